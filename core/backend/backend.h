@@ -1,0 +1,68 @@
+// The contract of all backends: triangles of one subvolume in, its sub-DAG out.
+//
+//   1. A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for one of the
+//      triangles and the voxel's closed cube. Triangles that miss the cube are harmless.
+//   2. The sub-DAG is the one and only: unique nodes, level arrays in the total order, whatever the
+//      order of the triangles, the memory, the method and what the backend remembers.
+//   3. All large buffers are charged to the budget given. When it cannot hold the subvolume the
+//      answer is kOutgrown, before the sink was called; the caller splits the cube and tries again.
+//      A cube of kSmallestEdge voxels never outgrows kSmallestBudget.
+//   4. A backend lives over many subvolumes on one thread and may remember planes and tables.
+//
+// tests/conformance runs over every backend.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/dag/sub_dag.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag {
+
+// Voxels along the edge of the smallest subvolume that the scheduler splits down to.
+inline constexpr int64_t kSmallestEdge = 64;
+// Bytes that suffice for it, however many triangles stream through.
+inline constexpr uint64_t kSmallestBudget = uint64_t{8} << 20;
+
+// The triangles that may touch a subvolume, in no particular order, as often as asked for.
+class TriangleStream {
+ public:
+  virtual ~TriangleStream() = default;
+  virtual uint64_t count() const = 0;
+  // Starts again at the first triangle.
+  virtual void rewind() = 0;
+  // Fills the front of `out`; returns how many, 0 at the end.
+  virtual size_t read(std::span<FixedTriangle> out) = 0;
+};
+
+// All that defines a subvolume task but its triangles.
+struct SubvolumeTask {
+  uint32_t grid_levels = 2;  // L
+  Cube cube;                 // of level <= L-2
+  uint32_t hash_bits = 64;   // 4 to 64
+};
+
+enum class BuildOutcome { kBuilt, kOutgrown };
+
+class Backend {
+ public:
+  virtual ~Backend() = default;
+  virtual std::string_view name() const = 0;
+  // Builds one subvolume. Throws Error (kCancelled, kDevice, kOutOfMemory, or what the stream
+  // throws); the backend stays usable.
+  virtual BuildOutcome build(const SubvolumeTask& task, TriangleStream& triangles,
+                             MemoryBudget& budget, const CancelToken& cancel, SubDagSink& sink,
+                             SubDagSummary& summary) = 0;
+};
+
+// The CPU backend: bricks rasterised tile by tile, nodes hash-consed. Uses AVX2 where the machine
+// has it, chosen at run time; `allow_simd` false keeps to the portable path, for tests.
+std::unique_ptr<Backend> make_cpu_backend(bool allow_simd = true);
+
+}  // namespace voxdag

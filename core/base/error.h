@@ -1,0 +1,44 @@
+// The one exception type of voxdag and its few codes. One table, in docs/errors.md, maps a code
+// to the exit status of the command line and to the HTTP status of the service; the functions
+// below are that table in code.
+#pragma once
+
+#include <exception>
+#include <string>
+
+namespace voxdag {
+
+enum class ErrorCode {
+  kInvalidInput,        // a scene, option or request that breaks its rules
+  kNotFound,            // a file, job or scene that is not there
+  kCorrupt,             // bytes of ours that fail their checks
+  kUnsupportedVersion,  // a format version this build does not read
+  kIo,                  // the system refused a read, a write or a sync
+  kNoSpace,             // the disk is full
+  kOutOfMemory,         // the memory budget or the machine cannot hold what is needed
+  kDevice,              // the GPU or its driver failed
+  kCancelled,           // the user asked to stop
+  kLimit,               // a limit of the format or of the arithmetic, named in the message
+};
+
+// What went wrong, where (file, subvolume, scene node) and what was expected, in one sentence.
+class Error : public std::exception {
+ public:
+  Error(ErrorCode code, std::string message) : code_(code), message_(std::move(message)) {}
+  ErrorCode code() const { return code_; }
+  const std::string& message() const { return message_; }
+  const char* what() const noexcept override { return message_.c_str(); }
+
+ private:
+  ErrorCode code_;
+  std::string message_;
+};
+
+// The stable name of a code, as JSON reports carry it: "invalid_input", "no_space", ...
+const char* error_name(ErrorCode code);
+// Exit status of the command line for a code; never 0.
+int exit_status(ErrorCode code);
+// HTTP status of the service for a code.
+int http_status(ErrorCode code);
+
+}  // namespace voxdag

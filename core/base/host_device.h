@@ -1,0 +1,32 @@
+// VOXDAG_HD marks a function that runs on the host and, in CUDA sources, on the device too.
+// Only this file and core/backend/ ask which compiler is at work.
+#pragma once
+
+#include <cstdint>
+
+#if defined(__CUDACC__)
+#define VOXDAG_HD __host__ __device__
+#else
+#define VOXDAG_HD
+#endif
+
+namespace voxdag {
+
+VOXDAG_HD inline int popcount64(uint64_t x) {
+#if defined(__CUDA_ARCH__)
+  return __popcll(x);
+#else
+  return __builtin_popcountll(x);
+#endif
+}
+
+// Position of the lowest set bit; x must not be 0.
+VOXDAG_HD inline int lowest_bit(uint64_t x) {
+#if defined(__CUDA_ARCH__)
+  return __ffsll(static_cast<long long>(x)) - 1;
+#else
+  return __builtin_ctzll(x);
+#endif
+}
+
+}  // namespace voxdag

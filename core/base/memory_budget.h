@@ -1,0 +1,77 @@
+// The memory promise, kept by bookkeeping: every large buffer is charged here before it is
+// allocated, and what does not fit is spilled, split or refused by whoever asked.
+//
+// Invariants:
+//   1. used() <= limit() at any time.
+//   2. A budget may be a share of a parent's: what it charges, the parent is charged too.
+// Thread-safe.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string_view>
+
+namespace voxdag {
+
+class MemoryBudget {
+ public:
+  explicit MemoryBudget(uint64_t limit_bytes, MemoryBudget* parent = nullptr)
+      : limit_(limit_bytes), parent_(parent) {}
+  MemoryBudget(const MemoryBudget&) = delete;
+  MemoryBudget& operator=(const MemoryBudget&) = delete;
+
+  uint64_t limit() const { return limit_; }
+  uint64_t used() const { return used_.load(std::memory_order_relaxed); }
+  uint64_t peak() const { return peak_.load(std::memory_order_relaxed); }
+  // Bytes that could be charged now, parents included.
+  uint64_t available() const;
+
+  // False, and nothing charged, if it does not fit.
+  bool try_charge(uint64_t bytes);
+  // Throws Error{kOutOfMemory} naming `what` if it does not fit.
+  void charge(uint64_t bytes, std::string_view what);
+  void release(uint64_t bytes);
+
+ private:
+  const uint64_t limit_;
+  MemoryBudget* const parent_;
+  std::atomic<uint64_t> used_{0};
+  std::atomic<uint64_t> peak_{0};
+};
+
+// A charge that is given back when it goes out of scope.
+class MemoryCharge {
+ public:
+  MemoryCharge() = default;
+  // Throws Error{kOutOfMemory} naming `what` if it does not fit.
+  MemoryCharge(MemoryBudget& budget, uint64_t bytes, std::string_view what)
+      : budget_(&budget), bytes_(bytes) {
+    budget.charge(bytes, what);
+  }
+  MemoryCharge(MemoryCharge&& other) noexcept { swap(other); }
+  MemoryCharge& operator=(MemoryCharge&& other) noexcept {
+    MemoryCharge(static_cast<MemoryCharge&&>(other)).swap(*this);
+    return *this;
+  }
+  ~MemoryCharge() {
+    if (budget_) budget_->release(bytes_);
+  }
+  // Grows or shrinks the charge to `bytes`; false, and unchanged, if it does not fit.
+  bool try_resize(uint64_t bytes);
+  uint64_t bytes() const { return bytes_; }
+
+ private:
+  void swap(MemoryCharge& other) noexcept {
+    MemoryBudget* b = budget_;
+    budget_ = other.budget_;
+    other.budget_ = b;
+    const uint64_t n = bytes_;
+    bytes_ = other.bytes_;
+    other.bytes_ = n;
+  }
+
+  MemoryBudget* budget_ = nullptr;
+  uint64_t bytes_ = 0;
+};
+
+}  // namespace voxdag

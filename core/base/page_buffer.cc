@@ -1,0 +1,24 @@
+#include "core/base/page_buffer.h"
+
+#include <sys/mman.h>
+
+#include <string>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+
+void* allocate_pages(size_t bytes, std::string_view what) {
+  void* pages = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (pages == MAP_FAILED)
+    throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " +
+                                             std::to_string(bytes) + " bytes for " +
+                                             std::string(what));
+  // A huge page is touched as a whole: below a few of them that would cost more than it saves.
+  if (bytes >= (size_t{8} << 20)) madvise(pages, bytes, MADV_HUGEPAGE);
+  return pages;
+}
+
+void free_pages(void* pages, size_t bytes) { munmap(pages, bytes); }
+
+}  // namespace voxdag

@@ -1,0 +1,62 @@
+// A large array straight from the system: zero-filled pages, given back at once when released,
+// huge pages asked for where that helps. The general allocator keeps freed memory, which would
+// break the memory promise; tables and level arrays live here instead. Not thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+#include "core/base/memory_budget.h"
+
+namespace voxdag {
+
+// Throws Error{kOutOfMemory} naming `what` when the system has no pages left.
+void* allocate_pages(size_t bytes, std::string_view what);
+void free_pages(void* pages, size_t bytes);
+
+template <class T>
+class PageBuffer {
+  static_assert(std::is_trivially_copyable_v<T>, "pages are handed out zero-filled");
+
+ public:
+  PageBuffer() = default;
+  // Charged to `budget`; throws Error{kOutOfMemory} naming `what` if it does not fit.
+  PageBuffer(MemoryBudget& budget, size_t size, std::string_view what)
+      : charge_(budget, size * sizeof(T), what),
+        data_(size ? static_cast<T*>(allocate_pages(size * sizeof(T), what)) : nullptr),
+        size_(size) {}
+  PageBuffer(PageBuffer&& other) noexcept
+      : charge_(std::move(other.charge_)),
+        data_(std::exchange(other.data_, nullptr)),
+        size_(std::exchange(other.size_, 0)) {}
+  PageBuffer& operator=(PageBuffer&& other) noexcept {
+    if (this != &other) {
+      if (data_) free_pages(data_, size_ * sizeof(T));
+      charge_ = std::move(other.charge_);
+      data_ = std::exchange(other.data_, nullptr);
+      size_ = std::exchange(other.size_, 0);
+    }
+    return *this;
+  }
+  ~PageBuffer() {
+    if (data_) free_pages(data_, size_ * sizeof(T));
+  }
+
+  T* data() { return data_; }
+  const T* data() const { return data_; }
+  size_t size() const { return size_; }
+  T& operator[](size_t i) { return data_[i]; }
+  const T& operator[](size_t i) const { return data_[i]; }
+  T* begin() { return data_; }
+  T* end() { return data_ + size_; }
+
+ private:
+  MemoryCharge charge_;
+  T* data_ = nullptr;
+  size_t size_ = 0;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,22 @@
+// A brick: 4x4x4 voxels as one 64-bit mask, the last level of the octree.
+//
+//   bit = 32 x1 + 16 y1 + 8 z1 + 4 x0 + 2 y0 + z0      (x1, x0: high and low bit of x, and so on)
+//
+// which is the voxel's Morton code within the brick: byte k of the mask is child k of a 2x2x2
+// split.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.h"
+
+namespace voxdag {
+
+inline constexpr int kBrickLevels = 2;  // a brick is a cube of level L - 2
+inline constexpr int kBrickEdge = 4;    // voxels
+
+VOXDAG_HD inline int brick_bit(int x, int y, int z) {
+  return (x & 2) << 4 | (y & 2) << 3 | (z & 2) << 2 | (x & 1) << 2 | (y & 1) << 1 | (z & 1);
+}
+
+}  // namespace voxdag

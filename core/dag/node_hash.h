@@ -1,0 +1,47 @@
+// Hashes of bricks and nodes: functions of the subtree alone, not of level, place or index. A hash
+// only brings candidates together; equality is always decided on masks and children.
+// docs/format.md, "Node hash", is the specification; changing a constant is a new format version.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.h"
+#include "core/base/integers.h"
+
+namespace voxdag {
+
+// A bijection of 64-bit words (two rounds of xor-shift and odd multiplication), so that two bricks
+// have the same uncut hash only if they are the same brick.
+VOXDAG_HD inline uint64_t hash_brick(uint64_t mask) {
+  uint64_t h = mask ^ 0x9e3779b97f4a7c15ull;
+  h = (h ^ h >> 32) * 0xd6e8feb86659fd93ull;
+  h = (h ^ h >> 29) * 0xa0761d6478bd642full;
+  return h ^ h >> 32;
+}
+
+// The running hash of a node: begin with its mask, add the hash of each child in child order, end.
+VOXDAG_HD inline uint64_t node_hash_begin(uint32_t child_mask) {
+  return child_mask * 0x9e3779b97f4a7c15ull ^ 0xe7037ed1a0b428dbull;
+}
+VOXDAG_HD inline uint64_t node_hash_add(uint64_t state, uint64_t child_hash) {
+  return fold_multiply(state ^ child_hash, 0x8ebc6af09c88c6e3ull) + 0x589965cc75374cc3ull;
+}
+VOXDAG_HD inline uint64_t node_hash_end(uint64_t state) {
+  return fold_multiply(state, 0x1d8e4e27c47d124full);
+}
+
+// Hashes of the children that `child_mask` names, in child order.
+VOXDAG_HD inline uint64_t hash_node(uint32_t child_mask, const uint64_t* child_hashes) {
+  uint64_t h = node_hash_begin(child_mask);
+  const int count = popcount64(child_mask);
+  for (int i = 0; i < count; ++i) h = node_hash_add(h, child_hashes[i]);
+  return node_hash_end(h);
+}
+
+// --hash-bits: the top `bits` (4 to 64) are kept, the others are 0. Parents are hashed from cut
+// hashes.
+VOXDAG_HD inline uint64_t cut_hash(uint64_t hash, uint32_t bits) {
+  return bits >= 64 ? hash : hash & ~(~uint64_t{0} >> bits);
+}
+
+}  // namespace voxdag

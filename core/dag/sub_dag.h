@@ -1,0 +1,65 @@
+// A sub-DAG: what a backend makes of one subvolume, handed over level by level.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/dag/level_array.h"
+#include "core/geometry/cube.h"
+
+namespace voxdag {
+
+// What is known of a subvolume's octree once it is built. Counts are of the octree, not the DAG.
+struct SubDagSummary {
+  uint64_t voxels = 0;     // set voxels in the cube
+  uint64_t svo_nodes = 0;  // octree nodes from the cube's root to the bricks, both included
+  uint64_t dag_nodes = 0;  // unique nodes, bricks included
+  uint64_t root_hash = 0;  // cut; 0 when empty
+  bool empty() const { return voxels == 0; }
+};
+
+// Takes a sub-DAG from the bricks upwards: bricks() once, then nodes() for every level from L-3 up
+// to the cube's own level, where the array has exactly one node, the root. Nothing is called for an
+// empty subvolume. The views are only valid during the call.
+class SubDagSink {
+ public:
+  virtual ~SubDagSink() = default;
+  virtual void bricks(const BrickLevelView& level) = 0;
+  virtual void nodes(const NodeLevelView& level) = 0;
+};
+
+// A whole sub-DAG in memory, for tests and small work.
+struct SubDag : SubDagSink {
+  struct Nodes {
+    uint32_t level = 0;
+    std::vector<uint64_t> hashes;
+    std::vector<uint8_t> masks;
+    std::vector<uint32_t> children;
+    NodeLevelView view() const { return {level, hashes, masks, children}; }
+    bool operator==(const Nodes&) const = default;
+  };
+  std::vector<uint64_t> brick_masks;
+  std::vector<Nodes> levels;  // from L-3 upwards
+
+  void bricks(const BrickLevelView& level) override {
+    brick_masks.assign(level.masks.begin(), level.masks.end());
+  }
+  void nodes(const NodeLevelView& level) override {
+    levels.push_back({level.level,
+                      {level.hashes.begin(), level.hashes.end()},
+                      {level.masks.begin(), level.masks.end()},
+                      {level.children.begin(), level.children.end()}});
+  }
+  bool operator==(const SubDag& o) const {
+    return brick_masks == o.brick_masks && levels == o.levels;
+  }
+};
+
+// Checks every invariant of a sub-DAG rooted at a cube of `cube_level` on a grid of `grid_levels`:
+// levels complete, masks not 0, indices in range, total order without doubles, hashes right for
+// `hash_bits`, every node but the root used by a parent. Throws Error{kCorrupt} naming the first
+// level and node that break one.
+void check_sub_dag(const SubDag& dag, uint32_t cube_level, uint32_t grid_levels,
+                   uint32_t hash_bits);
+
+}  // namespace voxdag

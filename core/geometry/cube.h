@@ -1,0 +1,44 @@
+// Octree-aligned cubes of the grid and the order of their children.
+//
+//        level 0 = the whole grid, edge R = 2^L voxels
+//        level l: edge 2^(L-l) voxels; bricks (edge 4) are level L-2
+//
+// Child index = 4x + 2y + z of the child's position in its parent (Morton order).
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.h"
+
+namespace voxdag {
+
+inline constexpr int kMinGridLevels = 2;   // R = 4: the root is a brick
+inline constexpr int kMaxGridLevels = 20;  // R = 1 048 576
+
+struct Cube {
+  uint32_t level = 0;                // 0 is the whole grid
+  uint32_t position[3] = {0, 0, 0};  // in cubes of this level, axis x, y, z
+
+  VOXDAG_HD Cube child(int index) const {
+    return {level + 1,
+            {2 * position[0] + ((index >> 2) & 1), 2 * position[1] + ((index >> 1) & 1),
+             2 * position[2] + (index & 1)}};
+  }
+  VOXDAG_HD Cube parent() const {
+    return {level - 1, {position[0] >> 1, position[1] >> 1, position[2] >> 1}};
+  }
+  // Which child of its parent this cube is.
+  VOXDAG_HD int child_index() const {
+    return static_cast<int>(4 * (position[0] & 1) + 2 * (position[1] & 1) + (position[2] & 1));
+  }
+  // Edge in voxels on a grid of 2^grid_levels.
+  VOXDAG_HD int64_t edge_voxels(uint32_t grid_levels) const {
+    return int64_t{1} << (grid_levels - level);
+  }
+  VOXDAG_HD bool operator==(const Cube& o) const {
+    return level == o.level && position[0] == o.position[0] && position[1] == o.position[1] &&
+           position[2] == o.position[2];
+  }
+};
+
+}  // namespace voxdag

@@ -1,0 +1,110 @@
+#include "core/geometry/grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/geometry/cube.h"
+
+namespace voxdag {
+namespace {
+
+void check_levels(uint32_t levels) {
+  if (levels < static_cast<uint32_t>(kMinGridLevels) ||
+      levels > static_cast<uint32_t>(kMaxGridLevels))
+    throw Error(ErrorCode::kInvalidInput,
+                "a grid of 2^" + std::to_string(levels) + " voxels an edge: expected 2^2 to 2^20");
+}
+
+Grid centred(const WorldBounds& bounds, double edge, uint32_t levels) {
+  Grid grid;
+  grid.levels = levels;
+  grid.edge = edge;
+  for (int a = 0; a < 3; ++a) {
+    const double middle = bounds.empty ? 0.0 : 0.5 * (bounds.low[a] + bounds.high[a]);
+    grid.origin[a] = middle - 0.5 * edge;
+  }
+  return grid;
+}
+
+double largest_extent(const WorldBounds& bounds) {
+  double extent = 0;
+  if (!bounds.empty)
+    for (int a = 0; a < 3; ++a) extent = std::max(extent, bounds.high[a] - bounds.low[a]);
+  if (!std::isfinite(extent))
+    throw Error(ErrorCode::kLimit, "the scene's extent does not fit a double");
+  return extent;
+}
+
+}  // namespace
+
+void WorldBounds::add(const double (&point)[3]) {
+  for (int a = 0; a < 3; ++a) {
+    low[a] = empty ? point[a] : std::min(low[a], point[a]);
+    high[a] = empty ? point[a] : std::max(high[a], point[a]);
+  }
+  empty = false;
+}
+
+Grid Grid::around(const WorldBounds& bounds, uint32_t levels) {
+  check_levels(levels);
+  const double extent = largest_extent(bounds);
+  return centred(bounds, extent > 0 ? extent * (1.0 + 0x1p-15) : 1.0, levels);
+}
+
+Grid Grid::given(const std::array<double, 3>& origin, double edge, uint32_t levels) {
+  check_levels(levels);
+  const bool finite = std::isfinite(origin[0]) && std::isfinite(origin[1]) &&
+                      std::isfinite(origin[2]) && std::isfinite(edge);
+  if (!finite || !(edge > 0))
+    throw Error(ErrorCode::kInvalidInput, "bounds: expected finite X,Y,Z and an EDGE above 0");
+  Grid grid;
+  grid.levels = levels;
+  grid.origin = origin;
+  grid.edge = edge;
+  return grid;
+}
+
+Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels) {
+  check_levels(levels);
+  if (!std::isfinite(voxel_size) || !(voxel_size > 0))
+    throw Error(ErrorCode::kInvalidInput, "voxel size: expected a finite number above 0");
+  const double edge = voxel_size * static_cast<double>(int64_t{1} << levels);
+  const double extent = largest_extent(bounds);
+  if (!(extent < edge) && extent > 0)
+    throw Error(ErrorCode::kInvalidInput,
+                "the scene's largest extent " + std::to_string(extent) +
+                    " does not fit a grid of edge " + std::to_string(edge) + " (voxel size " +
+                    std::to_string(voxel_size) + " times the resolution)");
+  return centred(bounds, edge, levels);
+}
+
+SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out) {
+  const double resolution = static_cast<double>(grid.resolution());
+  double u[3][3];
+  bool far = false;
+  for (int i = 0; i < 3; ++i)
+    for (int a = 0; a < 3; ++a) {
+      const double x = ((world.v[i][a] - grid.origin[a]) / grid.edge) * resolution;
+      u[i][a] = 2.0 * std::floor(128.0 * x) + 1.0;
+      far |= !(std::abs(u[i][a]) < static_cast<double>(kCoordinateLimit));
+    }
+  const double end = static_cast<double>(grid.resolution() * kUnitsPerVoxel);
+  for (int a = 0; a < 3; ++a)
+    if (std::max({u[0][a], u[1][a], u[2][a]}) < 0 || std::min({u[0][a], u[1][a], u[2][a]}) > end)
+      return SnapResult::kOutside;
+  if (far) return SnapResult::kTooFar;
+  for (int i = 0; i < 3; ++i)
+    for (int a = 0; a < 3; ++a) out.v[i][a] = static_cast<int64_t>(u[i][a]);
+  return SnapResult::kInside;
+}
+
+uint32_t levels_of_resolution(uint64_t resolution) {
+  for (uint32_t levels = kMinGridLevels; levels <= static_cast<uint32_t>(kMaxGridLevels); ++levels)
+    if (resolution == uint64_t{1} << levels) return levels;
+  throw Error(ErrorCode::kInvalidInput, "resolution " + std::to_string(resolution) +
+                                            ": expected a power of two from 4 to 1048576");
+}
+
+}  // namespace voxdag

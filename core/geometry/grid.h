@@ -1,0 +1,59 @@
+// The voxel grid in world space and how world positions are snapped to its fixed-point lattice.
+//
+// All of it in IEEE doubles with + - * / only, compiled without fused multiply-add, so that every
+// machine snaps alike:
+//     edge   = max(hi - lo) * (1 + 2^-15)        origin = 0.5 * (lo + hi) - 0.5 * edge
+//     x      = ((w - origin) / edge) * R         u      = 2 * floor(128 * x) + 1
+// The default cube does not depend on R.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag {
+
+struct WorldBounds {
+  std::array<double, 3> low{};
+  std::array<double, 3> high{};
+  bool empty = true;
+
+  void add(const double (&point)[3]);
+};
+
+// Vertex positions in world space, double precision, [vertex][axis].
+struct WorldTriangle {
+  double v[3][3];
+};
+
+struct Grid {
+  uint32_t levels = 2;  // L; R = 2^L voxels along an edge
+  std::array<double, 3> origin{};
+  double edge = 1.0;
+
+  int64_t resolution() const { return int64_t{1} << levels; }
+
+  // The default cube around a scene. A scene without extent, or without triangles, gets edge 1.
+  // Throws Error{kInvalidInput} for levels outside [2, 20].
+  static Grid around(const WorldBounds& bounds, uint32_t levels);
+  // The cube that a user gave: its low corner and its edge, finite and edge > 0.
+  static Grid given(const std::array<double, 3>& origin, double edge, uint32_t levels);
+  // Voxels of edge `voxel_size`, the cube centred on the scene; a scene that does not fit is
+  // Error{kInvalidInput}.
+  static Grid with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels);
+};
+
+enum class SnapResult {
+  kInside,   // may touch the grid
+  kOutside,  // its box misses the grid: dropped and counted
+  kTooFar,   // reaches the grid, but a coordinate is beyond kCoordinateLimit: a limit error
+};
+
+// Snaps a triangle of finite vertices. `out` is only meaningful for kInside.
+SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out);
+
+// log2 of a resolution; throws Error{kInvalidInput} unless it is a power of two in [4, 2^20].
+uint32_t levels_of_resolution(uint64_t resolution);
+
+}  // namespace voxdag

@@ -1,0 +1,36 @@
+#include "core/io/file_system.h"
+
+#include "core/base/error.h"
+
+namespace voxdag {
+
+std::string parent_directory(const std::string& path) {
+  const size_t end = path.find_last_not_of('/');
+  if (end == std::string::npos) return path.empty() ? "." : "/";
+  const size_t slash = path.find_last_of('/', end);
+  if (slash == std::string::npos) return ".";
+  const size_t last = path.find_last_not_of('/', slash);
+  return last == std::string::npos ? "/" : path.substr(0, last + 1);
+}
+
+std::string read_small_file(FileSystem& files, const std::string& path, uint64_t limit_bytes) {
+  const auto file = files.open_read(path);
+  if (file->size() > limit_bytes)
+    throw Error(ErrorCode::kLimit, path + " has " + std::to_string(file->size()) +
+                                       " bytes, expected at most " + std::to_string(limit_bytes));
+  std::string contents(file->size(), '\0');
+  file->read_at(0, std::as_writable_bytes(std::span(contents)));
+  return contents;
+}
+
+void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents) {
+  const std::string partial = path + ".partial";
+  const auto file = files.create(partial);
+  file->write_at(0, std::as_bytes(std::span(contents)));
+  file->sync();
+  file->close();
+  files.rename(partial, path);
+  files.sync_directory(parent_directory(path));
+}
+
+}  // namespace voxdag

@@ -1,0 +1,77 @@
+// All file access of voxdag goes through here, so that tests can put a disk in its place that is
+// full, forgets what was not synced, or flips bits. Paths are plain byte strings.
+//
+// Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT), kIo; the message names the call, the path, the
+// offset where there is one, and the system's reason. Short reads and writes and EINTR are handled
+// inside. Objects are used by one thread at a time, except that ReadableFile::read_at and
+// WritableFile::write_at may be called by several threads at once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace voxdag {
+
+class ReadableFile {
+ public:
+  virtual ~ReadableFile() = default;
+  virtual const std::string& path() const = 0;
+  virtual uint64_t size() const = 0;
+  // Fills `out` from `offset`; a file that ends before is Error{kCorrupt}.
+  virtual void read_at(uint64_t offset, std::span<std::byte> out) const = 0;
+};
+
+class WritableFile {
+ public:
+  virtual ~WritableFile() = default;
+  virtual const std::string& path() const = 0;
+  // Writes all of `data` at `offset`, growing the file as needed.
+  virtual void write_at(uint64_t offset, std::span<const std::byte> data) = 0;
+  // Returns once all that was written is on the disk.
+  virtual void sync() = 0;
+  // Flushes nothing by itself, reports what close() reports. Called by the destructor, silently.
+  virtual void close() = 0;
+};
+
+struct DirectoryEntry {
+  std::string name;
+  bool is_directory = false;
+};
+
+class FileSystem {
+ public:
+  virtual ~FileSystem() = default;
+  virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
+  // An empty file under `path`; one that was there is emptied.
+  virtual std::unique_ptr<WritableFile> create(const std::string& path) = 0;
+  // A file that is there, or an empty one, for writing without emptying it.
+  virtual std::unique_ptr<WritableFile> open_write(const std::string& path) = 0;
+  virtual bool exists(const std::string& path) = 0;
+  virtual void rename(const std::string& from, const std::string& to) = 0;
+  virtual void remove(const std::string& path) = 0;
+  // The directory and those above it that are missing.
+  virtual void make_directories(const std::string& path) = 0;
+  // Removes an empty directory.
+  virtual void remove_directory(const std::string& path) = 0;
+  virtual std::vector<DirectoryEntry> list(const std::string& path) = 0;
+  // Makes renames and new names in the directory survive a power cut.
+  virtual void sync_directory(const std::string& path) = 0;
+  // Bytes an ordinary user may still write on the disk that holds `path`.
+  virtual uint64_t free_space(const std::string& path) = 0;
+};
+
+// The machine's own.
+FileSystem& system_files();
+
+// The directory part of a path, "." if it has none.
+std::string parent_directory(const std::string& path);
+// The whole of a small file; one larger than `limit_bytes` is Error{kLimit}.
+std::string read_small_file(FileSystem& files, const std::string& path, uint64_t limit_bytes);
+// `contents` under `path`, whole or not at all: written beside it, synced, renamed, synced.
+void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents);
+
+}  // namespace voxdag

@@ -1,0 +1,173 @@
+#include <dirent.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "core/base/error.h"
+#include "core/io/file_system.h"
+
+namespace voxdag {
+namespace {
+
+[[noreturn]] void fail(const char* call, const std::string& path, int reason) {
+  ErrorCode code = ErrorCode::kIo;
+  if (reason == ENOENT || reason == ENOTDIR) code = ErrorCode::kNotFound;
+  if (reason == ENOSPC || reason == EDQUOT) code = ErrorCode::kNoSpace;
+  throw Error(code, std::string(call) + " " + path + ": " + strerror(reason));
+}
+
+// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() { release(); }
+  int get() const { return fd_; }
+  // Returns errno of close(), or 0.
+  int release() {
+    const int fd = fd_;
+    fd_ = -1;
+    return fd >= 0 && ::close(fd) != 0 ? errno : 0;
+  }
+
+ private:
+  int fd_;
+};
+
+int open_retrying(const std::string& path, int flags) {
+  int fd;
+  do fd = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
+  while (fd < 0 && errno == EINTR);
+  return fd;
+}
+
+class PosixReadableFile : public ReadableFile {
+ public:
+  explicit PosixReadableFile(const std::string& path)
+      : path_(path), fd_(open_retrying(path, O_RDONLY)) {
+    if (fd_.get() < 0) fail("open", path, errno);
+    struct stat s {};
+    if (fstat(fd_.get(), &s) != 0) fail("stat", path, errno);
+    if (!S_ISREG(s.st_mode)) throw Error(ErrorCode::kInvalidInput, path + " is not a regular file");
+    size_ = static_cast<uint64_t>(s.st_size);
+  }
+  const std::string& path() const override { return path_; }
+  uint64_t size() const override { return size_; }
+  void read_at(uint64_t offset, std::span<std::byte> out) const override {
+    while (!out.empty()) {
+      const ssize_t n = pread(fd_.get(), out.data(), out.size(), static_cast<off_t>(offset));
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) fail("read", path_ + " at offset " + std::to_string(offset), errno);
+      if (n == 0)
+        throw Error(ErrorCode::kCorrupt, path_ + " ends at byte " + std::to_string(offset) + ", " +
+                                             std::to_string(out.size()) + " bytes too early");
+      offset += static_cast<uint64_t>(n);
+      out = out.subspan(static_cast<size_t>(n));
+    }
+  }
+
+ private:
+  const std::string path_;
+  Descriptor fd_;
+  uint64_t size_ = 0;
+};
+
+class PosixWritableFile : public WritableFile {
+ public:
+  PosixWritableFile(const std::string& path, int flags)
+      : path_(path), fd_(open_retrying(path, O_RDWR | O_CREAT | flags)) {
+    if (fd_.get() < 0) fail("create", path, errno);
+  }
+  const std::string& path() const override { return path_; }
+  void write_at(uint64_t offset, std::span<const std::byte> data) override {
+    while (!data.empty()) {
+      const ssize_t n = pwrite(fd_.get(), data.data(), data.size(), static_cast<off_t>(offset));
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) fail("write", path_ + " at offset " + std::to_string(offset), errno);
+      offset += static_cast<uint64_t>(n);
+      data = data.subspan(static_cast<size_t>(n));
+    }
+  }
+  void sync() override {
+    if (fdatasync(fd_.get()) != 0) fail("sync", path_, errno);
+  }
+  void close() override {
+    if (const int reason = fd_.release()) fail("close", path_, reason);
+  }
+
+ private:
+  const std::string path_;
+  Descriptor fd_;
+};
+
+class PosixFileSystem : public FileSystem {
+ public:
+  std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
+    return std::make_unique<PosixReadableFile>(path);
+  }
+  std::unique_ptr<WritableFile> create(const std::string& path) override {
+    return std::make_unique<PosixWritableFile>(path, O_TRUNC);
+  }
+  std::unique_ptr<WritableFile> open_write(const std::string& path) override {
+    return std::make_unique<PosixWritableFile>(path, 0);
+  }
+  bool exists(const std::string& path) override {
+    struct stat s {};
+    if (stat(path.c_str(), &s) == 0) return true;
+    if (errno == ENOENT || errno == ENOTDIR) return false;
+    fail("stat", path, errno);
+  }
+  void rename(const std::string& from, const std::string& to) override {
+    if (::rename(from.c_str(), to.c_str()) != 0) fail("rename", from + " to " + to, errno);
+  }
+  void remove(const std::string& path) override {
+    if (unlink(path.c_str()) != 0) fail("remove", path, errno);
+  }
+  void make_directories(const std::string& path) override {
+    if (path.empty() || exists(path)) return;
+    const std::string parent = parent_directory(path);
+    if (parent != path) make_directories(parent);
+    if (mkdir(path.c_str(), 0777) != 0 && errno != EEXIST) fail("make directory", path, errno);
+  }
+  void remove_directory(const std::string& path) override {
+    if (rmdir(path.c_str()) != 0) fail("remove directory", path, errno);
+  }
+  std::vector<DirectoryEntry> list(const std::string& path) override {
+    DIR* directory = opendir(path.c_str());
+    if (!directory) fail("list", path, errno);
+    std::vector<DirectoryEntry> entries;
+    while (const dirent* e = readdir(directory)) {
+      const std::string name = e->d_name;
+      if (name == "." || name == "..") continue;
+      struct stat s {};
+      const bool is_directory = lstat((path + "/" + name).c_str(), &s) == 0 && S_ISDIR(s.st_mode);
+      entries.push_back({name, is_directory});
+    }
+    closedir(directory);
+    return entries;
+  }
+  void sync_directory(const std::string& path) override {
+    Descriptor fd(open_retrying(path, O_RDONLY | O_DIRECTORY));
+    if (fd.get() < 0) fail("open", path, errno);
+    if (fsync(fd.get()) != 0) fail("sync", path, errno);
+  }
+  uint64_t free_space(const std::string& path) override {
+    struct statvfs s {};
+    if (statvfs(path.c_str(), &s) != 0) fail("stat", path, errno);
+    return static_cast<uint64_t>(s.f_bavail) * s.f_frsize;
+  }
+};
+
+}  // namespace
+
+FileSystem& system_files() {
+  static PosixFileSystem files;
+  return files;
+}
+
+}  // namespace voxdag

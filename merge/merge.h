@@ -1,0 +1,64 @@
+// The merger's one public function: many sub-DAGs and the top tree above them become one global
+// DAG.
+//
+// Level by level from the bricks up, two streaming steps each (DESIGN: "why the merge is right"):
+//   rewire   each run's child indices go through its own old -> new map, which is strictly
+//            increasing, so the run stays sorted by (hash, mask, children)
+//   sweep    the sorted runs are merged by the full key, equal nodes dropped, maps emitted
+// The nodes above the subvolumes (the top tree) are one more run in the sweep of their level. What
+// is in memory is bounded by the budget, never by the scene: hash ranges, then rounds.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/base/progress.h"
+#include "core/format/artifact.h"
+#include "core/format/global_writer.h"
+#include "core/geometry/grid.h"
+#include "core/io/file_system.h"
+
+namespace voxdag {
+
+struct MergeInputs {
+  uint32_t grid_levels = 2;
+  uint32_t hash_bits = 64;
+  // The subvolumes' artifacts, cubes disjoint, in any order; none for an empty scene.
+  std::vector<ArtifactRef> artifacts;
+  // Opens the segment file of an id.
+  std::function<std::shared_ptr<ReadableFile>(uint32_t)> open_segment;
+  // Folder for what does not fit in memory: maps and the artifacts of merge rounds. Emptied again.
+  std::string scratch_folder;
+};
+
+// Told of what is durable, so that an interrupted merge can go on there.
+class Checkpoint {
+ public:
+  virtual ~Checkpoint() = default;
+  // All nodes of `level` are in the global file (round 0 is the last one) or in an artifact of an
+  // earlier round.
+  virtual void level_merged(uint32_t round, uint32_t level, uint64_t nodes) = 0;
+};
+
+struct MergeReport {
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;  // top tree included
+  uint64_t dag_nodes = 0;
+  uint64_t input_nodes = 0;  // rows of all runs of all rounds
+  uint32_t rounds = 0;       // 1 if all runs were swept at once
+  uint64_t scratch_bytes = 0;
+  uint64_t hash_ranges = 0;      // slabs of the hash space that were swept one after the other
+  uint64_t streamed_groups = 0;  // groups of equal hashes too large for memory, swept row by row
+};
+
+// Throws Error. `files` is where scratch files go; `out` gets all levels but is not finished.
+MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
+                           MemoryBudget& budget, unsigned threads, Progress& progress,
+                           const CancelToken& cancel, Checkpoint* checkpoint = nullptr);
+
+}  // namespace voxdag
