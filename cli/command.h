@@ -1,0 +1,30 @@
+// What every command of the command line shares. A command file has one function
+// `add_<name>_command(app, context)` that declares the command's options and what it runs; main.cc
+// calls them all and turns an Error into a message and an exit status.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include "core/base/cancel_token.h"
+#include "core/io/file_system.h"
+
+namespace voxdag::cli {
+
+struct CommandContext {
+  FileSystem& files;
+  CancelToken& cancel;  // set by Ctrl-C and SIGTERM
+  // Exit status of a command that ran but whose answer is "no" (diff: the files differ).
+  int exit_status = 0;
+};
+
+void add_build_command(CLI::App& app, CommandContext& context);
+void add_plan_command(CLI::App& app, CommandContext& context);
+void add_info_command(CLI::App& app, CommandContext& context);
+void add_verify_command(CLI::App& app, CommandContext& context);
+void add_diff_command(CLI::App& app, CommandContext& context);
+void add_generate_command(CLI::App& app, CommandContext& context);
+void add_render_command(CLI::App& app, CommandContext& context);
+
+}  // namespace voxdag::cli

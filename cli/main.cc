@@ -1,0 +1,71 @@
+#include <malloc.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+
+#include "cli/command.h"
+#include "core/base/error.h"
+
+namespace voxdag::cli {
+namespace {
+
+CancelToken g_cancel;
+
+// The first signal asks to stop; a second one is taken at its word.
+void on_signal(int signal) {
+  if (g_cancel.cancelled()) _Exit(128 + signal);
+  g_cancel.cancel();
+}
+
+void catch_signals() {
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+}
+
+int report(ErrorCode code, const char* message) {
+  std::fprintf(stderr, "voxdag: error: %s\n", message);
+  return exit_status(code);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"voxdag: huge triangle scenes to one global sparse voxel DAG, out of core", "voxdag"};
+  app.set_version_flag("--version", VOXDAG_VERSION);
+  app.require_subcommand(1);
+  CommandContext context{system_files(), g_cancel};
+  add_build_command(app, context);
+  add_plan_command(app, context);
+  add_info_command(app, context);
+  add_verify_command(app, context);
+  add_diff_command(app, context);
+  add_generate_command(app, context);
+  add_render_command(app, context);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // Help and version are "errors" of status 0; what the user mistyped is invalid input.
+    return app.exit(error) == 0 ? 0 : exit_status(ErrorCode::kInvalidInput);
+  } catch (const Error& error) {
+    return report(error.code(), error.what());
+  } catch (const std::bad_alloc&) {
+    return report(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
+  }
+  return context.exit_status;
+}
+
+}  // namespace
+}  // namespace voxdag::cli
+
+int main(int argc, char** argv) {
+  // Freed memory goes back to the system at once: resident memory is a promise (--memory).
+  mallopt(M_MMAP_THRESHOLD, 256 << 10);
+  mallopt(M_TRIM_THRESHOLD, 1 << 20);
+  mallopt(M_ARENA_MAX, 2);
+  voxdag::cli::catch_signals();
+  return voxdag::cli::run(argc, argv);
+}
