@@ -34,7 +34,8 @@ int report(ErrorCode code, const char* message) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"voxdag: huge triangle scenes to one global sparse voxel DAG, out of core", "voxdag"};
+  CLI::App app{"voxdag: huge triangle scenes to one global sparse voxel DAG, out of core",
+               "voxdag"};
   app.set_version_flag("--version", VOXDAG_VERSION);
   app.require_subcommand(1);
   CommandContext context{system_files(), g_cancel};

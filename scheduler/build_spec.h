@@ -16,8 +16,8 @@ namespace voxdag {
 
 // Geometry options decide the bytes of the global file.
 struct GeometryOptions {
-  std::vector<std::string> scenes;  // glTF files, together one scene
-  uint64_t resolution = 0;          // R, a power of two from 4 to 2^20
+  std::vector<std::string> scenes;              // glTF files, together one scene
+  uint64_t resolution = 0;                      // R, a power of two from 4 to 2^20
   std::optional<std::array<double, 4>> bounds;  // X, Y, Z of the low corner, EDGE
   std::optional<double> voxel_size;
   bool skip_invalid = false;
@@ -26,12 +26,12 @@ struct GeometryOptions {
 
 // Run options never do.
 struct RunOptions {
-  std::string output;               // the global file
-  std::string work_folder;          // "" for output + ".work"
-  uint64_t memory_bytes = 0;        // 0 for half of what RAM and cgroup allow
-  unsigned threads = 0;             // 0 for all cores
-  uint64_t subvolume_edge = 0;      // voxels, a power of two; 0 for a choice by the plan
-  std::string backend = "auto";     // auto or cpu
+  std::string output;            // the global file
+  std::string work_folder;       // "" for output + ".work"
+  uint64_t memory_bytes = 0;     // 0 for half of what RAM and cgroup allow
+  unsigned threads = 0;          // 0 for all cores
+  uint64_t subvolume_edge = 0;   // voxels, a power of two; 0 for a choice by the plan
+  std::string backend = "auto";  // auto or cpu
   bool keep_work = false;
   bool force = false;  // build though the estimate says that it cannot fit
 };

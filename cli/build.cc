@@ -1,0 +1,66 @@
+#include <cstdio>
+#include <memory>
+
+#include "cli/build_options.h"
+#include "cli/progress_bar.h"
+#include "cli/size.h"
+#include "scheduler/run_build.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct BuildCommand {
+  BuildOptions options;
+  RunOptions run;
+  bool json = false;
+};
+
+void print(const BuildReport& r) {
+  std::printf("%s: %s, sha256 %s\n", r.output.c_str(), size_text(r.bytes).c_str(),
+              r.sha256.c_str());
+  std::printf("  %s triangles in a grid of %lld^3\n", count_text(r.triangles).c_str(),
+              static_cast<long long>(r.grid.resolution()));
+  std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.voxels).c_str(),
+              count_text(r.svo_nodes).c_str(), count_text(r.dag_nodes).c_str());
+  std::printf("  %s subvolumes (%s split), artifacts %s, spilled %s, %u merge round%s\n",
+              count_text(r.subvolumes).c_str(), count_text(r.subvolumes_split).c_str(),
+              size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge_rounds,
+              r.merge_rounds == 1 ? "" : "s");
+  std::printf(" ");
+  for (const StageTime& stage : r.stages)
+    std::printf(" %s %s%s", stage.name.c_str(), duration_text(stage.wall_s).c_str(),
+                &stage == &r.stages.back() ? "\n" : ",");
+  std::printf("  %s wall, %s CPU, %s voxels/s, peak memory %s of %s\n",
+              duration_text(r.wall_s).c_str(), duration_text(r.cpu_s).c_str(),
+              count_text(static_cast<uint64_t>(static_cast<double>(r.voxels) / r.wall_s)).c_str(),
+              size_text(r.peak_rss_bytes).c_str(), size_text(r.memory_bytes).c_str());
+}
+
+void run(const BuildCommand& command, CommandContext& context) {
+  BuildSpec spec = command.options.spec();
+  spec.run.output = command.run.output;
+  spec.run.keep_work = command.run.keep_work;
+  spec.run.force = command.run.force;
+  const auto progress = make_progress_bar();
+  const BuildReport report = run_build(spec, {context.files, *progress, context.cancel});
+  if (command.json)
+    std::printf("%s\n", report_json(report).c_str());
+  else
+    print(report);
+}
+
+}  // namespace
+
+void add_build_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("build", "build the DAG of a scene");
+  const auto state = std::make_shared<BuildCommand>();
+  state->options.declare(*command);
+  command->add_option("-o,--output", state->run.output, "the .vdag file to make")->required();
+  command->add_flag("--keep-work", state->run.keep_work, "leave the temporary files");
+  command->add_flag("--force", state->run.force, "build even if the estimate says it cannot fit");
+  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+  command->set_config("--config", "", "read options from a file");
+  command->callback([state, &context] { run(*state, context); });
+}
+
+}  // namespace voxdag::cli

@@ -1,0 +1,38 @@
+// Hands a triangle down the octree of cubes: which children of a cube does it touch? Exact (closed
+// triangle, closed cube), so walking a tree in two ways agrees on who touches what.
+#pragma once
+
+#include <cstdint>
+
+#include "core/geometry/cube.h"
+#include "core/geometry/fixed_triangle.h"
+#include "core/geometry/overlap.h"
+
+namespace voxdag {
+
+// Bit c is set if the triangle touches child c of the cube, `parent_units` being the cube's edge in
+// lattice units. The triangle must touch the cube itself.
+inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube,
+                                 int64_t parent_units) {
+  const int64_t half = parent_units / 2;
+  uint32_t mask = 0xff;
+  int64_t low[3];
+  static constexpr uint32_t kLowHalf[3] = {0x0f, 0x33, 0x55};  // children with bit 0 on the axis
+  for (int a = 0; a < 3; ++a) {
+    low[a] = static_cast<int64_t>(cube.position[a]) * parent_units;
+    const int64_t middle = low[a] + half;
+    if (triangle.low(a) > middle) mask &= ~kLowHalf[a];
+    if (triangle.high(a) < middle) mask &= kLowHalf[a];
+  }
+  if ((mask & (mask - 1)) == 0) return mask;  // its box is inside one child
+  uint32_t touched = 0;
+  for (uint32_t rest = mask; rest; rest &= rest - 1) {
+    const int c = lowest_bit(rest);
+    const int64_t corner[3] = {low[0] + ((c >> 2) & 1) * half, low[1] + ((c >> 1) & 1) * half,
+                               low[2] + (c & 1) * half};
+    if (triangle_touches_cube(triangle, corner, half)) touched |= 1u << c;
+  }
+  return touched;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,40 @@
+#include "scheduler/distribute.h"
+
+namespace voxdag {
+
+CubeTree::CubeTree(uint32_t grid_levels, const Cube& root, std::span<const SubvolumePlan> leaves)
+    : grid_levels_(grid_levels), root_(root), nodes_(1) {
+  for (size_t leaf = 0; leaf < leaves.size(); ++leaf) {
+    const Cube& cube = leaves[leaf].cube;
+    int32_t node = 0;
+    for (uint32_t level = root.level + 1; level <= cube.level; ++level) {
+      const uint32_t up = cube.level - level;
+      const Cube ancestor{level,
+                          {cube.position[0] >> up, cube.position[1] >> up, cube.position[2] >> up}};
+      const int c = ancestor.child_index();
+      if (nodes_[node].child[c] == kNone) {
+        nodes_[node].child[c] = static_cast<int32_t>(nodes_.size());
+        nodes_.emplace_back();
+      }
+      node = nodes_[node].child[c];
+    }
+    nodes_[node].leaf = static_cast<int32_t>(leaf);
+  }
+}
+
+void distribute(TriangleBins& bins, BinId from, const CubeTree& tree,
+                const std::vector<BinId>& leaf_bins, size_t buffer_bytes,
+                const CancelToken& cancel) {
+  BinWriter writer(bins, leaf_bins, buffer_bytes);
+  const auto stream = bins.open(from);
+  std::vector<FixedTriangle> batch(1024);
+  while (const size_t n = stream->read(batch)) {
+    cancel.check();
+    for (size_t i = 0; i < n; ++i)
+      tree.for_each_touched(batch[i], [&](size_t leaf) { writer.append(leaf, batch[i]); });
+  }
+  writer.finish();
+  bins.drop(from);
+}
+
+}  // namespace voxdag

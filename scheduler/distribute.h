@@ -1,0 +1,55 @@
+// Hands triangles from one bin down to the bins of the subvolumes that they touch.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "scheduler/cube_walk.h"
+#include "scheduler/top_tree.h"
+#include "scheduler/triangle_bins.h"
+
+namespace voxdag {
+
+// The tree above a set of disjoint cubes, to find which of them a triangle touches.
+class CubeTree {
+ public:
+  CubeTree(uint32_t grid_levels, const Cube& root, std::span<const SubvolumePlan> leaves);
+  // Calls visit(index into leaves) for every leaf that the triangle touches.
+  template <class Visit>
+  void for_each_touched(const FixedTriangle& triangle, const Visit& visit) const {
+    descend(0, root_, triangle, visit);
+  }
+
+ private:
+  static constexpr int32_t kNone = -1;
+  struct Node {
+    int32_t child[8] = {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};
+    int32_t leaf = kNone;  // index of the leaf that this node is, if it is one
+  };
+
+  template <class Visit>
+  void descend(int32_t node, const Cube& cube, const FixedTriangle& triangle,
+               const Visit& visit) const {
+    if (nodes_[node].leaf != kNone) return visit(static_cast<size_t>(nodes_[node].leaf));
+    const int64_t units = cube.edge_voxels(grid_levels_) * kUnitsPerVoxel;
+    for (uint32_t mask = touched_children(triangle, cube, units); mask; mask &= mask - 1) {
+      const int c = lowest_bit(mask);
+      if (nodes_[node].child[c] != kNone)
+        descend(nodes_[node].child[c], cube.child(c), triangle, visit);
+    }
+  }
+
+  uint32_t grid_levels_;
+  Cube root_;
+  std::vector<Node> nodes_;
+};
+
+// Moves all triangles of `from` into the bins (one a leaf, in the same order) of the cubes that
+// they touch, and drops `from`.
+void distribute(TriangleBins& bins, BinId from, const CubeTree& tree,
+                const std::vector<BinId>& leaf_bins, size_t buffer_bytes,
+                const CancelToken& cancel);
+
+}  // namespace voxdag

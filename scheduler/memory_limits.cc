@@ -1,0 +1,46 @@
+#include "scheduler/memory_limits.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+namespace voxdag {
+namespace {
+
+// The limit of this process's cgroup (version 2, or 1 where that is mounted), or no limit.
+uint64_t cgroup_memory() {
+  uint64_t least = UINT64_MAX;
+  for (const char* path :
+       {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
+    std::ifstream file(path);
+    uint64_t bytes = 0;
+    if (file >> bytes) least = std::min(least, bytes);  // "max" does not parse: no limit
+  }
+  return least;
+}
+
+}  // namespace
+
+uint64_t default_memory() {
+  const uint64_t ram = static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) *
+                       static_cast<uint64_t>(sysconf(_SC_PAGE_SIZE));
+  return std::max(kLeastMemory, std::min(ram, cgroup_memory()) / 2);
+}
+
+uint64_t peak_resident_bytes() {
+  std::ifstream status("/proc/self/status");
+  std::string line;
+  while (std::getline(status, line)) {
+    if (!line.starts_with("VmHWM:")) continue;
+    std::istringstream fields(line.substr(6));
+    uint64_t kib = 0;
+    fields >> kib;
+    return kib << 10;
+  }
+  return 0;
+}
+
+}  // namespace voxdag

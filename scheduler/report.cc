@@ -1,0 +1,44 @@
+#include <nlohmann/json.hpp>
+
+#include "scheduler/run_build.h"
+
+namespace voxdag {
+
+std::string report_json(const BuildReport& report) {
+  using nlohmann::ordered_json;
+  ordered_json stages = ordered_json::array();
+  for (const StageTime& stage : report.stages)
+    stages.push_back({{"name", stage.name}, {"wall_s", stage.wall_s}, {"cpu_s", stage.cpu_s}});
+  const ordered_json json = {
+      {"output", report.output},
+      {"sha256", report.sha256},
+      {"resolution", report.grid.resolution()},
+      {"bounds", {{"origin", report.grid.origin}, {"edge", report.grid.edge}}},
+      {"hash_bits", report.hash_bits},
+      {"voxels", report.voxels},
+      {"svo_nodes", report.svo_nodes},
+      {"dag_nodes", report.dag_nodes},
+      {"bytes", report.bytes},
+      {"triangles", report.triangles},
+      {"dropped", {{"outside", report.dropped_outside}, {"invalid", report.dropped_invalid}}},
+      {"subvolumes",
+       {{"total", report.subvolumes},
+        {"reused", report.subvolumes_reused},
+        {"split", report.subvolumes_split}}},
+      {"artifacts", {{"bytes", report.artifact_bytes}, {"nodes", report.artifact_nodes}}},
+      {"spill_bytes", report.spill_bytes},
+      {"merge_rounds", report.merge_rounds},
+      {"merge_ranges", report.merge_ranges},
+      {"memory_bytes", report.memory_bytes},
+      {"threads", report.threads},
+      {"stages", stages},
+      {"wall_s", report.wall_s},
+      {"cpu_s", report.cpu_s},
+      {"peak_rss_bytes", report.peak_rss_bytes},
+      {"voxels_per_s",
+       report.wall_s > 0 ? static_cast<double>(report.voxels) / report.wall_s : 0.0},
+  };
+  return json.dump(2);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,65 @@
+// The dense top tree: for every cell of a coarse level, how many triangles touch it and how much
+// work they are. It decides which cubes of the grid become subvolumes.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag {
+
+// Bricks that a triangle is expected to touch: the volume, in bricks, of the Minkowski sum of the
+// triangle and a brick, that is area * (|nx| + |ny| + |nz|) + the extents along the axes + 1.
+double expected_bricks(const FixedTriangle& triangle);
+// The same in voxels.
+double expected_voxels(const FixedTriangle& triangle);
+
+struct SubvolumePlan {
+  Cube cube;
+  double weight = 0;       // expected bricks, each triangle's own counted
+  uint64_t triangles = 0;  // at least as many as touch the cube
+};
+
+class TopTree {
+ public:
+  static constexpr uint32_t kDeepest = 7;  // 128^3 cells
+
+  // Cells of `depth`, at most kDeepest and at least the smallest subvolume in size; the counters
+  // are charged to `budget`.
+  TopTree(uint32_t grid_levels, uint32_t depth, MemoryBudget& budget);
+  // The deepest tree whose counters take at most `bytes`.
+  static uint32_t depth_within(uint32_t grid_levels, uint64_t bytes);
+
+  void add(const FixedTriangle& triangle);
+  double total_weight() const { return total_weight_; }
+  uint64_t occupied_cells() const;
+
+  // The largest cubes of weight <= `most_weight` (single cells may weigh more), occupied ones only,
+  // in Morton order.
+  std::vector<SubvolumePlan> subvolumes_by_weight(double most_weight) const;
+  // Occupied cubes of this edge (or of the cells' edge, if that is larger), in Morton order.
+  std::vector<SubvolumePlan> subvolumes_by_edge(int64_t edge_voxels) const;
+
+ private:
+  struct Cell {
+    float weight = 0;
+    uint32_t triangles = 0;
+  };
+
+  void collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code);
+  template <class KeepWhole>
+  SubvolumePlan gather(const Cube& cube, uint64_t code, const KeepWhole& keep_whole,
+                       std::vector<SubvolumePlan>& out) const;
+
+  const uint32_t grid_levels_;
+  const uint32_t depth_;
+  PageBuffer<Cell> cells_;  // by Morton code
+  std::vector<uint64_t> touched_;
+  double total_weight_ = 0;
+};
+
+}  // namespace voxdag
