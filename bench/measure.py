@@ -1,0 +1,117 @@
+"""What the benchmarks share: running a command and knowing what it took, whole builds, tables.
+
+CPU time is user + system time of the whole process tree, wall time from start to exit, peak memory
+the largest resident set of any process of the tree.
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+REPO = Path(__file__).resolve().parent.parent
+MIB = 1 << 20
+
+
+@dataclass
+class Run:
+    """What one command took, and what it wrote to stdout."""
+
+    wall_s: float
+    cpu_s: float
+    peak_rss_bytes: int
+    stdout: str
+
+
+def run(command):
+    """Runs a command to its end; exits with its messages if it fails."""
+    command = [str(part) for part in command]
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as messages:
+        start = time.monotonic()
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=messages)
+        _, status, usage = os.wait4(process.pid, 0)
+        wall_s = time.monotonic() - start
+        process.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        messages.seek(0)
+        if process.returncode != 0:
+            sys.exit(f"{' '.join(command)}\nfailed with {process.returncode}: {messages.read()}")
+        cpu_s = usage.ru_utime + usage.ru_stime
+        return Run(wall_s, cpu_s, usage.ru_maxrss * 1024, out.read())
+
+
+def build(voxdag, scene, resolution, scratch, *options):
+    """Builds into an empty folder that is removed again; returns (Run, the build's report)."""
+    with tempfile.TemporaryDirectory(dir=scratch) as folder:
+        output = Path(folder) / "out.vdag"
+        taken = run([voxdag, "build", scene, "-r", resolution, "-o", output, "--json", *options])
+        return taken, json.loads(taken.stdout)
+
+
+def machine():
+    """The machine and the moment, for the head of a report."""
+    model = next(
+        (line.split(":", 1)[1].strip()
+         for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name")),
+        os.uname().machine,
+    )
+    return {
+        "cpu": model,
+        "cores": len(os.sched_getaffinity(0)),
+        "memory_bytes": os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"),
+        "kernel": os.uname().release,
+        "date": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
+        "load_1min": os.getloadavg()[0],
+    }
+
+
+def machine_line(facts):
+    return (
+        f"{facts['cpu']}, {facts['cores']} cores, {facts['memory_bytes'] / 2**30:.0f} GiB, "
+        f"Linux {facts['kernel']}, {facts['date']}, load {facts['load_1min']:.2f}"
+    )
+
+
+def median(values):
+    return statistics.median(values)
+
+
+def amount(value):
+    """A count in three or four digits: 2.568 G, 212.5 M, 940 k."""
+    for unit, scale in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
+        if value >= scale:
+            return f"{value / scale:.4g} {unit}"
+    return f"{value:.4g}"
+
+
+def print_table(heads, rows):
+    """A Markdown table with aligned columns, the first to the left, numbers to the right."""
+    cells = [heads] + [[str(cell) for cell in row] for row in rows]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(heads))]
+
+    def line(row):
+        padded = [row[0].ljust(widths[0])] + [c.rjust(w) for c, w in zip(row[1:], widths[1:])]
+        return "| " + " | ".join(padded) + " |"
+
+    rules = ["-" * widths[0]] + ["-" * (w - 1) + ":" for w in widths[1:]]
+    print("\n".join([line(cells[0]), line(rules)] + [line(row) for row in cells[1:]]), flush=True)
+
+
+def add_common_options(parser):
+    parser.add_argument("--voxdag", type=Path, default=REPO / "build/cpu/voxdag",
+                        help="the program to measure")
+    parser.add_argument("--scenes", type=Path, default=REPO / "../shared/scenes",
+                        help="folder of .glb scenes")
+    parser.add_argument("--scratch", type=Path, default=None,
+                        help="folder for results and work folders (default: the system's)")
+    parser.add_argument("--json", type=Path, help="also write the figures here, as JSON")
+
+
+def write_json(path, figures):
+    if path:
+        path.write_text(json.dumps(figures, indent=2) + "\n")
