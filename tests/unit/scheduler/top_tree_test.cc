@@ -1,0 +1,112 @@
+#include "scheduler/top_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "scheduler/distribute.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint32_t kLevels = 11;  // R = 2048
+
+FixedTriangle triangle_near(std::mt19937_64& random, int64_t size_units) {
+  const int64_t grid = int64_t{kUnitsPerVoxel} << kLevels;
+  FixedTriangle t;
+  int64_t centre[3];
+  for (int64_t& c : centre) c = static_cast<int64_t>(random() % static_cast<uint64_t>(grid));
+  for (auto& vertex : t.v)
+    for (int a = 0; a < 3; ++a)
+      vertex[a] = (centre[a] + static_cast<int64_t>(random() % static_cast<uint64_t>(size_units)) -
+                   size_units / 2) |
+                  1;
+  return t;
+}
+
+// Walks the leaves one by one with the plain overlap test.
+std::vector<size_t> touched_by_brute_force(const FixedTriangle& t,
+                                           const std::vector<SubvolumePlan>& leaves) {
+  std::vector<size_t> touched;
+  for (size_t i = 0; i < leaves.size(); ++i) {
+    const int64_t units = leaves[i].cube.edge_voxels(kLevels) * kUnitsPerVoxel;
+    int64_t low[3];
+    for (int a = 0; a < 3; ++a) low[a] = static_cast<int64_t>(leaves[i].cube.position[a]) * units;
+    if (triangle_touches_cube(t, low, units)) touched.push_back(i);
+  }
+  return touched;
+}
+
+// Every triangle reaches every subvolume that it touches, wherever the cuts are, and the plan has a
+// subvolume wherever a triangle is.
+TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
+  MemoryBudget budget(uint64_t{1} << 30);
+  for (const int64_t size : {int64_t{600}, int64_t{40000}, int64_t{900000}}) {
+    std::mt19937_64 random(static_cast<uint64_t>(size));
+    TopTree top(kLevels, TopTree::depth_within(kLevels, 1 << 20), budget);
+    std::vector<FixedTriangle> triangles;
+    for (int i = 0; i < 60; ++i) triangles.push_back(triangle_near(random, size));
+    for (const FixedTriangle& t : triangles) top.add(t);
+    for (const auto& leaves :
+         {top.subvolumes_by_edge(256), top.subvolumes_by_edge(64), top.subvolumes_by_edge(2048),
+          top.subvolumes_by_weight(top.total_weight() / 20)}) {
+      SCOPED_TRACE(testing::Message() << "size " << size << ", leaves " << leaves.size());
+      const CubeTree tree(kLevels, Cube{}, leaves);
+      for (const FixedTriangle& t : triangles) {
+        std::vector<size_t> got;
+        tree.for_each_touched(t, [&](size_t leaf) { got.push_back(leaf); });
+        std::sort(got.begin(), got.end());
+        // The tree may name a leaf too many (a box inside one cube is not tested), never too few.
+        const auto touched = touched_by_brute_force(t, leaves);
+        EXPECT_TRUE(std::includes(got.begin(), got.end(), touched.begin(), touched.end()));
+        // Voxels of the triangle inside the grid lie in some leaf.
+        const int64_t origin[3] = {0, 0, 0};
+        if (triangle_touches_cube(t, origin, int64_t{kUnitsPerVoxel} << kLevels)) {
+          EXPECT_FALSE(touched.empty());
+        }
+      }
+    }
+  }
+}
+
+// Cubes of a plan are disjoint, in Morton order, and no heavier than asked for unless they are
+// single cells.
+TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
+  MemoryBudget budget(uint64_t{1} << 30);
+  std::mt19937_64 random(3);
+  const uint32_t depth = TopTree::depth_within(kLevels, 1 << 20);
+  TopTree top(kLevels, depth, budget);
+  for (int i = 0; i < 2000; ++i) top.add(triangle_near(random, 5000));
+  const double most = top.total_weight() / 100;
+  const auto plan = top.subvolumes_by_weight(most);
+  EXPECT_GT(plan.size(), 100u);
+  double sum = 0;
+  for (size_t i = 0; i < plan.size(); ++i) {
+    sum += plan[i].weight;
+    if (plan[i].cube.level < depth) {
+      EXPECT_LE(plan[i].weight, most);
+    }
+    for (size_t j = 0; j < i; ++j) {
+      const Cube *a = &plan[i].cube, *b = &plan[j].cube;
+      if (a->level < b->level) std::swap(a, b);
+      const uint32_t up = a->level - b->level;
+      const bool nested = a->position[0] >> up == b->position[0] &&
+                          a->position[1] >> up == b->position[1] &&
+                          a->position[2] >> up == b->position[2];
+      EXPECT_FALSE(nested);
+    }
+  }
+  EXPECT_NEAR(sum, top.total_weight(), 0.01 * top.total_weight());
+}
+
+// The expectation is the volume of a Minkowski sum: for one right triangle along the axes it is
+// known in closed form.
+TEST(TopTree, ExpectedVoxelsOfAnAxisAlignedTriangle) {
+  FixedTriangle t{{{1, 1, 1}, {1 + 256 * 100, 1, 1}, {1, 1 + 256 * 50, 1}}};
+  EXPECT_NEAR(expected_voxels(t), 0.5 * 100 * 50 + 100 + 50 + 1, 1e-6);
+  EXPECT_NEAR(expected_bricks(t), 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
+}
+
+}  // namespace
+}  // namespace voxdag
