@@ -1,0 +1,39 @@
+// The DAG of a cube of voxels, made from the definitions only: bricks of 4x4x4 voxels, above them
+// nodes of up to eight children, equal ones merged level by level with ordinary maps, every level
+// in the order (hash, mask, child indices).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "tests/oracle/voxels.h"
+
+namespace oracle {
+
+// The node hash as the format page has it, written a second time.
+uint64_t brick_hash(uint64_t mask);
+uint64_t node_hash(uint32_t mask, const std::vector<uint64_t>& child_hashes);
+// Keeps the top `bits`.
+uint64_t cut(uint64_t hash, int bits);
+
+struct Node {
+  uint64_t hash = 0;               // cut
+  uint32_t mask = 0;               // bit 4x + 2y + z for the child there
+  std::vector<uint32_t> children;  // indices into the level below
+  auto operator<=>(const Node&) const = default;
+};
+
+struct Dag {
+  std::vector<uint64_t> bricks;           // masks
+  std::vector<std::vector<Node>> levels;  // from the bricks' parents up to the root
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;  // of the octree, bricks included
+  uint64_t dag_nodes = 0;  // unique ones, bricks included
+  uint64_t root_hash = 0;  // cut; 0 if there are no voxels
+  bool operator==(const Dag&) const = default;
+};
+
+// `voxels` has an edge of 4 or more, a power of two. No voxels: a DAG without levels.
+Dag build_dag(const Voxels& voxels, int hash_bits);
+
+}  // namespace oracle

@@ -1,0 +1,56 @@
+#include "tests/oracle/overlap.h"
+
+#include <algorithm>
+
+namespace oracle {
+namespace {
+
+// Room enough: a normal's components are below 2^83, a dot product with a point below 2^125.
+__extension__ typedef __int128 Wide;
+using Axis = std::array<Wide, 3>;
+
+Axis minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+Axis cross(const Axis& a, const Axis& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+Wide dot(const Axis& a, const Point& p) { return a[0] * p[0] + a[1] * p[1] + a[2] * p[2]; }
+
+template <class Points>
+std::pair<Wide, Wide> shadow(const Axis& axis, const Points& points) {
+  Wide least = dot(axis, points[0]), most = least;
+  for (const Point& p : points) {
+    least = std::min(least, dot(axis, p));
+    most = std::max(most, dot(axis, p));
+  }
+  return {least, most};
+}
+
+}  // namespace
+
+bool touches(const Triangle& triangle, const Point& low, int64_t edge) {
+  std::array<Point, 8> corners;
+  for (int i = 0; i < 8; ++i)
+    corners[i] = {low[0] + (i & 1 ? edge : 0), low[1] + (i & 2 ? edge : 0),
+                  low[2] + (i & 4 ? edge : 0)};
+
+  // The faces' normals of the cube, the triangle's, and all products of an edge of one with an edge
+  // of the other: the normals of the faces that the two bodies' difference can have.
+  const Axis unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const Axis edges[3] = {minus(triangle[1], triangle[0]), minus(triangle[2], triangle[1]),
+                         minus(triangle[0], triangle[2])};
+  std::vector<Axis> axes(unit, unit + 3);
+  axes.push_back(cross(edges[0], edges[1]));
+  for (const Axis& u : unit)
+    for (const Axis& e : edges) axes.push_back(cross(u, e));
+
+  for (const Axis& axis : axes) {
+    const auto [t_least, t_most] = shadow(axis, triangle);
+    const auto [c_least, c_most] = shadow(axis, corners);
+    if (t_most < c_least || c_most < t_least) return false;
+  }
+  return true;
+}
+
+}  // namespace oracle

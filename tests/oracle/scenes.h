@@ -1,0 +1,53 @@
+// Seeded triangle scenes of every kind that has ever gone wrong somewhere, placed in and around a
+// region of the grid. The same seed gives the same triangles on every machine.
+#pragma once
+
+#include <random>
+#include <string>
+
+#include "tests/oracle/triangle.h"
+
+namespace oracle {
+
+enum class SceneKind {
+  kSoup,            // random triangles of mixed sizes
+  kDegenerate,      // points, segments, doubled vertices, collinear ones
+  kSliver,          // long and a few units thin
+  kSubVoxel,        // smaller than a voxel, in one or astride several
+  kWalls,           // axis-aligned rectangles
+  kDiagonal,        // planes of 45 degrees that pass exactly through voxel edges
+  kSpanning,        // from one side of the region to another
+  kCoincident,      // the same triangles again, vertices turned round
+  kThroughCorners,  // edges exactly through voxel corners
+  kCrossing,        // partly or wholly outside the region
+  kWide,            // through the region, vertices at the limit of the coordinates
+};
+constexpr SceneKind kAllKinds[] = {
+    SceneKind::kSoup,     SceneKind::kDegenerate, SceneKind::kSliver,
+    SceneKind::kSubVoxel, SceneKind::kWalls,      SceneKind::kDiagonal,
+    SceneKind::kSpanning, SceneKind::kCoincident, SceneKind::kThroughCorners,
+    SceneKind::kCrossing, SceneKind::kWide};
+
+// "soup", "degenerate", ...
+std::string kind_name(SceneKind kind);
+
+// Random numbers that are alike everywhere, unlike the standard distributions.
+class Random {
+ public:
+  explicit Random(uint64_t seed) : engine_(seed) {}
+  // From [least, most].
+  int64_t between(int64_t least, int64_t most) {
+    return least + static_cast<int64_t>(engine_() % static_cast<uint64_t>(most - least + 1));
+  }
+  bool coin() { return between(0, 1) == 1; }
+  // An odd number from [least, most].
+  int64_t odd(int64_t least, int64_t most) { return between(least, most - 1) | 1; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+// About `count` triangles of one kind.
+Triangles make_scene(SceneKind kind, uint64_t seed, const Region& region, int count);
+
+}  // namespace oracle

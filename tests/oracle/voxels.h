@@ -1,0 +1,34 @@
+// The voxels of a region that triangles set.
+#pragma once
+
+#include <vector>
+
+#include "tests/oracle/triangle.h"
+
+namespace oracle {
+
+class Voxels {
+ public:
+  explicit Voxels(int edge) : edge_(edge), set_(static_cast<size_t>(edge) * edge * edge) {}
+  int edge() const { return edge_; }
+  // Coordinates within the region.
+  bool at(int x, int y, int z) const { return set_[index(x, y, z)]; }
+  void set(int x, int y, int z) { set_[index(x, y, z)] = true; }
+  uint64_t count() const;
+  bool operator==(const Voxels&) const = default;
+
+ private:
+  size_t index(int x, int y, int z) const {
+    return (static_cast<size_t>(x) * edge_ + y) * edge_ + z;
+  }
+  int edge_;
+  std::vector<bool> set_;
+};
+
+// A voxel is set iff one of the triangles touches its closed cube. The region's edge is a power of
+// two; parts that a triangle does not touch are passed over whole.
+Voxels voxelize(const Triangles& triangles, const Region& region);
+// The same, every voxel asked for every triangle. Slow.
+Voxels voxelize_one_by_one(const Triangles& triangles, const Region& region);
+
+}  // namespace oracle
