@@ -5,14 +5,14 @@
 //   artifact:  [frames of the brick level] [frames of level L-3] ... [frames of the top level]
 //   [index]
 //
-// A frame holds up to kFrameRows consecutive rows of one level, as columns (bricks: masks; nodes:
-// hashes, masks, children), zstd-compressed, with a checksum of its compressed bytes. The index
-// lists roots, levels and frames, with a checksum of its own; an ArtifactRef points at it, so that
-// a reader never scans.
+// A frame holds kFrameRows consecutive rows of one level (the last frame of a level: the rest), as
+// columns (bricks: masks; nodes: hashes, masks, children), zstd-compressed where that pays, with a
+// checksum of its bytes as stored. The index lists roots, levels and frames, with a checksum of its
+// own; an ArtifactRef points at it, so that a reader never scans.
 //
 // An artifact of one subvolume has one root; a merge round writes artifacts that hold many. Rows
-// are checked on the way in (order) and on the way out (checksum, counts, ranges): Error{kCorrupt}
-// names segment, level and frame.
+// are checked on the way in and on the way out: total order, masks not 0, children within the next
+// level; out also checksums and counts. Error{kCorrupt} names segment, level and frame or row.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
 #include "core/dag/level_array.h"
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
@@ -30,6 +31,8 @@
 namespace voxdag {
 
 inline constexpr uint32_t kFrameRows = 4096;
+// What a SegmentWriter charges: a buffer of 1 MiB, a frame in the making and zstd's tables.
+inline constexpr uint64_t kSegmentWriterBytes = uint64_t{3} << 19;
 
 // Where an artifact lies. `checksum` is that of its index, which carries those of all frames.
 struct ArtifactRef {
@@ -53,23 +56,37 @@ struct ArtifactRoot {
 // "segment-<id>.vdseg" in `folder`.
 std::string segment_path(const std::string& folder, uint32_t id);
 
-// One segment file being written, by one thread. Bytes are buffered (charged to the budget).
+class FrameEncoder;
+
+// One segment file being written, by one thread. Charges kSegmentWriterBytes to the budget: its
+// buffer, and what an ArtifactWriter needs to make a frame.
 class SegmentWriter {
  public:
+  // A new file; one of that name that was there is emptied.
   SegmentWriter(FileSystem& files, const std::string& folder, uint32_t id, MemoryBudget& budget);
   ~SegmentWriter();
-  uint32_t id() const;
+  uint32_t id() const { return id_; }
   // Bytes so far, buffered ones included.
-  uint64_t size() const;
-  // Writes the buffer out and returns once all bytes so far are on the disk.
-  void sync();
+  uint64_t size() const { return written_ + buffered_; }
   // Writes the buffer out without waiting for the disk; readers see all bytes from here on.
   void flush();
+  // Writes the buffer out and returns once all bytes so far, and the file's name, are on the disk.
+  void sync();
 
  private:
   friend class ArtifactWriter;
-  struct State;
-  std::unique_ptr<State> state_;
+  void append(std::span<const std::byte> bytes);
+
+  FileSystem& files_;
+  const std::string folder_;
+  const uint32_t id_;
+  std::unique_ptr<WritableFile> file_;
+  MemoryCharge frame_charge_;
+  PageBuffer<std::byte> buffer_;
+  std::unique_ptr<FrameEncoder> encoder_;
+  uint64_t written_ = 0;  // bytes in the file
+  size_t buffered_ = 0;
+  bool name_synced_ = false;
 };
 
 // Writes one artifact, level by level from the bricks upwards, any number of rows at a time.
@@ -103,7 +120,7 @@ struct FrameInfo {
   uint64_t first_child = 0;  // children of the level's rows before this frame
   uint64_t first_hash = 0;   // cut hash of its first row
   uint64_t offset = 0;       // in the segment
-  uint32_t bytes = 0;        // compressed
+  uint32_t bytes = 0;        // as stored
   uint32_t rows = 0;
   uint32_t children = 0;
   uint64_t checksum = 0;
@@ -116,7 +133,7 @@ struct ArtifactLevel {
   std::vector<FrameInfo> frames;
 };
 
-// A decoded frame, and the scratch memory to decode the next one into.
+// A decoded frame, and scratch memory for the next one: its stored bytes, and one column of it.
 struct Frame {
   uint32_t rows = 0;
   std::vector<uint64_t> brick_masks;  // brick level only
@@ -124,10 +141,11 @@ struct Frame {
   std::vector<uint8_t> masks;         // node levels only
   std::vector<uint32_t> children;     // node levels only, popcount(masks[i]) for row i
   std::vector<std::byte> scratch;
+  std::vector<std::byte> planes;
 };
 
 // Reads one artifact. Immutable after construction: read_frame() may be called by several threads,
-// each with its own Frame. Memory: the index (about 50 bytes a frame), not charged.
+// each with its own Frame. Memory: the index (56 bytes a frame), not charged.
 class ArtifactReader {
  public:
   // `segment` must be the file that ref.segment names. Throws Error{kCorrupt} or
@@ -141,10 +159,12 @@ class ArtifactReader {
   std::span<const ArtifactLevel> levels() const { return levels_; }
   // nullptr if the artifact does not reach up to `level`.
   const ArtifactLevel* level(uint32_t level) const;
-  // Decodes frame `index` of `level`, checksum, counts and child range verified.
+  // Decodes frame `index` of `level`, which must be there.
   void read_frame(uint32_t level, size_t index, Frame& out) const;
 
  private:
+  [[noreturn]] void damaged(uint32_t level, size_t frame, const std::string& what) const;
+
   std::shared_ptr<ReadableFile> file_;
   uint32_t grid_levels_ = 0;
   uint32_t hash_bits_ = 64;

@@ -1,0 +1,50 @@
+#include "core/format/checksum.h"
+
+#include <openssl/evp.h>
+#include <xxhash.h>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+
+uint64_t checksum64(std::span<const std::byte> bytes) {
+  return XXH64(bytes.data(), bytes.size(), 0);
+}
+
+struct Sha256::Context {
+  EVP_MD_CTX* md = EVP_MD_CTX_new();
+  ~Context() { EVP_MD_CTX_free(md); }
+};
+
+namespace {
+
+void check(int status) {
+  if (status != 1) throw Error(ErrorCode::kOutOfMemory, "libcrypto cannot compute a SHA-256");
+}
+
+}  // namespace
+
+Sha256::Sha256() : context_(std::make_unique<Context>()) {
+  check(context_->md && EVP_DigestInit_ex(context_->md, EVP_sha256(), nullptr) == 1);
+}
+
+Sha256::~Sha256() = default;
+
+void Sha256::add(std::span<const std::byte> bytes) {
+  check(EVP_DigestUpdate(context_->md, bytes.data(), bytes.size()));
+}
+
+std::string Sha256::finish() {
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned size = 0;
+  check(EVP_DigestFinal_ex(context_->md, digest, &size));
+  static const char* kDigits = "0123456789abcdef";
+  std::string hex;
+  for (unsigned i = 0; i < size; ++i) {
+    hex += kDigits[digest[i] >> 4];
+    hex += kDigits[digest[i] & 15];
+  }
+  return hex;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,30 @@
+// The two digests of our files: XXH64 against damage (short, and simple enough that the header-only
+// reader carries its own), SHA-256 to name contents.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace voxdag {
+
+// XXH64 with seed 0.
+uint64_t checksum64(std::span<const std::byte> bytes);
+
+// A running SHA-256.
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  void add(std::span<const std::byte> bytes);
+  // 64 lower-case hex digits; nothing may be added afterwards.
+  std::string finish();
+
+ private:
+  struct Context;
+  std::unique_ptr<Context> context_;
+};
+
+}  // namespace voxdag

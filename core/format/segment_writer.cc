@@ -1,0 +1,57 @@
+#include <algorithm>
+#include <cstring>
+
+#include "core/format/artifact.h"
+#include "core/format/artifact_index.h"
+#include "core/format/frame_codec.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kBufferBytes = uint64_t{1} << 20;
+
+}  // namespace
+
+std::string segment_path(const std::string& folder, uint32_t id) {
+  return folder + "/segment-" + std::to_string(id) + ".vdseg";
+}
+
+SegmentWriter::SegmentWriter(FileSystem& files, const std::string& folder, uint32_t id,
+                             MemoryBudget& budget)
+    : files_(files),
+      folder_(folder),
+      id_(id),
+      file_(files.create(segment_path(folder, id))),
+      frame_charge_(budget, kSegmentWriterBytes - kBufferBytes, "an artifact's frame"),
+      buffer_(budget, kBufferBytes, "a segment's write buffer"),
+      encoder_(std::make_unique<FrameEncoder>()) {
+  append(encode_segment_header(id));
+}
+
+SegmentWriter::~SegmentWriter() = default;
+
+void SegmentWriter::append(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    if (buffered_ == buffer_.size()) flush();
+    const size_t n = std::min(bytes.size(), buffer_.size() - buffered_);
+    std::memcpy(buffer_.data() + buffered_, bytes.data(), n);
+    buffered_ += n;
+    bytes = bytes.subspan(n);
+  }
+}
+
+void SegmentWriter::flush() {
+  if (buffered_ == 0) return;
+  file_->write_at(written_, std::span<const std::byte>(buffer_.data(), buffered_));
+  written_ += buffered_;
+  buffered_ = 0;
+}
+
+void SegmentWriter::sync() {
+  flush();
+  file_->sync();
+  if (!name_synced_) files_.sync_directory(folder_);
+  name_synced_ = true;
+}
+
+}  // namespace voxdag
