@@ -29,6 +29,7 @@ std::string report_json(const BuildReport& report) {
       {"spill_bytes", report.spill_bytes},
       {"merge_rounds", report.merge_rounds},
       {"merge_ranges", report.merge_ranges},
+      {"merge_streamed_groups", report.merge_streamed_groups},
       {"memory_bytes", report.memory_bytes},
       {"threads", report.threads},
       {"stages", stages},
@@ -38,7 +39,8 @@ std::string report_json(const BuildReport& report) {
       {"voxels_per_s",
        report.wall_s > 0 ? static_cast<double>(report.voxels) / report.wall_s : 0.0},
   };
-  return json.dump(2);
+  // A path need not be UTF-8; JSON must be.
+  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace);
 }
 
 }  // namespace voxdag

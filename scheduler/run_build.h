@@ -7,14 +7,9 @@
 
 #include "core/geometry/grid.h"
 #include "scheduler/build_spec.h"
+#include "scheduler/stage_clock.h"
 
 namespace voxdag {
-
-struct StageTime {
-  std::string name;
-  double wall_s = 0;
-  double cpu_s = 0;  // of the whole process
-};
 
 // The report of a finished build; report_json() gives it its stable names.
 struct BuildReport {
@@ -37,6 +32,7 @@ struct BuildReport {
   uint64_t spill_bytes = 0;
   uint32_t merge_rounds = 0;
   uint64_t merge_ranges = 0;
+  uint64_t merge_streamed_groups = 0;
   uint64_t memory_bytes = 0;
   unsigned threads = 0;
   std::vector<StageTime> stages;

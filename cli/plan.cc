@@ -1,0 +1,61 @@
+#include <cstdio>
+#include <memory>
+
+#include "cli/build_options.h"
+#include "cli/progress_bar.h"
+#include "cli/size.h"
+#include "scheduler/estimate.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct PlanCommand {
+  BuildOptions options;
+  bool json = false;
+};
+
+template <class Text>
+void print_figure(const char* name, const Figure& figure, const Text& text) {
+  std::printf("  %-16s %s   (%s to %s)\n", name, text(figure.likely).c_str(),
+              text(figure.low).c_str(), text(figure.high).c_str());
+}
+
+void print(const Estimate& e) {
+  const auto count = [](double value) { return count_text(static_cast<uint64_t>(value)); };
+  const auto size = [](double value) { return size_text(static_cast<uint64_t>(value)); };
+  std::printf("%s triangles, %s occupied subvolumes; estimated from builds at %s^3 and below:\n",
+              count_text(e.triangles).c_str(), count_text(e.subvolumes).c_str(),
+              count_text(e.pilot_resolution).c_str());
+  print_figure("voxels", e.voxels, count);
+  print_figure("octree nodes", e.svo_nodes, count);
+  print_figure("DAG nodes", e.dag_nodes, count);
+  print_figure("global file", e.file_bytes, size);
+  print_figure("disk, at most", e.disk_bytes, size);
+  print_figure("memory, at most", e.memory_bytes, size);
+  print_figure("CPU time", e.cpu_s, duration_text);
+  print_figure("wall time", e.wall_s, duration_text);
+  std::printf("  free: %s of disk; memory budget %s\n", size_text(e.free_disk).c_str(),
+              size_text(e.free_memory).c_str());
+}
+
+void run(const PlanCommand& command, CommandContext& context) {
+  const auto progress = make_progress_bar();
+  const Estimate estimate =
+      plan_build(command.options.spec(), {context.files, *progress, context.cancel});
+  if (command.json)
+    std::printf("%s\n", estimate_json(estimate).c_str());
+  else
+    print(estimate);
+}
+
+}  // namespace
+
+void add_plan_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("plan", "estimate what a build would take");
+  const auto state = std::make_shared<PlanCommand>();
+  state->options.declare(*command);
+  command->add_flag("--json", state->json, "one JSON object on standard output");
+  command->callback([state, &context] { run(*state, context); });
+}
+
+}  // namespace voxdag::cli

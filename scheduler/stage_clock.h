@@ -1,0 +1,34 @@
+// Times the stages of a build as they follow one another.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/base/clock.h"
+
+namespace voxdag {
+
+struct StageTime {
+  std::string name;
+  double wall_s = 0;
+  double cpu_s = 0;  // of the whole process
+};
+
+class StageClock {
+ public:
+  // The time since the last stage ended was that of `name`.
+  void finish(const std::string& name) {
+    const double wall = wall_seconds(), cpu = process_cpu_seconds();
+    stages_.push_back({name, wall - wall_, cpu - cpu_});
+    wall_ = wall;
+    cpu_ = cpu;
+  }
+  const std::vector<StageTime>& stages() const { return stages_; }
+
+ private:
+  std::vector<StageTime> stages_;
+  double wall_ = wall_seconds();
+  double cpu_ = process_cpu_seconds();
+};
+
+}  // namespace voxdag
