@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
@@ -133,10 +133,11 @@ Estimate plan_build(const BuildSpec& spec, const Seams& seams) {
   const BuildSpec full = checked(spec);
   MemoryBudget budget(full.run.memory_bytes);
   StageClock clock;
-  const std::string folder =
-      full.run.work_folder.empty()
-          ? std::filesystem::temp_directory_path() / ("voxdag-plan-" + std::to_string(getpid()))
-          : full.run.work_folder;
+  const char* temporary = std::getenv("TMPDIR");
+  std::string folder = full.run.work_folder;
+  if (folder.empty())
+    folder =
+        std::string(temporary ? temporary : "/tmp") + "/voxdag-plan-" + std::to_string(getpid());
   WorkFolder work(seams.files, folder);
   const PreparedScene scene = prepare_scene(full, work.spill_path(), budget, clock, seams);
   Estimate estimate = estimate_build(scene, kPilotLevels, full.run.threads, budget, seams.cancel);
