@@ -38,12 +38,10 @@ def measure_case(case, options, study):
 def summary(case, runs, reports, yardsticks):
     last = reports[-1]
     cpu_s = median([taken.cpu_s for taken in runs])
-    stages = [
-        {"name": stage["name"],
-         "wall_s": median([r["stages"][i]["wall_s"] for r in reports]),
-         "cpu_s": median([r["stages"][i]["cpu_s"] for r in reports])}
+    stages = {
+        stage["name"]: median([report["stages"][i]["cpu_s"] for report in reports])
         for i, stage in enumerate(last["stages"])
-    ]
+    }
     figures = {
         "case": case,
         "runs": len(runs),
@@ -58,7 +56,7 @@ def summary(case, runs, reports, yardsticks):
         "voxels_per_cpu_s": last["voxels"] / cpu_s,
         "svo_nodes_per_cpu_s": last["svo_nodes"] / cpu_s,
         "dag_nodes_per_cpu_s": last["dag_nodes"] / cpu_s,
-        "stages": stages,
+        "stages_cpu_s": stages,
     }
     if yardsticks:
         figures["study_cpu_s"] = median([y["cpu_s"] for y in yardsticks])
@@ -80,13 +78,15 @@ def print_builds(cases):
 
 
 def print_stages(cases):
-    names = [stage["name"] for stage in cases[0]["stages"]]
-    print("\nCPU seconds by stage (share of all stages):\n")
+    names = list(dict.fromkeys(name for case in cases for name in case["stages_cpu_s"]))
+    print("\nCPU seconds by stage, and their share:\n")
     rows = []
     for case in cases:
-        total = sum(stage["cpu_s"] for stage in case["stages"]) or 1
-        rows.append([case["case"]] + [f"{s['cpu_s']:.2f} ({100 * s['cpu_s'] / total:.0f} %)"
-                                      for s in case["stages"]])
+        stages = case["stages_cpu_s"]
+        total = sum(stages.values()) or 1
+        rows.append([case["case"]] + [
+            f"{stages[name]:.2f} ({100 * stages[name] / total:.0f} %)" if name in stages else "-"
+            for name in names])
     measure.print_table(["case"] + names, rows)
 
 
