@@ -1,0 +1,44 @@
+#include "core/base/cancel_token.h"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+namespace voxdag {
+namespace {
+
+// A token says nothing until it is set, and then keeps saying kCancelled.
+TEST(CancelToken, ThrowsOnceSet) {
+  CancelToken token;
+  EXPECT_FALSE(token.cancelled());
+  EXPECT_NO_THROW(token.check());
+  token.cancel();
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(token.cancelled());
+    try {
+      token.check();
+      FAIL() << "check() returned";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kCancelled);
+    }
+  }
+}
+
+// Work on one thread stops when another one asks it to.
+TEST(CancelToken, IsSeenByOtherThreads) {
+  CancelToken token;
+  bool stopped = false;
+  std::thread worker([&] {
+    try {
+      for (;;) token.check();
+    } catch (const Error&) {
+      stopped = true;
+    }
+  });
+  token.cancel();
+  worker.join();
+  EXPECT_TRUE(stopped);
+}
+
+}  // namespace
+}  // namespace voxdag

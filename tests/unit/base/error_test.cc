@@ -1,0 +1,68 @@
+#include "core/base/error.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+namespace voxdag {
+namespace {
+
+struct Row {
+  ErrorCode code;
+  const char* name;
+  int exit_status;
+  int http_status;
+};
+
+// The table that docs/errors.md promises to scripts and HTTP clients.
+constexpr Row kPromised[] = {
+    {ErrorCode::kInvalidInput, "invalid_input", 2, 400},
+    {ErrorCode::kNotFound, "not_found", 3, 404},
+    {ErrorCode::kCorrupt, "corrupt", 4, 500},
+    {ErrorCode::kUnsupportedVersion, "unsupported_version", 5, 400},
+    {ErrorCode::kIo, "io", 6, 500},
+    {ErrorCode::kNoSpace, "no_space", 7, 507},
+    {ErrorCode::kOutOfMemory, "out_of_memory", 8, 503},
+    {ErrorCode::kDevice, "device", 9, 500},
+    {ErrorCode::kLimit, "limit", 10, 422},
+    {ErrorCode::kCancelled, "cancelled", 130, 409},
+};
+
+// Names and statuses are an interface: none may change unnoticed.
+TEST(ErrorTable, IsAsPromised) {
+  for (const Row& row : kPromised) {
+    SCOPED_TRACE(row.name);
+    EXPECT_STREQ(error_name(row.code), row.name);
+    EXPECT_EQ(exit_status(row.code), row.exit_status);
+    EXPECT_EQ(http_status(row.code), row.http_status);
+  }
+}
+
+// A script can tell errors apart by the exit status, and never takes one for success or for what a
+// shell itself reports (126 and above, Ctrl-C aside).
+TEST(ErrorTable, ExitStatusesAreDistinctAndNotTheShells) {
+  std::set<int> seen;
+  for (const Row& row : kPromised) {
+    const int status = exit_status(row.code);
+    EXPECT_TRUE(seen.insert(status).second) << status;
+    EXPECT_GT(status, 1);
+    EXPECT_TRUE(status < 126 || row.code == ErrorCode::kCancelled) << status;
+  }
+}
+
+// What was thrown is what is caught, as Error and as std::exception.
+TEST(Error, KeepsCodeAndMessage) {
+  try {
+    throw Error(ErrorCode::kNoSpace, "disk full: spill.bin");
+  } catch (const std::exception& caught) {
+    EXPECT_STREQ(caught.what(), "disk full: spill.bin");
+    const auto* error = dynamic_cast<const Error*>(&caught);
+    ASSERT_NE(error, nullptr);
+    EXPECT_EQ(error->code(), ErrorCode::kNoSpace);
+    EXPECT_EQ(error->message(), "disk full: spill.bin");
+  }
+}
+
+}  // namespace
+}  // namespace voxdag

@@ -1,0 +1,71 @@
+#include "core/base/page_buffer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+namespace {
+
+// Pages come zero-filled, also those of a buffer that was just given back dirty.
+TEST(PageBuffer, IsZeroFilled) {
+  MemoryBudget budget(uint64_t{64} << 20);
+  for (int round = 0; round < 3; ++round) {
+    PageBuffer<uint64_t> buffer(budget, (20 << 20) / 8, "test");
+    EXPECT_TRUE(std::all_of(buffer.begin(), buffer.end(), [](uint64_t x) { return x == 0; }));
+    std::fill(buffer.begin(), buffer.end(), ~uint64_t{0});
+  }
+}
+
+// Bytes are charged while a buffer lives, whoever holds it.
+TEST(PageBuffer, ChargesWhatItHolds) {
+  MemoryBudget budget(10000);
+  {
+    PageBuffer<uint32_t> a(budget, 1000, "a");
+    EXPECT_EQ(budget.used(), 4000u);
+    a[999] = 7;
+    PageBuffer<uint32_t> b(std::move(a));
+    EXPECT_EQ(a.size(), 0u);
+    EXPECT_EQ(b[999], 7u);
+    EXPECT_EQ(budget.used(), 4000u);
+    PageBuffer<uint32_t> c(budget, 500, "c");
+    c = std::move(b);
+    EXPECT_EQ(c.size(), 1000u);
+    EXPECT_EQ(c[999], 7u);
+    EXPECT_EQ(budget.used(), 4000u);
+    c = PageBuffer<uint32_t>();
+    EXPECT_EQ(budget.used(), 0u);
+  }
+  EXPECT_EQ(budget.used(), 0u);
+}
+
+// An empty buffer costs nothing.
+TEST(PageBuffer, MayBeEmpty) {
+  MemoryBudget budget(0);
+  PageBuffer<uint32_t> buffer(budget, 0, "nothing");
+  EXPECT_EQ(buffer.begin(), buffer.end());
+}
+
+// Refused by the budget, by the system, or because the size in bytes does not fit 64 bits:
+// kOutOfMemory naming the buffer, and nothing stays charged.
+TEST(PageBuffer, NamesWhatDidNotFit) {
+  MemoryBudget small(4096), endless(UINT64_MAX);
+  const auto refused = [](MemoryBudget& budget, size_t size) {
+    try {
+      PageBuffer<uint64_t> buffer(budget, size, "the brick table");
+      ADD_FAILURE() << size << " words were handed out";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory);
+      EXPECT_NE(error.message().find("the brick table"), std::string::npos) << error.message();
+    }
+    EXPECT_EQ(budget.used(), 0u);
+  };
+  refused(small, 513);
+  refused(endless, size_t{1} << 58);
+  refused(endless, (size_t{1} << 61) + 1);
+}
+
+}  // namespace
+}  // namespace voxdag

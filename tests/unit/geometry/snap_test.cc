@@ -1,0 +1,115 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "core/geometry/grid.h"
+
+namespace voxdag {
+namespace {
+
+// A grid of 16 voxels of edge 1: world positions are voxel positions.
+Grid plain_grid() { return Grid::given({0, 0, 0}, 16, 4); }
+
+WorldTriangle at(double x, double y, double z) { return {{{x, y, z}, {x, y, z}, {x, y, z}}}; }
+
+int64_t snapped(double x) {
+  FixedTriangle out{};
+  EXPECT_EQ(snap_triangle(plain_grid(), at(x, 1, 1), out), SnapResult::kInside) << x;
+  return out.v[0][0];
+}
+
+// u = 2 floor(128 x) + 1: the middle of one of 128 slices of the voxel.
+TEST(Snap, GoesToTheMiddleOfASlice) {
+  EXPECT_EQ(snapped(0.0), 1);
+  EXPECT_EQ(snapped(std::nextafter(1 / 128.0, 0)), 1);
+  EXPECT_EQ(snapped(1 / 128.0), 3);
+  EXPECT_EQ(snapped(std::nextafter(1.0, 0)), 255);
+  EXPECT_EQ(snapped(1.0), 257);
+  EXPECT_EQ(snapped(std::nextafter(16.0, 0)), 4095);
+}
+
+// No vertex is ever on a voxel's boundary, nor in another voxel than the one it was in.
+TEST(Snap, IsOddAndStaysInItsVoxel) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> uniform(0, 16);
+  for (int i = 0; i < 20000; ++i) {
+    double x = uniform(random);
+    if (i % 3 == 0) x = std::floor(x);
+    if (i % 3 == 1) x = std::nextafter(std::ceil(x), 0);
+    const int64_t u = snapped(x);
+    ASSERT_EQ(u & 1, 1);
+    ASSERT_EQ(u >> kUnitBits, static_cast<int64_t>(std::floor(x))) << x;
+  }
+}
+
+// The formula itself, operation by operation, on an awkward cube.
+TEST(Snap, IsThatOfTheDesign) {
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> uniform(-3, 5);
+  const double origin = -2.718281828, edge = 7.3890560989;
+  const Grid grid = Grid::given({origin, origin, origin}, edge, 13);
+  for (int i = 0; i < 2000; ++i) {
+    WorldTriangle world;
+    for (auto& v : world.v)
+      for (double& x : v) x = uniform(random);
+    FixedTriangle out;
+    ASSERT_EQ(snap_triangle(grid, world, out), SnapResult::kInside);
+    for (int k = 0; k < 9; ++k) {
+      volatile double x = world.v[k / 3][k % 3] - origin;
+      x = x / edge;
+      x = x * 8192.0;
+      ASSERT_EQ(out.v[k / 3][k % 3], 2 * static_cast<int64_t>(std::floor(128.0 * x)) + 1);
+    }
+  }
+}
+
+// A triangle whose box misses the grid is dropped, on any side; one whose box touches it is not.
+TEST(Snap, DropsWhatMissesTheGrid) {
+  FixedTriangle out;
+  const double below = -1e-300, above = 16.0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double off : {below, above, -5.0, 1e6, -1e300, 1e300}) {
+      double p[3] = {1, 1, 1};
+      p[axis] = off;
+      EXPECT_EQ(snap_triangle(plain_grid(), at(p[0], p[1], p[2]), out), SnapResult::kOutside)
+          << axis << ' ' << off;
+    }
+  const WorldTriangle around{{{-100, -100, 8}, {100, -100, 8}, {0, 100, 8}}};
+  EXPECT_EQ(snap_triangle(plain_grid(), around, out), SnapResult::kInside);
+  EXPECT_EQ(out.v[0][0], -25599);
+}
+
+// A vertex at |u| >= 2^40 is a limit error, unless the triangle misses the grid anyhow.
+TEST(Snap, TellsWhatReachesTooFar) {
+  FixedTriangle out;
+  const double limit = 0x1p32;  // 2^40 units
+  const auto reach = [&](double x) {
+    const WorldTriangle t{{{1, 1, 1}, {1, 2, 1}, {x, 1, 1}}};
+    return snap_triangle(plain_grid(), t, out);
+  };
+  EXPECT_EQ(reach(std::nextafter(limit, 0)), SnapResult::kInside);
+  EXPECT_EQ(out.v[2][0], kCoordinateLimit - 1);
+  EXPECT_EQ(reach(limit), SnapResult::kTooFar);
+  EXPECT_EQ(reach(-limit), SnapResult::kInside);
+  EXPECT_EQ(out.v[2][0], 1 - kCoordinateLimit);
+  EXPECT_EQ(reach(-limit - 0.01), SnapResult::kTooFar);
+  EXPECT_EQ(reach(std::numeric_limits<double>::max()), SnapResult::kTooFar);
+  EXPECT_EQ(reach(-std::numeric_limits<double>::max()), SnapResult::kTooFar);
+  const WorldTriangle far_away{{{limit, 1, 1}, {2 * limit, 2, 1}, {limit, 1, 1}}};
+  EXPECT_EQ(snap_triangle(plain_grid(), far_away, out), SnapResult::kOutside);
+}
+
+// Far from its origin a tiny cube makes the quotient overflow: still an answer, never a cast of
+// infinity.
+TEST(Snap, SurvivesOverflow) {
+  FixedTriangle out;
+  const Grid tiny = Grid::given({0, 0, 0}, 1e-300, 20);
+  EXPECT_EQ(snap_triangle(tiny, at(1e300, 0, 0), out), SnapResult::kOutside);
+  const WorldTriangle through{{{-1e300, 0, 0}, {1e300, 0, 0}, {0, 0, 0}}};
+  EXPECT_EQ(snap_triangle(tiny, through, out), SnapResult::kTooFar);
+}
+
+}  // namespace
+}  // namespace voxdag

@@ -1,0 +1,193 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <thread>
+
+#include "core/base/error.h"
+#include "core/io/file_system.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace voxdag {
+namespace {
+
+std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
+
+std::string read(const ReadableFile& file, uint64_t offset, size_t size) {
+  std::string text(size, '?');
+  file.read_at(offset, std::as_writable_bytes(std::span(text)));
+  return text;
+}
+
+void expect_error(ErrorCode code, const std::string& part, const std::function<void()>& call) {
+  try {
+    call();
+    ADD_FAILURE() << "no error, expected one of " << error_name(code) << " with " << part;
+  } catch (const Error& error) {
+    EXPECT_STREQ(error_name(error.code()), error_name(code)) << error.message();
+    EXPECT_NE(error.message().find(part), std::string::npos) << error.message();
+  }
+}
+
+class PosixFiles : public testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  FileSystem& files_ = system_files();
+  const std::string path_ = folder_.file("data");
+
+  void put(const std::string& path, std::string_view text) {
+    const auto file = files_.create(path);
+    file->write_at(0, bytes(text));
+    file->close();
+  }
+};
+
+// What was written is read back, in any order of offsets, holes zero-filled.
+TEST_F(PosixFiles, ReadsWhatWasWritten) {
+  const auto out = files_.create(path_);
+  EXPECT_EQ(out->path(), path_);
+  out->write_at(6, bytes("world"));
+  out->write_at(0, bytes("hello"));
+  out->sync();
+  out->close();
+  const auto in = files_.open_read(path_);
+  EXPECT_EQ(in->path(), path_);
+  EXPECT_EQ(in->size(), 11u);
+  EXPECT_EQ(read(*in, 0, 11), std::string("hello\0world", 11));
+  EXPECT_EQ(read(*in, 8, 3), "rld");
+  EXPECT_EQ(read(*in, 11, 0), "");
+}
+
+// Offsets are 64-bit: beyond 4 GiB nothing wraps.
+TEST_F(PosixFiles, ReachesBeyondFourGibibytes) {
+  const uint64_t far = (uint64_t{5} << 30) + 3;
+  const auto out = files_.create(path_);
+  out->write_at(far, bytes("far"));
+  out->write_at(3, bytes("near"));
+  const auto in = files_.open_read(path_);
+  EXPECT_EQ(in->size(), far + 3);
+  EXPECT_EQ(read(*in, far, 3), "far");
+  EXPECT_EQ(read(*in, 3, 4), "near");
+}
+
+// A file that ends too early is kCorrupt, and the message says where.
+TEST_F(PosixFiles, ReadingPastTheEndIsCorrupt) {
+  put(path_, "0123456789");
+  const auto in = files_.open_read(path_);
+  expect_error(ErrorCode::kCorrupt, path_, [&] { read(*in, 8, 3); });
+  expect_error(ErrorCode::kCorrupt, "byte 10", [&] { read(*in, 8, 3); });
+  expect_error(ErrorCode::kCorrupt, "byte 100", [&] { read(*in, 100, 1); });
+}
+
+// create() empties what was there, open_write() does not.
+TEST_F(PosixFiles, CreateEmptiesAndOpenWriteKeeps) {
+  put(path_, "abcdef");
+  files_.open_write(path_)->write_at(2, bytes("XX"));
+  EXPECT_EQ(read_small_file(files_, path_, 100), "abXXef");
+  files_.create(path_)->close();
+  EXPECT_EQ(read_small_file(files_, path_, 100), "");
+  files_.open_write(folder_.file("new"))->write_at(0, bytes("n"));
+  EXPECT_EQ(read_small_file(files_, folder_.file("new"), 100), "n");
+}
+
+// What is missing is kNotFound, and each call names the path.
+TEST_F(PosixFiles, MissingThingsAreNotFound) {
+  const std::string gone = folder_.file("gone"), inside = folder_.file("gone/file");
+  const auto expect_not_found = [&](const std::function<void()>& call) {
+    expect_error(ErrorCode::kNotFound, gone, call);
+  };
+  expect_not_found([&] { files_.open_read(gone); });
+  expect_not_found([&] { files_.create(inside); });
+  expect_not_found([&] { files_.open_write(inside); });
+  expect_not_found([&] { files_.rename(gone, path_); });
+  expect_not_found([&] { files_.remove(gone); });
+  expect_not_found([&] { files_.remove_directory(gone); });
+  expect_not_found([&] { files_.list(gone); });
+  expect_not_found([&] { files_.sync_directory(gone); });
+  expect_not_found([&] { files_.free_space(gone); });
+  EXPECT_FALSE(files_.exists(gone));
+}
+
+// A file in the place of a folder, and the other way round.
+TEST_F(PosixFiles, FilesAreNotFolders) {
+  put(path_, "x");
+  EXPECT_FALSE(files_.exists(path_ + "/below"));
+  expect_error(ErrorCode::kNotFound, path_, [&] { files_.create(path_ + "/below"); });
+  expect_error(ErrorCode::kInvalidInput, folder_.path(), [&] { files_.open_read(folder_.path()); });
+  expect_error(ErrorCode::kIo, folder_.path(), [&] { files_.create(folder_.path()); });
+}
+
+// A full disk has a code of its own. /dev/full is one that always is.
+TEST_F(PosixFiles, FullDiskIsNoSpace) {
+  if (!files_.exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  const auto full = files_.create("/dev/full");
+  expect_error(ErrorCode::kNoSpace, "/dev/full at offset 0",
+               [&] { full->write_at(0, bytes("x")); });
+}
+
+// Folders: made with all above them, listed, removed only when empty.
+TEST_F(PosixFiles, Folders) {
+  const std::string deep = folder_.file("a/b/c");
+  files_.make_directories(deep);
+  files_.make_directories(deep + "/");
+  put(folder_.file("a/file"), "x");
+  auto entries = files_.list(folder_.file("a"));
+  std::sort(entries.begin(), entries.end(),
+            [](const auto& x, const auto& y) { return x.name < y.name; });
+  ASSERT_EQ(entries.size(), 2u);
+  EXPECT_EQ(entries[0].name, "b");
+  EXPECT_TRUE(entries[0].is_directory);
+  EXPECT_EQ(entries[1].name, "file");
+  EXPECT_FALSE(entries[1].is_directory);
+  files_.sync_directory(folder_.file("a"));
+  expect_error(ErrorCode::kIo, "a", [&] { files_.remove_directory(folder_.file("a")); });
+  files_.remove_directory(deep);
+  EXPECT_FALSE(files_.exists(deep));
+  EXPECT_GT(files_.free_space(deep.substr(0, deep.size() - 2)), 0u);
+}
+
+// Renaming replaces what bears the name; removing removes.
+TEST_F(PosixFiles, RenameReplaces) {
+  put(path_, "new");
+  put(folder_.file("old"), "old");
+  files_.rename(path_, folder_.file("old"));
+  EXPECT_FALSE(files_.exists(path_));
+  EXPECT_EQ(read_small_file(files_, folder_.file("old"), 3), "new");
+  files_.remove(folder_.file("old"));
+  EXPECT_FALSE(files_.exists(folder_.file("old")));
+}
+
+// Threads may write and read disjoint parts of one file at once.
+TEST_F(PosixFiles, ThreadsShareAFile) {
+  constexpr size_t kPart = 100000;
+  const auto out = files_.create(path_);
+  const auto in = files_.open_read(path_);
+  std::vector<std::thread> threads;
+  std::atomic<int> wrong{0};
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([&, t] {
+      const std::string text(kPart, static_cast<char>('a' + t));
+      out->write_at(static_cast<uint64_t>(t) * kPart, bytes(text));
+      wrong += read(*in, static_cast<uint64_t>(t) * kPart, kPart) != text;
+    });
+  for (std::thread& t : threads) t.join();
+  EXPECT_EQ(wrong, 0);
+  EXPECT_EQ(files_.open_read(path_)->size(), 4 * kPart);
+}
+
+// Closing twice, or after the destructor's turn, is harmless.
+TEST_F(PosixFiles, CloseMayBeCalledTwice) {
+  const auto file = files_.create(path_);
+  file->close();
+  EXPECT_NO_THROW(file->close());
+}
+
+// Small files have a limit, which the error names.
+TEST_F(PosixFiles, SmallFilesAreSmall) {
+  put(path_, "12345");
+  EXPECT_EQ(read_small_file(files_, path_, 5), "12345");
+  expect_error(ErrorCode::kLimit, "at most 4", [&] { read_small_file(files_, path_, 4); });
+}
+
+}  // namespace
+}  // namespace voxdag
