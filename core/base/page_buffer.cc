@@ -8,8 +8,9 @@
 
 namespace voxdag {
 
-void* allocate_pages(size_t bytes, std::string_view what) {
-  void* pages = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+namespace {
+
+void* check_pages(void* pages, size_t bytes, std::string_view what) {
   if (pages == MAP_FAILED)
     throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " +
                                              std::to_string(bytes) + " bytes for " +
@@ -17,6 +18,18 @@ void* allocate_pages(size_t bytes, std::string_view what) {
   // A huge page is touched as a whole: below a few of them that would cost more than it saves.
   if (bytes >= (size_t{8} << 20)) madvise(pages, bytes, MADV_HUGEPAGE);
   return pages;
+}
+
+}  // namespace
+
+void* allocate_pages(size_t bytes, std::string_view what) {
+  return check_pages(
+      mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), bytes,
+      what);
+}
+
+void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what) {
+  return check_pages(mremap(pages, bytes, new_bytes, MREMAP_MAYMOVE), new_bytes, what);
 }
 
 void free_pages(void* pages, size_t bytes) { munmap(pages, bytes); }
