@@ -1,0 +1,74 @@
+// Affine transforms of glTF nodes in IEEE doubles, with + - * / only and every association written
+// out, so that all machines get the same bits (docs/scenes.md gives the formulas to a reader).
+#pragma once
+
+#include <array>
+
+namespace voxdag::gltf {
+
+// Rows of the upper 3x4 part; the last row of the 4x4 matrix is 0 0 0 1.
+struct Transform {
+  double m[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+};
+
+// First `inner`, then `outer`.
+inline Transform multiply(const Transform& outer, const Transform& inner) {
+  Transform product;
+  for (int i = 0; i < 3; ++i) {
+    const double* row = outer.m[i];
+    for (int j = 0; j < 4; ++j) {
+      const double sum = (row[0] * inner.m[0][j] + row[1] * inner.m[1][j]) + row[2] * inner.m[2][j];
+      product.m[i][j] = j == 3 ? sum + row[3] : sum;
+    }
+  }
+  return product;
+}
+
+inline void apply(const Transform& transform, const double* local, double* world) {
+  for (int i = 0; i < 3; ++i) {
+    const double* row = transform.m[i];
+    world[i] = ((row[0] * local[0] + row[1] * local[1]) + row[2] * local[2]) + row[3];
+  }
+}
+
+// T * R * S. The quaternion (x, y, z, w) need not be of unit length: it is divided by its norm
+// squared where products of two of its components are taken, which needs no square root. A zero
+// quaternion gives a transform that is not finite.
+inline Transform from_trs(const std::array<double, 3>& t, const std::array<double, 4>& r,
+                          const std::array<double, 3>& s) {
+  const double x = r[0], y = r[1], z = r[2], w = r[3];
+  const double k = 2.0 / (((x * x + y * y) + z * z) + w * w);
+  const double rotation[3][3] = {
+      {1.0 - k * (y * y + z * z), k * (x * y - z * w), k * (x * z + y * w)},
+      {k * (x * y + z * w), 1.0 - k * (x * x + z * z), k * (y * z - x * w)},
+      {k * (x * z - y * w), k * (y * z + x * w), 1.0 - k * (x * x + y * y)}};
+  Transform transform;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) transform.m[i][j] = rotation[i][j] * s[static_cast<size_t>(j)];
+    transform.m[i][3] = t[static_cast<size_t>(i)];
+  }
+  return transform;
+}
+
+// A column-major 4x4 matrix as glTF stores it. False if its last row is not 0 0 0 1 (to 2^-10,
+// which is what single-precision inverses leave) or a number is not finite.
+inline bool from_columns(const double* columns, Transform& out) {
+  const auto near = [](double value, double wanted) {
+    return value - wanted <= 1.0 / 1024 && wanted - value <= 1.0 / 1024;
+  };
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 4; ++j) out.m[i][j] = columns[4 * j + i];
+  bool finite = true;
+  for (int k = 0; k < 16; ++k) finite = finite && columns[k] - columns[k] == 0;
+  return finite && near(columns[3], 0) && near(columns[7], 0) && near(columns[11], 0) &&
+         near(columns[15], 1);
+}
+
+inline bool is_finite(const Transform& transform) {
+  bool finite = true;
+  for (const auto& row : transform.m)
+    for (double value : row) finite = finite && value - value == 0;
+  return finite;
+}
+
+}  // namespace voxdag::gltf

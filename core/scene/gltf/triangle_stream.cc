@@ -1,0 +1,130 @@
+#include "core/scene/gltf/triangle_stream.h"
+
+#include <algorithm>
+
+namespace voxdag::gltf {
+namespace {
+
+constexpr uint64_t kNoWindow = ~uint64_t{0};
+
+uint64_t largest_vertex_count(const Document& document) {
+  uint64_t largest = 0;
+  for (const Mesh& mesh : document.meshes)
+    for (const Primitive& primitive : mesh.primitives)
+      if (primitive.makes_triangles())
+        largest =
+            std::max(largest, document.accessors[static_cast<size_t>(primitive.position)].count);
+  return largest;
+}
+
+bool is_finite(const double* point) {
+  return (point[0] - point[0]) + (point[1] - point[1]) + (point[2] - point[2]) == 0;
+}
+
+}  // namespace
+
+TriangleStream::TriangleStream(const Document& document, BufferReader& buffers,
+                               MemoryBudget& budget, bool skip_invalid, Batch& batch)
+    : document_(document),
+      buffers_(buffers),
+      budget_(budget),
+      skip_invalid_(skip_invalid),
+      batch_(batch),
+      cache_(budget, largest_vertex_count(document)),
+      corners_(3 * Batch::kTriangles) {}
+
+uint64_t TriangleStream::run() {
+  NodeWalk walk(document_, budget_);
+  while (walk.next()) draw_node(walk);
+  return skipped_;
+}
+
+void TriangleStream::draw_node(const NodeWalk& walk) {
+  node_ = walk.node();
+  const Node& node = document_.nodes[static_cast<size_t>(node_)];
+  const Mesh& mesh = document_.meshes[static_cast<size_t>(node.mesh)];
+  // A skin's joints place the vertices in the world already.
+  const Transform global = node.skin >= 0 ? Transform{} : walk.global();
+  for (size_t p = 0; p < mesh.primitives.size(); ++p) {
+    if (triangle_count(document_, mesh.primitives[p]) == 0) continue;
+    bind(node, p);
+    InstanceReader instances(document_, buffers_, node);
+    for (instance_ = 0; instance_ < instances.count(); ++instance_)
+      draw_instance(node.instancing.present ? multiply(global, instances.at(instance_)) : global);
+  }
+}
+
+void TriangleStream::bind(const Node& node, size_t primitive_index) {
+  const Mesh& mesh = document_.meshes[static_cast<size_t>(node.mesh)];
+  const std::vector<double>& weights = node.weights.empty() ? mesh.weights : node.weights;
+  const Binding wanted{node.mesh, primitive_index, weights.data(), node.skin};
+  if (wanted == binding_) return;
+  const Primitive& primitive = mesh.primitives[primitive_index];
+  if (node.skin < 0)
+    joints_.clear();
+  else if (node.skin != binding_.skin)
+    joints_ = joint_matrices(document_, buffers_, node.skin);
+  binding_ = {};
+  vertices_.emplace(document_, buffers_, primitive, weights, joints_);
+  corner_reader_.emplace(document_, buffers_, primitive);
+  cache_.bind(*vertices_);
+  vertex_count_ = vertices_->count();
+  triangle_count_ = triangle_count(document_, primitive);
+  window_first_ = kNoWindow;
+  binding_ = wanted;
+}
+
+void TriangleStream::draw_instance(const Transform& world) {
+  batch_.check_cancelled();
+  for (uint64_t first = 0; first < triangle_count_; first += Batch::kTriangles) {
+    const auto count =
+        static_cast<size_t>(std::min<uint64_t>(Batch::kTriangles, triangle_count_ - first));
+    if (first != window_first_) {
+      window_first_ = kNoWindow;
+      corner_reader_->read(first, count, corners_.data());
+      window_first_ = first;
+    }
+    draw_window(world, count);
+  }
+}
+
+void TriangleStream::draw_window(const Transform& world, size_t count) {
+  const uint32_t* corners = corners_.data();
+  for (size_t i = 0; i < count; ++i, corners += 3) {
+    if (place(corners, world, batch_.next())) {
+      batch_.keep();
+    } else {
+      if (!skip_invalid_) report(corners, world);
+      ++skipped_;
+    }
+  }
+}
+
+// False for a corner out of range or a vertex that is not finite in world space.
+bool TriangleStream::place(const uint32_t* corners, const Transform& world, WorldTriangle& out) {
+  if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
+  for (int k = 0; k < 3; ++k) apply(world, cache_.at(corners[k]), out.v[k]);
+  return is_finite(out.v[0]) && is_finite(out.v[1]) && is_finite(out.v[2]);
+}
+
+void TriangleStream::report(const uint32_t* corners, const Transform& world) const {
+  const Node& node = document_.nodes[static_cast<size_t>(node_)];
+  const Primitive& primitive =
+      document_.meshes[static_cast<size_t>(binding_.mesh)].primitives[binding_.primitive];
+  std::string where = document_.name_node(node_);
+  if (node.instancing.present) where += ": instance " + std::to_string(instance_);
+  where += ": " + document_.name_mesh(binding_.mesh) + ": primitive " +
+           std::to_string(binding_.primitive) + ": triangle " +
+           std::to_string(window_first_ + static_cast<uint64_t>(corners - corners_.data()) / 3) +
+           ": ";
+  for (int k = 0; k < 3; ++k)
+    if (corners[k] >= vertex_count_)
+      refuse(document_.path, where + "index " + std::to_string(corners[k]) + " of " +
+                                 document_.name_accessor(primitive.indices) + ", there are " +
+                                 std::to_string(vertex_count_) + " vertices");
+  refuse(document_.path, where + "a vertex of " + document_.name_accessor(primitive.position) +
+                             (gltf::is_finite(world) ? " is not a finite position"
+                                                     : " is not finite once transformed"));
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,94 @@
+// Scenes of glTF files, one after the other, each one's default scene.
+#include <memory>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/integers.h"
+#include "core/scene/gltf/read_document.h"
+#include "core/scene/gltf/triangle_stream.h"
+#include "core/scene/triangle_source.h"
+
+namespace voxdag {
+namespace {
+
+// One checked file, kept open.
+struct SceneFile {
+  SceneFile(FileSystem& files, const std::string& path, MemoryBudget& budget)
+      : file(files.open_read(path)), document(gltf::read_document(*file, budget)) {
+    gltf::check_document(document);
+    charge = MemoryCharge(budget, document.memory_bytes(), "the nodes and meshes of " + path);
+    buffers = std::make_unique<gltf::BufferReader>(files, *file, document, budget);
+  }
+
+  const std::unique_ptr<ReadableFile> file;
+  gltf::Document document;
+  MemoryCharge charge;
+  std::unique_ptr<gltf::BufferReader> buffers;
+};
+
+// Instances counted.
+uint128 count_triangles(const gltf::Document& document, MemoryBudget& budget) {
+  uint128 total = 0;
+  gltf::NodeWalk walk(document, budget);
+  while (walk.next()) {
+    const gltf::Node& node = document.nodes[static_cast<size_t>(walk.node())];
+    uint128 per_instance = 0;
+    for (const auto& p : document.meshes[static_cast<size_t>(node.mesh)].primitives)
+      per_instance += gltf::triangle_count(document, p);
+    total += per_instance * gltf::instance_count(document, node);
+  }
+  return total;
+}
+
+class GltfScene : public TriangleSource {
+ public:
+  GltfScene(FileSystem& files, const std::vector<std::string>& paths, const SceneOptions& options,
+            MemoryBudget& budget, const CancelToken& cancel)
+      : options_(options), budget_(budget), cancel_(cancel) {
+    uint128 total = 0;
+    for (const std::string& path : paths) {
+      cancel.check();
+      files_.push_back(std::make_unique<SceneFile>(files, path, budget));
+      total += count_triangles(files_.back()->document, budget);
+      if (total > INT64_MAX)
+        throw Error(ErrorCode::kLimit, path + ": over 2^63 triangles, instances counted");
+    }
+    declared_ = static_cast<uint64_t>(total);
+  }
+
+  void for_each_batch(const std::function<void(std::span<const WorldTriangle>)>& visit) override {
+    invalid_ = 0;
+    gltf::Batch batch(visit, budget_, cancel_);
+    for (const auto& f : files_)
+      invalid_ +=
+          gltf::TriangleStream(f->document, *f->buffers, budget_, options_.skip_invalid, batch)
+              .run();
+    batch.flush();
+  }
+  uint64_t declared_triangles() const override { return declared_; }
+  uint64_t invalid_triangles() const override { return invalid_; }
+  std::vector<std::string> warnings() const override {
+    std::vector<std::string> all;
+    for (const auto& f : files_)
+      all.insert(all.end(), f->document.warnings.begin(), f->document.warnings.end());
+    return all;
+  }
+
+ private:
+  const SceneOptions options_;
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+  std::vector<std::unique_ptr<SceneFile>> files_;
+  uint64_t declared_ = 0;
+  uint64_t invalid_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
+                                           const SceneOptions& options, MemoryBudget& budget,
+                                           const CancelToken& cancel) {
+  return std::make_unique<GltfScene>(files, paths, options, budget, cancel);
+}
+
+}  // namespace voxdag
