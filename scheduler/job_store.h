@@ -1,0 +1,94 @@
+// What is durable of a build: the job, its subvolumes and their artifacts, timings and progress, in
+// one SQLite file of the work folder (WAL, synchronous = FULL, foreign keys).
+//
+// Invariants:
+//   1. A row names an artifact only after the artifact's bytes were synced.
+//   2. Subvolumes form a forest: a split one has its eight parts (those with triangles) as
+//   children;
+//      the leaves are what is built.
+//   3. All rows of one call are committed together or not at all.
+// The writer is one process (the work folder's lock sees to that) and may call from any thread;
+// readers (`voxdag status`) open the same file at any time.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/dag/sub_dag.h"
+#include "core/format/artifact.h"
+#include "core/geometry/cube.h"
+#include "scheduler/sqlite.h"
+#include "scheduler/stage_clock.h"
+
+namespace voxdag {
+
+// What must be the same for a build to go on where it was.
+struct JobIdentity {
+  std::string scene_sha256;  // of the grid and the snapped triangles
+  std::string geometry;      // geometry options as JSON, for messages
+  int64_t format_version = 0;
+  bool operator==(const JobIdentity&) const = default;
+};
+
+enum class SubvolumeState { kPlanned = 0, kBuilt = 1, kSplit = 2 };
+
+using SubvolumeId = int64_t;
+
+struct StoredSubvolume {
+  SubvolumeId id = 0;
+  Cube cube;
+  double weight = 0;
+  SubvolumeState state = SubvolumeState::kPlanned;
+  // Of the built ones; no artifact if `summary` is empty.
+  ArtifactRef artifact;
+  SubDagSummary summary;
+};
+
+// How far a build is, for those who look at it from outside.
+struct JobProgress {
+  std::string stage;
+  std::string unit;
+  uint64_t done = 0;
+  uint64_t total = 0;
+  double stage_started_s = 0;  // Unix time
+  double updated_s = 0;
+  uint64_t memory_bytes = 0;  // resident
+  uint64_t disk_bytes = 0;    // in the work folder
+  std::string last_error;
+};
+
+class JobStore {
+ public:
+  static constexpr int64_t kSchemaVersion = 1;
+  enum class Access { kBuild, kLook };
+
+  // Opens the store, creating it for kBuild. Throws Error{kCorrupt} for a damaged one,
+  // Error{kInvalidInput} for a database that is not ours, Error{kUnsupportedVersion}.
+  JobStore(const std::string& path, Access access);
+
+  std::optional<JobIdentity> job();
+  // A new job replaces whatever was there; all its subvolumes are planned.
+  void start(const JobIdentity& job, std::span<const StoredSubvolume> plan);
+  // All that are not split, in the order of their ids.
+  std::vector<StoredSubvolume> leaves();
+  void record_built(std::span<const StoredSubvolume> built);
+  // Returns the ids of the parts, in their order.
+  std::vector<SubvolumeId> record_split(SubvolumeId whole, std::span<const Cube> parts);
+  // Its artifact turned out damaged: it is planned again.
+  void record_lost(SubvolumeId id);
+
+  void add_stage_time(const StageTime& time);
+  std::vector<StageTime> stage_times();
+  void set_progress(const JobProgress& progress);
+  std::optional<JobProgress> progress();
+
+ private:
+  std::mutex mutex_;  // guards the connection
+  SqlDatabase database_;
+};
+
+}  // namespace voxdag

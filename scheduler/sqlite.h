@@ -1,0 +1,80 @@
+// The little of SQLite that the job store needs: a connection that cleans up, statements that bind
+// and step, and errors as voxdag::Error. sqlite3.h is included in sqlite.cc alone.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace voxdag {
+
+// One prepared statement. Parameters and columns count from 0.
+class SqlStatement {
+ public:
+  SqlStatement(sqlite3* database, std::string_view sql);
+  SqlStatement(SqlStatement&&) = default;
+
+  SqlStatement& bind(int parameter, int64_t value);
+  SqlStatement& bind(int parameter, double value);
+  SqlStatement& bind(int parameter, std::string_view text);
+  // 64-bit words are stored as the signed integer of the same bits.
+  SqlStatement& bind_word(int parameter, uint64_t word) {
+    return bind(parameter, static_cast<int64_t>(word));
+  }
+
+  // True if there is a row to read.
+  bool step();
+  // Steps a statement that gives no rows, and makes it ready to be bound again.
+  void run();
+  void reset();
+
+  int64_t integer(int column) const;
+  uint64_t word(int column) const { return static_cast<uint64_t>(integer(column)); }
+  double real(int column) const;
+  std::string text(int column) const;
+
+ private:
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  sqlite3* database_;
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+};
+
+class SqlDatabase {
+ public:
+  enum class Mode { kReadWrite, kReadOnly };
+  // Opens (and for kReadWrite creates) a database. Waits up to `busy_ms` for other processes.
+  SqlDatabase(const std::string& path, Mode mode, int busy_ms = 5000);
+
+  void execute(const std::string& sql);
+  SqlStatement prepare(std::string_view sql) { return SqlStatement(handle_.get(), sql); }
+  // The single integer that a query gives.
+  int64_t integer(const std::string& sql);
+
+ private:
+  struct Close {
+    void operator()(sqlite3* database) const;
+  };
+  std::unique_ptr<sqlite3, Close> handle_;
+};
+
+// Commits when told to, rolls back otherwise.
+class SqlTransaction {
+ public:
+  explicit SqlTransaction(SqlDatabase& database) : database_(database) {
+    database_.execute("BEGIN IMMEDIATE");
+  }
+  ~SqlTransaction();
+  void commit();
+
+ private:
+  SqlDatabase& database_;
+  bool open_ = true;
+};
+
+}  // namespace voxdag
