@@ -1,0 +1,358 @@
+// Reads voxdag's global file (.vdag): one header, no dependencies but the C++17 standard library
+// and POSIX; copy it into your engine. docs/format.md describes the file.
+//
+//     voxdag_reader::File dag("scene.vdag");               // throws voxdag_reader::Error
+//     bool set = dag.voxel(x, y, z);                       // 0 <= x, y, z < dag.resolution()
+//     dag.walk(visitor);                                   // depth first, with pruning
+//     const voxdag_reader::Level& level = dag.level(l);    // raw words, for an upload to the GPU
+//
+// Level l has cubes of edge R/2^l voxels, 0 is the root; bricks (4x4x4 voxels) are level
+// brick_level() = log2(R) - 2. Within a level everything is addressed by word offsets:
+//     brick:  [mask, low 32 bits] [mask, high 32 bits]     bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0
+//     node:   [child mask, 8 bits] [offset of each child in the next level, in child order]
+// with child index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
+//
+// Opening checks the header and that all it names lies within the file. Whatever else is in a
+// damaged file, no access leaves the mapping: a bad offset is an Error. check_blocks() compares the
+// data with its checksums. The file is mapped (or read whole, where mmap fails) and must not be
+// shortened while it is open. Immutable after opening: any number of threads may read.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace voxdag_reader {
+
+enum class Problem { kNotFound, kIo, kCorrupt, kUnsupportedVersion };
+
+class Error : public std::runtime_error {
+ public:
+  Error(Problem problem, const std::string& message)
+      : std::runtime_error(message), problem_(problem) {}
+  Problem problem() const { return problem_; }
+
+ private:
+  Problem problem_;
+};
+
+struct Level {
+  const uint32_t* words = nullptr;
+  uint64_t word_count = 0;
+  uint64_t node_count = 0;
+  uint64_t file_offset = 0;  // bytes
+};
+
+struct Node {
+  uint32_t child_mask = 0;
+  const uint32_t* children = nullptr;  // word offsets in the next level, in child order
+};
+
+// XXH64, seed 0.
+inline uint64_t xxh64(const unsigned char* bytes, size_t size) {
+  constexpr uint64_t p1 = 0x9e3779b185ebca87u, p2 = 0xc2b2ae3d27d4eb4fu, p3 = 0x165667b19e3779f9u,
+                     p4 = 0x85ebca77c2b2ae63u, p5 = 0x27d4eb2f165667c5u;
+  const auto rotate = [](uint64_t x, int r) { return x << r | x >> (64 - r); };
+  const auto read = [](const unsigned char* from, size_t count) {
+    uint64_t value = 0;
+    std::memcpy(&value, from, count);
+    return value;
+  };
+  const auto round = [&](uint64_t sum, uint64_t lane) { return rotate(sum + lane * p2, 31) * p1; };
+  const unsigned char *at = bytes, *const end = bytes + size;
+  uint64_t h = p5;
+  if (size >= 32) {
+    uint64_t sums[4] = {p1 + p2, p2, 0, 0 - p1};
+    for (; end - at >= 32; at += 32)
+      for (int i = 0; i < 4; ++i) sums[i] = round(sums[i], read(at + 8 * i, 8));
+    h = rotate(sums[0], 1) + rotate(sums[1], 7) + rotate(sums[2], 12) + rotate(sums[3], 18);
+    for (const uint64_t sum : sums) h = (h ^ round(0, sum)) * p1 + p4;
+  }
+  h += size;
+  for (; end - at >= 8; at += 8) h = rotate(h ^ round(0, read(at, 8)), 27) * p1 + p4;
+  if (end - at >= 4) {
+    h = rotate(h ^ read(at, 4) * p1, 23) * p2 + p3;
+    at += 4;
+  }
+  for (; at < end; ++at) h = rotate(h ^ *at * p5, 11) * p1;
+  h = (h ^ h >> 33) * p2;
+  h = (h ^ h >> 29) * p3;
+  return h ^ h >> 32;
+}
+
+// The bytes of a file, mapped or read.
+class Bytes {
+ public:
+  explicit Bytes(const std::string& path) {
+    const int fd = open_file(path);
+    struct stat s;
+    if (fstat(fd, &s) != 0 || !S_ISREG(s.st_mode)) {
+      ::close(fd);
+      throw Error(Problem::kIo, path + " is not a regular file");
+    }
+    size_ = static_cast<uint64_t>(s.st_size);
+    void* const map = size_ ? mmap(nullptr, size_, PROT_READ, MAP_SHARED, fd, 0) : MAP_FAILED;
+    if (map != MAP_FAILED)
+      map_ = map;
+    else
+      read_all(fd, path);
+    ::close(fd);
+  }
+  Bytes(const Bytes&) = delete;
+  Bytes& operator=(const Bytes&) = delete;
+  ~Bytes() {
+    if (map_) munmap(map_, size_);
+  }
+  // 8-byte aligned.
+  const unsigned char* data() const {
+    return static_cast<const unsigned char*>(map_ ? map_ : copy_.data());
+  }
+  uint64_t size() const { return size_; }
+
+ private:
+  static int open_file(const std::string& path) {
+    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd >= 0) return fd;
+    const Problem problem = errno == ENOENT || errno == ENOTDIR ? Problem::kNotFound : Problem::kIo;
+    throw Error(problem, "open " + path + ": " + strerror(errno));
+  }
+  void read_all(int fd, const std::string& path) {
+    copy_.resize(static_cast<size_t>((size_ + 7) / 8));
+    char* const to = reinterpret_cast<char*>(copy_.data());
+    for (uint64_t done = 0; done < size_;) {
+      const ssize_t n = ::read(fd, to + done, static_cast<size_t>(size_ - done));
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) {
+        ::close(fd);
+        throw Error(Problem::kIo, "read " + path + " at offset " + std::to_string(done));
+      }
+      done += static_cast<uint64_t>(n);
+    }
+  }
+
+  void* map_ = nullptr;
+  std::vector<uint64_t> copy_;
+  uint64_t size_ = 0;
+};
+
+class File {
+ public:
+  explicit File(const std::string& path) : path_(path), bytes_(path) { read_header(); }
+
+  const std::string& path() const { return path_; }
+  uint64_t file_bytes() const { return bytes_.size(); }
+  const unsigned char* data() const { return bytes_.data(); }
+  // Low corner of the grid in world space, and its edge; a voxel's edge is edge() / resolution().
+  const double (&origin() const)[3] { return origin_; }
+  double edge() const { return edge_; }
+  uint32_t grid_levels() const { return grid_levels_; }
+  int64_t resolution() const { return int64_t{1} << grid_levels_; }
+  uint32_t brick_level() const { return grid_levels_ - 2; }
+  uint32_t hash_bits() const { return hash_bits_; }
+  uint64_t voxels() const { return voxels_; }
+  uint64_t svo_nodes() const { return svo_nodes_; }
+  uint64_t dag_nodes() const { return dag_nodes_; }
+  bool empty() const { return dag_nodes_ == 0; }
+  const Level& level(uint32_t l) const { return levels_[l]; }
+
+  // The 64 voxels of a brick; `offset` counts words of level brick_level().
+  uint64_t brick(uint32_t offset) const {
+    const Level& bricks = levels_[brick_level()];
+    if (bricks.word_count < 2 || offset > bricks.word_count - 2) outside(brick_level(), offset);
+    return bricks.words[offset] | static_cast<uint64_t>(bricks.words[offset + uint64_t{1}]) << 32;
+  }
+  // A node of a level above the bricks.
+  Node node(uint32_t l, uint32_t offset) const {
+    const Level& nodes = levels_[l];
+    if (offset >= nodes.word_count) outside(l, offset);
+    const uint32_t mask = nodes.words[offset];
+    if (mask == 0 || mask > 255 ||
+        static_cast<uint64_t>(count_bits(mask)) >= nodes.word_count - offset)
+      outside(l, offset);
+    return {mask, nodes.words + offset + 1};
+  }
+  // Word offset of child `index` (0 to 7), which must be in the mask.
+  static uint32_t child(const Node& node, int index) {
+    return node.children[count_bits(node.child_mask & ((1u << index) - 1))];
+  }
+  static int brick_bit(int64_t x, int64_t y, int64_t z) {
+    return static_cast<int>((x & 2) << 4 | (y & 2) << 3 | (z & 2) << 2 | (x & 1) << 2 |
+                            (y & 1) << 1 | (z & 1));
+  }
+
+  // Whether a voxel is set; one outside the grid is not.
+  bool voxel(int64_t x, int64_t y, int64_t z) const {
+    const int64_t r = resolution();
+    if (empty() || x < 0 || y < 0 || z < 0 || x >= r || y >= r || z >= r) return false;
+    uint32_t offset = 0;
+    for (uint32_t l = 0; l < brick_level(); ++l) {
+      const int shift = static_cast<int>(grid_levels_ - 1 - l);
+      const int index =
+          static_cast<int>((x >> shift & 1) << 2 | (y >> shift & 1) << 1 | (z >> shift & 1));
+      const Node n = node(l, offset);
+      if (!(n.child_mask >> index & 1)) return false;
+      offset = child(n, index);
+    }
+    return brick(offset) >> brick_bit(x, y, z) & 1;
+  }
+
+  // Depth first, children in child order. Positions are low corners in voxels.
+  //     bool visitor.node(level, x, y, z, offset)   false: its subtree is passed over
+  //     void visitor.brick(x, y, z, mask, offset)
+  template <class Visitor>
+  void walk(Visitor&& visitor) const {
+    if (!empty()) walk_from(visitor, 0, 0, 0, 0, 0);
+  }
+
+  // Compares all blocks with their checksums; returns the byte offset of the first that differs, or
+  // 0 when all are right.
+  uint64_t first_damaged_block() const {
+    const unsigned char* const table = data() + table_offset_;
+    for (uint64_t block = 0; block < block_count(); ++block) {
+      const uint64_t begin = kPageBytes + block * kBlockBytes;
+      const uint64_t size = std::min<uint64_t>(kBlockBytes, table_offset_ - begin);
+      if (xxh64(data() + begin, static_cast<size_t>(size)) != get<uint64_t>(table + 8 * block))
+        return begin;
+    }
+    return 0;
+  }
+  void check_blocks() const {
+    if (const uint64_t block = first_damaged_block())
+      corrupt("the block at byte " + std::to_string(block) + " fails its checksum");
+  }
+
+ private:
+  static constexpr uint64_t kPageBytes = 4096, kBlockBytes = 65536;
+  static constexpr uint32_t kMaxBrickLevel = 18;
+
+  template <class T>
+  static T get(const unsigned char* at) {
+    T value;
+    std::memcpy(&value, at, sizeof(T));
+    return value;
+  }
+  static int count_bits(uint32_t mask) {
+    int count = 0;
+    for (; mask; mask &= mask - 1) ++count;
+    return count;
+  }
+  uint64_t block_count() const { return (bytes_.size() - table_offset_) / 8; }
+
+  [[noreturn]] void corrupt(const std::string& what) const {
+    throw Error(Problem::kCorrupt, path_ + ": " + what);
+  }
+  [[noreturn]] void outside(uint32_t l, uint32_t offset) const {
+    corrupt("level " + std::to_string(l) + ", word " + std::to_string(offset) +
+            ": no node lies here");
+  }
+  void expect(bool right, const char* what) const {
+    if (!right) corrupt(std::string("header: ") + what);
+  }
+
+  template <class Visitor>
+  void walk_from(Visitor& visitor, uint32_t l, uint32_t offset, int64_t x, int64_t y,
+                 int64_t z) const {
+    if (l == brick_level()) return static_cast<void>(visitor.brick(x, y, z, brick(offset), offset));
+    const Node n = node(l, offset);
+    if (!visitor.node(l, x, y, z, offset)) return;
+    const int64_t half = resolution() >> (l + 1);
+    const uint32_t* next = n.children;
+    for (int index = 0; index < 8; ++index)
+      if (n.child_mask >> index & 1)
+        walk_from(visitor, l + 1, *next++, x + (index >> 2 & 1) * half, y + (index >> 1 & 1) * half,
+                  z + (index & 1) * half);
+  }
+
+  void read_header() {
+    const unsigned char* const page = data();
+    static const unsigned char kMagic[8] = {0x89, 'V', 'D', 'A', 'G', '\n', 0x1a, '\n'};
+    if (bytes_.size() < sizeof(kMagic) || std::memcmp(page, kMagic, sizeof(kMagic)) != 0)
+      corrupt("not a voxdag file");
+    if (bytes_.size() < kPageBytes) corrupt("the file ends within its header");
+    const uint32_t version = get<uint32_t>(page + 8);
+    if (version != 1)
+      throw Error(Problem::kUnsupportedVersion,
+                  path_ + ": format version " + std::to_string(version) + ", expected 1");
+    expect(xxh64(page, kPageBytes - 8) == get<uint64_t>(page + kPageBytes - 8),
+           "its checksum is wrong");
+    grid_levels_ = get<uint32_t>(page + 16);
+    hash_bits_ = get<uint32_t>(page + 20);
+    expect(get<uint32_t>(page + 12) == kPageBytes && get<uint32_t>(page + 28) == kBlockBytes,
+           "expected pages of 4096 bytes and blocks of 65536");
+    expect(grid_levels_ >= 2 && grid_levels_ <= 20, "expected a resolution of 2^2 to 2^20");
+    expect(hash_bits_ >= 4 && hash_bits_ <= 64, "expected 4 to 64 hash bits");
+    std::memcpy(origin_, page + 32, sizeof(origin_));
+    edge_ = get<double>(page + 56);
+    expect(std::isfinite(origin_[0]) && std::isfinite(origin_[1]) && std::isfinite(origin_[2]) &&
+               std::isfinite(edge_) && edge_ > 0,
+           "expected finite bounds and an edge above 0");
+    voxels_ = get<uint64_t>(page + 64);
+    svo_nodes_ = get<uint64_t>(page + 72);
+    dag_nodes_ = get<uint64_t>(page + 80);
+    if (get<uint64_t>(page + 88) != bytes_.size())
+      corrupt("the file has " + std::to_string(bytes_.size()) + " bytes, expected " +
+              std::to_string(get<uint64_t>(page + 88)));
+    read_levels(page);
+    read_table(page);
+  }
+
+  // Levels lie one after the other, the bricks first, each at the start of a page.
+  void read_levels(const unsigned char* page) {
+    uint64_t end = kPageBytes, nodes = 0;
+    for (uint32_t l = brick_level() + 1; l-- > 0;) {
+      const unsigned char* const entry = page + 128 + 32 * l;
+      Level& level = levels_[l];
+      level.file_offset = get<uint64_t>(entry);
+      level.node_count = get<uint64_t>(entry + 8);
+      level.word_count = get<uint64_t>(entry + 16);
+      level.words = reinterpret_cast<const uint32_t*>(data() + kPageBytes);
+      if (dag_nodes_ == 0) {
+        expect(level.file_offset == 0 && level.node_count == 0 && level.word_count == 0,
+               "a level of an empty scene has nodes");
+        continue;
+      }
+      expect(level.file_offset == end, "a level does not follow the one below it");
+      expect(level.word_count <= uint64_t{1} << 32, "a level has over 2^32 words");
+      expect(4 * level.word_count <= bytes_.size() - end, "a level ends beyond the file");
+      expect(level.node_count > 0 && level.node_count <= level.word_count / 2,
+             "a level has more nodes than its words hold");
+      level.words = reinterpret_cast<const uint32_t*>(data() + level.file_offset);
+      nodes += level.node_count;
+      end = (end + 4 * level.word_count + kPageBytes - 1) / kPageBytes * kPageBytes;
+      expect(end <= bytes_.size(), "a level ends beyond the file");
+    }
+    expect(nodes == dag_nodes_, "the levels' nodes are not as many as counted");
+    table_offset_ = end;
+  }
+
+  void read_table(const unsigned char* page) const {
+    const uint64_t blocks = (table_offset_ - kPageBytes + kBlockBytes - 1) / kBlockBytes;
+    expect(get<uint64_t>(page + 96) == table_offset_ && get<uint64_t>(page + 104) == blocks &&
+               bytes_.size() - table_offset_ == 8 * blocks,
+           "the checksum table is not where the levels end, or not as long as they need");
+    expect(
+        xxh64(data() + table_offset_, static_cast<size_t>(8 * blocks)) == get<uint64_t>(page + 112),
+        "the checksum table fails its own checksum");
+  }
+
+  const std::string path_;
+  const Bytes bytes_;
+  double origin_[3] = {};
+  double edge_ = 0;
+  uint32_t grid_levels_ = 0, hash_bits_ = 0;
+  uint64_t voxels_ = 0, svo_nodes_ = 0, dag_nodes_ = 0, table_offset_ = 0;
+  Level levels_[kMaxBrickLevel + 1];
+};
+
+}  // namespace voxdag_reader
