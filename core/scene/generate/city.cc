@@ -1,0 +1,126 @@
+// A city of square blocks with streets between them: towers in the middle, houses at the edge,
+// some parks. The number of blocks follows from the triangles wanted.
+#include "core/scene/generate/city.h"
+
+#include <algorithm>
+
+#include "core/scene/generate/kinds.h"
+
+namespace voxdag {
+namespace {
+
+constexpr double kPitch = 64;         // from street to street
+constexpr double kBlock = 52;         // edge of a block, pavement included
+constexpr double kPavement = 0.1875;  // height
+constexpr double kBuilt = 48;         // edge of what lots may fill
+// Triangles of an average block, measured; makes `--triangles` come out about right.
+constexpr uint64_t kTrianglesPerBlock = 9900;
+
+class City {
+ public:
+  City(const GenerateOptions& options, SceneBuilder& scene)
+      : seed_(options.seed), scene_(scene), parts_(scene) {
+    const uint64_t blocks = std::max<uint64_t>(1, options.triangles / kTrianglesPerBlock);
+    while ((columns_ + 1) * (columns_ + 1) <= blocks) ++columns_;
+    rows_ = (blocks + columns_ / 2) / columns_;
+  }
+
+  void make() {
+    for (uint64_t column = 0; column < columns_; ++column)
+      for (uint64_t row = 0; row < rows_; ++row) make_block(column, row);
+  }
+
+ private:
+  void make_block(uint64_t column, uint64_t row) {
+    Random random(seed_, {column, row});
+    const Vec3 centre{
+        kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
+        kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
+    make_ground(centre);
+    make_street(centre, random);
+    const double central = centrality(column, row);
+    if (random.chance(10)) return make_park(centre, random);
+    make_lots(centre, central, random);
+  }
+
+  // 1 in the middle of the city, 0 at its edge.
+  double centrality(uint64_t column, uint64_t row) const {
+    const auto off_middle = [](uint64_t i, uint64_t count) {
+      const double middle = 0.5 * static_cast<double>(count - 1);
+      const double d = static_cast<double>(i) - middle;
+      return (d < 0 ? -d : d) / (middle + 0.5);
+    };
+    return 1 - std::max(off_middle(column, columns_), off_middle(row, rows_));
+  }
+
+  void make_ground(const Vec3& c) {
+    constexpr double kHalf = kPitch / 2, kHalfBlock = kBlock / 2;
+    scene_.room(4, 2).quad({c.x - kHalf, 0, c.z - kHalf}, {c.x - kHalf, 0, c.z + kHalf},
+                           {c.x + kHalf, 0, c.z + kHalf}, {c.x + kHalf, 0, c.z - kHalf});
+    scene_.room(8, 10).box({c.x - kHalfBlock, 0, c.z - kHalfBlock},
+                           {c.x + kHalfBlock, kPavement, c.z + kHalfBlock}, false);
+  }
+
+  // Trees on the pavement, cars beside it.
+  void make_street(const Vec3& c, Random& random) {
+    for (int side = 0; side < 4; ++side)
+      for (int step = -2; step <= 2; ++step) {
+        const double along = 9.5 * step, tree = side & 1 ? -25 : 25, car = side & 1 ? -27.5 : 27.5;
+        if (random.chance(60)) plant(place(c, side, along, tree, kPavement), random);
+        if (random.chance(30))
+          scene_.place(parts_.car[side / 2], place(c, side, along + 4.75, car, 0), {1, 1, 1});
+      }
+  }
+
+  // Sides 0 and 1 run along x, 2 and 3 along z.
+  static Vec3 place(const Vec3& c, int side, double along, double across, double height) {
+    return side < 2 ? Vec3{c.x + along, height, c.z + across}
+                    : Vec3{c.x + across, height, c.z + along};
+  }
+
+  void plant(const Vec3& foot, Random& random) {
+    const double height = 5 + 0.5 * random.below(9);
+    scene_.place(parts_.tree, foot, {height, height, height});
+  }
+
+  void make_park(const Vec3& c, Random& random) {
+    for (int i = 0; i < 7; ++i)
+      for (int j = 0; j < 7; ++j) {
+        const double x = 6.5 * (i - 3) + 0.25 * random.between(-8, 8);
+        const double z = 6.5 * (j - 3) + 0.25 * random.between(-8, 8);
+        if (random.chance(70)) plant({c.x + x, kPavement, c.z + z}, random);
+      }
+  }
+
+  // One tower, four buildings or nine small ones.
+  void make_lots(const Vec3& c, double central, Random& random) {
+    const int across = central > 0.7 && random.chance(40)   ? 1
+                       : central > 0.3 || random.chance(25) ? 2
+                                                            : 3;
+    const double width = kBuilt / across;
+    const double usual = 2 + (across == 3 ? 2 : 22 * central * central + (across == 1 ? 12 : 3));
+    for (int i = 0; i < across; ++i)
+      for (int j = 0; j < across; ++j) {
+        const Vec3 centre{c.x + width * (2 * i - across + 1) / 2, kPavement,
+                          c.z + width * (2 * j - across + 1) / 2};
+        const auto floors = static_cast<uint32_t>(usual * (0.5 + 0.75 * random.unit()) + 0.5);
+        const Lot lot{centre, width - 2.5, std::max(1u, floors)};
+        if (across == 3 && random.chance(30))
+          add_turned_house(scene_, lot, random);
+        else
+          add_building(scene_, parts_, lot, random);
+      }
+  }
+
+  const uint64_t seed_;
+  SceneBuilder& scene_;
+  const CityParts parts_;
+  uint64_t columns_ = 0;
+  uint64_t rows_ = 0;
+};
+
+}  // namespace
+
+void make_city(const GenerateOptions& options, SceneBuilder& scene) { City(options, scene).make(); }
+
+}  // namespace voxdag

@@ -1,0 +1,32 @@
+// The pieces of a generated city, in metres, y up. Sizes are small multiples of 1/64, so that a
+// window written out as triangles and the same window as an instance have exactly the same corners.
+#pragma once
+
+#include <cstdint>
+
+#include "core/scene/generate/random.h"
+#include "core/scene/generate/scene_builder.h"
+
+namespace voxdag {
+
+// Parts stored once: a stretch of wall with a window in it for each of four directions, a tree, a
+// car along x and one along z.
+struct CityParts {
+  explicit CityParts(SceneBuilder& scene);
+  uint32_t window[4];  // facing +z, +x, -z, -x; unit size, the pane set back by 1
+  uint32_t tree;       // unit height, standing on the origin
+  uint32_t car[2];
+};
+
+// The box that a building may fill.
+struct Lot {
+  Vec3 centre;  // on the ground
+  double width = 0;
+  uint32_t floors = 0;
+};
+
+void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, Random& random);
+// A small house at any angle, without windows.
+void add_turned_house(SceneBuilder& scene, const Lot& lot, Random& random);
+
+}  // namespace voxdag

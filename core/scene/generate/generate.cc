@@ -1,0 +1,110 @@
+#include "core/scene/generate/generate.h"
+
+#include "core/base/error.h"
+#include "core/scene/generate/glb_layout.h"
+#include "core/scene/generate/glb_writer.h"
+#include "core/scene/generate/kinds.h"
+
+namespace voxdag {
+namespace {
+
+constexpr SceneKindInfo kKinds[] = {
+    {SceneKind::kCity, "city", "streets, houses with rotated roofs, windows, trees", 1'000'000},
+    {SceneKind::kMenger, "menger", "Menger's sponge on the integer lattice", 0},
+    {SceneKind::kTerrain, "terrain", "a fractal heightfield", 1'000'000},
+    {SceneKind::kSoup, "soup", "random triangles, slivers and degenerate ones among them", 100'000},
+    {SceneKind::kSpheres, "spheres", "spheres of many sizes", 500'000},
+};
+
+constexpr uint32_t kMaxMengerLevel = 6;
+
+void check(const GenerateOptions& options) {
+  const SceneKindInfo& info = scene_kind(options.kind);
+  const std::string name = info.name;
+  const bool has_parts = options.kind == SceneKind::kCity || options.kind == SceneKind::kSpheres;
+  if (options.instances && !has_parts)
+    throw Error(ErrorCode::kInvalidInput, name + " has no repeated parts to write as instances");
+  if (options.kind == SceneKind::kMenger && options.triangles != 0)
+    throw Error(ErrorCode::kInvalidInput, "menger is sized by its level, not by triangles");
+  if (options.level > kMaxMengerLevel)
+    throw Error(ErrorCode::kInvalidInput, "a menger level of " + std::to_string(options.level) +
+                                              ": expected 0 to " + std::to_string(kMaxMengerLevel));
+}
+
+void make(const GenerateOptions& options, BlockSink& sink) {
+  SceneBuilder scene(sink, options.instances);
+  switch (options.kind) {
+    case SceneKind::kCity:
+      make_city(options, scene);
+      break;
+    case SceneKind::kMenger:
+      make_menger(options, scene);
+      break;
+    case SceneKind::kTerrain:
+      make_terrain(options, scene);
+      break;
+    case SceneKind::kSoup:
+      make_soup(options, scene);
+      break;
+    case SceneKind::kSpheres:
+      make_spheres(options, scene);
+      break;
+  }
+  scene.finish();
+}
+
+// The layout, told about progress and looking at `cancel`.
+class MeasuredLayout : public GlbLayout {
+ public:
+  MeasuredLayout(Progress& progress, const CancelToken& cancel)
+      : progress_(progress), cancel_(cancel) {}
+  void mesh(const Mesh& mesh) override {
+    cancel_.check();
+    GlbLayout::mesh(mesh);
+    progress_.advance(mesh.triangles());
+  }
+
+ private:
+  Progress& progress_;
+  const CancelToken& cancel_;
+};
+
+}  // namespace
+
+std::span<const SceneKindInfo> scene_kinds() { return kKinds; }
+
+const SceneKindInfo& scene_kind(std::string_view name) {
+  std::string names;
+  for (const SceneKindInfo& info : kKinds) {
+    if (info.name == name) return info;
+    names += (names.empty() ? "" : ", ") + std::string(info.name);
+  }
+  throw Error(ErrorCode::kInvalidInput, "no generated scene is called \"" + std::string(name) +
+                                            "\": expected one of " + names);
+}
+
+const SceneKindInfo& scene_kind(SceneKind kind) { return kKinds[static_cast<size_t>(kind)]; }
+
+GenerateReport generate_scene(FileSystem& files, const std::string& path,
+                              const GenerateOptions& given, Progress& progress,
+                              const CancelToken& cancel) {
+  check(given);
+  GenerateOptions options = given;
+  const SceneKindInfo& info = scene_kind(options.kind);
+  if (options.triangles == 0) options.triangles = info.default_triangles;
+
+  MeasuredLayout layout(progress, cancel);
+  progress.begin_stage("count", options.triangles, "triangles");
+  make(options, layout);
+  progress.end_stage();
+
+  progress.begin_stage("write", layout.stored_triangles(), "triangles");
+  const std::string generator = std::string("voxdag generate ") + info.name;
+  GlbWriter writer(files, path, layout.json_text(generator), layout.bin_bytes(), progress, cancel);
+  make(options, writer);
+  const uint64_t bytes = writer.finish();
+  progress.end_stage();
+  return {layout.triangles(), layout.stored_triangles(), layout.instance_count(), bytes};
+}
+
+}  // namespace voxdag

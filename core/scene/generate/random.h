@@ -1,0 +1,46 @@
+// Random numbers for generated scenes: splitmix64, the same everywhere (std:: distributions are
+// not). A generator is made for each thing from the seed and the thing's coordinates, so that what
+// one thing looks like does not hang on how many numbers another took.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+
+#include "core/base/integers.h"
+
+namespace voxdag {
+
+// One step of splitmix64's output function: a bijective mix of all bits.
+inline uint64_t mix_bits(uint64_t x) {
+  x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ x >> 27) * 0x94d049bb133111ebull;
+  return x ^ x >> 31;
+}
+
+class Random {
+ public:
+  Random(uint64_t seed, std::initializer_list<uint64_t> thing) : state_(mix_bits(seed)) {
+    for (uint64_t coordinate : thing) state_ = mix_bits((state_ + kStep) ^ coordinate);
+  }
+
+  uint64_t bits() { return mix_bits(state_ += kStep); }
+  // 0 to count - 1.
+  uint32_t below(uint32_t count) {
+    return static_cast<uint32_t>((static_cast<uint128>(bits()) * count) >> 64);
+  }
+  // low to high, both included.
+  int between(int low, int high) {
+    return low + static_cast<int>(below(static_cast<uint32_t>(high - low + 1)));
+  }
+  bool chance(uint32_t percent) { return below(100) < percent; }
+  // A multiple of 2^-24 in [0, 1).
+  double unit() { return static_cast<double>(bits() >> 40) * 0x1p-24; }
+  // In [-1, 1).
+  double signed_unit() { return 2.0 * unit() - 1.0; }
+
+ private:
+  static constexpr uint64_t kStep = 0x9e3779b97f4a7c15ull;
+  uint64_t state_;
+};
+
+}  // namespace voxdag
