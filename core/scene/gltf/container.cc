@@ -1,7 +1,7 @@
 #include "core/scene/gltf/container.h"
 
-#include <algorithm>
 #include <array>
+#include <string_view>
 
 #include "core/base/error.h"
 
@@ -62,11 +62,21 @@ Container read_glb(const ReadableFile& file) {
   return container;
 }
 
+// White space, an opening brace or a byte order mark.
+bool may_be_json(const ReadableFile& file) {
+  std::array<std::byte, 1> first;
+  file.read_at(0, first);
+  return std::string_view(" \t\r\n{\xef").find(static_cast<char>(first[0])) !=
+         std::string_view::npos;
+}
+
 }  // namespace
 
 Container read_container(const ReadableFile& file) {
   if (file.size() == 0) refuse(file.path(), "is empty, expected a .glb or .gltf scene");
   const bool is_glb = file.size() >= 4 && read_u32(file, 0) == kMagic;
+  if (!is_glb && !may_be_json(file))
+    refuse(file.path(), "is neither a GLB, which begins with \"glTF\", nor JSON");
   const Container container = is_glb ? read_glb(file) : Container{{0, file.size()}, false, {}};
   if (container.json.size > kLongestJson)
     throw Error(ErrorCode::kLimit, file.path() + ": its JSON has " +

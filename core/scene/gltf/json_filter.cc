@@ -129,7 +129,10 @@ class Filter : public nlohmann::json_sax<json> {
     }
     emit(*s, std::string_view(&bracket, 1));
     frames_.push_back({s, 0, 0, {}});
-    if (s->keep == Keep::kParsed) separator_due_ = false;
+    if (s->keep == Keep::kParsed) {
+      separator_due_ = false;
+      if (type == JsonType::kObject) ++out_.object_count;
+    }
     if (type == JsonType::kObject && s->keep == Keep::kBuffer) out_.buffers.emplace_back();
     return true;
   }
@@ -156,6 +159,7 @@ class Filter : public nlohmann::json_sax<json> {
       out_.text += json(frames_.back().key).dump() + ":";
     out_.text += value;
     separator_due_ = true;
+    ++out_.value_count;
     const uint64_t bytes = out_.text.capacity();
     if (bytes > out_.charge.bytes() && !out_.charge.try_resize(bytes + kChargeStepBytes))
       throw Error(ErrorCode::kOutOfMemory, "out of memory: the JSON of " + path_ + " needs over " +

@@ -15,7 +15,9 @@ namespace voxdag::gltf {
 
 struct FilteredJson {
   std::string text;
-  MemoryCharge charge;  // for `text`
+  uint64_t object_count = 0;  // in `text`
+  uint64_t value_count = 0;   // in `text`, objects and arrays included
+  MemoryCharge charge;        // for `text`
   std::string version;
   std::string min_version;
   std::vector<std::string> extensions_used;

@@ -31,17 +31,15 @@ inline void apply(const Transform& transform, const double* local, double* world
   }
 }
 
-// T * R * S. The quaternion (x, y, z, w) need not be of unit length: it is divided by its norm
-// squared where products of two of its components are taken, which needs no square root. A zero
-// quaternion gives a transform that is not finite.
+// T * R * S. The quaternion (x, y, z, w) is taken as it is given, of unit length or (quantized
+// ones) nearly so, as every other reader of glTF takes it.
 inline Transform from_trs(const std::array<double, 3>& t, const std::array<double, 4>& r,
                           const std::array<double, 3>& s) {
   const double x = r[0], y = r[1], z = r[2], w = r[3];
-  const double k = 2.0 / (((x * x + y * y) + z * z) + w * w);
   const double rotation[3][3] = {
-      {1.0 - k * (y * y + z * z), k * (x * y - z * w), k * (x * z + y * w)},
-      {k * (x * y + z * w), 1.0 - k * (x * x + z * z), k * (y * z - x * w)},
-      {k * (x * z - y * w), k * (y * z + x * w), 1.0 - k * (x * x + y * y)}};
+      {1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)},
+      {2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)},
+      {2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)}};
   Transform transform;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) transform.m[i][j] = rotation[i][j] * s[static_cast<size_t>(j)];
