@@ -40,6 +40,7 @@ void run(const BuildCommand& command, CommandContext& context) {
   BuildSpec spec = command.options.spec();
   spec.run.output = command.run.output;
   spec.run.keep_work = command.run.keep_work;
+  spec.run.restart = command.run.restart;
   spec.run.force = command.run.force;
   const auto progress = make_progress_bar();
   const BuildReport report = run_build(spec, {context.files, *progress, context.cancel});
@@ -57,6 +58,7 @@ void add_build_command(CLI::App& app, CommandContext& context) {
   state->options.declare(*command);
   command->add_option("-o,--output", state->run.output, "the .vdag file to make")->required();
   command->add_flag("--keep-work", state->run.keep_work, "leave the temporary files");
+  command->add_flag("--restart", state->run.restart, "start over, whatever the work folder holds");
   command->add_flag("--force", state->run.force, "build even if the estimate says it cannot fit");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
   command->set_config("--config", "", "read options from a file");

@@ -33,7 +33,8 @@ struct RunOptions {
   uint64_t subvolume_edge = 0;   // voxels, a power of two; 0 for a choice by the plan
   std::string backend = "auto";  // auto or cpu
   bool keep_work = false;
-  bool force = false;  // build though the estimate says that it cannot fit
+  bool restart = false;  // start over, whatever the work folder holds
+  bool force = false;    // build though the estimate says that it cannot fit
 };
 
 struct BuildSpec {

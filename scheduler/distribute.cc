@@ -2,10 +2,10 @@
 
 namespace voxdag {
 
-CubeTree::CubeTree(uint32_t grid_levels, const Cube& root, std::span<const SubvolumePlan> leaves)
+CubeTree::CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves)
     : grid_levels_(grid_levels), root_(root), nodes_(1) {
   for (size_t leaf = 0; leaf < leaves.size(); ++leaf) {
-    const Cube& cube = leaves[leaf].cube;
+    const Cube& cube = leaves[leaf];
     int32_t node = 0;
     for (uint32_t level = root.level + 1; level <= cube.level; ++level) {
       const uint32_t up = cube.level - level;

@@ -7,7 +7,6 @@
 
 #include "core/base/cancel_token.h"
 #include "scheduler/cube_walk.h"
-#include "scheduler/top_tree.h"
 #include "scheduler/triangle_bins.h"
 
 namespace voxdag {
@@ -15,7 +14,7 @@ namespace voxdag {
 // The tree above a set of disjoint cubes, to find which of them a triangle touches.
 class CubeTree {
  public:
-  CubeTree(uint32_t grid_levels, const Cube& root, std::span<const SubvolumePlan> leaves);
+  CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves);
   // Calls visit(index into leaves) for every leaf that the triangle touches.
   template <class Visit>
   void for_each_touched(const FixedTriangle& triangle, const Visit& visit) const {

@@ -7,8 +7,9 @@
 #include <optional>
 #include <thread>
 
-#include "core/dag/brick.h"
+#include "core/base/error.h"
 #include "scheduler/distribute.h"
+#include "scheduler/journal.h"
 
 namespace voxdag {
 namespace {
@@ -45,10 +46,16 @@ class Queue {
     }
     changed_.notify_all();
   }
-  void fail(std::exception_ptr failure) {
-    std::lock_guard lock(mutex_);
-    if (!failure_) failure_ = failure;
-    changed_.notify_all();
+  // Runs a worker's code; what it throws stops all workers.
+  template <class Code>
+  void guard(const Code& code) {
+    try {
+      code();
+    } catch (...) {
+      std::lock_guard lock(mutex_);
+      if (!failure_) failure_ = std::current_exception();
+      changed_.notify_all();
+    }
   }
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
@@ -64,13 +71,15 @@ class Queue {
 
 class Worker {
  public:
-  Worker(const ExecutorOptions& options, uint32_t id, TriangleBins& bins, FileSystem& files,
-         MemoryBudget& budget, uint64_t share_bytes, const CancelToken& cancel)
+  Worker(const ExecutorOptions& options, uint32_t number, TriangleBins& bins, JobStore& store,
+         MemoryBudget& budget, uint64_t share_bytes, const Seams& seams)
       : options_(options),
         bins_(bins),
-        cancel_(cancel),
+        store_(store),
+        cancel_(seams.cancel),
         share_(share_bytes, &budget),
-        segment_(files, options.segment_folder, id, budget),
+        segment_(seams.files, options.segment_folder, options.first_segment_id + number, budget),
+        journal_(store, segment_),
         backend_(options.open_backend()) {}
 
   // Builds one subvolume, or answers with the eight that replace it.
@@ -80,99 +89,100 @@ class Worker {
     const SubvolumeTask task{options_.grid_levels, subvolume.cube, options_.hash_bits};
     const auto triangles = bins_.open(subvolume.bin);
     ArtifactWriter artifact(segment_, options_.grid_levels, options_.hash_bits);
-    SubDagSummary summary;
-    if (backend_->build(task, *triangles, share_, cancel_, artifact, summary) ==
+    StoredSubvolume built;
+    if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
         BuildOutcome::kOutgrown)
       return split(subvolume);
     bins_.drop(subvolume.bin);
-    ++results.built;
-    if (!summary.empty()) admit(subvolume.cube, summary, artifact);
+    built.id = subvolume.id;
+    if (!built.summary.empty()) {
+      const ArtifactRoot root{subvolume.cube, 0, built.summary.root_hash, built.summary.voxels,
+                              built.summary.svo_nodes};
+      built.artifact = artifact.finish({&root, 1});
+    }
+    journal_.built(built);
     return {};
   }
-  void finish() { segment_.flush(); }
-
-  BuiltSubvolumes results;
+  // What was built is durable and readable from here on.
+  void finish() { journal_.commit(); }
+  uint64_t splits() const { return splits_; }
 
  private:
-  void admit(const Cube& cube, const SubDagSummary& summary, ArtifactWriter& artifact) {
-    const ArtifactRoot root{cube, 0, summary.root_hash, summary.voxels, summary.svo_nodes};
-    results.artifacts.push_back(artifact.finish({&root, 1}));
-    results.artifact_bytes += results.artifacts.back().bytes;
-    results.artifact_nodes += summary.dag_nodes;
-  }
-
   std::vector<QueuedSubvolume> split(const QueuedSubvolume& subvolume) {
     if (subvolume.cube.edge_voxels(options_.grid_levels) <= kSmallestEdge)
       throw Error(ErrorCode::kOutOfMemory, "a subvolume of " + std::to_string(kSmallestEdge) +
                                                " voxels an edge does not fit a worker's share of " +
                                                std::to_string(share_.limit()) +
                                                " bytes: give it more memory (--memory)");
-    std::vector<SubvolumePlan> parts(8);
+    std::vector<Cube> parts(8);
     std::vector<BinId> part_bins(8);
     for (int c = 0; c < 8; ++c) {
-      parts[c].cube = subvolume.cube.child(c);
+      parts[c] = subvolume.cube.child(c);
       part_bins[c] = bins_.add_bin();
     }
     const CubeTree tree(options_.grid_levels, subvolume.cube, parts);
     distribute(bins_, subvolume.bin, tree, part_bins, kSplitBufferBytes, cancel_);
     std::vector<QueuedSubvolume> queued;
-    for (int c = 0; c < 8; ++c)
-      if (bins_.count(part_bins[c]) > 0)
-        queued.push_back({parts[c].cube, part_bins[c], subvolume.weight / 8});
-    ++results.split;
+    std::vector<Cube> cubes;
+    for (int c = 0; c < 8; ++c) {
+      if (bins_.count(part_bins[c]) == 0) continue;
+      queued.push_back({0, parts[c], part_bins[c], subvolume.weight / 8});
+      cubes.push_back(parts[c]);
+    }
+    const std::vector<SubvolumeId> ids = store_.record_split(subvolume.id, cubes);
+    for (size_t i = 0; i < ids.size(); ++i) queued[i].id = ids[i];
+    ++splits_;
     return queued;
   }
 
   const ExecutorOptions& options_;
   TriangleBins& bins_;
+  JobStore& store_;
   const CancelToken& cancel_;
   MemoryBudget share_;
   SegmentWriter segment_;
+  Journal journal_;
   std::unique_ptr<Backend> backend_;
+  uint64_t splits_ = 0;
 };
 
 }  // namespace
 
-BuiltSubvolumes build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> heap,
-                                 TriangleBins& bins, FileSystem& files, MemoryBudget& budget,
-                                 Progress& progress, const CancelToken& cancel) {
+uint64_t build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> heap,
+                          TriangleBins& bins, JobStore& store, MemoryBudget& budget,
+                          const Seams& seams) {
   uint64_t total = heap.size();
   Queue queue(std::move(heap));
   const uint64_t share_bytes = budget.available() / options.threads;
   std::vector<std::unique_ptr<Worker>> workers;
   for (unsigned i = 0; i < options.threads; ++i)
     workers.push_back(
-        std::make_unique<Worker>(options, i, bins, files, budget, share_bytes, cancel));
+        std::make_unique<Worker>(options, i, bins, store, budget, share_bytes, seams));
   std::mutex progress_mutex;
   const auto work = [&](Worker& worker) {
-    try {
-      while (const auto subvolume = queue.take()) {
-        const auto parts = worker.build(*subvolume);
-        queue.done(parts);
-        std::lock_guard lock(progress_mutex);
-        if (!parts.empty()) progress.set_total(total += parts.size() - 1);
-        if (parts.empty()) progress.advance(1);
+    while (const auto subvolume = queue.take()) {
+      const auto parts = worker.build(*subvolume);
+      queue.done(parts);
+      std::lock_guard lock(progress_mutex);
+      if (parts.empty()) {
+        seams.progress.advance(1);
+      } else {
+        seams.progress.set_total(total += parts.size() - 1);
       }
-      worker.finish();
-    } catch (...) {
-      queue.fail(std::current_exception());
     }
   };
   std::vector<std::thread> threads;
-  for (const auto& worker : workers) threads.emplace_back(work, std::ref(*worker));
+  for (const auto& worker : workers)
+    threads.emplace_back([&work, &queue, &worker] {
+      queue.guard([&] { work(*worker); });
+      // Also after a failure: what is finished is not lost.
+      queue.guard([&] { worker->finish(); });
+    });
   for (std::thread& thread : threads) thread.join();
   queue.rethrow_failure();
-
-  BuiltSubvolumes sum;
-  for (const auto& worker : workers) {
-    const BuiltSubvolumes& part = worker->results;
-    sum.artifacts.insert(sum.artifacts.end(), part.artifacts.begin(), part.artifacts.end());
-    sum.built += part.built;
-    sum.split += part.split;
-    sum.artifact_bytes += part.artifact_bytes;
-    sum.artifact_nodes += part.artifact_nodes;
-  }
-  return sum;
+  uint64_t splits = 0;
+  for (const auto& worker : workers) splits += worker->splits();
+  return splits;
 }
 
 }  // namespace voxdag

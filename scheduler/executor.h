@@ -1,6 +1,6 @@
 // Builds subvolumes on worker threads: each takes the heaviest one left, builds it with its own
-// backend, and appends the artifact to its own segment file. A subvolume that outgrows the worker's
-// share of memory is split in eight and comes back as eight.
+// backend, appends the artifact to its own segment file and journals it. A subvolume that outgrows
+// the worker's share of memory is split in eight and comes back as eight.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,16 @@
 #include <vector>
 
 #include "core/backend/backend.h"
-#include "core/base/progress.h"
 #include "core/format/artifact.h"
+#include "scheduler/build_spec.h"
+#include "scheduler/job_store.h"
 #include "scheduler/triangle_bins.h"
 
 namespace voxdag {
 
 // A subvolume task as the executor holds it: what defines it, and where its triangles lie.
 struct QueuedSubvolume {
+  SubvolumeId id = 0;
   Cube cube;
   BinId bin = 0;
   double weight = 0;  // heavier ones go first
@@ -30,20 +32,14 @@ struct ExecutorOptions {
   int64_t longest_edge = INT64_MAX;
   std::function<std::unique_ptr<Backend>()> open_backend;
   std::string segment_folder;
+  uint32_t first_segment_id = 0;
 };
 
-struct BuiltSubvolumes {
-  std::vector<ArtifactRef> artifacts;  // in no particular order
-  uint64_t built = 0;                  // empty ones included
-  uint64_t split = 0;
-  uint64_t artifact_bytes = 0;
-  uint64_t artifact_nodes = 0;
-};
-
-// Builds all of `queue`; the bins are dropped as they are used up. Throws the first Error of any
-// worker, after all have stopped.
-BuiltSubvolumes build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> queue,
-                                 TriangleBins& bins, FileSystem& files, MemoryBudget& budget,
-                                 Progress& progress, const CancelToken& cancel);
+// Builds all of `queue`, each result recorded in `store`; the bins are dropped as they are used up.
+// Returns how many subvolumes were split. Throws the first Error of any worker after all have
+// stopped and what was finished is recorded.
+uint64_t build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> queue,
+                          TriangleBins& bins, JobStore& store, MemoryBudget& budget,
+                          const Seams& seams);
 
 }  // namespace voxdag

@@ -23,6 +23,7 @@ struct IngestCounts {
   uint64_t triangles = 0;        // that may touch the grid
   uint64_t dropped_outside = 0;  // their boxes miss it
   double expected_voxels = 0;    // each triangle's own, shared voxels counted twice
+  std::string sha256;            // of the grid and the snapped triangles: names the content
 };
 
 // Streams the scene into `bin` and counts it into `top`. Throws Error{kLimit} for a triangle that
@@ -31,8 +32,8 @@ IngestCounts ingest(TriangleSource& scene, const Grid& grid, TriangleBins& bins,
                     TopTree& top, const Seams& seams);
 
 // Hands the triangles of `bin` down to the planned subvolumes, which are then ready to build.
-std::vector<QueuedSubvolume> hand_down(const std::vector<SubvolumePlan>& plan, uint32_t grid_levels,
-                                       TriangleBins& bins, BinId bin, size_t buffer_bytes,
-                                       const CancelToken& cancel);
+std::vector<QueuedSubvolume> hand_down(std::span<const StoredSubvolume> planned,
+                                       uint32_t grid_levels, TriangleBins& bins, BinId bin,
+                                       size_t buffer_bytes, const CancelToken& cancel);
 
 }  // namespace voxdag

@@ -186,7 +186,7 @@ std::vector<StageTime> JobStore::stage_times() {
   return times;
 }
 
-void JobStore::set_progress(const JobProgress& p) {
+void JobStore::set_progress(const ProgressSnapshot& p) {
   std::lock_guard lock(mutex_);
   database_.prepare("INSERT OR REPLACE INTO progress VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .bind(0, p.stage)
@@ -201,14 +201,14 @@ void JobStore::set_progress(const JobProgress& p) {
       .run();
 }
 
-std::optional<JobProgress> JobStore::progress() {
+std::optional<ProgressSnapshot> JobStore::progress() {
   std::lock_guard lock(mutex_);
   auto query = database_.prepare(
       "SELECT stage, unit, done, total, stage_started_s, updated_s, memory_bytes, disk_bytes, "
       "last_error FROM progress");
   if (!query.step()) return std::nullopt;
-  return JobProgress{query.text(0), query.text(1), query.word(2), query.word(3), query.real(4),
-                     query.real(5), query.word(6), query.word(7), query.text(8)};
+  return ProgressSnapshot{query.text(0), query.text(1), query.word(2), query.word(3), query.real(4),
+                          query.real(5), query.word(6), query.word(7), query.text(8)};
 }
 
 }  // namespace voxdag

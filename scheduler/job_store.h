@@ -49,7 +49,7 @@ struct StoredSubvolume {
 };
 
 // How far a build is, for those who look at it from outside.
-struct JobProgress {
+struct ProgressSnapshot {
   std::string stage;
   std::string unit;
   uint64_t done = 0;
@@ -83,8 +83,8 @@ class JobStore {
 
   void add_stage_time(const StageTime& time);
   std::vector<StageTime> stage_times();
-  void set_progress(const JobProgress& progress);
-  std::optional<JobProgress> progress();
+  void set_progress(const ProgressSnapshot& progress);
+  std::optional<ProgressSnapshot> progress();
 
  private:
   std::mutex mutex_;  // guards the connection

@@ -22,6 +22,20 @@ uint64_t cgroup_memory() {
   return least;
 }
 
+// A size that the kernel tells about this process; 0 where it does not.
+uint64_t status_bytes(const std::string& name) {
+  std::ifstream status("/proc/self/status");
+  std::string line;
+  while (std::getline(status, line)) {
+    if (!line.starts_with(name)) continue;
+    std::istringstream fields(line.substr(name.size()));
+    uint64_t kib = 0;
+    fields >> kib;
+    return kib << 10;
+  }
+  return 0;
+}
+
 }  // namespace
 
 uint64_t default_memory() {
@@ -30,17 +44,7 @@ uint64_t default_memory() {
   return std::max(kLeastMemory, std::min(ram, cgroup_memory()) / 2);
 }
 
-uint64_t peak_resident_bytes() {
-  std::ifstream status("/proc/self/status");
-  std::string line;
-  while (std::getline(status, line)) {
-    if (!line.starts_with("VmHWM:")) continue;
-    std::istringstream fields(line.substr(6));
-    uint64_t kib = 0;
-    fields >> kib;
-    return kib << 10;
-  }
-  return 0;
-}
+uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }
+uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
 
 }  // namespace voxdag

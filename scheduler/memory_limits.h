@@ -12,5 +12,7 @@ inline constexpr uint64_t kLeastMemory = uint64_t{64} << 20;
 uint64_t default_memory();
 // Largest resident set of this process so far (VmHWM), in bytes.
 uint64_t peak_resident_bytes();
+// What it holds now (VmRSS), in bytes.
+uint64_t resident_bytes();
 
 }  // namespace voxdag

@@ -1,11 +1,15 @@
 #include "scheduler/run_build.h"
 
+#include <algorithm>
+#include <set>
+
 #include "core/backend/backend.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/global_writer.h"
 #include "merge/merge.h"
 #include "scheduler/estimate.h"
+#include "scheduler/job_progress.h"
 #include "scheduler/memory_limits.h"
 #include "scheduler/prepare.h"
 #include "scheduler/work_folder.h"
@@ -17,17 +21,20 @@ namespace {
 constexpr uint32_t kLevelsWorthAnEstimate = 12;
 // The pilot of the check before a build is this much coarser, so that it costs next to nothing.
 constexpr uint32_t kLevelsBelowForTheCheck = 5;
+// Of artifacts and job store; another number is another job.
+constexpr int64_t kWorkFormatVersion = 1;
 
-// One build, stage by stage.
+// One build, stage by stage; what the work folder already has is not built again.
 class Build {
  public:
   Build(const BuildSpec& spec, const Seams& seams)
       : spec_(checked(spec)),
-        seams_(seams),
         budget_(spec_.run.memory_bytes),
         work_(seams.files,
-              spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder) {
-    if (spec_.run.keep_work) work_.keep();
+              spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder),
+        store_(std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild)),
+        progress_(seams.progress, *store_, work_),
+        seams_{seams.files, progress_, seams.cancel} {
     report_.output = spec_.run.output;
     report_.hash_bits = spec_.geometry.hash_bits;
     report_.threads = spec_.run.threads;
@@ -35,10 +42,23 @@ class Build {
   }
 
   BuildReport run() {
+    try {
+      return run_to_the_end();
+    } catch (const Error& error) {
+      // Without a job there is nothing to go on with; with one, the folder is what resumes it.
+      const bool resumable = store_->job().has_value();
+      if (resumable) progress_.record_failure(error);
+      if (!resumable) remove_work();
+      throw;
+    }
+  }
+
+ private:
+  BuildReport run_to_the_end() {
     const double start = wall_seconds();
-    const std::vector<ArtifactRef> artifacts = build();
+    build_missing();
     GlobalFileWriter out(seams_.files, spec_.run.output, report_.grid, report_.hash_bits);
-    merge(artifacts, out);
+    merge(out);
     write(out);
     report_.stages = clock_.stages();
     report_.wall_s = wall_seconds() - start;
@@ -46,44 +66,85 @@ class Build {
     report_.peak_rss_bytes = peak_resident_bytes();
     write_file_atomically(seams_.files, spec_.run.output + ".report.json",
                           report_json(report_) + "\n");
+    if (!spec_.run.keep_work) remove_work();
     return report_;
   }
 
- private:
-  // Scan, ingest, and all subvolumes; what they hold in memory is gone when it returns.
-  std::vector<ArtifactRef> build() {
-    PreparedScene scene = prepare_scene(spec_, work_.spill_path(), budget_, clock_, seams_);
+  void remove_work() {
+    progress_.detach();
+    store_.reset();
+    work_.remove();
+  }
+
+  // Scan, ingest, and all subvolumes that are not built yet; what they hold in memory is gone when
+  // it returns.
+  void build_missing() {
+    const PreparedScene scene = prepare_scene(spec_, work_.spill_path(), budget_, clock_, seams_);
     report_.grid = scene.grid;
     report_.triangles = scene.counts.triangles;
     report_.dropped_outside = scene.counts.dropped_outside;
     report_.dropped_invalid = scene.dropped_invalid;
     if (report_.triangles == 0)
       seams_.progress.warn("the scene has no triangles in the grid: the file will have no nodes");
-    check_room(scene);
+    start_or_resume(scene);
 
-    const uint32_t levels = scene.grid.levels;
-    std::vector<QueuedSubvolume> queue =
-        hand_down(scene.plan, levels, *scene.bins, scene.whole, budget_.limit() / 8, seams_.cancel);
+    std::vector<StoredSubvolume> leaves = store_->leaves();
+    std::erase_if(leaves,
+                  [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });
+    if (!leaves.empty()) build_subvolumes_of(scene, leaves);
+    report_.spill_bytes = scene.bins->spilled_bytes();
+    const std::vector<StoredSubvolume> all = store_->leaves();
+    report_.subvolumes = all.size();
+    report_.subvolumes_reused = all.size() - std::min(all.size(), built_now_);
+    for (const StoredSubvolume& subvolume : all) {
+      report_.artifact_bytes += subvolume.artifact.bytes;
+      report_.artifact_nodes += subvolume.summary.dag_nodes;
+    }
+  }
+
+  void start_or_resume(const PreparedScene& scene) {
+    const JobIdentity job{scene.counts.sha256, geometry_json(spec_.geometry), kWorkFormatVersion};
+    const auto stored = store_->job();
+    if (stored && !spec_.run.restart) {
+      if (*stored != job)
+        throw Error(ErrorCode::kInvalidInput,
+                    "the work folder " + work_.path() +
+                        " holds another job: " + difference(*stored, job) +
+                        "; give another folder (--work) or start over (--restart)");
+    } else {
+      check_room(scene);
+      std::vector<StoredSubvolume> plan(scene.plan.size());
+      for (size_t i = 0; i < plan.size(); ++i) {
+        plan[i].cube = scene.plan[i].cube;
+        plan[i].weight = scene.plan[i].weight;
+      }
+      store_->start(job, plan);
+    }
+    std::set<uint32_t> named;
+    for (const StoredSubvolume& subvolume : store_->leaves())
+      if (subvolume.state == SubvolumeState::kBuilt) named.insert(subvolume.artifact.segment);
+    work_.remove_garbage([&](uint32_t segment) { return named.contains(segment); });
+  }
+
+  void build_subvolumes_of(const PreparedScene& scene, std::span<const StoredSubvolume> planned) {
+    std::vector<QueuedSubvolume> queue = hand_down(planned, scene.grid.levels, *scene.bins,
+                                                   scene.whole, budget_.limit() / 8, seams_.cancel);
     clock_.finish("distribute");
     ExecutorOptions options;
-    options.grid_levels = levels;
+    options.grid_levels = scene.grid.levels;
     options.hash_bits = spec_.geometry.hash_bits;
     options.threads = spec_.run.threads;
     if (spec_.run.subvolume_edge)
       options.longest_edge = static_cast<int64_t>(spec_.run.subvolume_edge);
     options.open_backend = [] { return make_cpu_backend(); };
     options.segment_folder = work_.path();
+    options.first_segment_id = work_.next_segment_id();
     seams_.progress.begin_stage("build", queue.size(), "subvolumes");
-    BuiltSubvolumes built = build_subvolumes(options, std::move(queue), *scene.bins, seams_.files,
-                                             budget_, seams_.progress, seams_.cancel);
+    built_now_ = queue.size();
+    report_.subvolumes_split =
+        build_subvolumes(options, std::move(queue), *scene.bins, *store_, budget_, seams_);
     seams_.progress.end_stage();
-    report_.subvolumes = built.built;
-    report_.subvolumes_split = built.split;
-    report_.artifact_bytes = built.artifact_bytes;
-    report_.artifact_nodes = built.artifact_nodes;
-    report_.spill_bytes = scene.bins->spilled_bytes();
     clock_.finish("build");
-    return std::move(built.artifacts);
   }
 
   // Refuses a build that cannot fit before any work is done.
@@ -95,11 +156,12 @@ class Build {
     clock_.finish("estimate");
   }
 
-  void merge(const std::vector<ArtifactRef>& artifacts, GlobalFileWriter& out) {
+  void merge(GlobalFileWriter& out) {
     MergeInputs inputs;
     inputs.grid_levels = report_.grid.levels;
     inputs.hash_bits = report_.hash_bits;
-    inputs.artifacts = artifacts;
+    for (const StoredSubvolume& subvolume : store_->leaves())
+      if (!subvolume.summary.empty()) inputs.artifacts.push_back(subvolume.artifact);
     inputs.open_segment = [&](uint32_t id) { return work_.open_segment(id); };
     inputs.scratch_folder = work_.scratch_path();
     const MergeReport merged = merge_sub_dags(inputs, seams_.files, out, budget_, spec_.run.threads,
@@ -121,12 +183,25 @@ class Build {
     clock_.finish("write");
   }
 
+  static std::string difference(const JobIdentity& stored, const JobIdentity& asked) {
+    if (stored.format_version != asked.format_version)
+      return "its format version is " + std::to_string(stored.format_version) +
+             ", this program's " + std::to_string(asked.format_version);
+    if (stored.geometry != asked.geometry)
+      return "its geometry options are " + stored.geometry + ", asked for are " + asked.geometry;
+    return "its scene has other contents (SHA-256 " + stored.scene_sha256.substr(0, 16) + ", now " +
+           asked.scene_sha256.substr(0, 16) + ")";
+  }
+
   const BuildSpec spec_;
-  const Seams& seams_;
   StageClock clock_;
   MemoryBudget budget_;
   WorkFolder work_;
+  std::unique_ptr<JobStore> store_;
+  JobProgress progress_;
+  const Seams seams_;
   BuildReport report_;
+  uint64_t built_now_ = 0;
 };
 
 }  // namespace

@@ -41,11 +41,14 @@ struct BuildReport {
   uint64_t peak_rss_bytes = 0;
 };
 
-// Builds, or throws Error; nothing is left under the final name unless it is whole. The report is
-// also written to output + ".report.json".
+// Builds, or goes on with the build that the work folder holds, or throws Error; nothing is left
+// under the final name unless it is whole. The report is also written to output + ".report.json".
 BuildReport run_build(const BuildSpec& spec, const Seams& seams);
 
 // One JSON object, names as in docs/cli.md.
 std::string report_json(const BuildReport& report);
+// Geometry options as one line of JSON, for comparing jobs and for messages. Scenes are left out:
+// what counts of them is their content.
+std::string geometry_json(const GeometryOptions& options);
 
 }  // namespace voxdag

@@ -1,5 +1,10 @@
 #include "scheduler/work_folder.h"
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
 #include <string_view>
 
 #include "core/base/error.h"
@@ -8,10 +13,25 @@
 namespace voxdag {
 namespace {
 
+constexpr std::string_view kLockName = "lock";
+constexpr std::string_view kScratchName = "merge";
+
+// The id in "segment-<id>.vdseg".
+std::optional<uint32_t> segment_id(std::string_view name) {
+  constexpr std::string_view kBefore = "segment-", kAfter = ".vdseg";
+  if (!name.starts_with(kBefore) || !name.ends_with(kAfter)) return std::nullopt;
+  uint32_t id = 0;
+  const char* const end = name.data() + name.size() - kAfter.size();
+  const auto [rest, failure] = std::from_chars(name.data() + kBefore.size(), end, id);
+  if (failure != std::errc{} || rest != end) return std::nullopt;
+  return id;
+}
+
 bool is_ours(const DirectoryEntry& entry) {
   const std::string_view name = entry.name;
-  if (entry.is_directory) return name == "merge";
-  return name.ends_with(".vdseg") || name.ends_with(".vdspill") || name.ends_with(".vdmap");
+  if (entry.is_directory) return name == kScratchName;
+  return name == kLockName || name.starts_with("job.db") || name.ends_with(".vdspill") ||
+         segment_id(name).has_value();
 }
 
 }  // namespace
@@ -24,36 +44,66 @@ WorkFolder::WorkFolder(FileSystem& files, std::string path)
       throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " holds " + entry.name +
                                                 ", which voxdag did not make: expected an empty "
                                                 "folder or that of an earlier build (--work)");
-  remove_ours();
-  files_.make_directories(scratch_path());
-}
-
-WorkFolder::~WorkFolder() {
-  if (keep_) return;
-  try {
-    remove_ours();
-    files_.remove_directory(path_);
-  } catch (const Error&) {
-    // What cannot be removed costs space, not correctness.
-  }
-}
-
-void WorkFolder::remove_ours() {
-  for (const DirectoryEntry& entry : files_.list(path_)) {
-    if (!is_ours(entry)) continue;
-    const std::string path = path_ + "/" + entry.name;
-    if (!entry.is_directory) {
-      files_.remove(path);
-      continue;
-    }
-    for (const DirectoryEntry& inner : files_.list(path))
-      if (!inner.is_directory && is_ours(inner)) files_.remove(path + "/" + inner.name);
-    files_.remove_directory(path);
-  }
+  const std::string lock_path = path_ + "/" + std::string(kLockName);
+  lock_ = files_.try_lock(lock_path);
+  if (!lock_)
+    throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " is in use by " +
+                                              read_small_file(files_, lock_path, 1 << 12) +
+                                              ": expected to be the only build there");
+  char host[256] = "";
+  gethostname(host, sizeof host - 1);
+  const std::string holder = "process " + std::to_string(getpid()) + " on " + host;
+  // Emptied first: the last holder's name may have been longer.
+  files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
 }
 
 std::shared_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {
   return files_.open_read(segment_path(path_, id));
+}
+
+uint32_t WorkFolder::next_segment_id() const {
+  uint32_t next = 0;
+  for (const DirectoryEntry& entry : files_.list(path_))
+    if (const auto id = segment_id(entry.name)) next = std::max(next, *id + 1);
+  return next;
+}
+
+uint64_t WorkFolder::bytes() const {
+  uint64_t bytes = 0;
+  for (const std::string& folder : {path_, scratch_path()}) {
+    if (!files_.exists(folder)) continue;
+    for (const DirectoryEntry& entry : files_.list(folder))
+      if (!entry.is_directory) bytes += files_.open_read(folder + "/" + entry.name)->size();
+  }
+  return bytes;
+}
+
+void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_named) {
+  for (const DirectoryEntry& entry : files_.list(path_)) {
+    const auto id = segment_id(entry.name);
+    if (entry.name.ends_with(".vdspill") || (id && !is_named(*id)))
+      files_.remove(path_ + "/" + entry.name);
+  }
+  remove_scratch();
+  files_.make_directories(scratch_path());
+}
+
+void WorkFolder::remove_scratch() {
+  if (!files_.exists(scratch_path())) return;
+  for (const DirectoryEntry& entry : files_.list(scratch_path()))
+    if (!entry.is_directory) files_.remove(scratch_path() + "/" + entry.name);
+  files_.remove_directory(scratch_path());
+}
+
+void WorkFolder::remove() {
+  try {
+    remove_scratch();
+    for (const DirectoryEntry& entry : files_.list(path_))
+      if (is_ours(entry)) files_.remove(path_ + "/" + entry.name);
+    files_.remove_directory(path_);
+  } catch (const Error&) {
+    // Left behind, as promised above.
+  }
 }
 
 }  // namespace voxdag

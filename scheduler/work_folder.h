@@ -1,8 +1,10 @@
-// The folder of a build's temporary files. Only files that voxdag made, known by their names, are
-// ever removed from it; the folder itself goes when nothing else is left.
+// The folder of a build's job store and temporary files, owned by one process at a time. Only files
+// that voxdag made, known by their names, are ever removed from it; the folder itself goes when
+// nothing else is left.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -12,25 +14,34 @@ namespace voxdag {
 
 class WorkFolder {
  public:
-  // Makes the folder, and empties it of what an interrupted build left. Throws
-  // Error{kInvalidInput} if the folder holds files of somebody else.
+  // Makes the folder and locks it. Throws Error{kInvalidInput} if another process holds it (saying
+  // which) or if it holds files of somebody else.
   WorkFolder(FileSystem& files, std::string path);
-  // Removes our files, and the folder if it is empty then, unless keep() was called. Silent: what
-  // cannot be removed stays.
-  ~WorkFolder();
 
   const std::string& path() const { return path_; }
+  std::string store_path() const { return store_path(path_); }
+  static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
   std::string scratch_path() const { return path_ + "/merge"; }
   std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
-  void keep() { keep_ = true; }
+  // One more than the largest id of a segment that is there.
+  uint32_t next_segment_id() const;
+  // Bytes of all files in the folder, for reports.
+  uint64_t bytes() const;
+
+  // Removes segments that `is_named` does not know, spilled triangles and merge data: what an
+  // interrupted build left and no row of the store names.
+  void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
+  // Removes all that is ours, and the folder if it is empty then. Silent: what cannot be removed
+  // costs space, not correctness.
+  void remove();
 
  private:
-  void remove_ours();
+  void remove_scratch();
 
   FileSystem& files_;
   const std::string path_;
-  bool keep_ = false;
+  std::unique_ptr<FileLock> lock_;
 };
 
 }  // namespace voxdag

@@ -42,6 +42,12 @@ struct DirectoryEntry {
   bool is_directory = false;
 };
 
+// An exclusive lock, held until this is destroyed or the process ends, however it ends.
+class FileLock {
+ public:
+  virtual ~FileLock() = default;
+};
+
 class FileSystem {
  public:
   virtual ~FileSystem() = default;
@@ -60,6 +66,8 @@ class FileSystem {
   virtual std::vector<DirectoryEntry> list(const std::string& path) = 0;
   // Makes renames and new names in the directory survive a power cut.
   virtual void sync_directory(const std::string& path) = 0;
+  // Locks the file at `path`, made if it is not there; nullptr if somebody else holds it.
+  virtual std::unique_ptr<FileLock> try_lock(const std::string& path) = 0;
   // Bytes an ordinary user may still write on the disk that holds `path`.
   virtual uint64_t free_space(const std::string& path) = 0;
 };

@@ -1,5 +1,6 @@
 #include <dirent.h>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -105,6 +106,14 @@ class PosixWritableFile : public WritableFile {
   Descriptor fd_;
 };
 
+class PosixFileLock : public FileLock {
+ public:
+  explicit PosixFileLock(int fd) : fd_(fd) {}
+
+ private:
+  Descriptor fd_;
+};
+
 class PosixFileSystem : public FileSystem {
  public:
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
@@ -155,6 +164,14 @@ class PosixFileSystem : public FileSystem {
     Descriptor fd(open_retrying(path, O_RDONLY | O_DIRECTORY));
     if (fd.get() < 0) fail("open", path, errno);
     if (fsync(fd.get()) != 0) fail("sync", path, errno);
+  }
+  std::unique_ptr<FileLock> try_lock(const std::string& path) override {
+    const int fd = open_retrying(path, O_RDWR | O_CREAT);
+    if (fd < 0) fail("open", path, errno);
+    auto lock = std::make_unique<PosixFileLock>(fd);
+    if (flock(fd, LOCK_EX | LOCK_NB) == 0) return lock;
+    if (errno != EWOULDBLOCK) fail("lock", path, errno);
+    return nullptr;
   }
   uint64_t free_space(const std::string& path) override {
     struct statvfs s {};

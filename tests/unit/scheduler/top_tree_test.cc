@@ -52,7 +52,9 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
          {top.subvolumes_by_edge(256), top.subvolumes_by_edge(64), top.subvolumes_by_edge(2048),
           top.subvolumes_by_weight(top.total_weight() / 20)}) {
       SCOPED_TRACE(testing::Message() << "size " << size << ", leaves " << leaves.size());
-      const CubeTree tree(kLevels, Cube{}, leaves);
+      std::vector<Cube> cubes;
+      for (const SubvolumePlan& leaf : leaves) cubes.push_back(leaf.cube);
+      const CubeTree tree(kLevels, Cube{}, cubes);
       for (const FixedTriangle& t : triangles) {
         std::vector<size_t> got;
         tree.for_each_touched(t, [&](size_t leaf) { got.push_back(leaf); });
