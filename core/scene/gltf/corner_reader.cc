@@ -3,12 +3,6 @@
 #include <numeric>
 
 namespace voxdag::gltf {
-namespace {
-
-constexpr int kTriangles = 4;
-constexpr int kTriangleFan = 6;
-
-}  // namespace
 
 CornerReader::CornerReader(const Document& document, BufferReader& buffers,
                            const Primitive& primitive)
@@ -17,7 +11,7 @@ CornerReader::CornerReader(const Document& document, BufferReader& buffers,
 }
 
 void CornerReader::read(uint64_t first, size_t count, uint32_t* corners) {
-  if (mode_ == kTriangles) return read_indices(3 * first, 3 * count, corners);
+  if (mode_ == kTriangleList) return read_indices(3 * first, 3 * count, corners);
   row_.resize(count + 2);
   read_indices(first, count + 2, row_.data());
   // Every triangle of a fan shares the first vertex.

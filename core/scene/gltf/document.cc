@@ -100,7 +100,7 @@ uint64_t triangle_count(const Document& document, const Primitive& primitive) {
   if (!primitive.makes_triangles()) return 0;
   const int source = primitive.indices >= 0 ? primitive.indices : primitive.position;
   const uint64_t corners = document.accessors[static_cast<size_t>(source)].count;
-  if (primitive.mode == 4) return corners / 3;
+  if (primitive.mode == kTriangleList) return corners / 3;
   return corners < 3 ? 0 : corners - 2;
 }
 

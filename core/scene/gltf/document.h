@@ -81,15 +81,18 @@ struct JointSet {
   int weights = -1;
 };
 
+// Primitive modes; the smaller ones are points and lines.
+enum Mode : int { kTriangleList = 4, kTriangleStrip = 5, kTriangleFan = 6 };
+
 struct Primitive {
-  int mode = 4;
+  int mode = kTriangleList;
   int position = -1;
   int indices = -1;
   std::vector<int> targets;  // POSITION of each morph target, -1 if it moves nothing
   std::vector<JointSet> joint_sets;
   bool draco = false;  // carries KHR_draco_mesh_compression
 
-  bool makes_triangles() const { return mode >= 4; }
+  bool makes_triangles() const { return mode >= kTriangleList; }
 };
 
 struct Mesh {
