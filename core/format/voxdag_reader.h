@@ -14,8 +14,9 @@
 //
 // Opening checks the header and that all it names lies within the file. Whatever else is in a
 // damaged file, no access leaves the mapping: a bad offset is an Error. check_blocks() compares the
-// data with its checksums. The file is mapped (or read whole, where mmap fails) and must not be
-// shortened while it is open. Immutable after opening: any number of threads may read.
+// data with its checksums. The file is mapped, or read whole where mmap fails or Access::kRead is
+// asked for; a mapped file must not be shortened while it is open. Immutable after opening: any
+// number of threads may read.
 #pragma once
 
 #include <fcntl.h>
@@ -91,10 +92,12 @@ inline uint64_t xxh64(const unsigned char* bytes, size_t size) {
   return h ^ h >> 32;
 }
 
+enum class Access { kMap, kRead };
+
 // The bytes of a file, mapped or read.
 class Bytes {
  public:
-  explicit Bytes(const std::string& path) {
+  Bytes(const std::string& path, Access access) {
     const int fd = open_file(path);
     struct stat s;
     if (fstat(fd, &s) != 0 || !S_ISREG(s.st_mode)) {
@@ -102,11 +105,11 @@ class Bytes {
       throw Error(Problem::kIo, path + " is not a regular file");
     }
     size_ = static_cast<uint64_t>(s.st_size);
-    void* const map = size_ ? mmap(nullptr, size_, PROT_READ, MAP_SHARED, fd, 0) : MAP_FAILED;
-    if (map != MAP_FAILED)
-      map_ = map;
-    else
-      read_all(fd, path);
+    if (access == Access::kMap && size_ > 0) {
+      void* const map = mmap(nullptr, size_, PROT_READ, MAP_SHARED, fd, 0);
+      if (map != MAP_FAILED) map_ = map;
+    }
+    if (!map_) read_all(fd, path);
     ::close(fd);
   }
   Bytes(const Bytes&) = delete;
@@ -148,7 +151,10 @@ class Bytes {
 
 class File {
  public:
-  explicit File(const std::string& path) : path_(path), bytes_(path) { read_header(); }
+  explicit File(const std::string& path, Access access = Access::kMap)
+      : path_(path), bytes_(path, access) {
+    read_header();
+  }
 
   const std::string& path() const { return path_; }
   uint64_t file_bytes() const { return bytes_.size(); }
@@ -165,6 +171,8 @@ class File {
   uint64_t dag_nodes() const { return dag_nodes_; }
   bool empty() const { return dag_nodes_ == 0; }
   const Level& level(uint32_t l) const { return levels_[l]; }
+  // Where the levels end and the checksums of their 64 KiB blocks begin, in bytes.
+  uint64_t checksum_table_offset() const { return table_offset_; }
 
   // The 64 voxels of a brick; `offset` counts words of level brick_level().
   uint64_t brick(uint32_t offset) const {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -53,7 +54,7 @@ inline void write_bytes(const std::string& path, const ByteString& bytes) {
 inline oracle::Voxels random_voxels(uint64_t seed, int edge) {
   oracle::Random random(seed);
   oracle::Voxels voxels(edge);
-  const int block = 4 << random.between(0, 1);
+  const int block = std::min(edge, 4 << random.between(0, 1));
   for (int i = 0; i < 6; ++i) {
     const int thick = static_cast<int>(random.between(1, 3));
     int low[3];
