@@ -1,0 +1,63 @@
+// What the conformance tests share: the backends under test, and builds that keep what came out.
+//
+// A new backend is one row of backends_under_test(); every test runs over every row.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "core/backend/backend.h"
+#include "tests/oracle/core_types.h"
+#include "tests/oracle/scenes.h"
+
+namespace voxdag {
+
+struct BackendUnderTest {
+  std::string name;
+  std::function<std::unique_ptr<Backend>()> open;
+  friend std::ostream& operator<<(std::ostream& out, const BackendUnderTest& b) {
+    return out << b.name;
+  }
+};
+std::vector<BackendUnderTest> backends_under_test();
+
+class Conformance : public testing::TestWithParam<BackendUnderTest> {
+ protected:
+  std::unique_ptr<Backend> open() const { return GetParam().open(); }
+};
+
+#define VOXDAG_FOR_ALL_BACKENDS(fixture)                                                \
+  INSTANTIATE_TEST_SUITE_P(Backends, fixture, testing::ValuesIn(backends_under_test()), \
+                           [](const auto& row) { return row.param.name; })
+
+constexpr uint64_t kAmpleBudget = uint64_t{1} << 30;
+
+struct Built {
+  BuildOutcome outcome = BuildOutcome::kBuilt;
+  SubDag dag;
+  SubDagSummary summary;
+  bool sink_called = false;
+};
+
+// Builds, and checks what every build owes whatever its outcome: the sink is called in order, only
+// for what was built, and all memory is given back.
+Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,
+            uint64_t budget_bytes = kAmpleBudget);
+Built build(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles,
+            uint64_t budget_bytes = kAmpleBudget);
+
+// Checks sub-DAG and summary against the oracle's, array for array.
+void expect_equals(const Built& built, const oracle::Dag& truth, const SubvolumeTask& task);
+// Builds by the backend and by the oracle, and compares.
+void expect_right(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles);
+
+// The voxels that a sub-DAG of `cube` sets in a region within it.
+oracle::Voxels voxels_of(const SubDag& dag, const Cube& cube, uint32_t grid_levels,
+                         const oracle::Region& region);
+
+}  // namespace voxdag

@@ -1,0 +1,64 @@
+// A backend lives over many subvolumes and may remember what it likes: it must not show.
+#include "tests/conformance/harness.h"
+
+namespace voxdag {
+namespace {
+
+using Reuse = Conformance;
+VOXDAG_FOR_ALL_BACKENDS(Reuse);
+
+struct Work {
+  SubvolumeTask task;
+  oracle::Triangles triangles;
+  oracle::Dag truth;
+};
+
+// Tasks of different grids, cubes, cuts and scenes. Some share their triangles, as the subvolumes
+// of one build do.
+std::vector<Work> make_work() {
+  std::vector<Work> all;
+  oracle::Random random(41);
+  for (uint64_t scene = 0; scene < 24; ++scene) {
+    const uint32_t grid_levels = static_cast<uint32_t>(random.between(6, 20));
+    const uint32_t cube_levels = static_cast<uint32_t>(random.between(3, 6));
+    Cube cube{grid_levels - cube_levels, {}};
+    for (uint32_t& p : cube.position)
+      p = static_cast<uint32_t>(random.between(0, (int64_t{1} << cube.level) - 1));
+    const oracle::Region region = oracle::region_of(cube, grid_levels);
+    const auto kind = oracle::kAllKinds[scene % std::size(oracle::kAllKinds)];
+    const auto triangles = oracle::make_scene(kind, scene, region, 8);
+    const uint32_t hash_bits = scene % 2 ? 64 : 4;
+    for (int c = -1; c < 8; c += 3) {
+      const Cube part = c < 0 ? cube : cube.child(c);
+      const auto voxels = oracle::voxelize(triangles, oracle::region_of(part, grid_levels));
+      all.push_back({{grid_levels, part, hash_bits},
+                     triangles,
+                     oracle::build_dag(voxels, static_cast<int>(hash_bits))});
+    }
+  }
+  return all;
+}
+
+// One instance over many tasks, twice over in random order, with outgrown ones between: every
+// result is what a fresh one gives, which is the oracle's.
+TEST_P(Reuse, ResultsDoNotDependOnWhatWasBuiltBefore) {
+  const auto all = make_work();
+  const auto seasoned = open();
+  oracle::Random random(42);
+  for (size_t i = 0; i < 2 * all.size(); ++i) {
+    const size_t pick =
+        static_cast<size_t>(random.between(0, static_cast<int64_t>(all.size()) - 1));
+    SCOPED_TRACE(testing::Message() << "build " << i << ", task " << pick);
+    const Work& work = all[pick];
+    expect_equals(build(*seasoned, work.task, work.triangles), work.truth, work.task);
+    if (i % 8 == 0) expect_equals(build(*open(), work.task, work.triangles), work.truth, work.task);
+    if (i % 32 == 0) {
+      const SubvolumeTask large{9, {}, 64};
+      const auto scene = oracle::make_scene(oracle::SceneKind::kSpanning, i, {{0, 0, 0}, 512}, 80);
+      EXPECT_EQ(build(*seasoned, large, scene, kSmallestBudget).outcome, BuildOutcome::kOutgrown);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace voxdag
