@@ -41,6 +41,7 @@ int run(int argc, char** argv) {
   CommandContext context{system_files(), g_cancel};
   add_build_command(app, context);
   add_plan_command(app, context);
+  add_status_command(app, context);
   add_info_command(app, context);
   add_verify_command(app, context);
   add_diff_command(app, context);

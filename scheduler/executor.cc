@@ -17,7 +17,9 @@ namespace {
 // Bytes of half-filled chunks while one subvolume is split.
 constexpr size_t kSplitBufferBytes = size_t{512} << 10;
 
-bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) { return a.weight < b.weight; }
+bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) {
+  return a.subvolume.weight < b.subvolume.weight;
+}
 
 // The subvolumes left, shared by the workers. It ends when none is left and none is being built,
 // since building one may give eight more.
@@ -83,18 +85,18 @@ class Worker {
         backend_(options.open_backend()) {}
 
   // Builds one subvolume, or answers with the eight that replace it.
-  std::vector<QueuedSubvolume> build(const QueuedSubvolume& subvolume) {
+  std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
+    const StoredSubvolume& subvolume = queued.subvolume;
     const int64_t edge = subvolume.cube.edge_voxels(options_.grid_levels);
-    if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(subvolume);
+    if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
     const SubvolumeTask task{options_.grid_levels, subvolume.cube, options_.hash_bits};
-    const auto triangles = bins_.open(subvolume.bin);
+    const auto triangles = bins_.open(queued.bin);
     ArtifactWriter artifact(segment_, options_.grid_levels, options_.hash_bits);
-    StoredSubvolume built;
+    StoredSubvolume built = subvolume;
     if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
         BuildOutcome::kOutgrown)
-      return split(subvolume);
-    bins_.drop(subvolume.bin);
-    built.id = subvolume.id;
+      return split(queued);
+    bins_.drop(queued.bin);
     if (!built.summary.empty()) {
       const ArtifactRoot root{subvolume.cube, 0, built.summary.root_hash, built.summary.voxels,
                               built.summary.svo_nodes};
@@ -108,7 +110,8 @@ class Worker {
   uint64_t splits() const { return splits_; }
 
  private:
-  std::vector<QueuedSubvolume> split(const QueuedSubvolume& subvolume) {
+  std::vector<QueuedSubvolume> split(const QueuedSubvolume& whole) {
+    const StoredSubvolume& subvolume = whole.subvolume;
     if (subvolume.cube.edge_voxels(options_.grid_levels) <= kSmallestEdge)
       throw Error(ErrorCode::kOutOfMemory, "a subvolume of " + std::to_string(kSmallestEdge) +
                                                " voxels an edge does not fit a worker's share of " +
@@ -121,16 +124,18 @@ class Worker {
       part_bins[c] = bins_.add_bin();
     }
     const CubeTree tree(options_.grid_levels, subvolume.cube, parts);
-    distribute(bins_, subvolume.bin, tree, part_bins, kSplitBufferBytes, cancel_);
+    distribute(bins_, whole.bin, tree, part_bins, kSplitBufferBytes, cancel_);
     std::vector<QueuedSubvolume> queued;
     std::vector<Cube> cubes;
     for (int c = 0; c < 8; ++c) {
       if (bins_.count(part_bins[c]) == 0) continue;
-      queued.push_back({0, parts[c], part_bins[c], subvolume.weight / 8});
       cubes.push_back(parts[c]);
+      queued.push_back({StoredSubvolume{}, part_bins[c]});
+      queued.back().subvolume.cube = parts[c];
+      queued.back().subvolume.weight = subvolume.weight / 8;
     }
-    const std::vector<SubvolumeId> ids = store_.record_split(subvolume.id, cubes);
-    for (size_t i = 0; i < ids.size(); ++i) queued[i].id = ids[i];
+    const std::vector<SubvolumeId> ids = store_.record_split(subvolume, cubes);
+    for (size_t i = 0; i < ids.size(); ++i) queued[i].subvolume.id = ids[i];
     ++splits_;
     return queued;
   }

@@ -16,12 +16,11 @@
 
 namespace voxdag {
 
-// A subvolume task as the executor holds it: what defines it, and where its triangles lie.
+// A subvolume as the executor holds it: what defines it, and where its triangles lie. Heavier ones
+// go first.
 struct QueuedSubvolume {
-  SubvolumeId id = 0;
-  Cube cube;
+  StoredSubvolume subvolume;
   BinId bin = 0;
-  double weight = 0;  // heavier ones go first
 };
 
 struct ExecutorOptions {

@@ -103,7 +103,7 @@ std::vector<QueuedSubvolume> hand_down(std::span<const StoredSubvolume> planned,
   for (const StoredSubvolume& subvolume : planned) {
     leaf_bins.push_back(bins.add_bin());
     cubes.push_back(subvolume.cube);
-    queue.push_back({subvolume.id, subvolume.cube, leaf_bins.back(), subvolume.weight});
+    queue.push_back({subvolume, leaf_bins.back()});
   }
   distribute(bins, bin, CubeTree(grid_levels, Cube{}, cubes), leaf_bins, buffer_bytes, cancel);
   return queue;

@@ -1,8 +1,7 @@
 #include "scheduler/job_store.h"
 
-#include <algorithm>
-
 #include "core/base/error.h"
+#include "core/format/checksum.h"
 
 namespace voxdag {
 namespace {
@@ -23,10 +22,12 @@ CREATE TABLE subvolume (
   level INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL, z INTEGER NOT NULL,
   weight REAL NOT NULL,
   state INTEGER NOT NULL CHECK (state BETWEEN 0 AND 2),
-  segment INTEGER, offset INTEGER, bytes INTEGER, index_offset INTEGER, checksum INTEGER,
-  voxels INTEGER, svo_nodes INTEGER, dag_nodes INTEGER, root_hash INTEGER
+  segment INTEGER NOT NULL, offset INTEGER NOT NULL, bytes INTEGER NOT NULL,
+  index_offset INTEGER NOT NULL, checksum INTEGER NOT NULL,
+  voxels INTEGER NOT NULL, svo_nodes INTEGER NOT NULL, dag_nodes INTEGER NOT NULL,
+  root_hash INTEGER NOT NULL,
+  row_checksum INTEGER NOT NULL
 );
-CREATE INDEX subvolume_state ON subvolume (state);
 CREATE TABLE stage_time (
   id INTEGER PRIMARY KEY,
   name TEXT NOT NULL, wall_s REAL NOT NULL, cpu_s REAL NOT NULL
@@ -39,22 +40,58 @@ CREATE TABLE progress (
 );
 )sql";
 
-void insert_planned(SqlStatement& insert, const Cube& cube, double weight) {
-  insert.bind(0, int64_t{cube.level});
-  for (int a = 0; a < 3; ++a) insert.bind(1 + a, int64_t{cube.position[a]});
-  insert.bind(4, weight);
+// SQLite does not check its pages: what decides the result is checked row by row.
+uint64_t row_checksum(const StoredSubvolume& s) {
+  const ArtifactRef& a = s.artifact;
+  const uint64_t words[] = {static_cast<uint64_t>(s.id),
+                            s.cube.level,
+                            s.cube.position[0],
+                            s.cube.position[1],
+                            s.cube.position[2],
+                            static_cast<uint64_t>(s.state),
+                            a.segment,
+                            a.offset,
+                            a.bytes,
+                            a.index_offset,
+                            a.checksum,
+                            s.summary.voxels,
+                            s.summary.svo_nodes,
+                            s.summary.dag_nodes,
+                            s.summary.root_hash};
+  return checksum64(std::as_bytes(std::span(words)));
 }
 
-StoredSubvolume read_subvolume(const SqlStatement& row) {
+// The one way a subvolume's row is written.
+void write_row(SqlDatabase& database, const StoredSubvolume& s, std::optional<SubvolumeId> parent) {
+  auto insert = database.prepare(
+      "INSERT OR REPLACE INTO subvolume VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
+      "?)");
+  insert.bind(0, s.id);
+  if (parent) insert.bind(1, *parent);
+  insert.bind(2, int64_t{s.cube.level});
+  for (int a = 0; a < 3; ++a) insert.bind(3 + a, int64_t{s.cube.position[a]});
+  insert.bind(6, s.weight).bind(7, static_cast<int64_t>(s.state));
+  insert.bind(8, int64_t{s.artifact.segment}).bind_word(9, s.artifact.offset);
+  insert.bind_word(10, s.artifact.bytes).bind_word(11, s.artifact.index_offset);
+  insert.bind_word(12, s.artifact.checksum).bind_word(13, s.summary.voxels);
+  insert.bind_word(14, s.summary.svo_nodes).bind_word(15, s.summary.dag_nodes);
+  insert.bind_word(16, s.summary.root_hash).bind_word(17, row_checksum(s));
+  insert.run();
+}
+
+StoredSubvolume read_row(const SqlStatement& row) {
   StoredSubvolume s;
   s.id = row.integer(0);
-  s.cube.level = static_cast<uint32_t>(row.integer(1));
-  for (int a = 0; a < 3; ++a) s.cube.position[a] = static_cast<uint32_t>(row.integer(2 + a));
-  s.weight = row.real(5);
-  s.state = static_cast<SubvolumeState>(row.integer(6));
-  s.artifact = {static_cast<uint32_t>(row.integer(7)), row.word(8), row.word(9), row.word(10),
-                row.word(11)};
-  s.summary = {row.word(12), row.word(13), row.word(14), row.word(15)};
+  s.cube.level = static_cast<uint32_t>(row.integer(2));
+  for (int a = 0; a < 3; ++a) s.cube.position[a] = static_cast<uint32_t>(row.integer(3 + a));
+  s.weight = row.real(6);
+  s.state = static_cast<SubvolumeState>(row.integer(7));
+  s.artifact = {static_cast<uint32_t>(row.integer(8)), row.word(9), row.word(10), row.word(11),
+                row.word(12)};
+  s.summary = {row.word(13), row.word(14), row.word(15), row.word(16)};
+  if (row.word(17) != row_checksum(s))
+    throw Error(ErrorCode::kCorrupt, "job store: the row of subvolume " + std::to_string(s.id) +
+                                         " fails its checksum: start over with --restart");
   return s;
 }
 
@@ -78,6 +115,12 @@ JobStore::JobStore(const std::string& path, Access access)
     database_.execute("PRAGMA user_version = " + std::to_string(kSchemaVersion));
     transaction.commit();
     return;
+  }
+  if (access == Access::kBuild) {
+    auto check = database_.prepare("PRAGMA quick_check(1)");
+    if (!check.step() || check.text(0) != "ok")
+      throw Error(ErrorCode::kCorrupt,
+                  path + " is damaged (" + check.text(0) + "): remove it to start over");
   }
   if (application != kApplicationId)
     throw Error(ErrorCode::kInvalidInput, path + " is not a job store of voxdag");
@@ -104,69 +147,70 @@ void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> pl
       .bind(1, job.geometry)
       .bind(2, job.format_version)
       .run();
-  auto insert = database_.prepare(
-      "INSERT INTO subvolume (level, x, y, z, weight, state) VALUES (?, ?, ?, ?, ?, 0)");
-  for (const StoredSubvolume& subvolume : plan) {
-    insert_planned(insert, subvolume.cube, subvolume.weight);
-    insert.run();
+  SubvolumeId next = 1;
+  for (StoredSubvolume subvolume : plan) {
+    subvolume.id = next++;
+    write_row(database_, subvolume, std::nullopt);
   }
   transaction.commit();
 }
 
 std::vector<StoredSubvolume> JobStore::leaves() {
   std::lock_guard lock(mutex_);
-  auto query = database_.prepare(
-      "SELECT id, level, x, y, z, weight, state, segment, offset, bytes, index_offset, checksum, "
-      "voxels, svo_nodes, dag_nodes, root_hash FROM subvolume WHERE state <> 2 ORDER BY id");
+  auto query = database_.prepare("SELECT * FROM subvolume ORDER BY id");
   std::vector<StoredSubvolume> leaves;
-  while (query.step()) leaves.push_back(read_subvolume(query));
+  while (query.step()) {
+    const StoredSubvolume subvolume = read_row(query);
+    if (subvolume.state != SubvolumeState::kSplit) leaves.push_back(subvolume);
+  }
   return leaves;
 }
 
 void JobStore::record_built(std::span<const StoredSubvolume> built) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
-  auto update = database_.prepare(
-      "UPDATE subvolume SET state = 1, segment = ?, offset = ?, bytes = ?, index_offset = ?, "
-      "checksum = ?, voxels = ?, svo_nodes = ?, dag_nodes = ?, root_hash = ? WHERE id = ?");
-  for (const StoredSubvolume& s : built)
-    update.bind(0, int64_t{s.artifact.segment})
-        .bind_word(1, s.artifact.offset)
-        .bind_word(2, s.artifact.bytes)
-        .bind_word(3, s.artifact.index_offset)
-        .bind_word(4, s.artifact.checksum)
-        .bind_word(5, s.summary.voxels)
-        .bind_word(6, s.summary.svo_nodes)
-        .bind_word(7, s.summary.dag_nodes)
-        .bind_word(8, s.summary.root_hash)
-        .bind(9, s.id)
-        .run();
+  for (StoredSubvolume subvolume : built) {
+    subvolume.state = SubvolumeState::kBuilt;
+    update_row(subvolume);
+  }
   transaction.commit();
 }
 
-std::vector<SubvolumeId> JobStore::record_split(SubvolumeId whole, std::span<const Cube> parts) {
+std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
+                                                std::span<const Cube> parts) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
-  auto weight = database_.prepare("SELECT weight FROM subvolume WHERE id = ?");
-  weight.bind(0, whole).step();
-  const double part_weight =
-      weight.real(0) / static_cast<double>(std::max<size_t>(parts.size(), 1));
-  database_.prepare("UPDATE subvolume SET state = 2 WHERE id = ?").bind(0, whole).run();
-  auto insert = database_.prepare(
-      "INSERT INTO subvolume (level, x, y, z, weight, state, parent) VALUES (?, ?, ?, ?, ?, 0, ?)");
+  StoredSubvolume split = whole;
+  split.state = SubvolumeState::kSplit;
+  update_row(split);
+  SubvolumeId next = database_.integer("SELECT max(id) FROM subvolume") + 1;
   std::vector<SubvolumeId> ids;
   for (const Cube& cube : parts) {
-    insert_planned(insert, cube, part_weight);
-    insert.bind(5, whole).run();
-    ids.push_back(database_.integer("SELECT last_insert_rowid()"));
+    StoredSubvolume part;
+    part.id = next++;
+    part.cube = cube;
+    part.weight = whole.weight / static_cast<double>(parts.size());
+    write_row(database_, part, whole.id);
+    ids.push_back(part.id);
   }
   transaction.commit();
   return ids;
 }
 
-void JobStore::record_lost(SubvolumeId id) {
+void JobStore::record_lost(const StoredSubvolume& lost) {
   std::lock_guard lock(mutex_);
-  database_.prepare("UPDATE subvolume SET state = 0 WHERE id = ?").bind(0, id).run();
+  StoredSubvolume planned;
+  planned.id = lost.id;
+  planned.cube = lost.cube;
+  planned.weight = lost.weight;
+  update_row(planned);
+}
+
+void JobStore::update_row(const StoredSubvolume& subvolume) {
+  auto query = database_.prepare("SELECT parent FROM subvolume WHERE id = ? AND parent NOT NULL");
+  query.bind(0, subvolume.id);
+  const bool has_parent = query.step();
+  write_row(database_, subvolume, has_parent ? std::optional(query.integer(0)) : std::nullopt);
 }
 
 void JobStore::add_stage_time(const StageTime& time) {

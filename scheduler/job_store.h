@@ -6,7 +6,8 @@
 //   2. Subvolumes form a forest: a split one has its eight parts (those with triangles) as
 //   children;
 //      the leaves are what is built.
-//   3. All rows of one call are committed together or not at all.
+//   3. Every subvolume's row carries a checksum; one that fails it is Error{kCorrupt}.
+//   4. All rows of one call are committed together or not at all.
 // The writer is one process (the work folder's lock sees to that) and may call from any thread;
 // readers (`voxdag status`) open the same file at any time.
 #pragma once
@@ -77,9 +78,9 @@ class JobStore {
   std::vector<StoredSubvolume> leaves();
   void record_built(std::span<const StoredSubvolume> built);
   // Returns the ids of the parts, in their order.
-  std::vector<SubvolumeId> record_split(SubvolumeId whole, std::span<const Cube> parts);
+  std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
   // Its artifact turned out damaged: it is planned again.
-  void record_lost(SubvolumeId id);
+  void record_lost(const StoredSubvolume& lost);
 
   void add_stage_time(const StageTime& time);
   std::vector<StageTime> stage_times();
@@ -87,6 +88,8 @@ class JobStore {
   std::optional<ProgressSnapshot> progress();
 
  private:
+  void update_row(const StoredSubvolume& subvolume);
+
   std::mutex mutex_;  // guards the connection
   SqlDatabase database_;
 };

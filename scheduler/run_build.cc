@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/format/global_writer.h"
 #include "merge/merge.h"
+#include "scheduler/damage.h"
 #include "scheduler/estimate.h"
 #include "scheduler/job_progress.h"
 #include "scheduler/memory_limits.h"
@@ -57,9 +58,7 @@ class Build {
   BuildReport run_to_the_end() {
     const double start = wall_seconds();
     build_missing();
-    GlobalFileWriter out(seams_.files, spec_.run.output, report_.grid, report_.hash_bits);
-    merge(out);
-    write(out);
+    while (!merge_and_write()) build_missing();
     report_.stages = clock_.stages();
     report_.wall_s = wall_seconds() - start;
     report_.cpu_s = process_cpu_seconds();
@@ -74,6 +73,27 @@ class Build {
     progress_.detach();
     store_.reset();
     work_.remove();
+  }
+
+  // False if artifacts turned out damaged; their subvolumes are planned again then.
+  bool merge_and_write() {
+    try {
+      GlobalFileWriter out(seams_.files, spec_.run.output, report_.grid, report_.hash_bits);
+      merge(out);
+      write(out);
+      return true;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kNotFound) throw;
+      const auto damaged = find_damaged(
+          store_->leaves(), [&](uint32_t id) { return work_.open_segment(id); }, seams_.cancel);
+      if (damaged.empty()) throw;
+      for (const DamagedSubvolume& d : damaged) {
+        seams_.progress.warn("subvolume " + std::to_string(d.subvolume.id) +
+                             " is built again: " + d.what);
+        store_->record_lost(d.subvolume);
+      }
+      return false;
+    }
   }
 
   // Scan, ingest, and all subvolumes that are not built yet; what they hold in memory is gone when
@@ -92,9 +112,10 @@ class Build {
     std::erase_if(leaves,
                   [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });
     if (!leaves.empty()) build_subvolumes_of(scene, leaves);
-    report_.spill_bytes = scene.bins->spilled_bytes();
+    report_.spill_bytes += scene.bins->spilled_bytes();
     const std::vector<StoredSubvolume> all = store_->leaves();
     report_.subvolumes = all.size();
+    report_.artifact_bytes = report_.artifact_nodes = 0;
     report_.subvolumes_reused = all.size() - std::min(all.size(), built_now_);
     for (const StoredSubvolume& subvolume : all) {
       report_.artifact_bytes += subvolume.artifact.bytes;
@@ -140,8 +161,8 @@ class Build {
     options.segment_folder = work_.path();
     options.first_segment_id = work_.next_segment_id();
     seams_.progress.begin_stage("build", queue.size(), "subvolumes");
-    built_now_ = queue.size();
-    report_.subvolumes_split =
+    built_now_ += queue.size();
+    report_.subvolumes_split +=
         build_subvolumes(options, std::move(queue), *scene.bins, *store_, budget_, seams_);
     seams_.progress.end_stage();
     clock_.finish("build");
@@ -194,10 +215,10 @@ class Build {
   }
 
   const BuildSpec spec_;
-  StageClock clock_;
   MemoryBudget budget_;
   WorkFolder work_;
   std::unique_ptr<JobStore> store_;
+  StageClock clock_{[this](const StageTime& stage) { store_->add_stage_time(stage); }};
   JobProgress progress_;
   const Seams seams_;
   BuildReport report_;

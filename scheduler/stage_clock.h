@@ -1,7 +1,9 @@
 // Times the stages of a build as they follow one another.
 #pragma once
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/clock.h"
@@ -16,16 +18,22 @@ struct StageTime {
 
 class StageClock {
  public:
+  // `on_finish`, if there is one, hears of every stage that ended.
+  explicit StageClock(std::function<void(const StageTime&)> on_finish = {})
+      : on_finish_(std::move(on_finish)) {}
+
   // The time since the last stage ended was that of `name`.
   void finish(const std::string& name) {
     const double wall = wall_seconds(), cpu = process_cpu_seconds();
     stages_.push_back({name, wall - wall_, cpu - cpu_});
     wall_ = wall;
     cpu_ = cpu;
+    if (on_finish_) on_finish_(stages_.back());
   }
   const std::vector<StageTime>& stages() const { return stages_; }
 
  private:
+  std::function<void(const StageTime&)> on_finish_;
   std::vector<StageTime> stages_;
   double wall_ = wall_seconds();
   double cpu_ = process_cpu_seconds();

@@ -57,6 +57,12 @@ WorkFolder::WorkFolder(FileSystem& files, std::string path)
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
 }
 
+std::string WorkFolder::holder(FileSystem& files, const std::string& folder) {
+  const std::string lock_path = folder + "/" + std::string(kLockName);
+  if (!files.exists(lock_path) || files.try_lock(lock_path)) return "";
+  return read_small_file(files, lock_path, 1 << 12);
+}
+
 std::shared_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {
   return files_.open_read(segment_path(path_, id));
 }

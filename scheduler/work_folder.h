@@ -21,6 +21,8 @@ class WorkFolder {
   const std::string& path() const { return path_; }
   std::string store_path() const { return store_path(path_); }
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
+  // Who holds the folder: "process 17 on box"; "" if nobody does.
+  static std::string holder(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
   std::string scratch_path() const { return path_ + "/merge"; }
   std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;

@@ -1,0 +1,65 @@
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "cli/command.h"
+#include "cli/size.h"
+#include "scheduler/job_status.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct StatusCommand {
+  std::string work_folder;
+  bool json = false;
+  bool watch = false;
+};
+
+void print(const JobStatus& status) {
+  std::printf("%s; %s of %s subvolumes built\n",
+              status.running ? ("being built by " + status.holder).c_str() : "not running",
+              count_text(status.built).c_str(), count_text(status.subvolumes).c_str());
+  if (const auto& p = status.progress) {
+    std::printf("  stage %s: %s of %s %s, %s/s", p->stage.c_str(), count_text(p->done).c_str(),
+                count_text(p->total).c_str(), p->unit.c_str(),
+                count_text(static_cast<uint64_t>(status.rate())).c_str());
+    if (status.running && status.eta_s() > 0)
+      std::printf(", %s left", duration_text(status.eta_s()).c_str());
+    std::printf("\n  memory %s, disk %s\n", size_text(p->memory_bytes).c_str(),
+                size_text(p->disk_bytes).c_str());
+    if (!p->last_error.empty()) std::printf("  last error: %s\n", p->last_error.c_str());
+  }
+  for (const StageTime& stage : status.stages)
+    std::printf("  %-10s %s wall, %s CPU\n", stage.name.c_str(),
+                duration_text(stage.wall_s).c_str(), duration_text(stage.cpu_s).c_str());
+}
+
+void run(const StatusCommand& command, CommandContext& context) {
+  for (;;) {
+    const JobStatus status = read_job_status(context.files, command.work_folder);
+    if (command.json)
+      std::printf("%s\n", status_json(status).c_str());
+    else
+      print(status);
+    std::fflush(stdout);
+    if (!command.watch || !status.running) return;
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    context.cancel.check();
+    if (!context.files.exists(command.work_folder)) return;  // finished, and tidied away
+  }
+}
+
+}  // namespace
+
+void add_status_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("status", "a build's state and progress");
+  const auto state = std::make_shared<StatusCommand>();
+  command->add_option("work", state->work_folder, "the work folder, OUT.vdag.work by default")
+      ->required();
+  command->add_flag("--json", state->json, "one JSON object on standard output");
+  command->add_flag("--watch", state->watch, "every second, until the build ends");
+  command->callback([state, &context] { run(*state, context); });
+}
+
+}  // namespace voxdag::cli
