@@ -1,0 +1,52 @@
+#include "core/format/diff.h"
+
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/command.h"
+#include "cli/size.h"
+#include "core/format/open_global.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct DiffCommand {
+  std::string a, b;
+  bool json = false;
+};
+
+void run(const DiffCommand& command, CommandContext& context) {
+  const auto a = open_global_file(command.a), b = open_global_file(command.b);
+  MemoryBudget budget(~uint64_t{0});
+  const DiffReport report = diff_global_files(*a, *b, budget, context.cancel);
+  context.exit_status = report.same() ? 0 : 1;
+  if (command.json) {
+    const nlohmann::ordered_json json{{"same", report.same()},
+                                      {"voxels_a", a->voxels()},
+                                      {"voxels_b", b->voxels()},
+                                      {"only_a", report.only_a},
+                                      {"only_b", report.only_b}};
+    std::printf("%s\n", json.dump().c_str());
+  } else if (report.same()) {
+    std::printf("the same %s voxels\n", count_text(a->voxels()).c_str());
+  } else {
+    std::printf("%s of %s voxels only in %s\n%s of %s voxels only in %s\n",
+                count_text(report.only_a).c_str(), count_text(a->voxels()).c_str(),
+                command.a.c_str(), count_text(report.only_b).c_str(),
+                count_text(b->voxels()).c_str(), command.b.c_str());
+  }
+}
+
+}  // namespace
+
+void add_diff_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("diff", "voxels only in A, only in B; status 1 if any");
+  const auto state = std::make_shared<DiffCommand>();
+  command->add_option("a", state->a, "a .vdag file")->required();
+  command->add_option("b", state->b, "another one on the same grid")->required();
+  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+  command->callback([state, &context] { run(*state, context); });
+}
+
+}  // namespace voxdag::cli

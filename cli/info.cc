@@ -1,0 +1,96 @@
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "cli/command.h"
+#include "cli/size.h"
+#include "core/format/checksum.h"
+#include "core/format/open_global.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct InfoCommand {
+  std::string path;
+  bool digest = false;
+  bool json = false;
+};
+
+std::string file_digest(FileSystem& files, const std::string& path, const CancelToken& cancel) {
+  const auto file = files.open_read(path);
+  std::vector<std::byte> buffer(size_t{1} << 20);
+  Sha256 digest;
+  for (uint64_t at = 0; at < file->size(); at += buffer.size()) {
+    cancel.check();
+    const auto piece =
+        std::span(buffer).first(std::min<uint64_t>(buffer.size(), file->size() - at));
+    file->read_at(at, piece);
+    digest.add(piece);
+  }
+  return digest.finish();
+}
+
+uint64_t level_bytes(const voxdag_reader::Level& level) {
+  return level.word_count * sizeof(uint32_t);
+}
+
+std::string info_json(const voxdag_reader::File& file, const std::string& sha256) {
+  nlohmann::ordered_json levels = nlohmann::ordered_json::array();
+  for (uint32_t l = 0; l <= file.brick_level(); ++l)
+    levels.push_back(
+        {{"level", l}, {"nodes", file.level(l).node_count}, {"bytes", level_bytes(file.level(l))}});
+  const double(&origin)[3] = file.origin();
+  nlohmann::ordered_json json{
+      {"resolution", file.resolution()},
+      {"bounds", {{"origin", {origin[0], origin[1], origin[2]}}, {"edge", file.edge()}}},
+      {"hash_bits", file.hash_bits()},
+      {"voxels", file.voxels()},
+      {"svo_nodes", file.svo_nodes()},
+      {"dag_nodes", file.dag_nodes()},
+      {"bytes", file.file_bytes()},
+      {"levels", levels}};
+  if (!sha256.empty()) json["sha256"] = sha256;
+  return json.dump();
+}
+
+void print(const voxdag_reader::File& file, const std::string& sha256) {
+  const double(&origin)[3] = file.origin();
+  std::printf("%s: %s\n", file.path().c_str(), size_text(file.file_bytes()).c_str());
+  if (!sha256.empty()) std::printf("  sha256 %s\n", sha256.c_str());
+  std::printf("  grid of %lld^3 voxels, low corner %.9g %.9g %.9g, edge %.9g\n",
+              static_cast<long long>(file.resolution()), origin[0], origin[1], origin[2],
+              file.edge());
+  std::printf("  %s voxels, %s octree nodes, %s DAG nodes, hashes of %u bits\n",
+              count_text(file.voxels()).c_str(), count_text(file.svo_nodes()).c_str(),
+              count_text(file.dag_nodes()).c_str(), file.hash_bits());
+  std::printf("  level  cube edge            nodes         size\n");
+  for (uint32_t l = 0; l <= file.brick_level(); ++l)
+    std::printf("  %5u  %9lld  %15s  %11s%s\n", l, static_cast<long long>(file.resolution() >> l),
+                count_text(file.level(l).node_count).c_str(),
+                size_text(level_bytes(file.level(l))).c_str(),
+                l == file.brick_level() ? "  (bricks)" : "");
+}
+
+void run(const InfoCommand& command, CommandContext& context) {
+  const auto file = open_global_file(command.path);
+  const std::string sha256 =
+      command.digest ? file_digest(context.files, command.path, context.cancel) : "";
+  if (command.json)
+    std::printf("%s\n", info_json(*file, sha256).c_str());
+  else
+    print(*file, sha256);
+}
+
+}  // namespace
+
+void add_info_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("info", "counts and sizes of a DAG, per level");
+  const auto state = std::make_shared<InfoCommand>();
+  command->add_option("file", state->path, "the .vdag file")->required();
+  command->add_flag("--digest", state->digest, "also the SHA-256 of the file");
+  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+  command->callback([state, &context] { run(*state, context); });
+}
+
+}  // namespace voxdag::cli

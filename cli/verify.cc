@@ -1,0 +1,98 @@
+#include "core/format/verify.h"
+
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "cli/command.h"
+#include "cli/progress_bar.h"
+#include "cli/size.h"
+#include "cli/surface_sample.h"
+#include "core/format/open_global.h"
+
+namespace voxdag::cli {
+namespace {
+
+constexpr uint64_t kSceneMemory = uint64_t{64} << 20;  // windows of the scene's buffers
+
+struct VerifyCommand {
+  std::string path;
+  std::vector<std::string> scenes;
+  SceneOptions scene_options;
+  uint64_t seed = 1;
+  bool json = false;
+};
+
+Grid grid_of(const voxdag_reader::File& file) {
+  const double(&origin)[3] = file.origin();
+  return Grid::given({origin[0], origin[1], origin[2]}, file.edge(), file.grid_levels());
+}
+
+SampleReport check_against(const VerifyCommand& command, const voxdag_reader::File& file,
+                           Progress& progress, CommandContext& context) {
+  MemoryBudget budget(kSceneMemory);
+  const auto scene =
+      open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);
+  progress.begin_stage("sample the scene", 0, "triangles");
+  const auto boxes = sample_surface(*scene, grid_of(file), command.seed, context.cancel);
+  progress.end_stage();
+  return with_reader_errors([&] { return compare_with_sample(file, boxes); });
+}
+
+void print(const voxdag_reader::File& file, const std::optional<SampleReport>& sample) {
+  std::printf("%s: right; %s voxels, %s octree nodes, %s DAG nodes\n", file.path().c_str(),
+              count_text(file.voxels()).c_str(), count_text(file.svo_nodes()).c_str(),
+              count_text(file.dag_nodes()).c_str());
+  if (sample)
+    std::printf("  as the scene says: %s voxels compared in %s boxes near its surface, %s set\n",
+                count_text(sample->voxels).c_str(), count_text(sample->boxes).c_str(),
+                count_text(sample->set).c_str());
+}
+
+std::string verify_json(const VerifyCommand& command, const voxdag_reader::File& file,
+                        const std::optional<SampleReport>& sample) {
+  nlohmann::ordered_json json{{"ok", true},
+                              {"voxels", file.voxels()},
+                              {"svo_nodes", file.svo_nodes()},
+                              {"dag_nodes", file.dag_nodes()},
+                              {"bytes", file.file_bytes()}};
+  if (sample)
+    json["against"] = {{"seed", command.seed},
+                       {"boxes", sample->boxes},
+                       {"voxels", sample->voxels},
+                       {"set", sample->set}};
+  return json.dump();
+}
+
+void run(const VerifyCommand& command, CommandContext& context) {
+  const auto file = open_global_file(command.path);
+  const auto progress = make_progress_bar();
+  MemoryBudget budget(~uint64_t{0});
+  verify_global_file(*file, budget, *progress, context.cancel);
+  std::optional<SampleReport> sample;
+  if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
+  if (command.json)
+    std::printf("%s\n", verify_json(command, *file, sample).c_str());
+  else
+    print(*file, sample);
+}
+
+}  // namespace
+
+void add_verify_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("verify", "check every invariant of a DAG");
+  const auto state = std::make_shared<VerifyCommand>();
+  command->add_option("file", state->path, "the .vdag file")->required();
+  command->add_option("--against", state->scenes,
+                      "compare voxels near the surface of this scene, straight from its triangles");
+  command->add_option("--seed", state->seed, "of the sample that --against takes")
+      ->capture_default_str();
+  command->add_flag("--skip-invalid", state->scene_options.skip_invalid,
+                    "as the build had it: drop invalid triangles of the scene");
+  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+  command->callback([state, &context] { run(*state, context); });
+}
+
+}  // namespace voxdag::cli
