@@ -141,7 +141,7 @@ void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> pl
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
   database_.execute("UPDATE subvolume SET parent = NULL; DELETE FROM subvolume;");
-  database_.execute("DELETE FROM job; DELETE FROM stage_time; DELETE FROM progress;");
+  database_.execute("DELETE FROM job; DELETE FROM progress;");
   database_.prepare("INSERT INTO job VALUES (1, ?, ?, ?)")
       .bind(0, job.scene_sha256)
       .bind(1, job.geometry)
