@@ -1,0 +1,69 @@
+// The unique bricks of one subvolume: an open-addressing table from masks to ids 0, 1, 2, ...
+//
+// Slots are indexed by the top bits of the brick's hash and probed linearly. So growing is one
+// streaming pass, and the slots from first to last are almost in the order of the hash: the level
+// array is made by sorting a nearly sorted array (sort_slots()).
+// Not thread-safe. Throws Outgrown when the budget cannot hold more.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/backend/cpu/memory.h"
+
+namespace voxdag::cpu {
+
+class BrickTable {
+ public:
+  struct Slot {
+    uint64_t mask;  // 0: the slot is free
+    uint32_t id;
+    uint32_t tag;  // top half of the brick's hash
+  };
+
+  explicit BrickTable(MemoryBudget& budget) : budget_(budget) {}
+
+  uint64_t size() const { return count_; }
+
+  // Makes room for `more` bricks; must precede the calls below.
+  void reserve(uint64_t more) {
+    if ((count_ + more) * 8 > slots_.size() * 5) grow(count_ + more);
+  }
+
+  void prefetch(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
+
+  // `hash` is hash_brick(mask), mask not 0.
+  uint32_t find_or_add(uint64_t mask, uint64_t hash) {
+    uint64_t at = hash >> shift_;
+    while (true) {
+      Slot& slot = slots_[at];
+      if (slot.mask == mask) return slot.id;
+      if (slot.mask == 0) {
+        slot = {mask, static_cast<uint32_t>(count_), static_cast<uint32_t>(hash >> 32)};
+        return static_cast<uint32_t>(count_++);
+      }
+      at = (at + 1) & (slots_.size() - 1);
+    }
+  }
+
+  // Calls visit(mask, id) for every brick, in no particular order.
+  template <class Visit>
+  void for_each(Visit visit) {
+    for (const Slot& slot : slots_)
+      if (slot.mask != 0) visit(slot.mask, slot.id);
+  }
+
+  // All slots in use, in the order of (hash cut to `hash_bits`, mask). Ends the table's life as a
+  // table.
+  std::span<const Slot> sort_slots(uint32_t hash_bits);
+
+ private:
+  void grow(uint64_t bricks);
+
+  MemoryBudget& budget_;
+  PageBuffer<Slot> slots_;
+  int shift_ = 64;  // index of a hash = hash >> shift_
+  uint64_t count_ = 0;
+};
+
+}  // namespace voxdag::cpu

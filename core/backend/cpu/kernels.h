@@ -1,0 +1,35 @@
+// The inner loops that exist twice, portable and for AVX2 with BMI2, chosen at run time; they give
+// the same voxels. Sources named *_avx2.cc are compiled for that instruction set, so nothing of
+// them, inline functions of shared headers included, may run before the choice is made.
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/cpu/tile_bricks.h"
+#include "core/backend/cpu/tile_triangle.h"
+#include "core/backend/cpu/triangle_set.h"
+
+namespace voxdag::cpu {
+
+// Bit masks of a cube's children.
+struct Octants {
+  uint32_t touched;  // may be touched by the triangle; all that are touched are here
+  uint32_t inside;   // of those: the triangle covers them, they see no more than its plane
+};
+
+struct Kernels {
+  // Sets exactly the voxels of the tile that the triangle touches.
+  void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
+  // `inside`: the triangle covers the whole cube, which it is known not to miss.
+  Octants (*test_octants)(const NarrowTriangle& triangle, const Box& cube, bool inside);
+};
+
+const Kernels& portable_kernels();
+// Null if they were not built or this machine cannot run them.
+const Kernels* avx2_kernels();
+
+// For wide triangles there is one implementation only.
+void draw_wide(const TileTriangle<int64_t>& triangle, TileBricks& tile);
+Octants test_octants_wide(const WideTriangle& triangle, const Box& cube, bool inside);
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,55 @@
+#include "core/backend/cpu/kernels.h"
+
+#if defined(__AVX2__) && defined(__BMI2__)
+
+#include <immintrin.h>
+
+#include "core/backend/cpu/draw_avx2.h"
+#include "core/backend/cpu/octant_test.h"
+
+namespace voxdag::cpu {
+namespace {
+
+struct Avx2Quad {
+  __m256d x;
+
+  explicit Avx2Quad(__m256d quad) : x(quad) {}
+  explicit Avx2Quad(double all) : x(_mm256_set1_pd(all)) {}
+  Avx2Quad(double x0, double x1, double x2, double x3) : x(_mm256_setr_pd(x0, x1, x2, x3)) {}
+  // Reads a fourth coordinate, which idles.
+  static Avx2Quad load(const int32_t (&v)[3], int64_t origin) {
+    const __m128i four = _mm_loadu_si128(reinterpret_cast<const __m128i*>(v));
+    const __m128i local = _mm_sub_epi32(four, _mm_set1_epi32(static_cast<int32_t>(origin)));
+    return Avx2Quad(_mm256_cvtepi32_pd(local));
+  }
+  Avx2Quad operator+(const Avx2Quad& o) const { return Avx2Quad(_mm256_add_pd(x, o.x)); }
+  Avx2Quad operator-(const Avx2Quad& o) const { return Avx2Quad(_mm256_sub_pd(x, o.x)); }
+  Avx2Quad operator*(const Avx2Quad& o) const { return Avx2Quad(_mm256_mul_pd(x, o.x)); }
+  Avx2Quad rotated() const { return Avx2Quad(_mm256_permute4x64_pd(x, 0b11'00'10'01)); }
+  Avx2Quad above_zero() const { return Avx2Quad(_mm256_max_pd(x, _mm256_setzero_pd())); }
+  uint32_t negative() const { return static_cast<uint32_t>(_mm256_movemask_pd(x)); }
+};
+
+Octants test_octants(const NarrowTriangle& triangle, const Box& cube, bool inside) {
+  return OctantTest<Avx2Quad, int32_t>(triangle, cube).run(inside);
+}
+
+constexpr Kernels kAvx2 = {draw_avx2, test_octants};
+
+}  // namespace
+
+const Kernels* avx2_kernels() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") ? &kAvx2 : nullptr;
+}
+
+}  // namespace voxdag::cpu
+
+#else
+
+namespace voxdag::cpu {
+
+const Kernels* avx2_kernels() { return nullptr; }
+
+}  // namespace voxdag::cpu
+
+#endif

@@ -1,0 +1,63 @@
+#include "core/backend/cpu/node_table.h"
+
+#include <algorithm>
+
+#include "core/backend/cpu/slot_order.h"
+#include "core/dag/level_array.h"
+
+namespace voxdag::cpu {
+namespace {
+
+constexpr uint64_t kWordLimit = uint64_t{1} << 32;  // ids are 32-bit
+constexpr uint64_t kFirstWords = 1024;
+
+}  // namespace
+
+uint32_t NodeTable::add(uint64_t at, uint64_t hash, uint32_t mask, const uint32_t* children,
+                        int child_count) {
+  const uint32_t id = static_cast<uint32_t>(kFirstId + used_);
+  Record added = record(id);
+  added.set_hash(hash);
+  added.words[2] = mask;
+  std::copy(children, children + child_count, added.children());
+  slots_[at] = hash >> 32 << 32 | id;
+  used_ += Record::kWords + static_cast<uint64_t>(child_count);
+  ++count_;
+  return id;
+}
+
+void NodeTable::grow_slots(uint64_t nodes) {
+  PageBuffer<uint64_t> old = std::move(slots_);
+  slots_ = claim<uint64_t>(budget_, slots_for(nodes), "a node table");
+  shift_ = 64 - lowest_bit(slots_.size());
+  for (const uint64_t slot : old) {
+    if (slot == 0) continue;
+    uint64_t at = slot >> shift_;
+    while (slots_[at] != 0) at = (at + 1) & (slots_.size() - 1);
+    slots_[at] = slot;
+  }
+}
+
+void NodeTable::grow_records(uint64_t words) {
+  if (words > kWordLimit) throw Outgrown{};
+  claim_more(budget_, records_, std::max(words, kFirstWords), "a node table");
+}
+
+bool NodeTable::less(uint64_t slot_a, uint64_t slot_b) {
+  Record a = record(static_cast<uint32_t>(slot_a)), b = record(static_cast<uint32_t>(slot_b));
+  return compare_nodes(a.hash(), a.mask(), a.children(), b.hash(), b.mask(), b.children()) < 0;
+}
+
+std::span<const uint64_t> NodeTable::sort_slots(bool hashes_changed) {
+  const std::span<uint64_t> slots = compact_slots(
+      std::span(slots_.begin(), slots_.end()), [](uint64_t slot) { return slot != 0; },
+      [](uint64_t slot) { return static_cast<uint32_t>(slot >> 32); });
+  if (hashes_changed)
+    std::sort(slots.begin(), slots.end(), [this](uint64_t a, uint64_t b) { return less(a, b); });
+  else
+    sort_nearly_sorted(
+        slots, [this](uint64_t a, uint64_t b) { return a >> 32 != b >> 32 ? a < b : less(a, b); });
+  return slots;
+}
+
+}  // namespace voxdag::cpu

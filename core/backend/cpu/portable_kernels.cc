@@ -1,0 +1,54 @@
+#include "core/backend/cpu/draw_portable.h"
+#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/octant_test.h"
+
+namespace voxdag::cpu {
+namespace {
+
+struct PlainQuad {
+  double x[4];
+
+  explicit PlainQuad(double all) : x{all, all, all, all} {}
+  PlainQuad(double x0, double x1, double x2, double x3) : x{x0, x1, x2, x3} {}
+  template <class Coordinate>
+  static PlainQuad load(const Coordinate (&v)[3], int64_t origin) {
+    return {static_cast<double>(v[0] - origin), static_cast<double>(v[1] - origin),
+            static_cast<double>(v[2] - origin), 0.0};
+  }
+  PlainQuad operator+(const PlainQuad& o) const {
+    return {x[0] + o.x[0], x[1] + o.x[1], x[2] + o.x[2], x[3] + o.x[3]};
+  }
+  PlainQuad operator-(const PlainQuad& o) const {
+    return {x[0] - o.x[0], x[1] - o.x[1], x[2] - o.x[2], x[3] - o.x[3]};
+  }
+  PlainQuad operator*(const PlainQuad& o) const {
+    return {x[0] * o.x[0], x[1] * o.x[1], x[2] * o.x[2], x[3] * o.x[3]};
+  }
+  PlainQuad rotated() const { return {x[1], x[2], x[0], x[3]}; }
+  PlainQuad above_zero() const {
+    PlainQuad out(0.0);
+    for (int i = 0; i < 4; ++i) out.x[i] = x[i] > 0 ? x[i] : 0;
+    return out;
+  }
+  uint32_t negative() const {
+    uint32_t bits = 0;
+    for (int i = 0; i < 4; ++i) bits |= (x[i] < 0 ? 1u : 0u) << i;
+    return bits;
+  }
+};
+
+Octants test_octants_narrow(const NarrowTriangle& triangle, const Box& cube, bool inside) {
+  return OctantTest<PlainQuad, int32_t>(triangle, cube).run(inside);
+}
+
+constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow};
+
+}  // namespace
+
+const Kernels& portable_kernels() { return kPortable; }
+
+Octants test_octants_wide(const WideTriangle& triangle, const Box& cube, bool inside) {
+  return OctantTest<PlainQuad, int64_t>(triangle, cube).run(inside);
+}
+
+}  // namespace voxdag::cpu

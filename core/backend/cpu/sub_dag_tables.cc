@@ -1,0 +1,25 @@
+#include "core/backend/cpu/sub_dag_tables.h"
+
+#include "core/dag/node_hash.h"
+
+namespace voxdag::cpu {
+
+NodeRef SubDagTables::add_node(int size_log2, const NodeRef (&children)[8]) {
+  uint32_t mask = 0, ids[8];
+  uint64_t hashes[8];
+  int count = 0;
+  for (int c = 0; c < 8; ++c) {
+    if (!children[c].exists) continue;
+    mask |= 1u << c;
+    ids[count] = children[c].id;
+    hashes[count++] = children[c].hash;
+  }
+  if (count == 0) return {};
+  ++counts_.nodes;
+  NodeTable& table = nodes(size_log2);
+  table.reserve(1);
+  const uint64_t hash = hash_node(mask, hashes);
+  return {hash, table.find_or_add(hash, mask, ids, count), true};
+}
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,55 @@
+// A triangle as the rasterisers see it: exact integer tests on the voxels of one tile.
+//
+// With vertices v relative to the tile's low corner, n the quarter normal (vertices are odd, so
+// edges are even, and half-edges cross to a quarter of the normal) and k a voxel of the tile:
+//
+//   plane   n.(256 k - v0) changes sign over the voxel's box   <=>   0 <= n.k + lowest <= width
+//   edge    the edge function's largest value over the box, in one of the three projections, is
+//           not negative                                       <=>   a k_p + b k_q + c >= 0
+//
+// since for an integer i and any c: 256 i + c >= 0 <=> i + floor(c / 256) >= 0. So no test below
+// ever sees the eight bits within a voxel.
+//
+// Bounds. Narrow triangles: half-edges <= 2^27, |n_a| <= 2^54 (the triangle's shadow lies in its
+// box), sum of |n_a| <= 3 * 2^54. If the plane misses the tile there is nothing to draw; if not,
+// |n.k + lowest| <= 64 * 3 * 2^54 < 2^62 at every corner of a voxel. Edges: |a|, |b| <= 2^27,
+// |c| < 2^50. Wide triangles: half-edges < 2^40, so |n_a| < 2^81, n.v < 2^124 in 128 bits; edge
+// constants below 2^82 are clamped to +-2^60, which changes no sign since |a k_p + b k_q| < 2^47.
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+#include "core/backend/cpu/triangle_set.h"
+#include "core/base/integers.h"
+
+namespace voxdag::cpu {
+
+template <class Coordinate>
+struct TileTriangle {
+  static constexpr bool kNarrow = sizeof(Coordinate) == 4;
+  using Int = std::conditional_t<kNarrow, int64_t, int128>;
+
+  // The voxel (p, q) of projection d, along axes d + 1 and d + 2, is on the inner side of the edge
+  // iff a p + b q + c >= 0.
+  struct Edge {
+    int64_t a, b, c;
+  };
+
+  bool inside;  // edges do not matter in this tile, and are not set
+  int first_voxel[3], last_voxel[3];
+  int dominant;   // axis of the largest component of the normal, which is >= 0
+  Int normal[3];  // all 0 if the triangle is degenerate
+  Int lowest;
+  Int width;
+  Edge edges[3][3];  // [projection][edge]
+
+  // False if the triangle certainly touches no voxel of the tile.
+  bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const Box& tile);
+
+ private:
+  bool set_plane(const int64_t (&v)[3][3], int64_t (&half)[3][3], int64_t tile_voxels);
+  void set_edges(const int64_t (&v)[3][3], const int64_t (&half)[3][3]);
+};
+
+}  // namespace voxdag::cpu

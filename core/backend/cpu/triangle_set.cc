@@ -1,0 +1,27 @@
+#include "core/backend/cpu/triangle_set.h"
+
+namespace voxdag::cpu {
+
+void TriangleSet::add(const WideTriangle& triangle) {
+  const bool narrow = is_narrow(triangle);
+  uint32_t& count = narrow ? narrow_count_ : wide_count_;
+  if (count + 1 >= Entry::kWide) throw Outgrown{};
+  if (narrow) {
+    if (count + 2 > narrow_.size())
+      claim_more(budget_, narrow_, std::max<size_t>(count + 2, 256), "triangles");
+    narrow_[count] = narrowed(triangle);
+  } else {
+    if (count + 1 > wide_.size())
+      claim_more(budget_, wide_, std::max<size_t>(count + 1, 256), "triangles");
+    wide_[count] = triangle;
+  }
+  ++count;
+}
+
+void TriangleSet::clear() {
+  narrow_ = {};
+  wide_ = {};
+  narrow_count_ = wide_count_ = 0;
+}
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,106 @@
+// The triangles of one subvolume in memory, compact. Inside this backend axes stand in reversed
+// order, axis 0 being z and axis 2 being x, so that axis a owns bit a of a child index and bits a
+// and a + 3 of a brick's bit number.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "core/backend/cpu/memory.h"
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag::cpu {
+
+// Lattice coordinates, [axis][vertex].
+template <class Int>
+struct Triangle {
+  Int v[3][3];
+
+  Int low(int axis) const { return std::min({v[axis][0], v[axis][1], v[axis][2]}); }
+  Int high(int axis) const { return std::max({v[axis][0], v[axis][1], v[axis][2]}); }
+};
+
+// Narrow: |coordinates| < 2^30 and an extent of at most 2^28 (2^20 voxels) along every axis, which
+// is every triangle inside the largest grid. Wide: the others, |coordinates| < 2^40.
+using NarrowTriangle = Triangle<int32_t>;
+using WideTriangle = Triangle<int64_t>;
+
+inline constexpr int64_t kNarrowCoordinate = int64_t{1} << 30;
+inline constexpr int64_t kNarrowExtent = int64_t{1} << 28;
+
+// Lattice coordinates of a cube, axes reversed as above.
+struct Box {
+  int64_t low[3];
+  int64_t edge;
+
+  template <class Int>
+  bool misses(const Triangle<Int>& t) const {
+    for (int a = 0; a < 3; ++a)
+      if (t.high(a) < low[a] || t.low(a) > low[a] + edge) return true;
+    return false;
+  }
+  Box child(int index) const {
+    const int64_t half = edge / 2;
+    return {{low[0] + (index & 1) * half, low[1] + (index >> 1 & 1) * half,
+             low[2] + (index >> 2) * half},
+            half};
+  }
+};
+
+inline WideTriangle reverse_axes(const FixedTriangle& t) {
+  WideTriangle out;
+  for (int a = 0; a < 3; ++a)
+    for (int i = 0; i < 3; ++i) out.v[a][i] = t.v[i][2 - a];
+  return out;
+}
+
+inline bool is_narrow(const WideTriangle& t) {
+  for (int a = 0; a < 3; ++a) {
+    const int64_t low = t.low(a), high = t.high(a);
+    if (high - low > kNarrowExtent || low <= -kNarrowCoordinate || high >= kNarrowCoordinate)
+      return false;
+  }
+  return true;
+}
+
+inline NarrowTriangle narrowed(const WideTriangle& t) {
+  NarrowTriangle out;
+  for (int a = 0; a < 3; ++a)
+    for (int i = 0; i < 3; ++i) out.v[a][i] = static_cast<int32_t>(t.v[a][i]);
+  return out;
+}
+
+// A triangle on its way down the octree: its number, and two flags.
+struct Entry {
+  static constexpr uint32_t kInside = 1u << 31;  // covers the cube: only its plane matters there
+  static constexpr uint32_t kWide = 1u << 30;    // number counts wide triangles
+  uint32_t bits;
+
+  bool inside() const { return bits & kInside; }
+  bool wide() const { return bits & kWide; }
+  uint32_t number() const { return bits & (kWide - 1); }
+};
+
+// Not thread-safe. Throws Outgrown.
+class TriangleSet {
+ public:
+  explicit TriangleSet(MemoryBudget& budget) : budget_(budget) {}
+
+  // Entries of triangles are 0..narrow_count()-1, and the same with kWide.
+  uint32_t narrow_count() const { return narrow_count_; }
+  uint32_t wide_count() const { return wide_count_; }
+  void add(const WideTriangle& triangle);
+  // Gives the memory back.
+  void clear();
+  const NarrowTriangle& narrow(Entry entry) const { return narrow_[entry.number()]; }
+  const WideTriangle& wide(Entry entry) const { return wide_[entry.number()]; }
+
+ private:
+  MemoryBudget& budget_;
+  PageBuffer<NarrowTriangle> narrow_;  // one more than used, so that four can be loaded for three
+  PageBuffer<WideTriangle> wide_;
+  uint32_t narrow_count_ = 0;
+  uint32_t wide_count_ = 0;
+};
+
+}  // namespace voxdag::cpu
