@@ -1,0 +1,83 @@
+#include "core/scene/generate/generate.h"
+
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/command.h"
+#include "cli/progress_bar.h"
+#include "cli/size.h"
+#include "core/base/clock.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct GenerateCommand {
+  std::string kind;
+  std::string output;
+  GenerateOptions options;
+  bool json = false;
+};
+
+void print(const GenerateCommand& command, const GenerateReport& r, double wall_s) {
+  std::printf("%s: %s, %s triangles, %s", command.output.c_str(), command.kind.c_str(),
+              count_text(r.triangles).c_str(), size_text(r.bytes).c_str());
+  if (r.instances > 0)
+    std::printf(" (%s triangles stored, %s instances)", count_text(r.stored_triangles).c_str(),
+                count_text(r.instances).c_str());
+  std::printf(", seed %llu, %s\n", static_cast<unsigned long long>(command.options.seed),
+              duration_text(wall_s).c_str());
+}
+
+void print_json(const GenerateCommand& command, const GenerateReport& r, double wall_s) {
+  const nlohmann::ordered_json report = {
+      {"kind", command.kind},
+      {"seed", command.options.seed},
+      {"output", command.output},
+      {"triangles", r.triangles},
+      {"stored_triangles", r.stored_triangles},
+      {"instances", r.instances},
+      {"bytes", r.bytes},
+      {"wall_s", wall_s},
+  };
+  std::printf("%s\n", report.dump().c_str());
+}
+
+void run(GenerateCommand& command, CommandContext& context) {
+  command.options.kind = scene_kind(command.kind).kind;
+  const auto progress = make_progress_bar();
+  const double start_s = wall_seconds();
+  const GenerateReport report =
+      generate_scene(context.files, command.output, command.options, *progress, context.cancel);
+  const double wall_s = wall_seconds() - start_s;
+  command.json ? print_json(command, report, wall_s) : print(command, report, wall_s);
+}
+
+std::string kinds_text() {
+  std::string text = "what to make:";
+  for (const SceneKindInfo& info : scene_kinds())
+    text += std::string("\n") + info.name + ": " + info.summary;
+  return text;
+}
+
+}  // namespace
+
+void add_generate_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("generate", "make a scene from a seed");
+  const auto state = std::make_shared<GenerateCommand>();
+  command->add_option("kind", state->kind, kinds_text())->required();
+  command->add_option("output", state->output, "the .glb file to make")->required();
+  command->add_option("--seed", state->options.seed, "another seed, another scene")
+      ->capture_default_str();
+  auto* triangles = command->add_option("--triangles", state->options.triangles,
+                                        "how many, about (not for menger)");
+  triangles->check(CLI::PositiveNumber);
+  command->add_option("--level", state->options.level, "menger: how often the cube is cut, 0 to 6")
+      ->capture_default_str();
+  command->add_flag("--instances", state->options.instances,
+                    "city, spheres: repeated parts once, placed by EXT_mesh_gpu_instancing");
+  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+  command->callback([state, &context] { run(*state, context); });
+}
+
+}  // namespace voxdag::cli

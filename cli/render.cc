@@ -1,0 +1,154 @@
+#include <charconv>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+
+#include "cli/command.h"
+#include "cli/progress_bar.h"
+#include "cli/render/renderer.h"
+#include "cli/render/views.h"
+#include "cli/size.h"
+#include "core/base/clock.h"
+#include "core/format/open_global.h"
+
+namespace voxdag::cli {
+namespace {
+
+constexpr int kMaxPictureEdge = 16384;
+
+struct RenderCommand {
+  std::string input;
+  std::string output;
+  std::string view = "auto";
+  std::string camera, target;  // as typed
+  std::optional<double> fov_degrees;
+  std::string size = "1280x720";
+  render::RenderOptions options;
+  bool json = false;
+};
+
+// Numbers with `separator` between them, all of `text`; `expected` says what they should be.
+template <class Number, size_t kCount>
+std::array<Number, kCount> parse_list(const std::string& text, char separator,
+                                      const std::string& expected) {
+  std::array<Number, kCount> numbers{};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (size_t i = 0; i < kCount; ++i) {
+    const auto [stop, error] = std::from_chars(at, end, numbers[i]);
+    const bool last = i + 1 == kCount;
+    if (error != std::errc() || (last ? stop != end : stop == end || *stop != separator))
+      throw Error(ErrorCode::kInvalidInput, "\"" + text + "\": expected " + expected);
+    at = stop + (last ? 0 : 1);
+  }
+  return numbers;
+}
+
+// From world space to voxel units.
+render::Vec parse_point(const std::string& text, const std::string& option,
+                        const voxdag_reader::File& file) {
+  const auto world = parse_list<double, 3>(text, ',', option + " X,Y,Z");
+  const double scale = static_cast<double>(file.resolution()) / file.edge();
+  render::Vec point;
+  for (int axis = 0; axis < 3; ++axis)
+    point[axis] = (world[static_cast<size_t>(axis)] - file.origin()[axis]) * scale;
+  return point;
+}
+
+render::Placement place_camera(const RenderCommand& command, const voxdag_reader::File& file,
+                               const render::DagView& dag) {
+  render::Placement placement{{{0, 0, 1}}, {{0, 0, 0}}};
+  const double aspect = static_cast<double>(command.options.width) / command.options.height;
+  if (!dag.empty()) {
+    const render::RayCaster caster(dag);
+    placement = render::named_view(command.view, caster, dag, render::occupied_box(dag), aspect,
+                                   command.fov_degrees);
+  }
+  if (!command.camera.empty()) {
+    placement.eye = parse_point(command.camera, "--camera", file);
+    placement.target = parse_point(command.target, "--target", file);
+    placement.fov_degrees = command.fov_degrees.value_or(50);
+  }
+  return placement;
+}
+
+std::array<double, 3> world_point(const render::Vec& point, const voxdag_reader::File& file) {
+  const double voxel = file.edge() / static_cast<double>(file.resolution());
+  std::array<double, 3> world{};
+  for (int axis = 0; axis < 3; ++axis)
+    world[static_cast<size_t>(axis)] = file.origin()[axis] + point[axis] * voxel;
+  return world;
+}
+
+void report(const RenderCommand& command, const render::Placement& placement,
+            const voxdag_reader::File& file, double wall_s) {
+  const auto eye = world_point(placement.eye, file), target = world_point(placement.target, file);
+  if (command.json) {
+    const nlohmann::ordered_json json = {
+        {"output", command.output},
+        {"width", command.options.width},
+        {"height", command.options.height},
+        {"camera", eye},
+        {"target", target},
+        {"fov", placement.fov_degrees},
+        {"wall_s", wall_s},
+    };
+    std::printf("%s\n", json.dump().c_str());
+    return;
+  }
+  std::printf("%s: %d x %d, %s\n", command.output.c_str(), command.options.width,
+              command.options.height, duration_text(wall_s).c_str());
+  std::printf("  --camera %.6g,%.6g,%.6g --target %.6g,%.6g,%.6g --fov %.4g\n", eye[0], eye[1],
+              eye[2], target[0], target[1], target[2], placement.fov_degrees);
+}
+
+void run(RenderCommand& command, CommandContext& context) {
+  const auto [width, height] = parse_list<int, 2>(command.size, 'x', "--size WIDTHxHEIGHT");
+  if (width < 1 || height < 1 || width > kMaxPictureEdge || height > kMaxPictureEdge)
+    throw Error(ErrorCode::kInvalidInput, "--size " + command.size + ": expected edges of 1 to " +
+                                              std::to_string(kMaxPictureEdge) + " pixels");
+  command.options.width = width;
+  command.options.height = height;
+  const auto progress = make_progress_bar();
+  const auto file = open_global_file(command.input);
+  const render::DagView dag(*file);
+  if (dag.empty()) progress->warn(command.input + " has no voxels");
+  const double start_s = wall_seconds();
+  const render::Placement placement = place_camera(command, *file, dag);
+  const render::Picture picture =
+      render::render_picture(dag, placement, command.options, *progress, context.cancel);
+  render::write_png(context.files, command.output, picture);
+  report(command, placement, *file, wall_seconds() - start_s);
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("render", "draw a picture of a DAG");
+  const auto state = std::make_shared<RenderCommand>();
+  state->options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  command->add_option("input", state->input, "the .vdag file")->required();
+  command->add_option("-o,--output", state->output, "the .png file to make")->required();
+  auto* view = command->add_option("--view", state->view, "from where to look")
+                   ->check(CLI::IsMember(render::view_names()))
+                   ->capture_default_str();
+  auto* camera = command->add_option("--camera", state->camera, "X,Y,Z of the eye, in scene units");
+  auto* target = command->add_option("--target", state->target, "X,Y,Z that it looks at");
+  camera->needs(target)->excludes(view);
+  target->needs(camera);
+  command->add_option("--fov", state->fov_degrees, "field of view in degrees, top to bottom")
+      ->check(CLI::Range(1.0, 170.0));
+  command->add_option("--size", state->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+  command->add_option("--samples", state->options.samples, "rays a pixel: this, squared")
+      ->check(CLI::Range(1, 8))
+      ->capture_default_str();
+  command->add_option("--threads", state->options.threads, "threads to use")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+  command->callback([state, &context] { run(*state, context); });
+}
+
+}  // namespace voxdag::cli

@@ -1,0 +1,68 @@
+#include "cli/render/bounds.h"
+
+#include <algorithm>
+
+namespace voxdag::render {
+namespace {
+
+constexpr uint32_t kDepth = 11;
+
+class Search {
+ public:
+  explicit Search(const DagView& dag) : dag_(dag), depth_(std::min(dag.grid_levels(), kDepth)) {
+    visit(0, {0, 0, 0}, dag.root());
+  }
+
+  Box box() const {
+    const double size = static_cast<double>(dag_.resolution() >> depth_);
+    Box b;
+    for (int axis = 0; axis < 3; ++axis) {
+      b.low[axis] = static_cast<double>(low_[axis]) * size;
+      b.high[axis] = static_cast<double>(high_[axis]) * size;
+    }
+    return b;
+  }
+
+ private:
+  struct Cell {
+    int64_t c[3];
+  };
+
+  void visit(uint32_t depth, const Cell& cell, uint64_t content) {
+    if (inside(depth, cell)) return;
+    if (depth == depth_) return add(cell);
+    const DagView::Children children = dag_.children(depth, content);
+    // The corners first: they widen the box, and most of the rest then lies inside.
+    for (int i : {0, 7, 3, 4, 5, 2, 1, 6})
+      if (children.has(i))
+        visit(depth + 1,
+              {{2 * cell.c[0] + (i >> 2), 2 * cell.c[1] + (i >> 1 & 1), 2 * cell.c[2] + (i & 1)}},
+              dag_.content(depth, children, i));
+  }
+
+  bool inside(uint32_t depth, const Cell& cell) const {
+    const uint32_t shift = depth_ - depth;
+    for (int axis = 0; axis < 3; ++axis)
+      if (cell.c[axis] << shift < low_[axis] || (cell.c[axis] + 1) << shift > high_[axis])
+        return false;
+    return true;
+  }
+
+  void add(const Cell& cell) {
+    for (int axis = 0; axis < 3; ++axis) {
+      low_[axis] = std::min(low_[axis], cell.c[axis]);
+      high_[axis] = std::max(high_[axis], cell.c[axis] + 1);
+    }
+  }
+
+  const DagView& dag_;
+  const uint32_t depth_;
+  int64_t low_[3] = {INT64_MAX, INT64_MAX, INT64_MAX};
+  int64_t high_[3] = {INT64_MIN, INT64_MIN, INT64_MIN};
+};
+
+}  // namespace
+
+Box occupied_box(const DagView& dag) { return Search(dag).box(); }
+
+}  // namespace voxdag::render

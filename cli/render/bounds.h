@@ -1,0 +1,21 @@
+// The box around what is set.
+#pragma once
+
+#include <cstdint>
+
+#include "cli/render/dag_view.h"
+#include "cli/render/vec.h"
+
+namespace voxdag::render {
+
+struct Box {
+  Vec low, high;
+  Vec centre() const { return mix(low, high, 0.5); }
+  double diagonal() const { return length(high - low); }
+};
+
+// Exact to a 2048th of the grid, in voxels, the cells at its sides included. The view must not be
+// empty.
+Box occupied_box(const DagView& dag);
+
+}  // namespace voxdag::render

@@ -1,0 +1,191 @@
+#include "cli/render/shader.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "cli/render/surface.h"
+
+namespace voxdag::render {
+namespace {
+
+constexpr double kFar = 1e30;
+constexpr Vec kAlbedo{{0.80, 0.775, 0.74}};
+constexpr Vec kSunlight{{3.3, 3.0, 2.6}};
+constexpr Vec kZenith{{0.62, 0.80, 1.10}}, kHorizon{{1.0, 1.02, 1.05}}, kGround{{0.42, 0.38, 0.34}};
+constexpr Vec kTopColour{{0.60, 0.67, 0.76}}, kBottomColour{{0.86, 0.88, 0.90}};
+constexpr double kSunRadius = 0.02;
+constexpr double kBounce = 0.42;       // of the sky's light, from what hides it
+constexpr double kRayWidening = 0.07;  // of rays to the light
+constexpr int kSkyRays = 6;            // for one sample of a pixel
+
+Vec product(const Vec& a, const Vec& b) { return {{a[0] * b[0], a[1] * b[1], a[2] * b[2]}}; }
+
+double luminance(const Vec& c) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]; }
+
+Vec sky(const Vec& direction) {
+  const double up = direction[1];
+  return up >= 0 ? mix(kHorizon, kZenith, std::sqrt(up)) : mix(kHorizon, kGround, std::sqrt(-up));
+}
+
+// Bright light is compressed, white only in the limit.
+Vec tone(const Vec& light) {
+  Vec out;
+  for (int i = 0; i < 3; ++i) out[i] = light[i] * (1 + light[i] / 9) / (1 + light[i]);
+  return {{std::min(1.0, out[0]), std::min(1.0, out[1]), std::min(1.0, out[2])}};
+}
+
+bool inside(const Box& box, const Vec& p) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (p[axis] < box.low[axis] || p[axis] > box.high[axis]) return false;
+  return true;
+}
+
+}  // namespace
+
+Shader::Shader(const DagView& dag, const Box& box, const Camera& camera, int width, int height)
+    : dag_(dag), caster_(dag), camera_(camera), box_(box), height_(height) {
+  std::vector<Surface> seen;
+  std::vector<double> distances;
+  constexpr int kColumns = 40, kRows = 24;
+  for (int i = 0; i < kColumns * kRows; ++i) {
+    Surface s;
+    const double x = (i % kColumns + 0.5) * width / kColumns;
+    const double y = (i / kColumns + 0.5) * height / kRows;
+    if (!hit_surface(camera.ray(x, y), s)) continue;
+    seen.push_back(s);
+    distances.push_back(s.t);
+  }
+  const Vec eye = camera.ray(0, 0).origin;
+  has_floor_ = eye[1] > box.low[1] && !inside(box, eye);
+  if (seen.empty()) return;
+  std::sort(distances.begin(), distances.end());
+  reach_ = 0.35 * distances[distances.size() / 2];
+  haze_start_ = distances.front();
+  haze_depth_ = std::max(box.diagonal(), 1.0);
+  choose_sun(seen);
+  choose_exposure(seen);
+}
+
+bool Shader::hit_surface(const Ray& ray, Surface& s) const {
+  Hit hit;
+  const Cone pixel{0, camera_.pixel_spread() * 0.75};
+  if (!caster_.cast(ray, pixel, 0, kFar, hit)) return false;
+  s.t = hit.t;
+  s.size = static_cast<double>(dag_.resolution() >> hit.depth);
+  // Voxels of many pixels are shown as the cubes they are; smaller ones as the surface they sample.
+  const double pixels = s.size / std::max(hit.t * camera_.pixel_spread(), 1e-9);
+  const double cube = std::clamp((pixels - 5) / 8, 0.0, 1.0);
+  const Vec face = face_normal(hit, ray.direction);
+  s.normal =
+      cube < 1 ? normalized(mix(surface_normal(dag_, hit, ray.direction), face, cube)) : face;
+  s.point = ray.at(hit.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
+  return true;
+}
+
+Vec Shader::colour(double x, double y, Sampler& sampler) const {
+  const Ray ray = camera_.ray(x, y);
+  const Vec behind = background(y);
+  Surface s;
+  if (!hit_surface(ray, s)) return behind * floor_light(ray, kFar, sampler);
+  const Vec light = tone(lit_surface(s, kSkyRays, sampler) * exposure_);
+  const double depth = std::max(0.0, (s.t - haze_start_) / haze_depth_);
+  return mix(light, behind, 0.25 * (1 - std::exp(-depth * depth)));
+}
+
+Vec Shader::lit_surface(const Surface& s, int sky_rays, Sampler& sampler) const {
+  Vec light = skylight(s, sky_rays, sampler);
+  const Vec sun = jittered_sun(sampler);
+  const double facing = dot(s.normal, sun);
+  if (facing > 0 && in_sun(s, sun)) light = light + kSunlight * facing;
+  return product(kAlbedo, light);
+}
+
+Vec Shader::skylight(const Surface& s, int rays, Sampler& sampler) const {
+  const double start_u = sampler.next(), start_v = sampler.next();
+  const Cone cone{s.size, kRayWidening};
+  Vec sum;
+  for (int i = 0; i < rays; ++i) {
+    const double v = start_v + 0.618034 * i;
+    const Vec direction = cosine_direction(s.normal, (i + start_u) / rays, v - std::floor(v));
+    Hit hit;
+    double open = 1;
+    if (caster_.cast({s.point, direction}, cone, 0, reach_, hit)) {
+      const double near = hit.t / reach_;
+      open = kBounce * std::sqrt(near) * (1 - near) + near * near;
+    }
+    sum = sum + sky(direction) * open;
+  }
+  return sum * (1.0 / rays);
+}
+
+bool Shader::in_sun(const Surface& s, const Vec& towards_sun) const {
+  Hit hit;
+  return !caster_.cast({s.point, towards_sun}, {s.size, 0.004}, 0, kFar, hit);
+}
+
+Vec Shader::jittered_sun(Sampler& sampler) const {
+  Vec u, w;
+  basis_around(sun_, u, w);
+  const double r = kSunRadius * std::sqrt(sampler.next()),
+               angle = 2 * Sampler::kPi * sampler.next();
+  return normalized(sun_ + u * (r * std::cos(angle)) + w * (r * std::sin(angle)));
+}
+
+Vec Shader::background(double y) const {
+  return mix(kTopColour, kBottomColour, std::clamp(y / height_, 0.0, 1.0));
+}
+
+double Shader::floor_light(const Ray& ray, double until, Sampler& sampler) const {
+  if (!has_floor_ || ray.direction[1] >= 0) return 1;
+  const double t = (box_.low[1] - ray.origin[1]) / ray.direction[1];
+  if (t > until) return 1;
+  const Vec p = ray.at(t);
+  const double from_middle = length(p - box_.centre()) / box_.diagonal();
+  const double fade = std::exp(-1.6 * from_middle * from_middle);
+  if (fade < 0.01) return 1;
+  Surface s{p, {{0, 1, 0}}, 0.5 * camera_.pixel_spread() * t, t};
+  Hit hit;
+  double open = 0;
+  for (int i = 0; i < 4; ++i) {
+    const Vec d = cosine_direction(s.normal, (i + sampler.next()) / 4, sampler.next());
+    if (!caster_.cast({p, d}, {s.size, kRayWidening}, 0, 0.5 * box_.diagonal(), hit))
+      open += 0.25;
+    else
+      open += 0.25 * std::min(1.0, hit.t / (0.5 * box_.diagonal()));
+  }
+  const double sun = in_sun(s, jittered_sun(sampler)) ? 1 : 0;
+  return 1 - fade * (1 - (0.25 + 0.35 * open + 0.40 * sun));
+}
+
+// Of suns all around, at three heights: one that lights about half of what is seen, from behind the
+// camera's left shoulder if that does.
+void Shader::choose_sun(const std::vector<Surface>& seen) {
+  const Vec f = camera_.forward();
+  const double behind = std::atan2(-f[2], -f[0]);
+  constexpr double kPreferred = -0.9;
+  double best = kFar;
+  for (int i = 0; i < 16 * 3; ++i) {
+    const double turn = kPreferred + Sampler::kPi * (i % 16 - 8) / 8;
+    const double height = 0.65 + 0.25 * (i / 16);
+    const Vec sun{{std::cos(behind - turn) * std::cos(height), std::sin(height),
+                   std::sin(behind - turn) * std::cos(height)}};
+    double lit = 0;
+    for (const Surface& s : seen)
+      if (dot(s.normal, sun) > 0 && in_sun(s, sun)) ++lit;
+    lit /= static_cast<double>(seen.size());
+    const double cost = std::fabs(lit - 0.55) + 0.04 * std::fabs(turn - kPreferred);
+    if (cost >= best) continue;
+    best = cost;
+    sun_ = sun;
+  }
+}
+
+// The mean of what is seen comes out as a light grey.
+void Shader::choose_exposure(const std::vector<Surface>& seen) {
+  Sampler sampler(3);
+  double sum = 0;
+  for (const Surface& s : seen) sum += std::log(1e-3 + luminance(lit_surface(s, 8, sampler)));
+  exposure_ = 0.85 / std::exp(sum / static_cast<double>(seen.size()));
+}
+
+}  // namespace voxdag::render

@@ -1,0 +1,30 @@
+// Where to look from when the user does not say.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/render/bounds.h"
+#include "cli/render/camera.h"
+#include "cli/render/ray_caster.h"
+
+namespace voxdag::render {
+
+// "auto", "iso", "front", "back", "left", "right", "top", "inside".
+const std::vector<std::string>& view_names();
+
+// Throws Error{kInvalidInput} listing the names for one that is not there. "auto" is "inside" for a
+// scene most of which cannot be seen from without, and "iso" for any other. Without a field of view
+// in degrees, one that suits the view.
+Placement named_view(const std::string& name, const RayCaster& caster, const DagView& dag,
+                     const Box& box, double aspect, std::optional<double> fov_degrees);
+
+// The share of rays in all directions from random places of the surface that leave the scene: about
+// 1/2 for a convex thing, little for a room.
+double openness(const RayCaster& caster, const DagView& dag, const Box& box);
+
+// A place within the scene with a long view, walls around and a floor below.
+Placement inside_view(const RayCaster& caster, const Box& box, double fov_degrees);
+
+}  // namespace voxdag::render
