@@ -1,0 +1,43 @@
+// Merges one level of all runs: slab after slab of the hash space, the rows rewired, swept,
+// written, and their positions kept for the level above.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/base/progress.h"
+#include "merge/level_output.h"
+#include "merge/level_run.h"
+#include "merge/memory_plan.h"
+#include "merge/merge.h"
+#include "merge/position_maps.h"
+#include "merge/scratch.h"
+#include "merge/turnstile.h"
+
+namespace voxdag {
+
+// What all levels of a merge share.
+struct MergeSeams {
+  MergeScratch& scratch;
+  MemoryBudget& budget;
+  MemoryPlan plan;
+  Progress& progress;
+  const CancelToken& cancel;
+  MergeReport& report;
+};
+
+struct LevelTask {
+  uint32_t level = 0;
+  bool bricks = false;
+  std::span<const LevelRun* const> runs;
+  const PositionMaps* child_maps = nullptr;  // of the level below, run for run; null for bricks
+  PositionMaps& maps;                        // filled
+  LevelOutput& output;                       // between begin_level() and end_level()
+};
+
+// Adds ranges, groups and rows to the report.
+LevelExtent merge_level(const MergeSeams& seams, const LevelTask& task);
+
+}  // namespace voxdag

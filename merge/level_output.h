@@ -1,0 +1,62 @@
+// Where the merged rows of a level go: the global file in the last round, an artifact before.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/format/artifact.h"
+#include "core/format/global_writer.h"
+#include "merge/record.h"
+
+namespace voxdag {
+
+// Positions of a level end below this: they are kept in 32 bits.
+inline constexpr uint64_t kPositionLimit = uint64_t{1} << 32;
+
+class LevelOutput {
+ public:
+  virtual ~LevelOutput() = default;
+  // Positions count words, and batches may come in any order, also from several threads at once.
+  // Otherwise they count rows, and batches come in order, one at a time.
+  virtual bool in_words() const = 0;
+  virtual void begin_level(uint32_t level) = 0;
+  // Unique rows, the first of them at `position`.
+  virtual void write(uint64_t position, const RecordBatch& batch) = 0;
+  virtual void end_level(uint64_t nodes, uint64_t positions) = 0;
+};
+
+class GlobalOutput : public LevelOutput {
+ public:
+  explicit GlobalOutput(GlobalFileWriter& file) : file_(file) {}
+  bool in_words() const override { return true; }
+  void begin_level(uint32_t level) override { file_.begin_level(level); }
+  void write(uint64_t position, const RecordBatch& batch) override {
+    file_.write_words(position, batch.words());
+  }
+  void end_level(uint64_t nodes, uint64_t positions) override { file_.end_level(nodes, positions); }
+
+ private:
+  GlobalFileWriter& file_;
+};
+
+class ArtifactOutput : public LevelOutput {
+ public:
+  explicit ArtifactOutput(ArtifactWriter& artifact) : artifact_(artifact) {}
+  bool in_words() const override { return false; }
+  void begin_level(uint32_t level) override;
+  void write(uint64_t position, const RecordBatch& batch) override;
+  void end_level(uint64_t nodes, uint64_t positions) override;
+
+ private:
+  void write_bricks(const RecordBatch& batch);
+  void write_nodes(const RecordBatch& batch);
+
+  ArtifactWriter& artifact_;
+  uint32_t level_ = 0;
+  // Columns of up to a frame of rows.
+  std::vector<uint64_t> brick_masks_;
+  std::vector<uint8_t> masks_;
+  std::vector<uint32_t> children_;
+};
+
+}  // namespace voxdag

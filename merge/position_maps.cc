@@ -1,0 +1,44 @@
+#include "merge/position_maps.h"
+
+#include <algorithm>
+
+namespace voxdag {
+
+PositionMaps::PositionMaps(std::span<const uint64_t> rows, uint64_t resident_bytes,
+                           MergeScratch& scratch, MemoryBudget& budget)
+    : first_{0} {
+  for (const uint64_t count : rows) first_.push_back(first_.back() + count);
+  const uint64_t total = first_.back();
+  if (total * sizeof(uint32_t) <= resident_bytes)
+    values_ = PageBuffer<uint32_t>(budget, total, "the merge's position maps");
+  else
+    file_ = std::make_unique<ScratchFile>(scratch);
+}
+
+uint64_t PositionMaps::most_rows() const {
+  uint64_t most = 0;
+  for (size_t run = 0; run + 1 < first_.size(); ++run) most = std::max(most, rows(run));
+  return most;
+}
+
+void PositionMaps::store(size_t run, uint64_t first, std::span<const uint32_t> positions) {
+  if (resident())
+    std::copy(positions.begin(), positions.end(), values(run) + first);
+  else
+    file_->write(first_[run] + first, positions);
+}
+
+void PositionMaps::load(size_t run, uint64_t first, std::span<uint32_t> positions) const {
+  if (resident())
+    std::copy_n(values(run) + first, positions.size(), positions.begin());
+  else
+    file_->read(first_[run] + first, positions);
+}
+
+uint32_t PositionMaps::at(size_t run, uint64_t row) const {
+  uint32_t position = 0;
+  load(run, row, {&position, 1});
+  return position;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,98 @@
+#include "merge/round.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+#include "merge/top_run.h"
+
+namespace voxdag {
+namespace {
+
+class Round {
+ public:
+  Round(const MergeSeams& seams, const RoundTask& task, LevelOutput& output, Checkpoint* checkpoint)
+      : seams_(seams), task_(task), output_(output), checkpoint_(checkpoint) {}
+
+  std::vector<ArtifactRoot> run() {
+    const uint32_t brick_level = task_.grid_levels - kBrickLevels;
+    const uint32_t highest = task_.with_top ? 0 : highest_root();
+    for (uint32_t level = brick_level + 1; level-- > highest;) merge_level_of_all(level);
+    if (task_.with_top && placed_.size() != 1)
+      throw Error(ErrorCode::kCorrupt,
+                  "an artifact holds the whole grid and others a part of it: "
+                  "expected subvolumes that do not overlap");
+    return std::move(roots_);
+  }
+
+ private:
+  uint32_t highest_root() const {
+    uint32_t highest = task_.grid_levels;
+    for (const ArtifactReader& artifact : task_.artifacts)
+      for (const ArtifactRoot& root : artifact.roots())
+        highest = std::min(highest, root.cube.level);
+    return highest;
+  }
+
+  void merge_level_of_all(uint32_t level) {
+    std::vector<ArtifactRun> artifact_runs;
+    for (const ArtifactReader& artifact : task_.artifacts)
+      artifact_runs.emplace_back(artifact, level);
+    const TopRun top(task_.hash_bits,
+                     task_.with_top ? std::move(placed_) : std::vector<PlacedNode>());
+    std::vector<const LevelRun*> runs;
+    std::vector<uint64_t> rows;
+    for (const ArtifactRun& run : artifact_runs) runs.push_back(&run);
+    runs.push_back(&top);
+    for (const LevelRun* run : runs) rows.push_back(run->rows());
+
+    PositionMaps maps(rows, seams_.plan.resident_bytes, seams_.scratch, seams_.budget);
+    output_.begin_level(level);
+    const LevelExtent extent =
+        merge_level(seams_, {.level = level,
+                             .bricks = level + kBrickLevels == task_.grid_levels,
+                             .runs = runs,
+                             .child_maps = child_maps_ ? &*child_maps_ : nullptr,
+                             .maps = maps,
+                             .output = output_});
+    output_.end_level(extent.nodes, extent.positions);
+    if (task_.number == 0) seams_.report.dag_nodes += extent.nodes;
+    place(level, top, maps);
+    child_maps_ = std::move(maps);
+    if (checkpoint_) checkpoint_->level_merged(task_.number, level, extent.nodes);
+  }
+
+  // Finds where this level's top nodes and subvolume roots went.
+  void place(uint32_t level, const TopRun& top, const PositionMaps& maps) {
+    placed_.clear();
+    for (size_t row = 0; row < top.rows(); ++row)
+      placed_.push_back({top.cube(row), top.hash(row), maps.at(task_.artifacts.size(), row)});
+    if (task_.number == 0) seams_.report.svo_nodes += top.rows();
+    for (size_t run = 0; run < task_.artifacts.size(); ++run)
+      for (ArtifactRoot root : task_.artifacts[run].roots()) {
+        if (root.cube.level != level) continue;
+        root.index = maps.at(run, root.index);
+        placed_.push_back({root.cube, root.hash, root.index});
+        roots_.push_back(root);
+      }
+  }
+
+  const MergeSeams& seams_;
+  const RoundTask& task_;
+  LevelOutput& output_;
+  Checkpoint* const checkpoint_;
+  std::optional<PositionMaps> child_maps_;
+  std::vector<PlacedNode> placed_;  // on the level merged last
+  std::vector<ArtifactRoot> roots_;
+};
+
+}  // namespace
+
+std::vector<ArtifactRoot> merge_round(const MergeSeams& seams, const RoundTask& task,
+                                      LevelOutput& output, Checkpoint* checkpoint) {
+  return Round(seams, task, output, checkpoint).run();
+}
+
+}  // namespace voxdag
