@@ -18,6 +18,7 @@ namespace {
 constexpr double kTerminalInterval_s = 0.1;
 constexpr double kPlainInterval_s = 5;
 constexpr int kBarWidth = 24;
+constexpr size_t kNameWidth = 11;
 
 // 1234567 -> "1.23 M"
 std::string short_count(double count) {
@@ -73,8 +74,9 @@ class ProgressBar : public Progress {
     const double elapsed = std::max(now - start_s_, 1e-9);
     const double done = static_cast<double>(done_.load());
     const double part = total_ ? std::min(1.0, done / static_cast<double>(total_)) : 0;
-    std::string line = (terminal_ ? "\r\033[K" : "") + stage_;
-    line.resize(std::max<size_t>(line.size(), (terminal_ ? 4 : 0) + 11), ' ');
+    std::string line = stage_ + ' ';
+    line.resize(std::max<size_t>(line.size(), kNameWidth), ' ');
+    if (terminal_) line = "\r\033[K" + line;
     if (terminal_ && total_ && !ended) line += bar(part);
     if (total_ && !ended) line += percent(part);
     line += short_count(done) + (total_ ? " of " + short_count(static_cast<double>(total_)) : "");
