@@ -1,0 +1,116 @@
+// Run options, the number of triangles' copies and the order of work never show in the bytes. The
+// reports say that the variants really took different ways.
+#include <algorithm>
+
+#include "tests/reference/reference_build.h"
+
+namespace reference {
+namespace {
+
+using RunOptionsTest = Reference;
+using voxdag::BuildReport;
+
+Triangles mixed_scene(int resolution, int of_each_kind) {
+  Triangles scene;
+  for (const oracle::SceneKind kind : oracle::kAllKinds) {
+    if (kind == oracle::SceneKind::kWide) continue;
+    for (const auto& t : oracle::make_scene(kind, 1, {{0, 0, 0}, resolution}, of_each_kind))
+      scene.push_back(t);
+  }
+  return scene;
+}
+
+// Subvolume sizes, threads and budgets on a scene that the oracle knows.
+TEST_F(RunOptionsTest, NeverShow) {
+  const Triangles scene = mixed_scene(256, 12);
+  for (const uint32_t hash_bits : {4u, 16u, 64u}) {
+    SCOPED_TRACE(testing::Message() << "hash bits " << hash_bits);
+    auto spec = spec_for(scene, 256);
+    spec.geometry.hash_bits = hash_bits;
+    spec.run.subvolume_edge = 256;
+    const auto whole = expect_right(scene, 256, spec);
+    EXPECT_EQ(whole.subvolumes, 1u);
+    uint64_t most_subvolumes = 0;
+    for (const uint64_t edge : {0, 64, 128})
+      for (const unsigned threads : {1u, 2u})
+        for (const uint64_t memory : {64 * kMebibyte, 1024 * kMebibyte}) {
+          SCOPED_TRACE(testing::Message() << "subvolumes of " << edge << ", " << threads
+                                          << " threads, " << memory << " bytes");
+          spec.run.subvolume_edge = edge;
+          spec.run.threads = threads;
+          spec.run.memory_bytes = memory;
+          const auto report = run(spec);
+          EXPECT_EQ(report.sha256, whole.sha256);
+          EXPECT_TRUE(contents(report.output) == contents(whole.output));
+          EXPECT_EQ(report.threads, threads);
+          EXPECT_EQ(report.memory_bytes, memory);
+          most_subvolumes = std::max(most_subvolumes, report.subvolumes);
+        }
+    EXPECT_GT(most_subvolumes, 40u);
+  }
+}
+
+// More triangles than memory holds: they spill, and nothing shows.
+TEST_F(RunOptionsTest, SpillingNeverShows) {
+  const Triangles scene = mixed_scene(128, 200);
+  const auto plain = expect_right(scene, 128, spec_for(scene, 128));
+  EXPECT_EQ(plain.spill_bytes, 0u);
+  auto spec = spec_for(scene, 128, 500);
+  spec.run.memory_bytes = 64 * kMebibyte;
+  for (const uint64_t edge : {64, 128}) {
+    spec.run.subvolume_edge = edge;
+    spec.run.threads = edge == 64 ? 2 : 1;
+    const auto report = run(spec);
+    EXPECT_EQ(report.sha256, plain.sha256);
+    EXPECT_GT(report.triangles, 900000u);
+    EXPECT_GT(report.spill_bytes, 10 * kMebibyte);
+  }
+}
+
+// A subvolume that outgrows its share is split in eight, and nothing shows.
+TEST_F(RunOptionsTest, SplittingNeverShows) {
+  const Triangles scene =
+      oracle::make_scene(oracle::SceneKind::kSpanning, 3, {{0, 0, 0}, 1024}, 400);
+  auto spec = spec_for(scene, 1024);
+  spec.run.subvolume_edge = 1024;
+  spec.run.memory_bytes = 4096 * kMebibyte;
+  const auto whole = run(spec);
+  EXPECT_EQ(whole.subvolumes_split, 0u);
+  for (const unsigned threads : {1u, 2u}) {
+    spec.run.memory_bytes = 64 * kMebibyte;
+    spec.run.threads = threads;
+    const auto split = run(spec);
+    EXPECT_GT(split.subvolumes_split, 0u);
+    EXPECT_EQ(split.sha256, whole.sha256);
+  }
+}
+
+// With few hash bits the order in the file is another one, the DAG is the same: equal counts,
+// equal voxels, and again the same bytes whatever the run options.
+TEST_F(RunOptionsTest, HashBitsChangeTheOrderOnly) {
+  const Triangles scene = oracle::make_scene(oracle::SceneKind::kSpanning, 4, {{0, 0, 0}, 512}, 60);
+  auto spec = spec_for(scene, 512);
+  spec.run.subvolume_edge = 512;
+  const auto full = run(spec);
+  for (const uint32_t hash_bits : {4u, 16u}) {
+    SCOPED_TRACE(hash_bits);
+    spec.geometry.hash_bits = hash_bits;
+    spec.run = {};
+    spec.run.subvolume_edge = 512;
+    spec.run.threads = 1;
+    const auto cut = run(spec);
+    EXPECT_NE(cut.sha256, full.sha256);
+    EXPECT_EQ(cut.voxels, full.voxels);
+    EXPECT_EQ(cut.svo_nodes, full.svo_nodes);
+    EXPECT_EQ(cut.dag_nodes, full.dag_nodes);
+    for (const uint64_t edge : {64, 128}) {
+      spec.run.subvolume_edge = edge;
+      spec.run.threads = 2;
+      spec.run.memory_bytes = 64 * kMebibyte;
+      EXPECT_EQ(run(spec).sha256, cut.sha256);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace reference
