@@ -149,7 +149,7 @@ TEST_P(Memory, EveryBudgetIsOutgrownOrRight) {
       oracle::make_scene(oracle::SceneKind::kSpanning, 12, oracle::region_of({}, 9), 60);
   const Built whole = build(*backend, task, scene);
   int outgrown = 0, built = 0;
-  for (uint64_t budget = kSmallestBudget; budget <= kAmpleBudget; budget += budget / 2) {
+  for (uint64_t budget = kSmallestBudget / 64; budget <= kAmpleBudget; budget += budget / 2) {
     SCOPED_TRACE(budget);
     oracle::VectorStream stream(oracle::fixed(scene));
     const int64_t before = g_heap;
