@@ -109,14 +109,15 @@ class Build {
     start_or_resume(scene);
 
     std::vector<StoredSubvolume> leaves = store_->leaves();
+    const size_t leaf_count = leaves.size();
     std::erase_if(leaves,
                   [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });
+    report_.subvolumes_reused = leaf_count - leaves.size();
     if (!leaves.empty()) build_subvolumes_of(scene, leaves);
     report_.spill_bytes += scene.bins->spilled_bytes();
     const std::vector<StoredSubvolume> all = store_->leaves();
     report_.subvolumes = all.size();
     report_.artifact_bytes = report_.artifact_nodes = 0;
-    report_.subvolumes_reused = all.size() - std::min(all.size(), built_now_);
     for (const StoredSubvolume& subvolume : all) {
       report_.artifact_bytes += subvolume.artifact.bytes;
       report_.artifact_nodes += subvolume.summary.dag_nodes;
@@ -161,7 +162,6 @@ class Build {
     options.segment_folder = work_.path();
     options.first_segment_id = work_.next_segment_id();
     seams_.progress.begin_stage("build", queue.size(), "subvolumes");
-    built_now_ += queue.size();
     report_.subvolumes_split +=
         build_subvolumes(options, std::move(queue), *scene.bins, *store_, budget_, seams_);
     seams_.progress.end_stage();
@@ -222,7 +222,6 @@ class Build {
   JobProgress progress_;
   const Seams seams_;
   BuildReport report_;
-  uint64_t built_now_ = 0;
 };
 
 }  // namespace
