@@ -30,7 +30,10 @@ class Filter : public nlohmann::json_sax<json> {
     out_.charge = MemoryCharge(budget, 0, "the JSON of " + path);
   }
 
-  FilteredJson take() { return std::move(out_); }
+  FilteredJson take() {
+    out_.text += "  ";  // tinygltf takes no text of less than four characters, "{}" is one
+    return std::move(out_);
+  }
 
   bool null() override {
     if (const Schema* s = value()) violate(*s, "null");

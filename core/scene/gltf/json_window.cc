@@ -36,7 +36,7 @@ void JsonWindow::advance() {
     }
     track(c);
     current_ = c;
-  } while (withhold_current());
+  } while (is_withheld());
 }
 
 bool JsonWindow::next(char& c) {
@@ -52,33 +52,38 @@ bool JsonWindow::next(char& c) {
   return true;
 }
 
-// Follows where strings begin and end, escapes included.
+// Follows where strings begin and end.
 void JsonWindow::track(char c) {
-  if (!in_string_) {
-    if (c != '"') return;
-    in_string_ = true;
-    is_data_uri_ = true;
-    escaped_ = withheld_ = after_backslash_ = false;
-    string_ = {position_, 0};
-    return;
-  }
+  if (in_string_) return track_in_string(c);
+  if (c != '"') return;
+  in_string_ = is_data_uri_ = true;
+  escaped_ = after_backslash_ = in_escape_ = false;
+  hex_digits_left_ = 0;
+  string_ = {position_, 0};
+}
+
+void JsonWindow::track_in_string(char c) {
+  in_escape_ = true;
   if (after_backslash_) {
     after_backslash_ = false;
+    hex_digits_left_ = c == 'u' ? 4 : 0;
+  } else if (hex_digits_left_ > 0) {
+    --hex_digits_left_;
   } else if (c == '\\') {
     after_backslash_ = escaped_ = true;
-  } else if (c == '"') {
-    in_string_ = false;
-    return;
+  } else {
+    in_escape_ = false;
+    in_string_ = c != '"';
+    if (!in_string_) return;
   }
   const uint64_t i = string_.size++;
   if (i < kDataPrefix.size() && c != kDataPrefix[static_cast<size_t>(i)]) is_data_uri_ = false;
 }
 
-bool JsonWindow::withhold_current() {
-  const bool withhold = withhold_ && in_string_ && is_data_uri_ &&
-                        string_.size > kShownCharacters && is_base64(current_);
-  withheld_ = withheld_ || withhold;
-  return withhold;
+// An escape is never cut in two: it is not withheld, wherever it is.
+bool JsonWindow::is_withheld() const {
+  return withhold_ && in_string_ && is_data_uri_ && !in_escape_ &&
+         string_.size > kShownCharacters && is_base64(current_);
 }
 
 }  // namespace voxdag::gltf

@@ -24,16 +24,16 @@ class JsonWindow {
   char current() const { return current_; }
   void advance();
 
-  // The string that ended last: its raw characters between the quotes, and whether one of them
-  // was withheld or is a JSON escape.
+  // The string that ended last: its raw characters between the quotes, and whether there is a JSON
+  // escape among them.
   FileRange last_string() const { return string_; }
-  bool last_string_withheld() const { return withheld_; }
   bool last_string_escaped() const { return escaped_; }
 
  private:
   bool next(char& c);
   void track(char c);
-  bool withhold_current();
+  void track_in_string(char c);
+  bool is_withheld() const;
 
   const ReadableFile& file_;
   const FileRange json_;
@@ -46,9 +46,10 @@ class JsonWindow {
   // Inside a string:
   bool in_string_ = false;
   bool after_backslash_ = false;
+  int hex_digits_left_ = 0;  // of a \uXXXX
+  bool in_escape_ = false;   // current_ is part of an escape
   bool is_data_uri_ = false;
   bool escaped_ = false;
-  bool withheld_ = false;
   FileRange string_;
 };
 

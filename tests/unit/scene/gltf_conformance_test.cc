@@ -1,0 +1,238 @@
+// The shared conformance set and real scenes: the triangles, bounds and refusals that their
+// manifests ask for.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <unordered_map>
+
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kScenes = VOXDAG_SHARED_SCENES;
+
+// What one line of a manifest says of a file.
+struct Entry {
+  std::string file;
+  std::string triangles;  // "" if it does not say
+  std::string expect;     // "" in the manifest of the real scenes
+  std::string bounds;
+};
+
+std::vector<Entry> read_manifest(const fs::path& path, size_t expect_column, size_t bounds_column) {
+  std::vector<Entry> entries;
+  std::ifstream in(path);
+  std::string line;
+  std::getline(in, line);  // the names of the columns
+  while (std::getline(in, line)) {
+    std::vector<std::string> cells;
+    std::istringstream cut(line);
+    for (std::string cell; std::getline(cut, cell, '\t');) cells.push_back(cell);
+    cells.resize(16);
+    entries.push_back(
+        {cells[0], cells[1], expect_column ? cells[expect_column] : "", cells[bounds_column]});
+  }
+  return entries;
+}
+
+struct Opened {
+  explicit Opened(const fs::path& path) : budget(uint64_t{64} << 20) {
+    source = open_scene(system_files(), {path.string()}, {}, budget, cancel);
+  }
+  MemoryBudget budget;
+  CancelToken cancel;
+  std::unique_ptr<TriangleSource> source;
+};
+
+void expect_refused(const fs::path& path, const std::string& word = "") {
+  try {
+    Opened opened(path);
+    triangles_of(*opened.source);
+    ADD_FAILURE() << path << " was read";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidInput) << e.message();
+    EXPECT_NE(e.message().find(word), std::string::npos) << e.message();
+  }
+}
+
+// The largest coordinate, for tolerances relative to it.
+double magnitude(const std::vector<Corners>& triangles) {
+  double largest = 0;
+  for (const Corners& t : triangles)
+    for (const auto& corner : t)
+      for (double x : corner) largest = std::max(largest, std::abs(x));
+  return largest;
+}
+
+std::vector<Corners> read_obj(const fs::path& path) {
+  std::vector<std::array<double, 3>> vertices;
+  std::vector<Corners> triangles;
+  std::ifstream in(path);
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream words(line);
+    std::string kind;
+    words >> kind;
+    if (kind == "v") {
+      auto& v = vertices.emplace_back();
+      words >> v[0] >> v[1] >> v[2];
+    } else if (kind == "f") {
+      size_t a = 0, b = 0, c = 0;
+      words >> a >> b >> c;
+      triangles.push_back({vertices.at(a - 1), vertices.at(b - 1), vertices.at(c - 1)});
+    }
+  }
+  return triangles;
+}
+
+// The largest difference of a coordinate, the corners paired as fits best.
+double distance(const Corners& a, const Corners& b) {
+  double best = INFINITY;
+  std::array<size_t, 3> order = {0, 1, 2};
+  do {
+    double worst = 0;
+    for (size_t k = 0; k < 3; ++k)
+      for (size_t axis = 0; axis < 3; ++axis)
+        worst = std::max(worst, std::abs(a[k][axis] - b[order[k]][axis]));
+    best = std::min(best, worst);
+  } while (std::ranges::next_permutation(order).found);
+  return best;
+}
+
+// Equality of the two as multisets, whatever their order and winding: every expected triangle takes
+// the nearest found one that is left. They are looked up by the cell of their centroid and the
+// cells around it, so that rounding cannot hide one.
+void expect_same_triangles(const std::vector<Corners>& found,
+                           const std::vector<Corners>& expected) {
+  ASSERT_EQ(found.size(), expected.size());
+  // The ground truth went through floats, or has nine digits.
+  const double tolerance = 7e-8 * magnitude(expected);
+  const double cell = std::max(8 * tolerance, 1e-300);
+  const auto cell_of = [&](const Corners& t, size_t axis) {
+    return std::llround((t[0][axis] + t[1][axis] + t[2][axis]) / 3 / cell);
+  };
+  const auto key = [](long long x, long long y, long long z) {
+    return static_cast<uint64_t>(x) * 73856093u ^ static_cast<uint64_t>(y) * 19349669u ^
+           static_cast<uint64_t>(z) * 83492791u;
+  };
+  std::unordered_multimap<uint64_t, const Corners*> left;
+  for (const Corners& t : found) left.emplace(key(cell_of(t, 0), cell_of(t, 1), cell_of(t, 2)), &t);
+  const auto take_nearest = [&](const Corners& wanted) {
+    auto nearest = left.end();
+    double nearest_distance = tolerance;
+    for (int around = 0; around < 27; ++around) {
+      auto [it, last] = left.equal_range(key(cell_of(wanted, 0) + around / 9 - 1,
+                                             cell_of(wanted, 1) + around / 3 % 3 - 1,
+                                             cell_of(wanted, 2) + around % 3 - 1));
+      for (; it != last; ++it) {
+        const double d = distance(*it->second, wanted);
+        if (d > nearest_distance) continue;
+        nearest = it;
+        nearest_distance = d;
+      }
+    }
+    if (nearest == left.end()) return false;
+    left.erase(nearest);
+    return true;
+  };
+  size_t missing = 0;
+  for (const Corners& wanted : expected) missing += !take_nearest(wanted);
+  EXPECT_EQ(missing, 0u) << "of " << expected.size();
+}
+
+// Six numbers of six digits, as the manifests have them.
+void expect_bounds(const std::vector<Corners>& triangles, const std::string& bounds) {
+  std::array<double, 6> expected{}, found{};
+  std::istringstream words(bounds);
+  for (double& x : expected) words >> x;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    found[axis] = INFINITY;
+    found[axis + 3] = -INFINITY;
+    for (const Corners& t : triangles)
+      for (const auto& corner : t) {
+        found[axis] = std::min(found[axis], corner[axis]);
+        found[axis + 3] = std::max(found[axis + 3], corner[axis]);
+      }
+  }
+  for (size_t k = 0; k < 6; ++k)
+    EXPECT_NEAR(found[k], expected[k], 1e-5 * std::abs(expected[k])) << "bound " << k;
+}
+
+class GltfConformance : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(kScenes / "conformance" / "MANIFEST.tsv"))
+      GTEST_SKIP() << "the shared scenes are not there: " << kScenes;
+  }
+};
+
+// Every file of the set does what its line says.
+TEST_F(GltfConformance, Manifest) {
+  const fs::path folder = kScenes / "conformance";
+  size_t compared = 0, refused = 0;
+  for (const Entry& entry : read_manifest(folder / "MANIFEST.tsv", 3, 4)) {
+    SCOPED_TRACE(entry.file);
+    if (entry.expect == "refuse" || entry.expect == "refuse-or-decode") {
+      expect_refused(folder / entry.file);
+      ++refused;
+      continue;
+    }
+    Opened opened(folder / entry.file);
+    const auto triangles = triangles_of(*opened.source);
+    if (!entry.triangles.empty()) {
+      EXPECT_EQ(triangles.size(), std::stoull(entry.triangles));
+    }
+    EXPECT_EQ(opened.source->declared_triangles(), triangles.size());
+    if (!entry.bounds.empty()) expect_bounds(triangles, entry.bounds);
+    const fs::path truth =
+        folder / "expected" / fs::path(entry.file).filename().replace_extension(".obj");
+    if (!fs::exists(truth)) continue;
+    expect_same_triangles(triangles, read_obj(truth));
+    ++compared;
+  }
+  EXPECT_EQ(compared, 29u);
+  EXPECT_EQ(refused, 19u);
+}
+
+// A file without scenes draws its root nodes: the mesh of the other files of the set.
+TEST_F(GltfConformance, WithoutScenes) {
+  Opened opened(kScenes / "conformance" / "c22_no_scene.glb");
+  expect_same_triangles(triangles_of(*opened.source),
+                        read_obj(kScenes / "conformance" / "expected" / "c23_base64.obj"));
+}
+
+// Real scenes: counts, and bounds where the manifest has them.
+TEST_F(GltfConformance, RealScenes) {
+  size_t read = 0;
+  for (const Entry& entry : read_manifest(kScenes / "MANIFEST.tsv", 0, 11)) {
+    SCOPED_TRACE(entry.file);
+    const bool is_broken = entry.file.find("integer-out-of-bounds") != std::string::npos ||
+                           entry.file.find("Draco") != std::string::npos;
+    if (entry.triangles.empty() || is_broken || entry.file.ends_with(")")) continue;
+    Opened opened(kScenes / entry.file);
+    const auto triangles = triangles_of(*opened.source);
+    EXPECT_EQ(triangles.size(), std::stoull(entry.triangles));
+    if (!entry.bounds.empty()) expect_bounds(triangles, entry.bounds);
+    ++read;
+  }
+  EXPECT_EQ(read, 10u);
+}
+
+// Real files that cannot be read are refused with the reason by name.
+TEST_F(GltfConformance, RealRefusals) {
+  const fs::path folder = kScenes / "gltf_real";
+  expect_refused(folder / "Box_Draco.glb", "KHR_draco_mesh_compression");
+  expect_refused(folder / "pirate_meshopt.glb", "EXT_meshopt_compression");
+  expect_refused(folder / "lfs_pointer_as_bin.gltf", "130 are there in PrimitiveModes.bin");
+  expect_refused(folder / "gltf10_Cameras.gltf", "glTF version 1.1");
+  expect_refused(folder / "integer-out-of-bounds.gltf", "bufferViews[0].byteLength is 1e300");
+}
+
+}  // namespace
+}  // namespace voxdag::test

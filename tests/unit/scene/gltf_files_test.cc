@@ -1,0 +1,290 @@
+// The files that a scene lies in: containers, external buffers, data: URIs, and reading them by
+// windows within a budget.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/scene/gltf/base64.h"
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+void put_u32(std::string& bytes, size_t offset, uint32_t value) {
+  bytes.replace(offset, 4, little_endian(value));
+}
+
+// Opens folder/scene among other files.
+std::vector<Corners> triangles_among(const std::map<std::string, std::string>& contents) {
+  MemoryFiles files;
+  files.contents = contents;
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelToken cancel;
+  return triangles_of(*open_scene(files, {"folder/scene"}, {}, budget, cancel));
+}
+
+Error error_among(const std::map<std::string, std::string>& contents) {
+  try {
+    triangles_among(contents);
+  } catch (const Error& e) {
+    return e;
+  }
+  return Error(ErrorCode::kInvalidInput, "");
+}
+
+// A GLB cut anywhere is refused, and none of its bytes is read past the end.
+TEST(GltfContainer, EveryTruncationIsRefused) {
+  const std::string whole = one_triangle().glb();
+  for (size_t size = 0; size < whole.size(); ++size) {
+    const Error error = error_of_file(whole.substr(0, size));
+    ASSERT_EQ(error.code(), ErrorCode::kInvalidInput) << size;
+    ASSERT_NE(error.message(), "") << size;
+  }
+}
+
+// Lengths in the headers that do not fit each other.
+TEST(GltfContainer, LyingHeaders) {
+  const std::string whole = one_triangle().glb();
+  const auto with = [&](size_t offset, uint32_t value) {
+    std::string bytes = whole;
+    put_u32(bytes, offset, value);
+    return error_of_file(bytes).message();
+  };
+  EXPECT_NE(with(4, 1).find("GLB version 1, expected version 2"), std::string::npos);
+  EXPECT_NE(with(8, 0xffffffff).find("cut off"), std::string::npos);
+  EXPECT_NE(with(8, 3).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(with(8, 15).find("inside the header of a chunk"), std::string::npos);
+  EXPECT_NE(with(12, 0xfffffff0).find("a GLB chunk claims"), std::string::npos);
+  EXPECT_NE(with(16, 0x004E4942).find("not JSON"), std::string::npos);
+  EXPECT_NE(with(0, 0x58585858).find("neither a GLB"), std::string::npos);
+}
+
+// Bytes after the end that the header names, and a BIN chunk longer than its buffer, do no harm.
+TEST(GltfContainer, TrailingBytes) {
+  EXPECT_EQ(triangles_of_file(one_triangle().glb() + "trailing").size(), 1u);
+  SceneBuilder scene = one_triangle();
+  scene.bin += "xyz";
+  EXPECT_EQ(triangles_of_file(scene.glb()).size(), 1u);
+}
+
+// A file that says it has more than 1 GiB of JSON is refused before any of it is read.
+TEST(GltfContainer, JsonOfMoreThanTheLimit) {
+  class HugeFile : public ReadableFile {
+   public:
+    const std::string& path() const override { return path_; }
+    uint64_t size() const override { return (uint64_t{1} << 30) + 1; }
+    void read_at(uint64_t, std::span<std::byte> out) const override {
+      std::ranges::fill(out, std::byte{'{'});
+    }
+
+   private:
+    const std::string path_ = "huge.gltf";
+  };
+  class HugeFiles : public MemoryFiles {
+   public:
+    std::unique_ptr<ReadableFile> open_read(const std::string&) override {
+      return std::make_unique<HugeFile>();
+    }
+  };
+  HugeFiles files;
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelToken cancel;
+  try {
+    open_scene(files, {"huge.gltf"}, {}, budget, cancel);
+    FAIL() << "was opened";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kLimit);
+    EXPECT_NE(e.message().find("the limit is 1 GiB"), std::string::npos);
+  }
+}
+
+// Images, materials and the like are never looked at, however broken.
+TEST(GltfContainer, ImagesAreNeverRead) {
+  SceneBuilder scene = one_triangle();
+  scene.root["images"] = {{{"bufferView", 999}, {"mimeType", 7}}, {{"uri", "not there.png"}}};
+  scene.root["textures"] = {{{"source", -1}}};
+  scene.root["materials"] = {{{"pbrMetallicRoughness", 3}}};
+  scene.root["meshes"][0]["primitives"][0]["material"] = 77;
+  scene.root["nodes"][0]["extras"] = {{"deep", {1, 2, 3}}};
+  EXPECT_EQ(triangles_of_file(scene.glb()).size(), 1u);
+}
+
+// An external buffer is found beside the scene, its name percent-encoded.
+TEST(GltfBuffers, External) {
+  const SceneBuilder scene = one_triangle();
+  EXPECT_EQ(triangles_among({{"folder/scene", scene.gltf("sub%20dir/my%2fb.bin")},
+                             {"folder/sub dir/my/b.bin", scene.bin}})
+                .size(),
+            1u);
+}
+
+TEST(GltfBuffers, ExternalThatIsMissingOrShort) {
+  const SceneBuilder scene = one_triangle();
+  const Error missing = error_among({{"folder/scene", scene.gltf("a.bin")}});
+  EXPECT_EQ(missing.code(), ErrorCode::kNotFound);
+  EXPECT_NE(missing.message().find("folder/scene: buffer 0: "), std::string::npos);
+  const Error cut =
+      error_among({{"folder/scene", scene.gltf("a.bin")}, {"folder/a.bin", scene.bin.substr(1)}});
+  EXPECT_EQ(cut.code(), ErrorCode::kInvalidInput);
+  EXPECT_NE(cut.message().find("buffer 0 claims 42 bytes, 41 are there in a.bin"),
+            std::string::npos)
+      << cut.message();
+}
+
+// Only relative paths are followed.
+TEST(GltfBuffers, UrisThatAreNotFollowed) {
+  for (const char* uri : {"", "/etc/passwd", "http://example.org/a.bin", "file:a.bin", "C:\\a.bin",
+                          "a%2.bin", "a%zz", "a%00b"}) {
+    const Error error = error_among({{"folder/scene", one_triangle().gltf(uri)}});
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput) << uri;
+    EXPECT_NE(error.message().find("buffer 0: its uri"), std::string::npos) << error.message();
+  }
+}
+
+// A buffer without uri is the GLB's own or nobody's.
+TEST(GltfBuffers, WithoutUri) {
+  SceneBuilder scene = one_triangle();
+  scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
+  const Error error = error_of_file(scene.root.dump());
+  EXPECT_NE(error.message().find("buffer 0 has no uri and is not in the file"), std::string::npos);
+}
+
+// A data: URI longer than any window, read in pieces that begin at every remainder modulo three.
+TEST(GltfBuffers, LongDataUri) {
+  constexpr size_t kTriangles = 40000;
+  std::vector<float> positions;
+  for (size_t i = 0; i < 9 * kTriangles; ++i) positions.push_back(static_cast<float>(i % 1013));
+  for (size_t shift : {0, 1, 2}) {
+    SceneBuilder scene;
+    const int accessor = scene.add_positions(positions);
+    scene.add_root({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", accessor}}}})}});
+    scene.bin.insert(0, shift, 'x');
+    scene.root["bufferViews"][0]["byteOffset"] = shift;
+    const auto triangles =
+        triangles_of_file(scene.gltf("data:application/octet-stream;base64," + base64(scene.bin)));
+    ASSERT_EQ(triangles.size(), kTriangles);
+    for (size_t i = 0; i < 9 * kTriangles; ++i)
+      ASSERT_EQ(triangles[i / 9][i / 3 % 3][i % 3], positions[i]) << i;
+  }
+}
+
+// JSON may write base64's own characters as escapes, as some exporters do.
+TEST(GltfBuffers, DataUriWithJsonEscapes) {
+  SceneBuilder scene = one_triangle();
+  for (int i = 0; i < 10000; ++i) scene.bin += static_cast<char>(i * i % 251);
+  const std::string text = base64(scene.bin);
+  std::string escaped;
+  for (char c : text) escaped += c == 'A' ? "\\u0041" : c == '/' ? "\\/" : std::string(1, c);
+  ASSERT_NE(escaped, text);
+  std::string file = scene.gltf("data:;base64,HERE");
+  file.replace(file.find("HERE"), 4, escaped);
+  EXPECT_EQ(triangles_of_file(file).size(), 1u);
+}
+
+TEST(GltfBuffers, BrokenDataUris) {
+  const SceneBuilder scene = one_triangle();
+  const std::string text = base64(scene.bin);
+  const auto message = [&](const std::string& uri) {
+    return error_of_file(scene.gltf(uri)).message();
+  };
+  EXPECT_NE(message("data:text/plain,abc").find("is a data: URI that is not base64"),
+            std::string::npos);
+  EXPECT_NE(message("data:;base64").find("is a data: URI that is not base64"), std::string::npos);
+  EXPECT_NE(message("data:;base64," + text.substr(4)).find("buffer 0 claims 42 bytes, 39 are"),
+            std::string::npos)
+      << message("data:;base64," + text.substr(4));
+  EXPECT_NE(message("data:;base64,?" + text.substr(1)).find("is not base64"), std::string::npos);
+}
+
+TEST(Base64, DecodesTheExamplesOfTheRfc) {
+  const std::pair<const char*, const char*> examples[] = {
+      {"", ""},        {"Zg==", "f"},        {"Zm8=", "fo"},
+      {"Zm9v", "foo"}, {"Zm9vYg==", "foob"}, {"Zm8", "fo"}};
+  for (const auto& [text, expected] : examples) {
+    const std::string characters = text;
+    const auto bytes = std::as_bytes(std::span(characters));
+    std::string decoded(3 * ((characters.size() + 3) / 4), '\0');
+    ASSERT_TRUE(gltf::decode_base64(bytes, reinterpret_cast<std::byte*>(decoded.data())));
+    decoded.resize(gltf::base64_bytes(bytes.size(), bytes.last(std::min<size_t>(2, bytes.size()))));
+    EXPECT_EQ(decoded, expected);
+  }
+}
+
+// A mesh far larger than the budget, its triangles touching vertices all over it, comes out the
+// same as with room for all; the budget's peak never passes its limit.
+TEST(GltfWindows, LargerThanTheBudget) {
+  constexpr uint32_t kVertices = 120000;
+  constexpr size_t kTriangles = 20000;
+  SCOPED_TRACE("seed 1");
+  std::mt19937 random(1);
+  std::vector<float> positions(3 * kVertices);
+  for (float& p : positions) p = static_cast<float>(random() % 100000);
+  std::vector<uint32_t> corners(3 * kTriangles);
+  // Neighbours, with a jump to anywhere now and then.
+  for (size_t i = 0; i < corners.size(); ++i)
+    corners[i] = random() % 50 ? static_cast<uint32_t>(i % kVertices) : random() % kVertices;
+  SceneBuilder scene;
+  const int p = scene.add_positions(positions);
+  const int i = scene.add_accessor("SCALAR", kU32, corners);
+  scene.add_root({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", p}}}, {"indices", i}})}});
+  const std::string file = scene.glb();
+  ASSERT_GT(file.size(), size_t{1} << 20);
+
+  OpenScene roomy(file);
+  OpenScene tight(file, {}, uint64_t{1} << 20);
+  const auto expected = roomy.triangles();
+  ASSERT_EQ(expected.size(), kTriangles);
+  for (size_t t = 0; t < kTriangles; ++t)
+    for (size_t k = 0; k < 3; ++k)
+      ASSERT_EQ(expected[t][k][1], positions[3 * corners[3 * t + k] + 1]);
+  EXPECT_EQ(tight.triangles(), expected);
+  EXPECT_GT(roomy.budget.peak(), tight.budget.limit());
+  EXPECT_LE(tight.budget.peak(), tight.budget.limit());
+}
+
+// What is charged while streaming is given back, and all of it with the scene.
+TEST(GltfWindows, ChargesAreGivenBack) {
+  OpenScene open(one_triangle().glb());
+  const uint64_t resting = open.budget.used();
+  EXPECT_GT(resting, 0u);
+  open.triangles();
+  EXPECT_EQ(open.budget.used(), resting);
+  open.source.reset();
+  EXPECT_EQ(open.budget.used(), 0u);
+}
+
+TEST(GltfWindows, TooSmallABudgetIsAnError) {
+  try {
+    OpenScene(one_triangle().glb(), {}, 1000);
+    FAIL() << "was opened";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kOutOfMemory);
+  }
+}
+
+// A million draws stop within one of them once they are cancelled.
+TEST(GltfWindows, Cancelled) {
+  SceneBuilder scene = one_triangle();
+  OpenScene open(scene.glb());
+  open.cancel.cancel();
+  try {
+    open.triangles();
+    FAIL() << "went on";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kCancelled);
+  }
+}
+
+// Batches hold 1 to 4096 triangles, gathered across nodes.
+TEST(GltfWindows, BatchesAreFull) {
+  SceneBuilder scene = one_triangle();
+  for (int i = 1; i < 5000; ++i) scene.add_root({{"mesh", 0}});
+  OpenScene open(scene.glb());
+  std::vector<size_t> sizes;
+  open.source->for_each_batch(
+      [&](std::span<const WorldTriangle> batch) { sizes.push_back(batch.size()); });
+  EXPECT_EQ(sizes, (std::vector<size_t>{4096, 904}));
+}
+
+}  // namespace
+}  // namespace voxdag::test

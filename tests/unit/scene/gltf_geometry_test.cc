@@ -1,0 +1,254 @@
+// How the vertices and indices of a primitive become triangles, over small files made here.
+#include <gtest/gtest.h>
+
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+const std::vector<float> kSquare = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
+const Corners kLower = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
+const Corners kUpper = {{{1, 0, 0}, {1, 1, 0}, {0, 1, 0}}};
+
+SceneBuilder scene_of(SceneBuilder scene, Json primitive) {
+  scene.add_root({{"mesh", scene.add_mesh(std::move(primitive))}});
+  return scene;
+}
+
+template <class T>
+std::vector<Corners> indexed(int component_type) {
+  SceneBuilder scene;
+  const int positions = scene.add_positions(kSquare);
+  const int indices = scene.add_accessor<T>("SCALAR", component_type, {0, 1, 2, 1, 3, 2});
+  return triangles_of_file(
+      scene_of(scene, {{"attributes", {{"POSITION", positions}}}, {"indices", indices}}).glb());
+}
+
+// The three widths of indices and no indices at all name the same corners.
+TEST(GltfGeometry, IndicesOfEveryWidth) {
+  const std::vector<Corners> expected = {kLower, kUpper};
+  EXPECT_EQ(indexed<uint8_t>(kU8), expected);
+  EXPECT_EQ(indexed<uint16_t>(kU16), expected);
+  EXPECT_EQ(indexed<uint32_t>(kU32), expected);
+
+  SceneBuilder scene;
+  const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0});
+  EXPECT_EQ(triangles_of_file(scene_of(scene, {{"attributes", {{"POSITION", positions}}}}).glb()),
+            expected);
+}
+
+// A strip of four corners and a fan of four corners are two triangles each, indexed or not.
+TEST(GltfGeometry, StripsAndFans) {
+  SceneBuilder scene;
+  const int positions = scene.add_positions(kSquare);
+  const int round = scene.add_accessor<uint8_t>("SCALAR", kU8, {0, 1, 3, 2});
+  const auto draw = [&](Json more) {
+    Json primitive = {{"attributes", {{"POSITION", positions}}}};
+    primitive.update(more);
+    return triangles_of_file(scene_of(scene, primitive).glb());
+  };
+  const Corners second_of_strip = {{{1, 0, 0}, {0, 1, 0}, {1, 1, 0}}};
+  EXPECT_EQ(draw({{"mode", 5}}), (std::vector<Corners>{kLower, second_of_strip}));
+  const Corners first_of_fan = {{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}};
+  const Corners second_of_fan = {{{0, 0, 0}, {1, 1, 0}, {0, 1, 0}}};
+  EXPECT_EQ(draw({{"mode", 6}, {"indices", round}}),
+            (std::vector<Corners>{first_of_fan, second_of_fan}));
+}
+
+// A strip that is longer than a window of triangles goes on over its end without a gap.
+TEST(GltfGeometry, LongStripAndFanCrossWindows) {
+  constexpr size_t kVertices = 10000;
+  std::vector<float> line;
+  for (size_t i = 0; i < kVertices; ++i)
+    line.insert(line.end(), {static_cast<float>(i), static_cast<float>(i % 2), 0});
+  for (int mode : {5, 6}) {
+    SceneBuilder scene;
+    const int positions = scene.add_positions(line);
+    const auto triangles = triangles_of_file(
+        scene_of(scene, {{"attributes", {{"POSITION", positions}}}, {"mode", mode}}).glb());
+    ASSERT_EQ(triangles.size(), kVertices - 2);
+    for (size_t i = 0; i < triangles.size(); ++i) {
+      ASSERT_EQ(triangles[i][0][0], mode == 6 ? 0.0 : static_cast<double>(i));
+      ASSERT_EQ(triangles[i][2][0], static_cast<double>(i + 2));
+    }
+  }
+}
+
+// Vertices in steps of 20 bytes from an offset on, with rubbish in between.
+TEST(GltfGeometry, InterleavedVertices) {
+  SceneBuilder scene;
+  const float x = 1e30f;
+  const int view =
+      scene.add_view<float>({x, 0, 0, 0, x, x, 1, 0, 0, x, x, 0, 1, 0}, {{"byteStride", 20}});
+  const int positions = scene.add("accessors", {{"bufferView", view},
+                                                {"byteOffset", 4},
+                                                {"componentType", kF32},
+                                                {"count", 3},
+                                                {"type", "VEC3"}});
+  EXPECT_EQ(triangles_of_file(scene_of(scene, {{"attributes", {{"POSITION", positions}}}}).glb()),
+            (std::vector<Corners>{kLower}));
+}
+
+// Sparse elements replace those of a base, or zeros where there is none; vertices and indices.
+TEST(GltfGeometry, SparseAccessors) {
+  const auto sparse = [](SceneBuilder& scene, std::vector<uint16_t> at, auto values) {
+    return Json{{"count", at.size()},
+                {"indices", {{"bufferView", scene.add_view(at)}, {"componentType", kU16}}},
+                {"values", {{"bufferView", scene.add_view(values)}}}};
+  };
+  SceneBuilder scene;
+  const int base =
+      scene.add_accessor<float>("VEC3", kF32, {0, 0, 0, 9, 9, 9, 0, 1, 0},
+                                {{"sparse", sparse(scene, {1}, std::vector<float>{1, 0, 0})}});
+  const int zeros = scene.add(
+      "accessors", {{"componentType", kF32},
+                    {"count", 3},
+                    {"type", "VEC3"},
+                    {"sparse", sparse(scene, {1, 2}, std::vector<float>{1, 0, 0, 0, 1, 0})}});
+  const int indices = scene.add_accessor<uint16_t>(
+      "SCALAR", kU16, {0, 7, 2}, {{"sparse", sparse(scene, {1}, std::vector<uint16_t>{1})}});
+  for (int positions : {base, zeros})
+    EXPECT_EQ(triangles_of_file(
+                  scene_of(scene, {{"attributes", {{"POSITION", positions}}}, {"indices", indices}})
+                      .glb()),
+              (std::vector<Corners>{kLower}));
+}
+
+// Thousands of sparse vertices over many blocks: each arrives at its own index.
+TEST(GltfGeometry, ManySparseVertices) {
+  constexpr uint32_t kVertices = 30000;
+  SceneBuilder scene;
+  std::vector<uint32_t> at;
+  std::vector<float> values;
+  for (uint32_t i = 1; i < kVertices; i += 1 + i % 3) {
+    at.push_back(i);
+    values.insert(values.end(), {static_cast<float>(i), 1, 0});
+  }
+  const Json sparse = {{"count", at.size()},
+                       {"indices", {{"bufferView", scene.add_view(at)}, {"componentType", kU32}}},
+                       {"values", {{"bufferView", scene.add_view(values)}}}};
+  const int positions = scene.add(
+      "accessors",
+      {{"componentType", kF32}, {"count", kVertices}, {"type", "VEC3"}, {"sparse", sparse}});
+  const auto triangles =
+      triangles_of_file(scene_of(scene, {{"attributes", {{"POSITION", positions}}}}).glb());
+  ASSERT_EQ(triangles.size(), kVertices / 3);
+  for (uint32_t i = 0; i < kVertices; ++i) {
+    const bool replaced = std::ranges::binary_search(at, i);
+    ASSERT_EQ(triangles[i / 3][i % 3][0], replaced ? i : 0.0) << i;
+    ASSERT_EQ(triangles[i / 3][i % 3][1], replaced ? 1.0 : 0.0) << i;
+  }
+}
+
+// Normalized integers are divided by the largest of their type in doubles, and the most negative
+// one is -1 like its neighbour; others are taken as they are.
+TEST(GltfGeometry, QuantizedPositions) {
+  const auto first_corner = [](auto values, int type, bool normalized) {
+    SceneBuilder scene;
+    scene.root["extensionsUsed"] = scene.root["extensionsRequired"] = {"KHR_mesh_quantization"};
+    const int positions = scene.add_accessor("VEC3", type, values, {{"normalized", normalized}});
+    return triangles_of_file(scene_of(scene, {{"attributes", {{"POSITION", positions}}}}).glb())
+        .at(0)
+        .at(0);
+  };
+  using Point = std::array<double, 3>;
+  const std::vector<int8_t> i8 = {-128, 127, 3, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(first_corner(i8, kI8, true), (Point{-1, 1, 3 / 127.0}));
+  EXPECT_EQ(first_corner(i8, kI8, false), (Point{-128, 127, 3}));
+  const std::vector<uint8_t> u8 = {0, 255, 7, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(first_corner(u8, kU8, true), (Point{0, 1, 7 / 255.0}));
+  const std::vector<int16_t> i16 = {-32768, 32767, -5, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(first_corner(i16, kI16, true), (Point{-1, 1, -5 / 32767.0}));
+  const std::vector<uint16_t> u16 = {65535, 1, 0, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(first_corner(u16, kU16, true), (Point{1, 1 / 65535.0, 0}));
+  EXPECT_EQ(first_corner(u16, kU16, false), (Point{65535, 1, 0}));
+}
+
+// Points and lines make no triangles; the user is told. Their vertices may be anything.
+TEST(GltfGeometry, PointsAndLinesAreNamedInAWarning) {
+  SceneBuilder scene = one_triangle();
+  const int positions = scene.add_positions({50, 50, 50, 60, 60, 60, 70, 70, 70});
+  for (int mode : {0, 1, 2, 3})
+    scene.root["meshes"][0]["primitives"].push_back(
+        {{"attributes", {{"POSITION", positions}}}, {"mode", mode}});
+  OpenScene open(scene.glb());
+  EXPECT_EQ(open.source->declared_triangles(), 1u);
+  EXPECT_EQ(open.triangles(), (std::vector<Corners>{kLower}));
+  ASSERT_EQ(open.source->warnings().size(), 1u);
+  EXPECT_NE(open.source->warnings()[0].find("4 primitives of points or lines"), std::string::npos);
+}
+
+// Corners that fill no triangle are left out, and the user is told.
+TEST(GltfGeometry, LeftoverCornersAreNamedInAWarning) {
+  SceneBuilder scene;
+  const int positions = scene.add_positions(kSquare);
+  OpenScene open(scene_of(scene, {{"attributes", {{"POSITION", positions}}}}).glb());
+  EXPECT_EQ(open.triangles(), (std::vector<Corners>{kLower}));
+  ASSERT_EQ(open.source->warnings().size(), 1u);
+  EXPECT_NE(open.source->warnings()[0].find("accessor 0 is no multiple of three"),
+            std::string::npos);
+}
+
+// The mesh's weights move vertices by default, a node's own weights instead of them.
+TEST(GltfGeometry, MorphTargetsAtRest) {
+  SceneBuilder scene;
+  const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const int up = scene.add_positions({0, 0, 1, 0, 0, 2, 0, 0, 4});
+  const int aside = scene.add_positions({8, 0, 0, 8, 0, 0, 8, 0, 0});
+  const int mesh =
+      scene.add("meshes", {{"primitives",
+                            {{{"attributes", {{"POSITION", positions}}},
+                              {"targets", {{{"POSITION", up}}, {{"POSITION", aside}}}}}}},
+                           {"weights", {0.5, 0}}});
+  scene.add_root({{"mesh", mesh}});
+  scene.add_root({{"mesh", mesh}, {"weights", {1, 0.25}}});
+  const Corners by_mesh = {{{0, 0, 0.5}, {1, 0, 1}, {0, 1, 2}}};
+  const Corners by_node = {{{2, 0, 1}, {3, 0, 2}, {2, 1, 4}}};
+  EXPECT_EQ(triangles_of_file(scene.glb()), (std::vector<Corners>{by_mesh, by_node}));
+}
+
+// A skinned vertex is placed by its joints' global transforms and inverse bind matrices alone; the
+// transform of the node that draws it plays no part.
+TEST(GltfGeometry, SkinAtRest) {
+  SceneBuilder scene;
+  const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const int joints =
+      scene.add_accessor<uint8_t>("VEC4", kU8, {0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 99, 0});
+  const int weights =
+      scene.add_accessor<float>("VEC4", kF32, {1, 0, 0, 0, 1, 0, 0, 0, 0.5, 0.5, 0, 0});
+  std::vector<float> inverse_bind(32, 0);
+  for (size_t m : {0, 16})
+    for (size_t i : {0, 5, 10, 15}) inverse_bind[m + i] = 1;
+  inverse_bind[16 + 12] = -2;
+  const int bind = scene.add_accessor<float>("MAT4", kF32, inverse_bind);
+  const int mesh = scene.add_mesh(
+      {{"attributes", {{"POSITION", positions}, {"JOINTS_0", joints}, {"WEIGHTS_0", weights}}}});
+  const int child = scene.add("nodes", {{"translation", {0, 0, 3}}});
+  const int parent = scene.add_root({{"translation", {10, 0, 0}}, {"children", {child}}});
+  scene.add("skins", {{"joints", {parent, child}}, {"inverseBindMatrices", bind}});
+  scene.add_root({{"mesh", mesh}, {"skin", 0}, {"translation", {1000, 0, 0}}});
+  // Joint 0 moves by (10 0 0), joint 1 by (10 0 3) - (2 0 0).
+  const Corners expected = {{{10, 0, 0}, {9, 0, 3}, {9, 1, 1.5}}};
+  EXPECT_EQ(triangles_of_file(scene.glb()), (std::vector<Corners>{expected}));
+}
+
+// A weighted joint that the skin does not have makes its vertex invalid.
+TEST(GltfGeometry, JointOutOfRangeIsRefused) {
+  SceneBuilder scene;
+  const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const int joints = scene.add_accessor<uint8_t>("VEC4", kU8, {0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0});
+  const int weights = scene.add_accessor<uint8_t>(
+      "VEC4", kU8, {255, 0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0}, {{"normalized", true}});
+  const int mesh = scene.add_mesh(
+      {{"attributes", {{"POSITION", positions}, {"JOINTS_0", joints}, {"WEIGHTS_0", weights}}}});
+  const int joint = scene.add_root(Json::object());
+  scene.add("skins", {{"joints", {joint}}});
+  scene.add_root({{"mesh", mesh}, {"skin", 0}, {"name", "body"}});
+  const Error error = error_of_file(scene.glb());
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+  EXPECT_NE(error.message().find("node 1 \"body\": mesh 0: primitive 0"), std::string::npos)
+      << error.message();
+}
+
+}  // namespace
+}  // namespace voxdag::test

@@ -1,0 +1,148 @@
+// How nodes, instances and scenes place meshes in the world.
+#include <gtest/gtest.h>
+
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+using Point = std::array<double, 3>;
+
+// The corner (1 2 3) of a degenerate triangle, where the scene puts it.
+SceneBuilder corner_scene() {
+  SceneBuilder scene;
+  scene.add_mesh(
+      {{"attributes", {{"POSITION", scene.add_positions({1, 2, 3, 1, 2, 3, 1, 2, 3})}}}});
+  return scene;
+}
+
+std::vector<Point> corners_of(const SceneBuilder& scene) {
+  std::vector<Point> corners;
+  for (const Corners& t : triangles_of_file(scene.glb())) corners.push_back(t[0]);
+  return corners;
+}
+
+// First scale, then rotate (a quarter turn about z here), then translate.
+TEST(GltfNodes, ScaleThenRotateThenTranslate) {
+  SceneBuilder scene = corner_scene();
+  scene.add_root({{"mesh", 0},
+                  {"translation", {100, 200, 300}},
+                  {"rotation", {0, 0, 0.5, 0.5}},
+                  {"scale", {2, -3, 5}}});
+  // The quaternion is half of (0 0 1 1): as given, 1 - 2 * 0.25 = 0.5 and 2 * 0.25 = 0.5.
+  EXPECT_EQ(corners_of(scene),
+            (std::vector<Point>{{100 + 0.5 * 2 + 0.5 * 6, 200 + 0.5 * 2 - 0.5 * 6, 315}}));
+}
+
+// A parent that scales unevenly over a child that turns shears the mesh; mirrored ones mirror it.
+TEST(GltfNodes, ShearedAndMirrored) {
+  SceneBuilder scene = corner_scene();
+  const int child = scene.add("nodes", {{"mesh", 0}, {"rotation", {0.5, 0.5, 0.5, 0.5}}});
+  scene.add_root({{"scale", {-2, 1, 4}}, {"children", {child}}});
+  // This rotation sends x to y, y to z, z to x.
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{-6, 1, 8}}));
+}
+
+// A matrix is column-major and may be any affine one.
+TEST(GltfNodes, Matrix) {
+  SceneBuilder scene = corner_scene();
+  scene.add_root({{"mesh", 0}, {"matrix", {1, 0, 0, 0, 2, 1, 0, 0, 0, 0, -1, 0, 7, 8, 9, 1}}});
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{12, 10, 6}}));
+}
+
+// A chain of 5000 nodes neither overflows the stack nor loses one of its steps.
+TEST(GltfNodes, DeepChain) {
+  constexpr int kDepth = 5000;
+  SceneBuilder scene = corner_scene();
+  for (int i = 0; i < kDepth; ++i) {
+    Json node = {{"translation", {1, 0, 0}}};
+    if (i + 1 < kDepth)
+      node["children"] = {i + 1};
+    else
+      node["mesh"] = 0;
+    scene.add("nodes", node);
+  }
+  scene.root["scenes"] = {{{"nodes", {0}}}};
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{kDepth + 1, 2, 3}}));
+}
+
+// Nodes that share a mesh each draw it, parents before children, in the order of the file.
+TEST(GltfNodes, SharedMesh) {
+  SceneBuilder scene = corner_scene();
+  scene.add("nodes", {{"mesh", 0}, {"translation", {10, 0, 0}}});
+  scene.add("nodes", {{"mesh", 0}, {"translation", {20, 0, 0}}});
+  scene.add_root({{"mesh", 0}, {"children", {1, 0}}});
+  scene.add_root({{"mesh", 0}, {"translation", {30, 0, 0}}});
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{1, 2, 3}, {21, 2, 3}, {11, 2, 3}, {31, 2, 3}}));
+}
+
+// Every instance's T * R * S comes before the node's own transform; the triangles are declared.
+TEST(GltfNodes, GpuInstances) {
+  SceneBuilder scene = corner_scene();
+  std::vector<float> translations, scales;
+  std::vector<int16_t> rotations;
+  constexpr int kInstances = 1000;
+  for (int i = 0; i < kInstances; ++i) {
+    translations.insert(translations.end(), {static_cast<float>(i), 0, 0});
+    scales.insert(scales.end(), {1, i % 2 ? -1.f : 1.f, 1});
+    rotations.insert(rotations.end(), {0, 0, 0, 32767});
+  }
+  const Json attributes = {
+      {"TRANSLATION", scene.add_accessor<float>("VEC3", kF32, translations)},
+      {"ROTATION", scene.add_accessor<int16_t>("VEC4", kI16, rotations, {{"normalized", true}})},
+      {"SCALE", scene.add_accessor<float>("VEC3", kF32, scales)},
+      {"_COLOUR", 12345}};
+  scene.add_root({{"mesh", 0},
+                  {"scale", {10, 10, 10}},
+                  {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", attributes}}}}}});
+  scene.root["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
+  EXPECT_EQ(OpenScene(scene.glb()).source->declared_triangles(), uint64_t{kInstances});
+  const std::vector<Point> corners = corners_of(scene);
+  ASSERT_EQ(corners.size(), size_t{kInstances});
+  for (int i = 0; i < kInstances; ++i)
+    ASSERT_EQ(corners[static_cast<size_t>(i)], (Point{10.0 * (i + 1), i % 2 ? -20.0 : 20.0, 30}));
+}
+
+// The default scene is drawn; without one the first; without scenes every root.
+TEST(GltfNodes, WhichSceneIsDrawn) {
+  SceneBuilder scene = corner_scene();
+  for (int x : {10, 20, 30}) scene.add("nodes", {{"mesh", 0}, {"translation", {x, 0, 0}}});
+  scene.root["nodes"][2]["children"] = {1};
+  scene.root["scenes"] = {{{"nodes", {0}}}, {{"nodes", {2}}}};
+  scene.root["scene"] = 1;
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{31, 2, 3}, {51, 2, 3}}));
+  scene.root.erase("scene");
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{11, 2, 3}}));
+  scene.root.erase("scenes");
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{11, 2, 3}, {31, 2, 3}, {51, 2, 3}}));
+}
+
+// A file with nothing to draw is a scene of no triangles, not an error.
+TEST(GltfNodes, NothingToDraw) {
+  SceneBuilder scene;
+  EXPECT_TRUE(corners_of(scene).empty());
+  scene.add_root({{"camera", 0}, {"name", "eye"}});
+  EXPECT_TRUE(corners_of(scene).empty());
+}
+
+// Several files make one scene, one after the other, again and again in the same order.
+TEST(GltfNodes, SeveralFiles) {
+  SceneBuilder first = corner_scene(), second = corner_scene();
+  first.add_root({{"mesh", 0}});
+  second.add_root({{"mesh", 0}, {"translation", {5, 0, 0}}});
+  MemoryFiles files;
+  files.contents = {{"a", first.glb()}, {"b", second.glb()}};
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelToken cancel;
+  const auto source = open_scene(files, {"b", "a", "b"}, {}, budget, cancel);
+  EXPECT_EQ(source->declared_triangles(), 3u);
+  const auto triangles = triangles_of(*source);
+  ASSERT_EQ(triangles.size(), 3u);
+  EXPECT_EQ(triangles[0][0], (Point{6, 2, 3}));
+  EXPECT_EQ(triangles[1][0], (Point{1, 2, 3}));
+  EXPECT_EQ(triangles[2][0], (Point{6, 2, 3}));
+  EXPECT_EQ(triangles_of(*source), triangles);
+}
+
+}  // namespace
+}  // namespace voxdag::test

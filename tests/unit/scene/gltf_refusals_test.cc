@@ -1,0 +1,270 @@
+// What breaks the rules of glTF 2.0 is refused with an error that names the node, mesh, primitive
+// or accessor: never a crash, never a wrong picture.
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <limits>
+
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+// A valid scene with one thing wrong, and words that the error must have.
+struct Refusal {
+  const char* what;
+  const char* pointer;  // JSON pointer of what is replaced, or added
+  Json value;
+  const char* words;
+  ErrorCode code = ErrorCode::kInvalidInput;
+};
+
+void PrintTo(const Refusal& refusal, std::ostream* out) { *out << refusal.what; }
+
+const Refusal kRefusals[] = {
+    {"glTF 1.0", "/asset/version", "1.0", "glTF version 1.0"},
+    {"a later minimum", "/asset/minVersion", "2.1", "needs glTF version 2.1"},
+    {"no asset", "/asset", nullptr, "asset is null, expected an object"},
+    {"an unknown required extension", "/extensionsRequired", {"ACME_bent"}, "ACME_bent"},
+    {"Draco", "/extensionsRequired", {"KHR_draco_mesh_compression"}, "KHR_draco_mesh_compression"},
+    {"meshopt", "/extensionsRequired", {"EXT_meshopt_compression"}, "EXT_meshopt_compression"},
+    {"optional Draco without a fallback",
+     "/accessors/0",
+     {{"componentType", 5126}, {"count", 3}, {"type", "VEC3"}},
+     "mesh 0: primitive 0 is compressed by KHR_draco_mesh_compression"},
+    {"nodes that are no array", "/nodes", Json::object(), "nodes is an object, expected an array"},
+    {"a node that is its own child", "/nodes/0/children", {0}, "node 0 \"it\" is its own ancestor"},
+    {"a child that is not there", "/nodes/0/children", {7}, "node 0 \"it\": child node 7"},
+    {"a negative child", "/nodes/0/children", {-1}, "nodes[0].children[0] is -1"},
+    {"a root with a parent", "/nodes/1/children", {0}, "node 0 \"it\" is no root"},
+    {"a node twice in the scene", "/scenes/0/nodes", {0, 0}, "node 0 \"it\" is listed twice"},
+    {"a scene node that is not there", "/scenes/0/nodes", {0, 2}, "scene 0: node 2 does not exist"},
+    {"a default scene that is not there", "/scene", 3, "scene 3 does not exist"},
+    {"a mesh that is not there", "/nodes/0/mesh", 4, "node 0 \"it\": mesh 4 does not exist"},
+    {"a negative mesh", "/nodes/0/mesh", -3, "nodes[0].mesh is -3"},
+    {"a fractional mesh", "/nodes/0/mesh", 0.5, "nodes[0].mesh is 0.5"},
+    {"a huge mesh index", "/nodes/0/mesh", 4294967296, "nodes[0].mesh is 4294967296"},
+    {"a skin that is not there", "/nodes/0/skin", 0, "node 0 \"it\": skin 0 does not exist"},
+    {"a matrix of 15 numbers",
+     "/nodes/0/matrix",
+     {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0},
+     "node 0 \"it\": its matrix has 15 numbers"},
+    {"a projective matrix",
+     "/nodes/0/matrix",
+     {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
+     "node 0 \"it\": its matrix is not affine"},
+    {"a string in a matrix", "/nodes/0/scale", {1, "1", 1}, "nodes[0].scale[1] is a string"},
+    {"an infinite scale",
+     "/nodes/0",
+     {{"mesh", 0}, {"scale", {1, 1, 1e308}}, {"rotation", {100, 0, 0, 1e300}}},
+     "node 0: its transform is not finite"},
+    {"a position that overflows",
+     "/nodes/0/matrix",
+     {1.7e308, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1.7e308, 0, 0, 1},
+     "node 0 \"it\": mesh 0: primitive 0: triangle 0: a vertex of accessor 0 is not a finite"},
+    {"weights without targets", "/nodes/0/weights", {1.0}, "node 0 \"it\" has 1 morph weights"},
+    {"mesh weights without targets", "/meshes/0/weights", {1.0}, "primitive 0 has 1 morph weights"},
+    {"no primitives", "/meshes/0", Json::object(), "meshes[0].primitives is missing"},
+    {"no attributes",
+     "/meshes/0/primitives/0",
+     {{"indices", 1}},
+     "primitives[0].attributes is miss"},
+    {"no POSITION", "/meshes/0/primitives/0/attributes", {{"NORMAL", 0}}, "has no POSITION"},
+    {"a mode that is not there", "/meshes/0/primitives/0/mode", 7,
+     "mesh 0: primitive 0 has mode 7"},
+    {"POSITION that is not there", "/meshes/0/primitives/0/attributes/POSITION", 9,
+     "mesh 0: primitive 0: POSITION: accessor 9 does not exist"},
+    {"POSITION of scalars", "/meshes/0/primitives/0/attributes/POSITION", 1,
+     "POSITION: accessor 1 has 1 components, expected 3"},
+    {"POSITION of integers", "/accessors/0/componentType", kI16,
+     "accessor 0 has components of type short, expected float"},
+    {"normalized floats", "/accessors/0/normalized", true, "accessor 0 has normalized"},
+    {"indices of floats", "/accessors/1/componentType", kF32,
+     "indices: accessor 1 has components of type float"},
+    {"indices of signed integers", "/accessors/1/componentType", kI16, "of type short"},
+    {"an unknown component type", "/accessors/0/componentType", 5124, "of type unknown"},
+    {"an unknown type", "/accessors/0/type", "VEC9", "VEC9"},
+    {"morph targets of another count", "/meshes/0/primitives/0/targets",
+     Json::array({{{"POSITION", 2}}}), "accessor 2 has 2 elements, expected 3"},
+    {"a target that is not there", "/meshes/0/primitives/0/targets",
+     Json::array({{{"POSITION", 8}}}), "morph target: accessor 8 does not exist"},
+    {"joints without weights", "/meshes/0/primitives/0/attributes/JOINTS_0", 0, "JOINTS_n without"},
+    {"more elements than bytes", "/accessors/0/count", 4,
+     "POSITION: accessor 0 ends past the 36 bytes of bufferView 0"},
+    {"2^40 elements", "/accessors/0/count", uint64_t{1} << 40, "the limit is 2^32",
+     ErrorCode::kLimit},
+    {"2^32 elements", "/accessors/0/count", uint64_t{1} << 32, "ends past the 36 bytes"},
+    {"an offset that overflows", "/accessors/0/byteOffset", INT64_MAX, "ends past the 36 bytes"},
+    {"an offset past the view", "/accessors/0/byteOffset", 4, "ends past the 36 bytes"},
+    {"a negative offset", "/accessors/0/byteOffset", -4, "accessors[0].byteOffset is -4"},
+    {"a count of text", "/accessors/0/count", "3", "accessors[0].count is a string"},
+    {"a view that is not there", "/accessors/0/bufferView", 5, "bufferView 5 does not exist"},
+    {"a stride below the element", "/bufferViews/0/byteStride", 8,
+     "the byteStride of bufferView 0"},
+    {"a stride beyond the view", "/bufferViews/0/byteStride", 252, "ends past the 36 bytes"},
+    {"a stride over 252", "/bufferViews/0/byteStride", 256, "byteStride"},
+    {"an odd stride", "/bufferViews/0/byteStride", 13, "byteStride"},
+    {"indices with a stride", "/bufferViews/1/byteStride", 4, "bufferView 1 has a byteStride"},
+    {"a view past its buffer", "/bufferViews/0/byteLength", 4096, "ends past the"},
+    {"a view that overflows", "/bufferViews/0/byteOffset", INT64_MAX, "ends past the"},
+    {"a fractional view", "/bufferViews/0/byteLength", 1e300, "bufferViews[0].byteLength is 1e"},
+    {"a buffer that is not there", "/bufferViews/0/buffer", 2, "buffer 2 does not exist"},
+    {"more sparse elements than elements", "/accessors/0/sparse/count", 4, "replaces 4 of 3"},
+    {"sparse values past their view", "/accessors/0/sparse/values/byteOffset", 4,
+     "its sparse values ends past"},
+    {"signed sparse indices", "/accessors/0/sparse/indices/componentType", kI8,
+     "its sparse indices are not unsigned integers"},
+    {"instances of another count",
+     "/nodes/0/extensions/EXT_mesh_gpu_instancing/attributes",
+     {{"TRANSLATION", 0}, {"SCALE", 2}},
+     "EXT_mesh_gpu_instancing: accessor"},
+    {"instances of a wrong type",
+     "/nodes/0/extensions/EXT_mesh_gpu_instancing/attributes",
+     {{"ROTATION", 0}},
+     "ROTATION: accessor 0 has 3 components, expected 4"},
+};
+
+// One triangle out of a sparse accessor, a second unused node, and an accessor of two vectors.
+SceneBuilder valid_scene() {
+  SceneBuilder scene = one_triangle();
+  scene.root["nodes"][0]["name"] = "it";
+  scene.add("nodes", Json::object());
+  scene.add_positions({0, 0, 0, 1, 1, 1});
+  scene.root["accessors"][0]["sparse"] = {
+      {"count", 1},
+      {"indices", {{"bufferView", scene.add_view<uint8_t>({2})}, {"componentType", kU8}}},
+      {"values", {{"bufferView", scene.add_view<float>({0, 1, 0})}}}};
+  scene.root["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"] =
+      Json::object();
+  return scene;
+}
+
+TEST(GltfRefusals, TheSceneIsValidBeforeItIsBroken) {
+  EXPECT_EQ(triangles_of_file(valid_scene().glb()).size(), 1u);
+}
+
+class GltfRefusal : public testing::TestWithParam<Refusal> {};
+
+TEST_P(GltfRefusal, NamesTheOffender) {
+  const Refusal& refusal = GetParam();
+  SCOPED_TRACE(refusal.what);
+  SceneBuilder scene = valid_scene();
+  scene.root[Json::json_pointer(refusal.pointer)] = refusal.value;
+  const Error error = error_of_file(scene.glb());
+  EXPECT_EQ(error.code(), refusal.code);
+  EXPECT_NE(error.message().find(refusal.words), std::string::npos) << error.message();
+  EXPECT_EQ(error.message().find("folder/scene: "), 0u) << error.message();
+}
+
+std::string test_name(const testing::TestParamInfo<Refusal>& info) {
+  std::string name = info.param.what;
+  std::erase_if(name, [](unsigned char c) { return !std::isalnum(c) && c != ' '; });
+  std::ranges::replace(name, ' ', '_');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(All, GltfRefusal, testing::ValuesIn(kRefusals), test_name);
+
+// Two parents need two edits at once.
+TEST(GltfRefusals, TwoParents) {
+  SceneBuilder scene = valid_scene();
+  scene.add("nodes", Json::object());
+  scene.root["nodes"][0]["children"] = {2};
+  scene.root["nodes"][1]["children"] = {2};
+  EXPECT_NE(error_of_file(scene.glb()).message().find("node 2 has two parents, node 0 \"it\""),
+            std::string::npos);
+}
+
+// A cycle far from the scene's roots would never be walked; it is an error all the same.
+TEST(GltfRefusals, LongCycle) {
+  SceneBuilder scene = valid_scene();
+  scene.root["nodes"][1]["children"] = {2};
+  scene.add("nodes", {{"children", {3}}});
+  scene.add("nodes", {{"children", {1}}});
+  EXPECT_NE(error_of_file(scene.glb()).message().find("is its own ancestor"), std::string::npos);
+}
+
+// Sparse indices must increase and exist: found when the accessor is read.
+TEST(GltfRefusals, SparseIndices) {
+  for (const std::vector<uint8_t>& indices :
+       {std::vector<uint8_t>{1, 1}, std::vector<uint8_t>{2, 1}, std::vector<uint8_t>{1, 3}}) {
+    SceneBuilder scene = valid_scene();
+    scene.root["accessors"][0]["sparse"] = {
+        {"count", 2},
+        {"indices", {{"bufferView", scene.add_view(indices)}, {"componentType", kU8}}},
+        {"values", {{"bufferView", scene.add_view<float>({0, 1, 0, 0, 1, 0})}}}};
+    EXPECT_NE(error_of_file(scene.glb()).message().find("accessor 0: its sparse index "),
+              std::string::npos);
+  }
+}
+
+// A member given twice could mean either; it is refused.
+TEST(GltfRefusals, DuplicateMembers) {
+  const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":1}]})";
+  EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
+}
+
+// JSON nested deeper than any stack, in what is read and in what is not.
+TEST(GltfRefusals, DeeplyNestedJson) {
+  const std::string deep = std::string(1000000, '[') + std::string(1000000, ']');
+  EXPECT_EQ(error_of_file(R"({"asset":{"version":"2.0"},"extras":)" + deep + "}").message(), "");
+  EXPECT_NE(error_of_file(R"({"asset":{"version":"2.0"},"nodes":)" + deep + "}")
+                .message()
+                .find("nodes[0] is an array, expected an object"),
+            std::string::npos);
+  EXPECT_NE(error_of_file(std::string(1000000, '[')).message(), "");
+}
+
+// Names from a file cannot forge lines of a log.
+TEST(GltfRefusals, NamesAreMadePrintable) {
+  SceneBuilder scene = valid_scene();
+  scene.root["nodes"][0]["name"] = "a\nb\"" + std::string(1000, 'x');
+  scene.root["nodes"][0]["mesh"] = 4;
+  const Error error = error_of_file(scene.glb());
+  EXPECT_NE(error.message().find("node 0 \"a?b?x"), std::string::npos) << error.message();
+  EXPECT_LT(error.message().size(), 200u);
+}
+
+// Extensions that move no vertex may be required; optional ones that are not read are told of.
+TEST(GltfRefusals, ExtensionsThatAreNot) {
+  SceneBuilder scene = valid_scene();
+  scene.root["extensionsRequired"] = {"KHR_materials_unlit", "KHR_texture_transform"};
+  scene.root["extensionsUsed"] = {"KHR_materials_unlit", "ACME_bent"};
+  OpenScene open(scene.glb());
+  EXPECT_EQ(open.triangles().size(), 1u);
+  ASSERT_EQ(open.source->warnings().size(), 1u);
+  EXPECT_NE(open.source->warnings()[0].find("ACME_bent"), std::string::npos);
+}
+
+// Invalid triangles end the build, or are dropped and counted if the user said so; vertices that no
+// triangle uses may be anything.
+TEST(GltfRefusals, InvalidTriangles) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float inf = std::numeric_limits<float>::infinity();
+  SceneBuilder scene;
+  const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0, nan, 0, 0, 0, 0, -inf});
+  const int indices = scene.add_accessor<uint16_t>(
+      "SCALAR", kU16, {0, 1, 2, 0, 1, 3, 0, 1, 65535, 0, 4, 1, 2, 1, 0});
+  scene.add_root({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", positions}}},
+                                           {"indices", indices}})}});
+  EXPECT_NE(error_of_file(scene.glb())
+                .message()
+                .find("node 0: mesh 0: primitive 0: triangle 1: a vertex of accessor 0"),
+            std::string::npos);
+  OpenScene skipping(scene.glb(), {.skip_invalid = true});
+  EXPECT_EQ(skipping.source->declared_triangles(), 5u);
+  for (int pass = 0; pass < 2; ++pass) {
+    EXPECT_EQ(skipping.triangles().size(), 2u);
+    EXPECT_EQ(skipping.source->invalid_triangles(), 3u);
+  }
+  scene.root["accessors"][1]["count"] = 3;
+  EXPECT_EQ(triangles_of_file(scene.glb()).size(), 1u);
+  scene.root["accessors"][1]["byteOffset"] = 12;
+  EXPECT_NE(error_of_file(scene.glb())
+                .message()
+                .find("triangle 0: index 65535 of accessor 1, there are 5 vertices"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace voxdag::test
