@@ -18,12 +18,29 @@
 
 namespace voxdag {
 
+// Progress whose total is put right as more becomes known.
+class MergeProgress {
+ public:
+  explicit MergeProgress(Progress& progress) : progress_(progress) {}
+  void begin(uint64_t total) { progress_.begin_stage("merge", total_ = total, "nodes"); }
+  void set_total(uint64_t total) { progress_.set_total(total_ = total); }
+  void expect_more(uint64_t rows) {
+    if (rows > 0) set_total(total_ + rows);
+  }
+  void advance(uint64_t rows) { progress_.advance(rows); }
+  void end() { progress_.end_stage(); }
+
+ private:
+  Progress& progress_;
+  uint64_t total_ = 0;
+};
+
 // What all levels of a merge share.
 struct MergeSeams {
   MergeScratch& scratch;
   MemoryBudget& budget;
   MemoryPlan plan;
-  Progress& progress;
+  MergeProgress& progress;
   const CancelToken& cancel;
   MergeReport& report;
 };

@@ -28,7 +28,7 @@ struct MemoryPlan {
     plan.workers = static_cast<unsigned>(
         std::clamp<uint64_t>(for_workers / (uint64_t{1} << 20), 1, std::max(1u, threads)));
     plan.worker_bytes = std::max(for_workers / plan.workers, kLeastWorkerBytes);
-    plan.resident_bytes = bytes / 5;
+    plan.resident_bytes = bytes / 6;
     const uint64_t others = plan.workers * plan.worker_bytes + 2 * plan.resident_bytes;
     plan.slab_bytes = slab_within(bytes - std::min(bytes, others));
     return plan;

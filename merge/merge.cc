@@ -74,15 +74,15 @@ class Merger {
 
   void run(GlobalFileWriter& out) {
     const uint64_t rows = survey(inputs_.artifacts);
-    uint32_t round = count_rounds() - 1;
-    seams_.progress.begin_stage("merge", rows * (round + 1), "nodes");
-    for (; !fit_at_once(artifacts_); --round) {
+    seams_.progress.begin(fit_at_once() ? rows : 2 * rows);
+    for (uint32_t round = 1; !fit_at_once(); ++round) {
       const std::vector<ArtifactRef> merged = reduce(round);
-      const uint64_t swept = seams_.report.input_nodes;
-      seams_.progress.set_total(swept + survey(merged) * round);
+      const uint64_t rows_swept = seams_.report.input_nodes;
+      const uint64_t rows_left = survey(merged);
+      seams_.progress.set_total(rows_swept + (fit_at_once() ? rows_left : 2 * rows_left));
     }
     merge_last(out);
-    seams_.progress.end_stage();
+    seams_.progress.end();
   }
 
  private:
@@ -93,23 +93,8 @@ class Merger {
     return found.rows;
   }
 
-  bool fit_at_once(std::span<const SurveyedArtifact> artifacts) const {
-    return artifacts.size() < 2 || group_ends(artifacts, seams_.plan.slab_bytes).size() == 1;
-  }
-
-  // Artifacts of rounds to come are taken to have the largest frames there are.
-  uint32_t count_rounds() const {
-    const uint64_t largest = Slab::bytes_for(2 * kFrameRows, 2 * kFrameRows * 8, true);
-    uint32_t rounds = 1;
-    for (auto artifacts = artifacts_; !fit_at_once(artifacts); ++rounds) {
-      const size_t groups = group_ends(artifacts, round_slab_bytes_).size();
-      if (groups == artifacts.size())
-        throw Error(ErrorCode::kOutOfMemory,
-                    "out of memory: merging two subvolumes takes more than " +
-                        std::to_string(seams_.budget.available()) + " bytes");
-      artifacts.assign(groups, {{}, largest});
-    }
-    return rounds;
+  bool fit_at_once() const {
+    return artifacts_.size() < 2 || group_ends(artifacts_, seams_.plan.slab_bytes).size() == 1;
   }
 
   std::vector<ArtifactRoot> merge(size_t begin, size_t end, uint32_t round, LevelOutput& output) {
@@ -122,10 +107,15 @@ class Merger {
 
   // Merges groups of artifacts into one artifact each.
   std::vector<ArtifactRef> reduce(uint32_t round) {
+    const std::vector<size_t> ends = group_ends(artifacts_, round_slab_bytes_);
+    if (ends.size() == artifacts_.size())
+      throw Error(ErrorCode::kOutOfMemory,
+                  "out of memory: merging any two neighbouring subvolumes takes more than " +
+                      std::to_string(seams_.budget.available()) + " bytes");
     auto segment = std::make_unique<RoundSegment>(seams_.scratch, round, seams_.budget);
     std::vector<ArtifactRef> merged;
     size_t begin = 0;
-    for (const size_t end : group_ends(artifacts_, round_slab_bytes_)) {
+    for (const size_t end : ends) {
       ArtifactWriter writer(segment->writer(), inputs_.grid_levels, inputs_.hash_bits);
       ArtifactOutput output(writer);
       const std::vector<ArtifactRoot> roots = merge(begin, end, round, output);
@@ -165,8 +155,9 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
   MergeReport report;
   if (inputs.artifacts.empty()) return report;
   MergeScratch scratch(files, inputs.scratch_folder);
-  const MergeSeams seams{scratch,  budget, MemoryPlan::divide(budget.available(), threads),
-                         progress, cancel, report};
+  MergeProgress rows_swept(progress);
+  const MergeSeams seams{scratch,    budget, MemoryPlan::divide(budget.available(), threads),
+                         rows_swept, cancel, report};
   Merger(inputs, seams, checkpoint).run(out);
   report.scratch_bytes = scratch.bytes_written();
   return report;

@@ -32,7 +32,8 @@ struct MergeInputs {
   std::vector<ArtifactRef> artifacts;
   // Opens the segment file of an id.
   std::function<std::shared_ptr<ReadableFile>(uint32_t)> open_segment;
-  // Folder for what does not fit in memory: maps and the artifacts of merge rounds. Emptied again.
+  // A folder of its own for what does not fit in memory: maps and the artifacts of merge rounds.
+  // Emptied again.
   std::string scratch_folder;
 };
 
@@ -40,8 +41,8 @@ struct MergeInputs {
 class Checkpoint {
  public:
   virtual ~Checkpoint() = default;
-  // All nodes of `level` are in the global file (round 0 is the last one) or in an artifact of an
-  // earlier round.
+  // All nodes of `level` are in the global file (round 0, the last one) or in an artifact of an
+  // earlier round (1, 2, ... in their order).
   virtual void level_merged(uint32_t round, uint32_t level, uint64_t nodes) = 0;
 };
 

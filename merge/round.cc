@@ -42,6 +42,7 @@ class Round {
       artifact_runs.emplace_back(artifact, level);
     const TopRun top(task_.hash_bits,
                      task_.with_top ? std::move(placed_) : std::vector<PlacedNode>());
+    seams_.progress.expect_more(top.rows());
     std::vector<const LevelRun*> runs;
     std::vector<uint64_t> rows;
     for (const ArtifactRun& run : artifact_runs) runs.push_back(&run);

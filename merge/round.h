@@ -13,7 +13,7 @@ namespace voxdag {
 struct RoundTask {
   uint32_t grid_levels = 2;
   uint32_t hash_bits = 64;
-  uint32_t number = 0;  // 0 is the last round
+  uint32_t number = 0;  // 0 is the last round, 1, 2, ... those before it in their order
   // Adds the top tree and goes on up to the root; otherwise up to the highest subvolume.
   bool with_top = false;
   std::span<const ArtifactReader> artifacts;

@@ -1,0 +1,120 @@
+// The merge under small budgets: same bytes, by hash ranges, rounds, spilled maps and streamed
+// groups, each of which the report must show to have happened.
+#include <gtest/gtest.h>
+
+#include "core/dag/node_hash.h"
+#include "tests/unit/merge/merge_harness.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kMiB = uint64_t{1} << 20;
+
+// Cutting the hash space into slabs, and spilling maps, changes nothing.
+TEST(MergeMemory, HashRangesGiveTheSameBytes) {
+  const oracle::Voxels voxels = noise_voxels(1, 256);
+  for (const uint32_t hash_bits : {16u, 64u}) {
+    SCOPED_TRACE("hash bits " + std::to_string(hash_bits));
+    MergeHarness harness(8, hash_bits);
+    harness.add(voxels, equal_cubes(1));
+    const Merged large = harness.merge();
+    harness.expect_dag_of(voxels, large);
+    EXPECT_EQ(large.report.rounds, 1u);
+    EXPECT_EQ(large.report.hash_ranges, 7u);  // one a level
+    EXPECT_EQ(large.report.scratch_bytes, 0u);
+    for (unsigned threads = 1; threads <= 3; ++threads) {
+      const Merged small = harness.merge({.budget_bytes = 5 * kMiB, .threads = threads});
+      EXPECT_EQ(small.file.sha256, large.file.sha256);
+      EXPECT_EQ(small.report.rounds, 1u);
+      EXPECT_GT(small.report.hash_ranges, 7u);
+      EXPECT_GT(small.report.scratch_bytes, 0u);
+    }
+  }
+}
+
+// Artifacts too many to be merged at once are merged in rounds.
+TEST(MergeMemory, RoundsGiveTheSameBytes) {
+  const oracle::Voxels voxels = noise_voxels(2, 256);
+  for (const uint32_t hash_bits : {4u, 64u}) {
+    SCOPED_TRACE("hash bits " + std::to_string(hash_bits));
+    MergeHarness harness(8, hash_bits);
+    harness.add(voxels, equal_cubes(3));
+    const Merged at_once = harness.merge();
+    harness.expect_dag_of(voxels, at_once);
+    EXPECT_EQ(at_once.report.rounds, 1u);
+    for (const auto& [half_mib, rounds] : {std::pair{16, 2u}, {11, 3u}}) {
+      SCOPED_TRACE(std::to_string(half_mib) + "/2 MiB");
+      const Merged merged = harness.merge({.budget_bytes = half_mib * kMiB / 2});
+      EXPECT_EQ(merged.file.sha256, at_once.file.sha256);
+      EXPECT_EQ(merged.report.rounds, rounds);
+      EXPECT_GT(merged.report.scratch_bytes, 0u);
+      EXPECT_GT(merged.report.input_nodes, at_once.report.input_nodes);
+    }
+  }
+}
+
+// A run whose map is larger than the memory for maps is rewired window by window.
+TEST(MergeMemory, WindowsOfAMapGiveTheSameBytes) {
+  const oracle::Voxels voxels = noise_voxels(3, 256);
+  MergeHarness harness(8, 64);
+  // One run, whose brick map takes 1 MiB. Of 4 MiB, 2/3 MiB are for a level's maps, and a worker
+  // has 1 MiB less a frame for its window.
+  harness.add(voxels, {Cube{}});
+  const Merged merged = harness.merge({.budget_bytes = 4 * kMiB, .threads = 1});
+  harness.expect_dag_of(voxels, merged);
+  EXPECT_GE(merged.report.scratch_bytes, kMiB);
+}
+
+// Bricks whose hashes all begin with the same four bits: with hashes cut there, one group of equal
+// hashes that is larger than all the memory that the merge has.
+TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
+  constexpr uint64_t kBudgetBytes = 9 * kMiB / 2;
+  const uint32_t hash_bits = 4;
+  oracle::Voxels voxels(512);
+  std::mt19937_64 random(4);
+  uint64_t bricks = 0;
+  for (int x = 0; x < 512; x += 4)
+    for (int y = 0; y < 512; y += 4)
+      for (int z = 0; z < 160; z += 4) {
+        uint64_t mask = random();
+        while (oracle::cut(oracle::brick_hash(mask), hash_bits) != uint64_t{11} << 60)
+          mask = random();
+        for (int bit = 0; bit < 64; ++bit)
+          if (mask >> bit & 1)
+            voxels.set(x + (bit >> 4 & 2) + (bit >> 2 & 1), y + (bit >> 3 & 2) + (bit >> 1 & 1),
+                       z + (bit >> 2 & 2) + (bit & 1));
+        ++bricks;
+      }
+  ASSERT_GT(bricks * sizeof(uint64_t), kBudgetBytes);
+  MergeHarness harness(9, hash_bits);
+  harness.add(voxels, equal_cubes(1));
+  const Merged merged = harness.merge({.budget_bytes = kBudgetBytes});
+  harness.expect_dag_of(voxels, merged);
+  EXPECT_GT(merged.report.streamed_groups, 0u);
+}
+
+// Few equal hashes in much memory: ranges too large for the range sweep are merged row by row.
+TEST(MergeMemory, RangesOfFewHashesGiveTheSameBytes) {
+  const oracle::Voxels voxels = noise_voxels(5, 128);
+  MergeHarness harness(7, 4);
+  harness.add(voxels, mixed_cubes(5, 2));
+  for (const uint64_t mib : {6, 12, 100}) {
+    SCOPED_TRACE(std::to_string(mib) + " MiB");
+    harness.expect_dag_of(voxels, harness.merge({.budget_bytes = mib * kMiB, .threads = 3}));
+  }
+}
+
+// A budget that cannot hold two frames of two runs is refused, not exceeded.
+TEST(MergeMemory, TooSmallABudgetIsAnError) {
+  MergeHarness harness(6, 64);
+  harness.add(noise_voxels(6, 64), equal_cubes(1));
+  try {
+    harness.merge({.budget_bytes = 100000});
+    FAIL() << "expected an Error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory) << error.message();
+  }
+}
+
+}  // namespace
+}  // namespace voxdag
