@@ -1,6 +1,7 @@
 #include "scheduler/run_build.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "core/backend/backend.h"
@@ -47,10 +48,15 @@ class Build {
       return run_to_the_end();
     } catch (const Error& error) {
       // Without a job there is nothing to go on with; with one, the folder is what resumes it.
-      const bool resumable = store_->job().has_value();
-      if (resumable) progress_.record_failure(error);
-      if (!resumable) remove_work();
-      throw;
+      if (!store_->job()) {
+        remove_work();
+        throw;
+      }
+      const Error told = error.code() == ErrorCode::kNoSpace
+                             ? Error(error.code(), error.message() + room_needed())
+                             : error;
+      progress_.record_failure(told);
+      throw told;
     }
   }
 
@@ -67,6 +73,23 @@ class Build {
                           report_json(report_) + "\n");
     if (!spec_.run.keep_work) remove_work();
     return report_;
+  }
+
+  // What a full disk's user needs to know, reckoned from the subvolumes built so far: their
+  // artifacts and a global file of about the same size.
+  std::string room_needed() {
+    double built = 0, planned = 0, bytes = 0;
+    for (const StoredSubvolume& subvolume : store_->leaves()) {
+      const bool is_built = subvolume.state == SubvolumeState::kBuilt;
+      (is_built ? built : planned) += subvolume.weight;
+      bytes += static_cast<double>(subvolume.artifact.bytes);
+    }
+    std::string needed;
+    if (built > 0) {
+      const double artifacts = bytes * (1 + planned / built);
+      needed = " for about " + std::to_string(std::llround((2 * artifacts - bytes) / 1e6)) + " MB";
+    }
+    return "; the job is paused: make room" + needed + " and run the same command again";
   }
 
   void remove_work() {
