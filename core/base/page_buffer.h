@@ -53,10 +53,10 @@ class PageBuffer {
   // naming `what`, and is unchanged, if it does not fit.
   void grow(size_t size, std::string_view what) {
     const uint64_t old_bytes = charge_.bytes();
-    if (!charge_.try_resize(size * sizeof(T)))
+    if (!charge_.try_resize(byte_count(size)))
       throw Error(ErrorCode::kOutOfMemory, std::string(what) + " outgrew the memory budget");
     try {
-      data_ = static_cast<T*>(grow_pages(data_, old_bytes, size * sizeof(T), what));
+      data_ = static_cast<T*>(grow_pages(data_, old_bytes, byte_count(size), what));
     } catch (...) {
       charge_.try_resize(old_bytes);
       throw;

@@ -41,6 +41,30 @@ TEST(PageBuffer, ChargesWhatItHolds) {
   EXPECT_EQ(budget.used(), 0u);
 }
 
+// Growing keeps the contents, zero-fills the rest and charges it; what does not fit changes
+// nothing.
+TEST(PageBuffer, Grows) {
+  MemoryBudget budget(uint64_t{1} << 20);
+  PageBuffer<uint32_t> buffer(budget, 1000, "table");
+  for (uint32_t i = 0; i < 1000; ++i) buffer[i] = i + 1;
+  buffer.grow(100000, "table");
+  EXPECT_EQ(buffer.size(), 100000u);
+  EXPECT_EQ(budget.used(), 400000u);
+  for (uint32_t i = 0; i < 100000; ++i) ASSERT_EQ(buffer[i], i < 1000 ? i + 1 : 0);
+  for (const size_t size : {size_t{1} << 20, (size_t{1} << 62) + 100000}) {
+    try {
+      buffer.grow(size, "the brick table");
+      ADD_FAILURE() << "grew to " << size;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory);
+      EXPECT_NE(error.message().find("the brick table"), std::string::npos) << error.message();
+    }
+    EXPECT_EQ(buffer.size(), 100000u);
+    EXPECT_EQ(buffer[999], 1000u);
+    EXPECT_EQ(budget.used(), 400000u);
+  }
+}
+
 // An empty buffer costs nothing.
 TEST(PageBuffer, MayBeEmpty) {
   MemoryBudget budget(0);

@@ -36,6 +36,7 @@ class FailingDisk : public FileSystem {
     step("sync_directory");
     disk_.sync_directory(p);
   }
+  std::unique_ptr<FileLock> try_lock(const std::string& p) override { return disk_.try_lock(p); }
   uint64_t free_space(const std::string& p) override { return disk_.free_space(p); }
 
  private:

@@ -1,4 +1,7 @@
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <functional>
@@ -173,6 +176,32 @@ TEST_F(PosixFiles, ThreadsShareAFile) {
   for (std::thread& t : threads) t.join();
   EXPECT_EQ(wrong, 0);
   EXPECT_EQ(files_.open_read(path_)->size(), 4 * kPart);
+}
+
+// One holder at a time, until the lock goes out of scope; the file stays.
+TEST_F(PosixFiles, LocksAreExclusive) {
+  auto first = files_.try_lock(path_);
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(files_.try_lock(path_), nullptr);
+  EXPECT_NE(files_.try_lock(folder_.file("other")), nullptr);
+  first.reset();
+  EXPECT_NE(files_.try_lock(path_), nullptr);
+  EXPECT_TRUE(files_.exists(path_));
+  expect_error(ErrorCode::kNotFound, "gone", [&] { files_.try_lock(folder_.file("gone/lock")); });
+}
+
+// A process that dies leaves no lock behind.
+TEST_F(PosixFiles, LocksEndWithTheProcess) {
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    auto lock = files_.try_lock(path_);
+    raise(SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_NE(files_.try_lock(path_), nullptr);
 }
 
 // Closing twice, or after the destructor's turn, is harmless.
