@@ -8,8 +8,9 @@ namespace voxdag::cpu {
 
 void BrickTable::grow(uint64_t bricks) {
   if (bricks > UINT32_MAX) throw Outgrown{};
-  PageBuffer<Slot> old = std::move(slots_);
-  slots_ = claim<Slot>(budget_, slots_for(bricks), "the brick table");
+  Buffer<Slot> old = std::move(slots_);
+  slots_ = Buffer<Slot>(memory_, slots_for(bricks), Buffer<Slot>::kZero);
+  capacity_ = entries_for(slots_.size());
   shift_ = 64 - lowest_bit(slots_.size());
   for (const Slot& slot : old) {
     if (slot.mask == 0) continue;

@@ -21,13 +21,13 @@ class BrickTable {
     uint32_t tag;  // top half of the brick's hash
   };
 
-  explicit BrickTable(MemoryBudget& budget) : budget_(budget) {}
+  explicit BrickTable(Memory& memory) : memory_(memory) {}
 
   uint64_t size() const { return count_; }
 
   // Makes room for `more` bricks; must precede the calls below.
   void reserve(uint64_t more) {
-    if ((count_ + more) * 8 > slots_.size() * 5) grow(count_ + more);
+    if (count_ + more > capacity_) grow(count_ + more);
   }
 
   void prefetch(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
@@ -60,8 +60,9 @@ class BrickTable {
  private:
   void grow(uint64_t bricks);
 
-  MemoryBudget& budget_;
-  PageBuffer<Slot> slots_;
+  Memory& memory_;
+  Buffer<Slot> slots_;
+  uint64_t capacity_ = 0;
   int shift_ = 64;  // index of a hash = hash >> shift_
   uint64_t count_ = 0;
 };

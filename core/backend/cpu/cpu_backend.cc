@@ -15,8 +15,9 @@ class CpuBackend : public Backend {
 
   BuildOutcome build(const SubvolumeTask& task, TriangleStream& triangles, MemoryBudget& budget,
                      const CancelToken& cancel, SubDagSink& sink, SubDagSummary& summary) override {
+    cpu::Memory memory{budget, pages_};
     try {
-      const auto build = std::make_unique<cpu::SubvolumeBuild>(task, kernels_, budget, cancel);
+      const auto build = std::make_unique<cpu::SubvolumeBuild>(task, kernels_, memory, cancel);
       summary = build->run(triangles, sink);
       return BuildOutcome::kBuilt;
     } catch (const cpu::Outgrown&) {
@@ -26,6 +27,7 @@ class CpuBackend : public Backend {
 
  private:
   const cpu::Kernels& kernels_;
+  cpu::PagePool pages_;
 };
 
 }  // namespace

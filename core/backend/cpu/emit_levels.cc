@@ -21,11 +21,11 @@ class LevelEmitter {
       most_children = std::max(most_children, tables.nodes(s).total_children());
     }
     most_hashes = std::max(most_hashes, most_nodes);
-    MemoryBudget& budget = tables.budget();
-    brick_places_ = claim<uint32_t>(budget, tables.bricks().size(), "places of bricks");
-    hashes_ = claim<uint64_t>(budget, most_hashes, "a level array");
-    masks_ = claim<uint8_t>(budget, most_nodes, "a level array");
-    children_ = claim<uint32_t>(budget, most_children, "a level array");
+    Memory& memory = tables.memory();
+    brick_places_ = Buffer<uint32_t>(memory, tables.bricks().size());
+    hashes_ = Buffer<uint64_t>(memory, most_hashes);
+    masks_ = Buffer<uint8_t>(memory, most_nodes);
+    children_ = Buffer<uint32_t>(memory, most_children);
   }
 
   SubDagSummary run() {
@@ -45,8 +45,7 @@ class LevelEmitter {
  private:
   // Makes the hashes of all records those of --hash-bits, from the bricks up.
   void cut_hashes() {
-    PageBuffer<uint64_t> brick_hashes =
-        claim<uint64_t>(tables_.budget(), tables_.bricks().size(), "cut hashes of bricks");
+    Buffer<uint64_t> brick_hashes(tables_.memory(), tables_.bricks().size());
     tables_.bricks().for_each([&](uint64_t mask, uint32_t id) {
       brick_hashes[id] = cut_hash(hash_brick(mask), hash_bits_);
     });
@@ -113,10 +112,10 @@ class LevelEmitter {
   const uint32_t grid_levels_;
   const uint32_t hash_bits_;
   SubDagSink& sink_;
-  PageBuffer<uint32_t> brick_places_;  // by brick id
-  PageBuffer<uint64_t> hashes_;        // of a level's nodes; masks of the bricks
-  PageBuffer<uint8_t> masks_;
-  PageBuffer<uint32_t> children_;
+  Buffer<uint32_t> brick_places_;  // by brick id
+  Buffer<uint64_t> hashes_;        // of a level's nodes; masks of the bricks
+  Buffer<uint8_t> masks_;
+  Buffer<uint32_t> children_;
 };
 
 }  // namespace

@@ -22,6 +22,8 @@ struct Kernels {
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
   // `inside`: the triangle covers the whole cube, which it is known not to miss.
   Octants (*test_octants)(const NarrowTriangle& triangle, const Box& cube, bool inside);
+  // Bits set in `count` words.
+  uint64_t (*count_bits)(const uint64_t* words, int count);
 };
 
 const Kernels& portable_kernels();

@@ -34,7 +34,13 @@ Octants test_octants(const NarrowTriangle& triangle, const Box& cube, bool insid
   return OctantTest<Avx2Quad, int32_t>(triangle, cube).run(inside);
 }
 
-constexpr Kernels kAvx2 = {draw_avx2, test_octants};
+uint64_t count_bits(const uint64_t* words, int count) {
+  uint64_t bits = 0;
+  for (int i = 0; i < count; ++i) bits += static_cast<uint64_t>(_mm_popcnt_u64(words[i]));
+  return bits;
+}
+
+constexpr Kernels kAvx2 = {draw_avx2, test_octants, count_bits};
 
 }  // namespace
 

@@ -9,7 +9,6 @@ namespace voxdag::cpu {
 namespace {
 
 constexpr uint64_t kWordLimit = uint64_t{1} << 32;  // ids are 32-bit
-constexpr uint64_t kFirstWords = 1024;
 
 }  // namespace
 
@@ -27,8 +26,9 @@ uint32_t NodeTable::add(uint64_t at, uint64_t hash, uint32_t mask, const uint32_
 }
 
 void NodeTable::grow_slots(uint64_t nodes) {
-  PageBuffer<uint64_t> old = std::move(slots_);
-  slots_ = claim<uint64_t>(budget_, slots_for(nodes), "a node table");
+  Buffer<uint64_t> old = std::move(slots_);
+  slots_ = Buffer<uint64_t>(memory_, slots_for(nodes), Buffer<uint64_t>::kZero);
+  capacity_ = entries_for(slots_.size());
   shift_ = 64 - lowest_bit(slots_.size());
   for (const uint64_t slot : old) {
     if (slot == 0) continue;
@@ -40,7 +40,7 @@ void NodeTable::grow_slots(uint64_t nodes) {
 
 void NodeTable::grow_records(uint64_t words) {
   if (words > kWordLimit) throw Outgrown{};
-  claim_more(budget_, records_, std::max(words, kFirstWords), "a node table");
+  records_.grow(memory_, words);
 }
 
 bool NodeTable::less(uint64_t slot_a, uint64_t slot_b) {

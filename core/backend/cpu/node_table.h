@@ -38,7 +38,7 @@ class NodeTable {
     int child_count() const { return popcount64(mask()); }
   };
 
-  explicit NodeTable(MemoryBudget& budget) : budget_(budget) {}
+  explicit NodeTable(Memory& memory) : memory_(memory) {}
 
   uint64_t size() const { return count_; }
   uint64_t total_children() const { return used_ - count_ * Record::kWords; }
@@ -46,7 +46,7 @@ class NodeTable {
 
   // Makes room for `more` nodes; must precede the calls below.
   void reserve(uint64_t more) {
-    if ((count_ + more) * 8 > slots_.size() * 5) grow_slots(count_ + more);
+    if (count_ + more > capacity_) grow_slots(count_ + more);
     const uint64_t words = kFirstId + used_ + more * (Record::kWords + 8);
     if (words > records_.size()) grow_records(words);
   }
@@ -99,9 +99,10 @@ class NodeTable {
   void grow_records(uint64_t words);
   bool less(uint64_t slot_a, uint64_t slot_b);
 
-  MemoryBudget& budget_;
-  PageBuffer<uint64_t> slots_;  // 0: free
-  PageBuffer<uint32_t> records_;
+  Memory& memory_;
+  Buffer<uint64_t> slots_;  // 0: free
+  Buffer<uint32_t> records_;
+  uint64_t capacity_ = 0;
   int shift_ = 64;  // index of a hash = hash >> shift_
   uint64_t count_ = 0;
   uint64_t used_ = 0;  // words of records, from kFirstId on

@@ -41,7 +41,13 @@ Octants test_octants_narrow(const NarrowTriangle& triangle, const Box& cube, boo
   return OctantTest<PlainQuad, int32_t>(triangle, cube).run(inside);
 }
 
-constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow};
+uint64_t count_bits(const uint64_t* words, int count) {
+  uint64_t bits = 0;
+  for (int i = 0; i < count; ++i) bits += static_cast<uint64_t>(popcount64(words[i]));
+  return bits;
+}
+
+constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow, count_bits};
 
 }  // namespace
 

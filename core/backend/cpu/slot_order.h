@@ -10,10 +10,11 @@
 
 namespace voxdag::cpu {
 
-// Slots for `entries` of them: a power of two, at most 5/8 full.
+// Slots are at most 5/8 full, and a power of two.
+inline uint64_t entries_for(uint64_t slots) { return slots / 8 * 5; }
 inline uint64_t slots_for(uint64_t entries) {
-  uint64_t slots = 256;
-  while (entries * 8 > slots * 5) slots *= 2;
+  uint64_t slots = 512;
+  while (entries > entries_for(slots)) slots *= 2;
   return slots;
 }
 

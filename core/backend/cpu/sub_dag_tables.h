@@ -38,15 +38,15 @@ struct OctreeCounts {
 // A cube of `size_log2` s has an edge of 2^s voxels; bricks are s = 2.
 class SubDagTables {
  public:
-  SubDagTables(MemoryBudget& budget, int size_log2) : budget_(budget), bricks_(budget) {
-    for (int s = kBrickLevels + 1; s <= size_log2; ++s) nodes_.emplace_back(budget);
+  SubDagTables(Memory& memory, int size_log2) : memory_(memory), bricks_(memory) {
+    for (int s = kBrickLevels + 1; s <= size_log2; ++s) nodes_.emplace_back(memory);
   }
 
   int size_log2() const { return kBrickLevels + static_cast<int>(nodes_.size()); }
   BrickTable& bricks() { return bricks_; }
   // Of cubes of 2^size_log2 voxels, size_log2 > 2.
   NodeTable& nodes(int size_log2) { return nodes_[size_log2 - kBrickLevels - 1]; }
-  MemoryBudget& budget() { return budget_; }
+  Memory& memory() { return memory_; }
 
   OctreeCounts& counts() { return counts_; }
 
@@ -54,7 +54,7 @@ class SubDagTables {
   NodeRef add_node(int size_log2, const NodeRef (&children)[8]);
 
  private:
-  MemoryBudget& budget_;
+  Memory& memory_;
   BrickTable bricks_;
   std::vector<NodeTable> nodes_;
   OctreeCounts counts_;

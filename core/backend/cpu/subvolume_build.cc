@@ -21,14 +21,14 @@ int size_log2_of(const SubvolumeTask& task) {
 }  // namespace
 
 SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels,
-                               MemoryBudget& budget, const CancelToken& cancel)
+                               Memory& memory, const CancelToken& cancel)
     : task_(task),
       kernels_(kernels),
-      budget_(budget),
+      memory_(memory),
       cancel_(cancel),
-      triangles_(budget),
-      tables_(budget, size_log2_of(task)),
-      reducer_(tables_) {}
+      triangles_(memory),
+      tables_(memory, size_log2_of(task)),
+      reducer_(tables_, kernels) {}
 
 SubDagSummary SubvolumeBuild::run(TriangleStream& stream, SubDagSink& sink) {
   stream.rewind();
@@ -71,15 +71,13 @@ void SubvolumeBuild::read(TriangleStream& stream) {
 }
 
 void SubvolumeBuild::reserve_entries(size_t count) {
-  if (count <= entries_.size()) return;
-  claim_more(budget_, entries_, std::max<size_t>(count, 1024), "triangle lists");
+  if (count > entries_.size()) entries_.grow(memory_, count);
 }
 
 NodeRef SubvolumeBuild::build(int size_log2, const Box& cube, size_t first, size_t count) {
   if (count == 0) return {};
   if (size_log2 <= kTileLog2) return build_tile(size_log2, cube, first, count);
-  if (count > octants_.size())
-    claim_more(budget_, octants_, std::max<size_t>(count, 1024), "triangle lists");
+  if (count > octants_.size()) octants_.grow(memory_, count);
   size_t counts[8] = {};
   for (size_t i = 0; i < count; ++i) {
     const Octants octants = test_octants(entries_[first + i], cube);

@@ -16,7 +16,7 @@ namespace voxdag::cpu {
 // Used once. Throws Outgrown, before the sink was called, when the budget is too small.
 class SubvolumeBuild {
  public:
-  SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, MemoryBudget& budget,
+  SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, Memory& memory,
                  const CancelToken& cancel);
   SubDagSummary run(TriangleStream& stream, SubDagSink& sink);
 
@@ -34,13 +34,13 @@ class SubvolumeBuild {
 
   const SubvolumeTask task_;
   const Kernels& kernels_;
-  MemoryBudget& budget_;
+  Memory& memory_;
   const CancelToken& cancel_;
   TriangleSet triangles_;
   // Entries of the cubes on the way from the root to the current one, and the octants of those
   // being handed down.
-  PageBuffer<Entry> entries_;
-  PageBuffer<uint16_t> octants_;
+  Buffer<Entry> entries_;
+  Buffer<uint16_t> octants_;
   size_t entries_used_ = 0;
   SubDagTables tables_;
   TileReducer reducer_;

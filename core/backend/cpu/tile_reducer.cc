@@ -5,6 +5,25 @@
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
+namespace {
+
+// popcount of a child mask: a call into a library where the instruction cannot be taken for granted.
+struct BitTable {
+  uint8_t bits[256] = {};
+  constexpr BitTable() {
+    for (int i = 1; i < 256; ++i) bits[i] = static_cast<uint8_t>(bits[i / 2] + i % 2);
+  }
+  constexpr int operator[](uint32_t mask) const { return bits[mask]; }
+};
+constexpr BitTable kBitsInByte;
+
+uint64_t hash_of(uint32_t mask, int count, const uint64_t* child_hashes) {
+  uint64_t hash = node_hash_begin(mask);
+  for (int i = 0; i < count; ++i) hash = node_hash_add(hash, child_hashes[i]);
+  return node_hash_end(hash);
+}
+
+}  // namespace
 
 NodeRef TileReducer::reduce_bricks(TileBricks& tile, int size_log2) {
   const int bricks_log2 = 3 * (size_log2 - kBrickLevels);
@@ -12,21 +31,19 @@ NodeRef TileReducer::reduce_bricks(TileBricks& tile, int size_log2) {
   BrickTable& table = tables_.bricks();
   table.reserve(kTileBricks);
   int count = 0;
-  uint64_t voxels = 0;
   for (int w = 0; w < words; ++w) {
     existing_[w] = std::exchange(tile.occupied[w], 0);
     for (uint64_t rest = existing_[w]; rest != 0; rest &= rest - 1) {
       const uint64_t mask = std::exchange(tile.masks[64 * w + lowest_bit(rest)], 0);
       const uint64_t hash = hash_brick(mask);
       table.prefetch(hash);
-      voxels += popcount64(mask);
       masks_[count] = mask;
       hashes_[count++] = hash;
     }
   }
   if (count == 0) return {};
   for (int i = 0; i < count; ++i) ids_[i] = table.find_or_add(masks_[i], hashes_[i]);
-  tables_.counts() += {static_cast<uint64_t>(count), voxels};
+  tables_.counts() += {static_cast<uint64_t>(count), kernels_.count_bits(masks_, count)};
   return reduce(words, count, kBrickLevels, size_log2);
 }
 
@@ -51,14 +68,15 @@ int TileReducer::reduce_level(int words, NodeTable& table) {
       above |= uint64_t{1} << byte;
       child_masks_[count] = static_cast<uint8_t>(mask);
       first_child_[count++] = static_cast<uint16_t>(children);
-      children += popcount64(mask);
+      children += kBitsInByte[mask];
     }
     // Word w / 8 of the next level was read already.
     existing_[w / 8] = w % 8 == 0 ? above : existing_[w / 8] | above << 8 * (w % 8);
   }
   table.reserve(static_cast<uint64_t>(count));
   for (int i = 0; i < count; ++i) {
-    hashes_[i] = hash_node(child_masks_[i], &hashes_[first_child_[i]]);
+    hashes_[i] =
+        hash_of(child_masks_[i], kBitsInByte[child_masks_[i]], &hashes_[first_child_[i]]);
     table.prefetch_slot(hashes_[i]);
   }
   if (count > 4)
@@ -66,7 +84,7 @@ int TileReducer::reduce_level(int words, NodeTable& table) {
   // A node's children stand at or behind its own place.
   for (int i = 0; i < count; ++i)
     ids_[i] = table.find_or_add(hashes_[i], child_masks_[i], &ids_[first_child_[i]],
-                                popcount64(child_masks_[i]));
+                                kBitsInByte[child_masks_[i]]);
   return count;
 }
 

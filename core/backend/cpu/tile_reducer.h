@@ -7,6 +7,7 @@
 
 #include <cstdint>
 
+#include "core/backend/cpu/kernels.h"
 #include "core/backend/cpu/sub_dag_tables.h"
 #include "core/backend/cpu/tile_bricks.h"
 
@@ -14,7 +15,7 @@ namespace voxdag::cpu {
 
 class TileReducer {
  public:
-  explicit TileReducer(SubDagTables& tables) : tables_(tables) {}
+  TileReducer(SubDagTables& tables, const Kernels& kernels) : tables_(tables), kernels_(kernels) {}
 
   // The node of a tile of 2^size_log2 voxels; its octree nodes and voxels are added to the tables'
   // counts. Leaves the tile empty.
@@ -44,6 +45,7 @@ class TileReducer {
   static constexpr int kMostNodes = kTileBricks / 8;
 
   SubDagTables& tables_;
+  const Kernels& kernels_;
   // The current level: which cubes exist, and their ids and hashes, one after the other.
   uint64_t existing_[kTileBricks / 64];
   uint32_t ids_[kTileBricks];

@@ -7,12 +7,10 @@ void TriangleSet::add(const WideTriangle& triangle) {
   uint32_t& count = narrow ? narrow_count_ : wide_count_;
   if (count + 1 >= Entry::kWide) throw Outgrown{};
   if (narrow) {
-    if (count + 2 > narrow_.size())
-      claim_more(budget_, narrow_, std::max<size_t>(count + 2, 256), "triangles");
+    if (count + 2 > narrow_.size()) narrow_.grow(memory_, count + 2);
     narrow_[count] = narrowed(triangle);
   } else {
-    if (count + 1 > wide_.size())
-      claim_more(budget_, wide_, std::max<size_t>(count + 1, 256), "triangles");
+    if (count + 1 > wide_.size()) wide_.grow(memory_, count + 1);
     wide_[count] = triangle;
   }
   ++count;

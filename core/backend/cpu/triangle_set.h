@@ -84,7 +84,7 @@ struct Entry {
 // Not thread-safe. Throws Outgrown.
 class TriangleSet {
  public:
-  explicit TriangleSet(MemoryBudget& budget) : budget_(budget) {}
+  explicit TriangleSet(Memory& memory) : memory_(memory) {}
 
   // Entries of triangles are 0..narrow_count()-1, and the same with kWide.
   uint32_t narrow_count() const { return narrow_count_; }
@@ -96,9 +96,9 @@ class TriangleSet {
   const WideTriangle& wide(Entry entry) const { return wide_[entry.number()]; }
 
  private:
-  MemoryBudget& budget_;
-  PageBuffer<NarrowTriangle> narrow_;  // one more than used, so that four can be loaded for three
-  PageBuffer<WideTriangle> wide_;
+  Memory& memory_;
+  Buffer<NarrowTriangle> narrow_;  // one more than used, so that four can be loaded for three
+  Buffer<WideTriangle> wide_;
   uint32_t narrow_count_ = 0;
   uint32_t wide_count_ = 0;
 };

@@ -1,0 +1,40 @@
+// Block kernels: a group of threads that work in phases on memory they share.
+//
+// A kernel K has
+//   K::kThreads, K::kPhases      threads of a block, phases between which they wait for each other
+//   K::Shared                    the block's memory: plain data, uninitialised
+//   operator()(phase, block, thread, Shared&)
+// On a GPU one thread block runs all threads side by side; on the host one thread runs them one
+// after the other, phase by phase, so that the tests see every index the device would.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.h"
+
+namespace voxdag::parallel {
+
+// Sets bits of a word that the threads of a block share. An OR has no order, so the word is the
+// same whoever comes first.
+VOXDAG_HD inline void or_shared(uint64_t& word, uint64_t bits) {
+#if defined(__CUDA_ARCH__)
+  unsigned int* half = reinterpret_cast<unsigned int*>(&word);
+  const unsigned int low = static_cast<unsigned int>(bits);
+  const unsigned int high = static_cast<unsigned int>(bits >> 32);
+  if (low) atomicOr(half, low);
+  if (high) atomicOr(half + 1, high);
+#else
+  word |= bits;
+#endif
+}
+
+// Sets a flag that any thread of any block may set, and none reads meanwhile.
+VOXDAG_HD inline void raise_flag(uint32_t* flag) {
+#if defined(__CUDA_ARCH__)
+  atomicOr(flag, 1u);
+#else
+  __atomic_store_n(flag, 1u, __ATOMIC_RELAXED);
+#endif
+}
+
+}  // namespace voxdag::parallel

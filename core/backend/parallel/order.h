@@ -1,0 +1,77 @@
+// A permutation of items, refined by stable radix sorts: sorting by the least significant part of a
+// key first, then by the more significant ones, gives the order of the whole key.
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/parallel/space.h"
+
+namespace voxdag::parallel {
+
+struct CountUp {
+  uint32_t* out;
+  VOXDAG_HD void operator()(uint32_t i) const { out[i] = i; }
+};
+
+template <class Key>
+struct KeysInOrder {
+  Key key;
+  const uint32_t* items;
+  uint64_t* keys;
+  VOXDAG_HD void operator()(uint32_t i) const { keys[i] = key(items[i]); }
+};
+
+template <class T>
+struct Gather {
+  const uint32_t* items;
+  const T* from;
+  T* to;
+  VOXDAG_HD void operator()(uint32_t i) const { to[i] = from[items[i]]; }
+};
+
+struct InvertOrder {
+  const uint32_t* items;
+  uint32_t* place_of;
+  VOXDAG_HD void operator()(uint32_t i) const { place_of[items[i]] = i; }
+};
+
+template <class Space>
+class Order {
+ public:
+  Order(Space& space, uint32_t count)
+      : space_(space), count_(count), keys_(space, count), items_(space, count) {
+    space_.for_each(count, CountUp{items_.data()});
+  }
+
+  uint32_t count() const { return count_; }
+  const uint32_t* items() const { return items_.data(); }
+
+  // Sorts stably by bits [begin_bit, end_bit) of key(item), a host+device functor.
+  template <class Key>
+  void sort_by(Key key, int begin_bit, int end_bit) {
+    Buffer<Space, uint64_t> key_scratch(space_, count_);
+    Buffer<Space, uint32_t> item_scratch(space_, count_);
+    space_.for_each(count_, KeysInOrder<Key>{key, items_.data(), keys_.data()});
+    space_.sort_pairs(keys_, key_scratch, items_, item_scratch, count_, begin_bit, end_bit);
+  }
+
+  // Where each item stands.
+  Buffer<Space, uint32_t> places() {
+    Buffer<Space, uint32_t> place_of(space_, count_);
+    space_.for_each(count_, InvertOrder{items_.data(), place_of.data()});
+    return place_of;
+  }
+
+ private:
+  Space& space_;
+  const uint32_t count_;
+  Buffer<Space, uint64_t> keys_;
+  Buffer<Space, uint32_t> items_;
+};
+
+struct KeyAt {
+  const uint64_t* keys;
+  VOXDAG_HD uint64_t operator()(uint32_t item) const { return keys[item]; }
+};
+
+}  // namespace voxdag::parallel
