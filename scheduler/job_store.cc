@@ -101,7 +101,7 @@ JobStore::JobStore(const std::string& path, Access access)
     : database_(path, access == Access::kBuild ? SqlDatabase::Mode::kReadWrite
                                                : SqlDatabase::Mode::kReadOnly) {
   if (access == Access::kBuild) {
-    database_.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;");
+    database_.execute("PRAGMA journal_mode = WAL");
     database_.execute("PRAGMA foreign_keys = ON;");
   }
   const int64_t application = database_.integer("PRAGMA application_id");
@@ -179,7 +179,7 @@ void JobStore::record_built(std::span<const StoredSubvolume> built) {
 std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
                                                 std::span<const Cube> parts) {
   std::lock_guard lock(mutex_);
-  SqlTransaction transaction(database_);
+  SqlTransaction transaction(database_, Durable::kLater);
   StoredSubvolume split = whole;
   split.state = SubvolumeState::kSplit;
   update_row(split);
@@ -203,7 +203,9 @@ void JobStore::record_lost(const StoredSubvolume& lost) {
   planned.id = lost.id;
   planned.cube = lost.cube;
   planned.weight = lost.weight;
+  SqlTransaction transaction(database_);
   update_row(planned);
+  transaction.commit();
 }
 
 void JobStore::update_row(const StoredSubvolume& subvolume) {
@@ -215,11 +217,13 @@ void JobStore::update_row(const StoredSubvolume& subvolume) {
 
 void JobStore::add_stage_time(const StageTime& time) {
   std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_, Durable::kLater);
   database_.prepare("INSERT INTO stage_time (name, wall_s, cpu_s) VALUES (?, ?, ?)")
       .bind(0, time.name)
       .bind(1, time.wall_s)
       .bind(2, time.cpu_s)
       .run();
+  transaction.commit();
 }
 
 std::vector<StageTime> JobStore::stage_times() {
@@ -232,6 +236,7 @@ std::vector<StageTime> JobStore::stage_times() {
 
 void JobStore::set_progress(const ProgressSnapshot& p) {
   std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_, Durable::kLater);
   database_.prepare("INSERT OR REPLACE INTO progress VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .bind(0, p.stage)
       .bind(1, p.unit)
@@ -243,6 +248,7 @@ void JobStore::set_progress(const ProgressSnapshot& p) {
       .bind_word(7, p.disk_bytes)
       .bind(8, p.last_error)
       .run();
+  transaction.commit();
 }
 
 std::optional<ProgressSnapshot> JobStore::progress() {

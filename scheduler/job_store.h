@@ -1,5 +1,5 @@
 // What is durable of a build: the job, its subvolumes and their artifacts, timings and progress, in
-// one SQLite file of the work folder (WAL, synchronous = FULL, foreign keys).
+// one SQLite file of the work folder (WAL, synchronous = FULL where it counts, foreign keys).
 //
 // Invariants:
 //   1. A row names an artifact only after the artifact's bytes were synced.

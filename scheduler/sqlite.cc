@@ -117,6 +117,13 @@ int64_t SqlDatabase::integer(const std::string& sql) {
   return statement.integer(0);
 }
 
+SqlTransaction::SqlTransaction(SqlDatabase& database, Durable durable) : database_(database) {
+  // In WAL mode FULL syncs the log at each commit; NORMAL leaves it to the next that does.
+  database_.execute(durable == Durable::kNow ? "PRAGMA synchronous = FULL"
+                                             : "PRAGMA synchronous = NORMAL");
+  database_.execute("BEGIN IMMEDIATE");
+}
+
 SqlTransaction::~SqlTransaction() {
   if (!open_) return;
   try {

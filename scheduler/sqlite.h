@@ -63,12 +63,13 @@ class SqlDatabase {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
+// kLater is for what may be lost in a power cut: it becomes durable with the next kNow, in order.
+enum class Durable { kNow, kLater };
+
 // Commits when told to, rolls back otherwise.
 class SqlTransaction {
  public:
-  explicit SqlTransaction(SqlDatabase& database) : database_(database) {
-    database_.execute("BEGIN IMMEDIATE");
-  }
+  explicit SqlTransaction(SqlDatabase& database, Durable durable = Durable::kNow);
   ~SqlTransaction();
   void commit();
 

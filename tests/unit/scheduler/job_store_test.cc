@@ -1,0 +1,152 @@
+#include "scheduler/job_store.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/base/error.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace voxdag {
+namespace {
+
+class JobStoreTest : public testing::Test {
+ protected:
+  std::string path() const { return folder_.path() + "/job.db"; }
+  static std::vector<StoredSubvolume> plan(size_t count) {
+    std::vector<StoredSubvolume> plan(count);
+    for (size_t i = 0; i < count; ++i) {
+      plan[i].cube = {3, {static_cast<uint32_t>(i), 1, 2}};
+      plan[i].weight = static_cast<double>(10 * i);
+    }
+    return plan;
+  }
+  static StoredSubvolume built(const StoredSubvolume& planned) {
+    StoredSubvolume s = planned;
+    s.artifact = {7, 1ull << 40, 12345, (1ull << 40) + 99, 0xfedcba9876543210ull};
+    s.summary = {1ull << 50, 1ull << 45, 77, 0x8000000000000001ull};
+    return s;
+  }
+
+  TemporaryFolder folder_;
+  const JobIdentity job_{"abc", "{\"resolution\":4}", 1};
+};
+
+// What was recorded is there when the store is opened again, every bit of every number.
+TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
+  {
+    JobStore store(path(), JobStore::Access::kBuild);
+    EXPECT_FALSE(store.job().has_value());
+    store.start(job_, plan(3));
+    store.record_built(std::vector{built(store.leaves()[1])});
+    store.add_stage_time({"build", 1.5, 2.5});
+  }
+  JobStore store(path(), JobStore::Access::kBuild);
+  EXPECT_EQ(store.job(), job_);
+  const auto leaves = store.leaves();
+  ASSERT_EQ(leaves.size(), 3u);
+  EXPECT_EQ(leaves[0].state, SubvolumeState::kPlanned);
+  EXPECT_EQ(leaves[1].state, SubvolumeState::kBuilt);
+  const StoredSubvolume expected = built(leaves[1]);
+  EXPECT_EQ(leaves[1].artifact, expected.artifact);
+  EXPECT_EQ(leaves[1].summary.voxels, expected.summary.voxels);
+  EXPECT_EQ(leaves[1].summary.root_hash, expected.summary.root_hash);
+  EXPECT_EQ(leaves[2].weight, 20);
+  ASSERT_EQ(store.stage_times().size(), 1u);
+  EXPECT_EQ(store.stage_times()[0].cpu_s, 2.5);
+}
+
+// A split subvolume is replaced by its parts; a lost one is planned again; both survive.
+TEST_F(JobStoreTest, SplitsAndLosses) {
+  JobStore store(path(), JobStore::Access::kBuild);
+  store.start(job_, plan(2));
+  const StoredSubvolume whole = store.leaves()[0];
+  const std::vector<Cube> parts = {whole.cube.child(0), whole.cube.child(5)};
+  const auto ids = store.record_split(whole, parts);
+  ASSERT_EQ(ids.size(), 2u);
+  auto leaves = store.leaves();
+  ASSERT_EQ(leaves.size(), 3u);
+  EXPECT_EQ(leaves[1].cube, parts[0]);
+  EXPECT_EQ(leaves[2].id, ids[1]);
+  store.record_built(std::vector{built(leaves[2])});
+  store.record_lost(store.leaves()[2]);
+  leaves = store.leaves();
+  EXPECT_EQ(leaves[2].state, SubvolumeState::kPlanned);
+  EXPECT_EQ(leaves[2].cube, parts[1]);
+  EXPECT_TRUE(leaves[2].summary.empty());
+}
+
+// A new job replaces the old one with all its rows.
+TEST_F(JobStoreTest, StartingOverForgets) {
+  JobStore store(path(), JobStore::Access::kBuild);
+  store.start(job_, plan(5));
+  store.record_split(store.leaves()[3], std::vector{store.leaves()[3].cube.child(1)});
+  const JobIdentity other{"def", "{}", 1};
+  store.start(other, plan(2));
+  EXPECT_EQ(store.job(), other);
+  EXPECT_EQ(store.leaves().size(), 2u);
+}
+
+// Files that are not ours, or of another version, are refused by what they are.
+TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
+  std::ofstream(path()) << "this is no database at all, whatever its name may say";
+  try {
+    JobStore store(path(), JobStore::Access::kBuild);
+    FAIL() << "opened a text file";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt) << error.what();
+  }
+  std::remove(path().c_str());
+  SqlDatabase(path(), SqlDatabase::Mode::kReadWrite).execute("CREATE TABLE t (a)");
+  try {
+    JobStore store(path(), JobStore::Access::kBuild);
+    FAIL() << "opened somebody else's database";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput) << error.what();
+  }
+  std::remove(path().c_str());
+  { JobStore store(path(), JobStore::Access::kBuild); }
+  SqlDatabase(path(), SqlDatabase::Mode::kReadWrite).execute("PRAGMA user_version = 99");
+  try {
+    JobStore store(path(), JobStore::Access::kBuild);
+    FAIL() << "opened a store of version 99";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupportedVersion) << error.what();
+  }
+}
+
+// SQLite would hand out a row that rotted on the disk; the row's own checksum does not.
+TEST_F(JobStoreTest, NoticesARowThatChanged) {
+  for (const char* change : {"x = x + 1", "state = 1", "voxels = 12", "checksum = checksum + 1"}) {
+    SCOPED_TRACE(change);
+    JobStore store(path(), JobStore::Access::kBuild);
+    store.start(job_, plan(2));
+    SqlDatabase(path(), SqlDatabase::Mode::kReadWrite)
+        .execute("UPDATE subvolume SET " + std::string(change) + " WHERE id = 2");
+    try {
+      store.leaves();
+      FAIL() << "read a changed row";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+      EXPECT_NE(error.message().find("subvolume 2"), std::string::npos) << error.what();
+    }
+  }
+}
+
+// A looker reads while the builder's connection is open, and cannot write.
+TEST_F(JobStoreTest, CanBeLookedAtMeanwhile) {
+  JobStore builder(path(), JobStore::Access::kBuild);
+  builder.start(job_, plan(2));
+  JobStore looker(path(), JobStore::Access::kLook);
+  EXPECT_EQ(looker.leaves().size(), 2u);
+  ProgressSnapshot progress;
+  progress.stage = "build";
+  progress.done = 1;
+  builder.set_progress(progress);
+  ASSERT_TRUE(looker.progress().has_value());
+  EXPECT_EQ(looker.progress()->done, 1u);
+  EXPECT_THROW(looker.set_progress(progress), Error);
+}
+
+}  // namespace
+}  // namespace voxdag

@@ -1,0 +1,210 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "core/base/error.h"
+#include "core/scene/generate/generate.h"
+#include "scheduler/job_status.h"
+#include "scheduler/job_store.h"
+#include "scheduler/run_build.h"
+#include "scheduler/work_folder.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace voxdag {
+namespace {
+
+// Cancels once a stage has done so much.
+class CancellingProgress : public NoProgress {
+ public:
+  CancellingProgress(CancelToken& cancel, std::string stage, uint64_t after)
+      : cancel_(cancel), stage_(std::move(stage)), left_(after) {}
+  void begin_stage(std::string_view stage, uint64_t, std::string_view) override {
+    active_ = stage == stage_;
+    if (active_ && left_ == 0) cancel_.cancel();
+  }
+  void advance(uint64_t count) override {
+    if (!active_) return;
+    left_ -= std::min(left_, count);
+    if (left_ == 0) cancel_.cancel();
+  }
+
+ private:
+  CancelToken& cancel_;
+  const std::string stage_;
+  bool active_ = false;
+  uint64_t left_;
+};
+
+class ResumeTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    GenerateOptions options;
+    options.kind = SceneKind::kSpheres;
+    options.triangles = 20000;
+    NoProgress progress;
+    CancelToken cancel;
+    generate_scene(system_files(), scene(), options, progress, cancel);
+  }
+  std::string scene() const { return folder_.path() + "/scene.glb"; }
+  std::string output() const { return folder_.path() + "/out.vdag"; }
+  std::string work() const { return output() + ".work"; }
+
+  BuildSpec spec() const {
+    BuildSpec spec;
+    spec.geometry.scenes = {scene()};
+    spec.geometry.resolution = 1024;
+    spec.run.output = output();
+    spec.run.memory_bytes = uint64_t{256} << 20;
+    spec.run.threads = 1;
+    spec.run.subvolume_edge = 128;
+    return spec;
+  }
+  static BuildReport build(const BuildSpec& spec) {
+    NoProgress progress;
+    CancelToken cancel;
+    return run_build(spec, {system_files(), progress, cancel});
+  }
+  // Builds until `stage` has done `after` units, then stops as Ctrl-C would.
+  static void build_until(const BuildSpec& spec, const std::string& stage, uint64_t after) {
+    CancelToken cancel;
+    CancellingProgress progress(cancel, stage, after);
+    try {
+      run_build(spec, {system_files(), progress, cancel});
+      FAIL() << "the build was not interrupted";
+    } catch (const Error& error) {
+      ASSERT_EQ(error.code(), ErrorCode::kCancelled) << error.what();
+    }
+    EXPECT_FALSE(std::filesystem::exists(spec.run.output));
+  }
+  static ErrorCode code_of(const BuildSpec& spec) {
+    try {
+      build(spec);
+    } catch (const Error& error) {
+      return error.code();
+    }
+    ADD_FAILURE() << "the build went through";
+    return ErrorCode::kIo;
+  }
+
+  TemporaryFolder folder_;
+};
+
+// Interrupted in any stage, the same call goes on, reuses what was built and ends with the same
+// bytes; afterwards nothing is left but the result and its report.
+TEST_F(ResumeTest, GoesOnAfterAnInterruptionInAnyStage) {
+  const std::string expected = build(spec()).sha256;
+  std::filesystem::remove(output());
+  struct Moment {
+    const char* stage;
+    uint64_t after;
+    bool reuses;
+  };
+  for (const Moment& moment :
+       {Moment{"scan", 1, false}, Moment{"ingest", 1, false}, Moment{"build", 1, true},
+        Moment{"build", 40, true}, Moment{"merge", 0, true}, Moment{"merge", 1, true}}) {
+    SCOPED_TRACE(std::string(moment.stage) + " after " + std::to_string(moment.after));
+    build_until(spec(), moment.stage, moment.after);
+    const BuildReport report = build(spec());
+    EXPECT_EQ(report.sha256, expected);
+    EXPECT_EQ(report.subvolumes_reused > 0, moment.reuses);
+    EXPECT_FALSE(std::filesystem::exists(work()));
+    std::filesystem::remove(output());
+  }
+}
+
+// Another scene, resolution or hash is another job: refused, saying what differs, until told to
+// start over. Run options may change between the runs.
+TEST_F(ResumeTest, RefusesAnotherJobInTheSameFolder) {
+  build_until(spec(), "build", 5);
+  BuildSpec other = spec();
+  other.geometry.resolution = 512;
+  EXPECT_EQ(code_of(other), ErrorCode::kInvalidInput);
+  other = spec();
+  other.geometry.hash_bits = 16;
+  EXPECT_EQ(code_of(other), ErrorCode::kInvalidInput);
+  std::filesystem::copy(scene(), folder_.path() + "/second.glb");
+  other = spec();
+  other.geometry.scenes.push_back(folder_.path() + "/second.glb");
+  EXPECT_EQ(code_of(other), ErrorCode::kInvalidInput);
+  other = spec();
+  other.geometry.hash_bits = 16;
+  other.run.restart = true;
+  EXPECT_EQ(build(other).subvolumes_reused, 0u);
+
+  std::filesystem::remove(output());
+  build_until(spec(), "build", 5);
+  other = spec();
+  other.run.threads = 2;
+  other.run.memory_bytes = uint64_t{64} << 20;
+  other.run.subvolume_edge = 64;
+  const BuildReport report = build(other);
+  EXPECT_GT(report.subvolumes_reused, 0u);
+  EXPECT_GT(report.subvolumes_split, 0u);
+  other.run = spec().run;
+  EXPECT_EQ(report.sha256, build(other).sha256);
+}
+
+// A damaged artifact, or a segment that is gone, costs its own subvolumes and nothing else.
+TEST_F(ResumeTest, BuildsDamagedArtifactsAgain) {
+  const std::string expected = build(spec()).sha256;
+  for (const bool whole_segment : {false, true}) {
+    SCOPED_TRACE(whole_segment ? "segment removed" : "byte flipped");
+    std::filesystem::remove(output());
+    build_until(spec(), "merge", 0);
+    const std::string segment = segment_path(work(), 0);
+    if (whole_segment) {
+      std::filesystem::remove(segment);
+    } else {
+      std::fstream file(segment, std::ios::in | std::ios::out | std::ios::binary);
+      const auto middle = static_cast<std::streamoff>(std::filesystem::file_size(segment) / 2);
+      file.seekg(middle);
+      const char byte = static_cast<char>(file.get() ^ 0x10);
+      file.seekp(middle);
+      file.put(byte);
+    }
+    const BuildReport report = build(spec());
+    EXPECT_EQ(report.sha256, expected);
+    EXPECT_LT(report.subvolumes_reused, report.subvolumes);
+    EXPECT_EQ(report.subvolumes_reused + (whole_segment ? report.subvolumes : 1),
+              report.subvolumes);
+  }
+}
+
+// One builder a folder; the second is told who holds it. Files of others are not touched.
+TEST_F(ResumeTest, OwnsItsFolderAlone) {
+  {
+    WorkFolder first(system_files(), work());
+    try {
+      build(spec());
+      FAIL() << "two builds in one folder";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+      EXPECT_NE(error.message().find("process " + std::to_string(getpid())), std::string::npos)
+          << error.what();
+    }
+    EXPECT_NE(WorkFolder::holder(system_files(), work()), "");
+  }
+  EXPECT_EQ(WorkFolder::holder(system_files(), work()), "");
+  std::ofstream(work() + "/letter.txt") << "not ours";
+  EXPECT_EQ(code_of(spec()), ErrorCode::kInvalidInput);
+  EXPECT_TRUE(std::filesystem::exists(work() + "/letter.txt"));
+}
+
+// The state of an interrupted build can be read by others.
+TEST_F(ResumeTest, TellsItsStatus) {
+  EXPECT_THROW(read_job_status(system_files(), work()), Error);
+  build_until(spec(), "build", 5);
+  const JobStatus status = read_job_status(system_files(), work());
+  EXPECT_FALSE(status.running);
+  EXPECT_GE(status.built, 5u);
+  EXPECT_GT(status.subvolumes, status.built);
+  ASSERT_TRUE(status.progress.has_value());
+  EXPECT_EQ(status.progress->stage, "build");
+  EXPECT_NE(status.progress->last_error.find("cancelled"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace voxdag
