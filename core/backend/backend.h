@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "core/base/cancel_token.h"
@@ -64,5 +65,27 @@ class Backend {
 // The CPU backend: bricks rasterised tile by tile, nodes hash-consed. Uses AVX2 where the machine
 // has it, chosen at run time; `allow_simd` false keeps to the portable path, for tests.
 std::unique_ptr<Backend> make_cpu_backend(bool allow_simd = true);
+
+// How the parallel backends go about it; the answer is the same.
+enum class Method {
+  kFast,      // bricks drawn tile by tile, DAG by hashes: what is fastest on a GPU
+  kPointers,  // voxel list, DAG by pointers: the tutorial's first version
+  kHashes,    // voxel list, DAG by hashes: the tutorial's second version
+};
+
+// The parallel pipeline on the host's threads (0 for all of them): for tests, and to compare with.
+std::unique_ptr<Backend> make_parallel_host_backend(Method method, unsigned threads = 1);
+
+// GPUs that make_cuda_backend() can open: 0 without CUDA in this build, driver or device. Never
+// throws.
+int cuda_device_count();
+inline bool cuda_device_available() { return cuda_device_count() > 0; }
+// Why there is none, in a sentence; empty if there is one.
+std::string cuda_device_problem();
+
+// The parallel pipeline on a GPU, device memory charged to the build's budget like any other. It
+// has its own stream, so two backends on one device overlap transfers and host work of one with
+// kernels of the other. Throws Error{kDevice} when there is no such device.
+std::unique_ptr<Backend> make_cuda_backend(Method method = Method::kFast, int device = 0);
 
 }  // namespace voxdag

@@ -70,7 +70,10 @@ struct Decoder {
 
 std::vector<BackendUnderTest> backends_under_test() {
   return {{"cpu", [] { return make_cpu_backend(true); }},
-          {"cpu_portable", [] { return make_cpu_backend(false); }}};
+          {"cpu_portable", [] { return make_cpu_backend(false); }},
+          {"parallel_host_fast", [] { return make_parallel_host_backend(Method::kFast, 2); }},
+          {"parallel_host_hashes", [] { return make_parallel_host_backend(Method::kHashes); }},
+          {"parallel_host_pointers", [] { return make_parallel_host_backend(Method::kPointers); }}};
 }
 
 Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,

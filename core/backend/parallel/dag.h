@@ -14,7 +14,6 @@ template <class Space>
 struct DagBricks {
   uint32_t count = 0;
   Buffer<Space, uint64_t> masks;
-  Buffer<Space, uint64_t> hashes;  // cut
 };
 
 template <class Space>
@@ -29,6 +28,7 @@ template <class Space>
 struct Dag {
   DagBricks<Space> bricks;
   std::vector<DagLevel<Space>> levels;  // from the bricks' parents up to the root
+  uint64_t root_hash = 0;
 
   uint64_t node_count() const {
     uint64_t count = bricks.count;

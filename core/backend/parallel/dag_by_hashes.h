@@ -3,11 +3,12 @@
 // and parents rewired. Children of dropped nodes are never looked at again, so that sorting follows
 // the largest level of the DAG, not of the octree.
 //
-// A verification sweep makes it exact: on every level every octree node, dropped or not, is compared
-// with the survivor of its hash (brick masks; above, mask and list of child hashes). If all agree on
-// all levels, equal hash implies equal subtree, by induction from the bricks: the children of two
-// equal nodes have equal hashes, so are equal. Then a level's hashes are all different, and their
-// order is the total order. Any mismatch, and the DAG is made by pointers instead.
+// A verification sweep makes it exact: on every level every octree node, dropped or not, is
+// compared with the survivor of its hash (brick masks; above, mask and list of child hashes). If
+// all agree on all levels, equal hash implies equal subtree, by induction from the bricks: the
+// children of two equal nodes have equal hashes, so are equal. Then a level's hashes are all
+// different, and their order is the total order. Any mismatch, and the DAG is made by pointers
+// instead.
 #pragma once
 
 #include <cstdint>
@@ -130,15 +131,13 @@ std::vector<Buffer<Space, uint64_t>> hash_octree(Space& space, const Octree<Spac
                                                  uint32_t hash_bits) {
   std::vector<Buffer<Space, uint64_t>> hashes;
   hashes.emplace_back(space, tree.brick_count);
-  space.for_each(tree.brick_count,
-                 HashBrick{tree.brick_masks.data(), hash_bits, hashes[0].data()});
+  space.for_each(tree.brick_count, HashBrick{tree.brick_masks.data(), hash_bits, hashes[0].data()});
   for (const OctreeLevel<Space>& level : tree.levels) {
     Buffer<Space, uint64_t> here(space, level.count);
-    space.for_each(level.count,
-                   HashOctreeNode{{level.first_child.data(), level.masks.data()},
-                                  hashes.back().data(),
-                                  hash_bits,
-                                  here.data()});
+    space.for_each(level.count, HashOctreeNode{{level.first_child.data(), level.masks.data()},
+                                               hashes.back().data(),
+                                               hash_bits,
+                                               here.data()});
     hashes.push_back(std::move(here));
   }
   return hashes;
@@ -182,9 +181,9 @@ Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
   out.nodes = Buffer<Space, uint32_t>(space, out.count);
   out.hashes = Buffer<Space, uint64_t>(space, out.count);
   level.children = Buffer<Space, uint32_t>(space, n);
-  space.for_each(n, DropDoubles{marked.data(), order.items(), candidates.data(),
-                                candidate_hashes.data(), out.nodes.data(), out.hashes.data(),
-                                level.children.data()});
+  space.for_each(
+      n, DropDoubles{marked.data(), order.items(), candidates.data(), candidate_hashes.data(),
+                     out.nodes.data(), out.hashes.data(), level.children.data()});
   return out;
 }
 
@@ -210,14 +209,14 @@ std::optional<Dag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& 
   space.upload(&none, mismatch.data(), 1);
   Survivors<Space> survivors = surviving_root(space, hashes.back());
   Dag<Space> dag;
+  dag.root_hash = space.value(survivors.hashes.data());
   dag.levels.resize(tree.levels.size());
   for (size_t l = tree.levels.size(); l-- > 0;) {
     const OctreeLevel<Space>& level = tree.levels[l];
     const OctreeNodes nodes{level.first_child.data(), level.masks.data()};
-    space.for_each(level.count,
-                   VerifyNode{nodes, hashes[l + 1].data(), hashes[l].data(),
-                              survivors.hashes.data(), survivors.nodes.data(), survivors.count,
-                              mismatch.data()});
+    space.for_each(level.count, VerifyNode{nodes, hashes[l + 1].data(), hashes[l].data(),
+                                           survivors.hashes.data(), survivors.nodes.data(),
+                                           survivors.count, mismatch.data()});
     hashes.pop_back();
     Survivors<Space> below =
         reduce_children(space, nodes, survivors, hashes[l].data(), hash_bits, dag.levels[l]);
@@ -232,7 +231,6 @@ std::optional<Dag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& 
   dag.bricks.masks = Buffer<Space, uint64_t>(space, survivors.count);
   space.for_each(survivors.count, Gather<uint64_t>{survivors.nodes.data(), tree.brick_masks.data(),
                                                    dag.bricks.masks.data()});
-  dag.bricks.hashes = std::move(survivors.hashes);
   return dag;
 }
 

@@ -50,8 +50,7 @@ struct PointerKey {
   int bits;
   VOXDAG_HD uint64_t operator()(uint32_t node) const {
     uint64_t key = 0;
-    for (uint32_t slot = first; slot < end; ++slot)
-      key = key << bits | links.pointer(node, slot);
+    for (uint32_t slot = first; slot < end; ++slot) key = key << bits | links.pointer(node, slot);
     return key;
   }
 };
@@ -147,8 +146,8 @@ struct EmitChildren {
 // `order` has equal items side by side, ascending by all of the total order but the hash. `hash`
 // makes a functor that hashes survivors: hash(survivors, hashes).
 template <class Space, class Same, class MakeHash>
-Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same,
-                             uint32_t hash_bits, MakeHash hash) {
+Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same, uint32_t hash_bits,
+                             MakeHash hash) {
   const uint32_t n = order.count();
   Buffer<Space, uint32_t> marked(space, n + 1);
   space.for_each(n, MarkFirstOfEquals<Same>{same, order.items(), marked.data()});
@@ -164,8 +163,7 @@ Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same,
   by_hash.sort_by(KeyAt{hashes.data()}, first_hash_bit(hash_bits), 64);
   out.survivors = Buffer<Space, uint32_t>(space, out.count);
   out.hashes = Buffer<Space, uint64_t>(space, out.count);
-  space.for_each(out.count,
-                 Gather<uint32_t>{by_hash.items(), firsts.data(), out.survivors.data()});
+  space.for_each(out.count, Gather<uint32_t>{by_hash.items(), firsts.data(), out.survivors.data()});
   space.for_each(out.count, Gather<uint64_t>{by_hash.items(), hashes.data(), out.hashes.data()});
   const Buffer<Space, uint32_t> place_of_group = by_hash.places();
   out.index_of = Buffer<Space, uint32_t>(space, n);
@@ -232,17 +230,18 @@ Dag<Space> make_dag_by_pointers(Space& space, const Octree<Space>& tree, uint32_
   dag.bricks.masks = Buffer<Space, uint64_t>(space, reduced.count);
   space.for_each(reduced.count, Gather<uint64_t>{reduced.survivors.data(), tree.brick_masks.data(),
                                                  dag.bricks.masks.data()});
-  dag.bricks.hashes = std::move(reduced.hashes);
-  const uint64_t* child_hashes = dag.bricks.hashes.data();
+  const Buffer<Space, uint64_t> brick_hashes = std::move(reduced.hashes);
+  const uint64_t* child_hashes = brick_hashes.data();
   for (const OctreeLevel<Space>& level : tree.levels) {
     const LinkedNodes links{{level.first_child.data(), level.masks.data()},
                             reduced.index_of.data()};
-    Reduced<Space> here = reduce_nodes(space, level.count, links, child_hashes, reduced.count,
-                                       hash_bits);
+    Reduced<Space> here =
+        reduce_nodes(space, level.count, links, child_hashes, reduced.count, hash_bits);
     dag.levels.push_back(make_level(space, links, here));
     child_hashes = dag.levels.back().hashes.data();
     reduced = std::move(here);
   }
+  dag.root_hash = space.value(child_hashes);
   return dag;
 }
 

@@ -1,5 +1,5 @@
-// A DAG's level arrays on the host, ready for the sink: all of them fetched before the sink hears of
-// any, so that a subvolume that outgrows its memory does so in time.
+// A DAG's level arrays on the host, ready for the sink: all of them fetched before the sink hears
+// of any, so that a subvolume that outgrows its memory does so in time.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/backend/parallel/dag.h"
+#include "core/base/error.h"
 #include "core/base/page_buffer.h"
 #include "core/dag/sub_dag.h"
 
@@ -24,9 +25,7 @@ class HostArray {
       array_ = std::move(array);
       view_ = {array_.data(), size};
     } else {
-      MemoryCharge(space.budget(), 0, "");
-      if (space.budget().available() < size * sizeof(T)) throw Outgrown{};
-      copy_ = PageBuffer<T>(space.budget(), size, "level arrays");
+      copy_ = pages(space.budget(), size);
       space.download(array.data(), copy_.data(), size);
       array = {};
       view_ = {copy_.data(), size};
@@ -35,6 +34,15 @@ class HostArray {
   std::span<const T> view() const { return view_; }
 
  private:
+  static PageBuffer<T> pages(MemoryBudget& budget, uint64_t size) {
+    try {
+      return PageBuffer<T>(budget, size, "level arrays");
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::kOutOfMemory) throw Outgrown{};
+      throw;
+    }
+  }
+
   Buffer<Space, T> array_;
   PageBuffer<T> copy_;
   std::span<const T> view_;
@@ -43,18 +51,13 @@ class HostArray {
 template <class Space>
 class HostLevels {
  public:
-  HostLevels(Space& space, Dag<Space>&& dag)
-      : brick_hashes_(space, std::move(dag.bricks.hashes)),
-        brick_masks_(space, std::move(dag.bricks.masks)) {
+  HostLevels(Space& space, Dag<Space>&& dag) : brick_masks_(space, std::move(dag.bricks.masks)) {
     for (DagLevel<Space>& level : dag.levels)
       levels_.push_back({{space, std::move(level.hashes)},
                          {space, std::move(level.masks)},
                          {space, std::move(level.children)}});
   }
 
-  uint64_t root_hash() const {
-    return levels_.empty() ? brick_hashes_.view()[0] : levels_.back().hashes.view()[0];
-  }
   void send(uint32_t brick_level, SubDagSink& sink) const {
     sink.bricks({brick_masks_.view()});
     uint32_t level = brick_level;
@@ -68,7 +71,7 @@ class HostLevels {
     HostArray<Space, uint8_t> masks;
     HostArray<Space, uint32_t> children;
   };
-  HostArray<Space, uint64_t> brick_hashes_, brick_masks_;
+  HostArray<Space, uint64_t> brick_masks_;
   std::vector<Nodes> levels_;
 };
 

@@ -127,8 +127,7 @@ void HostSpace::radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch,
     });
     uint32_t at = 0;
     for (uint32_t d = 0; d <= digit_mask; ++d)
-      for (uint32_t p = 0; p < parts; ++p)
-        at += std::exchange(places[p << kDigitBits | d], at);
+      for (uint32_t p = 0; p < parts; ++p) at += std::exchange(places[p << kDigitBits | d], at);
     parallel_for(threads_, parts, [&](unsigned, size_t p) {
       const Part part(n, parts, p);
       uint32_t* next = &places[p << kDigitBits];

@@ -17,6 +17,7 @@ class HostSpace {
  public:
   static constexpr bool kOnHost = true;
   static constexpr uint64_t kWindow = uint64_t{1} << 16;
+  static constexpr uint32_t kTilesAtOnce = 64;
   template <class T>
   using Array = Buffer<HostSpace, T>;
 

@@ -67,13 +67,13 @@ struct MakeParent {
 
 // `level_count` levels above the bricks. The list is merged and not empty, and given up.
 template <class Space>
-Octree<Space> make_octree(Space& space, BrickList<Space>& bricks, int level_count) {
+Octree<Space> make_octree(Space& space, BrickList<Space>& bricks, uint32_t level_count) {
   Octree<Space> tree;
   tree.brick_count = bricks.size();
   Buffer<Space, uint64_t> codes = bricks.take_codes();
   tree.brick_masks = bricks.take_masks();
   uint32_t child_count = tree.brick_count;
-  for (int l = 0; l < level_count; ++l) {
+  for (uint32_t l = 0; l < level_count; ++l) {
     Buffer<Space, uint32_t> first_child(space, child_count);
     OctreeLevel<Space> level;
     {
@@ -86,9 +86,9 @@ Octree<Space> make_octree(Space& space, BrickList<Space>& bricks, int level_coun
     first_child = {};
     level.masks = Buffer<Space, uint8_t>(space, level.count);
     Buffer<Space, uint64_t> parent_codes(space, level.count);
-    space.for_each(level.count, MakeParent{codes.data(), child_count, level.count,
-                                           level.first_child.data(), level.masks.data(),
-                                           parent_codes.data()});
+    space.for_each(level.count,
+                   MakeParent{codes.data(), child_count, level.count, level.first_child.data(),
+                              level.masks.data(), parent_codes.data()});
     codes = std::move(parent_codes);
     child_count = level.count;
     tree.levels.push_back(std::move(level));

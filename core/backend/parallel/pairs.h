@@ -141,8 +141,7 @@ class PairExpansion {
   void run(const FixedTriangle* triangles, uint32_t first, uint32_t last, Out& out) {
     triangles_ = triangles;
     Frame& top = frames_[0];
-    space_.for_each(last - first,
-                    StartPairs{first, top.codes.data(), top.pair_triangles.data()});
+    space_.for_each(last - first, StartPairs{first, top.codes.data(), top.pair_triangles.data()});
     hand_on(0, last - first, out);
   }
 
@@ -165,9 +164,9 @@ class PairExpansion {
 
   template <int N>
   void count_parts(Frame& f, int shift, uint32_t count) {
-    space_.for_each(count,
-                    CountParts<N>{place_, shift, triangles_, f.codes.data(),
-                                  f.pair_triangles.data(), f.parts.data(), f.offsets.data()});
+    space_.for_each(
+        count, CountParts<N>{place_, shift, triangles_, f.codes.data(), f.pair_triangles.data(),
+                             f.parts.data(), f.offsets.data()});
   }
 
   template <class Out>

@@ -22,8 +22,9 @@
 //   upload_staged(area, to)             sends them there
 //   allocate, release, budget           memory; use Buffer
 //
-// Everything happens in the order of the calls. kWindow is how many items a space likes to work on
-// at once. A space belongs to one build and one thread. Cancelled builds throw from any call.
+// Everything happens in the order of the calls. kWindow is how many items, and
+// kTilesAtOnce how many tiles, a space likes to work on at once; kOnHost says that its memory is
+// the host's. A space belongs to one build and one thread. Cancelled builds throw from any call.
 #pragma once
 
 #include <cstddef>

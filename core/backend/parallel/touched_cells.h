@@ -12,8 +12,8 @@
 //
 // Bounds, for triangles of at most 2^28 units in each axis and blocks of at most 2^28 units (the
 // largest grid): half edges <= 2^27, quarter normals n_a <= 2^55. If triangle and block are not
-// apart in an axis, |low - v| <= 2^29 there, so edge constants stay below 2^58. The plane's constant
-// needs 128 bits; divided by 2^shift it is clamped to +-2^60, which changes no sign since
+// apart in an axis, |low - v| <= 2^29 there, so edge constants stay below 2^58. The plane's
+// constant needs 128 bits; divided by 2^shift it is clamped to +-2^60, which changes no sign since
 // |n . k| + sum |n_a| <= 12 * 2^55 < 2^59. Larger triangles are tested cell by cell.
 #pragma once
 

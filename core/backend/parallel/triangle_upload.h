@@ -1,6 +1,6 @@
 // Triangles from the stream into a space: read into a staging area of the host, copied from there.
-// On a GPU two areas take turns, so that one is read into while the other is on its way; on the host
-// the staging area is the destination itself.
+// On a GPU two areas take turns, so that one is read into while the other is on its way; on the
+// host the staging area is the destination itself.
 #pragma once
 
 #include <algorithm>

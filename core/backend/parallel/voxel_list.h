@@ -46,8 +46,8 @@ class VoxelList {
     if (size_ == 0) return;
     space_.sort_keys(codes_, scratch_, size_, 0, code_bits_);
     space_.for_each(size_, SplitVoxelCode{codes_.data(), bits_.data()});
-    const uint32_t packed = space_.merge_runs(codes_.data(), bits_.data(), size_, scratch_.data(),
-                                              packed_.data());
+    const uint32_t packed =
+        space_.merge_runs(codes_.data(), bits_.data(), size_, scratch_.data(), packed_.data());
     const uint32_t at = bricks_.make_room(packed);
     space_.copy(scratch_.data(), bricks_.codes() + at, packed);
     space_.copy(packed_.data(), bricks_.masks() + at, packed);
@@ -82,8 +82,7 @@ void voxelize_by_list(Space& space, const SubvolumeTask& task, TriangleStream& s
       items_that_fit(space, 6, frames * PairExpansion<Space>::kBytesPerPair, 256),
       static_cast<uint32_t>(Space::kWindow));
   const uint32_t voxels = items_that_fit(space, 6, VoxelList<Space>::kBytesPerVoxel, 4096);
-  const uint32_t batch =
-      std::min(window, items_that_fit(space, 16, sizeof(FixedTriangle), 256));
+  const uint32_t batch = std::min(window, items_that_fit(space, 16, sizeof(FixedTriangle), 256));
   PairExpansion<Space> pairs(space, task, cube_levels - kBrickLevels, true, window);
   VoxelList<Space> list(space, bricks, 3 * cube_levels, voxels);
   Buffer<Space, FixedTriangle> triangles(space, batch);

@@ -1,0 +1,91 @@
+// A Backend made of the parallel pipeline, over any space:
+//
+//     triangles -> bricks (tiles.h, or the reference voxel_list.h) -> octree -> DAG (by hashes, or
+//     by pointers) -> level arrays on the host -> sink
+//
+// `Device` outlives the builds and opens a space for each: device.open(task, budget, cancel).
+#pragma once
+
+#include <optional>
+#include <utility>
+
+#include "core/backend/backend.h"
+#include "core/backend/parallel/brick_list.h"
+#include "core/backend/parallel/dag_by_hashes.h"
+#include "core/backend/parallel/dag_by_pointers.h"
+#include "core/backend/parallel/host_levels.h"
+#include "core/backend/parallel/octree.h"
+#include "core/backend/parallel/tiles.h"
+#include "core/backend/parallel/voxel_list.h"
+
+namespace voxdag::parallel {
+
+template <class Space>
+BrickList<Space> voxelize(Space& space, Method method, const SubvolumeTask& task,
+                          TriangleStream& triangles) {
+  const int cube_levels = static_cast<int>(task.grid_levels - task.cube.level);
+  const int code_bits = 3 * (cube_levels - kBrickLevels);
+  if (method == Method::kFast && cube_levels >= kTileLevels) {
+    try {
+      BrickList<Space> bricks(space, code_bits);
+      voxelize_by_tiles(space, task, triangles, bricks);
+      return bricks;
+    } catch (const Outgrown&) {
+      // A larger cube is split; the smallest has to fit whatever streams through it.
+      if (cube_levels > kTileLevels) throw;
+    }
+  }
+  BrickList<Space> bricks(space, code_bits);
+  voxelize_by_list(space, task, triangles, bricks);
+  bricks.merge();
+  return bricks;
+}
+
+template <class Space>
+Dag<Space> make_dag(Space& space, Method method, const Octree<Space>& tree, uint32_t hash_bits) {
+  if (method != Method::kPointers)
+    if (auto dag = make_dag_by_hashes(space, tree, hash_bits)) return std::move(*dag);
+  return make_dag_by_pointers(space, tree, hash_bits);
+}
+
+template <class Device>
+class ParallelBackend : public Backend {
+ public:
+  ParallelBackend(Device device, Method method) : device_(std::move(device)), method_(method) {}
+  std::string_view name() const override { return Device::kName; }
+
+  BuildOutcome build(const SubvolumeTask& task, TriangleStream& triangles, MemoryBudget& budget,
+                     const CancelToken& cancel, SubDagSink& sink, SubDagSummary& summary) override {
+    summary = {};
+    try {
+      auto space = device_.open(task, budget, cancel);
+      auto bricks = voxelize(space, method_, task, triangles);
+      if (bricks.size() == 0) return BuildOutcome::kBuilt;
+      SubDagSummary found;
+      const auto levels = reduce(space, task, bricks, found);
+      levels.send(task.grid_levels - kBrickLevels, sink);
+      summary = found;
+      return BuildOutcome::kBuilt;
+    } catch (const Outgrown&) {
+      return BuildOutcome::kOutgrown;
+    }
+  }
+
+ private:
+  template <class Space>
+  HostLevels<Space> reduce(Space& space, const SubvolumeTask& task, BrickList<Space>& bricks,
+                           SubDagSummary& summary) {
+    const uint32_t level_count = task.grid_levels - kBrickLevels - task.cube.level;
+    auto tree = make_octree(space, bricks, level_count);
+    const uint64_t voxels = space.count_bits(tree.brick_masks.data(), tree.brick_count);
+    auto dag = make_dag(space, method_, tree, task.hash_bits);
+    summary = {voxels, tree.node_count(), dag.node_count(), dag.root_hash};
+    tree = {};
+    return HostLevels<Space>(space, std::move(dag));
+  }
+
+  Device device_;
+  const Method method_;
+};
+
+}  // namespace voxdag::parallel
