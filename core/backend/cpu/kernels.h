@@ -22,6 +22,10 @@ struct Kernels {
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
   // `inside`: the triangle covers the whole cube, which it is known not to miss.
   Octants (*test_octants)(const NarrowTriangle& triangle, const Box& cube, bool inside);
+  // Sets bit i of `bits` iff least <= values[i] <= most, for `count` values, a multiple of 4; the
+  // other bits of the last word are 0.
+  void (*find_in_range)(const int64_t* values, int count, int64_t least, int64_t most,
+                        uint64_t* bits);
   // Bits set in `count` words.
   uint64_t (*count_bits)(const uint64_t* words, int count);
 };

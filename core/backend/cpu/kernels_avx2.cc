@@ -40,7 +40,21 @@ uint64_t count_bits(const uint64_t* words, int count) {
   return bits;
 }
 
-constexpr Kernels kAvx2 = {draw_avx2, test_octants, count_bits};
+void find_in_range(const int64_t* values, int count, int64_t least, int64_t most, uint64_t* bits) {
+  const __m256i low = _mm256_set1_epi64x(least), high = _mm256_set1_epi64x(most);
+  for (int i = 0; i < count; i += 64) {
+    uint64_t outside = 0;
+    const int end = count - i < 64 ? count - i : 64;
+    for (int j = 0; j < end; j += 4) {
+      const __m256i x = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values + i + j));
+      const __m256i out = _mm256_or_si256(_mm256_cmpgt_epi64(low, x), _mm256_cmpgt_epi64(x, high));
+      outside |= static_cast<uint64_t>(_mm256_movemask_pd(_mm256_castsi256_pd(out))) << j;
+    }
+    bits[i / 64] = ~outside & (end < 64 ? (uint64_t{1} << end) - 1 : ~uint64_t{0});
+  }
+}
+
+constexpr Kernels kAvx2 = {draw_avx2, test_octants, find_in_range, count_bits};
 
 }  // namespace
 

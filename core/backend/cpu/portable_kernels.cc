@@ -47,7 +47,17 @@ uint64_t count_bits(const uint64_t* words, int count) {
   return bits;
 }
 
-constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow, count_bits};
+void find_in_range(const int64_t* values, int count, int64_t least, int64_t most, uint64_t* bits) {
+  for (int i = 0; i < count; i += 64) {
+    uint64_t word = 0;
+    for (int j = 0; j < 64 && i + j < count; ++j)
+      word |= uint64_t{values[i + j] >= least && values[i + j] <= most} << j;
+    bits[i / 64] = word;
+  }
+}
+
+constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow, find_in_range,
+                               count_bits};
 
 }  // namespace
 

@@ -4,6 +4,14 @@
 
 namespace voxdag::cpu {
 
+NodeRef SubDagTables::add_brick(uint64_t mask) {
+  if (mask == 0) return {};
+  counts_ += {1, static_cast<uint64_t>(popcount64(mask))};
+  bricks_.reserve(1);
+  const uint64_t hash = hash_brick(mask);
+  return {hash, bricks_.find_or_add(mask, hash), true};
+}
+
 NodeRef SubDagTables::add_node(int size_log2, const NodeRef (&children)[8]) {
   uint32_t mask = 0, ids[8];
   uint64_t hashes[8];

@@ -50,6 +50,8 @@ class SubDagTables {
 
   OctreeCounts& counts() { return counts_; }
 
+  // A brick that may be empty, counted as one octree node more if it is not.
+  NodeRef add_brick(uint64_t mask);
   // The node above eight cubes of half its size, counted as one octree node more.
   NodeRef add_node(int size_log2, const NodeRef (&children)[8]);
 

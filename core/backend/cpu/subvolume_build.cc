@@ -5,7 +5,8 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr size_t kBatch = 256;  // triangles read at once
+constexpr size_t kBatch = 256;       // triangles read at once
+constexpr size_t kFewTriangles = 4;  // in a tile that remembered planes may be better for
 
 Box box_of(const SubvolumeTask& task) {
   Box box;
@@ -20,15 +21,16 @@ int size_log2_of(const SubvolumeTask& task) {
 
 }  // namespace
 
-SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels,
-                               Memory& memory, const CancelToken& cancel)
+SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, Memory& memory,
+                               const CancelToken& cancel)
     : task_(task),
       kernels_(kernels),
       memory_(memory),
       cancel_(cancel),
       triangles_(memory),
       tables_(memory, size_log2_of(task)),
-      reducer_(tables_, kernels) {}
+      reducer_(tables_, kernels),
+      planes_(memory, tables_, reducer_, kernels) {}
 
 SubDagSummary SubvolumeBuild::run(TriangleStream& stream, SubDagSink& sink) {
   stream.rewind();
@@ -76,7 +78,11 @@ void SubvolumeBuild::reserve_entries(size_t count) {
 
 NodeRef SubvolumeBuild::build(int size_log2, const Box& cube, size_t first, size_t count) {
   if (count == 0) return {};
-  if (size_log2 <= kTileLog2) return build_tile(size_log2, cube, first, count);
+  if (NodeRef node; count == 1 && entries_[first].inside() &&
+                    planes_.build(triangles_, entries_[first], cube, size_log2, node))
+    return node;
+  if (size_log2 <= kTileLog2 && !worth_splitting(size_log2, first, count))
+    return build_tile(size_log2, cube, first, count);
   if (count > octants_.size()) octants_.grow(memory_, count);
   size_t counts[8] = {};
   for (size_t i = 0; i < count; ++i) {
@@ -103,6 +109,13 @@ NodeRef SubvolumeBuild::build(int size_log2, const Box& cube, size_t first, size
     children[c] = build(size_log2 - 1, cube.child(c), next[c] - counts[c], counts[c]);
   entries_used_ = below;
   return tables_.add_node(size_log2, children);
+}
+
+bool SubvolumeBuild::worth_splitting(int size_log2, size_t first, size_t count) {
+  if (size_log2 <= PlaneMemory::kSmallestLog2 || count > kFewTriangles) return false;
+  for (size_t i = 0; i < count; ++i)
+    if (!planes_.remembers(triangles_, entries_[first + i])) return false;
+  return true;
 }
 
 NodeRef SubvolumeBuild::build_tile(int size_log2, const Box& cube, size_t first, size_t count) {

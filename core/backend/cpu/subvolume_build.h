@@ -7,6 +7,7 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/plane_memory.h"
 #include "core/backend/cpu/sub_dag_tables.h"
 #include "core/backend/cpu/tile_reducer.h"
 #include "core/backend/cpu/triangle_set.h"
@@ -26,6 +27,8 @@ class SubvolumeBuild {
   // The node of a cube of 2^size_log2 voxels that the entries [first, first + count) of the stack
   // may touch.
   NodeRef build(int size_log2, const Box& cube, size_t first, size_t count);
+  // Whether a cube of tile size, or less, is better split, since its parts may be remembered.
+  bool worth_splitting(int size_log2, size_t first, size_t count);
   NodeRef build_tile(int size_log2, const Box& cube, size_t first, size_t count);
   Octants test_octants(Entry entry, const Box& cube) const;
   void draw(const WideTriangle& triangle, const Box& tile);
@@ -44,6 +47,7 @@ class SubvolumeBuild {
   size_t entries_used_ = 0;
   SubDagTables tables_;
   TileReducer reducer_;
+  PlaneMemory planes_;
   TileBricks tile_;
 };
 

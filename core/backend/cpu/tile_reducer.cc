@@ -7,7 +7,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// popcount of a child mask: a call into a library where the instruction cannot be taken for granted.
+// popcount of a child mask: a call into a library where the instruction cannot be taken for
+// granted.
 struct BitTable {
   uint8_t bits[256] = {};
   constexpr BitTable() {
@@ -26,8 +27,7 @@ uint64_t hash_of(uint32_t mask, int count, const uint64_t* child_hashes) {
 }  // namespace
 
 NodeRef TileReducer::reduce_bricks(TileBricks& tile, int size_log2) {
-  const int bricks_log2 = 3 * (size_log2 - kBrickLevels);
-  const int words = bricks_log2 > 6 ? 1 << (bricks_log2 - 6) : 1;
+  const int words = words_of(size_log2 - kBrickLevels);
   BrickTable& table = tables_.bricks();
   table.reserve(kTileBricks);
   int count = 0;
@@ -75,8 +75,7 @@ int TileReducer::reduce_level(int words, NodeTable& table) {
   }
   table.reserve(static_cast<uint64_t>(count));
   for (int i = 0; i < count; ++i) {
-    hashes_[i] =
-        hash_of(child_masks_[i], kBitsInByte[child_masks_[i]], &hashes_[first_child_[i]]);
+    hashes_[i] = hash_of(child_masks_[i], kBitsInByte[child_masks_[i]], &hashes_[first_child_[i]]);
     table.prefetch_slot(hashes_[i]);
   }
   if (count > 4)

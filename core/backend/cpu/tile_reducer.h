@@ -21,24 +21,27 @@ class TileReducer {
   // counts. Leaves the tile empty.
   NodeRef reduce_bricks(TileBricks& tile, int size_log2);
 
-  // The same for a tile whose nodes of 2^from_log2 voxels are known: those whose bit in `existing`
-  // is set are refs[0], refs[1], ... in Morton order; they are counted already.
-  template <class Refs>
-  NodeRef reduce_nodes(const uint64_t* existing, int words, const Refs& refs, int from_log2,
-                       int size_log2) {
+  // The same for a cube whose nodes of 2^from_log2 voxels are known: those whose bits are set in
+  // `existing`, in Morton order; next(m) gives the id and hash of the m-th. They are counted
+  // already.
+  template <class Next>
+  NodeRef reduce_nodes(const uint64_t* existing, int from_log2, int size_log2, Next next) {
+    const int words = words_of(size_log2 - from_log2);
     int count = 0;
     for (int w = 0; w < words; ++w) {
       existing_[w] = existing[w];
-      count += popcount64(existing[w]);
-    }
-    for (int i = 0; i < count; ++i) {
-      ids_[i] = refs[i].id;
-      hashes_[i] = refs[i].hash;
+      for (uint64_t rest = existing[w]; rest != 0; rest &= rest - 1) {
+        const auto& node = next(64 * w + lowest_bit(rest));
+        ids_[count] = node.id;
+        hashes_[count++] = node.hash;
+      }
     }
     return reduce(words, count, from_log2, size_log2);
   }
 
  private:
+  // Words of the bit set of all cubes `levels` levels below one.
+  static int words_of(int levels) { return levels > 2 ? 1 << (3 * levels - 6) : 1; }
   NodeRef reduce(int words, int count, int from_log2, int size_log2);
   int reduce_level(int words, NodeTable& table);
 
