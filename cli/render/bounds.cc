@@ -6,6 +6,7 @@ namespace voxdag::render {
 namespace {
 
 constexpr uint32_t kDepth = 11;
+constexpr uint32_t kPointDepth = 6;
 
 class Search {
  public:
@@ -61,8 +62,26 @@ class Search {
   int64_t high_[3] = {INT64_MIN, INT64_MIN, INT64_MIN};
 };
 
+void add_points(const DagView& dag, uint32_t depth, const Vec& low, uint64_t content,
+                std::vector<Vec>& points) {
+  const double half = static_cast<double>(dag.resolution() >> depth) / 2;
+  if (depth == std::min(dag.grid_levels(), kPointDepth))
+    return points.push_back(low + Vec{{half, half, half}});
+  const DagView::Children children = dag.children(depth, content);
+  for (int i = 0; i < 8; ++i)
+    if (children.has(i))
+      add_points(dag, depth + 1, low + Vec{{i & 4 ? half : 0, i & 2 ? half : 0, i & 1 ? half : 0}},
+                 dag.content(depth, children, i), points);
+}
+
 }  // namespace
 
 Box occupied_box(const DagView& dag) { return Search(dag).box(); }
+
+std::vector<Vec> occupied_points(const DagView& dag) {
+  std::vector<Vec> points;
+  add_points(dag, 0, {{0, 0, 0}}, dag.root(), points);
+  return points;
+}
 
 }  // namespace voxdag::render

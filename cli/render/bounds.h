@@ -1,7 +1,7 @@
 // The box around what is set.
 #pragma once
 
-#include <cstdint>
+#include <vector>
 
 #include "cli/render/dag_view.h"
 #include "cli/render/vec.h"
@@ -17,5 +17,8 @@ struct Box {
 // Exact to a 2048th of the grid, in voxels, the cells at its sides included. The view must not be
 // empty.
 Box occupied_box(const DagView& dag);
+
+// The middles of the occupied cells of a 64th of the grid.
+std::vector<Vec> occupied_points(const DagView& dag);
 
 }  // namespace voxdag::render

@@ -8,7 +8,8 @@ namespace voxdag::render {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kMargin = 1.04;
+constexpr double kMargin = 1.06;
+constexpr double kFar = 1e30;
 
 double half_tangent(double fov_degrees) { return std::tan(fov_degrees * kPi / 360); }
 
@@ -38,21 +39,34 @@ Ray Camera::ray(double x, double y) const {
   return {eye_, normalized(forward_ + offset)};
 }
 
-Placement whole_box(const Box& box, const Vec& towards_eye, double fov_degrees, double aspect) {
+Placement see_whole(const std::vector<Vec>& points, const Vec& towards_eye, double fov_degrees,
+                    double aspect) {
   const Vec back = normalized(towards_eye);
   Vec right, up;
   picture_axes(back * -1.0, right, up);
-  const double tangent = half_tangent(fov_degrees);
-  // A corner is seen if it lies no farther from the axis than the view is wide at its depth.
-  double distance = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec p = Vec{{corner & 4 ? box.high[0] : box.low[0], corner & 2 ? box.high[1] : box.low[1],
-                       corner & 1 ? box.high[2] : box.low[2]}} -
-                  box.centre();
-    const double across = std::max(std::fabs(dot(p, right)) / aspect, std::fabs(dot(p, up)));
-    distance = std::max(distance, dot(p, back) + across * kMargin / tangent);
+  const double tangent_up = half_tangent(fov_degrees) / kMargin;
+  // With the eye at e, point p is in the picture if |p.right - e.right| <= tangent (e.back -
+  // p.back), and likewise up: both sides of each are bounds on e, the tightest of which are met in
+  // the middle.
+  double e[2] = {0, 0}, distance = -kFar;
+  const Vec axes[2] = {right, up};
+  const double tangents[2] = {tangent_up * aspect, tangent_up};
+  for (int i = 0; i < 2; ++i) {
+    double high = -kFar, low = -kFar;
+    for (const Vec& p : points) {
+      high = std::max(high, dot(p, axes[i]) + tangents[i] * dot(p, back));
+      low = std::max(low, -dot(p, axes[i]) + tangents[i] * dot(p, back));
+    }
+    e[i] = (high - low) / 2;
+    distance = std::max(distance, (high + low) / (2 * tangents[i]));
   }
-  return {box.centre() + back * distance, box.centre(), fov_degrees};
+  double front = -kFar, middle = 0;
+  for (const Vec& p : points) {
+    front = std::max(front, dot(p, back));
+    middle += dot(p, back) / static_cast<double>(points.size());
+  }
+  const Vec axis = right * e[0] + up * e[1];
+  return {axis + back * std::max(distance, front + 1), axis + back * middle, fov_degrees};
 }
 
 }  // namespace voxdag::render

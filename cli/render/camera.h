@@ -1,7 +1,8 @@
-// A pinhole camera in voxel units, and where to put one to see a box whole.
+// A pinhole camera in voxel units, and where to put one to see a thing whole.
 #pragma once
 
-#include "cli/render/bounds.h"
+#include <vector>
+
 #include "cli/render/vec.h"
 
 namespace voxdag::render {
@@ -29,8 +30,9 @@ class Camera {
   double half_width_, half_height_;  // of the picture, in pixels
 };
 
-// Looks at the box's middle, from `towards_eye` (need not be of length 1), from just so far that
-// all of it is seen.
-Placement whole_box(const Box& box, const Vec& towards_eye, double fov_degrees, double aspect);
+// Looks from `towards_eye` (need not be of length 1) with all of `points` in the picture's middle,
+// from no farther than it takes. At least one point.
+Placement see_whole(const std::vector<Vec>& points, const Vec& towards_eye, double fov_degrees,
+                    double aspect);
 
 }  // namespace voxdag::render

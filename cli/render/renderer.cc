@@ -14,10 +14,11 @@
 namespace voxdag::render {
 namespace {
 
-uint8_t srgb_byte(double linear) {
+// `dither` in [0, 1) spreads what rounding would make steps of.
+uint8_t srgb_byte(double linear, double dither) {
   const double v = std::clamp(linear, 0.0, 1.0);
   const double s = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
-  return static_cast<uint8_t>(255 * s + 0.5);
+  return static_cast<uint8_t>(std::min(255.0, 255 * s + dither));
 }
 
 void render_pixel(const Shader& shader, int samples, int x, int y, Picture& picture) {
@@ -25,12 +26,15 @@ void render_pixel(const Shader& shader, int samples, int x, int y, Picture& pict
   for (int i = 0; i < samples * samples; ++i) {
     const auto pixel =
         static_cast<uint64_t>(y) * static_cast<uint64_t>(picture.width) + static_cast<uint64_t>(x);
-    Sampler sampler(pixel * 64 + static_cast<uint64_t>(i));
-    sum = sum + shader.colour(x + (i % samples + sampler.next()) / samples,
-                              y + (i / samples + sampler.next()) / samples, sampler);
+    Sampler sampler(pixel * 16, static_cast<uint64_t>(i));
+    const Sampler::Pair within = sampler.pair();
+    sum = sum + shader.colour(x + (i % samples + within.u) / samples,
+                              y + (i / samples + within.v) / samples, sampler);
   }
   const double scale = 1.0 / (samples * samples);
-  for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(sum[c] * scale);
+  constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
+  const double dither = (kBayer[y % 4][x % 4] + 0.5) / 16;
+  for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(sum[c] * scale, dither);
 }
 
 // Runs work(0) to work(count - 1) on threads; the first exception stops all and is thrown.

@@ -9,11 +9,11 @@ namespace voxdag::render {
 namespace {
 
 constexpr double kFar = 1e30;
-constexpr Vec kAlbedo{{0.80, 0.775, 0.74}};
-constexpr Vec kSunlight{{3.3, 3.0, 2.6}};
-constexpr Vec kZenith{{0.62, 0.80, 1.10}}, kHorizon{{1.0, 1.02, 1.05}}, kGround{{0.42, 0.38, 0.34}};
-constexpr Vec kTopColour{{0.60, 0.67, 0.76}}, kBottomColour{{0.86, 0.88, 0.90}};
-constexpr double kSunRadius = 0.02;
+constexpr Vec kAlbedo{{0.74, 0.69, 0.62}};
+constexpr Vec kSunlight{{3.6, 3.2, 2.6}};
+constexpr Vec kZenith{{0.50, 0.70, 1.05}}, kHorizon{{0.95, 1.0, 1.08}}, kGround{{0.40, 0.36, 0.32}};
+constexpr Vec kTopColour{{0.46, 0.54, 0.65}}, kBottomColour{{0.86, 0.87, 0.88}};
+constexpr double kSunRadius = 0.012;
 constexpr double kBounce = 0.42;       // of the sky's light, from what hides it
 constexpr double kRayWidening = 0.07;  // of rays to the light
 constexpr int kSkyRays = 6;            // for one sample of a pixel
@@ -27,11 +27,14 @@ Vec sky(const Vec& direction) {
   return up >= 0 ? mix(kHorizon, kZenith, std::sqrt(up)) : mix(kHorizon, kGround, std::sqrt(-up));
 }
 
-// Bright light is compressed, white only in the limit.
+// A photographic film's curve (Narkowicz 2015): steep in the middle, bright light compressed.
 Vec tone(const Vec& light) {
   Vec out;
-  for (int i = 0; i < 3; ++i) out[i] = light[i] * (1 + light[i] / 9) / (1 + light[i]);
-  return {{std::min(1.0, out[0]), std::min(1.0, out[1]), std::min(1.0, out[2])}};
+  for (int i = 0; i < 3; ++i) {
+    const double x = light[i];
+    out[i] = std::min(1.0, x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14));
+  }
+  return out;
 }
 
 bool inside(const Box& box, const Vec& p) {
@@ -79,6 +82,9 @@ bool Shader::hit_surface(const Ray& ray, Surface& s) const {
   s.normal =
       cube < 1 ? normalized(mix(surface_normal(dag_, hit, ray.direction), face, cube)) : face;
   s.point = ray.at(hit.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
+  // In a narrow place that may lie in something else. Where the ray came through is free.
+  if (caster_.cast({s.point, s.normal}, {s.size, 0}, 0, 0, hit))
+    s.point = ray.at(s.t - 1.5 * s.size);
   return true;
 }
 
@@ -101,12 +107,11 @@ Vec Shader::lit_surface(const Surface& s, int sky_rays, Sampler& sampler) const 
 }
 
 Vec Shader::skylight(const Surface& s, int rays, Sampler& sampler) const {
-  const double start_u = sampler.next(), start_v = sampler.next();
   const Cone cone{s.size, kRayWidening};
   Vec sum;
   for (int i = 0; i < rays; ++i) {
-    const double v = start_v + 0.618034 * i;
-    const Vec direction = cosine_direction(s.normal, (i + start_u) / rays, v - std::floor(v));
+    const Vec direction = cosine_direction(
+        s.normal, sampler.pair(static_cast<uint64_t>(i), static_cast<uint64_t>(rays)));
     Hit hit;
     double open = 1;
     if (caster_.cast({s.point, direction}, cone, 0, reach_, hit)) {
@@ -115,6 +120,7 @@ Vec Shader::skylight(const Surface& s, int rays, Sampler& sampler) const {
     }
     sum = sum + sky(direction) * open;
   }
+  sampler.next_pair();
   return sum * (1.0 / rays);
 }
 
@@ -126,8 +132,8 @@ bool Shader::in_sun(const Surface& s, const Vec& towards_sun) const {
 Vec Shader::jittered_sun(Sampler& sampler) const {
   Vec u, w;
   basis_around(sun_, u, w);
-  const double r = kSunRadius * std::sqrt(sampler.next()),
-               angle = 2 * Sampler::kPi * sampler.next();
+  const Sampler::Pair p = sampler.pair();
+  const double r = kSunRadius * std::sqrt(p.u), angle = 2 * kPi * p.v;
   return normalized(sun_ + u * (r * std::cos(angle)) + w * (r * std::sin(angle)));
 }
 
@@ -147,25 +153,26 @@ double Shader::floor_light(const Ray& ray, double until, Sampler& sampler) const
   Hit hit;
   double open = 0;
   for (int i = 0; i < 4; ++i) {
-    const Vec d = cosine_direction(s.normal, (i + sampler.next()) / 4, sampler.next());
+    const Vec d = cosine_direction(s.normal, sampler.pair(static_cast<uint64_t>(i), 4));
     if (!caster_.cast({p, d}, {s.size, kRayWidening}, 0, 0.5 * box_.diagonal(), hit))
       open += 0.25;
     else
       open += 0.25 * std::min(1.0, hit.t / (0.5 * box_.diagonal()));
   }
+  sampler.next_pair();
   const double sun = in_sun(s, jittered_sun(sampler)) ? 1 : 0;
   return 1 - fade * (1 - (0.25 + 0.35 * open + 0.40 * sun));
 }
 
-// Of suns all around, at three heights: one that lights about half of what is seen, from behind the
-// camera's left shoulder if that does.
+// From over the camera's left shoulder; within a scene, of suns all around at three heights one
+// that lights about a third of what is seen.
 void Shader::choose_sun(const std::vector<Surface>& seen) {
   const Vec f = camera_.forward();
   const double behind = std::atan2(-f[2], -f[0]);
   constexpr double kPreferred = -0.9;
   double best = kFar;
-  for (int i = 0; i < 16 * 3; ++i) {
-    const double turn = kPreferred + Sampler::kPi * (i % 16 - 8) / 8;
+  for (int i = 0; i < (has_floor_ ? 1 : 16 * 3); ++i) {
+    const double turn = kPreferred + kPi * (i % 16) / 8;
     const double height = 0.65 + 0.25 * (i / 16);
     const Vec sun{{std::cos(behind - turn) * std::cos(height), std::sin(height),
                    std::sin(behind - turn) * std::cos(height)}};
@@ -173,19 +180,21 @@ void Shader::choose_sun(const std::vector<Surface>& seen) {
     for (const Surface& s : seen)
       if (dot(s.normal, sun) > 0 && in_sun(s, sun)) ++lit;
     lit /= static_cast<double>(seen.size());
-    const double cost = std::fabs(lit - 0.55) + 0.04 * std::fabs(turn - kPreferred);
+    const double cost = std::fabs(lit - 0.35);
     if (cost >= best) continue;
     best = cost;
     sun_ = sun;
   }
 }
 
-// The mean of what is seen comes out as a light grey.
+// The middle of what is seen comes out in the middle of the film's curve, its lightest tenth below
+// the curve's end.
 void Shader::choose_exposure(const std::vector<Surface>& seen) {
   Sampler sampler(3);
-  double sum = 0;
-  for (const Surface& s : seen) sum += std::log(1e-3 + luminance(lit_surface(s, 8, sampler)));
-  exposure_ = 0.85 / std::exp(sum / static_cast<double>(seen.size()));
+  std::vector<double> light;
+  for (const Surface& s : seen) light.push_back(1e-3 + luminance(lit_surface(s, 8, sampler)));
+  std::sort(light.begin(), light.end());
+  exposure_ = std::min(0.42 / light[light.size() / 2], 0.8 / light[light.size() * 9 / 10]);
 }
 
 }  // namespace voxdag::render

@@ -30,7 +30,7 @@ Vec random_cell(const DagView& dag, Sampler& sampler, double& size) {
   int64_t cell[3] = {0, 0, 0};
   for (uint32_t d = 0; d < depth; ++d) {
     const DagView::Children children = dag.children(d, content);
-    auto skip = static_cast<int>(sampler.next() * std::popcount(children.mask));
+    auto skip = static_cast<int>(sampler.pair().u * std::popcount(children.mask));
     int index = 0;
     while (!children.has(index) || skip-- > 0) ++index;
     content = dag.content(d, children, index);
@@ -43,57 +43,48 @@ Vec random_cell(const DagView& dag, Sampler& sampler, double& size) {
   return middle;
 }
 
-// How far one sees from a place, level and a little up and down, in kYaws directions.
-class Panorama {
+// A glance through a camera: few rays, judged for how much there is to see.
+class Glance {
  public:
-  static constexpr int kYaws = 24;
-
-  Panorama(const RayCaster& caster, const Vec& eye, double limit) : caster_(caster), eye_(eye) {
-    cone_.spread = 0.01;
-    for (int yaw = 0; yaw < kYaws; ++yaw) {
-      double sum = 0;
-      for (double rise : {-0.25, -0.05, 0.15, 0.4}) sum += distance(direction(yaw, rise), limit);
-      reach_[yaw] = sum / 4;
-      nearest_ = std::min(nearest_, reach_[yaw]);
-    }
-    below_ = distance({{0, -1, 0}}, limit);
-    above_ = distance({{0, 1, 0}}, limit);
-  }
-
-  static Vec direction(int yaw, double rise) {
-    const double angle = 2 * Sampler::kPi * yaw / kYaws;
-    return normalized({{std::cos(angle), rise, std::sin(angle)}});
-  }
-  // The best direction's yaw, and how good it is: how far one sees there, if there is a floor close
-  // below and nothing before one's nose; little where the view runs out of the scene.
-  double best(int& yaw) const {
-    double best = -1;
-    for (int y = 0; y < kYaws; ++y) {
-      double score = 2 * reach_[y];
-      for (int side : {1, 2, kYaws - 2, kYaws - 1}) score += 0.5 * reach_[(y + side) % kYaws];
-      if (score > best) {
-        best = score;
-        yaw = y;
+  Glance(const RayCaster& caster, const Placement& placement) {
+    const Camera camera(placement, kColumns, kRows);
+    for (int y = 0; y < kRows; ++y)
+      for (int x = 0; x < kColumns; ++x) {
+        Hit hit;
+        const bool seen =
+            caster.cast(camera.ray(x + 0.5, y + 0.5), {0, camera.pixel_spread()}, 0, kFar, hit);
+        depth_[y][x] = seen ? std::max(hit.t, 1.0) : kFar;
       }
-    }
-    const double room = std::min(1.0, nearest_ / (0.08 * best));
-    const double floor = below_ < 0.5 * above_ || above_ == 0 ? 1.0 : 0.6;
-    return below_ > 0 ? best * room * floor : 0;
+  }
+
+  // Higher for long views with much in them; lower for a wall before one's nose, or where one looks
+  // out of the scene. `near` is a distance that is too close.
+  double score(double near) const {
+    int breaks = 0, close = 0, out = 0;
+    double sum = 0;
+    for (int y = 0; y < kRows; ++y)
+      for (int x = 0; x < kColumns; ++x) {
+        const double depth = depth_[y][x];
+        if (x > 1) breaks += bends(depth_[y][x - 2], depth_[y][x - 1], depth);
+        if (y > 1) breaks += bends(depth_[y - 2][x], depth_[y - 1][x], depth);
+        close += depth < near;
+        out += depth == kFar;
+        sum += depth == kFar ? 0 : depth;
+      }
+    constexpr double kRays = kColumns * kRows;
+    const double free = 1 - close / kRays, within = 1 - out / kRays;
+    return (0.1 + breaks / kRays) * (sum / kRays) * free * free * free * within;
   }
 
  private:
-  // 0 where the ray leaves the scene.
-  double distance(const Vec& direction, double limit) const {
-    Hit hit;
-    return caster_.cast({eye_, direction}, cone_, 0, kFar, hit) ? std::min(hit.t, limit) : 0;
+  static constexpr int kColumns = 24, kRows = 14;
+
+  // Whether three neighbouring rays do not end on one plane, along which 1/depth is linear.
+  static bool bends(double a, double b, double c) {
+    return std::fabs(1 / a - 2 / b + 1 / c) * b > 0.03;
   }
 
-  const RayCaster& caster_;
-  const Vec eye_;
-  Cone cone_;
-  double reach_[kYaws];
-  double nearest_ = kFar;
-  double below_ = 0, above_ = 0;
+  double depth_[kRows][kColumns];
 };
 
 }  // namespace
@@ -113,7 +104,8 @@ Placement named_view(const std::string& name, const RayCaster& caster, const Dag
   if (name == "inside") return inside_view(caster, box, fov_degrees.value_or(kInsideFov));
   for (const NamedDirection& d : kDirections)
     if (name == d.name)
-      return whole_box(box, d.towards_eye, fov_degrees.value_or(kOutsideFov), aspect);
+      return see_whole(occupied_points(dag), d.towards_eye, fov_degrees.value_or(kOutsideFov),
+                       aspect);
   std::string names;
   for (const std::string& known : view_names()) names += (names.empty() ? "" : ", ") + known;
   throw Error(ErrorCode::kInvalidInput, "no view is called \"" + name + "\": expected " + names);
@@ -128,7 +120,7 @@ double openness(const RayCaster& caster, const DagView& dag, const Box& box) {
     const Vec place = random_cell(dag, sampler, size);
     for (int j = 0; j < kRays; ++j) {
       Hit hit;
-      const Ray ray{place, sampler.direction()};
+      const Ray ray{place, uniform_direction(sampler.pair())};
       if (!caster.cast(ray, {size, 0}, 3 * size, box.diagonal(), hit)) ++escaped;
     }
   }
@@ -136,22 +128,25 @@ double openness(const RayCaster& caster, const DagView& dag, const Box& box) {
 }
 
 Placement inside_view(const RayCaster& caster, const Box& box, double fov_degrees) {
-  constexpr int kPlaces = 600;
+  constexpr int kPlaces = 400, kYaws = 8;
   Sampler sampler(2);
   const Vec extent = box.high - box.low;
   Placement best{box.centre(), box.centre() + Vec{{1, 0, 0}}, fov_degrees};
   double best_score = 0;
   for (int i = 0; i < kPlaces; ++i) {
-    Vec eye = box.low;
-    eye[0] += extent[0] * (0.08 + 0.84 * sampler.next());
-    eye[1] += extent[1] * (0.05 + 0.55 * sampler.next());
-    eye[2] += extent[2] * (0.08 + 0.84 * sampler.next());
-    int yaw = 0;
-    const double score = Panorama(caster, eye, box.diagonal()).best(yaw);
-    if (score <= best_score) continue;
-    best_score = score;
-    best.eye = eye;
-    best.target = eye + Panorama::direction(yaw, 0.04) * (0.25 * box.diagonal());
+    const Sampler::Pair across = sampler.pair(), up = sampler.pair();
+    const Vec eye =
+        box.low + Vec{{extent[0] * (0.05 + 0.9 * across.u), extent[1] * (0.05 + 0.35 * up.u),
+                       extent[2] * (0.05 + 0.9 * across.v)}};
+    for (int yaw = 0; yaw < kYaws; ++yaw) {
+      const double angle = 2 * kPi * (yaw + up.v) / kYaws;
+      const Vec forward{{std::cos(angle), 0.08, std::sin(angle)}};
+      const Placement trial{eye, eye + forward * (0.25 * box.diagonal()), fov_degrees};
+      const double score = Glance(caster, trial).score(0.04 * box.diagonal());
+      if (score <= best_score) continue;
+      best_score = score;
+      best = trial;
+    }
   }
   return best;
 }

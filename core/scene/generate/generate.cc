@@ -9,7 +9,7 @@ namespace voxdag {
 namespace {
 
 constexpr SceneKindInfo kKinds[] = {
-    {SceneKind::kCity, "city", "streets, houses with rotated roofs, windows, trees", 1'000'000},
+    {SceneKind::kCity, "city", "streets, houses with rotated roofs, windows, trees", 400'000},
     {SceneKind::kMenger, "menger", "Menger's sponge on the integer lattice", 0},
     {SceneKind::kTerrain, "terrain", "a fractal heightfield", 1'000'000},
     {SceneKind::kSoup, "soup", "random triangles, slivers and degenerate ones among them", 100'000},
