@@ -80,13 +80,19 @@ void expect_file_equals(const std::string& path, const oracle::Voxels& voxels, i
     SCOPED_TRACE(testing::Message() << l + 1 << " levels above the bricks");
     expect_nodes_equal(dag.levels[l], truth.levels[l]);
   }
-  expect_voxels_equal(file, voxels);
+  if (voxels.edge() <= 128) expect_voxels_equal(file, voxels);
 }
 
 std::string contents(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   EXPECT_TRUE(in) << path;
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::string Reference::fast_disk() {
+  std::error_code none;
+  const auto space = std::filesystem::space("/dev/shm", none);
+  return !none && space.available > 4096 * kMebibyte ? "/dev/shm" : testing::TempDir();
 }
 
 voxdag::BuildSpec Reference::spec_for(const Triangles& scene, int64_t resolution, int copies) {

@@ -52,7 +52,9 @@ TEST_F(RunOptionsTest, NeverShow) {
 
 // More triangles than memory holds: they spill, and nothing shows.
 TEST_F(RunOptionsTest, SpillingNeverShows) {
-  const Triangles scene = mixed_scene(128, 200);
+  Triangles scene = mixed_scene(128, 2);
+  for (const auto& t : oracle::make_scene(oracle::SceneKind::kSubVoxel, 2, {{0, 0, 0}, 128}, 2000))
+    scene.push_back(t);
   const auto plain = expect_right(scene, 128, spec_for(scene, 128));
   EXPECT_EQ(plain.spill_bytes, 0u);
   auto spec = spec_for(scene, 128, 500);

@@ -11,8 +11,8 @@ namespace voxdag {
 
 class TemporaryFolder {
  public:
-  TemporaryFolder() {
-    std::string name = testing::TempDir() + "voxdag-XXXXXX";
+  explicit TemporaryFolder(const std::string& parent = testing::TempDir()) {
+    std::string name = parent + "/voxdag-XXXXXX";
     if (mkdtemp(name.data())) path_ = name;
     EXPECT_FALSE(path_.empty()) << "cannot make " << name;
   }
