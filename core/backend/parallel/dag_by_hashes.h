@@ -166,7 +166,7 @@ Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
   const uint32_t n = level.child_count = space.value(offsets.data() + parents.count);
   Buffer<Space, uint32_t> candidates(space, n);
   Buffer<Space, uint64_t> candidate_hashes(space, n);
-  space.expand(offsets.data(), 0, parents.count,
+  space.expand(offsets.data(), 0, parents.count, n,
                EmitCandidates{nodes, parents.nodes.data(), octree_hashes, candidates.data(),
                               candidate_hashes.data()});
   offsets = {};

@@ -217,7 +217,7 @@ DagLevel<Space> make_level(Space& space, const LinkedNodes& links, Reduced<Space
   space.scan(offsets.data(), level.count);
   level.child_count = space.value(offsets.data() + level.count);
   level.children = Buffer<Space, uint32_t>(space, level.child_count);
-  space.expand(offsets.data(), 0, level.count,
+  space.expand(offsets.data(), 0, level.count, level.child_count,
                EmitChildren{links, survivors, level.children.data()});
   return level;
 }

@@ -59,10 +59,11 @@ class HostLevels {
   }
 
   void send(uint32_t brick_level, SubDagSink& sink) const {
-    sink.bricks({brick_masks_.view()});
+    sink.bricks(BrickLevelView{brick_masks_.view()});
     uint32_t level = brick_level;
     for (const Nodes& nodes : levels_)
-      sink.nodes({--level, nodes.hashes.view(), nodes.masks.view(), nodes.children.view()});
+      sink.nodes(
+          NodeLevelView{--level, nodes.hashes.view(), nodes.masks.view(), nodes.children.view()});
   }
 
  private:

@@ -47,9 +47,9 @@ class HostSpace {
   }
 
   template <class F>
-  void expand(const uint32_t* offsets, uint32_t first, uint32_t last, F f) {
+  void expand(const uint32_t* offsets, uint32_t first, uint32_t last, uint32_t count, F f) {
     const uint32_t base = offsets[first];
-    for_chunks(offsets[last] - base, [&](uint64_t begin, uint64_t end) {
+    for_chunks(count, [&](uint64_t begin, uint64_t end) {
       const uint32_t from = static_cast<uint32_t>(begin) + base;
       uint32_t source = static_cast<uint32_t>(
           std::upper_bound(offsets + first, offsets + last, from) - offsets - 1);

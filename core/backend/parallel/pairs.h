@@ -179,7 +179,7 @@ class PairExpansion {
       const PairSpan to = is_last(depth) ? out.span() : next_frame(depth);
       const Slice slice = find_slice(f, first, count, to.room);
       if (slice.outputs > 0)
-        space_.expand(f.offsets.data(), first, slice.end,
+        space_.expand(f.offsets.data(), first, slice.end, slice.outputs,
                       EmitParts{makes_voxels(depth) ? 6 : 3, f.codes.data(),
                                 f.pair_triangles.data(), f.parts.data(), to.codes, to.triangles});
       if (slice.end == first)

@@ -6,9 +6,9 @@
 //
 //   for_each(n, f)                      f(i) for i < n, in no order; f is copied
 //   for_each_block(n, k)                block kernels, see block.h
-//   expand(offsets, first, last, f)     segmented work expansion: source s owns the outputs from
-//                                       offsets[s] to offsets[s + 1]; f(s, rank, output) for those
-//                                       of sources [first, last), the first output counted as 0
+//   expand(offsets, first, last, n, f)  segmented work expansion: source s owns the outputs from
+//                                       offsets[s] to offsets[s + 1]; f(s, rank, output) for the n
+//                                       outputs of sources [first, last), the first counted as 0
 //   scan(counts, n)                     counts[0, n) to exclusive prefix sums, the sum in counts[n]
 //   select(flags, n, out)               the positions whose flag is not 0, ascending; their number
 //   merge_runs(keys, masks, n, ...)     reduce by key: each run of equal keys to one key and the OR

@@ -98,7 +98,7 @@ void draw_tiles(Space& space, const SubvolumeTask& task, const FixedTriangle* tr
     space.scan(counts.data(), blocks);
     const uint32_t count = space.value(counts.data() + blocks);
     const uint32_t at = bricks.make_room(count);
-    space.expand(counts.data(), 0, blocks,
+    space.expand(counts.data(), 0, blocks, count,
                  MoveBricks{codes.data(), masks.data(), bricks.codes() + at, bricks.masks() + at});
     bricks.took(count, true);
   }

@@ -1,0 +1,17 @@
+// The parallel pipeline on a GPU.
+#include "core/backend/cuda/cuda_space.h"
+#include "core/backend/parallel/parallel_backend.h"
+
+namespace voxdag {
+
+std::unique_ptr<Backend> make_cuda_backend(Method method, int device) {
+  try {
+    return std::make_unique<parallel::ParallelBackend<cuda::CudaDevice>>(cuda::CudaDevice(device),
+                                                                         method);
+  } catch (const parallel::Outgrown&) {
+    throw Error(ErrorCode::kDevice,
+                "CUDA device " + std::to_string(device) + " has no memory left to open it");
+  }
+}
+
+}  // namespace voxdag

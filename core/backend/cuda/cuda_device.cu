@@ -1,0 +1,130 @@
+#include <utility>
+#include <vector>
+
+#include "core/backend/cuda/cuda_device.h"
+#include "core/backend/cuda/cuda_space.h"
+
+namespace voxdag {
+namespace cuda {
+namespace {
+
+constexpr int kLeastMajor = 8;  // compute capability of the oldest code in this build
+
+// The runtime's numbers of the devices that can run this build; if none, `problem` says why.
+std::vector<int> usable_devices(std::string& problem) {
+  int count = 0, driver = 0;
+  const cudaError_t status = cudaGetDeviceCount(&count);
+  if (status != cudaSuccess) {
+    cudaGetLastError();
+    const bool has_driver = cudaDriverGetVersion(&driver) == cudaSuccess && driver > 0;
+    problem = std::string("no CUDA device: ") +
+              (has_driver ? cudaGetErrorString(status) : "no NVIDIA driver is installed");
+    return {};
+  }
+  std::vector<int> usable;
+  for (int device = 0; device < count; ++device) {
+    int major = 0, pools = 0;
+    if (cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device) == cudaSuccess &&
+        cudaDeviceGetAttribute(&pools, cudaDevAttrMemoryPoolsSupported, device) == cudaSuccess &&
+        major >= kLeastMajor && pools)
+      usable.push_back(device);
+  }
+  if (usable.empty())
+    problem = "no usable CUDA device: expected compute capability 8.0 or later and memory pools";
+  return usable;
+}
+
+int runtime_device(int device) {
+  std::string problem;
+  const std::vector<int> usable = usable_devices(problem);
+  if (usable.empty()) throw Error(ErrorCode::kDevice, problem);
+  if (device < 0 || static_cast<size_t>(device) >= usable.size())
+    throw Error(ErrorCode::kDevice, "no CUDA device " + std::to_string(device) +
+                                        ": this machine has " + std::to_string(usable.size()));
+  return usable[static_cast<size_t>(device)];
+}
+
+template <class T>
+Pinned<T> make_pinned(size_t count, const std::string& where) {
+  void* memory = nullptr;
+  check_call(cudaMallocHost(&memory, count * sizeof(T)), "cudaMallocHost", where);
+  return Pinned<T>(static_cast<T*>(memory));
+}
+
+}  // namespace
+
+CudaDevice::CudaDevice(int device)
+    : device_(runtime_device(device)), place_("CUDA device " + std::to_string(device_)) {
+  check_call(cudaSetDevice(device_), "cudaSetDevice", place_);
+  cudaStream_t stream = nullptr;
+  check_call(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreate", place_);
+  stream_.reset(stream);
+  check_call(cudaDeviceGetDefaultMemPool(&pool_, device_), "cudaDeviceGetDefaultMemPool", place_);
+  uint64_t keep_all =
+      UINT64_MAX;  // freed memory stays with the pool from one subvolume to the next
+  check_call(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &keep_all),
+             "cudaMemPoolSetAttribute", place_);
+  mailbox_ = make_pinned<uint64_t>(1, place_);
+  for (Staging& staging : staging_) {
+    staging.triangles = make_pinned<FixedTriangle>(kStagingTriangles, place_);
+    cudaEvent_t event = nullptr;
+    check_call(cudaEventCreateWithFlags(&event, cudaEventDisableTiming), "cudaEventCreate", place_);
+    staging.copied.reset(event);
+  }
+}
+
+CudaSpace CudaDevice::open(const SubvolumeTask& task, MemoryBudget& budget,
+                           const CancelToken& cancel) {
+  check_call(cudaSetDevice(device_), "cudaSetDevice", place_);
+  const Cube& cube = task.cube;
+  return CudaSpace(*this,
+                   place_ + ", subvolume of level " + std::to_string(cube.level) + " at " +
+                       std::to_string(cube.position[0]) + " " + std::to_string(cube.position[1]) +
+                       " " + std::to_string(cube.position[2]),
+                   budget, cancel);
+}
+
+std::span<FixedTriangle> CudaDevice::free_staging(const std::string& where) {
+  check_call(cudaEventSynchronize(staging_[turn_].copied.get()), "cudaEventSynchronize", where);
+  return {staging_[turn_].triangles.get(), kStagingTriangles};
+}
+
+void CudaDevice::send_staging(size_t count, FixedTriangle* to, const std::string& where) {
+  Staging& staging = staging_[turn_];
+  check_call(cudaMemcpyAsync(to, staging.triangles.get(), count * sizeof(FixedTriangle),
+                             cudaMemcpyHostToDevice, stream()),
+             "cudaMemcpyAsync", where);
+  check_call(cudaEventRecord(staging.copied.get(), stream()), "cudaEventRecord", where);
+  turn_ ^= 1;
+}
+
+void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
+  void* memory = nullptr;
+  cudaError_t status = cudaMallocAsync(&memory, bytes, stream());
+  if (status == cudaErrorMemoryAllocation) {
+    // What the pool keeps may be in pieces: give it back to the device and ask once more.
+    cudaGetLastError();
+    check_call(cudaStreamSynchronize(stream()), "cudaStreamSynchronize", where);
+    check_call(cudaMemPoolTrimTo(pool_, 0), "cudaMemPoolTrimTo", where);
+    status = cudaMallocAsync(&memory, bytes, stream());
+  }
+  check_call(status, "cudaMallocAsync", where);
+  return memory;
+}
+
+void CudaDevice::release(void* memory) noexcept { cudaFreeAsync(memory, stream()); }
+
+}  // namespace cuda
+
+int cuda_device_count() {
+  std::string problem;
+  return static_cast<int>(cuda::usable_devices(problem).size());
+}
+
+std::string cuda_device_problem() {
+  std::string problem;
+  cuda::usable_devices(problem);
+  return problem;
+}
+
+}  // namespace voxdag

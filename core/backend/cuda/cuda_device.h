@@ -1,0 +1,59 @@
+// One GPU as one backend uses it: a stream of its own, pinned memory for what goes to and fro in
+// small pieces. Lives over many subvolumes; used by one thread.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "core/backend/backend.h"
+#include "core/backend/cuda/cuda_handles.h"
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag::cuda {
+
+class CudaSpace;
+
+class CudaDevice {
+ public:
+  static constexpr std::string_view kName = "cuda";
+  static constexpr size_t kStagingTriangles = 4096;  // of a staging area: 288 KiB
+
+  // Throws Error{kDevice} saying why there is no such device.
+  explicit CudaDevice(int device);
+
+  // Makes this the thread's current device.
+  CudaSpace open(const SubvolumeTask& task, MemoryBudget& budget, const CancelToken& cancel);
+
+  cudaStream_t stream() const { return stream_.get(); }
+  // A pinned word, for single values on their way to the host.
+  void* mailbox() { return mailbox_.get(); }
+
+  // A pinned area that no copy reads any more.
+  std::span<FixedTriangle> free_staging(const std::string& where);
+  // Copies the front of the area that free_staging() gave last, in stream order.
+  void send_staging(size_t count, FixedTriangle* to, const std::string& where);
+
+  // Memory of the device in stream order. Throws Outgrown where there is none left.
+  void* allocate(uint64_t bytes, const std::string& where);
+  void release(void* memory) noexcept;
+
+ private:
+  struct Staging {
+    Pinned<FixedTriangle> triangles;
+    Event copied;
+  };
+
+  int device_ = 0;  // the runtime's number
+  std::string place_;
+  Stream stream_;
+  cudaMemPool_t pool_ = nullptr;  // the device's own
+  Pinned<uint64_t> mailbox_;
+  Staging staging_[2];
+  int turn_ = 0;
+};
+
+}  // namespace voxdag::cuda

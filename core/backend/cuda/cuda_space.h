@@ -1,0 +1,159 @@
+// The GPU's space: loops are kernels on one stream, memory is the device's. See
+// core/backend/parallel/space.h for what the calls mean. Only for CUDA sources.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "core/backend/cuda/cuda_call.h"
+#include "core/backend/cuda/cuda_device.h"
+#include "core/backend/parallel/space.h"
+
+namespace voxdag::cuda {
+
+inline constexpr unsigned kThreadsPerBlock = 256;
+
+template <class F>
+__global__ void __launch_bounds__(kThreadsPerBlock) run_for_each(uint32_t n, F f) {
+  const uint32_t i = blockIdx.x * kThreadsPerBlock + threadIdx.x;
+  if (i < n) f(i);
+}
+
+template <class Kernel>
+__global__ void __launch_bounds__(Kernel::kThreads) run_block(Kernel kernel) {
+  __shared__ typename Kernel::Shared shared;
+#pragma unroll
+  for (int phase = 0; phase < Kernel::kPhases; ++phase) {
+    if (phase > 0) __syncthreads();
+    kernel(phase, blockIdx.x, threadIdx.x, shared);
+  }
+}
+
+// Output i of an expansion finds its source by bisection.
+template <class F>
+struct ExpandOne {
+  const uint32_t* offsets;
+  uint32_t first, last;
+  F f;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    const uint32_t base = offsets[first], output = i + base;
+    uint32_t source = first, end = last;
+    while (end - source > 1) {
+      const uint32_t middle = source + (end - source) / 2;
+      if (offsets[middle] <= output)
+        source = middle;
+      else
+        end = middle;
+    }
+    f(source, output - offsets[source], i);
+  }
+};
+
+class CudaSpace {
+ public:
+  static constexpr bool kOnHost = false;
+  static constexpr uint64_t kWindow = uint64_t{1} << 22;
+  static constexpr uint32_t kTilesAtOnce = 4096;
+  template <class T>
+  using Array = parallel::Buffer<CudaSpace, T>;
+
+  CudaSpace(CudaDevice& device, std::string where, MemoryBudget& budget, const CancelToken& cancel)
+      : device_(device), where_(std::move(where)), budget_(budget), cancel_(cancel) {}
+  CudaSpace(const CudaSpace&) = delete;
+
+  MemoryBudget& budget() { return budget_; }
+  void* allocate(uint64_t bytes) { return device_.allocate(bytes, where_); }
+  void release(void* memory, uint64_t) { device_.release(memory); }
+
+  template <class F>
+  void for_each(uint64_t n, F f) {
+    cancel_.check();
+    if (n == 0) return;
+    const unsigned blocks = static_cast<unsigned>((n + kThreadsPerBlock - 1) / kThreadsPerBlock);
+    run_for_each<<<blocks, kThreadsPerBlock, 0, stream()>>>(static_cast<uint32_t>(n), f);
+    check(cudaGetLastError(), "kernel launch");
+  }
+
+  template <class Kernel>
+  void for_each_block(uint32_t blocks, Kernel kernel) {
+    cancel_.check();
+    if (blocks == 0) return;
+    run_block<<<blocks, Kernel::kThreads, 0, stream()>>>(kernel);
+    check(cudaGetLastError(), "block kernel launch");
+  }
+
+  template <class F>
+  void expand(const uint32_t* offsets, uint32_t first, uint32_t last, uint32_t count, F f) {
+    for_each(count, ExpandOne<F>{offsets, first, last, f});
+  }
+
+  void scan(uint32_t* counts, uint32_t n);
+  uint32_t select(const uint8_t* flags, uint32_t n, uint32_t* out);
+  uint32_t merge_runs(const uint64_t* keys, const uint64_t* masks, uint32_t n, uint64_t* out_keys,
+                      uint64_t* out_masks);
+  uint64_t count_bits(const uint64_t* masks, uint32_t n);
+  void sort_keys(Array<uint64_t>& keys, Array<uint64_t>& scratch, uint32_t n, int begin_bit,
+                 int end_bit);
+  void sort_pairs(Array<uint64_t>& keys, Array<uint64_t>& key_scratch, Array<uint32_t>& values,
+                  Array<uint32_t>& value_scratch, uint32_t n, int begin_bit, int end_bit);
+
+  template <class T>
+  void copy(const T* from, T* to, uint64_t n) {
+    transfer(from, to, n, cudaMemcpyDeviceToDevice);
+  }
+  template <class T>
+  void upload(const T* from, T* to, uint64_t n) {
+    transfer(from, to, n, cudaMemcpyHostToDevice);
+  }
+  template <class T>
+  void download(const T* from, T* to, uint64_t n) {
+    transfer(from, to, n, cudaMemcpyDeviceToHost);
+    check(cudaStreamSynchronize(stream()), "cudaStreamSynchronize");
+  }
+  template <class T>
+  T value(const T* from) {
+    static_assert(sizeof(T) <= sizeof(uint64_t));
+    download(from, static_cast<T*>(device_.mailbox()), 1);
+    return *static_cast<T*>(device_.mailbox());
+  }
+  std::span<FixedTriangle> staging(FixedTriangle*, uint64_t most) {
+    cancel_.check();
+    const auto area = device_.free_staging(where_);
+    return area.first(std::min<uint64_t>(area.size(), most));
+  }
+  void upload_staged(std::span<const FixedTriangle> area, FixedTriangle* to) {
+    device_.send_staging(area.size(), to, where_);
+  }
+
+ private:
+  cudaStream_t stream() const { return device_.stream(); }
+  void check(cudaError_t status, const char* call) const { check_call(status, call, where_); }
+  template <class T>
+  void transfer(const T* from, T* to, uint64_t n, cudaMemcpyKind kind) {
+    cancel_.check();
+    if (n == 0) return;
+    check(cudaMemcpyAsync(to, from, n * sizeof(T), kind, stream()), "cudaMemcpyAsync");
+  }
+  // CUB's two phases: call(nullptr, bytes) asks for the temporary storage, call(storage, bytes)
+  // works. The storage is kept for the next call.
+  template <class Call>
+  void with_storage(const char* name, Call call);
+
+  template <class T>
+  T* answer() {
+    if (answer_.size() == 0) answer_ = Array<uint64_t>(*this, 1);
+    return reinterpret_cast<T*>(answer_.data());
+  }
+
+  CudaDevice& device_;
+  const std::string where_;
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+  Array<uint8_t> storage_;
+  Array<uint64_t> answer_;  // one word, for what reductions find
+};
+
+}  // namespace voxdag::cuda

@@ -1,0 +1,30 @@
+# Enables the CUDA language where nvcc is there, and says nothing where it is not. Included by the
+# root, so that every executable knows how to link what was compiled here.
+option(VOXDAG_CUDA "Build the CUDA backend where nvcc is found" ON)
+
+if(VOXDAG_CUDA AND NOT VOXDAG_SANITIZE)
+  if(NOT CMAKE_CUDA_COMPILER)
+    find_program(VOXDAG_NVCC nvcc HINTS ENV CUDA_HOME ENV CUDA_PATH /usr/local/cuda PATH_SUFFIXES bin)
+    if(VOXDAG_NVCC)
+      set(CMAKE_CUDA_COMPILER ${VOXDAG_NVCC})
+    endif()
+  endif()
+  # Machine code for A100- and H100-class devices, and PTX for what comes later.
+  if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+    set(CMAKE_CUDA_ARCHITECTURES 80-real 90-real 90-virtual)
+  endif()
+  set(CMAKE_CUDA_HOST_COMPILER ${CMAKE_CXX_COMPILER})
+  include(CheckLanguage)
+  check_language(CUDA)
+  if(CMAKE_CUDA_COMPILER)
+    enable_language(CUDA)
+    # CMake 3.25 does not know that nvcc 12 and later speak C++20.
+    if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)
+      set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
+    endif()
+    set(VOXDAG_HAS_CUDA ON)
+    if(VOXDAG_CCACHE)
+      set(CMAKE_CUDA_COMPILER_LAUNCHER ${VOXDAG_CCACHE})
+    endif()
+  endif()
+endif()

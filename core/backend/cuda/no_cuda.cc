@@ -1,0 +1,17 @@
+// What stands in for the CUDA backend in builds without CUDA.
+#include "core/backend/backend.h"
+#include "core/base/error.h"
+
+namespace voxdag {
+
+int cuda_device_count() { return 0; }
+
+std::string cuda_device_problem() {
+  return "this build has no CUDA backend: it was made without nvcc";
+}
+
+std::unique_ptr<Backend> make_cuda_backend(Method, int) {
+  throw Error(ErrorCode::kDevice, cuda_device_problem());
+}
+
+}  // namespace voxdag

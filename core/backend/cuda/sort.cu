@@ -1,0 +1,32 @@
+// Radix sorts on the device.
+#include <cub/device/device_radix_sort.cuh>
+
+#include "core/backend/cuda/with_storage.h"
+
+namespace voxdag::cuda {
+
+void CudaSpace::sort_keys(Array<uint64_t>& keys, Array<uint64_t>& scratch, uint32_t n,
+                          int begin_bit, int end_bit) {
+  if (n == 0 || begin_bit == end_bit) return;
+  cub::DoubleBuffer<uint64_t> buffers(keys.data(), scratch.data());
+  with_storage("cub::DeviceRadixSort::SortKeys", [&](void* storage, size_t& bytes) {
+    return cub::DeviceRadixSort::SortKeys(storage, bytes, buffers, n, begin_bit, end_bit, stream());
+  });
+  if (buffers.Current() != keys.data()) keys.swap(scratch);
+}
+
+void CudaSpace::sort_pairs(Array<uint64_t>& keys, Array<uint64_t>& key_scratch,
+                           Array<uint32_t>& values, Array<uint32_t>& value_scratch, uint32_t n,
+                           int begin_bit, int end_bit) {
+  if (n == 0 || begin_bit == end_bit) return;
+  cub::DoubleBuffer<uint64_t> key_buffers(keys.data(), key_scratch.data());
+  cub::DoubleBuffer<uint32_t> value_buffers(values.data(), value_scratch.data());
+  with_storage("cub::DeviceRadixSort::SortPairs", [&](void* storage, size_t& bytes) {
+    return cub::DeviceRadixSort::SortPairs(storage, bytes, key_buffers, value_buffers, n, begin_bit,
+                                           end_bit, stream());
+  });
+  if (key_buffers.Current() != keys.data()) keys.swap(key_scratch);
+  if (value_buffers.Current() != values.data()) values.swap(value_scratch);
+}
+
+}  // namespace voxdag::cuda
