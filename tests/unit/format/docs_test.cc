@@ -3,7 +3,6 @@
 
 #include <cstdlib>
 #include <map>
-#include <regex>
 #include <sstream>
 
 #include "core/dag/node_hash.h"
@@ -23,21 +22,36 @@ std::vector<std::string> lines_of(const std::string& document) {
   return lines;
 }
 
+// The cells of a row of a table, without the blanks and backquotes around them; none if it is none.
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  if (line.empty() || line[0] != '|') return cells;
+  std::istringstream in(line.substr(1));
+  for (std::string cell; std::getline(in, cell, '|');) {
+    const size_t first = cell.find_first_not_of(" `"), last = cell.find_last_not_of(" `");
+    cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+  }
+  return cells;
+}
+
+bool is_number(const std::string& text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+}
+
 // The bytes that a hexdump in a document stands for.
 ByteString parse_hexdump(const std::vector<std::string>& lines) {
   ByteString bytes;
-  const std::regex row("([0-9a-f]{8})((?: {1,2}[0-9a-f]{2}){0,16})(?: .*)?");
   bool inside = false, repeat = false;
   for (const std::string& line : lines) {
     if (line == "```hexdump" || line == "```") inside = line.size() > 3;
-    std::smatch match;
     if (inside && line == "*") repeat = true;
-    if (!inside || !std::regex_match(line, match, row)) continue;
-    const size_t offset = std::stoul(match[1].str(), nullptr, 16);
+    if (!inside || line.find_first_not_of("0123456789abcdef") != 8) continue;
+    const size_t offset = std::stoul(line.substr(0, 8), nullptr, 16);
     while (repeat && bytes.size() < offset) bytes += bytes.substr(bytes.size() - 16);
     repeat = false;
     EXPECT_EQ(bytes.size(), offset) << line;
-    std::istringstream digits(match[2].str());
+    // Three columns a byte, with one more blank in the middle.
+    std::istringstream digits(line.substr(8, 51));
     for (std::string byte; digits >> byte;)
       bytes += static_cast<char>(std::stoul(byte, nullptr, 16));
   }
@@ -72,14 +86,13 @@ TEST(FormatDocTest, HeaderTableIsTheLayout) {
                                                 {"attribute table", kAttributesAt},
                                                 {"", kReservedAt},
                                                 {"header checksum", kHeaderChecksumAt}};
-  const std::regex row(R"(\| (\d+) \| [^|]+ \| ([^|]*?) ?\|.*)");
   std::map<std::string, size_t> found;
   bool inside = false;
   for (const std::string& line : lines_of("format.md")) {
     if (line == "### Header page") inside = true;
     if (line == "A level entry:") inside = false;
-    std::smatch match;
-    if (inside && std::regex_match(line, match, row)) found[match[2]] = std::stoul(match[1]);
+    const auto cells = cells_of(line);
+    if (inside && cells.size() == 4 && is_number(cells[0])) found[cells[2]] = std::stoul(cells[0]);
   }
   EXPECT_EQ(found, fields);
 }
@@ -98,21 +111,23 @@ TEST(FormatDocTest, NodeHashVectorsHold) {
                                cut_hash(hash_node(0x81, two_cut), 16),
                                hash_node(0xff, eight)};
   std::vector<uint64_t> found;
-  const std::regex row(R"(\| (?:brick|node) .* \| `([0-9a-f]{16})` \|)");
-  std::smatch match;
-  for (const std::string& line : lines_of("format.md"))
-    if (std::regex_match(line, match, row)) found.push_back(std::stoull(match[1], nullptr, 16));
+  for (const std::string& line : lines_of("format.md")) {
+    const auto cells = cells_of(line);
+    if (cells.size() == 2 && cells[1].size() == 16 &&
+        cells[1].find_first_not_of("0123456789abcdef") == std::string::npos)
+      found.push_back(std::stoull(cells[1], nullptr, 16));
+  }
   EXPECT_THAT(found, testing::ElementsAreArray(expected));
 }
 
 // docs/errors.md is the table of core/base/error.cc.
 TEST(ErrorsDocTest, TableIsThatOfTheCode) {
   std::map<std::string, std::pair<int, int>> documented, coded;
-  const std::regex row(R"(\| `(\w+)` \| (\d+) \| (\d+) \| .+ \|)");
-  std::smatch match;
-  for (const std::string& line : lines_of("errors.md"))
-    if (std::regex_match(line, match, row))
-      documented[match[1]] = {std::stoi(match[2]), std::stoi(match[3])};
+  for (const std::string& line : lines_of("errors.md")) {
+    const auto cells = cells_of(line);
+    if (cells.size() == 4 && is_number(cells[1]))
+      documented[cells[0]] = {std::stoi(cells[1]), std::stoi(cells[2])};
+  }
   for (int i = 0; i <= static_cast<int>(ErrorCode::kLimit); ++i) {
     const ErrorCode code = static_cast<ErrorCode>(i);
     coded[error_name(code)] = {exit_status(code), http_status(code)};

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <bit>
 #include <cstring>
 #include <functional>
 
@@ -121,6 +123,31 @@ struct BrokenDag {
   const char* message;
 };
 
+// A brick that no node refers to, in its right place among the others.
+void add_lonely_brick(oracle::Dag& dag) {
+  const uint64_t lonely = 0x0123456789abcdef;
+  dag.bricks.push_back(lonely);
+  std::sort(dag.bricks.begin(), dag.bricks.end(),
+            [](uint64_t a, uint64_t b) { return oracle::brick_hash(a) < oracle::brick_hash(b); });
+  const auto at = std::find(dag.bricks.begin(), dag.bricks.end(), lonely) - dag.bricks.begin();
+  for (oracle::Node& node : dag.levels[0])
+    for (uint32_t& child : node.children) child += child >= at;
+}
+
+// The root without its last child as one more root.
+void add_second_root(oracle::Dag& dag) {
+  std::vector<oracle::Node>& roots = dag.levels.back();
+  oracle::Node root = roots[0];
+  root.mask &= (1u << (std::bit_width(root.mask) - 1)) - 1;
+  root.children.pop_back();
+  std::vector<uint64_t> hashes;
+  for (const uint32_t child : root.children)
+    hashes.push_back(dag.levels[dag.levels.size() - 2][child].hash);
+  root.hash = oracle::node_hash(root.mask, hashes);
+  roots.push_back(root);
+  std::sort(roots.begin(), roots.end());
+}
+
 void PrintTo(const BrokenDag& broken, std::ostream* out) { *out << broken.rule; }
 
 class BrokenDagTest : public VerifyTest, public testing::WithParamInterface<BrokenDag> {};
@@ -150,15 +177,7 @@ INSTANTIATE_TEST_SUITE_P(
                   "does not follow the one before it in the total order"},
         BrokenDag{"nodes unique", [](auto& dag) { dag.levels[0][2] = dag.levels[0][1]; },
                   "does not follow the one before it in the total order"},
-        BrokenDag{"all nodes reachable",
-                  [](auto& dag) {
-                    // The brick that only one node has is taken out of it.
-                    for (auto& node : dag.levels[0])
-                      for (auto& child : node.children)
-                        if (child == 5) child = 4;
-                    std::sort(dag.levels[0].begin(), dag.levels[0].end());
-                  },
-                  "level "},
+        BrokenDag{"all bricks reachable", add_lonely_brick, " has no parent"},
         BrokenDag{"mask within 8 bits", [](auto& dag) { dag.levels[0][0].mask |= 256; },
                   "level 2, word 0: child mask "},
         BrokenDag{"mask not 0",
@@ -167,8 +186,7 @@ INSTANTIATE_TEST_SUITE_P(
                     dag.levels[0][0].children.clear();
                   },
                   "level 2, word 0: child mask 0, expected 1 to 255"},
-        BrokenDag{"one root", [](auto& dag) { dag.levels[2].push_back(dag.levels[2][0]); },
-                  "level 0, "},
+        BrokenDag{"one root", add_second_root, "level 0: 2 roots, expected 1"},
         BrokenDag{"voxels counted", [](auto& dag) { ++dag.voxels; }, "voxels, the DAG has "},
         BrokenDag{"octree nodes counted", [](auto& dag) { --dag.svo_nodes; },
                   "octree nodes, the DAG has "}));
