@@ -98,6 +98,17 @@ void CudaDevice::send_staging(size_t count, FixedTriangle* to, const std::string
   turn_ ^= 1;
 }
 
+uint64_t CudaDevice::available(const std::string& where) const {
+  size_t free_bytes = 0, total_bytes = 0;
+  uint64_t reserved = 0, used = 0;
+  check_call(cudaMemGetInfo(&free_bytes, &total_bytes), "cudaMemGetInfo", where);
+  check_call(cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrReservedMemCurrent, &reserved),
+             "cudaMemPoolGetAttribute", where);
+  check_call(cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemCurrent, &used),
+             "cudaMemPoolGetAttribute", where);
+  return free_bytes + (reserved - used);
+}
+
 void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   void* memory = nullptr;
   cudaError_t status = cudaMallocAsync(&memory, bytes, stream());

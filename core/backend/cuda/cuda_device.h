@@ -37,6 +37,8 @@ class CudaDevice {
   // Copies the front of the area that free_staging() gave last, in stream order.
   void send_staging(size_t count, FixedTriangle* to, const std::string& where);
 
+  // Bytes of the device that nobody uses now, the pool's own included.
+  uint64_t available(const std::string& where) const;
   // Memory of the device in stream order. Throws Outgrown where there is none left.
   void* allocate(uint64_t bytes, const std::string& where);
   void release(void* memory) noexcept;

@@ -65,6 +65,7 @@ class CudaSpace {
   CudaSpace(const CudaSpace&) = delete;
 
   MemoryBudget& budget() { return budget_; }
+  uint64_t available() const { return std::min(budget_.available(), device_.available(where_)); }
   void* allocate(uint64_t bytes) { return device_.allocate(bytes, where_); }
   void release(void* memory, uint64_t) { device_.release(memory); }
 

@@ -25,6 +25,7 @@ class HostSpace {
       : budget_(budget), cancel_(cancel), threads_(threads) {}
 
   MemoryBudget& budget() { return budget_; }
+  uint64_t available() const { return budget_.available(); }
   void* allocate(uint64_t bytes);
   void release(void* pages, uint64_t bytes);
 

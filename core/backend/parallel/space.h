@@ -20,6 +20,7 @@
 //   value(pointer)                      one element, on the host
 //   staging(to, most)                   host memory to read triangles into that belong at `to`
 //   upload_staged(area, to)             sends them there
+//   available()                         bytes that could be had now, about
 //   allocate, release, budget           memory; use Buffer
 //
 // Everything happens in the order of the calls. kWindow is how many items, and

@@ -69,7 +69,7 @@ class VoxelList {
 template <class Space>
 uint32_t items_that_fit(Space& space, uint64_t share, uint64_t bytes_each, uint64_t least) {
   return static_cast<uint32_t>(
-      std::clamp(space.budget().available() / share / bytes_each, least, 64 * Space::kWindow));
+      std::clamp(space.available() / share / bytes_each, least, 64 * Space::kWindow));
 }
 
 // Fills `bricks` with all that the triangles touch, in batches.

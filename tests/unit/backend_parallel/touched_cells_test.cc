@@ -1,0 +1,98 @@
+// touched_cells() equals the definition, core/geometry/overlap.h, cell for cell.
+#include "core/backend/parallel/touched_cells.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/oracle/core_types.h"
+#include "tests/oracle/scenes.h"
+
+namespace voxdag::parallel {
+namespace {
+
+struct Tally {
+  uint64_t blocks = 0, cells = 0;
+};
+
+template <int N>
+void expect_defined(const FixedTriangle& t, const int64_t (&low)[3], int shift, Tally& tally) {
+  const uint64_t expected = touched_cells_one_by_one<N>(t, low, shift);
+  ASSERT_EQ(touched_cells<N>(t, low, shift), expected)
+      << "block of " << N << "^3 cells of 2^" << shift << " at " << low[0] << ' ' << low[1] << ' '
+      << low[2] << ", triangle at " << t.v[0][0] << ' ' << t.v[0][1] << ' ' << t.v[0][2];
+  ++tally.blocks;
+  tally.cells += static_cast<uint64_t>(popcount64(expected));
+}
+
+// Blocks of every size a grid can have, at a corner of the triangle and next to it.
+void expect_defined_around(const FixedTriangle& t, oracle::Random& random, Tally& tally) {
+  for (int shift = 8; shift <= 27; shift += static_cast<int>(random.between(1, 3)))
+    for (int i = 0; i < 4; ++i) {
+      int64_t low[3];
+      for (int a = 0; a < 3; ++a) {
+        const int64_t near = t.v[random.between(0, 2)][a] + t.v[random.between(0, 2)][a];
+        low[a] = ((near >> (shift + 1)) + random.between(-3, 1)) * (int64_t{1} << shift);
+      }
+      if (shift < 27) expect_defined<4>(t, low, std::min(shift, 26), tally);
+      expect_defined<2>(t, low, shift, tally);
+    }
+}
+
+TEST(TouchedCells, EqualsTheDefinitionOnAllKinds) {
+  oracle::Random random(3);
+  for (const oracle::SceneKind kind : oracle::kAllKinds) {
+    SCOPED_TRACE(oracle::kind_name(kind));
+    Tally tally;
+    for (const int edge : {16, 64, 4096, 1 << 20}) {
+      const int64_t far = (int64_t{1} << 20) - edge;
+      const oracle::Region region{{far, far / 2 / edge * edge, 0}, edge};
+      for (const auto& t : oracle::make_scene(kind, static_cast<uint64_t>(edge), region, 60)) {
+        expect_defined_around(oracle::fixed(t), random, tally);
+        if (testing::Test::HasFatalFailure()) return;
+      }
+    }
+    EXPECT_GT(tally.cells, tally.blocks / 100) << "few blocks were touched at all";
+  }
+}
+
+// Triangles at, just below and just beyond the size up to which 64-bit products are used, with
+// normals as long as they get there.
+TEST(TouchedCells, EqualsTheDefinitionAtTheLimitOfNarrow) {
+  oracle::Random random(4);
+  Tally tally;
+  for (int i = 0; i < 4000; ++i) {
+    const int64_t extent = kNarrowUnits + 2 * random.between(-1, 1);
+    FixedTriangle t;
+    int64_t low[3];
+    const int shift = static_cast<int>(random.between(8, 26));
+    for (int a = 0; a < 3; ++a) {
+      const int64_t at = random.odd(-kNarrowUnits, kNarrowUnits);
+      for (auto& v : t.v) v[a] = at + (random.coin() ? extent : 0);
+      if (random.coin()) t.v[random.between(0, 2)][a] = at + 2 * random.between(0, extent / 2);
+      low[a] = (random.between(at, at + extent) >> shift) * (int64_t{1} << shift);
+    }
+    expect_defined<4>(t, low, shift, tally);
+    expect_defined<2>(t, low, shift + 1, tally);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(tally.cells, tally.blocks / 10);
+}
+
+// The cells of a block are numbered as children and as bits of a brick are.
+TEST(TouchedCells, BitsAreMortonCodes) {
+  for (int i = 0; i < 64; ++i) {
+    uint32_t k[3];
+    morton_decode(static_cast<uint64_t>(i), k[0], k[1], k[2]);
+    uint64_t cell4 = ~uint64_t{0}, cell2 = ~uint64_t{0};
+    for (int a = 0; a < 3; ++a) {
+      cell4 &= cells_at<4>(a, static_cast<int>(k[a]));
+      cell2 &= cells_at<2>(a, static_cast<int>(k[a]));
+    }
+    EXPECT_EQ(cell4, uint64_t{1} << i);
+    EXPECT_EQ(cell2, i < 8 ? uint64_t{1} << i : cell2);
+  }
+}
+
+}  // namespace
+}  // namespace voxdag::parallel
