@@ -16,13 +16,11 @@ struct SceneFile {
   SceneFile(FileSystem& files, const std::string& path, MemoryBudget& budget)
       : file(files.open_read(path)), document(gltf::read_document(*file, budget)) {
     gltf::check_document(document);
-    charge = MemoryCharge(budget, document.memory_bytes(), "the nodes and meshes of " + path);
     buffers = std::make_unique<gltf::BufferReader>(files, *file, document, budget);
   }
 
   const std::unique_ptr<ReadableFile> file;
   gltf::Document document;
-  MemoryCharge charge;
   std::unique_ptr<gltf::BufferReader> buffers;
 };
 

@@ -87,7 +87,7 @@ void BufferReader::check_length(int index) {
     refuse(document_.path, "buffer " + std::to_string(index) + " claims " +
                                std::to_string(buffer.byte_length) + " bytes, " +
                                std::to_string(there) + " are there" +
-                               (buffer.uri.empty() ? "" : " in " + buffer.uri));
+                               (buffer.uri.empty() ? "" : " in " + printable(buffer.uri)));
 }
 
 const ReadableFile& BufferReader::external(int index) {

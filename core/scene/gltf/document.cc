@@ -9,13 +9,6 @@ namespace {
 
 constexpr size_t kLongestName = 64;
 
-std::string printable(const std::string& name) {
-  std::string shown = name.substr(0, kLongestName);
-  for (char& c : shown)
-    if (static_cast<unsigned char>(c) < 0x20 || c == '"' || c == 0x7f) c = '?';
-  return name.size() > kLongestName ? shown + "..." : shown;
-}
-
 template <class T>
 std::string name_of(const char* kind, const std::vector<T>& all, int index) {
   const size_t i = static_cast<size_t>(index);
@@ -29,6 +22,13 @@ uint64_t bytes_of(const std::vector<T>& v) {
 }
 
 }  // namespace
+
+std::string printable(const std::string& text) {
+  std::string shown = text.substr(0, kLongestName);
+  for (char& c : shown)
+    if (static_cast<unsigned char>(c) < 0x20 || c == '"' || c == 0x7f) c = '?';
+  return text.size() > kLongestName ? shown + "..." : shown;
+}
 
 std::string numbered(int index, const std::string& name) {
   const std::string number = std::to_string(index);

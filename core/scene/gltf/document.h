@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/memory_budget.h"
 #include "core/scene/gltf/transform.h"
 
 namespace voxdag::gltf {
@@ -139,14 +140,15 @@ struct Document {
   int scene = -1;                        // the default one
   std::vector<int> roots;                // of the scene to draw, set by check_document()
   std::vector<std::string> warnings;
+  MemoryCharge charge;  // for memory_bytes()
 
-  // "node 3 \"wheel\"", for messages: control characters and overlong names are cut.
+  // "node 3 \"wheel\"", for messages.
   std::string name_node(int node) const;
   std::string name_mesh(int mesh) const;
   std::string name_accessor(int accessor) const;
   std::string name_skin(int skin) const;
 
-  // About what the structs hold, for the memory budget.
+  // About what all of this takes.
   uint64_t memory_bytes() const;
 };
 
@@ -162,6 +164,9 @@ inline uint64_t element_bytes(const Accessor& accessor) {
 uint64_t triangle_count(const Document& document, const Primitive& primitive);
 // Times the node's mesh is drawn.
 uint64_t instance_count(const Document& document, const Node& node);
+
+// A text from the file as messages show it: control characters replaced, cut if overlong.
+std::string printable(const std::string& text);
 
 // "16 \"name\"", or the bare number for what has no name.
 std::string numbered(int index, const std::string& name);

@@ -29,7 +29,7 @@ bool is_harmless(std::string_view name) {
 void check_required_extensions(const std::string& path, const std::vector<std::string>& required) {
   for (const std::string& name : required)
     if (!is_read(name) && !is_harmless(name))
-      refuse(path, "requires the extension " + name + ", which voxdag does not read");
+      refuse(path, "requires the extension " + printable(name) + ", which voxdag does not read");
 }
 
 std::vector<std::string> warn_of_unread_extensions(const std::string& path,
@@ -37,7 +37,7 @@ std::vector<std::string> warn_of_unread_extensions(const std::string& path,
   std::vector<std::string> warnings;
   for (const std::string& name : used)
     if (!is_read(name) && !is_harmless(name))
-      warnings.push_back(path + ": the optional extension " + name + " is ignored");
+      warnings.push_back(path + ": the optional extension " + printable(name) + " is ignored");
   return warnings;
 }
 

@@ -12,58 +12,56 @@ namespace {
 
 using nlohmann::json;
 
-constexpr uint64_t kChargeStepBytes = 64 << 10;
-
 constexpr size_t kLongestReason = 300;
 constexpr size_t kLongestKey = 64;
+constexpr size_t kSectionDepth = 2;  // the root and one of its arrays
 
-// A base64 data: URI had JSON escapes inside, so that its place in the file does not do.
+// A data: URI had JSON escapes inside, so that its place in the file does not do.
 struct EscapedDataUri {};
 
-// Where the text before the comma of a data: URI must end.
+// What the text before the comma of a data: URI must end with.
 constexpr std::string_view kBase64Mark = ";base64";
 
+// Takes the parser's events, follows where in the schema they are, and sorts what it finds.
 class Filter : public nlohmann::json_sax<json> {
  public:
-  Filter(const std::string& path, const JsonWindow& window, bool withheld, MemoryBudget& budget)
-      : path_(path), window_(window), withheld_(withheld) {
-    out_.charge = MemoryCharge(budget, 0, "the JSON of " + path);
-  }
+  Filter(const std::string& path, const JsonWindow& window, MemoryBudget& budget)
+      : path_(path), window_(window), out_(budget, "the JSON of " + path) {}
 
-  FilteredJson take() {
-    out_.text += "  ";  // tinygltf takes no text of less than four characters, "{}" is one
-    return std::move(out_);
-  }
+  FilteredJson take() { return std::move(out_); }
 
   bool null() override {
     if (const Schema* s = value()) violate(*s, "null");
     return true;
   }
   bool boolean(bool v) override {
-    if (const Schema* s = value_of(JsonType::kBoolean, "a boolean")) emit(*s, v ? "true" : "false");
+    if (const Schema* s = value_of(JsonType::kBoolean, "a boolean"))
+      keep_value(*s, v ? "true" : "false");
     return true;
   }
   bool number_integer(number_integer_t v) override {
-    const Schema* s = value();
-    if (s && s->type != JsonType::kNumber) violate(*s, std::to_string(v));
-    if (s && s->type == JsonType::kNumber) emit(*s, std::to_string(v));
+    const std::string digits = std::to_string(v);
+    if (const Schema* s = value_of(JsonType::kNumber, digits.c_str())) keep_value(*s, digits);
     return true;
   }
   bool number_unsigned(number_unsigned_t v) override {
-    if (const Schema* s = value()) whole_number(*s, v);
+    const Schema* s = value();
+    if (s && !is_whole_number_of(s->type, v))
+      violate(*s, std::to_string(v));
+    else if (s)
+      keep_whole_number(*s, v);
     return true;
   }
   bool number_float(number_float_t, const string_t& digits) override {
-    if (const Schema* s = value_of(JsonType::kNumber, digits.c_str())) emit(*s, digits);
+    if (const Schema* s = value_of(JsonType::kNumber, digits.c_str())) keep_value(*s, digits);
     return true;
   }
   bool string(string_t& v) override {
-    const Schema* s = value_of(JsonType::kString, "a string");
-    if (!s) return true;
-    if (s->keep == Keep::kParsed)
-      emit(*s, json(v).dump());
-    else
-      note_string(*s, v);
+    const Schema* s = value();
+    if (s && !is_string_of(s->type, v))
+      violate(*s, s->type == JsonType::kElementType ? printable(v) : "a string");
+    else if (s)
+      keep_string(*s, v);
     return true;
   }
   bool binary(binary_t&) override { return true; }
@@ -93,8 +91,10 @@ class Filter : public nlohmann::json_sax<json> {
   struct Frame {
     const Schema* schema;
     uint64_t seen = 0;   // bit per named member
-    uint64_t count = 0;  // values so far
-    std::string key;     // of the value that comes next or is inside
+    uint64_t count = 0;  // elements of an array so far
+    std::string key;     // of an object's value that comes next or is inside
+
+    bool is_array() const { return schema->type == JsonType::kArray; }
   };
 
   // The schema of the value that begins here, null if it is dropped.
@@ -102,10 +102,9 @@ class Filter : public nlohmann::json_sax<json> {
     if (dropped_depth_ > 0) return nullptr;
     if (frames_.empty()) return &gltf_schema();
     Frame& frame = frames_.back();
-    const Schema* schema =
-        frame.schema->type == JsonType::kArray ? frame.schema->elements : pending_;
-    if (frame.schema->type == JsonType::kArray) ++frame.count;
-    return schema;
+    if (!frame.is_array()) return pending_;
+    ++frame.count;
+    return frame.schema->elements;
   }
   const Schema* value_of(JsonType type, const char* found) {
     const Schema* s = value();
@@ -114,29 +113,15 @@ class Filter : public nlohmann::json_sax<json> {
     return nullptr;
   }
 
-  void whole_number(const Schema& s, uint64_t v) {
-    const uint64_t limit = s.type == JsonType::kIndex ? INT32_MAX : INT64_MAX;
-    const bool fits = s.type == JsonType::kIndex || s.type == JsonType::kSize
-                          ? v <= limit
-                          : s.type == JsonType::kNumber;
-    if (!fits) return violate(s, std::to_string(v));
-    if (s.keep == Keep::kBuffer) out_.buffers.back().byte_length = v;
-    emit(s, std::to_string(v));
-  }
-
   bool open(JsonType type, char bracket, const char* found) {
     const Schema* s = value_of(type, found);
     if (!s) {
       ++dropped_depth_;
       return true;
     }
-    emit(*s, std::string_view(&bracket, 1));
+    if (s->keep == Keep::kParsed) out_.slices.open(key_here(), bracket);
+    if (s->keep == Keep::kBuffer && type == JsonType::kObject) out_.buffers.emplace_back();
     frames_.push_back({s, 0, 0, {}});
-    if (s->keep == Keep::kParsed) {
-      separator_due_ = false;
-      if (type == JsonType::kObject) ++out_.object_count;
-    }
-    if (type == JsonType::kObject && s->keep == Keep::kBuffer) out_.buffers.emplace_back();
     return true;
   }
   bool close(char bracket) {
@@ -146,64 +131,64 @@ class Filter : public nlohmann::json_sax<json> {
     }
     const Schema& s = *frames_.back().schema;
     check_required(frames_.back());
-    if (s.keep == Keep::kParsed) {
-      out_.text += bracket;
-      separator_due_ = true;
-    }
+    const uint64_t count = frames_.back().count;
     frames_.pop_back();
+    if (frames_.size() == 1) out_.element_counts[frames_[0].key] = count;
+    if (s.keep != Keep::kParsed) return true;
+    out_.slices.close(bracket);
+    if (frames_.size() == kSectionDepth && frames_[1].is_array())
+      out_.slices.may_cut(frames_[0].key);
     return true;
   }
 
-  // Appends a value that is handed on, with its comma and its key.
-  void emit(const Schema& s, std::string_view value) {
-    if (s.keep != Keep::kParsed) return;
-    if (separator_due_) out_.text += ',';
-    if (!frames_.empty() && frames_.back().schema->type == JsonType::kObject)
-      out_.text += json(frames_.back().key).dump() + ":";
-    out_.text += value;
-    separator_due_ = true;
-    ++out_.value_count;
-    const uint64_t bytes = out_.text.capacity();
-    if (bytes > out_.charge.bytes() && !out_.charge.try_resize(bytes + kChargeStepBytes))
-      throw Error(ErrorCode::kOutOfMemory, "out of memory: the JSON of " + path_ + " needs over " +
-                                               std::to_string(bytes) + " bytes of the budget");
+  void keep_value(const Schema& s, std::string_view text) {
+    if (s.keep == Keep::kParsed) out_.slices.value(key_here(), text);
   }
-
-  void note_string(const Schema& s, const std::string& v) {
+  void keep_whole_number(const Schema& s, uint64_t v) {
+    if (s.keep == Keep::kBuffer) out_.buffers.back().byte_length = v;
+    if (s.keep == Keep::kIndices)
+      // The root, its meshes, a mesh, its primitives.
+      out_.indices.push_back({static_cast<uint32_t>(frames_[1].count - 1),
+                              static_cast<uint32_t>(frames_[3].count - 1), static_cast<int>(v)});
+    keep_value(s, std::to_string(v));
+  }
+  void keep_string(const Schema& s, const std::string& v) {
     switch (s.keep) {
+      case Keep::kParsed:
+        return keep_value(s, json(v).dump());
       case Keep::kHeader:
         (frames_.back().key == "version" ? out_.version : out_.min_version) = v;
-        break;
+        return;
       case Keep::kExtensionsUsed:
         out_.extensions_used.push_back(v);
-        break;
+        return;
       case Keep::kExtensionsRequired:
         out_.extensions_required.push_back(v);
-        break;
+        return;
       case Keep::kBuffer:
-        note_uri(v);
-        break;
-      case Keep::kParsed:
-        break;
+        return keep_uri(v);
+      case Keep::kIndices:
+        return;
     }
   }
 
-  void note_uri(const std::string& uri) {
+  void keep_uri(const std::string& uri) {
     Buffer& buffer = out_.buffers.back();
     if (!uri.starts_with("data:")) {
       buffer.source = Buffer::Source::kExternal;
       buffer.uri = uri;
+      if (window_.last_string_is_cut()) violate(path_here() + " is longer than any file name");
       return;
     }
     const size_t comma = uri.find(',');
     if (comma == std::string::npos ||
         !std::string_view(uri).substr(0, comma).ends_with(kBase64Mark))
       return violate(path_here() + " is a data: URI that is not base64");
-    if (!window_.last_string_escaped()) {
+    if (!window_.last_string_is_escaped()) {
       const FileRange all = window_.last_string();
       buffer.source = Buffer::Source::kBase64;
       buffer.text = {all.begin + comma + 1, all.size - comma - 1};
-    } else if (withheld_) {
+    } else if (window_.last_string_is_cut()) {
       throw EscapedDataUri{};
     } else {
       buffer.source = Buffer::Source::kMemory;
@@ -231,32 +216,33 @@ class Filter : public nlohmann::json_sax<json> {
   void violate(const std::string& what) {
     if (out_.violation.empty()) out_.violation = what;
   }
+
+  const std::string* key_here() const {
+    return frames_.empty() || frames_.back().is_array() ? nullptr : &frames_.back().key;
+  }
   // "nodes[3].children[0]"
   std::string path_here() const {
     std::string path;
     for (const Frame& frame : frames_) {
-      const bool is_array = frame.schema->type == JsonType::kArray;
-      if (!is_array && !path.empty()) path += '.';
-      path += is_array ? std::to_string(frame.count - 1).insert(0, 1, '[').append(1, ']')
-                       : frame.key.substr(0, kLongestKey);
+      if (!frame.is_array() && !path.empty()) path += '.';
+      path += frame.is_array() ? std::to_string(frame.count - 1).insert(0, 1, '[').append(1, ']')
+                               : frame.key.substr(0, kLongestKey);
     }
     return path.empty() ? "the root" : path;
   }
 
   const std::string& path_;
   const JsonWindow& window_;
-  const bool withheld_;
   FilteredJson out_;
   std::vector<Frame> frames_;
   const Schema* pending_ = nullptr;  // of the value after the key just read
   uint64_t dropped_depth_ = 0;       // open brackets of what is being dropped
-  bool separator_due_ = false;
 };
 
-FilteredJson filter_once(const ReadableFile& file, FileRange range, bool withhold,
+FilteredJson filter_once(const ReadableFile& file, FileRange range, bool cut_strings,
                          MemoryBudget& budget) {
-  JsonWindow window(file, range, withhold);
-  Filter filter(file.path(), window, withhold, budget);
+  JsonWindow window(file, range, cut_strings, budget);
+  Filter filter(file.path(), window, budget);
   json::sax_parse(JsonIterator(window), JsonIterator(), &filter);
   return filter.take();
 }
@@ -267,8 +253,6 @@ FilteredJson filter_json(const ReadableFile& file, FileRange range, MemoryBudget
   try {
     return filter_once(file, range, true, budget);
   } catch (const EscapedDataUri&) {
-    // The URI itself, the parser's copy and the one that is kept.
-    const MemoryCharge strings(budget, 3 * range.size, "escaped data: URIs of " + file.path());
     return filter_once(file, range, false, budget);
   }
 }

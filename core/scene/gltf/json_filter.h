@@ -4,27 +4,37 @@
 //     at all (versions, extensions).
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "core/scene/gltf/document.h"
+#include "core/scene/gltf/json_slices.h"
 
 namespace voxdag::gltf {
 
+// The member "indices" of a primitive.
+struct PrimitiveIndices {
+  uint32_t mesh;
+  uint32_t primitive;
+  int accessor;
+};
+
 struct FilteredJson {
-  std::string text;
-  uint64_t object_count = 0;  // in `text`
-  uint64_t value_count = 0;   // in `text`, objects and arrays included
-  MemoryCharge charge;        // for `text`
+  explicit FilteredJson(MemoryBudget& budget, const std::string& what) : slices(budget, what) {}
+
+  JsonSlices slices;
+  std::map<std::string, uint64_t> element_counts;  // of the root's arrays, by name
+  std::vector<PrimitiveIndices> indices;
   std::string version;
   std::string min_version;
   std::vector<std::string> extensions_used;
   std::vector<std::string> extensions_required;
   std::vector<Buffer> buffers;
   // The first member that is missing, repeated or of a wrong type, and what was expected there;
-  // empty if none. Then `text` is not to be used, but the versions still tell a glTF 1.0 file.
+  // empty if none. Then the slices are not to be used, but the versions still tell a glTF 1.0 file.
   std::string violation;
 };
 

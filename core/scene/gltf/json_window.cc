@@ -1,27 +1,30 @@
 #include "core/scene/gltf/json_window.h"
 
 #include <algorithm>
-#include <string_view>
+
+#include "core/base/error.h"
 
 namespace voxdag::gltf {
 namespace {
 
 constexpr size_t kWindowBytes = size_t{64} << 10;
-constexpr std::string_view kDataPrefix = "data:";
-// Room for the media type; what follows is withheld.
-constexpr uint64_t kShownCharacters = 256;
+// As long as any name or path of a file need be.
+constexpr uint64_t kShownCharacters = 4096;
+// The parser keeps a string raw and decoded, in buffers that grow by doubling, and hands on a copy.
+constexpr uint64_t kCopies = 6;
+constexpr uint64_t kChargeStepBytes = 64 << 10;
 
-bool is_base64(char c) {
-  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '+' ||
-         c == '/' || c == '=';
-}
+// ASCII that stands for itself within a string.
+bool is_plain(char c) { return c >= ' ' && c <= '~'; }
 
 }  // namespace
 
-JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, bool withhold)
+JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, bool cut_strings,
+                       MemoryBudget& budget)
     : file_(file),
       json_(json),
-      withhold_(withhold),
+      cut_strings_(cut_strings),
+      charge_(budget, 0, "strings of the JSON"),
       window_begin_(json.begin),
       position_(json.begin) {
   advance();
@@ -37,6 +40,9 @@ void JsonWindow::advance() {
     track(c);
     current_ = c;
   } while (is_withheld());
+  if (!in_string_) return;
+  ++shown_;
+  charge_shown();
 }
 
 bool JsonWindow::next(char& c) {
@@ -56,9 +62,10 @@ bool JsonWindow::next(char& c) {
 void JsonWindow::track(char c) {
   if (in_string_) return track_in_string(c);
   if (c != '"') return;
-  in_string_ = is_data_uri_ = true;
+  in_string_ = true;
   escaped_ = after_backslash_ = in_escape_ = false;
   hex_digits_left_ = 0;
+  shown_ = 0;
   string_ = {position_, 0};
 }
 
@@ -74,16 +81,21 @@ void JsonWindow::track_in_string(char c) {
   } else {
     in_escape_ = false;
     in_string_ = c != '"';
-    if (!in_string_) return;
   }
-  const uint64_t i = string_.size++;
-  if (i < kDataPrefix.size() && c != kDataPrefix[static_cast<size_t>(i)]) is_data_uri_ = false;
+  string_.size += in_string_;
 }
 
-// An escape is never cut in two: it is not withheld, wherever it is.
+// Neither an escape nor a character of several bytes is ever cut in two.
 bool JsonWindow::is_withheld() const {
-  return withhold_ && in_string_ && is_data_uri_ && !in_escape_ &&
-         string_.size > kShownCharacters && is_base64(current_);
+  return cut_strings_ && in_string_ && string_.size > kShownCharacters && !in_escape_ &&
+         is_plain(current_);
+}
+
+void JsonWindow::charge_shown() {
+  const uint64_t bytes = kCopies * shown_;
+  if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kChargeStepBytes)) return;
+  throw Error(ErrorCode::kOutOfMemory, "out of memory: a string in the JSON of " + file_.path() +
+                                           " has over " + std::to_string(shown_) + " characters");
 }
 
 }  // namespace voxdag::gltf

@@ -1,8 +1,9 @@
 // The JSON of a scene file, read through a small window, one character at a time.
 //
-// A data: URI may be as long as the file, be it geometry or a picture. Its base64 characters past
-// the first few are withheld from the parser, which would gather them in memory; where the string
-// lies in the file is remembered instead, so that a buffer can be decoded from there by windows.
+// Strings can be long: a data: URI, be it geometry or a picture, may be most of the file. Their
+// plain characters past the first few thousand are withheld from the parser, which would gather
+// them in memory; where the string lies in the file is remembered instead, so that a buffer can be
+// decoded from there by windows. What the parser does gather is charged.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +11,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "core/scene/gltf/document.h"
 
@@ -17,27 +19,30 @@ namespace voxdag::gltf {
 
 class JsonWindow {
  public:
-  // `withhold` false hands out every character.
-  JsonWindow(const ReadableFile& file, FileRange json, bool withhold);
+  // `cut_strings` false hands out every character.
+  JsonWindow(const ReadableFile& file, FileRange json, bool cut_strings, MemoryBudget& budget);
 
   bool at_end() const { return ended_; }
   char current() const { return current_; }
   void advance();
 
-  // The string that ended last: its raw characters between the quotes, and whether there is a JSON
-  // escape among them.
+  // Of the string that ended last: its raw characters between the quotes, whether one of them is
+  // an escape of JSON, and whether one was withheld.
   FileRange last_string() const { return string_; }
-  bool last_string_escaped() const { return escaped_; }
+  bool last_string_is_escaped() const { return escaped_; }
+  bool last_string_is_cut() const { return shown_ < string_.size; }
 
  private:
   bool next(char& c);
   void track(char c);
   void track_in_string(char c);
   bool is_withheld() const;
+  void charge_shown();
 
   const ReadableFile& file_;
   const FileRange json_;
-  const bool withhold_;
+  const bool cut_strings_;
+  MemoryCharge charge_;
   std::vector<char> window_;
   uint64_t window_begin_ = 0;  // position in the file of window_[0]
   uint64_t position_ = 0;      // of the character after current_
@@ -48,8 +53,8 @@ class JsonWindow {
   bool after_backslash_ = false;
   int hex_digits_left_ = 0;  // of a \uXXXX
   bool in_escape_ = false;   // current_ is part of an escape
-  bool is_data_uri_ = false;
   bool escaped_ = false;
+  uint64_t shown_ = 0;  // characters that were not withheld
   FileRange string_;
 };
 

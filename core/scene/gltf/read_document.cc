@@ -13,9 +13,9 @@ int major_version(const std::string& version) {
 
 void check_version(const std::string& path, const FilteredJson& json) {
   if (!json.version.empty() && major_version(json.version) != 2)
-    refuse(path, "is glTF version " + json.version.substr(0, 16) + ", expected 2.0");
+    refuse(path, "is glTF version " + printable(json.version) + ", expected 2.0");
   if (!json.min_version.empty() && json.min_version != "2.0")
-    refuse(path, "needs glTF version " + json.min_version.substr(0, 16) + ", voxdag reads 2.0");
+    refuse(path, "needs glTF version " + printable(json.min_version) + ", voxdag reads 2.0");
 }
 
 // The GLB's own buffer is its first, if that has no uri.

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "core/scene/gltf/document.h"
+
 namespace voxdag::gltf {
 namespace {
 
@@ -18,6 +20,10 @@ Schema scalar(JsonType type, Keep keep = Keep::kParsed) { return {type, {}, null
 
 const Schema kIndex = scalar(JsonType::kIndex);
 const Schema kSize = scalar(JsonType::kSize);
+const Schema kStride = scalar(JsonType::kStride);
+const Schema kComponentType = scalar(JsonType::kComponentType);
+const Schema kElementType = scalar(JsonType::kElementType);
+const Schema kPrimitiveIndices = scalar(JsonType::kIndex, Keep::kIndices);
 const Schema kString = scalar(JsonType::kString);
 const Schema kBoolean = scalar(JsonType::kBoolean);
 const Schema kNumber = scalar(JsonType::kNumber);
@@ -43,21 +49,21 @@ const Schema kBuffers = array_of(kBuffer, Keep::kBuffer);
 const Schema kView = object({{"buffer", &kIndex, kRequired},
                              {"byteLength", &kSize, kRequired},
                              {"byteOffset", &kSize},
-                             {"byteStride", &kSize}});
+                             {"byteStride", &kStride}});
 const Schema kViews = array_of(kView);
 
 const Schema kSparseIndices = object({{"bufferView", &kIndex, kRequired},
                                       {"byteOffset", &kIndex},
-                                      {"componentType", &kIndex, kRequired}});
+                                      {"componentType", &kComponentType, kRequired}});
 const Schema kSparseValues = object({{"bufferView", &kIndex, kRequired}, {"byteOffset", &kIndex}});
 const Schema kSparse = object({{"count", &kIndex, kRequired},
                                {"indices", &kSparseIndices, kRequired},
                                {"values", &kSparseValues, kRequired}});
 const Schema kAccessor = object({{"bufferView", &kIndex},
                                  {"byteOffset", &kSize},
-                                 {"componentType", &kIndex, kRequired},
+                                 {"componentType", &kComponentType, kRequired},
                                  {"count", &kSize, kRequired},
-                                 {"type", &kString, kRequired},
+                                 {"type", &kElementType, kRequired},
                                  {"normalized", &kBoolean},
                                  {"sparse", &kSparse},
                                  {"name", &kString}});
@@ -66,7 +72,7 @@ const Schema kAccessors = array_of(kAccessor);
 const Schema kPrimitiveExtensions = object({{"KHR_draco_mesh_compression", &kPresence}});
 const Schema kTargets = array_of(kAccessorByName);
 const Schema kPrimitive = object({{"attributes", &kAccessorByName, kRequired},
-                                  {"indices", &kIndex},
+                                  {"indices", &kPrimitiveIndices},
                                   {"mode", &kIndex},
                                   {"targets", &kTargets},
                                   {"extensions", &kPrimitiveExtensions}});
@@ -122,6 +128,12 @@ const char* type_name(JsonType type) {
       return "a whole number from 0 to 2147483647";
     case JsonType::kSize:
       return "a whole number that is not negative";
+    case JsonType::kStride:
+      return "a multiple of 4 up to 252";
+    case JsonType::kComponentType:
+      return "a component type (5120 to 5123, 5125 or 5126)";
+    case JsonType::kElementType:
+      return "SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 or MAT4";
     case JsonType::kNumber:
       return "a number";
     case JsonType::kString:
@@ -130,6 +142,28 @@ const char* type_name(JsonType type) {
       return "true or false";
   }
   return "";
+}
+
+bool is_whole_number_of(JsonType type, uint64_t value) {
+  switch (type) {
+    case JsonType::kIndex:
+      return value <= INT32_MAX;
+    case JsonType::kSize:
+      return value <= INT64_MAX;
+    case JsonType::kStride:
+      return value <= 252 && value % 4 == 0;
+    case JsonType::kComponentType:
+      return value <= INT32_MAX && component_bytes(static_cast<int>(value)) > 0;
+    default:
+      return type == JsonType::kNumber;
+  }
+}
+
+bool is_string_of(JsonType type, std::string_view value) {
+  if (type == JsonType::kString) return true;
+  return type == JsonType::kElementType &&
+         (value == "SCALAR" || value == "VEC2" || value == "VEC3" || value == "VEC4" ||
+          value == "MAT2" || value == "MAT3" || value == "MAT4");
 }
 
 }  // namespace voxdag::gltf

@@ -2,6 +2,7 @@
 // (materials, images, animations, cameras, extras, unknown extensions) is dropped unread.
 #pragma once
 
+#include <cstdint>
 #include <string_view>
 #include <vector>
 
@@ -12,8 +13,11 @@ enum class JsonType {
   kArray,
   kIndex,   // a whole number from 0 to 2^31 - 1
   kSize,    // a whole number from 0 to 2^63 - 1
+  kStride,  // 0, or a multiple of 4 up to 252
+  kComponentType,
   kNumber,  // any number
   kString,
+  kElementType,  // "SCALAR", "VEC2" ... "MAT4"
   kBoolean,
 };
 
@@ -23,7 +27,8 @@ enum class Keep {
   kHeader,  // asset: its strings are noted
   kExtensionsUsed,
   kExtensionsRequired,
-  kBuffer,  // noted and never handed on: tinygltf would load it
+  kBuffer,   // noted and never handed on: tinygltf would load it
+  kIndices,  // of a primitive; likewise: tinygltf refuses some that are right
 };
 
 struct Schema;
@@ -52,5 +57,9 @@ const Schema& gltf_schema();
 
 // "an array", for messages.
 const char* type_name(JsonType type);
+
+// Whether a value of JSON is of a type.
+bool is_whole_number_of(JsonType type, uint64_t value);
+bool is_string_of(JsonType type, std::string_view value);
 
 }  // namespace voxdag::gltf

@@ -141,6 +141,42 @@ TEST(GltfBuffers, UrisThatAreNotFollowed) {
   }
 }
 
+// Strings of many megabytes, read or not, take no memory: the budget here is far smaller. Only what
+// must be gathered whole, escapes, is charged, and refused if it does not fit.
+TEST(GltfBuffers, LongStringsTakeNoMemory) {
+  SceneBuilder scene = one_triangle();
+  const std::string picture = "data:image/png;base64," + std::string(3000000, 'A');
+  scene.root["images"] = {{{"uri", picture}}};
+  scene.root["nodes"][0]["name"] = std::string(3000000, 'x') + "\u00e4";
+  scene.root["asset"]["generator"] = std::string(3000000, '\t');
+  scene.root["extras"] = {{std::string(3000000, 'k'), 1}};
+  EXPECT_THROW(OpenScene(scene.glb(), {}, uint64_t{1} << 20), Error);
+  scene.root["asset"].erase("generator");
+  EXPECT_EQ(OpenScene(scene.glb(), {}, uint64_t{1} << 20).triangles().size(), 1u);
+}
+
+// Thousands of nodes, meshes and accessors go through the parser in slices, in their order.
+TEST(GltfBuffers, StructureInSlices) {
+  constexpr int kCount = 20000;
+  SceneBuilder scene;
+  const int view = scene.add_view<float>(std::vector<float>(9 + kCount, 1));
+  for (int i = 0; i < kCount; ++i) {
+    scene.add("accessors", {{"bufferView", view},
+                            {"byteOffset", 4 * i},
+                            {"componentType", kF32},
+                            {"count", 3},
+                            {"type", "VEC3"}});
+    scene.add_mesh({{"attributes", {{"POSITION", i}}}, {"indices", 0}});
+    scene.add_root({{"mesh", kCount - 1 - i}, {"translation", {i, 0, 0}}});
+  }
+  const int indices = scene.add_accessor<uint16_t>("SCALAR", kU16, {0, 1, 2});
+  for (Json& mesh : scene.root["meshes"]) mesh["primitives"][0]["indices"] = indices;
+  OpenScene open(scene.glb(), {}, uint64_t{40} << 20);
+  const auto triangles = open.triangles();
+  ASSERT_EQ(triangles.size(), size_t{kCount});
+  for (int i = 0; i < kCount; ++i) ASSERT_EQ(triangles[static_cast<size_t>(i)][0][0], i + 1.0);
+}
+
 // A buffer without uri is the GLB's own or nobody's.
 TEST(GltfBuffers, WithoutUri) {
   SceneBuilder scene = one_triangle();

@@ -74,6 +74,8 @@ const Refusal kRefusals[] = {
      "mesh 0: primitive 0 has mode 7"},
     {"POSITION that is not there", "/meshes/0/primitives/0/attributes/POSITION", 9,
      "mesh 0: primitive 0: POSITION: accessor 9 does not exist"},
+    {"indices that are not there", "/meshes/0/primitives/0/indices", 9,
+     "mesh 0: primitive 0: indices: accessor 9 does not exist"},
     {"POSITION of scalars", "/meshes/0/primitives/0/attributes/POSITION", 1,
      "POSITION: accessor 1 has 1 components, expected 3"},
     {"POSITION of integers", "/accessors/0/componentType", kI16,
@@ -82,8 +84,9 @@ const Refusal kRefusals[] = {
     {"indices of floats", "/accessors/1/componentType", kF32,
      "indices: accessor 1 has components of type float"},
     {"indices of signed integers", "/accessors/1/componentType", kI16, "of type short"},
-    {"an unknown component type", "/accessors/0/componentType", 5124, "of type unknown"},
-    {"an unknown type", "/accessors/0/type", "VEC9", "VEC9"},
+    {"an unknown component type", "/accessors/0/componentType", 5124,
+     "accessors[0].componentType is 5124"},
+    {"an unknown type", "/accessors/0/type", "VEC9", "accessors[0].type is VEC9"},
     {"morph targets of another count", "/meshes/0/primitives/0/targets",
      Json::array({{{"POSITION", 2}}}), "accessor 2 has 2 elements, expected 3"},
     {"a target that is not there", "/meshes/0/primitives/0/targets",
@@ -102,8 +105,8 @@ const Refusal kRefusals[] = {
     {"a stride below the element", "/bufferViews/0/byteStride", 8,
      "the byteStride of bufferView 0"},
     {"a stride beyond the view", "/bufferViews/0/byteStride", 252, "ends past the 36 bytes"},
-    {"a stride over 252", "/bufferViews/0/byteStride", 256, "byteStride"},
-    {"an odd stride", "/bufferViews/0/byteStride", 13, "byteStride"},
+    {"a stride over 252", "/bufferViews/0/byteStride", 256, "bufferViews[0].byteStride is 256"},
+    {"an odd stride", "/bufferViews/0/byteStride", 13, "bufferViews[0].byteStride is 13"},
     {"indices with a stride", "/bufferViews/1/byteStride", 4, "bufferView 1 has a byteStride"},
     {"a view past its buffer", "/bufferViews/0/byteLength", 4096, "ends past the"},
     {"a view that overflows", "/bufferViews/0/byteOffset", INT64_MAX, "ends past the"},
@@ -196,6 +199,17 @@ TEST(GltfRefusals, SparseIndices) {
     EXPECT_NE(error_of_file(scene.glb()).message().find("accessor 0: its sparse index "),
               std::string::npos);
   }
+}
+
+// Sparse indices may stand on their own, without a view of zeros under them.
+TEST(GltfRefusals, SparseIndicesWithoutBase) {
+  SceneBuilder scene = one_triangle();
+  scene.root["accessors"][1].erase("bufferView");
+  scene.root["accessors"][1]["sparse"] = {
+      {"count", 2},
+      {"indices", {{"bufferView", scene.add_view<uint8_t>({1, 2})}, {"componentType", kU8}}},
+      {"values", {{"bufferView", scene.add_view<uint16_t>({1, 2})}}}};
+  EXPECT_EQ(triangles_of_file(scene.glb()), triangles_of_file(one_triangle().glb()));
 }
 
 // A member given twice could mean either; it is refused.

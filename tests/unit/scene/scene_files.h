@@ -36,6 +36,7 @@ class MemoryFiles : public FileSystem {
   void make_directories(const std::string&) override { read_only(); }
   void remove_directory(const std::string&) override { read_only(); }
   std::vector<DirectoryEntry> list(const std::string&) override { read_only(); }
+  void touch(const std::string&) override { read_only(); }
   void sync_directory(const std::string&) override { read_only(); }
   uint64_t free_space(const std::string&) override { return 0; }
   std::unique_ptr<FileLock> try_lock(const std::string&) override { read_only(); }

@@ -1,0 +1,176 @@
+// Scenes with bytes changed at random either work or end with an Error: no crash, no hang, no
+// allocation by a count that the bytes do not bear out (the sanitizers and the budget watch).
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+// A mutation may turn a count of instances into a large one; that is no reason to draw them all.
+constexpr uint64_t kMostTriangles = 200000;
+
+SceneBuilder everything() {
+  SceneBuilder scene = one_triangle();
+  const int joints = scene.add_accessor<uint8_t>("VEC4", kU8, std::vector<uint8_t>(12, 0));
+  const int weights = scene.add_accessor<float>("VEC4", kF32, std::vector<float>(12, 0.25f));
+  const int target = scene.add_positions(std::vector<float>(9, 1));
+  scene.root["accessors"][0]["sparse"] = {
+      {"count", 1},
+      {"indices", {{"bufferView", scene.add_view<uint8_t>({2})}, {"componentType", kU8}}},
+      {"values", {{"bufferView", scene.add_view<float>({0, 1, 0})}}}};
+  Json& primitive = scene.root["meshes"][0]["primitives"][0];
+  primitive["attributes"]["JOINTS_0"] = joints;
+  primitive["attributes"]["WEIGHTS_0"] = weights;
+  primitive["targets"] = Json::array({{{"POSITION", target}}});
+  scene.root["meshes"][0]["weights"] = {0.5};
+  scene.add("skins", {{"joints", {0, 1}}});
+  scene.add_root({{"mesh", 0}, {"skin", 0}});
+  const int translations = scene.add_positions({0, 0, 1, 0, 0, 2});
+  scene.add_root(
+      {{"mesh", 0},
+       {"scale", {1, 2, 3}},
+       {"extensions",
+        {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", translations}}}}}}}});
+  Json strip = primitive;
+  strip["mode"] = 5;
+  scene.root["meshes"][0]["primitives"].push_back(strip);
+  return scene;
+}
+
+// Changes one to eight bytes: to anything, to a digit, to another byte of the file; or cuts it.
+std::string mutate(std::string file, std::mt19937& random) {
+  const size_t changes = 1 + random() % 8;
+  for (size_t i = 0; i < changes && !file.empty(); ++i) {
+    char& c = file[random() % file.size()];
+    switch (random() % 5) {
+      case 0:
+        c = static_cast<char>(random());
+        break;
+      case 1:
+        c = static_cast<char>('0' + random() % 10);
+        break;
+      case 2:
+        c = file[random() % file.size()];
+        break;
+      case 3:
+        c = static_cast<char>(c ^ 1 << random() % 8);
+        break;
+      default:
+        if (random() % 20 == 0) file.resize(random() % file.size());
+    }
+  }
+  return file;
+}
+
+// What became of the mutations; a fuzzer whose files all break at once, or all work, tests little.
+struct Outcomes {
+  int worked = 0;
+  int refused = 0;
+};
+
+void run(const std::string& original, int count, uint32_t seed, Outcomes& outcomes) {
+  std::mt19937 random(seed);
+  for (int i = 0; i < count; ++i) {
+    const std::string file = mutate(original, random);
+    SCOPED_TRACE("seed " + std::to_string(seed) + ", mutation " + std::to_string(i));
+    try {
+      OpenScene open(file, {.skip_invalid = i % 2 == 0}, uint64_t{16} << 20);
+      if (open.source->declared_triangles() <= kMostTriangles) open.triangles();
+      ++outcomes.worked;
+    } catch (const Error& e) {
+      ++outcomes.refused;
+      EXPECT_NE(e.message(), "");
+    } catch (const std::exception& e) {
+      ADD_FAILURE() << "not an Error: " << e.what();
+    }
+  }
+}
+
+TEST(FuzzScene, MutatedGlb) {
+  const std::string file = everything().glb();
+  ASSERT_FALSE(triangles_of_file(file).empty());
+  Outcomes outcomes;
+  run(file, 2000, 1, outcomes);
+  EXPECT_GT(outcomes.worked, 100);
+  EXPECT_GT(outcomes.refused, 100);
+}
+
+TEST(FuzzScene, MutatedGltfWithDataUri) {
+  const SceneBuilder scene = everything();
+  const std::string file = scene.gltf("data:application/octet-stream;base64," + base64(scene.bin));
+  ASSERT_FALSE(triangles_of_file(file).empty());
+  Outcomes outcomes;
+  run(file, 2000, 2, outcomes);
+  EXPECT_GT(outcomes.worked, 100);
+  EXPECT_GT(outcomes.refused, 100);
+}
+
+// Only numbers of the JSON change, so that most mutations reach the checks behind the parser.
+TEST(FuzzScene, MutatedNumbers) {
+  const uint64_t kNumbers[] = {0,
+                               1,
+                               2,
+                               3,
+                               4,
+                               5,
+                               6,
+                               7,
+                               255,
+                               65535,
+                               1u << 31,
+                               uint64_t{1} << 32,
+                               uint64_t{1} << 40,
+                               INT64_MAX,
+                               UINT64_MAX};
+  std::mt19937 random(3);
+  SceneBuilder scene = everything();
+  const std::string bin = scene.bin;
+  const std::string text = scene.root.dump();
+  for (int i = 0; i < 3000; ++i) {
+    SCOPED_TRACE("seed 3, mutation " + std::to_string(i));
+    std::string changed = text;
+    for (size_t k = 0, n = 1 + random() % 2; k < n; ++k) {
+      size_t at = random() % changed.size();
+      while (at < changed.size() && !std::isdigit(static_cast<unsigned char>(changed[at]))) ++at;
+      size_t end = at;
+      while (end < changed.size() && std::isdigit(static_cast<unsigned char>(changed[end]))) ++end;
+      changed.replace(at, end - at, std::to_string(kNumbers[random() % std::size(kNumbers)]));
+    }
+    changed.insert(1, R"("buffers":[{"byteLength":)" + std::to_string(bin.size()) + "}],");
+    try {
+      OpenScene open(make_glb(changed, bin), {.skip_invalid = i % 2 == 0}, uint64_t{16} << 20);
+      if (open.source->declared_triangles() <= kMostTriangles) open.triangles();
+    } catch (const Error& e) {
+      EXPECT_NE(e.message(), "");
+    } catch (const std::exception& e) {
+      ADD_FAILURE() << "not an Error: " << e.what();
+    }
+  }
+}
+
+TEST(FuzzScene, MutatedSharedScenes) {
+  const std::filesystem::path folder = std::filesystem::path(VOXDAG_SHARED_SCENES) / "conformance";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the shared scenes are not there";
+  uint32_t seed = 10;
+  Outcomes outcomes;
+  for (const char* name :
+       {"c05_strip_fan.glb", "c08_sparse.glb", "c14_quantized.glb", "c15_gpu_instancing.glb",
+        "c17_morph.glb", "c18_skinned.glb", "c23_base64.gltf"}) {
+    SCOPED_TRACE(name);
+    std::ifstream in(folder / name, std::ios::binary);
+    const std::string file{std::istreambuf_iterator<char>(in), {}};
+    ASSERT_FALSE(file.empty());
+    run(file, 200, seed++, outcomes);
+  }
+  EXPECT_GT(outcomes.worked, 100);
+  EXPECT_GT(outcomes.refused, 100);
+}
+
+}  // namespace
+}  // namespace voxdag::test
