@@ -12,6 +12,7 @@ namespace {
 struct BuildCommand {
   BuildOptions options;
   RunOptions run;
+  std::string cache_size;
   bool json = false;
 };
 
@@ -40,6 +41,9 @@ void run(const BuildCommand& command, CommandContext& context) {
   BuildSpec spec = command.options.spec();
   spec.run.output = command.run.output;
   spec.run.keep_work = command.run.keep_work;
+  spec.run.cache_folder = command.run.cache_folder;
+  if (!command.cache_size.empty())
+    spec.run.cache_bytes = parse_size(command.cache_size, "--cache-size");
   spec.run.restart = command.run.restart;
   spec.run.force = command.run.force;
   const auto progress = make_progress_bar();
@@ -57,6 +61,9 @@ void add_build_command(CLI::App& app, CommandContext& context) {
   const auto state = std::make_shared<BuildCommand>();
   state->options.declare(*command);
   command->add_option("-o,--output", state->run.output, "the .vdag file to make")->required();
+  command->add_option("--cache", state->run.cache_folder,
+                      "folder of subvolumes shared between builds");
+  command->add_option("--cache-size", state->cache_size, "its limit (default 16GiB)");
   command->add_flag("--keep-work", state->run.keep_work, "leave the temporary files");
   command->add_flag("--restart", state->run.restart, "start over, whatever the work folder holds");
   command->add_flag("--force", state->run.force, "build even if the estimate says it cannot fit");

@@ -32,6 +32,8 @@ struct RunOptions {
   unsigned threads = 0;          // 0 for all cores
   uint64_t subvolume_edge = 0;   // voxels, a power of two; 0 for a choice by the plan
   std::string backend = "auto";  // auto or cpu
+  std::string cache_folder;      // "" for none
+  uint64_t cache_bytes = uint64_t{16} << 30;
   bool keep_work = false;
   bool restart = false;  // start over, whatever the work folder holds
   bool force = false;    // build though the estimate says that it cannot fit

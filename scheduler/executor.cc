@@ -78,6 +78,7 @@ class Worker {
       : options_(options),
         bins_(bins),
         store_(store),
+        files_(seams.files),
         cancel_(seams.cancel),
         share_(share_bytes, &budget),
         segment_(seams.files, options.segment_folder, options.first_segment_id + number, budget),
@@ -91,6 +92,17 @@ class Worker {
     if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
     const SubvolumeTask task{options_.grid_levels, subvolume.cube, options_.hash_bits};
     const auto triangles = bins_.open(queued.bin);
+    std::optional<std::string> key;
+    if (options_.cache) {
+      key = ArtifactCache::key(task, *triangles, share_);
+      StoredSubvolume copied = subvolume;
+      if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
+        bins_.drop(queued.bin);
+        ++counts.cached;
+        journal_.built(copied);
+        return {};
+      }
+    }
     ArtifactWriter artifact(segment_, options_.grid_levels, options_.hash_bits);
     StoredSubvolume built = subvolume;
     if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
@@ -101,15 +113,24 @@ class Worker {
       const ArtifactRoot root{subvolume.cube, 0, built.summary.root_hash, built.summary.voxels,
                               built.summary.svo_nodes};
       built.artifact = artifact.finish({&root, 1});
+      if (key) share(*key, built.artifact);
     }
     journal_.built(built);
     return {};
   }
   // What was built is durable and readable from here on.
   void finish() { journal_.commit(); }
-  uint64_t splits() const { return splits_; }
+
+  ExecutorCounts counts;
 
  private:
+  void share(const std::string& key, const ArtifactRef& artifact) {
+    segment_.flush();
+    if (!written_segment_)
+      written_segment_ = files_.open_read(segment_path(options_.segment_folder, segment_.id()));
+    options_.cache->add(key, *written_segment_, artifact);
+  }
+
   std::vector<QueuedSubvolume> split(const QueuedSubvolume& whole) {
     const StoredSubvolume& subvolume = whole.subvolume;
     if (subvolume.cube.edge_voxels(options_.grid_levels) <= kSmallestEdge)
@@ -136,26 +157,27 @@ class Worker {
     }
     const std::vector<SubvolumeId> ids = store_.record_split(subvolume, cubes);
     for (size_t i = 0; i < ids.size(); ++i) queued[i].subvolume.id = ids[i];
-    ++splits_;
+    ++counts.split;
     return queued;
   }
 
   const ExecutorOptions& options_;
   TriangleBins& bins_;
   JobStore& store_;
+  FileSystem& files_;
   const CancelToken& cancel_;
   MemoryBudget share_;
   SegmentWriter segment_;
   Journal journal_;
   std::unique_ptr<Backend> backend_;
-  uint64_t splits_ = 0;
+  std::unique_ptr<ReadableFile> written_segment_;
 };
 
 }  // namespace
 
-uint64_t build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> heap,
-                          TriangleBins& bins, JobStore& store, MemoryBudget& budget,
-                          const Seams& seams) {
+ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> heap,
+                                TriangleBins& bins, JobStore& store, MemoryBudget& budget,
+                                const Seams& seams) {
   uint64_t total = heap.size();
   Queue queue(std::move(heap));
   const uint64_t share_bytes = budget.available() / options.threads;
@@ -185,9 +207,12 @@ uint64_t build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubv
     });
   for (std::thread& thread : threads) thread.join();
   queue.rethrow_failure();
-  uint64_t splits = 0;
-  for (const auto& worker : workers) splits += worker->splits();
-  return splits;
+  ExecutorCounts sum;
+  for (const auto& worker : workers) {
+    sum.split += worker->counts.split;
+    sum.cached += worker->counts.cached;
+  }
+  return sum;
 }
 
 }  // namespace voxdag

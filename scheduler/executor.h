@@ -10,6 +10,7 @@
 
 #include "core/backend/backend.h"
 #include "core/format/artifact.h"
+#include "scheduler/artifact_cache.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/job_store.h"
 #include "scheduler/triangle_bins.h"
@@ -32,13 +33,19 @@ struct ExecutorOptions {
   std::function<std::unique_ptr<Backend>()> open_backend;
   std::string segment_folder;
   uint32_t first_segment_id = 0;
+  ArtifactCache* cache = nullptr;  // if artifacts are shared between builds
+};
+
+struct ExecutorCounts {
+  uint64_t split = 0;
+  uint64_t cached = 0;  // copied from the cache instead of built
 };
 
 // Builds all of `queue`, each result recorded in `store`; the bins are dropped as they are used up.
-// Returns how many subvolumes were split. Throws the first Error of any worker after all have
+// Throws the first Error of any worker after all have
 // stopped and what was finished is recorded.
-uint64_t build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> queue,
-                          TriangleBins& bins, JobStore& store, MemoryBudget& budget,
-                          const Seams& seams);
+ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> queue,
+                                TriangleBins& bins, JobStore& store, MemoryBudget& budget,
+                                const Seams& seams);
 
 }  // namespace voxdag

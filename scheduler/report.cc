@@ -33,6 +33,7 @@ std::string report_json(const BuildReport& report) {
       {"subvolumes",
        {{"total", report.subvolumes},
         {"reused", report.subvolumes_reused},
+        {"cached", report.subvolumes_cached},
         {"split", report.subvolumes_split}}},
       {"artifacts", {{"bytes", report.artifact_bytes}, {"nodes", report.artifact_nodes}}},
       {"spill_bytes", report.spill_bytes},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "core/backend/backend.h"
@@ -37,6 +38,8 @@ class Build {
         store_(std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild)),
         progress_(seams.progress, *store_, work_),
         seams_{seams.files, progress_, seams.cancel} {
+    if (!spec_.run.cache_folder.empty())
+      cache_.emplace(seams.files, spec_.run.cache_folder, spec_.run.cache_bytes);
     report_.output = spec_.run.output;
     report_.hash_bits = spec_.geometry.hash_bits;
     report_.threads = spec_.run.threads;
@@ -184,9 +187,13 @@ class Build {
     options.open_backend = [] { return make_cpu_backend(); };
     options.segment_folder = work_.path();
     options.first_segment_id = work_.next_segment_id();
+    if (cache_) options.cache = &*cache_;
     seams_.progress.begin_stage("build", queue.size(), "subvolumes");
-    report_.subvolumes_split +=
+    const ExecutorCounts counts =
         build_subvolumes(options, std::move(queue), *scene.bins, *store_, budget_, seams_);
+    report_.subvolumes_split += counts.split;
+    report_.subvolumes_cached += counts.cached;
+    report_.subvolumes_reused += counts.cached;
     seams_.progress.end_stage();
     clock_.finish("build");
   }
@@ -240,6 +247,7 @@ class Build {
   const BuildSpec spec_;
   MemoryBudget budget_;
   WorkFolder work_;
+  std::optional<ArtifactCache> cache_;
   std::unique_ptr<JobStore> store_;
   StageClock clock_{[this](const StageTime& stage) { store_->add_stage_time(stage); }};
   JobProgress progress_;
@@ -252,6 +260,8 @@ class Build {
 BuildReport run_build(const BuildSpec& spec, const Seams& seams) {
   if (spec.run.output.empty())
     throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
+  // A folder under that name would be refused only when all is built: opening it refuses it now.
+  if (seams.files.exists(spec.run.output)) seams.files.open_read(spec.run.output);
   return Build(spec, seams).run();
 }
 

@@ -79,7 +79,7 @@ uint64_t WorkFolder::bytes() const {
   for (const std::string& folder : {path_, scratch_path()}) {
     if (!files_.exists(folder)) continue;
     for (const DirectoryEntry& entry : files_.list(folder))
-      if (!entry.is_directory) bytes += files_.open_read(folder + "/" + entry.name)->size();
+      if (!entry.is_directory) bytes += entry.bytes;
   }
   return bytes;
 }

@@ -171,17 +171,7 @@ ArtifactRef ArtifactWriter::finish(std::span<const ArtifactRoot> roots) {
   State& s = *state_;
   if (s.level_open) s.broken("a level is still open");
   s.index.roots.assign(roots.begin(), roots.end());
-  const std::vector<std::byte> bytes = encode_index(s.index);
-  ArtifactRef ref;
-  ref.segment = s.segment.id();
-  ref.offset = s.offset;
-  ref.index_offset = s.segment.size();
-  ref.bytes = ref.index_offset + bytes.size() - ref.offset;
-  ref.checksum = checksum64(bytes);
-  // What a reader would refuse must not be named.
-  decode_index(bytes, ref, "artifact for segment " + std::to_string(ref.segment));
-  s.segment.append(bytes);
-  return ref;
+  return s.segment.append_index(s.offset, encode_index(s.index));
 }
 
 }  // namespace voxdag

@@ -3,6 +3,7 @@
 
 #include "core/format/artifact.h"
 #include "core/format/artifact_index.h"
+#include "core/format/checksum.h"
 #include "core/format/frame_codec.h"
 
 namespace voxdag {
@@ -38,6 +39,19 @@ void SegmentWriter::append(std::span<const std::byte> bytes) {
     buffered_ += n;
     bytes = bytes.subspan(n);
   }
+}
+
+ArtifactRef SegmentWriter::append_index(uint64_t first, std::span<const std::byte> index) {
+  ArtifactRef ref;
+  ref.segment = id_;
+  ref.offset = first;
+  ref.index_offset = size();
+  ref.bytes = ref.index_offset + index.size() - first;
+  ref.checksum = checksum64(index);
+  // What a reader would refuse must not be named.
+  decode_index(index, ref, "artifact for segment " + std::to_string(id_));
+  append(index);
+  return ref;
 }
 
 void SegmentWriter::flush() {

@@ -40,6 +40,8 @@ class WritableFile {
 struct DirectoryEntry {
   std::string name;
   bool is_directory = false;
+  uint64_t bytes = 0;
+  double modified_s = 0;  // Unix time
 };
 
 // An exclusive lock, held until this is destroyed or the process ends, however it ends.
@@ -64,6 +66,8 @@ class FileSystem {
   // Removes an empty directory.
   virtual void remove_directory(const std::string& path) = 0;
   virtual std::vector<DirectoryEntry> list(const std::string& path) = 0;
+  // Sets the file's time of modification to now.
+  virtual void touch(const std::string& path) = 0;
   // Makes renames and new names in the directory survive a power cut.
   virtual void sync_directory(const std::string& path) = 0;
   // Locks the file at `path`, made if it is not there; nullptr if somebody else holds it.

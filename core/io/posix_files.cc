@@ -154,11 +154,16 @@ class PosixFileSystem : public FileSystem {
       const std::string name = e->d_name;
       if (name == "." || name == "..") continue;
       struct stat s {};
-      const bool is_directory = lstat((path + "/" + name).c_str(), &s) == 0 && S_ISDIR(s.st_mode);
-      entries.push_back({name, is_directory});
+      if (lstat((path + "/" + name).c_str(), &s) != 0) continue;  // gone since
+      entries.push_back(
+          {name, S_ISDIR(s.st_mode), static_cast<uint64_t>(s.st_size),
+           static_cast<double>(s.st_mtim.tv_sec) + 1e-9 * static_cast<double>(s.st_mtim.tv_nsec)});
     }
     closedir(directory);
     return entries;
+  }
+  void touch(const std::string& path) override {
+    if (utimensat(AT_FDCWD, path.c_str(), nullptr, 0) != 0) fail("touch", path, errno);
   }
   void sync_directory(const std::string& path) override {
     Descriptor fd(open_retrying(path, O_RDONLY | O_DIRECTORY));
