@@ -67,10 +67,11 @@ double area(const FixedTriangle& t) {
 
 // Calls `visit` with every triangle that may touch the grid.
 template <class Visit>
-void for_each_snapped(TriangleSource& scene, const Grid& grid, const CancelToken& cancel,
-                      Visit visit) {
+void for_each_snapped(TriangleSource& scene, const Grid& grid, Progress& progress,
+                      const CancelToken& cancel, Visit visit) {
   scene.for_each_batch([&](std::span<const WorldTriangle> batch) {
     cancel.check();
+    progress.advance(batch.size());
     for (const WorldTriangle& world : batch) {
       FixedTriangle triangle;
       const SnapResult result = snap_triangle(grid, world, triangle);
@@ -84,9 +85,9 @@ void for_each_snapped(TriangleSource& scene, const Grid& grid, const CancelToken
 }
 
 std::vector<FixedTriangle> draw_triangles(TriangleSource& scene, const Grid& grid, Random& random,
-                                          const CancelToken& cancel) {
+                                          Progress& progress, const CancelToken& cancel) {
   Reservoir alike(kSampleBoxes / 2), by_area(kSampleBoxes / 2);
-  for_each_snapped(scene, grid, cancel, [&](const FixedTriangle& triangle) {
+  for_each_snapped(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
     alike.offer(triangle, 1.0, random);
     by_area.offer(triangle, area(triangle), random);
   });
@@ -144,10 +145,11 @@ void mark(const FixedTriangle& t, SampleBox& box) {
 }  // namespace
 
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
-                                      const CancelToken& cancel) {
+                                      Progress& progress, const CancelToken& cancel) {
+  progress.begin_stage("sample the scene", 2 * scene.declared_triangles(), "triangles");
   Random random(seed);
   std::vector<SampleBox> boxes;
-  for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, cancel)) {
+  for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, progress, cancel)) {
     constexpr int kTries = 16;  // a triangle may lie mostly outside the grid
     std::optional<std::array<int64_t, 3>> voxel;
     for (int i = 0; i < kTries && !voxel; ++i) voxel = random_voxel(triangle, grid, random);
@@ -155,13 +157,14 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   }
   std::sort(boxes.begin(), boxes.end(),
             [](const SampleBox& a, const SampleBox& b) { return a.low[0] < b.low[0]; });
-  for_each_snapped(scene, grid, cancel, [&](const FixedTriangle& triangle) {
+  for_each_snapped(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
     const int64_t first = (triangle.low(0) >> kUnitBits) - kBoxEdge + 1;
     const int64_t last = triangle.high(0) >> kUnitBits;
     auto box = std::lower_bound(boxes.begin(), boxes.end(), first,
                                 [](const SampleBox& b, int64_t x) { return b.low[0] < x; });
     for (; box != boxes.end() && box->low[0] <= last; ++box) mark(triangle, *box);
   });
+  progress.end_stage();
   return boxes;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/cancel_token.h"
+#include "core/base/progress.h"
 #include "core/format/voxdag_reader.h"
 #include "core/geometry/grid.h"
 #include "core/scene/triangle_source.h"
@@ -26,7 +27,7 @@ struct SampleBox {
 
 // None if no triangle touches the grid.
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
-                                      const CancelToken& cancel);
+                                      Progress& progress, const CancelToken& cancel);
 
 struct SampleReport {
   uint64_t boxes = 0;

@@ -35,9 +35,7 @@ SampleReport check_against(const VerifyCommand& command, const voxdag_reader::Fi
   MemoryBudget budget(kSceneMemory);
   const auto scene =
       open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);
-  progress.begin_stage("sample the scene", 0, "triangles");
-  const auto boxes = sample_surface(*scene, grid_of(file), command.seed, context.cancel);
-  progress.end_stage();
+  const auto boxes = sample_surface(*scene, grid_of(file), command.seed, progress, context.cancel);
   return with_reader_errors([&] { return compare_with_sample(file, boxes); });
 }
 

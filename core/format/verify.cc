@@ -55,10 +55,11 @@ class Verifier {
   std::string where(uint32_t level, uint64_t word) const {
     return where(level) + ", word " + std::to_string(word);
   }
-  void advance(uint64_t node) {
-    if (node % kNodesAtOnce != 0) return;
+  // Before node `i` of `count`: announces the nodes up to the next look at the cancel token.
+  void advance(uint64_t i, uint64_t count) {
+    if (i % kNodesAtOnce != 0) return;
     cancel_.check();
-    progress_.advance(std::min(kNodesAtOnce, node));
+    progress_.advance(std::min(kNodesAtOnce, count - i));
   }
 
   void check_header() const;
@@ -134,7 +135,7 @@ void Verifier::check_bricks() {
   hashes_ = PageBuffer<uint64_t>(budget_, bricks.node_count, "hashes of a level");
   uint64_t last_mask = 0;
   for (uint64_t i = 0; i < bricks.node_count; ++i) {
-    advance(i);
+    advance(i, bricks.node_count);
     const uint64_t mask = file_.brick(static_cast<uint32_t>(2 * i));
     const uint64_t hash = cut_hash(hash_brick(mask), file_.hash_bits());
     if (mask == 0) broken(where(level, 2 * i), "the brick is empty");
@@ -154,7 +155,7 @@ void Verifier::check_nodes(uint32_t level) {
   const uint32_t* previous = nullptr;
   const uint32_t* word = nodes.words;
   for (uint64_t i = 0; i < nodes.node_count; ++i) {
-    advance(i);
+    advance(i, nodes.node_count);
     const uint64_t at = static_cast<uint64_t>(word - nodes.words);
     const int children = kChildCount[*word];
     uint64_t child_hashes[8];
