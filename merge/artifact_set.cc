@@ -76,6 +76,10 @@ uint64_t slab_bytes(const ArtifactReader& reader) {
   return most;
 }
 
+// An artifact counts as at least this much, however small it is: so the number of runs that are
+// open at once, and the bookkeeping for each, is bounded by the budget too.
+constexpr uint64_t kLeastRunBytes = uint64_t{64} << 10;
+
 // The Morton code of the cube's low corner, in bricks of the largest grid.
 uint64_t place_of(const Cube& cube) {
   const uint64_t code = morton_encode(cube.position[0], cube.position[1], cube.position[2]);
@@ -103,8 +107,9 @@ ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSeg
   for (const ArtifactRef& ref : refs) {
     const ArtifactReader reader = opener.open(ref);
     survey.rows += row_count(reader);
-    placed.emplace_back(place_of(reader.roots()[0].cube),
-                        SurveyedArtifact{ref, index_bytes(reader) + slab_bytes(reader)});
+    placed.emplace_back(
+        place_of(reader.roots()[0].cube),
+        SurveyedArtifact{ref, std::max(kLeastRunBytes, index_bytes(reader) + slab_bytes(reader))});
   }
   std::ranges::stable_sort(placed, {}, &std::pair<uint64_t, SurveyedArtifact>::first);
   for (const auto& [place, artifact] : placed) survey.by_place.push_back(artifact);

@@ -18,7 +18,7 @@ namespace {
 // Rows of a range: what stays in a core's own cache while it is sorted; more runs get larger
 // ranges, so that each run's share of a range is worth visiting.
 constexpr uint64_t kRangeRows = 8192;
-constexpr uint64_t kRangeRowsEachRun = 8;
+constexpr uint64_t kRangeRowsEachRun = 16;
 // Ranges of more rows are merged row by row, looking for cancellation as they go.
 constexpr uint64_t kMostRangeRows = uint64_t{1} << 20;
 

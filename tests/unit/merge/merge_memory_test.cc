@@ -42,7 +42,7 @@ TEST(MergeMemory, RoundsGiveTheSameBytes) {
     const Merged at_once = harness.merge();
     harness.expect_dag_of(voxels, at_once);
     EXPECT_EQ(at_once.report.rounds, 1u);
-    for (const auto& [half_mib, rounds] : {std::pair{16, 2u}, {11, 3u}}) {
+    for (const auto& [half_mib, rounds] : {std::pair{24, 2u}, {16, 3u}, {11, 4u}}) {
       SCOPED_TRACE(std::to_string(half_mib) + "/2 MiB");
       const Merged merged = harness.merge({.budget_bytes = half_mib * kMiB / 2});
       EXPECT_EQ(merged.file.sha256, at_once.file.sha256);

@@ -1,0 +1,190 @@
+// How fast a core merges: rows of all runs per CPU second, and what its steps take.
+#include <benchmark/benchmark.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include "bench/merge/synthetic_runs.h"
+#include "merge/artifact_set.h"
+#include "merge/level_merge.h"
+#include "merge/merge.h"
+#include "merge/slab.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kRows = 8'000'000;
+constexpr uint64_t kGiB = uint64_t{1} << 30;
+
+// The artifacts of each number of runs, made once, in a folder of their own.
+class Fixtures {
+ public:
+  ~Fixtures() { std::filesystem::remove_all(folder_); }
+  const std::string& folder() const { return folder_; }
+  const SyntheticRuns& of(size_t runs) {
+    std::unique_ptr<SyntheticRuns>& made = made_[runs];
+    if (!made) {
+      const std::string folder = folder_ + "/" + std::to_string(runs);
+      std::filesystem::create_directory(folder);
+      made = std::make_unique<SyntheticRuns>(folder, runs, kRows);
+    }
+    return *made;
+  }
+
+ private:
+  static std::string make_folder() {
+    std::string name = std::filesystem::temp_directory_path() / "voxdag-bench-XXXXXX";
+    if (!mkdtemp(name.data())) throw Error(ErrorCode::kIo, "cannot make " + name);
+    return name;
+  }
+  std::string folder_ = make_folder();
+  std::map<size_t, std::unique_ptr<SyntheticRuns>> made_;
+};
+
+Fixtures& fixtures() {
+  static Fixtures all;
+  return all;
+}
+
+// The whole merge, global file written. Arguments: runs, memory in MiB.
+void BM_Merge(benchmark::State& state) {
+  const SyntheticRuns& runs = fixtures().of(static_cast<size_t>(state.range(0)));
+  MergeInputs inputs;
+  inputs.grid_levels = SyntheticRuns::kGridLevels;
+  inputs.artifacts = runs.refs();
+  inputs.open_segment = [&](uint32_t) { return runs.open(); };
+  inputs.scratch_folder = fixtures().folder() + "/scratch";
+  Grid grid;
+  grid.levels = inputs.grid_levels;
+  MergeReport report;
+  for (auto _ : state) {
+    MemoryBudget budget(static_cast<uint64_t>(state.range(1)) << 20);
+    NoProgress progress;
+    CancelToken cancel;
+    GlobalFileWriter out(system_files(), fixtures().folder() + "/merged.vdag", grid, 64);
+    report = merge_sub_dags(inputs, system_files(), out, budget, 1, progress, cancel);
+  }
+  state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * report.input_nodes));
+  state.counters["rounds"] = report.rounds;
+  state.counters["ranges"] = static_cast<double>(report.hash_ranges);
+  state.counters["kept"] =
+      static_cast<double>(report.dag_nodes) / static_cast<double>(report.input_nodes);
+}
+BENCHMARK(BM_Merge)
+    ->Args({1, 8192})
+    ->Args({64, 8192})
+    ->Args({512, 8192})
+    ->Args({2048, 8192})
+    ->Args({512, 256})
+    ->Args({512, 40})
+    ->Unit(benchmark::kMillisecond);
+
+// One level in memory; the parts of a merge without the files that it writes.
+class OneLevel {
+ public:
+  OneLevel(size_t runs, uint32_t levels_above_bricks)
+      : source_(fixtures().of(runs)),
+        survey_(survey_artifacts(source_.refs(), open(), SyntheticRuns::kGridLevels, 64)),
+        artifacts_(survey_.by_place, open(), SyntheticRuns::kGridLevels, 64, budget_) {
+    const uint32_t level = SyntheticRuns::kGridLevels - 2 - levels_above_bricks;
+    std::vector<uint64_t> rows, rows_below;
+    for (const ArtifactReader& artifact : artifacts_.readers()) {
+      runs_.push_back(std::make_unique<ArtifactRun>(artifact, level));
+      pointers_.push_back(runs_.back().get());
+      rows.push_back(runs_.back()->rows());
+      rows_below.push_back(levels_above_bricks ? artifact.level(level + 1)->rows : 0);
+      total_ += rows.back();
+    }
+    maps_.emplace(rows, kGiB, scratch_, budget_);
+    below_.emplace(rows_below, kGiB, scratch_, budget_);
+    for (size_t run = 0; run < runs; ++run)
+      for (uint64_t row = 0; row < rows_below[run]; ++row)
+        below_->values(run)[row] = static_cast<uint32_t>(7 * row);
+  }
+
+  Slab slab() {
+    Slab made(pointers_, Slab::pieces_within(pointers_, {}), {},
+              std::max<uint64_t>(8192, 8 * pointers_.size()), false, budget_);
+    return made;
+  }
+  void load(Slab& slab) { slab.load(&*below_, {1, kGiB}, budget_, cancel_); }
+  uint64_t rows() const { return total_; }
+
+  // Decodes all frames and does nothing with them.
+  void decode() {
+    Frame frame;
+    for (const auto& run : runs_)
+      for (size_t f = 0; f < run->frames().size(); ++f) run->read_frame(f, frame);
+  }
+  // Everything, into an output that forgets.
+  void merge(bool bricks) {
+    struct Nowhere : LevelOutput {
+      bool in_words() const override { return true; }
+      void begin_level(uint32_t) override {}
+      void write(uint64_t, const RecordBatch&) override {}
+      void end_level(uint64_t, uint64_t) override {}
+    } nowhere;
+    MergeReport report;
+    NoProgress silent;
+    MergeProgress progress(silent);
+    const MergeSeams seams{scratch_, budget_, MemoryPlan::divide(budget_.available(), 1),
+                           progress, cancel_, report};
+    merge_level(seams, {1, bricks, pointers_, &*below_, *maps_, nowhere});
+  }
+
+ private:
+  OpenSegment open() const {
+    return [this](uint32_t) { return source_.open(); };
+  }
+
+  const SyntheticRuns& source_;
+  MemoryBudget budget_{8 * kGiB};
+  MergeScratch scratch_{system_files(), fixtures().folder() + "/scratch"};
+  CancelToken cancel_;
+  ArtifactSurvey survey_;
+  ArtifactSet artifacts_;
+  std::vector<std::unique_ptr<ArtifactRun>> runs_;
+  std::vector<const LevelRun*> pointers_;
+  std::optional<PositionMaps> maps_, below_;
+  uint64_t total_ = 0;
+};
+
+// Arguments of all that follow: runs, levels above the bricks.
+void BM_Decode(benchmark::State& state) {
+  OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
+  for (auto _ : state) level.decode();
+  state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
+}
+
+// Decoding and rewiring into a slab.
+void BM_Rewire(benchmark::State& state) {
+  OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
+  for (auto _ : state) {
+    Slab slab = level.slab();
+    level.load(slab);
+  }
+  state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
+}
+
+// Decoding, rewiring and sweeping, nothing written.
+void BM_Sweep(benchmark::State& state) {
+  OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
+  for (auto _ : state) level.merge(state.range(1) == 0);
+  state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
+}
+
+void levels(benchmark::internal::Benchmark* benchmark) {
+  for (const int runs : {64, 512})
+    for (const int level : {0, 1}) benchmark->Args({runs, level});
+  benchmark->Unit(benchmark::kMillisecond);
+}
+BENCHMARK(BM_Decode)->Apply(levels);
+BENCHMARK(BM_Rewire)->Apply(levels);
+BENCHMARK(BM_Sweep)->Apply(levels);
+
+}  // namespace
+}  // namespace voxdag
+
+BENCHMARK_MAIN();
