@@ -46,6 +46,7 @@ class WatchedFiles : public FileSystem {
     note("sync directory");
     system_files().sync_directory(path);
   }
+  void touch(const std::string& path) override { system_files().touch(path); }
   std::unique_ptr<FileLock> try_lock(const std::string& path) override {
     return system_files().try_lock(path);
   }
