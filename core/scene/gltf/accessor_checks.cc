@@ -21,9 +21,9 @@ struct Extent {
   bool may_be_strided;
 };
 
-void check_view(const Document& d, const BufferView& view, const std::string& where) {
+void check_view(Document& d, const BufferView& view, const std::string& where) {
   check_index(d, d.buffers.size(), view.buffer, where, "buffer");
-  const Buffer& buffer = d.buffers[static_cast<size_t>(view.buffer)];
+  Buffer& buffer = d.buffers[static_cast<size_t>(view.buffer)];
   const std::string name = "buffer " + std::to_string(view.buffer);
   const uint128 end = static_cast<uint128>(view.byte_offset) + view.byte_length;
   if (end > buffer.byte_length)
@@ -31,9 +31,10 @@ void check_view(const Document& d, const BufferView& view, const std::string& wh
            where + " ends past the " + std::to_string(buffer.byte_length) + " bytes of " + name);
   if (buffer.source == Buffer::Source::kNone)
     refuse(d.path, where + ": " + name + " has no uri and is not in the file");
+  buffer.is_read = true;
 }
 
-void check_extent(const Document& d, const Extent& extent, const std::string& where) {
+void check_extent(Document& d, const Extent& extent, const std::string& where) {
   check_index(d, d.views.size(), extent.view, where, "bufferView");
   const BufferView& view = d.views[static_cast<size_t>(extent.view)];
   const std::string name = "bufferView " + std::to_string(extent.view);
@@ -53,7 +54,7 @@ void check_extent(const Document& d, const Extent& extent, const std::string& wh
            where + " ends past the " + std::to_string(view.byte_length) + " bytes of " + name);
 }
 
-void check_sparse(const Document& d, const Accessor& accessor, const std::string& where) {
+void check_sparse(Document& d, const Accessor& accessor, const std::string& where) {
   const Sparse& sparse = accessor.sparse;
   if (sparse.count > accessor.count)
     refuse(d.path, where + " replaces " + std::to_string(sparse.count) + " of " +
@@ -91,7 +92,7 @@ void check_type(const Document& d, const Accessor& accessor, const AccessorUse& 
 
 }  // namespace
 
-void check_accessor(const Document& d, int index, const AccessorUse& use) {
+void check_accessor(Document& d, int index, const AccessorUse& use) {
   if (index < 0) return;
   check_index(d, d.accessors.size(), index, use.where, "accessor");
   const Accessor& accessor = d.accessors[static_cast<size_t>(index)];

@@ -18,8 +18,8 @@ struct AccessorUse {
 
 // Throws Error{kInvalidInput} unless accessor `index` exists, fits the use, and its elements lie
 // inside its view and its view inside what its buffer claims; Error{kLimit} for over 2^32 elements.
-// -1, no accessor, is always right.
-void check_accessor(const Document& document, int index, const AccessorUse& use);
+// -1, no accessor, is always right. Marks the buffers it lies in as read.
+void check_accessor(Document& document, int index, const AccessorUse& use);
 
 // Throws Error{kInvalidInput} unless accessor `index`, if there is one, has `count` elements.
 void check_count(const Document& document, int index, uint64_t count, const std::string& where);

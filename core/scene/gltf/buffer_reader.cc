@@ -37,16 +37,8 @@ BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
       document_(document),
       budget_(budget),
       window_(budget, 3 * kMostGroups, "the window over " + scene_file.path()) {
-  std::vector<bool> used(document.buffers.size());
-  for (const Accessor& accessor : document.accessors) {
-    for (int view : {accessor.view, accessor.sparse.index_view, accessor.sparse.value_view}) {
-      if (view < 0 || static_cast<size_t>(view) >= document.views.size()) continue;
-      const auto buffer = static_cast<size_t>(document.views[static_cast<size_t>(view)].buffer);
-      if (buffer < used.size()) used[buffer] = true;
-    }
-  }
-  for (size_t i = 0; i < used.size(); ++i)
-    if (used[i]) check_length(static_cast<int>(i));
+  for (size_t i = 0; i < document.buffers.size(); ++i)
+    if (document.buffers[i].is_read) check_length(static_cast<int>(i));
 }
 
 std::span<const std::byte> BufferReader::window(int index, uint64_t offset, size_t size) {

@@ -19,8 +19,8 @@ class BufferReader {
  public:
   static constexpr size_t kWindowBytes = size_t{256} << 10;
 
-  // Checks that every buffer that a view of `document` lies in has as many bytes as it claims:
-  // else Error{kInvalidInput}; Error{kNotFound} for an external file that is not there.
+  // Checks that every buffer that is read has as many bytes as it claims, else
+  // Error{kInvalidInput}; Error{kNotFound} for an external file that is not there.
   BufferReader(FileSystem& files, const ReadableFile& scene_file, const Document& document,
                MemoryBudget& budget);
 

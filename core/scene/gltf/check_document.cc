@@ -34,7 +34,7 @@ void check_weights(const Document& d, const std::vector<double>& weights,
                        std::to_string(primitive.targets.size()));
 }
 
-void check_joint_sets(const Document& d, const Primitive& primitive, uint64_t vertices,
+void check_joint_sets(Document& d, const Primitive& primitive, uint64_t vertices,
                       const std::string& where) {
   const AccessorUse joints{where + ": JOINTS", 4, {kUnsignedByte, kUnsignedShort}};
   const AccessorUse weights{where + ": WEIGHTS",
@@ -103,7 +103,7 @@ void check_mesh(Document& d, int index) {
                          " primitives of points or lines, which make no voxels");
 }
 
-void check_skin(const Document& d, int index) {
+void check_skin(Document& d, int index) {
   const Skin& skin = at(d.skins, index);
   const std::string where = d.name_skin(index);
   if (skin.joints.empty()) refuse(d.path, where + " has no joints");
@@ -113,7 +113,7 @@ void check_skin(const Document& d, int index) {
     refuse(d.path, where + " has fewer inverse bind matrices than joints");
 }
 
-void check_instancing(const Document& d, const Node& node, const std::string& where) {
+void check_instancing(Document& d, const Node& node, const std::string& where) {
   const Instancing& instancing = node.instancing;
   if (!instancing.present) return;
   if (node.skin >= 0)
@@ -128,7 +128,7 @@ void check_instancing(const Document& d, const Node& node, const std::string& wh
     check_count(d, accessor, instances, of);
 }
 
-void check_node(const Document& d, int index) {
+void check_node(Document& d, int index) {
   const Node& node = at(d.nodes, index);
   const std::string where = d.name_node(index);
   if (node.skin >= 0) check_index(d, d.skins.size(), node.skin, where, "skin");

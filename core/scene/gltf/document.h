@@ -33,6 +33,7 @@ struct Buffer {
   };
   Source source = Source::kNone;
   uint64_t byte_length = 0;
+  bool is_read = false;  // some of it makes triangles; set by check_document()
   FileRange text;
   std::string uri;
   std::string characters;

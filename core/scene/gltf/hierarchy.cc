@@ -27,8 +27,7 @@ void check_for_cycles(const Document& d) {
 void link_parents(Document& d) {
   for (int i = 0; i < static_cast<int>(d.nodes.size()); ++i) {
     for (int child : d.nodes[static_cast<size_t>(i)].children) {
-      if (child < 0 || static_cast<size_t>(child) >= d.nodes.size())
-        check_index(d, d.nodes.size(), child, d.name_node(i), "child node");
+      check_index(d, d.nodes.size(), child, d.name_node(i), "child node");
       int& parent = d.nodes[static_cast<size_t>(child)].parent;
       if (parent >= 0)
         refuse(d.path, d.name_node(child) + " has two parents, " + d.name_node(parent) + " and " +

@@ -131,6 +131,20 @@ TEST(GltfBuffers, ExternalThatIsMissingOrShort) {
       << cut.message();
 }
 
+// A buffer that makes no triangles (of normals here) may be anywhere.
+TEST(GltfBuffers, ExternalThatIsNotRead) {
+  SceneBuilder scene = one_triangle();
+  scene.root["bufferViews"].push_back({{"buffer", 1}, {"byteLength", 36}});
+  const int normals = scene.add(
+      "accessors", {{"bufferView", 2}, {"componentType", kF32}, {"count", 3}, {"type", "VEC3"}});
+  scene.root["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals;
+  scene.root["buffers"] = {{{"byteLength", scene.bin.size()}, {"uri", "a.bin"}},
+                           {{"byteLength", 36}, {"uri", "normals.bin"}}};
+  EXPECT_EQ(
+      triangles_among({{"folder/scene", scene.root.dump()}, {"folder/a.bin", scene.bin}}).size(),
+      1u);
+}
+
 // Only relative paths are followed.
 TEST(GltfBuffers, UrisThatAreNotFollowed) {
   for (const char* uri : {"", "/etc/passwd", "http://example.org/a.bin", "file:a.bin", "C:\\a.bin",
