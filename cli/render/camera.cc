@@ -8,8 +8,7 @@ namespace voxdag::render {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kMargin = 1.06;
-constexpr double kFar = 1e30;
+constexpr double kMargin = 1.08;
 
 double half_tangent(double fov_degrees) { return std::tan(fov_degrees * kPi / 360); }
 
@@ -19,6 +18,15 @@ void picture_axes(const Vec& forward, Vec& right, Vec& up) {
   const Vec reference = vertical ? Vec{{0, 0, forward[1] < 0 ? -1.0 : 1.0}} : Vec{{0, 1, 0}};
   right = normalized(cross(forward, reference));
   up = cross(right, forward);
+}
+
+// How far the points reach along `axis`; a few stray ones among thousands are let go.
+double bound(const std::vector<Vec>& points, const Vec& axis) {
+  std::vector<double> reach;
+  for (const Vec& p : points) reach.push_back(dot(p, axis));
+  const auto last = reach.end() - 1 - static_cast<ptrdiff_t>(points.size() / 2000);
+  std::nth_element(reach.begin(), last, reach.end());
+  return *last;
 }
 
 }  // namespace
@@ -48,25 +56,19 @@ Placement see_whole(const std::vector<Vec>& points, const Vec& towards_eye, doub
   // With the eye at e, point p is in the picture if |p.right - e.right| <= tangent (e.back -
   // p.back), and likewise up: both sides of each are bounds on e, the tightest of which are met in
   // the middle.
-  double e[2] = {0, 0}, distance = -kFar;
+  double e[2] = {0, 0}, distance = bound(points, back) + 1;
   const Vec axes[2] = {right, up};
   const double tangents[2] = {tangent_up * aspect, tangent_up};
   for (int i = 0; i < 2; ++i) {
-    double high = -kFar, low = -kFar;
-    for (const Vec& p : points) {
-      high = std::max(high, dot(p, axes[i]) + tangents[i] * dot(p, back));
-      low = std::max(low, -dot(p, axes[i]) + tangents[i] * dot(p, back));
-    }
+    const double high = bound(points, axes[i] + back * tangents[i]);
+    const double low = bound(points, back * tangents[i] - axes[i]);
     e[i] = (high - low) / 2;
     distance = std::max(distance, (high + low) / (2 * tangents[i]));
   }
-  double front = -kFar, middle = 0;
-  for (const Vec& p : points) {
-    front = std::max(front, dot(p, back));
-    middle += dot(p, back) / static_cast<double>(points.size());
-  }
+  double middle = 0;
+  for (const Vec& p : points) middle += dot(p, back) / static_cast<double>(points.size());
   const Vec axis = right * e[0] + up * e[1];
-  return {axis + back * std::max(distance, front + 1), axis + back * middle, fov_degrees};
+  return {axis + back * distance, axis + back * middle, fov_degrees};
 }
 
 }  // namespace voxdag::render

@@ -9,14 +9,15 @@ namespace voxdag::render {
 namespace {
 
 constexpr double kFar = 1e30;
-constexpr Vec kAlbedo{{0.74, 0.69, 0.62}};
-constexpr Vec kSunlight{{3.6, 3.2, 2.6}};
-constexpr Vec kZenith{{0.50, 0.70, 1.05}}, kHorizon{{0.95, 1.0, 1.08}}, kGround{{0.40, 0.36, 0.32}};
+constexpr Vec kAlbedo{{0.74, 0.70, 0.64}};
+constexpr Vec kLamplight{{3.6, 3.2, 2.6}};
+constexpr Vec kZenith{{0.62, 0.78, 1.00}}, kHorizon{{0.95, 0.98, 1.02}},
+    kGround{{0.40, 0.36, 0.31}};
 constexpr Vec kTopColour{{0.46, 0.54, 0.65}}, kBottomColour{{0.86, 0.87, 0.88}};
-constexpr double kSunRadius = 0.012;
-constexpr double kBounce = 0.42;       // of the sky's light, from what hides it
-constexpr double kRayWidening = 0.07;  // of rays to the light
-constexpr int kSkyRays = 6;            // for one sample of a pixel
+constexpr double kLampRadius = 0.012;
+constexpr double kBounce = 0.42;      // of the sky's light, from what hides it
+constexpr double kRayWidening = 0.1;  // of rays to the light
+constexpr int kSkyRays = 6;           // for one sample of a pixel
 
 Vec product(const Vec& a, const Vec& b) { return {{a[0] * b[0], a[1] * b[1], a[2] * b[2]}}; }
 
@@ -62,10 +63,10 @@ Shader::Shader(const DagView& dag, const Box& box, const Camera& camera, int wid
   has_floor_ = eye[1] > box.low[1] && !inside(box, eye);
   if (seen.empty()) return;
   std::sort(distances.begin(), distances.end());
-  reach_ = 0.35 * distances[distances.size() / 2];
+  reach_ = (has_floor_ ? 0.35 : 1.0) * distances[distances.size() / 2];
   haze_start_ = distances.front();
   haze_depth_ = std::max(box.diagonal(), 1.0);
-  choose_sun(seen);
+  choose_lamp(seen);
   choose_exposure(seen);
 }
 
@@ -99,11 +100,7 @@ Vec Shader::colour(double x, double y, Sampler& sampler) const {
 }
 
 Vec Shader::lit_surface(const Surface& s, int sky_rays, Sampler& sampler) const {
-  Vec light = skylight(s, sky_rays, sampler);
-  const Vec sun = jittered_sun(sampler);
-  const double facing = dot(s.normal, sun);
-  if (facing > 0 && in_sun(s, sun)) light = light + kSunlight * facing;
-  return product(kAlbedo, light);
+  return product(kAlbedo, skylight(s, sky_rays, sampler) + lamplight(s, sampler));
 }
 
 Vec Shader::skylight(const Surface& s, int rays, Sampler& sampler) const {
@@ -116,7 +113,7 @@ Vec Shader::skylight(const Surface& s, int rays, Sampler& sampler) const {
     double open = 1;
     if (caster_.cast({s.point, direction}, cone, 0, reach_, hit)) {
       const double near = hit.t / reach_;
-      open = kBounce * std::sqrt(near) * (1 - near) + near * near;
+      open = kBounce * std::sqrt(near) * (1 - near) + near * near * near;
     }
     sum = sum + sky(direction) * open;
   }
@@ -124,17 +121,23 @@ Vec Shader::skylight(const Surface& s, int rays, Sampler& sampler) const {
   return sum * (1.0 / rays);
 }
 
-bool Shader::in_sun(const Surface& s, const Vec& towards_sun) const {
-  Hit hit;
-  return !caster_.cast({s.point, towards_sun}, {s.size, 0.004}, 0, kFar, hit);
+Vec Shader::lamplight(const Surface& s, Sampler& sampler) const {
+  const Vec towards = lamp_ - s.point;
+  const double distance = length(towards), facing = dot(s.normal, towards) / distance;
+  const Sampler::Pair p = sampler.pair();
+  if (facing <= 0) return {};
+  Vec u, w;
+  basis_around(towards * (1 / distance), u, w);
+  const double r = kLampRadius * distance * std::sqrt(p.u), angle = 2 * kPi * p.v;
+  if (!sees_lamp(s, lamp_ + u * (r * std::cos(angle)) + w * (r * std::sin(angle)))) return {};
+  return kLamplight * (facing / (1 + distance * distance / (lamp_reach_ * lamp_reach_)));
 }
 
-Vec Shader::jittered_sun(Sampler& sampler) const {
-  Vec u, w;
-  basis_around(sun_, u, w);
-  const Sampler::Pair p = sampler.pair();
-  const double r = kSunRadius * std::sqrt(p.u), angle = 2 * kPi * p.v;
-  return normalized(sun_ + u * (r * std::cos(angle)) + w * (r * std::sin(angle)));
+bool Shader::sees_lamp(const Surface& s, const Vec& lamp) const {
+  const double distance = length(lamp - s.point);
+  Hit hit;
+  return !caster_.cast({s.point, (lamp - s.point) * (1 / distance)}, {s.size, 0.004}, 0, distance,
+                       hit);
 }
 
 Vec Shader::background(double y) const {
@@ -160,41 +163,54 @@ double Shader::floor_light(const Ray& ray, double until, Sampler& sampler) const
       open += 0.25 * std::min(1.0, hit.t / (0.5 * box_.diagonal()));
   }
   sampler.next_pair();
-  const double sun = in_sun(s, jittered_sun(sampler)) ? 1 : 0;
-  return 1 - fade * (1 - (0.25 + 0.35 * open + 0.40 * sun));
+  const double lit = sees_lamp(s, lamp_) ? 1 : 0;
+  return 1 - fade * (1 - (0.25 + 0.35 * open + 0.40 * lit));
 }
 
-// From over the camera's left shoulder; within a scene, of suns all around at three heights one
-// that lights about a third of what is seen.
-void Shader::choose_sun(const std::vector<Surface>& seen) {
-  const Vec f = camera_.forward();
-  const double behind = std::atan2(-f[2], -f[0]);
-  constexpr double kPreferred = -0.9;
-  double best = kFar;
-  for (int i = 0; i < (has_floor_ ? 1 : 16 * 3); ++i) {
-    const double turn = kPreferred + kPi * (i % 16) / 8;
-    const double height = 0.65 + 0.25 * (i / 16);
-    const Vec sun{{std::cos(behind - turn) * std::cos(height), std::sin(height),
-                   std::sin(behind - turn) * std::cos(height)}};
-    double lit = 0;
-    for (const Surface& s : seen)
-      if (dot(s.normal, sun) > 0 && in_sun(s, sun)) ++lit;
-    lit /= static_cast<double>(seen.size());
-    const double cost = std::fabs(lit - 0.35);
-    if (cost >= best) continue;
-    best = cost;
-    sun_ = sun;
+double Shader::lit_share(const std::vector<Surface>& seen, const Vec& lamp) const {
+  int lit = 0;
+  for (const Surface& s : seen)
+    if (dot(s.normal, lamp - s.point) > 0 && sees_lamp(s, lamp)) ++lit;
+  return static_cast<double>(lit) / static_cast<double>(seen.size());
+}
+
+// A sun over the camera's left shoulder. Within a scene, of suns all around at three heights one
+// that lights about a third of what is seen; if none gets in, a lamp above and beside the camera.
+void Shader::choose_lamp(const std::vector<Surface>& seen) {
+  const Vec back = camera_.forward() * -1.0, eye = camera_.ray(0, 0).origin;
+  const double behind = std::atan2(back[2], back[0]);
+  const double far = 1000 * box_.diagonal();
+  constexpr int kTurns = 16, kHeights = 3;
+  double best = 0;
+  lamp_reach_ = 1e6 * far;
+  for (int i = 0; i < (has_floor_ ? 1 : kTurns * kHeights); ++i) {
+    const double azimuth = behind + 0.9 - 2 * kPi * (i % kTurns) / kTurns;
+    const double height = 0.65 + 0.25 * (i / kTurns);
+    const Vec sun = Vec{{std::cos(azimuth) * std::cos(height), std::sin(height),
+                         std::sin(azimuth) * std::cos(height)}} *
+                    far;
+    const double lit = has_floor_ ? 1 : lit_share(seen, sun);
+    if (i > 0 && std::fabs(lit - 0.35) >= std::fabs(best - 0.35)) continue;
+    best = lit;
+    lamp_ = sun;
   }
+  if (best > 0.03) return;
+  const Vec aside = normalized({{back[2], 0.8, -back[0]}});
+  Hit hit;
+  double room = 0.3 * reach_;
+  if (caster_.cast({eye, aside}, {}, 0, 2 * room, hit)) room = hit.t / 2;
+  lamp_ = eye + aside * room;
+  lamp_reach_ = reach_;
 }
 
-// The middle of what is seen comes out in the middle of the film's curve, its lightest tenth below
-// the curve's end.
+// The middle of what is seen comes out in the middle of the film's curve, its lightest tenth still
+// short of white.
 void Shader::choose_exposure(const std::vector<Surface>& seen) {
   Sampler sampler(3);
   std::vector<double> light;
   for (const Surface& s : seen) light.push_back(1e-3 + luminance(lit_surface(s, 8, sampler)));
   std::sort(light.begin(), light.end());
-  exposure_ = std::min(0.42 / light[light.size() / 2], 0.8 / light[light.size() * 9 / 10]);
+  exposure_ = std::min(0.36 / light[light.size() / 2], 0.8 / light[light.size() * 9 / 10]);
 }
 
 }  // namespace voxdag::render

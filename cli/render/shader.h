@@ -1,6 +1,8 @@
-// What a ray brings back: a matt surface under a sun and a soft sky, both found by casting rays, on
-// a floor that takes the scene's shadow, before a plain background.
+// What a ray brings back: a matt surface under a sun (in closed rooms, a lamp) and a soft sky, both
+// found by casting rays, on a floor that takes the scene's shadow, before a plain background.
 #pragma once
+
+#include <vector>
 
 #include "cli/render/bounds.h"
 #include "cli/render/camera.h"
@@ -12,7 +14,7 @@ namespace voxdag::render {
 
 class Shader {
  public:
-  // Chooses the sun and the exposure for what the camera sees. `camera` must outlive the shader.
+  // Chooses lamp and exposure for what the camera sees. `camera` must outlive the shader.
   Shader(const DagView& dag, const Box& box, const Camera& camera, int width, int height);
 
   // Linear red, green, blue in [0, 1] at a point of the picture.
@@ -29,13 +31,15 @@ class Shader {
   bool hit_surface(const Ray& ray, Surface& surface) const;
   Vec lit_surface(const Surface& surface, int sky_rays, Sampler& sampler) const;
   Vec skylight(const Surface& surface, int rays, Sampler& sampler) const;
-  bool in_sun(const Surface& surface, const Vec& towards_sun) const;
-  Vec jittered_sun(Sampler& sampler) const;
+  // From a point of the lamp that `sampler` picks; none where something is in between.
+  Vec lamplight(const Surface& surface, Sampler& sampler) const;
+  bool sees_lamp(const Surface& surface, const Vec& lamp) const;
   Vec background(double y) const;
   // How much light reaches the floor where `ray` meets it, 1 where the scene takes none away.
   double floor_light(const Ray& ray, double until, Sampler& sampler) const;
 
-  void choose_sun(const std::vector<Surface>& seen);
+  double lit_share(const std::vector<Surface>& seen, const Vec& lamp) const;
+  void choose_lamp(const std::vector<Surface>& seen);
   void choose_exposure(const std::vector<Surface>& seen);
 
   const DagView& dag_;
@@ -46,7 +50,8 @@ class Shader {
   bool has_floor_ = false;
   double reach_ = 0;  // how far a surface looks for what takes its skylight, in voxels
   double haze_start_ = 0, haze_depth_ = 1;
-  Vec sun_;
+  Vec lamp_;               // the sun, far away, or a lamp in a closed room
+  double lamp_reach_ = 0;  // where its light has half its strength
   double exposure_ = 1;
 };
 

@@ -1,7 +1,6 @@
 #include "cli/render/views.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "cli/render/sampling.h"
 #include "core/base/error.h"
@@ -11,7 +10,7 @@ namespace {
 
 constexpr double kFar = 1e30;
 constexpr double kOutsideFov = 32, kInsideFov = 62;
-constexpr double kRoomOpenness = 0.16;
+constexpr double kEnclosureOfRooms = 0.1;
 
 struct NamedDirection {
   const char* name;
@@ -23,24 +22,27 @@ const NamedDirection kDirections[] = {
     {"left", {{-1, 0, 0}}},     {"right", {{1, 0, 0}}}, {"top", {{0, 1, 0}}},
 };
 
-// A random occupied cell: its middle and its edge.
+// A random occupied cell: its middle and its edge. At each level a child is chosen by how many
+// children it has, which comes close to choosing all cells alike.
 Vec random_cell(const DagView& dag, Sampler& sampler, double& size) {
-  const uint32_t depth = std::min(dag.grid_levels(), 11u);
+  const uint32_t depth = std::min(dag.grid_levels() - 1, 11u);
   uint64_t content = dag.root();
-  int64_t cell[3] = {0, 0, 0};
+  Vec low;
+  size = static_cast<double>(dag.resolution());
   for (uint32_t d = 0; d < depth; ++d) {
     const DagView::Children children = dag.children(d, content);
-    auto skip = static_cast<int>(sampler.pair().u * std::popcount(children.mask));
+    int weights[8] = {}, sum = 0;
+    for (int i = 0; i < 8; ++i)
+      if (children.has(i))
+        sum += weights[i] = kBitCount[dag.children(d + 1, dag.content(d, children, i)).mask];
+    auto left = static_cast<int>(sampler.pair().u * sum);
     int index = 0;
-    while (!children.has(index) || skip-- > 0) ++index;
+    while (left >= weights[index]) left -= weights[index++];
     content = dag.content(d, children, index);
-    for (int axis = 0; axis < 3; ++axis) cell[axis] = 2 * cell[axis] + (index >> (2 - axis) & 1);
+    size /= 2;
+    low = low + Vec{{index & 4 ? size : 0, index & 2 ? size : 0, index & 1 ? size : 0}};
   }
-  size = static_cast<double>(dag.resolution() >> depth);
-  Vec middle;
-  for (int axis = 0; axis < 3; ++axis)
-    middle[axis] = (static_cast<double>(cell[axis]) + 0.5) * size;
-  return middle;
+  return low + Vec{{size / 2, size / 2, size / 2}};
 }
 
 // A glance through a camera: few rays, judged for how much there is to see.
@@ -57,27 +59,36 @@ class Glance {
       }
   }
 
+  // The share of rays at which what is seen is not one plane: little for a wall or a box.
+  double detail() const {
+    int breaks = 0;
+    for (int y = 0; y < kRows; ++y)
+      for (int x = 0; x < kColumns; ++x) {
+        if (x > 1) breaks += bends(depth_[y][x - 2], depth_[y][x - 1], depth_[y][x]);
+        if (y > 1) breaks += bends(depth_[y - 2][x], depth_[y - 1][x], depth_[y][x]);
+      }
+    return breaks / kRays;
+  }
+
   // Higher for long views with much in them; lower for a wall before one's nose, or where one looks
   // out of the scene. `near` is a distance that is too close.
   double score(double near) const {
-    int breaks = 0, close = 0, out = 0;
+    int close = 0, out = 0;
     double sum = 0;
     for (int y = 0; y < kRows; ++y)
       for (int x = 0; x < kColumns; ++x) {
         const double depth = depth_[y][x];
-        if (x > 1) breaks += bends(depth_[y][x - 2], depth_[y][x - 1], depth);
-        if (y > 1) breaks += bends(depth_[y - 2][x], depth_[y - 1][x], depth);
         close += depth < near;
         out += depth == kFar;
         sum += depth == kFar ? 0 : depth;
       }
-    constexpr double kRays = kColumns * kRows;
     const double free = 1 - close / kRays, within = 1 - out / kRays;
-    return (0.1 + breaks / kRays) * (sum / kRays) * free * free * free * within;
+    return detail() * std::sqrt(sum / kRays) * free * free * free * within;
   }
 
  private:
   static constexpr int kColumns = 24, kRows = 14;
+  static constexpr double kRays = kColumns * kRows;
 
   // Whether three neighbouring rays do not end on one plane, along which 1/depth is linear.
   static bool bends(double a, double b, double c) {
@@ -88,7 +99,6 @@ class Glance {
 };
 
 }  // namespace
-
 const std::vector<std::string>& view_names() {
   static const std::vector<std::string> names = {"auto", "iso",   "front", "back",
                                                  "left", "right", "top",   "inside"};
@@ -98,7 +108,7 @@ const std::vector<std::string>& view_names() {
 Placement named_view(const std::string& name, const RayCaster& caster, const DagView& dag,
                      const Box& box, double aspect, std::optional<double> fov_degrees) {
   if (name == "auto") {
-    const bool room = openness(caster, dag, box) < kRoomOpenness;
+    const bool room = enclosure(caster, dag, box) > kEnclosureOfRooms;
     return named_view(room ? "inside" : "iso", caster, dag, box, aspect, fov_degrees);
   }
   if (name == "inside") return inside_view(caster, box, fov_degrees.value_or(kInsideFov));
@@ -111,20 +121,23 @@ Placement named_view(const std::string& name, const RayCaster& caster, const Dag
   throw Error(ErrorCode::kInvalidInput, "no view is called \"" + name + "\": expected " + names);
 }
 
-double openness(const RayCaster& caster, const DagView& dag, const Box& box) {
-  constexpr int kPlaces = 512, kRays = 8;
+double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
+  constexpr int kPlaces = 1000, kRays = 24;
   Sampler sampler(1);
-  int escaped = 0;
+  double sum = 0;
   for (int i = 0; i < kPlaces; ++i) {
-    double size = 0;
+    double size = 0, longest = 0;
     const Vec place = random_cell(dag, sampler, size);
     for (int j = 0; j < kRays; ++j) {
       Hit hit;
       const Ray ray{place, uniform_direction(sampler.pair())};
-      if (!caster.cast(ray, {size, 0}, 3 * size, box.diagonal(), hit)) ++escaped;
+      const bool escaped = !caster.cast(ray, {size, 0}, 3 * size, box.diagonal(), hit);
+      longest = escaped ? 0 : std::max(longest, hit.t);
+      if (escaped) break;
     }
+    sum += longest;
   }
-  return static_cast<double>(escaped) / (kPlaces * kRays);
+  return sum / (kPlaces * box.diagonal());
 }
 
 Placement inside_view(const RayCaster& caster, const Box& box, double fov_degrees) {

@@ -20,9 +20,9 @@ const std::vector<std::string>& view_names();
 Placement named_view(const std::string& name, const RayCaster& caster, const DagView& dag,
                      const Box& box, double aspect, std::optional<double> fov_degrees);
 
-// The share of rays in all directions from random places of the surface that leave the scene: about
-// 1/2 for a convex thing, little for a room.
-double openness(const RayCaster& caster, const DagView& dag, const Box& box);
+// How far one sees from random places on the surface, as a share of the scene's extent and 0 for
+// places from which one can see out: next to nothing for a thing, or for caves; more for rooms.
+double enclosure(const RayCaster& caster, const DagView& dag, const Box& box);
 
 // A place within the scene with a long view, walls around and a floor below.
 Placement inside_view(const RayCaster& caster, const Box& box, double fov_degrees);
