@@ -1,0 +1,200 @@
+// A build that is killed, cut off from power, or has its disk fill up or fail, at any operation on
+// the disk, goes on when it is run again and ends with the very same bytes.
+//
+// The short form that CI runs samples the operations. VOXDAG_CRASH_ROUNDS=N gives the number of
+// moments per fault; with N large, every operation is tried and as many random moments.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <random>
+#include <thread>
+
+#include "core/format/verify.h"
+#include "core/format/voxdag_reader.h"
+#include "core/scene/generate/generate.h"
+#include "scheduler/run_build.h"
+#include "tests/crash/faulty_files.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace crash {
+namespace {
+
+using voxdag::BuildReport;
+using voxdag::BuildSpec;
+
+uint64_t rounds() {
+  const char* text = std::getenv("VOXDAG_CRASH_ROUNDS");
+  return text ? std::strtoull(text, nullptr, 10) : 12;
+}
+
+class CrashTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    voxdag::GenerateOptions options;
+    options.kind = voxdag::SceneKind::kCity;
+    options.triangles = 3000;
+    voxdag::NoProgress progress;
+    voxdag::CancelToken cancel;
+    voxdag::generate_scene(voxdag::system_files(), folder_.file("scene.glb"), options, progress,
+                           cancel);
+    expected_ = run(voxdag::system_files()).sha256;
+    std::filesystem::remove(output());
+  }
+  std::string output() const { return folder_.file("out.vdag"); }
+
+  // Small budget and several threads: spilling, splitting and merge rounds are all on the way.
+  BuildSpec spec() const {
+    BuildSpec spec;
+    spec.geometry.scenes = {folder_.file("scene.glb")};
+    spec.geometry.resolution = 512;
+    spec.run.output = output();
+    spec.run.memory_bytes = uint64_t{64} << 20;
+    spec.run.threads = 2;
+    spec.run.subvolume_edge = 128;
+    return spec;
+  }
+  BuildReport run(voxdag::FileSystem& files) const {
+    voxdag::NoProgress progress;
+    voxdag::CancelToken cancel;
+    return voxdag::run_build(spec(), {files, progress, cancel});
+  }
+
+  // Builds in a process of its own; true if it was killed on the way.
+  bool killed(FaultPlan plan, std::chrono::microseconds after = {}) const {
+    const pid_t child = fork();
+    if (child == 0) {
+      FaultyFiles files(plan);
+      try {
+        run(files);
+      } catch (...) {
+        _exit(1);
+      }
+      _exit(0);
+    }
+    if (after.count() > 0) {
+      std::this_thread::sleep_for(after);
+      kill(child, SIGKILL);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFSIGNALED(status) || WEXITSTATUS(status) == 0) << "the build failed by itself";
+    return WIFSIGNALED(status);
+  }
+
+  // Whatever happened before: run again, it ends as it should and leaves nothing behind.
+  void expect_to_go_on() {
+    if (std::filesystem::exists(output())) {
+      // Only a whole file may ever have that name.
+      const voxdag_reader::File file(output());
+      voxdag::MemoryBudget budget(uint64_t{1} << 30);
+      voxdag::NoProgress progress;
+      EXPECT_NO_THROW(voxdag::verify_global_file(file, budget, progress, voxdag::CancelToken{}));
+    }
+    EXPECT_EQ(run(voxdag::system_files()).sha256, expected_);
+    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
+    std::filesystem::remove(output());
+  }
+
+  // Numbers from 1 to `count`, all of them if there are few enough rounds' worth.
+  static std::vector<uint64_t> moments(uint64_t count) {
+    std::vector<uint64_t> all(count);
+    for (uint64_t i = 0; i < count; ++i) all[i] = i + 1;
+    if (all.size() > rounds()) {
+      std::shuffle(all.begin(), all.end(), std::mt19937_64(rounds()));
+      all.resize(rounds());
+      all.front() = count;  // the last one is always among them
+    }
+    return all;
+  }
+  uint64_t operations_of_a_build() {
+    FaultyFiles counting({});
+    run(counting);
+    std::filesystem::remove(output());
+    return counting.operations();
+  }
+
+  voxdag::TemporaryFolder folder_;
+  std::string expected_;
+};
+
+// SIGKILL and power cuts around every write, sync, rename and removal.
+TEST_F(CrashTest, KilledAtAnyOperation) {
+  const uint64_t operations = operations_of_a_build();
+  ASSERT_GT(operations, 20u);
+  for (const Fault fault : {Fault::kKillBefore, Fault::kKillAfter, Fault::kPowerCut}) {
+    uint64_t kills = 0;
+    for (const uint64_t at : moments(operations)) {
+      SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(fault) << " at operation "
+                                      << at << " of " << operations);
+      kills += killed({fault, at});
+      expect_to_go_on();
+    }
+    EXPECT_GT(kills, 0u);
+  }
+}
+
+// SIGKILL at moments that have nothing to do with our own calls: inside SQLite, or amid computing.
+TEST_F(CrashTest, KilledAtRandomMoments) {
+  std::mt19937_64 random(1);
+  for (uint64_t i = 0; i < rounds(); ++i) {
+    const auto after = std::chrono::microseconds(1000 + random() % 400000);
+    SCOPED_TRACE(testing::Message() << "after " << after.count() << " us");
+    killed({}, after);
+    // Killed again while it goes on.
+    killed({}, after / 2);
+    expect_to_go_on();
+  }
+}
+
+// A disk that is full, or fails, says so, and nothing is lost when it has recovered.
+TEST_F(CrashTest, DiskFullOrBroken) {
+  const uint64_t operations = operations_of_a_build();
+  struct Case {
+    Fault fault;
+    voxdag::ErrorCode code;
+  };
+  for (const Case& c : {Case{Fault::kNoSpace, voxdag::ErrorCode::kNoSpace},
+                        Case{Fault::kIoError, voxdag::ErrorCode::kIo}}) {
+    for (const uint64_t at : moments(operations)) {
+      SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(c.fault) << " from operation "
+                                      << at << " of " << operations);
+      FaultyFiles files({c.fault, at});
+      try {
+        run(files);
+        // Removing what is left over may fail in silence, nothing else.
+        EXPECT_TRUE(std::filesystem::exists(output()));
+        std::filesystem::remove_all(output() + ".work");
+      } catch (const voxdag::Error& error) {
+        EXPECT_EQ(error.code(), c.code) << error.what();
+      }
+      expect_to_go_on();
+    }
+  }
+}
+
+// Reads that fail are errors that name no artifact as damaged: nothing is thrown away for them.
+TEST_F(CrashTest, ReadsThatFail) {
+  FaultyFiles counting({});
+  run(counting);
+  std::filesystem::remove(output());
+  for (const uint64_t at : moments(counting.reads())) {
+    SCOPED_TRACE(testing::Message() << "from read " << at << " of " << counting.reads());
+    FaultyFiles files({Fault::kReadError, at});
+    try {
+      run(files);
+      ADD_FAILURE() << "the build went through";
+    } catch (const voxdag::Error& error) {
+      EXPECT_EQ(error.code(), voxdag::ErrorCode::kIo) << error.what();
+    }
+    expect_to_go_on();
+  }
+}
+
+}  // namespace
+}  // namespace crash

@@ -1,0 +1,79 @@
+// A file system that fails when told to: after leveldb's fault_injection_test, a disk that forgets
+// what was not synced, is full, or takes the process with it.
+//
+// Every call that changes the disk is an operation, numbered from 1 in the order in which they
+// begin. Thread-safe.
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/io/file_system.h"
+
+namespace crash {
+
+enum class Fault {
+  kNone,
+  kKillBefore,  // SIGKILL instead of the operation
+  kKillAfter,   // SIGKILL once it is done
+  kPowerCut,    // all that was not synced is forgotten, then SIGKILL
+  kNoSpace,     // this and all later operations fail with Error{kNoSpace}; a write is half done
+  kIoError,     // the same with Error{kIo}
+  kReadError,   // this read and all later ones fail with Error{kIo}
+};
+
+struct FaultPlan {
+  Fault fault = Fault::kNone;
+  uint64_t at = 0;  // the operation's number; for kReadError, the read's
+};
+
+class FaultyFiles : public voxdag::FileSystem {
+ public:
+  explicit FaultyFiles(FaultPlan plan) : plan_(plan) {}
+  uint64_t operations() const { return operations_; }
+  uint64_t reads() const { return reads_; }
+
+  std::unique_ptr<voxdag::ReadableFile> open_read(const std::string& path) override;
+  std::unique_ptr<voxdag::WritableFile> create(const std::string& path) override;
+  std::unique_ptr<voxdag::WritableFile> open_write(const std::string& path) override;
+  bool exists(const std::string& path) override { return disk_.exists(path); }
+  void rename(const std::string& from, const std::string& to) override;
+  void remove(const std::string& path) override;
+  void make_directories(const std::string& path) override { disk_.make_directories(path); }
+  void remove_directory(const std::string& path) override { disk_.remove_directory(path); }
+  std::vector<voxdag::DirectoryEntry> list(const std::string& path) override {
+    return disk_.list(path);
+  }
+  void touch(const std::string& path) override { disk_.touch(path); }
+  void sync_directory(const std::string& path) override;
+  std::unique_ptr<voxdag::FileLock> try_lock(const std::string& path) override {
+    return disk_.try_lock(path);
+  }
+  uint64_t free_space(const std::string& path) override { return disk_.free_space(path); }
+
+ private:
+  friend class FaultyWriter;
+  friend class FaultyReader;
+  // Runs one operation, or what the plan has in its place. `half` is what a write does that the
+  // disk gives up on.
+  template <class Operation, class Half>
+  void operate(const Operation& operation, const Half& half);
+  void read();
+  // Files back to what was synced of them, names to what was synced of their folders.
+  void forget_unsynced();
+
+  voxdag::FileSystem& disk_ = voxdag::system_files();
+  const FaultPlan plan_;
+  std::atomic<uint64_t> operations_{0};
+  std::atomic<uint64_t> reads_{0};
+  std::mutex mutex_;                                   // guards what a power cut leaves
+  std::map<std::string, std::string> synced_;          // contents, of files that were written here
+  std::map<std::string, std::string> unsynced_names_;  // new name -> old name, "" for a new file
+};
+
+}  // namespace crash
