@@ -13,8 +13,9 @@ namespace {
 
 // One checked file, kept open.
 struct SceneFile {
-  SceneFile(FileSystem& files, const std::string& path, MemoryBudget& budget)
-      : file(files.open_read(path)), document(gltf::read_document(*file, budget)) {
+  SceneFile(FileSystem& files, const std::string& path, MemoryBudget& budget,
+            const CancelToken& cancel)
+      : file(files.open_read(path)), document(gltf::read_document(*file, budget, cancel)) {
     gltf::check_document(document);
     buffers = std::make_unique<gltf::BufferReader>(files, *file, document, budget);
   }
@@ -46,7 +47,7 @@ class GltfScene : public TriangleSource {
     uint128 total = 0;
     for (const std::string& path : paths) {
       cancel.check();
-      files_.push_back(std::make_unique<SceneFile>(files, path, budget));
+      files_.push_back(std::make_unique<SceneFile>(files, path, budget, cancel));
       total += count_triangles(files_.back()->document, budget);
       if (total > INT64_MAX)
         throw Error(ErrorCode::kLimit, path + ": over 2^63 triangles, instances counted");
@@ -67,8 +68,12 @@ class GltfScene : public TriangleSource {
   uint64_t invalid_triangles() const override { return invalid_; }
   std::vector<std::string> warnings() const override {
     std::vector<std::string> all;
-    for (const auto& f : files_)
-      all.insert(all.end(), f->document.warnings.begin(), f->document.warnings.end());
+    for (const auto& f : files_) {
+      const gltf::Document& d = f->document;
+      all.insert(all.end(), d.warnings.begin(), d.warnings.end());
+      if (d.further_warnings > 0)
+        all.push_back(d.path + ": " + std::to_string(d.further_warnings) + " further warnings");
+    }
     return all;
   }
 

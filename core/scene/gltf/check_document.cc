@@ -63,8 +63,8 @@ void check_draco(const Document& d, const Primitive& primitive, const std::strin
 void warn_of_leftovers(Document& d, const Primitive& primitive, const std::string& where) {
   const int corners = primitive.indices >= 0 ? primitive.indices : primitive.position;
   if (primitive.mode != kTriangleList || at(d.accessors, corners).count % 3 == 0) return;
-  d.warnings.push_back(d.path + ": " + where + ": " + d.name_accessor(corners) +
-                       " is no multiple of three, the corners left over are ignored");
+  d.warn(where + ": " + d.name_accessor(corners) +
+         " is no multiple of three, the corners left over are ignored");
 }
 
 void check_triangles(Document& d, const Primitive& primitive, const std::vector<double>& weights,
@@ -98,9 +98,8 @@ void check_mesh(Document& d, int index) {
       ++without_triangles;
   }
   if (without_triangles > 0)
-    d.warnings.push_back(d.path + ": " + d.name_mesh(index) + " has " +
-                         std::to_string(without_triangles) +
-                         " primitives of points or lines, which make no voxels");
+    d.warn(d.name_mesh(index) + " has " + std::to_string(without_triangles) +
+           " primitives of points or lines, which make no voxels");
 }
 
 void check_skin(Document& d, int index) {

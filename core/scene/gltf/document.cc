@@ -8,6 +8,7 @@ namespace voxdag::gltf {
 namespace {
 
 constexpr size_t kLongestName = 64;
+constexpr size_t kMostWarnings = 20;
 
 template <class T>
 std::string name_of(const char* kind, const std::vector<T>& all, int index) {
@@ -37,6 +38,13 @@ std::string numbered(int index, const std::string& name) {
 
 void refuse(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::kInvalidInput, path + ": " + what);
+}
+
+void Document::warn(const std::string& what) {
+  if (warnings.size() < kMostWarnings)
+    warnings.push_back(path + ": " + what);
+  else
+    ++further_warnings;
 }
 
 std::string Document::name_node(int node) const { return name_of("node ", nodes, node); }

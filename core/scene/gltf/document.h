@@ -140,8 +140,12 @@ struct Document {
   std::vector<std::vector<int>> scenes;  // roots of each
   int scene = -1;                        // the default one
   std::vector<int> roots;                // of the scene to draw, set by check_document()
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings;     // the first few
+  uint64_t further_warnings = 0;
   MemoryCharge charge;  // for memory_bytes()
+
+  // Adds "<path>: <what>" to the warnings.
+  void warn(const std::string& what);
 
   // "node 3 \"wheel\"", for messages.
   std::string name_node(int node) const;

@@ -18,27 +18,17 @@ constexpr std::string_view kHarmless[] = {
     "EXT_mesh_features",   "EXT_instance_features", "KHR_audio",    "KHR_techniques_webgl",
     "FB_geometry_metadata"};
 
-bool is_read(std::string_view name) { return std::ranges::find(kRead, name) != std::end(kRead); }
-
-bool is_harmless(std::string_view name) {
-  return std::ranges::any_of(kHarmless, [&](auto prefix) { return name.starts_with(prefix); });
-}
-
 }  // namespace
+
+bool may_matter(const std::string& extension) {
+  return std::ranges::find(kRead, extension) == std::end(kRead) &&
+         std::ranges::none_of(kHarmless, [&](auto p) { return extension.starts_with(p); });
+}
 
 void check_required_extensions(const std::string& path, const std::vector<std::string>& required) {
   for (const std::string& name : required)
-    if (!is_read(name) && !is_harmless(name))
+    if (may_matter(name))
       refuse(path, "requires the extension " + printable(name) + ", which voxdag does not read");
-}
-
-std::vector<std::string> warn_of_unread_extensions(const std::string& path,
-                                                   const std::vector<std::string>& used) {
-  std::vector<std::string> warnings;
-  for (const std::string& name : used)
-    if (!is_read(name) && !is_harmless(name))
-      warnings.push_back(path + ": the optional extension " + printable(name) + " is ignored");
-  return warnings;
 }
 
 }  // namespace voxdag::gltf

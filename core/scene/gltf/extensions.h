@@ -10,8 +10,7 @@ namespace voxdag::gltf {
 // that could change the geometry.
 void check_required_extensions(const std::string& path, const std::vector<std::string>& required);
 
-// One sentence for each extension that is used, not required, and not read.
-std::vector<std::string> warn_of_unread_extensions(const std::string& path,
-                                                   const std::vector<std::string>& used);
+// Whether the geometry could be another if voxdag read the extension.
+bool may_matter(const std::string& extension);
 
 }  // namespace voxdag::gltf

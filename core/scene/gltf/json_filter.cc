@@ -239,21 +239,21 @@ class Filter : public nlohmann::json_sax<json> {
   uint64_t dropped_depth_ = 0;       // open brackets of what is being dropped
 };
 
-FilteredJson filter_once(const ReadableFile& file, FileRange range, bool cut_strings,
-                         MemoryBudget& budget) {
-  JsonWindow window(file, range, cut_strings, budget);
-  Filter filter(file.path(), window, budget);
+FilteredJson filter_once(JsonWindow window, const std::string& path, MemoryBudget& budget) {
+  Filter filter(path, window, budget);
   json::sax_parse(JsonIterator(window), JsonIterator(), &filter);
   return filter.take();
 }
 
 }  // namespace
 
-FilteredJson filter_json(const ReadableFile& file, FileRange range, MemoryBudget& budget) {
+FilteredJson filter_json(const ReadableFile& file, FileRange range, MemoryBudget& budget,
+                         const CancelToken& cancel) {
+  constexpr bool kCutStrings = true;
   try {
-    return filter_once(file, range, true, budget);
+    return filter_once(JsonWindow(file, range, kCutStrings, budget, cancel), file.path(), budget);
   } catch (const EscapedDataUri&) {
-    return filter_once(file, range, false, budget);
+    return filter_once(JsonWindow(file, range, !kCutStrings, budget, cancel), file.path(), budget);
   }
 }
 

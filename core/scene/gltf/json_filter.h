@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "core/scene/gltf/document.h"
@@ -39,6 +40,7 @@ struct FilteredJson {
 };
 
 // Throws Error{kInvalidInput} for what is no JSON, Error{kOutOfMemory} for what does not fit.
-FilteredJson filter_json(const ReadableFile& file, FileRange json, MemoryBudget& budget);
+FilteredJson filter_json(const ReadableFile& file, FileRange json, MemoryBudget& budget,
+                         const CancelToken& cancel);
 
 }  // namespace voxdag::gltf

@@ -20,10 +20,11 @@ bool is_plain(char c) { return c >= ' ' && c <= '~'; }
 }  // namespace
 
 JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, bool cut_strings,
-                       MemoryBudget& budget)
+                       MemoryBudget& budget, const CancelToken& cancel)
     : file_(file),
       json_(json),
       cut_strings_(cut_strings),
+      cancel_(cancel),
       charge_(budget, 0, "strings of the JSON"),
       window_begin_(json.begin),
       position_(json.begin) {
@@ -49,6 +50,7 @@ bool JsonWindow::next(char& c) {
   if (position_ == window_begin_ + window_.size()) {
     const uint64_t left = json_.begin + json_.size - position_;
     if (left == 0) return false;
+    cancel_.check();
     window_begin_ = position_;
     window_.resize(static_cast<size_t>(std::min<uint64_t>(left, kWindowBytes)));
     file_.read_at(window_begin_, std::as_writable_bytes(std::span(window_)));

@@ -11,6 +11,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "core/scene/gltf/document.h"
@@ -20,7 +21,8 @@ namespace voxdag::gltf {
 class JsonWindow {
  public:
   // `cut_strings` false hands out every character.
-  JsonWindow(const ReadableFile& file, FileRange json, bool cut_strings, MemoryBudget& budget);
+  JsonWindow(const ReadableFile& file, FileRange json, bool cut_strings, MemoryBudget& budget,
+             const CancelToken& cancel);
 
   bool at_end() const { return ended_; }
   char current() const { return current_; }
@@ -42,6 +44,7 @@ class JsonWindow {
   const ReadableFile& file_;
   const FileRange json_;
   const bool cut_strings_;
+  const CancelToken& cancel_;
   MemoryCharge charge_;
   std::vector<char> window_;
   uint64_t window_begin_ = 0;  // position in the file of window_[0]

@@ -1,9 +1,12 @@
 // The one place that includes tiny_gltf.h.
-#include <malloc.h>
 #include <tiny_gltf.h>
 
 #include <array>
 #include <exception>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "core/base/error.h"
 #include "core/scene/gltf/read_document.h"
@@ -148,7 +151,8 @@ Node convert(tinygltf::Node& n, int index, Document& document) {
   const std::string where = document.path + ": node " + numbered(index, n.name);
   out.local = local_transform(n, where);
   if (!is_rotation(n.rotation))
-    document.warnings.push_back(where + ": its rotation is no unit quaternion, taken as given");
+    document.warn("node " + numbered(index, n.name) +
+                  ": its rotation is no unit quaternion, taken as given");
   out.name = std::move(n.name);
   out.children = std::move(n.children);
   out.weights = std::move(n.weights);
@@ -192,15 +196,21 @@ void append(tinygltf::Model model, Document& document) {
 }
 
 void set_indices(const std::vector<PrimitiveIndices>& all, Document& document) {
-  for (const PrimitiveIndices& i : all)
+  for (const PrimitiveIndices& i : all) {
+    if (i.mesh >= document.meshes.size() ||
+        i.primitive >= document.meshes[i.mesh].primitives.size())
+      refuse(document.path, "mesh " + std::to_string(i.mesh) + " was not parsed whole");
     document.meshes[i.mesh].primitives[i.primitive].indices = i.accessor;
+  }
 }
 
 }  // namespace
 
-void parse_structure(const FilteredJson& json, MemoryBudget& budget, Document& document) {
+void parse_structure(const FilteredJson& json, MemoryBudget& budget, const CancelToken& cancel,
+                     Document& document) {
   MemoryCharge reserved = reserve(json, budget, document);
   for (const JsonSlice& slice : json.slices.all()) {
+    cancel.check();
     const uint64_t bytes = slice.object_count * kBytesPerObject +
                            slice.value_count * kBytesPerValue +
                            slice.text.size() * kBytesPerCharacter;

@@ -28,9 +28,9 @@ void place_bin_chunk(const Container& container, std::vector<Buffer>& buffers) {
 
 }  // namespace
 
-Document read_document(const ReadableFile& file, MemoryBudget& budget) {
+Document read_document(const ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel) {
   const Container container = read_container(file);
-  FilteredJson json = filter_json(file, container.json, budget);
+  FilteredJson json = filter_json(file, container.json, budget, cancel);
   check_version(file.path(), json);
   check_required_extensions(file.path(), json.extensions_required);
   if (!json.violation.empty()) refuse(file.path(), json.violation);
@@ -42,8 +42,10 @@ Document read_document(const ReadableFile& file, MemoryBudget& budget) {
   for (const auto* names : {&json.extensions_used, &json.extensions_required})
     for (const std::string& name : *names)
       document.quantized = document.quantized || name == "KHR_mesh_quantization";
-  document.warnings = warn_of_unread_extensions(file.path(), json.extensions_used);
-  parse_structure(json, budget, document);
+  for (const std::string& name : json.extensions_used)
+    if (may_matter(name))
+      document.warn("the optional extension " + printable(name) + " is ignored");
+  parse_structure(json, budget, cancel, document);
   return document;
 }
 

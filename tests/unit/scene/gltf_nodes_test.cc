@@ -117,6 +117,19 @@ TEST(GltfNodes, WhichSceneIsDrawn) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{11, 2, 3}, {31, 2, 3}, {51, 2, 3}}));
 }
 
+// A rotation far from unit length is taken as it is, with a warning; a thousand of them do not make
+// a thousand warnings.
+TEST(GltfNodes, RotationsThatAreNone) {
+  SceneBuilder scene = corner_scene();
+  for (int i = 0; i < 1000; ++i) scene.add_root({{"mesh", 0}, {"rotation", {0, 0, 0, 2}}});
+  OpenScene open(scene.glb());
+  EXPECT_EQ(open.triangles()[0][0], (Point{1, 2, 3}));
+  const auto warnings = open.source->warnings();
+  ASSERT_EQ(warnings.size(), 21u);
+  EXPECT_NE(warnings[0].find("node 0: its rotation is no unit quaternion"), std::string::npos);
+  EXPECT_NE(warnings[20].find("980 further warnings"), std::string::npos);
+}
+
 // A file with nothing to draw is a scene of no triangles, not an error.
 TEST(GltfNodes, NothingToDraw) {
   SceneBuilder scene;
