@@ -70,16 +70,38 @@ struct DrawTile {
 
   VOXDAG_HD void draw(const FixedTriangle& triangle, uint64_t cell, Shared& shared) const {
     constexpr int kBrickShift = kUnitBits + kBrickLevels;
-    const uint64_t first_brick = cell << 3 * (kCellLevels - kBrickLevels);
     int64_t low[3];
     place.low(cell, kUnitBits + kCellLevels, low);
-    uint64_t bricks = touched_cells<4>(triangle, low, kBrickShift);
-    for (; bricks != 0; bricks &= bricks - 1) {
-      const uint64_t brick = first_brick | static_cast<uint64_t>(lowest_bit(bricks));
-      place.low(brick, kBrickShift, low);
-      const uint64_t voxels = touched_cells<4>(triangle, low, kUnitBits);
-      or_shared(shared.masks[slot(static_cast<uint32_t>(brick % kTileBricks))], voxels);
+    const uint64_t bricks = touched_cells<4>(triangle, low, kBrickShift);
+    const uint32_t first = static_cast<uint32_t>(cell % (kTileBricks / 64)) * 64;
+    if (!is_narrow(triangle)) return draw_wide(triangle, low, bricks, first, shared);
+    const TriangleOnLattice on_voxels(triangle, low, kUnitBits);
+    for (uint64_t left = bricks; left != 0; left &= left - 1) {
+      const int brick = lowest_bit(left);
+      int at[3];
+      for (int a = 0; a < 3; ++a) at[a] = kBrickEdge * brick_coordinate(brick, a);
+      draw(on_voxels.touched<4>(at), first + static_cast<uint32_t>(brick), shared);
     }
+  }
+  VOXDAG_HD void draw_wide(const FixedTriangle& triangle, const int64_t (&low)[3], uint64_t bricks,
+                           uint32_t first, Shared& shared) const {
+    constexpr int kBrickShift = kUnitBits + kBrickLevels;
+    for (; bricks != 0; bricks &= bricks - 1) {
+      const int brick = lowest_bit(bricks);
+      int64_t brick_low[3];
+      for (int a = 0; a < 3; ++a)
+        brick_low[a] = low[a] + (static_cast<int64_t>(brick_coordinate(brick, a)) << kBrickShift);
+      draw(touched_cells<4>(triangle, brick_low, kUnitBits), first + static_cast<uint32_t>(brick),
+           shared);
+    }
+  }
+  VOXDAG_HD void draw(uint64_t voxels, uint32_t brick, Shared& shared) const {
+    or_shared(shared.masks[slot(brick)], voxels);
+  }
+  // Along one axis, in bricks, of brick 0 to 63 of a cell.
+  VOXDAG_HD static int brick_coordinate(int brick, int axis) {
+    const int bits = brick >> (2 - axis);
+    return (bits & 1) | (bits >> 2 & 2);
   }
 
   VOXDAG_HD void count_run(uint32_t thread, Shared& shared) const {

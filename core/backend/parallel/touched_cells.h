@@ -1,20 +1,22 @@
 // Which cells of a block of N x N x N cubes a triangle touches, all at once: the exact test of
 // core/geometry/overlap.h with what the cells have in common computed once.
 //
-// The block's low corner is `low`, a cell's edge is 2^shift lattice units. With k a cell's position
-// in the block, every test asks for the sign of
+// Let `low` be a corner of the lattice of cells, 2^shift units an edge, and k a cell's position on
+// it. Every test asks for the sign of
 //
-//     g . k * 2^shift + c      for an integer vector g;      2^shift i + c >= 0 <=> i + floor(c /
-//                                                            2^shift) >= 0 for an integer i
+//     g . k * 2^shift + c     for an integer vector g;   2^shift i + c >= 0  <=>  i + floor(c /
+//                                                        2^shift) >= 0  for an integer i
 //
-// so that k is only ever multiplied with g. Vertices are odd: their differences are even, and half
-// edges and quarter normals are integers.
+// so that only the floored constants ever see the units within a cell. Vertices are odd: their
+// differences are even, so half edges and quarter normals are integers; and none lies on the
+// boundary of a cell.
 //
-// Bounds, for triangles of at most 2^28 units in each axis and blocks of at most 2^28 units (the
-// largest grid): half edges <= 2^27, quarter normals n_a <= 2^55. If triangle and block are not
-// apart in an axis, |low - v| <= 2^29 there, so edge constants stay below 2^58. The plane's
-// constant needs 128 bits; divided by 2^shift it is clamped to +-2^60, which changes no sign since
-// |n . k| + sum |n_a| <= 12 * 2^55 < 2^59. Larger triangles are tested cell by cell.
+// Bounds, for triangles of less than 2^28 units in each axis ("narrow") and lattices of at most
+// 2^28 units (the largest grid): half edges < 2^27, quarter normals n_a < 2^55. Where triangle and
+// lattice are not apart in an axis, |low - v| < 2^29 there, so edge constants stay below 2^58. The
+// plane's need 128 bits. Clamping a constant changes no sign as long as what is added to it is
+// smaller: less than 2^30 for edges (8 half edges), 12 max |n_a| for the plane, with N = 4. Larger
+// triangles are tested cell by cell.
 #pragma once
 
 #include <cstdint>
@@ -28,69 +30,132 @@ namespace voxdag::parallel {
 
 inline constexpr int64_t kNarrowUnits = int64_t{1} << 28;
 
-// Cells are bits in Morton order (N = 2: child index, N = 4: brick bit). The cells whose
-// coordinate along `axis` is k.
+// Cells are bits in Morton order (N = 2: child index, N = 4: brick bit): the sum of this over axes.
+VOXDAG_HD constexpr int cell_bit(int axis, int k) { return ((k & 1) | (k & 2) << 2) << (2 - axis); }
+
+// Cells with coordinate 0 along `axis`, repeated for all its coordinates.
 template <int N>
-VOXDAG_HD inline uint64_t cells_at(int axis, int k) {
-  const uint64_t low_bit_clear = axis == 2   ? 0x5555555555555555ull
-                                 : axis == 1 ? 0x3333333333333333ull
-                                             : 0x0f0f0f0f0f0f0f0full;
-  const uint64_t high_bit_clear = axis == 2   ? 0x00ff00ff00ff00ffull
-                                  : axis == 1 ? 0x0000ffff0000ffffull
-                                              : 0x00000000ffffffffull;
-  const uint64_t cells =
-      (k & 1 ? ~low_bit_clear : low_bit_clear) & (k & 2 ? ~high_bit_clear : high_bit_clear);
-  return N == 2 ? cells & 0xff : cells;
+VOXDAG_HD inline uint64_t repeat_along(int axis, uint64_t cells) {
+  cells |= cells << cell_bit(axis, 1);
+  return N == 2 ? cells : cells | cells << cell_bit(axis, 2);
 }
 
-// Cells that the triangle's bounding box touches, along one axis.
-template <int N>
-VOXDAG_HD inline uint64_t cells_in_range(int axis, int64_t first, int64_t last) {
-  uint64_t cells = 0;
-  for (int k = 0; k < N; ++k)
-    if (k >= first && k <= last) cells |= cells_at<N>(axis, k);
-  return cells;
+template <class Int>
+VOXDAG_HD inline Int clamp_to(int128 x, Int bound) {
+  return x > bound ? bound : x < -bound ? static_cast<Int>(-bound) : static_cast<Int>(x);
 }
 
-// Cells whose corners do not all lie on one side of the plane through `base` (n . (low - v)).
-template <int N>
-VOXDAG_HD inline uint64_t cells_at_plane(const int64_t (&n)[3], int128 base, int shift) {
-  constexpr int64_t kFar = int64_t{1} << 60;
-  const int128 floored = base >> shift;
-  const int64_t constant = floored > kFar    ? kFar
-                           : floored < -kFar ? -kFar
-                                             : static_cast<int64_t>(floored);
-  const int64_t remainder = (floored << shift) != base;
-  int64_t most = constant, least = constant + remainder;
-  for (int a = 0; a < 3; ++a) (n[a] > 0 ? most : least) += n[a];
-  uint64_t cells = 0;
-  for (int x = 0; x < N; ++x)
-    for (int y = 0; y < N; ++y)
-      for (int z = 0; z < N; ++z) {
-        const int64_t at = n[0] * x + n[1] * y + n[2] * z;
-        if (at + most >= 0 && at + least <= 0)
-          cells |= cells_at<N>(0, x) & cells_at<N>(1, y) & cells_at<N>(2, z);
+// A narrow triangle against the cells of a lattice.
+struct TriangleOnLattice {
+  // In the projection along one axis, a cell is on the inner side of an edge iff
+  // a k_a + b k_b + constant >= 0, along the two axes that follow.
+  struct Edge {
+    int32_t a, b;
+    int64_t constant;
+  };
+  int64_t first[3], last[3];  // cells of the bounding box
+  int64_t n[3];
+  int128 plane;       // n . (low - v) / 2^shift, floored
+  int32_t remainder;  // 1 if that was not exact
+  bool short_normal;  // 32 bits will do for the plane
+  Edge edges[3][3];   // [projection][edge]
+
+  VOXDAG_HD TriangleOnLattice(const FixedTriangle& t, const int64_t (&low)[3], int shift) {
+    int64_t half[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int a = 0; a < 3; ++a) half[i][a] = (t.v[i == 2 ? 0 : i + 1][a] - t.v[i][a]) / 2;
+    int128 base = 0;
+    short_normal = true;
+    for (int a = 0; a < 3; ++a) {
+      first[a] = (t.low(a) - low[a]) >> shift;
+      last[a] = (t.high(a) - low[a]) >> shift;
+      const int b = a == 2 ? 0 : a + 1, c = a == 0 ? 2 : a - 1;
+      n[a] = half[0][b] * half[1][c] - half[0][c] * half[1][b];
+      base += static_cast<int128>(n[a]) * (low[a] - t.v[0][a]);
+      if (n[a] > kShortNormal || n[a] < -kShortNormal) short_normal = false;
+    }
+    plane = base >> shift;
+    remainder = (plane << shift) != base;
+    for (int c = 0; c < 3; ++c) {
+      const int a = c == 2 ? 0 : c + 1, b = c == 0 ? 2 : c - 1;
+      for (int i = 0; i < 3; ++i) {
+        const int64_t ga = n[c] < 0 ? half[i][b] : -half[i][b];
+        const int64_t gb = n[c] < 0 ? -half[i][a] : half[i][a];
+        const int64_t constant = ga * (low[a] - t.v[i][a]) + gb * (low[b] - t.v[i][b]);
+        edges[c][i] = {static_cast<int32_t>(ga), static_cast<int32_t>(gb),
+                       (constant >> shift) + (ga > 0 ? ga : 0) + (gb > 0 ? gb : 0)};
       }
-  return cells;
-}
-
-// Cells with a point where ga a + gb b + constant >= 0, in units of cells along axes a and b.
-template <int N>
-VOXDAG_HD inline uint64_t cells_inside_edge(int a, int b, int64_t ga, int64_t gb,
-                                            int64_t constant) {
-  constant += (ga > 0 ? ga : 0) + (gb > 0 ? gb : 0);
-  const int64_t span_a = ga * (N - 1), span_b = gb * (N - 1);
-  if (constant + (span_a < 0 ? span_a : 0) + (span_b < 0 ? span_b : 0) >= 0) return ~uint64_t{0};
-  if (constant + (span_a > 0 ? span_a : 0) + (span_b > 0 ? span_b : 0) < 0) return 0;
-  uint64_t cells = 0;
-  for (int i = 0; i < N; ++i) {
-    uint64_t row = 0;
-    for (int j = 0; j < N; ++j)
-      if (ga * i + gb * j + constant >= 0) row |= cells_at<N>(b, j);
-    cells |= row & cells_at<N>(a, i);
+    }
   }
-  return cells;
-}
+
+  // The cells of the block at position `at` that the triangle touches.
+  template <int N>
+  VOXDAG_HD uint64_t touched(const int (&at)[3]) const {
+    uint64_t cells = ~uint64_t{0};
+    for (int a = 0; a < 3; ++a) cells &= in_box<N>(a, first[a] - at[a], last[a] - at[a]);
+    if (cells == 0) return 0;
+    cells &= short_normal ? at_plane<N>(at, kFar32) : at_plane<N>(at, kFar64);
+    for (int c = 0; c < 3 && cells != 0; ++c) cells &= inside_edges<N>(c, at);
+    return cells;
+  }
+
+ private:
+  static constexpr int64_t kShortNormal = int64_t{1} << 26;
+  static constexpr int32_t kFar32 = (int32_t{1} << 30) - 1;
+  static constexpr int64_t kFar64 = int64_t{1} << 60;
+
+  template <int N>
+  VOXDAG_HD static uint64_t in_box(int axis, int64_t from, int64_t to) {
+    uint64_t cells = 0;
+    for (int k = 0; k < N; ++k)
+      if (k >= from && k <= to) cells |= uint64_t{1} << cell_bit(axis, k);
+    cells = repeat_along<N>(axis == 0 ? 1 : 0, cells);
+    return repeat_along<N>(axis == 2 ? 1 : 2, cells);
+  }
+
+  // Cells whose corners do not all lie on one side of the plane.
+  template <int N, class Int>
+  VOXDAG_HD uint64_t at_plane(const int (&at)[3], Int far) const {
+    int128 here = plane;
+    for (int a = 0; a < 3; ++a) here += static_cast<int128>(n[a]) * at[a];
+    Int most = clamp_to<Int>(here, far), least = most + static_cast<Int>(remainder), step[3];
+    for (int a = 0; a < 3; ++a) {
+      step[a] = static_cast<Int>(n[a]);
+      (step[a] > 0 ? most : least) += step[a];
+    }
+    uint64_t cells = 0;
+    for (int x = 0; x < N; ++x)
+      for (int y = 0; y < N; ++y)
+        for (int z = 0; z < N; ++z) {
+          const Int value = step[0] * x + step[1] * y + step[2] * z;
+          const bool meets = value + most >= 0 && value + least <= 0;
+          cells |= uint64_t{meets} << (cell_bit(0, x) + cell_bit(1, y) + cell_bit(2, z));
+        }
+    return cells;
+  }
+
+  // Cells on the inner side of the three edges in the projection along axis c.
+  template <int N>
+  VOXDAG_HD uint64_t inside_edges(int c, const int (&at)[3]) const {
+    const int a = c == 2 ? 0 : c + 1, b = c == 0 ? 2 : c - 1;
+    uint64_t cells = ~uint64_t{0};
+    for (int i = 0; i < 3; ++i) {
+      const Edge& edge = edges[c][i];
+      const int64_t here = edge.constant + int64_t{edge.a} * at[a] + int64_t{edge.b} * at[b];
+      const int32_t constant = clamp_to<int32_t>(here, kFar32);
+      const int32_t span_a = edge.a * (N - 1), span_b = edge.b * (N - 1);
+      if (constant + (span_a < 0 ? span_a : 0) + (span_b < 0 ? span_b : 0) >= 0) continue;
+      if (constant + (span_a > 0 ? span_a : 0) + (span_b > 0 ? span_b : 0) < 0) return 0;
+      uint64_t inside = 0;
+      for (int p = 0; p < N; ++p)
+        for (int q = 0; q < N; ++q)
+          inside |= uint64_t{edge.a * p + edge.b * q + constant >= 0}
+                    << (cell_bit(a, p) + cell_bit(b, q));
+      cells &= inside;
+    }
+    return cells == ~uint64_t{0} ? cells : repeat_along<N>(c, cells);
+  }
+};
 
 // As touched_cells(), one cell after the other: for triangles too large for 64-bit products.
 template <int N>
@@ -107,40 +172,26 @@ VOXDAG_HD inline uint64_t touched_cells_one_by_one(const FixedTriangle& t, const
   return cells;
 }
 
+// False if the bounding box misses a cube of edge 2^shift.
+VOXDAG_HD inline bool box_touches_cube(const FixedTriangle& t, const int64_t (&low)[3], int shift) {
+  for (int a = 0; a < 3; ++a)
+    if (t.high(a) < low[a] || t.low(a) > low[a] + (int64_t{1} << shift)) return false;
+  return true;
+}
+
+VOXDAG_HD inline bool is_narrow(const FixedTriangle& t) {
+  for (int a = 0; a < 3; ++a)
+    if (t.high(a) - t.low(a) >= kNarrowUnits) return false;
+  return true;
+}
+
+// Cells of 2^shift units, the first one's low corner at `low`.
 template <int N>
 VOXDAG_HD inline uint64_t touched_cells(const FixedTriangle& t, const int64_t (&low)[3],
                                         int shift) {
-  uint64_t cells = ~uint64_t{0};
-  bool narrow = true;
-  for (int a = 0; a < 3; ++a) {
-    const int64_t from = t.low(a), to = t.high(a);
-    cells &= cells_in_range<N>(a, (from - low[a] - 1) >> shift, (to - low[a]) >> shift);
-    if (to - from > kNarrowUnits) narrow = false;
-  }
-  if (cells == 0) return 0;
-  if (!narrow) return touched_cells_one_by_one<N>(t, low, shift);
-
-  int64_t half[3][3], n[3];
-  for (int i = 0; i < 3; ++i)
-    for (int a = 0; a < 3; ++a) half[i][a] = (t.v[i == 2 ? 0 : i + 1][a] - t.v[i][a]) / 2;
-  int128 base = 0;
-  for (int a = 0; a < 3; ++a) {
-    const int b = a == 2 ? 0 : a + 1, c = a == 0 ? 2 : a - 1;
-    n[a] = half[0][b] * half[1][c] - half[0][c] * half[1][b];
-    base += static_cast<int128>(n[a]) * (low[a] - t.v[0][a]);
-  }
-  cells &= cells_at_plane<N>(n, base, shift);
-  for (int c = 0; c < 3; ++c) {
-    const int a = c == 2 ? 0 : c + 1, b = c == 0 ? 2 : c - 1;
-    for (int i = 0; i < 3; ++i) {
-      if (cells == 0) return 0;
-      const int64_t ga = n[c] < 0 ? half[i][b] : -half[i][b];
-      const int64_t gb = n[c] < 0 ? -half[i][a] : half[i][a];
-      const int64_t constant = ga * (low[a] - t.v[i][a]) + gb * (low[b] - t.v[i][b]);
-      cells &= cells_inside_edge<N>(a, b, ga, gb, constant >> shift);
-    }
-  }
-  return cells;
+  if (!box_touches_cube(t, low, shift + (N == 2 ? 1 : 2))) return 0;
+  if (!is_narrow(t)) return touched_cells_one_by_one<N>(t, low, shift);
+  return TriangleOnLattice(t, low, shift).touched<N>({0, 0, 0});
 }
 
 }  // namespace voxdag::parallel

@@ -62,7 +62,7 @@ TEST(TouchedCells, EqualsTheDefinitionAtTheLimitOfNarrow) {
   oracle::Random random(4);
   Tally tally;
   for (int i = 0; i < 4000; ++i) {
-    const int64_t extent = kNarrowUnits + 2 * random.between(-1, 1);
+    const int64_t extent = kNarrowUnits + 2 * random.between(-2, 1);
     FixedTriangle t;
     int64_t low[3];
     const int shift = static_cast<int>(random.between(8, 26));
@@ -79,18 +79,61 @@ TEST(TouchedCells, EqualsTheDefinitionAtTheLimitOfNarrow) {
   EXPECT_GT(tally.cells, tally.blocks / 10);
 }
 
+// Small and large triangles with vertices a few units from the cells' corners, where a plane or an
+// edge just meets a cell or just misses it.
+TEST(TouchedCells, EqualsTheDefinitionNearCorners) {
+  oracle::Random random(5);
+  Tally tally;
+  for (int i = 0; i < 40000; ++i) {
+    const int shift = static_cast<int>(random.between(8, 12));
+    const int64_t near = i % 2 ? 3 : 40, corners = random.between(1, 4);
+    const int64_t low[3] = {0, 0, 0};
+    FixedTriangle t;
+    for (auto& v : t.v)
+      for (int64_t& x : v)
+        x = random.between(0, corners) * (int64_t{1} << shift) + random.odd(-near, near);
+    expect_defined<4>(t, low, shift, tally);
+    expect_defined<2>(t, low, shift + 1, tally);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(tally.cells, tally.blocks);
+}
+
+// One setup serves blocks all over the lattice, at any offset from it.
+TEST(TouchedCells, BlocksOfOneLattice) {
+  oracle::Random random(6);
+  Tally tally;
+  for (const oracle::SceneKind kind : oracle::kAllKinds) {
+    SCOPED_TRACE(oracle::kind_name(kind));
+    for (const auto& triangle : oracle::make_scene(kind, 8, {{1024, 0, 4096}, 16}, 50)) {
+      const FixedTriangle t = oracle::fixed(triangle);
+      if (!is_narrow(t)) continue;
+      const int64_t low[3] = {1024 * 256, 0, 4096 * 256};
+      const TriangleOnLattice lattice(t, low, 8);
+      for (int i = 0; i < 64; ++i) {
+        int at[3];
+        int64_t block_low[3];
+        for (int a = 0; a < 3; ++a) {
+          at[a] = static_cast<int>(random.between(0, 12));
+          block_low[a] = low[a] + at[a] * 256;
+        }
+        const uint64_t expected = touched_cells_one_by_one<4>(t, block_low, 8);
+        ASSERT_EQ(lattice.touched<4>(at), expected);
+        tally.cells += static_cast<uint64_t>(popcount64(expected));
+      }
+    }
+  }
+  EXPECT_GT(tally.cells, 1000u);
+}
+
 // The cells of a block are numbered as children and as bits of a brick are.
 TEST(TouchedCells, BitsAreMortonCodes) {
   for (int i = 0; i < 64; ++i) {
     uint32_t k[3];
     morton_decode(static_cast<uint64_t>(i), k[0], k[1], k[2]);
-    uint64_t cell4 = ~uint64_t{0}, cell2 = ~uint64_t{0};
-    for (int a = 0; a < 3; ++a) {
-      cell4 &= cells_at<4>(a, static_cast<int>(k[a]));
-      cell2 &= cells_at<2>(a, static_cast<int>(k[a]));
-    }
-    EXPECT_EQ(cell4, uint64_t{1} << i);
-    EXPECT_EQ(cell2, i < 8 ? uint64_t{1} << i : cell2);
+    int bit = 0;
+    for (int a = 0; a < 3; ++a) bit += cell_bit(a, static_cast<int>(k[a]));
+    EXPECT_EQ(bit, i);
   }
 }
 

@@ -1,0 +1,118 @@
+#include <cstdio>
+
+#include "core/backend/selftest/run.h"
+#include "core/backend/selftest/scenes.h"
+#include "core/base/clock.h"
+#include "core/base/parallel_for.h"
+#include "core/geometry/overlap.h"
+
+namespace voxdag::selftest {
+namespace {
+
+// Looks at nothing: the sink's own work is not what is measured.
+class ForgetfulSink : public SubDagSink {
+ public:
+  void bricks(const BrickLevelView&) override {}
+  void nodes(const NodeLevelView&) override {}
+};
+
+struct Subvolume {
+  Cube cube;
+  std::vector<FixedTriangle> triangles;
+};
+
+bool touches(const FixedTriangle& t, const Cube& cube, uint32_t grid_levels) {
+  const int64_t edge = cube.edge_voxels(grid_levels) * kUnitsPerVoxel;
+  const int64_t low[3] = {cube.position[0] * edge, cube.position[1] * edge,
+                          cube.position[2] * edge};
+  return triangle_touches_cube(t, low, edge);
+}
+
+// Hands triangles down to cubes of the subvolumes' edge.
+void divide(Subvolume whole, const BenchOptions& options, std::vector<Subvolume>& out) {
+  if (whole.triangles.empty()) return;
+  if (whole.cube.edge_voxels(options.grid_levels) <= options.subvolume_edge) {
+    out.push_back(std::move(whole));
+    return;
+  }
+  for (int c = 0; c < 8; ++c) {
+    Subvolume child{whole.cube.child(c), {}};
+    for (const FixedTriangle& t : whole.triangles)
+      if (touches(t, child.cube, options.grid_levels)) child.triangles.push_back(t);
+    divide(std::move(child), options, out);
+  }
+}
+
+struct Sums {
+  uint64_t voxels = 0, svo_nodes = 0, dag_nodes = 0, outgrown = 0;
+};
+
+void build(Backend& backend, const Subvolume& subvolume, const BenchOptions& options, Sums& sums) {
+  MemoryStream stream(subvolume.triangles);
+  MemoryBudget budget(options.worker_bytes);
+  const CancelToken never;
+  ForgetfulSink sink;
+  SubDagSummary summary;
+  if (backend.build({options.grid_levels, subvolume.cube, 64}, stream, budget, never, sink,
+                    summary) == BuildOutcome::kOutgrown) {
+    ++sums.outgrown;
+    return;
+  }
+  sums.voxels += summary.voxels;
+  sums.svo_nodes += summary.svo_nodes;
+  sums.dag_nodes += summary.dag_nodes;
+}
+
+void measure(const Subject& subject, unsigned workers, const std::string& scene,
+             const std::vector<Subvolume>& subvolumes, const BenchOptions& options) {
+  std::vector<std::unique_ptr<Backend>> backends;
+  for (unsigned w = 0; w < workers; ++w) backends.push_back(subject.open());
+  double best = 0;
+  Sums sums;
+  for (int round = 0; round < 3; ++round) {
+    std::vector<Sums> parts(workers);
+    const double start = wall_seconds();
+    parallel_for(workers, subvolumes.size(), [&](unsigned worker, size_t i) {
+      build(*backends[worker], subvolumes[i], options, parts[worker]);
+    });
+    const double seconds = wall_seconds() - start;
+    if (round == 0 || seconds < best) best = seconds;
+    sums = {};
+    for (const Sums& part : parts) {
+      sums.voxels += part.voxels;
+      sums.svo_nodes += part.svo_nodes;
+      sums.dag_nodes += part.dag_nodes;
+      sums.outgrown += part.outgrown;
+    }
+  }
+  std::printf("%-10s %-22s %7u %10zu %14llu %12llu %12llu %9.3f %10.1f", scene.c_str(),
+              subject.name.c_str(), workers, subvolumes.size(),
+              static_cast<unsigned long long>(sums.voxels),
+              static_cast<unsigned long long>(sums.svo_nodes),
+              static_cast<unsigned long long>(sums.dag_nodes), best,
+              1e-6 * static_cast<double>(sums.voxels) / best);
+  if (sums.outgrown)
+    std::printf("  (%llu subvolumes outgrown, not counted)",
+                static_cast<unsigned long long>(sums.outgrown));
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+void bench(const std::vector<Subject>& subjects, const BenchOptions& options) {
+  std::printf("R %u, best of three\n", 1u << options.grid_levels);
+  std::printf("%-10s %-22s %7s %10s %14s %12s %12s %9s %10s\n", "scene", "backend", "workers",
+              "subvolumes", "voxels", "octree", "sub-DAGs", "seconds", "Mvoxel/s");
+  for (Scene& scene : std::vector<Scene>{scan(100000, options.grid_levels),
+                                         building(280000, options.grid_levels)}) {
+    std::vector<Subvolume> subvolumes;
+    divide({Cube{}, std::move(scene.triangles)}, options, subvolumes);
+    measure({"cpu", [] { return make_cpu_backend(); }}, options.cpu_workers, scene.name, subvolumes,
+            options);
+    for (const Subject& subject : subjects)
+      measure(subject, options.workers, scene.name, subvolumes, options);
+  }
+}
+
+}  // namespace voxdag::selftest
