@@ -9,9 +9,6 @@
 
 namespace voxdag::gltf {
 
-// The product of the node's and its ancestors' transforms, from the root to it.
-Transform global_transform(const Document& document, int node);
-
 // One per joint. Throws Error{kInvalidInput} for an inverse bind matrix that is not affine.
 std::vector<Transform> joint_matrices(const Document& document, BufferReader& buffers, int skin);
 

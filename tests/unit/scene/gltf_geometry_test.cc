@@ -232,6 +232,29 @@ TEST(GltfGeometry, SkinAtRest) {
   EXPECT_EQ(triangles_of_file(scene.glb()), (std::vector<Corners>{expected}));
 }
 
+// A skeleton of 20 000 joints in one chain takes the time of its joints, not of their square.
+TEST(GltfGeometry, LongSkeleton) {
+  constexpr int kJoints = 20000;
+  SceneBuilder scene;
+  const int positions = scene.add_positions(std::vector<float>(9, 0));
+  const uint16_t last = kJoints - 1;
+  const int joints =
+      scene.add_accessor<uint16_t>("VEC4", kU16, {last, 0, 0, 0, last, 0, 0, 0, last, 0, 0, 0});
+  const int weights = scene.add_accessor<float>("VEC4", kF32, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
+  const int mesh = scene.add_mesh(
+      {{"attributes", {{"POSITION", positions}, {"JOINTS_0", joints}, {"WEIGHTS_0", weights}}}});
+  Json all = Json::array();
+  for (int i = 0; i < kJoints; ++i) {
+    Json node = {{"translation", {1, 0, 0}}};
+    if (i + 1 < kJoints) node["children"] = {i + 1};
+    all.push_back(scene.add("nodes", node));
+  }
+  scene.add("skins", {{"joints", all}});
+  const int body = scene.add("nodes", {{"mesh", mesh}, {"skin", 0}});
+  scene.root["scenes"] = {{{"nodes", {0, body}}}};
+  EXPECT_EQ(triangles_of_file(scene.glb()).at(0)[0], (std::array<double, 3>{kJoints, 0, 0}));
+}
+
 // A weighted joint that the skin does not have makes its vertex invalid.
 TEST(GltfGeometry, JointOutOfRangeIsRefused) {
   SceneBuilder scene;
