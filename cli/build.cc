@@ -68,7 +68,6 @@ void add_build_command(CLI::App& app, CommandContext& context) {
   command->add_flag("--restart", state->run.restart, "start over, whatever the work folder holds");
   command->add_flag("--force", state->run.force, "build even if the estimate says it cannot fit");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->set_config("--config", "", "read options from a file");
   command->callback([state, &context] { run(*state, context); });
 }
 

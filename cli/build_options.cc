@@ -1,12 +1,15 @@
 #include "cli/build_options.h"
 
 #include <charconv>
+#include <sstream>
 
 #include "cli/size.h"
 #include "core/base/error.h"
 
 namespace voxdag::cli {
 namespace {
+
+constexpr uint64_t kLargestConfig = uint64_t{1} << 20;
 
 std::array<double, 4> parse_bounds(const std::string& text) {
   std::array<double, 4> numbers{};
@@ -23,6 +26,21 @@ std::array<double, 4> parse_bounds(const std::string& text) {
   return numbers;
 }
 
+// Options from a TOML or INI file, for those that the command line does not give. CLI11 reads such
+// files for the program as a whole only, not for a command.
+void take_options_from(const std::string& path, CLI::App& command) {
+  std::istringstream text(read_small_file(system_files(), path, kLargestConfig));
+  for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_config(text)) {
+    CLI::Option* const option = command.get_option_no_throw("--" + item.fullname());
+    if (!option || !option->get_configurable())
+      throw Error(ErrorCode::kInvalidInput,
+                  path + ": '" + item.fullname() + "' is not an option of " + command.get_name());
+    if (option->count() > 0) continue;
+    // Should the command line give it later: the last one counts.
+    option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)->add_result(item.inputs);
+  }
+}
+
 }  // namespace
 
 void BuildOptions::declare(CLI::App& command) {
@@ -36,13 +54,19 @@ void BuildOptions::declare(CLI::App& command) {
   auto* bounds = command.add_option("--bounds", bounds_, "the cube: low corner X,Y,Z and its EDGE")
                      ->group(geometry);
   command
-      .add_option("--voxel-size", voxel_size_, "edge of a voxel; the cube is centred on the scene")
+      .add_option("--voxel-size", g.voxel_size, "edge of a voxel; the cube is centred on the scene")
       ->group(geometry)
       ->excludes(bounds);
   command.add_flag("--skip-invalid", g.skip_invalid, "drop and count invalid triangles")
       ->group(geometry);
   command.add_option("--hash-bits", g.hash_bits, "bits of a node's hash that are kept, 4 to 64")
       ->group(geometry);
+  command
+      .add_option_function<std::string>(
+          "--config", [&command](const std::string& path) { take_options_from(path, command); },
+          "read options from a TOML or INI file")
+      ->trigger_on_parse()
+      ->configurable(false);
   const char* run = "Run (never changes the result)";
   command.add_option("--memory", memory_, "memory budget, 64MiB or more (default: half the RAM)")
       ->group(run);
@@ -59,8 +83,11 @@ void BuildOptions::declare(CLI::App& command) {
 BuildSpec BuildOptions::spec() const {
   BuildSpec spec = spec_;
   if (!bounds_.empty()) spec.geometry.bounds = parse_bounds(bounds_);
-  if (voxel_size_ != 0) spec.geometry.voxel_size = voxel_size_;
-  if (!memory_.empty()) spec.run.memory_bytes = parse_size(memory_, "--memory");
+  if (!memory_.empty()) {
+    spec.run.memory_bytes = parse_size(memory_, "--memory");
+    if (spec.run.memory_bytes == 0)
+      throw Error(ErrorCode::kInvalidInput, "--memory 0: expected at least 64 MiB");
+  }
   return spec;
 }
 

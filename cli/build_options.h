@@ -19,7 +19,6 @@ class BuildOptions {
  private:
   BuildSpec spec_;
   std::string bounds_;
-  double voxel_size_ = 0;
   std::string memory_;
 };
 
