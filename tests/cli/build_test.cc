@@ -1,0 +1,169 @@
+// voxdag build: its report, its files, its options, its errors.
+#include <sys/stat.h>
+
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+class BuildCommand : public CommandLine {
+ protected:
+  void SetUp() override { make_scene(); }
+  Json build(std::vector<std::string> more = {}, const std::string& output = "m.vdag") {
+    std::vector<std::string> args = {"build", "m.glb", "-r", "128", "-o", output};
+    args.insert(args.end(), more.begin(), more.end());
+    return run_json(args);
+  }
+};
+
+// The names that scripts may rely on, and that they agree with the file.
+TEST_F(BuildCommand, ReportsAsPromised) {
+  const Json report = build();
+  for (const char* name :
+       {"output",    "sha256",      "resolution",   "bounds",         "hash_bits",    "voxels",
+        "svo_nodes", "dag_nodes",   "bytes",        "triangles",      "dropped",      "subvolumes",
+        "artifacts", "spill_bytes", "merge_rounds", "merge_ranges",   "memory_bytes", "threads",
+        "stages",    "wall_s",      "cpu_s",        "peak_rss_bytes", "voxels_per_s"})
+    EXPECT_TRUE(report.contains(name)) << name;
+  EXPECT_EQ(report["output"], "m.vdag");
+  EXPECT_EQ(report["resolution"], 128);
+  EXPECT_EQ(report["hash_bits"], 64);
+  EXPECT_EQ(report["triangles"], 2112);
+  EXPECT_EQ(report["bounds"]["origin"].size(), 3u);
+  EXPECT_GT(report["bounds"]["edge"], 9.0);
+  for (const char* name : {"outside", "invalid"}) EXPECT_EQ(report["dropped"][name], 0) << name;
+  EXPECT_GT(report["subvolumes"]["total"], 0);
+  for (const char* name : {"reused", "split"}) EXPECT_EQ(report["subvolumes"][name], 0) << name;
+  for (const Json& stage : report["stages"])
+    for (const char* name : {"name", "wall_s", "cpu_s"}) EXPECT_TRUE(stage.contains(name)) << name;
+  EXPECT_EQ(report["sha256"].get<std::string>().size(), 64u);
+  EXPECT_EQ(report["bytes"], contents("m.vdag").size());
+  EXPECT_GT(report["voxels"], 10000);
+}
+
+// The same report lies beside the result, and the work folder is gone.
+TEST_F(BuildCommand, LeavesFileAndReportOnly) {
+  const Json report = build();
+  EXPECT_EQ(Json::parse(contents("m.vdag.report.json")), report);
+  EXPECT_FALSE(exists("m.vdag.work"));
+  EXPECT_FALSE(exists("m.vdag.partial"));
+  build({"--keep-work", "--work", "kept"}, "n.vdag");
+  EXPECT_TRUE(exists("kept"));
+}
+
+// Without --json: words on standard output, progress on standard error.
+TEST_F(BuildCommand, SpeaksPlainly) {
+  const Answer answer = run({"build", "m.glb", "-r", "64", "-o", "m.vdag"});
+  EXPECT_EQ(answer.status, 0);
+  for (const char* part : {"m.vdag", "sha256", "triangles", "voxels", "DAG nodes"})
+    EXPECT_NE(answer.out.find(part), std::string::npos) << part;
+  EXPECT_NE(answer.err.find("build"), std::string::npos);
+}
+
+// Run options do not change the bytes; geometry options do.
+TEST_F(BuildCommand, OnlyGeometryOptionsShow) {
+  const std::string sha256 = build()["sha256"];
+  const std::string bytes = contents("m.vdag");
+  EXPECT_EQ(
+      build({"--memory", "64MiB", "--threads", "1", "--subvolume", "64", "--work", "w"})["sha256"],
+      sha256);
+  EXPECT_EQ(contents("m.vdag"), bytes);
+  EXPECT_EQ(build({"--backend", "cpu", "--force", "--restart"}, "sub/folder/n.vdag")["sha256"],
+            sha256);
+  EXPECT_NE(build({"--hash-bits", "8"})["sha256"], sha256);
+  EXPECT_NE(build({"--voxel-size", "0.1"})["sha256"], sha256);
+  const Json part = build({"--bounds", "0,0,0,4.5"});
+  EXPECT_NE(part["sha256"], sha256);
+  EXPECT_EQ(part["bounds"]["edge"], 4.5);
+  EXPECT_GT(part["dropped"]["outside"], 0);
+}
+
+// Options may come from a file; those of the command line win.
+TEST_F(BuildCommand, ReadsOptionsFromAFile) {
+  put("options.toml", "resolution = 32\nhash-bits = 16\n");
+  const Json report = run_json({"build", "m.glb", "-o", "m.vdag", "--config", "options.toml"});
+  EXPECT_EQ(report["resolution"], 32);
+  EXPECT_EQ(report["hash_bits"], 16);
+  EXPECT_EQ(build({"--config", "options.toml"})["resolution"], 128);
+  const Json late =
+      run_json({"build", "m.glb", "-o", "m.vdag", "--config", "options.toml", "-r", "64"});
+  EXPECT_EQ(late["resolution"], 64);
+  EXPECT_EQ(late["hash_bits"], 16);
+  put("wrong.toml", "resolutoin = 32\n");
+  expect_error(2, "resolutoin", {"build", "m.glb", "-o", "x.vdag", "--config", "wrong.toml"});
+}
+
+// Each wrong value is refused with the option or the limit named, and nothing is left behind.
+TEST_F(BuildCommand, RefusesWrongOptions) {
+  const struct {
+    std::vector<std::string> options;
+    int status;
+    const char* part;
+  } rows[] = {
+      {{"-r", "100"}, 2, "power of two"},
+      {{"-r", "2"}, 2, "power of two"},
+      {{"-r", "2097152"}, 2, "1048576"},
+      {{"-r", "-64"}, 2, "resolution"},
+      {{"-r", "many"}, 2, "resolution"},
+      {{"-r", "64", "--memory", "63MiB"}, 2, "64 MiB"},
+      {{"-r", "64", "--memory", "0"}, 2, "64 MiB"},
+      {{"-r", "64", "--memory", "lots"}, 2, "--memory"},
+      {{"-r", "64", "--memory", "-1GiB"}, 2, "--memory"},
+      {{"-r", "64", "--memory", "1GiBs"}, 2, "--memory"},
+      {{"-r", "64", "--hash-bits", "3"}, 2, "4 to 64"},
+      {{"-r", "64", "--hash-bits", "65"}, 2, "4 to 64"},
+      {{"-r", "64", "--subvolume", "96"}, 2, "power of two"},
+      {{"-r", "64", "--subvolume", "32"}, 2, "64"},
+      {{"-r", "64", "--bounds", "0,0,0"}, 2, "--bounds"},
+      {{"-r", "64", "--bounds", "0,0,0,1,2"}, 2, "--bounds"},
+      {{"-r", "64", "--bounds", "0,0,0,x"}, 2, "--bounds"},
+      {{"-r", "64", "--bounds", "0,0,0,0"}, 2, "EDGE"},
+      {{"-r", "64", "--bounds", "0,0,0,-1"}, 2, "EDGE"},
+      {{"-r", "64", "--bounds", "0,nan,0,1"}, 2, "finite"},
+      {{"-r", "64", "--voxel-size", "0"}, 2, "voxel size"},
+      {{"-r", "64", "--voxel-size", "-1"}, 2, "voxel size"},
+      {{"-r", "64", "--voxel-size", "inf"}, 2, "voxel size"},
+      {{"-r", "64", "--voxel-size", "0.01"}, 2, "does not fit"},
+      {{"-r", "64", "--voxel-size", "1", "--bounds", "0,0,0,1"}, 2, "xclude"},
+      {{"-r", "64", "--backend", "abacus"}, 9, "abacus"},
+      {{"-r", "64", "--config", "none.toml"}, 3, "none.toml"},
+      {{"-r", "64", "--config", "m.glb"}, 2, "m.glb"},
+  };
+  for (const auto& row : rows) {
+    std::vector<std::string> args = {"build", "m.glb", "-o", "x.vdag"};
+    args.insert(args.end(), row.options.begin(), row.options.end());
+    std::string line;
+    for (const std::string& word : row.options) line += word + " ";
+    SCOPED_TRACE(line);
+    expect_error(row.status, row.part, args);
+    EXPECT_FALSE(exists("x.vdag"));
+    EXPECT_FALSE(exists("x.vdag.work"));
+  }
+}
+
+// Scenes that are missing or no scenes, outputs that cannot be.
+TEST_F(BuildCommand, RefusesWrongFiles) {
+  expect_error(3, "none.glb", {"build", "none.glb", "-r", "64", "-o", "x.vdag"});
+  expect_error(3, "none.glb", {"build", "m.glb", "none.glb", "-r", "64", "-o", "x.vdag"});
+  put("text.glb", "this is not a scene");
+  expect_error(2, "text.glb", {"build", "text.glb", "-r", "64", "-o", "x.vdag"});
+  put("cut.glb", contents("m.glb").substr(0, 5000));
+  expect_error(2, "cut.glb", {"build", "cut.glb", "-r", "64", "-o", "x.vdag"});
+  EXPECT_FALSE(exists("x.vdag"));
+  EXPECT_FALSE(exists("x.vdag.work"));
+  // A folder in the place of the output is refused before anything is built.
+  ASSERT_EQ(mkdir(folder_.file("taken").c_str(), 0777), 0);
+  expect_error(2, "taken", {"build", "m.glb", "-r", "64", "-o", "taken"});
+  EXPECT_FALSE(exists("taken.work"));
+}
+
+// A work folder that holds somebody else's files is not touched.
+TEST_F(BuildCommand, LeavesForeignWorkFoldersAlone) {
+  ASSERT_EQ(mkdir(folder_.file("mine").c_str(), 0777), 0);
+  put("mine/letter.txt", "dear");
+  expect_error(2, "mine", {"build", "m.glb", "-r", "64", "-o", "x.vdag", "--work", "mine"});
+  EXPECT_EQ(contents("mine/letter.txt"), "dear");
+}
+
+}  // namespace
+}  // namespace command_line

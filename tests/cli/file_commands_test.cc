@@ -1,0 +1,147 @@
+// info, verify, diff, render, plan, status and generate on small files.
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+class FileCommands : public CommandLine {
+ protected:
+  void SetUp() override {
+    make_scene();
+    report_ = run_json({"build", "m.glb", "-r", "128", "-o", "m.vdag"});
+  }
+  Json report_;
+};
+
+TEST_F(FileCommands, InfoNamesAndCounts) {
+  const Json info = run_json({"info", "m.vdag", "--digest"});
+  for (const char* name :
+       {"resolution", "bounds", "hash_bits", "voxels", "svo_nodes", "dag_nodes", "bytes", "sha256"})
+    EXPECT_EQ(info[name], report_[name]) << name;
+  ASSERT_EQ(info["levels"].size(), 6u);
+  uint64_t nodes = 0;
+  for (const Json& level : info["levels"]) {
+    nodes += level["nodes"].get<uint64_t>();
+    EXPECT_GT(level["bytes"], 0);
+  }
+  EXPECT_EQ(nodes, report_["dag_nodes"]);
+  EXPECT_EQ(info["levels"][0]["nodes"], 1);
+  EXPECT_EQ(info["levels"][5]["level"], 5);
+  const Answer plain = run({"info", "m.vdag"});
+  EXPECT_EQ(plain.status, 0);
+  EXPECT_NE(plain.out.find("128"), std::string::npos);
+}
+
+// A right file passes, with and without its scene; any damage is status 4.
+TEST_F(FileCommands, Verify) {
+  EXPECT_EQ(run_json({"verify", "m.vdag"})["ok"], true);
+  EXPECT_EQ(run_json({"verify", "m.vdag", "--against", "m.glb"})["ok"], true);
+  const std::string bytes = contents("m.vdag");
+  for (const size_t at : {size_t{9}, size_t{70}, size_t{5000}, bytes.size() - 1}) {
+    SCOPED_TRACE(at);
+    std::string damaged = bytes;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+    put("damaged.vdag", damaged);
+    const Answer answer = run({"verify", "damaged.vdag"});
+    EXPECT_EQ(answer.status, at == 9 ? 5 : 4) << answer.err;
+    EXPECT_NE(answer.err.find("damaged.vdag"), std::string::npos) << answer.err;
+  }
+  put("short.vdag", bytes.substr(0, bytes.size() - 1));
+  expect_error(4, "short.vdag", {"verify", "short.vdag"});
+}
+
+// A file of another scene is not what the scene says.
+TEST_F(FileCommands, VerifyAgainstAnotherScene) {
+  ASSERT_EQ(run({"generate", "menger", "other.glb", "--level", "1"}).status, 0);
+  const Answer answer = run({"verify", "m.vdag", "--against", "other.glb"});
+  EXPECT_EQ(answer.status, 4) << answer.err;
+}
+
+// Equal files are status 0, different ones 1, incomparable ones an error.
+TEST_F(FileCommands, Diff) {
+  run_json({"build", "m.glb", "-r", "128", "-o", "cut.vdag", "--hash-bits", "4"});
+  const Json same = run_json({"diff", "m.vdag", "cut.vdag"});
+  EXPECT_EQ(same["same"], true);
+  EXPECT_EQ(same["only_a"], 0);
+  EXPECT_EQ(same["only_b"], 0);
+
+  const std::string bounds = "0,0,0,9";
+  run_json({"build", "m.glb", "-r", "64", "-o", "a.vdag", "--bounds", bounds});
+  ASSERT_EQ(run({"generate", "menger", "other.glb", "--level", "1"}).status, 0);
+  run_json({"build", "other.glb", "-r", "64", "-o", "b.vdag", "--bounds", bounds});
+  const Answer different = run({"diff", "a.vdag", "b.vdag", "--json"});
+  EXPECT_EQ(different.status, 1) << different.err;
+  const Json json = Json::parse(different.out);
+  EXPECT_EQ(json["same"], false);
+  EXPECT_GT(json["only_a"].get<uint64_t>() + json["only_b"].get<uint64_t>(), 0u);
+  expect_error(2, "", {"diff", "m.vdag", "a.vdag"});
+}
+
+// What is missing, or no file of ours, is told apart.
+TEST_F(FileCommands, WrongFiles) {
+  put("text.vdag", std::string(10000, 'x'));
+  for (const char* command : {"info", "verify"}) {
+    SCOPED_TRACE(command);
+    expect_error(3, "none.vdag", {command, "none.vdag"});
+    expect_error(4, "text.vdag", {command, "text.vdag"});
+  }
+  expect_error(3, "none.vdag", {"diff", "m.vdag", "none.vdag"});
+  expect_error(3, "none.vdag", {"render", "none.vdag", "-o", "x.png"});
+  EXPECT_FALSE(exists("x.png"));
+}
+
+TEST_F(FileCommands, RenderMakesAPicture) {
+  const Json picture = run_json({"render", "m.vdag", "-o", "m.png", "--size", "64x48"});
+  EXPECT_EQ(picture["width"], 64);
+  EXPECT_EQ(picture["height"], 48);
+  EXPECT_EQ(contents("m.png").substr(0, 8), "\x89PNG\r\n\x1a\n");
+  expect_error(2, "--size", {"render", "m.vdag", "-o", "x.png", "--size", "64"});
+  EXPECT_FALSE(exists("x.png"));
+}
+
+// The estimate has a range for everything, and builds nothing.
+TEST_F(FileCommands, PlanNames) {
+  const Json plan = run_json({"plan", "m.glb", "-r", "1024"});
+  for (const char* name : {"voxels", "svo_nodes", "dag_nodes", "file_bytes", "disk_bytes",
+                           "memory_bytes", "cpu_s", "wall_s"}) {
+    SCOPED_TRACE(name);
+    ASSERT_TRUE(plan.contains(name));
+    EXPECT_LE(plan[name]["low"], plan[name]["likely"]);
+    EXPECT_LE(plan[name]["likely"], plan[name]["high"]);
+    EXPECT_GT(plan[name]["high"], 0);
+  }
+  for (const char* name : {"triangles", "subvolumes", "free_disk_bytes", "memory_budget_bytes"})
+    EXPECT_GT(plan[name], 0) << name;
+  EXPECT_FALSE(exists("m.glb.work"));
+}
+
+// A kept work folder answers; one that is not there, or holds no job, is not found.
+TEST_F(FileCommands, StatusNames) {
+  run_json({"build", "m.glb", "-r", "128", "-o", "m.vdag", "--keep-work"});
+  const Json status = run_json({"status", "m.vdag.work"});
+  EXPECT_EQ(status["running"], false);
+  EXPECT_EQ(status["subvolumes"]["built"], status["subvolumes"]["total"]);
+  for (const char* name : {"stages", "stage", "memory_bytes", "disk_bytes", "last_error"})
+    EXPECT_TRUE(status.contains(name)) << name;
+  expect_error(3, "none.work", {"status", "none.work"});
+}
+
+// A seed makes the same bytes every time, another one others.
+TEST_F(FileCommands, GenerateIsSeeded) {
+  const auto make = [&](const std::string& kind, const std::string& seed) {
+    const Json json = run_json({"generate", kind, "g.glb", "--seed", seed, "--triangles", "500"});
+    EXPECT_EQ(json["kind"], kind);
+    EXPECT_EQ(json["bytes"], contents("g.glb").size());
+    return contents("g.glb");
+  };
+  for (const char* kind : {"city", "terrain", "soup", "spheres"}) {
+    SCOPED_TRACE(kind);
+    const std::string one = make(kind, "1");
+    EXPECT_TRUE(make(kind, "1") == one);
+    EXPECT_FALSE(make(kind, "2") == one);
+  }
+  expect_error(2, "expected one of", {"generate", "cathedral", "g.glb"});
+}
+
+}  // namespace
+}  // namespace command_line

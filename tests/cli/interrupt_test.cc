@@ -1,0 +1,53 @@
+// Ctrl-C, and the same command again.
+#include <signal.h>
+#include <time.h>
+
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+class Interrupt : public CommandLine {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(run({"generate", "soup", "s.glb", "--triangles", "3000"}).status, 0);
+  }
+  // Runs the build until it has said something and a little longer, then sends a signal.
+  Answer interrupt(int signal, int wait_ms) {
+    put(".stderr", "");
+    const pid_t pid = start(args_);
+    for (int i = 0; i < 3000 && contents(".stderr").empty(); ++i) sleep_ms(1);
+    sleep_ms(wait_ms);
+    kill(pid, signal);
+    return wait_for(pid);
+  }
+  static void sleep_ms(int ms) {
+    const timespec t{ms / 1000, ms % 1000 * 1000000};
+    nanosleep(&t, nullptr);
+  }
+  const std::vector<std::string> args_ = {"build",  "s.glb",     "-r", "2048",        "-o",
+                                          "s.vdag", "--threads", "1",  "--subvolume", "128"};
+};
+
+// Both signals stop it with status 130 and nothing under the final name; the same command then
+// ends with the bytes of a build that was never stopped.
+TEST_F(Interrupt, StopsAndGoesOn) {
+  std::vector<std::string> clean = args_;
+  clean[5] = "clean.vdag";
+  ASSERT_EQ(run(clean).status, 0);
+  for (const int signal : {SIGINT, SIGTERM})
+    for (const int wait_ms : {0, 30, 100}) {
+      SCOPED_TRACE(testing::Message() << "signal " << signal << " after " << wait_ms << " ms");
+      const Answer answer = interrupt(signal, wait_ms);
+      ASSERT_EQ(answer.status, 130) << answer.err;
+      EXPECT_NE(answer.err.find("cancelled"), std::string::npos) << answer.err;
+      EXPECT_FALSE(exists("s.vdag"));
+      EXPECT_FALSE(exists("s.vdag.report.json"));
+    }
+  EXPECT_EQ(run(args_).status, 0);
+  EXPECT_TRUE(contents("s.vdag") == contents("clean.vdag"));
+  EXPECT_FALSE(exists("s.vdag.work"));
+}
+
+}  // namespace
+}  // namespace command_line
