@@ -28,6 +28,8 @@ CREATE TABLE subvolume (
   root_hash INTEGER NOT NULL,
   row_checksum INTEGER NOT NULL
 );
+-- Replacing a row looks for rows that refer to it: without an index, through all of them.
+CREATE INDEX subvolume_by_parent ON subvolume (parent);
 CREATE TABLE stage_time (
   id INTEGER PRIMARY KEY,
   name TEXT NOT NULL, wall_s REAL NOT NULL, cpu_s REAL NOT NULL
