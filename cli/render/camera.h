@@ -22,6 +22,7 @@ class Camera {
   Ray ray(double x, double y) const;
   // The width of a pixel at distance 1.
   double pixel_spread() const { return pixel_; }
+  const Vec& eye() const { return eye_; }
   const Vec& forward() const { return forward_; }
 
  private:

@@ -7,40 +7,47 @@
 
 namespace voxdag::render {
 
-// For one sample of a pixel. Each pixel has its own random offsets; its samples are spread evenly
-// from there (the R2 sequence), so that few of them already cover each pair of numbers well.
+// Pairs of numbers in [0, 1) that cover the unit square evenly (the R2 sequence). The sequences of
+// neighbouring pixels start far from one another, so that what noise is left is fine-grained.
 class Sampler {
  public:
-  explicit Sampler(uint64_t pixel, uint64_t sample = 0) : state_(pixel), sample_(sample) {}
-
-  // Two numbers in [0, 1): member `i` of `count` that this sample may ask for together.
   struct Pair {
     double u, v;
   };
-  Pair pair(uint64_t i, uint64_t count) const {
-    const auto n = static_cast<double>(sample_ * count + i);
-    return {wrap(offset(0) + 0.7548776662466927 * n), wrap(offset(1) + 0.5698402909980532 * n)};
+
+  explicit Sampler(uint64_t seed) : start_{random(seed, 0), random(seed, 1)} {}
+  // Sample `sample` of a pixel.
+  Sampler(int x, int y, int sample)
+      : start_{x * 0.7548776662466927 + y * 0.5698402909980532,
+               x * 0.4142135623730951 + y * 0.7320508075688772},
+        sample_(sample) {}
+
+  // Member `i` of `count` pairs that this sample asks for together.
+  Pair pair(int i, int count) const {
+    const double n = static_cast<double>(sample_) * count + i;
+    return {wrap(start_[0] + random(question_, 0) + 0.7548776662466927 * n),
+            wrap(start_[1] + random(question_, 1) + 0.5698402909980532 * n)};
   }
-  // Other numbers from here on.
-  void next_pair() { state_ += 2; }
-  // A pair that is not part of a set.
+  // The pairs from here on have nothing to do with those before.
+  void next_question() { ++question_; }
   Pair pair() {
     const Pair p = pair(0, 1);
-    next_pair();
+    next_question();
     return p;
   }
 
  private:
   static double wrap(double x) { return x - std::floor(x); }
-  double offset(uint64_t which) const {
-    uint64_t x = (state_ + which + 1) * 0x9e3779b97f4a7c15ull;
+  static double random(uint64_t which, uint64_t axis) {
+    uint64_t x = (2 * which + axis + 1) * 0x9e3779b97f4a7c15ull;
     x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9ull;
     x = (x ^ x >> 27) * 0x94d049bb133111ebull;
     return static_cast<double>((x ^ x >> 31) >> 11) * 0x1p-53;
   }
 
-  uint64_t state_;
-  const uint64_t sample_;
+  double start_[2];
+  int sample_ = 0;
+  uint64_t question_ = 0;
 };
 
 inline constexpr double kPi = 3.14159265358979323846;

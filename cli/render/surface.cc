@@ -120,12 +120,31 @@ Vec face_normal(const Hit& hit, const Vec& direction) {
   return normal;
 }
 
-Vec surface_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
+Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
   const Vec face = face_normal(hit, direction);
   const Neighbourhood cells(dag, hit);
   Vec normal;
   if (cells.weight() < 3 || !thinnest_direction(cells.covariance(), normal)) return face;
   return dot(normal, face - direction) < 0 ? normal * -1.0 : normal;
+}
+
+bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surface& s) {
+  constexpr double kFar = 1e30;
+  const RayCaster caster(dag);
+  Hit hit;
+  if (!caster.cast(ray, {0, 0.75 * pixel_spread}, 0, kFar, hit)) return false;
+  s.t = hit.t;
+  s.size = static_cast<double>(dag.resolution() >> hit.depth);
+  const double pixels = s.size / std::max(s.t * pixel_spread, 1e-9);
+  const double cube = std::clamp((pixels - 5) / 8, 0.0, 1.0);
+  const Vec face = face_normal(hit, ray.direction);
+  s.normal = cube < 1 ? normalized(mix(plane_normal(dag, hit, ray.direction), face, cube)) : face;
+  // Beyond the steps that cells make of a slope.
+  s.start = ray.at(s.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
+  // In a narrow place that may lie in something else; where the ray came through is free.
+  if (caster.cast({s.start, s.normal}, {s.size, 0}, 0, 0, hit))
+    s.start = ray.at(s.t - 1.5 * s.size);
+  return true;
 }
 
 }  // namespace voxdag::render

@@ -1,0 +1,46 @@
+// The light on a surface: a sun (in closed rooms, a lamp) and a soft sky, both found by casting
+// rays.
+#pragma once
+
+#include <vector>
+
+#include "cli/render/bounds.h"
+#include "cli/render/camera.h"
+#include "cli/render/ray_caster.h"
+#include "cli/render/sampling.h"
+#include "cli/render/surface.h"
+
+namespace voxdag::render {
+
+class Lighting {
+ public:
+  // Chooses where the lamp stands for what the camera sees, of which `seen` is a sample.
+  Lighting(const DagView& dag, const Box& box, const Camera& camera,
+           const std::vector<Surface>& seen);
+
+  // Red, green and blue that come from the sky, 1 from all of an open one.
+  Vec skylight(const Surface& surface, int rays, Sampler& sampler) const;
+  // What of the lamp's light a surface takes, 0 to 1; from a point of the lamp that `sampler`
+  // picks.
+  double lamplight(const Surface& surface, Sampler& sampler) const;
+  // How much light the floor below the scene gets where `ray` meets it, 1 where the scene takes
+  // none away, or where there is no floor.
+  double floor_light(const Ray& ray, Sampler& sampler) const;
+
+ private:
+  bool sees_lamp(const Vec& from, double size, const Vec& lamp) const;
+  double lit_share(const std::vector<Surface>& seen, const Vec& lamp) const;
+  void place_sun(const std::vector<Surface>& seen, const Vec& back);
+  void place_lamp(const Vec& eye, const Vec& back);
+
+  const RayCaster caster_;
+  const Box box_;
+  const double pixel_spread_;
+  bool has_floor_ = false;
+  double sky_reach_ = 0;   // how far a surface looks for what takes its skylight, in voxels
+  Vec lamp_;               // the sun, far away, or a lamp
+  double lamp_reach_ = 0;  // where its light has half its strength
+  double lit_ = 0;         // share of what is seen
+};
+
+}  // namespace voxdag::render
