@@ -69,11 +69,18 @@ struct Decoder {
 }  // namespace
 
 std::vector<BackendUnderTest> backends_under_test() {
-  return {{"cpu", [] { return make_cpu_backend(true); }},
-          {"cpu_portable", [] { return make_cpu_backend(false); }},
-          {"parallel_host_fast", [] { return make_parallel_host_backend(Method::kFast, 2); }},
-          {"parallel_host_hashes", [] { return make_parallel_host_backend(Method::kHashes); }},
-          {"parallel_host_pointers", [] { return make_parallel_host_backend(Method::kPointers); }}};
+  std::vector<BackendUnderTest> all = {
+      {"cpu", [] { return make_cpu_backend(true); }},
+      {"cpu_portable", [] { return make_cpu_backend(false); }},
+      {"parallel_host_fast", [] { return make_parallel_host_backend(Method::kFast, 2); }},
+      {"parallel_host_hashes", [] { return make_parallel_host_backend(Method::kHashes); }},
+      {"parallel_host_pointers", [] { return make_parallel_host_backend(Method::kPointers); }}};
+  if (cuda_device_available())
+    for (const auto& [name, method] : {std::pair{"cuda_fast", Method::kFast},
+                                       {"cuda_hashes", Method::kHashes},
+                                       {"cuda_pointers", Method::kPointers}})
+      all.push_back({name, [method = method] { return make_cuda_backend(method); }});
+  return all;
 }
 
 Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,

@@ -23,7 +23,8 @@ __global__ void __launch_bounds__(kThreadsPerBlock) run_for_each(uint32_t n, F f
 }
 
 template <class Kernel>
-__global__ void __launch_bounds__(Kernel::kThreads) run_block(Kernel kernel) {
+__global__ void __launch_bounds__(Kernel::kThreads, Kernel::kBlocksAtOnce)
+    run_block(Kernel kernel) {
   __shared__ typename Kernel::Shared shared;
 #pragma unroll
   for (int phase = 0; phase < Kernel::kPhases; ++phase) {

@@ -1,6 +1,7 @@
 # Enables the CUDA language where nvcc is there, and says nothing where it is not. Included by the
 # root, so that every executable knows how to link what was compiled here.
 option(VOXDAG_CUDA "Build the CUDA backend where nvcc is found" ON)
+set(VOXDAG_HAS_CUDA OFF CACHE INTERNAL "The CUDA backend is built")
 
 if(VOXDAG_CUDA AND NOT VOXDAG_SANITIZE)
   if(NOT CMAKE_CUDA_COMPILER)
@@ -22,7 +23,7 @@ if(VOXDAG_CUDA AND NOT VOXDAG_SANITIZE)
     if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)
       set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
     endif()
-    set(VOXDAG_HAS_CUDA ON)
+    set(VOXDAG_HAS_CUDA ON CACHE INTERNAL "The CUDA backend is built")
     if(VOXDAG_CCACHE)
       set(CMAKE_CUDA_COMPILER_LAUNCHER ${VOXDAG_CCACHE})
     endif()

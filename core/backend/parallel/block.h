@@ -2,6 +2,7 @@
 //
 // A kernel K has
 //   K::kThreads, K::kPhases      threads of a block, phases between which they wait for each other
+//   K::kBlocksAtOnce             blocks that a multiprocessor should have registers for
 //   K::Shared                    the block's memory: plain data, uninitialised
 //   operator()(phase, block, thread, Shared&)
 // On a GPU one thread block runs all threads side by side; on the host one thread runs them one

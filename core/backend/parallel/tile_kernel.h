@@ -22,6 +22,7 @@ inline constexpr int kTileCodeBits = 3 * (kTileLevels - kCellLevels);  // of a c
 
 struct DrawTile {
   static constexpr uint32_t kThreads = 256;
+  static constexpr int kBlocksAtOnce = 2;
   static constexpr int kPhases = 5;
   static constexpr uint32_t kRun = kTileBricks / kThreads;  // bricks that a thread sends out
   static constexpr uint32_t kGroup = 16;                    // threads whose counts are added up

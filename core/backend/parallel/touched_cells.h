@@ -45,7 +45,7 @@ VOXDAG_HD inline Int clamp_to(int128 x, Int bound) {
   return x > bound ? bound : x < -bound ? static_cast<Int>(-bound) : static_cast<Int>(x);
 }
 
-// A narrow triangle against the cells of a lattice.
+// A narrow triangle against the cells of a lattice, whose first block its bounding box touches.
 struct TriangleOnLattice {
   // In the projection along one axis, a cell is on the inner side of an edge iff
   // a k_a + b k_b + constant >= 0, along the two axes that follow.
@@ -53,7 +53,7 @@ struct TriangleOnLattice {
     int32_t a, b;
     int64_t constant;
   };
-  int64_t first[3], last[3];  // cells of the bounding box
+  int32_t first[3], last[3];  // cells of the bounding box
   int64_t n[3];
   int128 plane;       // n . (low - v) / 2^shift, floored
   int32_t remainder;  // 1 if that was not exact
@@ -67,8 +67,8 @@ struct TriangleOnLattice {
     int128 base = 0;
     short_normal = true;
     for (int a = 0; a < 3; ++a) {
-      first[a] = (t.low(a) - low[a]) >> shift;
-      last[a] = (t.high(a) - low[a]) >> shift;
+      first[a] = static_cast<int32_t>((t.low(a) - low[a]) >> shift);
+      last[a] = static_cast<int32_t>((t.high(a) - low[a]) >> shift);
       const int b = a == 2 ? 0 : a + 1, c = a == 0 ? 2 : a - 1;
       n[a] = half[0][b] * half[1][c] - half[0][c] * half[1][b];
       base += static_cast<int128>(n[a]) * (low[a] - t.v[0][a]);
@@ -105,7 +105,7 @@ struct TriangleOnLattice {
   static constexpr int64_t kFar64 = int64_t{1} << 60;
 
   template <int N>
-  VOXDAG_HD static uint64_t in_box(int axis, int64_t from, int64_t to) {
+  VOXDAG_HD static uint64_t in_box(int axis, int from, int to) {
     uint64_t cells = 0;
     for (int k = 0; k < N; ++k)
       if (k >= from && k <= to) cells |= uint64_t{1} << cell_bit(axis, k);

@@ -100,8 +100,11 @@ void measure(const Subject& subject, unsigned workers, const std::string& scene,
 
 }  // namespace
 
-void bench(const std::vector<Subject>& subjects, const BenchOptions& options) {
-  std::printf("R %u, best of three\n", 1u << options.grid_levels);
+void bench(const std::vector<Subject>& subjects, BenchOptions options) {
+  if (options.subvolume_edge == 0)
+    options.subvolume_edge = std::max(kSmallestEdge, int64_t{1} << options.grid_levels >> 3);
+  std::printf("R %u, subvolumes of %lld, best of three\n", 1u << options.grid_levels,
+              static_cast<long long>(options.subvolume_edge));
   std::printf("%-10s %-22s %7s %10s %14s %12s %12s %9s %10s\n", "scene", "backend", "workers",
               "subvolumes", "voxels", "octree", "sub-DAGs", "seconds", "Mvoxel/s");
   for (Scene& scene : std::vector<Scene>{scan(100000, options.grid_levels),

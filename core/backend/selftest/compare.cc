@@ -98,8 +98,9 @@ bool compare_with_cpu(const std::vector<Subject>& subjects, bool quick) {
          tricky_scenes(static_cast<uint64_t>(edge), task.cube, task.grid_levels, 60))
       comparison.row(task, scene);
   }
+  const uint64_t triangles = quick ? 8000 : 100000;
   for (const uint32_t levels : quick ? std::vector<uint32_t>{7} : std::vector<uint32_t>{8, 10, 11})
-    for (const Scene& scene : {scan(100000, levels), building(100000, levels)})
+    for (const Scene& scene : {scan(triangles, levels), building(triangles, levels)})
       for (const uint32_t hash_bits : {64u, 8u}) comparison.row({levels, {}, hash_bits}, scene);
   return comparison.all_equal;
 }

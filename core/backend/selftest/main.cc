@@ -1,5 +1,6 @@
 // voxdag-gpu-selftest: does the GPU give what the CPU gives, and how fast? Needs nothing but a
 // compiler (and CUDA); see docs/gpu.md.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

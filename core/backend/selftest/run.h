@@ -42,13 +42,13 @@ bool compare_with_cpu(const std::vector<Subject>& subjects, bool quick);
 
 struct BenchOptions {
   uint32_t grid_levels = 12;
-  int64_t subvolume_edge = 1024;
-  unsigned workers = 2;  // of a subject, each with a backend of its own
+  int64_t subvolume_edge = 0;  // 0 for an eighth of the grid's
+  unsigned workers = 2;        // of a subject, each with a backend of its own
   unsigned cpu_workers = 1;
   uint64_t worker_bytes = uint64_t{8} << 30;
 };
 
 // Builds two large scenes subvolume by subvolume and prints voxels per second of wall time.
-void bench(const std::vector<Subject>& subjects, const BenchOptions& options);
+void bench(const std::vector<Subject>& subjects, BenchOptions options);
 
 }  // namespace voxdag::selftest
