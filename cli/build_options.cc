@@ -75,7 +75,11 @@ void BuildOptions::declare(CLI::App& command) {
       .add_option("--subvolume", r.subvolume_edge,
                   "edge of a subvolume in voxels, a power of two (default: by the plan)")
       ->group(run);
-  command.add_option("--backend", r.backend, "auto or cpu")->group(run);
+  command.add_option("--backend", r.backend, "auto, cpu, cuda or parallel-host")->group(run);
+  command
+      .add_option("--method", r.method,
+                  "consing (cpu), pointers or hashes (default: the backend's fastest)")
+      ->group(run);
   command.add_option("--work", r.work_folder, "folder for temporary files (default: OUT.work)")
       ->group(run);
 }

@@ -31,7 +31,8 @@ struct RunOptions {
   uint64_t memory_bytes = 0;     // 0 for half of what RAM and cgroup allow
   unsigned threads = 0;          // 0 for all cores
   uint64_t subvolume_edge = 0;   // voxels, a power of two; 0 for a choice by the plan
-  std::string backend = "auto";  // auto or cpu
+  std::string backend = "auto";  // auto, cpu, cuda or parallel-host
+  std::string method;            // "" for the backend's own, consing, pointers or hashes
   std::string cache_folder;      // "" for none
   uint64_t cache_bytes = uint64_t{16} << 30;
   bool keep_work = false;

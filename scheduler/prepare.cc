@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "scheduler/memory_limits.h"
+#include "scheduler/open_backend.h"
 
 namespace voxdag {
 namespace {
@@ -49,9 +50,7 @@ BuildSpec checked(const BuildSpec& spec) {
   const uint64_t edge = r.subvolume_edge;
   if (edge && ((edge & (edge - 1)) || edge < static_cast<uint64_t>(kSmallestEdge)))
     refuse("subvolume edge " + std::to_string(edge) + ": expected a power of two from 64 voxels");
-  if (r.backend != "auto" && r.backend != "cpu")
-    throw Error(ErrorCode::kDevice,
-                "backend '" + r.backend + "' is not in this build: expected auto or cpu");
+  backend_opener(r);
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = std::max(1u, std::thread::hardware_concurrency());
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();

@@ -5,7 +5,6 @@
 #include <optional>
 #include <set>
 
-#include "core/backend/backend.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/global_writer.h"
@@ -14,6 +13,7 @@
 #include "scheduler/estimate.h"
 #include "scheduler/job_progress.h"
 #include "scheduler/memory_limits.h"
+#include "scheduler/open_backend.h"
 #include "scheduler/prepare.h"
 #include "scheduler/work_folder.h"
 
@@ -184,7 +184,7 @@ class Build {
     options.threads = spec_.run.threads;
     if (spec_.run.subvolume_edge)
       options.longest_edge = static_cast<int64_t>(spec_.run.subvolume_edge);
-    options.open_backend = [] { return make_cpu_backend(); };
+    options.open_backend = backend_opener(spec_.run);
     options.segment_folder = work_.path();
     options.first_segment_id = work_.next_segment_id();
     if (cache_) options.cache = &*cache_;
