@@ -17,6 +17,11 @@ struct Octants {
   uint32_t inside;   // of those: the triangle covers them, they see no more than its plane
 };
 
+struct BrickCount {
+  int bricks;
+  uint64_t voxels;
+};
+
 struct Kernels {
   // Sets exactly the voxels of the tile that the triangle touches.
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
@@ -26,8 +31,9 @@ struct Kernels {
   // other bits of the last word are 0.
   void (*find_in_range)(const int64_t* values, int count, int64_t least, int64_t most,
                         uint64_t* bits);
-  // Bits set in `count` words.
-  uint64_t (*count_bits)(const uint64_t* words, int count);
+  // Takes the bricks out of a tile, which becomes empty, in Morton order; counts their voxels.
+  // `words` words of `existing`, one bit per brick, say which were there.
+  BrickCount (*collect)(TileBricks& tile, int words, uint64_t* existing, uint64_t* masks);
 };
 
 const Kernels& portable_kernels();

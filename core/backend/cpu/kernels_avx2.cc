@@ -34,10 +34,33 @@ Octants test_octants(const NarrowTriangle& triangle, const Box& cube, bool insid
   return OctantTest<Avx2Quad, int32_t>(triangle, cube).run(inside);
 }
 
-uint64_t count_bits(const uint64_t* words, int count) {
-  uint64_t bits = 0;
-  for (int i = 0; i < count; ++i) bits += static_cast<uint64_t>(_mm_popcnt_u64(words[i]));
-  return bits;
+BrickCount collect(TileBricks& tile, int words, uint64_t* existing, uint64_t* masks) {
+  BrickCount found{0, 0};
+  const __m256i zero = _mm256_setzero_si256();
+  for (int w = 0; w < words; ++w) {
+    uint64_t bits = 0, touched;
+    __builtin_memcpy(&touched, tile.touched + 8 * w, 8);
+    __builtin_memset(tile.touched + 8 * w, 0, 8);
+    for (; touched != 0; touched &= touched - 1) {
+      const int node = __builtin_ctzll(touched) / 8;
+      __m256i* const eight = reinterpret_cast<__m256i*>(tile.masks + 64 * w + 8 * node);
+      const __m256i low = _mm256_load_si256(eight), high = _mm256_load_si256(eight + 1);
+      const auto empty = [zero](__m256i x) {
+        return _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(x, zero)));
+      };
+      uint32_t there = static_cast<uint32_t>(empty(low) | empty(high) << 4) ^ 0xff;
+      bits |= uint64_t{there} << 8 * node;
+      for (; there != 0; there &= there - 1) {
+        const uint64_t mask = tile.masks[64 * w + 8 * node + __builtin_ctz(there)];
+        found.voxels += static_cast<uint64_t>(_mm_popcnt_u64(mask));
+        masks[found.bricks++] = mask;
+      }
+      _mm256_store_si256(eight, zero);
+      _mm256_store_si256(eight + 1, zero);
+    }
+    existing[w] = bits;
+  }
+  return found;
 }
 
 void find_in_range(const int64_t* values, int count, int64_t least, int64_t most, uint64_t* bits) {
@@ -54,7 +77,7 @@ void find_in_range(const int64_t* values, int count, int64_t least, int64_t most
   }
 }
 
-constexpr Kernels kAvx2 = {draw_avx2, test_octants, find_in_range, count_bits};
+constexpr Kernels kAvx2 = {draw_avx2, test_octants, find_in_range, collect};
 
 }  // namespace
 

@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "core/backend/cpu/draw_portable.h"
 #include "core/backend/cpu/kernels.h"
 #include "core/backend/cpu/octant_test.h"
@@ -41,10 +43,23 @@ Octants test_octants_narrow(const NarrowTriangle& triangle, const Box& cube, boo
   return OctantTest<PlainQuad, int32_t>(triangle, cube).run(inside);
 }
 
-uint64_t count_bits(const uint64_t* words, int count) {
-  uint64_t bits = 0;
-  for (int i = 0; i < count; ++i) bits += static_cast<uint64_t>(popcount64(words[i]));
-  return bits;
+BrickCount collect(TileBricks& tile, int words, uint64_t* existing, uint64_t* masks) {
+  BrickCount found{0, 0};
+  for (int w = 0; w < words; ++w) {
+    uint64_t bits = 0;
+    for (int node = 8 * w; node < 8 * w + 8; ++node) {
+      if (!std::exchange(tile.touched[node], 0)) continue;
+      for (int i = 8 * node; i < 8 * node + 8; ++i) {
+        const uint64_t mask = std::exchange(tile.masks[i], 0);
+        if (mask == 0) continue;
+        bits |= uint64_t{1} << i % 64;
+        found.voxels += static_cast<uint64_t>(popcount64(mask));
+        masks[found.bricks++] = mask;
+      }
+    }
+    existing[w] = bits;
+  }
+  return found;
 }
 
 void find_in_range(const int64_t* values, int count, int64_t least, int64_t most, uint64_t* bits) {
@@ -56,8 +71,7 @@ void find_in_range(const int64_t* values, int count, int64_t least, int64_t most
   }
 }
 
-constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow, find_in_range,
-                               count_bits};
+constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow, find_in_range, collect};
 
 }  // namespace
 

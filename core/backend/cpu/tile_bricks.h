@@ -11,18 +11,19 @@ inline constexpr int kTileBricks = 1 << 3 * (kTileLog2 - 2);
 
 // A brick coordinate (0..15) with its bits moved to 0, 3, 6, 9: axis a's part of a brick's Morton
 // index in the tile is this, shifted by a.
-inline constexpr uint16_t kSpread[16] = {
+inline constexpr uint32_t kSpread[16] = {
     0x000, 0x001, 0x008, 0x009, 0x040, 0x041, 0x048, 0x049,
     0x200, 0x201, 0x208, 0x209, 0x240, 0x241, 0x248, 0x249,
 };
 
 struct TileBricks {
-  alignas(64) uint64_t masks[kTileBricks] = {};          // in Morton order
-  alignas(64) uint64_t occupied[kTileBricks / 64] = {};  // one bit per brick: its mask is not 0
+  alignas(64) uint64_t masks[kTileBricks] = {};  // in Morton order
+  // Eight bricks in a row are a cube of 8 voxels: not 0 if one of them may have voxels.
+  alignas(64) uint8_t touched[kTileBricks / 8] = {};
 
   [[gnu::always_inline]] void add(uint32_t brick, uint64_t voxels) {
     masks[brick] |= voxels;
-    occupied[brick / 64] |= uint64_t{voxels != 0} << brick % 64;
+    touched[brick / 8] = 1;
   }
 };
 

@@ -1,7 +1,5 @@
 #include "core/backend/cpu/tile_reducer.h"
 
-#include <utility>
-
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
@@ -30,21 +28,15 @@ NodeRef TileReducer::reduce_bricks(TileBricks& tile, int size_log2) {
   const int words = words_of(size_log2 - kBrickLevels);
   BrickTable& table = tables_.bricks();
   table.reserve(kTileBricks);
-  int count = 0;
-  for (int w = 0; w < words; ++w) {
-    existing_[w] = std::exchange(tile.occupied[w], 0);
-    for (uint64_t rest = existing_[w]; rest != 0; rest &= rest - 1) {
-      const uint64_t mask = std::exchange(tile.masks[64 * w + lowest_bit(rest)], 0);
-      const uint64_t hash = hash_brick(mask);
-      table.prefetch(hash);
-      masks_[count] = mask;
-      hashes_[count++] = hash;
-    }
+  const BrickCount found = kernels_.collect(tile, words, existing_, masks_);
+  if (found.bricks == 0) return {};
+  for (int i = 0; i < found.bricks; ++i) {
+    hashes_[i] = hash_brick(masks_[i]);
+    table.prefetch(hashes_[i]);
   }
-  if (count == 0) return {};
-  for (int i = 0; i < count; ++i) ids_[i] = table.find_or_add(masks_[i], hashes_[i]);
-  tables_.counts() += {static_cast<uint64_t>(count), kernels_.count_bits(masks_, count)};
-  return reduce(words, count, kBrickLevels, size_log2);
+  for (int i = 0; i < found.bricks; ++i) ids_[i] = table.find_or_add(masks_[i], hashes_[i]);
+  tables_.counts() += {static_cast<uint64_t>(found.bricks), found.voxels};
+  return reduce(words, found.bricks, kBrickLevels, size_log2);
 }
 
 NodeRef TileReducer::reduce(int words, int count, int from_log2, int size_log2) {
