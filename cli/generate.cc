@@ -72,7 +72,7 @@ void add_generate_command(CLI::App& app, CommandContext& context) {
   auto* triangles = command->add_option("--triangles", state->options.triangles,
                                         "how many, about (not for menger)");
   triangles->check(CLI::PositiveNumber);
-  command->add_option("--level", state->options.level, "menger: how often the cube is cut, 0 to 6")
+  command->add_option("--level", state->options.level, "menger: how often the cube is cut, 0 to 5")
       ->capture_default_str();
   command->add_flag("--instances", state->options.instances,
                     "city, spheres: repeated parts once, placed by EXT_mesh_gpu_instancing");

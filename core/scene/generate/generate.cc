@@ -16,19 +16,31 @@ constexpr SceneKindInfo kKinds[] = {
     {SceneKind::kSpheres, "spheres", "spheres of many sizes", 500'000},
 };
 
-constexpr uint32_t kMaxMengerLevel = 6;
+constexpr uint32_t kMaxMengerLevel = 5;
+// Of a terrain, which packs its triangles best.
+constexpr uint64_t kLeastBytesPerTriangle = 12;
+
+// What can be said without counting; GlbLayout says the rest.
+void check_size(const GenerateOptions& options) {
+  const bool is_menger = options.kind == SceneKind::kMenger;
+  const bool fits =
+      is_menger ? options.level <= kMaxMengerLevel
+                : options.instances || options.triangles <= kMaxGlbBytes / kLeastBytesPerTriangle;
+  if (!fits)
+    throw Error(ErrorCode::kLimit,
+                "a .glb holds at most 4 294 967 295 bytes: ask for " +
+                    (is_menger ? "a level of at most " + std::to_string(kMaxMengerLevel)
+                               : std::string("fewer triangles")));
+}
 
 void check(const GenerateOptions& options) {
-  const SceneKindInfo& info = scene_kind(options.kind);
-  const std::string name = info.name;
+  const std::string name = scene_kind(options.kind).name;
   const bool has_parts = options.kind == SceneKind::kCity || options.kind == SceneKind::kSpheres;
   if (options.instances && !has_parts)
     throw Error(ErrorCode::kInvalidInput, name + " has no repeated parts to write as instances");
   if (options.kind == SceneKind::kMenger && options.triangles != 0)
     throw Error(ErrorCode::kInvalidInput, "menger is sized by its level, not by triangles");
-  if (options.level > kMaxMengerLevel)
-    throw Error(ErrorCode::kInvalidInput, "a menger level of " + std::to_string(options.level) +
-                                              ": expected 0 to " + std::to_string(kMaxMengerLevel));
+  check_size(options);
 }
 
 void make(const GenerateOptions& options, BlockSink& sink) {

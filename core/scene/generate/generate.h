@@ -34,7 +34,7 @@ struct GenerateOptions {
   // Triangles wanted: soup gives exactly these, terrain the largest square below, city and spheres
   // about as many. 0 is the kind's default.
   uint64_t triangles = 0;
-  // menger only: how often the cube was cut, 0 to 6.
+  // menger only: how often the cube was cut, 0 to 5.
   uint32_t level = 3;
   // city and spheres: repeated parts are stored once and placed by EXT_mesh_gpu_instancing.
   bool instances = false;
