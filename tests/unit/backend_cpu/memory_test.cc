@@ -1,0 +1,56 @@
+#include "core/backend/cpu/memory.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace voxdag::cpu {
+namespace {
+
+class CpuMemory : public testing::Test {
+ protected:
+  MemoryBudget budget_{uint64_t{64} << 20};
+  PagePool pool_;
+  Memory memory_{budget_, pool_};
+};
+
+// A block that was used before is handed out zero where zero was asked for.
+TEST_F(CpuMemory, KeptPagesAreZeroedAgain) {
+  for (const size_t size : {1000u, 100000u, 3000000u}) {
+    SCOPED_TRACE(size);
+    {
+      Buffer<uint8_t> dirty(memory_, size);
+      std::fill(dirty.begin(), dirty.end(), 0xff);
+    }
+    const Buffer<uint8_t> clean(memory_, size, Buffer<uint8_t>::kZero);
+    EXPECT_TRUE(std::all_of(clean.begin(), clean.end(), [](uint8_t b) { return b == 0; }));
+  }
+}
+
+// Growing keeps the contents, within kept sizes and beyond, and charges what the buffer has.
+TEST_F(CpuMemory, BuffersGrow) {
+  Buffer<uint32_t> buffer(memory_, 10);
+  uint32_t filled = 0;
+  while (buffer.size() < 6000000) {
+    for (; filled < buffer.size(); ++filled) buffer[filled] = filled * 2654435761u;
+    buffer.grow(memory_, buffer.size() + 1);
+    ASSERT_EQ(budget_.used(), buffer.size() * sizeof(uint32_t));
+    for (uint32_t i = 0; i < filled; i += 97) ASSERT_EQ(buffer[i], i * 2654435761u);
+  }
+}
+
+// What does not fit is Outgrown; the buffer that would not grow is as it was.
+TEST_F(CpuMemory, TooLargeIsOutgrown) {
+  EXPECT_THROW(Buffer<uint64_t>(memory_, 9 << 20), Outgrown);
+  Buffer<uint64_t> buffer(memory_, 6 << 20);
+  buffer[0] = 42;
+  const uint64_t used = budget_.used();
+  EXPECT_THROW(buffer.grow(memory_, 9 << 20), Outgrown);
+  EXPECT_EQ(budget_.used(), used);
+  EXPECT_EQ(buffer[0], 42u);
+  buffer = {};
+  EXPECT_EQ(budget_.used(), 0u);
+}
+
+}  // namespace
+}  // namespace voxdag::cpu

@@ -1,0 +1,158 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "core/backend/cpu/brick_table.h"
+#include "core/backend/cpu/node_table.h"
+#include "core/dag/level_array.h"
+#include "core/dag/node_hash.h"
+#include "tests/oracle/scenes.h"
+
+namespace voxdag::cpu {
+namespace {
+
+class Tables : public testing::Test {
+ protected:
+  MemoryBudget budget_{uint64_t{1} << 30};
+  PagePool pool_;
+  Memory memory_{budget_, pool_};
+  oracle::Random random_{5};
+
+  uint64_t word() { return static_cast<uint64_t>(random_.between(INT64_MIN / 2, INT64_MAX / 2)); }
+};
+
+// Equal masks get equal ids, different ones different ids, over many growths.
+TEST_F(Tables, BricksAreFoundAgain) {
+  BrickTable table(memory_);
+  std::map<uint64_t, uint32_t> truth;
+  for (int i = 0; i < 200000; ++i) {
+    const uint64_t mask = i % 3 ? word() | 1 : static_cast<uint64_t>(random_.between(1, 500));
+    table.reserve(1);
+    const uint32_t id = table.find_or_add(mask, hash_brick(mask));
+    const auto [at, added] = truth.emplace(mask, id);
+    ASSERT_EQ(at->second, id);
+    ASSERT_TRUE(!added || id == truth.size() - 1);
+  }
+  EXPECT_EQ(table.size(), truth.size());
+}
+
+// The slots come out in the order of (cut hash, mask), for whole and for cut hashes.
+TEST_F(Tables, BricksAreSorted) {
+  for (const uint32_t bits : {64u, 33u, 16u, 4u}) {
+    SCOPED_TRACE(bits);
+    BrickTable table(memory_);
+    for (int i = 0; i < 5000; ++i) {
+      const uint64_t mask = word() | 1;
+      table.reserve(1);
+      table.find_or_add(mask, hash_brick(mask));
+    }
+    const auto slots = table.sort_slots(bits);
+    ASSERT_EQ(slots.size(), table.size());
+    for (size_t i = 1; i < slots.size(); ++i) {
+      const uint64_t a = cut_hash(hash_brick(slots[i - 1].mask), bits);
+      const uint64_t b = cut_hash(hash_brick(slots[i].mask), bits);
+      ASSERT_TRUE(a < b || (a == b && slots[i - 1].mask < slots[i].mask)) << i;
+    }
+  }
+}
+
+struct Node {
+  uint64_t hash;
+  uint32_t mask;
+  std::vector<uint32_t> children;
+  auto operator<=>(const Node&) const = default;
+};
+
+// Nodes with hashes of a few values only, so that slots, tags and whole hashes collide, the highest
+// ones included, whose clusters run around the table's end.
+class NodeTables : public Tables {
+ protected:
+  Node random_node(int distinct_hashes) {
+    Node node;
+    node.mask = static_cast<uint32_t>(random_.between(1, 255));
+    for (int i = 0; i < popcount64(node.mask); ++i)
+      node.children.push_back(static_cast<uint32_t>(random_.between(0, 3)));
+    uint64_t pick = node.mask;
+    for (const uint32_t child : node.children) pick = pick * 7 + child;
+    pick %= static_cast<uint64_t>(distinct_hashes);
+    node.hash = pick % 2 ? ~pick : hash_brick(pick);
+    return node;
+  }
+};
+
+// A node is found again by mask and children, never by its hash alone.
+TEST_F(NodeTables, NodesAreFoundAgainWhateverTheirHashes) {
+  for (const int distinct : {1, 50, 100000}) {
+    SCOPED_TRACE(distinct);
+    NodeTable table(memory_);
+    std::map<Node, uint32_t> truth;
+    for (int i = 0; i < (distinct == 1 ? 1000 : 20000); ++i) {
+      const Node node = random_node(distinct);
+      table.reserve(1);
+      const uint32_t id =
+          table.find_or_add(node.hash, node.mask, node.children.data(), popcount64(node.mask));
+      ASSERT_EQ(truth.emplace(node, id).first->second, id);
+      NodeTable::Record record = table.record(id);
+      ASSERT_EQ(record.hash(), node.hash);
+      ASSERT_EQ(record.mask(), node.mask);
+      ASSERT_TRUE(std::equal(node.children.begin(), node.children.end(), record.children()));
+    }
+    EXPECT_EQ(table.size(), truth.size());
+  }
+}
+
+// Slots come out in the total order (hash, mask, children), ties and wrapped clusters included;
+// the same when hashes were changed behind the table's back.
+TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
+  for (const int distinct : {1, 20, 100000})
+    for (const bool changed : {false, true}) {
+      SCOPED_TRACE(testing::Message() << distinct << ", changed " << changed);
+      NodeTable table(memory_);
+      std::vector<Node> truth;
+      for (int i = 0; i < 3000; ++i) {
+        const Node node = random_node(distinct);
+        table.reserve(1);
+        table.find_or_add(node.hash, node.mask, node.children.data(), popcount64(node.mask));
+      }
+      table.for_each_record([&](NodeTable::Record record) {
+        if (changed) record.set_hash(hash_brick(record.hash()) >> 60);
+        truth.push_back({record.hash(),
+                         record.mask(),
+                         {record.children(), record.children() + record.child_count()}});
+      });
+      std::sort(truth.begin(), truth.end());
+      const auto slots = table.sort_slots(changed);
+      ASSERT_EQ(slots.size(), truth.size());
+      for (size_t i = 0; i < slots.size(); ++i) {
+        NodeTable::Record record = table.record(static_cast<uint32_t>(slots[i]));
+        const Node node{record.hash(),
+                        record.mask(),
+                        {record.children(), record.children() + record.child_count()}};
+        ASSERT_EQ(node, truth[i]) << i;
+      }
+    }
+}
+
+// Without room to grow the table says so, and nothing stays charged.
+TEST_F(NodeTables, OutgrowsItsBudget) {
+  MemoryBudget small(64 << 10);
+  Memory memory{small, pool_};
+  {
+    NodeTable table(memory);
+    EXPECT_THROW(
+        for (uint32_t i = 1; i < 10000; ++i) {
+          table.reserve(1);
+          const uint32_t child = i;
+          table.find_or_add(hash_brick(i), 1, &child, 1);
+        },
+        Outgrown);
+    EXPECT_GT(table.size(), 500u);
+  }
+  EXPECT_EQ(small.used(), 0u);
+  EXPECT_LE(small.peak(), small.limit());
+}
+
+}  // namespace
+}  // namespace voxdag::cpu

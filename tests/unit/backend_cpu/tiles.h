@@ -1,0 +1,69 @@
+// What the tests of drawing share: tiles anywhere in the largest grid, and the voxels in them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "core/backend/cpu/kernels.h"
+#include "core/geometry/morton.h"
+#include "tests/oracle/core_types.h"
+#include "tests/oracle/scenes.h"
+#include "tests/oracle/voxels.h"
+
+namespace voxdag::cpu {
+
+// A triangle of the oracle as this backend holds it: axes reversed, a spare one behind it, since
+// kernels load four coordinates for three.
+template <class Coordinate>
+struct Padded {
+  explicit Padded(const oracle::Triangle& t) {
+    const WideTriangle wide = reverse_axes(oracle::fixed(t));
+    for (int a = 0; a < 3; ++a)
+      for (int i = 0; i < 3; ++i) triangle.v[a][i] = static_cast<Coordinate>(wide.v[a][i]);
+  }
+  Triangle<Coordinate> triangle;
+  Triangle<Coordinate> spare{};
+};
+
+inline bool is_narrow(const oracle::Triangle& t) {
+  return is_narrow(reverse_axes(oracle::fixed(t)));
+}
+
+inline Box box_of(const oracle::Region& region) {
+  Box box;
+  for (int a = 0; a < 3; ++a) box.low[a] = region.low[2 - a] * kUnitsPerVoxel;
+  box.edge = region.edge * kUnitsPerVoxel;
+  return box;
+}
+
+// A cube of 2^size_log2 voxels, aligned, in a grid of 2^20.
+inline oracle::Region random_region(oracle::Random& random, int size_log2) {
+  oracle::Region region;
+  region.edge = 1 << size_log2;
+  for (int64_t& low : region.low)
+    low = random.between(0, (int64_t{1} << (20 - size_log2)) - 1) << size_log2;
+  return region;
+}
+
+inline oracle::Voxels voxels_of(const TileBricks& tile, int edge) {
+  oracle::Voxels voxels(edge);
+  for (int x = 0; x < edge; ++x)
+    for (int y = 0; y < edge; ++y)
+      for (int z = 0; z < edge; ++z) {
+        const uint64_t code = morton_encode(x, y, z);
+        if (tile.masks[code / 64] >> code % 64 & 1) voxels.set(x, y, z);
+      }
+  return voxels;
+}
+
+// A triangle drawn into an empty tile.
+template <class Coordinate, class Draw>
+oracle::Voxels drawn(const Triangle<Coordinate>& triangle, bool inside,
+                     const oracle::Region& region, Draw draw) {
+  const auto tile = std::make_unique<TileBricks>();
+  TileTriangle<Coordinate> in_tile;
+  if (in_tile.set_up(triangle, inside, box_of(region))) draw(in_tile, *tile);
+  return voxels_of(*tile, region.edge);
+}
+
+}  // namespace voxdag::cpu
