@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <new>
+#include <system_error>
 
 #include "cli/command.h"
 #include "core/base/error.h"
@@ -54,6 +55,8 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : exit_status(ErrorCode::kInvalidInput);
   } catch (const Error& error) {
     return report(error.code(), error.what());
+  } catch (const std::system_error& error) {
+    return report(ErrorCode::kOutOfMemory, error.what());
   } catch (const std::bad_alloc&) {
     return report(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
   }

@@ -6,6 +6,7 @@
 #include "cli/command.h"
 #include "cli/size.h"
 #include "scheduler/job_status.h"
+#include "scheduler/work_folder.h"
 
 namespace voxdag::cli {
 namespace {
@@ -36,7 +37,9 @@ void print(const JobStatus& status) {
 }
 
 void run(const StatusCommand& command, CommandContext& context) {
-  for (;;) {
+  for (bool looked = false;; looked = true) {
+    // Between two looks the build may finish and tidy its folder away.
+    if (looked && !context.files.exists(WorkFolder::store_path(command.work_folder))) return;
     const JobStatus status = read_job_status(context.files, command.work_folder);
     if (command.json)
       std::printf("%s\n", status_json(status).c_str());
@@ -46,7 +49,6 @@ void run(const StatusCommand& command, CommandContext& context) {
     if (!command.watch || !status.running) return;
     std::this_thread::sleep_for(std::chrono::seconds(1));
     context.cancel.check();
-    if (!context.files.exists(command.work_folder)) return;  // finished, and tidied away
   }
 }
 

@@ -73,11 +73,19 @@ bool ArtifactCache::find(const std::string& key, uint32_t grid_levels, StoredSub
     subvolume.artifact =
         copy_artifact(*entry.file, entry.ref, subvolume.cube, grid_levels, segment);
     subvolume.summary = {entry.root.voxels, entry.root.svo_nodes, entry.dag_nodes, entry.root.hash};
-    files_.touch(path_of(key));
+    mark_used(key);
     return true;
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kNoSpace) throw;  // the segment's disk, not the cache's
     return false;
+  }
+}
+
+void ArtifactCache::mark_used(const std::string& key) {
+  try {
+    files_.touch(path_of(key));
+  } catch (const Error&) {
+    // A cache that may only be read: its age is not ours to keep.
   }
 }
 

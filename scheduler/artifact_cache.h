@@ -37,6 +37,7 @@ class ArtifactCache {
 
  private:
   std::string path_of(const std::string& key) const { return folder_ + "/" + key + ".vdart"; }
+  void mark_used(const std::string& key);
   // Removes the least recently used entries down to nine tenths of the limit.
   void evict();
 

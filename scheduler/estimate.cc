@@ -139,6 +139,12 @@ Estimate plan_build(const BuildSpec& spec, const Seams& seams) {
     folder =
         std::string(temporary ? temporary : "/tmp") + "/voxdag-plan-" + std::to_string(getpid());
   WorkFolder work(seams.files, folder);
+  // The triangles that were spilled go again; a job that the folder holds is not touched.
+  struct Tidy {
+    WorkFolder& work;
+    const bool own_folder;
+    ~Tidy() { own_folder ? work.remove() : work.remove_spilled(); }
+  } tidy{work, full.run.work_folder.empty()};
   const PreparedScene scene = prepare_scene(full, work.spill_path(), budget, clock, seams);
   Estimate estimate = estimate_build(scene, kPilotLevels, full.run.threads, budget, seams.cancel);
   estimate.free_disk = seams.files.free_space(work.path());

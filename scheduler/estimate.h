@@ -44,8 +44,8 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
 // The whole of `voxdag plan`: reads the scene, plans, estimates, builds nothing.
 Estimate plan_build(const BuildSpec& spec, const Seams& seams);
 
-// Throws Error{kNoSpace} with the figures if not even the low end fits on the disk of `folder`
-// (Error{kLimit} if a level of the file would pass its limit); warns if the high end may not.
+// Throws Error{kNoSpace} with the figures if not even the low end fits on the disk of `folder`;
+// warns if the high end may not.
 void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& folder,
                     Progress& progress);
 

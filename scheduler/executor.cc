@@ -16,6 +16,17 @@ namespace {
 
 // Bytes of half-filled chunks while one subvolume is split.
 constexpr size_t kSplitBufferBytes = size_t{512} << 10;
+// Pages that a backend keeps from one subvolume to the next, no longer charged.
+constexpr uint64_t kPagesAWorkerKeeps = uint64_t{8} << 20;
+// No more than this many files are held open for writing.
+constexpr uint64_t kMostWorkers = 256;
+
+// As many as were asked for, unless their shares would be too small for the smallest subvolume.
+unsigned workers_within(uint64_t bytes, unsigned wanted) {
+  const uint64_t least = kSmallestBudget + kSegmentWriterBytes + kPagesAWorkerKeeps;
+  return static_cast<unsigned>(
+      std::clamp<uint64_t>(bytes / least, 1, std::min<uint64_t>(wanted, kMostWorkers)));
+}
 
 bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) {
   return a.subvolume.weight < b.subvolume.weight;
@@ -87,6 +98,7 @@ class Worker {
 
   // Builds one subvolume, or answers with the eight that replace it.
   std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
+    cancel_.check();
     const StoredSubvolume& subvolume = queued.subvolume;
     const int64_t edge = subvolume.cube.edge_voxels(options_.grid_levels);
     if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
@@ -180,9 +192,11 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<Queu
                                 const Seams& seams) {
   uint64_t total = heap.size();
   Queue queue(std::move(heap));
-  const uint64_t share_bytes = budget.available() / options.threads;
+  const unsigned worker_count = workers_within(budget.available(), options.threads);
+  const uint64_t share_bytes =
+      budget.available() / worker_count - kSegmentWriterBytes - kPagesAWorkerKeeps;
   std::vector<std::unique_ptr<Worker>> workers;
-  for (unsigned i = 0; i < options.threads; ++i)
+  for (unsigned i = 0; i < worker_count; ++i)
     workers.push_back(
         std::make_unique<Worker>(options, i, bins, store, budget, share_bytes, seams));
   std::mutex progress_mutex;
@@ -199,12 +213,14 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<Queu
     }
   };
   std::vector<std::thread> threads;
-  for (const auto& worker : workers)
-    threads.emplace_back([&work, &queue, &worker] {
-      queue.guard([&] { work(*worker); });
-      // Also after a failure: what is finished is not lost.
-      queue.guard([&] { worker->finish(); });
-    });
+  queue.guard([&] {
+    for (const auto& worker : workers)
+      threads.emplace_back([&work, &queue, &worker] {
+        queue.guard([&] { work(*worker); });
+        // Also after a failure: what is finished is not lost.
+        queue.guard([&] { worker->finish(); });
+      });
+  });
   for (std::thread& thread : threads) thread.join();
   queue.rethrow_failure();
   ExecutorCounts sum;

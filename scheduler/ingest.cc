@@ -1,5 +1,7 @@
 #include "scheduler/ingest.h"
 
+#include <malloc.h>
+
 #include <span>
 
 #include "core/base/error.h"
@@ -106,6 +108,8 @@ std::vector<QueuedSubvolume> hand_down(std::span<const StoredSubvolume> planned,
     queue.push_back({subvolume, leaf_bins.back()});
   }
   distribute(bins, bin, CubeTree(grid_levels, Cube{}, cubes), leaf_bins, buffer_bytes, cancel);
+  // Chunks of triangles are small blocks of the heap, which would keep them resident.
+  malloc_trim(0);
   return queue;
 }
 

@@ -45,11 +45,7 @@ void JobProgress::end_stage() {
 void JobProgress::record_failure(const Error& error) {
   std::lock_guard lock(mutex_);
   snapshot_.last_error = std::string(error_name(error.code())) + ": " + error.message();
-  try {
-    record(true);
-  } catch (const Error&) {
-    // The disk that failed the build may fail this too; the build's own error is what counts.
-  }
+  record(true);
 }
 
 void JobProgress::detach() {
@@ -64,7 +60,11 @@ void JobProgress::record(bool at_once) {
   snapshot_.updated_s = unix_seconds();
   snapshot_.memory_bytes = resident_bytes();
   snapshot_.disk_bytes = work_.bytes();
-  store_->set_progress(snapshot_);
+  try {
+    store_->set_progress(snapshot_);
+  } catch (const Error&) {
+    // Looking on is a comfort; a store that cannot be written will say so when it matters.
+  }
 }
 
 }  // namespace voxdag

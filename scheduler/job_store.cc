@@ -102,14 +102,14 @@ StoredSubvolume read_row(const SqlStatement& row) {
 JobStore::JobStore(const std::string& path, Access access)
     : database_(path, access == Access::kBuild ? SqlDatabase::Mode::kReadWrite
                                                : SqlDatabase::Mode::kReadOnly) {
-  if (access == Access::kBuild) {
-    database_.execute("PRAGMA journal_mode = WAL");
-    database_.execute("PRAGMA foreign_keys = ON;");
-  }
   const int64_t application = database_.integer("PRAGMA application_id");
   const int64_t version = database_.integer("PRAGMA user_version");
   const bool fresh = application == 0 && version == 0 &&
                      database_.integer("SELECT count(*) FROM sqlite_master") == 0;
+  if (access == Access::kBuild && (fresh || application == kApplicationId)) {
+    database_.execute("PRAGMA journal_mode = WAL");
+    database_.execute("PRAGMA foreign_keys = ON");
+  }
   if (fresh && access == Access::kBuild) {
     SqlTransaction transaction(database_);
     database_.execute(kSchema);

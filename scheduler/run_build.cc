@@ -1,5 +1,7 @@
 #include "scheduler/run_build.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -26,6 +28,8 @@ constexpr uint32_t kLevelsWorthAnEstimate = 12;
 constexpr uint32_t kLevelsBelowForTheCheck = 5;
 // Of artifacts and job store; another number is another job.
 constexpr int64_t kWorkFormatVersion = 1;
+// How often damaged artifacts are built again before the disk is to blame.
+constexpr int kMostAttempts = 3;
 
 // One build, stage by stage; what the work folder already has is not built again.
 class Build {
@@ -35,7 +39,7 @@ class Build {
         budget_(spec_.run.memory_bytes),
         work_(seams.files,
               spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder),
-        store_(std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild)),
+        store_(open_store(seams.files)),
         progress_(seams.progress, *store_, work_),
         seams_{seams.files, progress_, seams.cancel} {
     if (!spec_.run.cache_folder.empty())
@@ -64,10 +68,30 @@ class Build {
   }
 
  private:
+  // A store that cannot be read is no obstacle to starting over.
+  std::unique_ptr<JobStore> open_store(FileSystem& files) const {
+    try {
+      return std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild);
+    } catch (const Error& error) {
+      if (!spec_.run.restart ||
+          (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion))
+        throw;
+    }
+    for (const char* suffix : {"", "-wal", "-shm"})
+      if (files.exists(work_.store_path() + suffix)) files.remove(work_.store_path() + suffix);
+    return std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild);
+  }
+
   BuildReport run_to_the_end() {
     const double start = wall_seconds();
     build_missing();
-    while (!merge_and_write()) build_missing();
+    for (int attempt = 1; !merge_and_write(); ++attempt) {
+      if (attempt == kMostAttempts)
+        throw Error(ErrorCode::kCorrupt, work_.path() +
+                                             ": artifacts are damaged again and again: "
+                                             "expected a disk that gives back what was written");
+      build_missing();
+    }
     report_.stages = clock_.stages();
     report_.wall_s = wall_seconds() - start;
     report_.cpu_s = process_cpu_seconds();
@@ -109,7 +133,9 @@ class Build {
       write(out);
       return true;
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kNotFound) throw;
+      if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kNotFound &&
+          error.code() != ErrorCode::kUnsupportedVersion)
+        throw;
       const auto damaged = find_damaged(
           store_->leaves(), [&](uint32_t id) { return work_.open_segment(id); }, seams_.cancel);
       if (damaged.empty()) throw;
@@ -153,7 +179,7 @@ class Build {
   void start_or_resume(const PreparedScene& scene) {
     const JobIdentity job{scene.counts.sha256, geometry_json(spec_.geometry), kWorkFormatVersion};
     const auto stored = store_->job();
-    if (stored && !spec_.run.restart) {
+    if (stored && !start_over_) {
       if (*stored != job)
         throw Error(ErrorCode::kInvalidInput,
                     "the work folder " + work_.path() +
@@ -167,6 +193,7 @@ class Build {
         plan[i].weight = scene.plan[i].weight;
       }
       store_->start(job, plan);
+      start_over_ = false;
     }
     std::set<uint32_t> named;
     for (const StoredSubvolume& subvolume : store_->leaves())
@@ -228,7 +255,10 @@ class Build {
   }
 
   void write(GlobalFileWriter& out) {
-    const GlobalFileSummary file = out.finish(report_.voxels, report_.svo_nodes);
+    seams_.progress.begin_stage("write", 1, "files");
+    const GlobalFileSummary file = out.finish(report_.voxels, report_.svo_nodes, seams_.cancel);
+    seams_.progress.advance(1);
+    seams_.progress.end_stage();
     report_.bytes = file.bytes;
     report_.sha256 = file.sha256;
     clock_.finish("write");
@@ -253,15 +283,34 @@ class Build {
   JobProgress progress_;
   const Seams seams_;
   BuildReport report_;
+  bool start_over_ = spec_.run.restart;
 };
+
+}  // namespace
+
+namespace {
+
+// What would be refused only when all is built is refused now.
+void check_output(FileSystem& files, const std::string& output) {
+  if (output.ends_with('/'))
+    throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a file, not a folder");
+  if (files.exists(output) && files.open_read(output)->size() > 0 && !is_global_file(files, output))
+    throw Error(ErrorCode::kInvalidInput,
+                output +
+                    " is there and is no global file of voxdag: expected a free name or that "
+                    "of an earlier result (-o)");
+  files.make_directories(parent_directory(output));
+  const std::string probe = output + ".probe-" + std::to_string(getpid());
+  files.create(probe)->close();
+  files.remove(probe);
+}
 
 }  // namespace
 
 BuildReport run_build(const BuildSpec& spec, const Seams& seams) {
   if (spec.run.output.empty())
     throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
-  // A folder under that name would be refused only when all is built: opening it refuses it now.
-  if (seams.files.exists(spec.run.output)) seams.files.open_read(spec.run.output);
+  check_output(seams.files, spec.run.output);
   return Build(spec, seams).run();
 }
 

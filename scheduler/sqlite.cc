@@ -2,6 +2,8 @@
 
 #include <sqlite3.h>
 
+#include <cerrno>
+
 #include "core/base/error.h"
 
 namespace voxdag {
@@ -19,15 +21,14 @@ namespace {
     case SQLITE_MISMATCH:
       code = ErrorCode::kCorrupt;
       break;
-    case SQLITE_CANTOPEN:
-      code = ErrorCode::kNotFound;
-      break;
     case SQLITE_NOMEM:
       code = ErrorCode::kOutOfMemory;
       break;
     default:
       break;
   }
+  const int reason = database ? sqlite3_system_errno(database) : 0;
+  if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT)) code = ErrorCode::kNoSpace;
   const char* path = database ? sqlite3_db_filename(database, "main") : nullptr;
   throw Error(code, std::string("job store ") + (path ? path : "") + ": " +
                         (database ? sqlite3_errmsg(database) : sqlite3_errstr(result)));

@@ -75,7 +75,7 @@ void TopTree::add(const FixedTriangle& triangle) {
   const float each = static_cast<float>(weight / static_cast<double>(touched_.size()));
   for (const uint64_t code : touched_) {
     cells_[code].weight += each;
-    ++cells_[code].triangles;
+    if (cells_[code].triangles < UINT32_MAX) ++cells_[code].triangles;
   }
   total_weight_ += weight;
 }

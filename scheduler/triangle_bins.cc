@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+
 namespace voxdag {
 namespace {
 
@@ -73,6 +76,7 @@ void TriangleBins::add_chunk(BinId bin, std::span<const std::byte> records) {
     if (!spill_writer_) spill_writer_ = files_.create(spill_path_);
     chunk.offset = spilled_bytes_;
     spilled_bytes_ += records.size();
+    chunk.checksum = checksum64(records);
     lock.unlock();
     spill_writer_->write_at(chunk.offset, records);
     lock.lock();
@@ -85,6 +89,10 @@ void TriangleBins::add_chunk(BinId bin, std::span<const std::byte> records) {
 void TriangleBins::read_chunk(const Chunk& chunk, std::vector<std::byte>& out) const {
   out.resize(chunk.triangles * record_bytes_);
   spill_reader_->read_at(chunk.offset, out);
+  if (checksum64(out) != chunk.checksum)
+    throw Error(ErrorCode::kCorrupt, spill_path_ + " at offset " + std::to_string(chunk.offset) +
+                                         " fails its checksum: the disk gave back other triangles "
+                                         "than were written; run the same command again");
 }
 
 class BinStream : public TriangleStream {

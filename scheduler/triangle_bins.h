@@ -45,6 +45,7 @@ class TriangleBins {
   struct Chunk {
     std::vector<std::byte> memory;  // empty when spilled
     uint64_t offset = 0;            // in the spill file
+    uint64_t checksum = 0;          // of the spilled records
     uint32_t triangles = 0;
   };
   struct Bin {

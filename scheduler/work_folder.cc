@@ -30,8 +30,8 @@ std::optional<uint32_t> segment_id(std::string_view name) {
 bool is_ours(const DirectoryEntry& entry) {
   const std::string_view name = entry.name;
   if (entry.is_directory) return name == kScratchName;
-  return name == kLockName || name.starts_with("job.db") || name.ends_with(".vdspill") ||
-         segment_id(name).has_value();
+  return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
+         name.ends_with(".vdspill") || segment_id(name).has_value();
 }
 
 }  // namespace
@@ -97,15 +97,26 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
 void WorkFolder::remove_scratch() {
   if (!files_.exists(scratch_path())) return;
   for (const DirectoryEntry& entry : files_.list(scratch_path()))
-    if (!entry.is_directory) files_.remove(scratch_path() + "/" + entry.name);
+    if (segment_id(entry.name) || entry.name.starts_with("merge-"))
+      files_.remove(scratch_path() + "/" + entry.name);
   files_.remove_directory(scratch_path());
+}
+
+void WorkFolder::remove_spilled() {
+  try {
+    if (files_.exists(spill_path())) files_.remove(spill_path());
+  } catch (const Error&) {
+    // Left behind: it costs space, and the next build there removes it.
+  }
 }
 
 void WorkFolder::remove() {
   try {
     remove_scratch();
+    // The lock goes last: until then nobody else may take the folder for theirs.
     for (const DirectoryEntry& entry : files_.list(path_))
-      if (is_ours(entry)) files_.remove(path_ + "/" + entry.name);
+      if (is_ours(entry) && entry.name != kLockName) files_.remove(path_ + "/" + entry.name);
+    files_.remove(path_ + "/" + std::string(kLockName));
     files_.remove_directory(path_);
   } catch (const Error&) {
     // Left behind, as promised above.

@@ -34,6 +34,8 @@ class WorkFolder {
   // Removes segments that `is_named` does not know, spilled triangles and merge data: what an
   // interrupted build left and no row of the store names.
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
+  // Removes spilled triangles. Silent, like remove().
+  void remove_spilled();
   // Removes all that is ours, and the folder if it is empty then. Silent: what cannot be removed
   // costs space, not correctness.
   void remove();

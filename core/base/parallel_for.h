@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -29,8 +30,12 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
     }
   };
   std::vector<std::thread> threads;
-  for (unsigned worker = 1; worker < workers && worker < count; ++worker)
-    threads.emplace_back(work, worker);
+  try {
+    for (unsigned worker = 1; worker < workers && worker < count; ++worker)
+      threads.emplace_back(work, worker);
+  } catch (const std::system_error&) {
+    // The system gives no more threads: those that there are, this one at least, do all the work.
+  }
   work(0);
   for (std::thread& thread : threads) thread.join();
   if (failure) std::rethrow_exception(failure);

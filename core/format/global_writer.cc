@@ -41,19 +41,22 @@ class HeaderPage {
 
 // Calls `use` with bytes [begin, end) of the file, piece by piece.
 template <class Use>
-void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, Use use) {
+void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const CancelToken& cancel,
+                  Use use) {
   std::vector<std::byte> buffer(std::min(kReadBytes, end - begin));
   while (begin < end) {
     const auto piece = std::span(buffer).first(std::min<uint64_t>(buffer.size(), end - begin));
+    cancel.check();
     file.read_at(begin, piece);
     use(std::span<const std::byte>(piece));
     begin += piece.size();
   }
 }
 
-std::vector<uint64_t> block_checksums(const ReadableFile& file, uint64_t end) {
+std::vector<uint64_t> block_checksums(const ReadableFile& file, uint64_t end,
+                                      const CancelToken& cancel) {
   std::vector<uint64_t> checksums;
-  read_through(file, kPageBytes, end, [&](std::span<const std::byte> piece) {
+  read_through(file, kPageBytes, end, cancel, [&](std::span<const std::byte> piece) {
     for (size_t at = 0; at < piece.size(); at += kBlockBytes)
       checksums.push_back(
           checksum64(piece.subspan(at, std::min<size_t>(kBlockBytes, piece.size() - at))));
@@ -166,13 +169,22 @@ void GlobalFileWriter::State::put_header(uint64_t voxels, uint64_t svo_nodes,
   file->write_at(0, header.sealed());
 }
 
-GlobalFileSummary GlobalFileWriter::finish(uint64_t voxels, uint64_t svo_nodes) {
+bool is_global_file(FileSystem& files, const std::string& path) {
+  const auto file = files.open_read(path);
+  uint64_t magic = 0;
+  if (file->size() < sizeof magic) return false;
+  file->read_at(kMagicAt, std::as_writable_bytes(std::span(&magic, 1)));
+  return magic == kMagic;
+}
+
+GlobalFileSummary GlobalFileWriter::finish(uint64_t voxels, uint64_t svo_nodes,
+                                           const CancelToken& cancel) {
   State& s = *state_;
   if (s.level_open || (!s.levels.empty() && s.current_level() != 0))
     throw Error(ErrorCode::kCorrupt,
                 s.path + ": level " + std::to_string(s.current_level()) + " is not finished");
   const auto written = s.files.open_read(s.partial_path);
-  const std::vector<uint64_t> checksums = block_checksums(*written, s.end);
+  const std::vector<uint64_t> checksums = block_checksums(*written, s.end, cancel);
   const auto table = std::as_bytes(std::span(checksums));
   s.file->write_at(s.end, table);
   s.put_header(voxels, svo_nodes, table);
@@ -180,7 +192,7 @@ GlobalFileSummary GlobalFileWriter::finish(uint64_t voxels, uint64_t svo_nodes) 
   GlobalFileSummary summary;
   summary.bytes = s.end + table.size();
   Sha256 digest;
-  read_through(*s.files.open_read(s.partial_path), 0, summary.bytes,
+  read_through(*s.files.open_read(s.partial_path), 0, summary.bytes, cancel,
                [&](std::span<const std::byte> piece) { digest.add(piece); });
   summary.sha256 = digest.finish();
 

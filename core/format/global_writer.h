@@ -12,6 +12,7 @@
 #include <span>
 #include <string>
 
+#include "core/base/cancel_token.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 
@@ -21,6 +22,9 @@ struct GlobalFileSummary {
   uint64_t bytes = 0;
   std::string sha256;  // 64 lower-case hex digits
 };
+
+// Whether the file at `path` begins as a global file does.
+bool is_global_file(FileSystem& files, const std::string& path);
 
 class GlobalFileWriter {
  public:
@@ -39,7 +43,8 @@ class GlobalFileWriter {
   void end_level(uint64_t nodes, uint64_t words);
 
   // Adds checksums and header, syncs, renames to the final name, syncs the folder.
-  GlobalFileSummary finish(uint64_t voxels, uint64_t svo_nodes);
+  GlobalFileSummary finish(uint64_t voxels, uint64_t svo_nodes,
+                           const CancelToken& cancel = CancelToken());
 
  private:
   struct State;

@@ -50,7 +50,7 @@ int open_retrying(const std::string& path, int flags) {
 class PosixReadableFile : public ReadableFile {
  public:
   explicit PosixReadableFile(const std::string& path)
-      : path_(path), fd_(open_retrying(path, O_RDONLY)) {
+      : path_(path), fd_(open_retrying(path, O_RDONLY | O_NONBLOCK)) {
     if (fd_.get() < 0) fail("open", path, errno);
     struct stat s {};
     if (fstat(fd_.get(), &s) != 0) fail("stat", path, errno);
@@ -142,6 +142,7 @@ class PosixFileSystem : public FileSystem {
     const std::string parent = parent_directory(path);
     if (parent != path) make_directories(parent);
     if (mkdir(path.c_str(), 0777) != 0 && errno != EEXIST) fail("make directory", path, errno);
+    sync_directory(parent);
   }
   void remove_directory(const std::string& path) override {
     if (rmdir(path.c_str()) != 0) fail("remove directory", path, errno);
@@ -174,9 +175,16 @@ class PosixFileSystem : public FileSystem {
     const int fd = open_retrying(path, O_RDWR | O_CREAT);
     if (fd < 0) fail("open", path, errno);
     auto lock = std::make_unique<PosixFileLock>(fd);
-    if (flock(fd, LOCK_EX | LOCK_NB) == 0) return lock;
-    if (errno != EWOULDBLOCK) fail("lock", path, errno);
-    return nullptr;
+    if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+      if (errno != EWOULDBLOCK) fail("lock", path, errno);
+      return nullptr;
+    }
+    // The last holder may have removed the file between our two calls: then this locks nothing.
+    struct stat held {
+    }, named{};
+    const bool same = fstat(fd, &held) == 0 && stat(path.c_str(), &named) == 0 &&
+                      held.st_ino == named.st_ino && held.st_dev == named.st_dev;
+    return same ? std::move(lock) : try_lock(path);
   }
   uint64_t free_space(const std::string& path) override {
     struct statvfs s {};
