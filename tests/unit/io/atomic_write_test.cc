@@ -32,6 +32,7 @@ class FailingDisk : public FileSystem {
   void make_directories(const std::string& p) override { disk_.make_directories(p); }
   void remove_directory(const std::string& p) override { disk_.remove_directory(p); }
   std::vector<DirectoryEntry> list(const std::string& p) override { return disk_.list(p); }
+  void touch(const std::string& p) override { disk_.touch(p); }
   void sync_directory(const std::string& p) override {
     step("sync_directory");
     disk_.sync_directory(p);
