@@ -17,8 +17,10 @@ class CpuBackend : public Backend {
                      const CancelToken& cancel, SubDagSink& sink, SubDagSummary& summary) override {
     cpu::Memory memory{budget, pages_};
     try {
-      const auto build = std::make_unique<cpu::SubvolumeBuild>(task, kernels_, memory, cancel);
+      const auto build =
+          std::make_unique<cpu::SubvolumeBuild>(task, kernels_, memory, cancel, table_sizes_);
       summary = build->run(triangles, sink);
+      table_sizes_ = build->table_sizes();
       return BuildOutcome::kBuilt;
     } catch (const cpu::Outgrown&) {
       return BuildOutcome::kOutgrown;
@@ -28,6 +30,7 @@ class CpuBackend : public Backend {
  private:
   const cpu::Kernels& kernels_;
   cpu::PagePool pages_;
+  cpu::TableSizes table_sizes_;  // of the last subvolume
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 // children's places in the array below (in the order of adding, where neighbours are neighbours),
 // slots are sorted, records are copied out in that order and learn their own places.
 #include <algorithm>
+#include <cstring>
 
 #include "core/backend/cpu/sub_dag_tables.h"
 #include "core/dag/node_hash.h"
@@ -25,7 +26,7 @@ class LevelEmitter {
     brick_places_ = Buffer<uint32_t>(memory, tables.bricks().size());
     hashes_ = Buffer<uint64_t>(memory, most_hashes);
     masks_ = Buffer<uint8_t>(memory, most_nodes);
-    children_ = Buffer<uint32_t>(memory, most_children);
+    children_ = Buffer<uint32_t>(memory, most_children + 8);
   }
 
   SubDagSummary run() {
@@ -98,9 +99,10 @@ class LevelEmitter {
       NodeTable::Record record = table.record(static_cast<uint32_t>(slots[i]));
       hashes_[i] = record.hash();
       masks_[i] = static_cast<uint8_t>(record.mask());
-      const int count = record.child_count();
-      for (int c = 0; c < count; ++c) children_[at + c] = record.children()[c];
-      at += count;
+      // Always eight: what is too many is overwritten by the next node. Tables and arrays have
+      // room.
+      std::memcpy(&children_[at], record.children(), 8 * sizeof(uint32_t));
+      at += record.child_count();
       record.set_place(i);
     }
     sink_.nodes({grid_levels_ - static_cast<uint32_t>(size_log2),

@@ -18,7 +18,7 @@ uint32_t NodeTable::add(uint64_t at, uint64_t hash, uint32_t mask, const uint32_
   Record added = record(id);
   added.set_hash(hash);
   added.words[2] = mask;
-  std::copy(children, children + child_count, added.children());
+  for (int i = 0; i < child_count; ++i) added.children()[i] = children[i];
   slots_[at] = hash >> 32 << 32 | id;
   used_ += Record::kWords + static_cast<uint64_t>(child_count);
   ++count_;

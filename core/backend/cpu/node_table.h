@@ -13,8 +13,8 @@
 #include <cstdint>
 #include <span>
 
+#include "core/backend/cpu/child_mask.h"
 #include "core/backend/cpu/memory.h"
-#include "core/base/host_device.h"
 
 namespace voxdag::cpu {
 
@@ -35,7 +35,7 @@ class NodeTable {
     void set_place(uint32_t index) { words[0] = index; }
     uint32_t mask() const { return words[2]; }
     uint32_t* children() { return words + kWords; }
-    int child_count() const { return popcount64(mask()); }
+    int child_count() const { return child_count_of(mask()); }
   };
 
   explicit NodeTable(Memory& memory) : memory_(memory) {}
@@ -44,7 +44,8 @@ class NodeTable {
   uint64_t total_children() const { return used_ - count_ * Record::kWords; }
   Record record(uint32_t id) { return {&records_[id]}; }
 
-  // Makes room for `more` nodes; must precede the calls below.
+  // Makes room for `more` nodes; must precede the calls below. Eight children can be read from any
+  // record, however many it has.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow_slots(count_ + more);
     const uint64_t words = kFirstId + used_ + more * (Record::kWords + 8);

@@ -35,12 +35,15 @@ struct OctreeCounts {
   }
 };
 
+// How many entries the tables of a cube had, by s: room that the next cube will want too.
+struct TableSizes {
+  uint64_t entries[kMaxGridLevels + 1] = {};
+};
+
 // A cube of `size_log2` s has an edge of 2^s voxels; bricks are s = 2.
 class SubDagTables {
  public:
-  SubDagTables(Memory& memory, int size_log2) : memory_(memory), bricks_(memory) {
-    for (int s = kBrickLevels + 1; s <= size_log2; ++s) nodes_.emplace_back(memory);
-  }
+  SubDagTables(Memory& memory, int size_log2, const TableSizes& expected = {});
 
   int size_log2() const { return kBrickLevels + static_cast<int>(nodes_.size()); }
   BrickTable& bricks() { return bricks_; }
@@ -49,6 +52,7 @@ class SubDagTables {
   Memory& memory() { return memory_; }
 
   OctreeCounts& counts() { return counts_; }
+  TableSizes sizes() const;
 
   // A brick that may be empty, counted as one octree node more if it is not.
   NodeRef add_brick(uint64_t mask);

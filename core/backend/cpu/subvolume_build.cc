@@ -22,13 +22,13 @@ int size_log2_of(const SubvolumeTask& task) {
 }  // namespace
 
 SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, Memory& memory,
-                               const CancelToken& cancel)
+                               const CancelToken& cancel, const TableSizes& expected)
     : task_(task),
       kernels_(kernels),
       memory_(memory),
       cancel_(cancel),
       triangles_(memory),
-      tables_(memory, size_log2_of(task)),
+      tables_(memory, size_log2_of(task), expected),
       reducer_(tables_, kernels),
       planes_(memory, tables_, reducer_, kernels) {}
 

@@ -18,8 +18,10 @@ namespace voxdag::cpu {
 class SubvolumeBuild {
  public:
   SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, Memory& memory,
-                 const CancelToken& cancel);
+                 const CancelToken& cancel, const TableSizes& expected);
   SubDagSummary run(TriangleStream& stream, SubDagSink& sink);
+  // After run().
+  TableSizes table_sizes() const { return tables_.sizes(); }
 
  private:
   NodeRef build_streamed(TriangleStream& stream);

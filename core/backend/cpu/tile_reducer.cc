@@ -1,20 +1,10 @@
 #include "core/backend/cpu/tile_reducer.h"
 
+#include "core/backend/cpu/child_mask.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
 namespace {
-
-// popcount of a child mask: a call into a library where the instruction cannot be taken for
-// granted.
-struct BitTable {
-  uint8_t bits[256] = {};
-  constexpr BitTable() {
-    for (int i = 1; i < 256; ++i) bits[i] = static_cast<uint8_t>(bits[i / 2] + i % 2);
-  }
-  constexpr int operator[](uint32_t mask) const { return bits[mask]; }
-};
-constexpr BitTable kBitsInByte;
 
 uint64_t hash_of(uint32_t mask, int count, const uint64_t* child_hashes) {
   uint64_t hash = node_hash_begin(mask);
@@ -60,14 +50,15 @@ int TileReducer::reduce_level(int words, NodeTable& table) {
       above |= uint64_t{1} << byte;
       child_masks_[count] = static_cast<uint8_t>(mask);
       first_child_[count++] = static_cast<uint16_t>(children);
-      children += kBitsInByte[mask];
+      children += child_count_of(mask);
     }
     // Word w / 8 of the next level was read already.
     existing_[w / 8] = w % 8 == 0 ? above : existing_[w / 8] | above << 8 * (w % 8);
   }
   table.reserve(static_cast<uint64_t>(count));
   for (int i = 0; i < count; ++i) {
-    hashes_[i] = hash_of(child_masks_[i], kBitsInByte[child_masks_[i]], &hashes_[first_child_[i]]);
+    hashes_[i] =
+        hash_of(child_masks_[i], child_count_of(child_masks_[i]), &hashes_[first_child_[i]]);
     table.prefetch_slot(hashes_[i]);
   }
   if (count > 4)
@@ -75,7 +66,7 @@ int TileReducer::reduce_level(int words, NodeTable& table) {
   // A node's children stand at or behind its own place.
   for (int i = 0; i < count; ++i)
     ids_[i] = table.find_or_add(hashes_[i], child_masks_[i], &ids_[first_child_[i]],
-                                kBitsInByte[child_masks_[i]]);
+                                child_count_of(child_masks_[i]));
   return count;
 }
 
