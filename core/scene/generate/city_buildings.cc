@@ -84,9 +84,9 @@ void add_flat_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   for (int i = random.between(1, 3); i > 0; --i) {
     const double x = tier.x + tier.half_x() * 0.5 * random.signed_unit();
     const double z = tier.z + tier.half_z() * 0.5 * random.signed_unit();
-    scene.room(8, 10).turned_box({x, y, z},
-                                 {1.0 + random.unit(), 1.5 + random.unit(), 1.5 + random.unit()},
-                                 pythagorean_turn(random.below(12)));
+    const Vec3 size{1.0 + random.unit(), 1.5 + random.unit(), 1.5 + random.unit()};
+    const Turn turn = pythagorean_turn(random.below(12));
+    scene.room(8, 10).turned_box({x, y, z}, size, turn);
   }
   if (tier.floors > 4 && random.chance(40))
     scene.room(8, 12).box({tier.x - 0.125, y, tier.z - 0.125},

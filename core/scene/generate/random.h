@@ -1,6 +1,9 @@
 // Random numbers for generated scenes: splitmix64, the same everywhere (std:: distributions are
 // not). A generator is made for each thing from the seed and the thing's coordinates, so that what
 // one thing looks like does not hang on how many numbers another took.
+//
+// Never draw twice among the arguments of one call: compilers differ in which they evaluate first.
+// (Within braces the order is fixed.)
 #pragma once
 
 #include <cstdint>
