@@ -52,8 +52,8 @@ struct RangeMasks {
 };
 constexpr RangeMasks kRanges;
 
-// Columns of bricks: bit p of row q. Visited from one loop, whose length the processor need not
-// guess row by row.
+// Columns of bricks: bit p of row q, visited as number p + 16 q. Visited from one loop, whose
+// length the processor need not guess row by row.
 struct ColumnSet {
   alignas(8) uint16_t rows[16] = {};
 
@@ -64,11 +64,25 @@ struct ColumnSet {
       __builtin_memcpy(&bits, rows + 4 * part, 8);
       for (; bits != 0; bits &= bits - 1) {
         const int number = 64 * part + __builtin_ctzll(bits);
-        visit(number & 15, number >> 4);
+        visit(number);
       }
     }
   }
 };
+
+// Parts of a brick's Morton index in the tile: its column's, by number, and its height's.
+template <int D>
+struct BrickIndex {
+  uint16_t of_column[256] = {};
+  uint16_t of_height[16] = {};
+  constexpr BrickIndex() {
+    for (int i = 0; i < 256; ++i)
+      of_column[i] = static_cast<uint16_t>(kSpread[i % 16] << kP<D> | kSpread[i / 16] << kQ<D>);
+    for (int z = 0; z < 16; ++z) of_height[z] = static_cast<uint16_t>(kSpread[z] << D);
+  }
+};
+template <int D>
+inline constexpr BrickIndex<D> kBrickIndex;
 
 template <int D>
 class ColumnWalk {
@@ -96,9 +110,11 @@ class ColumnWalk {
         plain.rows[q] = all & columns(row.inner_from, row.inner_to);
         edge.rows[q] = all & ~plain.rows[q];
       }
-      edge.for_each([this](int p, int q) { edge_column(p, q); });
+      edge.for_each([this](int number) __attribute__((always_inline)) { edge_column(number); });
     }
-    plain.for_each([this](int p, int q) { column<0>(p, q, 0, {0, 0, 0}); });
+    plain.for_each([this](int number) __attribute__((always_inline)) {
+      column<0>(number, 0, {0, 0, 0});
+    });
   }
 
  private:
@@ -109,30 +125,32 @@ class ColumnWalk {
     return static_cast<uint16_t>(0xffffu >> (15 - to) & 0xffffu << from);
   }
 
-  VOXDAG_INLINE void edge_column(int p, int q) {
+  VOXDAG_INLINE void edge_column(int number) {
+    const int p = number & 15, q = number >> 4;
     const int64_t most[3] = {over.most(0, p, q), over.most(1, p, q), over.most(2, p, q)};
     if ((most[0] | most[1] | most[2]) < 0) return;
     const uint32_t c0 = static_cast<uint64_t>(most[0] - over.drop[0]) >> 63;
     const uint32_t c1 = static_cast<uint64_t>(most[1] - over.drop[1]) >> 63;
     const uint32_t c2 = static_cast<uint64_t>(most[2] - over.drop[2]) >> 63;
     if (c0 + c1 + c2 == 1)
-      column<1>(p, q, static_cast<int>(c1 + 2 * c2), most);
+      column<1>(number, static_cast<int>(c1 + 2 * c2), most);
     else
-      column<3>(p, q, 0, most);
+      column<3>(number, 0, most);
   }
 
   // Edges: how many of the edges are tested, none, `edge` or all.
   template <int Edges>
-  VOXDAG_INLINE void column(int p, int q, int edge, const int64_t (&most)[3]) {
+  VOXDAG_INLINE void column(int number, int edge, const int64_t (&most)[3]) {
+    const int p = number & 15, q = number >> 4;
     const int64_t height = heights.origin + heights.step_p * p + heights.step_q * q;
-    const int brick = static_cast<int>(height >> (kColumnBits + 2));
-    const int within =
-        static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1);
-    int from = brick + (((within >> kHeightBits) + 1) >> 2);
-    int to = brick + ((within + heights.reach) >> (kHeightBits + 2));
+    int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
+    int64_t to = (height + heights.reach) >> (kColumnBits + 2);
     from = from > first[D] ? from : first[D];
     to = to < last[D] ? to : last[D];
     if (from > to) return;
+    const int64_t brick = height >> (kColumnBits + 2);
+    const int within =
+        static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1);
     __m256i outer = _mm256_setzero_si256();
     if constexpr (Edges > 0) {
       __m256i low, high;
@@ -140,13 +158,14 @@ class ColumnWalk {
       outer = _mm256_srai_epi16(_mm256_packs_epi32(low, high), 15);
       if (Edges == 3 && _mm256_movemask_epi8(outer) == -1) return;
     }
-    const auto bounds = heights.bounds(p, q, brick, within, outer);
-    const uint32_t index = kSpread[p] << P | kSpread[q] << Q;
-    for (int z = from; z <= to; ++z) {
-      uint64_t mask = bounds.mask(z - brick);
-      if constexpr (Edges > 0) mask &= side_mask<Edges>(edge, p, q, z);
-      if constexpr (Edges == 3) mask &= range_mask<P>(p) & range_mask<Q>(q) & range_mask<D>(z);
-      tile.add(index | kSpread[z] << D, mask);
+    const auto bounds = heights.bounds(p, q, static_cast<int>(brick), within, outer);
+    const uint32_t index = kBrickIndex<D>.of_column[number];
+    for (int64_t z = from; z <= to; ++z) {
+      uint64_t mask = bounds.mask(static_cast<int>(z - brick));
+      if constexpr (Edges > 0) mask &= side_mask<Edges>(edge, p, q, static_cast<int>(z));
+      if constexpr (Edges == 3)
+        mask &= range_mask<P>(p) & range_mask<Q>(q) & range_mask<D>(static_cast<int>(z));
+      tile.add(index | kBrickIndex<D>.of_height[z], mask);
     }
   }
 

@@ -25,33 +25,46 @@ constexpr uint64_t line_along(int axis) {
          uint64_t{1} << (low_bit(axis) + high_bit(axis));
 }
 
+// What the 64 voxels of a brick add to the plane's value at its first.
 template <class Int>
-uint64_t plane_mask(const Int (&normal)[3], Int at_first, Int width) {
+struct VoxelOffsets {
+  Int of[64];
+
+  explicit VoxelOffsets(const Int (&normal)[3]) {
+    for (int voxel = 0; voxel < 64; ++voxel) {
+      of[voxel] = 0;
+      for (int a = 0; a < 3; ++a) of[voxel] += normal[a] * voxel_coordinate(a, voxel);
+    }
+  }
+};
+
+template <class Int>
+uint64_t plane_mask(const VoxelOffsets<Int>& offsets, Int at_first, Int width) {
   uint64_t mask = 0;
   for (int voxel = 0; voxel < 64; ++voxel) {
-    Int value = at_first;
-    for (int a = 0; a < 3; ++a) value += normal[a] * voxel_coordinate(a, voxel);
-    if (value >= 0 && value <= width) mask |= uint64_t{1} << voxel;
+    const Int value = at_first + offsets.of[voxel];
+    mask |= static_cast<uint64_t>((value >= 0) & (value <= width)) << voxel;
   }
   return mask;
 }
 
-// The voxels whose column along `axis` is on the inner side of all three edges.
+// Removes the voxels whose column along `axis` is on the outer side of an edge. Most edges cross
+// few bricks: one whose least value over the brick is not negative takes nothing.
 template <class Edge>
-uint64_t edge_mask(const Edge (&edges)[3], int axis, const int (&brick)[3]) {
+void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint64_t& mask) {
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;
-  uint64_t mask = 0;
-  for (int i = 0; i < 16; ++i) {
-    const int64_t kp = 4 * brick[p] + (i & 3), kq = 4 * brick[q] + (i >> 2);
-    bool inner = true;
-    for (const Edge& edge : edges) inner &= edge.a * kp + edge.b * kq + edge.c >= 0;
-    if (inner) mask |= line_along(axis) << (voxel_bits(p, i & 3) | voxel_bits(q, i >> 2));
+  for (const Edge& edge : edges) {
+    const int64_t at_first = edge.a * (4 * brick[p]) + edge.b * (4 * brick[q]) + edge.c;
+    if (at_first + 3 * (std::min<int64_t>(edge.a, 0) + std::min<int64_t>(edge.b, 0)) >= 0) continue;
+    for (int i = 0; i < 16; ++i)
+      if (at_first + edge.a * (i & 3) + edge.b * (i >> 2) < 0)
+        mask &= ~(line_along(axis) << (voxel_bits(p, i & 3) | voxel_bits(q, i >> 2)));
   }
-  return mask;
 }
 
 // The voxels of a brick within [first, last] along an axis, counted from the brick's first.
 uint64_t range_mask(int axis, int first, int last) {
+  if (first <= 0 && last >= 3) return ~uint64_t{0};
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;
   uint64_t mask = 0;
   for (int k = std::max(first, 0); k <= std::min(last, 3); ++k)
@@ -61,13 +74,15 @@ uint64_t range_mask(int axis, int first, int last) {
 }
 
 template <class Coordinate>
-uint64_t brick_mask(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
+uint64_t brick_mask(const TileTriangle<Coordinate>& t,
+                    const VoxelOffsets<typename TileTriangle<Coordinate>::Int>& offsets,
+                    const int (&brick)[3]) {
   auto at_first = t.lowest;
   for (int a = 0; a < 3; ++a) at_first += t.normal[a] * (4 * brick[a]);
-  uint64_t mask = plane_mask(t.normal, at_first, t.width);
+  uint64_t mask = plane_mask(offsets, at_first, t.width);
   for (int a = 0; a < 3 && mask != 0; ++a) {
     mask &= range_mask(a, t.first_voxel[a] - 4 * brick[a], t.last_voxel[a] - 4 * brick[a]);
-    if (!t.inside) mask &= edge_mask(t.edges[a], a, brick);
+    if (!t.inside) cut_by_edges(t.edges[a], a, brick, mask);
   }
   return mask;
 }
@@ -101,13 +116,14 @@ void draw_exactly(const TileTriangle<Coordinate>& t, TileBricks& tile) {
     first[a] = t.first_voxel[a] / 4;
     last[a] = t.last_voxel[a] / 4;
   }
+  const VoxelOffsets offsets(t.normal);
   int brick[3];
   for (brick[2] = first[2]; brick[2] <= last[2]; ++brick[2])
     for (brick[1] = first[1]; brick[1] <= last[1]; ++brick[1])
       for (brick[0] = first[0]; brick[0] <= last[0]; ++brick[0])
         if (may_touch(t, brick))
           tile.add(kSpread[brick[0]] | kSpread[brick[1]] << 1 | kSpread[brick[2]] << 2,
-                   brick_mask(t, brick));
+                   brick_mask(t, offsets, brick));
 }
 
 template void draw_exactly(const TileTriangle<int32_t>&, TileBricks&);

@@ -3,12 +3,12 @@
 //
 // Along the axis D of the normal's largest component a column is touched at the heights z with
 //     0 <= n_D z + n.(p, q) + lowest <= width       (tile_triangle.h), that is
-//     y < z + 1,  z <= y + width / n_D              with y = -(n.(p, q) + lowest) / n_D
+//     y <= z <= y + width / n_D                     with y = -(n.(p, q) + lowest) / n_D
 // at most four voxels, since width <= 3 n_D. Lanes hold y in 16 bits, 12 of them below the voxel,
 // relative to the brick where the column begins: y spans 0..4 for the lowest of the 16, up to 6
-// more for the others, up to 3 more above. Rounded downwards (y) and upwards, never by more than 3
-// and 5 units; a lane whose height is then too near to a whole number, in doubt between two voxels,
-// is settled by division (about 3 columns of bricks in 100 have one).
+// more for the others, up to 3 more above. It is rounded downwards, the upper bound upwards, by
+// little more than 2 units; a lane that is then so near to a whole number that the true height may
+// lie beyond it, is settled by division (2 columns of bricks in 100 have one).
 //
 // Only included by sources compiled for AVX2; all of it has internal linkage.
 #pragma once
@@ -61,6 +61,15 @@ VOXDAG_INLINE __m256i load(const void* at) {
   return _mm256_load_si256(static_cast<const __m256i*>(at));
 }
 
+// [column]: all ones in its 16-bit lane.
+struct SingleLanes {
+  alignas(32) uint16_t only[16][16] = {};
+  constexpr SingleLanes() {
+    for (int i = 0; i < 16; ++i) only[i][i] = 0xffff;
+  }
+};
+constexpr SingleLanes kLanes;
+
 template <int D>
 class Heights {
  public:
@@ -87,33 +96,34 @@ class Heights {
     step_p = static_cast<int64_t>(-4.0 * static_cast<double>(np) * column_unit);
     step_q = static_cast<int64_t>(-4.0 * static_cast<double>(nq) * column_unit);
     const int64_t lowest = t.lowest + 3 * (above_zero(np) + above_zero(nq));
-    origin = static_cast<int64_t>(-static_cast<double>(lowest) * column_unit) -
-             (int64_t{1} << (kColumnBits - kHeightBits));
+    origin = static_cast<int64_t>(-static_cast<double>(lowest) * column_unit -
+                                  kLowered * (int64_t{1} << (kColumnBits - kHeightBits)));
     const double unit = inverse * (1 << kHeightBits);
     const float sp = static_cast<float>(static_cast<double>(magnitude(np)) * unit);
     const float sq = static_cast<float>(static_cast<double>(magnitude(nq)) * unit);
-    const int width = static_cast<int>(static_cast<double>(t.width) * unit) + 5;
-    reach = static_cast<int>(3.0f * (sp + sq)) + 2 + width;
-    width_lanes_ = _mm256_set1_epi16(static_cast<int16_t>(width));
-    set_lanes(np > 0, sp, nq > 0, sq);
+    const float width = static_cast<float>(static_cast<double>(t.width) * unit);
+    reach = static_cast<int64_t>(3.0f * (sp + sq) + width + kTopRaised + 2.0f)
+            << (kColumnBits - kHeightBits);
+    set_lanes(np > 0, sp, nq > 0, sq, width);
   }
 
-  // The height of a column of bricks: that of its lowest voxel column, one unit of 16-bit lanes
-  // lower, kColumnBits below the voxel. 12 + 40 bits and 16 columns: off by less than 2^-30.
+  // The height of a column of bricks: that of its lowest voxel column, kLowered units of 16-bit
+  // lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
   int64_t origin, step_p, step_q;
-  // From there to the highest top of the column, in units of 16-bit lanes, rounded up.
-  int reach;
+  // From there to the highest top of the column, or higher.
+  int64_t reach;
 
   // For the column of bricks (p, q) that begins in `brick`, `within` units above its floor; lanes
   // of `outer` that are all ones have no voxels.
   VOXDAG_INLINE Bounds bounds(int p, int q, int brick, int within, __m256i outer) const {
-    __m256i below = _mm256_add_epi16(_mm256_set1_epi16(static_cast<int16_t>(within)), lanes_);
-    __m256i top = _mm256_add_epi16(below, width_lanes_);
-    const __m256i raised = _mm256_add_epi16(below, _mm256_set1_epi16(3));
-    const __m256i lowered = _mm256_sub_epi16(top, _mm256_set1_epi16(5));
+    const __m256i base = _mm256_set1_epi16(static_cast<int16_t>(within));
+    __m256i below = _mm256_add_epi16(base, below_lanes_);
+    __m256i top = _mm256_add_epi16(base, top_lanes_);
+    const __m256i raised = _mm256_add_epi16(below, _mm256_set1_epi16(kBelowDoubt));
+    const __m256i lowered = _mm256_sub_epi16(top, _mm256_set1_epi16(kTopDoubt));
+    const __m256i whole = _mm256_set1_epi16(static_cast<int16_t>(0xffff << kHeightBits));
     const __m256i differ =
         _mm256_or_si256(_mm256_xor_si256(raised, below), _mm256_xor_si256(lowered, top));
-    const __m256i whole = _mm256_set1_epi16(static_cast<int16_t>(0xffff << kHeightBits));
     if (!_mm256_testz_si256(differ, whole)) [[unlikely]]
       settle(p, q, brick, _mm256_and_si256(differ, whole), below, top);
     below = _mm256_or_si256(below, outer);
@@ -124,38 +134,54 @@ class Heights {
  private:
   static constexpr int P = kP<D>, Q = kQ<D>;
 
-  // How far each column is above the lowest one: sp, sq are the slopes' magnitudes.
-  VOXDAG_INLINE void set_lanes(bool p_falls, float sp, bool q_falls, float sq) {
+  // In units of 16-bit lanes, with 0.02 to spare for rounding in floats. What is within a column's
+  // base is cut to a whole unit, below_lanes_ are rounded, top_lanes_ cut:
+  //   below   in (y - 2.02, y - 0.02]             so a whole number in doubt is 1 or 2 above it
+  //   top     in (y + width / n_D + 0.02, ... + 2.02]                 and 0, 1 or 2 below it
+  static constexpr double kLowered = 0.52;
+  static constexpr float kTopRaised = 2.54f;
+  static constexpr int16_t kBelowDoubt = 2, kTopDoubt = 3;
+
+  // How far each column is above the lowest one; sp, sq are the slopes' magnitudes.
+  VOXDAG_INLINE void set_lanes(bool p_falls, float sp, bool q_falls, float sq, float width) {
     const __m256 p_low =
         p_falls ? _mm256_setr_ps(3, 2, 3, 2, 3, 2, 3, 2) : _mm256_setr_ps(0, 1, 0, 1, 0, 1, 0, 1);
     const __m256 p_high = _mm256_add_ps(p_low, _mm256_set1_ps(p_falls ? -2.0f : 2.0f));
     const __m256 q_both =
         q_falls ? _mm256_setr_ps(3, 3, 2, 2, 1, 1, 0, 0) : _mm256_setr_ps(0, 0, 1, 1, 2, 2, 3, 3);
     const __m256 from_q = _mm256_mul_ps(q_both, _mm256_set1_ps(sq));
-    const __m256 vsp = _mm256_set1_ps(sp);
-    lanes_ =
-        _mm256_packs_epi32(_mm256_cvttps_epi32(_mm256_add_ps(_mm256_mul_ps(p_low, vsp), from_q)),
-                           _mm256_cvttps_epi32(_mm256_add_ps(_mm256_mul_ps(p_high, vsp), from_q)));
+    const __m256 low = _mm256_add_ps(_mm256_mul_ps(p_low, _mm256_set1_ps(sp)), from_q);
+    const __m256 high = _mm256_add_ps(_mm256_mul_ps(p_high, _mm256_set1_ps(sp)), from_q);
+    const auto lanes = [&](float more) {
+      const __m256 vmore = _mm256_set1_ps(more);
+      return _mm256_packus_epi32(_mm256_cvttps_epi32(_mm256_add_ps(low, vmore)),
+                                 _mm256_cvttps_epi32(_mm256_add_ps(high, vmore)));
+    };
+    below_lanes_ = lanes(0.5f);
+    top_lanes_ = lanes(width + kTopRaised);
   }
 
-  // Makes the columns exact whose bits in `doubtful` are not 0.
+  // Makes the columns exact whose lanes in `doubtful` are not 0.
   [[gnu::noinline]] void settle(int p, int q, int brick, __m256i doubtful, __m256i& below,
                                 __m256i& top) const {
-    alignas(32) uint16_t doubt[16], low[16], high[16];
-    _mm256_store_si256(reinterpret_cast<__m256i*>(doubt), doubtful);
-    _mm256_store_si256(reinterpret_cast<__m256i*>(low), below);
-    _mm256_store_si256(reinterpret_cast<__m256i*>(high), top);
+    const __m256i certain = _mm256_cmpeq_epi16(doubtful, _mm256_setzero_si256());
     const int64_t n = t.normal[D];
-    for (int i = 0; i < 16; ++i) {
-      if (doubt[i] == 0) continue;
-      const int64_t at_zero =
-          t.lowest + t.normal[P] * (4 * p + column_p(i)) + t.normal[Q] * (4 * q + column_q(i));
-      low[i] = static_cast<uint16_t>((floor_divide(-at_zero - 1, n) - 4 * brick) << kHeightBits);
-      high[i] =
-          static_cast<uint16_t>((floor_divide(t.width - at_zero, n) - 4 * brick) << kHeightBits);
+    // Two bits per lane.
+    for (uint32_t rest = ~static_cast<uint32_t>(_mm256_movemask_epi8(certain)) & 0x55555555u;
+         rest != 0; rest &= rest - 1) {
+      const int column = __builtin_ctz(rest) / 2;
+      const int64_t at_zero = t.lowest + t.normal[P] * (4 * p + column_p(column)) +
+                              t.normal[Q] * (4 * q + column_q(column));
+      const int64_t exact_below = floor_divide(-at_zero - 1, n) - 4 * brick;
+      const int64_t exact_top = floor_divide(t.width - at_zero, n) - 4 * brick;
+      const __m256i lane = load(kLanes.only[column]);
+      const auto put = [lane](__m256i& into, int64_t height) {
+        into = _mm256_blendv_epi8(
+            into, _mm256_set1_epi16(static_cast<int16_t>(height << kHeightBits)), lane);
+      };
+      put(below, exact_below);
+      put(top, exact_top);
     }
-    below = load(low);
-    top = load(high);
   }
 
   static int64_t floor_divide(int64_t a, int64_t b) {
@@ -177,7 +203,7 @@ class Heights {
   }
 
   const TileTriangle<int32_t>& t;
-  __m256i lanes_, width_lanes_;
+  __m256i below_lanes_, top_lanes_;
 };
 
 }  // namespace
