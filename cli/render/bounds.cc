@@ -84,4 +84,19 @@ std::vector<Vec> occupied_points(const DagView& dag) {
   return points;
 }
 
+// Strays are the 2000th part at either end of an axis, if the rest is much smaller without them.
+std::vector<Vec> without_strays(const std::vector<Vec>& points) {
+  std::vector<Vec> kept = points;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> along;
+    for (const Vec& p : points) along.push_back(p[axis]);
+    std::sort(along.begin(), along.end());
+    const size_t strays = along.size() / 2000;
+    const double low = along[strays], high = along[along.size() - 1 - strays];
+    if (high - low > 0.8 * (along.back() - along.front())) continue;
+    std::erase_if(kept, [&](const Vec& p) { return p[axis] < low || p[axis] > high; });
+  }
+  return kept;
+}
+
 }  // namespace voxdag::render

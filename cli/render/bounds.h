@@ -21,4 +21,8 @@ Box occupied_box(const DagView& dag);
 // The middles of the occupied cells of a 64th of the grid.
 std::vector<Vec> occupied_points(const DagView& dag);
 
+// The points without those few of thousands that lie far from all others, such as a speck that the
+// scene's maker forgot.
+std::vector<Vec> without_strays(const std::vector<Vec>& points);
+
 }  // namespace voxdag::render

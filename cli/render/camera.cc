@@ -8,7 +8,7 @@ namespace voxdag::render {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kMargin = 1.08;
+constexpr double kMargin = 1.06;
 
 double half_tangent(double fov_degrees) { return std::tan(fov_degrees * kPi / 360); }
 
@@ -20,13 +20,11 @@ void picture_axes(const Vec& forward, Vec& right, Vec& up) {
   up = cross(right, forward);
 }
 
-// How far the points reach along `axis`; a few stray ones among thousands are let go.
+// How far the points reach along `axis`.
 double bound(const std::vector<Vec>& points, const Vec& axis) {
-  std::vector<double> reach;
-  for (const Vec& p : points) reach.push_back(dot(p, axis));
-  const auto last = reach.end() - 1 - static_cast<ptrdiff_t>(points.size() / 2000);
-  std::nth_element(reach.begin(), last, reach.end());
-  return *last;
+  double reach = dot(points[0], axis);
+  for (const Vec& p : points) reach = std::max(reach, dot(p, axis));
+  return reach;
 }
 
 }  // namespace

@@ -114,8 +114,8 @@ Placement named_view(const std::string& name, const RayCaster& caster, const Dag
   if (name == "inside") return inside_view(caster, box, fov_degrees.value_or(kInsideFov));
   for (const NamedDirection& d : kDirections)
     if (name == d.name)
-      return see_whole(occupied_points(dag), d.towards_eye, fov_degrees.value_or(kOutsideFov),
-                       aspect);
+      return see_whole(without_strays(occupied_points(dag)), d.towards_eye,
+                       fov_degrees.value_or(kOutsideFov), aspect);
   std::string names;
   for (const std::string& known : view_names()) names += (names.empty() ? "" : ", ") + known;
   throw Error(ErrorCode::kInvalidInput, "no view is called \"" + name + "\": expected " + names);

@@ -1,10 +1,11 @@
 // Random triangles in a cube: what no sensible model holds and a builder has to survive. Of a
-// hundred, about
-//     64  ordinary, their size from 1/4 to 1/4096 of the cube, each halving as likely as the next
-//     16  slivers: two corners far apart, the third close to one of them or to the edge between
-//      8  in an axis-aligned plane
-//      4  as large as the cube
-//      8  degenerate: a point, a segment with a double corner, three corners in line
+// thousand, about
+//     680  ordinary, their size from 1/16 to 1/16384 of the cube, each halving as likely as the
+//     next 160  slivers: two corners far apart, the third close to one of them or to the edge
+//     between
+//      79  in an axis-aligned plane
+//       1  as large as the cube
+//      80  degenerate: a point, a segment with a double corner, three corners in line
 #include "core/scene/generate/kinds.h"
 #include "core/scene/generate/random.h"
 
@@ -25,7 +26,7 @@ Vec3 random_vector(Random& random, double size) {
 Vec3 random_place(Random& random) { return random_vector(random, kHalfEdge * 0.75); }
 
 double random_size(Random& random) {
-  return kHalfEdge * 0.25 / static_cast<double>(1u << random.below(11));
+  return kHalfEdge * 0.0625 / static_cast<double>(1u << random.below(11));
 }
 
 Corners ordinary(Random& random) {
@@ -76,11 +77,11 @@ Corners degenerate(Random& random) {
 }
 
 Corners random_triangle(Random& random) {
-  const uint32_t draw = random.below(100);
-  if (draw < 64) return ordinary(random);
-  if (draw < 80) return sliver(random);
-  if (draw < 88) return aligned(random);
-  if (draw < 92) return spanning(random);
+  const uint32_t draw = random.below(1000);
+  if (draw < 680) return ordinary(random);
+  if (draw < 840) return sliver(random);
+  if (draw < 919) return aligned(random);
+  if (draw < 920) return spanning(random);
   return degenerate(random);
 }
 

@@ -10,7 +10,7 @@ namespace voxdag {
 namespace {
 
 constexpr double kEdge = 1024;
-constexpr double kHeight = 260;
+constexpr double kHeight = 170;
 constexpr uint32_t kTileCells = 254;  // (254 + 1)^2 vertices fit a mesh
 
 class Noise {
@@ -59,17 +59,19 @@ class Heights {
  private:
   // In the square [0, 1]^2; about [0, 1].
   double height(double s, double t) const {
-    const double x = 8 + 3 * s + 0.35 * noise_.at(8 + 4 * s, 8 + 4 * t, 100);
-    const double z = 8 + 3 * t + 0.35 * noise_.at(8 + 4 * s, 8 + 4 * t, 101);
-    double sum = 0.35 + 0.3 * noise_.at(x * 0.5, z * 0.5, 0);
-    double frequency = 1, amplitude = 0.34, weight = 1;
+    const double x = 8 + 2.5 * s + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 100);
+    const double z = 8 + 2.5 * t + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 101);
+    const double land = 0.5 + 0.6 * noise_.at(x * 0.7, z * 0.7, 0);
+    // High land is rough; what an octave leaves smooth, the next ones do too.
+    double weight = land < 0.15 ? 0.15 : land > 1 ? 1 : land;
+    double sum = 0.55 * land, frequency = 1.5, amplitude = 0.42;
     for (uint64_t octave = 1; octave <= octaves_; ++octave) {
       const double ridge = 1 - std::fabs(noise_.at(x * frequency, z * frequency, octave));
       const double signal = ridge * ridge * weight;
-      sum += (signal - 0.5) * amplitude;
-      weight = signal > 1 ? 1 : signal;
+      sum += signal * amplitude;
+      weight = signal * 1.9 > 1 ? 1 : signal * 1.9;
       frequency *= 2;
-      amplitude *= 0.48;
+      amplitude *= 0.5;
     }
     return sum;
   }
