@@ -42,7 +42,7 @@ Film::Film(const std::vector<LightPixel>& seen, double extent, int height)
     haze_start_ = std::min<double>(haze_start_, p.t);
   }
   std::sort(light.begin(), light.end());
-  exposure_ = std::min(0.36 / light[light.size() / 2], 0.8 / light[light.size() * 9 / 10]);
+  exposure_ = std::min(0.42 / light[light.size() / 2], 0.85 / light[light.size() * 9 / 10]);
 }
 
 Vec Film::colour(const LightPixel& p, int y) const {

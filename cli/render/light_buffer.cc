@@ -25,13 +25,14 @@ LightPixel LightBuffer::smoothed(const Camera& camera, int x, int y) const {
   const Vec place = place_of(pixel, camera, x, y);
   // How far off the plane a neighbour may lie.
   const double slack = 3 * pixel.t * camera.pixel_spread();
-  double weights = 0, floor = 0;
-  Vec sky;
+  double weights = 0, floor = 0, near_weights = 0, lamp = 0;
+  Vec sky, near_normal;
   for (int v = std::max(0, y - kReach); v <= std::min(height_ - 1, y + kReach); ++v)
     for (int u = std::max(0, x - kReach); u <= std::min(width_ - 1, x + kReach); ++u) {
       const LightPixel& other = at(u, v);
       if ((other.coverage > 0) != on_surface) continue;
-      double weight = nearness(u - x, v - y);
+      const double near = nearness(u - x, v - y);
+      double weight = near;
       if (on_surface) {
         const double alike = std::max(0.0, dot(normal, normal_of(other)));
         const double off = std::fabs(dot(normal, place_of(other, camera, u, v) - place));
@@ -40,11 +41,19 @@ LightPixel LightBuffer::smoothed(const Camera& camera, int x, int y) const {
       weights += weight;
       floor += weight * other.floor;
       sky = sky + Vec{{other.sky[0], other.sky[1], other.sky[2]}} * weight;
+      weight *= near * near * near * near * near;
+      near_weights += weight;
+      lamp += weight * other.lamp;
+      near_normal = near_normal + normal_of(other) * weight;
     }
   LightPixel result = pixel;
   if (!(weights > 0)) return result;
   if (!on_surface) result.floor = static_cast<float>(floor / weights);
   for (int c = 0; c < 3; ++c) result.sky[c] = static_cast<float>(sky[c] / weights);
+  if (!on_surface || !(near_weights > 0)) return result;
+  result.lamp = static_cast<float>(lamp / near_weights);
+  near_normal = normalized(near_normal);
+  for (int c = 0; c < 3; ++c) result.normal[c] = static_cast<float>(near_normal[c]);
   return result;
 }
 

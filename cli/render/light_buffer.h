@@ -15,7 +15,7 @@ struct LightPixel {
   float t = 0;         // distance
   float normal[3] = {};
   float sky[3] = {};
-  float lamp = 0;
+  float lamp = 0;   // share of the lamp that is seen, dimmed by distance; not yet by the normal
   float floor = 1;  // of those that did not
 };
 
@@ -31,7 +31,7 @@ class LightBuffer {
   const LightPixel& at(int x, int y) const { return pixels_[index(x, y)]; }
 
   // The pixel, its light from the sky averaged over the neighbours that lie on the plane of its
-  // surface (or, where it shows none, are on the floor).
+  // surface (or, where it shows none, are on the floor); lamp and normal too, over fewer of them.
   LightPixel smoothed(const Camera& camera, int x, int y) const;
 
  private:

@@ -60,15 +60,20 @@ Vec Lighting::skylight(const Surface& s, int rays, Sampler& sampler) const {
 
 double Lighting::lamplight(const Surface& s, Sampler& sampler) const {
   const Vec towards = lamp_ - s.start;
-  const double distance = length(towards), facing = dot(s.normal, towards) / distance;
+  const double distance = length(towards);
   const Sampler::Pair p = sampler.pair();
-  if (facing <= 0) return 0;
+  if (dot(s.normal, towards) <= 0) return 0;
   Vec u, w;
   basis_around(towards * (1 / distance), u, w);
   const double r = kLampRadius * distance * std::sqrt(p.u), angle = 2 * kPi * p.v;
   const Vec part = lamp_ + u * (r * std::cos(angle)) + w * (r * std::sin(angle));
   if (!sees_lamp(s.start, s.size, part)) return 0;
-  return facing / (1 + distance * distance / (lamp_reach_ * lamp_reach_));
+  return 1 / (1 + distance * distance / (lamp_reach_ * lamp_reach_));
+}
+
+double Lighting::facing_lamp(const Vec& place, const Vec& normal) const {
+  const Vec towards = lamp_ - place;
+  return std::max(0.0, dot(normal, towards) / length(towards));
 }
 
 bool Lighting::sees_lamp(const Vec& from, double size, const Vec& lamp) const {

@@ -20,9 +20,10 @@ class Lighting {
 
   // Red, green and blue that come from the sky, 1 from all of an open one.
   Vec skylight(const Surface& surface, int rays, Sampler& sampler) const;
-  // What of the lamp's light a surface takes, 0 to 1; from a point of the lamp that `sampler`
-  // picks.
+  // Whether a surface sees the point of the lamp that `sampler` picks: 0, or 1 dimmed by distance.
   double lamplight(const Surface& surface, Sampler& sampler) const;
+  // The share of the lamp's light that a surface takes which faces along `normal`, 0 to 1.
+  double facing_lamp(const Vec& place, const Vec& normal) const;
   // How much light the floor below the scene gets where `ray` meets it, 1 where the scene takes
   // none away, or where there is no floor.
   double floor_light(const Ray& ray, Sampler& sampler) const;

@@ -103,15 +103,21 @@ std::vector<LightPixel> first_light(const Lighting& lighting, const std::vector<
     Gatherer gatherer(lighting);
     gatherer.add(s, kSkyRays, sampler);
     light.push_back(gatherer.pixel());
+    light.back().lamp *= static_cast<float>(lighting.facing_lamp(s.start, s.normal));
   }
   return light;
 }
 
-void develop_row(const LightBuffer& light, const Camera& camera, const Film& film, int y,
-                 Picture& picture) {
+void develop_row(const LightBuffer& light, const Camera& camera, const Lighting& lighting,
+                 const Film& film, int y, Picture& picture) {
   constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
   for (int x = 0; x < picture.width; ++x) {
-    const Vec colour = film.colour(light.smoothed(camera, x, y), y);
+    LightPixel pixel = light.smoothed(camera, x, y);
+    if (pixel.coverage > 0)
+      pixel.lamp *= static_cast<float>(
+          lighting.facing_lamp(camera.ray(x + 0.5, y + 0.5).at(pixel.t),
+                               {{pixel.normal[0], pixel.normal[1], pixel.normal[2]}}));
+    const Vec colour = film.colour(pixel, y);
     const double dither = (kBayer[y % 4][x % 4] + 0.5) / 16;
     for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(colour[c], dither);
   }
@@ -163,7 +169,7 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
 
   Picture picture(width, height);
   for_each_row(height, options.threads,
-               [&](int y) { develop_row(light, camera, film, y, picture); });
+               [&](int y) { develop_row(light, camera, lighting, film, y, picture); });
   return picture;
 }
 
