@@ -77,7 +77,7 @@ class Build {
           (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion))
         throw;
     }
-    for (const char* suffix : {"", "-wal", "-shm"})
+    for (const char* suffix : {"", "-wal", "-shm", "-journal"})
       if (files.exists(work_.store_path() + suffix)) files.remove(work_.store_path() + suffix);
     return std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild);
   }
