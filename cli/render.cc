@@ -1,4 +1,6 @@
+#include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -50,6 +52,9 @@ std::array<Number, kCount> parse_list(const std::string& text, char separator,
 render::Vec parse_point(const std::string& text, const std::string& option,
                         const voxdag_reader::File& file) {
   const auto world = parse_list<double, 3>(text, ',', option + " X,Y,Z");
+  for (const double coordinate : world)
+    if (!std::isfinite(coordinate))
+      throw Error(ErrorCode::kInvalidInput, option + " " + text + ": expected finite numbers");
   const double scale = static_cast<double>(file.resolution()) / file.edge();
   render::Vec point;
   for (int axis = 0; axis < 3; ++axis)

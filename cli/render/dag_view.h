@@ -91,8 +91,11 @@ inline DagView::Children DagView::children(uint32_t depth, uint64_t content) con
 
 inline uint64_t DagView::brick(uint64_t offset) const {
   const std::span<const uint32_t> words = levels_[grid_levels_ - kBrickLevels];
-  if (words.size() < 2 || offset > words.size() - 2) corrupt(grid_levels_ - kBrickLevels, offset);
-  return words[offset] | static_cast<uint64_t>(words[offset + 1]) << 32;
+  const uint32_t level = grid_levels_ - kBrickLevels;
+  if (words.size() < 2 || offset > words.size() - 2) corrupt(level, offset);
+  const uint64_t mask = words[offset] | static_cast<uint64_t>(words[offset + 1]) << 32;
+  if (mask == 0) corrupt(level, offset);
+  return mask;
 }
 
 }  // namespace voxdag::render

@@ -173,6 +173,7 @@ TEST(RayCaster, RefusesOffsetsOutsideALevel) {
   EXPECT_EQ(code_of(1, 0, 0x1ff), ErrorCode::kCorrupt);  // nine children
   EXPECT_EQ(code_of(1, 0, 0xff), ErrorCode::kCorrupt);   // children beyond the level's end
   EXPECT_EQ(code_of(2, 1, 0xffffffff), ErrorCode::kCorrupt);
+  EXPECT_EQ(code_of(3, 0, 0), ErrorCode::kCorrupt);  // a brick without voxels
 }
 
 }  // namespace
