@@ -78,7 +78,7 @@ class Gatherer {
 
 LightPixel gather_pixel(const DagView& dag, const Camera& camera, const Lighting& lighting,
                         int samples, int x, int y) {
-  constexpr int kSkyRays = 5;
+  constexpr int kSkyRays = 4;
   Gatherer gatherer(lighting);
   for (int i = 0; i < samples * samples; ++i) {
     Sampler sampler(x, y, i);

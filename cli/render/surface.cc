@@ -1,6 +1,7 @@
 #include "cli/render/surface.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace voxdag::render {
 namespace {
@@ -31,12 +32,18 @@ class Neighbourhood {
  private:
   void visit(uint32_t depth, int64_t x, int64_t y, int64_t z, uint64_t content) {
     if (depth == hit_.depth) return add(x, y, z);
+    // Child indices of the low and the high half of each axis.
+    constexpr uint32_t kHalves[3][2] = {{0x0f, 0xf0}, {0x33, 0xcc}, {0x55, 0xaa}};
     const DagView::Children children = dag_.children(depth, content);
-    for (int i = 0; i < 8; ++i) {
-      if (!children.has(i)) continue;
-      const int64_t cx = 2 * x + (i >> 2), cy = 2 * y + (i >> 1 & 1), cz = 2 * z + (i & 1);
-      if (near(depth + 1, 0, cx) && near(depth + 1, 1, cy) && near(depth + 1, 2, cz))
-        visit(depth + 1, cx, cy, cz, dag_.content(depth, children, i));
+    const int64_t low[3] = {2 * x, 2 * y, 2 * z};
+    uint32_t wanted = children.mask;
+    for (int axis = 0; axis < 3; ++axis)
+      for (int half = 0; half < 2; ++half)
+        if (!near(depth + 1, axis, low[axis] + half)) wanted &= ~kHalves[axis][half];
+    for (; wanted != 0; wanted &= wanted - 1) {
+      const int i = std::countr_zero(wanted);
+      visit(depth + 1, low[0] + (i >> 2), low[1] + (i >> 1 & 1), low[2] + (i & 1),
+            dag_.content(depth, children, i));
     }
   }
 

@@ -29,24 +29,33 @@ class Interrupt : public CommandLine {
                                           "s.vdag", "--threads", "1",  "--subvolume", "128"};
 };
 
-// Both signals stop it with status 130 and nothing under the final name; the same command then
-// ends with the bytes of a build that was never stopped.
+// Either signal stops a build with status 130 and nothing under the final name; the same command
+// then ends with the bytes of a build that was never stopped. A build that was faster than its
+// signal says nothing, but of those that start anew at least one must have been caught.
 TEST_F(Interrupt, StopsAndGoesOn) {
   std::vector<std::string> clean = args_;
   clean[5] = "clean.vdag";
   ASSERT_EQ(run(clean).status, 0);
-  for (const int signal : {SIGINT, SIGTERM})
-    for (const int wait_ms : {0, 30, 100}) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    int caught = 0;
+    for (const int wait_ms : {0, 10, 50, 200}) {
       SCOPED_TRACE(testing::Message() << "signal " << signal << " after " << wait_ms << " ms");
       const Answer answer = interrupt(signal, wait_ms);
-      ASSERT_EQ(answer.status, 130) << answer.err;
-      EXPECT_NE(answer.err.find("cancelled"), std::string::npos) << answer.err;
-      EXPECT_FALSE(exists("s.vdag"));
-      EXPECT_FALSE(exists("s.vdag.report.json"));
+      if (answer.status != 0) {
+        ASSERT_EQ(answer.status, 130) << answer.err;
+        EXPECT_NE(answer.err.find("cancelled"), std::string::npos) << answer.err;
+        EXPECT_FALSE(exists("s.vdag"));
+        EXPECT_FALSE(exists("s.vdag.report.json"));
+        ++caught;
+        ASSERT_EQ(run(args_).status, 0);
+      }
+      EXPECT_TRUE(contents("s.vdag") == contents("clean.vdag"));
+      EXPECT_FALSE(exists("s.vdag.work"));
+      remove("s.vdag");
+      remove("s.vdag.report.json");
     }
-  EXPECT_EQ(run(args_).status, 0);
-  EXPECT_TRUE(contents("s.vdag") == contents("clean.vdag"));
-  EXPECT_FALSE(exists("s.vdag.work"));
+    EXPECT_GT(caught, 0);
+  }
 }
 
 }  // namespace
