@@ -2,6 +2,8 @@
 #include <signal.h>
 #include <time.h>
 
+#include <filesystem>
+
 #include "tests/cli/command_line.h"
 
 namespace command_line {
@@ -51,8 +53,8 @@ TEST_F(Interrupt, StopsAndGoesOn) {
       }
       EXPECT_TRUE(contents("s.vdag") == contents("clean.vdag"));
       EXPECT_FALSE(exists("s.vdag.work"));
-      remove("s.vdag");
-      remove("s.vdag.report.json");
+      for (const char* name : {"s.vdag", "s.vdag.report.json"})
+        std::filesystem::remove(folder_.file(name));
     }
     EXPECT_GT(caught, 0);
   }
