@@ -11,6 +11,18 @@ uint64_t checksum64(std::span<const std::byte> bytes) {
   return XXH64(bytes.data(), bytes.size(), 0);
 }
 
+uint64_t indexed_sum(uint64_t first, std::span<const uint32_t> words) {
+  constexpr uint64_t kOdd = 0x9e3779b97f4a7c15;
+  uint64_t sum = 0;
+  for (size_t i = 0; i < words.size(); ++i) {
+    const uint64_t mixed = (first + i) * kOdd;
+    // An odd weight: no change of a word leaves its product as it was.
+    const uint64_t weight = (mixed ^ (mixed >> 29)) | 1;
+    sum += (words[i] + kOdd) * weight;
+  }
+  return sum;
+}
+
 struct Sha256::Context {
   EVP_MD_CTX* md = EVP_MD_CTX_new();
   ~Context() { EVP_MD_CTX_free(md); }

@@ -13,6 +13,10 @@ namespace voxdag {
 // XXH64 with seed 0.
 uint64_t checksum64(std::span<const std::byte> bytes);
 
+// A sum over 32-bit words, each weighted by its index, modulo 2^64: the parts of a whole may be
+// summed in any order, by any number of threads, and added up. `first` is the index of words[0].
+uint64_t indexed_sum(uint64_t first, std::span<const uint32_t> words);
+
 // A running SHA-256.
 class Sha256 {
  public:

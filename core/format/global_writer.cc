@@ -1,7 +1,9 @@
 #include "core/format/global_writer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 #include "core/base/error.h"
@@ -18,10 +20,6 @@ namespace {
 
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;  // a multiple of the block
 static_assert(kReadBytes % kBlockBytes == 0);
-
-struct LevelEntry {
-  uint64_t offset = 0, nodes = 0, words = 0;
-};
 
 // The header page, zeros but for the fields put.
 class HeaderPage {
@@ -53,16 +51,44 @@ void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const 
   }
 }
 
-std::vector<uint64_t> block_checksums(const ReadableFile& file, uint64_t end,
-                                      const CancelToken& cancel) {
-  std::vector<uint64_t> checksums;
-  read_through(file, kPageBytes, end, cancel, [&](std::span<const std::byte> piece) {
-    for (size_t at = 0; at < piece.size(); at += kBlockBytes)
-      checksums.push_back(
-          checksum64(piece.subspan(at, std::min<size_t>(kBlockBytes, piece.size() - at))));
-  });
-  return checksums;
-}
+uint64_t bytes_of(const GlobalLevel& level) { return sizeof(uint32_t) * level.words; }
+
+// Sums the levels again as their file is read from its first level on.
+class LevelSums {
+ public:
+  explicit LevelSums(std::span<const GlobalLevel> levels) : levels_(levels) {}
+
+  void add(std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+      const uint64_t used = level_ < levels_.size() ? bytes_of(levels_[level_]) : 0;
+      const uint64_t room = round_up_to_page(used);
+      const auto mine = bytes.first(std::min<uint64_t>(bytes.size(), room - at_));
+      sum_words(mine.first(std::min<uint64_t>(mine.size(), used - std::min(used, at_))));
+      bytes = bytes.subspan(mine.size());
+      at_ += mine.size();
+      if (at_ == room) end_level();
+    }
+  }
+  // The first level that did not sum up to what was written.
+  std::optional<size_t> wrong_level() const { return wrong_; }
+
+ private:
+  void sum_words(std::span<const std::byte> bytes) {
+    const auto* words = reinterpret_cast<const uint32_t*>(bytes.data());
+    sum_ += indexed_sum(at_ / sizeof(uint32_t), {words, bytes.size() / sizeof(uint32_t)});
+  }
+  void end_level() {
+    if (sum_ != levels_[level_].sum && !wrong_) wrong_ = level_;
+    ++level_;
+    at_ = sum_ = 0;
+  }
+
+  std::span<const GlobalLevel> levels_;
+  size_t level_ = 0;
+  uint64_t at_ = 0;  // bytes of the level so far, padding included
+  uint64_t sum_ = 0;
+  std::optional<size_t> wrong_;
+};
 
 }  // namespace
 
@@ -72,27 +98,30 @@ struct GlobalFileWriter::State {
   const std::string partial_path;
   const Grid grid;
   const uint32_t hash_bits;
-  std::unique_ptr<WritableFile> file;
-  std::vector<LevelEntry> levels;  // from the bricks upwards; the last one is open or the newest
+  std::unique_ptr<WritableFile> file;  // once there is a level, or a header
+  std::vector<GlobalLevel> levels;     // that ended, from the bricks upwards
   bool level_open = false;
-  bool renamed = false;
-  uint64_t end = kPageBytes;  // where the next level, or the table, begins
+  std::atomic<uint64_t> open_sum = 0;  // of the open level
+  bool kept = false;                   // the partial file is to stay
+  uint64_t end = kPageBytes;           // where the open level, the next one, or the table begins
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }
-  uint32_t current_level() const {
-    return brick_level() + 1 - static_cast<uint32_t>(levels.size());
+  // The open level, or the next one.
+  uint32_t current_level() const { return brick_level() - static_cast<uint32_t>(levels.size()); }
+  bool complete() const { return levels.empty() || levels.size() == brick_level() + 1; }
+  void create_file() {
+    if (!file) file = files.create(partial_path);
   }
+  std::vector<uint64_t> block_checksums(const CancelToken& cancel) const;
   void put_header(uint64_t voxels, uint64_t svo_nodes, std::span<const std::byte> table);
 };
 
 GlobalFileWriter::GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid,
                                    uint32_t hash_bits)
-    : state_(new State{files, path, path + ".partial", grid, hash_bits, nullptr, {}}) {
-  state_->file = files.create(state_->partial_path);
-}
+    : state_(new State{files, path, path + ".partial", grid, hash_bits, nullptr, {}}) {}
 
 GlobalFileWriter::~GlobalFileWriter() {
-  if (state_->renamed) return;
+  if (state_->kept || !state_->file) return;
   state_->file.reset();
   try {
     state_->files.remove(state_->partial_path);
@@ -101,21 +130,46 @@ GlobalFileWriter::~GlobalFileWriter() {
   }
 }
 
+const std::string& GlobalFileWriter::path() const { return state_->path; }
+
+std::span<const GlobalLevel> GlobalFileWriter::levels() const { return state_->levels; }
+
+void GlobalFileWriter::go_on(std::span<const GlobalLevel> levels) {
+  State& s = *state_;
+  uint64_t end = kPageBytes;
+  for (const GlobalLevel& level : levels) end += round_up_to_page(bytes_of(level));
+  if (s.files.open_read(s.partial_path)->size() < end || levels.size() > s.brick_level() + 1)
+    throw Error(ErrorCode::kCorrupt, s.partial_path + " does not hold the levels that were merged");
+  s.file = s.files.open_write(s.partial_path);
+  s.levels.assign(levels.begin(), levels.end());
+  s.end = end;
+  s.kept = true;
+}
+
+void GlobalFileWriter::sync() {
+  state_->create_file();
+  state_->file->sync();
+  state_->files.sync_directory(parent_directory(state_->path));
+  state_->kept = true;
+}
+
 void GlobalFileWriter::begin_level(uint32_t level) {
   State& s = *state_;
   if (s.level_open || level + s.levels.size() != s.brick_level())
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(level) +
                                          " does not follow the levels before it");
-  s.levels.push_back({s.end, 0, 0});
+  s.create_file();
+  s.open_sum = 0;
   s.level_open = true;
 }
 
 void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> words) {
-  const State& s = *state_;
+  State& s = *state_;
   if (first > kMaxLevelWords || words.size() > kMaxLevelWords - first)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
                                        " is over the format's limit of 2^32 words a level");
-  s.file->write_at(s.levels.back().offset + sizeof(uint32_t) * first, std::as_bytes(words));
+  s.open_sum += indexed_sum(first, words);
+  s.file->write_at(s.end + sizeof(uint32_t) * first, std::as_bytes(words));
 }
 
 void GlobalFileWriter::end_level(uint64_t nodes, uint64_t words) {
@@ -128,14 +182,29 @@ void GlobalFileWriter::end_level(uint64_t nodes, uint64_t words) {
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(s.current_level()) +
                                          " has " + std::to_string(nodes) + " nodes in " +
                                          std::to_string(words) + " words");
-  LevelEntry& level = s.levels.back();
-  level.nodes = nodes;
-  level.words = words;
-  const uint64_t level_end = level.offset + sizeof(uint32_t) * words;
+  s.levels.push_back({nodes, words, s.open_sum});
+  const uint64_t level_end = s.end + bytes_of(s.levels.back());
   s.end = round_up_to_page(level_end);
   const std::byte zeros[kPageBytes] = {};
   s.file->write_at(level_end, std::span(zeros).first(s.end - level_end));
   s.level_open = false;
+}
+
+std::vector<uint64_t> GlobalFileWriter::State::block_checksums(const CancelToken& cancel) const {
+  std::vector<uint64_t> checksums;
+  LevelSums sums(levels);
+  read_through(*files.open_read(partial_path), kPageBytes, end, cancel,
+               [&](std::span<const std::byte> piece) {
+                 for (size_t at = 0; at < piece.size(); at += kBlockBytes)
+                   checksums.push_back(checksum64(
+                       piece.subspan(at, std::min<size_t>(kBlockBytes, piece.size() - at))));
+                 sums.add(piece);
+               });
+  if (const auto wrong = sums.wrong_level())
+    throw Error(ErrorCode::kCorrupt,
+                partial_path + ": level " + std::to_string(brick_level() - *wrong) +
+                    " is not what was written: the disk gave back other bytes");
+  return checksums;
 }
 
 void GlobalFileWriter::State::put_header(uint64_t voxels, uint64_t svo_nodes,
@@ -153,10 +222,11 @@ void GlobalFileWriter::State::put_header(uint64_t voxels, uint64_t svo_nodes,
   header.put(kEdgeAt, grid.edge);
   header.put(kVoxelsAt, voxels);
   header.put(kSvoNodesAt, svo_nodes);
-  uint64_t dag_nodes = 0;
+  uint64_t dag_nodes = 0, offset = kPageBytes;
   for (size_t i = 0; i < levels.size(); ++i) {
     const size_t entry = kLevelsAt + (brick_level() - i) * kLevelEntryBytes;
-    header.put(entry, levels[i].offset);
+    header.put(entry, offset);
+    offset += round_up_to_page(bytes_of(levels[i]));
     header.put(entry + 8, levels[i].nodes);
     header.put(entry + 16, levels[i].words);
     dag_nodes += levels[i].nodes;
@@ -177,14 +247,14 @@ bool is_global_file(FileSystem& files, const std::string& path) {
   return magic == kMagic;
 }
 
-GlobalFileSummary GlobalFileWriter::finish(uint64_t voxels, uint64_t svo_nodes,
-                                           const CancelToken& cancel) {
+GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes,
+                                         const CancelToken& cancel) {
   State& s = *state_;
-  if (s.level_open || (!s.levels.empty() && s.current_level() != 0))
+  if (s.level_open || !s.complete())
     throw Error(ErrorCode::kCorrupt,
                 s.path + ": level " + std::to_string(s.current_level()) + " is not finished");
-  const auto written = s.files.open_read(s.partial_path);
-  const std::vector<uint64_t> checksums = block_checksums(*written, s.end, cancel);
+  s.create_file();
+  const std::vector<uint64_t> checksums = s.block_checksums(cancel);
   const auto table = std::as_bytes(std::span(checksums));
   s.file->write_at(s.end, table);
   s.put_header(voxels, svo_nodes, table);
@@ -197,11 +267,15 @@ GlobalFileSummary GlobalFileWriter::finish(uint64_t voxels, uint64_t svo_nodes,
   summary.sha256 = digest.finish();
 
   s.file->sync();
+  return summary;
+}
+
+void GlobalFileWriter::publish() {
+  State& s = *state_;
   s.file->close();
   s.files.rename(s.partial_path, s.path);
-  s.renamed = true;
+  s.kept = true;  // there is none any more
   s.files.sync_directory(parent_directory(s.path));
-  return summary;
 }
 
 }  // namespace voxdag

@@ -5,6 +5,9 @@
 // Within a level everything is addressed in 32-bit words from the level's start: a brick is two
 // words (low half of the mask first), a node is its child mask followed by the word offsets of its
 // children in the next level. Nothing in the file varies with time, place or machine.
+//
+// Every level is summed as it is written and again before the file is sealed, so that what a disk
+// gives back wrong is Error{kCorrupt} and never gets a checksum of its own.
 #pragma once
 
 #include <cstdint>
@@ -23,16 +26,33 @@ struct GlobalFileSummary {
   std::string sha256;  // 64 lower-case hex digits
 };
 
+// A level that was written.
+struct GlobalLevel {
+  uint64_t nodes = 0;
+  uint64_t words = 0;
+  uint64_t sum = 0;  // indexed_sum() of its words
+};
+
 // Whether the file at `path` begins as a global file does.
 bool is_global_file(FileSystem& files, const std::string& path);
 
 class GlobalFileWriter {
  public:
-  // Writes to "<path>.partial" until finish(). Throws Error.
+  // Writes to "<path>.partial", from the first level on, until publish(). Throws Error.
   GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid,
                    uint32_t hash_bits);
-  // Without finish(): removes the partial file.
+  // Without publish(): removes the partial file, unless it was synced to go on with.
   ~GlobalFileWriter();
+
+  const std::string& path() const;
+  // Goes on after the levels that an earlier writer wrote to the same path and synced. Throws
+  // Error{kNotFound} or Error{kCorrupt} if the partial file is not there or too short; what its
+  // levels hold is checked by seal().
+  void go_on(std::span<const GlobalLevel> levels);
+  // Those that ended, from the bricks upwards.
+  std::span<const GlobalLevel> levels() const;
+  // All levels that ended are on the disk from here on, and stay there for go_on().
+  void sync();
 
   // Levels must come as L-2, L-3, ..., 0; none at all for a scene without voxels.
   void begin_level(uint32_t level);
@@ -42,9 +62,17 @@ class GlobalFileWriter {
   // All `words` of the level were written. A level over 2^32 words is Error{kLimit} naming it.
   void end_level(uint64_t nodes, uint64_t words);
 
-  // Adds checksums and header, syncs, renames to the final name, syncs the folder.
+  // Adds checksums and header and syncs.
+  GlobalFileSummary seal(uint64_t voxels, uint64_t svo_nodes,
+                         const CancelToken& cancel = CancelToken());
+  // Renames the sealed file to its final name and syncs the folder.
+  void publish();
   GlobalFileSummary finish(uint64_t voxels, uint64_t svo_nodes,
-                           const CancelToken& cancel = CancelToken());
+                           const CancelToken& cancel = CancelToken()) {
+    const GlobalFileSummary summary = seal(voxels, svo_nodes, cancel);
+    publish();
+    return summary;
+  }
 
  private:
   struct State;

@@ -31,6 +31,9 @@ class WritableFile {
   virtual const std::string& path() const = 0;
   // Writes all of `data` at `offset`, growing the file as needed.
   virtual void write_at(uint64_t offset, std::span<const std::byte> data) = 0;
+  // Gives the space of a range back whose content is no longer needed: it reads as zeros from then
+  // on, or as before where the disk cannot do that.
+  virtual void release(uint64_t /*offset*/, uint64_t /*bytes*/) {}
   // Returns once all that was written is on the disk.
   virtual void sync() = 0;
   // Flushes nothing by itself, reports what close() reports. Called by the destructor, silently.
@@ -41,7 +44,8 @@ struct DirectoryEntry {
   std::string name;
   bool is_directory = false;
   uint64_t bytes = 0;
-  double modified_s = 0;  // Unix time
+  uint64_t disk_bytes = 0;  // what it takes up: less than `bytes` where space was released
+  double modified_s = 0;    // Unix time
 };
 
 // An exclusive lock, held until this is destroyed or the process ends, however it ends.

@@ -94,6 +94,15 @@ class PosixWritableFile : public WritableFile {
       data = data.subspan(static_cast<size_t>(n));
     }
   }
+  // In whole blocks: zeros written into parts of them would cost more than they give back.
+  void release(uint64_t offset, uint64_t bytes) override {
+    constexpr uint64_t kBlock = 4096;
+    const uint64_t begin = (offset + kBlock - 1) / kBlock * kBlock;
+    const uint64_t end = (offset + bytes) / kBlock * kBlock;
+    if (begin < end)
+      fallocate(fd_.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(begin),
+                static_cast<off_t>(end - begin));
+  }
   void sync() override {
     if (fdatasync(fd_.get()) != 0) fail("sync", path_, errno);
   }
@@ -158,6 +167,7 @@ class PosixFileSystem : public FileSystem {
       if (lstat((path + "/" + name).c_str(), &s) != 0) continue;  // gone since
       entries.push_back(
           {name, S_ISDIR(s.st_mode), static_cast<uint64_t>(s.st_size),
+           512 * static_cast<uint64_t>(s.st_blocks),
            static_cast<double>(s.st_mtim.tv_sec) + 1e-9 * static_cast<double>(s.st_mtim.tv_nsec)});
     }
     closedir(directory);

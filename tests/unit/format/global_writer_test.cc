@@ -158,6 +158,72 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
   }
 }
 
+// A file whose levels were synced is gone on with by another writer, after any level, and is the
+// same.
+TEST_F(GlobalWriterTest, GoesOnAfterAnyLevel) {
+  const oracle::Dag dag = oracle::build_dag(random_voxels(4, 32), 64);
+  const std::string expected = write_global(path_, dag, grid_of(32)).sha256;
+  const auto levels = level_words(dag);
+  const auto write_level = [&](GlobalFileWriter& writer, size_t i) {
+    writer.begin_level(static_cast<uint32_t>(3 - i));
+    writer.write_words(0, levels[i]);
+    writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
+  };
+  for (size_t done = 1; done <= levels.size(); ++done) {
+    SCOPED_TRACE(done);
+    std::vector<GlobalLevel> kept;
+    {
+      GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
+      for (size_t i = 0; i < done; ++i) write_level(writer, i);
+      writer.sync();
+      kept.assign(writer.levels().begin(), writer.levels().end());
+      if (done < levels.size()) writer.begin_level(static_cast<uint32_t>(3 - done));
+    }
+    GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
+    writer.go_on(kept);
+    for (size_t i = done; i < levels.size(); ++i) write_level(writer, i);
+    EXPECT_EQ(writer.finish(dag.voxels, dag.svo_nodes).sha256, expected);
+  }
+}
+
+// A bit that the disk flips before the file has its checksums is noticed, and so is a partial file
+// that was cut short.
+TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
+  const oracle::Dag dag = oracle::build_dag(random_voxels(5, 32), 64);
+  const auto levels = level_words(dag);
+  const std::string partial = path_ + ".partial";
+  const auto write = [&](GlobalFileWriter& writer) {
+    for (size_t i = 0; i < levels.size(); ++i) {
+      writer.begin_level(static_cast<uint32_t>(3 - i));
+      writer.write_words(0, levels[i]);
+      writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
+    }
+  };
+  uint64_t at = kPageBytes;
+  for (size_t i = 0; i < levels.size(); ++i) {
+    SCOPED_TRACE(i);
+    GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
+    write(writer);
+    ByteString bytes = read_bytes(partial);
+    bytes[at + 4 * (levels[i].size() / 2)] ^= 16;
+    write_bytes(partial, bytes);
+    const Error error = error_of([&] { writer.seal(dag.voxels, dag.svo_nodes); });
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+    EXPECT_THAT(error.message(), HasSubstr("level " + std::to_string(3 - i)));
+    at += (4 * levels[i].size() + kPageBytes - 1) / kPageBytes * kPageBytes;
+  }
+  std::vector<GlobalLevel> kept;
+  {
+    GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
+    write(writer);
+    writer.sync();
+    kept.assign(writer.levels().begin(), writer.levels().end());
+  }
+  std::filesystem::resize_file(partial, at - 1);
+  GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
+  EXPECT_EQ(error_of([&] { writer.go_on(kept); }).code(), ErrorCode::kCorrupt);
+}
+
 // A level of over 2^32 words is a limit error that names the level, whichever way it is noticed.
 TEST_F(GlobalWriterTest, LevelsOverTheLimitAreRefused) {
   GlobalFileWriter writer(system_files(), path_, grid_of(16), 64);
