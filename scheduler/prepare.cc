@@ -50,7 +50,7 @@ BuildSpec checked(const BuildSpec& spec) {
   const uint64_t edge = r.subvolume_edge;
   if (edge && ((edge & (edge - 1)) || edge < static_cast<uint64_t>(kSmallestEdge)))
     refuse("subvolume edge " + std::to_string(edge) + ": expected a power of two from 64 voxels");
-  backend_opener(r);
+  check_backend(r);
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = std::max(1u, std::thread::hardware_concurrency());
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();

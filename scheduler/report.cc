@@ -42,6 +42,7 @@ std::string report_json(const BuildReport& report) {
       {"merge_streamed_groups", report.merge_streamed_groups},
       {"memory_bytes", report.memory_bytes},
       {"threads", report.threads},
+      {"backend", report.backend},
       {"stages", stages},
       {"wall_s", report.wall_s},
       {"cpu_s", report.cpu_s},

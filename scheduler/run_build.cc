@@ -208,10 +208,12 @@ class Build {
     ExecutorOptions options;
     options.grid_levels = scene.grid.levels;
     options.hash_bits = spec_.geometry.hash_bits;
-    options.threads = spec_.run.threads;
+    const BackendChoice backend = choose_backend(spec_.run, seams_.progress);
+    report_.backend = backend.name;
+    options.threads = std::min(spec_.run.threads, backend.most_workers);
+    options.open_backend = backend.open;
     if (spec_.run.subvolume_edge)
       options.longest_edge = static_cast<int64_t>(spec_.run.subvolume_edge);
-    options.open_backend = backend_opener(spec_.run);
     options.segment_folder = work_.path();
     options.first_segment_id = work_.next_segment_id();
     if (cache_) options.cache = &*cache_;

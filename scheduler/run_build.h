@@ -36,6 +36,7 @@ struct BuildReport {
   uint64_t merge_streamed_groups = 0;
   uint64_t memory_bytes = 0;
   unsigned threads = 0;
+  std::string backend;  // that built what was not reused
   std::vector<StageTime> stages;
   double wall_s = 0;
   double cpu_s = 0;

@@ -46,6 +46,10 @@ TEST_F(SharedScenes, Sponza4096) {
   EXPECT_EQ(fine.sha256, whole.sha256);
   EXPECT_GT(fine.subvolumes, 4000u);
   EXPECT_GT(fine.spill_bytes, 0u);
+  EXPECT_GT(fine.merge_rounds, 1u);
+  const BuildReport split = run_with(64 * kMebibyte, 4096, 1);
+  EXPECT_EQ(split.sha256, whole.sha256);
+  EXPECT_GT(split.subvolumes_split, 0u);
   EXPECT_EQ(run_with(256 * kMebibyte, 256, 1).sha256, whole.sha256);
   EXPECT_EQ(run_with(64 * kMebibyte, 1024, 2).sha256, whole.sha256);
   EXPECT_EQ(run_with(64 * kMebibyte, 0, 1).sha256, whole.sha256);
