@@ -1,31 +1,15 @@
 #include "scheduler/backend_check.h"
 
-#include <algorithm>
 #include <span>
 #include <vector>
+
+#include "core/backend/memory_stream.h"
 
 namespace voxdag {
 namespace {
 
 constexpr uint32_t kGridLevels = 9;
 constexpr uint64_t kBudgetBytes = uint64_t{256} << 20;
-
-class MemoryStream : public TriangleStream {
- public:
-  explicit MemoryStream(std::span<const FixedTriangle> triangles) : triangles_(triangles) {}
-  uint64_t count() const override { return triangles_.size(); }
-  void rewind() override { next_ = 0; }
-  size_t read(std::span<FixedTriangle> out) override {
-    const size_t n = std::min(out.size(), triangles_.size() - next_);
-    std::copy_n(triangles_.begin() + static_cast<std::ptrdiff_t>(next_), n, out.begin());
-    next_ += n;
-    return n;
-  }
-
- private:
-  std::span<const FixedTriangle> triangles_;
-  size_t next_ = 0;
-};
 
 // Triangles all over the grid, from a quarter of a voxel to a quarter of the grid across; every
 // eighth is a sliver.

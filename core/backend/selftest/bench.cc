@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cstdio>
 
+#include "core/backend/memory_stream.h"
 #include "core/backend/selftest/run.h"
 #include "core/backend/selftest/scenes.h"
 #include "core/base/clock.h"

@@ -1,11 +1,9 @@
-// Building subvolumes for the self-test: triangles from memory, sub-DAGs kept or only counted.
+// What the self-test does with backends: compare them, and time them.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -17,23 +15,6 @@ namespace voxdag::selftest {
 struct Subject {
   std::string name;
   std::function<std::unique_ptr<Backend>()> open;
-};
-
-class MemoryStream : public TriangleStream {
- public:
-  explicit MemoryStream(std::span<const FixedTriangle> triangles) : triangles_(triangles) {}
-  uint64_t count() const override { return triangles_.size(); }
-  void rewind() override { next_ = 0; }
-  size_t read(std::span<FixedTriangle> out) override {
-    const size_t n = std::min(out.size(), triangles_.size() - next_);
-    std::copy_n(triangles_.begin() + static_cast<std::ptrdiff_t>(next_), n, out.begin());
-    next_ += n;
-    return n;
-  }
-
- private:
-  std::span<const FixedTriangle> triangles_;
-  size_t next_ = 0;
 };
 
 // Builds scenes of every kind by the subject and by the CPU backend, compares every level array and
