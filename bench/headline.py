@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Whole builds: the shipped program, default options, empty work folders.
 
-Each case is built several times, and medians are shown. With --study the yardstick's build stage
-runs before every build, and the ratio is CPU seconds of the whole `voxdag build` (reading,
-artifacts, merge, final file) over CPU seconds of the study's build stage alone.
+Each case is built several times, and medians are shown; cases that take more than a minute are
+built once. With --study the yardstick's build stage runs before every build, and the ratio is CPU
+seconds of the whole `voxdag build` (reading, artifacts, merge, final file) over CPU seconds of the
+study's build stage alone. `plot` draws the figures of --json.
 """
 
 import argparse
@@ -13,22 +14,26 @@ from pathlib import Path
 
 import measure
 from measure import amount, median
+from scenes import HAIRBALL, add_hairball_option, can_make_hairball, scene_path
 from study import Study, same_work
 
-# The study's name of a scene and the same scene as .glb.
-STUDY_NAMES = {"sponza": "sponza", "dragon_100k": "dragon"}
-CASES = ["sponza:16384", "sponza:32768", "dragon_100k:8192", "dragon_100k:16384"]
-SHORT_CASES = ["sponza:16384", "dragon_100k:8192"]
+CASES = (
+    [f"sponza:{1 << levels}" for levels in range(13, 18)]
+    + [f"dragon_100k:{1 << levels}" for levels in range(13, 16)]
+    + [f"{HAIRBALL}:4096", f"{HAIRBALL}:8192", "minecraft_terrain:16384", "wooden_staircase:16384"])
+SHORT_CASES = ["sponza:8192", "sponza:16384", "dragon_100k:8192", f"{HAIRBALL}:4096",
+               "minecraft_terrain:16384", "wooden_staircase:16384"]
+LONG_S = 60  # of one build
 
 
-def measure_case(case, options, study):
+def measure_case(case, options, study, folder):
     scene, resolution = case.split(":")
     levels = int(resolution).bit_length() - 1
-    path = options.scenes / f"{scene}.glb"
+    path = scene_path(scene, options, folder)
     runs, reports, yardsticks = [], [], []
-    for _ in range(options.repeat):
-        if study and scene in STUDY_NAMES:
-            yardsticks.append(study.build_stage(STUDY_NAMES[scene], levels))
+    while len(runs) < options.repeat and not (runs and runs[-1].wall_s > LONG_S):
+        if study and study.knows(scene):
+            yardsticks.append(study.build_stage(scene, path, levels))
         taken, report = measure.build(options.voxdag, path, resolution, options.scratch)
         runs.append(taken)
         reports.append(report)
@@ -38,23 +43,32 @@ def measure_case(case, options, study):
 def summary(case, runs, reports, yardsticks):
     last = reports[-1]
     cpu_s = median([taken.cpu_s for taken in runs])
+    wall_s = median([taken.wall_s for taken in runs])
     stages = {
         stage["name"]: median([report["stages"][i]["cpu_s"] for report in reports])
         for i, stage in enumerate(last["stages"])
     }
+    scene, resolution = case.split(":")
     figures = {
         "case": case,
+        "scene": scene,
+        "resolution": int(resolution),
         "runs": len(runs),
         "cpu_s": cpu_s,
         "cpu_s_all": [taken.cpu_s for taken in runs],
-        "wall_s": median([taken.wall_s for taken in runs]),
+        "wall_s": wall_s,
+        "wall_over_cpu": wall_s / cpu_s,
         "peak_rss_bytes": max(taken.peak_rss_bytes for taken in runs),
+        "bytes": last["bytes"],
+        "peak_disk_bytes": max(taken.peak_disk_bytes for taken in runs),
+        "sha256": last["sha256"],
         "subvolumes": last["subvolumes"]["total"],
+        "artifact_nodes": last["artifacts"]["nodes"],
         "voxels": last["voxels"],
         "svo_nodes": last["svo_nodes"],
         "dag_nodes": last["dag_nodes"],
         "voxels_per_cpu_s": last["voxels"] / cpu_s,
-        "svo_nodes_per_cpu_s": last["svo_nodes"] / cpu_s,
+        "ns_per_svo_node": 1e9 * cpu_s / last["svo_nodes"],
         "dag_nodes_per_cpu_s": last["dag_nodes"] / cpu_s,
         "stages_cpu_s": stages,
     }
@@ -67,14 +81,31 @@ def summary(case, runs, reports, yardsticks):
     return figures
 
 
+def growth(cases):
+    """By scene, over its smallest to its largest resolution: the factor of CPU time and of DAG
+    nodes per doubling, as geometric means."""
+    grown = []
+    for scene in dict.fromkeys(case["scene"] for case in cases):
+        own = sorted((c for c in cases if c["scene"] == scene), key=lambda c: c["resolution"])
+        first, last = own[0], own[-1]
+        doublings = (last["resolution"] // first["resolution"]).bit_length() - 1
+        if doublings:
+            grown.append({
+                "scene": scene, "from": first["resolution"], "to": last["resolution"],
+                **{name: (last[name] / first[name]) ** (1 / doublings)
+                   for name in ("cpu_s", "voxels", "dag_nodes", "bytes")}})
+    return grown
+
+
 def print_builds(cases):
     measure.print_table(
-        ["case", "voxels", "DAG nodes", "subvol.", "CPU s", "wall s", "peak MiB", "voxels/CPU s",
-         "octree nodes/CPU s", "DAG nodes/CPU s"],
+        ["case", "voxels", "DAG nodes", "subvol.", "CPU s", "wall s", "wall / CPU", "peak MiB",
+         "file MiB", "peak disk / file", "voxels/CPU s", "ns/octree node", "DAG nodes/CPU s"],
         [[c["case"], amount(c["voxels"]), amount(c["dag_nodes"]), c["subvolumes"],
-          f"{c['cpu_s']:.2f}", f"{c['wall_s']:.2f}", f"{c['peak_rss_bytes'] / measure.MIB:.0f}",
-          amount(c["voxels_per_cpu_s"]), amount(c["svo_nodes_per_cpu_s"]),
-          amount(c["dag_nodes_per_cpu_s"])] for c in cases])
+          f"{c['cpu_s']:.2f}", f"{c['wall_s']:.2f}", f"{c['wall_over_cpu']:.2f}",
+          f"{c['peak_rss_bytes'] / measure.MIB:.0f}", f"{c['bytes'] / measure.MIB:.0f}",
+          f"{c['peak_disk_bytes'] / c['bytes']:.1f}", amount(c["voxels_per_cpu_s"]),
+          f"{c['ns_per_svo_node']:.1f}", amount(c["dag_nodes_per_cpu_s"])] for c in cases])
 
 
 def print_stages(cases):
@@ -102,25 +133,44 @@ def print_ratios(cases):
          for c in cases])
 
 
+def print_growth(grown):
+    if not grown:
+        return
+    print("\nGrowth per doubling of R, geometric mean:\n")
+    measure.print_table(
+        ["scene", "R", "CPU time", "voxels", "DAG nodes", "file"],
+        [[g["scene"], f"{g['from']} to {g['to']}"] +
+         [f"{g[name]:.2f}" for name in ("cpu_s", "voxels", "dag_nodes", "bytes")] for g in grown])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     measure.add_common_options(parser)
+    add_hairball_option(parser)
     parser.add_argument("--study", type=Path, help="the study's folder; without it, no ratios")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--case", action="append", metavar="SCENE:R", help="instead of the usual")
-    parser.add_argument("--short", action="store_true", help="the two quickest cases")
+    parser.add_argument("--short", action="store_true", help="what takes less than five minutes")
     options = parser.parse_args()
 
+    names = options.case or (SHORT_CASES if options.short else CASES)
+    if not options.case and not can_make_hairball(options):
+        print("No hairball: its generator needs numpy, and to lie beside the scenes.\n")
+        names = [name for name in names if not name.startswith(HAIRBALL)]
     facts = measure.machine()
     print(measure.machine_line(facts) + "\n", flush=True)
-    with tempfile.TemporaryDirectory(dir=options.scratch) as folder:
+    with tempfile.TemporaryDirectory(dir=options.scratch) as name:
+        folder = Path(name)
         study = Study(options.study, folder) if options.study else None
-        names = options.case or (SHORT_CASES if options.short else CASES)
-        cases = [measure_case(case, options, study) for case in names]
+        cases = [measure_case(case, options, study, folder) for case in names]
+    facts["load_1min_after"] = measure.machine()["load_1min"]
+    grown = growth(cases)
     print_builds(cases)
     print_stages(cases)
     print_ratios(cases)
-    figures = {"machine": facts, "cases": cases}
+    print_growth(grown)
+    print(f"\nLoad at the end: {facts['load_1min_after']:.2f}")
+    figures = {"machine": facts, "cases": cases, "growth": grown}
     measure.write_json(options.json, figures)
     if not options.json:
         print("\n" + json.dumps(figures))

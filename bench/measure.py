@@ -10,6 +10,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,12 +21,13 @@ MIB = 1 << 20
 
 @dataclass
 class Run:
-    """What one command took, and what it wrote to stdout."""
+    """What one command took, and what it wrote to stdout; of a build also what its folder held."""
 
     wall_s: float
     cpu_s: float
     peak_rss_bytes: int
     stdout: str
+    peak_disk_bytes: int = 0
 
 
 def run(command):
@@ -45,11 +47,45 @@ def run(command):
         return Run(wall_s, cpu_s, usage.ru_maxrss * 1024, out.read())
 
 
+class DiskWatch:
+    """The most bytes that a folder held while the watch was on, looked at every 20 ms."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.peak_bytes = 0
+        self.over = threading.Event()
+        self.thread = threading.Thread(target=self.watch)
+
+    def look(self):
+        total = 0
+        for path in self.folder.rglob("*"):
+            try:
+                total += path.stat().st_blocks * 512
+            except FileNotFoundError:
+                pass  # gone since it was listed
+        self.peak_bytes = max(self.peak_bytes, total)
+
+    def watch(self):
+        while not self.over.wait(0.02):
+            self.look()
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self.over.set()
+        self.thread.join()
+        self.look()
+
+
 def build(voxdag, scene, resolution, scratch, *options):
     """Builds into an empty folder that is removed again; returns (Run, the build's report)."""
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         output = Path(folder) / "out.vdag"
-        taken = run([voxdag, "build", scene, "-r", resolution, "-o", output, "--json", *options])
+        with DiskWatch(Path(folder)) as disk:
+            taken = run([voxdag, "build", scene, "-r", resolution, "-o", output, "--json", *options])
+        taken.peak_disk_bytes = disk.peak_bytes
         return taken, json.loads(taken.stdout)
 
 

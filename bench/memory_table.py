@@ -13,6 +13,7 @@ from pathlib import Path
 
 import measure
 from measure import MIB
+from scenes import add_hairball_option, hairball
 
 SLACK_BYTES = 64 * MIB
 LARGE = "8GiB"
@@ -20,15 +21,6 @@ LARGE = "8GiB"
 
 def sponza(options, _folder):
     return options.scenes / "sponza.glb"
-
-
-def hairball(options, folder):
-    """A million slivers, made by a generator beside the scenes (it needs numpy)."""
-    if options.hairball:
-        return options.hairball
-    path = folder / "hairball.glb"
-    measure.run([sys.executable, options.scenes / "../tools/gen_hairball.py", path])
-    return path
 
 
 def large_file(options, folder):
@@ -87,7 +79,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     measure.add_common_options(parser)
     parser.add_argument("--case", action="append", choices=CASES, help="instead of all")
-    parser.add_argument("--hairball", type=Path, help="hairball.glb, if it was made already")
+    add_hairball_option(parser)
     options = parser.parse_args()
 
     facts = measure.machine()

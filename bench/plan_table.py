@@ -8,8 +8,6 @@ factor of 2. The disk's peak is watched while the build runs. Exits 1 if a figur
 import argparse
 import json
 import sys
-import tempfile
-import threading
 from pathlib import Path
 
 import measure
@@ -20,52 +18,15 @@ WITHIN = {"voxels": 1.25, "file_bytes": 2.0, "disk_bytes": 2.0, "memory_bytes": 
 SHOWN = ["voxels", "file_bytes", "disk_bytes", "memory_bytes", "dag_nodes", "cpu_s"]
 
 
-class DiskWatch:
-    """The most bytes that a folder held while the watch was on, looked at every 20 ms."""
-
-    def __init__(self, folder):
-        self.folder = folder
-        self.peak_bytes = 0
-        self.over = threading.Event()
-        self.thread = threading.Thread(target=self.watch)
-
-    def look(self):
-        total = 0
-        for path in self.folder.rglob("*"):
-            try:
-                total += path.stat().st_blocks * 512
-            except FileNotFoundError:
-                pass  # gone since it was listed
-        self.peak_bytes = max(self.peak_bytes, total)
-
-    def watch(self):
-        while not self.over.wait(0.02):
-            self.look()
-
-    def __enter__(self):
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self.over.set()
-        self.thread.join()
-        self.look()
-
-
 def measure_case(scene, resolution, options):
     plan_run = measure.run([options.voxdag, "plan", scene, "-r", resolution, "--json"])
     plan = json.loads(plan_run.stdout)
-    with tempfile.TemporaryDirectory(dir=options.scratch) as folder:
-        output = Path(folder) / "out.vdag"
-        with DiskWatch(Path(folder)) as disk:
-            taken = measure.run(
-                [options.voxdag, "build", scene, "-r", resolution, "-o", output, "--json"])
-        report = json.loads(taken.stdout)
+    taken, report = measure.build(options.voxdag, scene, resolution, options.scratch)
     truth = {
         "voxels": report["voxels"],
         "dag_nodes": report["dag_nodes"],
         "file_bytes": report["bytes"],
-        "disk_bytes": disk.peak_bytes,
+        "disk_bytes": taken.peak_disk_bytes,
         "memory_bytes": taken.peak_rss_bytes,
         "cpu_s": taken.cpu_s,
     }

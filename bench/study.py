@@ -10,6 +10,10 @@ import shutil
 from pathlib import Path
 
 from measure import run
+from scenes import HAIRBALL, glb_to_obj
+
+# Scenes that the study has a copy of, by its name.
+MESHES = {"sponza": "sponza", "dragon_100k": "dragon"}
 
 # The study's own cube and child order differ a little: its counts only tell that the work was alike.
 VOXELS_WITHIN = 0.005
@@ -32,11 +36,23 @@ class Study:
         run(["g++", "-std=c++20", "-O3", "-march=native", "-w", "-o", self.program,
              self.folder / "bench.cpp"])
 
-    def build_stage(self, scene, levels):
-        """CPU and wall seconds, voxels and DAG nodes of the build stage at R = 2^levels."""
+    def knows(self, scene):
+        return scene in MESHES or scene == HAIRBALL
+
+    def mesh_of(self, scene, scene_path):
+        """The scene as .obj: the study's own copy, or converted."""
         mesh = self.folder / f"{scene}.obj"
         if not mesh.exists():
-            mesh.write_bytes(lzma.decompress((self.source / f"{scene}.obj.xz").read_bytes()))
+            if scene in MESHES:
+                packed = self.source / f"{MESHES[scene]}.obj.xz"
+                mesh.write_bytes(lzma.decompress(packed.read_bytes()))
+            else:
+                glb_to_obj(scene_path, mesh)
+        return mesh
+
+    def build_stage(self, scene, scene_path, levels):
+        """CPU and wall seconds, voxels and DAG nodes of the build stage at R = 2^levels."""
+        mesh = self.mesh_of(scene, scene_path)
         text = run([self.program, mesh, levels]).stdout
         found = re.search(r"BUILD cpu ([\d.]+) s \(wall ([\d.]+)\) \| voxels ([\d.e+]+).*"
                           r"dag ([\d.e+]+) nodes", text)

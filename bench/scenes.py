@@ -1,0 +1,66 @@
+"""The scenes that benchmarks build: files of a folder, and a hairball that is made when asked for."""
+
+import importlib.util
+import json
+import struct
+import sys
+from array import array
+from pathlib import Path
+
+from measure import run
+
+HAIRBALL = "hairball"
+
+
+def can_make_hairball(options):
+    """Whether a file was given, or the generator beside the scenes is there, and numpy for it."""
+    return bool(options.hairball) or (
+        (options.scenes / "../tools/gen_hairball.py").exists()
+        and importlib.util.find_spec("numpy") is not None)
+
+
+def hairball(options, folder):
+    """A million slivers: --hairball, or made in `folder` by the generator beside the scenes."""
+    if options.hairball:
+        return options.hairball
+    path = folder / f"{HAIRBALL}.glb"
+    if not path.exists():
+        run([sys.executable, options.scenes / "../tools/gen_hairball.py", path])
+    return path
+
+
+def scene_path(name, options, folder):
+    return hairball(options, folder) if name == HAIRBALL else options.scenes / f"{name}.glb"
+
+
+def add_hairball_option(parser):
+    parser.add_argument("--hairball", type=Path,
+                        help="hairball.glb, if it was made already")
+
+
+def glb_to_obj(glb, obj):
+    """The meshes of a .glb without transforms, as the study reads them."""
+    data = glb.read_bytes()
+    json_bytes, = struct.unpack_from("<I", data, 12)
+    document = json.loads(data[20:20 + json_bytes])
+    binary = data[28 + json_bytes:]
+
+    def values(number, code, each):
+        accessor = document["accessors"][number]
+        view = document["bufferViews"][accessor["bufferView"]]
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        out = array(code)
+        out.frombytes(binary[start:start + accessor["count"] * each * out.itemsize])
+        return out
+
+    with obj.open("w") as out:
+        first = 1
+        for mesh in document["meshes"]:
+            for primitive in mesh["primitives"]:
+                points = values(primitive["attributes"]["POSITION"], "f", 3)
+                corners = values(primitive["indices"], "I", 1)
+                for i in range(0, len(points), 3):
+                    out.write("v %.9g %.9g %.9g\n" % tuple(points[i:i + 3]))
+                for i in range(0, len(corners), 3):
+                    out.write("f %d %d %d\n" % tuple(first + c for c in corners[i:i + 3]))
+                first += len(points) // 3
