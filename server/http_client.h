@@ -4,19 +4,13 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
 
-namespace voxdag::server {
+#include "server/http/headers.h"
 
-// Header names compare without regard to case.
-struct HeaderLess {
-  using is_transparent = void;
-  bool operator()(std::string_view a, std::string_view b) const;
-};
-using HeaderMap = std::multimap<std::string, std::string, HeaderLess>;
+namespace voxdag::server {
 
 struct ClientResponse {
   int status = 0;

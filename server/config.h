@@ -1,0 +1,62 @@
+// What the operator decides: the file of `voxdag serve --config`, docs/operating.md.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/io/file_system.h"
+#include "server/http/http_server.h"
+
+namespace voxdag::server {
+
+struct JobLimits {
+  unsigned at_a_time = 1;
+  uint64_t memory_bytes = 0;  // of all running jobs together; 0: half of what the machine allows
+  unsigned threads = 0;       // of each job unless it says less; 0: all cores
+  uint64_t least_free_disk_bytes = uint64_t{1} << 30;  // below it nothing is begun
+  int nice = 5;                                        // of the processes that build
+  unsigned attempts = 5;
+  double backoff_s = 15;  // before the second attempt; doubles each time
+  double most_backoff_s = 900;
+  double grace_s = 8;       // for a build to stop at a checkpoint
+  uint64_t queued = 20000;  // jobs that have not ended
+  double plan_s = 120;      // for a dry run
+  unsigned plans_at_a_time = 1;
+};
+
+struct TransferLimits {
+  uint64_t scene_bytes = uint64_t{64} << 30;
+  uint64_t body_bytes = 64 << 10;  // of JSON
+  size_t transfers = 64;           // uploads and downloads at a time
+  size_t event_streams = 256;
+  double requests_per_s = 200;  // of one address, with bursts of twice that; the loopback is exempt
+};
+
+struct Retention {
+  double finished_days = 30;  // ended jobs and their files
+  uint64_t finished_jobs = 10000;
+  double upload_days = 2;  // parts of scenes that wait for the rest
+};
+
+struct ServerConfig {
+  HttpOptions http{.port = 8080};
+  std::string data_folder;
+  std::string token_file;                // "" for none: loopback only
+  std::vector<std::string> scene_roots;  // absolute folders whose scenes jobs may name by path
+  std::vector<std::string> hosts;        // names that a Host header may have beside the loopback's
+  std::string program;                   // that runs jobs; "" for this one
+  JobLimits jobs;
+  TransferLimits transfers;
+  Retention retention;
+  double drain_s = 10;  // for answers in flight when the service stops
+};
+
+// Adds what a JSON file says. Throws Error{kInvalidInput} naming the file and the member that is
+// unknown or has a wrong value.
+void read_config(FileSystem& files, const std::string& path, ServerConfig& config);
+// Throws Error{kInvalidInput} if the parts do not go together: no data folder, an address that is
+// not the loopback without tokens, a certificate without its key.
+void check_config(const ServerConfig& config);
+
+}  // namespace voxdag::server

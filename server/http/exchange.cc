@@ -1,0 +1,199 @@
+#include "server/http/exchange.h"
+
+#include <sys/time.h>
+
+#include <algorithm>
+#include <charconv>
+#include <ctime>
+
+#include "core/base/integers.h"
+#include "server/random_id.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr size_t kFileStep = 256 << 10;
+
+std::string http_date() {
+  const time_t now = time(nullptr);
+  tm parts{};
+  gmtime_r(&now, &parts);
+  char text[40];
+  const size_t size = strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &parts);
+  return std::string(text, size);
+}
+
+Problem problem_of_status(int status) {
+  switch (status) {
+    case 404:
+      return not_found("nothing is here");
+    case 413:
+      return Problem(413, "too_large", "the body is over its limit");
+    case 414:
+      return problem(ErrorCode::kInvalidInput, "the target is longer than 8192 bytes");
+    case 416:
+      return Problem(416, "range_not_satisfiable", "the Range header breaks its grammar");
+    case 500:
+      return Problem(500, "internal", "a fault of the service");
+    default:
+      return bad_request("expected a request by HTTP/1.1");
+  }
+}
+
+// Texts, and ranges of a file, one after the other.
+httplib::ContentProvider provide(std::shared_ptr<ReadableFile> file,
+                                 std::vector<FilePiece> pieces) {
+  return [file = std::move(file), pieces = std::move(pieces), buffer = std::string()](
+             size_t offset, size_t, httplib::DataSink& sink) mutable {
+    uint64_t skip = offset;
+    for (const FilePiece& piece : pieces) {
+      if (skip < piece.text.size())
+        return sink.write(piece.text.data() + skip, piece.text.size() - skip);
+      skip -= piece.text.size();
+      if (skip < piece.range.size()) {
+        buffer.resize(std::min<uint64_t>(kFileStep, piece.range.size() - skip));
+        try {
+          file->read_at(piece.range.begin + skip, std::as_writable_bytes(std::span(buffer)));
+        } catch (const Error&) {
+          return false;  // the answer has begun: all that is left is to break it off
+        }
+        return sink.write(buffer.data(), buffer.size());
+      }
+      skip -= piece.range.size();
+    }
+    return false;
+  };
+}
+
+httplib::ContentProviderWithoutLength provide(EventText next, const Connection& connection) {
+  return [next = std::move(next), &connection](size_t, httplib::DataSink& sink) {
+    const auto text = next();
+    if (!text) {
+      sink.done();
+      return true;
+    }
+    if (text->empty()) return !connection.peer_gone();
+    return sink.write(text->data(), text->size());
+  };
+}
+
+}  // namespace
+
+Response problem_response(const Problem& problem) {
+  Response response;
+  response.status = problem.status;
+  response.headers = problem.headers;
+  response.headers.emplace("Content-Type", "application/problem+json");
+  response.headers.emplace("Cache-Control", "no-store");
+  response.body = problem_json(problem);
+  return response;
+}
+
+Exchange::Exchange(Connection& connection, const std::string& address) : connection_(connection) {
+  request_.peer = address;
+  request_.id = random_id();
+}
+
+void Exchange::begin(httplib::Request& raw) {
+  begun_ = true;
+  connection_.begin_exchange();
+  request_.method = raw.method;
+  target_ = raw.target;
+  for (const auto& [name, value] : raw.headers)
+    if (name != "REMOTE_ADDR" && name != "REMOTE_PORT") request_.headers.emplace(name, value);
+  const auto lengths = request_.headers.count("Content-Length");
+  if (lengths > 0) {
+    const std::string text = request_.header("Content-Length");
+    uint64_t length = 0;
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), length);
+    if (lengths > 1 || parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size())
+      bad_framing_ = "Content-Length is not one number";
+    request_.content_length = length;
+  }
+  if (request_.headers.contains("Transfer-Encoding")) {
+    chunked_ = equal_ignoring_case(request_.header("Transfer-Encoding"), "chunked") &&
+               request_.headers.count("Transfer-Encoding") == 1;
+    if (!chunked_ || lengths > 0) bad_framing_ = "Transfer-Encoding is not just chunked";
+  }
+  request_.has_body = chunked_ || request_.content_length.value_or(0) > 0;
+  raw.path = "/";
+  raw.ranges.clear();
+  raw.headers.erase("Accept-Encoding");
+}
+
+void Exchange::check(const httplib::Request&, const httplib::ContentReader* reader) {
+  if (!bad_framing_.empty()) throw bad_request(bad_framing_);
+  if (request_.headers.contains("Content-Encoding"))
+    throw Problem(415, "unsupported_media_type", "expected a body without Content-Encoding");
+  request_.target = parse_target(target_);
+  request_.read_body = [this, reader](const Request::Sink& sink) {
+    if (!reader || !request_.has_body) return BodyEnd::kWhole;
+    bool stopped = false;
+    read_to_end_ = (*reader)([&](const char* data, size_t size) {
+      stopped = !sink(std::string_view(data, size));
+      return !stopped;
+    });
+    if (read_to_end_) return BodyEnd::kWhole;
+    if (stopped) return BodyEnd::kStopped;
+    return connection_.trouble() == Connection::Trouble::kTooSlow ? BodyEnd::kTooSlow
+                                                                  : BodyEnd::kBroken;
+  };
+}
+
+void Exchange::put(Response response, httplib::Response& out, bool last) {
+  answered_ = true;
+  out.status = response.status;
+  for (const auto& [name, value] : response.headers) out.headers.emplace(name, value);
+  out.set_header("X-Request-Id", request_.id);
+  out.set_header("Date", http_date());
+  if (last || !is_whole()) out.set_header("Connection", "close");
+  const std::string type = header_value(response.headers, "Content-Type");
+  if (response.file) {
+    uint64_t size = 0;
+    for (const FilePiece& piece : response.pieces) size += piece.text.size() + piece.range.size();
+    out.headers.erase("Content-Type");
+    out.set_content_provider(size, type,
+                             provide(std::move(response.file), std::move(response.pieces)),
+                             [slot = std::move(response.slot)](bool) {});
+  } else if (response.next_event) {
+    out.headers.erase("Content-Type");
+    out.set_chunked_content_provider(type, provide(std::move(response.next_event), connection_),
+                                     [slot = std::move(response.slot)](bool) {});
+  } else {
+    out.body = std::move(response.body);
+  }
+}
+
+void Exchange::refuse(httplib::Response& out) {
+  answered_ = true;
+  Problem why = problem_of_status(out.status);
+  if (connection_.trouble() == Connection::Trouble::kHeaderTooLarge)
+    why = Problem(431, "headers_too_large", "the header fields are over their limit");
+  if (connection_.trouble() == Connection::Trouble::kTooSlow)
+    why = Problem(408, "timeout", "the request came too slowly");
+  out.status = why.status;
+  out.body = problem_json(why);
+  out.headers.erase("Content-Type");
+  out.set_header("Content-Type", "application/problem+json");
+  out.set_header("X-Request-Id", request_.id);
+}
+
+bool Exchange::is_whole() const {
+  if (!begun_ || !bad_framing_.empty()) return false;
+  if (chunked_) return read_to_end_;
+  return connection_.body_bytes() == request_.content_length.value_or(0);
+}
+
+void Exchange::say_why_not() {
+  if (begun_ || answered_) return;
+  httplib::Response out;
+  out.status = 400;
+  if (connection_.trouble() == Connection::Trouble::kNone) return;
+  refuse(out);
+  std::string text = "HTTP/1.1 " + std::to_string(out.status) + " " + status_title(out.status) +
+                     "\r\nContent-Type: application/problem+json\r\nConnection: close\r\n" +
+                     "Content-Length: " + std::to_string(out.body.size()) + "\r\n\r\n" + out.body;
+  connection_.write(text.data(), text.size());
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,22 @@
+// Header fields of a request or an answer. Names compare without regard to case.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+
+namespace voxdag::server {
+
+struct HeaderLess {
+  using is_transparent = void;
+  bool operator()(std::string_view a, std::string_view b) const;
+};
+using HeaderMap = std::multimap<std::string, std::string, HeaderLess>;
+
+// The first field of the name, "" if there is none.
+std::string header_value(const HeaderMap& headers, std::string_view name);
+// Without the blanks and tabs around it.
+std::string_view trimmed(std::string_view text);
+bool equal_ignoring_case(std::string_view a, std::string_view b);
+
+}  // namespace voxdag::server

@@ -1,0 +1,83 @@
+#include "server/http/target.h"
+
+#include "server/problem.h"
+
+namespace voxdag::server {
+namespace {
+
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+std::string decode(std::string_view text, bool plus_is_blank) {
+  std::string out;
+  out.reserve(text.size());
+  for (size_t i = 0; i < text.size(); ++i) {
+    char c = text[i];
+    if (c == '%') {
+      const int high = i + 2 < text.size() ? hex_digit(text[i + 1]) : -1;
+      const int low = high >= 0 ? hex_digit(text[i + 2]) : -1;
+      if (low < 0) throw bad_request("the target has a broken percent escape");
+      c = static_cast<char>(high * 16 + low);
+      i += 2;
+    } else if (c == '+' && plus_is_blank) {
+      c = ' ';
+    }
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+      throw bad_request("the target has a control character");
+    out += c;
+  }
+  return out;
+}
+
+// Calls use(part) for each part between separators.
+template <class Use>
+void split(std::string_view text, char separator, const Use& use) {
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(separator, begin), text.size());
+    use(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+}
+
+void parse_query(std::string_view text, std::map<std::string, std::string>& query) {
+  split(text, '&', [&](std::string_view pair) {
+    if (pair.empty()) return;
+    const size_t equals = std::min(pair.find('='), pair.size());
+    const std::string_view value =
+        equals < pair.size() ? pair.substr(equals + 1) : std::string_view{};
+    const auto [at, is_new] =
+        query.emplace(decode(pair.substr(0, equals), true), decode(value, true));
+    if (!is_new) throw bad_request("a query parameter is given twice");
+  });
+}
+
+// "http://host/path" is "/path" of this host.
+std::string_view without_origin(std::string_view text) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!text.starts_with(scheme)) continue;
+    const size_t slash = text.find('/', scheme.size());
+    return slash == std::string_view::npos ? "/" : text.substr(slash);
+  }
+  return text;
+}
+
+}  // namespace
+
+Target parse_target(std::string_view text) {
+  text = without_origin(text.substr(0, text.find('#')));
+  if (!text.starts_with('/')) throw bad_request("the target is no path: expected /…");
+  Target target;
+  const size_t mark = std::min(text.find('?'), text.size());
+  target.path = text.substr(0, mark);
+  if (target.path.size() > 1)
+    split(text.substr(1, mark - 1), '/',
+          [&](std::string_view part) { target.segments.push_back(decode(part, false)); });
+  if (mark < text.size()) parse_query(text.substr(mark + 1), target.query);
+  return target;
+}
+
+}  // namespace voxdag::server

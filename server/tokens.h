@@ -1,0 +1,53 @@
+// Bearer tokens and what each may do. The file holds hashes only:
+//
+//     # role name sha256(token)
+//     admin  anna  9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08
+//
+// Tokens are 256 random bits, so that a plain SHA-256 hides them.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/io/file_system.h"
+
+namespace voxdag::server {
+
+// Each may do what those before it may.
+enum class Role { kNone, kRead, kSubmit, kAdmin };
+
+// "read", "submit" or "admin"; no value for anything else.
+std::optional<Role> parse_role(std::string_view name);
+
+struct Caller {
+  Role role = Role::kNone;
+  std::string name;  // for the audit log
+};
+
+class Tokens {
+ public:
+  // Throws Error{kInvalidInput} naming the line that is wrong, or for a file without tokens.
+  static Tokens read(FileSystem& files, const std::string& path);
+
+  // Takes as long for one token as for another.
+  std::optional<Caller> find(std::string_view token) const;
+
+ private:
+  struct Entry {
+    Caller caller;
+    std::string sha256;
+  };
+  std::vector<Entry> entries_;
+};
+
+// A new token, and the line that lets it in.
+struct NewToken {
+  std::string token;
+  std::string line;
+};
+// Throws Error{kInvalidInput} for a role or name that is none.
+NewToken make_token(const std::string& role, const std::string& name);
+
+}  // namespace voxdag::server
