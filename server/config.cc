@@ -65,7 +65,7 @@ class Members {
     takers_[name] = [name, &out](const json& value) { take(value, name, out); };
     return *this;
   }
-  Members& add(const std::string& name, const Members& members) {
+  Members& nest(const std::string& name, const Members& members) {
     takers_[name] = [name, members](const json& value) { members.read(value, name); };
     return *this;
   }
@@ -119,11 +119,11 @@ Members members_of(ServerConfig& c) {
       .add("scene_roots", c.scene_roots)
       .add("hosts", c.hosts)
       .add("drain_s", c.drain_s)
-      .add("tls", tls)
-      .add("jobs", jobs)
-      .add("transfers", transfers)
-      .add("connections", connections)
-      .add("retention", retention);
+      .nest("tls", tls)
+      .nest("jobs", jobs)
+      .nest("transfers", transfers)
+      .nest("connections", connections)
+      .nest("retention", retention);
   return all;
 }
 

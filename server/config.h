@@ -40,7 +40,7 @@ struct Retention {
 };
 
 struct ServerConfig {
-  HttpOptions http{.port = 8080};
+  HttpOptions http;
   std::string data_folder;
   std::string token_file;                // "" for none: loopback only
   std::vector<std::string> scene_roots;  // absolute folders whose scenes jobs may name by path

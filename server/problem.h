@@ -10,10 +10,9 @@
 
 namespace voxdag::server {
 
-class Problem : public std::exception {
- public:
-  Problem(int status, std::string code, std::string detail)
-      : status(status), code(std::move(code)), detail(std::move(detail)) {}
+struct Problem : std::exception {
+  Problem(int http_status, std::string name, std::string text)
+      : status(http_status), code(std::move(name)), detail(std::move(text)) {}
   const char* what() const noexcept override { return detail.c_str(); }
 
   int status;

@@ -41,7 +41,7 @@ thread_local Exchange* t_exchange = nullptr;
 // and time are ours, because it would let a few slow clients take all its threads.
 class HttpServer::Engine : private httplib::Server {
  public:
-  Engine(const HttpOptions& options, Handler handler, OnFault on_fault)
+  Engine(const HttpOptions& options, HttpServer::Handler handler, OnFault on_fault)
       : limits_(options.limits),
         handler_(std::move(handler)),
         on_fault_(std::move(on_fault)),
@@ -82,9 +82,10 @@ class HttpServer::Engine : private httplib::Server {
     Get("/", plain);
     Options("/", plain);
     Delete("/", plain);
-    for (const auto add : {&Server::Post, &Server::Put, &Server::Patch, &Server::Delete})
-      (this->*static_cast<Server& (Server::*)(const std::string&, HandlerWithContentReader)>(add))(
-          "/", with_body);
+    Post("/", with_body);
+    Put("/", with_body);
+    Patch("/", with_body);
+    Delete("/", with_body);
     set_error_handler([](const httplib::Request&, httplib::Response& out) {
       if (out.body.empty() && !out.content_provider_) t_exchange->refuse(out);
     });

@@ -14,7 +14,7 @@ namespace voxdag::server {
 
 struct HttpOptions {
   std::string address = "127.0.0.1";
-  int port = 0;                  // 0 for any free one
+  int port = 8080;               // 0 for any free one
   std::string certificate_file;  // "" for plain HTTP
   std::string key_file;
   HttpLimits limits;
