@@ -15,6 +15,7 @@
 namespace voxdag::cli {
 namespace {
 
+constexpr double kLeastPartToForesee = 0.01;  // a time left reckoned from less is a guess
 constexpr double kTerminalInterval_s = 0.1;
 constexpr double kPlainInterval_s = 5;
 constexpr int kBarWidth = 24;
@@ -81,7 +82,8 @@ class ProgressBar : public Progress {
     if (total_ && !ended) line += percent(part);
     line += short_count(done) + (total_ ? " of " + short_count(static_cast<double>(total_)) : "");
     line += " " + unit_ + ", " + short_count(done / elapsed) + "/s, " + duration_text(elapsed);
-    if (!ended && part > 0) line += ", " + duration_text(elapsed / part - elapsed) + " left";
+    if (!ended && part >= kLeastPartToForesee)
+      line += ", " + duration_text(elapsed / part - elapsed) + " left";
     if (!terminal_ || ended) line += "\n";
     std::fputs(line.c_str(), stderr);
     std::fflush(stderr);
