@@ -1,0 +1,191 @@
+// The occupied subvolumes as small cubes seen from a corner of the grid: outlines while they wait,
+// solid when they are built, bright for a moment after.
+
+import {get_json} from "./api.js";
+import {h, set_text} from "./dom.js";
+import {count_text, has_ended} from "./format.js";
+
+const kWidth = 480, kHeight = 460;
+const kMargin = 10;
+const kCos = Math.cos(Math.PI / 6), kSin = 0.5;
+const kGlow_ms = 900;
+const kOutlineLimit_px = 5;  // smaller cubes show no outlines
+const kSoonest_ms = 1000;    // between two looks
+
+export class CubesView {
+  constructor(path, signal) {
+    this.path = path;
+    this.signal = signal;
+    this.cubes = [];
+    this.turn = 0;  // quarter turns about the vertical axis
+    this.seen_built = -1;
+    this.next_look = 0;
+    this.canvas = h("canvas", {class: "cubes", role: "img"});
+    this.note = h("p", {class: "faint"}, "Shown once the subvolumes are planned.");
+    this.turner = h("div", {class: "buttons"}, ...[[-1, "Turn left"], [1, "Turn right"]].map(([by, text]) =>
+      h("button", {type: "button", class: "quiet small", on: {click: () => this.turn_by(by)}}, text)));
+    this.element = h("div", {class: "cubes-view"}, this.canvas, h("div", {class: "split"}, this.note, this.turner));
+    this.show_emptiness(true);
+    const scheme = matchMedia("(prefers-color-scheme: dark)");
+    scheme.addEventListener("change", () => this.draw(), {signal});
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+  }
+
+  // Fetches the cubes again if the job has built more of them; not more often than is of use.
+  async look(job) {
+    const built = job.progress?.subvolumes?.built ?? 0;
+    const key = `${job.attempts} ${built} ${job.progress?.subvolumes?.total} ${has_ended(job.state)}`;
+    if (key === this.key || this.looking) return;
+    const wait_ms = this.next_look - performance.now();
+    if (wait_ms > 0) {
+      this.again ??= setTimeout(() => {
+        this.again = null;
+        this.look(job);
+      }, wait_ms);
+      return;
+    }
+    this.looking = true;
+    const begin = performance.now();
+    try {
+      this.take(await get_json(this.path, this.signal));
+      this.key = key;
+    } catch (problem) {
+      if (this.signal.aborted) return;
+      if (problem.status === 404) this.key = key;  // not planned yet, or too early a failure
+    } finally {
+      this.looking = false;
+      const now = performance.now();
+      this.next_look = now + Math.max(kSoonest_ms, 10 * (now - begin));
+    }
+  }
+
+  take({resolution, cubes, built, total}) {
+    const before = new Map(this.cubes.map((cube) => [cube.key, cube]));
+    const now = performance.now();
+    this.resolution = resolution;
+    this.cubes = cubes.map(([x, y, z, edge, is_built]) => {
+      const key = `${x} ${y} ${z} ${edge}`;
+      const old = before.get(key);
+      const lit_at = !is_built ? null : !old ? -Infinity : old.lit_at ?? now;
+      return {key, x, y, z, edge, lit_at};
+    });
+    this.show_emptiness(this.cubes.length === 0);
+    this.order();
+    this.draw();
+    const text = `${count_text(built)} of ${count_text(total)} occupied subvolumes are built`;
+    set_text(this.note, text);
+    this.canvas.setAttribute("aria-label", text);
+  }
+
+  show_emptiness(empty) {
+    this.canvas.hidden = this.turner.hidden = empty;
+  }
+
+  turn_by(by) {
+    this.turn = (this.turn + by + 4) % 4;
+    this.order();
+    this.draw();
+  }
+
+  // A cube's low corner after the turn; y is up.
+  turned({x, y, z, edge}) {
+    const far = (c) => this.resolution - edge - c;
+    return [[x, y, z], [z, y, far(x)], [far(x), y, far(z)], [far(z), y, x]][this.turn];
+  }
+
+  // From back to front. Cubes of an octree do not overlap, so the Morton order of their low corners
+  // does it for any mixture of sizes: no cube comes before one that lies lower on all axes.
+  order() {
+    const least = Math.min(...this.cubes.map((cube) => cube.edge));
+    for (const cube of this.cubes) {
+      cube.at = this.turned(cube);
+      cube.rank = morton(...cube.at.map((c) => Math.floor(c / least)));
+    }
+    this.cubes.sort((a, b) => a.rank - b.rank);
+  }
+
+  draw() {
+    if (!this.cubes.length || !this.canvas.clientWidth) return;
+    const ratio = window.devicePixelRatio || 1;
+    const scale = this.canvas.clientWidth / kWidth * ratio;
+    this.canvas.width = Math.round(kWidth * scale);
+    this.canvas.height = Math.round(kHeight * scale);
+    const pen = this.canvas.getContext("2d");
+    pen.scale(scale, scale);
+    pen.lineJoin = "round";
+    const colors = this.colors();
+    const size = (kHeight - 2 * kMargin) / 2 / this.resolution;  // pixels a voxel
+    this.frame(pen, colors, size);
+    const now = performance.now();
+    let glowing = false;
+    for (const cube of this.cubes) {
+      const glow = cube.lit_at === null ? 0 : Math.max(0, 1 - (now - cube.lit_at) / kGlow_ms);
+      glowing ||= glow > 0;
+      this.draw_cube(pen, colors, size, cube, glow);
+    }
+    if (glowing && !matchMedia("(prefers-reduced-motion: reduce)").matches && !this.signal.aborted)
+      requestAnimationFrame(() => this.draw());
+  }
+
+  colors() {
+    const style = getComputedStyle(this.canvas);
+    const get = (name) => style.getPropertyValue(name).trim();
+    return {top: get("--cube-top"), left: get("--cube-left"), right: get("--cube-right"), edge: get("--cube-edge"),
+            wait: get("--cube-wait"), wait_edge: get("--cube-wait-edge"), frame: get("--line"), glow: get("--cube-glow")};
+  }
+
+  point(size, x, y, z) {
+    return [kWidth / 2 + (x - z) * kCos * size,
+            kMargin + (this.resolution + (x + z) * kSin - y) * size];
+  }
+
+  // The three far edges and the outline of the whole grid's floor.
+  frame(pen, colors, size) {
+    const r = this.resolution;
+    const lines = [[[0, 0, 0], [r, 0, 0], [r, 0, r], [0, 0, r], [0, 0, 0]], [[0, 0, 0], [0, r, 0]],
+                   [[0, r, r], [0, r, 0], [r, r, 0]], [[0, 0, r], [0, r, r]], [[r, 0, 0], [r, r, 0]]];
+    pen.strokeStyle = colors.frame;
+    pen.lineWidth = 1;
+    for (const line of lines) {
+      pen.beginPath();
+      line.forEach(([x, y, z]) => pen.lineTo(...this.point(size, x, y, z)));
+      pen.stroke();
+    }
+  }
+
+  draw_cube(pen, colors, size, {at: [x, y, z], edge, lit_at}, glow) {
+    const p = (dx, dy, dz) => this.point(size, x + dx * edge, y + dy * edge, z + dz * edge);
+    const faces = [
+      ["top", [p(0, 1, 0), p(1, 1, 0), p(1, 1, 1), p(0, 1, 1)]],
+      ["left", [p(0, 0, 1), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)]],
+      ["right", [p(1, 0, 0), p(1, 0, 1), p(1, 1, 1), p(1, 1, 0)]],
+    ];
+    const built = lit_at !== null;
+    const outlined = edge * size >= kOutlineLimit_px;
+    pen.lineWidth = 0.75;
+    pen.strokeStyle = built ? colors.edge : colors.wait_edge;
+    for (const [face, points] of faces) {
+      pen.beginPath();
+      points.forEach((point) => pen.lineTo(...point));
+      pen.closePath();
+      pen.fillStyle = built ? colors[face] : colors.wait;
+      pen.fill();
+      if (glow > 0) {
+        pen.globalAlpha = glow;
+        pen.fillStyle = colors.glow;
+        pen.fill();
+        pen.globalAlpha = 1;
+      }
+      if (outlined) pen.stroke();
+    }
+  }
+}
+
+// Up to 2^17 a coordinate: 51 bits, which a double holds exactly.
+function morton(x, y, z) {
+  let code = 0;
+  for (let bit = 2 ** 16; bit >= 1; bit /= 2) {
+    code = code * 8 + (x & bit ? 4 : 0) + (y & bit ? 2 : 0) + (z & bit ? 1 : 0);
+  }
+  return code;
+}
