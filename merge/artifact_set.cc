@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/format/checksum.h"
 #include "core/geometry/morton.h"
 #include "merge/level_run.h"
 #include "merge/slab.h"
@@ -61,6 +62,18 @@ uint64_t row_count(const ArtifactReader& reader) {
   return rows;
 }
 
+uint64_t content_of(const ArtifactReader& reader) {
+  std::vector<uint64_t> words;
+  for (const ArtifactRoot& root : reader.roots()) {
+    words.insert(words.end(),
+                 {root.cube.level, root.cube.position[0], root.cube.position[1],
+                  root.cube.position[2], root.index, root.hash, root.voxels, root.svo_nodes});
+  }
+  for (const ArtifactLevel& level : reader.levels())
+    words.insert(words.end(), {level.level, level.rows, level.children});
+  return checksum64(std::as_bytes(std::span(words)));
+}
+
 // What a slab needs to hold any two neighbouring frames.
 uint64_t slab_bytes(const ArtifactReader& reader) {
   uint64_t most = 0;
@@ -107,12 +120,15 @@ ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSeg
   for (const ArtifactRef& ref : refs) {
     const ArtifactReader reader = opener.open(ref);
     survey.rows += row_count(reader);
-    placed.emplace_back(
-        place_of(reader.roots()[0].cube),
-        SurveyedArtifact{ref, std::max(kLeastRunBytes, index_bytes(reader) + slab_bytes(reader))});
+    SurveyedArtifact found{ref,
+                           std::max(kLeastRunBytes, index_bytes(reader) + slab_bytes(reader)),
+                           content_of(reader),
+                           {}};
+    for (const ArtifactRoot& root : reader.roots()) found.cubes.push_back(root.cube);
+    placed.emplace_back(place_of(found.cubes[0]), std::move(found));
   }
   std::ranges::stable_sort(placed, {}, &std::pair<uint64_t, SurveyedArtifact>::first);
-  for (const auto& [place, artifact] : placed) survey.by_place.push_back(artifact);
+  for (auto& [place, artifact] : placed) survey.by_place.push_back(std::move(artifact));
   return survey;
 }
 

@@ -16,11 +16,14 @@ namespace voxdag {
 
 using OpenSegment = std::function<std::shared_ptr<ReadableFile>(uint32_t)>;
 
-// An artifact, and the memory that it takes in a merge, at least: its index, and any two
-// neighbouring frames of it in a slab.
 struct SurveyedArtifact {
   ArtifactRef ref;
+  // The memory that it takes in a merge, at least: its index, and any two neighbouring frames of it
+  // in a slab.
   uint64_t least_bytes = 0;
+  // Checksum of its roots and its levels' rows, the same wherever it lies.
+  uint64_t content = 0;
+  std::vector<Cube> cubes;  // of its roots
 };
 
 struct ArtifactSurvey {

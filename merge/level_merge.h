@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
@@ -29,6 +30,7 @@ class MergeProgress {
   }
   void advance(uint64_t rows) { progress_.advance(rows); }
   void end() { progress_.end_stage(); }
+  void warn(const std::string& message) { progress_.warn(message); }
 
  private:
   Progress& progress_;

@@ -9,9 +9,12 @@
 // is in memory is bounded by the budget, never by the scene: hash ranges, then rounds.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,17 +36,29 @@ struct MergeInputs {
   // Opens the segment file of an id.
   std::function<std::shared_ptr<ReadableFile>(uint32_t)> open_segment;
   // A folder of its own for what does not fit in memory: maps and the artifacts of merge rounds.
-  // Emptied again.
+  // What it holds at the end is what a checkpoint names.
   std::string scratch_folder;
+  // Work of less than this is not worth a checkpoint.
+  double checkpoint_interval_s = 1;
 };
 
-// Told of what is durable, so that an interrupted merge can go on there.
+// Where the state of an unfinished merge is kept, so that it can go on there.
+//
+// A state is some hundred KB that only the merge understands; it names files of the scratch folder
+// and the global file's partial one, all synced before save(). It knows the inputs by their
+// content, so an artifact that was built again in between does no harm.
 class Checkpoint {
  public:
   virtual ~Checkpoint() = default;
-  // All nodes of `level` are in the global file (round 0, the last one) or in an artifact of an
-  // earlier round (1, 2, ... in their order).
-  virtual void level_merged(uint32_t round, uint32_t level, uint64_t nodes) = 0;
+  // The state saved last, if there is one.
+  virtual std::optional<std::vector<std::byte>> load() = 0;
+  // Replaces it; durable on return. Of the inputs' levels only those above `level` (of smaller
+  // number) are read from here on.
+  virtual void save(uint32_t level, std::span<const std::byte> state) = 0;
+  // It is of no use any more.
+  virtual void forget() = 0;
+  // Nothing reads these bytes of an input's segment any more: their space may be given back.
+  virtual void release(uint32_t segment, uint64_t offset, uint64_t bytes) = 0;
 };
 
 struct MergeReport {
@@ -57,7 +72,9 @@ struct MergeReport {
   uint64_t streamed_groups = 0;  // groups of equal hashes too large for memory, swept row by row
 };
 
-// Throws Error. `files` is where scratch files go; `out` gets all levels but is not finished.
+// Throws Error. `files` is where scratch files go; `out` gets all levels but is not sealed. With a
+// checkpoint, goes on from the state that it has; a state that does not fit is forgotten with a
+// warning, and the merge starts over.
 MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
                            MemoryBudget& budget, unsigned threads, Progress& progress,
                            const CancelToken& cancel, Checkpoint* checkpoint = nullptr);

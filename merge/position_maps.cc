@@ -8,11 +8,36 @@ PositionMaps::PositionMaps(std::span<const uint64_t> rows, uint64_t resident_byt
                            MergeScratch& scratch, MemoryBudget& budget)
     : first_{0} {
   for (const uint64_t count : rows) first_.push_back(first_.back() + count);
-  const uint64_t total = first_.back();
-  if (total * sizeof(uint32_t) <= resident_bytes)
-    values_ = PageBuffer<uint32_t>(budget, total, "the merge's position maps");
+  if (total_rows() * sizeof(uint32_t) <= resident_bytes)
+    values_ = PageBuffer<uint32_t>(budget, total_rows(), "the merge's position maps");
   else
-    file_ = std::make_unique<ScratchFile>(scratch);
+    file_ = std::make_shared<ScratchFile>(scratch);
+}
+
+PositionMaps::PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<ScratchFile> file,
+                           uint64_t resident_bytes, MemoryBudget& budget)
+    : first_{0}, file_(std::move(file)) {
+  for (const uint64_t count : rows) first_.push_back(first_.back() + count);
+  if (total_rows() * sizeof(uint32_t) > resident_bytes) return;
+  values_ = PageBuffer<uint32_t>(budget, total_rows(), "the merge's position maps");
+  file_->read(0, {values_.data(), values_.size()});
+  file_.reset();
+}
+
+std::shared_ptr<ScratchFile> PositionMaps::synced_file(MergeScratch& scratch) const {
+  std::shared_ptr<ScratchFile> file = file_;
+  if (!file) {
+    file = std::make_shared<ScratchFile>(scratch);
+    file->write(0, {values_.data(), values_.size()});
+  }
+  file->sync();
+  return file;
+}
+
+std::vector<uint64_t> PositionMaps::rows() const {
+  std::vector<uint64_t> all;
+  for (size_t run = 0; run + 1 < first_.size(); ++run) all.push_back(rows(run));
+  return all;
 }
 
 uint64_t PositionMaps::most_rows() const {

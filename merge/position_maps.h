@@ -24,6 +24,9 @@ class PositionMaps {
   // One map for each entry of `rows`. Kept in memory if all of them take at most `resident_bytes`.
   PositionMaps(std::span<const uint64_t> rows, uint64_t resident_bytes, MergeScratch& scratch,
                MemoryBudget& budget);
+  // Those that an earlier merge left in `file`.
+  PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<ScratchFile> file,
+               uint64_t resident_bytes, MemoryBudget& budget);
 
   bool resident() const { return file_ == nullptr; }
   uint64_t rows(size_t run) const { return first_[run + 1] - first_[run]; }
@@ -38,10 +41,16 @@ class PositionMaps {
   void load(size_t run, uint64_t first, std::span<uint32_t> positions) const;
   uint32_t at(size_t run, uint64_t row) const;
 
+  // A file that holds all maps and is on the disk: their own, or a copy.
+  std::shared_ptr<ScratchFile> synced_file(MergeScratch& scratch) const;
+  std::vector<uint64_t> rows() const;
+
  private:
+  uint64_t total_rows() const { return first_.back(); }
+
   std::vector<uint64_t> first_;  // where each run's map begins, and the end of the last
   PageBuffer<uint32_t> values_;
-  std::unique_ptr<ScratchFile> file_;
+  std::shared_ptr<ScratchFile> file_;
 };
 
 }  // namespace voxdag

@@ -2,29 +2,30 @@
 
 #include <algorithm>
 #include <memory>
-#include <optional>
 
 #include "core/base/error.h"
 #include "core/dag/brick.h"
-#include "merge/top_run.h"
 
 namespace voxdag {
 namespace {
 
 class Round {
  public:
-  Round(const MergeSeams& seams, const RoundTask& task, LevelOutput& output, Checkpoint* checkpoint)
-      : seams_(seams), task_(task), output_(output), checkpoint_(checkpoint) {}
+  Round(const MergeSeams& seams, const RoundTask& task, LevelOutput& output, RoundProgress progress)
+      : seams_(seams), task_(task), output_(output), done_(std::move(progress)) {}
 
-  std::vector<ArtifactRoot> run() {
-    const uint32_t brick_level = task_.grid_levels - kBrickLevels;
+  std::vector<ArtifactRoot> run(const std::function<void(const RoundProgress&)>& after_level) {
     const uint32_t highest = task_.with_top ? 0 : highest_root();
-    for (uint32_t level = brick_level + 1; level-- > highest;) merge_level_of_all(level);
-    if (task_.with_top && placed_.size() != 1)
+    uint32_t level = done_.level.value_or(task_.grid_levels - kBrickLevels + 1);
+    while (level-- > highest) {
+      merge_level_of_all(level);
+      if (after_level) after_level(done_);
+    }
+    if (task_.with_top && done_.placed.size() != 1)
       throw Error(ErrorCode::kCorrupt,
                   "an artifact holds the whole grid and others a part of it: "
                   "expected subvolumes that do not overlap");
-    return std::move(roots_);
+    return std::move(done_.roots);
   }
 
  private:
@@ -41,7 +42,7 @@ class Round {
     for (const ArtifactReader& artifact : task_.artifacts)
       artifact_runs.emplace_back(artifact, level);
     const TopRun top(task_.hash_bits,
-                     task_.with_top ? std::move(placed_) : std::vector<PlacedNode>());
+                     task_.with_top ? std::move(done_.placed) : std::vector<PlacedNode>());
     seams_.progress.expect_more(top.rows());
     std::vector<const LevelRun*> runs;
     std::vector<uint64_t> rows;
@@ -55,45 +56,43 @@ class Round {
         merge_level(seams_, {.level = level,
                              .bricks = level + kBrickLevels == task_.grid_levels,
                              .runs = runs,
-                             .child_maps = child_maps_ ? &*child_maps_ : nullptr,
+                             .child_maps = done_.maps ? &*done_.maps : nullptr,
                              .maps = maps,
                              .output = output_});
     output_.end_level(extent.nodes, extent.positions);
-    if (task_.number == 0) seams_.report.dag_nodes += extent.nodes;
+    if (task_.with_top) seams_.report.dag_nodes += extent.nodes;
     place(level, top, maps);
-    child_maps_ = std::move(maps);
-    if (checkpoint_) checkpoint_->level_merged(task_.number, level, extent.nodes);
+    done_.maps = std::move(maps);
+    done_.level = level;
   }
 
   // Finds where this level's top nodes and subvolume roots went.
   void place(uint32_t level, const TopRun& top, const PositionMaps& maps) {
-    placed_.clear();
+    done_.placed.clear();
     for (size_t row = 0; row < top.rows(); ++row)
-      placed_.push_back({top.cube(row), top.hash(row), maps.at(task_.artifacts.size(), row)});
-    if (task_.number == 0) seams_.report.svo_nodes += top.rows();
+      done_.placed.push_back({top.cube(row), top.hash(row), maps.at(task_.artifacts.size(), row)});
+    if (task_.with_top) seams_.report.svo_nodes += top.rows();
     for (size_t run = 0; run < task_.artifacts.size(); ++run)
       for (ArtifactRoot root : task_.artifacts[run].roots()) {
         if (root.cube.level != level) continue;
         root.index = maps.at(run, root.index);
-        placed_.push_back({root.cube, root.hash, root.index});
-        roots_.push_back(root);
+        done_.placed.push_back({root.cube, root.hash, root.index});
+        done_.roots.push_back(root);
       }
   }
 
   const MergeSeams& seams_;
   const RoundTask& task_;
   LevelOutput& output_;
-  Checkpoint* const checkpoint_;
-  std::optional<PositionMaps> child_maps_;
-  std::vector<PlacedNode> placed_;  // on the level merged last
-  std::vector<ArtifactRoot> roots_;
+  RoundProgress done_;
 };
 
 }  // namespace
 
-std::vector<ArtifactRoot> merge_round(const MergeSeams& seams, const RoundTask& task,
-                                      LevelOutput& output, Checkpoint* checkpoint) {
-  return Round(seams, task, output, checkpoint).run();
+std::vector<ArtifactRoot> merge_round(
+    const MergeSeams& seams, const RoundTask& task, LevelOutput& output, RoundProgress progress,
+    const std::function<void(const RoundProgress&)>& after_level) {
+  return Round(seams, task, output, std::move(progress)).run(after_level);
 }
 
 }  // namespace voxdag

@@ -96,25 +96,6 @@ TEST(Merge, EqualSubDagsInDifferentOctantsKeepTheirPlaces) {
     }
 }
 
-// Each level is told of once, from the bricks up, with the nodes that it has.
-TEST(Merge, TheCheckpointIsToldOfEveryLevel) {
-  struct Told : Checkpoint {
-    std::vector<uint32_t> levels;
-    uint64_t nodes = 0;
-    void level_merged(uint32_t round, uint32_t level, uint64_t count) override {
-      EXPECT_EQ(round, 0u);
-      levels.push_back(level);
-      nodes += count;
-    }
-  } told;
-  const oracle::Voxels voxels = mixed_voxels(22, 32);
-  MergeHarness harness(5, 64);
-  harness.add(voxels, equal_cubes(1));
-  const Merged merged = harness.merge({.checkpoint = &told});
-  EXPECT_EQ(told.levels, (std::vector<uint32_t>{3, 2, 1, 0}));
-  EXPECT_EQ(told.nodes, merged.report.dag_nodes);
-}
-
 // Progress ends where its total says, in one round and in several.
 TEST(Merge, ProgressReachesItsTotal) {
   struct Counting : NoProgress {

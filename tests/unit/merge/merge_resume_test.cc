@@ -1,0 +1,228 @@
+// A merge that is interrupted goes on from what it saved, with the same bytes at the end; what it
+// cannot go on from is noticed, and the merge starts over or says that its inputs are gone.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "merge/merge_state.h"
+#include "tests/unit/merge/merge_harness.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kMiB = uint64_t{1} << 20;
+
+void change_byte(const std::string& path, uint64_t at, char change) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(at));
+  const char byte = static_cast<char>(file.get() ^ change);
+  file.seekp(static_cast<std::streamoff>(at));
+  file.put(byte);
+}
+
+// Keeps the state in memory; the process "dies" at the save of a given number, just before or just
+// after the state is durable.
+class DyingCheckpoint : public Checkpoint {
+ public:
+  explicit DyingCheckpoint(std::string segment = "") : segment_(std::move(segment)) {}
+  std::optional<std::vector<std::byte>> load() override { return state; }
+  void save(uint32_t level, std::span<const std::byte> bytes) override {
+    if (saves + 1 == die_at && die_before) throw Error(ErrorCode::kIo, "the process dies here");
+    state.emplace(bytes.begin(), bytes.end());
+    levels.push_back(level);
+    if (++saves == die_at) throw Error(ErrorCode::kIo, "the process dies here");
+  }
+  void forget() override {
+    state.reset();
+    ++forgotten;
+  }
+  // Takes the permission at its word, if it may: zeros.
+  void release(uint32_t, uint64_t offset, uint64_t bytes) override {
+    if (segment_.empty()) return;
+    std::fstream file(segment_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(offset));
+    file << std::string(bytes, '\0');
+    released += bytes;
+  }
+
+  std::optional<std::vector<std::byte>> state;
+  std::vector<uint32_t> levels;
+  bool die_before = false;
+  uint64_t saves = 0, die_at = 0, forgotten = 0, released = 0;
+
+ private:
+  const std::string segment_;
+};
+
+struct Case {
+  const char* name;
+  uint64_t budget_bytes;
+  uint32_t hash_bits;
+  uint32_t cubes_level;
+  uint32_t rounds;
+};
+
+class MergeResume : public testing::TestWithParam<Case> {
+ protected:
+  MergeOptions options(Checkpoint& checkpoint) const {
+    return {.budget_bytes = GetParam().budget_bytes, .checkpoint = &checkpoint};
+  }
+};
+
+// Killed after every save in turn, also while it goes on, a merge ends with the same bytes and the
+// same counts, though the space of what it no longer needs was taken back.
+TEST_P(MergeResume, GoesOnAfterEverySave) {
+  const oracle::Voxels voxels = noise_voxels(31, 256);
+  MergeHarness harness(8, GetParam().hash_bits);
+  harness.add(voxels, equal_cubes(GetParam().cubes_level));
+  const Merged whole = harness.merge({.budget_bytes = GetParam().budget_bytes});
+  EXPECT_EQ(whole.report.rounds, GetParam().rounds);
+
+  DyingCheckpoint checkpoint(harness.segment());
+  uint64_t deaths = 0;
+  for (;; ++deaths) {
+    ASSERT_LT(deaths, 100u);
+    checkpoint.die_before = deaths % 2 == 1;
+    checkpoint.die_at = checkpoint.saves + 1 + checkpoint.die_before;
+    try {
+      const Merged merged = harness.merge(options(checkpoint));
+      EXPECT_EQ(merged.file.sha256, whole.file.sha256);
+      EXPECT_EQ(merged.report.voxels, whole.report.voxels);
+      EXPECT_EQ(merged.report.svo_nodes, whole.report.svo_nodes);
+      EXPECT_EQ(merged.report.dag_nodes, whole.report.dag_nodes);
+      break;
+    } catch (const Error& error) {
+      ASSERT_EQ(error.code(), ErrorCode::kIo) << error.what();
+    }
+  }
+  EXPECT_GE(deaths, 7u);  // the levels
+  EXPECT_EQ(checkpoint.forgotten, 0u);
+  EXPECT_GT(checkpoint.released, 0u);
+  EXPECT_TRUE(std::ranges::is_sorted(checkpoint.levels, std::greater()));
+  EXPECT_EQ(checkpoint.levels.back(), 0u);
+}
+
+// With more or less memory than before it goes on all the same, rounds done so far included.
+TEST_P(MergeResume, GoesOnWithOtherMemory) {
+  const oracle::Voxels voxels = noise_voxels(32, 256);
+  MergeHarness harness(8, GetParam().hash_bits);
+  harness.add(voxels, equal_cubes(GetParam().cubes_level));
+  MergeOptions other;
+  other.budget_bytes = GetParam().rounds > 1 ? 64 * kMiB : GetParam().budget_bytes * 3 / 2;
+  other.threads = 1;
+  const std::string expected = harness.merge(other).file.sha256;
+  for (const uint64_t die_at : {1u, 2u, 4u}) {
+    SCOPED_TRACE(die_at);
+    DyingCheckpoint checkpoint;
+    checkpoint.die_at = die_at;
+    EXPECT_THROW(harness.merge(options(checkpoint)), Error);
+    other.checkpoint = &checkpoint;
+    EXPECT_EQ(harness.merge(other).file.sha256, expected);
+    EXPECT_EQ(checkpoint.forgotten, 0u);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, MergeResume,
+                         testing::Values(Case{"AtOnce", 1024 * kMiB, 64, 1, 1},
+                                         Case{"SpilledMaps", 5 * kMiB, 64, 1, 1},
+                                         Case{"EqualHashes", 5 * kMiB, 4, 1, 1},
+                                         Case{"ThreeRounds", 8 * kMiB, 64, 3, 3}),
+                         [](const auto& test) { return test.param.name; });
+
+// A state, a map, a round's artifact or a partial file with a flipped bit, or that is gone: never a
+// wrong DAG. With the inputs at hand the merge starts over.
+TEST(MergeDamage, WhatIsDoubtfulStartsOver) {
+  const oracle::Voxels voxels = noise_voxels(33, 256);
+  struct Way {
+    uint64_t budget_bytes, die_at;
+    uint32_t cubes_level;
+  };
+  for (const auto& [budget_bytes, die_at, cubes_level] :
+       {Way{1024 * kMiB, 3, 1}, Way{5 * kMiB, 2, 1}, Way{8 * kMiB, 1, 3}}) {
+    MergeHarness harness(8, 64);
+    harness.add(voxels, equal_cubes(cubes_level));
+    const std::string expected = harness.merge({.budget_bytes = budget_bytes}).file.sha256;
+    std::vector<std::string> places = {"state"};
+    for (size_t i = 0; i < places.size(); ++i)
+      for (const bool gone : {false, true}) {
+        DyingCheckpoint checkpoint;
+        checkpoint.die_at = die_at;
+        const MergeOptions options{.budget_bytes = budget_bytes, .checkpoint = &checkpoint};
+        EXPECT_THROW(harness.merge(options), Error);
+        if (i == 0 && !gone) {
+          const MergeState state = decode_state(*checkpoint.state);
+          if (!state.merged.empty())
+            places.push_back(segment_path(harness.scratch_folder(), state.merged[0].segment));
+          if (const auto& last = state.last_round) {
+            places.push_back(last->output + ".partial");
+            places.push_back(harness.scratch_folder() + "/" + ScratchFile::name_of(last->map.id));
+          }
+        }
+        SCOPED_TRACE(testing::Message() << places[i] << (gone ? " gone" : " changed") << ", "
+                                        << budget_bytes << " bytes, died at " << die_at);
+        if (i == 0 && gone) continue;
+        if (i == 0)
+          (*checkpoint.state)[checkpoint.state->size() / 2] ^= std::byte{4};
+        else if (gone)
+          std::filesystem::remove(places[i]);
+        else
+          change_byte(places[i], 4096 + 100, 4);
+        // Noticed at once, or when it is read: then the next merge starts over.
+        try {
+          EXPECT_EQ(harness.merge(options).file.sha256, expected);
+          EXPECT_EQ(checkpoint.forgotten, 1u);
+        } catch (const Error& error) {
+          EXPECT_EQ(error.code(), ErrorCode::kCorrupt) << error.what();
+          checkpoint.forget();
+          EXPECT_EQ(harness.merge(options).file.sha256, expected);
+        }
+      }
+    EXPECT_GT(places.size(), 1u);
+  }
+}
+
+// Another set of inputs is another merge; the same content at other places is the same.
+TEST(MergeDamage, KnowsItsInputsByTheirContent) {
+  const oracle::Voxels voxels = noise_voxels(34, 64);
+  MergeHarness harness(6, 64);
+  harness.add(voxels, equal_cubes(1));
+  const std::string expected = harness.merge().file.sha256;
+  DyingCheckpoint checkpoint;
+  checkpoint.die_at = 2;
+  EXPECT_THROW(harness.merge({.checkpoint = &checkpoint}), Error);
+  harness.artifacts().clear();
+  harness.add(voxels, equal_cubes(1));  // once more, behind the first ones
+  EXPECT_EQ(harness.merge({.checkpoint = &checkpoint}).file.sha256, expected);
+  EXPECT_EQ(checkpoint.forgotten, 0u);
+
+  DyingCheckpoint other;
+  other.die_at = 2;
+  EXPECT_THROW(harness.merge({.checkpoint = &other}), Error);
+  harness.artifacts().pop_back();
+  EXPECT_NE(harness.merge({.checkpoint = &other}).file.sha256, expected);
+  EXPECT_EQ(other.forgotten, 1u);
+}
+
+// Any prefix of a state, and any flipped bit, is refused.
+TEST(MergeState, RefusesDamage) {
+  MergeState state;
+  state.inputs = 5;
+  state.merged.push_back({1, 2, 3, 4, 5});
+  state.last_round.emplace();
+  state.last_round->output = "somewhere";
+  state.last_round->map_rows = {1, 2, 3};
+  state.last_round->roots.push_back({Cube{1, {0, 1, 0}}, 7, 8, 9, 10});
+  const std::vector<std::byte> bytes = encode_state(state);
+  EXPECT_EQ(encode_state(decode_state(bytes)), bytes);
+  for (size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_THROW(decode_state(std::span(bytes).first(size)), Error);
+  for (size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+    std::vector<std::byte> changed = bytes;
+    changed[bit / 8] ^= std::byte{1} << bit % 8;
+    EXPECT_THROW(decode_state(changed), Error);
+  }
+}
+
+}  // namespace
+}  // namespace voxdag
