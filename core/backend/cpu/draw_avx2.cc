@@ -2,11 +2,13 @@
 // largest component ("height"), where the plane passes a voxel column within a few voxels.
 //
 //   1. Edges bound the columns of bricks in each row. In a column that no edge crosses only the
-//      plane matters; where one edge crosses, on the plane the other two hold throughout, so that
-//      one is tested; where more do, all are, and the triangle's box.
+//      plane matters. On the plane, an edge that does not cross holds throughout, so only those
+//      that do are tested; where two or three do, the triangle's box too, since a corner may be
+//      near.
 //   2. All 16 voxel columns of a column of bricks at once: the heights between which the plane
-//      passes them (heights_avx2.h), then one bit per voxel of each brick.
-//   3. Edges in the other two projections, 16 columns at once (edges_avx2.h).
+//      passes them (heights_avx2.h), and those that the edges leave, seen along the two other axes
+//      (sides_avx2.h).
+//   3. From there one bit per voxel of each brick.
 #include "core/backend/cpu/draw_avx2.h"
 
 #if defined(__AVX2__) && defined(__BMI2__)
@@ -16,41 +18,37 @@
 #include "core/backend/cpu/draw_portable.h"
 #include "core/backend/cpu/edges_avx2.h"
 #include "core/backend/cpu/heights_avx2.h"
+#include "core/backend/cpu/sides_avx2.h"
 
 namespace voxdag::cpu {
 namespace {
 
-// Bits of voxel columns (in the order of kP, kQ) to bits of the brick's voxels.
-template <int Axis>
-VOXDAG_INLINE uint64_t widen(uint32_t columns) {
-  // Columns are in Morton order of the two other axes, the lower one first.
-  if constexpr (Axis == 2) {
-    const uint64_t m = _pdep_u64(columns, 0x0f0f0f0f) * 0x11;
-    return m | m << 32;
-  } else if constexpr (Axis == 1) {
-    uint64_t m = _pdep_u64(columns, 0x0000333300003333);
-    m |= m << 2;
-    return m | m << 16;
-  } else {
-    uint64_t m = _pdep_u64(columns, 0x0055005500550055);
-    m |= m << 1;
-    return m | m << 8;
-  }
-}
-
-// [axis][first][last]: the voxels of a brick between two coordinates.
-struct RangeMasks {
-  uint64_t masks[3][4][4] = {};
-  constexpr RangeMasks() {
-    for (int voxel = 0; voxel < 64; ++voxel)
-      for (int axis = 0; axis < 3; ++axis) {
-        const int k = (voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1;
-        for (int first = 0; first <= k; ++first)
-          for (int last = k; last < 4; ++last) masks[axis][first][last] |= uint64_t{1} << voxel;
-      }
+// The edges in a set of them, one bit each.
+struct EdgeLists {
+  uint8_t edges[8][3] = {};
+  constexpr EdgeLists() {
+    for (int set = 0; set < 8; ++set)
+      for (int edge = 0, count = 0; edge < 3; ++edge)
+        if (set >> edge & 1) edges[set][count++] = static_cast<uint8_t>(edge);
   }
 };
-constexpr RangeMasks kRanges;
+constexpr EdgeLists kEdgeLists;
+
+// [of q][first][last]: all ones in the 16-bit lanes of voxel columns whose p (or q) within the
+// brick is not from first to last.
+struct OutsideLanes {
+  alignas(32) uint16_t lanes[2][4][4][16] = {};
+  constexpr OutsideLanes() {
+    for (int column = 0; column < 16; ++column)
+      for (int first = 0; first < 4; ++first)
+        for (int last = 0; last < 4; ++last) {
+          const int p = column_p(column), q = column_q(column);
+          lanes[0][first][last][column] = p < first || p > last ? 0xffff : 0;
+          lanes[1][first][last][column] = q < first || q > last ? 0xffff : 0;
+        }
+  }
+};
+constexpr OutsideLanes kOutside;
 
 // Columns of bricks: bit p of row q, visited as number p + 16 q. Visited from one loop, whose
 // length the processor need not guess row by row.
@@ -101,8 +99,7 @@ class ColumnWalk {
       for (int q = first[Q]; q <= last[Q]; ++q) plain.rows[q] = columns(first[P], last[P]);
     } else {
       over.set(t.edges[D], D != 2);
-      side_p.set(t.edges[P], P == 1);
-      side_q.set(t.edges[Q], Q == 1);
+      sides.set(t);
       const RowBounds bounds(over, first[P], last[P]);
       for (int q = first[Q]; q <= last[Q]; ++q) {
         const Row row = bounds.row(q);
@@ -129,18 +126,20 @@ class ColumnWalk {
     const int p = number & 15, q = number >> 4;
     const int64_t most[3] = {over.most(0, p, q), over.most(1, p, q), over.most(2, p, q)};
     if ((most[0] | most[1] | most[2]) < 0) return;
-    const uint32_t c0 = static_cast<uint64_t>(most[0] - over.drop[0]) >> 63;
-    const uint32_t c1 = static_cast<uint64_t>(most[1] - over.drop[1]) >> 63;
-    const uint32_t c2 = static_cast<uint64_t>(most[2] - over.drop[2]) >> 63;
-    if (c0 + c1 + c2 == 1)
-      column<1>(number, static_cast<int>(c1 + 2 * c2), most);
+    const uint64_t crossing = static_cast<uint64_t>(most[0] - over.drop[0]) >> 63 |
+                              static_cast<uint64_t>(most[1] - over.drop[1]) >> 63 << 1 |
+                              static_cast<uint64_t>(most[2] - over.drop[2]) >> 63 << 2;
+    if ((crossing & (crossing - 1)) == 0)
+      column<1>(number, crossing, most);
+    else if (crossing != 7)
+      column<2>(number, crossing, most);
     else
-      column<3>(number, 0, most);
+      column<3>(number, crossing, most);
   }
 
-  // Edges: how many of the edges are tested, none, `edge` or all.
+  // Edges: how many there are in the set `crossing`; those are tested.
   template <int Edges>
-  VOXDAG_INLINE void column(int number, int edge, const int64_t (&most)[3]) {
+  VOXDAG_INLINE void column(int number, uint64_t crossing, const int64_t (&most)[3]) {
     const int p = number & 15, q = number >> 4;
     const int64_t height = heights.origin + heights.step_p * p + heights.step_q * q;
     int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
@@ -148,57 +147,48 @@ class ColumnWalk {
     from = from > first[D] ? from : first[D];
     to = to < last[D] ? to : last[D];
     if (from > to) return;
-    const int64_t brick = height >> (kColumnBits + 2);
+    const int brick = static_cast<int>(height >> (kColumnBits + 2));
     const int within =
         static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1);
+    const auto& edges = kEdgeLists.edges[crossing];
     __m256i outer = _mm256_setzero_si256();
-    if constexpr (Edges > 0) {
-      __m256i low, high;
-      over.outer(most, Edges == 1 ? edge : 0, Edges == 1 ? edge : 2, low, high);
-      outer = _mm256_srai_epi16(_mm256_packs_epi32(low, high), 15);
-      if (Edges == 3 && _mm256_movemask_epi8(outer) == -1) return;
+    if constexpr (Edges > 0) outer = over.outer<Edges>(edges, most);
+    if constexpr (Edges > 1) {
+      outer = _mm256_or_si256(outer, outside<P>(p));
+      outer = _mm256_or_si256(outer, outside<Q>(q));
+      if (_mm256_movemask_epi8(outer) == -1) return;
     }
-    const auto bounds = heights.bounds(p, q, static_cast<int>(brick), within, outer);
+    HeightBounds bounds = heights.bounds(p, q, brick, within, outer);
+    for (int k = 0; k < Edges; ++k)
+      bounds = _mm256_max_epu8(bounds, sides.bounds(edges[k], p, q, brick));
+    if constexpr (Edges > 1) bounds = _mm256_max_epu8(bounds, box_bounds(brick));
+    const auto spread = heights.spread(bounds);
     const uint32_t index = kBrickIndex<D>.of_column[number];
-    for (int64_t z = from; z <= to; ++z) {
-      uint64_t mask = bounds.mask(static_cast<int>(z - brick));
-      if constexpr (Edges > 0) mask &= side_mask<Edges>(edge, p, q, static_cast<int>(z));
-      if constexpr (Edges == 3)
-        mask &= range_mask<P>(p) & range_mask<Q>(q) & range_mask<D>(static_cast<int>(z));
-      tile.add(index | kBrickIndex<D>.of_height[z], mask);
-    }
+    for (int64_t z = from; z <= to; ++z)
+      tile.add(index | kBrickIndex<D>.of_height[z], spread.mask(static_cast<int>(z - brick)));
   }
 
-  // The voxels of a brick that the edges leave in the projections along P and along Q.
-  template <int Edges>
-  VOXDAG_INLINE uint64_t side_mask(int edge, int p, int q, int z) const {
-    int64_t along_p[3], along_q[3];
-    const int from = Edges == 1 ? edge : 0, to = Edges == 1 ? edge : 2;
-    int64_t signs = 0;
-    for (int i = from; i <= to; ++i) {
-      // Projections list the lower axis first.
-      along_p[i] = side_p.most(i, Q < D ? q : z, Q < D ? z : q);
-      along_q[i] = side_q.most(i, P < D ? p : z, P < D ? z : p);
-      signs |= along_p[i] | along_q[i];
-    }
-    if (signs < 0) return 0;
-    return widen<P>(side_p.inner_columns(along_p, from, to)) &
-           widen<Q>(side_q.inner_columns(along_q, from, to));
-  }
-
-  // The voxels of a brick within the triangle's box along one axis.
+  // Voxel columns of a column of bricks beyond the triangle's box along one axis of the footprint.
   template <int Axis>
-  VOXDAG_INLINE uint64_t range_mask(int brick) const {
+  VOXDAG_INLINE __m256i outside(int brick) const {
     const int low = t.first_voxel[Axis] - 4 * brick, high = t.last_voxel[Axis] - 4 * brick;
-    return kRanges.masks[Axis][low > 0 ? low : 0][high < 3 ? high : 3];
+    return load(kOutside.lanes[Axis == Q][low > 0 ? low : 0][high < 3 ? high : 3]);
+  }
+
+  // The triangle's box as bounds of the heights.
+  VOXDAG_INLINE HeightBounds box_bounds(int brick) const {
+    const int below = t.first_voxel[D] - 1 - 4 * brick;
+    const int above = kMostHeight - t.last_voxel[D] + 4 * brick;
+    return _mm256_unpacklo_epi64(_mm256_set1_epi8(static_cast<int8_t>(below > 0 ? below : 0)),
+                                 _mm256_set1_epi8(static_cast<int8_t>(above > 0 ? above : 0)));
   }
 
   const TileTriangle<int32_t>& t;
   TileBricks& tile;
   int first[3], last[3];  // bricks of the triangle's box
   const Heights<D> heights;
-  EdgeSet<true> over;             // edges seen along D
-  EdgeSet<false> side_p, side_q;  // and along the other axes
+  EdgeSet over;    // edges seen along D
+  Sides<D> sides;  // and along the other axes
 };
 
 }  // namespace

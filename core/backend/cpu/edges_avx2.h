@@ -24,12 +24,11 @@ VOXDAG_INLINE int64_t above_zero(int64_t a) { return a > 0 ? a : 0; }
 VOXDAG_INLINE int64_t magnitude(int64_t a) { return a < 0 ? -a : a; }
 
 // For each of 16 voxel columns p + 2 q (low bits of p, q) + 4 p + 8 q (high bits), in two vectors,
-// what a and b add to an edge's value less what they add at most. Packed: columns 0-3, 8-11 and
-// 4-7, 12-15, so that packing the two to 16 bits restores the order; otherwise 0-7 and 8-15.
+// what a and b add to an edge's value less what they add at most: columns 0-3, 8-11 and 4-7, 12-15,
+// so that packing the two to 16 bits restores the order.
 struct EdgeLanes {
   __m256i low, high;
 
-  template <bool Packed>
   VOXDAG_INLINE void set(int64_t a, int64_t b) {
     const __m256i one_p = _mm256_setr_epi32(0, -1, 0, -1, 0, -1, 0, -1);
     const __m256i one_q = _mm256_setr_epi32(0, 0, -1, -1, 0, 0, -1, -1);
@@ -41,13 +40,12 @@ struct EdgeLanes {
         _mm256_set1_epi32(static_cast<int32_t>(3 * (above_zero(a) + above_zero(b))));
     __m256i base = _mm256_add_epi32(_mm256_and_si256(va, one_p), _mm256_and_si256(vb, one_q));
     base = _mm256_sub_epi32(base, most);
-    low = _mm256_add_epi32(base, _mm256_and_si256(Packed ? vb2 : va2, upper));
-    high = _mm256_add_epi32(low, Packed ? va2 : vb2);
+    low = _mm256_add_epi32(base, _mm256_and_si256(vb2, upper));
+    high = _mm256_add_epi32(low, va2);
   }
 };
 
-// The edges in the projection along one axis.
-template <bool Packed>
+// The edges in the projection along the columns.
 struct EdgeSet {
   int64_t p4[3], q4[3], c[3];  // largest value over a brick: p4 brick_p + q4 brick_q + c
   int64_t drop[3];             // from there to the least over the brick's whole footprint
@@ -61,30 +59,24 @@ struct EdgeSet {
       q4[i] = 4 * b;
       c[i] = edges[i].c + 3 * (above_zero(a) + above_zero(b));
       drop[i] = 4 * (magnitude(a) + magnitude(b));
-      lanes[i].template set<Packed>(a, b);
+      lanes[i].set(a, b);
     }
   }
   VOXDAG_INLINE int64_t most(int i, int p, int q) const { return c[i] + p4[i] * p + q4[i] * q; }
 
-  // Vectors of the sign bits of columns on the outer side of one of the edges [first, last], whose
-  // largest values over the brick are `most`, not negative.
-  VOXDAG_INLINE void outer(const int64_t (&most)[3], int first, int last, __m256i& low,
-                           __m256i& high) const {
-    low = high = _mm256_setzero_si256();
-    for (int i = first; i <= last; ++i) {
+  // Voxel columns on the outer side of one of the first Count edges named, whose largest values
+  // over the brick are `most`, not negative: all ones in their 16-bit lanes.
+  template <int Count>
+  VOXDAG_INLINE __m256i outer(const uint8_t (&edges)[3], const int64_t (&most)[3]) const {
+    __m256i low = _mm256_setzero_si256(), high = low;
+    for (int k = 0; k < Count; ++k) {
+      const int64_t value = most[edges[k]];
       const __m256i base =
-          _mm256_set1_epi32(static_cast<int32_t>(most[i] < kEdgeClamp ? most[i] : kEdgeClamp));
-      low = _mm256_or_si256(low, _mm256_add_epi32(base, lanes[i].low));
-      high = _mm256_or_si256(high, _mm256_add_epi32(base, lanes[i].high));
+          _mm256_set1_epi32(static_cast<int32_t>(value < kEdgeClamp ? value : kEdgeClamp));
+      low = _mm256_or_si256(low, _mm256_add_epi32(base, lanes[edges[k]].low));
+      high = _mm256_or_si256(high, _mm256_add_epi32(base, lanes[edges[k]].high));
     }
-  }
-  // The same as bits, for columns on the inner side of all.
-  VOXDAG_INLINE uint32_t inner_columns(const int64_t (&most)[3], int first, int last) const {
-    __m256i low, high;
-    outer(most, first, last, low, high);
-    const uint32_t bits = static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(low))) |
-                          static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(high))) << 8;
-    return ~bits & 0xffff;
+    return _mm256_srai_epi16(_mm256_packs_epi32(low, high), 15);
   }
 };
 
@@ -99,7 +91,7 @@ struct Row {
 class RowBounds {
  public:
   // Rows run from p = first to last.
-  VOXDAG_INLINE RowBounds(const EdgeSet<true>& set, int first, int last) {
+  VOXDAG_INLINE RowBounds(const EdgeSet& set, int first, int last) {
     limits_ = _mm256_setr_pd(first, -last, first, -last);
     for (int i = 0; i < 3; ++i) {
       // The largest value over a column of bricks, m = c + p4 p + q4 q, is 0 at p = at + step q.

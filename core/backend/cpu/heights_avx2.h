@@ -16,6 +16,7 @@
 #include <immintrin.h>
 
 #include "core/backend/cpu/edges_avx2.h"
+#include "core/backend/cpu/sides_avx2.h"
 #include "core/backend/cpu/tile_triangle.h"
 
 namespace voxdag::cpu {
@@ -24,24 +25,13 @@ namespace {
 constexpr int kHeightBits = 12;  // below the voxel, in 16-bit lanes
 constexpr int kColumnBits = 40;  // below the voxel, per column of bricks in 64 bits
 
-// The axes of a column's footprint for columns along D, chosen so that the bits of a voxel column's
-// number, p + 2 q (low bits of p, q) + 4 p + 8 q (high bits), are in the order of the brick's bits.
-template <int D>
-constexpr int kP = D == 0 ? 2 : 0;
-template <int D>
-constexpr int kQ = D == 2   ? 1
-                   : D == 1 ? 2
-                            : 1;
-
-constexpr int column_p(int column) { return (column & 1) | (column >> 1 & 2); }
-constexpr int column_q(int column) { return (column >> 1 & 1) | (column >> 2 & 2); }
-
 // A brick's 64 voxels as bytes of two vectors: bit 5 of a voxel's number chooses the vector, bit 4
 // its half. Axis a owns bits a and a + 3 of the number.
 template <int D>
 struct ByteOrder {
   alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel's column
   alignas(32) int8_t height[4][2][32] = {};  // of the voxel above the first of four bricks
+  alignas(32) int8_t depth[4][2][32] = {};   // below the highest voxel of the four
   constexpr ByteOrder() {
     for (int voxel = 0; voxel < 64; ++voxel) {
       const auto coordinate = [voxel](int axis) {
@@ -49,8 +39,11 @@ struct ByteOrder {
       };
       const int p = coordinate(kP<D>), q = coordinate(kQ<D>);
       column[voxel / 32][voxel % 32] = static_cast<int8_t>((p & 1) | (q & 1) << 1 | (p & 2) << 1);
-      for (int brick = 0; brick < 4; ++brick)
-        height[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(4 * brick + coordinate(D));
+      for (int brick = 0; brick < 4; ++brick) {
+        const int z = 4 * brick + coordinate(D);
+        height[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(z);
+        depth[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(kMostHeight - z);
+      }
     }
   }
 };
@@ -73,17 +66,18 @@ constexpr SingleLanes kLanes;
 template <int D>
 class Heights {
  public:
-  // Voxels of a column with below < height <= top are touched: a byte per voxel of a brick.
-  struct Bounds {
-    __m256i below[2], top[2];
+  // Bounds of columns (HeightBounds), a byte per voxel of a brick.
+  struct Spread {
+    __m256i below[2], over[2];
 
     // The voxels of the brick that is `up` bricks above the one where the column begins, up < 4.
     VOXDAG_INLINE uint64_t mask(int up) const {
       uint32_t half[2];
       for (int i = 0; i < 2; ++i) {
         const __m256i z = load(kByteOrder<D>.height[up][i]);
-        half[i] = static_cast<uint32_t>(_mm256_movemask_epi8(
-            _mm256_andnot_si256(_mm256_cmpgt_epi8(z, top[i]), _mm256_cmpgt_epi8(z, below[i]))));
+        const __m256i depth = load(kByteOrder<D>.depth[up][i]);
+        half[i] = static_cast<uint32_t>(_mm256_movemask_epi8(_mm256_andnot_si256(
+            _mm256_cmpgt_epi8(over[i], depth), _mm256_cmpgt_epi8(z, below[i]))));
       }
       return half[0] | static_cast<uint64_t>(half[1]) << 32;
     }
@@ -115,7 +109,7 @@ class Heights {
 
   // For the column of bricks (p, q) that begins in `brick`, `within` units above its floor; lanes
   // of `outer` that are all ones have no voxels.
-  VOXDAG_INLINE Bounds bounds(int p, int q, int brick, int within, __m256i outer) const {
+  VOXDAG_INLINE HeightBounds bounds(int p, int q, int brick, int within, __m256i outer) const {
     const __m256i base = _mm256_set1_epi16(static_cast<int16_t>(within));
     __m256i below = _mm256_add_epi16(base, below_lanes_);
     __m256i top = _mm256_add_epi16(base, top_lanes_);
@@ -127,8 +121,21 @@ class Heights {
     if (!_mm256_testz_si256(differ, whole)) [[unlikely]]
       settle(p, q, brick, _mm256_and_si256(differ, whole), below, top);
     below = _mm256_or_si256(below, outer);
-    return spread(_mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
-                                      _mm256_srli_epi16(top, kHeightBits)));
+    // Of the top its distance from the highest voxel: all four bits turned over.
+    return _mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
+                               _mm256_srli_epi16(_mm256_andnot_si256(top, whole), kHeightBits));
+  }
+
+  // The half of a column is its high bit of q: for D = 1 that is the vector of its voxels,
+  // otherwise their half.
+  static VOXDAG_INLINE Spread spread(HeightBounds bounds) {
+    const __m256i order0 = load(kByteOrder<D>.column[0]), order1 = load(kByteOrder<D>.column[1]);
+    const __m256i eight = _mm256_set1_epi8(8);
+    const __m256i half0 = D == 1 ? _mm256_permute4x64_epi64(bounds, 0x44) : bounds;
+    const __m256i half1 = D == 1 ? _mm256_permute4x64_epi64(bounds, 0xee) : bounds;
+    return {{_mm256_shuffle_epi8(half0, order0), _mm256_shuffle_epi8(half1, order1)},
+            {_mm256_shuffle_epi8(half0, _mm256_add_epi8(order0, eight)),
+             _mm256_shuffle_epi8(half1, _mm256_add_epi8(order1, eight))}};
   }
 
  private:
@@ -187,19 +194,6 @@ class Heights {
   static int64_t floor_divide(int64_t a, int64_t b) {
     const int64_t quotient = a / b;
     return quotient - (quotient * b > a ? 1 : 0);
-  }
-
-  // From one byte per column (`below` of eight columns, then `top` of the same, in either half) to
-  // one byte per voxel. The half of a column is its high bit of q: for D = 1 that is the vector of
-  // its voxels, otherwise their half.
-  static VOXDAG_INLINE Bounds spread(__m256i bytes) {
-    const __m256i order0 = load(kByteOrder<D>.column[0]), order1 = load(kByteOrder<D>.column[1]);
-    const __m256i eight = _mm256_set1_epi8(8);
-    const __m256i half0 = D == 1 ? _mm256_permute4x64_epi64(bytes, 0x44) : bytes;
-    const __m256i half1 = D == 1 ? _mm256_permute4x64_epi64(bytes, 0xee) : bytes;
-    return {{_mm256_shuffle_epi8(half0, order0), _mm256_shuffle_epi8(half1, order1)},
-            {_mm256_shuffle_epi8(half0, _mm256_add_epi8(order0, eight)),
-             _mm256_shuffle_epi8(half1, _mm256_add_epi8(order1, eight))}};
   }
 
   const TileTriangle<int32_t>& t;
