@@ -8,8 +8,12 @@
 namespace voxdag {
 
 void MergeScratch::remove_all_but(const std::set<std::string>& names) {
+  const auto is_ours = [](const std::string& name) {
+    return name.starts_with("merge-") || name.starts_with("segment-");
+  };
   for (const DirectoryEntry& entry : files_.list(path_))
-    if (!entry.is_directory && !names.contains(entry.name)) files_.remove(path_ + "/" + entry.name);
+    if (!entry.is_directory && is_ours(entry.name) && !names.contains(entry.name))
+      files_.remove(path_ + "/" + entry.name);
 }
 
 ScratchPath::~ScratchPath() {

@@ -34,7 +34,7 @@ class MergeScratch {
   uint32_t take_id() { return next_id_++; }
   uint32_t next_id() const { return next_id_; }
   void set_next_id(uint32_t id) { next_id_ = id; }
-  // Removes the files of an earlier merge, but for `names`.
+  // Removes what an earlier merge left, but for `names`; only files that bear such names as ours.
   void remove_all_but(const std::set<std::string>& names);
 
  private:

@@ -1,9 +1,12 @@
 #include "scheduler/artifact_cache.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <vector>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/artifact_copy.h"
 #include "core/format/checksum.h"
@@ -29,13 +32,27 @@ bool is_entry(const DirectoryEntry& entry) {
   return !entry.is_directory && entry.name.ends_with(".vdart");
 }
 
+bool is_partial(const DirectoryEntry& entry) {
+  return !entry.is_directory && entry.name.find(".vdart.partial") != std::string::npos;
+}
+
+// An entry is written in seconds: a partial one of this age has no writer any more.
+constexpr double kAbandonedAfter_s = 3600;
+
 }  // namespace
 
 ArtifactCache::ArtifactCache(FileSystem& files, std::string folder, uint64_t limit_bytes)
     : files_(files), folder_(std::move(folder)), limit_bytes_(limit_bytes) {
   files_.make_directories(folder_);
-  for (const DirectoryEntry& entry : files_.list(folder_))
+  const double now_s = clock_seconds(CLOCK_REALTIME);
+  for (const DirectoryEntry& entry : files_.list(folder_)) {
     if (is_entry(entry)) known_bytes_ += entry.bytes;
+    if (is_partial(entry) && now_s - entry.modified_s > kAbandonedAfter_s) remove(entry);
+  }
+}
+
+std::string ArtifactCache::partial_of(const std::string& key) {
+  return path_of(key) + ".partial-" + std::to_string(getpid()) + "-" + std::to_string(partials_++);
 }
 
 std::optional<std::string> ArtifactCache::key(const SubvolumeTask& task, TriangleStream& triangles,
@@ -92,7 +109,13 @@ void ArtifactCache::mark_used(const std::string& key) {
 void ArtifactCache::add(const std::string& key, const ReadableFile& segment,
                         const ArtifactRef& artifact) {
   try {
-    write_cache_entry(files_, path_of(key), segment, artifact);
+    const std::string partial = partial_of(key);
+    try {
+      write_cache_entry(files_, path_of(key), partial, segment, artifact);
+    } catch (const Error&) {
+      files_.remove(partial);
+      throw;
+    }
     std::lock_guard lock(mutex_);
     known_bytes_ += artifact.bytes;
     if (known_bytes_ > limit_bytes_) evict();
@@ -112,11 +135,15 @@ void ArtifactCache::evict() {
   for (const DirectoryEntry& entry : entries) {
     if (known_bytes_ <= limit_bytes_ / 10 * 9) return;
     known_bytes_ -= entry.bytes;
-    try {
-      files_.remove(folder_ + "/" + entry.name);
-    } catch (const Error&) {
-      // Another build was quicker.
-    }
+    remove(entry);
+  }
+}
+
+void ArtifactCache::remove(const DirectoryEntry& entry) {
+  try {
+    files_.remove(folder_ + "/" + entry.name);
+  } catch (const Error&) {
+    // Another build was quicker.
   }
 }
 

@@ -8,6 +8,7 @@
 // vanishes or is damaged is a miss. Thread-safe.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <optional>
@@ -37,15 +38,19 @@ class ArtifactCache {
 
  private:
   std::string path_of(const std::string& key) const { return folder_ + "/" + key + ".vdart"; }
+  // A name that no other writer uses, in this process or another.
+  std::string partial_of(const std::string& key);
   void mark_used(const std::string& key);
   // Removes the least recently used entries down to nine tenths of the limit.
   void evict();
+  void remove(const DirectoryEntry& entry);
 
   FileSystem& files_;
   const std::string folder_;
   const uint64_t limit_bytes_;
   std::mutex mutex_;          // guards the count
   uint64_t known_bytes_ = 0;  // at the last look, plus what was added since
+  std::atomic<uint64_t> partials_{0};
 };
 
 }  // namespace voxdag

@@ -2,25 +2,30 @@
 
 #include <map>
 
-#include "core/base/error.h"
-
 namespace voxdag {
 namespace {
 
-void read_whole(std::shared_ptr<ReadableFile> segment, const StoredSubvolume& subvolume) {
+void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
+                const StoredSubvolume& subvolume) {
   const ArtifactReader reader(std::move(segment), subvolume.artifact);
   const auto roots = reader.roots();
   if (roots.size() != 1 || !(roots[0].cube == subvolume.cube))
     throw Error(ErrorCode::kCorrupt, "the artifact is that of another cube");
   Frame frame;
-  for (const ArtifactLevel& level : reader.levels())
-    for (size_t i = 0; i < level.frames.size(); ++i) reader.read_frame(level.level, i, frame);
+  for (const ArtifactLevel& l : reader.levels())
+    for (size_t i = 0; l.level < level && i < l.frames.size(); ++i)
+      reader.read_frame(l.level, i, frame);
 }
 
 }  // namespace
 
+bool speaks_of_damage(const Error& error) {
+  return error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kNotFound ||
+         error.code() == ErrorCode::kUnsupportedVersion;
+}
+
 std::vector<DamagedSubvolume> find_damaged(
-    std::span<const StoredSubvolume> subvolumes,
+    std::span<const StoredSubvolume> subvolumes, uint32_t level,
     const std::function<std::shared_ptr<ReadableFile>(uint32_t)>& open_segment,
     const CancelToken& cancel) {
   std::vector<DamagedSubvolume> damaged;
@@ -31,11 +36,9 @@ std::vector<DamagedSubvolume> find_damaged(
     try {
       auto& segment = segments[subvolume.artifact.segment];
       if (!segment) segment = open_segment(subvolume.artifact.segment);
-      read_whole(segment, subvolume);
+      read_above(level, segment, subvolume);
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kNotFound &&
-          error.code() != ErrorCode::kUnsupportedVersion)
-        throw;
+      if (!speaks_of_damage(error)) throw;
       damaged.push_back({subvolume, error.message()});
     }
   }

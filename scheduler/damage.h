@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/cancel_token.h"
+#include "core/base/error.h"
 #include "scheduler/job_store.h"
 
 namespace voxdag {
@@ -17,9 +18,13 @@ struct DamagedSubvolume {
   std::string what;  // what is wrong with its artifact
 };
 
-// Reads the artifacts of all built subvolumes from end to end.
+// Whether an error may mean that an artifact, or another file of ours, is damaged.
+bool speaks_of_damage(const Error& error);
+
+// Reads the artifacts of all built subvolumes, the levels above `level` (of smaller number): the
+// others are not needed any more and may be gone.
 std::vector<DamagedSubvolume> find_damaged(
-    std::span<const StoredSubvolume> subvolumes,
+    std::span<const StoredSubvolume> subvolumes, uint32_t level,
     const std::function<std::shared_ptr<ReadableFile>(uint32_t)>& open_segment,
     const CancelToken& cancel);
 

@@ -2,45 +2,10 @@
 
 #include "core/base/error.h"
 #include "core/format/checksum.h"
+#include "scheduler/job_schema.h"
 
 namespace voxdag {
 namespace {
-
-// "vdag": tells our databases from others.
-constexpr int64_t kApplicationId = 0x76646167;
-
-constexpr const char* kSchema = R"sql(
-CREATE TABLE job (
-  id INTEGER PRIMARY KEY CHECK (id = 1),
-  scene_sha256 TEXT NOT NULL,
-  geometry TEXT NOT NULL,
-  format_version INTEGER NOT NULL
-);
-CREATE TABLE subvolume (
-  id INTEGER PRIMARY KEY,
-  parent INTEGER REFERENCES subvolume (id),
-  level INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL, z INTEGER NOT NULL,
-  weight REAL NOT NULL,
-  state INTEGER NOT NULL CHECK (state BETWEEN 0 AND 2),
-  segment INTEGER NOT NULL, offset INTEGER NOT NULL, bytes INTEGER NOT NULL,
-  index_offset INTEGER NOT NULL, checksum INTEGER NOT NULL,
-  voxels INTEGER NOT NULL, svo_nodes INTEGER NOT NULL, dag_nodes INTEGER NOT NULL,
-  root_hash INTEGER NOT NULL,
-  row_checksum INTEGER NOT NULL
-);
--- Replacing a row looks for rows that refer to it: without an index, through all of them.
-CREATE INDEX subvolume_by_parent ON subvolume (parent);
-CREATE TABLE stage_time (
-  id INTEGER PRIMARY KEY,
-  name TEXT NOT NULL, wall_s REAL NOT NULL, cpu_s REAL NOT NULL
-);
-CREATE TABLE progress (
-  id INTEGER PRIMARY KEY CHECK (id = 1),
-  stage TEXT NOT NULL, unit TEXT NOT NULL, done INTEGER NOT NULL, total INTEGER NOT NULL,
-  stage_started_s REAL NOT NULL, updated_s REAL NOT NULL,
-  memory_bytes INTEGER NOT NULL, disk_bytes INTEGER NOT NULL, last_error TEXT NOT NULL
-);
-)sql";
 
 // SQLite does not check its pages: what decides the result is checked row by row.
 uint64_t row_checksum(const StoredSubvolume& s) {
@@ -102,34 +67,10 @@ StoredSubvolume read_row(const SqlStatement& row) {
 JobStore::JobStore(const std::string& path, Access access)
     : database_(path, access == Access::kBuild ? SqlDatabase::Mode::kReadWrite
                                                : SqlDatabase::Mode::kReadOnly) {
-  const int64_t application = database_.integer("PRAGMA application_id");
-  const int64_t version = database_.integer("PRAGMA user_version");
-  const bool fresh = application == 0 && version == 0 &&
-                     database_.integer("SELECT count(*) FROM sqlite_master") == 0;
-  if (access == Access::kBuild && (fresh || application == kApplicationId)) {
-    database_.execute("PRAGMA journal_mode = WAL");
-    database_.execute("PRAGMA foreign_keys = ON");
-  }
-  if (fresh && access == Access::kBuild) {
-    SqlTransaction transaction(database_);
-    database_.execute(kSchema);
-    database_.execute("PRAGMA application_id = " + std::to_string(kApplicationId));
-    database_.execute("PRAGMA user_version = " + std::to_string(kSchemaVersion));
-    transaction.commit();
-    return;
-  }
-  if (access == Access::kBuild) {
-    auto check = database_.prepare("PRAGMA quick_check(1)");
-    if (!check.step() || check.text(0) != "ok")
-      throw Error(ErrorCode::kCorrupt,
-                  path + " is damaged (" + check.text(0) + "): remove it to start over");
-  }
-  if (application != kApplicationId)
-    throw Error(ErrorCode::kInvalidInput, path + " is not a job store of voxdag");
-  if (version != kSchemaVersion)
-    throw Error(ErrorCode::kUnsupportedVersion,
-                path + " is a job store of version " + std::to_string(version) +
-                    ": expected version " + std::to_string(kSchemaVersion));
+  if (access == Access::kBuild)
+    prepare_schema(database_, path);
+  else
+    check_schema(database_, path);
 }
 
 std::optional<JobIdentity> JobStore::job() {
@@ -143,7 +84,8 @@ void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> pl
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
   database_.execute("UPDATE subvolume SET parent = NULL; DELETE FROM subvolume;");
-  database_.execute("DELETE FROM job; DELETE FROM progress;");
+  database_.execute(
+      "DELETE FROM job; DELETE FROM progress; DELETE FROM merge; DELETE FROM result;");
   database_.prepare("INSERT INTO job VALUES (1, ?, ?, ?)")
       .bind(0, job.scene_sha256)
       .bind(1, job.geometry)
@@ -215,6 +157,64 @@ void JobStore::update_row(const StoredSubvolume& subvolume) {
   query.bind(0, subvolume.id);
   const bool has_parent = query.step();
   write_row(database_, subvolume, has_parent ? std::optional(query.integer(0)) : std::nullopt);
+}
+
+std::optional<StoredMerge> JobStore::merge() {
+  std::lock_guard lock(mutex_);
+  auto query = database_.prepare("SELECT level, state FROM merge");
+  if (!query.step()) return std::nullopt;
+  return StoredMerge{static_cast<uint32_t>(query.integer(0)), query.bytes(1)};
+}
+
+void JobStore::save_merge(uint32_t level, std::span<const std::byte> state) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.prepare("INSERT OR REPLACE INTO merge VALUES (1, ?, ?)")
+      .bind(0, int64_t{level})
+      .bind(1, state)
+      .run();
+  transaction.commit();
+}
+
+void JobStore::forget_merge() {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.execute("DELETE FROM merge; DELETE FROM result;");
+  transaction.commit();
+}
+
+void JobStore::record_result(const JobResult& result) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.prepare("INSERT OR REPLACE INTO result VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
+      .bind(0, result.output)
+      .bind(1, result.sha256)
+      .bind_word(2, result.bytes)
+      .bind_word(3, result.voxels)
+      .bind_word(4, result.svo_nodes)
+      .bind_word(5, result.dag_nodes)
+      .bind(6, int64_t{result.merge_rounds})
+      .bind_word(7, result.merge_ranges)
+      .bind_word(8, result.merge_streamed_groups)
+      .run();
+  transaction.commit();
+}
+
+std::optional<JobResult> JobStore::result() {
+  std::lock_guard lock(mutex_);
+  auto query = database_.prepare(
+      "SELECT output, sha256, bytes, voxels, svo_nodes, dag_nodes, merge_rounds, merge_ranges, "
+      "merge_streamed_groups FROM result");
+  if (!query.step()) return std::nullopt;
+  return JobResult{query.text(0),
+                   query.text(1),
+                   query.word(2),
+                   query.word(3),
+                   query.word(4),
+                   query.word(5),
+                   static_cast<uint32_t>(query.integer(6)),
+                   query.word(7),
+                   query.word(8)};
 }
 
 void JobStore::add_stage_time(const StageTime& time) {

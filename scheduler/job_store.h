@@ -1,17 +1,18 @@
-// What is durable of a build: the job, its subvolumes and their artifacts, timings and progress, in
-// one SQLite file of the work folder (WAL, synchronous = FULL where it counts, foreign keys).
+// What is durable of a build: the job, its subvolumes and their artifacts, the unfinished merge,
+// timings and progress, in one SQLite file of the work folder (WAL, synchronous = FULL where it
+// counts, foreign keys).
 //
 // Invariants:
 //   1. A row names an artifact only after the artifact's bytes were synced.
 //   2. Subvolumes form a forest: a split one has its eight parts (those with triangles) as
-//   children;
-//      the leaves are what is built.
+//      children; the leaves are what is built.
 //   3. Every subvolume's row carries a checksum; one that fails it is Error{kCorrupt}.
 //   4. All rows of one call are committed together or not at all.
 // The writer is one process (the work folder's lock sees to that) and may call from any thread;
 // readers (`voxdag status`) open the same file at any time.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <mutex>
 #include <optional>
@@ -49,6 +50,25 @@ struct StoredSubvolume {
   SubDagSummary summary;
 };
 
+// A merge that is not finished; see Checkpoint.
+struct StoredMerge {
+  uint32_t level = 0;  // of the artifacts' levels only those above it are still read
+  std::vector<std::byte> state;
+};
+
+// The global file, whole and about to get its name.
+struct JobResult {
+  std::string output;
+  std::string sha256;
+  uint64_t bytes = 0;
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;
+  uint64_t dag_nodes = 0;
+  uint32_t merge_rounds = 0;
+  uint64_t merge_ranges = 0;
+  uint64_t merge_streamed_groups = 0;
+};
+
 // How far a build is, for those who look at it from outside.
 struct ProgressSnapshot {
   std::string stage;
@@ -64,11 +84,11 @@ struct ProgressSnapshot {
 
 class JobStore {
  public:
-  static constexpr int64_t kSchemaVersion = 1;
   enum class Access { kBuild, kLook };
 
-  // Opens the store, creating it for kBuild. Throws Error{kCorrupt} for a damaged one,
-  // Error{kInvalidInput} for a database that is not ours, Error{kUnsupportedVersion}.
+  // Opens the store; for kBuild creates it, or brings one of an earlier version up to date. Throws
+  // Error{kCorrupt} for a damaged one, Error{kInvalidInput} for a database that is not ours,
+  // Error{kUnsupportedVersion}.
   JobStore(const std::string& path, Access access);
 
   std::optional<JobIdentity> job();
@@ -81,6 +101,13 @@ class JobStore {
   std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
   // Its artifact turned out damaged: it is planned again.
   void record_lost(const StoredSubvolume& lost);
+
+  std::optional<StoredMerge> merge();
+  void save_merge(uint32_t level, std::span<const std::byte> state);
+  // Also of its result.
+  void forget_merge();
+  void record_result(const JobResult& result);
+  std::optional<JobResult> result();
 
   void add_stage_time(const StageTime& time);
   std::vector<StageTime> stage_times();

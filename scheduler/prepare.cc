@@ -14,8 +14,8 @@ namespace {
 // second of work, and tables that stay in the caches.
 constexpr double kMostBricksASubvolume = 4e6;
 // ... but small builds are cut into at least about this many pieces, of at least this weight.
-constexpr double kLeastPieces = 128;
-constexpr double kLeastBricksASubvolume = 65536;
+constexpr double kLeastPieces = 64;
+constexpr double kLeastBricksASubvolume = 131072;
 // More bins than this would make their buffers too small; finer cuts are made by splitting.
 constexpr size_t kMostBins = 8192;
 

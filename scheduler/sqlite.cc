@@ -67,6 +67,15 @@ SqlStatement& SqlStatement::bind(int parameter, std::string_view text) {
   return *this;
 }
 
+SqlStatement& SqlStatement::bind(int parameter, std::span<const std::byte> bytes) {
+  // No bytes are an empty blob, not NULL.
+  const void* data = bytes.empty() ? static_cast<const void*>("") : bytes.data();
+  const int result =
+      sqlite3_bind_blob64(statement_.get(), parameter + 1, data, bytes.size(), SQLITE_STATIC);
+  if (result != SQLITE_OK) fail(database_, result);
+  return *this;
+}
+
 bool SqlStatement::step() {
   const int result = sqlite3_step(statement_.get());
   if (result == SQLITE_ROW) return true;
@@ -93,6 +102,12 @@ std::string SqlStatement::text(int column) const {
   const auto* bytes = sqlite3_column_text(statement_.get(), column);
   const int size = sqlite3_column_bytes(statement_.get(), column);
   return bytes ? std::string(reinterpret_cast<const char*>(bytes), static_cast<size_t>(size)) : "";
+}
+
+std::vector<std::byte> SqlStatement::bytes(int column) const {
+  const auto* bytes = static_cast<const std::byte*>(sqlite3_column_blob(statement_.get(), column));
+  const int size = sqlite3_column_bytes(statement_.get(), column);
+  return bytes ? std::vector<std::byte>(bytes, bytes + size) : std::vector<std::byte>();
 }
 
 void SqlDatabase::Close::operator()(sqlite3* database) const { sqlite3_close_v2(database); }

@@ -2,10 +2,13 @@
 // and step, and errors as voxdag::Error. sqlite3.h is included in sqlite.cc alone.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -21,6 +24,7 @@ class SqlStatement {
   SqlStatement& bind(int parameter, int64_t value);
   SqlStatement& bind(int parameter, double value);
   SqlStatement& bind(int parameter, std::string_view text);
+  SqlStatement& bind(int parameter, std::span<const std::byte> bytes);
   // 64-bit words are stored as the signed integer of the same bits.
   SqlStatement& bind_word(int parameter, uint64_t word) {
     return bind(parameter, static_cast<int64_t>(word));
@@ -36,6 +40,7 @@ class SqlStatement {
   uint64_t word(int column) const { return static_cast<uint64_t>(integer(column)); }
   double real(int column) const;
   std::string text(int column) const;
+  std::vector<std::byte> bytes(int column) const;
 
  private:
   struct Finalize {

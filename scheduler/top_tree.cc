@@ -11,6 +11,9 @@
 namespace voxdag {
 namespace {
 
+// Cells are no smaller, in voxels an edge: finer ones cost more than they tell about a scene.
+constexpr int64_t kLeastCellEdge = 2 * kSmallestEdge;
+
 double expected_cubes(const FixedTriangle& t, double cube_units) {
   double e[2][3], extents = 0;
   for (int a = 0; a < 3; ++a) {
@@ -38,7 +41,7 @@ double expected_voxels(const FixedTriangle& t) {
 
 uint32_t TopTree::depth_within(uint32_t grid_levels, uint64_t bytes) {
   uint32_t depth = 0;
-  while (depth < kDeepest && (int64_t{1} << (grid_levels - depth)) > kSmallestEdge &&
+  while (depth < kDeepest && (int64_t{1} << (grid_levels - depth)) > kLeastCellEdge &&
          (sizeof(Cell) << (3 * (depth + 1))) <= bytes)
     ++depth;
   return depth;

@@ -60,7 +60,7 @@ uint64_t TriangleBins::spilled_bytes() const {
 
 void TriangleBins::drop(BinId bin) {
   std::lock_guard lock(mutex_);
-  for (const Chunk& chunk : bins_[bin]->chunks) memory_bytes_ -= chunk.memory.size();
+  for (const Chunk& chunk : bins_[bin]->chunks) memory_bytes_ -= chunk.memory.size() + kListBytes;
   *bins_[bin] = Bin{};
   charge_.try_resize(memory_bytes_);
 }
@@ -69,10 +69,13 @@ void TriangleBins::add_chunk(BinId bin, std::span<const std::byte> records) {
   Chunk chunk;
   chunk.triangles = static_cast<uint32_t>(records.size() / record_bytes_);
   std::unique_lock lock(mutex_);
+  memory_bytes_ += kListBytes;
   if (charge_.try_resize(memory_bytes_ + records.size())) {
     memory_bytes_ += records.size();
     chunk.memory.assign(records.begin(), records.end());
   } else {
+    // Where not even the list fits, it goes uncharged: it is little beside what is spilled.
+    charge_.try_resize(memory_bytes_);
     if (!spill_writer_) spill_writer_ = files_.create(spill_path_);
     chunk.offset = spilled_bytes_;
     spilled_bytes_ += records.size();

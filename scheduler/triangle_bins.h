@@ -48,6 +48,8 @@ class TriangleBins {
     uint64_t checksum = 0;          // of the spilled records
     uint32_t triangles = 0;
   };
+  // What the list of a bin's chunks takes for one of them, while it grows.
+  static constexpr uint64_t kListBytes = 2 * sizeof(Chunk);
   struct Bin {
     std::vector<Chunk> chunks;
     uint64_t triangles = 0;
@@ -62,7 +64,7 @@ class TriangleBins {
   MemoryCharge charge_;
   mutable std::mutex mutex_;  // guards all below; chunks of a filled bin no longer change
   std::vector<std::unique_ptr<Bin>> bins_;
-  uint64_t memory_bytes_ = 0;
+  uint64_t memory_bytes_ = 0;  // of records and lists
   uint64_t spilled_bytes_ = 0;
   std::unique_ptr<WritableFile> spill_writer_;
   std::unique_ptr<ReadableFile> spill_reader_;

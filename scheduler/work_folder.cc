@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <optional>
 #include <string_view>
+#include <thread>
 
 #include "core/base/error.h"
 #include "core/format/artifact.h"
@@ -15,6 +17,9 @@ namespace {
 
 constexpr std::string_view kLockName = "lock";
 constexpr std::string_view kScratchName = "merge";
+// `voxdag status` holds the lock for an instant.
+constexpr int kLockRetries = 10;
+constexpr auto kLockPause = std::chrono::milliseconds(20);
 
 // The id in "segment-<id>.vdseg".
 std::optional<uint32_t> segment_id(std::string_view name) {
@@ -25,6 +30,10 @@ std::optional<uint32_t> segment_id(std::string_view name) {
   const auto [rest, failure] = std::from_chars(name.data() + kBefore.size(), end, id);
   if (failure != std::errc{} || rest != end) return std::nullopt;
   return id;
+}
+
+bool is_scratch(const DirectoryEntry& entry) {
+  return !entry.is_directory && (segment_id(entry.name) || entry.name.starts_with("merge-"));
 }
 
 bool is_ours(const DirectoryEntry& entry) {
@@ -39,13 +48,13 @@ bool is_ours(const DirectoryEntry& entry) {
 WorkFolder::WorkFolder(FileSystem& files, std::string path)
     : files_(files), path_(std::move(path)) {
   files_.make_directories(path_);
-  for (const DirectoryEntry& entry : files_.list(path_))
-    if (!is_ours(entry))
-      throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " holds " + entry.name +
-                                                ", which voxdag did not make: expected an empty "
-                                                "folder or that of an earlier build (--work)");
+  check_is_ours();
   const std::string lock_path = path_ + "/" + std::string(kLockName);
   lock_ = files_.try_lock(lock_path);
+  for (int i = 0; !lock_ && i < kLockRetries; ++i) {
+    std::this_thread::sleep_for(kLockPause);
+    lock_ = files_.try_lock(lock_path);
+  }
   if (!lock_)
     throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " is in use by " +
                                               read_small_file(files_, lock_path, 1 << 12) +
@@ -55,6 +64,19 @@ WorkFolder::WorkFolder(FileSystem& files, std::string path)
   const std::string holder = "process " + std::to_string(getpid()) + " on " + host;
   // Emptied first: the last holder's name may have been longer.
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
+}
+
+void WorkFolder::check_is_ours() const {
+  const auto refuse = [&](const std::string& name) {
+    throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " holds " + name +
+                                              ", which voxdag did not make: expected an empty "
+                                              "folder or that of an earlier build (--work)");
+  };
+  for (const DirectoryEntry& entry : files_.list(path_))
+    if (!is_ours(entry)) refuse(entry.name);
+  if (!files_.exists(scratch_path())) return;
+  for (const DirectoryEntry& entry : files_.list(scratch_path()))
+    if (!is_scratch(entry)) refuse(std::string(kScratchName) + "/" + entry.name);
 }
 
 std::string WorkFolder::holder(FileSystem& files, const std::string& folder) {
@@ -79,7 +101,7 @@ uint64_t WorkFolder::bytes() const {
   for (const std::string& folder : {path_, scratch_path()}) {
     if (!files_.exists(folder)) continue;
     for (const DirectoryEntry& entry : files_.list(folder))
-      if (!entry.is_directory) bytes += entry.bytes;
+      if (!entry.is_directory) bytes += std::min(entry.bytes, entry.disk_bytes);
   }
   return bytes;
 }
@@ -90,6 +112,15 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
     if (entry.name.ends_with(".vdspill") || (id && !is_named(*id)))
       files_.remove(path_ + "/" + entry.name);
   }
+}
+
+void WorkFolder::release(uint32_t segment, uint64_t offset, uint64_t bytes) {
+  std::unique_ptr<WritableFile>& file = released_[segment];
+  if (!file) file = files_.open_write(segment_path(path_, segment));
+  file->release(offset, bytes);
+}
+
+void WorkFolder::empty_scratch() {
   remove_scratch();
   files_.make_directories(scratch_path());
 }
@@ -97,8 +128,7 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
 void WorkFolder::remove_scratch() {
   if (!files_.exists(scratch_path())) return;
   for (const DirectoryEntry& entry : files_.list(scratch_path()))
-    if (segment_id(entry.name) || entry.name.starts_with("merge-"))
-      files_.remove(scratch_path() + "/" + entry.name);
+    if (is_scratch(entry)) files_.remove(scratch_path() + "/" + entry.name);
   files_.remove_directory(scratch_path());
 }
 
@@ -111,6 +141,7 @@ void WorkFolder::remove_spilled() {
 }
 
 void WorkFolder::remove() {
+  released_.clear();
   try {
     remove_scratch();
     // The lock goes last: until then nobody else may take the folder for theirs.

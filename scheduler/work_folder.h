@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -14,8 +15,9 @@ namespace voxdag {
 
 class WorkFolder {
  public:
-  // Makes the folder and locks it. Throws Error{kInvalidInput} if another process holds it (saying
-  // which) or if it holds files of somebody else.
+  // Makes the folder and locks it, waiting a moment for those who only look. Throws
+  // Error{kInvalidInput} if another process holds it (saying which) or if it holds files of
+  // somebody else.
   WorkFolder(FileSystem& files, std::string path);
 
   const std::string& path() const { return path_; }
@@ -31,9 +33,14 @@ class WorkFolder {
   // Bytes of all files in the folder, for reports.
   uint64_t bytes() const;
 
-  // Removes segments that `is_named` does not know, spilled triangles and merge data: what an
-  // interrupted build left and no row of the store names.
+  // Nothing reads these bytes of a segment any more: gives their space back.
+  void release(uint32_t segment, uint64_t offset, uint64_t bytes);
+
+  // Removes segments that `is_named` does not know, and spilled triangles: what an interrupted
+  // build left and no row of the store names.
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
+  // Removes merge data.
+  void empty_scratch();
   // Removes spilled triangles. Silent, like remove().
   void remove_spilled();
   // Removes all that is ours, and the folder if it is empty then. Silent: what cannot be removed
@@ -41,11 +48,13 @@ class WorkFolder {
   void remove();
 
  private:
+  void check_is_ours() const;
   void remove_scratch();
 
   FileSystem& files_;
   const std::string path_;
   std::unique_ptr<FileLock> lock_;
+  std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments that lost some bytes
 };
 
 }  // namespace voxdag

@@ -1,5 +1,7 @@
 #include "core/format/artifact_copy.h"
 
+#include <algorithm>
+
 #include "core/base/error.h"
 #include "core/dag/brick.h"
 #include "core/format/artifact_index.h"
@@ -11,6 +13,7 @@ namespace {
 
 constexpr uint64_t kEntryMagic = 0x0a48434147414456;  // "VDAGACH\n"
 constexpr size_t kFooterBytes = 48;
+constexpr uint64_t kCopyBytes = uint64_t{256} << 10;
 
 [[noreturn]] void corrupt(const std::string& where, const std::string& what) {
   throw Error(ErrorCode::kCorrupt, where + ": " + what);
@@ -51,24 +54,27 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
   return to.append_index(first, encode_index(index));
 }
 
-void write_cache_entry(FileSystem& files, const std::string& path, const ReadableFile& from,
-                       const ArtifactRef& ref) {
-  std::vector<std::byte> entry = encode_segment_header(0);
-  const size_t begin = entry.size();
-  entry.resize(begin + ref.bytes);
-  from.read_at(ref.offset, std::span(entry).subspan(begin));
+void write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
+                       const ReadableFile& from, const ArtifactRef& ref) {
+  const auto file = files.create(partial);
+  const std::vector<std::byte> header = encode_segment_header(0);
+  file->write_at(0, header);
+  const uint64_t begin = header.size(), end = begin + ref.bytes;
+  std::vector<std::byte> piece;
+  for (uint64_t at = begin; at < end; at += piece.size()) {
+    piece.resize(std::min<uint64_t>(end - at, kCopyBytes));
+    from.read_at(ref.offset + at - begin, piece);
+    file->write_at(at, piece);
+  }
   std::vector<std::byte> footer;
   ByteSink sink(footer);
   sink.put(kEntryMagic);
-  sink.put(uint64_t{begin});
+  sink.put(begin);
   sink.put(ref.bytes);
   sink.put(uint64_t{ref.index_offset - ref.offset + begin});
   sink.put(ref.checksum);
   sink.put(checksum64(footer));
-  entry.insert(entry.end(), footer.begin(), footer.end());
-  const std::string partial = path + ".partial";
-  const auto file = files.create(partial);
-  file->write_at(0, entry);
+  file->write_at(end, footer);
   file->close();
   files.rename(partial, path);
 }

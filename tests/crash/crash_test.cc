@@ -64,6 +64,7 @@ class CrashTest : public testing::Test {
     spec.run.memory_bytes = uint64_t{64} << 20;
     spec.run.threads = 2;
     spec.run.subvolume_edge = 128;
+    spec.run.checkpoint_interval_s = 0;  // after every level of the merge
     return spec;
   }
   BuildReport run(voxdag::FileSystem& files) const {

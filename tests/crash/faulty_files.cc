@@ -37,6 +37,7 @@ class FaultyWriter : public voxdag::WritableFile {
         },
         [] {});
   }
+  void release(uint64_t offset, uint64_t bytes) override { file_->release(offset, bytes); }
   void close() override { file_->close(); }
 
  private:
@@ -64,8 +65,8 @@ template <class Operation, class Half>
 void FaultyFiles::operate(const Operation& operation, const Half& half) {
   const uint64_t number = ++operations_;
   const bool now = number == plan_.at;
-  if (now && plan_.fault == Fault::kPowerCut) forget_unsynced();
-  if (now && (plan_.fault == Fault::kKillBefore || plan_.fault == Fault::kPowerCut)) raise(SIGKILL);
+  if (now && plan_.fault == Fault::kPowerCut) cut_power();
+  if (now && plan_.fault == Fault::kKillBefore) raise(SIGKILL);
   const bool failing = plan_.at > 0 && number >= plan_.at;
   if (failing && plan_.fault == Fault::kNoSpace) {
     half();
@@ -104,7 +105,14 @@ std::unique_ptr<voxdag::WritableFile> FaultyFiles::create(const std::string& pat
 
 std::unique_ptr<voxdag::WritableFile> FaultyFiles::open_write(const std::string& path) {
   std::unique_ptr<voxdag::WritableFile> file;
-  operate([&] { file = disk_.open_write(path); }, [] {});
+  operate(
+      [&] {
+        std::lock_guard lock(mutex_);
+        // What an earlier process left of it is on the disk.
+        if (!synced_.contains(path)) synced_[path] = disk_.exists(path) ? contents(path) : "";
+        file = disk_.open_write(path);
+      },
+      [] {});
   return std::make_unique<FaultyWriter>(*this, std::move(file));
 }
 
@@ -144,7 +152,8 @@ void FaultyFiles::sync_directory(const std::string& path) {
       [] {});
 }
 
-void FaultyFiles::forget_unsynced() {
+void FaultyFiles::cut_power() {
+  // Held until the end: no other thread may take for durable what is forgotten here.
   std::lock_guard lock(mutex_);
   for (const auto& [path, bytes] : synced_)
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
@@ -154,6 +163,7 @@ void FaultyFiles::forget_unsynced() {
     else
       std::filesystem::rename(name, old);
   }
+  raise(SIGKILL);
 }
 
 }  // namespace crash

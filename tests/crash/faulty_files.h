@@ -64,8 +64,8 @@ class FaultyFiles : public voxdag::FileSystem {
   template <class Operation, class Half>
   void operate(const Operation& operation, const Half& half);
   void read();
-  // Files back to what was synced of them, names to what was synced of their folders.
-  void forget_unsynced();
+  // Files back to what was synced of them, names to what was synced of their folders; SIGKILL.
+  void cut_power();
 
   voxdag::FileSystem& disk_ = voxdag::system_files();
   const FaultPlan plan_;

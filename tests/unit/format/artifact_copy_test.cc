@@ -19,7 +19,7 @@ class ArtifactCopyTest : public testing::Test {
     write_artifact(segment, random_rows(1, 50, 10, 1, 64), 10, 64);
     const ArtifactRef ref =
         write_artifact(segment, oracle::as_sub_dag(dag_, 10), 10, 64, {&root, 1});
-    write_cache_entry(system_files(), entry_path_,
+    write_cache_entry(system_files(), entry_path_, entry_path_ + ".partial",
                       *system_files().open_read(segment_path(folder_.path(), 0)), ref);
   }
   // Reads the entry and copies its artifact for `cube` of a grid of 2^14 voxels an edge.

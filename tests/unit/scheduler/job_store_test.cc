@@ -115,6 +115,52 @@ TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
   }
 }
 
+// A store as version 1 left it, without the tables that came later, is brought up to date with all
+// that it holds; who only looks reads it as it is.
+TEST_F(JobStoreTest, BringsAnEarlierVersionUpToDate) {
+  {
+    JobStore store(path(), JobStore::Access::kBuild);
+    store.start(job_, plan(3));
+    store.record_built(std::vector{built(store.leaves()[1])});
+  }
+  SqlDatabase(path(), SqlDatabase::Mode::kReadWrite)
+      .execute("DROP TABLE merge; DROP TABLE result; PRAGMA user_version = 1");
+  EXPECT_EQ(JobStore(path(), JobStore::Access::kLook).leaves().size(), 3u);
+  for (int opened = 1; opened <= 2; ++opened) {
+    JobStore store(path(), JobStore::Access::kBuild);
+    EXPECT_EQ(store.job(), job_);
+    EXPECT_EQ(store.leaves()[1].artifact, built(plan(3)[1]).artifact);
+    EXPECT_EQ(store.merge().has_value(), opened == 2);
+    store.save_merge(5, {});
+  }
+  EXPECT_EQ(SqlDatabase(path(), SqlDatabase::Mode::kReadOnly).integer("PRAGMA user_version"), 2);
+}
+
+// An unfinished merge and its result are remembered, replaced and forgotten; a new job has neither.
+TEST_F(JobStoreTest, RemembersTheMerge) {
+  const std::vector<std::byte> state = {std::byte{0}, std::byte{7}, std::byte{255}};
+  const JobResult result{"out", "sha", 1ull << 40, 2, 3, 4, 5, 6, 7};
+  JobStore store(path(), JobStore::Access::kBuild);
+  store.start(job_, plan(1));
+  EXPECT_FALSE(store.merge().has_value());
+  EXPECT_FALSE(store.result().has_value());
+  store.save_merge(9, state);
+  store.save_merge(3, state);
+  store.record_result(result);
+  ASSERT_TRUE(store.merge().has_value());
+  EXPECT_EQ(store.merge()->level, 3u);
+  EXPECT_EQ(store.merge()->state, state);
+  ASSERT_TRUE(store.result().has_value());
+  EXPECT_EQ(store.result()->bytes, result.bytes);
+  EXPECT_EQ(store.result()->merge_streamed_groups, 7u);
+  store.forget_merge();
+  EXPECT_FALSE(store.merge().has_value());
+  EXPECT_FALSE(store.result().has_value());
+  store.save_merge(3, state);
+  store.start(job_, plan(1));
+  EXPECT_FALSE(store.merge().has_value());
+}
+
 // SQLite would hand out a row that rotted on the disk; the row's own checksum does not.
 TEST_F(JobStoreTest, NoticesARowThatChanged) {
   for (const char* change : {"x = x + 1", "state = 1", "voxels = 12", "checksum = checksum + 1"}) {

@@ -1,0 +1,148 @@
+#include "scheduler/merge_stage.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "merge/merge.h"
+#include "scheduler/damage.h"
+
+namespace voxdag {
+namespace {
+
+// More warnings than this say no more than their number.
+constexpr size_t kMostWarnings = 5;
+
+// Keeps a merge's state in the job store.
+class StoredCheckpoint : public Checkpoint {
+ public:
+  StoredCheckpoint(JobStore& store, WorkFolder& work) : store_(store), work_(work) {}
+  std::optional<std::vector<std::byte>> load() override {
+    auto stored = store_.merge();
+    if (!stored) return std::nullopt;
+    return std::move(stored->state);
+  }
+  void save(uint32_t level, std::span<const std::byte> state) override {
+    store_.save_merge(level, state);
+  }
+  void forget() override { store_.forget_merge(); }
+  void release(uint32_t segment, uint64_t offset, uint64_t bytes) override {
+    work_.release(segment, offset, bytes);
+  }
+
+ private:
+  JobStore& store_;
+  WorkFolder& work_;
+};
+
+std::string sha256_of(FileSystem& files, const std::string& path, const CancelToken& cancel) {
+  const auto file = files.open_read(path);
+  Sha256 digest;
+  std::vector<std::byte> buffer(size_t{1} << 20);
+  for (uint64_t at = 0; at < file->size(); at += buffer.size()) {
+    cancel.check();
+    const auto piece = std::span(buffer).first(std::min(buffer.size(), file->size() - at));
+    file->read_at(at, piece);
+    digest.add(piece);
+  }
+  return digest.finish();
+}
+
+}  // namespace
+
+bool MergeStage::run(const RunOptions& options, BuildReport& report) {
+  if (is_published(report)) return true;
+  try {
+    GlobalFileWriter out(seams_.files, report.output, report.grid, report.hash_bits);
+    merge(options, out, report);
+    write(out, report);
+    return true;
+  } catch (const Error& error) {
+    if (!speaks_of_damage(error) || !heal(error)) throw;
+    return false;
+  }
+}
+
+// An earlier run may have been stopped when the file had its name already.
+bool MergeStage::is_published(BuildReport& report) {
+  const auto result = store_.result();
+  if (!result || result->output != report.output || !seams_.files.exists(report.output) ||
+      sha256_of(seams_.files, report.output, seams_.cancel) != result->sha256)
+    return false;
+  report.sha256 = result->sha256;
+  report.bytes = result->bytes;
+  report.voxels = result->voxels;
+  report.svo_nodes = result->svo_nodes;
+  report.dag_nodes = result->dag_nodes;
+  report.merge_rounds = result->merge_rounds;
+  report.merge_ranges = result->merge_ranges;
+  report.merge_streamed_groups = result->merge_streamed_groups;
+  return true;
+}
+
+void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildReport& report) {
+  MergeInputs inputs;
+  inputs.grid_levels = report.grid.levels;
+  inputs.hash_bits = report.hash_bits;
+  for (const StoredSubvolume& subvolume : store_.leaves())
+    if (!subvolume.summary.empty()) inputs.artifacts.push_back(subvolume.artifact);
+  const MemoryCharge list(budget_, inputs.artifacts.size() * sizeof(ArtifactRef),
+                          "the list of artifacts");
+  inputs.open_segment = [&](uint32_t id) { return work_.open_segment(id); };
+  inputs.scratch_folder = work_.scratch_path();
+  inputs.checkpoint_interval_s = options.checkpoint_interval_s;
+  StoredCheckpoint checkpoint(store_, work_);
+  const MergeReport merged = merge_sub_dags(inputs, seams_.files, out, budget_, report.threads,
+                                            seams_.progress, seams_.cancel, &checkpoint);
+  report.voxels = merged.voxels;
+  report.svo_nodes = merged.svo_nodes;
+  report.dag_nodes = merged.dag_nodes;
+  report.merge_rounds = merged.rounds;
+  report.merge_ranges = merged.hash_ranges;
+  report.merge_streamed_groups = merged.streamed_groups;
+  report.spill_bytes += merged.scratch_bytes;
+  if (report.voxels == 0 && report.triangles > 0)
+    seams_.progress.warn("none of the " + std::to_string(report.triangles) +
+                         " triangles near the grid touches it: the file will have no nodes");
+  clock_.finish("merge");
+}
+
+void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
+  seams_.progress.begin_stage("write", 1, "files");
+  const GlobalFileSummary file = out.seal(report.voxels, report.svo_nodes, seams_.cancel);
+  store_.record_result({report.output, file.sha256, file.bytes, report.voxels, report.svo_nodes,
+                        report.dag_nodes, report.merge_rounds, report.merge_ranges,
+                        report.merge_streamed_groups});
+  out.publish();
+  seams_.progress.advance(1);
+  seams_.progress.end_stage();
+  report.bytes = file.bytes;
+  report.sha256 = file.sha256;
+  clock_.finish("write");
+}
+
+// Plans damaged subvolumes again; if none is, what the merge made itself is at fault.
+bool MergeStage::heal(const Error& error) {
+  const auto merge = store_.merge();
+  const auto damaged = find_damaged(
+      store_.leaves(), merge ? merge->level : UINT32_MAX,
+      [&](uint32_t id) { return work_.open_segment(id); }, seams_.cancel);
+  size_t warnings = 0;
+  for (const DamagedSubvolume& d : damaged) {
+    if (++warnings <= kMostWarnings)
+      seams_.progress.warn("subvolume " + std::to_string(d.subvolume.id) +
+                           " is built again: " + d.what);
+    store_.record_lost(d.subvolume);
+  }
+  if (warnings > kMostWarnings)
+    seams_.progress.warn("... and so are " + std::to_string(warnings - kMostWarnings) + " more");
+  if (!damaged.empty()) return true;
+  if (started_over_) return false;
+  started_over_ = true;
+  store_.forget_merge();
+  seams_.progress.warn("the merge starts over: " + error.message());
+  return true;
+}
+
+}  // namespace voxdag

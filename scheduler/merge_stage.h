@@ -1,0 +1,39 @@
+// The last stages of a build: the artifacts are merged into the global file, which then gets its
+// name. What an earlier run of the job merged is gone on with; what turns out damaged is healed.
+#pragma once
+
+#include "core/base/memory_budget.h"
+#include "core/format/global_writer.h"
+#include "scheduler/build_spec.h"
+#include "scheduler/job_store.h"
+#include "scheduler/run_build.h"
+#include "scheduler/stage_clock.h"
+#include "scheduler/work_folder.h"
+
+namespace voxdag {
+
+class MergeStage {
+ public:
+  MergeStage(JobStore& store, WorkFolder& work, MemoryBudget& budget, StageClock& clock,
+             const Seams& seams)
+      : store_(store), work_(work), budget_(budget), clock_(clock), seams_(seams) {}
+
+  // Makes the file that `options` name and fills in the report. False if something turned out
+  // damaged that another call may get right, once subvolumes that are planned again are built.
+  bool run(const RunOptions& options, BuildReport& report);
+
+ private:
+  bool is_published(BuildReport& report);
+  void merge(const RunOptions& options, GlobalFileWriter& out, BuildReport& report);
+  void write(GlobalFileWriter& out, BuildReport& report);
+  bool heal(const Error& error);
+
+  JobStore& store_;
+  WorkFolder& work_;
+  MemoryBudget& budget_;
+  StageClock& clock_;
+  const Seams& seams_;
+  bool started_over_ = false;
+};
+
+}  // namespace voxdag
