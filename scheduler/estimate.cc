@@ -163,21 +163,41 @@ Estimate plan_build(const BuildSpec& spec, const Seams& seams) {
   return estimate;
 }
 
-void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& folder,
-                    Progress& progress) {
-  const double free = static_cast<double>(files.free_space(folder));
-  const auto gigabytes = [](double bytes) {
+namespace {
+
+void check_disk(const char* what, const Figure& bytes, const std::string& folder, uint64_t free,
+                Progress& progress) {
+  const auto gigabytes = [](double count) {
     char text[32];
-    std::snprintf(text, sizeof text, "%.2f GB", bytes / 1e9);
+    std::snprintf(text, sizeof text, "%.2f GB", count / 1e9);
     return std::string(text);
   };
-  const std::string figures = "the build is estimated to need " +
-                              gigabytes(estimate.disk_bytes.low) + " to " +
-                              gigabytes(estimate.disk_bytes.high) + " of disk at its peak, " +
-                              folder + " has " + gigabytes(free) + " free";
-  if (estimate.disk_bytes.low > free)
+  const double free_bytes = static_cast<double>(free);
+  const std::string figures = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
+                              " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
+                              " has " + gigabytes(free_bytes) + " free";
+  if (bytes.low > free_bytes)
     throw Error(ErrorCode::kNoSpace, figures + ": make room, or build anyway with --force");
-  if (estimate.disk_bytes.high > free) progress.warn(figures);
+  if (bytes.high > free_bytes) progress.warn(figures);
+}
+
+}  // namespace
+
+void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
+                    const std::string& output_folder, Progress& progress) {
+  const uint64_t work_free = files.free_space(work_folder);
+  const uint64_t output_free = files.free_space(output_folder);
+  // Free to the very byte alike: one disk, on which the whole must fit.
+  if (work_free == output_free) {
+    check_disk("the build", estimate.disk_bytes, work_folder, work_free, progress);
+    return;
+  }
+  const Figure& all = estimate.disk_bytes;
+  const Figure& file = estimate.file_bytes;
+  check_disk("the build's work folder",
+             {all.low - file.low, all.likely - file.likely, all.high - file.high}, work_folder,
+             work_free, progress);
+  check_disk("the global file", file, output_folder, output_free, progress);
 }
 
 std::string estimate_json(const Estimate& e) {

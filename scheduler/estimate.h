@@ -48,10 +48,10 @@ double most_disk_bytes(const PreparedScene& scene);
 // The whole of `voxdag plan`: reads the scene, plans, estimates, builds nothing.
 Estimate plan_build(const BuildSpec& spec, const Seams& seams);
 
-// Throws Error{kNoSpace} with the figures if not even the low end fits on the disk of `folder`;
-// warns if the high end may not.
-void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& folder,
-                    Progress& progress);
+// Throws Error{kNoSpace} with the figures if not even the low end fits on the disk of the work
+// folder, or the file on that of the output's folder; warns if the high end may not.
+void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
+                    const std::string& output_folder, Progress& progress);
 
 // One JSON object, names as in docs/cli.md.
 std::string estimate_json(const Estimate& estimate);

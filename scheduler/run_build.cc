@@ -9,13 +9,12 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "core/format/global_writer.h"
-#include "merge/merge.h"
-#include "scheduler/damage.h"
 #include "scheduler/estimate.h"
 #include "scheduler/job_progress.h"
 #include "scheduler/memory_limits.h"
+#include "scheduler/merge_stage.h"
 #include "scheduler/open_backend.h"
+#include "scheduler/output_lock.h"
 #include "scheduler/prepare.h"
 #include "scheduler/work_folder.h"
 
@@ -37,6 +36,7 @@ class Build {
   Build(const BuildSpec& spec, const Seams& seams)
       : spec_(checked(spec)),
         budget_(spec_.run.memory_bytes),
+        output_(seams.files, spec_.run.output),
         work_(seams.files,
               spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder),
         store_(open_store(seams.files)),
@@ -59,9 +59,11 @@ class Build {
         remove_work();
         throw;
       }
-      const Error told = error.code() == ErrorCode::kNoSpace
-                             ? Error(error.code(), error.message() + room_needed())
-                             : error;
+      Error told = error;
+      if (error.code() == ErrorCode::kNoSpace)
+        told = Error(error.code(), error.message() + room_needed());
+      if (error.code() == ErrorCode::kCancelled)
+        told = Error(error.code(), error.message() + "; run the same command again to go on");
       progress_.record_failure(told);
       throw told;
     }
@@ -85,12 +87,13 @@ class Build {
   BuildReport run_to_the_end() {
     const double start = wall_seconds();
     build_missing();
-    for (int attempt = 1; !merge_and_write(); ++attempt) {
+    MergeStage merge(*store_, work_, budget_, clock_, seams_);
+    for (int attempt = 1; !merge.run(spec_.run, report_); ++attempt) {
       if (attempt == kMostAttempts)
         throw Error(ErrorCode::kCorrupt, work_.path() +
                                              ": artifacts are damaged again and again: "
                                              "expected a disk that gives back what was written");
-      build_missing();
+      if (any_planned()) build_missing();
     }
     report_.stages = clock_.stages();
     report_.wall_s = wall_seconds() - start;
@@ -100,6 +103,12 @@ class Build {
                           report_json(report_) + "\n");
     if (!spec_.run.keep_work) remove_work();
     return report_;
+  }
+
+  bool any_planned() const {
+    const std::vector<StoredSubvolume> leaves = store_->leaves();
+    return std::ranges::any_of(
+        leaves, [](const StoredSubvolume& s) { return s.state == SubvolumeState::kPlanned; });
   }
 
   // What a full disk's user needs to know, reckoned from the subvolumes built so far: their
@@ -123,29 +132,6 @@ class Build {
     progress_.detach();
     store_.reset();
     work_.remove();
-  }
-
-  // False if artifacts turned out damaged; their subvolumes are planned again then.
-  bool merge_and_write() {
-    try {
-      GlobalFileWriter out(seams_.files, spec_.run.output, report_.grid, report_.hash_bits);
-      merge(out);
-      write(out);
-      return true;
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kNotFound &&
-          error.code() != ErrorCode::kUnsupportedVersion)
-        throw;
-      const auto damaged = find_damaged(
-          store_->leaves(), [&](uint32_t id) { return work_.open_segment(id); }, seams_.cancel);
-      if (damaged.empty()) throw;
-      for (const DamagedSubvolume& d : damaged) {
-        seams_.progress.warn("subvolume " + std::to_string(d.subvolume.id) +
-                             " is built again: " + d.what);
-        store_->record_lost(d.subvolume);
-      }
-      return false;
-    }
   }
 
   // Scan, ingest, and all subvolumes that are not built yet; what they hold in memory is gone when
@@ -199,11 +185,14 @@ class Build {
     for (const StoredSubvolume& subvolume : store_->leaves())
       if (subvolume.state == SubvolumeState::kBuilt) named.insert(subvolume.artifact.segment);
     work_.remove_garbage([&](uint32_t segment) { return named.contains(segment); });
+    if (!store_->merge()) work_.empty_scratch();
   }
 
   void build_subvolumes_of(const PreparedScene& scene, std::span<const StoredSubvolume> planned) {
     std::vector<QueuedSubvolume> queue = hand_down(planned, scene.grid.levels, *scene.bins,
                                                    scene.whole, budget_.limit() / 8, seams_.cancel);
+    const MemoryCharge lists(budget_, queue.size() * (sizeof queue[0] + sizeof planned[0]),
+                             "lists of subvolumes");
     clock_.finish("distribute");
     ExecutorOptions options;
     options.grid_levels = scene.grid.levels;
@@ -238,38 +227,9 @@ class Build {
     if (most_disk_bytes(scene) < static_cast<double>(free_disk())) return;
     const Estimate estimate = estimate_build(scene, scene.grid.levels - kLevelsBelowForTheCheck,
                                              spec_.run.threads, budget_, seams_.cancel);
-    check_estimate(estimate, seams_.files, work_.path(), seams_.progress);
+    check_estimate(estimate, seams_.files, work_.path(), parent_directory(spec_.run.output),
+                   seams_.progress);
     clock_.finish("estimate");
-  }
-
-  void merge(GlobalFileWriter& out) {
-    MergeInputs inputs;
-    inputs.grid_levels = report_.grid.levels;
-    inputs.hash_bits = report_.hash_bits;
-    for (const StoredSubvolume& subvolume : store_->leaves())
-      if (!subvolume.summary.empty()) inputs.artifacts.push_back(subvolume.artifact);
-    inputs.open_segment = [&](uint32_t id) { return work_.open_segment(id); };
-    inputs.scratch_folder = work_.scratch_path();
-    const MergeReport merged = merge_sub_dags(inputs, seams_.files, out, budget_, spec_.run.threads,
-                                              seams_.progress, seams_.cancel);
-    report_.voxels = merged.voxels;
-    report_.svo_nodes = merged.svo_nodes;
-    report_.dag_nodes = merged.dag_nodes;
-    report_.merge_rounds = merged.rounds;
-    report_.merge_ranges = merged.hash_ranges;
-    report_.merge_streamed_groups = merged.streamed_groups;
-    report_.spill_bytes += merged.scratch_bytes;
-    clock_.finish("merge");
-  }
-
-  void write(GlobalFileWriter& out) {
-    seams_.progress.begin_stage("write", 1, "files");
-    const GlobalFileSummary file = out.finish(report_.voxels, report_.svo_nodes, seams_.cancel);
-    seams_.progress.advance(1);
-    seams_.progress.end_stage();
-    report_.bytes = file.bytes;
-    report_.sha256 = file.sha256;
-    clock_.finish("write");
   }
 
   static std::string difference(const JobIdentity& stored, const JobIdentity& asked) {
@@ -284,6 +244,7 @@ class Build {
 
   const BuildSpec spec_;
   MemoryBudget budget_;
+  const OutputLock output_;
   WorkFolder work_;
   std::optional<ArtifactCache> cache_;
   std::unique_ptr<JobStore> store_;
