@@ -144,8 +144,7 @@ void Exchange::put(Response response, httplib::Response& out, bool last) {
   answered_ = true;
   out.status = response.status;
   for (const auto& [name, value] : response.headers) out.headers.emplace(name, value);
-  out.set_header("X-Request-Id", request_.id);
-  out.set_header("Date", http_date());
+  add_standard_headers(out);
   if (last || !is_whole()) out.set_header("Connection", "close");
   const std::string type = header_value(response.headers, "Content-Type");
   if (response.file) {
@@ -175,7 +174,16 @@ void Exchange::refuse(httplib::Response& out) {
   out.body = problem_json(why);
   out.headers.erase("Content-Type");
   out.set_header("Content-Type", "application/problem+json");
+  add_standard_headers(out);
+}
+
+void Exchange::add_standard_headers(httplib::Response& out) const {
   out.set_header("X-Request-Id", request_.id);
+  out.set_header("Date", http_date());
+  out.set_header("X-Content-Type-Options", "nosniff");
+  out.set_header("Referrer-Policy", "no-referrer");
+  if (!out.has_header("Content-Security-Policy"))
+    out.set_header("Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'");
 }
 
 bool Exchange::is_whole() const {

@@ -34,6 +34,8 @@ class Exchange {
   void say_why_not();
 
  private:
+  void add_standard_headers(httplib::Response& out) const;
+
   Connection& connection_;
   Request request_;
   std::string target_;

@@ -22,8 +22,9 @@ struct Request {
   std::string method;
   Target target;
   HeaderMap headers;
-  std::string peer;  // the client's address
-  std::string id;    // of this request, in answer and log
+  std::string peer;    // the client's address
+  std::string id;      // of this request, in answer and log
+  std::string caller;  // whose token it has, once that is known
   std::optional<uint64_t> content_length;
   bool has_body = false;  // a Content-Length above 0, or chunks of unknown number
 

@@ -1,0 +1,43 @@
+// What the handlers share: the service's parts, as references to what Service owns.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <string>
+
+#include "server/config.h"
+#include "server/jobs/dispatcher.h"
+#include "server/jobs/task_maker.h"
+#include "server/metrics.h"
+#include "server/queue/job_queue.h"
+#include "server/scenes/scene_store.h"
+#include "server/slots.h"
+
+namespace voxdag::server {
+
+struct Context {
+  const ServerConfig& config;
+  FileSystem& files;
+  JobQueue& queue;
+  SceneStore& scenes;
+  TaskMaker& tasks;
+  Dispatcher& dispatcher;
+  Metrics& metrics;
+  const std::atomic<bool>& draining;
+
+  Slots event_streams{config.transfers.event_streams};
+  Slots transfers{config.transfers.transfers};
+  Slots plans{config.jobs.plans_at_a_time};
+  // Held while a job begins to need a scene, or a scene goes or changes that none may need.
+  std::mutex scene_use = {};
+};
+
+class Router;
+void add_job_routes(Router& router, Context& context);
+void add_result_routes(Router& router, Context& context);
+void add_event_routes(Router& router, Context& context);
+void add_scene_routes(Router& router, Context& context);
+void add_system_routes(Router& router, Context& context);
+
+}  // namespace voxdag::server

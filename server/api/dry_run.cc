@@ -1,0 +1,71 @@
+#include "server/api/dry_run.h"
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "server/api/router.h"
+#include "server/jobs/child_process.h"
+#include "server/problem.h"
+#include "server/random_id.h"
+
+namespace voxdag::server {
+namespace {
+
+// Away with its files, whatever happened.
+class TemporaryTask {
+ public:
+  TemporaryTask(FileSystem& files, const std::string& path) : folder{path}, files_(files) {
+    files_.make_directories(path);
+  }
+  ~TemporaryTask() {
+    try {
+      remove_tree(files_, folder.path);
+    } catch (const Error&) {
+      // The next start of the service removes it.
+    }
+  }
+  const JobFolder folder;
+
+ private:
+  FileSystem& files_;
+};
+
+Problem problem_of(const Report& failure) {
+  for (const ErrorCode code :
+       {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kUnsupportedVersion,
+        ErrorCode::kIo, ErrorCode::kNoSpace, ErrorCode::kOutOfMemory, ErrorCode::kDevice,
+        ErrorCode::kLimit, ErrorCode::kCorrupt})
+    if (failure.code == error_name(code)) return problem(code, failure.text);
+  return Problem(500, "internal", "the plan failed");
+}
+
+}  // namespace
+
+Response dry_run(Context& context, const JobRequest& request) {
+  const auto slot = context.plans.take();
+  if (!slot) throw busy("another plan is being made", 5);
+  const Task task = context.tasks.make(request, Task::Kind::kPlan);
+  const TemporaryTask place(context.files, context.config.data_folder + "/plans/" + random_id());
+  write_task(context.files, place.folder.task(), task);
+  const std::string program =
+      context.config.program.empty() ? "/proc/self/exe" : context.config.program;
+  ChildProcess child(
+      {{program, "run-job", place.folder.path}, place.folder.log(), context.config.jobs.nice});
+  std::string estimate;
+  std::optional<Report> failure;
+  const double deadline = wall_seconds() + context.config.jobs.plan_s;
+  bool too_long = false;
+  child.read_lines(
+      [&](std::string_view line) {
+        const auto report = parse_report(line);
+        if (report && report->kind == Report::Kind::kResult) estimate = report->text;
+        if (report && report->kind == Report::Kind::kError) failure = report;
+      },
+      [&] { return too_long = too_long || context.draining || wall_seconds() > deadline; });
+  child.wait();
+  if (too_long) throw busy("the plan took too long", 60);
+  if (failure) throw problem_of(*failure);
+  if (estimate.empty()) throw Problem(500, "internal", "the plan's process crashed");
+  return json_response(200, estimate);
+}
+
+}  // namespace voxdag::server

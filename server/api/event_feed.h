@@ -1,0 +1,40 @@
+// One client's stream of a job's events (docs/api.md, "Following a job").
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <string>
+
+#include "server/jobs/dispatcher.h"
+#include "server/queue/job_queue.h"
+
+namespace voxdag::server {
+
+class EventFeed {
+ public:
+  // Events after `last_seen` are sent again; none if it is not given.
+  EventFeed(JobQueue& queue, const Dispatcher& dispatcher, const ServerConfig& config,
+            const std::atomic<bool>& draining, std::string id, std::optional<int64_t> last_seen);
+
+  // What is to be sent next, "" for nothing yet; no value when the stream is at its end. Waits up
+  // to about a second.
+  std::optional<std::string> next();
+
+ private:
+  void wait();
+  void add_changes(std::string& text);
+  void add_progress(std::string& text);
+
+  JobQueue& queue_;
+  const Dispatcher& dispatcher_;
+  const ServerConfig& config_;
+  const std::atomic<bool>& draining_;
+  const std::string id_;
+  int64_t last_number_ = -1;  // of the newest event that was sent; -1 before the first
+  bool started_ = false;
+  bool ended_ = false;
+  uint64_t seen_version_ = 0, seen_changes_ = 0, seen_progress_ = 0;
+  double last_sent_s_ = 0, last_progress_s_ = 0;
+};
+
+}  // namespace voxdag::server

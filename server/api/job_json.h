@@ -1,0 +1,19 @@
+// A job as answers show it (JOB of docs/api.md).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "server/jobs/live_job.h"
+#include "server/queue/job.h"
+
+namespace voxdag::server {
+
+// "2026-11-21T07:00:00.123Z"; "" for 0.
+std::string time_text(double unix_s);
+
+// `live` may be null; `place` is the job's in the queue, from 1, 0 if it has none.
+std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsigned most_attempts);
+
+}  // namespace voxdag::server

@@ -1,0 +1,177 @@
+#include "server/jobs/job_request.h"
+
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "cli/size.h"
+#include "core/base/error.h"
+#include "scheduler/memory_limits.h"
+#include "server/problem.h"
+
+namespace voxdag::server {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr size_t kMostScenes = 64;
+constexpr size_t kLongestText = 4096;
+constexpr size_t kLongestName = 200;
+constexpr uint64_t kLeastSubvolume = 64;
+constexpr uint64_t kLargestResolution = uint64_t{1} << 20;
+
+[[noreturn]] void fail(const std::string& member, const std::string& expected) {
+  throw bad_request("'" + member + "': expected " + expected);
+}
+
+std::string text_of(const ordered_json& value, const std::string& member) {
+  if (!value.is_string()) fail(member, "a text");
+  const auto& text = value.get_ref<const std::string&>();
+  if (text.empty() || text.size() > kLongestText) fail(member, "1 to 4096 bytes");
+  for (const char c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) fail(member, "no control characters");
+  return text;
+}
+
+std::vector<std::string> texts_of(const ordered_json& value, const std::string& member) {
+  if (!value.is_array()) return {text_of(value, member)};
+  if (value.empty() || value.size() > kMostScenes) fail(member, "1 to 64 scenes");
+  std::vector<std::string> texts;
+  for (const ordered_json& item : value) texts.push_back(text_of(item, member));
+  return texts;
+}
+
+bool flag_of(const ordered_json& value, const std::string& member) {
+  if (!value.is_boolean()) fail(member, "true or false");
+  return value.get<bool>();
+}
+
+double number_of(const ordered_json& value, const std::string& member) {
+  if (!value.is_number() || !std::isfinite(value.get<double>())) fail(member, "a finite number");
+  return value.get<double>();
+}
+
+// A whole number from `least` to `most`.
+uint64_t count_of(const ordered_json& value, const std::string& member, uint64_t least,
+                  uint64_t most) {
+  const std::string expected =
+      "a whole number from " + std::to_string(least) + " to " + std::to_string(most);
+  if (!value.is_number_integer() || (!value.is_number_unsigned() && value.get<int64_t>() < 0))
+    fail(member, expected);
+  const uint64_t count = value.get<uint64_t>();
+  if (count < least || count > most) fail(member, expected);
+  return count;
+}
+
+uint64_t power_of_two(const ordered_json& value, const std::string& member, uint64_t least) {
+  const uint64_t count = count_of(value, member, least, kLargestResolution);
+  if (!std::has_single_bit(count)) fail(member, "a power of two");
+  return count;
+}
+
+uint64_t memory_of(const ordered_json& value) {
+  uint64_t bytes = 0;
+  if (value.is_string()) {
+    try {
+      bytes = cli::parse_size(text_of(value, "memory"), "memory");
+    } catch (const Error&) {
+      fail("memory", "a size such as \"2GiB\", or bytes as a number");
+    }
+  } else {
+    bytes = count_of(value, "memory", 0, INT64_MAX);
+  }
+  if (bytes < kLeastMemory) fail("memory", "at least 64MiB");
+  return bytes;
+}
+
+std::string one_of(const ordered_json& value, const std::string& member,
+                   const std::vector<std::string>& names) {
+  std::string text = text_of(value, member), expected;
+  for (const std::string& name : names) {
+    if (text == name) return text;
+    expected += (expected.empty() ? "" : ", ") + name;
+  }
+  fail(member, "one of " + expected);
+}
+
+std::array<double, 4> bounds_of(const ordered_json& value) {
+  if (!value.is_array() || value.size() != 4) fail("bounds", "[X, Y, Z, EDGE]");
+  std::array<double, 4> bounds{};
+  for (size_t i = 0; i < 4; ++i) bounds[i] = number_of(value[i], "bounds");
+  if (bounds[3] <= 0) fail("bounds", "an EDGE above 0");
+  return bounds;
+}
+
+using Takers = std::map<std::string, std::function<void(const ordered_json&)>>;
+
+void take_members(const ordered_json& object, const std::string& where, const Takers& takers) {
+  if (!object.is_object()) fail(where, "an object");
+  for (const auto& [name, value] : object.items()) {
+    const auto taker = takers.find(name);
+    if (taker == takers.end()) fail(name.substr(0, 64), "a member that docs/api.md names");
+    taker->second(value);
+  }
+}
+
+void take_options(const ordered_json& options, BuildSpec& spec) {
+  GeometryOptions& g = spec.geometry;
+  RunOptions& r = spec.run;
+  take_members(
+      options, "options",
+      {{"bounds", [&](const auto& v) { g.bounds = bounds_of(v); }},
+       {"voxel_size", [&](const auto& v) { g.voxel_size = number_of(v, "voxel_size"); }},
+       {"skip_invalid", [&](const auto& v) { g.skip_invalid = flag_of(v, "skip_invalid"); }},
+       {"hash_bits",
+        [&](const auto& v) {
+          g.hash_bits = static_cast<uint32_t>(count_of(v, "hash_bits", 4, 64));
+        }},
+       {"memory", [&](const auto& v) { r.memory_bytes = memory_of(v); }},
+       {"threads",
+        [&](const auto& v) { r.threads = static_cast<unsigned>(count_of(v, "threads", 1, 1024)); }},
+       {"subvolume",
+        [&](const auto& v) { r.subvolume_edge = power_of_two(v, "subvolume", kLeastSubvolume); }},
+       {"backend",
+        [&](const auto& v) {
+          r.backend = one_of(v, "backend", {"auto", "cpu", "cuda", "parallel-host"});
+        }},
+       {"method", [&](const auto& v) {
+          r.method = one_of(v, "method", {"consing", "pointers", "hashes"});
+        }}});
+  if (g.bounds && g.voxel_size) fail("voxel_size", "no bounds beside it");
+  if (g.voxel_size && *g.voxel_size <= 0) fail("voxel_size", "a number above 0");
+}
+
+}  // namespace
+
+JobRequest parse_job_request(std::string_view body) {
+  const auto json = ordered_json::parse(body, nullptr, false);
+  if (json.is_discarded()) throw bad_request("the body is not JSON");
+  JobRequest request;
+  uint64_t& resolution = request.spec.geometry.resolution;
+  take_members(
+      json, "the body",
+      {{"scene", [&](const auto& v) { request.scenes = texts_of(v, "scene"); }},
+       {"resolution", [&](const auto& v) { resolution = power_of_two(v, "resolution", 4); }},
+       {"name",
+        [&](const auto& v) {
+          request.name = text_of(v, "name");
+          if (request.name.size() > kLongestName) fail("name", "at most 200 bytes");
+        }},
+       {"priority",
+        [&](const auto& v) {
+          if (!v.is_number_integer() || v > 100 || v < -100) fail("priority", "-100 to 100");
+          request.priority = v.template get<int>();
+        }},
+       {"options", [&](const auto& v) { take_options(v, request.spec); }}});
+  if (request.scenes.empty()) fail("scene", "a scene");
+  if (resolution == 0) fail("resolution", "voxels an edge");
+  request.text = ordered_json{{"scene", request.scenes},
+                              {"resolution", resolution},
+                              {"options", json.value("options", ordered_json::object())}}
+                     .dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+  return request;
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,25 @@
+// What a client asks to be built: the body of POST /jobs.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "scheduler/build_spec.h"
+
+namespace voxdag::server {
+
+struct JobRequest {
+  std::string name;
+  int priority = 0;
+  std::vector<std::string> scenes;  // names of uploads, or absolute paths
+  BuildSpec spec;                   // all of it but scenes, output and work folder
+  std::string text;                 // JSON of scene, resolution and options, as posted
+};
+
+// Throws Problem (400) naming the member that is unknown, missing or has a wrong value, and (422)
+// for limits of the format.
+JobRequest parse_job_request(std::string_view body);
+
+}  // namespace voxdag::server

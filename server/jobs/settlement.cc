@@ -1,0 +1,66 @@
+#include "server/jobs/settlement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+
+namespace voxdag::server {
+namespace {
+
+bool is_transient(const std::string& code) { return code == "no_space" || code == "io"; }
+
+JobError error_of(const LiveJob& live, const ChildProcess::End& end, double now_s) {
+  if (const auto failure = live.failure())
+    return {failure->code, failure->text, now_s, is_transient(failure->code)};
+  if (end.signal == SIGKILL)
+    return {"out_of_memory",
+            "the job's process was killed, by the system for want of memory perhaps", now_s, false};
+  if (end.signal != 0)
+    return {"internal", "the job's process crashed (signal " + std::to_string(end.signal) + ")",
+            now_s, false};
+  return {"internal",
+          "the job's process ended with status " + std::to_string(end.exit_status) +
+              " and said nothing",
+          now_s, false};
+}
+
+void finish(Job& job, JobState state, double now_s) {
+  job.state = state;
+  job.finished_s = now_s;
+}
+
+double pause_s(const JobLimits& limits, unsigned attempts) {
+  const double exponent = std::min(attempts, 32u) - 1.0;
+  return std::min(limits.most_backoff_s, limits.backoff_s * std::exp2(std::max(0.0, exponent)));
+}
+
+}  // namespace
+
+void settle_job(Job& job, const LiveJob& live, const ChildProcess::End& end,
+                const JobLimits& limits, double now_s) {
+  job.warnings = live.warnings();
+  job.progress = live.progress_json();
+  const bool asked = live.stop_asked_s() > 0;
+  if (const std::string result = live.result(); !result.empty()) {
+    if (job.state == JobState::kCancelling) return finish(job, JobState::kCanceled, now_s);
+    job.result = result;
+    job.error.reset();
+    return finish(job, JobState::kSucceeded, now_s);
+  }
+  const JobError error = error_of(live, end, now_s);
+  const bool stopped = asked && (error.code == "cancelled" || end.signal == SIGKILL);
+  if (!stopped) job.error = error;
+  if (job.state == JobState::kCancelling) return finish(job, JobState::kCanceled, now_s);
+  if (job.state != JobState::kRunning) return;  // suspended, and perhaps resumed already
+  if (stopped || error.code == "cancelled") {
+    job.state = JobState::kQueued;
+    job.front = true;
+  } else if (error.transient && job.attempts < limits.attempts) {
+    job.state = JobState::kQueued;
+    job.not_before_s = now_s + pause_s(limits, job.attempts);
+  } else {
+    finish(job, JobState::kFailed, now_s);
+  }
+}
+
+}  // namespace voxdag::server

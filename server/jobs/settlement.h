@@ -1,0 +1,19 @@
+// What becomes of a job when its process has ended.
+#pragma once
+
+#include "server/config.h"
+#include "server/jobs/child_process.h"
+#include "server/jobs/live_job.h"
+#include "server/queue/job.h"
+
+namespace voxdag::server {
+
+// Changes the job, which may meanwhile have been suspended, resumed or asked to be canceled:
+//   a result                      succeeded (canceled if that was asked for)
+//   stopped because we asked      as asked: canceled, suspended; queued again if the service stops
+//   no_space, io                  queued again after a pause, while there are attempts left
+//   anything else                 failed
+void settle_job(Job& job, const LiveJob& live, const ChildProcess::End& end,
+                const JobLimits& limits, double now_s);
+
+}  // namespace voxdag::server

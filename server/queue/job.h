@@ -1,0 +1,75 @@
+// A job as the queue keeps it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace voxdag::server {
+
+//             ┌── retry ──────────────────────────────┐
+//   queued ─▶ running ─▶ succeeded                    │
+//     ▲ ▲ │     │ │ └───▶ failed ─────────────────────┤
+//     │ │ │     │ └─ cancelling ─▶ canceled ──────────┘
+//     │ │ └─────┼──── cancel ───────▲   ▲
+//     │ └ resume ─ suspended ───────────┘
+//     └── transient error, restart of the service
+enum class JobState {
+  kQueued,
+  kRunning,
+  kSuspended,
+  kCancelling,
+  kCanceled,
+  kFailed,
+  kSucceeded,
+};
+
+inline constexpr std::array<const char*, 7> kJobStateNames = {
+    "queued", "running", "suspended", "cancelling", "canceled", "failed", "succeeded"};
+
+inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
+std::optional<JobState> parse_state(std::string_view name);
+// Nothing will happen to it by itself any more.
+inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
+
+struct JobError {
+  std::string code;  // docs/errors.md, or "internal"
+  std::string message;
+  double at_s = 0;  // Unix time, like all times here; 0 for never
+  bool transient = false;
+};
+
+enum class Preview { kNone = 0, kReady = 1, kFailed = 2 };
+
+struct Job {
+  std::string id;
+  int64_t number = 0;  // in the order of posting
+  std::string name;
+  JobState state = JobState::kQueued;
+  std::string request;              // JSON: scene, resolution, options
+  std::vector<std::string> scenes;  // uploads that it needs until it has ended
+  std::string posted_by;
+  int priority = 0;
+  bool front = false;  // was running already: before others of its priority
+  unsigned attempts = 0;
+  double created_s = 0, started_s = 0, finished_s = 0, not_before_s = 0;
+  std::optional<JobError> error;
+  std::vector<std::string> warnings;
+  std::string result;    // JSON; "" until it succeeded
+  std::string progress;  // JSON; of the last attempt, "" before the first
+  Preview preview = Preview::kNone;
+};
+
+// One change of a job's state; `number` counts them over all jobs.
+struct JobEvent {
+  int64_t number = 0;
+  double at_s = 0;
+  JobState state = JobState::kQueued;
+  unsigned attempt = 0;
+  std::string error;  // code, "" for none
+};
+
+}  // namespace voxdag::server

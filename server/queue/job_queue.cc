@@ -1,0 +1,282 @@
+#include "server/queue/job_queue.h"
+
+#include <chrono>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "server/problem.h"
+#include "server/queue/job_rows.h"
+#include "server/random_id.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
+
+SqlDatabase open_writer(const std::string& path) {
+  SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
+  prepare_schema(database, path);
+  return database;
+}
+
+// No ids of callers are ever made into SQL; states are.
+std::string states_in(const std::vector<JobState>& states) {
+  std::string list;
+  for (const JobState state : states)
+    list += (list.empty() ? "" : ", ") + std::to_string(static_cast<int>(state));
+  return "state IN (" + list + ")";
+}
+
+const std::string kEnded = "state >= " + std::to_string(static_cast<int>(JobState::kCanceled));
+const std::string kOpen = "state < " + std::to_string(static_cast<int>(JobState::kCanceled));
+
+std::optional<Job> job_of_key(SqlDatabase& database, const IdempotencyKey& key) {
+  if (key.key.empty()) return {};
+  auto known = database.prepare("SELECT job, request FROM idempotency WHERE key = ?");
+  if (!known.bind(0, key.key).step()) return {};
+  if (known.text(1) != key.request)
+    throw Problem(422, "idempotency_mismatch",
+                  "this Idempotency-Key came with another request before");
+  return read_job(database, known.text(0));
+}
+
+Problem no_job(const std::string& id) {
+  return not_found("no job " + id.substr(0, 32) +
+                   ": expected the id of a job that was not deleted");
+}
+
+}  // namespace
+
+double unix_seconds() { return clock_seconds(CLOCK_REALTIME); }
+
+std::optional<JobState> parse_state(std::string_view name) {
+  for (size_t i = 0; i < kJobStateNames.size(); ++i)
+    if (name == kJobStateNames[i]) return static_cast<JobState>(i);
+  return {};
+}
+
+JobQueue::JobQueue(const std::string& path)
+    : writer_(open_writer(path)),
+      reader_(path, SqlDatabase::Mode::kReadOnly),
+      find_(reader_.prepare("SELECT " + std::string(kJobColumns) + " FROM job WHERE id = ?")) {}
+
+JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t most_open) {
+  Added added;
+  {
+    std::lock_guard lock(write_mutex_);
+    SqlTransaction transaction(writer_);
+    if (auto known = job_of_key(writer_, key)) return {std::move(*known), true};
+    if (static_cast<uint64_t>(writer_.integer("SELECT count(*) FROM job WHERE " + kOpen)) >=
+        most_open)
+      throw busy("the queue is full", 60);
+    job.id = random_id();
+    job.number = writer_.integer("SELECT coalesce(max(number), 0) + 1 FROM job");
+    job.created_s = unix_seconds();
+    write_job(writer_, job);
+    write_event(writer_, job);
+    if (!key.key.empty())
+      writer_.prepare("INSERT INTO idempotency VALUES (?, ?, ?)")
+          .bind(0, key.key)
+          .bind(1, key.request)
+          .bind(2, job.id)
+          .run();
+    transaction.commit();
+    added.job = std::move(job);
+  }
+  announce_change(true);
+  return added;
+}
+
+std::optional<Job> JobQueue::find(const std::string& id) {
+  std::lock_guard lock(read_mutex_);
+  std::optional<Job> job;
+  if (find_.bind(0, id).step()) job = job_of_row(find_);
+  find_.reset();
+  return job;
+}
+
+std::optional<Job> JobQueue::find_by_key(const IdempotencyKey& key) {
+  std::lock_guard lock(read_mutex_);
+  return job_of_key(reader_, key);
+}
+
+std::vector<Job> JobQueue::query(const std::string& rest, const std::vector<int64_t>& numbers) {
+  std::lock_guard lock(read_mutex_);
+  auto rows = reader_.prepare("SELECT " + std::string(kJobColumns) + " FROM job " + rest);
+  for (size_t i = 0; i < numbers.size(); ++i) rows.bind(static_cast<int>(i), numbers[i]);
+  std::vector<Job> jobs;
+  while (rows.step()) jobs.push_back(job_of_row(rows));
+  return jobs;
+}
+
+std::vector<Job> JobQueue::list(const JobFilter& filter) {
+  const std::string states = filter.states.empty() ? "" : " AND " + states_in(filter.states);
+  return query("WHERE number < ?" + states + " ORDER BY number DESC LIMIT ?",
+               {filter.before, static_cast<int64_t>(filter.limit)});
+}
+
+std::map<JobState, uint64_t> JobQueue::counts() {
+  std::lock_guard lock(read_mutex_);
+  auto rows = reader_.prepare("SELECT state, count(*) FROM job GROUP BY state");
+  std::map<JobState, uint64_t> counts;
+  while (rows.step())
+    counts[static_cast<JobState>(rows.integer(0))] = static_cast<uint64_t>(rows.integer(1));
+  return counts;
+}
+
+std::shared_ptr<const JobQueue::Places> JobQueue::places() {
+  std::lock_guard lock(places_mutex_);
+  uint64_t now;
+  {
+    std::lock_guard version_lock(version_mutex_);
+    now = queue_version_;
+  }
+  if (places_ && places_version_ == now) return places_;
+  auto places = std::make_shared<Places>();
+  {
+    std::lock_guard read_lock(read_mutex_);
+    auto rows = reader_.prepare("SELECT number FROM job WHERE " + states_in({JobState::kQueued}) +
+                                " ORDER BY " + kQueueOrder);
+    while (rows.step()) places->emplace(rows.integer(0), places->size() + 1);
+  }
+  places_version_ = now;
+  return places_ = std::move(places);
+}
+
+bool JobQueue::uses_scene(const std::string& name) {
+  std::lock_guard lock(write_mutex_);
+  auto rows = writer_.prepare(
+      "SELECT 1 FROM job_scene JOIN job ON job.id = job_scene.job WHERE job_scene.scene = ? AND " +
+      kOpen + " LIMIT 1");
+  return rows.bind(0, name).step();
+}
+
+Job JobQueue::change(const std::string& id, const std::function<void(Job&)>& edit) {
+  Job job;
+  bool moves = false;
+  {
+    std::lock_guard lock(write_mutex_);
+    SqlTransaction transaction(writer_);
+    const auto found = read_job(writer_, id);
+    if (!found) throw no_job(id);
+    job = *found;
+    edit(job);
+    write_job(writer_, job);
+    if (job.state != found->state) write_event(writer_, job);
+    moves = job.state != found->state || job.priority != found->priority;
+    transaction.commit();
+  }
+  announce_change(moves);
+  return job;
+}
+
+void JobQueue::remove(const std::string& id) {
+  {
+    std::lock_guard lock(write_mutex_);
+    SqlTransaction transaction(writer_);
+    const auto job = read_job(writer_, id);
+    if (!job) throw no_job(id);
+    if (!has_ended(job->state)) {
+      Problem problem = conflict("the job has not ended: cancel it first");
+      problem.state = state_name(job->state);
+      throw problem;
+    }
+    writer_.prepare("DELETE FROM job WHERE id = ?").bind(0, id).run();
+    transaction.commit();
+  }
+  announce_change(true);
+}
+
+std::optional<Job> JobQueue::next(double now_s, const std::set<std::string>& except) {
+  // Those in `except` are few: at most the ones that are just stopping.
+  const auto jobs = query("WHERE " + states_in({JobState::kQueued}) + " AND not_before_s <= " +
+                              std::to_string(now_s) + " ORDER BY " + kQueueOrder + " LIMIT ?",
+                          {static_cast<int64_t>(except.size() + 1)});
+  for (const Job& job : jobs)
+    if (!except.contains(job.id)) return job;
+  return {};
+}
+
+std::optional<Job> JobQueue::next_without_preview(const std::set<std::string>& except) {
+  const auto jobs = query("WHERE " + states_in({JobState::kSucceeded}) +
+                              " AND preview = 0 ORDER BY number DESC LIMIT ?",
+                          {static_cast<int64_t>(except.size() + 1)});
+  for (const Job& job : jobs)
+    if (!except.contains(job.id)) return job;
+  return {};
+}
+
+std::vector<Job> JobQueue::recover() {
+  std::vector<Job> canceled;
+  for (const Job& found :
+       query("WHERE " + states_in({JobState::kRunning, JobState::kCancelling}) + " ORDER BY number",
+             {})) {
+    const Job job = change(found.id, [](Job& j) {
+      const bool stops = j.state == JobState::kCancelling;
+      j.state = stops ? JobState::kCanceled : JobState::kQueued;
+      j.front = !stops;
+      if (stops) j.finished_s = unix_seconds();
+    });
+    if (job.state == JobState::kCanceled) canceled.push_back(job);
+  }
+  return canceled;
+}
+
+std::vector<std::string> JobQueue::expired(double finished_before_s, uint64_t most) {
+  std::lock_guard lock(read_mutex_);
+  auto rows = reader_.prepare("SELECT id FROM job WHERE " + kEnded +
+                              " AND (finished_s < ? OR number <= coalesce((SELECT number FROM job "
+                              "WHERE " +
+                              kEnded + " ORDER BY number DESC LIMIT 1 OFFSET ?), 0))");
+  rows.bind(0, finished_before_s).bind(1, static_cast<int64_t>(most));
+  std::vector<std::string> ids;
+  while (rows.step()) ids.push_back(rows.text(0));
+  return ids;
+}
+
+std::vector<JobEvent> JobQueue::events_after(const std::string& id, int64_t number) {
+  std::lock_guard lock(read_mutex_);
+  auto rows = reader_.prepare(
+      "SELECT number, at_s, state, attempt, error FROM job_event WHERE job = ? AND number > ? "
+      "ORDER BY number");
+  rows.bind(0, id).bind(1, number);
+  std::vector<JobEvent> events;
+  while (rows.step())
+    events.push_back({rows.integer(0), rows.real(1), static_cast<JobState>(rows.integer(2)),
+                      static_cast<unsigned>(rows.integer(3)), rows.text(4)});
+  return events;
+}
+
+uint64_t JobQueue::version() const {
+  std::lock_guard lock(version_mutex_);
+  return version_;
+}
+
+void JobQueue::wait_for_change(uint64_t seen, double most_s) const {
+  std::unique_lock lock(version_mutex_);
+  changed_.wait_for(lock, std::chrono::duration<double>(most_s), [&] { return version_ != seen; });
+}
+
+void JobQueue::announce() {
+  {
+    std::lock_guard lock(version_mutex_);
+    ++version_;
+  }
+  changed_.notify_all();
+}
+
+void JobQueue::announce_change(bool moves) {
+  {
+    std::lock_guard lock(version_mutex_);
+    ++changes_;
+    queue_version_ += moves;
+  }
+  announce();
+}
+
+uint64_t JobQueue::changes() const {
+  std::lock_guard lock(version_mutex_);
+  return changes_;
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,111 @@
+// The service's jobs, durable: one SQLite file (WAL, synchronous = FULL). What a call returns has
+// been committed. A SIGKILL between any two instructions leaves every job in a state that recover()
+// makes good.
+//
+// Order of the queue: priority, then jobs that were running before, then order of posting.
+// Thread-safe; readers never wait for a writer's sync.
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "scheduler/sqlite.h"
+#include "server/queue/job.h"
+
+namespace voxdag::server {
+
+struct JobFilter {
+  std::vector<JobState> states;  // none for all
+  int64_t before = INT64_MAX;    // job numbers below it
+  size_t limit = 50;
+};
+
+struct IdempotencyKey {
+  std::string key;      // "" for none
+  std::string request;  // digest of what was asked for
+};
+
+class JobQueue {
+ public:
+  // Throws Error{kCorrupt}, {kInvalidInput} for a database that is not ours, {kUnsupportedVersion}.
+  explicit JobQueue(const std::string& path);
+
+  struct Added {
+    Job job;
+    bool replayed = false;
+  };
+  // Gives the job its id and number and queues it; or finds the one that has this key. Throws
+  // Problem: 422 if the key came with another request, 503 if `most_open` jobs have not ended.
+  Added add(Job job, const IdempotencyKey& key, uint64_t most_open);
+
+  std::optional<Job> find(const std::string& id);
+  // Newest first.
+  std::vector<Job> list(const JobFilter& filter);
+  std::map<JobState, uint64_t> counts();
+  // Places in the queue from 1, by job number; as of the last change.
+  using Places = std::unordered_map<int64_t, uint64_t>;
+  std::shared_ptr<const Places> places();
+  // Whether a job that has not ended needs this upload.
+  bool uses_scene(const std::string& name);
+
+  // Applies `edit` to the job in one transaction and returns it. A change of state is recorded as
+  // an event. What `edit` throws leaves the job as it was. Throws Problem (404) if there is none.
+  Job change(const std::string& id, const std::function<void(Job&)>& edit);
+  // Throws Problem unless the job has ended.
+  void remove(const std::string& id);
+
+  // The first queued job that may start at `now_s` and is not in `except`.
+  std::optional<Job> next(double now_s, const std::set<std::string>& except);
+  // One that succeeded and has no preview yet, and is not in `except`.
+  std::optional<Job> next_without_preview(const std::set<std::string>& except);
+  // Running jobs are queued again, at the front; cancelling ones are canceled. Returns the latter.
+  std::vector<Job> recover();
+  // Ended jobs that finished before `finished_before_s`, or are not among the newest `most`.
+  std::vector<std::string> expired(double finished_before_s, uint64_t most);
+
+  std::vector<JobEvent> events_after(const std::string& id, int64_t number);
+  // The job that has this key, if one has. Throws Problem (422) if it came with another request.
+  std::optional<Job> find_by_key(const IdempotencyKey& key);
+
+  // Counts all changes of all jobs, and announcements.
+  uint64_t version() const;
+  // Counts the changes alone.
+  uint64_t changes() const;
+  // Waits until version() differs from `seen`, or for `most_s` seconds.
+  void wait_for_change(uint64_t seen, double most_s) const;
+  // As a change does, for what is not in the database (progress).
+  void announce();
+
+ private:
+  // Announces a change; `moves` if it may have moved jobs in the queue.
+  void announce_change(bool moves);
+  std::vector<Job> query(const std::string& rest, const std::vector<int64_t>& numbers);
+
+  std::mutex write_mutex_;  // guards the next
+  SqlDatabase writer_;
+  std::mutex read_mutex_;  // guards the next
+  SqlDatabase reader_;
+  SqlStatement find_;
+
+  std::mutex places_mutex_;  // guards the next
+  std::shared_ptr<const Places> places_;
+  uint64_t places_version_ = 0;
+
+  mutable std::mutex version_mutex_;  // guards the next
+  mutable std::condition_variable changed_;
+  uint64_t version_ = 1;
+  uint64_t changes_ = 1;
+  uint64_t queue_version_ = 1;  // counts those that may move jobs in the queue
+};
+
+double unix_seconds();
+
+}  // namespace voxdag::server

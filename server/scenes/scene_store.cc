@@ -1,0 +1,200 @@
+#include "server/scenes/scene_store.h"
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr size_t kLongestName = 128;
+// "vdsc": the scenes of a service.
+constexpr int64_t kApplicationId = 0x76647363;
+
+// `total` is -1 while it is not known; `sha256` is "" until the upload is whole.
+constexpr const char* kSchema = R"sql(
+CREATE TABLE scene (
+  name TEXT PRIMARY KEY, size INTEGER NOT NULL, sha256 TEXT NOT NULL, modified_s REAL NOT NULL
+);
+CREATE TABLE upload (
+  name TEXT PRIMARY KEY, offset INTEGER NOT NULL, total INTEGER NOT NULL, sha256 TEXT NOT NULL,
+  updated_s REAL NOT NULL
+);
+)sql";
+
+double now_s() { return clock_seconds(CLOCK_REALTIME); }
+
+std::string made(FileSystem& files, const std::string& folder) {
+  files.make_directories(folder + "/files");
+  files.make_directories(folder + "/parts");
+  return folder;
+}
+
+SqlDatabase open_database(const std::string& path) {
+  SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
+  const bool fresh = database.integer("SELECT count(*) FROM sqlite_master") == 0;
+  if (!fresh && database.integer("PRAGMA application_id") != kApplicationId)
+    throw Error(ErrorCode::kInvalidInput, path + ": expected the scenes of voxdag serve");
+  database.execute("PRAGMA journal_mode = WAL");
+  if (!fresh) return database;
+  SqlTransaction transaction(database);
+  database.execute(kSchema);
+  database.execute("PRAGMA application_id = " + std::to_string(kApplicationId));
+  transaction.commit();
+  return database;
+}
+
+Scene scene_of_row(const SqlStatement& row) {
+  return {row.text(0), true, row.word(1), row.word(1), row.text(2), row.real(3)};
+}
+
+}  // namespace
+
+bool is_scene_name(std::string_view name) {
+  const auto is_alphanumeric = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  };
+  if (name.empty() || name.size() > kLongestName || !is_alphanumeric(name[0])) return false;
+  for (const char c : name)
+    if (!is_alphanumeric(c) && c != '.' && c != '_' && c != '-') return false;
+  return name.ends_with(".glb") || name.ends_with(".gltf");
+}
+
+SceneStore::SceneStore(FileSystem& files, const std::string& folder)
+    : files_(files), folder_(made(files, folder)), database_(open_database(folder + "/scenes.db")) {
+  struct Whole {
+    std::string name, sha256;
+    uint64_t size;
+  };
+  std::vector<Whole> whole;
+  auto rows = database_.prepare("SELECT name, sha256, offset FROM upload WHERE sha256 != ''");
+  while (rows.step()) whole.push_back({rows.text(0), rows.text(1), rows.word(2)});
+  rows.reset();
+  for (const Whole& w : whole) finish_publishing(w.name, w.size, w.sha256);
+}
+
+std::optional<Scene> SceneStore::find(const std::string& name) {
+  std::lock_guard lock(mutex_);
+  auto row = database_.prepare("SELECT name, size, sha256, modified_s FROM scene WHERE name = ?");
+  if (row.bind(0, name).step()) return scene_of_row(row);
+  auto part = database_.prepare("SELECT name, offset, total, updated_s FROM upload WHERE name = ?");
+  if (!part.bind(0, name).step()) return {};
+  Scene scene{name, false, {}, part.word(1), "", part.real(3)};
+  if (part.integer(2) >= 0) scene.size = part.word(2);
+  return scene;
+}
+
+std::vector<Scene> SceneStore::list(const std::string& after, size_t limit) {
+  std::vector<std::string> names;
+  {
+    std::lock_guard lock(mutex_);
+    auto rows = database_.prepare(
+        "SELECT name FROM scene WHERE name > ?1 UNION SELECT name FROM upload WHERE name > ?1 "
+        "ORDER BY name LIMIT ?2");
+    rows.bind(0, after).bind(1, static_cast<int64_t>(limit));
+    while (rows.step()) names.push_back(rows.text(0));
+  }
+  std::vector<Scene> scenes;
+  for (const std::string& name : names)
+    if (auto scene = find(name)) scenes.push_back(std::move(*scene));
+  return scenes;
+}
+
+std::optional<UploadState> SceneStore::upload(const std::string& name) {
+  std::lock_guard lock(mutex_);
+  auto row = database_.prepare("SELECT offset, total FROM upload WHERE name = ?");
+  if (!row.bind(0, name).step()) return {};
+  UploadState state{row.word(0), {}};
+  if (row.integer(1) >= 0) state.total = row.word(1);
+  return state;
+}
+
+bool SceneStore::remove(const std::string& name) {
+  drop_upload(name);
+  {
+    std::lock_guard lock(mutex_);
+    SqlTransaction transaction(database_);
+    database_.prepare("DELETE FROM scene WHERE name = ?").bind(0, name).run();
+    transaction.commit();
+  }
+  if (!files_.exists(path(name))) return false;
+  files_.remove(path(name));
+  return true;
+}
+
+void SceneStore::remove_stale_uploads(double before_s) {
+  std::vector<std::string> names;
+  {
+    std::lock_guard lock(mutex_);
+    auto rows = database_.prepare("SELECT name FROM upload WHERE updated_s < ?");
+    rows.bind(0, before_s);
+    while (rows.step()) names.push_back(rows.text(0));
+  }
+  for (const std::string& name : names) {
+    if (!lock_name(name)) continue;
+    drop_upload(name);
+    unlock_name(name);
+  }
+}
+
+bool SceneStore::lock_name(const std::string& name) {
+  std::lock_guard lock(mutex_);
+  return busy_.insert(name).second;
+}
+
+void SceneStore::unlock_name(const std::string& name) {
+  std::lock_guard lock(mutex_);
+  busy_.erase(name);
+}
+
+void SceneStore::record(const std::string& name, const UploadState& state) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.prepare("INSERT OR REPLACE INTO upload VALUES (?, ?, ?, '', ?)")
+      .bind(0, name)
+      .bind_word(1, state.offset)
+      .bind(2, state.total ? static_cast<int64_t>(*state.total) : int64_t{-1})
+      .bind(3, now_s())
+      .run();
+  transaction.commit();
+}
+
+void SceneStore::publish(const std::string& name, uint64_t size, const std::string& sha256) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.prepare("UPDATE upload SET sha256 = ?, offset = ? WHERE name = ?")
+      .bind(0, sha256)
+      .bind_word(1, size)
+      .bind(2, name)
+      .run();
+  transaction.commit();
+  finish_publishing(name, size, sha256);
+}
+
+void SceneStore::finish_publishing(const std::string& name, uint64_t size,
+                                   const std::string& sha256) {
+  if (files_.exists(part_path(name))) {
+    files_.rename(part_path(name), path(name));
+    files_.sync_directory(folder_ + "/files");
+  }
+  SqlTransaction transaction(database_);
+  database_.prepare("INSERT OR REPLACE INTO scene VALUES (?, ?, ?, ?)")
+      .bind(0, name)
+      .bind_word(1, size)
+      .bind(2, sha256)
+      .bind(3, now_s())
+      .run();
+  database_.prepare("DELETE FROM upload WHERE name = ?").bind(0, name).run();
+  transaction.commit();
+}
+
+void SceneStore::drop_upload(const std::string& name) {
+  {
+    std::lock_guard lock(mutex_);
+    SqlTransaction transaction(database_);
+    database_.prepare("DELETE FROM upload WHERE name = ?").bind(0, name).run();
+    transaction.commit();
+  }
+  if (files_.exists(part_path(name))) files_.remove(part_path(name));
+}
+
+}  // namespace voxdag::server

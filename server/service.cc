@@ -1,0 +1,161 @@
+#include "server/service.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "server/api/context.h"
+#include "server/api/router.h"
+#include "server/gate.h"
+#include "server/http/http_server.h"
+#include "server/problem.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr std::chrono::minutes kHousekeepingEvery{10};
+constexpr double kSecondsPerDay = 86400;
+constexpr size_t kLongestLogged = 200;
+
+ServerConfig checked(ServerConfig config, FileSystem& files) {
+  check_config(config);
+  files.make_directories(config.data_folder);
+  return config;
+}
+
+std::unique_ptr<FileLock> take_folder(FileSystem& files, const std::string& folder) {
+  auto lock = files.try_lock(folder + "/lock");
+  if (!lock)
+    throw Error(ErrorCode::kInvalidInput, folder + ": another service uses this data folder");
+  return lock;
+}
+
+}  // namespace
+
+class Service::Parts {
+ public:
+  Parts(ServerConfig given, FileSystem& files, Log log)
+      : config_(checked(std::move(given), files)),
+        files_(files),
+        log_(std::move(log)),
+        lock_(take_folder(files, config_.data_folder)),
+        gate_(config_, files),
+        queue_(config_.data_folder + "/queue.db"),
+        scenes_(files, config_.data_folder + "/scenes"),
+        tasks_(config_, scenes_),
+        http_(
+            config_.http, [this](Request& request) { return answer(request); },
+            [this](const Request& request, const std::string& what) {
+              log_("request " + request.id + " " + request.method + " failed: " + what);
+            }),
+        dispatcher_(config_, files, queue_, tasks_, log_,
+                    [this](const Job& job) { metrics_.count_settled(job); }),
+        context_{config_, files, queue_, scenes_, tasks_, dispatcher_, metrics_, draining_} {
+    remove_tree(files_, config_.data_folder + "/plans");
+    add_job_routes(router_, context_);
+    add_result_routes(router_, context_);
+    add_event_routes(router_, context_);
+    add_scene_routes(router_, context_);
+    add_system_routes(router_, context_);
+  }
+
+  int port() const { return http_.port(); }
+  std::string url() const {
+    const std::string& host = config_.http.address;
+    return (config_.http.certificate_file.empty() ? "http://" : "https://") +
+           (host.find(':') == std::string::npos ? host : '[' + host + ']') + ":" +
+           std::to_string(port());
+  }
+
+  void run() {
+    // Builds wind down while answers in flight finish.
+    std::thread keeper([this] {
+      keep_house();
+      dispatcher_.stop();
+    });
+    http_.run(config_.drain_s);
+    stop();
+    keeper.join();
+  }
+
+  void stop() {
+    {
+      std::lock_guard lock(stop_mutex_);
+      draining_ = true;
+    }
+    stop_wake_.notify_all();
+    queue_.announce();  // event streams wait for it
+    http_.stop();
+  }
+
+ private:
+  // Until the service stops.
+  void keep_house() {
+    std::unique_lock lock(stop_mutex_);
+    while (!draining_) {
+      try {
+        scenes_.remove_stale_uploads(unix_seconds() -
+                                     config_.retention.upload_days * kSecondsPerDay);
+      } catch (const Error& error) {
+        log_("cannot remove old uploads: " + error.message());
+      }
+      stop_wake_.wait_for(lock, kHousekeepingEvery, [this] { return draining_.load(); });
+    }
+  }
+
+  Response answer(Request& request) {
+    const double start = wall_seconds();
+    Response response;
+    try {
+      response = router_.route(request, gate_);
+    } catch (const Problem& problem) {
+      note(request, problem.status, start);
+      throw;
+    } catch (...) {
+      note(request, 500, start);
+      throw;
+    }
+    note(request, response.status, start);
+    return response;
+  }
+
+  // A line for every change that was tried, and counters for everything.
+  void note(const Request& request, int status, double start) {
+    metrics_.count_request(status, wall_seconds() - start);
+    if (request.method == "GET" || request.method == "HEAD") return;
+    log_("audit " + request.method + " " + request.target.path.substr(0, kLongestLogged) +
+         " status=" + std::to_string(status) +
+         " who=" + (request.caller.empty() ? "-" : request.caller) + " from=" + request.peer +
+         " request=" + request.id);
+  }
+
+  const ServerConfig config_;
+  FileSystem& files_;
+  const Log log_;
+  const std::unique_ptr<FileLock> lock_;
+  std::atomic<bool> draining_{false};
+  Metrics metrics_;
+  Gate gate_;
+  JobQueue queue_;
+  SceneStore scenes_;
+  TaskMaker tasks_;
+  HttpServer http_;
+  Dispatcher dispatcher_;
+  Context context_;
+  Router router_;
+  std::mutex stop_mutex_;
+  std::condition_variable stop_wake_;  // draining_ has become true
+};
+
+Service::Service(ServerConfig config, FileSystem& files, Log log)
+    : parts_(std::make_unique<Parts>(std::move(config), files, std::move(log))) {}
+Service::~Service() = default;
+int Service::port() const { return parts_->port(); }
+std::string Service::url() const { return parts_->url(); }
+void Service::run() { parts_->run(); }
+void Service::stop() { parts_->stop(); }
+
+}  // namespace voxdag::server
