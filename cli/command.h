@@ -27,5 +27,7 @@ void add_verify_command(CLI::App& app, CommandContext& context);
 void add_diff_command(CLI::App& app, CommandContext& context);
 void add_generate_command(CLI::App& app, CommandContext& context);
 void add_render_command(CLI::App& app, CommandContext& context);
+// serve, token, and what serve starts.
+void add_serve_commands(CLI::App& app, CommandContext& context);
 
 }  // namespace voxdag::cli

@@ -48,6 +48,7 @@ int run(int argc, char** argv) {
   add_diff_command(app, context);
   add_generate_command(app, context);
   add_render_command(app, context);
+  add_serve_commands(app, context);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
