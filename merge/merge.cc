@@ -20,6 +20,9 @@
 namespace voxdag {
 namespace {
 
+// Giving back less at a time costs more than it is worth.
+constexpr uint64_t kLeastReleasedBytes = uint64_t{32} << 10;
+
 // How many artifacts at a time: `ends` of consecutive groups.
 std::vector<size_t> group_ends(std::span<const SurveyedArtifact> artifacts, uint64_t slab_bytes) {
   std::vector<size_t> ends;
@@ -265,20 +268,22 @@ class Merger {
     journal_.save(level_read(*progress.level), std::move(state), std::move(named));
   }
 
-  // Frames of the inputs' levels down from `level` are not needed any more.
+  // Frames of the inputs' levels down from `level` are not needed any more. An artifact's levels
+  // lie one after the other, the bricks first.
   void release_levels(std::span<const ArtifactReader> readers, uint32_t level) {
+    released_ends_.resize(readers.size());
     for (size_t i = 0; i < readers.size(); ++i) {
-      if (is_round_segment(artifacts_[i].ref.segment)) continue;
-      uint64_t begin = UINT64_MAX, end = 0;
-      for (const ArtifactLevel& merged : readers[i].levels()) {
-        if (merged.level < level || merged.level >= released_level_ || merged.frames.empty())
-          continue;
-        begin = std::min(begin, merged.frames.front().offset);
-        end = merged.frames.back().offset + merged.frames.back().bytes;
-      }
-      if (begin < end) journal_.release(artifacts_[i].ref.segment, begin, end - begin);
+      const ArtifactRef& ref = artifacts_[i].ref;
+      if (is_round_segment(ref.segment)) continue;
+      uint64_t end = ref.offset;
+      for (const ArtifactLevel& merged : readers[i].levels())
+        if (merged.level >= level && !merged.frames.empty())
+          end = merged.frames.back().offset + merged.frames.back().bytes;
+      const uint64_t begin = std::max(ref.offset, released_ends_[i]);
+      if (end < begin + kLeastReleasedBytes) continue;
+      journal_.release(ref.segment, begin, end - begin);
+      released_ends_[i] = end;
     }
-    released_level_ = level;
   }
 
   // The levels of the inputs that are still read end above `level`, unless a round was finished:
@@ -308,7 +313,7 @@ class Merger {
   std::map<uint32_t, std::unique_ptr<RoundSegment>> segments_;  // that artifacts lie in
   RoundProgress progress_;                                      // of the last round, when restored
   bool last_round_begun_ = false;
-  uint32_t released_level_ = UINT32_MAX;  // levels from here down were released
+  std::vector<uint64_t> released_ends_;  // of the space that each artifact gave back
 };
 
 }  // namespace

@@ -38,8 +38,8 @@ struct MergeInputs {
   // A folder of its own for what does not fit in memory: maps and the artifacts of merge rounds.
   // What it holds at the end is what a checkpoint names.
   std::string scratch_folder;
-  // Work of less than this is not worth a checkpoint.
-  double checkpoint_interval_s = 1;
+  // Less work than this, in CPU seconds, is not worth a checkpoint.
+  double checkpoint_interval_s = 2;
 };
 
 // Where the state of an unfinished merge is kept, so that it can go on there.

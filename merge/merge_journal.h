@@ -38,7 +38,7 @@ class MergeJournal {
   }
 
   // Enough was done since the last state.
-  bool due() const { return checkpoint_ && wall_seconds() - saved_s_ >= interval_s_; }
+  bool due() const { return checkpoint_ && process_cpu_seconds() - saved_s_ >= interval_s_; }
   // `named`: the files of the scratch folder that the state names, all synced. Those that only the
   // state before named are removed.
   void save(uint32_t level, MergeState state, std::vector<std::shared_ptr<ScratchPath>> named) {
@@ -47,7 +47,7 @@ class MergeJournal {
     named_.insert(named_.end(), named.begin(), named.end());
     checkpoint_->save(level, encode_state(std::move(state)));
     named_.erase(named_.begin(), named_.begin() + static_cast<std::ptrdiff_t>(before));
-    saved_s_ = wall_seconds();
+    saved_s_ = process_cpu_seconds();
   }
   void release(uint32_t segment, uint64_t offset, uint64_t bytes) {
     checkpoint_->release(segment, offset, bytes);
@@ -56,7 +56,7 @@ class MergeJournal {
  private:
   Checkpoint* const checkpoint_;
   const double interval_s_;
-  double saved_s_ = wall_seconds();
+  double saved_s_ = process_cpu_seconds();
   std::vector<std::shared_ptr<ScratchPath>> named_;
 };
 

@@ -35,7 +35,7 @@ struct RunOptions {
   std::string method;            // "" for the backend's own, consing, pointers or hashes
   std::string cache_folder;      // "" for none
   uint64_t cache_bytes = uint64_t{16} << 30;
-  double checkpoint_interval_s = 1;  // merge work of less is not worth a checkpoint
+  double checkpoint_interval_s = 2;  // CPU time of the merge that is worth a checkpoint
   bool keep_work = false;
   bool restart = false;  // start over, whatever the work folder holds
   bool force = false;    // build though the estimate says that it cannot fit

@@ -28,10 +28,8 @@ class HeaderPage {
   void put(size_t at, T value) {
     std::memcpy(bytes_.data() + at, &value, sizeof(value));
   }
-  std::span<const std::byte> sealed() {
-    put(kHeaderChecksumAt, checksum64(std::span(bytes_).first(kHeaderChecksumAt)));
-    return bytes_;
-  }
+  void seal() { put(kHeaderChecksumAt, checksum64(std::span(bytes_).first(kHeaderChecksumAt))); }
+  std::span<const std::byte> bytes() const { return bytes_; }
 
  private:
   std::vector<std::byte> bytes_ = std::vector<std::byte>(kPageBytes);
@@ -53,7 +51,7 @@ void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const 
 
 uint64_t bytes_of(const GlobalLevel& level) { return sizeof(uint32_t) * level.words; }
 
-// Sums the levels again as their file is read from its first level on.
+// Sums the levels again as their file is read from its first level on; padding must be zeros.
 class LevelSums {
  public:
   explicit LevelSums(std::span<const GlobalLevel> levels) : levels_(levels) {}
@@ -63,7 +61,11 @@ class LevelSums {
       const uint64_t used = level_ < levels_.size() ? bytes_of(levels_[level_]) : 0;
       const uint64_t room = round_up_to_page(used);
       const auto mine = bytes.first(std::min<uint64_t>(bytes.size(), room - at_));
-      sum_words(mine.first(std::min<uint64_t>(mine.size(), used - std::min(used, at_))));
+      const size_t summed = std::min<uint64_t>(mine.size(), used - std::min(used, at_));
+      sum_words(mine.first(summed));
+      const auto padding = mine.subspan(summed);
+      if (std::ranges::any_of(padding, [](std::byte b) { return b != std::byte{0}; }) && !wrong_)
+        wrong_ = level_;
       bytes = bytes.subspan(mine.size());
       at_ += mine.size();
       if (at_ == room) end_level();
@@ -113,7 +115,9 @@ struct GlobalFileWriter::State {
     if (!file) file = files.create(partial_path);
   }
   std::vector<uint64_t> block_checksums(const CancelToken& cancel) const;
-  void put_header(uint64_t voxels, uint64_t svo_nodes, std::span<const std::byte> table);
+  HeaderPage header(uint64_t voxels, uint64_t svo_nodes, std::span<const std::byte> table) const;
+  std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
+                     const CancelToken& cancel) const;
 };
 
 GlobalFileWriter::GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid,
@@ -207,8 +211,8 @@ std::vector<uint64_t> GlobalFileWriter::State::block_checksums(const CancelToken
   return checksums;
 }
 
-void GlobalFileWriter::State::put_header(uint64_t voxels, uint64_t svo_nodes,
-                                         std::span<const std::byte> table) {
+HeaderPage GlobalFileWriter::State::header(uint64_t voxels, uint64_t svo_nodes,
+                                           std::span<const std::byte> table) const {
   HeaderPage header;
   header.put(kMagicAt, kMagic);
   header.put(kVersionAt, kVersion);
@@ -236,7 +240,40 @@ void GlobalFileWriter::State::put_header(uint64_t voxels, uint64_t svo_nodes,
   header.put(kTableOffsetAt, end);
   header.put(kTableCountAt, table.size() / sizeof(uint64_t));
   header.put(kTableChecksumAt, checksum64(table));
-  file->write_at(0, header.sealed());
+  header.seal();
+  return header;
+}
+
+// Of the whole file, which must be what was written.
+std::string GlobalFileWriter::State::digest(const HeaderPage& header,
+                                            std::span<const uint64_t> checksums,
+                                            const CancelToken& cancel) const {
+  const auto written = files.open_read(partial_path);
+  const auto table = std::as_bytes(checksums);
+  Sha256 digest;
+  bool sound = true;
+  const auto add_expected = [&](uint64_t begin, std::span<const std::byte> expected) {
+    read_through(*written, begin, begin + expected.size(), cancel,
+                 [&](std::span<const std::byte> piece) {
+                   digest.add(piece);
+                   sound = sound && std::ranges::equal(piece, expected.first(piece.size()));
+                   expected = expected.subspan(piece.size());
+                 });
+  };
+  add_expected(0, header.bytes());
+  size_t block = 0;
+  read_through(*written, kPageBytes, end, cancel, [&](std::span<const std::byte> piece) {
+    digest.add(piece);
+    for (size_t at = 0; at < piece.size(); at += kBlockBytes)
+      sound = sound && block < checksums.size() &&
+              checksums[block++] ==
+                  checksum64(piece.subspan(at, std::min<size_t>(kBlockBytes, piece.size() - at)));
+  });
+  add_expected(end, table);
+  if (!sound)
+    throw Error(ErrorCode::kCorrupt,
+                partial_path + " is not what was written: the disk gave back other bytes");
+  return digest.finish();
 }
 
 bool is_global_file(FileSystem& files, const std::string& path) {
@@ -257,15 +294,9 @@ GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes,
   const std::vector<uint64_t> checksums = s.block_checksums(cancel);
   const auto table = std::as_bytes(std::span(checksums));
   s.file->write_at(s.end, table);
-  s.put_header(voxels, svo_nodes, table);
-
-  GlobalFileSummary summary;
-  summary.bytes = s.end + table.size();
-  Sha256 digest;
-  read_through(*s.files.open_read(s.partial_path), 0, summary.bytes, cancel,
-               [&](std::span<const std::byte> piece) { digest.add(piece); });
-  summary.sha256 = digest.finish();
-
+  const HeaderPage header = s.header(voxels, svo_nodes, table);
+  s.file->write_at(0, header.bytes());
+  const GlobalFileSummary summary{s.end + table.size(), s.digest(header, checksums, cancel)};
   s.file->sync();
   return summary;
 }

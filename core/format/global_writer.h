@@ -6,8 +6,8 @@
 // words (low half of the mask first), a node is its child mask followed by the word offsets of its
 // children in the next level. Nothing in the file varies with time, place or machine.
 //
-// Every level is summed as it is written and again before the file is sealed, so that what a disk
-// gives back wrong is Error{kCorrupt} and never gets a checksum of its own.
+// Every level is summed as it is written and again when the file is sealed, and the sealed file is
+// read back: what a disk gives back wrong is Error{kCorrupt} and never gets a checksum of its own.
 #pragma once
 
 #include <cstdint>

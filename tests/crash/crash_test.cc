@@ -3,136 +3,11 @@
 //
 // The short form that CI runs samples the operations. VOXDAG_CRASH_ROUNDS=N gives the number of
 // moments per fault; with N large, every operation is tried and as many random moments.
-#include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <chrono>
-#include <cstdlib>
-#include <filesystem>
-#include <random>
-#include <thread>
-
-#include "core/format/verify.h"
-#include "core/format/voxdag_reader.h"
-#include "core/scene/generate/generate.h"
-#include "scheduler/run_build.h"
-#include "tests/crash/faulty_files.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "core/base/clock.h"
+#include "tests/crash/crash_fixture.h"
 
 namespace crash {
 namespace {
-
-using voxdag::BuildReport;
-using voxdag::BuildSpec;
-
-// Remembers the last warning: a sound build that goes on has none to give.
-class Warnings : public voxdag::NoProgress {
- public:
-  void warn(std::string_view message) override { last = message; }
-  std::string last;
-};
-
-uint64_t rounds() {
-  const char* text = std::getenv("VOXDAG_CRASH_ROUNDS");
-  return text ? std::strtoull(text, nullptr, 10) : 12;
-}
-
-class CrashTest : public testing::Test {
- protected:
-  void SetUp() override {
-    voxdag::GenerateOptions options;
-    options.kind = voxdag::SceneKind::kCity;
-    options.triangles = 3000;
-    voxdag::NoProgress progress;
-    voxdag::CancelToken cancel;
-    voxdag::generate_scene(voxdag::system_files(), folder_.file("scene.glb"), options, progress,
-                           cancel);
-    expected_ = run(voxdag::system_files()).sha256;
-    std::filesystem::remove(output());
-  }
-  std::string output() const { return folder_.file("out.vdag"); }
-
-  // Small budget and several threads: spilling, splitting and merge rounds are all on the way.
-  BuildSpec spec() const {
-    BuildSpec spec;
-    spec.geometry.scenes = {folder_.file("scene.glb")};
-    spec.geometry.resolution = 512;
-    spec.run.output = output();
-    spec.run.memory_bytes = uint64_t{64} << 20;
-    spec.run.threads = 2;
-    spec.run.subvolume_edge = 128;
-    spec.run.checkpoint_interval_s = 0;  // after every level of the merge
-    return spec;
-  }
-  BuildReport run(voxdag::FileSystem& files) const {
-    Warnings warnings;
-    voxdag::CancelToken cancel;
-    const BuildReport report = voxdag::run_build(spec(), {files, warnings, cancel});
-    // A recorded artifact that was not durable would be found damaged, and built again.
-    EXPECT_EQ(warnings.last, "");
-    return report;
-  }
-
-  // Builds in a process of its own; true if it was killed on the way.
-  bool killed(FaultPlan plan, std::chrono::microseconds after = {}) const {
-    const pid_t child = fork();
-    if (child == 0) {
-      FaultyFiles files(plan);
-      try {
-        run(files);
-      } catch (...) {
-        _exit(1);
-      }
-      _exit(0);
-    }
-    if (after.count() > 0) {
-      std::this_thread::sleep_for(after);
-      kill(child, SIGKILL);
-    }
-    int status = 0;
-    waitpid(child, &status, 0);
-    EXPECT_TRUE(WIFSIGNALED(status) || WEXITSTATUS(status) == 0) << "the build failed by itself";
-    return WIFSIGNALED(status);
-  }
-
-  // Whatever happened before: run again, it ends as it should and leaves nothing behind.
-  void expect_to_go_on() {
-    if (std::filesystem::exists(output())) {
-      // Only a whole file may ever have that name.
-      const voxdag_reader::File file(output());
-      voxdag::MemoryBudget budget(uint64_t{1} << 30);
-      voxdag::NoProgress progress;
-      EXPECT_NO_THROW(voxdag::verify_global_file(file, budget, progress, voxdag::CancelToken{}));
-    }
-    EXPECT_EQ(run(voxdag::system_files()).sha256, expected_);
-    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
-    std::filesystem::remove(output());
-  }
-
-  // Numbers from 1 to `count`, all of them if there are few enough rounds' worth.
-  static std::vector<uint64_t> moments(uint64_t count) {
-    std::vector<uint64_t> all(count);
-    for (uint64_t i = 0; i < count; ++i) all[i] = i + 1;
-    if (all.size() > rounds()) {
-      std::shuffle(all.begin(), all.end(), std::mt19937_64(rounds()));
-      all.resize(rounds());
-      all.front() = count;  // the last one is always among them
-    }
-    return all;
-  }
-  uint64_t operations_of_a_build() {
-    FaultyFiles counting({});
-    run(counting);
-    std::filesystem::remove(output());
-    return counting.operations();
-  }
-
-  voxdag::TemporaryFolder folder_;
-  std::string expected_;
-};
 
 // SIGKILL and power cuts around every write, sync, rename and removal.
 TEST_F(CrashTest, KilledAtAnyOperation) {
@@ -150,12 +25,27 @@ TEST_F(CrashTest, KilledAtAnyOperation) {
   }
 }
 
+// The same scene finer, in larger subvolumes: about as long a build, most of it computing.
+class FineCrashTest : public CrashTest {
+ protected:
+  BuildSpec spec() const override {
+    BuildSpec spec = CrashTest::spec();
+    spec.geometry.resolution = 2048;
+    spec.run.subvolume_edge = 512;
+    return spec;
+  }
+};
+
 // SIGKILL at moments that have nothing to do with our own calls: inside SQLite, or amid computing.
-TEST_F(CrashTest, KilledAtRandomMoments) {
+TEST_F(FineCrashTest, KilledAtRandomMoments) {
+  const double start = voxdag::wall_seconds();
+  run(voxdag::system_files());
+  const auto whole_us = static_cast<uint64_t>(1e6 * (voxdag::wall_seconds() - start));
+  std::filesystem::remove(output());
   std::mt19937_64 random(1);
   for (uint64_t i = 0; i < rounds(); ++i) {
-    const auto after = std::chrono::microseconds(1000 + random() % 400000);
-    SCOPED_TRACE(testing::Message() << "after " << after.count() << " us");
+    const auto after = std::chrono::microseconds(1000 + random() % whole_us);
+    SCOPED_TRACE(testing::Message() << "after " << after.count() << " us of " << whole_us);
     killed({}, after);
     // Killed again while it goes on.
     killed({}, after / 2);

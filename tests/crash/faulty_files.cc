@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <vector>
 
 namespace crash {
 namespace {
@@ -26,16 +27,19 @@ class FaultyWriter : public voxdag::WritableFile {
   const std::string& path() const override { return file_->path(); }
   void write_at(uint64_t offset, std::span<const std::byte> data) override {
     files_.operate([&] { file_->write_at(offset, data); },
-                   [&] { file_->write_at(offset, data.first(data.size() / 2)); });
+                   [&] { file_->write_at(offset, data.first(data.size() / 2)); },
+                   [&] {
+                     std::vector<std::byte> changed(data.begin(), data.end());
+                     if (!changed.empty()) changed[changed.size() * 2 / 3] ^= std::byte{8};
+                     file_->write_at(offset, changed);
+                   });
   }
   void sync() override {
-    files_.operate(
-        [&] {
-          file_->sync();
-          std::lock_guard lock(files_.mutex_);
-          files_.synced_[path()] = contents(path());
-        },
-        [] {});
+    files_.operate([&] {
+      file_->sync();
+      std::lock_guard lock(files_.mutex_);
+      files_.synced_[path()] = contents(path());
+    });
   }
   void release(uint64_t offset, uint64_t bytes) override { file_->release(offset, bytes); }
   void close() override { file_->close(); }
@@ -61,8 +65,8 @@ class FaultyReader : public voxdag::ReadableFile {
   std::unique_ptr<voxdag::ReadableFile> file_;
 };
 
-template <class Operation, class Half>
-void FaultyFiles::operate(const Operation& operation, const Half& half) {
+template <class Operation, class Half, class Flipped>
+void FaultyFiles::operate(const Operation& operation, const Half& half, const Flipped& flipped) {
   const uint64_t number = ++operations_;
   const bool now = number == plan_.at;
   if (now && plan_.fault == Fault::kPowerCut) cut_power();
@@ -76,6 +80,7 @@ void FaultyFiles::operate(const Operation& operation, const Half& half) {
     half();
     throw Error(ErrorCode::kIo, "the test's disk is broken");
   }
+  if (now && plan_.fault == Fault::kFlipBit) return flipped();
   operation();
   if (now && plan_.fault == Fault::kKillAfter) raise(SIGKILL);
 }
@@ -92,64 +97,53 @@ std::unique_ptr<voxdag::ReadableFile> FaultyFiles::open_read(const std::string& 
 
 std::unique_ptr<voxdag::WritableFile> FaultyFiles::create(const std::string& path) {
   std::unique_ptr<voxdag::WritableFile> file;
-  operate(
-      [&] {
-        std::lock_guard lock(mutex_);
-        if (!disk_.exists(path)) unsynced_names_[path] = "";
-        synced_[path] = "";
-        file = disk_.create(path);
-      },
-      [] {});
+  operate([&] {
+    std::lock_guard lock(mutex_);
+    if (!disk_.exists(path)) unsynced_names_[path] = "";
+    synced_[path] = "";
+    file = disk_.create(path);
+  });
   return std::make_unique<FaultyWriter>(*this, std::move(file));
 }
 
 std::unique_ptr<voxdag::WritableFile> FaultyFiles::open_write(const std::string& path) {
   std::unique_ptr<voxdag::WritableFile> file;
-  operate(
-      [&] {
-        std::lock_guard lock(mutex_);
-        // What an earlier process left of it is on the disk.
-        if (!synced_.contains(path)) synced_[path] = disk_.exists(path) ? contents(path) : "";
-        file = disk_.open_write(path);
-      },
-      [] {});
+  operate([&] {
+    std::lock_guard lock(mutex_);
+    // What an earlier process left of it is on the disk.
+    if (!synced_.contains(path)) synced_[path] = disk_.exists(path) ? contents(path) : "";
+    file = disk_.open_write(path);
+  });
   return std::make_unique<FaultyWriter>(*this, std::move(file));
 }
 
 void FaultyFiles::rename(const std::string& from, const std::string& to) {
-  operate(
-      [&] {
-        disk_.rename(from, to);
-        std::lock_guard lock(mutex_);
-        unsynced_names_.erase(from);
-        unsynced_names_[to] = from;
-        synced_[to] = synced_[from];
-        synced_.erase(from);
-      },
-      [] {});
+  operate([&] {
+    disk_.rename(from, to);
+    std::lock_guard lock(mutex_);
+    unsynced_names_.erase(from);
+    unsynced_names_[to] = from;
+    synced_[to] = synced_[from];
+    synced_.erase(from);
+  });
 }
 
 void FaultyFiles::remove(const std::string& path) {
-  operate(
-      [&] {
-        disk_.remove(path);
-        std::lock_guard lock(mutex_);
-        synced_.erase(path);
-        unsynced_names_.erase(path);
-      },
-      [] {});
+  operate([&] {
+    disk_.remove(path);
+    std::lock_guard lock(mutex_);
+    synced_.erase(path);
+    unsynced_names_.erase(path);
+  });
 }
 
 void FaultyFiles::sync_directory(const std::string& path) {
-  operate(
-      [&] {
-        disk_.sync_directory(path);
-        std::lock_guard lock(mutex_);
-        std::erase_if(unsynced_names_, [&](const auto& name) {
-          return voxdag::parent_directory(name.first) == path;
-        });
-      },
-      [] {});
+  operate([&] {
+    disk_.sync_directory(path);
+    std::lock_guard lock(mutex_);
+    std::erase_if(unsynced_names_,
+                  [&](const auto& name) { return voxdag::parent_directory(name.first) == path; });
+  });
 }
 
 void FaultyFiles::cut_power() {

@@ -2,7 +2,7 @@
 // what was not synced, is full, or takes the process with it.
 //
 // Every call that changes the disk is an operation, numbered from 1 in the order in which they
-// begin. Thread-safe.
+// begin (they differ a little from run to run where there are several threads). Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -24,6 +24,7 @@ enum class Fault {
   kPowerCut,    // all that was not synced is forgotten, then SIGKILL
   kNoSpace,     // this and all later operations fail with Error{kNoSpace}; a write is half done
   kIoError,     // the same with Error{kIo}
+  kFlipBit,     // if it is a write, one bit of it lands on the disk flipped
   kReadError,   // this read and all later ones fail with Error{kIo}
 };
 
@@ -59,10 +60,15 @@ class FaultyFiles : public voxdag::FileSystem {
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
-  // Runs one operation, or what the plan has in its place. `half` is what a write does that the
-  // disk gives up on.
-  template <class Operation, class Half>
-  void operate(const Operation& operation, const Half& half);
+  // Runs one operation, or what the plan has in its place: `half` is what a write does that the
+  // disk gives up on, `flipped` one that it gets wrong.
+  template <class Operation, class Half, class Flipped>
+  void operate(const Operation& operation, const Half& half, const Flipped& flipped);
+  template <class Operation>
+  void operate(const Operation& operation) {
+    operate(
+        operation, [] {}, operation);
+  }
   void read();
   // Files back to what was synced of them, names to what was synced of their folders; SIGKILL.
   void cut_power();

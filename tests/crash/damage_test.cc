@@ -1,0 +1,143 @@
+// What a disk gives back changed is noticed, and healed or refused: never a wrong DAG.
+#include <fstream>
+
+#include "core/base/error.h"
+#include "scheduler/job_store.h"
+#include "tests/crash/crash_fixture.h"
+
+namespace crash {
+namespace {
+
+using voxdag::Error;
+using voxdag::ErrorCode;
+
+class DamageTest : public CrashTest {
+ protected:
+  // Builds until the process is killed at that operation of the disk; false if it was not.
+  bool killed_at(uint64_t operation) const { return killed({Fault::kKillBefore, operation}); }
+
+  // Flips one bit of the file, which must not be empty.
+  static void flip(const std::string& path, std::mt19937_64& random) {
+    const uint64_t bit = random() % (8 * std::filesystem::file_size(path));
+    SCOPED_TRACE(testing::Message() << path << ", bit " << bit);
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekg(static_cast<std::streamoff>(bit / 8));
+    const char byte = static_cast<char>(file.get() ^ (1 << bit % 8));
+    file.seekp(static_cast<std::streamoff>(bit / 8));
+    file.put(byte);
+  }
+
+  // Whatever the disk holds: the build ends with the right bytes, or is refused and starts over
+  // with them. True if it ended by itself.
+  bool expect_healed_or_refused(voxdag::FileSystem& files = voxdag::system_files()) {
+    bool healed = true;
+    try {
+      EXPECT_EQ(build(spec(), files).sha256, expected_);
+    } catch (const Error& error) {
+      healed = false;
+      EXPECT_TRUE(error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kInvalidInput ||
+                  error.code() == ErrorCode::kUnsupportedVersion || error.code() == ErrorCode::kIo)
+          << error.what();
+      BuildSpec again = spec();
+      again.run.restart = true;
+      // A store that does not look like ours any more is not ours to remove.
+      if (error.code() == ErrorCode::kInvalidInput)
+        std::filesystem::remove(output() + ".work/job.db");
+      EXPECT_EQ(build(again, voxdag::system_files()).sha256, expected_) << error.what();
+    }
+    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
+    std::filesystem::remove(output());
+    return healed;
+  }
+};
+
+// A bit that flips on its way to the disk, in any write of any file.
+TEST_F(DamageTest, BitsFlippedInAnyWrite) {
+  const uint64_t operations = operations_of_a_build();
+  for (const uint64_t at : moments(operations)) {
+    SCOPED_TRACE(testing::Message() << "operation " << at << " of " << operations);
+    FaultyFiles files({Fault::kFlipBit, at});
+    EXPECT_TRUE(expect_healed_or_refused(files));
+  }
+}
+
+// A bit that flips while the build is stopped, in any file that it left: segments, the job store
+// and its log, maps, rounds' artifacts, the global file so far.
+TEST_F(DamageTest, BitsFlippedBetweenTwoRuns) {
+  const uint64_t operations = operations_of_a_build();
+  std::mt19937_64 random(2);
+  uint64_t flips = 0;
+  for (uint64_t round = 0; round < rounds() / 3; ++round) {
+    const uint64_t at = 1 + random() % operations;
+    std::vector<std::string> names = {"out.vdag.partial"};
+    for (uint64_t i = 0; i < names.size(); ++i) {
+      if (!killed_at(at)) break;
+      if (i == 0)
+        for (const auto& file : std::filesystem::recursive_directory_iterator(output() + ".work"))
+          if (file.is_regular_file())
+            names.push_back(std::filesystem::relative(file.path(), folder_.path()));
+      const std::string path = folder_.file(names[i]);
+      SCOPED_TRACE(testing::Message()
+                   << names[i] << ", killed at operation " << at << " of " << operations);
+      std::error_code missing;
+      if (std::filesystem::file_size(path, missing) > 0 && !missing) {
+        flip(path, random);
+        ++flips;
+      }
+      expect_healed_or_refused();
+    }
+  }
+  EXPECT_GT(flips, 0u);
+}
+
+// The same for the job store alone, which has no checksums of SQLite's: many bits of one store.
+TEST_F(DamageTest, BitsFlippedInTheJobStore) {
+  const uint64_t operations = operations_of_a_build();
+  std::mt19937_64 random(3);
+  for (uint64_t round = 0; round < rounds(); ++round) {
+    if (!killed_at(operations / 4 + random() % (operations / 2))) continue;
+    const std::string store = output() + ".work/job.db";
+    {
+      // Opened and closed, its log is in it.
+      voxdag::JobStore closed(store, voxdag::JobStore::Access::kBuild);
+    }
+    SCOPED_TRACE(round);
+    flip(store, random);
+    expect_healed_or_refused();
+  }
+}
+
+// More triangles than the memory for them: what was spilled is read back changed, and refused.
+TEST_F(DamageTest, BitsFlippedInSpilledTriangles) {
+  voxdag::GenerateOptions options;
+  options.kind = voxdag::SceneKind::kSoup;
+  options.triangles = 700000;
+  voxdag::NoProgress progress;
+  voxdag::CancelToken cancel;
+  voxdag::generate_scene(voxdag::system_files(), folder_.file("scene.glb"), options, progress,
+                         cancel);
+  BuildSpec many = spec();
+  many.geometry.resolution = 64;
+  many.run.subvolume_edge = 64;
+  FaultyFiles counting({});
+  const BuildReport whole = build(many, counting);
+  EXPECT_GT(whole.spill_bytes, 0u);
+  std::filesystem::remove(output());
+  uint64_t refused = 0;
+  for (const uint64_t at : {counting.operations() / 4, counting.operations() / 3}) {
+    SCOPED_TRACE(at);
+    FaultyFiles files({Fault::kFlipBit, at});
+    try {
+      EXPECT_EQ(build(many, files).sha256, whole.sha256);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+      ++refused;
+      EXPECT_EQ(build(many, voxdag::system_files()).sha256, whole.sha256);
+    }
+    std::filesystem::remove(output());
+  }
+  EXPECT_GT(refused, 0u);
+}
+
+}  // namespace
+}  // namespace crash
