@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "core/base/error.h"
 #include "core/scene/generate/generate.h"
 #include "scheduler/job_status.h"
 #include "scheduler/job_store.h"
+#include "scheduler/output_lock.h"
 #include "scheduler/run_build.h"
 #include "scheduler/work_folder.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -191,6 +193,103 @@ TEST_F(ResumeTest, OwnsItsFolderAlone) {
   std::ofstream(work() + "/letter.txt") << "not ours";
   EXPECT_EQ(code_of(spec()), ErrorCode::kInvalidInput);
   EXPECT_TRUE(std::filesystem::exists(work() + "/letter.txt"));
+}
+
+// A folder of somebody else that happens to bear a name of ours is refused, and stays as it is.
+TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
+  std::filesystem::create_directories(work() + "/merge");
+  std::ofstream(work() + "/merge/thesis.txt") << "not ours";
+  EXPECT_EQ(code_of(spec()), ErrorCode::kInvalidInput);
+  EXPECT_TRUE(std::filesystem::exists(work() + "/merge/thesis.txt"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(work()), {}), 1);
+}
+
+// Somebody who looks at the lock for an instant does not keep a build from starting.
+TEST_F(ResumeTest, WaitsForThoseWhoLook) {
+  std::filesystem::create_directories(work());
+  auto looking = system_files().try_lock(work() + "/lock");
+  ASSERT_TRUE(looking);
+  std::thread looker([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    looking.reset();
+  });
+  const std::string sha256 = build(spec()).sha256;
+  looker.join();
+  EXPECT_EQ(sha256.size(), 64u);
+}
+
+// Two builds with work folders of their own cannot write one output; the first one's file so far is
+// not touched.
+TEST_F(ResumeTest, OwnsItsOutputAlone) {
+  BuildSpec first = spec();
+  first.run.work_folder = folder_.path() + "/first";
+  build_until(first, "build", 5);
+  {
+    const OutputLock held(system_files(), output());
+    EXPECT_EQ(code_of(spec()), ErrorCode::kInvalidInput);
+    EXPECT_FALSE(std::filesystem::exists(work()));
+  }
+  EXPECT_FALSE(std::filesystem::exists(output() + ".partial"));
+  EXPECT_GT(build(first).subvolumes_reused, 0u);
+}
+
+// A merge that goes on writes where it began to; its output cannot be changed any more.
+TEST_F(ResumeTest, KeepsTheOutputOfAMergeThatBegan) {
+  BuildSpec checkpointed = spec();
+  checkpointed.run.work_folder = folder_.path() + "/work";
+  checkpointed.run.checkpoint_interval_s = 0;
+  const std::string expected = build(checkpointed).sha256;
+  std::filesystem::remove(output());
+  build_until(checkpointed, "write", 0);
+  BuildSpec elsewhere = checkpointed;
+  elsewhere.run.output = folder_.path() + "/other.vdag";
+  EXPECT_EQ(code_of(elsewhere), ErrorCode::kInvalidInput);
+  EXPECT_EQ(build(checkpointed).sha256, expected);
+}
+
+// A work folder that cannot be made or written is an error that names it, before any work.
+TEST_F(ResumeTest, NeedsAFolderToWriteIn) {
+  BuildSpec nowhere = spec();
+  nowhere.run.work_folder = scene() + "/work";  // below a file
+  try {
+    build(nowhere);
+    FAIL() << "built without a work folder";
+  } catch (const Error& error) {
+    EXPECT_NE(error.message().find(scene()), std::string::npos) << error.what();
+  }
+  EXPECT_FALSE(std::filesystem::exists(output() + ".partial"));
+}
+
+// A job of another program's version is refused by its number until told to start over.
+TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
+  const std::string expected = build(spec()).sha256;
+  for (const char* change : {"PRAGMA user_version = 77", "UPDATE job SET format_version = 77"}) {
+    SCOPED_TRACE(change);
+    std::filesystem::remove(output());
+    build_until(spec(), "build", 5);
+    SqlDatabase(work() + "/job.db", SqlDatabase::Mode::kReadWrite).execute(change);
+    try {
+      build(spec());
+      ADD_FAILURE() << "the build went through";
+    } catch (const Error& error) {
+      EXPECT_NE(error.message().find("77"), std::string::npos) << error.what();
+    }
+    BuildSpec again = spec();
+    again.run.restart = true;
+    EXPECT_EQ(build(again).sha256, expected);
+  }
+}
+
+// Told to stop, a build says how to go on.
+TEST_F(ResumeTest, SaysHowToGoOn) {
+  CancelToken cancel;
+  CancellingProgress progress(cancel, "build", 5);
+  try {
+    run_build(spec(), {system_files(), progress, cancel});
+    FAIL() << "the build was not interrupted";
+  } catch (const Error& error) {
+    EXPECT_NE(error.message().find("same command"), std::string::npos) << error.what();
+  }
 }
 
 // The state of an interrupted build can be read by others.
