@@ -1,0 +1,275 @@
+#include <filesystem>
+
+#include "core/base/error.h"
+#include "server/digest.h"
+#include "tests/server/running_service.h"
+
+namespace voxdag::server {
+namespace {
+
+using Api = RunningService;
+
+// From upload to result, as a client does it, and the bytes are those of `voxdag build`.
+TEST_F(Api, TurnsASceneIntoADag) {
+  start();
+  ASSERT_EQ(put_scene("m.glb", scene_bytes()).status, 201);
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 512}, {"name", "my job"}});
+  ASSERT_TRUE(until_state(id, "succeeded"));
+  const Json done = job(id);
+  EXPECT_EQ(done["attempts"], 1);
+  EXPECT_EQ(done["progress"]["subvolumes"]["built"], done["progress"]["subvolumes"]["total"]);
+  EXPECT_EQ(done["result"]["levels"].size(), 8u);
+
+  const std::string by_hand = folder_.file("by-hand.vdag");
+  const std::string command = std::string(VOXDAG_BINARY) + " build " + folder_.file("menger.glb") +
+                              " -r 512 -o " + by_hand + " >/dev/null 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const std::string expected = read_small_file(system_files(), by_hand, 1 << 30);
+  const ClientResponse dag = http_->get("/api/v1/jobs/" + id + "/dag");
+  EXPECT_EQ(dag.status, 200);
+  EXPECT_TRUE(dag.body == expected) << "the bytes differ from those of voxdag build";
+  EXPECT_EQ(dag.header("ETag"), '"' + sha256_hex(expected) + '"');
+  EXPECT_NE(dag.header("Content-Disposition").find("\"my-job-512.vdag\""), std::string::npos);
+
+  const Json report = Json::parse(http_->get("/api/v1/jobs/" + id + "/report").body);
+  EXPECT_EQ(report["sha256"], done["result"]["sha256"]);
+  EXPECT_EQ(report["output"], "my-job-512.vdag");
+  const Json cubes = Json::parse(http_->get("/api/v1/jobs/" + id + "/subvolumes").body);
+  EXPECT_EQ(cubes["cubes"].size(), cubes["total"].get<size_t>());
+  EXPECT_EQ(cubes["built"], cubes["total"]);
+  const std::string text = http_->get("/api/v1/jobs/" + id + "/log").body;
+  EXPECT_NE(text.find("merge: "), std::string::npos) << text;
+  EXPECT_EQ(text.find(folder_.path()), std::string::npos) << "no path of this machine";
+  EXPECT_TRUE(until([&] { return job(id)["preview"] == true; }));
+  EXPECT_TRUE(http_->get("/api/v1/jobs/" + id + "/preview.png").body.starts_with("\x89PNG"));
+
+  EXPECT_EQ(http_->send("DELETE", "/api/v1/jobs/" + id, "").status, 204);
+  EXPECT_EQ(http_->get("/api/v1/jobs/" + id).status, 404);
+  EXPECT_FALSE(std::filesystem::exists(config_.data_folder + "/jobs/" + id));
+}
+
+TEST_F(Api, ServesPartsOfTheFile) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 64}});
+  ASSERT_TRUE(until_state(id, "succeeded"));
+  const std::string path = "/api/v1/jobs/" + id + "/dag";
+  const ClientResponse whole = http_->get(path);
+  const std::string tag = whole.header("ETag"), size = std::to_string(whole.body.size());
+  const auto get = [&](const HeaderMap& headers) { return http_->get(path, headers); };
+
+  ClientResponse part = get({{"Range", "bytes=10-19"}});
+  EXPECT_EQ(part.status, 206);
+  EXPECT_EQ(part.body, whole.body.substr(10, 10));
+  EXPECT_EQ(part.header("Content-Range"), "bytes 10-19/" + size);
+  part = get({{"Range", "bytes=100-"}, {"If-Range", tag}});
+  EXPECT_EQ(part.body, whole.body.substr(100));
+  EXPECT_EQ(get({{"Range", "bytes=100-"}, {"If-Range", "\"other\""}}).status, 200);
+  EXPECT_EQ(get({{"If-None-Match", tag}}).status, 304);
+  part = get({{"Range", "bytes=0-3,8-11"}});
+  EXPECT_EQ(part.status, 206);
+  EXPECT_TRUE(part.header("Content-Type").starts_with("multipart/byteranges; boundary="));
+  EXPECT_NE(
+      part.body.find("Content-Range: bytes 8-11/" + size + "\r\n\r\n" + whole.body.substr(8, 4)),
+      std::string::npos);
+  const ClientResponse outside = get({{"Range", "bytes=" + size + "-"}});
+  EXPECT_EQ(not_problem(outside, 416, "range_not_satisfiable"), "");
+  EXPECT_EQ(outside.header("Content-Range"), "bytes */" + size);
+  const ClientResponse head = http_->head(path);
+  EXPECT_EQ(head.header("Content-Length"), size);
+  EXPECT_TRUE(head.body.empty());
+}
+
+TEST_F(Api, GoesOnWithABrokenUpload) {
+  start();
+  const std::string bytes = scene_bytes(), path = "/api/v1/scenes/m.glb";
+  const std::string size = std::to_string(bytes.size()), half = std::to_string(bytes.size() / 2);
+  // A connection that breaks off in the middle of the body.
+  const int port = std::stoi(url().substr(url().rfind(':') + 1));
+  raw_exchange(port, "PUT " + path + " HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + size +
+                         "\r\n\r\n" + bytes.substr(0, bytes.size() / 2));
+  ASSERT_TRUE(until([&] { return http_->head(path).header("Upload-Offset") == half; }));
+  EXPECT_EQ(http_->head(path).header("Upload-Length"), size);
+  EXPECT_EQ(
+      not_problem(post("/api/v1/jobs", {{"scene", "m.glb"}, {"resolution", 64}}), 409, "conflict"),
+      "");
+  const auto range = [&](const std::string& first) {
+    return HeaderMap{
+        {"Content-Range", "bytes " + first + "-" + std::to_string(bytes.size() - 1) + "/" + size}};
+  };
+  const std::string rest = bytes.substr(bytes.size() / 2);
+  const ClientResponse wrong =
+      put_scene("m.glb", rest.substr(1), range(std::to_string(bytes.size() / 2 + 1)));
+  EXPECT_EQ(not_problem(wrong, 409, "conflict"), "");
+  EXPECT_EQ(wrong.header("Upload-Offset"), half);
+  HeaderMap headers = range(half);
+  headers.emplace("Repr-Digest", digest_field(sha256_hex(bytes)));
+  const ClientResponse done = put_scene("m.glb", rest, headers);
+  EXPECT_EQ(done.status, 201) << done.body;
+  EXPECT_EQ(Json::parse(done.body)["sha256"], sha256_hex(bytes));
+}
+
+TEST_F(Api, RefusesAWrongChecksum) {
+  start();
+  const HeaderMap wrong = {{"Content-Digest", digest_field(sha256_hex("other"))}};
+  EXPECT_EQ(not_problem(put_scene("m.glb", "hello", wrong), 400, "invalid_input"), "");
+  EXPECT_EQ(http_->get("/api/v1/scenes/m.glb").status, 404);
+}
+
+TEST_F(Api, AnswersARepetitionOnce) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const Json body = {{"scene", "m.glb"}, {"resolution", 64}};
+  const HeaderMap key = {{"Idempotency-Key", "k1"}};
+  const ClientResponse first = post("/api/v1/jobs", body, key);
+  const ClientResponse again = post("/api/v1/jobs", body, key);
+  EXPECT_EQ(again.status, 202);
+  EXPECT_EQ(again.header("Location"), first.header("Location"));
+  EXPECT_EQ(again.header("Idempotent-Replayed"), "true");
+  EXPECT_EQ(not_problem(post("/api/v1/jobs", {{"scene", "m.glb"}, {"resolution", 128}}, key), 422,
+                        "idempotency_mismatch"),
+            "");
+}
+
+// Cancel, suspend, resume and retry, over a job that would take minutes.
+TEST_F(Api, SteersJobs) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 16384}});
+  const std::string path = "/api/v1/jobs/" + id;
+  ASSERT_TRUE(until_state(id, "running"));
+  EXPECT_EQ(not_problem(http_->send("DELETE", path, ""), 409, "conflict"), "");
+  EXPECT_EQ(not_problem(http_->send("DELETE", "/api/v1/scenes/m.glb", ""), 409, "conflict"), "");
+  EXPECT_EQ(post(path + "/suspend").status, 202);
+  EXPECT_EQ(job(id)["state"], "suspended");
+  EXPECT_EQ(post(path + "/suspend").status, 202) << "it is so already";
+  EXPECT_EQ(not_problem(post(path + "/retry"), 409, "conflict"), "");
+  EXPECT_EQ(post(path + "/resume").status, 202);
+  ASSERT_TRUE(until_state(id, "running"));
+  EXPECT_EQ(job(id)["attempts"], 1) << "resuming is no new attempt";
+  EXPECT_EQ(post(path + "/cancel").status, 202);
+  ASSERT_TRUE(until_state(id, "canceled"));
+  EXPECT_EQ(not_problem(post(path + "/resume"), 409, "conflict"), "");
+  EXPECT_EQ(post(path + "/retry").status, 202);
+  ASSERT_TRUE(until_state(id, "running"));
+  EXPECT_EQ(post(path + "/cancel").status, 202);
+  ASSERT_TRUE(until_state(id, "canceled"));
+  EXPECT_FALSE(std::filesystem::exists(config_.data_folder + "/jobs/" + id + "/work"));
+  const Json list = Json::parse(http_->get("/api/v1/jobs?state=canceled&limit=1").body);
+  EXPECT_EQ(list["jobs"].at(0)["id"], id);
+  EXPECT_EQ(list["counts"]["canceled"], 1);
+}
+
+TEST_F(Api, TellsWhatAJobWouldTake) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const ClientResponse plan =
+      post("/api/v1/jobs?dry_run=true", {{"scene", "m.glb"}, {"resolution", 1024}});
+  ASSERT_EQ(plan.status, 200) << plan.body;
+  EXPECT_GT(Json::parse(plan.body)["voxels"]["likely"], 0);
+  EXPECT_TRUE(Json::parse(http_->get("/api/v1/jobs").body)["jobs"].empty());
+  put_scene("bad.glb", "no scene at all");
+  EXPECT_EQ(post("/api/v1/jobs?dry_run=true", {{"scene", "bad.glb"}, {"resolution", 64}}).status,
+            400);
+}
+
+// A stream begins with the job, tells every change, and ends with it; Last-Event-ID repeats.
+TEST_F(Api, StreamsEvents) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 512}});
+  const auto follow = [&](const HeaderMap& headers) {
+    std::string text;
+    const ClientResponse response = http_->stream(
+        "/api/v1/jobs/" + id + "/events", headers,
+        [](const ClientResponse& r) { return r.status == 200; },
+        [&](std::string_view piece) {
+          text += piece;
+          return true;
+        });
+    EXPECT_EQ(response.header("Content-Type"), "text/event-stream");
+    return text;
+  };
+  const std::string text = follow({});
+  EXPECT_TRUE(text.starts_with("retry: 3000\n\nevent: job\nid: ")) << text;
+  EXPECT_NE(text.find("event: end\ndata: {\"state\":\"succeeded\"}\n\n"), std::string::npos);
+  const std::string again = follow({{"Last-Event-ID", "0"}});
+  for (const char* state : {"queued", "running", "succeeded"})
+    EXPECT_NE(again.find("\"state\":\"" + std::string(state) + "\",\"attempt\""), std::string::npos)
+        << again;
+}
+
+TEST_F(Api, FailsWithTheReason) {
+  start();
+  put_scene("bad.glb", "no scene at all");
+  const std::string id = post_job({{"scene", "bad.glb"}, {"resolution", 64}});
+  ASSERT_TRUE(until([&] { return job(id)["state"] == "failed"; }));
+  const Json error = job(id)["error"];
+  EXPECT_EQ(error["code"], "invalid_input");
+  EXPECT_NE(error["message"].get<std::string>().find("bad.glb"), std::string::npos) << error;
+  EXPECT_EQ(error["message"].get<std::string>().find(folder_.path()), std::string::npos) << error;
+  EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/" + id + "/dag"), 404, "not_found"), "");
+}
+
+// Scenes by path: below a root, and nowhere else.
+TEST_F(Api, TakesScenesBelowItsRootsOnly) {
+  std::filesystem::create_directories(folder_.file("root/sub"));
+  std::filesystem::create_directories(folder_.file("secret"));
+  const std::string bytes = scene_bytes();
+  write_file_atomically(system_files(), folder_.file("root/sub/a.glb"), bytes);
+  write_file_atomically(system_files(), folder_.file("secret/b.glb"), bytes);
+  std::filesystem::create_symlink(folder_.file("secret"), folder_.file("root/link"));
+  config_.scene_roots = {folder_.file("root")};
+  start();
+  const auto status = [&](const std::string& scene) {
+    return post("/api/v1/jobs", {{"scene", scene}, {"resolution", 64}}).status;
+  };
+  EXPECT_EQ(status(folder_.file("root/sub/a.glb")), 202);
+  for (const char* name :
+       {"secret/b.glb", "root/link/b.glb", "root/../secret/b.glb", "root/none.glb", "root/sub"}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(status(folder_.file(name)), 404);
+  }
+  EXPECT_EQ(status("../secret/b.glb"), 404);
+  EXPECT_EQ(status("/etc/passwd"), 404);
+}
+
+TEST_F(Api, DescribesItself) {
+  start();
+  const Json api = Json::parse(http_->get("/openapi.json").body);
+  EXPECT_EQ(api["openapi"], "3.1.0");
+  EXPECT_EQ(http_->get("/healthz").status, 200);
+  EXPECT_EQ(http_->get("/readyz").status, 200);
+  EXPECT_EQ(Json::parse(http_->get("/version").body)["api"], "v1");
+  const std::string metrics = http_->get("/metrics").body;
+  for (const char* name : {"voxdag_jobs{state=\"queued\"} 0", "voxdag_http_request_seconds_count",
+                           "voxdag_free_disk_bytes"})
+    EXPECT_NE(metrics.find(name), std::string::npos) << metrics;
+  const ClientResponse nothing = http_->get("/nothing/here");
+  EXPECT_EQ(not_problem(nothing, 404, "not_found"), "");
+  EXPECT_EQ(nothing.header("X-Content-Type-Options"), "nosniff");
+  const ClientResponse method = http_->send("DELETE", "/api/v1/jobs", "");
+  EXPECT_EQ(not_problem(method, 405, "method_not_allowed"), "");
+  EXPECT_EQ(method.header("Allow"), "POST, GET, HEAD");
+}
+
+// A second service would start the same jobs.
+TEST_F(Api, HasItsDataFolderForItself) {
+  start();
+  EXPECT_THROW(Service(config_, system_files(), [](const std::string&) {}), Error);
+}
+
+// What changed, by whom.
+TEST_F(Api, KeepsAnAudit) {
+  start();
+  put_scene("m.glb", "x");
+  http_->get("/api/v1/scenes");
+  const std::string text = log();
+  EXPECT_NE(text.find("audit PUT /api/v1/scenes/m.glb status=201 who=local from=127.0.0.1"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(text.find("audit GET"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace voxdag::server

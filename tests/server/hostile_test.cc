@@ -1,0 +1,143 @@
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <random>
+
+#include "core/base/clock.h"
+#include "server/tokens.h"
+#include "tests/server/running_service.h"
+
+namespace voxdag::server {
+namespace {
+
+class Hostile : public RunningService {
+ protected:
+  int port() const { return std::stoi(url().substr(url().rfind(':') + 1)); }
+  int status(const std::string& bytes) {
+    const std::string answer = raw_exchange(port(), bytes);
+    return answer.size() > 12 ? std::stoi(answer.substr(9, 3)) : 0;
+  }
+};
+
+// Requests that are no requests, or of which nobody can tell where they end.
+TEST_F(Hostile, BrokenRequestsAreRefused) {
+  start();
+  EXPECT_EQ(status("hello\r\n\r\n"), 400);
+  EXPECT_EQ(status("GET /healthz\r\n\r\n"), 400);
+  EXPECT_EQ(status("GET /%zz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
+  EXPECT_EQ(status("TRACE / HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
+  EXPECT_EQ(status("POST /api/v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n"
+                   "Content-Length: 6\r\n\r\nhello"),
+            400);
+  EXPECT_EQ(status("POST /api/v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: x\r\n\r\n"),
+            400);
+  EXPECT_EQ(status("POST /api/v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 3\r\n"
+                   "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n"),
+            400);
+  EXPECT_EQ(status("GET /" + std::string(9000, 'a') + " HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
+  std::string many = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n";
+  for (int i = 0; i < 2000; ++i) many += "X-Filler: 0123456789012345678901234567890\r\n";
+  EXPECT_EQ(status(many + "\r\n"), 431);
+  EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
+}
+
+// A body that was not read is not taken for the next request.
+TEST_F(Hostile, AnUnreadBodyEndsTheConnection) {
+  start();
+  const std::string answer = raw_exchange(
+      port(),
+      "POST /api/v1/jobs/none/cancel HTTP/1.1\r\nHost: localhost\r\n"
+      "Content-Length: 44\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n\r\n");
+  EXPECT_EQ(answer.find("\"ok\""), std::string::npos) << answer;
+  EXPECT_NE(answer.find("Connection: close"), std::string::npos) << answer;
+}
+
+TEST_F(Hostile, BodiesOverTheirLimitAreRefused) {
+  config_.transfers.scene_bytes = 1000;
+  start();
+  EXPECT_EQ(not_problem(put_scene("a.glb", std::string(1001, 'x')), 413, "too_large"), "");
+  const std::string chunk(600, 'x');
+  EXPECT_EQ(status("PUT /api/v1/scenes/a.glb HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: "
+                   "chunked\r\n\r\n258\r\n" +
+                   chunk + "\r\n258\r\n" + chunk + "\r\n0\r\n\r\n"),
+            413);
+  const Json large = {{"scene", std::string(70000, 'a')}, {"resolution", 64}};
+  EXPECT_EQ(not_problem(post("/api/v1/jobs", large), 413, "too_large"), "");
+  EXPECT_EQ(not_problem(http_->send("POST", "/api/v1/jobs", "{}", {{"Content-Encoding", "gzip"}}),
+                        415, "unsupported_media_type"),
+            "");
+}
+
+TEST_F(Hostile, NamesCannotLeaveTheFolder) {
+  start();
+  for (const char* name :
+       {"..%2f..%2fx.glb", "%2fetc%2fx.glb", "..%5cx.glb", "x.glb%00", ".glb", "x", "%e4.glb"}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(put_scene(name, "x").status, 400);
+  }
+  EXPECT_EQ(put_scene("../x.glb", "x").status, 404);
+}
+
+// Clients that drip a byte now and then hold neither threads nor places of those who ask and go.
+TEST_F(Hostile, SlowClientsKeepNobodyWaiting) {
+  config_.http.limits.connections = 40;
+  start();
+  std::vector<int> slow;
+  for (int i = 0; i < 64; ++i) {
+    slow.push_back(raw_connect(port()));
+    const std::string start_of_request = "GET /healthz HTTP/1.1\r\nX-Slow: ";
+    send(slow.back(), start_of_request.data(), start_of_request.size(), MSG_NOSIGNAL);
+  }
+  for (int i = 0; i < 20; ++i)
+    EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
+  for (const int socket : slow) close(socket);
+}
+
+// A header that takes too long costs its connection.
+TEST_F(Hostile, AHeaderHasItsTime) {
+  config_.http.limits.header_s = 0.2;
+  start();
+  const int socket = raw_connect(port());
+  const std::string begin = "GET /healthz HTTP/1.1\r\n";
+  send(socket, begin.data(), begin.size(), MSG_NOSIGNAL);
+  std::string answer(4096, '\0');
+  const ssize_t got = recv(socket, answer.data(), answer.size(), 0);
+  ASSERT_GT(got, 0);
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 408")) << answer;
+  close(socket);
+}
+
+TEST_F(Hostile, TokensAreAskedFor) {
+  const NewToken reader = make_token("read", "r");
+  write_file_atomically(system_files(), folder_.file("tokens"), reader.line + "\n");
+  config_.token_file = folder_.file("tokens");
+  start();
+  EXPECT_EQ(not_problem(http_->get("/api/v1/jobs"), 401, "unauthorized"), "");
+  EXPECT_EQ(http_->get("/healthz").status, 200);
+  EXPECT_EQ(http_->get("/metrics").status, 401);
+  HttpClient client({url(), reader.token, "", 60});
+  EXPECT_EQ(client.get("/api/v1/jobs").status, 200);
+  EXPECT_EQ(client.send("DELETE", "/api/v1/scenes/a.glb", "").status, 403);
+}
+
+// Whatever bytes come, the service answers the next client.
+TEST_F(Hostile, NoiseDoesNoHarm) {
+  start();
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  const std::string good =
+      "POST /api/v1/jobs?dry_run=false HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+      "application/json\r\nContent-Length: 34\r\n\r\n{\"scene\":\"a.glb\",\"resolution\":64} ";
+  for (int i = 0; i < 100; ++i) {
+    std::string bytes = good;
+    for (int flips = 0; flips < 4; ++flips)
+      bytes[random() % bytes.size()] = static_cast<char>(random());
+    bytes.resize(1 + random() % bytes.size());
+    raw_exchange(port(), bytes);
+  }
+  EXPECT_EQ(http_->get("/healthz").status, 200);
+}
+
+}  // namespace
+}  // namespace voxdag::server

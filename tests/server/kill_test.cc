@@ -1,0 +1,153 @@
+// The service killed at random moments, as a power cut or the system would: every job succeeds in
+// the end, with the bytes of an undisturbed `voxdag build`.
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <random>
+
+#include "core/base/clock.h"
+#include "server/digest.h"
+#include "tests/server/running_service.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr double kPatience_s = 120;
+
+// How often to kill: a few times in the tests of every day.
+int rounds() {
+  const char* text = std::getenv("VOXDAG_CRASH_ROUNDS");
+  return text ? std::atoi(text) : 4;
+}
+
+class KilledService : public testing::Test {
+ protected:
+  ~KilledService() override { end(SIGKILL); }
+
+  // Starts `voxdag serve` and waits until it listens.
+  void start() {
+    const std::string log = folder_.file("log");
+    const size_t before = contents(log).size();
+    pid_ = fork();
+    if (pid_ == 0) {
+      const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
+      dup2(file, 2);
+      execl(VOXDAG_BINARY, VOXDAG_BINARY, "serve", "--port", "0", "--config",
+            folder_.file("config.json").c_str(), nullptr);
+      _exit(127);
+    }
+    const double deadline = wall_seconds() + kPatience_s;
+    constexpr std::string_view kMark = "listening on ";
+    for (;;) {
+      const std::string text = contents(log).substr(before);
+      const size_t at = text.find(kMark), end = text.find('\n', at);
+      if (at != std::string::npos && end != std::string::npos) {
+        const size_t begin = at + kMark.size();
+        http_ = std::make_unique<HttpClient>(
+            ClientOptions{text.substr(begin, end - begin), "", "", 60});
+        return;
+      }
+      ASSERT_LT(wall_seconds(), deadline) << text;
+      usleep(2000);
+    }
+  }
+  // The exit status, or minus the signal.
+  int end(int signal) {
+    if (pid_ <= 0) return 0;
+    kill(pid_, signal);
+    int status = 0;
+    waitpid(pid_, &status, 0);
+    pid_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+  std::string contents(const std::string& path) {
+    return system_files().exists(path) ? read_small_file(system_files(), path, 1 << 30) : "";
+  }
+  void run(const std::string& arguments) {
+    const std::string command = std::string(VOXDAG_BINARY) + " " + arguments + " >/dev/null 2>&1";
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  }
+  void prepare() {
+    run("generate soup " + folder_.file("s.glb") + " --triangles 30000");
+    write_file_atomically(
+        system_files(), folder_.file("config.json"),
+        Json{{"data", folder_.file("data")},
+             {"jobs", {{"least_free_disk", 0}, {"memory", "256MiB"}, {"threads", 1}, {"nice", 0}}}}
+            .dump());
+    scene_ = contents(folder_.file("s.glb"));
+    start();
+    const ClientResponse put =
+        http_->upload("/api/v1/scenes/s.glb", scene_.size(),
+                      [&](uint64_t at, uint64_t most) { return scene_.substr(at, most); });
+    ASSERT_EQ(put.status, 201) << put.body;
+  }
+  void post_jobs() {
+    for (const int resolution : {512, 1024, 2048}) {
+      const Json body = {{"scene", "s.glb"}, {"resolution", resolution}};
+      const ClientResponse answer = http_->send("POST", "/api/v1/jobs", body.dump());
+      ASSERT_EQ(answer.status, 202) << answer.body;
+      jobs_.push_back({Json::parse(answer.body)["id"], resolution});
+    }
+  }
+  std::string state(const std::string& id) {
+    return Json::parse(http_->get("/api/v1/jobs/" + id).body).at("state");
+  }
+
+  struct Posted {
+    std::string id;
+    int resolution;
+  };
+  TemporaryFolder folder_;
+  std::string scene_;
+  std::vector<Posted> jobs_;
+  std::unique_ptr<HttpClient> http_;
+  pid_t pid_ = -1;
+};
+
+TEST_F(KilledService, FinishesEveryJobInTheEnd) {
+  prepare();
+  post_jobs();
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<int> pause_us(0, 400'000);
+  for (int round = 0; round < rounds(); ++round) {
+    usleep(static_cast<useconds_t>(pause_us(random)));
+    ASSERT_EQ(end(SIGKILL), -SIGKILL);
+    start();
+  }
+  for (const auto& [id, resolution] : jobs_) {
+    SCOPED_TRACE("resolution " + std::to_string(resolution));
+    const double deadline = wall_seconds() + kPatience_s;
+    while (state(id) != "succeeded" && state(id) != "failed" && wall_seconds() < deadline)
+      usleep(20000);
+    const Json job = Json::parse(http_->get("/api/v1/jobs/" + id).body);
+    ASSERT_EQ(job["state"], "succeeded") << job.dump(2);
+    EXPECT_EQ(job["attempts"], 1) << "an end of the service is no failure of the job";
+    const std::string by_hand = folder_.file("by-hand.vdag");
+    run("build " + folder_.file("s.glb") + " -r " + std::to_string(resolution) + " -o " + by_hand);
+    EXPECT_EQ(job["result"]["sha256"], sha256_hex(contents(by_hand)));
+    EXPECT_EQ(sha256_hex(http_->get("/api/v1/jobs/" + id + "/dag").body), job["result"]["sha256"]);
+  }
+}
+
+// SIGTERM: builds stop at a checkpoint, the exit is clean, and the next service goes on.
+TEST_F(KilledService, DrainsAndGoesOn) {
+  prepare();
+  post_jobs();
+  const std::string id = jobs_.back().id;
+  const double deadline = wall_seconds() + kPatience_s;
+  while (state(jobs_.front().id) == "queued" && wall_seconds() < deadline) usleep(2000);
+  EXPECT_EQ(end(SIGTERM), 0);
+  EXPECT_NE(contents(folder_.file("log")).find("stopped"), std::string::npos);
+  start();
+  while (state(id) != "succeeded" && state(id) != "failed" && wall_seconds() < deadline)
+    usleep(20000);
+  EXPECT_EQ(state(id), "succeeded");
+  EXPECT_EQ(end(SIGTERM), 0);
+}
+
+}  // namespace
+}  // namespace voxdag::server

@@ -1,0 +1,63 @@
+// The service within the test, on a free port, with its jobs in real processes.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+
+#include "server/http_client.h"
+#include "server/service.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace voxdag::server {
+
+using Json = nlohmann::json;
+
+class RunningService : public testing::Test {
+ protected:
+  RunningService();
+  ~RunningService() override;
+
+  void start();
+  void stop();
+  std::string url() const { return service_->url(); }
+
+  // Menger's sponge, 36 096 triangles.
+  std::string scene_bytes();
+  ClientResponse put_scene(const std::string& name, const std::string& bytes,
+                           const HeaderMap& headers = {});
+  ClientResponse post(const std::string& path, const Json& body = nullptr,
+                      const HeaderMap& headers = {});
+  // Posts a job and expects it to be taken; returns its id.
+  std::string post_job(const Json& body);
+  Json job(const std::string& id);
+  // Asks until it holds, for up to two minutes.
+  bool until(const std::function<bool()>& holds);
+  bool until_state(const std::string& id, const std::string& state);
+  // What is wrong with an answer that should be this problem; "" if nothing.
+  static std::string not_problem(const ClientResponse& response, int status,
+                                 const std::string& code);
+  std::string log();
+
+  TemporaryFolder folder_;
+  ServerConfig config_;
+  std::unique_ptr<HttpClient> http_;
+
+ private:
+  std::unique_ptr<Service> service_;
+  std::thread thread_;
+  std::mutex log_mutex_;
+  std::string log_;
+};
+
+// Sends bytes as they are and reads until the other side closes, or says nothing for a while.
+std::string raw_exchange(int port, const std::string& bytes);
+// A connected socket.
+int raw_connect(int port);
+
+}  // namespace voxdag::server

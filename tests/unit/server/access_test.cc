@@ -1,0 +1,199 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "server/config.h"
+#include "server/digest.h"
+#include "server/gate.h"
+#include "server/jobs/job_request.h"
+#include "server/problem.h"
+#include "server/rate_limiter.h"
+#include "server/slots.h"
+#include "server/tokens.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace voxdag::server {
+namespace {
+
+int status_of(const std::function<void()>& act) {
+  try {
+    act();
+    return 0;
+  } catch (const Problem& problem) {
+    return problem.status;
+  }
+}
+
+TEST(TokenFile, LetsInWhoIsNamed) {
+  const TemporaryFolder folder;
+  const NewToken reader = make_token("read", "r"), admin = make_token("admin", "anna@x");
+  write_file_atomically(system_files(), folder.file("t"),
+                        "# people\n\n" + reader.line + "\n  " + admin.line + "\n");
+  const Tokens tokens = Tokens::read(system_files(), folder.file("t"));
+  ASSERT_TRUE(tokens.find(admin.token));
+  EXPECT_EQ(tokens.find(admin.token)->role, Role::kAdmin);
+  EXPECT_EQ(tokens.find(admin.token)->name, "anna@x");
+  EXPECT_EQ(tokens.find(reader.token)->role, Role::kRead);
+  EXPECT_FALSE(tokens.find(""));
+  EXPECT_FALSE(tokens.find(admin.token + "x"));
+  EXPECT_FALSE(tokens.find(admin.line.substr(admin.line.rfind(' ') + 1))) << "the hash is no token";
+  EXPECT_NE(reader.token, admin.token);
+}
+
+TEST(TokenFile, IsRefusedWithItsLine) {
+  const TemporaryFolder folder;
+  for (const std::string& text : std::vector<std::string>{
+           "", "# none\n", "root a " + sha256_hex("x"), "read a", "read a abc",
+           "read a " + sha256_hex("x") + " more", "read a/b " + sha256_hex("x")}) {
+    SCOPED_TRACE(text);
+    write_file_atomically(system_files(), folder.file("t"), text);
+    EXPECT_THROW(Tokens::read(system_files(), folder.file("t")), Error);
+  }
+}
+
+class GateTest : public testing::Test {
+ protected:
+  Request request(const std::string& method, HeaderMap headers,
+                  const std::string& peer = "127.0.0.1") {
+    Request r;
+    r.method = method;
+    r.headers = std::move(headers);
+    r.peer = peer;
+    return r;
+  }
+  int status(Gate& gate, const Request& r, Role role) {
+    return status_of([&] { gate.admit(r, role); });
+  }
+  ServerConfig config_;
+  TemporaryFolder folder_;
+};
+
+// A page of another site, or one that calls this machine by its own name, gets nothing done.
+TEST_F(GateTest, WithoutTokensKeepsOtherSitesOut) {
+  Gate gate(config_, system_files());
+  EXPECT_EQ(status(gate, request("GET", {{"Host", "localhost:8080"}}), Role::kAdmin), 0);
+  EXPECT_EQ(status(gate, request("GET", {{"Host", "[::1]:8080"}}), Role::kRead), 0);
+  EXPECT_EQ(status(gate, request("GET", {{"Host", "evil.example"}}), Role::kRead), 403);
+  const auto post = [&](const char* origin) {
+    return status(gate, request("POST", {{"Host", "127.0.0.1:8080"}, {"Origin", origin}}),
+                  Role::kSubmit);
+  };
+  EXPECT_EQ(post("http://127.0.0.1:8080"), 0);
+  EXPECT_EQ(post("http://evil.example"), 403);
+  EXPECT_EQ(post("http://127.0.0.1:9999"), 403);
+  EXPECT_EQ(post("null"), 403);
+}
+
+TEST_F(GateTest, WithTokensAsksForOneThatSuffices) {
+  const NewToken reader = make_token("read", "r"), admin = make_token("admin", "a");
+  write_file_atomically(system_files(), folder_.file("t"), reader.line + "\n" + admin.line);
+  config_.token_file = folder_.file("t");
+  Gate gate(config_, system_files());
+  const auto with = [&](const std::string& header, Role role) {
+    return status(gate, request("GET", {{"Authorization", header}}), role);
+  };
+  EXPECT_EQ(status(gate, request("GET", {}), Role::kNone), 0);
+  EXPECT_EQ(status(gate, request("GET", {}), Role::kRead), 401);
+  EXPECT_EQ(with("Bearer " + reader.token, Role::kRead), 0);
+  EXPECT_EQ(with("bearer " + admin.token, Role::kSubmit), 0);
+  EXPECT_EQ(with("Bearer " + reader.token, Role::kSubmit), 403);
+  EXPECT_EQ(with("Basic " + reader.token, Role::kRead), 401);
+  EXPECT_EQ(with("Bearer", Role::kRead), 401);
+  for (int i = 0; i < 100; ++i) with("Bearer wrong", Role::kRead);
+  EXPECT_EQ(with("Bearer wrong", Role::kRead), 429);
+  EXPECT_EQ(with("Bearer " + reader.token, Role::kRead), 0) << "others guess; this one knows";
+}
+
+TEST(RateLimiterTest, RefillsWithTime) {
+  RateLimiter limiter(2);
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(limiter.take("a", 0)) << i;
+  EXPECT_FALSE(limiter.take("a", 0));
+  EXPECT_TRUE(limiter.take("b", 0));
+  EXPECT_TRUE(limiter.take("a", 0.5));
+  EXPECT_FALSE(limiter.take("a", 0.5));
+  RateLimiter unlimited(0);
+  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(unlimited.take("a", 0));
+}
+
+TEST(SlotsTest, AreGivenBack) {
+  Slots slots(1);
+  auto first = slots.take();
+  EXPECT_TRUE(first);
+  EXPECT_FALSE(slots.take());
+  first.reset();
+  EXPECT_TRUE(slots.take());
+}
+
+TEST(DigestField, IsReadAndWritten) {
+  const std::string sum = sha256_hex("hello");
+  EXPECT_EQ(digest_field(sum), "sha-256=:LPJNul+wow4m6DsqxbninhsWHlwfp0JecwQzYpOLmCQ=:");
+  EXPECT_EQ(parse_digest_field("md5=:abc=:, " + digest_field(sum)), sum);
+  EXPECT_EQ(parse_digest_field(""), "");
+  for (const char* field :
+       {"sha-256=:abc:", "sha-256=:LPJNul+wow4m6DsqxbninhsWHlwfp0JecwQzYpOLmCQ=",
+        "sha-256=:LPJNul+wow4m6DsqxbninhsWHlwfp0JecwQzYpOL!CQ=:"}) {
+    SCOPED_TRACE(field);
+    EXPECT_EQ(status_of([&] { parse_digest_field(field); }), 400);
+  }
+}
+
+// Whatever lies in configs/ for the service is loaded as it would be.
+TEST(Configs, AreLoaded) {
+  const std::string folder = std::string(VOXDAG_SOURCE_DIR) + "/configs";
+  ServerConfig config;
+  read_config(system_files(), folder + "/server.json", config);
+  check_config(config);
+  int jobs = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder + "/jobs")) {
+    SCOPED_TRACE(entry.path());
+    parse_job_request(read_small_file(system_files(), entry.path(), 1 << 16));
+    ++jobs;
+  }
+  EXPECT_GE(jobs, 2);
+}
+
+TEST(Configs, AreRefusedByName) {
+  const TemporaryFolder folder;
+  const std::pair<const char*, const char*> texts[] = {
+      {"{", "JSON"},
+      {"{\"prot\": 1}", "'prot'"},
+      {"{\"port\": \"x\"}", "'port'"},
+      {"{\"port\": 1e99}", "'port'"},
+      {"{\"jobs\": {\"memory\": \"many\"}}", "memory"},
+      {"{\"jobs\": {\"at_a_time\": -1}}", "'at_a_time'"},
+      {"{\"tls\": []}", "'tls'"},
+      {"{\"scene_roots\": \"/x\"}", "'scene_roots'"}};
+  for (const auto& [text, part] : texts) {
+    SCOPED_TRACE(text);
+    write_file_atomically(system_files(), folder.file("c"), text);
+    ServerConfig config;
+    try {
+      read_config(system_files(), folder.file("c"), config);
+      ADD_FAILURE() << "was taken";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+      EXPECT_NE(error.message().find(part), std::string::npos) << error.message();
+    }
+  }
+}
+
+// Nobody opens a port to the network by mistake.
+TEST(Configs, RefuseTheNetworkWithoutTokens) {
+  ServerConfig config;
+  config.data_folder = "/tmp/x";
+  EXPECT_NO_THROW(check_config(config));
+  config.http.address = "0.0.0.0";
+  try {
+    check_config(config);
+    ADD_FAILURE() << "was taken";
+  } catch (const Error& error) {
+    EXPECT_NE(error.message().find("--tokens"), std::string::npos) << "says how";
+  }
+  config.token_file = "/tmp/t";
+  EXPECT_NO_THROW(check_config(config));
+  config.http.certificate_file = "/tmp/c";
+  EXPECT_THROW(check_config(config), Error);
+}
+
+}  // namespace
+}  // namespace voxdag::server

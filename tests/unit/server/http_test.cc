@@ -1,0 +1,114 @@
+#include <gtest/gtest.h>
+
+#include "server/http/byte_range.h"
+#include "server/http/connection_table.h"
+#include "server/http/headers.h"
+#include "server/http/target.h"
+#include "server/problem.h"
+
+namespace voxdag::server {
+namespace {
+
+using Kind = RangeAnswer::Kind;
+using Ranges = std::vector<ByteRange>;
+
+// What lies within is served, cut at the end of the file.
+TEST(ByteRanges, AreCutToTheFile) {
+  EXPECT_EQ(parse_ranges("bytes=0-9", 100).ranges, (Ranges{{0, 10}}));
+  EXPECT_EQ(parse_ranges("bytes=90-", 100).ranges, (Ranges{{90, 100}}));
+  EXPECT_EQ(parse_ranges("bytes=-5", 100).ranges, (Ranges{{95, 100}}));
+  EXPECT_EQ(parse_ranges("bytes=-500", 100).ranges, (Ranges{{0, 100}}));
+  EXPECT_EQ(parse_ranges("bytes=99-200", 100).ranges, (Ranges{{99, 100}}));
+  EXPECT_EQ(parse_ranges("Bytes= 0-0 , 5-9 ,,", 100).ranges, (Ranges{{0, 1}, {5, 10}}));
+  EXPECT_EQ(parse_ranges("bytes=0-0, 200-300", 100).ranges, (Ranges{{0, 1}}));
+}
+
+// Debian's httplib 0.11.4 reads beyond the end for these.
+TEST(ByteRanges, OutsideTheFileAreUnsatisfiable) {
+  for (const char* header : {"bytes=100-", "bytes=100-200", "bytes=-0", "bytes=200-300,400-",
+                             "bytes=18446744073709551615-", "bytes=99999999999999999999999-"}) {
+    SCOPED_TRACE(header);
+    EXPECT_EQ(parse_ranges(header, 100).kind, Kind::kUnsatisfiable);
+  }
+}
+
+// A header that is none, or asks for more than it is worth, is answered with the whole file.
+TEST(ByteRanges, ThatMakeNoSenseAreIgnored) {
+  for (const char* header :
+       {"", "bytes", "bytes=", "bytes=-", "bytes=5-4", "bytes=a-b", "bytes=1", "items=0-1",
+        "bytes=0-1-2", "bytes=+0-1", "bytes=0-99,0-99", "bytes= - ",
+        "bytes=0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0"}) {
+    SCOPED_TRACE(header);
+    EXPECT_EQ(parse_ranges(header, 100).kind, Kind::kWhole);
+  }
+}
+
+TEST(ContentRange, SaysWhichPartComes) {
+  ByteRange range;
+  uint64_t total = 0;
+  ASSERT_TRUE(parse_content_range("bytes 5-9/20", range, total));
+  EXPECT_EQ(range, (ByteRange{5, 10}));
+  EXPECT_EQ(total, 20u);
+  for (const char* header :
+       {"", "bytes 5-9", "bytes 5-9/*", "bytes */20", "bytes 9-5/20", "bytes 5-20/20", "5-9/20",
+        "bytes 5/20-9", "bytes -9/20", "bytes 0-18446744073709551615/18446744073709551615"}) {
+    SCOPED_TRACE(header);
+    EXPECT_FALSE(parse_content_range(header, range, total));
+  }
+}
+
+TEST(Target, IsTakenApart) {
+  const Target target = parse_target("/api/v1/jobs/a%20b?limit=5&state=a%2Cb+c&empty");
+  EXPECT_EQ(target.segments, (std::vector<std::string>{"api", "v1", "jobs", "a b"}));
+  EXPECT_EQ(target.query.at("limit"), "5");
+  EXPECT_EQ(target.query.at("state"), "a,b c");
+  EXPECT_EQ(target.query.at("empty"), "");
+  EXPECT_TRUE(parse_target("/").segments.empty());
+  EXPECT_EQ(parse_target("http://host:80/x").segments, (std::vector<std::string>{"x"}));
+}
+
+// Dots and encoded slashes stay names: no path is ever made of several segments.
+TEST(Target, DoesNotResolveDots) {
+  EXPECT_EQ(parse_target("/a/../b").segments, (std::vector<std::string>{"a", "..", "b"}));
+  EXPECT_EQ(parse_target("/a/..%2f..%2fetc").segments,
+            (std::vector<std::string>{"a", "../../etc"}));
+  EXPECT_EQ(parse_target("//a").segments, (std::vector<std::string>{"", "a"}));
+}
+
+TEST(Target, RefusesWhatIsBroken) {
+  for (const char* text : {"", "x", "*", "/%", "/%2", "/%zz", "/%00", "/a%0d%0ab", "/?a=1&a=2"}) {
+    SCOPED_TRACE(text);
+    EXPECT_THROW(parse_target(text), Problem);
+  }
+}
+
+TEST(Headers, CompareWithoutRegardToCase) {
+  const HeaderMap headers = {{"Content-Type", "a"}};
+  EXPECT_EQ(header_value(headers, "content-TYPE"), "a");
+  EXPECT_EQ(header_value(headers, "content"), "");
+  EXPECT_EQ(trimmed(" \t a b \t"), "a b");
+  EXPECT_EQ(trimmed(" "), "");
+}
+
+// Clients that only hold places make room for those that come; clients at work stay.
+TEST(ConnectionTable, GivesThePlaceOfTheLongestWaiting) {
+  HttpLimits limits;
+  limits.connections = 2;
+  limits.per_address = 2;
+  ConnectionTable table(limits);
+  ConnectionTable::Place first, second, third;
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", first));
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", second));
+  EXPECT_FALSE(table.admit(-1, "10.0.0.1", third)) << "two of one address";
+  table.set_waiting(first, false);
+  ASSERT_TRUE(table.admit(-1, "10.0.0.2", third)) << "the second waits";
+  table.remove(second);
+  table.set_waiting(third, false);
+  EXPECT_FALSE(table.admit(-1, "10.0.0.3", second)) << "all are at work";
+  table.remove(first);
+  table.remove(third);
+  EXPECT_EQ(table.size(), 0u);
+}
+
+}  // namespace
+}  // namespace voxdag::server

@@ -1,0 +1,210 @@
+#include <gtest/gtest.h>
+
+#include "server/problem.h"
+#include "server/queue/job_queue.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace voxdag::server {
+namespace {
+
+class Queue : public testing::Test {
+ protected:
+  Job post(int priority = 0, const IdempotencyKey& key = {}) {
+    Job job;
+    job.request = R"({"scene":["a.glb"],"resolution":64,"options":{}})";
+    job.scenes = {"a.glb"};
+    job.priority = priority;
+    return queue_->add(job, key, 100).job;
+  }
+  Job set_state(const std::string& id, JobState state) {
+    return queue_->change(id, [&](Job& j) {
+      j.state = state;
+      if (has_ended(state)) j.finished_s = unix_seconds();
+    });
+  }
+  void reopen() {
+    queue_.reset();
+    queue_ = std::make_unique<JobQueue>(folder_.file("queue.db"));
+  }
+  int status_of(const std::function<void()>& act) {
+    try {
+      act();
+      return 0;
+    } catch (const Problem& problem) {
+      return problem.status;
+    }
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<JobQueue> queue_ = std::make_unique<JobQueue>(folder_.file("queue.db"));
+};
+
+// All of a job survives the end of the process.
+TEST_F(Queue, KeepsEverythingOfAJob) {
+  const std::string id = post(7).id;
+  queue_->change(id, [](Job& j) {
+    j.name = "a \"name\"\xff";
+    j.state = JobState::kQueued;
+    j.attempts = 3;
+    j.error = JobError{"no_space", "full", 12.5, true};
+    j.warnings = {"one", "two"};
+    j.progress = "{\"stage\":\"build\"}";
+    j.not_before_s = 99;
+    j.preview = Preview::kReady;
+  });
+  reopen();
+  const auto job = queue_->find(id);
+  ASSERT_TRUE(job);
+  EXPECT_EQ(job->name, "a \"name\"\xff");
+  EXPECT_EQ(job->priority, 7);
+  EXPECT_EQ(job->attempts, 3u);
+  ASSERT_TRUE(job->error);
+  EXPECT_EQ(job->error->code, "no_space");
+  EXPECT_EQ(job->error->at_s, 12.5);
+  EXPECT_TRUE(job->error->transient);
+  EXPECT_EQ(job->warnings, (std::vector<std::string>{"one", "two"}));
+  EXPECT_EQ(job->progress, "{\"stage\":\"build\"}");
+  EXPECT_EQ(job->not_before_s, 99);
+  EXPECT_EQ(job->preview, Preview::kReady);
+  EXPECT_EQ(job->scenes, (std::vector<std::string>{"a.glb"}));
+}
+
+TEST_F(Queue, ServesByPriorityThenFrontThenOrder) {
+  const std::string first = post().id, second = post().id, urgent = post(5).id;
+  queue_->change(second, [](Job& j) { j.front = true; });
+  EXPECT_EQ(queue_->next(1e12, {})->id, urgent);
+  EXPECT_EQ(queue_->next(1e12, {urgent})->id, second);
+  EXPECT_EQ(queue_->next(1e12, {urgent, second})->id, first);
+  EXPECT_FALSE(queue_->next(1e12, {urgent, second, first}));
+  const auto places = queue_->places();
+  EXPECT_EQ(places->at(queue_->find(urgent)->number), 1u);
+  EXPECT_EQ(places->at(queue_->find(first)->number), 3u);
+}
+
+TEST_F(Queue, WaitsUntilAJobMayBeTriedAgain) {
+  const std::string id = post().id;
+  queue_->change(id, [](Job& j) { j.not_before_s = 1000; });
+  EXPECT_FALSE(queue_->next(999, {}));
+  EXPECT_TRUE(queue_->next(1000, {}));
+}
+
+// After a crash of the service: what ran goes on first, what was to stop has stopped.
+TEST_F(Queue, RecoversWhatWasRunning) {
+  const std::string waiting = post().id, running = post().id, stopping = post().id;
+  set_state(running, JobState::kRunning);
+  set_state(stopping, JobState::kCancelling);
+  reopen();
+  const auto canceled = queue_->recover();
+  ASSERT_EQ(canceled.size(), 1u);
+  EXPECT_EQ(canceled[0].id, stopping);
+  EXPECT_EQ(queue_->find(stopping)->state, JobState::kCanceled);
+  EXPECT_EQ(queue_->next(1e12, {})->id, running);
+  EXPECT_EQ(queue_->find(waiting)->state, JobState::kQueued);
+}
+
+TEST_F(Queue, AnswersARepetitionWithTheSameJob) {
+  const IdempotencyKey key{"key", "digest"};
+  const std::string id = post(0, key).id;
+  reopen();
+  EXPECT_EQ(post(0, key).id, id);
+  EXPECT_EQ(queue_->find_by_key(key)->id, id);
+  EXPECT_EQ(status_of([&] { post(0, {"key", "other"}); }), 422);
+  set_state(id, JobState::kCanceled);
+  queue_->remove(id);
+  EXPECT_NE(post(0, key).id, id) << "the key lives as long as its job";
+}
+
+TEST_F(Queue, RefusesMoreThanItMayHold) {
+  Job job;
+  job.request = "{}";
+  queue_->add(job, {}, 1);
+  EXPECT_EQ(status_of([&] { queue_->add(job, {}, 1); }), 503);
+}
+
+TEST_F(Queue, RemovesOnlyWhatHasEnded) {
+  const std::string id = post().id;
+  EXPECT_EQ(status_of([&] { queue_->remove(id); }), 409);
+  set_state(id, JobState::kFailed);
+  queue_->remove(id);
+  EXPECT_FALSE(queue_->find(id));
+  EXPECT_EQ(status_of([&] { queue_->remove(id); }), 404);
+  EXPECT_TRUE(queue_->events_after(id, 0).empty()) << "its events go with it";
+}
+
+TEST_F(Queue, RecordsEveryChangeOfState) {
+  const std::string id = post().id, other = post().id;
+  set_state(id, JobState::kRunning);
+  queue_->change(id, [](Job& j) { j.priority = 3; });
+  set_state(id, JobState::kSucceeded);
+  const auto events = queue_->events_after(id, 0);
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[0].state, JobState::kQueued);
+  EXPECT_EQ(events[1].state, JobState::kRunning);
+  EXPECT_EQ(events[2].state, JobState::kSucceeded);
+  EXPECT_EQ(queue_->events_after(id, events[1].number).size(), 1u);
+  EXPECT_EQ(queue_->events_after(other, 0).size(), 1u);
+}
+
+// An edit that throws leaves nothing behind.
+TEST_F(Queue, ForgetsAChangeThatFails) {
+  const std::string id = post().id;
+  EXPECT_EQ(status_of([&] {
+              queue_->change(id, [](Job& j) {
+                j.priority = 50;
+                throw conflict("no");
+              });
+            }),
+            409);
+  EXPECT_EQ(queue_->find(id)->priority, 0);
+}
+
+TEST_F(Queue, ListsPageByPage) {
+  std::vector<std::string> ids;
+  for (int i = 0; i < 5; ++i) ids.insert(ids.begin(), post().id);
+  set_state(ids[0], JobState::kSucceeded);
+  JobFilter filter;
+  filter.limit = 3;
+  auto page = queue_->list(filter);
+  ASSERT_EQ(page.size(), 3u);
+  EXPECT_EQ(page[0].id, ids[0]);
+  filter.before = page.back().number;
+  page = queue_->list(filter);
+  ASSERT_EQ(page.size(), 2u);
+  EXPECT_EQ(page[1].id, ids[4]);
+  filter = {{JobState::kSucceeded, JobState::kFailed}, INT64_MAX, 50};
+  EXPECT_EQ(queue_->list(filter).size(), 1u);
+  EXPECT_EQ(queue_->counts().at(JobState::kQueued), 4u);
+}
+
+TEST_F(Queue, KnowsWhichScenesAreNeeded) {
+  const std::string id = post().id;
+  EXPECT_TRUE(queue_->uses_scene("a.glb"));
+  EXPECT_FALSE(queue_->uses_scene("b.glb"));
+  set_state(id, JobState::kCanceled);
+  EXPECT_FALSE(queue_->uses_scene("a.glb"));
+}
+
+TEST_F(Queue, LetsEndedJobsExpire) {
+  const std::string old = post().id, newer = post().id, open = post().id;
+  queue_->change(old, [](Job& j) {
+    j.state = JobState::kFailed;
+    j.finished_s = 100;
+  });
+  queue_->change(newer, [](Job& j) {
+    j.state = JobState::kSucceeded;
+    j.finished_s = 200;
+  });
+  EXPECT_EQ(queue_->expired(150, 100), (std::vector<std::string>{old}));
+  EXPECT_EQ(queue_->expired(0, 1), (std::vector<std::string>{old}));
+  EXPECT_TRUE(queue_->expired(0, 2).empty());
+  EXPECT_EQ(queue_->expired(1e12, 100).size(), 2u);
+}
+
+TEST_F(Queue, RefusesADatabaseOfSomebodyElse) {
+  SqlDatabase(folder_.file("other.db"), SqlDatabase::Mode::kReadWrite)
+      .execute("CREATE TABLE t (a)");
+  EXPECT_THROW(JobQueue(folder_.file("other.db")), Error);
+}
+
+}  // namespace
+}  // namespace voxdag::server
