@@ -60,6 +60,7 @@ void add_build_command(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand("build", "build the DAG of a scene");
   const auto state = std::make_shared<BuildCommand>();
   state->options.declare(*command);
+  state->options.declare_work_folder(*command);
   command->add_option("-o,--output", state->run.output, "the .vdag file to make")->required();
   command->add_option("--cache", state->run.cache_folder,
                       "folder of subvolumes shared between builds");

@@ -10,6 +10,7 @@ namespace voxdag::cli {
 namespace {
 
 constexpr uint64_t kLargestConfig = uint64_t{1} << 20;
+constexpr const char* kRunGroup = "Run (never changes the result)";
 
 std::array<double, 4> parse_bounds(const std::string& text) {
   std::array<double, 4> numbers{};
@@ -67,21 +68,25 @@ void BuildOptions::declare(CLI::App& command) {
           "read options from a TOML or INI file")
       ->trigger_on_parse()
       ->configurable(false);
-  const char* run = "Run (never changes the result)";
   command.add_option("--memory", memory_, "memory budget, 64MiB or more (default: half the RAM)")
-      ->group(run);
-  command.add_option("--threads", r.threads, "worker threads (default: all cores)")->group(run);
+      ->group(kRunGroup);
+  command.add_option("--threads", r.threads, "worker threads (default: all cores)")
+      ->group(kRunGroup);
   command
       .add_option("--subvolume", r.subvolume_edge,
                   "edge of a subvolume in voxels, a power of two (default: by the plan)")
-      ->group(run);
-  command.add_option("--backend", r.backend, "auto, cpu, cuda or parallel-host")->group(run);
+      ->group(kRunGroup);
+  command.add_option("--backend", r.backend, "auto, cpu, cuda or parallel-host")->group(kRunGroup);
   command
       .add_option("--method", r.method,
                   "consing (cpu), pointers or hashes (default: the backend's fastest)")
-      ->group(run);
-  command.add_option("--work", r.work_folder, "folder for temporary files (default: OUT.work)")
-      ->group(run);
+      ->group(kRunGroup);
+}
+
+void BuildOptions::declare_work_folder(CLI::App& command) {
+  command
+      .add_option("--work", spec_.run.work_folder, "folder for temporary files (default: OUT.work)")
+      ->group(kRunGroup);
 }
 
 BuildSpec BuildOptions::spec() const {

@@ -1,4 +1,4 @@
-// The options that `build` and `plan` share: what to build, and within which limits.
+// The options that `build`, `plan` and `submit` share: what to build, and within which limits.
 #pragma once
 
 #include <string>
@@ -13,6 +13,8 @@ class BuildOptions {
  public:
   // Declares the scene, geometry and run options on a command.
   void declare(CLI::App& command);
+  // And --work, for commands that build on this machine.
+  void declare_work_folder(CLI::App& command);
   // Throws Error{kInvalidInput} naming the option that is wrong.
   BuildSpec spec() const;
 

@@ -29,5 +29,12 @@ void add_generate_command(CLI::App& app, CommandContext& context);
 void add_render_command(CLI::App& app, CommandContext& context);
 // serve, token, and what serve starts.
 void add_serve_commands(CLI::App& app, CommandContext& context);
+void add_submit_command(CLI::App& app, CommandContext& context);
+void add_jobs_command(CLI::App& app, CommandContext& context);
+void add_watch_command(CLI::App& app, CommandContext& context);
+void add_cancel_command(CLI::App& app, CommandContext& context);
+void add_suspend_command(CLI::App& app, CommandContext& context);
+void add_resume_command(CLI::App& app, CommandContext& context);
+void add_download_command(CLI::App& app, CommandContext& context);
 
 }  // namespace voxdag::cli

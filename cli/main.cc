@@ -49,6 +49,13 @@ int run(int argc, char** argv) {
   add_generate_command(app, context);
   add_render_command(app, context);
   add_serve_commands(app, context);
+  add_submit_command(app, context);
+  add_jobs_command(app, context);
+  add_watch_command(app, context);
+  add_cancel_command(app, context);
+  add_suspend_command(app, context);
+  add_resume_command(app, context);
+  add_download_command(app, context);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

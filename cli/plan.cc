@@ -54,6 +54,7 @@ void add_plan_command(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand("plan", "estimate what a build would take");
   const auto state = std::make_shared<PlanCommand>();
   state->options.declare(*command);
+  state->options.declare_work_folder(*command);
   command->add_flag("--json", state->json, "one JSON object on standard output");
   command->callback([state, &context] { run(*state, context); });
 }

@@ -33,9 +33,9 @@ export class CubesView {
 
   // Fetches the cubes again if the job has built more of them; not more often than is of use.
   async look(job) {
-    const built = job.progress?.subvolumes?.built ?? 0;
-    const key = `${job.attempts} ${built} ${job.progress?.subvolumes?.total} ${has_ended(job.state)}`;
-    if (key === this.key || this.looking) return;
+    const {built, total} = job.progress?.subvolumes ?? {total: 0};
+    const key = `${job.attempts} ${built} ${total} ${has_ended(job.state)}`;
+    if (!total || key === this.key || this.looking) return;
     const wait_ms = this.next_look - performance.now();
     if (wait_ms > 0) {
       this.again ??= setTimeout(() => {

@@ -1,0 +1,35 @@
+// A stage's progress as one line on standard error: a bar that is drawn over on a terminal, a plain
+// line otherwise. Used by one thread at a time.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace voxdag::cli {
+
+struct StageView {
+  std::string_view name, unit;
+  uint64_t done = 0;
+  uint64_t total = 0;  // 0 if unknown
+  double elapsed_s = 0;
+  double rate = 0;   // units a second
+  double eta_s = 0;  // 0 if unknown
+};
+
+class ProgressLine {
+ public:
+  // `quiet` shows warnings only.
+  explicit ProgressLine(bool quiet = false);
+  // How often it is worth showing a stage that goes on.
+  double interval_s() const;
+  void show(const StageView& stage, bool ended) const;
+  void warn(std::string_view message) const;
+  // A line of its own.
+  void note(std::string_view text) const;
+
+ private:
+  const bool quiet_;
+  const bool terminal_;
+};
+
+}  // namespace voxdag::cli

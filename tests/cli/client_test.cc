@@ -1,0 +1,223 @@
+// submit, jobs, watch, cancel, suspend, resume and download against a real server.
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "server/http_client.h"
+#include "tests/cli/command_line.h"
+#include "tests/cli/serve_process.h"
+
+namespace command_line {
+namespace {
+
+class Client : public CommandLine {
+ protected:
+  void SetUp() override {
+    make_scene();
+    std::filesystem::create_directory(folder_.file("server"));
+    start_server();
+    ASSERT_NE(server_->url(), "") << server_->log();
+  }
+  void TearDown() override {
+    unsetenv("VOXDAG_SERVER");
+    if (server_) {
+      EXPECT_EQ(server_->stop(), 0) << server_->log();
+    }
+  }
+  void start_server(const std::vector<std::string>& more = {}, const std::string& port = "0") {
+    server_.reset();
+    server_ = std::make_unique<ServeProcess>(folder_.file("server"), more, port);
+    setenv("VOXDAG_SERVER", server_->url().c_str(), 1);
+  }
+
+  std::string submit(const std::string& resolution, std::vector<std::string> more = {}) {
+    std::vector<std::string> args = {"submit", "m.glb", "-r", resolution};
+    args.insert(args.end(), more.begin(), more.end());
+    return run_json(args).at("id");
+  }
+  // A job that is still at work whatever the machine, until it is canceled.
+  std::string submit_long() {
+    EXPECT_EQ(run({"generate", "soup", "long.glb", "--triangles", "50000"}).status, 0);
+    return run_json({"submit", "long.glb", "-r", "32768", "--threads", "1"}).at("id");
+  }
+  std::string state(const std::string& id) {
+    const Json listed = run_json({"jobs"});
+    for (const Json& job : listed.at("jobs"))
+      if (job.at("id") == id) return job.at("state");
+    return "";
+  }
+  // Cancelling a job that runs takes it a moment.
+  void expect_state_in_the_end(const std::string& id, const std::string& expected) {
+    for (int i = 0; i < 1200 && state(id) != expected; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_EQ(state(id), expected);
+  }
+  // A metric without labels.
+  double metric(const std::string& name) {
+    const std::string text = http().get("/metrics").body;
+    const size_t at = text.find("\n" + name + " ");
+    return at == std::string::npos ? -1 : std::stod(text.substr(at + name.size() + 2));
+  }
+  voxdag::server::HttpClient http() {
+    voxdag::server::ClientOptions options;
+    options.url = server_->url();
+    return voxdag::server::HttpClient(options);
+  }
+
+  std::unique_ptr<ServeProcess> server_;
+};
+
+// From a local scene to a file that verifies: the bytes are those of a build on this machine.
+TEST_F(Client, BuildsAsTheCommandDoes) {
+  const Json job = run_json({"submit", "m.glb", "-r", "128", "--hash-bits", "16", "--name",
+                             "sponge", "--memory", "256MiB", "--wait"});
+  EXPECT_EQ(job["state"], "succeeded");
+  EXPECT_EQ(job["name"], "sponge");
+  EXPECT_EQ(job["options"]["hash_bits"], 16);
+  const std::string id = job["id"];
+  const Json report = run_json({"download", id, "-o", "out/got.vdag"});
+  EXPECT_EQ(report["resumed_at"], 0);
+  EXPECT_EQ(report["sha256"], job["result"]["sha256"]);
+  EXPECT_EQ(report["bytes"], contents("out/got.vdag").size());
+  EXPECT_EQ(run({"verify", "out/got.vdag", "--against", "m.glb"}).status, 0);
+  const Json built = run_json({"build", "m.glb", "-r", "128", "--hash-bits", "16", "-o", "m.vdag"});
+  EXPECT_EQ(built["sha256"], report["sha256"]);
+
+  const Answer listed = run({"jobs"});
+  for (const char* part : {"STATE", "succeeded", "sponge", "128"})
+    EXPECT_NE(listed.out.find(part), std::string::npos) << listed.out;
+  EXPECT_NE(listed.out.find(id), std::string::npos) << listed.out;
+  EXPECT_EQ(run_json({"jobs", "--state", "failed,queued"})["jobs"].size(), 0u);
+
+  // Who comes late sees the stages that were, and the result.
+  const Answer watched = run({"watch", id});
+  EXPECT_EQ(watched.status, 0);
+  EXPECT_NE(watched.err.find("\nbuild "), std::string::npos) << watched.err;
+  EXPECT_NE(watched.out.find(report["sha256"].get<std::string>()), std::string::npos);
+}
+
+// The same file is sent once; of one that the server has a part of, the rest is sent.
+TEST_F(Client, UploadsWhatIsMissing) {
+  const std::string scene = contents("m.glb");
+  const Json job = run_json({"submit", "m.glb", "-r", "64"});
+  const std::string name = job["scene"][0];
+  EXPECT_EQ(name.substr(0, 2), "m-");
+  EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), scene.size());
+  run_json({"submit", "m.glb", "-r", "32", "--wait"});
+  EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), scene.size());
+
+  ASSERT_EQ(run({"watch", job["id"]}).status, 0);
+  ASSERT_EQ(http().send("DELETE", "/api/v1/scenes/" + name, "").status, 204);
+  const size_t half = scene.size() / 2;
+  const auto part =
+      http().upload("/api/v1/scenes/" + name, half,
+                    [&](uint64_t offset, uint64_t most) {
+                      return scene.substr(offset, std::min<uint64_t>(most, half - offset));
+                    },
+                    {{"Content-Range",
+                      "bytes 0-" + std::to_string(half - 1) + "/" + std::to_string(scene.size())}});
+  ASSERT_EQ(part.status, 202) << part.body;
+  run_json({"submit", "m.glb", "-r", "16", "--wait"});
+  EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), 2 * scene.size());
+}
+
+// A download goes on from what an earlier one left, and never passes off other bytes as the result.
+TEST_F(Client, DownloadsTheRest) {
+  const Json job = run_json({"submit", "m.glb", "-r", "128", "--wait"});
+  const std::string id = job["id"], sha256 = job["result"]["sha256"];
+  const std::string partial = "got.vdag." + sha256.substr(0, 12) + ".partial";
+  ASSERT_EQ(run({"download", id, "-o", "whole.vdag"}).status, 0);
+  const std::string whole = contents("whole.vdag");
+
+  put(partial, whole.substr(0, whole.size() / 2));
+  const Json report = run_json({"download", id, "-o", "got.vdag"});
+  EXPECT_EQ(report["resumed_at"], whole.size() / 2);
+  EXPECT_TRUE(contents("got.vdag") == whole);
+  EXPECT_FALSE(exists(partial));
+
+  std::filesystem::remove(folder_.file("got.vdag"));
+  put(partial, std::string(100, 'x'));
+  expect_error(4, sha256, {"download", id, "-o", "got.vdag"});
+  EXPECT_FALSE(exists("got.vdag"));
+  EXPECT_FALSE(exists(partial));
+  ASSERT_EQ(run({"download", id, "-o", "got.vdag"}).status, 0);
+  EXPECT_TRUE(contents("got.vdag") == whole);
+}
+
+// Jobs in the queue behind a long one can be suspended, canceled and gone on with.
+TEST_F(Client, SuspendsCancelsAndResumes) {
+  const std::string first = submit_long();
+  const std::string kept = submit("64"), dropped = submit("32");
+  EXPECT_EQ(run({"suspend", kept}).status, 0);
+  EXPECT_EQ(state(kept), "suspended");
+  expect_error(3, "suspended", {"download", kept, "-o", "x.vdag"});
+  EXPECT_EQ(run({"cancel", dropped}).status, 0);
+  EXPECT_EQ(state(dropped), "canceled");
+  EXPECT_EQ(run({"watch", dropped}).status, 130);
+  EXPECT_EQ(run_json({"resume", kept})["state"], "queued");
+  EXPECT_EQ(run_json({"resume", dropped})["state"], "queued");
+  EXPECT_EQ(run({"cancel", first}).status, 0);
+  expect_state_in_the_end(first, "canceled");
+  for (const std::string& id : {kept, dropped}) EXPECT_EQ(run({"watch", id}).status, 0);
+}
+
+// A watcher does not mind that the server restarts; the job goes on too.
+TEST_F(Client, WatchesOverARestart) {
+  const std::string first = submit_long(), id = submit("64");
+  const std::string url = server_->url();
+  const pid_t watcher = start({"watch", id, "--json"});
+  while (contents(".stderr").find("queued") == std::string::npos)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(server_->stop(), 0);
+  start_server({}, url.substr(url.rfind(':') + 1));
+  if (server_->url().empty()) {
+    kill(watcher, SIGINT);
+    wait_for(watcher);
+    GTEST_SKIP() << "somebody else took the port meanwhile: " << server_->log();
+  }
+  http().send("POST", "/api/v1/jobs/" + first + "/cancel", "");
+  const Answer answer = wait_for(watcher);
+  EXPECT_EQ(answer.status, 0) << answer.err;
+  EXPECT_EQ(Json::parse(answer.out)["state"], "succeeded");
+}
+
+// Errors come with the statuses of docs/errors.md.
+TEST_F(Client, SaysWhatIsWrong) {
+  expect_error(3, "no ", {"watch", "0123456789abcdef"});
+  expect_error(2, "16 hex digits", {"cancel", "../scenes"});
+  expect_error(3, "none.glb", {"submit", "none.glb", "-r", "64"});
+  expect_error(2, "power of two", {"submit", "m.glb", "-r", "100"});
+  put("text.obj", "no scene");
+  expect_error(2, "text.obj", {"submit", "text.obj", "-r", "64"});
+  expect_error(2, "http://", {"jobs", "--server", "ftp://127.0.0.1"});
+  expect_error(6, "127.0.0.1:1", {"jobs", "--server", "http://127.0.0.1:1"});
+  unsetenv("VOXDAG_SERVER");
+  expect_error(2, "--server", {"jobs"});
+}
+
+// With tokens: none, one that may read, one that may submit.
+TEST_F(Client, CarriesAToken) {
+  std::string lines;
+  for (const std::string role : {"read", "submit"}) {
+    const Answer made = run({"token", "--role", role, "--name", "anna"});
+    ASSERT_EQ(made.status, 0) << made.err;
+    lines += made.out;
+    put(role, made.err.substr(made.err.rfind(' ') + 1));
+  }
+  put("tokens", lines);
+  ASSERT_EQ(server_->stop(), 0);
+  start_server({"--tokens", folder_.file("tokens")});
+  ASSERT_NE(server_->url(), "") << server_->log();
+  expect_error(2, "unauthorized", {"jobs"});
+  expect_error(3, "missing", {"jobs", "--token-file", "missing"});
+  EXPECT_EQ(run({"jobs", "--token-file", "read"}).status, 0);
+  expect_error(2, "forbidden", {"submit", "/m.glb", "-r", "64", "--token-file", "read"});
+  const Answer answer = run({"submit", "m.glb", "-r", "64", "--token-file", "submit", "--wait"});
+  EXPECT_EQ(answer.status, 0) << answer.err;
+}
+
+}  // namespace
+}  // namespace command_line

@@ -1,0 +1,35 @@
+// A `voxdag serve` of a test's own, on a free port of the loopback.
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+#include <vector>
+
+namespace command_line {
+
+// Starts in the constructor, listening when it returns; stops in the destructor at the latest.
+class ServeProcess {
+ public:
+  // Keeps its data and its log in `folder`.
+  explicit ServeProcess(const std::string& folder, const std::vector<std::string>& more = {},
+                        const std::string& port = "0");
+  ~ServeProcess();
+  ServeProcess(const ServeProcess&) = delete;
+  ServeProcess& operator=(const ServeProcess&) = delete;
+
+  const std::string& url() const { return url_; }  // "" if it did not start
+  // SIGTERM; its exit status.
+  int stop();
+  std::string log() const;
+
+ private:
+  void wait_until_it_listens();
+  bool is_running();
+
+  const std::string log_path_;
+  pid_t pid_ = 0;
+  std::string url_;
+};
+
+}  // namespace command_line
