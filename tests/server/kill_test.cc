@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <map>
 #include <random>
 
 #include "core/base/clock.h"
@@ -117,7 +118,9 @@ TEST_F(KilledService, FinishesEveryJobInTheEnd) {
     usleep(static_cast<useconds_t>(pause_us(random)));
     ASSERT_EQ(end(SIGKILL), -SIGKILL);
     start();
+    if (state(jobs_.back().id) == "succeeded") post_jobs();  // always some to interrupt
   }
+  std::map<int, std::string> expected;  // SHA-256 by resolution
   for (const auto& [id, resolution] : jobs_) {
     SCOPED_TRACE("resolution " + std::to_string(resolution));
     const double deadline = wall_seconds() + kPatience_s;
@@ -126,9 +129,14 @@ TEST_F(KilledService, FinishesEveryJobInTheEnd) {
     const Json job = Json::parse(http_->get("/api/v1/jobs/" + id).body);
     ASSERT_EQ(job["state"], "succeeded") << job.dump(2);
     EXPECT_EQ(job["attempts"], 1) << "an end of the service is no failure of the job";
-    const std::string by_hand = folder_.file("by-hand.vdag");
-    run("build " + folder_.file("s.glb") + " -r " + std::to_string(resolution) + " -o " + by_hand);
-    EXPECT_EQ(job["result"]["sha256"], sha256_hex(contents(by_hand)));
+    std::string& sha256 = expected[resolution];
+    if (sha256.empty()) {
+      const std::string by_hand = folder_.file("by-hand.vdag");
+      run("build " + folder_.file("s.glb") + " -r " + std::to_string(resolution) + " -o " +
+          by_hand);
+      sha256 = sha256_hex(contents(by_hand));
+    }
+    EXPECT_EQ(job["result"]["sha256"], sha256);
     EXPECT_EQ(sha256_hex(http_->get("/api/v1/jobs/" + id + "/dag").body), job["result"]["sha256"]);
   }
 }
