@@ -79,13 +79,14 @@ JobFilter filter_of(const Call& call) {
   filter.limit = call.query_count("limit", filter.limit, 1, kMostListed);
   filter.before =
       static_cast<int64_t>(call.query_count("cursor", INT64_MAX, 1, uint64_t{INT64_MAX}));
-  std::string states = call.query("state");
-  while (!states.empty()) {
-    const size_t comma = std::min(states.find(','), states.size());
-    const auto state = parse_state(std::string_view(states).substr(0, comma));
+  if (!call.request.target.query.contains("state")) return filter;
+  const std::string states = call.query("state");
+  for (size_t begin = 0; begin <= states.size();) {
+    const size_t end = std::min(states.find(',', begin), states.size());
+    const auto state = parse_state(std::string_view(states).substr(begin, end - begin));
     if (!state) throw bad_request("'state': expected states of jobs, with commas between them");
     filter.states.push_back(*state);
-    states.erase(0, comma + 1);
+    begin = end + 1;
   }
   return filter;
 }
@@ -115,11 +116,10 @@ Response patch_job(Context& context, Call& call) {
   call.allow_query({});
   const auto body = nlohmann::json::parse(
       read_json_body(call.request, context.config.transfers.body_bytes), nullptr, false);
-  if (!body.is_object() || body.size() != 1 || !body.contains("priority") ||
-      !body["priority"].is_number_integer() || body["priority"] > 100 || body["priority"] < -100)
-    throw bad_request("expected {\"priority\": N} with N from -100 to 100");
-  const Job job = context.queue.change(call.names[0],
-                                       [&](Job& j) { j.priority = body["priority"].get<int>(); });
+  if (!body.is_object() || body.size() != 1 || !body.contains("priority"))
+    throw bad_request("expected {\"priority\": N}");
+  const int priority = parse_priority(body["priority"].dump());
+  const Job job = context.queue.change(call.names[0], [&](Job& j) { j.priority = priority; });
   return json_response(200, describe(context, job));
 }
 

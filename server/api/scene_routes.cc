@@ -105,6 +105,7 @@ Response put_scene(Context& context, Call& call) {
   const auto slot = context.transfers.take();
   if (!slot) throw busy("too many transfers at a time", 5);
   const Part part = part_of(call.request);
+  if (!call.request.has_body) throw bad_request("expected the scene's bytes as body");
   check_room(context, part);
   check_unused(context, name);
   const std::string part_digest = parse_digest_field(call.request.header("Content-Digest"));
@@ -132,7 +133,10 @@ Response put_scene(Context& context, Call& call) {
 Response list_scenes(Context& context, Call& call) {
   call.allow_query({"limit", "cursor"});
   const size_t limit = call.query_count("limit", kStandardListed, 1, kMostListed);
-  auto scenes = context.scenes.list(call.query("cursor"), limit + 1);
+  const std::string cursor = call.query("cursor");
+  if (call.request.target.query.contains("cursor") && !is_scene_name(cursor))
+    throw bad_request("'cursor': expected a next_cursor");
+  auto scenes = context.scenes.list(cursor, limit + 1);
   nlohmann::ordered_json json = {{"scenes", nlohmann::ordered_json::array()},
                                  {"next_cursor", nullptr}};
   if (scenes.size() > limit) {

@@ -86,6 +86,14 @@ class HttpServer::Engine : private httplib::Server {
     Put("/", with_body);
     Patch("/", with_body);
     Delete("/", with_body);
+    // Methods that httplib knows and nobody asks for with good intent: TRACE, CONNECT.
+    set_pre_routing_handler([this](const auto& raw, auto& out) {
+      if (std::string_view("GET HEAD POST PUT PATCH DELETE OPTIONS").find(raw.method) !=
+          std::string_view::npos)
+        return HandlerResponse::Unhandled;
+      answer(raw, out, nullptr);
+      return HandlerResponse::Handled;
+    });
     set_error_handler([](const httplib::Request&, httplib::Response& out) {
       if (out.body.empty() && !out.content_provider_) t_exchange->refuse(out);
     });

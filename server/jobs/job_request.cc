@@ -19,8 +19,9 @@ using nlohmann::ordered_json;
 constexpr size_t kMostScenes = 64;
 constexpr size_t kLongestText = 4096;
 constexpr size_t kLongestName = 200;
-constexpr uint64_t kLeastSubvolume = 64;
-constexpr uint64_t kLargestResolution = uint64_t{1} << 20;
+constexpr int64_t kLeastSubvolume = 64;
+constexpr int64_t kLargestResolution = int64_t{1} << 20;
+constexpr int64_t kHighestPriority = 100;
 
 [[noreturn]] void fail(const std::string& member, const std::string& expected) {
   throw bad_request("'" + member + "': expected " + expected);
@@ -53,19 +54,30 @@ double number_of(const ordered_json& value, const std::string& member) {
   return value.get<double>();
 }
 
-// A whole number from `least` to `most`.
-uint64_t count_of(const ordered_json& value, const std::string& member, uint64_t least,
-                  uint64_t most) {
-  const std::string expected =
-      "a whole number from " + std::to_string(least) + " to " + std::to_string(most);
-  if (!value.is_number_integer() || (!value.is_number_unsigned() && value.get<int64_t>() < 0))
-    fail(member, expected);
-  const uint64_t count = value.get<uint64_t>();
-  if (count < least || count > most) fail(member, expected);
-  return count;
+// A whole number from `least` to `most`; 64.0 is one, too.
+int64_t whole_of(const ordered_json& value, const std::string& member, int64_t least,
+                 int64_t most) {
+  constexpr double kExact = 0x1p53;
+  const bool is_whole = value.is_number_unsigned() ? value.get<uint64_t>() <= INT64_MAX
+                        : value.is_number_float()
+                            ? std::abs(value.get<double>()) <= kExact &&
+                                  value.get<double>() == std::floor(value.get<double>())
+                            : value.is_number_integer();
+  if (!is_whole || value.get<int64_t>() < least || value.get<int64_t>() > most)
+    fail(member, "a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+  return value.get<int64_t>();
 }
 
-uint64_t power_of_two(const ordered_json& value, const std::string& member, uint64_t least) {
+uint64_t count_of(const ordered_json& value, const std::string& member, int64_t least,
+                  int64_t most) {
+  return static_cast<uint64_t>(whole_of(value, member, least, most));
+}
+
+int priority_of(const ordered_json& value) {
+  return static_cast<int>(whole_of(value, "priority", -kHighestPriority, kHighestPriority));
+}
+
+uint64_t power_of_two(const ordered_json& value, const std::string& member, int64_t least) {
   const uint64_t count = count_of(value, member, least, kLargestResolution);
   if (!std::has_single_bit(count)) fail(member, "a power of two");
   return count;
@@ -145,6 +157,10 @@ void take_options(const ordered_json& options, BuildSpec& spec) {
 
 }  // namespace
 
+int parse_priority(std::string_view number) {
+  return priority_of(ordered_json::parse(number, nullptr, false));
+}
+
 JobRequest parse_job_request(std::string_view body) {
   const auto json = ordered_json::parse(body, nullptr, false);
   if (json.is_discarded()) throw bad_request("the body is not JSON");
@@ -159,11 +175,7 @@ JobRequest parse_job_request(std::string_view body) {
           request.name = text_of(v, "name");
           if (request.name.size() > kLongestName) fail("name", "at most 200 bytes");
         }},
-       {"priority",
-        [&](const auto& v) {
-          if (!v.is_number_integer() || v > 100 || v < -100) fail("priority", "-100 to 100");
-          request.priority = v.template get<int>();
-        }},
+       {"priority", [&](const auto& v) { request.priority = priority_of(v); }},
        {"options", [&](const auto& v) { take_options(v, request.spec); }}});
   if (request.scenes.empty()) fail("scene", "a scene");
   if (resolution == 0) fail("resolution", "voxels an edge");

@@ -21,5 +21,7 @@ struct JobRequest {
 // Throws Problem (400) naming the member that is unknown, missing or has a wrong value, and (422)
 // for limits of the format.
 JobRequest parse_job_request(std::string_view body);
+// Of a JSON number. Throws Problem (400).
+int parse_priority(std::string_view number);
 
 }  // namespace voxdag::server

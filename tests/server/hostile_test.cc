@@ -25,7 +25,7 @@ TEST_F(Hostile, BrokenRequestsAreRefused) {
   EXPECT_EQ(status("hello\r\n\r\n"), 400);
   EXPECT_EQ(status("GET /healthz\r\n\r\n"), 400);
   EXPECT_EQ(status("GET /%zz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
-  EXPECT_EQ(status("TRACE / HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
+  EXPECT_EQ(status("TRACE / HTTP/1.1\r\nHost: localhost\r\n\r\n"), 405);
   EXPECT_EQ(status("POST /api/v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n"
                    "Content-Length: 6\r\n\r\nhello"),
             400);
