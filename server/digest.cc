@@ -53,7 +53,7 @@ std::string parse_digest_field(const std::string& header) {
     }
     return hex;
   }
-  return "";
+  throw bad_request("a digest has no sha-256: expected sha-256=:BASE64:");
 }
 
 }  // namespace voxdag::server

@@ -57,9 +57,9 @@ Response post_job(Context& context, Call& call) {
     throw bad_request("'dry_run': expected true or false");
   const JobRequest request =
       parse_job_request(read_json_body(call.request, context.config.transfers.body_bytes));
+  const IdempotencyKey key = key_of(call.request, request);
   if (dry == "true") return dry_run(context, request);
   if (context.draining) throw busy("the service is stopping");
-  const IdempotencyKey key = key_of(call.request, request);
   std::lock_guard lock(context.scene_use);
   if (const auto known = context.queue.find_by_key(key)) return accepted(context, *known, true);
   context.tasks.make(request, Task::Kind::kBuild);  // says what cannot be done

@@ -99,6 +99,12 @@ BodyEnd receive(Context& context, Call& call, const Part& part, Upload& upload) 
   return end;
 }
 
+// "" if the header is not there.
+std::string digest_of(const Request& request, const char* name) {
+  const auto found = request.headers.find(name);
+  return found == request.headers.end() ? "" : parse_digest_field(found->second);
+}
+
 Response put_scene(Context& context, Call& call) {
   call.allow_query({});
   const std::string name = checked_name(call);
@@ -108,8 +114,8 @@ Response put_scene(Context& context, Call& call) {
   if (!call.request.has_body) throw bad_request("expected the scene's bytes as body");
   check_room(context, part);
   check_unused(context, name);
-  const std::string part_digest = parse_digest_field(call.request.header("Content-Digest"));
-  const std::string whole_digest = parse_digest_field(call.request.header("Repr-Digest"));
+  const std::string part_digest = digest_of(call.request, "Content-Digest");
+  const std::string whole_digest = digest_of(call.request, "Repr-Digest");
   Upload upload(context.scenes, name, part.first, part.total);
   switch (receive(context, call, part, upload)) {
     case BodyEnd::kWhole:
