@@ -1,6 +1,7 @@
 #include "scheduler/journal.h"
 
 #include "core/base/clock.h"
+#include "core/base/error.h"
 
 namespace voxdag {
 namespace {
@@ -18,10 +19,28 @@ void Journal::built(const StoredSubvolume& subvolume) {
 
 void Journal::commit() {
   if (pending_.empty()) return;
-  segment_.sync();
+  try {
+    segment_.sync();
+  } catch (const Error&) {
+    salvage();
+    throw;
+  }
   store_.record_built(pending_);
   pending_.clear();
   last_commit_s_ = wall_seconds();
+}
+
+void Journal::salvage() {
+  try {
+    segment_.sync_written();
+    std::erase_if(pending_, [&](const StoredSubvolume& s) {
+      return s.artifact.offset + s.artifact.bytes > segment_.written();
+    });
+    store_.record_built(pending_);
+  } catch (const Error&) {
+    // Then they are built again.
+  }
+  pending_.clear();
 }
 
 }  // namespace voxdag

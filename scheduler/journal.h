@@ -19,6 +19,9 @@ class Journal {
   void commit();
 
  private:
+  // The disk is full: what it did take is made durable and recorded.
+  void salvage();
+
   JobStore& store_;
   SegmentWriter& segment_;
   std::vector<StoredSubvolume> pending_;

@@ -72,6 +72,9 @@ class SegmentWriter {
   void flush();
   // Writes the buffer out and returns once all bytes so far, and the file's name, are on the disk.
   void sync();
+  // The same for what is out of the buffer already, which are the first written() bytes.
+  void sync_written();
+  uint64_t written() const { return written_; }
 
  private:
   friend class ArtifactWriter;

@@ -79,6 +79,30 @@ TEST_F(CrashTest, DiskFullOrBroken) {
   }
 }
 
+// A disk that fills up while subvolumes are built keeps what it did take.
+TEST_F(CrashTest, AFullDiskLosesNothingThatItTook) {
+  voxdag::GenerateOptions options;
+  options.kind = voxdag::SceneKind::kSoup;
+  options.triangles = 20000;
+  voxdag::NoProgress progress;
+  voxdag::CancelToken cancel;
+  voxdag::generate_scene(voxdag::system_files(), folder_.file("scene.glb"), options, progress,
+                         cancel);
+  BuildSpec one = spec();
+  one.geometry.resolution = 2048;
+  one.run.threads = 1;
+  FaultyFiles counting({});
+  const BuildReport whole = build(one, counting);
+  ASSERT_GT(whole.artifact_bytes, uint64_t{4} << 20) << "fewer than four writes of a segment";
+  std::filesystem::remove(output());
+  // Five operations come before the segment's first MiB; the fourth MiB fails.
+  FaultyFiles files({Fault::kNoSpace, 9});
+  EXPECT_THROW(build(one, files), voxdag::Error);
+  const BuildReport report = build(one, voxdag::system_files());
+  EXPECT_GT(report.subvolumes_reused, 0u);
+  EXPECT_EQ(report.sha256, whole.sha256);
+}
+
 // Reads that fail are errors that name no artifact as damaged: nothing is thrown away for them.
 TEST_F(CrashTest, ReadsThatFail) {
   FaultyFiles counting({});

@@ -26,13 +26,13 @@ class FaultyWriter : public voxdag::WritableFile {
       : files_(files), file_(std::move(file)) {}
   const std::string& path() const override { return file_->path(); }
   void write_at(uint64_t offset, std::span<const std::byte> data) override {
-    files_.operate([&] { file_->write_at(offset, data); },
-                   [&] { file_->write_at(offset, data.first(data.size() / 2)); },
-                   [&] {
-                     std::vector<std::byte> changed(data.begin(), data.end());
-                     if (!changed.empty()) changed[changed.size() * 2 / 3] ^= std::byte{8};
-                     file_->write_at(offset, changed);
-                   });
+    files_.write([&] { file_->write_at(offset, data); },
+                 [&] { file_->write_at(offset, data.first(data.size() / 2)); },
+                 [&] {
+                   std::vector<std::byte> changed(data.begin(), data.end());
+                   if (!changed.empty()) changed[changed.size() * 2 / 3] ^= std::byte{8};
+                   file_->write_at(offset, changed);
+                 });
   }
   void sync() override {
     files_.operate([&] {
@@ -65,24 +65,29 @@ class FaultyReader : public voxdag::ReadableFile {
   std::unique_ptr<voxdag::ReadableFile> file_;
 };
 
-template <class Operation, class Half, class Flipped>
-void FaultyFiles::operate(const Operation& operation, const Half& half, const Flipped& flipped) {
+template <class Operation>
+void FaultyFiles::operate(const Operation& operation) {
   const uint64_t number = ++operations_;
   const bool now = number == plan_.at;
   if (now && plan_.fault == Fault::kPowerCut) cut_power();
   if (now && plan_.fault == Fault::kKillBefore) raise(SIGKILL);
-  const bool failing = plan_.at > 0 && number >= plan_.at;
-  if (failing && plan_.fault == Fault::kNoSpace) {
-    half();
-    throw Error(ErrorCode::kNoSpace, "the test's disk is full");
-  }
-  if (failing && plan_.fault == Fault::kIoError) {
-    half();
+  if (plan_.fault == Fault::kIoError && number >= plan_.at)
     throw Error(ErrorCode::kIo, "the test's disk is broken");
-  }
-  if (now && plan_.fault == Fault::kFlipBit) return flipped();
   operation();
   if (now && plan_.fault == Fault::kKillAfter) raise(SIGKILL);
+}
+
+template <class Operation, class Half, class Flipped>
+void FaultyFiles::write(const Operation& operation, const Half& half, const Flipped& flipped) {
+  const uint64_t number = operations_ + 1;
+  const bool failing = plan_.at > 0 && number >= plan_.at;
+  if (failing && (plan_.fault == Fault::kNoSpace || plan_.fault == Fault::kIoError)) half();
+  operate([&] {
+    if (failing && plan_.fault == Fault::kNoSpace)
+      throw Error(ErrorCode::kNoSpace, "the test's disk is full");
+    if (number == plan_.at && plan_.fault == Fault::kFlipBit) return flipped();
+    operation();
+  });
 }
 
 void FaultyFiles::read() {

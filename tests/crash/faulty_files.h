@@ -22,8 +22,8 @@ enum class Fault {
   kKillBefore,  // SIGKILL instead of the operation
   kKillAfter,   // SIGKILL once it is done
   kPowerCut,    // all that was not synced is forgotten, then SIGKILL
-  kNoSpace,     // this and all later operations fail with Error{kNoSpace}; a write is half done
-  kIoError,     // the same with Error{kIo}
+  kNoSpace,     // this write and all later ones are half done and fail with Error{kNoSpace}
+  kIoError,     // this and all later operations fail with Error{kIo}; a write is half done
   kFlipBit,     // if it is a write, one bit of it lands on the disk flipped
   kReadError,   // this read and all later ones fail with Error{kIo}
 };
@@ -60,15 +60,12 @@ class FaultyFiles : public voxdag::FileSystem {
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
-  // Runs one operation, or what the plan has in its place: `half` is what a write does that the
-  // disk gives up on, `flipped` one that it gets wrong.
-  template <class Operation, class Half, class Flipped>
-  void operate(const Operation& operation, const Half& half, const Flipped& flipped);
+  // Runs one operation, or what the plan has in its place.
   template <class Operation>
-  void operate(const Operation& operation) {
-    operate(
-        operation, [] {}, operation);
-  }
+  void operate(const Operation& operation);
+  // Runs a write: `half` is one that the disk gives up on, `flipped` one that it gets wrong.
+  template <class Operation, class Half, class Flipped>
+  void write(const Operation& operation, const Half& half, const Flipped& flipped);
   void read();
   // Files back to what was synced of them, names to what was synced of their folders; SIGKILL.
   void cut_power();
