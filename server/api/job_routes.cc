@@ -53,7 +53,7 @@ Response accepted(Context& context, const Job& job, bool replayed) {
 Response post_job(Context& context, Call& call) {
   call.allow_query({"dry_run"});
   const std::string dry = call.query("dry_run");
-  if (!dry.empty() && dry != "true" && dry != "false")
+  if (call.request.target.query.contains("dry_run") && dry != "true" && dry != "false")
     throw bad_request("'dry_run': expected true or false");
   const JobRequest request =
       parse_job_request(read_json_body(call.request, context.config.transfers.body_bytes));

@@ -1,5 +1,6 @@
 #include "server/jobs/job_request.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <functional>
@@ -34,6 +35,13 @@ std::string text_of(const ordered_json& value, const std::string& member) {
   for (const char c : text)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) fail(member, "no control characters");
   return text;
+}
+
+// UTF-8's continuation bytes count with what they continue.
+size_t characters_of(const std::string& text) {
+  return static_cast<size_t>(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xc0) != 0x80;
+  }));
 }
 
 std::vector<std::string> texts_of(const ordered_json& value, const std::string& member) {
@@ -173,7 +181,7 @@ JobRequest parse_job_request(std::string_view body) {
        {"name",
         [&](const auto& v) {
           request.name = text_of(v, "name");
-          if (request.name.size() > kLongestName) fail("name", "at most 200 bytes");
+          if (characters_of(request.name) > kLongestName) fail("name", "at most 200 characters");
         }},
        {"priority", [&](const auto& v) { request.priority = priority_of(v); }},
        {"options", [&](const auto& v) { take_options(v, request.spec); }}});
