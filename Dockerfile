@@ -1,6 +1,8 @@
 # voxdag in a container, on the CPU:
 #     docker build -t voxdag .
 #     docker run --rm -v "$PWD:/data" --user "$(id -u):$(id -g)" voxdag build scene.glb -r 4096 -o scene.vdag
+# or as the service, with tokens made by `voxdag token` (docs/operating.md):
+#     docker run -d -p 127.0.0.1:8080:8080 -v voxdag:/data -v "$PWD/tokens:/tokens:ro" voxdag
 # On a CUDA base (12 or later), which lets a build that finds nvcc use it:
 #     docker build --build-arg BUILD_BASE=nvidia/cuda:12.6.3-devel-ubuntu24.04 \
 #                  --build-arg RUN_BASE=nvidia/cuda:12.6.3-base-ubuntu24.04 -t voxdag:cuda .
@@ -32,5 +34,7 @@ RUN --mount=type=bind,from=build,source=/out,target=/out \
 COPY --from=build /out/voxdag /usr/local/bin/voxdag
 USER 10001
 WORKDIR /data
+EXPOSE 8080
 ENTRYPOINT ["voxdag"]
-CMD ["--help"]
+# The network is behind that address, so tokens are needed: docs/operating.md.
+CMD ["serve", "--listen", "0.0.0.0", "--data", "/data", "--tokens", "/tokens"]
