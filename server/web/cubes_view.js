@@ -1,5 +1,5 @@
-// The occupied subvolumes as small cubes seen from a corner of the grid: outlines while they wait,
-// solid when they are built, bright for a moment after.
+// The occupied subvolumes as small cubes seen from a corner of the grid. Those that wait are a faint
+// shell of glass; those that are built stand in it, solid, and bright for a moment after.
 
 import {get_json} from "./api.js";
 import {h, set_text} from "./dom.js";
@@ -10,6 +10,7 @@ const kMargin = 10;
 const kCos = Math.cos(Math.PI / 6), kSin = 0.5;
 const kGlow_ms = 900;
 const kOutlineLimit_px = 5;  // smaller cubes show no outlines
+const kGlowLimit = 6000;     // more cubes than that do not glow: each frame draws them all
 const kSoonest_ms = 1000;    // between two looks
 
 export class CubesView {
@@ -67,7 +68,7 @@ export class CubesView {
       const key = `${x} ${y} ${z} ${edge}`;
       const old = before.get(key);
       const lit_at = !is_built ? null : !old ? -Infinity : old.lit_at ?? now;
-      return {key, x, y, z, edge, lit_at};
+      return {key, x, y, z, edge, lit_at, faces: {}};
     });
     this.show_emptiness(this.cubes.length === 0);
     this.order();
@@ -102,6 +103,13 @@ export class CubesView {
       cube.rank = morton(...cube.at.map((c) => Math.floor(c / least)));
     }
     this.cubes.sort((a, b) => a.rank - b.rank);
+    // Faces that look at another cube of the same size are not seen.
+    const here = new Set(this.cubes.map((cube) => `${cube.at} ${cube.edge}`));
+    for (const {at: [x, y, z], edge, faces} of this.cubes) {
+      faces.top = !here.has(`${[x, y + edge, z]} ${edge}`);
+      faces.left = !here.has(`${[x, y, z + edge]} ${edge}`);
+      faces.right = !here.has(`${[x + edge, y, z]} ${edge}`);
+    }
   }
 
   draw() {
@@ -116,15 +124,18 @@ export class CubesView {
     const colors = this.colors();
     const size = (kHeight - 2 * kMargin) / 2 / this.resolution;  // pixels a voxel
     this.frame(pen, colors, size);
+    for (const cube of this.cubes)
+      if (cube.lit_at === null) this.draw_waiting(pen, colors, size, cube);
+    const glows = this.cubes.length <= kGlowLimit && !matchMedia("(prefers-reduced-motion: reduce)").matches;
     const now = performance.now();
     let glowing = false;
     for (const cube of this.cubes) {
-      const glow = cube.lit_at === null ? 0 : Math.max(0, 1 - (now - cube.lit_at) / kGlow_ms);
+      if (cube.lit_at === null) continue;
+      const glow = glows ? Math.max(0, 1 - (now - cube.lit_at) / kGlow_ms) : 0;
       glowing ||= glow > 0;
-      this.draw_cube(pen, colors, size, cube, glow);
+      this.draw_built(pen, colors, size, cube, glow);
     }
-    if (glowing && !matchMedia("(prefers-reduced-motion: reduce)").matches && !this.signal.aborted)
-      requestAnimationFrame(() => this.draw());
+    if (glowing && !this.signal.aborted) requestAnimationFrame(() => this.draw());
   }
 
   colors() {
@@ -153,22 +164,39 @@ export class CubesView {
     }
   }
 
-  draw_cube(pen, colors, size, {at: [x, y, z], edge, lit_at}, glow) {
+  // Calls paint(face) for each face that can be seen, its path begun.
+  each_face(pen, size, {at: [x, y, z], edge}, paint) {
     const p = (dx, dy, dz) => this.point(size, x + dx * edge, y + dy * edge, z + dz * edge);
-    const faces = [
-      ["top", [p(0, 1, 0), p(1, 1, 0), p(1, 1, 1), p(0, 1, 1)]],
-      ["left", [p(0, 0, 1), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)]],
-      ["right", [p(1, 0, 0), p(1, 0, 1), p(1, 1, 1), p(1, 1, 0)]],
-    ];
-    const built = lit_at !== null;
-    const outlined = edge * size >= kOutlineLimit_px;
-    pen.lineWidth = 0.75;
-    pen.strokeStyle = built ? colors.edge : colors.wait_edge;
-    for (const [face, points] of faces) {
+    const paths = {
+      top: [p(0, 1, 0), p(1, 1, 0), p(1, 1, 1), p(0, 1, 1)],
+      left: [p(0, 0, 1), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)],
+      right: [p(1, 0, 0), p(1, 0, 1), p(1, 1, 1), p(1, 1, 0)],
+    };
+    for (const [face, points] of Object.entries(paths)) {
       pen.beginPath();
       points.forEach((point) => pen.lineTo(...point));
       pen.closePath();
-      pen.fillStyle = built ? colors[face] : colors.wait;
+      paint(face);
+    }
+  }
+
+  draw_waiting(pen, colors, size, cube) {
+    const outlined = cube.edge * size >= kOutlineLimit_px;
+    pen.lineWidth = 0.75;
+    pen.strokeStyle = colors.wait_edge;
+    pen.fillStyle = colors.wait;
+    this.each_face(pen, size, cube, (face) => {
+      if (!cube.faces[face]) return;
+      pen.fill();
+      if (outlined) pen.stroke();
+    });
+  }
+
+  draw_built(pen, colors, size, cube, glow) {
+    pen.lineWidth = 0.75;
+    pen.strokeStyle = colors.edge;
+    this.each_face(pen, size, cube, (face) => {
+      pen.fillStyle = colors[face];
       pen.fill();
       if (glow > 0) {
         pen.globalAlpha = glow;
@@ -176,8 +204,8 @@ export class CubesView {
         pen.fill();
         pen.globalAlpha = 1;
       }
-      if (outlined) pen.stroke();
-    }
+      if (cube.edge * size >= kOutlineLimit_px) pen.stroke();
+    });
   }
 }
 

@@ -42,8 +42,9 @@ export function size_text(bytes) {
   return unit === 0 ? `${Math.round(bytes)} B` : `${three_digits(bytes)} ${units[unit]}`;
 }
 
-// 64 -> "1 m 04 s"
+// 64 -> "1 m 04 s", 0.046 -> "46 ms"
 export function duration_text(seconds) {
+  if (seconds > 0 && seconds < 0.9995) return `${Math.max(1, Math.round(1000 * seconds))} ms`;
   const whole = Math.round(seconds);
   const two = (n) => String(n).padStart(2, "0");
   if (whole >= 86400) return `${Math.floor(whole / 86400)} d ${two(Math.floor(whole / 3600) % 24)} h`;

@@ -91,7 +91,7 @@ class JobPage {
       document.title = `${state_text(job.state)} · ${title_text(job)} · voxdag`;
     }
     this.show_head();
-    clear(this.places.actions, actions(job, () => this.reload()));
+    if (changed) this.show_actions();
     clear(this.places.trouble, trouble_box(job));
     clear(this.places.warnings, job.warnings.length > 0 && h("ul", {class: "notice"},
       job.warnings.map((text) => h("li", {}, text))));
@@ -149,6 +149,13 @@ class JobPage {
       fact("Posted", ...when(job.created_at)),
       fact("Started", ...when(job.started_at)),
       fact("Ended", ...when(job.finished_at)));
+  }
+
+  // Buttons come and go with the state; whoever pressed one by keyboard stays among them.
+  show_actions() {
+    const had_focus = this.places.actions.contains(document.activeElement);
+    clear(this.places.actions, actions(this.job, () => this.reload()));
+    if (had_focus) this.places.actions.querySelector("button, a")?.focus();
   }
 
   show_link(status, problem) {

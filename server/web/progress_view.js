@@ -33,11 +33,15 @@ export class ProgressView {
     update_job_meter(this.bar, job);
     set_text(this.stage, headline(job));
     const part = done_part(p);
-    set_text(this.percent, part === null || job.state === "queued" ? "" : `${Math.floor(100 * part)} %`);
+    set_text(this.percent, part === null || job.state === "queued" ? "" : percent_text(part));
     set_text(this.detail, detail_text(job));
     this.figures.hidden = !p;
     if (p) for (const [key, , text] of kFigures) set_text(this.values[key], text(p));
   }
+}
+
+function percent_text(part) {
+  return part > 0 && part < 0.1 ? `${(Math.floor(1000 * part) / 10).toFixed(1)} %` : `${Math.floor(100 * part)} %`;
 }
 
 function headline(job) {

@@ -69,6 +69,6 @@ function levels_table(job) {
   });
   return h("div", {class: "scroll", tabindex: "0", role: "region", "aria-labelledby": "levels-title"}, h("table", {},
     h("thead", {}, h("tr", {}, h("th", {scope: "col"}, "Level"), h("th", {scope: "col", class: "number"}, "Cubes of"),
-      h("th", {scope: "col", class: "number"}, "Nodes"), h("td", {}), h("th", {scope: "col", class: "number"}, "Bytes"))),
+      h("th", {scope: "col", class: "number"}, "Nodes"), h("td", {class: "bar-cell"}), h("th", {scope: "col", class: "number"}, "Bytes"))),
     h("tbody", {}, rows)));
 }
