@@ -1,0 +1,157 @@
+#include <algorithm>
+#include <set>
+#include <string>
+#include <tuple>
+
+#include "core/base/error.h"
+#include "merge/merger.h"
+
+namespace voxdag {
+namespace {
+
+// Giving back less at a time costs more than it is worth.
+constexpr uint64_t kLeastReleasedBytes = uint64_t{32} << 10;
+
+std::tuple<uint32_t, uint32_t, uint32_t, uint32_t> key_of(const Cube& cube) {
+  return {cube.level, cube.position[0], cube.position[1], cube.position[2]};
+}
+
+// A state that these speak of cannot be gone on with; other errors say nothing of it.
+bool speaks_of_damage(const Error& error) {
+  return error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kNotFound ||
+         error.code() == ErrorCode::kUnsupportedVersion;
+}
+
+}  // namespace
+
+void Merger::restore(GlobalFileWriter& out) {
+  try {
+    const std::optional<MergeState> state = journal_.load();
+    if (state) go_on_from(*state, out);
+  } catch (const Error& error) {
+    if (!speaks_of_damage(error)) throw;
+    seams_.progress.warn("the merge starts over: " + error.message());
+    journal_.forget();
+    segments_.clear();
+    progress_ = {};
+    survey(inputs_.artifacts);
+  }
+  std::set<std::string> named;
+  for (const auto& path : journal_.named()) named.insert(path->name());
+  seams_.scratch.remove_all_but(named);
+}
+
+void Merger::go_on_from(const MergeState& state, GlobalFileWriter& out) {
+  if (state.inputs != inputs_checksum_)
+    throw Error(ErrorCode::kCorrupt, "its subvolumes are not those that it began with");
+  seams_.scratch.set_next_id(state.next_scratch_id);
+  for (const ArtifactRef& ref : state.merged) {
+    auto& segment = segments_[ref.segment];
+    if (segment) continue;
+    segment = std::make_unique<RoundSegment>(seams_.scratch, ref.segment);
+    journal_.add_named(segment->path());
+  }
+  replace_inputs(state.merged);
+  if (state.last_round) go_on_in_last_round(*state.last_round, out);
+  seams_.report = state.report;
+  rows_before_ = state.report.input_nodes;
+}
+
+void Merger::replace_inputs(const std::vector<ArtifactRef>& merged) {
+  if (merged.empty()) return;
+  std::set<std::tuple<uint32_t, uint32_t, uint32_t, uint32_t>> held;
+  const std::vector<SurveyedArtifact> inputs = std::move(artifacts_);
+  survey(merged);
+  for (const SurveyedArtifact& artifact : artifacts_)
+    for (const Cube& cube : artifact.cubes) held.insert(key_of(cube));
+  std::vector<ArtifactRef> refs = merged;
+  for (const SurveyedArtifact& input : inputs)
+    if (!held.contains(key_of(input.cubes[0]))) refs.push_back(input.ref);
+  survey(refs);
+}
+
+void Merger::go_on_in_last_round(const LastRoundState& state, GlobalFileWriter& out) {
+  if (state.output != out.path())
+    throw Error(ErrorCode::kInvalidInput, "the merge that goes on has begun to write " +
+                                              state.output + ", not " + out.path() +
+                                              ": expected the same output, or --restart");
+  if (!fit_at_once())
+    throw Error(ErrorCode::kOutOfMemory,
+                "out of memory: the merge that goes on was begun with more: expected as much "
+                "memory as before (--memory), or --restart");
+  auto file = std::make_unique<ScratchFile>(seams_.scratch, state.map);
+  journal_.add_named(file->path());
+  uint64_t map_rows = 0;
+  for (const uint64_t rows : state.map_rows) map_rows += rows;
+  if (state.map_rows.size() != artifacts_.size() + 1 || map_rows != state.map.words)
+    throw Error(ErrorCode::kCorrupt, "its maps are not those of its subvolumes");
+  progress_.level = state.level;
+  progress_.maps.emplace(state.map_rows, std::move(file), seams_.plan.resident_bytes,
+                         seams_.budget);
+  progress_.placed = state.placed;
+  progress_.roots = state.roots;
+  out.go_on(state.levels);
+  last_round_begun_ = true;
+}
+
+MergeState Merger::state_of(std::vector<ArtifactRef> merged) const {
+  MergeState state;
+  state.inputs = inputs_checksum_;
+  state.next_scratch_id = seams_.scratch.next_id();
+  state.report = seams_.report;
+  state.merged = std::move(merged);
+  return state;
+}
+
+void Merger::save_round(RoundSegment& segment, std::vector<ArtifactRef> merged, size_t next) {
+  segment.writer().sync();
+  for (size_t i = next; i < artifacts_.size(); ++i)
+    if (is_round_segment(artifacts_[i].ref.segment)) merged.push_back(artifacts_[i].ref);
+  journal_.save(level_read(inputs_.grid_levels), state_of(std::move(merged)), segment_paths());
+}
+
+void Merger::save_level(const RoundProgress& progress, GlobalFileWriter& out) {
+  out.sync();
+  const auto map = progress.maps->synced_file(seams_.scratch);
+  seams_.scratch.files().sync_directory(seams_.scratch.path());
+  std::vector<ArtifactRef> merged;
+  for (const SurveyedArtifact& artifact : artifacts_)
+    if (is_round_segment(artifact.ref.segment)) merged.push_back(artifact.ref);
+  MergeState state = state_of(std::move(merged));
+  state.last_round = LastRoundState{
+      *progress.level,       out.path(),    {out.levels().begin(), out.levels().end()},
+      progress.maps->rows(), map->record(), progress.placed,
+      progress.roots};
+  auto named = segment_paths();
+  named.push_back(map->path());
+  journal_.save(level_read(*progress.level), std::move(state), std::move(named));
+}
+
+void Merger::release_levels(std::span<const ArtifactReader> readers, uint32_t level) {
+  released_ends_.resize(readers.size());
+  for (size_t i = 0; i < readers.size(); ++i) {
+    const ArtifactRef& ref = artifacts_[i].ref;
+    if (is_round_segment(ref.segment)) continue;
+    uint64_t end = ref.offset;
+    for (const ArtifactLevel& merged : readers[i].levels())
+      if (merged.level >= level && !merged.frames.empty())
+        end = merged.frames.back().offset + merged.frames.back().bytes;
+    const uint64_t begin = std::max(ref.offset, released_ends_[i]);
+    if (end < begin + kLeastReleasedBytes) continue;
+    journal_.release(ref.segment, begin, end - begin);
+    released_ends_[i] = end;
+  }
+}
+
+uint32_t Merger::level_read(uint32_t level) const {
+  const auto is_input = [](const SurveyedArtifact& a) { return !is_round_segment(a.ref.segment); };
+  return std::ranges::any_of(artifacts_, is_input) ? level : 0;
+}
+
+std::vector<std::shared_ptr<ScratchPath>> Merger::segment_paths() const {
+  std::vector<std::shared_ptr<ScratchPath>> paths;
+  for (const auto& [id, segment] : segments_) paths.push_back(segment->path());
+  return paths;
+}
+
+}  // namespace voxdag
