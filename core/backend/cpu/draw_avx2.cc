@@ -9,11 +9,15 @@
 //      passes them (heights_avx2.h), and those that the edges leave, seen along the two other axes
 //      (sides_avx2.h).
 //   3. From there one bit per voxel of each brick.
+//
+// A triangle across an axis is one layer of voxels: its columns are its voxels.
 #include "core/backend/cpu/draw_avx2.h"
 
 #if defined(__AVX2__) && defined(__BMI2__)
 
 #include <immintrin.h>
+
+#include <type_traits>
 
 #include "core/backend/cpu/draw_portable.h"
 #include "core/backend/cpu/edges_avx2.h"
@@ -50,6 +54,17 @@ struct OutsideLanes {
 };
 constexpr OutsideLanes kOutside;
 
+// [axis][coordinate]: the voxels of a brick in one layer.
+struct Layers {
+  uint64_t voxels[3][4] = {};
+  constexpr Layers() {
+    for (int voxel = 0; voxel < 64; ++voxel)
+      for (int axis = 0; axis < 3; ++axis)
+        voxels[axis][(voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1] |= uint64_t{1} << voxel;
+  }
+};
+constexpr Layers kLayers;
+
 // Columns of bricks: bit p of row q, visited as number p + 16 q. Visited from one loop, whose
 // length the processor need not guess row by row.
 struct ColumnSet {
@@ -82,47 +97,38 @@ struct BrickIndex {
 template <int D>
 inline constexpr BrickIndex<D> kBrickIndex;
 
+// The columns of bricks that a triangle may touch, and which of them its edges cross.
 template <int D>
-class ColumnWalk {
- public:
-  VOXDAG_INLINE ColumnWalk(const TileTriangle<int32_t>& triangle, TileBricks& bricks)
-      : t(triangle), tile(bricks), heights(triangle) {
+struct Columns {
+  const TileTriangle<int32_t>& t;
+  int first[3], last[3];  // bricks of the triangle's box
+  EdgeSet over;           // edges seen along D; not set if the triangle covers the tile
+  ColumnSet plain, edge;  // crossed by none, and perhaps by some
+
+  VOXDAG_INLINE explicit Columns(const TileTriangle<int32_t>& triangle) : t(triangle) {
     for (int a = 0; a < 3; ++a) {
       first[a] = t.first_voxel[a] / 4;
       last[a] = t.last_voxel[a] / 4;
     }
-  }
-
-  VOXDAG_INLINE void run() {
-    ColumnSet plain, edge;
     if (t.inside) {
-      for (int q = first[Q]; q <= last[Q]; ++q) plain.rows[q] = columns(first[P], last[P]);
-    } else {
-      over.set(t.edges[D], D != 2);
-      sides.set(t);
-      const RowBounds bounds(over, first[P], last[P]);
-      for (int q = first[Q]; q <= last[Q]; ++q) {
-        const Row row = bounds.row(q);
-        const uint16_t all = columns(row.from, row.to);
-        plain.rows[q] = all & columns(row.inner_from, row.inner_to);
-        edge.rows[q] = all & ~plain.rows[q];
-      }
-      edge.for_each([this](int number) __attribute__((always_inline)) { edge_column(number); });
+      for (int q = first[Q]; q <= last[Q]; ++q) plain.rows[q] = bits(first[P], last[P]);
+      return;
     }
-    plain.for_each([this](int number) __attribute__((always_inline)) {
-      column<0>(number, 0, {0, 0, 0});
-    });
+    over.set(t.edges[D], D != 2);
+    const RowBounds bounds(over, first[P], last[P]);
+    for (int q = first[Q]; q <= last[Q]; ++q) {
+      const Row row = bounds.row(q);
+      const uint16_t all = bits(row.from, row.to);
+      plain.rows[q] = all & bits(row.inner_from, row.inner_to);
+      edge.rows[q] = all & ~plain.rows[q];
+    }
   }
 
- private:
-  static constexpr int P = kP<D>, Q = kQ<D>;
-
-  // Bits from..to, none if from > to; -16 <= to, from <= 16.
-  static VOXDAG_INLINE uint16_t columns(int from, int to) {
-    return static_cast<uint16_t>(0xffffu >> (15 - to) & 0xffffu << from);
-  }
-
-  VOXDAG_INLINE void edge_column(int number) {
+  // For a column of `edge`, calls visit(Count, crossing, most): how many edges cross it, as an
+  // integral_constant, their set, and the largest values of all edges over the column. Nothing if
+  // the column is outside.
+  template <class Visit>
+  VOXDAG_INLINE void look_at(int number, Visit visit) const {
     const int p = number & 15, q = number >> 4;
     const int64_t most[3] = {over.most(0, p, q), over.most(1, p, q), over.most(2, p, q)};
     if ((most[0] | most[1] | most[2]) < 0) return;
@@ -130,13 +136,90 @@ class ColumnWalk {
                               static_cast<uint64_t>(most[1] - over.drop[1]) >> 63 << 1 |
                               static_cast<uint64_t>(most[2] - over.drop[2]) >> 63 << 2;
     if ((crossing & (crossing - 1)) == 0)
-      column<1>(number, crossing, most);
+      visit(std::integral_constant<int, 1>(), crossing, most);
     else if (crossing != 7)
-      column<2>(number, crossing, most);
+      visit(std::integral_constant<int, 2>(), crossing, most);
     else
-      column<3>(number, crossing, most);
+      visit(std::integral_constant<int, 3>(), crossing, most);
   }
 
+  // All ones in the 16-bit lanes of voxel columns that the `Count` edges of the set `crossing`
+  // leave out; where there are several also those beyond the triangle's box.
+  template <int Count>
+  VOXDAG_INLINE __m256i outer(int number, uint64_t crossing, const int64_t (&most)[3]) const {
+    const __m256i lanes = over.outer<Count>(kEdgeLists.edges[crossing], most);
+    if (Count == 1) return lanes;
+    return _mm256_or_si256(lanes,
+                           _mm256_or_si256(outside<P>(number & 15), outside<Q>(number >> 4)));
+  }
+
+ private:
+  static constexpr int P = kP<D>, Q = kQ<D>;
+
+  // Bits from..to, none if from > to; -16 <= to, from <= 16.
+  static VOXDAG_INLINE uint16_t bits(int from, int to) {
+    return static_cast<uint16_t>(0xffffu >> (15 - to) & 0xffffu << from);
+  }
+  template <int Axis>
+  VOXDAG_INLINE __m256i outside(int brick) const {
+    const int low = t.first_voxel[Axis] - 4 * brick, high = t.last_voxel[Axis] - 4 * brick;
+    return load(kOutside.lanes[Axis == Q][low > 0 ? low : 0][high < 3 ? high : 3]);
+  }
+};
+
+// Bits of 4 x 4 voxel columns in Morton order, with the axes exchanged.
+VOXDAG_INLINE uint32_t transposed(uint32_t columns) {
+  const uint32_t low = (columns >> 1 ^ columns) & 0x2222;
+  columns ^= low | low << 1;
+  const uint32_t high = (columns >> 4 ^ columns) & 0x00f0;
+  return columns ^ (high | high << 4);
+}
+
+// A triangle across D, in one layer of voxels: their columns are all that matters.
+template <int D>
+VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
+  const Columns<D> columns(t);
+  const int z = t.first_voxel[D];
+  const uint32_t at_height = kBrickIndex<D>.of_height[z / 4];
+  const uint64_t layer = kLayers.voxels[D][z % 4];
+  columns.edge.for_each([&](int number) __attribute__((always_inline)) {
+    columns.look_at(
+        number, [&](auto count, uint64_t crossing,
+                    const int64_t(&most)[3]) __attribute__((always_inline)) {
+          const __m256i outer = columns.template outer<count()>(number, crossing, most);
+          // A byte per column, in the halves' lower eight.
+          const uint32_t bytes = ~static_cast<uint32_t>(
+              _mm256_movemask_epi8(_mm256_packs_epi16(outer, _mm256_setzero_si256())));
+          uint32_t inner = (bytes & 0xff) | (bytes >> 8 & 0xff00);
+          if constexpr (kP < D >> kQ<D>) inner = transposed(inner);
+          tile.add(kBrickIndex<D>.of_column[number] | at_height, _pdep_u64(inner, layer));
+        });
+  });
+  columns.plain.for_each([&](int number) __attribute__((always_inline)) {
+    tile.add(kBrickIndex<D>.of_column[number] | at_height, layer);
+  });
+}
+
+template <int D>
+class ColumnWalk {
+ public:
+  VOXDAG_INLINE ColumnWalk(const TileTriangle<int32_t>& triangle, TileBricks& bricks)
+      : t(triangle), tile(bricks), columns(triangle), heights(triangle) {
+    if (!t.inside) sides.set(t);
+  }
+
+  VOXDAG_INLINE void run() {
+    columns.edge.for_each([this](int number) __attribute__((always_inline)) {
+      columns.look_at(
+          number, [&](auto count, uint64_t crossing, const int64_t(&most)[3])
+                      __attribute__((always_inline)) { column<count()>(number, crossing, most); });
+    });
+    columns.plain.for_each([this](int number) __attribute__((always_inline)) {
+      column<0>(number, 0, {0, 0, 0});
+    });
+  }
+
+ private:
   // Edges: how many there are in the set `crossing`; those are tested.
   template <int Edges>
   VOXDAG_INLINE void column(int number, uint64_t crossing, const int64_t (&most)[3]) {
@@ -144,35 +227,23 @@ class ColumnWalk {
     const int64_t height = heights.origin + heights.step_p * p + heights.step_q * q;
     int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
     int64_t to = (height + heights.reach) >> (kColumnBits + 2);
-    from = from > first[D] ? from : first[D];
-    to = to < last[D] ? to : last[D];
+    from = from > columns.first[D] ? from : columns.first[D];
+    to = to < columns.last[D] ? to : columns.last[D];
     if (from > to) return;
     const int brick = static_cast<int>(height >> (kColumnBits + 2));
     const int within =
         static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1);
-    const auto& edges = kEdgeLists.edges[crossing];
     __m256i outer = _mm256_setzero_si256();
-    if constexpr (Edges > 0) outer = over.outer<Edges>(edges, most);
-    if constexpr (Edges > 1) {
-      outer = _mm256_or_si256(outer, outside<P>(p));
-      outer = _mm256_or_si256(outer, outside<Q>(q));
-      if (_mm256_movemask_epi8(outer) == -1) return;
-    }
+    if constexpr (Edges > 0) outer = columns.template outer<Edges>(number, crossing, most);
+    if (Edges > 1 && _mm256_movemask_epi8(outer) == -1) return;
     HeightBounds bounds = heights.bounds(p, q, brick, within, outer);
     for (int k = 0; k < Edges; ++k)
-      bounds = _mm256_max_epu8(bounds, sides.bounds(edges[k], p, q, brick));
+      bounds = _mm256_max_epu8(bounds, sides.bounds(kEdgeLists.edges[crossing][k], p, q, brick));
     if constexpr (Edges > 1) bounds = _mm256_max_epu8(bounds, box_bounds(brick));
     const auto spread = heights.spread(bounds);
     const uint32_t index = kBrickIndex<D>.of_column[number];
     for (int64_t z = from; z <= to; ++z)
       tile.add(index | kBrickIndex<D>.of_height[z], spread.mask(static_cast<int>(z - brick)));
-  }
-
-  // Voxel columns of a column of bricks beyond the triangle's box along one axis of the footprint.
-  template <int Axis>
-  VOXDAG_INLINE __m256i outside(int brick) const {
-    const int low = t.first_voxel[Axis] - 4 * brick, high = t.last_voxel[Axis] - 4 * brick;
-    return load(kOutside.lanes[Axis == Q][low > 0 ? low : 0][high < 3 ? high : 3]);
   }
 
   // The triangle's box as bounds of the heights.
@@ -185,22 +256,29 @@ class ColumnWalk {
 
   const TileTriangle<int32_t>& t;
   TileBricks& tile;
-  int first[3], last[3];  // bricks of the triangle's box
+  const Columns<D> columns;
   const Heights<D> heights;
-  EdgeSet over;    // edges seen along D
-  Sides<D> sides;  // and along the other axes
+  Sides<D> sides;  // edges seen along the axes other than D
 };
+
+template <int D>
+VOXDAG_INLINE void draw_along(const TileTriangle<int32_t>& t, TileBricks& tile) {
+  if ((t.normal[kP<D>] | t.normal[kQ<D>]) == 0)
+    draw_flat<D>(t, tile);
+  else
+    ColumnWalk<D>(t, tile).run();
+}
 
 }  // namespace
 
 void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile) {
   if (triangle.normal[triangle.dominant] == 0) return draw_exactly(triangle, tile);
   if (triangle.dominant == 0)
-    ColumnWalk<0>(triangle, tile).run();
+    draw_along<0>(triangle, tile);
   else if (triangle.dominant == 1)
-    ColumnWalk<1>(triangle, tile).run();
+    draw_along<1>(triangle, tile);
   else
-    ColumnWalk<2>(triangle, tile).run();
+    draw_along<2>(triangle, tile);
 }
 
 }  // namespace voxdag::cpu

@@ -21,8 +21,9 @@
 namespace voxdag::cpu {
 namespace {
 
-// The axes of a column's footprint for columns along D, chosen so that the bits of a voxel column's
-// number, p + 2 q (low bits of p, q) + 4 p + 8 q (high bits), are in the order of the brick's bits.
+// The axes of the footprint of columns along D. A voxel column has the number p + 2 q (low bits of
+// p, q) + 4 p + 8 q (high bits). Q is chosen so that the high bit of q is one of the two highest of
+// a brick's bits.
 template <int D>
 constexpr int kP = D == 0 ? 2 : 0;
 template <int D>
