@@ -119,6 +119,7 @@ void Exchange::begin(httplib::Request& raw) {
   raw.path = "/";
   raw.ranges.clear();
   raw.headers.erase("Accept-Encoding");
+  raw.headers.erase("Content-Type");  // httplib would take forms apart
 }
 
 void Exchange::check(const httplib::Request&, const httplib::ContentReader* reader) {
