@@ -12,7 +12,7 @@
 namespace voxdag {
 namespace {
 
-constexpr int kZstdLevel = 1;
+constexpr int kZstdLevel = -1;  // 1 makes artifacts an eighth smaller and a build 5 % slower
 constexpr uint32_t kCompressedFlag = 0x80000000u;
 constexpr uint32_t kFramesToSkip = 15;  // after a column that shrank too little
 constexpr size_t kBrickColumn = 0, kMaskColumn = 1;
