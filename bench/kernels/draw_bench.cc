@@ -1,0 +1,78 @@
+// How fast triangles become bricks: tests of the octree's cubes, and drawing into a tile.
+#include <benchmark/benchmark.h>
+
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "core/backend/cpu/kernels.h"
+
+namespace voxdag::cpu {
+namespace {
+
+constexpr size_t kTriangles = 1024;
+constexpr int kTileVoxels = 1 << kTileLog2;
+
+const Kernels* kernels(bool simd) { return simd ? avx2_kernels() : &portable_kernels(); }
+
+// Random triangles around a tile at the origin: `edge` voxels long, `width` wide.
+std::vector<NarrowTriangle> triangles(int edge, int width) {
+  std::mt19937_64 random(1);
+  const auto between = [&](int low, int high) {
+    const int64_t units = (int64_t{high} - low) * kUnitsPerVoxel;
+    return static_cast<int32_t>((low * kUnitsPerVoxel + static_cast<int64_t>(random() % units)) |
+                                1);
+  };
+  std::vector<NarrowTriangle> out(kTriangles + 1);  // kernels load one vertex too many
+  for (NarrowTriangle& t : out)
+    for (auto& axis : t.v) {
+      axis[0] = between(0, kTileVoxels);
+      axis[1] = axis[0] + between(-edge, edge) - 1;
+      axis[2] = axis[0] + between(-width, width) - 1;
+      axis[1] |= 1;
+      axis[2] |= 1;
+    }
+  return out;
+}
+
+void draw(benchmark::State& state, bool simd) {
+  const Kernels* k = kernels(simd);
+  if (!k) return state.SkipWithError("this machine has no AVX2");
+  const auto scene = triangles(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
+  const auto tile = std::make_unique<TileBricks>();
+  std::vector<uint64_t> existing(kTileBricks / 64), masks(kTileBricks);
+  const Box box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
+  int64_t bricks = 0, drawn = 0;
+  for (auto _ : state)
+    for (size_t i = 0; i < kTriangles; ++i) {
+      TileTriangle<int32_t> triangle;
+      if (!triangle.set_up(scene[i], false, box)) continue;
+      k->draw(triangle, *tile);
+      bricks += k->collect(*tile, kTileBricks / 64, existing.data(), masks.data()).bricks;
+      ++drawn;
+    }
+  state.SetItemsProcessed(bricks);
+  state.counters["triangles/s"] =
+      benchmark::Counter(static_cast<double>(drawn), benchmark::Counter::kIsRate);
+}
+
+void test_octants(benchmark::State& state, bool simd) {
+  const Kernels* k = kernels(simd);
+  if (!k) return state.SkipWithError("this machine has no AVX2");
+  const auto scene = triangles(256, 64);
+  const Box box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
+  for (auto _ : state)
+    for (size_t i = 0; i < kTriangles; ++i)
+      benchmark::DoNotOptimize(k->test_octants(scene[i], box, false));
+  state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * kTriangles));
+}
+
+// Items are bricks. Length and width in voxels: a scan's triangles, a wall's, slivers.
+BENCHMARK_CAPTURE(draw, avx2, true)->Args({32, 32})->Args({512, 512})->Args({64, 1});
+BENCHMARK_CAPTURE(draw, portable, false)->Args({32, 32})->Args({512, 512})->Args({64, 1});
+// Items are triangles.
+BENCHMARK_CAPTURE(test_octants, avx2, true);
+BENCHMARK_CAPTURE(test_octants, portable, false);
+
+}  // namespace
+}  // namespace voxdag::cpu
