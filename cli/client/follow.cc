@@ -67,10 +67,15 @@ ErrorCode code_named(const std::string& name) {
 }  // namespace
 
 Json follow_job(Server& server, const std::string& id) {
-  for (JobView view;; server.pause(kPause_s)) {
-    Json job = server.job(id);
-    view.show(job);
-    if (has_ended(job)) return job;
+  try {
+    for (JobView view;; server.pause(kPause_s)) {
+      Json job = server.job(id);
+      view.show(job);
+      if (has_ended(job)) return job;
+    }
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCancelled) throw;
+    throw Error(ErrorCode::kCancelled, "no longer watching job " + id + ", which goes on");
   }
 }
 

@@ -1,6 +1,7 @@
 #include "cli/client/upload.h"
 
 #include <charconv>
+#include <optional>
 
 #include "cli/progress_bar.h"
 #include "core/format/checksum.h"
@@ -10,6 +11,8 @@ namespace voxdag::cli {
 namespace {
 
 constexpr size_t kPiece = 1 << 20;
+constexpr uint64_t kGoesAhead = 64 << 10;
+constexpr uint64_t kPart = 64 << 20;
 constexpr size_t kDigitsInName = 12;
 constexpr size_t kLongestStem = 100;
 
@@ -31,26 +34,18 @@ class Upload {
  public:
   Upload(Server& server, const std::string& path)
       : server_(server), file_(server.files().open_read(path)), size_(file_->size()) {
+    if (size_ == 0) throw Error(ErrorCode::kInvalidInput, "scene " + path + ": the file is empty");
     digest();
     name_ = name_on_server(path, sha256_);
   }
 
   std::string run() {
-    if (is_there()) return name_;
-    Patience patience(server_.cancel());
-    for (bool begun = false;; begun = true) {
-      const uint64_t before = offset_;
-      std::string trouble;
-      double wait_s = 0;
-      try {
-        if (begun && is_there()) break;
-        if (send_rest(trouble, wait_s)) break;
-      } catch (const Error& error) {
-        if (error.code() != ErrorCode::kIo || file_failed_) throw;
-        trouble = error.message();
-      }
-      if (offset_ > before) patience.renew();
-      if (!patience.wait(wait_s)) throw Error(ErrorCode::kIo, trouble);
+    uint64_t furthest = 0;
+    for (Patience patience(server_.cancel()); !is_there();) {
+      if (offset_ > furthest) patience.renew();
+      furthest = std::max(furthest, offset_);
+      if (send_rest()) break;
+      if (!patience.wait(wait_s_)) throw Error(ErrorCode::kIo, trouble_);
     }
     return name_;
   }
@@ -80,17 +75,18 @@ class Upload {
     sha256_ = sha256.finish();
   }
 
-  // Whether the server has the whole file; sets offset_ to what it has.
+  // Whether the server has the whole file; sets offset_ to how much of it there is.
   bool is_there() {
-    const server::ClientResponse head = server_.http().head(path_on_server());
     offset_ = 0;
-    if (head.status == 404) return false;
-    if (head.status >= 400) {  // a HEAD has no body that says more
-      throw_if_problem(server_.http().get(path_on_server()));
+    try {
+      const server::ClientResponse answer =
+          server_.ask([&](server::HttpClient& http) { return http.get(path_on_server()); });
+      const Json scene = Json::parse(answer.body);
+      if (scene.at("complete").get<bool>() && scene.at("sha256") == sha256_) return true;
+      take_offset(answer);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kNotFound) throw;
     }
-    const Json scene = Json::parse(server_.http().get(path_on_server()).body);
-    if (scene.at("complete").get<bool>() && scene.at("sha256") == sha256_) return true;
-    take_offset(head);
     return false;
   }
 
@@ -101,32 +97,49 @@ class Upload {
     if (failure == std::errc{} && offset < size_) offset_ = offset;
   }
 
-  // Sends what is missing. False if it has to be tried again, saying why.
-  bool send_rest(std::string& trouble, double& wait_s) {
-    server::HeaderMap headers{{"Repr-Digest", server::digest_field(sha256_)}};
-    if (offset_ > 0)
-      headers.emplace("Content-Range", "bytes " + std::to_string(offset_) + "-" +
-                                           std::to_string(size_ - 1) + "/" + std::to_string(size_));
+  // Sends what is missing, in parts, of which a server that crashes loses one at most. False if it
+  // has to be tried again: trouble_ says why. A little goes ahead: a server that does not want the
+  // scene at all can say so then; on more it would hang up.
+  bool send_rest() {
     const auto progress = make_progress_bar();
     progress->begin_stage("upload", size_ - offset_, "bytes");
-    const uint64_t first = offset_;
-    const server::ClientResponse answer = server_.http().upload(
-        path_on_server(), size_ - first,
-        [&](uint64_t offset, uint64_t most) {
-          server_.cancel().check();
-          std::string bytes = piece(first + offset, most);
-          progress->advance(bytes.size());
-          return bytes;
-        },
-        headers);
-    wait_s = come_again_s(answer);
-    if (answer.status < 400 || (answer.status != 409 && wait_s < 0)) {
-      throw_if_problem(answer);
-      progress->end_stage();
-      return true;
+    for (uint64_t part = kGoesAhead; offset_ < size_; part = kPart) {
+      const uint64_t end = std::min(size_, offset_ + part);
+      const auto answer = send_part(end, *progress);
+      if (!answer) return false;
+      wait_s_ = come_again_s(*answer);
+      if (answer->status == 409 || wait_s_ >= 0) {
+        trouble_ = "scene " + name_ + ": the server answered " + std::to_string(answer->status);
+        return false;
+      }
+      throw_if_problem(*answer);
+      offset_ = end;
     }
-    trouble = "scene " + name_ + ": the server answered " + std::to_string(answer.status);
-    return false;
+    progress->end_stage();
+    return true;
+  }
+
+  // Nothing if the connection broke.
+  std::optional<server::ClientResponse> send_part(uint64_t end, Progress& progress) {
+    const uint64_t first = offset_;
+    server::HeaderMap headers{{"Content-Range", "bytes " + std::to_string(first) + "-" +
+                                                    std::to_string(end - 1) + "/" +
+                                                    std::to_string(size_)}};
+    if (end == size_) headers.emplace("Repr-Digest", server::digest_field(sha256_));
+    const auto source = [&](uint64_t offset, uint64_t most) {
+      server_.cancel().check();
+      std::string bytes = piece(first + offset, most);
+      progress.advance(bytes.size());
+      return bytes;
+    };
+    try {
+      return server_.http().upload(path_on_server(), end - first, source, headers);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kIo || file_failed_) throw;
+      trouble_ = error.message();
+      wait_s_ = 0;
+      return std::nullopt;
+    }
   }
 
   Server& server_;
@@ -135,6 +148,8 @@ class Upload {
   std::string sha256_, name_;
   uint64_t offset_ = 0;       // bytes that the server has
   bool file_failed_ = false;  // reading it, not the connection
+  std::string trouble_;       // what was in the way of the last attempt
+  double wait_s_ = 0;         // that a busy server asks for
 };
 
 }  // namespace
