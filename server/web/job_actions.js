@@ -17,7 +17,8 @@ export function actions(job, reload) {
   const button = (text, deed, kind = "") => {
     const element = h("button", {type: "button", class: kind, "data-deed": text.toLowerCase()}, text);
     element.addEventListener("click", async () => {
-      element.disabled = true;
+      if (element.hasAttribute("aria-busy")) return;
+      element.setAttribute("aria-busy", "true");  // a disabled button would lose the focus
       clear(trouble);
       try {
         await deed();
@@ -25,7 +26,7 @@ export function actions(job, reload) {
         if (problem.code === undefined) throw problem;
         clear(trouble, problem_box(problem));
       } finally {
-        element.disabled = false;
+        element.removeAttribute("aria-busy");
       }
     });
     return element;
