@@ -9,6 +9,7 @@ study's build stage alone. `plot` draws the figures of --json.
 
 import argparse
 import json
+import sys
 import tempfile
 from pathlib import Path
 
@@ -162,7 +163,10 @@ def main():
     with tempfile.TemporaryDirectory(dir=options.scratch) as name:
         folder = Path(name)
         study = Study(options.study, folder) if options.study else None
-        cases = [measure_case(case, options, study, folder) for case in names]
+        cases = []
+        for case in names:
+            cases.append(measure_case(case, options, study, folder))
+            print(f"{case}: {cases[-1]['cpu_s']:.2f} CPU s", file=sys.stderr, flush=True)
     facts["load_1min_after"] = measure.machine()["load_1min"]
     grown = growth(cases)
     print_builds(cases)
