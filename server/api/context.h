@@ -33,6 +33,9 @@ struct Context {
   std::mutex scene_use = {};
 };
 
+// Throws Problem (404) if there is none.
+Job find_job(JobQueue& queue, const std::string& id);
+
 class Router;
 void add_job_routes(Router& router, Context& context);
 void add_result_routes(Router& router, Context& context);

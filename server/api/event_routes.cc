@@ -21,8 +21,7 @@ std::optional<int64_t> last_event_id(const Request& request) {
 
 Response follow(Context& context, Call& call) {
   call.allow_query({});
-  if (!context.queue.find(call.names[0]))
-    throw not_found("no such job: expected the id of one that was not deleted");
+  find_job(context.queue, call.names[0]);
   Response response;
   response.headers.emplace("Content-Type", "text/event-stream");
   response.headers.emplace("Cache-Control", "no-store");

@@ -27,12 +27,6 @@ std::string describe(Context& context, const Job& job) {
   return job_json(job, live.get(), place, context.config.jobs.attempts);
 }
 
-Job find_job(Context& context, const std::string& id) {
-  auto job = context.queue.find(id);
-  if (!job) throw not_found("no such job: expected the id of one that was not deleted");
-  return std::move(*job);
-}
-
 IdempotencyKey key_of(const Request& request, const JobRequest& job) {
   const auto given = request.headers.find("Idempotency-Key");
   if (given == request.headers.end()) return {};
@@ -133,6 +127,12 @@ Response act(Context& context, Call& call, Action action) {
 
 }  // namespace
 
+Job find_job(JobQueue& queue, const std::string& id) {
+  auto job = queue.find(id);
+  if (!job) throw not_found("no such job: expected the id of one that was not deleted");
+  return std::move(*job);
+}
+
 void add_job_routes(Router& router, Context& context) {
   router.add("POST", "/api/v1/jobs", Role::kSubmit,
              [&](Call& call) { return post_job(context, call); });
@@ -140,7 +140,7 @@ void add_job_routes(Router& router, Context& context) {
              [&](Call& call) { return list_jobs(context, call); });
   router.add("GET", "/api/v1/jobs/{id}", Role::kRead, [&](Call& call) {
     call.allow_query({});
-    return json_response(200, describe(context, find_job(context, call.names[0])));
+    return json_response(200, describe(context, find_job(context.queue, call.names[0])));
   });
   router.add("PATCH", "/api/v1/jobs/{id}", Role::kAdmin,
              [&](Call& call) { return patch_job(context, call); });

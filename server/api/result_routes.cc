@@ -14,15 +14,9 @@ constexpr uint64_t kLargestReport = uint64_t{4} << 20;
 constexpr uint64_t kStandardTail = 65536;
 constexpr uint64_t kLongestTail = uint64_t{1} << 20;
 
-Job find_job(Context& context, Call& call) {
-  auto job = context.queue.find(call.names[0]);
-  if (!job) throw not_found("no such job: expected the id of one that was not deleted");
-  return std::move(*job);
-}
-
 Job finished_job(Context& context, Call& call) {
   call.allow_query({});
-  Job job = find_job(context, call);
+  Job job = find_job(context.queue, call.names[0]);
   if (job.state != JobState::kSucceeded) {
     Problem problem = not_found("the job has no result: expected one that succeeded");
     problem.state = state_name(job.state);
@@ -91,7 +85,7 @@ Response get_preview(Context& context, Call& call) {
 Response get_log(Context& context, Call& call) {
   call.allow_query({"bytes"});
   const uint64_t most = call.query_count("bytes", kStandardTail, 1, kLongestTail);
-  const Job job = find_job(context, call);
+  const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).log();
   Response response;
   response.headers.emplace("Content-Type", "text/plain; charset=utf-8");
@@ -107,7 +101,7 @@ Response get_log(Context& context, Call& call) {
 
 Response get_subvolumes(Context& context, Call& call) {
   call.allow_query({});
-  const Job job = find_job(context, call);
+  const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).subvolumes();
   if (!context.files.exists(path)) throw not_found("the job's subvolumes are not planned yet");
   const auto file = context.files.open_read(path);

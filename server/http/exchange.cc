@@ -122,7 +122,7 @@ void Exchange::begin(httplib::Request& raw) {
   raw.headers.erase("Content-Type");  // httplib would take forms apart
 }
 
-void Exchange::check(const httplib::Request&, const httplib::ContentReader* reader) {
+void Exchange::check(const httplib::ContentReader* reader) {
   if (!bad_framing_.empty()) throw bad_request(bad_framing_);
   if (request_.headers.contains("Content-Encoding"))
     throw Problem(415, "unsupported_media_type", "expected a body without Content-Encoding");

@@ -23,7 +23,7 @@ class Exchange {
   void begin(httplib::Request& raw);
   // Throws Problem if the request cannot be told apart from the next, or its target is no path.
   // `reader` is null where httplib expects no body.
-  void check(const httplib::Request& raw, const httplib::ContentReader* reader);
+  void check(const httplib::ContentReader* reader);
   Request& request() { return request_; }
   void put(Response response, httplib::Response& out, bool last);
   // The problem behind a status that httplib chose itself.

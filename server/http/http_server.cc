@@ -76,9 +76,10 @@ class HttpServer::Engine : private httplib::Server {
  private:
   void register_handlers() {
     // Every request is routed by us: begin() has made its path "/".
-    const Handler plain = [this](const auto& raw, auto& out) { answer(raw, out, nullptr); };
-    const HandlerWithContentReader with_body =
-        [this](const auto& raw, auto& out, const auto& reader) { answer(raw, out, &reader); };
+    const Handler plain = [this](const auto&, auto& out) { answer(out, nullptr); };
+    const HandlerWithContentReader with_body = [this](const auto&, auto& out, const auto& reader) {
+      answer(out, &reader);
+    };
     Get("/", plain);
     Options("/", plain);
     Delete("/", plain);
@@ -91,7 +92,7 @@ class HttpServer::Engine : private httplib::Server {
       if (std::string_view("GET HEAD POST PUT PATCH DELETE OPTIONS").find(raw.method) !=
           std::string_view::npos)
         return HandlerResponse::Unhandled;
-      answer(raw, out, nullptr);
+      answer(out, nullptr);
       return HandlerResponse::Handled;
     });
     set_error_handler([](const httplib::Request&, httplib::Response& out) {
@@ -146,12 +147,11 @@ class HttpServer::Engine : private httplib::Server {
     connection.linger();
   }
 
-  void answer(const httplib::Request& raw, httplib::Response& out,
-              const httplib::ContentReader* reader) {
+  void answer(httplib::Response& out, const httplib::ContentReader* reader) {
     Exchange& exchange = *t_exchange;
     Response response;
     try {
-      exchange.check(raw, reader);
+      exchange.check(reader);
       response = handler_(exchange.request());
     } catch (const Problem& problem) {
       response = problem_response(problem);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* kPreview = "preview";
 constexpr double kPreview_s = 900;
-constexpr int kPreviewNice = 19;
+constexpr int kPreviewNicer = 5;  // than builds
 constexpr double kLongestSleep_s = 1;
 constexpr double kRetireEvery_s = 300;
 constexpr double kSecondsPerDay = 86400;
@@ -264,9 +264,9 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
   try {
     const ChildProcess::End end =
         run_child({{program_, "render", place.result(), "-o", place.preview(), "--size", "960x540",
-                    "--threads", "1"},
+                    "--samples", "1", "--threads", "1"},
                    place.path + "/preview.log",
-                   kPreviewNice},
+                   config_.jobs.nice + kPreviewNicer},
                   live, kPreview_s);
     if (live.stop_asked_s() > 0) return;
     const bool drawn = end.signal == 0 && end.exit_status == 0 && files_.exists(place.preview());

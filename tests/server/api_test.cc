@@ -40,12 +40,18 @@ TEST_F(Api, TurnsASceneIntoADag) {
   const std::string text = http_->get("/api/v1/jobs/" + id + "/log").body;
   EXPECT_NE(text.find("merge: "), std::string::npos) << text;
   EXPECT_EQ(text.find(folder_.path()), std::string::npos) << "no path of this machine";
-  EXPECT_TRUE(until([&] { return job(id)["preview"] == true; }));
-  EXPECT_TRUE(http_->get("/api/v1/jobs/" + id + "/preview.png").body.starts_with("\x89PNG"));
-
   EXPECT_EQ(http_->send("DELETE", "/api/v1/jobs/" + id, "").status, 204);
   EXPECT_EQ(http_->get("/api/v1/jobs/" + id).status, 404);
   EXPECT_FALSE(std::filesystem::exists(config_.data_folder + "/jobs/" + id));
+}
+
+TEST_F(Api, DrawsAPicture) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 16}});
+  ASSERT_TRUE(until_state(id, "succeeded"));
+  EXPECT_TRUE(until([&] { return job(id)["preview"] == true; }));
+  EXPECT_TRUE(http_->get("/api/v1/jobs/" + id + "/preview.png").body.starts_with("\x89PNG"));
 }
 
 TEST_F(Api, ServesPartsOfTheFile) {

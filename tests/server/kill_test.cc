@@ -15,7 +15,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kPatience_s = 120;
+constexpr double kPatience_s = 600;
 
 // How often to kill: a few times in the tests of every day.
 int rounds() {
@@ -47,7 +47,7 @@ class KilledService : public testing::Test {
       if (at != std::string::npos && end != std::string::npos) {
         const size_t begin = at + kMark.size();
         http_ = std::make_unique<HttpClient>(
-            ClientOptions{text.substr(begin, end - begin), "", "", 60});
+            ClientOptions{text.substr(begin, end - begin), "", "", 300});
         return;
       }
       ASSERT_LT(wall_seconds(), deadline) << text;

@@ -13,7 +13,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kPatience_s = 120;
+constexpr double kPatience_s = 600;
 
 }  // namespace
 
@@ -24,6 +24,7 @@ RunningService::RunningService() {
   config_.jobs.least_free_disk_bytes = 0;
   config_.jobs.memory_bytes = uint64_t{1} << 30;
   config_.jobs.threads = 2;
+  config_.jobs.nice = 0;
 }
 
 RunningService::~RunningService() { stop(); }
@@ -34,7 +35,7 @@ void RunningService::start() {
     log_ += line + "\n";
   });
   thread_ = std::thread([this] { service_->run(); });
-  http_ = std::make_unique<HttpClient>(ClientOptions{service_->url(), "", "", 60});
+  http_ = std::make_unique<HttpClient>(ClientOptions{service_->url(), "", "", 300});
 }
 
 void RunningService::stop() {

@@ -36,7 +36,7 @@ class RunningService : public testing::Test {
   // Posts a job and expects it to be taken; returns its id.
   std::string post_job(const Json& body);
   Json job(const std::string& id);
-  // Asks until it holds, for up to two minutes.
+  // Asks until it holds, for up to ten minutes.
   bool until(const std::function<bool()>& holds);
   bool until_state(const std::string& id, const std::string& state);
   // What is wrong with an answer that should be this problem; "" if nothing.
