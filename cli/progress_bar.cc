@@ -48,7 +48,7 @@ class ProgressBar : public Progress {
   }
 
  private:
-  void show(double now, bool ended) const {
+  void show(double now, bool ended) {
     const uint64_t done = done_;
     const double elapsed = std::max(now - start_s_, 1e-9);
     const double part =
@@ -58,7 +58,7 @@ class ProgressBar : public Progress {
     line_.show({stage_, unit_, done, total_, elapsed, rate, left}, ended);
   }
 
-  const ProgressLine line_;
+  ProgressLine line_;
   std::mutex mutex_;  // guards all below but done_
   std::string stage_, unit_;
   uint64_t total_ = 0;

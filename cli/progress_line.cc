@@ -46,11 +46,15 @@ std::string percent(double part) {
 
 ProgressLine::ProgressLine(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {}
 
+ProgressLine::~ProgressLine() {
+  if (open_) std::fputs("\n", stderr);
+}
+
 double ProgressLine::interval_s() const {
   return terminal_ ? kTerminalInterval_s : kPlainInterval_s;
 }
 
-void ProgressLine::show(const StageView& stage, bool ended) const {
+void ProgressLine::show(const StageView& stage, bool ended) {
   if (quiet_) return;
   const auto done = static_cast<double>(stage.done);
   const auto total = static_cast<double>(stage.total);
@@ -65,16 +69,18 @@ void ProgressLine::show(const StageView& stage, bool ended) const {
   line += " " + std::string(stage.unit) + ", " + short_count(stage.rate) + "/s, " +
           duration_text(stage.elapsed_s);
   if (!ended && stage.eta_s > 0) line += ", " + duration_text(stage.eta_s) + " left";
-  if (!terminal_ || ended) line += "\n";
+  open_ = terminal_ && !ended;
+  if (!open_) line += "\n";
   std::fputs(line.c_str(), stderr);
   std::fflush(stderr);
 }
 
-void ProgressLine::warn(std::string_view message) const {
+void ProgressLine::warn(std::string_view message) {
   note(std::string("voxdag: warning: ").append(message));
 }
 
-void ProgressLine::note(std::string_view text) const {
+void ProgressLine::note(std::string_view text) {
+  open_ = false;
   std::fprintf(stderr, "%s%.*s\n", terminal_ ? kClearLine : "", static_cast<int>(text.size()),
                text.data());
 }

@@ -20,16 +20,22 @@ class ProgressLine {
  public:
   // `quiet` shows warnings only.
   explicit ProgressLine(bool quiet = false);
+  // Ends a line that was cut short, so that what is said next stands on its own.
+  ~ProgressLine();
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
   // How often it is worth showing a stage that goes on.
   double interval_s() const;
-  void show(const StageView& stage, bool ended) const;
-  void warn(std::string_view message) const;
+  void show(const StageView& stage, bool ended);
+  void warn(std::string_view message);
   // A line of its own.
-  void note(std::string_view text) const;
+  void note(std::string_view text);
 
  private:
   const bool quiet_;
   const bool terminal_;
+  bool open_ = false;  // a line on the terminal waits to be drawn over
 };
 
 }  // namespace voxdag::cli

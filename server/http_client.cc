@@ -156,9 +156,14 @@ void throw_if_problem(const ClientResponse& response) {
   if (response.status < 400) return;
   const auto json = nlohmann::json::parse(response.body, nullptr, false);
   std::string code, detail = "the server answered with status " + std::to_string(response.status);
+  // What answers may be another server, or a proxy before ours.
+  const auto text = [&](const char* name, const std::string& otherwise) {
+    const auto found = json.find(name);
+    return found != json.end() && found->is_string() ? found->get<std::string>() : otherwise;
+  };
   if (json.is_object()) {
-    code = json.value("code", "");
-    detail = json.value("detail", detail);
+    code = text("code", "");
+    detail = text("detail", detail);
     if (code_of(code, response.status) == ErrorCode::kInvalidInput && code != "invalid_input")
       detail += " (" + code + ")";
   }

@@ -14,7 +14,7 @@ class JobView {
  public:
   void show(const Json& job) {
     const std::string state = job.at("state");
-    if (state != state_ && state != "running") say(state_line(job));
+    if (state != state_ && state != "running") line_.note(state_line(job));
     state_ = state;
     const Json& warnings = job.at("warnings");
     for (; warnings_ < warnings.size(); ++warnings_)
@@ -38,7 +38,7 @@ class JobView {
     show_stage(stages[ended_], false, progress.at("rate"), progress.at("eta_s"));
   }
 
-  void show_stage(const Json& stage, bool ended, double rate, double eta_s) const {
+  void show_stage(const Json& stage, bool ended, double rate, double eta_s) {
     const std::string name = stage.at("name"), unit = stage.at("unit");
     line_.show({name, unit, stage.at("done"), stage.at("total"), stage.at("wall_s"), rate, eta_s},
                ended);
@@ -48,9 +48,7 @@ class JobView {
     return stage.at("done").get<double>() / std::max(stage.at("wall_s").get<double>(), 1e-9);
   }
 
-  void say(const std::string& text) const { line_.note(text); }
-
-  const ProgressLine line_;
+  ProgressLine line_;
   std::string state_;
   Json attempt_;
   size_t warnings_ = 0;  // that were shown
