@@ -110,14 +110,15 @@ void ArtifactCache::add(const std::string& key, const ReadableFile& segment,
                         const ArtifactRef& artifact) {
   try {
     const std::string partial = partial_of(key);
+    uint64_t bytes = 0;
     try {
-      write_cache_entry(files_, path_of(key), partial, segment, artifact);
+      bytes = write_cache_entry(files_, path_of(key), partial, segment, artifact);
     } catch (const Error&) {
       files_.remove(partial);
       throw;
     }
     std::lock_guard lock(mutex_);
-    known_bytes_ += artifact.bytes;
+    known_bytes_ += bytes;
     if (known_bytes_ > limit_bytes_) evict();
   } catch (const Error&) {
     // As promised: the build goes on without the entry.

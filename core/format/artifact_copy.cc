@@ -54,8 +54,8 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
   return to.append_index(first, encode_index(index));
 }
 
-void write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
-                       const ReadableFile& from, const ArtifactRef& ref) {
+uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
+                           const ReadableFile& from, const ArtifactRef& ref) {
   const auto file = files.create(partial);
   const std::vector<std::byte> header = encode_segment_header(0);
   file->write_at(0, header);
@@ -77,6 +77,7 @@ void write_cache_entry(FileSystem& files, const std::string& path, const std::st
   file->write_at(end, footer);
   file->close();
   files.rename(partial, path);
+  return end + footer.size();
 }
 
 CacheEntry read_cache_entry(FileSystem& files, const std::string& path) {

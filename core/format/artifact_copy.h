@@ -19,9 +19,9 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
 
 // Writes the artifact at `ref` of `from` as a cache entry at `path`, whole or not at all: to
 // `partial` first, a name of the caller's own, which is then renamed. Not synced: an entry that a
-// power cut tears fails its checksums and is no more than a miss.
-void write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
-                       const ReadableFile& from, const ArtifactRef& ref);
+// power cut tears fails its checksums and is no more than a miss. Returns the bytes of the file.
+uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
+                           const ReadableFile& from, const ArtifactRef& ref);
 
 struct CacheEntry {
   std::unique_ptr<ReadableFile> file;
