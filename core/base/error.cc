@@ -19,7 +19,7 @@ constexpr Row kTable[] = {
     {ErrorCode::kIo, "io", 6, 500},
     {ErrorCode::kNoSpace, "no_space", 7, 507},
     {ErrorCode::kOutOfMemory, "out_of_memory", 8, 503},
-    {ErrorCode::kDevice, "device", 9, 500},
+    {ErrorCode::kDevice, "device", 9, 422},
     {ErrorCode::kCancelled, "cancelled", 130, 409},
     {ErrorCode::kLimit, "limit", 10, 422},
 };
