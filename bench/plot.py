@@ -27,7 +27,8 @@ def draw(figures, output):
 
     cases = figures["cases"]
     resolutions = sorted({case["resolution"] for case in cases})
-    figure, panels = pyplot.subplots(1, len(PANELS), figsize=(5 * len(PANELS), 4.5))
+    figure, panels = pyplot.subplots(1, len(PANELS), figsize=(5 * len(PANELS), 5),
+                                    layout="constrained")
     for panel, (title, value) in zip(panels, PANELS):
         for number, scene in enumerate(dict.fromkeys(case["scene"] for case in cases)):
             own = sorted((c for c in cases if c["scene"] == scene), key=lambda c: c["resolution"])
@@ -44,9 +45,9 @@ def draw(figures, output):
         panel.set_xlabel("R")
         panel.set_title(title)
         panel.grid(True, which="both", alpha=0.3)
-    panels[0].legend(fontsize="small")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4,
+                  fontsize="small")
     figure.suptitle(measure.machine_line(figures["machine"]), fontsize="small")
-    figure.tight_layout()
     figure.savefig(output, dpi=110)
 
 
