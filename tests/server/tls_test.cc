@@ -9,7 +9,8 @@
 namespace voxdag::server {
 namespace {
 
-// A certificate for localhost, signed by itself, and its key.
+// A certificate for this machine, signed by itself, and its key. By address: a container may not
+// know the name localhost.
 void make_certificate(const std::string& certificate_file, const std::string& key_file) {
   EVP_PKEY* key = EVP_EC_gen("P-256");
   X509* certificate = X509_new();
@@ -23,7 +24,7 @@ void make_certificate(const std::string& certificate_file, const std::string& ke
                              reinterpret_cast<const unsigned char*>("localhost"), -1, -1, 0);
   X509_set_issuer_name(certificate, name);
   X509_EXTENSION* names =
-      X509V3_EXT_conf_nid(nullptr, nullptr, NID_subject_alt_name, "DNS:localhost");
+      X509V3_EXT_conf_nid(nullptr, nullptr, NID_subject_alt_name, "IP:127.0.0.1");
   X509_add_ext(certificate, names, -1);
   X509_sign(certificate, key, EVP_sha256());
   FILE* file = std::fopen(certificate_file.c_str(), "w");
@@ -53,7 +54,7 @@ TEST_F(Tls, EncryptsEverything) {
   const std::string port = url().substr(url().rfind(':'));
   ASSERT_TRUE(url().starts_with("https://"));
   http_ = std::make_unique<HttpClient>(
-      ClientOptions{"https://localhost" + port, "", config_.http.certificate_file, 60});
+      ClientOptions{"https://127.0.0.1" + port, "", config_.http.certificate_file, 60});
   ASSERT_EQ(put_scene("m.glb", scene_bytes()).status, 201);
   const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 256}});
   std::string events;
@@ -65,9 +66,9 @@ TEST_F(Tls, EncryptsEverything) {
       });
   EXPECT_NE(events.find("event: end"), std::string::npos);
   EXPECT_EQ(http_->get("/api/v1/jobs/" + id + "/dag").status, 200);
-  HttpClient stranger({"https://localhost" + port, "", "", 60});
+  HttpClient stranger({"https://127.0.0.1" + port, "", "", 60});
   EXPECT_THROW(stranger.get("/healthz"), Error);
-  HttpClient plain({"http://localhost" + port, "", "", 60});
+  HttpClient plain({"http://127.0.0.1" + port, "", "", 60});
   EXPECT_THROW(plain.get("/healthz"), Error);
 }
 
