@@ -31,7 +31,7 @@ constexpr double kArtifactBytesANode = 16;
 constexpr double kMostDiskBytesANode = 40;
 constexpr double kBuildOverPilotTime = 1.5;
 // Bytes a unique node that the merge holds at its peak, and what a process takes without a scene.
-constexpr double kMemoryBytesANode = 40;
+constexpr double kMemoryBytesANode = 34;
 constexpr double kBaseMemoryBytes = 24e6;
 
 Figure exactly(double value) { return {value, value, value}; }
