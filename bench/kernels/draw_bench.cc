@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/backend/cpu/kernels.h"
+#include "core/dag/brick.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -40,7 +41,9 @@ void draw(benchmark::State& state, bool simd) {
   if (!k) return state.SkipWithError("this machine has no AVX2");
   const auto scene = triangles(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
   const auto tile = std::make_unique<TileBricks>();
-  std::vector<uint64_t> existing(kTileBricks / 64), masks(kTileBricks);
+  std::vector<uint8_t> existing(kTileBlocks / 8);
+  std::vector<uint16_t> blocks(kTileBlocks + 1);
+  std::vector<uint64_t> keys(kTileBlocks + 1);
   const Box box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
   int64_t bricks = 0, drawn = 0;
   for (auto _ : state)
@@ -48,7 +51,14 @@ void draw(benchmark::State& state, bool simd) {
       TileTriangle<int32_t> triangle;
       if (!triangle.set_up(scene[i], false, box)) continue;
       k->draw(triangle, *tile);
-      bricks += k->collect(*tile, kTileBricks / 64, existing.data(), masks.data()).bricks;
+      const int count =
+          k->list_blocks(*tile, kTileBlocks / 8, existing.data(), blocks.data(), keys.data());
+      for (int b = 0; b < count; ++b) {
+        uint64_t there[kBlockBricks];
+        Block& block = tile->blocks[blocks[static_cast<size_t>(b)]];
+        bricks += popcount64(k->unpack(block, there).mask);
+        block = {};
+      }
       ++drawn;
     }
   state.SetItemsProcessed(bricks);

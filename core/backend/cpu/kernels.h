@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "core/backend/cpu/block.h"
 #include "core/backend/cpu/tile_bricks.h"
 #include "core/backend/cpu/tile_triangle.h"
 #include "core/backend/cpu/triangle_set.h"
@@ -17,9 +18,10 @@ struct Octants {
   uint32_t inside;   // of those: the triangle covers them, they see no more than its plane
 };
 
-struct BrickCount {
-  int bricks;
-  uint64_t voxels;
+// What is in a block.
+struct BlockContent {
+  uint32_t mask;  // of the bricks that are there
+  uint32_t voxels;
 };
 
 struct Kernels {
@@ -31,9 +33,12 @@ struct Kernels {
   // other bits of the last word are 0.
   void (*find_in_range)(const int64_t* values, int count, int64_t least, int64_t most,
                         uint64_t* bits);
-  // Takes the bricks out of a tile, which becomes empty, in Morton order; counts their voxels.
-  // `words` words of `existing`, one bit per brick, say which were there.
-  BrickCount (*collect)(TileBricks& tile, int words, uint64_t* existing, uint64_t* masks);
+  // Lists a tile's blocks that have voxels, in Morton order: numbers and keys. Bits of `existing`
+  // say which these are, 8 * groups of them. Nothing of the tile stays marked as touched.
+  int (*list_blocks)(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
+                     uint64_t* keys);
+  // Writes the bricks of a block that are there one after the other; room for eight.
+  BlockContent (*unpack)(const Block& block, uint64_t* bricks);
 };
 
 const Kernels& portable_kernels();

@@ -34,33 +34,61 @@ Octants test_octants(const NarrowTriangle& triangle, const Box& cube, bool insid
   return OctantTest<Avx2Quad, int32_t>(triangle, cube).run(inside);
 }
 
-BrickCount collect(TileBricks& tile, int words, uint64_t* existing, uint64_t* masks) {
-  BrickCount found{0, 0};
-  const __m256i zero = _mm256_setzero_si256();
-  for (int w = 0; w < words; ++w) {
-    uint64_t bits = 0, touched;
-    __builtin_memcpy(&touched, tile.touched + 8 * w, 8);
-    __builtin_memset(tile.touched + 8 * w, 0, 8);
+__m256i* halves(Block& block) { return reinterpret_cast<__m256i*>(&block); }
+const __m256i* halves(const Block& block) { return reinterpret_cast<const __m256i*>(&block); }
+
+// As block_key(), four bricks at once.
+uint64_t key_of(__m256i low, __m256i high) {
+  const auto products = [](__m256i bricks, const uint64_t* add) {
+    const __m256i sums =
+        _mm256_add_epi32(bricks, _mm256_load_si256(reinterpret_cast<const __m256i*>(add)));
+    return _mm256_mul_epu32(sums, _mm256_srli_epi64(sums, 32));
+  };
+  const __m256i four =
+      _mm256_add_epi64(products(low, kBlockKeys.add), products(high, kBlockKeys.add + 4));
+  const __m128i two =
+      _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
+  return static_cast<uint64_t>(_mm_cvtsi128_si64(two)) +
+         static_cast<uint64_t>(_mm_extract_epi64(two, 1));
+}
+
+int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
+                uint64_t* keys) {
+  int count = 0;
+  for (int group = 0; group < groups; ++group) {
+    uint64_t touched, bits = 0;
+    __builtin_memcpy(&touched, tile.touched + 8 * group, 8);
+    __builtin_memset(tile.touched + 8 * group, 0, 8);
     for (; touched != 0; touched &= touched - 1) {
-      const int node = __builtin_ctzll(touched) / 8;
-      __m256i* const eight = reinterpret_cast<__m256i*>(tile.masks + 64 * w + 8 * node);
-      const __m256i low = _mm256_load_si256(eight), high = _mm256_load_si256(eight + 1);
-      const auto empty = [zero](__m256i x) {
-        return _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(x, zero)));
-      };
-      uint32_t there = static_cast<uint32_t>(empty(low) | empty(high) << 4) ^ 0xff;
-      bits |= uint64_t{there} << 8 * node;
-      for (; there != 0; there &= there - 1) {
-        const uint64_t mask = tile.masks[64 * w + 8 * node + __builtin_ctz(there)];
-        found.voxels += static_cast<uint64_t>(_mm_popcnt_u64(mask));
-        masks[found.bricks++] = mask;
-      }
-      _mm256_store_si256(eight, zero);
-      _mm256_store_si256(eight + 1, zero);
+      const int i = __builtin_ctzll(touched) / 8;
+      const __m256i* const half = halves(tile.blocks[8 * group + i]);
+      const __m256i low = _mm256_load_si256(half), high = _mm256_load_si256(half + 1);
+      const __m256i any = _mm256_or_si256(low, high);
+      // Written in any case, kept if there is something.
+      numbers[count] = static_cast<uint16_t>(8 * group + i);
+      keys[count] = key_of(low, high);
+      const int there = 1 - _mm256_testz_si256(any, any);
+      count += there;
+      bits |= static_cast<uint64_t>(there) << i;
     }
-    existing[w] = bits;
+    existing[group] = static_cast<uint8_t>(bits);
   }
-  return found;
+  return count;
+}
+
+BlockContent unpack(const Block& block, uint64_t* bricks) {
+  const auto empty = [](__m256i x) {
+    return _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(x, _mm256_setzero_si256())));
+  };
+  const __m256i low = _mm256_load_si256(halves(block));
+  const __m256i high = _mm256_load_si256(halves(block) + 1);
+  const uint32_t mask = static_cast<uint32_t>(empty(low) | empty(high) << 4) ^ 0xff;
+  uint64_t voxels = 0;
+  for (uint32_t rest = mask; rest != 0; rest &= rest - 1) {
+    *bricks = block.bricks[__builtin_ctz(rest)];
+    voxels += static_cast<uint64_t>(_mm_popcnt_u64(*bricks++));
+  }
+  return {mask, static_cast<uint32_t>(voxels)};
 }
 
 void find_in_range(const int64_t* values, int count, int64_t least, int64_t most, uint64_t* bits) {
@@ -77,7 +105,7 @@ void find_in_range(const int64_t* values, int count, int64_t least, int64_t most
   }
 }
 
-constexpr Kernels kAvx2 = {draw_avx2, test_octants, find_in_range, collect};
+constexpr Kernels kAvx2 = {draw_avx2, test_octants, find_in_range, list_blocks, unpack};
 
 }  // namespace
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include "core/backend/cpu/draw_portable.h"
@@ -43,23 +44,35 @@ Octants test_octants_narrow(const NarrowTriangle& triangle, const Box& cube, boo
   return OctantTest<PlainQuad, int32_t>(triangle, cube).run(inside);
 }
 
-BrickCount collect(TileBricks& tile, int words, uint64_t* existing, uint64_t* masks) {
-  BrickCount found{0, 0};
-  for (int w = 0; w < words; ++w) {
-    uint64_t bits = 0;
-    for (int node = 8 * w; node < 8 * w + 8; ++node) {
-      if (!std::exchange(tile.touched[node], 0)) continue;
-      for (int i = 8 * node; i < 8 * node + 8; ++i) {
-        const uint64_t mask = std::exchange(tile.masks[i], 0);
-        if (mask == 0) continue;
-        bits |= uint64_t{1} << i % 64;
-        found.voxels += static_cast<uint64_t>(popcount64(mask));
-        masks[found.bricks++] = mask;
-      }
+int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
+                uint64_t* keys) {
+  int count = 0;
+  for (int group = 0; group < groups; ++group) {
+    uint32_t bits = 0;
+    for (int i = 0; i < 8; ++i) {
+      const int number = 8 * group + i;
+      if (!std::exchange(tile.touched[number], 0)) continue;
+      const Block& block = tile.blocks[number];
+      if (std::all_of(block.bricks, block.bricks + kBlockBricks, [](uint64_t b) { return b == 0; }))
+        continue;
+      bits |= 1u << i;
+      numbers[count] = static_cast<uint16_t>(number);
+      keys[count++] = block_key(block);
     }
-    existing[w] = bits;
+    existing[group] = static_cast<uint8_t>(bits);
   }
-  return found;
+  return count;
+}
+
+BlockContent unpack(const Block& block, uint64_t* bricks) {
+  BlockContent content{0, 0};
+  for (int i = 0; i < kBlockBricks; ++i) {
+    if (block.bricks[i] == 0) continue;
+    content.mask |= 1u << i;
+    content.voxels += static_cast<uint32_t>(popcount64(block.bricks[i]));
+    *bricks++ = block.bricks[i];
+  }
+  return content;
 }
 
 void find_in_range(const int64_t* values, int count, int64_t least, int64_t most, uint64_t* bits) {
@@ -71,7 +84,8 @@ void find_in_range(const int64_t* values, int count, int64_t least, int64_t most
   }
 }
 
-constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow, find_in_range, collect};
+constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow, find_in_range,
+                               list_blocks, unpack};
 
 }  // namespace
 

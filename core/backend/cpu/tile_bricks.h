@@ -4,10 +4,12 @@
 
 #include <cstdint>
 
+#include "core/backend/cpu/block.h"
+
 namespace voxdag::cpu {
 
 inline constexpr int kTileLog2 = 6;  // log2 of a full tile's edge in voxels
-inline constexpr int kTileBricks = 1 << 3 * (kTileLog2 - 2);
+inline constexpr int kTileBlocks = 1 << 3 * (kTileLog2 - kBlockLog2);
 
 // A brick coordinate (0..15) with its bits moved to 0, 3, 6, 9: axis a's part of a brick's Morton
 // index in the tile is this, shifted by a.
@@ -17,13 +19,16 @@ inline constexpr uint32_t kSpread[16] = {
 };
 
 struct TileBricks {
-  alignas(64) uint64_t masks[kTileBricks] = {};  // in Morton order
-  // Eight bricks in a row are a cube of 8 voxels: not 0 if one of them may have voxels.
-  alignas(64) uint8_t touched[kTileBricks / 8] = {};
+  Block blocks[kTileBlocks] = {};  // in Morton order
+  // By block: not 0 if it may have voxels.
+  alignas(64) uint8_t touched[kTileBlocks] = {};
 
-  [[gnu::always_inline]] void add(uint32_t brick, uint64_t voxels) {
-    masks[brick] |= voxels;
-    touched[brick / 8] = 1;
+  uint64_t& brick(uint32_t index) {
+    return blocks[index / kBlockBricks].bricks[index % kBlockBricks];
+  }
+  [[gnu::always_inline]] void add(uint32_t index, uint64_t voxels) {
+    brick(index) |= voxels;
+    touched[index / kBlockBricks] = 1;
   }
 };
 

@@ -45,13 +45,13 @@ inline oracle::Region random_region(oracle::Random& random, int size_log2) {
   return region;
 }
 
-inline oracle::Voxels voxels_of(const TileBricks& tile, int edge) {
+inline oracle::Voxels voxels_of(TileBricks& tile, int edge) {
   oracle::Voxels voxels(edge);
   for (int x = 0; x < edge; ++x)
     for (int y = 0; y < edge; ++y)
       for (int z = 0; z < edge; ++z) {
         const uint64_t code = morton_encode(x, y, z);
-        if (tile.masks[code / 64] >> code % 64 & 1) voxels.set(x, y, z);
+        if (tile.brick(static_cast<uint32_t>(code / 64)) >> code % 64 & 1) voxels.set(x, y, z);
       }
   return voxels;
 }
