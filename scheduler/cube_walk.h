@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "core/base/host_device.h"
 #include "core/geometry/cube.h"
 #include "core/geometry/fixed_triangle.h"
 #include "core/geometry/overlap.h"
@@ -16,15 +17,20 @@ inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube
                                  int64_t parent_units) {
   const int64_t half = parent_units / 2;
   uint32_t mask = 0xff;
+  bool inside = true;
   int64_t low[3];
   static constexpr uint32_t kLowHalf[3] = {0x0f, 0x33, 0x55};  // children with bit 0 on the axis
   for (int a = 0; a < 3; ++a) {
     low[a] = static_cast<int64_t>(cube.position[a]) * parent_units;
     const int64_t middle = low[a] + half;
-    if (triangle.low(a) > middle) mask &= ~kLowHalf[a];
-    if (triangle.high(a) < middle) mask &= kLowHalf[a];
+    const int64_t first = triangle.low(a), last = triangle.high(a);
+    if (first > middle) mask &= ~kLowHalf[a];
+    if (last < middle) mask &= kLowHalf[a];
+    inside &= first >= low[a] && last <= low[a] + parent_units;
   }
   if ((mask & (mask - 1)) == 0) return mask;  // its box is inside one child
+  // A triangle inside the cube that is on both sides of one middle, and no other, crosses it.
+  if (inside && popcount64(mask) == 2) return mask;
   uint32_t touched = 0;
   for (uint32_t rest = mask; rest; rest &= rest - 1) {
     const int c = lowest_bit(rest);

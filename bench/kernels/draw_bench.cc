@@ -14,8 +14,6 @@ namespace {
 constexpr size_t kTriangles = 1024;
 constexpr int kTileVoxels = 1 << kTileLog2;
 
-const Kernels* kernels(bool simd) { return simd ? avx2_kernels() : &portable_kernels(); }
-
 // Random triangles around a tile at the origin: `edge` voxels long, `width` wide.
 std::vector<NarrowTriangle> triangles(int edge, int width) {
   std::mt19937_64 random(1);
@@ -36,9 +34,8 @@ std::vector<NarrowTriangle> triangles(int edge, int width) {
   return out;
 }
 
-void draw(benchmark::State& state, bool simd) {
-  const Kernels* k = kernels(simd);
-  if (!k) return state.SkipWithError("this machine has no AVX2");
+void draw(benchmark::State& state, const Kernels* k) {
+  if (!k) return state.SkipWithError("not on this machine");
   const auto scene = triangles(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
   const auto tile = std::make_unique<TileBricks>();
   std::vector<uint8_t> existing(kTileBlocks / 8);
@@ -66,9 +63,8 @@ void draw(benchmark::State& state, bool simd) {
       benchmark::Counter(static_cast<double>(drawn), benchmark::Counter::kIsRate);
 }
 
-void test_octants(benchmark::State& state, bool simd) {
-  const Kernels* k = kernels(simd);
-  if (!k) return state.SkipWithError("this machine has no AVX2");
+void test_octants(benchmark::State& state, const Kernels* k) {
+  if (!k) return state.SkipWithError("not on this machine");
   const auto scene = triangles(256, 64);
   const Box box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
   for (auto _ : state)
@@ -78,11 +74,15 @@ void test_octants(benchmark::State& state, bool simd) {
 }
 
 // Items are bricks. Length and width in voxels: a scan's triangles, a wall's, slivers.
-BENCHMARK_CAPTURE(draw, avx2, true)->Args({32, 32})->Args({512, 512})->Args({64, 1});
-BENCHMARK_CAPTURE(draw, portable, false)->Args({32, 32})->Args({512, 512})->Args({64, 1});
+BENCHMARK_CAPTURE(draw, avx512, avx512_kernels())->Args({32, 32})->Args({512, 512})->Args({64, 1});
+BENCHMARK_CAPTURE(draw, avx2, avx2_kernels())->Args({32, 32})->Args({512, 512})->Args({64, 1});
+BENCHMARK_CAPTURE(draw, portable, &portable_kernels())
+    ->Args({32, 32})
+    ->Args({512, 512})
+    ->Args({64, 1});
 // Items are triangles.
-BENCHMARK_CAPTURE(test_octants, avx2, true);
-BENCHMARK_CAPTURE(test_octants, portable, false);
+BENCHMARK_CAPTURE(test_octants, avx2, avx2_kernels());
+BENCHMARK_CAPTURE(test_octants, portable, &portable_kernels());
 
 }  // namespace
 }  // namespace voxdag::cpu

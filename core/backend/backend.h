@@ -62,9 +62,12 @@ class Backend {
                              SubDagSummary& summary) = 0;
 };
 
-// The CPU backend: bricks rasterised tile by tile, nodes hash-consed. Uses AVX2 where the machine
-// has it, chosen at run time; `allow_simd` false keeps to the portable path, for tests.
-std::unique_ptr<Backend> make_cpu_backend(bool allow_simd = true);
+// Instruction sets that the CPU backend has kernels for, each more than the one before.
+enum class Simd { kNone, kAvx2, kAvx512 };
+
+// The CPU backend: bricks rasterised tile by tile, nodes hash-consed. Uses the largest instruction
+// set up to `most` that the machine has, chosen at run time; the answer is the same.
+std::unique_ptr<Backend> make_cpu_backend(Simd most = Simd::kAvx512);
 
 // How the parallel backends go about it; the answer is the same.
 enum class Method {

@@ -70,8 +70,9 @@ struct Decoder {
 
 std::vector<BackendUnderTest> backends_under_test() {
   std::vector<BackendUnderTest> all = {
-      {"cpu", [] { return make_cpu_backend(true); }},
-      {"cpu_portable", [] { return make_cpu_backend(false); }},
+      {"cpu", [] { return make_cpu_backend(); }},
+      {"cpu_avx2", [] { return make_cpu_backend(Simd::kAvx2); }},
+      {"cpu_portable", [] { return make_cpu_backend(Simd::kNone); }},
       {"parallel_host_fast", [] { return make_parallel_host_backend(Method::kFast, 2); }},
       {"parallel_host_hashes", [] { return make_parallel_host_backend(Method::kHashes); }},
       {"parallel_host_pointers", [] { return make_parallel_host_backend(Method::kPointers); }}};

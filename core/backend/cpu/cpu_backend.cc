@@ -35,9 +35,10 @@ class CpuBackend : public Backend {
 
 }  // namespace
 
-std::unique_ptr<Backend> make_cpu_backend(bool allow_simd) {
-  const cpu::Kernels* avx2 = allow_simd ? cpu::avx2_kernels() : nullptr;
-  return std::make_unique<CpuBackend>(avx2 ? *avx2 : cpu::portable_kernels());
+std::unique_ptr<Backend> make_cpu_backend(Simd most) {
+  const cpu::Kernels* kernels = most >= Simd::kAvx512 ? cpu::avx512_kernels() : nullptr;
+  if (!kernels && most >= Simd::kAvx2) kernels = cpu::avx2_kernels();
+  return std::make_unique<CpuBackend>(kernels ? *kernels : cpu::portable_kernels());
 }
 
 }  // namespace voxdag

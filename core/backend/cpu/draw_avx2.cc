@@ -19,8 +19,8 @@
 
 #include <type_traits>
 
+#include "core/backend/cpu/columns_avx2.h"
 #include "core/backend/cpu/draw_portable.h"
-#include "core/backend/cpu/edges_avx2.h"
 #include "core/backend/cpu/heights_avx2.h"
 #include "core/backend/cpu/sides_avx2.h"
 
@@ -54,75 +54,11 @@ struct OutsideLanes {
 };
 constexpr OutsideLanes kOutside;
 
-// [axis][coordinate]: the voxels of a brick in one layer.
-struct Layers {
-  uint64_t voxels[3][4] = {};
-  constexpr Layers() {
-    for (int voxel = 0; voxel < 64; ++voxel)
-      for (int axis = 0; axis < 3; ++axis)
-        voxels[axis][(voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1] |= uint64_t{1} << voxel;
-  }
-};
-constexpr Layers kLayers;
-
-// Columns of bricks: bit p of row q, visited as number p + 16 q. Visited from one loop, whose
-// length the processor need not guess row by row.
-struct ColumnSet {
-  alignas(8) uint16_t rows[16] = {};
-
-  template <class Visit>
-  VOXDAG_INLINE void for_each(Visit visit) const {
-    for (int part = 0; part < 4; ++part) {
-      uint64_t bits;
-      __builtin_memcpy(&bits, rows + 4 * part, 8);
-      for (; bits != 0; bits &= bits - 1) {
-        const int number = 64 * part + __builtin_ctzll(bits);
-        visit(number);
-      }
-    }
-  }
-};
-
-// Parts of a brick's Morton index in the tile: its column's, by number, and its height's.
+// Columns, and how the edges lie in one of them.
 template <int D>
-struct BrickIndex {
-  uint16_t of_column[256] = {};
-  uint16_t of_height[16] = {};
-  constexpr BrickIndex() {
-    for (int i = 0; i < 256; ++i)
-      of_column[i] = static_cast<uint16_t>(kSpread[i % 16] << kP<D> | kSpread[i / 16] << kQ<D>);
-    for (int z = 0; z < 16; ++z) of_height[z] = static_cast<uint16_t>(kSpread[z] << D);
-  }
-};
-template <int D>
-inline constexpr BrickIndex<D> kBrickIndex;
-
-// The columns of bricks that a triangle may touch, and which of them its edges cross.
-template <int D>
-struct Columns {
-  const TileTriangle<int32_t>& t;
-  int first[3], last[3];  // bricks of the triangle's box
-  EdgeSet over;           // edges seen along D; not set if the triangle covers the tile
-  ColumnSet plain, edge;  // crossed by none, and perhaps by some
-
-  VOXDAG_INLINE explicit Columns(const TileTriangle<int32_t>& triangle) : t(triangle) {
-    for (int a = 0; a < 3; ++a) {
-      first[a] = t.first_voxel[a] / 4;
-      last[a] = t.last_voxel[a] / 4;
-    }
-    if (t.inside) {
-      for (int q = first[Q]; q <= last[Q]; ++q) plain.rows[q] = bits(first[P], last[P]);
-      return;
-    }
-    over.set(t.edges[D], D != 2);
-    const RowBounds bounds(over, first[P], last[P]);
-    for (int q = first[Q]; q <= last[Q]; ++q) {
-      const Row row = bounds.row(q);
-      const uint16_t all = bits(row.from, row.to);
-      plain.rows[q] = all & bits(row.inner_from, row.inner_to);
-      edge.rows[q] = all & ~plain.rows[q];
-    }
-  }
+struct EdgeColumns : Columns<D, EdgeSet> {
+  using Columns<D, EdgeSet>::Columns;
+  using Columns<D, EdgeSet>::over;
 
   // For a column of `edge`, calls visit(Count, crossing, most): how many edges cross it, as an
   // integral_constant, their set, and the largest values of all edges over the column. Nothing if
@@ -147,38 +83,25 @@ struct Columns {
   // leave out; where there are several also those beyond the triangle's box.
   template <int Count>
   VOXDAG_INLINE __m256i outer(int number, uint64_t crossing, const int64_t (&most)[3]) const {
-    const __m256i lanes = over.outer<Count>(kEdgeLists.edges[crossing], most);
+    const __m256i lanes = over.template outer<Count>(kEdgeLists.edges[crossing], most);
     if (Count == 1) return lanes;
-    return _mm256_or_si256(lanes,
-                           _mm256_or_si256(outside<P>(number & 15), outside<Q>(number >> 4)));
+    return _mm256_or_si256(
+        lanes, _mm256_or_si256(outside<kP<D>>(number & 15), outside<kQ<D>>(number >> 4)));
   }
 
  private:
-  static constexpr int P = kP<D>, Q = kQ<D>;
-
-  // Bits from..to, none if from > to; -16 <= to, from <= 16.
-  static VOXDAG_INLINE uint16_t bits(int from, int to) {
-    return static_cast<uint16_t>(0xffffu >> (15 - to) & 0xffffu << from);
-  }
   template <int Axis>
   VOXDAG_INLINE __m256i outside(int brick) const {
-    const int low = t.first_voxel[Axis] - 4 * brick, high = t.last_voxel[Axis] - 4 * brick;
-    return load(kOutside.lanes[Axis == Q][low > 0 ? low : 0][high < 3 ? high : 3]);
+    int low, high;
+    this->template within_box<Axis>(brick, low, high);
+    return load(kOutside.lanes[Axis == kQ<D>][low][high]);
   }
 };
-
-// Bits of 4 x 4 voxel columns in Morton order, with the axes exchanged.
-VOXDAG_INLINE uint32_t transposed(uint32_t columns) {
-  const uint32_t low = (columns >> 1 ^ columns) & 0x2222;
-  columns ^= low | low << 1;
-  const uint32_t high = (columns >> 4 ^ columns) & 0x00f0;
-  return columns ^ (high | high << 4);
-}
 
 // A triangle across D, in one layer of voxels: their columns are all that matters.
 template <int D>
 VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
-  const Columns<D> columns(t);
+  const EdgeColumns<D> columns(t);
   const int z = t.first_voxel[D];
   const uint32_t at_height = kBrickIndex<D>.of_height[z / 4];
   const uint64_t layer = kLayers.voxels[D][z % 4];
@@ -256,7 +179,7 @@ class ColumnWalk {
 
   const TileTriangle<int32_t>& t;
   TileBricks& tile;
-  const Columns<D> columns;
+  const EdgeColumns<D> columns;
   const Heights<D> heights;
   Sides<D> sides;  // edges seen along the axes other than D
 };

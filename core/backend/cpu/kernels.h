@@ -1,6 +1,7 @@
-// The inner loops that exist twice, portable and for AVX2 with BMI2, chosen at run time; they give
-// the same voxels. Sources named *_avx2.cc are compiled for that instruction set, so nothing of
-// them, inline functions of shared headers included, may run before the choice is made.
+// The inner loops that exist three times, portable, for AVX2 with BMI2, and for AVX-512 (F, BW, DQ,
+// VL, VBMI), chosen at run time; they give the same voxels. Sources named *_avx2.cc and *_avx512.cc
+// are compiled for these instruction sets, so nothing of them, inline functions of shared headers
+// included, may run before the choice is made.
 #pragma once
 
 #include <cstdint>
@@ -25,6 +26,7 @@ struct BlockContent {
 };
 
 struct Kernels {
+  const char* name;
   // Sets exactly the voxels of the tile that the triangle touches.
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
   // `inside`: the triangle covers the whole cube, which it is known not to miss.
@@ -37,13 +39,14 @@ struct Kernels {
   // say which these are, 8 * groups of them. Nothing of the tile stays marked as touched.
   int (*list_blocks)(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
                      uint64_t* keys);
-  // Writes the bricks of a block that are there one after the other; room for eight.
+  // Writes the bricks of a block that are there one after the other; room for eight of them.
   BlockContent (*unpack)(const Block& block, uint64_t* bricks);
 };
 
 const Kernels& portable_kernels();
 // Null if they were not built or this machine cannot run them.
 const Kernels* avx2_kernels();
+const Kernels* avx512_kernels();
 
 // For wide triangles there is one implementation only.
 void draw_wide(const TileTriangle<int64_t>& triangle, TileBricks& tile);

@@ -105,7 +105,7 @@ void find_in_range(const int64_t* values, int count, int64_t least, int64_t most
   }
 }
 
-constexpr Kernels kAvx2 = {draw_avx2, test_octants, find_in_range, list_blocks, unpack};
+constexpr Kernels kAvx2 = {"avx2", draw_avx2, test_octants, find_in_range, list_blocks, unpack};
 
 }  // namespace
 

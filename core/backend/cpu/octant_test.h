@@ -16,6 +16,7 @@
 
 #include <cstdint>
 
+#include "core/backend/cpu/child_mask.h"
 #include "core/backend/cpu/kernels.h"
 #include "core/base/integers.h"
 
@@ -43,15 +44,16 @@ struct OctantTest {
 
   const Triangle<Coordinate>& t;
   const Box& cube;
-  double half;   // edge of a child
-  double reach;  // no coordinate relative to the cube's low corner is larger
+  double half;        // edge of a child
+  double reach;       // no coordinate relative to the cube's low corner is larger
+  int long_axes = 0;  // along which the triangle is as long as a child
   double normal[3];
 
   OctantTest(const Triangle<Coordinate>& triangle, const Box& box) : t(triangle), cube(box) {
     half = static_cast<double>(cube.edge / 2);
   }
 
-  // Children that the triangle's box touches, exactly; sets `reach`.
+  // Children that the triangle's box touches, exactly; sets `reach` and `long_axes`.
   uint32_t box_test() {
     uint32_t touched = 0xff;
     int64_t farthest = cube.edge;
@@ -65,6 +67,7 @@ struct OctantTest {
       if (high < cube.edge / 2) touched &= kLowChildren[a];
       farthest = high > farthest ? high : farthest;
       farthest = -low > farthest ? -low : farthest;
+      long_axes += high - low >= cube.edge / 2;
     }
     reach = static_cast<double>(farthest);
     return touched & 0xff;
@@ -131,7 +134,8 @@ struct OctantTest {
 
   Octants run(bool whole_cube_inside) {
     Octants out{box_test(), 0};
-    if (!whole_cube_inside && (out.touched & (out.touched - 1)) == 0) return out;
+    // A small triangle covers no child, and where its box is in two it most likely touches both.
+    if (!whole_cube_inside && kChildCounts.of[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
     set_normal();
     out.touched &= plane_test();
     if (whole_cube_inside) return {out.touched, out.touched};

@@ -84,8 +84,8 @@ void find_in_range(const int64_t* values, int count, int64_t least, int64_t most
   }
 }
 
-constexpr Kernels kPortable = {draw_exactly<int32_t>, test_octants_narrow, find_in_range,
-                               list_blocks, unpack};
+constexpr Kernels kPortable = {"portable",    draw_exactly<int32_t>, test_octants_narrow,
+                               find_in_range, list_blocks,           unpack};
 
 }  // namespace
 

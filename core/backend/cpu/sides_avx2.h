@@ -15,24 +15,11 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/edges_avx2.h"
+#include "core/backend/cpu/columns_avx2.h"
 #include "core/backend/cpu/tile_triangle.h"
 
 namespace voxdag::cpu {
 namespace {
-
-// The axes of the footprint of columns along D. A voxel column has the number p + 2 q (low bits of
-// p, q) + 4 p + 8 q (high bits). Q is chosen so that the high bit of q is one of the two highest of
-// a brick's bits.
-template <int D>
-constexpr int kP = D == 0 ? 2 : 0;
-template <int D>
-constexpr int kQ = D == 2   ? 1
-                   : D == 1 ? 2
-                            : 1;
-
-constexpr int column_p(int column) { return (column & 1) | (column >> 1 & 2); }
-constexpr int column_q(int column) { return (column >> 1 & 1) | (column >> 2 & 2); }
 
 // Bounds of the heights in the 16 columns of a column of bricks, one byte each, counted from the
 // floor of the brick where it begins: touched are below < z <= 15 - over. In either half eight

@@ -5,10 +5,9 @@
 #include <vector>
 
 #include "core/backend/cpu/block_memo.h"
-#include "core/backend/cpu/kernels.h"
 #include "core/dag/brick.h"
 #include "core/dag/node_hash.h"
-#include "tests/oracle/scenes.h"
+#include "tests/unit/backend_cpu/tiles.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -28,12 +27,6 @@ class Blocks : public testing::Test {
     return std::equal(a.bricks, a.bricks + kBlockBricks, b.bricks);
   }
 };
-
-std::vector<const Kernels*> all_kernels() {
-  std::vector<const Kernels*> all = {&portable_kernels()};
-  if (avx2_kernels()) all.push_back(avx2_kernels());
-  return all;
-}
 
 // Listed are the blocks that have voxels, each with the key that growing a memo gives it, in order;
 // the marks are gone, those of blocks that were marked for nothing included.

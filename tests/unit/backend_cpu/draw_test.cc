@@ -23,24 +23,14 @@ void for_many_triangles(int rounds, Check check) {
     }
 }
 
-// The portable kernel sets the voxels that the oracle's separating-axis test sets, no others.
-TEST(Draw, PortableEqualsOracle) {
-  for_many_triangles(60, [](const oracle::Triangle& t, const oracle::Region& region) {
+// Every kernel sets the voxels that the oracle's separating-axis test sets, no others.
+TEST(Draw, KernelsEqualOracle) {
+  for_many_triangles(120, [](const oracle::Triangle& t, const oracle::Region& region) {
     if (!is_narrow(t)) return;
     const Padded<int32_t> narrow(t);
-    EXPECT_TRUE(drawn(narrow.triangle, false, region, portable_kernels().draw) ==
-                oracle::voxelize({t}, region));
-  });
-}
-
-// So does the AVX2 kernel.
-TEST(Draw, Avx2EqualsOracle) {
-  const Kernels* avx2 = avx2_kernels();
-  if (!avx2) GTEST_SKIP() << "this machine has no AVX2";
-  for_many_triangles(120, [&](const oracle::Triangle& t, const oracle::Region& region) {
-    if (!is_narrow(t)) return;
-    const Padded<int32_t> narrow(t);
-    EXPECT_TRUE(drawn(narrow.triangle, false, region, avx2->draw) == oracle::voxelize({t}, region));
+    const oracle::Voxels truth = oracle::voxelize({t}, region);
+    for (const Kernels* kernels : all_kernels())
+      EXPECT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
   });
 }
 
@@ -58,8 +48,6 @@ TEST(Draw, WideEqualsOracle) {
 // Planes that pass exactly through voxel corners, or miss them by a hair, are where heights in
 // fixed point are in doubt: slopes that are ratios of small numbers, at every offset.
 TEST(Draw, HeightsInDoubtAreSettled) {
-  const Kernels* avx2 = avx2_kernels();
-  if (!avx2) GTEST_SKIP() << "this machine has no AVX2";
   oracle::Random random(2);
   const oracle::Region region{{512, 1024, 4096}, 16};
   for (int round = 0; round < 3000; ++round) {
@@ -78,7 +66,9 @@ TEST(Draw, HeightsInDoubtAreSettled) {
     }
     SCOPED_TRACE(testing::Message() << "round " << round);
     const Padded<int32_t> narrow(t);
-    ASSERT_TRUE(drawn(narrow.triangle, false, region, avx2->draw) == oracle::voxelize({t}, region));
+    const oracle::Voxels truth = oracle::voxelize({t}, region);
+    for (const Kernels* kernels : all_kernels())
+      ASSERT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
   }
 }
 
@@ -103,10 +93,8 @@ TEST(Draw, InsideIsThePlaneOnly) {
         oracle::Region child{region.low, region.edge / 2};
         for (int a = 0; a < 3; ++a) child.low[a] += (c >> (2 - a) & 1) * child.edge;
         const oracle::Voxels truth = oracle::voxelize({t}, child);
-        EXPECT_TRUE(drawn(narrow.triangle, true, child, portable_kernels().draw) == truth);
-        if (const Kernels* avx2 = avx2_kernels()) {
-          EXPECT_TRUE(drawn(narrow.triangle, true, child, avx2->draw) == truth);
-        }
+        for (const Kernels* kernels : all_kernels())
+          EXPECT_TRUE(drawn(narrow.triangle, true, child, kernels->draw) == truth) << kernels->name;
       }
     }
   }

@@ -97,8 +97,8 @@ TEST(Planes, RememberedNodesEqualDrawnOnes) {
     if (!is_narrow(t)) continue;
     SCOPED_TRACE(testing::Message() << "round " << round << ", normal " << n[0] << ' ' << n[1]
                                     << ' ' << n[2] << ", edge " << region.edge);
-    const bool simd = avx2_kernels() && round % 2;
-    Workshop by_memory(simd ? *avx2_kernels() : portable_kernels());
+    const std::vector<const Kernels*> kernels = all_kernels();
+    Workshop by_memory(*kernels[static_cast<size_t>(round) % kernels.size()]);
     Workshop by_drawing(portable_kernels());
     TriangleSet set(by_memory.memory);
     set.add(reverse_axes(oracle::fixed(t)));

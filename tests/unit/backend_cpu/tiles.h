@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "core/backend/cpu/kernels.h"
 #include "core/geometry/morton.h"
@@ -24,6 +25,14 @@ struct Padded {
   Triangle<Coordinate> triangle;
   Triangle<Coordinate> spare{};
 };
+
+// All kernels that this machine can run.
+inline std::vector<const Kernels*> all_kernels() {
+  std::vector<const Kernels*> all = {&portable_kernels()};
+  for (const Kernels* kernels : {avx2_kernels(), avx512_kernels()})
+    if (kernels) all.push_back(kernels);
+  return all;
+}
 
 inline bool is_narrow(const oracle::Triangle& t) {
   return is_narrow(reverse_axes(oracle::fixed(t)));
