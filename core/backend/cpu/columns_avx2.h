@@ -1,75 +1,15 @@
-// Columns of bricks along the axis D of the normal's largest component: which of them a triangle
-// may touch, and where their bricks lie in the tile. Shared by the rasterisers for AVX2 and
-// AVX-512.
+// Which columns of bricks a triangle may touch: shared by the rasterisers for AVX2 and AVX-512.
 //
 // Only included by sources compiled for AVX2; all of it has internal linkage.
 #pragma once
 
-#include "core/backend/cpu/edges_avx2.h"
-#include "core/backend/cpu/tile_bricks.h"
+#include "core/backend/cpu/column_set.h"
 #include "core/backend/cpu/tile_triangle.h"
 
 namespace voxdag::cpu {
 namespace {
 
-// The axes of the footprint of columns along D. A voxel column has the number p + 2 q (low bits of
-// p, q) + 4 p + 8 q (high bits). Q is chosen so that the high bit of q is one of the two highest of
-// a brick's bits.
-template <int D>
-constexpr int kP = D == 0 ? 2 : 0;
-template <int D>
-constexpr int kQ = D == 2   ? 1
-                   : D == 1 ? 2
-                            : 1;
-
-constexpr int column_p(int column) { return (column & 1) | (column >> 1 & 2); }
-constexpr int column_q(int column) { return (column >> 1 & 1) | (column >> 2 & 2); }
-
-// [axis][coordinate]: the voxels of a brick in one layer.
-struct Layers {
-  uint64_t voxels[3][4] = {};
-  constexpr Layers() {
-    for (int voxel = 0; voxel < 64; ++voxel)
-      for (int axis = 0; axis < 3; ++axis)
-        voxels[axis][(voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1] |= uint64_t{1} << voxel;
-  }
-};
-constexpr Layers kLayers;
-
-// Columns of bricks: bit p of row q, visited as number p + 16 q. Visited from one loop, whose
-// length the processor need not guess row by row.
-struct ColumnSet {
-  alignas(8) uint16_t rows[16] = {};
-
-  template <class Visit>
-  VOXDAG_INLINE void for_each(Visit visit) const {
-    for (int part = 0; part < 4; ++part) {
-      uint64_t bits;
-      __builtin_memcpy(&bits, rows + 4 * part, 8);
-      for (; bits != 0; bits &= bits - 1) {
-        const int number = 64 * part + __builtin_ctzll(bits);
-        visit(number);
-      }
-    }
-  }
-};
-
-// Parts of a brick's Morton index in the tile: its column's, by number, and its height's.
-template <int D>
-struct BrickIndex {
-  uint16_t of_column[256] = {};
-  uint16_t of_height[16] = {};
-  constexpr BrickIndex() {
-    for (int i = 0; i < 256; ++i)
-      of_column[i] = static_cast<uint16_t>(kSpread[i % 16] << kP<D> | kSpread[i / 16] << kQ<D>);
-    for (int z = 0; z < 16; ++z) of_height[z] = static_cast<uint16_t>(kSpread[z] << D);
-  }
-};
-template <int D>
-inline constexpr BrickIndex<D> kBrickIndex;
-
-// The columns of bricks that a triangle may touch. `Edges` is an EdgeValues and what else is needed
-// of the edges seen along D.
+// The columns of bricks that a triangle may touch. `Edges` are the edges seen along D.
 template <int D, class Edges>
 struct Columns {
   const TileTriangle<int32_t>& t;
@@ -83,45 +23,16 @@ struct Columns {
       last[a] = t.last_voxel[a] / 4;
     }
     if (t.inside) {
-      for (int q = first[Q]; q <= last[Q]; ++q) plain.rows[q] = bits(first[P], last[P]);
+      for (int q = first[Q]; q <= last[Q]; ++q) plain.rows[q] = ColumnSet::bits(first[P], last[P]);
       return;
     }
     over.set(t.edges[D], D != 2);
-    const RowBounds bounds(over, first[P], last[P]);
-    for (int q = first[Q]; q <= last[Q]; ++q) {
-      const Row row = bounds.row(q);
-      const uint16_t all = bits(row.from, row.to);
-      plain.rows[q] = all & bits(row.inner_from, row.inner_to);
-      edge.rows[q] = all & ~plain.rows[q];
-    }
-  }
-
-  // Of the voxels 0..3 along an axis of brick `number`, those within the triangle's box: the
-  // first, at least 0, and the last, at most 3.
-  template <int Axis>
-  VOXDAG_INLINE void within_box(int brick, int& low, int& high) const {
-    low = t.first_voxel[Axis] - 4 * brick;
-    high = t.last_voxel[Axis] - 4 * brick;
-    low = low > 0 ? low : 0;
-    high = high < 3 ? high : 3;
+    over.find_columns(first[P], last[P], first[Q], last[Q], plain, edge);
   }
 
  private:
   static constexpr int P = kP<D>, Q = kQ<D>;
-
-  // Bits from..to, none if from > to; -16 <= to, from <= 16.
-  static VOXDAG_INLINE uint16_t bits(int from, int to) {
-    return static_cast<uint16_t>(0xffffu >> (15 - to) & 0xffffu << from);
-  }
 };
-
-// Bits of 4 x 4 voxel columns in Morton order, with the axes exchanged.
-VOXDAG_INLINE uint32_t transposed(uint32_t columns) {
-  const uint32_t low = (columns >> 1 ^ columns) & 0x2222;
-  columns ^= low | low << 1;
-  const uint32_t high = (columns >> 4 ^ columns) & 0x00f0;
-  return columns ^ (high | high << 4);
-}
 
 }  // namespace
 }  // namespace voxdag::cpu

@@ -1,7 +1,6 @@
-// All that the AVX-512 rasteriser (draw_avx512.cc) asks about the edges in a column of bricks, and
-// the bits of its voxels. What edges_avx2.h, sides_avx2.h and heights_avx2.h do for the edges that
-// cross a column, one after the other, is done here for all three at once, without a branch; the
-// bounds of rounding are argued there.
+// The voxels of a column of bricks in the AVX-512 rasteriser (draw_avx512.cc): bounds of heights by
+// all edges at once, whether they cross the column or not, and the bits of the voxels between the
+// bounds. The reckoning is that of sides_avx2.h and heights_avx2.h, where rounding is argued.
 //
 // Only included by sources compiled for AVX-512 (F, BW, DQ, VL, VBMI); all of it has internal
 // linkage.
@@ -9,68 +8,11 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/columns_avx2.h"
+#include "core/backend/cpu/edges_avx512.h"
 #include "core/backend/cpu/sides_avx2.h"
 
 namespace voxdag::cpu {
 namespace {
-
-// The voxels 0..15 of a row as doubles.
-struct Doubles {
-  double of[16] = {};
-  constexpr Doubles() {
-    for (int i = 0; i < 16; ++i) of[i] = i;
-  }
-};
-constexpr Doubles kDoubles;
-
-// [of q][first][last]: the voxel columns whose p (or q) within the brick is not from first to last.
-struct OutsideBits {
-  uint16_t bits[2][4][4] = {};
-  constexpr OutsideBits() {
-    for (int column = 0; column < 16; ++column)
-      for (int first = 0; first < 4; ++first)
-        for (int last = 0; last < 4; ++last) {
-          const int p = column_p(column), q = column_q(column);
-          const uint16_t bit = static_cast<uint16_t>(1u << column);
-          if (p < first || p > last) bits[0][first][last] |= bit;
-          if (q < first || q > last) bits[1][first][last] |= bit;
-        }
-  }
-};
-constexpr OutsideBits kOutsideBits;
-
-// The edges seen along the columns: of 16 voxel columns, in the order of their numbers, what a and
-// b add to an edge's value less what they add at most.
-struct EdgeSet512 : EdgeValues {
-  __m512i lanes[3];
-
-  VOXDAG_INLINE void set(const Edge (&edges)[3], bool swap) {
-    EdgeValues::set(edges, swap);
-    const __m512i kp = _mm512_setr_epi32(0, 1, 0, 1, 2, 3, 2, 3, 0, 1, 0, 1, 2, 3, 2, 3);
-    const __m512i kq = _mm512_setr_epi32(0, 0, 1, 1, 0, 0, 1, 1, 2, 2, 3, 3, 2, 2, 3, 3);
-    for (int i = 0; i < 3; ++i) {
-      const int64_t a = swap ? edges[i].b : edges[i].a, b = swap ? edges[i].a : edges[i].b;
-      const __m512i most =
-          _mm512_set1_epi32(static_cast<int32_t>(3 * (above_zero(a) + above_zero(b))));
-      const __m512i from_p = _mm512_mullo_epi32(_mm512_set1_epi32(static_cast<int32_t>(a)), kp);
-      const __m512i from_q = _mm512_mullo_epi32(_mm512_set1_epi32(static_cast<int32_t>(b)), kq);
-      lanes[i] = _mm512_sub_epi32(_mm512_add_epi32(from_p, from_q), most);
-    }
-  }
-
-  // The voxel columns of a column of bricks that are on the outer side of an edge.
-  VOXDAG_INLINE uint32_t outer(int p, int q) const {
-    const auto edge = [&](int i) __attribute__((always_inline)) {
-      int64_t value = most(i, p, q);
-      value = value < kEdgeClamp ? value : kEdgeClamp;
-      value = value > -kEdgeClamp ? value : -kEdgeClamp;
-      return _mm512_add_epi32(_mm512_set1_epi32(static_cast<int32_t>(value)), lanes[i]);
-    };
-    return _cvtmask16_u32(
-        _mm512_movepi32_mask(_mm512_or_si512(_mm512_or_si512(edge(0), edge(1)), edge(2))));
-  }
-};
 
 // Where the bytes of the bounds by q (0..3) and by p (4..7), `below` and then 8 further `over`,
 // belong in HeightBounds: [of p].
@@ -94,23 +36,30 @@ class Sides512 {
   template <int D>
   VOXDAG_INLINE void set(const TileTriangle<int32_t>& t) {
     constexpr bool kSwapQ = (kP<D> + 1) % 3 == D, kSwapP = (kQ<D> + 1) % 3 == D;
-    const Edge(&of_q)[3] = t.edges[kP<D>];
-    const Edge(&of_p)[3] = t.edges[kQ<D>];
     const __m512d zero = _mm512_setzero_pd();
     const __m512d steps = _mm512_setr_pd(0, 1, 2, 3, 0, 1, 2, 3);
+    const EdgeLanes512 of_q(t.edges[kP<D>]), of_p(t.edges[kQ<D>]);
+    const __m512d across = pair(kSwapQ ? of_q.b : of_q.a, kSwapP ? of_p.b : of_p.a);
+    const __m512d up = pair(kSwapQ ? of_q.a : of_q.b, kSwapP ? of_p.a : of_p.b);
+    const __m512d c = pair(of_q.c, of_p.c);
+    const __mmask8 falling = _mm512_cmp_pd_mask(up, zero, _CMP_LT_OQ);
+    const __m512d inverse =
+        _mm512_mask_mov_pd(_mm512_div_pd(_mm512_set1_pd(1.0), _mm512_abs_pd(up)),
+                           _mm512_cmp_pd_mask(up, zero, _CMP_EQ_OQ), _mm512_set1_pd(0x1p60));
+    const __m512d more = _mm512_mask_mov_pd(_mm512_set1_pd(-0x1p-30), falling,
+                                            _mm512_set1_pd(kMostHeight + 1 - 0x1p-30));
     for (int i = 0; i < 3; ++i) {
-      const __m512d across = pair(kSwapQ ? of_q[i].b : of_q[i].a, kSwapP ? of_p[i].b : of_p[i].a);
-      const __m512d up = pair(kSwapQ ? of_q[i].a : of_q[i].b, kSwapP ? of_p[i].a : of_p[i].b);
-      const __mmask8 falls = _mm512_cmp_pd_mask(up, zero, _CMP_LT_OQ);
-      const __mmask8 level = _mm512_cmp_pd_mask(up, zero, _CMP_EQ_OQ);
-      start_[i] = _mm512_fnmadd_pd(across, steps, _mm512_sub_pd(zero, pair(of_q[i].c, of_p[i].c)));
-      across4_[i] = _mm512_mul_pd(across, _mm512_set1_pd(-4.0));
-      up4_[i] = _mm512_mul_pd(up, _mm512_set1_pd(-4.0));
-      inverse_[i] = _mm512_mask_mov_pd(_mm512_div_pd(_mm512_set1_pd(1.0), _mm512_abs_pd(up)), level,
-                                       _mm512_set1_pd(0x1p60));
-      more_[i] = _mm512_mask_mov_pd(_mm512_set1_pd(-0x1p-30), falls,
-                                    _mm512_set1_pd(kMostHeight + 1 - 0x1p-30));
-      falls_[i] = falls;
+      const __m512i lanes = _mm512_set_epi64(4 + i, 4 + i, 4 + i, 4 + i, i, i, i, i);
+      const auto spread = [lanes](__m512d x) __attribute__((always_inline)) {
+        return _mm512_permutexvar_pd(lanes, x);
+      };
+      start_[i] = _mm512_fnmsub_pd(spread(across), steps, spread(c));
+      across4_[i] = _mm512_mul_pd(spread(across), _mm512_set1_pd(-4.0));
+      up4_[i] = _mm512_mul_pd(spread(up), _mm512_set1_pd(-4.0));
+      inverse_[i] = spread(inverse);
+      more_[i] = spread(more);
+      falls_[i] = static_cast<__mmask8>((falling >> i & 1 ? 0x0f : 0) |
+                                        (falling >> (4 + i) & 1 ? 0xf0 : 0));
     }
     low_ = t.first_voxel[D] - 1;
     high_ = kMostHeight - t.last_voxel[D];
@@ -139,9 +88,8 @@ class Sides512 {
   }
 
  private:
-  static VOXDAG_INLINE __m512d pair(int64_t of_q, int64_t of_p) {
-    return _mm512_mask_mov_pd(_mm512_set1_pd(static_cast<double>(of_q)), 0xf0,
-                              _mm512_set1_pd(static_cast<double>(of_p)));
+  static VOXDAG_INLINE __m512d pair(__m256d of_q, __m256d of_p) {
+    return _mm512_insertf64x4(_mm512_castpd256_pd512(of_q), of_p, 1);
   }
   static VOXDAG_INLINE __m256i order(int of_p) {
     return _mm256_load_si256(reinterpret_cast<const __m256i*>(kSideBytes.from[of_p]));

@@ -92,9 +92,9 @@ struct EdgeColumns : Columns<D, EdgeSet> {
  private:
   template <int Axis>
   VOXDAG_INLINE __m256i outside(int brick) const {
-    int low, high;
-    this->template within_box<Axis>(brick, low, high);
-    return load(kOutside.lanes[Axis == kQ<D>][low][high]);
+    const int low = this->t.first_voxel[Axis] - 4 * brick;
+    const int high = this->t.last_voxel[Axis] - 4 * brick;
+    return load(kOutside.lanes[Axis == kQ<D>][low > 0 ? low : 0][high < 3 ? high : 3]);
   }
 };
 

@@ -5,6 +5,7 @@
 #if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && \
     defined(__AVX512VL__) && defined(__AVX512VBMI__) && defined(__BMI2__)
 
+#include "core/backend/cpu/columns_avx2.h"
 #include "core/backend/cpu/columns_avx512.h"
 #include "core/backend/cpu/draw_portable.h"
 #include "core/backend/cpu/heights_avx2.h"
@@ -14,21 +15,35 @@ namespace {
 
 template <int D>
 struct EdgeColumns : Columns<D, EdgeSet512> {
-  using Columns<D, EdgeSet512>::Columns;
+  VOXDAG_INLINE explicit EdgeColumns(const TileTriangle<int32_t>& triangle)
+      : Columns<D, EdgeSet512>(triangle) {
+    if (triangle.inside) return;
+    leave_out<kP<D>>(outside_p_, kLowP);
+    leave_out<kQ<D>>(outside_q_, kLowQ);
+  }
 
   // The voxel columns of column `number` that are outside an edge or the triangle's box.
   VOXDAG_INLINE uint32_t outer(int number) const {
     const int p = number & 15, q = number >> 4;
-    return this->over.outer(p, q) | outside<kP<D>>(p) | outside<kQ<D>>(q);
+    return this->over.outer(p, q) | outside_p_[p] | outside_q_[q];
   }
 
  private:
+  // Voxel columns (numbered p + 2 q + 4 p + 8 q by bits) of p = 0 .. 3, and of q.
+  static constexpr uint16_t kLowP[4] = {0x0505, 0x0a0a, 0x5050, 0xa0a0};
+  static constexpr uint16_t kLowQ[4] = {0x0033, 0x00cc, 0x3300, 0xcc00};
+
+  // In the first and the last brick along an axis, the voxel columns beyond the triangle's box.
   template <int Axis>
-  VOXDAG_INLINE uint32_t outside(int brick) const {
-    int low, high;
-    this->template within_box<Axis>(brick, low, high);
-    return kOutsideBits.bits[Axis == kQ<D>][low][high];
+  VOXDAG_INLINE void leave_out(uint16_t (&bits)[16], const uint16_t (&columns)[4]) {
+    const int low = this->t.first_voxel[Axis], high = this->t.last_voxel[Axis];
+    for (int k = 0; k < 3; ++k) {
+      bits[low / 4] |= k < low % 4 ? columns[k] : 0;
+      bits[high / 4] |= 3 - k > high % 4 ? columns[3 - k] : 0;
+    }
   }
+
+  uint16_t outside_p_[16] = {}, outside_q_[16] = {};  // by brick
 };
 
 // A triangle across D, in one layer of voxels: their columns are all that matters.

@@ -9,9 +9,8 @@
 
 #include <immintrin.h>
 
+#include "core/backend/cpu/column_set.h"
 #include "core/backend/cpu/tile_triangle.h"
-
-#define VOXDAG_INLINE __attribute__((always_inline)) inline
 
 namespace voxdag::cpu {
 namespace {
@@ -46,9 +45,10 @@ struct EdgeLanes {
 };
 
 // The edges in the projection along the columns.
-struct EdgeValues {
+struct EdgeSet {
   int64_t p4[3], q4[3], c[3];  // largest value over a brick: p4 brick_p + q4 brick_q + c
   int64_t drop[3];             // from there to the least over the brick's whole footprint
+  EdgeLanes lanes[3];
 
   // `swap`: an edge's a belongs to axis q and b to p.
   VOXDAG_INLINE void set(const Edge (&edges)[3], bool swap) {
@@ -58,20 +58,15 @@ struct EdgeValues {
       q4[i] = 4 * b;
       c[i] = edges[i].c + 3 * (above_zero(a) + above_zero(b));
       drop[i] = 4 * (magnitude(a) + magnitude(b));
+      lanes[i].set(a, b);
     }
   }
   VOXDAG_INLINE int64_t most(int i, int p, int q) const { return c[i] + p4[i] * p + q4[i] * q; }
-};
 
-// And over voxel columns.
-struct EdgeSet : EdgeValues {
-  EdgeLanes lanes[3];
-
-  VOXDAG_INLINE void set(const Edge (&edges)[3], bool swap) {
-    EdgeValues::set(edges, swap);
-    for (int i = 0; i < 3; ++i)
-      lanes[i].set(swap ? edges[i].b : edges[i].a, swap ? edges[i].a : edges[i].b);
-  }
+  // The columns of bricks in the rows first_q..last_q, from first_p to last_p, that no edge
+  // crosses, and those that perhaps one does.
+  VOXDAG_INLINE void find_columns(int first_p, int last_p, int first_q, int last_q,
+                                  ColumnSet& plain, ColumnSet& edge) const;
 
   // Voxel columns on the outer side of one of the first Count edges named, whose largest values
   // over the brick are `most`, not negative: all ones in their 16-bit lanes.
@@ -100,7 +95,7 @@ struct Row {
 class RowBounds {
  public:
   // Rows run from p = first to last.
-  VOXDAG_INLINE RowBounds(const EdgeValues& set, int first, int last) {
+  VOXDAG_INLINE RowBounds(const EdgeSet& set, int first, int last) {
     limits_ = _mm256_setr_pd(first, -last, first, -last);
     for (int i = 0; i < 3; ++i) {
       // The largest value over a column of bricks, m = c + p4 p + q4 q, is 0 at p = at + step q.
@@ -138,6 +133,17 @@ class RowBounds {
 
   __m256d start_[3], step_[3], limits_;
 };
+
+VOXDAG_INLINE void EdgeSet::find_columns(int first_p, int last_p, int first_q, int last_q,
+                                         ColumnSet& plain, ColumnSet& edge) const {
+  const RowBounds bounds(*this, first_p, last_p);
+  for (int q = first_q; q <= last_q; ++q) {
+    const Row row = bounds.row(q);
+    const uint16_t all = ColumnSet::bits(row.from, row.to);
+    plain.rows[q] = all & ColumnSet::bits(row.inner_from, row.inner_to);
+    edge.rows[q] = all & ~plain.rows[q];
+  }
+}
 
 }  // namespace
 }  // namespace voxdag::cpu

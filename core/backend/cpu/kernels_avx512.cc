@@ -71,7 +71,8 @@ const Kernels* avx512_kernels() {
   static const bool supported =
       __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
       __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-      __builtin_cpu_supports("avx512vbmi") && avx2_kernels() != nullptr;
+      __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("fma") &&
+      avx2_kernels() != nullptr;
   if (!supported) return nullptr;
   static const Kernels kernels = {"avx512",      draw_avx512, avx2_kernels()->test_octants,
                                   find_in_range, list_blocks, unpack};

@@ -15,7 +15,8 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/columns_avx2.h"
+#include "core/backend/cpu/column_set.h"
+#include "core/backend/cpu/edges_avx2.h"
 #include "core/backend/cpu/tile_triangle.h"
 
 namespace voxdag::cpu {
