@@ -14,12 +14,14 @@ namespace {
 // Cells are no smaller, in voxels an edge: finer ones cost more than they tell about a scene.
 constexpr int64_t kLeastCellEdge = 2 * kSmallestEdge;
 
-double expected_cubes(const FixedTriangle& t, double cube_units) {
+// Cubes of 2^shift units an edge.
+double expected_cubes(const FixedTriangle& t, int shift) {
+  const double scale = 1.0 / static_cast<double>(int64_t{1} << shift);
   double e[2][3], extents = 0;
   for (int a = 0; a < 3; ++a) {
-    e[0][a] = static_cast<double>(t.v[1][a] - t.v[0][a]) / cube_units;
-    e[1][a] = static_cast<double>(t.v[2][a] - t.v[0][a]) / cube_units;
-    extents += static_cast<double>(t.high(a) - t.low(a)) / cube_units;
+    e[0][a] = static_cast<double>(t.v[1][a] - t.v[0][a]) * scale;
+    e[1][a] = static_cast<double>(t.v[2][a] - t.v[0][a]) * scale;
+    extents += static_cast<double>(t.high(a) - t.low(a)) * scale;
   }
   double area = 0;  // of the three projections, summed: area * (|nx| + |ny| + |nz|)
   for (int a = 0; a < 3; ++a) {
@@ -32,12 +34,10 @@ double expected_cubes(const FixedTriangle& t, double cube_units) {
 }  // namespace
 
 double expected_bricks(const FixedTriangle& t) {
-  return expected_cubes(t, static_cast<double>(kBrickEdge * kUnitsPerVoxel));
+  return expected_cubes(t, kUnitBits + kBrickLevels);
 }
 
-double expected_voxels(const FixedTriangle& t) {
-  return expected_cubes(t, static_cast<double>(kUnitsPerVoxel));
-}
+double expected_voxels(const FixedTriangle& t) { return expected_cubes(t, kUnitBits); }
 
 uint32_t TopTree::depth_within(uint32_t grid_levels, uint64_t bytes) {
   uint32_t depth = 0;

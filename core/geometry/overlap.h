@@ -12,27 +12,25 @@
 
 namespace voxdag {
 
-// `low`: the cube's low corner, `edge`: its edge, in lattice units (1/256 voxel).
-// Needs |coordinates| <= 2^40 for triangle and cube.
-VOXDAG_HD inline bool triangle_touches_cube(const FixedTriangle& t, const int64_t (&low)[3],
-                                            int64_t edge) {
-  for (int a = 0; a < 3; ++a)
-    if (t.high(a) < low[a] || t.low(a) > low[a] + edge) return false;
-
+// The test in integers `Int` for products: 64 bits where the triangle's coordinates relative to the
+// cube, and the cube's edge, are below kNarrowReach, 128 where they are below 2^41.
+template <class Int>
+VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int64_t (&low)[3],
+                                               int64_t edge) {
   int64_t e[3][3];
   for (int i = 0; i < 3; ++i)
     for (int a = 0; a < 3; ++a) e[i][a] = t.v[(i + 1) % 3][a] - t.v[i][a];
-  int128 normal[3];
+  Int normal[3];
   for (int a = 0; a < 3; ++a) {
     const int b = (a + 1) % 3, c = (a + 2) % 3;
-    normal[a] = static_cast<int128>(e[0][b]) * e[1][c] - static_cast<int128>(e[0][c]) * e[1][b];
+    normal[a] = static_cast<Int>(e[0][b]) * e[1][c] - static_cast<Int>(e[0][c]) * e[1][b];
   }
 
   // Plane: n.(p - v0) changes sign, or vanishes, over the cube's corners.
-  int128 least = 0, most = 0;
+  Int least = 0, most = 0;
   for (int a = 0; a < 3; ++a) {
-    const int128 near = normal[a] * (low[a] - t.v[0][a]);
-    const int128 far = normal[a] * (low[a] + edge - t.v[0][a]);
+    const Int near = normal[a] * (low[a] - t.v[0][a]);
+    const Int far = normal[a] * (low[a] + edge - t.v[0][a]);
     least += near < far ? near : far;
     most += near < far ? far : near;
   }
@@ -45,14 +43,31 @@ VOXDAG_HD inline bool triangle_touches_cube(const FixedTriangle& t, const int64_
     const int64_t sign = normal[c] < 0 ? -1 : 1;
     for (int i = 0; i < 3; ++i) {
       const int64_t na = -e[i][b] * sign, nb = e[i][a] * sign;
-      int128 value = static_cast<int128>(na) * (low[a] - t.v[i][a]) +
-                     static_cast<int128>(nb) * (low[b] - t.v[i][b]);
-      if (na > 0) value += static_cast<int128>(na) * edge;
-      if (nb > 0) value += static_cast<int128>(nb) * edge;
+      Int value =
+          static_cast<Int>(na) * (low[a] - t.v[i][a]) + static_cast<Int>(nb) * (low[b] - t.v[i][b]);
+      if (na > 0) value += static_cast<Int>(na) * edge;
+      if (nb > 0) value += static_cast<Int>(nb) * edge;
       if (value < 0) return false;
     }
   }
   return true;
+}
+
+// Edges of the triangle are then below 2^20, its normal below 2^41, the plane's sums below 2^63.
+inline constexpr int64_t kNarrowReach = int64_t{1} << 19;
+
+// `low`: the cube's low corner, `edge`: its edge, in lattice units (1/256 voxel).
+// Needs |coordinates| <= 2^40 for triangle and cube.
+VOXDAG_HD inline bool triangle_touches_cube(const FixedTriangle& t, const int64_t (&low)[3],
+                                            int64_t edge) {
+  bool narrow = edge < kNarrowReach;
+  for (int a = 0; a < 3; ++a) {
+    const int64_t first = t.low(a) - low[a], last = t.high(a) - low[a];
+    if (last < 0 || first > edge) return false;
+    narrow &= first > -kNarrowReach && last < kNarrowReach;
+  }
+  return narrow ? triangle_touches_cube_in<int64_t>(t, low, edge)
+                : triangle_touches_cube_in<int128>(t, low, edge);
 }
 
 }  // namespace voxdag

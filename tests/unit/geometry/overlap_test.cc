@@ -100,6 +100,28 @@ TEST(Overlap, EqualsTheOracleAtTheLimit) {
   EXPECT_GT(misses, 10000);
 }
 
+// Around the reach of the test in 64 bits, whose sums would not fit if it were chosen too often.
+TEST(Overlap, EqualsTheOracleAtTheNarrowReach) {
+  Random random(7);
+  int narrow = 0, hits = 0;
+  for (int i = 0; i < 60000; ++i) {
+    const int64_t reach = kNarrowReach + (random.coin() ? -1 : random.between(0, 2));
+    Triangle t;
+    for (Point& p : t)
+      for (int64_t& u : p)
+        u = random.coin() ? random.odd(-reach, reach) : random.coin() ? reach : -reach;
+    Box box{{0, 0, 0}, kNarrowReach - random.between(0, 1)};
+    if (i % 2 == 0) box.edge = int64_t{1} << random.between(8, 18);
+    const bool expected = truth(t, box);
+    ASSERT_EQ(ours(t, box), expected) << "pair " << i;
+    hits += expected;
+    narrow += reach < kNarrowReach && box.edge < kNarrowReach;
+  }
+  EXPECT_GT(narrow, 10000);
+  EXPECT_GT(hits, 5000);
+  EXPECT_LT(hits, 55000);
+}
+
 // Small triangles around one small cube, near-misses by single units: every way of passing a
 // corner, an edge or a face.
 TEST(Overlap, EqualsTheOracleUnitByUnit) {
