@@ -35,7 +35,11 @@ struct RunOptions {
   std::string method;            // "" for the backend's own, consing, pointers or hashes
   std::string cache_folder;      // "" for none
   uint64_t cache_bytes = uint64_t{16} << 30;
-  double checkpoint_interval_s = 2;  // CPU time of the merge that is worth a checkpoint
+  // Time that is worth a checkpoint: CPU time of the merge, wall time of what comes before the
+  // build.
+  double checkpoint_interval_s = 2;
+  // Scenes of at least so many triangles are kept once ingested: about two CPU seconds of work.
+  uint64_t kept_from_triangles = uint64_t{4} << 20;
   bool keep_work = false;
   bool restart = false;  // start over, whatever the work folder holds
   bool force = false;    // build though the estimate says that it cannot fit

@@ -22,18 +22,26 @@ CubeTree::CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube>
   }
 }
 
+void distribute(TriangleStream& triangles, const CubeTree& tree, BinWriter& writer,
+                const CancelToken& cancel,
+                const std::function<void(uint64_t copied)>& after_batch) {
+  std::vector<FixedTriangle> batch(1024);
+  uint64_t copied = 0;
+  while (const size_t n = triangles.read(batch)) {
+    cancel.check();
+    for (size_t i = 0; i < n; ++i)
+      tree.for_each_touched(batch[i], [&](size_t leaf) { writer.append(leaf, batch[i]); });
+    copied += n;
+    if (after_batch) after_batch(copied);
+  }
+  writer.flush();
+}
+
 void distribute(TriangleBins& bins, BinId from, const CubeTree& tree,
                 const std::vector<BinId>& leaf_bins, size_t buffer_bytes,
                 const CancelToken& cancel) {
   BinWriter writer(bins, leaf_bins, buffer_bytes);
-  const auto stream = bins.open(from);
-  std::vector<FixedTriangle> batch(1024);
-  while (const size_t n = stream->read(batch)) {
-    cancel.check();
-    for (size_t i = 0; i < n; ++i)
-      tree.for_each_touched(batch[i], [&](size_t leaf) { writer.append(leaf, batch[i]); });
-  }
-  writer.finish();
+  distribute(*bins.open(from), tree, writer, cancel);
   bins.drop(from);
 }
 

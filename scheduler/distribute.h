@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -45,8 +46,12 @@ class CubeTree {
   std::vector<Node> nodes_;
 };
 
-// Moves all triangles of `from` into the bins (one a leaf, in the same order) of the cubes that
-// they touch, and drops `from`.
+// Copies the triangles of a stream into the bins (one a leaf, in the same order, the targets of
+// `writer`) of the cubes that they touch. `after_batch` hears how many of the stream were copied.
+void distribute(TriangleStream& triangles, const CubeTree& tree, BinWriter& writer,
+                const CancelToken& cancel,
+                const std::function<void(uint64_t copied)>& after_batch = {});
+// Moves all triangles of a bin like that, and drops it.
 void distribute(TriangleBins& bins, BinId from, const CubeTree& tree,
                 const std::vector<BinId>& leaf_bins, size_t buffer_bytes,
                 const CancelToken& cancel);

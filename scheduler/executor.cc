@@ -93,7 +93,7 @@ class Worker {
         cancel_(seams.cancel),
         share_(share_bytes, &budget),
         segment_(seams.files, options.segment_folder, options.first_segment_id + number, budget),
-        journal_(store, segment_),
+        journal_(store, segment_, bins),
         backend_(options.open_backend()) {}
 
   // Builds one subvolume, or answers with the eight that replace it.
@@ -111,7 +111,7 @@ class Worker {
       if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
         bins_.drop(queued.bin);
         ++counts.cached;
-        journal_.built(copied);
+        journal_.built(copied, queued.kept);
         return {};
       }
     }
@@ -127,7 +127,7 @@ class Worker {
       built.artifact = artifact.finish({&root, 1});
       if (key) share(*key, built.artifact);
     }
-    journal_.built(built);
+    journal_.built(built, queued.kept);
     return {};
   }
   // What was built is durable and readable from here on.
@@ -163,12 +163,16 @@ class Worker {
     for (int c = 0; c < 8; ++c) {
       if (bins_.count(part_bins[c]) == 0) continue;
       cubes.push_back(parts[c]);
-      queued.push_back({StoredSubvolume{}, part_bins[c]});
+      queued.push_back({StoredSubvolume{}, part_bins[c], whole.kept});
       queued.back().subvolume.cube = parts[c];
       queued.back().subvolume.weight = subvolume.weight / 8;
     }
     const std::vector<SubvolumeId> ids = store_.record_split(subvolume, cubes);
     for (size_t i = 0; i < ids.size(); ++i) queued[i].subvolume.id = ids[i];
+    if (whole.kept) {
+      bins_.hold(*whole.kept, queued.size());
+      bins_.release(*whole.kept);
+    }
     ++counts.split;
     return queued;
   }

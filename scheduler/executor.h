@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/backend/backend.h"
@@ -22,6 +23,8 @@ namespace voxdag {
 struct QueuedSubvolume {
   StoredSubvolume subvolume;
   BinId bin = 0;
+  std::optional<BinId>
+      kept;  // the kept bin, this one or another, from which it can be filled again
 };
 
 struct ExecutorOptions {

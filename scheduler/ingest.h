@@ -1,39 +1,30 @@
-// Ingest: the scene's triangles are streamed, snapped to the grid, counted into the top tree and
-// kept in one bin; then handed down to the subvolumes that the plan made.
+// The passes over a scene: the scan finds its bounds; ingest snaps its triangles to the grid,
+// counts them into the top tree and keeps them in one bin. Both go on from any state that an
+// earlier pass left.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <vector>
+#include <functional>
 
-#include "core/base/progress.h"
-#include "core/geometry/grid.h"
-#include "core/scene/triangle_source.h"
 #include "scheduler/build_spec.h"
-#include "scheduler/executor.h"
+#include "scheduler/ingest_record.h"
 #include "scheduler/top_tree.h"
 #include "scheduler/triangle_bins.h"
 
 namespace voxdag {
 
-// The cube that the geometry options ask for. Reads the whole scene once, unless bounds are given.
-Grid choose_grid(const GeometryOptions& options, TriangleSource& scene, const Seams& seams);
+// Called after each batch, when `state` speaks of all triangles up to its position.
+using AfterBatch = std::function<void()>;
 
-struct IngestCounts {
-  uint64_t triangles = 0;        // that may touch the grid
-  uint64_t dropped_outside = 0;  // their boxes miss it
-  double expected_voxels = 0;    // each triangle's own, shared voxels counted twice
-  std::string sha256;            // of the grid and the snapped triangles: names the content
-};
+// Adds the scene's triangles to the bounds of `state`.
+void scan(TriangleSource& scene, IngestState& state, const Seams& seams,
+          const AfterBatch& after_batch);
 
-// Streams the scene into `bin` and counts it into `top`. Throws Error{kLimit} for a triangle that
-// reaches into the grid from beyond the coordinate limit.
-IngestCounts ingest(TriangleSource& scene, const Grid& grid, TriangleBins& bins, BinId bin,
-                    TopTree& top, const Seams& seams);
+// The cube that the geometry options ask for, of a scene with these bounds.
+Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
 
-// Hands the triangles of `bin` down to the planned subvolumes, which are then ready to build.
-std::vector<QueuedSubvolume> hand_down(std::span<const StoredSubvolume> planned,
-                                       uint32_t grid_levels, TriangleBins& bins, BinId bin,
-                                       size_t buffer_bytes, const CancelToken& cancel);
+// Streams the scene into the only bin of `writer` and counts it into `top`. Throws Error{kLimit}
+// for a triangle that reaches into the grid from beyond the coordinate limit.
+void ingest(TriangleSource& scene, IngestState& state, BinWriter& writer, TopTree& top,
+            const Seams& seams, const AfterBatch& after_batch);
 
 }  // namespace voxdag

@@ -60,6 +60,14 @@ CREATE TABLE result (
   merge_streamed_groups INTEGER NOT NULL
 );
 )sql",
+    // How far scan, ingest and hand-down are; the triangles are in a file.
+    R"sql(
+CREATE TABLE ingest (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  record BLOB NOT NULL,
+  row_checksum INTEGER NOT NULL
+);
+)sql",
 };
 static_assert(std::size(kMigrations) == kSchemaVersion);
 
@@ -70,7 +78,7 @@ bool is_empty(SqlDatabase& database) {
 }
 
 void check_sound(SqlDatabase& database, const std::string& path) {
-  auto check = database.prepare("PRAGMA quick_check(1)");
+  auto check = database.prepare("PRAGMA integrity_check(1)");
   if (!check.step() || check.text(0) != "ok")
     throw Error(ErrorCode::kCorrupt,
                 path + " is damaged (" + check.text(0) + "): start over with --restart");

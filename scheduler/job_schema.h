@@ -8,7 +8,7 @@
 
 namespace voxdag {
 
-inline constexpr int64_t kSchemaVersion = 2;
+inline constexpr int64_t kSchemaVersion = 3;
 
 // Makes the tables of an empty database, or brings those of an earlier version up to date: all of
 // it or nothing. Throws Error{kCorrupt} for a damaged database, Error{kInvalidInput} for one that

@@ -149,6 +149,7 @@ void JobStore::record_lost(const StoredSubvolume& lost) {
   planned.weight = lost.weight;
   SqlTransaction transaction(database_);
   update_row(planned);
+  database_.execute("DELETE FROM ingest");
   transaction.commit();
 }
 
@@ -157,6 +158,34 @@ void JobStore::update_row(const StoredSubvolume& subvolume) {
   query.bind(0, subvolume.id);
   const bool has_parent = query.step();
   write_row(database_, subvolume, has_parent ? std::optional(query.integer(0)) : std::nullopt);
+}
+
+std::optional<std::vector<std::byte>> JobStore::ingest() {
+  std::lock_guard lock(mutex_);
+  auto query = database_.prepare("SELECT record, row_checksum FROM ingest");
+  if (!query.step()) return std::nullopt;
+  std::vector<std::byte> record = query.bytes(0);
+  if (checksum64(record) != query.word(1))
+    throw Error(ErrorCode::kCorrupt, "job store: the row of what was ingested fails its checksum");
+  return record;
+}
+
+void JobStore::save_ingest(std::span<const std::byte> record) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.prepare("INSERT OR REPLACE INTO ingest VALUES (1, ?, ?)")
+      .bind(0, record)
+      .bind_word(1, checksum64(record))
+      .run();
+  transaction.commit();
+}
+
+void JobStore::forget_ingest() {
+  std::lock_guard lock(mutex_);
+  if (database_.integer("SELECT count(*) FROM ingest") == 0) return;
+  SqlTransaction transaction(database_);
+  database_.execute("DELETE FROM ingest");
+  transaction.commit();
 }
 
 std::optional<StoredMerge> JobStore::merge() {

@@ -1,6 +1,6 @@
-// What is durable of a build: the job, its subvolumes and their artifacts, the unfinished merge,
-// timings and progress, in one SQLite file of the work folder (WAL, synchronous = FULL where it
-// counts, foreign keys).
+// What is durable of a build: how far ingest is, the job, its subvolumes and their artifacts, the
+// unfinished merge, timings and progress, in one SQLite file of the work folder (WAL, synchronous =
+// FULL where it counts, foreign keys).
 //
 // Invariants:
 //   1. A row names an artifact only after the artifact's bytes were synced.
@@ -99,8 +99,16 @@ class JobStore {
   void record_built(std::span<const StoredSubvolume> built);
   // Returns the ids of the parts, in their order.
   std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
-  // Its artifact turned out damaged: it is planned again.
+  // Its artifact turned out damaged: it is planned again. What is kept of ingest is forgotten,
+  // since the triangles of what was built are gone.
   void record_lost(const StoredSubvolume& lost);
+
+  // How far scan, ingest and hand-down are, in the words of who saved it: of the job that is there,
+  // or of one that is about to start. Throws Error{kCorrupt} for one that fails its checksum.
+  std::optional<std::vector<std::byte>> ingest();
+  void save_ingest(std::span<const std::byte> record);
+  // Costs nothing if there is none.
+  void forget_ingest();
 
   std::optional<StoredMerge> merge();
   void save_merge(uint32_t level, std::span<const std::byte> state);

@@ -11,9 +11,10 @@ constexpr double kCommitInterval_s = 1;
 
 }  // namespace
 
-void Journal::built(const StoredSubvolume& subvolume) {
+void Journal::built(const StoredSubvolume& subvolume, std::optional<BinId> kept) {
   if (pending_.empty() && last_commit_s_ == 0) last_commit_s_ = wall_seconds();
   pending_.push_back(subvolume);
+  if (kept) pending_releases_.push_back(*kept);
   if (wall_seconds() - last_commit_s_ >= kCommitInterval_s) commit();
 }
 
@@ -27,6 +28,8 @@ void Journal::commit() {
   }
   store_.record_built(pending_);
   pending_.clear();
+  for (const BinId bin : pending_releases_) bins_.release(bin);
+  pending_releases_.clear();
   last_commit_s_ = wall_seconds();
 }
 

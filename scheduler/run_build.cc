@@ -10,6 +10,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "scheduler/estimate.h"
+#include "scheduler/hand_down.h"
 #include "scheduler/job_progress.h"
 #include "scheduler/memory_limits.h"
 #include "scheduler/merge_stage.h"
@@ -41,7 +42,8 @@ class Build {
               spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder),
         store_(open_store(seams.files)),
         progress_(seams.progress, *store_, work_),
-        seams_{seams.files, progress_, seams.cancel} {
+        seams_{seams.files, progress_, seams.cancel},
+        keeper_(spec_, *store_, work_, seams_) {
     if (!spec_.run.cache_folder.empty())
       cache_.emplace(seams.files, spec_.run.cache_folder, spec_.run.cache_bytes);
     report_.output = spec_.run.output;
@@ -54,8 +56,10 @@ class Build {
     try {
       return run_to_the_end();
     } catch (const Error& error) {
-      // Without a job there is nothing to go on with; with one, the folder is what resumes it.
-      if (!store_->job()) {
+      // With a job, or a part of a scene that is not at fault, the folder is what goes on.
+      const bool scene_is_at_fault =
+          error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
+      if (!store_->job() && (scene_is_at_fault || !keeper_.keeps())) {
         remove_work();
         throw;
       }
@@ -70,14 +74,16 @@ class Build {
   }
 
  private:
-  // A store that cannot be read is no obstacle to starting over.
+  // A store that cannot be read is no obstacle to starting over; nor is one that does not look like
+  // ours, where we have been before.
   std::unique_ptr<JobStore> open_store(FileSystem& files) const {
     try {
       return std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild);
     } catch (const Error& error) {
-      if (!spec_.run.restart ||
-          (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion))
-        throw;
+      const bool not_ours = error.code() == ErrorCode::kInvalidInput;
+      const bool unreadable =
+          error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kUnsupportedVersion;
+      if (!spec_.run.restart || !(unreadable || (not_ours && work_.was_there()))) throw;
     }
     for (const char* suffix : {"", "-wal", "-shm", "-journal"})
       if (files.exists(work_.store_path() + suffix)) files.remove(work_.store_path() + suffix);
@@ -86,6 +92,11 @@ class Build {
 
   BuildReport run_to_the_end() {
     const double start = wall_seconds();
+    if (start_over_)
+      keeper_.forget();
+    else
+      refuse_other_options();
+    work_.remove_spilled();
     build_missing();
     MergeStage merge(*store_, work_, budget_, clock_, seams_);
     for (int attempt = 1; !merge.run(spec_.run, report_); ++attempt) {
@@ -134,14 +145,34 @@ class Build {
     work_.remove();
   }
 
+  // Builds what is missing. Triangles that the disk gave back changed are read from the scene
+  // again; where it has no room for them, memory may.
+  void build_missing() {
+    for (int attempt = 1;; ++attempt) {
+      try {
+        return try_to_build_missing();
+      } catch (const DamagedTriangles& damage) {
+        if (attempt == kMostAttempts) throw;
+        seams_.progress.warn(damage.message() + "; the scene is read again");
+        keeper_.forget();
+      } catch (const Error& error) {
+        if (error.code() != ErrorCode::kNoSpace || !keeper_.is_optional()) throw;
+        seams_.progress.warn(error.message() +
+                             "; the scene is read again, to hold its triangles in memory");
+        keeper_.give_up();
+      }
+    }
+  }
+
   // Scan, ingest, and all subvolumes that are not built yet; what they hold in memory is gone when
   // it returns.
-  void build_missing() {
-    const PreparedScene scene = prepare_scene(spec_, work_.spill_path(), budget_, clock_, seams_);
+  void try_to_build_missing() {
+    PreparedScene scene =
+        prepare_scene(spec_, work_.spill_path(), budget_, clock_, seams_, &keeper_);
     report_.grid = scene.grid;
     report_.triangles = scene.counts.triangles;
     report_.dropped_outside = scene.counts.dropped_outside;
-    report_.dropped_invalid = scene.dropped_invalid;
+    report_.dropped_invalid = scene.counts.dropped_invalid;
     if (report_.triangles == 0)
       seams_.progress.warn("the scene has no triangles in the grid: the file will have no nodes");
     start_or_resume(scene);
@@ -162,15 +193,30 @@ class Build {
     }
   }
 
+  [[noreturn]] void refuse(const std::string& difference) const {
+    throw Error(ErrorCode::kInvalidInput,
+                "the work folder " + work_.path() + " holds another job: " + difference +
+                    "; give another folder (--work) or start over (--restart)");
+  }
+
+  // Before the scene is read.
+  void refuse_other_options() const {
+    const auto stored = store_->job();
+    if (!stored) return;
+    if (stored->format_version != kWorkFormatVersion)
+      refuse("its format version is " + std::to_string(stored->format_version) +
+             ", this program's " + std::to_string(kWorkFormatVersion));
+    const std::string asked = geometry_json(spec_.geometry);
+    if (stored->geometry != asked)
+      refuse("its geometry options are " + stored->geometry + ", asked for are " + asked);
+  }
+
   void start_or_resume(const PreparedScene& scene) {
-    const JobIdentity job{scene.counts.sha256, geometry_json(spec_.geometry), kWorkFormatVersion};
     const auto stored = store_->job();
     if (stored && !start_over_) {
-      if (*stored != job)
-        throw Error(ErrorCode::kInvalidInput,
-                    "the work folder " + work_.path() +
-                        " holds another job: " + difference(*stored, job) +
-                        "; give another folder (--work) or start over (--restart)");
+      if (stored->scene_sha256 != scene.sha256)
+        refuse("its scene has other contents (SHA-256 " + stored->scene_sha256.substr(0, 16) +
+               ", now " + scene.sha256.substr(0, 16) + ")");
     } else {
       check_room(scene);
       std::vector<StoredSubvolume> plan(scene.plan.size());
@@ -178,7 +224,7 @@ class Build {
         plan[i].cube = scene.plan[i].cube;
         plan[i].weight = scene.plan[i].weight;
       }
-      store_->start(job, plan);
+      store_->start({scene.sha256, geometry_json(spec_.geometry), kWorkFormatVersion}, plan);
       start_over_ = false;
     }
     std::set<uint32_t> named;
@@ -188,9 +234,9 @@ class Build {
     if (!store_->merge()) work_.empty_scratch();
   }
 
-  void build_subvolumes_of(const PreparedScene& scene, std::span<const StoredSubvolume> planned) {
-    std::vector<QueuedSubvolume> queue = hand_down(planned, scene.grid.levels, *scene.bins,
-                                                   scene.whole, budget_.limit() / 8, seams_.cancel);
+  void build_subvolumes_of(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
+    std::vector<QueuedSubvolume> queue =
+        hand_down(planned, scene, keeper_, budget_.limit() / 8, seams_.cancel);
     const MemoryCharge lists(budget_, queue.size() * (sizeof queue[0] + sizeof planned[0]),
                              "lists of subvolumes");
     clock_.finish("distribute");
@@ -209,6 +255,7 @@ class Build {
     seams_.progress.begin_stage("build", queue.size(), "subvolumes");
     const ExecutorCounts counts =
         build_subvolumes(options, std::move(queue), *scene.bins, *store_, budget_, seams_);
+    keeper_.finish();
     report_.subvolumes_split += counts.split;
     report_.subvolumes_cached += counts.cached;
     report_.subvolumes_reused += counts.cached;
@@ -232,16 +279,6 @@ class Build {
     clock_.finish("estimate");
   }
 
-  static std::string difference(const JobIdentity& stored, const JobIdentity& asked) {
-    if (stored.format_version != asked.format_version)
-      return "its format version is " + std::to_string(stored.format_version) +
-             ", this program's " + std::to_string(asked.format_version);
-    if (stored.geometry != asked.geometry)
-      return "its geometry options are " + stored.geometry + ", asked for are " + asked.geometry;
-    return "its scene has other contents (SHA-256 " + stored.scene_sha256.substr(0, 16) + ", now " +
-           asked.scene_sha256.substr(0, 16) + ")";
-  }
-
   const BuildSpec spec_;
   MemoryBudget budget_;
   const OutputLock output_;
@@ -251,6 +288,7 @@ class Build {
   StageClock clock_{[this](const StageTime& stage) { store_->add_stage_time(stage); }};
   JobProgress progress_;
   const Seams seams_;
+  IngestKeeper keeper_;
   BuildReport report_;
   bool start_over_ = spec_.run.restart;
 };

@@ -2,7 +2,9 @@
 // work they are. It decides which cubes of the grid become subvolumes.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/memory_budget.h"
@@ -36,6 +38,15 @@ class TopTree {
 
   void add(const FixedTriangle& triangle);
   double total_weight() const { return total_weight_; }
+  // What was counted, apart from the total: plain bytes that another top tree of the same shape can
+  // be filled with.
+  std::span<const std::byte> cells() const {
+    return std::as_bytes(std::span(cells_.data(), cells_.size()));
+  }
+  std::span<std::byte> fill(double total_weight) {
+    total_weight_ = total_weight;
+    return std::as_writable_bytes(std::span(cells_.data(), cells_.size()));
+  }
   uint64_t occupied_cells() const;
 
   // The largest cubes of weight <= `most_weight` (single cells may weigh more), occupied ones only,

@@ -4,13 +4,14 @@
 #include <cstring>
 
 #include "core/base/error.h"
-#include "core/format/checksum.h"
 
 namespace voxdag {
 namespace {
 
 constexpr size_t kCoordinates = 9;
 constexpr size_t kMostRecordsAChunk = 1024;
+// Larger ones in a file that is kept: fewer pieces to name, to read and to give back.
+constexpr size_t kMostRecordsAKeptChunk = 4096;
 constexpr size_t kLeastRecordsAChunk = 16;
 
 template <class Coordinate>
@@ -37,15 +38,23 @@ TriangleBins::TriangleBins(FileSystem& files, std::string spill_path, bool wide,
                            MemoryBudget& share)
     : files_(files),
       spill_path_(std::move(spill_path)),
-      record_bytes_(wide ? kWideBytes : kNarrowBytes),
+      record_bytes_(record_bytes(wide)),
       charge_(share, 0, "triangle bins") {}
 
 TriangleBins::~TriangleBins() = default;
+
+size_t TriangleBins::record_bytes(bool wide) { return wide ? kWideBytes : kNarrowBytes; }
 
 BinId TriangleBins::add_bin() {
   std::lock_guard lock(mutex_);
   bins_.push_back(std::make_unique<Bin>());
   return static_cast<BinId>(bins_.size() - 1);
+}
+
+BinId TriangleBins::add_kept_bin() {
+  const BinId bin = add_bin();
+  bins_[bin]->kept = true;
+  return bin;
 }
 
 uint64_t TriangleBins::count(BinId bin) const {
@@ -55,13 +64,39 @@ uint64_t TriangleBins::count(BinId bin) const {
 
 uint64_t TriangleBins::spilled_bytes() const {
   std::lock_guard lock(mutex_);
-  return spilled_bytes_;
+  return (spill_ ? spill_->appended_bytes() : 0) + (kept_file_ ? kept_file_->appended_bytes() : 0);
 }
 
 void TriangleBins::drop(BinId bin) {
   std::lock_guard lock(mutex_);
-  for (const Chunk& chunk : bins_[bin]->chunks) memory_bytes_ -= chunk.memory.size() + kListBytes;
-  *bins_[bin] = Bin{};
+  if (!bins_[bin]->kept) give_back(*bins_[bin]);
+}
+
+void TriangleBins::hold(BinId bin, uint64_t users) {
+  std::lock_guard lock(mutex_);
+  bins_[bin]->users += users;
+}
+
+void TriangleBins::release(BinId bin) {
+  std::lock_guard lock(mutex_);
+  if (--bins_[bin]->users == 0) give_back(*bins_[bin]);
+}
+
+void TriangleBins::give_back(Bin& bin) {
+  // Neighbours go together: only whole blocks of the disk can be given back.
+  Extent piece;
+  TriangleFile* const file = bin.kept ? kept_file_.get() : spill_.get();
+  for (const Chunk& chunk : bin.chunks) {
+    memory_bytes_ -= chunk.memory.size() + kListBytes;
+    if (!chunk.memory.empty()) continue;
+    if (chunk.extent.offset != piece.offset + piece.bytes) {
+      if (piece.bytes) file->release(piece);
+      piece = {chunk.extent.offset, 0, 0};
+    }
+    piece.bytes += chunk.extent.bytes;
+  }
+  if (piece.bytes) file->release(piece);
+  bin = Bin{};
   charge_.try_resize(memory_bytes_);
 }
 
@@ -69,46 +104,90 @@ void TriangleBins::add_chunk(BinId bin, std::span<const std::byte> records) {
   Chunk chunk;
   chunk.triangles = static_cast<uint32_t>(records.size() / record_bytes_);
   std::unique_lock lock(mutex_);
+  Bin& target = *bins_[bin];
   memory_bytes_ += kListBytes;
-  if (charge_.try_resize(memory_bytes_ + records.size())) {
+  if (!target.kept && charge_.try_resize(memory_bytes_ + records.size())) {
     memory_bytes_ += records.size();
     chunk.memory.assign(records.begin(), records.end());
   } else {
     // Where not even the list fits, it goes uncharged: it is little beside what is spilled.
     charge_.try_resize(memory_bytes_);
-    if (!spill_writer_) spill_writer_ = files_.create(spill_path_);
-    chunk.offset = spilled_bytes_;
-    spilled_bytes_ += records.size();
-    chunk.checksum = checksum64(records);
+    if (!target.kept && !spill_) spill_ = std::make_unique<TriangleFile>(files_, spill_path_);
+    TriangleFile& file = target.kept ? *kept_file_ : *spill_;
     lock.unlock();
-    spill_writer_->write_at(chunk.offset, records);
+    chunk.extent = file.append(records);
     lock.lock();
-    if (!spill_reader_) spill_reader_ = files_.open_read(spill_path_);
+    if (target.kept) unchained_.push_back({bin, chunk.triangles, chunk.extent});
   }
-  bins_[bin]->triangles += chunk.triangles;
-  bins_[bin]->chunks.push_back(std::move(chunk));
+  target.triangles += chunk.triangles;
+  target.chunks.push_back(std::move(chunk));
 }
 
-void TriangleBins::read_chunk(const Chunk& chunk, std::vector<std::byte>& out) const {
-  out.resize(chunk.triangles * record_bytes_);
-  spill_reader_->read_at(chunk.offset, out);
-  if (checksum64(out) != chunk.checksum)
-    throw Error(ErrorCode::kCorrupt, spill_path_ + " at offset " + std::to_string(chunk.offset) +
-                                         " fails its checksum: the disk gave back other triangles "
-                                         "than were written; run the same command again");
+void TriangleBins::read_chunk(const Bin& bin, const Chunk& chunk,
+                              std::vector<std::byte>& out) const {
+  out.resize(chunk.extent.bytes);
+  (bin.kept ? *kept_file_ : *spill_).read(chunk.extent, out);
+}
+
+// A link is the extent of the one before and the chunks that are new since then.
+Extent TriangleBins::write_chain() {
+  if (unchained_.empty()) return last_link_;
+  std::vector<std::byte> link(sizeof last_link_ + unchained_.size() * sizeof(NamedChunk));
+  std::memcpy(link.data(), &last_link_, sizeof last_link_);
+  std::memcpy(link.data() + sizeof last_link_, unchained_.data(), link.size() - sizeof last_link_);
+  last_link_ = kept_file_->append(link);
+  unchained_.clear();
+  return last_link_;
+}
+
+void TriangleBins::read_chain(const Extent& last) {
+  std::lock_guard lock(mutex_);
+  last_link_ = last;
+  for (Extent at = last; at.bytes;) {
+    std::vector<std::byte> link(at.bytes);
+    kept_file_->read(at, link);
+    std::memcpy(&at, link.data(), sizeof at);
+    for (size_t i = sizeof at; i < link.size(); i += sizeof(NamedChunk)) {
+      NamedChunk chunk;
+      std::memcpy(&chunk, link.data() + i, sizeof chunk);
+      if (chunk.bin >= bins_.size())
+        throw DamagedTriangles("the kept triangles name a bin that is not there");
+      bins_[chunk.bin]->chunks.push_back({{}, chunk.extent, chunk.triangles});
+      bins_[chunk.bin]->triangles += chunk.triangles;
+      memory_bytes_ += kListBytes;
+    }
+  }
+  // Newest links came first; the file is in the order of writing.
+  for (const auto& bin : bins_)
+    std::ranges::sort(bin->chunks, {}, [](const Chunk& chunk) { return chunk.extent.offset; });
+  charge_.try_resize(memory_bytes_);
 }
 
 class BinStream : public TriangleStream {
  public:
-  BinStream(const TriangleBins& bins, const TriangleBins::Bin& bin) : bins_(bins), bin_(bin) {}
-  uint64_t count() const override { return bin_.triangles; }
-  void rewind() override { chunk_ = record_ = 0; }
+  BinStream(const TriangleBins& bins, const TriangleBins::Bin& bin, uint64_t first)
+      : bins_(bins), bin_(bin), first_(first) {
+    rewind();
+  }
+  uint64_t count() const override { return bin_.triangles - first_; }
+  void rewind() override {
+    chunk_ = 0;
+    uint64_t left = first_;
+    while (chunk_ < bin_.chunks.size() && left >= bin_.chunks[chunk_].triangles)
+      left -= bin_.chunks[chunk_++].triangles;
+    record_ = static_cast<size_t>(left);
+    loaded_ = kNoChunk;
+  }
   size_t read(std::span<FixedTriangle> out) override {
     size_t filled = 0;
     while (filled < out.size() && chunk_ < bin_.chunks.size()) {
       const TriangleBins::Chunk& chunk = bin_.chunks[chunk_];
-      if (record_ == 0 && chunk.memory.empty()) bins_.read_chunk(chunk, spilled_);
-      const std::byte* records = chunk.memory.empty() ? spilled_.data() : chunk.memory.data();
+      if (chunk.memory.empty() && loaded_ != chunk_) {
+        loaded_ = kNoChunk;
+        bins_.read_chunk(bin_, chunk, from_file_);
+        loaded_ = chunk_;
+      }
+      const std::byte* records = chunk.memory.empty() ? from_file_.data() : chunk.memory.data();
       const size_t n = std::min<size_t>(out.size() - filled, chunk.triangles - record_);
       for (size_t i = 0; i < n; ++i, ++record_)
         decode_record(records + record_ * bins_.record_bytes_, out[filled + i]);
@@ -122,6 +201,8 @@ class BinStream : public TriangleStream {
   }
 
  private:
+  static constexpr size_t kNoChunk = SIZE_MAX;
+
   void decode_record(const std::byte* record, FixedTriangle& triangle) const {
     if (bins_.record_bytes_ == kNarrowBytes)
       decode<int32_t>(record, triangle);
@@ -131,21 +212,24 @@ class BinStream : public TriangleStream {
 
   const TriangleBins& bins_;
   const TriangleBins::Bin& bin_;
+  const uint64_t first_;
   size_t chunk_ = 0;
   size_t record_ = 0;  // next one of the chunk
-  std::vector<std::byte> spilled_;
+  size_t loaded_ = kNoChunk;
+  std::vector<std::byte> from_file_;
 };
 
-std::unique_ptr<TriangleStream> TriangleBins::open(BinId bin) const {
+std::unique_ptr<TriangleStream> TriangleBins::open(BinId bin, uint64_t first) const {
   std::lock_guard lock(mutex_);
-  return std::make_unique<BinStream>(*this, *bins_[bin]);
+  return std::make_unique<BinStream>(*this, *bins_[bin], first);
 }
 
 BinWriter::BinWriter(TriangleBins& bins, std::vector<BinId> targets, size_t buffer_bytes)
     : bins_(bins), targets_(std::move(targets)), tails_(targets_.size()) {
   const size_t records =
       buffer_bytes / (bins.record_bytes() * std::max<size_t>(targets_.size(), 1));
-  chunk_bytes_ = std::clamp(records, kLeastRecordsAChunk, kMostRecordsAChunk) * bins.record_bytes();
+  const size_t most = bins.kept_file() ? kMostRecordsAKeptChunk : kMostRecordsAChunk;
+  chunk_bytes_ = std::clamp(records, kLeastRecordsAChunk, most) * bins.record_bytes();
 }
 
 void BinWriter::append(size_t target, const FixedTriangle& triangle) {
@@ -161,10 +245,10 @@ void BinWriter::append(size_t target, const FixedTriangle& triangle) {
   tail.clear();
 }
 
-void BinWriter::finish() {
+void BinWriter::flush() {
   for (size_t i = 0; i < tails_.size(); ++i) {
     if (!tails_[i].empty()) bins_.add_chunk(targets_[i], tails_[i]);
-    tails_[i] = {};
+    tails_[i].clear();
   }
 }
 

@@ -40,7 +40,8 @@ bool is_ours(const DirectoryEntry& entry) {
   const std::string_view name = entry.name;
   if (entry.is_directory) return name == kScratchName;
   return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
-         name == "job.db-journal" || name.ends_with(".vdspill") || segment_id(name).has_value();
+         name == "job.db-journal" || name.ends_with(".vdspill") || name.ends_with(".vdkept") ||
+         segment_id(name).has_value();
 }
 
 }  // namespace
@@ -50,6 +51,7 @@ WorkFolder::WorkFolder(FileSystem& files, std::string path)
   files_.make_directories(path_);
   check_is_ours();
   const std::string lock_path = path_ + "/" + std::string(kLockName);
+  was_there_ = files_.exists(lock_path);
   lock_ = files_.try_lock(lock_path);
   for (int i = 0; !lock_ && i < kLockRetries; ++i) {
     std::this_thread::sleep_for(kLockPause);
@@ -109,8 +111,7 @@ uint64_t WorkFolder::bytes() const {
 void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_named) {
   for (const DirectoryEntry& entry : files_.list(path_)) {
     const auto id = segment_id(entry.name);
-    if (entry.name.ends_with(".vdspill") || (id && !is_named(*id)))
-      files_.remove(path_ + "/" + entry.name);
+    if (id && !is_named(*id)) files_.remove(path_ + "/" + entry.name);
   }
 }
 
@@ -132,9 +133,9 @@ void WorkFolder::remove_scratch() {
   files_.remove_directory(scratch_path());
 }
 
-void WorkFolder::remove_spilled() {
+void WorkFolder::remove_silently(const std::string& path) {
   try {
-    if (files_.exists(spill_path())) files_.remove(spill_path());
+    if (files_.exists(path)) files_.remove(path);
   } catch (const Error&) {
     // Left behind: it costs space, and the next build there removes it.
   }

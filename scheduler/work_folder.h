@@ -21,11 +21,15 @@ class WorkFolder {
   WorkFolder(FileSystem& files, std::string path);
 
   const std::string& path() const { return path_; }
+  // Whether an earlier build had it.
+  bool was_there() const { return was_there_; }
   std::string store_path() const { return store_path(path_); }
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
   // Who holds the folder: "process 17 on box"; "" if nobody does.
   static std::string holder(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
+  // Triangles that are kept from one run to the next.
+  std::string kept_path() const { return path_ + "/triangles.vdkept"; }
   std::string scratch_path() const { return path_ + "/merge"; }
   std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
   // One more than the largest id of a segment that is there.
@@ -36,13 +40,14 @@ class WorkFolder {
   // Nothing reads these bytes of a segment any more: gives their space back.
   void release(uint32_t segment, uint64_t offset, uint64_t bytes);
 
-  // Removes segments that `is_named` does not know, and spilled triangles: what an interrupted
-  // build left and no row of the store names.
+  // Removes segments that `is_named` does not know: what an interrupted build left and no row of
+  // the store names.
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
   // Removes merge data.
   void empty_scratch();
-  // Removes spilled triangles. Silent, like remove().
-  void remove_spilled();
+  // Removes spilled triangles; kept ones. Silent, like remove().
+  void remove_spilled() { remove_silently(spill_path()); }
+  void remove_kept() { remove_silently(kept_path()); }
   // Removes all that is ours, and the folder if it is empty then. Silent: what cannot be removed
   // costs space, not correctness.
   void remove();
@@ -50,9 +55,11 @@ class WorkFolder {
  private:
   void check_is_ours() const;
   void remove_scratch();
+  void remove_silently(const std::string& path);
 
   FileSystem& files_;
   const std::string path_;
+  bool was_there_ = false;
   std::unique_ptr<FileLock> lock_;
   std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments that lost some bytes
 };

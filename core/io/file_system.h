@@ -16,11 +16,23 @@
 
 namespace voxdag {
 
+// What changes when a file does: whoever finds it as it was finds the same bytes, unless they were
+// changed so soon before that the clock of the times had not moved on.
+struct FileIdentity {
+  uint64_t inode = 0;
+  uint64_t bytes = 0;
+  int64_t modified_ns = 0;  // Unix time, of the contents
+  int64_t changed_ns = 0;   // ... and of names and times too: nobody can set it back
+  bool operator==(const FileIdentity&) const = default;
+};
+
 class ReadableFile {
  public:
   virtual ~ReadableFile() = default;
   virtual const std::string& path() const = 0;
   virtual uint64_t size() const = 0;
+  // When it was opened; all zeros where that is not known.
+  virtual FileIdentity identity() const { return {}; }
   // Fills `out` from `offset`; a file that ends before is Error{kCorrupt}.
   virtual void read_at(uint64_t offset, std::span<std::byte> out) const = 0;
 };

@@ -55,10 +55,15 @@ class PosixReadableFile : public ReadableFile {
     struct stat s {};
     if (fstat(fd_.get(), &s) != 0) fail("stat", path, errno);
     if (!S_ISREG(s.st_mode)) throw Error(ErrorCode::kInvalidInput, path + " is not a regular file");
-    size_ = static_cast<uint64_t>(s.st_size);
+    const auto nanoseconds = [](const timespec& t) {
+      return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+    };
+    identity_ = {s.st_ino, static_cast<uint64_t>(s.st_size), nanoseconds(s.st_mtim),
+                 nanoseconds(s.st_ctim)};
   }
   const std::string& path() const override { return path_; }
-  uint64_t size() const override { return size_; }
+  uint64_t size() const override { return identity_.bytes; }
+  FileIdentity identity() const override { return identity_; }
   void read_at(uint64_t offset, std::span<std::byte> out) const override {
     while (!out.empty()) {
       const ssize_t n = pread(fd_.get(), out.data(), out.size(), static_cast<off_t>(offset));
@@ -75,7 +80,7 @@ class PosixReadableFile : public ReadableFile {
  private:
   const std::string path_;
   Descriptor fd_;
-  uint64_t size_ = 0;
+  FileIdentity identity_;
 };
 
 class PosixWritableFile : public WritableFile {

@@ -55,17 +55,23 @@ class GltfScene : public TriangleSource {
     declared_ = static_cast<uint64_t>(total);
   }
 
-  void for_each_batch(const std::function<void(std::span<const WorldTriangle>)>& visit) override {
-    invalid_ = 0;
-    gltf::Batch batch(visit, budget_, cancel_);
+  void for_each_batch_from(uint64_t first, const Visitor& visit) override {
+    passed_ = {};
+    gltf::Batch batch(visit, passed_, first, budget_, cancel_);
     for (const auto& f : files_)
-      invalid_ +=
-          gltf::TriangleStream(f->document, *f->buffers, budget_, options_.skip_invalid, batch)
-              .run();
+      gltf::TriangleStream(f->document, *f->buffers, budget_, options_.skip_invalid, batch).run();
     batch.flush();
   }
+  uint64_t position() const override { return passed_.triangles; }
   uint64_t declared_triangles() const override { return declared_; }
-  uint64_t invalid_triangles() const override { return invalid_; }
+  uint64_t invalid_triangles() const override { return passed_.invalid; }
+  std::vector<SourceFile> files() const override {
+    std::vector<SourceFile> all;
+    for (const auto& f : files_) all.push_back({f->file->path(), f->file->identity()});
+    for (const auto& f : files_)
+      for (const auto& [buffer, file] : f->buffers->external_files()) all.push_back(file);
+    return all;
+  }
   std::vector<std::string> warnings() const override {
     std::vector<std::string> all;
     for (const auto& f : files_) {
@@ -83,7 +89,7 @@ class GltfScene : public TriangleSource {
   const CancelToken& cancel_;
   std::vector<std::unique_ptr<SceneFile>> files_;
   uint64_t declared_ = 0;
-  uint64_t invalid_ = 0;
+  gltf::Passed passed_;
 };
 
 }  // namespace

@@ -16,18 +16,32 @@
 
 namespace voxdag {
 
+struct SourceFile {
+  std::string path;
+  FileIdentity identity;
+  bool operator==(const SourceFile&) const = default;
+};
+
 class TriangleSource {
  public:
+  using Visitor = std::function<void(std::span<const WorldTriangle>)>;
+
   virtual ~TriangleSource() = default;
   // Calls `visit` with batches of 1 to 4096 triangles, all finite, until none is left; may be
   // called again and gives the same triangles in the same order. Throws Error naming scene file,
   // node, mesh, primitive or accessor.
-  virtual void for_each_batch(const std::function<void(std::span<const WorldTriangle>)>& visit) = 0;
+  void for_each_batch(const Visitor& visit) { for_each_batch_from(0, visit); }
+  // The same, past the first `first` declared triangles: jumps over them without looking at them.
+  virtual void for_each_batch_from(uint64_t first, const Visitor& visit) = 0;
+  // Declared triangles up to the end of the batch that is visited: where another pass may begin.
+  virtual uint64_t position() const = 0;
   // Triangles the scene declares, instances counted; what for_each_batch() gives plus what
   // skip_invalid drops.
   virtual uint64_t declared_triangles() const = 0;
-  // Dropped by skip_invalid in the last for_each_batch().
+  // Dropped by skip_invalid in the last pass.
   virtual uint64_t invalid_triangles() const = 0;
+  // All files that the triangles come from, as they were when they were opened.
+  virtual std::vector<SourceFile> files() const { return {}; }
   // What a user should know, one sentence each (ignored optional extensions, points and lines that
   // make no voxels).
   virtual std::vector<std::string> warnings() const { return {}; }

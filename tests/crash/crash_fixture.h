@@ -40,12 +40,16 @@ inline uint64_t rounds() {
   return text ? std::strtoull(text, nullptr, 10) : 6;
 }
 
-class CrashTest : public testing::Test {
+// What becomes of the scene's triangles before they are built.
+enum class Ingested { kInMemory, kKept };
+
+class CrashTest : public testing::TestWithParam<Ingested> {
  protected:
   void SetUp() override {
     voxdag::GenerateOptions options;
     options.kind = voxdag::SceneKind::kCity;
-    options.triangles = 3000;
+    // Ingest of a kept scene is to have a few batches.
+    options.triangles = is_kept() ? 20000 : 3000;
     voxdag::NoProgress progress;
     voxdag::CancelToken cancel;
     voxdag::generate_scene(voxdag::system_files(), folder_.file("scene.glb"), options, progress,
@@ -53,6 +57,7 @@ class CrashTest : public testing::Test {
     expected_ = run(voxdag::system_files()).sha256;
     std::filesystem::remove(output());
   }
+  static bool is_kept() { return GetParam() == Ingested::kKept; }
   std::string output() const { return folder_.file("out.vdag"); }
 
   // Small budget and several threads: spilling, splitting and merge rounds are all on the way.
@@ -64,7 +69,8 @@ class CrashTest : public testing::Test {
     spec.run.memory_bytes = uint64_t{64} << 20;
     spec.run.threads = 2;
     spec.run.subvolume_edge = 128;
-    spec.run.checkpoint_interval_s = 0;  // after every level of the merge
+    spec.run.checkpoint_interval_s = 0;  // after every batch of triangles and level of the merge
+    if (is_kept()) spec.run.kept_from_triangles = 1;
     return spec;
   }
   static BuildReport build(const BuildSpec& spec, voxdag::FileSystem& files) {
@@ -138,5 +144,9 @@ class CrashTest : public testing::Test {
   voxdag::TemporaryFolder folder_;
   std::string expected_;
 };
+
+inline std::string name_of(const testing::TestParamInfo<Ingested>& info) {
+  return info.param == Ingested::kKept ? "Kept" : "InMemory";
+}
 
 }  // namespace crash

@@ -55,6 +55,7 @@ class FaultyReader : public voxdag::ReadableFile {
       : files_(files), file_(std::move(file)) {}
   const std::string& path() const override { return file_->path(); }
   uint64_t size() const override { return file_->size(); }
+  voxdag::FileIdentity identity() const override { return file_->identity(); }
   void read_at(uint64_t offset, std::span<std::byte> out) const override {
     files_.read();
     file_->read_at(offset, out);

@@ -19,8 +19,10 @@ bool under_a_sanitizer() {
   return pages > (uint64_t{1} << 40) / 4096;
 }
 
+class MemoryTest : public CrashTest {};
+
 // Slivers that cross the whole grid: the crowded case, in which subvolumes outgrow their share.
-TEST_F(CrashTest, EndsUnderALimitOfAddressSpace) {
+TEST_P(MemoryTest, EndsUnderALimitOfAddressSpace) {
   if (under_a_sanitizer()) GTEST_SKIP() << "a sanitizer needs the address space for itself";
   voxdag::GenerateOptions options;
   options.kind = voxdag::SceneKind::kSoup;
@@ -52,6 +54,9 @@ TEST_F(CrashTest, EndsUnderALimitOfAddressSpace) {
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
+
+INSTANTIATE_TEST_SUITE_P(Ingested, MemoryTest,
+                         testing::Values(Ingested::kInMemory, Ingested::kKept), name_of);
 
 }  // namespace
 }  // namespace crash

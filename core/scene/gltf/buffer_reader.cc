@@ -94,6 +94,9 @@ const ReadableFile& BufferReader::external(int index) {
   } catch (const Error& e) {
     throw Error(e.code(), where + ": " + e.message());
   }
+  const FileIdentity identity = open_.back().file->identity();
+  SourceFile& known = external_files_.try_emplace(index, SourceFile{path, identity}).first->second;
+  if (known.identity != identity) known.identity = {};
   return *open_.back().file;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -12,6 +13,7 @@
 #include "core/base/page_buffer.h"
 #include "core/io/file_system.h"
 #include "core/scene/gltf/document.h"
+#include "core/scene/triangle_source.h"
 
 namespace voxdag::gltf {
 
@@ -27,6 +29,10 @@ class BufferReader {
   // Bytes [offset, offset + size) of a buffer, at most kWindowBytes of them, inside it. Valid until
   // the next call.
   std::span<const std::byte> window(int buffer, uint64_t offset, size_t size);
+
+  // Files beside the scene file that were opened, by buffer. The identity is unknown of one that
+  // had changed when it was opened again.
+  const std::map<int, SourceFile>& external_files() const { return external_files_; }
 
  private:
   void check_length(int buffer);
@@ -45,6 +51,7 @@ class BufferReader {
     std::unique_ptr<ReadableFile> file;
   };
   std::vector<OpenFile> open_;
+  std::map<int, SourceFile> external_files_;
 };
 
 }  // namespace voxdag::gltf

@@ -33,10 +33,9 @@ TriangleStream::TriangleStream(const Document& document, BufferReader& buffers,
       cache_(budget, largest_vertex_count(document)),
       corners_(3 * Batch::kTriangles) {}
 
-uint64_t TriangleStream::run() {
+void TriangleStream::run() {
   NodeWalk walk(document_, budget_);
   while (walk.next()) draw_node(walk);
-  return skipped_;
 }
 
 void TriangleStream::draw_node(const NodeWalk& walk) {
@@ -46,11 +45,16 @@ void TriangleStream::draw_node(const NodeWalk& walk) {
   // A skin's joints place the vertices in the world already.
   const Transform global = node.skin >= 0 ? Transform{} : walk.global();
   for (size_t p = 0; p < mesh.primitives.size(); ++p) {
-    if (triangle_count(document_, mesh.primitives[p]) == 0) continue;
+    const uint64_t triangles = triangle_count(document_, mesh.primitives[p]);
+    const uint64_t all = triangles * instance_count(document_, node);
+    const uint64_t skipped = batch_.skip(all);
+    if (skipped == all) continue;
     bind(node, p);
     InstanceReader instances(document_, buffers_, node);
-    for (instance_ = 0; instance_ < instances.count(); ++instance_)
-      draw_instance(node.instancing.present ? multiply(global, instances.at(instance_)) : global);
+    uint64_t first = skipped % triangles;
+    for (instance_ = skipped / triangles; instance_ < instances.count(); ++instance_, first = 0)
+      draw_instance(node.instancing.present ? multiply(global, instances.at(instance_)) : global,
+                    first);
   }
 }
 
@@ -74,9 +78,9 @@ void TriangleStream::bind(const Node& node, size_t primitive_index) {
   binding_ = wanted;
 }
 
-void TriangleStream::draw_instance(const Transform& world) {
+void TriangleStream::draw_instance(const Transform& world, uint64_t first_triangle) {
   batch_.check_cancelled();
-  for (uint64_t first = 0; first < triangle_count_; first += Batch::kTriangles) {
+  for (uint64_t first = first_triangle; first < triangle_count_; first += Batch::kTriangles) {
     const auto count =
         static_cast<size_t>(std::min<uint64_t>(Batch::kTriangles, triangle_count_ - first));
     if (first != window_first_) {
@@ -95,7 +99,7 @@ void TriangleStream::draw_window(const Transform& world, size_t count) {
       batch_.keep();
     } else {
       if (!skip_invalid_) report(corners, world);
-      ++skipped_;
+      batch_.drop();
     }
   }
 }

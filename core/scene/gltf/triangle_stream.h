@@ -20,9 +20,9 @@ class TriangleStream {
   TriangleStream(const Document& document, BufferReader& buffers, MemoryBudget& budget,
                  bool skip_invalid, Batch& batch);
 
-  // Gives every triangle to the batch. Throws Error{kInvalidInput} naming node, mesh and primitive
-  // for an invalid one, unless those are skipped. Returns how many were.
-  uint64_t run();
+  // Gives every triangle to the batch, but for those it jumps over. Throws Error{kInvalidInput}
+  // naming node, mesh and primitive for an invalid one, unless those are dropped.
+  void run();
 
  private:
   // What the readers below are set up for.
@@ -36,7 +36,7 @@ class TriangleStream {
 
   void draw_node(const NodeWalk& at);
   void bind(const Node& node, size_t primitive_index);
-  void draw_instance(const Transform& world);
+  void draw_instance(const Transform& world, uint64_t first_triangle);
   void draw_window(const Transform& world, size_t count);
   bool place(const uint32_t* corners, const Transform& world, WorldTriangle& out);
   void report(const uint32_t* corners, const Transform& world) const;
@@ -46,7 +46,6 @@ class TriangleStream {
   MemoryBudget& budget_;
   const bool skip_invalid_;
   Batch& batch_;
-  uint64_t skipped_ = 0;
 
   Binding binding_;
   std::vector<Transform> joints_;

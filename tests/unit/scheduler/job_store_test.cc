@@ -124,7 +124,7 @@ TEST_F(JobStoreTest, BringsAnEarlierVersionUpToDate) {
     store.record_built(std::vector{built(store.leaves()[1])});
   }
   SqlDatabase(path(), SqlDatabase::Mode::kReadWrite)
-      .execute("DROP TABLE merge; DROP TABLE result; PRAGMA user_version = 1");
+      .execute("DROP TABLE merge; DROP TABLE result; DROP TABLE ingest; PRAGMA user_version = 1");
   EXPECT_EQ(JobStore(path(), JobStore::Access::kLook).leaves().size(), 3u);
   for (int opened = 1; opened <= 2; ++opened) {
     JobStore store(path(), JobStore::Access::kBuild);
@@ -133,7 +133,7 @@ TEST_F(JobStoreTest, BringsAnEarlierVersionUpToDate) {
     EXPECT_EQ(store.merge().has_value(), opened == 2);
     store.save_merge(5, {});
   }
-  EXPECT_EQ(SqlDatabase(path(), SqlDatabase::Mode::kReadOnly).integer("PRAGMA user_version"), 2);
+  EXPECT_EQ(SqlDatabase(path(), SqlDatabase::Mode::kReadOnly).integer("PRAGMA user_version"), 3);
 }
 
 // An unfinished merge and its result are remembered, replaced and forgotten; a new job has neither.

@@ -14,31 +14,10 @@
 #include "scheduler/run_build.h"
 #include "scheduler/work_folder.h"
 #include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/scheduler/interruptions.h"
 
 namespace voxdag {
 namespace {
-
-// Cancels once a stage has done so much.
-class CancellingProgress : public NoProgress {
- public:
-  CancellingProgress(CancelToken& cancel, std::string stage, uint64_t after)
-      : cancel_(cancel), stage_(std::move(stage)), left_(after) {}
-  void begin_stage(std::string_view stage, uint64_t, std::string_view) override {
-    active_ = stage == stage_;
-    if (active_ && left_ == 0) cancel_.cancel();
-  }
-  void advance(uint64_t count) override {
-    if (!active_) return;
-    left_ -= std::min(left_, count);
-    if (left_ == 0) cancel_.cancel();
-  }
-
- private:
-  CancelToken& cancel_;
-  const std::string stage_;
-  bool active_ = false;
-  uint64_t left_;
-};
 
 class ResumeTest : public testing::Test {
  protected:
@@ -68,18 +47,6 @@ class ResumeTest : public testing::Test {
     NoProgress progress;
     CancelToken cancel;
     return run_build(spec, {system_files(), progress, cancel});
-  }
-  // Builds until `stage` has done `after` units, then stops as Ctrl-C would.
-  static void build_until(const BuildSpec& spec, const std::string& stage, uint64_t after) {
-    CancelToken cancel;
-    CancellingProgress progress(cancel, stage, after);
-    try {
-      run_build(spec, {system_files(), progress, cancel});
-      FAIL() << "the build was not interrupted";
-    } catch (const Error& error) {
-      ASSERT_EQ(error.code(), ErrorCode::kCancelled) << error.what();
-    }
-    EXPECT_FALSE(std::filesystem::exists(spec.run.output));
   }
   static ErrorCode code_of(const BuildSpec& spec) {
     try {
@@ -278,6 +245,23 @@ TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
     again.run.restart = true;
     EXPECT_EQ(build(again).sha256, expected);
   }
+}
+
+// A job store that does not look like one any more, in a folder that an earlier build had, does not
+// stand in the way of starting over; where none had been, it is somebody else's.
+TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
+  build_until(spec(), "build", 5);
+  const std::string store = work() + "/job.db";
+  SqlDatabase(store, SqlDatabase::Mode::kReadWrite).execute("PRAGMA application_id = 77");
+  EXPECT_EQ(code_of(spec()), ErrorCode::kInvalidInput);
+  BuildSpec again = spec();
+  again.run.restart = true;
+  EXPECT_EQ(build(again).subvolumes_reused, 0u);
+
+  std::filesystem::create_directories(work());
+  SqlDatabase(store, SqlDatabase::Mode::kReadWrite).execute("CREATE TABLE thesis (chapter)");
+  EXPECT_EQ(code_of(again), ErrorCode::kInvalidInput);
+  EXPECT_TRUE(std::filesystem::exists(store));
 }
 
 // Told to stop, a build says how to go on.

@@ -63,7 +63,7 @@ TEST_F(TriangleBinsTest, GivesBackWhatItTook) {
         expected[target].push_back(random_triangle(random, wide ? kCoordinateLimit : 1ll << 31));
         writer.append(target, expected[target].back());
       }
-      writer.finish();
+      writer.flush();
       for (size_t i = 0; i < 3; ++i) {
         EXPECT_EQ(bins.count(ids[i]), expected[i].size());
         for (const size_t batch : {size_t{1}, size_t{7}, size_t{4096}})

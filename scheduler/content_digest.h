@@ -1,0 +1,29 @@
+// SHA-256 over the grid and the snapped triangles in their order: names the content of a scene. It
+// is plain data, so that it can be kept and gone on with.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "core/geometry/fixed_triangle.h"
+#include "core/geometry/grid.h"
+
+namespace voxdag {
+
+class ContentDigest {
+ public:
+  ContentDigest() = default;
+  explicit ContentDigest(const Grid& grid);
+  void add(std::span<const FixedTriangle> triangles);
+  // 64 lower-case hex digits of what was added so far.
+  std::string hex() const;
+
+ private:
+  void add_bytes(std::span<const std::byte> bytes);
+
+  std::array<std::byte, 112> state_{};
+};
+
+}  // namespace voxdag
