@@ -19,34 +19,47 @@ struct Outgrown {};
 // Blocks of pages that wait to be used again. Not thread-safe.
 class PagePool {
  public:
+  struct Block {
+    void* pages = nullptr;
+    size_t bytes = 0;
+  };
+
   PagePool() = default;
   PagePool(const PagePool&) = delete;
   PagePool& operator=(const PagePool&) = delete;
-  ~PagePool();
+  ~PagePool() { clear(); }
 
-  // The bytes that a block for `bytes` of them has: a power of two up to kLargestKept, whole pages
-  // beyond.
+  // What a block for `bytes` has when it is new: a power of two up to 4 MiB, whole pages beyond.
   static size_t block_bytes(size_t bytes);
-  // `bytes` must be block_bytes() of something. Contents are zero, or whatever they were if `zero`
-  // is false. Throws Error{kOutOfMemory} when the system has no pages left.
-  void* take(size_t bytes, bool zero);
-  // A block with the contents of an old one, whose pages it takes over.
-  void* grow(void* block, size_t bytes, size_t new_bytes);
-  void give_back(void* block, size_t bytes) noexcept;
+  // The smallest kept block of `bytes` to `most` bytes. Null if there is none.
+  Block take_kept(size_t bytes, size_t most);
+  // Keeps the block, or gives it back to the system where there would be more than `most_kept`.
+  void give_back(Block block, size_t most_kept) noexcept;
+  void clear() noexcept;
+  size_t kept_bytes() const { return kept_bytes_; }
 
  private:
-  static constexpr size_t kSmallest = size_t{4} << 10;
-  static constexpr size_t kLargestKept = size_t{4} << 20;
-  static constexpr size_t kMostKept = size_t{16} << 20;  // bytes, in all
-
-  std::vector<std::vector<void*>> kept_ = std::vector<std::vector<void*>>(11);  // by size
+  std::vector<Block> kept_;
   size_t kept_bytes_ = 0;
 };
 
-// Where the buffers of one build come from: charged to `budget` while they live.
-struct Memory {
+// Where the buffers of one build come from: charged to `budget` while they live. What the pool
+// keeps is not, but makes way for what would not fit beside it.
+class Memory {
+ public:
   MemoryBudget& budget;
   PagePool& pool;
+
+  // A block of block_bytes(bytes), zero, or, if `zero` is false, one of up to twice that with any
+  // contents; charged. Throws Outgrown where the budget has no room, Error{kOutOfMemory} where the
+  // system has none.
+  PagePool::Block take(size_t bytes, bool zero);
+  // Makes a block larger, keeping its contents. Throws likewise; the block is then as it was.
+  void grow(PagePool::Block& block, size_t bytes);
+  void give_back(PagePool::Block block) noexcept;
+
+ private:
+  void charge(size_t bytes);
 };
 
 // An array of at least the size asked for. Throws Outgrown if the budget cannot hold it.
@@ -58,67 +71,46 @@ class Buffer {
   enum Contents { kAny, kZero };
 
   Buffer() = default;
-  Buffer(Memory& memory, size_t size, Contents contents = kAny) : memory_(&memory) {
-    bytes_ = PagePool::block_bytes(size * sizeof(T));
-    if (!memory.budget.try_charge(bytes_)) throw Outgrown{};
-    try {
-      data_ = static_cast<T*>(memory.pool.take(bytes_, contents == kZero));
-    } catch (...) {
-      memory.budget.release(bytes_);
-      throw;
-    }
-  }
+  Buffer(Memory& memory, size_t size, Contents contents = kAny)
+      : memory_(&memory), block_(memory.take(size * sizeof(T), contents == kZero)) {}
   Buffer(Buffer&& other) noexcept { swap(other); }
   Buffer& operator=(Buffer&& other) noexcept {
     Buffer(std::move(other)).swap(*this);
     return *this;
   }
   ~Buffer() {
-    if (!data_) return;
-    memory_->pool.give_back(data_, bytes_);
-    memory_->budget.release(bytes_);
+    if (block_.pages) memory_->give_back(block_);
   }
 
   // Makes the size at least `size`, and larger than it was by a quarter. What is there stays; the
   // rest is undefined.
   void grow(Memory& memory, size_t size) {
-    if (!data_) {
+    if (!block_.pages) {
       *this = Buffer(memory, size);
       return;
     }
-    const size_t least = size * sizeof(T), ample = bytes_ + bytes_ / 4;
-    const size_t bytes = PagePool::block_bytes(least > ample ? least : ample);
-    // Both are there for a moment unless the system moves the pages; the charge is for one.
-    if (!memory.budget.try_charge(bytes - bytes_)) throw Outgrown{};
-    try {
-      data_ = static_cast<T*>(memory.pool.grow(data_, bytes_, bytes));
-    } catch (...) {
-      memory.budget.release(bytes - bytes_);
-      throw;
-    }
-    bytes_ = bytes;
+    const size_t least = size * sizeof(T), ample = block_.bytes + block_.bytes / 4;
+    memory.grow(block_, least > ample ? least : ample);
   }
 
-  T* data() { return data_; }
-  const T* data() const { return data_; }
-  size_t size() const { return bytes_ / sizeof(T); }
-  T& operator[](size_t i) { return data_[i]; }
-  const T& operator[](size_t i) const { return data_[i]; }
-  T* begin() { return data_; }
-  T* end() { return data_ + size(); }
-  const T* begin() const { return data_; }
-  const T* end() const { return data_ + size(); }
+  T* data() { return static_cast<T*>(block_.pages); }
+  const T* data() const { return static_cast<const T*>(block_.pages); }
+  size_t size() const { return block_.bytes / sizeof(T); }
+  T& operator[](size_t i) { return data()[i]; }
+  const T& operator[](size_t i) const { return data()[i]; }
+  T* begin() { return data(); }
+  T* end() { return data() + size(); }
+  const T* begin() const { return data(); }
+  const T* end() const { return data() + size(); }
 
  private:
   void swap(Buffer& other) noexcept {
     std::swap(memory_, other.memory_);
-    std::swap(data_, other.data_);
-    std::swap(bytes_, other.bytes_);
+    std::swap(block_, other.block_);
   }
 
   Memory* memory_ = nullptr;
-  T* data_ = nullptr;
-  size_t bytes_ = 0;
+  PagePool::Block block_;
 };
 
 }  // namespace voxdag::cpu

@@ -27,6 +27,30 @@ TEST_F(CpuMemory, KeptPagesAreZeroedAgain) {
   }
 }
 
+// Pages that are kept make way for what the budget could not hold beside them, and are no more than
+// an eighth of a large budget.
+TEST_F(CpuMemory, KeptPagesStayWithinTheBudget) {
+  { const Buffer<uint8_t> used(memory_, 7 << 20); }
+  EXPECT_EQ(pool_.kept_bytes(), 7u << 20);
+  { const Buffer<uint8_t> more(memory_, 16 << 20); }
+  EXPECT_EQ(pool_.kept_bytes(), 7u << 20);
+  {
+    const Buffer<uint8_t> again(memory_, 5 << 20);
+    EXPECT_EQ(again.size(), 7u << 20);
+    EXPECT_EQ(budget_.used(), 7u << 20);
+    EXPECT_EQ(pool_.kept_bytes(), 0u);
+  }
+  const Buffer<uint8_t> most(memory_, 60 << 20);
+  EXPECT_EQ(pool_.kept_bytes(), 0u);
+}
+
+// What must be zero is as large as was asked for: tables rely on that.
+TEST_F(CpuMemory, ZeroedBlocksAreExact) {
+  { const Buffer<uint8_t> used(memory_, 7 << 20); }
+  const Buffer<uint8_t> table(memory_, 4 << 20, Buffer<uint8_t>::kZero);
+  EXPECT_EQ(table.size(), 4u << 20);
+}
+
 // Growing keeps the contents, within kept sizes and beyond, and charges what the buffer has.
 TEST_F(CpuMemory, BuffersGrow) {
   Buffer<uint32_t> buffer(memory_, 10);
