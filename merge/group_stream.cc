@@ -62,7 +62,7 @@ class GroupFile {
 
   void add_frames(GroupPiece& piece, const FrameSpan& frames) {
     Slab slab(task_.runs, {{.run = piece.run, .frames = frames}}, {hash_, hash_}, kFrameRows, false,
-              seams_.budget);
+              task_.memory, seams_.budget);
     slab.load(task_.child_maps, {seams_.plan.workers, seams_.plan.worker_bytes}, seams_.budget,
               seams_.cancel);
     const SlabBound begin = slab.bound(0, 0), end = slab.bound(slab.ranges(), 0);
@@ -159,11 +159,13 @@ LevelExtent stream_group(const MergeSeams& seams, const LevelTask& task, uint64_
                          uint64_t first_position, uint64_t bytes) {
   GroupFile group(seams, task, hash, bytes);
   group.fill();
+  task.memory.release();
   const auto pieces = group.pieces();
 
   OrderedRows out(task.output, task.bricks, first_position, seams.budget);
   const size_t each = std::clamp<uint64_t>(bytes / 2 / sizeof(uint32_t) / pieces.size(), 64, 16384);
-  PageBuffer<uint32_t> buffers(seams.budget, each * pieces.size(), "a group of equal hashes");
+  PageBuffer<uint32_t> buffers(seams.budget, each * pieces.size() + kLongestRowWords,
+                               "a group of equal hashes");
   std::vector<GroupCursor> cursors;
   for (size_t i = 0; i < pieces.size(); ++i) {
     const std::span<uint32_t> mine(buffers.data() + i * each, each);

@@ -19,8 +19,6 @@ namespace {
 // ranges, so that each run's share of a range is worth visiting.
 constexpr uint64_t kRangeRows = 8192;
 constexpr uint64_t kRangeRowsEachRun = 16;
-// Ranges of more rows are merged row by row, looking for cancellation as they go.
-constexpr uint64_t kMostRangeRows = uint64_t{1} << 20;
 
 // Walks the rows of one piece within one range.
 class PieceCursor {
@@ -82,7 +80,7 @@ class SlabSweep {
   }
 
   bool fits(const RangeExtent& range) const {
-    return range.rows <= kMostRangeRows &&
+    return range.rows <= RangeSweeper::kMostRows &&
            RangeSweeper::bytes_for(range.rows, range.words) <= seams_.plan.worker_bytes;
   }
 
@@ -176,7 +174,7 @@ uint64_t range_rows(const MergeSeams& seams, size_t runs) {
 LevelExtent merge_slab(const MergeSeams& seams, const LevelTask& task, const HashInterval& interval,
                        uint64_t first_position) {
   Slab slab(task.runs, Slab::pieces_within(task.runs, interval), interval,
-            range_rows(seams, task.runs.size()), !task.maps.resident(), seams.budget);
+            range_rows(seams, task.runs.size()), !task.maps.resident(), task.memory, seams.budget);
   slab.load(task.child_maps, {seams.plan.workers, seams.plan.worker_bytes}, seams.budget,
             seams.cancel);
   return SlabSweep(seams, task, slab, first_position).run();
@@ -196,11 +194,14 @@ void check_many(const LevelTask& task, uint64_t hash) {
 
 }  // namespace
 
+uint64_t bytes_for_workers(const MemoryPlan& plan) {
+  return plan.workers * std::max(plan.worker_bytes, OrderedRows::bytes());
+}
+
 LevelExtent merge_level(const MergeSeams& seams, const LevelTask& task) {
   for (const LevelRun* run : task.runs) seams.report.input_nodes += run->rows();
-  const uint64_t for_workers =
-      seams.plan.workers * std::max(seams.plan.worker_bytes, OrderedRows::bytes());
-  const uint64_t available = seams.budget.available();
+  const uint64_t available = seams.budget.available() + task.memory.bytes();
+  const uint64_t for_workers = bytes_for_workers(seams.plan);
   const uint64_t slab_bytes = MemoryPlan::slab_within(available - std::min(available, for_workers));
   LevelExtent extent;
   HashInterval done{0, 0};

@@ -54,7 +54,11 @@ struct LevelTask {
   const PositionMaps* child_maps = nullptr;  // of the level below, run for run; null for bricks
   PositionMaps& maps;                        // filled
   LevelOutput& output;                       // between begin_level() and end_level()
+  SlabMemory& memory;                        // kept from level to level
 };
+
+// What the workers may take besides the slab and the maps.
+uint64_t bytes_for_workers(const MemoryPlan& plan);
 
 // Adds ranges, groups and rows to the report.
 LevelExtent merge_level(const MergeSeams& seams, const LevelTask& task);

@@ -8,28 +8,42 @@ namespace {
 
 // Buckets of more rows are sorted by comparison before the insertion sort runs over all.
 constexpr uint32_t kManyRows = 32;
+// Every piece has a few rows in a range, somewhere in memory: they are asked for so many pieces
+// ahead.
+constexpr size_t kPiecesAhead = 8;
 
-void prefetch(const void* begin, const void* end) {
-  for (const char* p = static_cast<const char*>(begin); p < end; p += 64) __builtin_prefetch(p);
+template <class T>
+void prefetch(const T* begin, const T* end) {
+  constexpr uintptr_t kLine = 64;
+  for (auto p = reinterpret_cast<uintptr_t>(begin) / kLine * kLine;
+       p < reinterpret_cast<uintptr_t>(end); p += kLine)
+    __builtin_prefetch(reinterpret_cast<const void*>(p));
+}
+
+void prefetch_rows(const Slab& slab, size_t range, size_t piece) {
+  if (piece >= slab.pieces().size()) return;
+  const SlabPiece& p = slab.pieces()[piece];
+  const SlabBound begin = slab.bound(range, piece), end = slab.bound(range + 1, piece);
+  prefetch(slab.hashes() + p.row_base + begin.row, slab.hashes() + p.row_base + end.row);
+  prefetch(slab.masks() + p.row_base + begin.row, slab.masks() + p.row_base + end.row);
 }
 
 }  // namespace
 
 RangeSweeper::RangeSweeper(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t words)
     : entries_(budget, rows, "a merge range"),
-      masks_(budget, rows, "a merge range"),
       positions_(budget, rows, "a merge range"),
       bucket_ends_(budget, 2 * rows + 2, "a merge range"),
       unique_(budget, bricks, rows, words) {}
 
 uint64_t RangeSweeper::bytes_for(uint64_t rows, uint64_t words) {
-  return rows * (sizeof(Entry) + 1 + 4 + 8) + RecordBatch::bytes_for(rows, words);
+  return rows * (sizeof(Entry) + 4 + 8) + RecordBatch::bytes_for(rows, words);
 }
 
 void RangeSweeper::sweep(const Slab& slab, size_t range, bool in_words) {
   words_ = slab.words();
   distribute(slab, range);
-  emit_groups(slab, in_words);
+  emit_groups(in_words);
 }
 
 // Fills entries_ in the order of the hash.
@@ -50,6 +64,7 @@ void RangeSweeper::distribute(const Slab& slab, size_t range) {
   for (size_t p = 0; p < pieces.size(); ++p) {
     const SlabBound begin = slab.bound(range, p), end = slab.bound(range + 1, p);
     const uint64_t* const hashes = slab.hashes() + pieces[p].row_base;
+    prefetch_rows(slab, range, p + kPiecesAhead);
     prefetch(words_ + pieces[p].word_base + begin.word, words_ + pieces[p].word_base + end.word);
     for (uint32_t i = begin.row; i < end.row; ++i) ++ends[bucket(hashes[i]) + 1];
   }
@@ -62,8 +77,7 @@ void RangeSweeper::distribute(const Slab& slab, size_t range) {
     const uint8_t* const masks = slab.masks() + pieces[p].row_base;
     uint32_t word = static_cast<uint32_t>(pieces[p].word_base + begin.word);
     for (uint32_t i = begin.row; i < end.row; ++i) {
-      entries_[ends[bucket(hashes[i])]++] = {hashes[i], row, word};
-      masks_[row++] = masks[i];
+      entries_[ends[bucket(hashes[i])]++] = {hashes[i], row++ | uint32_t{masks[i]} << 24, word};
       word += kRowWords[masks[i]];
     }
   }
@@ -90,22 +104,20 @@ void RangeSweeper::sort_buckets(size_t bucket_count) {
 }
 
 bool RangeSweeper::same_row(const Entry& a, const Entry& b) const {
-  if (masks_[a.row] != masks_[b.row]) return false;
+  if (a.mask() != b.mask()) return false;
   const uint32_t* const x = words_ + a.word;
   const uint32_t* const y = words_ + b.word;
-  for (uint32_t i = 0; i < kRowWords[masks_[a.row]]; ++i)
+  for (uint32_t i = 0; i < kRowWords[a.mask()]; ++i)
     if (x[i] != y[i]) return false;
   return true;
 }
 
 // Groups of equal hash: mostly one row, or one row in several runs.
-void RangeSweeper::emit_groups(const Slab& slab, bool in_words) {
+void RangeSweeper::emit_groups(bool in_words) {
   unique_.clear();
   extent_ = 0;
   Entry* const entries = entries_.data();
-  const auto key = [&](const Entry& e) {
-    return RowKey{e.hash, masks_[e.row], slab.words() + e.word};
-  };
+  const auto key = [&](const Entry& e) { return RowKey{e.hash, e.mask(), words_ + e.word}; };
   for (size_t begin = 0, end; begin < row_count_; begin = end) {
     const Entry first = entries[begin];
     bool all_same = true;
@@ -118,10 +130,10 @@ void RangeSweeper::emit_groups(const Slab& slab, bool in_words) {
     for (size_t i = begin; i < end; ++i) {
       if (i == begin || (!all_same && !same_row(entries[i - 1], entries[i]))) {
         position = static_cast<uint32_t>(extent_);
-        unique_.push(first.hash, masks_[entries[i].row], words_ + entries[i].word);
+        unique_.push(first.hash, entries[i].mask(), words_ + entries[i].word);
         extent_ = in_words ? unique_.word_count() : unique_.row_count();
       }
-      positions_[entries[i].row] = position;
+      positions_[entries[i].row()] = position;
     }
   }
 }

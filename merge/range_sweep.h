@@ -17,6 +17,9 @@ namespace voxdag {
 
 class RangeSweeper {
  public:
+  // More rows than this are not swept at once.
+  static constexpr uint64_t kMostRows = uint64_t{1} << 20;
+
   // For ranges of up to `rows` rows with `words` words.
   RangeSweeper(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t words);
   static uint64_t bytes_for(uint64_t rows, uint64_t words);
@@ -34,17 +37,20 @@ class RangeSweeper {
  private:
   struct Entry {
     uint64_t hash;
-    uint32_t row;   // in the order of positions()
-    uint32_t word;  // first one, in the slab
+    uint32_t row_and_mask;  // the row in the order of positions(), below the mask
+    uint32_t word;          // first one, in the slab
+
+    uint32_t row() const { return row_and_mask & 0xffffff; }
+    uint8_t mask() const { return static_cast<uint8_t>(row_and_mask >> 24); }
   };
+  static_assert(kMostRows <= uint64_t{1} << 24);
 
   void distribute(const Slab& slab, size_t range);
   void sort_buckets(size_t bucket_count);
-  void emit_groups(const Slab& slab, bool in_words);
+  void emit_groups(bool in_words);
   bool same_row(const Entry& a, const Entry& b) const;
 
   PageBuffer<Entry> entries_;
-  PageBuffer<uint8_t> masks_;
   PageBuffer<uint32_t> positions_;
   PageBuffer<uint32_t> bucket_ends_;
   RecordBatch unique_;

@@ -4,10 +4,14 @@
 //
 // A record is a row as it stands in the global file: a node's mask followed by its children, a
 // brick's low half followed by its high half.
+//
+// Wherever a row's words lie, kLongestRowWords words can be read from the first one on, so that a
+// row is copied without asking how many it has: that would be a branch as good as random.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <span>
 
 #include "core/base/memory_budget.h"
@@ -18,6 +22,7 @@ namespace voxdag {
 
 inline constexpr uint8_t kBrickRowMask = 3;
 inline constexpr uint32_t kBrickWords = 2;
+inline constexpr uint32_t kLongestRowWords = 8;
 
 // Words of a row by its mask; a table, since baseline x86-64 has no popcount.
 inline constexpr std::array<uint8_t, 256> kRowWords = [] {
@@ -43,7 +48,7 @@ class RecordBatch {
   // Room for `rows` rows of `row_words` words in all.
   RecordBatch(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t row_words)
       : bricks_(bricks),
-        words_(budget, row_words + (bricks ? 0 : rows), "the merge's output"),
+        words_(budget, row_words + (bricks ? 0 : rows) + kLongestRowWords, "the merge's output"),
         hashes_(budget, rows, "the merge's output") {}
   static uint64_t bytes_for(uint64_t rows, uint64_t row_words) { return 12 * rows + 4 * row_words; }
 
@@ -58,17 +63,15 @@ class RecordBatch {
       word_count_ += kBrickWords;
       return;
     }
-    *out++ = mask;
-    const uint32_t count = kRowWords[mask];
-    for (uint32_t i = 0; i < count; ++i) out[i] = row_words[i];
-    word_count_ += 1 + count;
+    out[0] = mask;
+    std::memcpy(out + 1, row_words, kLongestRowWords * sizeof(uint32_t));
+    word_count_ += 1 + kRowWords[mask];
   }
 
   bool bricks() const { return bricks_; }
   uint64_t row_count() const { return row_count_; }
   uint64_t word_count() const { return word_count_; }
   uint64_t row_room() const { return hashes_.size() - row_count_; }
-  uint64_t word_room() const { return words_.size() - word_count_; }
   std::span<const uint32_t> words() const { return {words_.data(), word_count_}; }
   std::span<const uint64_t> hashes() const { return {hashes_.data(), row_count_}; }
 

@@ -16,6 +16,7 @@ class Round {
 
   std::vector<ArtifactRoot> run(const std::function<void(const RoundProgress&)>& after_level) {
     const uint32_t highest = task_.with_top ? 0 : highest_root();
+    reserve_memory();
     uint32_t level = done_.level.value_or(task_.grid_levels - kBrickLevels + 1);
     while (level-- > highest) {
       merge_level_of_all(level);
@@ -58,12 +59,35 @@ class Round {
                              .runs = runs,
                              .child_maps = done_.maps ? &*done_.maps : nullptr,
                              .maps = maps,
-                             .output = output_});
+                             .output = output_,
+                             .memory = memory_});
     output_.end_level(extent.nodes, extent.positions);
     if (task_.with_top) seams_.report.dag_nodes += extent.nodes;
     place(level, top, maps);
     done_.maps = std::move(maps);
     done_.level = level;
+    if (seams_.budget.available() < memory_.bytes() / 4 + bytes_beside_slab()) memory_.release();
+  }
+
+  // Memory for the largest level from the start, where there is room for that.
+  void reserve_memory() {
+    std::vector<uint64_t> rows(task_.grid_levels), words(task_.grid_levels);
+    for (const ArtifactReader& artifact : task_.artifacts)
+      for (const ArtifactLevel& level : artifact.levels()) {
+        rows[level.level] += level.rows;
+        words[level.level] += std::max(level.children, kBrickWords * level.rows);
+      }
+    const uint64_t most_rows = std::ranges::max(rows), most_words = std::ranges::max(words);
+    const bool resident = most_rows * sizeof(uint32_t) <= seams_.plan.resident_bytes;
+    const uint64_t bytes = Slab::bytes_for(most_rows, most_words, false);
+    if (resident && bytes <= kLargestSlabBytes &&
+        bytes + bytes_beside_slab() + seams_.plan.resident_bytes <= seams_.budget.available())
+      memory_.reserve(most_rows, most_words, false, seams_.budget);
+  }
+
+  // What the next level may take, its runs' rows being in a slab.
+  uint64_t bytes_beside_slab() const {
+    return bytes_for_workers(seams_.plan) + seams_.plan.resident_bytes;
   }
 
   // Finds where this level's top nodes and subvolume roots went.
@@ -85,6 +109,7 @@ class Round {
   const RoundTask& task_;
   LevelOutput& output_;
   RoundProgress done_;
+  SlabMemory memory_;
 };
 
 }  // namespace

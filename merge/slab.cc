@@ -69,8 +69,8 @@ std::optional<HashInterval> Slab::widest_interval(std::span<const LevelRun* cons
 
 Slab::Slab(std::span<const LevelRun* const> runs, std::vector<SlabPiece> pieces,
            const HashInterval& interval, uint64_t range_rows, bool with_positions,
-           MemoryBudget& budget)
-    : runs_(runs), pieces_(std::move(pieces)), interval_(interval) {
+           SlabMemory& memory, MemoryBudget& budget)
+    : runs_(runs), pieces_(std::move(pieces)), interval_(interval), memory_(memory) {
   uint64_t rows = 0, words = 0;
   for (SlabPiece& piece : pieces_) {
     const LevelRun& run = *runs_[piece.run];
@@ -85,12 +85,26 @@ Slab::Slab(std::span<const LevelRun* const> runs, std::vector<SlabPiece> pieces,
   }
   range_bits_ = choose_range_bits(interval_, rows, range_rows, pieces_.size());
   range_count_ = (interval_.last >> range_bits_) - (interval_.first >> range_bits_) + 1;
+  memory_.reserve(rows, words, with_positions, budget);
+  bounds_ =
+      PageBuffer<SlabBound>(budget, (range_count_ + 1) * pieces_.size(), "a merge slab's ranges");
+}
+
+void SlabMemory::reserve(uint64_t rows, uint64_t words, bool with_positions, MemoryBudget& budget) {
+  words += kLongestRowWords;
+  if (rows <= hashes_.size() && words <= words_.size() &&
+      (!with_positions || rows <= positions_.size()))
+    return;
+  release();  // all of them, so that no more is ever held than one slab took
   hashes_ = PageBuffer<uint64_t>(budget, rows, "a merge slab");
   masks_ = PageBuffer<uint8_t>(budget, rows, "a merge slab");
   words_ = PageBuffer<uint32_t>(budget, words, "a merge slab");
   if (with_positions) positions_ = PageBuffer<uint32_t>(budget, rows, "a merge slab");
-  bounds_ =
-      PageBuffer<SlabBound>(budget, (range_count_ + 1) * pieces_.size(), "a merge slab's ranges");
+}
+
+uint64_t SlabMemory::bytes() const {
+  return hashes_.size() * sizeof(uint64_t) + masks_.size() +
+         (words_.size() + positions_.size()) * sizeof(uint32_t);
 }
 
 uint64_t Slab::first_hash(size_t range) const {

@@ -38,6 +38,23 @@ struct SlabBound {
   uint32_t word = 0;
 };
 
+// The memory of a slab's columns. It is kept from one slab to the next, as far as there is room for
+// that: pages fresh from the system take as long to be zeroed as it takes to read rows into them.
+class SlabMemory {
+ public:
+  // Room for so many rows; what was in the columns is lost.
+  void reserve(uint64_t rows, uint64_t words, bool with_positions, MemoryBudget& budget);
+  void release() { *this = {}; }
+  uint64_t bytes() const;
+
+ private:
+  friend class Slab;
+  PageBuffer<uint64_t> hashes_;
+  PageBuffer<uint8_t> masks_;
+  PageBuffer<uint32_t> words_;
+  PageBuffer<uint32_t> positions_;
+};
+
 // How the rows are rewired: the threads, and the memory each may use besides the slab.
 struct SlabWorkers {
   unsigned count = 1;
@@ -62,9 +79,10 @@ class Slab {
   static std::vector<SlabPiece> pieces_within(std::span<const LevelRun* const> runs,
                                               const HashInterval& interval);
 
-  // Ranges of about `range_rows` rows, if hashes are spread evenly.
+  // Ranges of about `range_rows` rows, if hashes are spread evenly. At most one slab at a time lies
+  // in `memory`.
   Slab(std::span<const LevelRun* const> runs, std::vector<SlabPiece> pieces,
-       const HashInterval& interval, uint64_t range_rows, bool with_positions,
+       const HashInterval& interval, uint64_t range_rows, bool with_positions, SlabMemory& memory,
        MemoryBudget& budget);
 
   // Reads and rewires; `child_maps` may be null if no run needs them.
@@ -77,10 +95,10 @@ class Slab {
   SlabBound bound(size_t range, size_t piece) const {
     return bounds_[range * pieces_.size() + piece];
   }
-  const uint64_t* hashes() const { return hashes_.data(); }
-  const uint8_t* masks() const { return masks_.data(); }
-  const uint32_t* words() const { return words_.data(); }
-  uint32_t* positions() { return positions_.data(); }
+  const uint64_t* hashes() const { return memory_.hashes_.data(); }
+  const uint8_t* masks() const { return memory_.masks_.data(); }
+  const uint32_t* words() const { return memory_.words_.data(); }
+  uint32_t* positions() { return memory_.positions_.data(); }
 
  private:
   class Loader;
@@ -93,10 +111,7 @@ class Slab {
   HashInterval interval_;
   unsigned range_bits_ = 0;
   size_t range_count_ = 0;
-  PageBuffer<uint64_t> hashes_;
-  PageBuffer<uint8_t> masks_;
-  PageBuffer<uint32_t> words_;
-  PageBuffer<uint32_t> positions_;
+  SlabMemory& memory_;
   PageBuffer<SlabBound> bounds_;
 };
 

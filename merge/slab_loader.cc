@@ -84,17 +84,17 @@ class Slab::Loader {
     const uint64_t row = piece.row_base + run.rows_before(f) - piece.first_row;
     const uint64_t word =
         piece.word_base + run.words_before(f) - run.words_before(piece.frames.begin);
-    std::copy(frame.hashes.begin(), frame.hashes.end(), slab_.hashes_.data() + row);
-    uint32_t* out = slab_.words_.data() + word;
+    std::copy(frame.hashes.begin(), frame.hashes.end(), slab_.memory_.hashes_.data() + row);
+    uint32_t* out = slab_.memory_.words_.data() + word;
     if (run.bricks()) {
-      std::fill_n(slab_.masks_.data() + row, frame.rows, kBrickRowMask);
+      std::fill_n(slab_.memory_.masks_.data() + row, frame.rows, kBrickRowMask);
       for (const uint64_t mask : frame.brick_masks) {
         *out++ = static_cast<uint32_t>(mask >> 32);
         *out++ = static_cast<uint32_t>(mask);
       }
       return;
     }
-    std::copy(frame.masks.begin(), frame.masks.end(), slab_.masks_.data() + row);
+    std::copy(frame.masks.begin(), frame.masks.end(), slab_.memory_.masks_.data() + row);
     if (map)
       replace_all(frame.children, map, out);
     else
@@ -119,7 +119,7 @@ class Slab::Loader {
         static_cast<uint32_t>(run.rows_before(f) - piece.first_row),
         static_cast<uint32_t>(run.words_before(f) - run.words_before(piece.frames.begin))};
     const auto mark = [&] { slab_.bounds_[next++ * slab_.pieces_.size() + piece_index] = here; };
-    const uint8_t* masks = slab_.masks_.data() + piece.row_base + here.row;
+    const uint8_t* masks = slab_.memory_.masks_.data() + piece.row_base + here.row;
     for (size_t i = 0; i < frame.rows && next < end; ++i) {
       while (next < end && reached(next, frame.hashes[i])) mark();
       ++here.row;
@@ -140,7 +140,7 @@ class Slab::Loader {
   // The run's map is larger than the memory for it: one window of it at a time.
   void replace_by_windows(Worker& worker, const SlabPiece& piece, const CancelToken& cancel) {
     worker.replaced.assign(piece.words, false);
-    uint32_t* const words = slab_.words_.data() + piece.word_base;
+    uint32_t* const words = slab_.memory_.words_.data() + piece.word_base;
     const uint64_t map_rows = maps_->rows(piece.run);
     for (uint64_t first = 0; first < map_rows; first += worker.window.size()) {
       cancel.check();

@@ -106,7 +106,7 @@ class OneLevel {
 
   Slab slab() {
     Slab made(pointers_, Slab::pieces_within(pointers_, {}), {},
-              std::max<uint64_t>(8192, 8 * pointers_.size()), false, budget_);
+              std::max<uint64_t>(8192, 8 * pointers_.size()), false, memory_, budget_);
     return made;
   }
   void load(Slab& slab) { slab.load(&*below_, {1, kGiB}, budget_, cancel_); }
@@ -131,7 +131,7 @@ class OneLevel {
     MergeProgress progress(silent);
     const MergeSeams seams{scratch_, budget_, MemoryPlan::divide(budget_.available(), 1),
                            progress, cancel_, report};
-    merge_level(seams, {1, bricks, pointers_, &*below_, *maps_, nowhere});
+    merge_level(seams, {1, bricks, pointers_, &*below_, *maps_, nowhere, memory_});
   }
 
  private:
@@ -148,6 +148,7 @@ class OneLevel {
   std::vector<std::unique_ptr<ArtifactRun>> runs_;
   std::vector<const LevelRun*> pointers_;
   std::optional<PositionMaps> maps_, below_;
+  SlabMemory memory_;
   uint64_t total_ = 0;
 };
 
