@@ -15,8 +15,9 @@ void* check_pages(void* pages, size_t bytes, std::string_view what) {
     throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " +
                                              std::to_string(bytes) + " bytes for " +
                                              std::string(what));
-  // A huge page is touched as a whole: below a few of them that would cost more than it saves.
-  if (bytes >= (size_t{8} << 20)) madvise(pages, bytes, MADV_HUGEPAGE);
+  // Random access to tables of this size waits for page tables otherwise. A huge page never reaches
+  // beyond the pages that were asked for, so no more becomes resident than is charged.
+  if (bytes >= (size_t{2} << 20)) madvise(pages, bytes, MADV_HUGEPAGE);
   return pages;
 }
 
