@@ -1,6 +1,7 @@
 #include "core/backend/cpu/node_table.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "core/backend/cpu/slot_order.h"
 #include "core/dag/level_array.h"
@@ -18,7 +19,8 @@ uint32_t NodeTable::add(uint64_t at, uint64_t hash, uint32_t mask, const uint32_
   Record added = record(id);
   added.set_hash(hash);
   added.words[2] = mask;
-  for (int i = 0; i < child_count; ++i) added.children()[i] = children[i];
+  // Always eight: what is too many is overwritten by the next node.
+  std::memcpy(added.children(), children, 8 * sizeof(uint32_t));
   slots_[at] = hash >> 32 << 32 | id;
   used_ += Record::kWords + static_cast<uint64_t>(child_count);
   ++count_;

@@ -39,7 +39,7 @@ NodeRef SubDagTables::add_brick(uint64_t mask) {
 }
 
 NodeRef SubDagTables::add_node(int size_log2, const NodeRef (&children)[8]) {
-  uint32_t mask = 0, ids[8];
+  uint32_t mask = 0, ids[8] = {};
   uint64_t hashes[8];
   int count = 0;
   for (int c = 0; c < 8; ++c) {

@@ -67,6 +67,7 @@ class TileReducer {
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
   static constexpr int kMostBricks = kTileBlocks * kBlockBricks;
+  static constexpr int kChildren = 8;  // that can be read wherever those of a node begin
 
   SubDagTables& tables_;
   const Kernels& kernels_;
@@ -76,7 +77,7 @@ class TileReducer {
     uint64_t words[kTileBlocks / 64];
     uint8_t bytes[kTileBlocks / 8];
   } existing_;
-  uint32_t ids_[kTileBlocks];
+  uint32_t ids_[kTileBlocks + kChildren] = {};
   uint64_t hashes_[kTileBlocks];
   Parents parents_;  // the level above
   // Blocks of a tile: numbers and keys, and which of them (by place in this list) are new.
@@ -87,7 +88,7 @@ class TileReducer {
   // Bricks of the new blocks.
   uint64_t bricks_[kMostBricks];
   uint64_t brick_hashes_[kMostBricks];
-  uint32_t brick_ids_[kMostBricks];
+  uint32_t brick_ids_[kMostBricks + kChildren] = {};
 };
 
 }  // namespace voxdag::cpu

@@ -69,6 +69,14 @@ struct Node {
 // ones included, whose clusters run around the table's end.
 class NodeTables : public Tables {
  protected:
+  // What stands behind the children makes no difference.
+  uint32_t add(NodeTable& table, const Node& node) {
+    uint32_t children[8];
+    for (uint32_t& child : children) child = static_cast<uint32_t>(random_.between(0, 3));
+    std::copy(node.children.begin(), node.children.end(), children);
+    return table.find_or_add(node.hash, node.mask, children, popcount64(node.mask));
+  }
+
   Node random_node(int distinct_hashes) {
     Node node;
     node.mask = static_cast<uint32_t>(random_.between(1, 255));
@@ -91,8 +99,7 @@ TEST_F(NodeTables, NodesAreFoundAgainWhateverTheirHashes) {
     for (int i = 0; i < (distinct == 1 ? 1000 : 20000); ++i) {
       const Node node = random_node(distinct);
       table.reserve(1);
-      const uint32_t id =
-          table.find_or_add(node.hash, node.mask, node.children.data(), popcount64(node.mask));
+      const uint32_t id = add(table, node);
       ASSERT_EQ(truth.emplace(node, id).first->second, id);
       NodeTable::Record record = table.record(id);
       ASSERT_EQ(record.hash(), node.hash);
@@ -114,7 +121,7 @@ TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
       for (int i = 0; i < 3000; ++i) {
         const Node node = random_node(distinct);
         table.reserve(1);
-        table.find_or_add(node.hash, node.mask, node.children.data(), popcount64(node.mask));
+        add(table, node);
       }
       table.for_each_record([&](NodeTable::Record record) {
         if (changed) record.set_hash(hash_brick(record.hash()) >> 60);
@@ -144,8 +151,8 @@ TEST_F(NodeTables, OutgrowsItsBudget) {
     EXPECT_THROW(
         for (uint32_t i = 1; i < 10000; ++i) {
           table.reserve(1);
-          const uint32_t child = i;
-          table.find_or_add(hash_brick(i), 1, &child, 1);
+          const uint32_t children[8] = {i};
+          table.find_or_add(hash_brick(i), 1, children, 1);
         },
         Outgrown);
     EXPECT_GT(table.size(), 500u);
