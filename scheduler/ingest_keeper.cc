@@ -66,22 +66,22 @@ std::optional<IngestState> IngestKeeper::resume() {
   try {
     if (const auto stored = store_.ingest()) record_ = decode_ingest_record(*stored);
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::kCorrupt) throw;
-    seams_.progress.warn(error.message() + ": the scene is read again");
-    forget();
+    if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion)
+      throw;
+    seams_.progress.warn(error.message() + "; the scene is read again");
+    store_.forget_ingest();
   }
   if (!record_) {
     work_.remove_kept();
     return std::nullopt;
   }
   // Without a job there is no plan that the triangles could have been handed down to.
-  const bool fits = record_->request == request_of(spec_) && files_are_unchanged() &&
-                    (record_->state.stage != IngestStage::kReady || store_.job());
-  if (!fits) {
-    forget();
-    return std::nullopt;
-  }
-  return record_->state;
+  if (record_->request == request_of(spec_) && files_are_unchanged() &&
+      (record_->state.stage != IngestStage::kReady || store_.job()))
+    return record_->state;
+  // It stays until another scene is there to take its place: this one may only be out of reach.
+  record_.reset();
+  return std::nullopt;
 }
 
 bool IngestKeeper::wants(const TriangleSource& scene) const {
@@ -142,6 +142,14 @@ void IngestKeeper::commit(const IngestState& state) {
   record_->state = state;
   store_.save_ingest(encode(*record_));
   saved_s_ = wall_seconds();
+}
+
+bool IngestKeeper::has_saved() const {
+  try {
+    return store_.ingest().has_value();
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 void IngestKeeper::forget() {

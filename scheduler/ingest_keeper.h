@@ -50,6 +50,8 @@ class IngestKeeper {
   // that stays to be known.
   void finish();
 
+  // Whether there is something to go on with, of whatever scene.
+  bool has_saved() const;
   void forget();
   // Forgets, and keeps nothing for the rest of this run.
   void give_up();

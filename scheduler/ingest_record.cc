@@ -8,6 +8,9 @@
 namespace voxdag {
 namespace {
 
+// Another one for every change of what follows it.
+constexpr uint64_t kRecordVersion = 1;
+
 void put_bytes(std::vector<std::byte>& out, std::span<const std::byte> bytes) {
   const size_t at = out.size();
   out.resize(at + bytes.size());
@@ -56,6 +59,7 @@ class Reader {
 
 std::vector<std::byte> encode(const IngestRecord& record) {
   std::vector<std::byte> out;
+  put(out, kRecordVersion);
   put(out, record.request);
   put(out, record.state);
   for (const SourceFile& file : record.files) {
@@ -67,6 +71,10 @@ std::vector<std::byte> encode(const IngestRecord& record) {
 
 IngestRecord decode_ingest_record(std::span<const std::byte> bytes) {
   Reader in(bytes);
+  if (const auto version = in.get<uint64_t>(); version != kRecordVersion)
+    throw Error(ErrorCode::kUnsupportedVersion,
+                "job store: the record of what was ingested is of version " +
+                    std::to_string(version) + ": expected " + std::to_string(kRecordVersion));
   IngestRecord record;
   record.request = in.text();
   record.state = in.get<IngestState>();

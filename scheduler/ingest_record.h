@@ -54,7 +54,8 @@ struct IngestRecord {
 };
 
 std::vector<std::byte> encode(const IngestRecord& record);
-// Throws Error{kCorrupt} for what encode() never gave.
+// Throws Error{kCorrupt} for what encode() never gave, Error{kUnsupportedVersion} for what it gives
+// in another version.
 IngestRecord decode_ingest_record(std::span<const std::byte> bytes);
 
 }  // namespace voxdag

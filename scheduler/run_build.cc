@@ -59,7 +59,7 @@ class Build {
       // With a job, or a part of a scene that is not at fault, the folder is what goes on.
       const bool scene_is_at_fault =
           error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
-      if (!store_->job() && (scene_is_at_fault || !keeper_.keeps())) {
+      if (!store_->job() && (scene_is_at_fault || !keeper_.has_saved())) {
         remove_work();
         throw;
       }

@@ -11,7 +11,7 @@ namespace {
 constexpr size_t kCoordinates = 9;
 constexpr size_t kMostRecordsAChunk = 1024;
 // Larger ones in a file that is kept: fewer pieces to name, to read and to give back.
-constexpr size_t kMostRecordsAKeptChunk = 4096;
+constexpr size_t kMostRecordsAKeptChunk = 16384;
 constexpr size_t kLeastRecordsAChunk = 16;
 
 template <class Coordinate>

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <filesystem>
 #include <functional>
 #include <thread>
 
@@ -216,6 +218,30 @@ TEST_F(PosixFiles, SmallFilesAreSmall) {
   put(path_, "12345");
   EXPECT_EQ(read_small_file(files_, path_, 5), "12345");
   expect_error(ErrorCode::kLimit, "at most 4", [&] { read_small_file(files_, path_, 4); });
+}
+
+// A file that is found as it was found has its identity; one that was changed in place, replaced or
+// grown has another, and setting its time back does not help.
+TEST_F(PosixFiles, IdentityTellsAChange) {
+  put(path_, "12345");
+  const auto identity = [&] { return files_.open_read(path_)->identity(); };
+  const FileIdentity first = identity();
+  EXPECT_EQ(first.bytes, 5u);
+  // Longer than the clock of the times stands still.
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(identity(), first);
+  const auto time = std::filesystem::last_write_time(path_);
+  files_.open_write(path_)->write_at(2, bytes("x"));
+  std::filesystem::last_write_time(path_, time);
+  const FileIdentity changed = identity();
+  EXPECT_EQ(changed.modified_ns, first.modified_ns);
+  EXPECT_NE(changed, first);
+  files_.open_write(path_)->write_at(5, bytes("6"));
+  EXPECT_EQ(identity().bytes, 6u);
+  const FileIdentity grown = identity();
+  put(folder_.file("other"), "12345x");
+  files_.rename(folder_.file("other"), path_);
+  EXPECT_NE(identity().inode, grown.inode);
 }
 
 }  // namespace

@@ -194,5 +194,28 @@ TEST_F(JobStoreTest, CanBeLookedAtMeanwhile) {
   EXPECT_THROW(looker.set_progress(progress), Error);
 }
 
+// How far ingest is outlives the start of a job and is forgotten when told to, and when an artifact
+// is lost whose triangles are gone; a row that rotted is told from a sound one.
+TEST_F(JobStoreTest, RemembersHowFarIngestIs) {
+  const std::vector<std::byte> record = {std::byte{3}, std::byte{0}, std::byte{200}};
+  JobStore store(path(), JobStore::Access::kBuild);
+  EXPECT_FALSE(store.ingest().has_value());
+  store.save_ingest({});
+  store.save_ingest(record);
+  store.start(job_, plan(2));
+  EXPECT_EQ(store.ingest(), record);
+  store.record_built(std::vector{built(store.leaves()[1])});
+  EXPECT_EQ(store.ingest(), record);
+  store.record_lost(store.leaves()[1]);
+  EXPECT_FALSE(store.ingest().has_value());
+  store.save_ingest(record);
+  store.forget_ingest();
+  EXPECT_FALSE(store.ingest().has_value());
+  store.save_ingest(record);
+  SqlDatabase(path(), SqlDatabase::Mode::kReadWrite)
+      .execute("UPDATE ingest SET record = x'0301c8'");
+  EXPECT_THROW(store.ingest(), Error);
+}
+
 }  // namespace
 }  // namespace voxdag

@@ -110,5 +110,29 @@ TEST(TopTree, ExpectedVoxelsOfAnAxisAlignedTriangle) {
   EXPECT_NEAR(expected_bricks(t), 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
 }
 
+// Filled with the cells of another, a top tree goes on as that one would have: the plans are equal.
+TEST(TopTree, GoesOnFromTheCellsOfAnother) {
+  MemoryBudget budget(uint64_t{1} << 30);
+  std::mt19937_64 random(4);
+  const uint32_t depth = TopTree::depth_within(kLevels, 1 << 20);
+  TopTree whole(kLevels, depth, budget), first(kLevels, depth, budget),
+      rest(kLevels, depth, budget);
+  for (int i = 0; i < 2000; ++i) {
+    const FixedTriangle triangle = triangle_near(random, 5000);
+    if (i == 700) std::ranges::copy(first.cells(), rest.fill(first.total_weight()).begin());
+    whole.add(triangle);
+    (i < 700 ? first : rest).add(triangle);
+  }
+  EXPECT_EQ(rest.total_weight(), whole.total_weight());
+  const auto plan = whole.subvolumes_by_weight(whole.total_weight() / 50);
+  const auto again = rest.subvolumes_by_weight(whole.total_weight() / 50);
+  ASSERT_EQ(plan.size(), again.size());
+  for (size_t i = 0; i < plan.size(); ++i) {
+    EXPECT_EQ(plan[i].cube, again[i].cube);
+    EXPECT_EQ(plan[i].weight, again[i].weight);
+    EXPECT_EQ(plan[i].triangles, again[i].triangles);
+  }
+}
+
 }  // namespace
 }  // namespace voxdag

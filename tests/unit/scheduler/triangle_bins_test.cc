@@ -82,5 +82,84 @@ TEST_F(TriangleBinsTest, GivesBackWhatItTook) {
     }
 }
 
+// Kept bins are found again by another process from the end of the file and the last link of the
+// chain alone, whatever was written after that; the last who needs one gives its space back.
+TEST_F(TriangleBinsTest, KeptBinsAreFoundAgain) {
+  MemoryBudget share(1 << 20);
+  std::mt19937_64 random(8);
+  std::vector<FixedTriangle> expected[2];
+  Extent last;
+  uint64_t end = 0;
+  for (int run = 0; run < 3; ++run) {
+    SCOPED_TRACE(run);
+    TriangleBins bins(system_files(), spill_path(), false, share);
+    bins.keep_in(std::make_unique<TriangleFile>(system_files(), folder_ + "/kept", end));
+    const std::vector<BinId> ids = {bins.add_kept_bin(), bins.add_kept_bin()};
+    bins.read_chain(last);
+    for (size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(bins.count(ids[i]), expected[i].size());
+      EXPECT_TRUE(equal(read_all(bins, ids[i], 100), expected[i]));
+    }
+    BinWriter writer(bins, ids, 1 << 14);
+    for (int link = 0; link < 3; ++link) {
+      for (int i = 0; i < 700; ++i) {
+        const size_t target = random() % 2;
+        expected[target].push_back(random_triangle(random, 1ll << 31));
+        writer.append(target, expected[target].back());
+      }
+      writer.flush();
+      last = bins.write_chain();
+    }
+    bins.kept_file()->sync();
+    end = bins.kept_file()->end();
+    // Not named by any link: as if it had never been.
+    for (int i = 0; i < 500; ++i) writer.append(0, random_triangle(random, 1000));
+    writer.flush();
+    EXPECT_FALSE(std::filesystem::exists(spill_path()));
+  }
+  const auto reopened = [&](int bin_count) {
+    auto bins = std::make_unique<TriangleBins>(system_files(), spill_path(), false, share);
+    bins->keep_in(std::make_unique<TriangleFile>(system_files(), folder_ + "/kept", end));
+    for (int i = 0; i < bin_count; ++i) bins->add_kept_bin();
+    return bins;
+  };
+  EXPECT_THROW(reopened(1)->read_chain(last), DamagedTriangles) << "a bin is missing";
+  const auto bins = reopened(2);
+  bins->read_chain(last);
+  bins->hold(0, 2);
+  bins->drop(0);
+  bins->release(0);
+  EXPECT_EQ(bins->count(0), expected[0].size());
+  bins->release(0);
+  EXPECT_EQ(bins->count(0), 0u);
+}
+
+// A stream may begin at any triangle, within a chunk or between two.
+TEST_F(TriangleBinsTest, StreamsBeginAnywhere) {
+  MemoryBudget share(40000);
+  TriangleBins bins(system_files(), spill_path(), false, share);
+  const BinId bin = bins.add_bin();
+  BinWriter writer(bins, {bin}, 4000);
+  std::mt19937_64 random(9);
+  std::vector<FixedTriangle> expected;
+  for (int i = 0; i < 3000; ++i) {
+    expected.push_back(random_triangle(random, 1000));
+    writer.append(0, expected.back());
+  }
+  writer.flush();
+  for (const uint64_t first : {0u, 1u, 110u, 111u, 112u, 2999u, 3000u}) {
+    SCOPED_TRACE(first);
+    const auto stream = bins.open(bin, first);
+    EXPECT_EQ(stream->count(), 3000 - first);
+    for (int pass = 0; pass < 2; ++pass) {
+      std::vector<FixedTriangle> tail(4000);
+      tail.resize(stream->read(tail));
+      EXPECT_TRUE(
+          equal(tail, {expected.begin() + static_cast<std::ptrdiff_t>(first), expected.end()}));
+      stream->rewind();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace voxdag

@@ -1,0 +1,38 @@
+#include "scheduler/content_digest.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/format/checksum.h"
+
+namespace voxdag {
+namespace {
+
+// The digest is SHA-256 over the grid's five numbers and the triangles, in whatever portions they
+// come, and goes on from a copy of itself.
+TEST(ContentDigest, IsTheSha256OfGridAndTriangles) {
+  const Grid grid{10, {1.5, -2, 0.25}, 7.5};
+  std::vector<FixedTriangle> triangles(1000);
+  int64_t next = 1;
+  for (FixedTriangle& t : triangles)
+    for (auto& vertex : t.v)
+      for (int64_t& u : vertex) u = next += 2;
+  Sha256 expected;
+  const double numbers[] = {1024, 1.5, -2, 0.25, 7.5};
+  expected.add(std::as_bytes(std::span(numbers)));
+  expected.add(std::as_bytes(std::span(triangles)));
+
+  ContentDigest digest(grid);
+  digest.add(std::span(triangles).first(7));
+  const ContentDigest copy = digest;
+  digest.add(std::span(triangles).first(1));
+  ContentDigest again = copy;
+  again.add(std::span(triangles).subspan(7, 500));
+  again.add(std::span(triangles).subspan(507));
+  EXPECT_EQ(again.hex(), expected.finish());
+  EXPECT_NE(digest.hex(), copy.hex());
+}
+
+}  // namespace
+}  // namespace voxdag
