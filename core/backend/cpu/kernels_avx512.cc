@@ -13,8 +13,13 @@ namespace {
 // As block_key(), eight bricks at once.
 uint64_t key_of(__m512i bricks) {
   const __m512i sums = _mm512_add_epi32(bricks, _mm512_load_si512(kBlockKeys.add));
-  return static_cast<uint64_t>(
-      _mm512_reduce_add_epi64(_mm512_mul_epu32(sums, _mm512_srli_epi64(sums, 32))));
+  const __m512i eight = _mm512_mul_epu32(sums, _mm512_srli_epi64(sums, 32));
+  const __m256i four =
+      _mm256_add_epi64(_mm512_castsi512_si256(eight), _mm512_extracti64x4_epi64(eight, 1));
+  const __m128i two =
+      _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
+  return static_cast<uint64_t>(_mm_cvtsi128_si64(two)) +
+         static_cast<uint64_t>(_mm_extract_epi64(two, 1));
 }
 
 int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
