@@ -54,9 +54,10 @@ void fill_kept_bins(std::span<const StoredSubvolume> planned, PreparedScene& sce
                state.position = first + copied;
                if (!keeper.is_due()) return;
                writer.flush();
-               keeper.save(state, bins);
+               keeper.save_soon(state, bins);
              });
   state.stage = IngestStage::kReady;
+  state.top_tree = {};
   keeper.save(state, bins);
   bins.release(scene.whole);
 }

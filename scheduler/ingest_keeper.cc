@@ -1,6 +1,7 @@
 #include "scheduler/ingest_keeper.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
@@ -61,8 +62,9 @@ IngestKeeper::IngestKeeper(const BuildSpec& spec, JobStore& store, WorkFolder& w
     : spec_(spec), store_(store), work_(work), seams_(seams) {}
 
 std::optional<IngestState> IngestKeeper::resume() {
+  settle();
   record_.reset();
-  saved_s_ = wall_seconds();
+  begun_s_ = wall_seconds();
   try {
     if (const auto stored = store_.ingest()) record_ = decode_ingest_record(*stored);
   } catch (const Error& error) {
@@ -98,7 +100,7 @@ void IngestKeeper::begin(const TriangleSource& scene, int64_t opened_ns) {
   if (settled_ns(files) > opened_ns) return;
   record_ = IngestRecord{request_of(spec_), std::move(files), {}};
   record_->state.declared_triangles = scene.declared_triangles();
-  saved_s_ = wall_seconds();
+  begun_s_ = wall_seconds();
 }
 
 bool IngestKeeper::is_of(const std::vector<SourceFile>& files) const {
@@ -109,26 +111,55 @@ std::unique_ptr<TriangleFile> IngestKeeper::open_file(uint64_t end) {
   return std::make_unique<TriangleFile>(seams_.files, work_.kept_path(), end);
 }
 
-bool IngestKeeper::is_due() const {
-  return record_ && wall_seconds() - saved_s_ >= spec_.run.checkpoint_interval_s;
+bool IngestKeeper::is_due() {
+  if (pending_.valid()) {
+    if (pending_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+    settle();
+  }
+  return record_ && wall_seconds() - begun_s_ >= spec_.run.checkpoint_interval_s;
+}
+
+void IngestKeeper::settle() {
+  if (pending_.valid()) pending_.get();
+}
+
+void IngestKeeper::settle_whatever_comes() {
+  try {
+    settle();
+  } catch (const Error&) {
+    // The checkpoint before it counts.
+  }
 }
 
 void IngestKeeper::save(IngestState& state, TriangleBins& bins) {
+  save_soon(state, bins);
+  settle();
+}
+
+void IngestKeeper::save_soon(IngestState& state, TriangleBins& bins) {
+  settle();
   if (!record_) return;
-  TriangleFile& file = *bins.kept_file();
+  begun_s_ = wall_seconds();
+  const std::shared_ptr<TriangleFile> file = bins.kept_file();
   state.chunks = bins.write_chain();
-  state.file_end = file.end();
-  file.sync();
-  const Extent old = record_->state.top_tree;
-  commit(state);
-  if (old.bytes && old.offset != state.top_tree.offset) file.release(old);
+  state.file_end = file->end();
+  pending_ = std::async(std::launch::async, [this, state, file] {
+    file->sync();
+    const Extent old = record_->state.top_tree;
+    commit(state);
+    if (old.bytes && old.offset != state.top_tree.offset) file->release(old);
+  });
+  // Tests want a checkpoint after every batch.
+  if (spec_.run.checkpoint_interval_s == 0) settle();
 }
 
 void IngestKeeper::save_scan(const IngestState& state) {
+  begun_s_ = wall_seconds();
   if (record_) commit(state);
 }
 
 void IngestKeeper::finish() {
+  settle();
   if (!record_) return;
   IngestState state = record_->state;
   state.chunks = state.cubes = state.top_tree = {};
@@ -138,13 +169,16 @@ void IngestKeeper::finish() {
 }
 
 void IngestKeeper::commit(const IngestState& state) {
-  if (!files_are_unchanged()) return forget();
+  if (!files_are_unchanged()) {
+    record_.reset();
+    return forget_saved();
+  }
   record_->state = state;
   store_.save_ingest(encode(*record_));
-  saved_s_ = wall_seconds();
 }
 
-bool IngestKeeper::has_saved() const {
+bool IngestKeeper::has_saved() {
+  settle_whatever_comes();
   try {
     return store_.ingest().has_value();
   } catch (const Error&) {
@@ -153,7 +187,12 @@ bool IngestKeeper::has_saved() const {
 }
 
 void IngestKeeper::forget() {
+  settle_whatever_comes();
   record_.reset();
+  forget_saved();
+}
+
+void IngestKeeper::forget_saved() {
   // The file first: that may be the room in which the job store commits.
   work_.remove_kept();
   store_.forget_ingest();
@@ -164,7 +203,8 @@ void IngestKeeper::give_up() {
   forget();
 }
 
-bool IngestKeeper::is_optional() const {
+bool IngestKeeper::is_optional() {
+  settle_whatever_comes();
   return record_ && fits_in_memory(spec_, record_->state.declared_triangles);
 }
 

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -40,34 +41,44 @@ class IngestKeeper {
 
   bool keeps() const { return record_.has_value(); }
   std::unique_ptr<TriangleFile> open_file(uint64_t end);
-  bool is_due() const;
+  // Whether it is time for a checkpoint, and the last one is durable.
+  bool is_due();
   // Makes durable what is in the kept bins, and that it is as `state` says; completes `state` by
   // where it lies. Does nothing where nothing is kept, and gives up if the scene's files have
   // changed.
   void save(IngestState& state, TriangleBins& bins);
+  // The same on another thread, so that the disk does not keep ingest waiting: a crash costs the
+  // interval and what a sync takes. What goes wrong is thrown by the next call.
+  void save_soon(IngestState& state, TriangleBins& bins);
+  // Of a scan, which has no triangles.
   void save_scan(const IngestState& state);
   // All subvolumes are built and recorded: the triangles go, and that the scene is the same is all
   // that stays to be known.
   void finish();
 
   // Whether there is something to go on with, of whatever scene.
-  bool has_saved() const;
+  bool has_saved();
   void forget();
   // Forgets, and keeps nothing for the rest of this run.
   void give_up();
   // Whether the triangles fit in memory as well.
-  bool is_optional() const;
+  bool is_optional();
 
  private:
+  // Waits for what save_soon() began.
+  void settle();
+  void settle_whatever_comes();
   bool files_are_unchanged() const;
   void commit(const IngestState& state);
+  void forget_saved();
 
   const BuildSpec& spec_;
   JobStore& store_;
   WorkFolder& work_;
   const Seams& seams_;
   std::optional<IngestRecord> record_;  // as last saved
-  double saved_s_ = 0;
+  double begun_s_ = 0;                  // the last checkpoint
+  std::future<void> pending_;           // until it is settled, record_ belongs to its thread
   bool gave_up_ = false;
 };
 

@@ -161,19 +161,22 @@ class Preparation {
       ingest(*scene_, state_, writer, top, seams_, [&] {
         if (!keeper_ || !keeper_->is_due()) return;
         writer.flush();
-        save(top);
+        append(top);
+        keeper_->save_soon(state_, *prepared_.bins);
       });
       state_.stage = IngestStage::kHandDown;
       state_.position = 0;
-      if (keeps()) save(top);
+      if (prepared_.bins->kept_file()) {
+        append(top);
+        keeper_->save(state_, *prepared_.bins);
+      }
     }
     prepared_.plan = choose_subvolumes(top, spec_.run);
   }
 
-  void save(const TopTree& top) {
+  void append(const TopTree& top) {
     state_.top_tree = prepared_.bins->kept_file()->append(top.cells());
     state_.top_tree_weight = top.total_weight();
-    keeper_->save(state_, *prepared_.bins);
   }
 
   const BuildSpec& spec_;

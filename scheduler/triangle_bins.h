@@ -44,8 +44,8 @@ class TriangleBins {
   static size_t record_bytes(bool wide);
 
   // Where kept bins are from now on.
-  void keep_in(std::unique_ptr<TriangleFile> file) { kept_file_ = std::move(file); }
-  TriangleFile* kept_file() const { return kept_file_.get(); }
+  void keep_in(std::shared_ptr<TriangleFile> file) { kept_file_ = std::move(file); }
+  const std::shared_ptr<TriangleFile>& kept_file() const { return kept_file_; }
   BinId add_kept_bin();
   // Writes where the kept bins' chunks are to their file, as a link of a chain: each names the
   // chunks since the one before. Returns the last link.
@@ -93,7 +93,7 @@ class TriangleBins {
   std::vector<std::unique_ptr<Bin>> bins_;
   uint64_t memory_bytes_ = 0;  // of records and lists
   std::unique_ptr<TriangleFile> spill_;
-  std::unique_ptr<TriangleFile> kept_file_;
+  std::shared_ptr<TriangleFile> kept_file_;
   std::vector<NamedChunk> unchained_;  // kept chunks since the last link
   Extent last_link_;
 };

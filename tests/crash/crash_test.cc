@@ -32,6 +32,8 @@ class FineCrashTest : public CrashTest {
     BuildSpec spec = CrashTest::spec();
     spec.geometry.resolution = 2048;
     spec.run.subvolume_edge = 512;
+    // Checkpoints while the triangles go on.
+    if (is_kept()) spec.run.checkpoint_interval_s = 1e-4;
     return spec;
   }
 };
