@@ -14,6 +14,7 @@ void OrderedRows::push(const RowKey& row) {
 
 void OrderedRows::flush() {
   if (batch_.row_count() == 0) return;
+  output_.add(batch_);
   output_.write(flushed_, batch_);
   flushed_ += batch_extent();
   batch_.clear();

@@ -102,9 +102,9 @@ class SlabSweep {
     sweeper.sweep(slab_, range, in_words);
     const auto position = turnstile_.enter(range);
     if (!position) return;
-    if (!in_words) task_.output.write(*position, sweeper.unique());
+    task_.output.add(sweeper.unique());
     pass(sweeper.unique().row_count(), sweeper.extent());
-    if (in_words) task_.output.write(*position, sweeper.unique());
+    task_.output.write(*position, sweeper.unique());
     const uint32_t* from = sweeper.positions().data();
     for (size_t p = 0; p < slab_.pieces().size(); ++p) {
       const uint32_t rows = slab_.bound(range + 1, p).row - slab_.bound(range, p).row;

@@ -11,7 +11,7 @@ void ArtifactOutput::begin_level(uint32_t level) {
 
 void ArtifactOutput::end_level(uint64_t, uint64_t) { artifact_.end_level(); }
 
-void ArtifactOutput::write(uint64_t, const RecordBatch& batch) {
+void ArtifactOutput::add(const RecordBatch& batch) {
   if (batch.bricks())
     write_bricks(batch);
   else

@@ -16,11 +16,13 @@ inline constexpr uint64_t kPositionLimit = uint64_t{1} << 32;
 class LevelOutput {
  public:
   virtual ~LevelOutput() = default;
-  // Positions count words, and batches may come in any order, also from several threads at once.
-  // Otherwise they count rows, and batches come in order, one at a time.
+  // Positions count words, otherwise rows.
   virtual bool in_words() const = 0;
   virtual void begin_level(uint32_t level) = 0;
-  // Unique rows, the first of them at `position`.
+  // Unique rows come in order, one batch at a time.
+  virtual void add(const RecordBatch& batch) = 0;
+  // What need not be done in turn: every batch that was added comes once more, the first of its
+  // rows at `position`, in any order, also from several threads at once.
   virtual void write(uint64_t position, const RecordBatch& batch) = 0;
   virtual void end_level(uint64_t nodes, uint64_t positions) = 0;
 };
@@ -30,6 +32,7 @@ class GlobalOutput : public LevelOutput {
   explicit GlobalOutput(GlobalFileWriter& file) : file_(file) {}
   bool in_words() const override { return true; }
   void begin_level(uint32_t level) override { file_.begin_level(level); }
+  void add(const RecordBatch& batch) override { file_.sum_words(batch.words()); }
   void write(uint64_t position, const RecordBatch& batch) override {
     file_.write_words(position, batch.words());
   }
@@ -44,7 +47,8 @@ class ArtifactOutput : public LevelOutput {
   explicit ArtifactOutput(ArtifactWriter& artifact) : artifact_(artifact) {}
   bool in_words() const override { return false; }
   void begin_level(uint32_t level) override;
-  void write(uint64_t position, const RecordBatch& batch) override;
+  void add(const RecordBatch& batch) override;
+  void write(uint64_t, const RecordBatch&) override {}
   void end_level(uint64_t nodes, uint64_t positions) override;
 
  private:

@@ -10,7 +10,7 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMagic = 0x0a4752454d474456;  // "VDGMERG\n"
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 
 // One description of every field for both directions: `code(field)` puts or gets it.
 template <class Code, class T>
@@ -43,7 +43,6 @@ template <class Code>
 void code_fields(Code& code, GlobalLevel& level) {
   code(level.nodes);
   code(level.words);
-  code(level.sum);
 }
 
 template <class Code>
@@ -78,7 +77,8 @@ template <class Code>
 void code_fields(Code& code, LastRoundState& round) {
   code(round.level);
   code.text(round.output);
-  code_all(code, round.levels);
+  code_all(code, round.file.levels);
+  code_all(code, round.file.checksums);
   code_all(code, round.map_rows);
   code(round.map.id);
   code(round.map.words);

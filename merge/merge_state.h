@@ -24,7 +24,7 @@ namespace voxdag {
 struct LastRoundState {
   uint32_t level = 0;
   std::string output;  // path of the global file
-  std::vector<GlobalLevel> levels;
+  GlobalProgress file;
   std::vector<uint64_t> map_rows;
   ScratchRecord map;
   std::vector<PlacedNode> placed;

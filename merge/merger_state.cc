@@ -90,7 +90,7 @@ void Merger::go_on_in_last_round(const LastRoundState& state, GlobalFileWriter& 
                          seams_.budget);
   progress_.placed = state.placed;
   progress_.roots = state.roots;
-  out.go_on(state.levels);
+  out.go_on(state.file);
   last_round_begun_ = true;
 }
 
@@ -118,10 +118,9 @@ void Merger::save_level(const RoundProgress& progress, GlobalFileWriter& out) {
   for (const SurveyedArtifact& artifact : artifacts_)
     if (is_round_segment(artifact.ref.segment)) merged.push_back(artifact.ref);
   MergeState state = state_of(std::move(merged));
-  state.last_round = LastRoundState{
-      *progress.level,       out.path(),    {out.levels().begin(), out.levels().end()},
-      progress.maps->rows(), map->record(), progress.placed,
-      progress.roots};
+  state.last_round =
+      LastRoundState{*progress.level, out.path(),      out.progress(), progress.maps->rows(),
+                     map->record(),   progress.placed, progress.roots};
   auto named = segment_paths();
   named.push_back(map->path());
   journal_.save(level_read(*progress.level), std::move(state), std::move(named));

@@ -123,6 +123,7 @@ class OneLevel {
     struct Nowhere : LevelOutput {
       bool in_words() const override { return true; }
       void begin_level(uint32_t) override {}
+      void add(const RecordBatch&) override {}
       void write(uint64_t, const RecordBatch&) override {}
       void end_level(uint64_t, uint64_t) override {}
     } nowhere;

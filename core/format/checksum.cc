@@ -3,6 +3,8 @@
 #include <openssl/evp.h>
 #include <xxhash.h>
 
+#include <new>
+
 #include "core/base/error.h"
 
 namespace voxdag {
@@ -10,6 +12,28 @@ namespace voxdag {
 uint64_t checksum64(std::span<const std::byte> bytes) {
   return XXH64(bytes.data(), bytes.size(), 0);
 }
+
+struct Checksum64::State {
+  XXH64_state_t* hash = XXH64_createState();
+  ~State() { XXH64_freeState(hash); }
+};
+
+Checksum64::Checksum64() : state_(std::make_unique<State>()) {
+  if (!state_->hash) throw std::bad_alloc();
+  reset();
+}
+
+Checksum64::Checksum64(Checksum64&&) noexcept = default;
+Checksum64& Checksum64::operator=(Checksum64&&) noexcept = default;
+Checksum64::~Checksum64() = default;
+
+void Checksum64::add(std::span<const std::byte> bytes) {
+  XXH64_update(state_->hash, bytes.data(), bytes.size());
+}
+
+uint64_t Checksum64::value() const { return XXH64_digest(state_->hash); }
+
+void Checksum64::reset() { XXH64_reset(state_->hash, 0); }
 
 uint64_t indexed_sum(uint64_t first, std::span<const uint32_t> words) {
   constexpr uint64_t kOdd = 0x9e3779b97f4a7c15;

@@ -13,6 +13,24 @@ namespace voxdag {
 // XXH64 with seed 0.
 uint64_t checksum64(std::span<const std::byte> bytes);
 
+// A running XXH64.
+class Checksum64 {
+ public:
+  Checksum64();
+  Checksum64(Checksum64&&) noexcept;
+  Checksum64& operator=(Checksum64&&) noexcept;
+  ~Checksum64();
+  void add(std::span<const std::byte> bytes);
+  // Of what was added so far.
+  uint64_t value() const;
+  // As if nothing had been added.
+  void reset();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
 // A sum over 32-bit words, each weighted by its index, modulo 2^64: the parts of a whole may be
 // summed in any order, by any number of threads, and added up. `first` is the index of words[0].
 uint64_t indexed_sum(uint64_t first, std::span<const uint32_t> words);

@@ -1,13 +1,11 @@
 #include "core/format/global_writer.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cstring>
-#include <optional>
-#include <vector>
 
 #include "core/base/error.h"
 #include "core/dag/brick.h"
+#include "core/format/block_sums.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
 #include "core/format/global_layout.h"
@@ -51,47 +49,6 @@ void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const 
 
 uint64_t bytes_of(const GlobalLevel& level) { return sizeof(uint32_t) * level.words; }
 
-// Sums the levels again as their file is read from its first level on; padding must be zeros.
-class LevelSums {
- public:
-  explicit LevelSums(std::span<const GlobalLevel> levels) : levels_(levels) {}
-
-  void add(std::span<const std::byte> bytes) {
-    while (!bytes.empty()) {
-      const uint64_t used = level_ < levels_.size() ? bytes_of(levels_[level_]) : 0;
-      const uint64_t room = round_up_to_page(used);
-      const auto mine = bytes.first(std::min<uint64_t>(bytes.size(), room - at_));
-      const size_t summed = std::min<uint64_t>(mine.size(), used - std::min(used, at_));
-      sum_words(mine.first(summed));
-      const auto padding = mine.subspan(summed);
-      if (std::ranges::any_of(padding, [](std::byte b) { return b != std::byte{0}; }) && !wrong_)
-        wrong_ = level_;
-      bytes = bytes.subspan(mine.size());
-      at_ += mine.size();
-      if (at_ == room) end_level();
-    }
-  }
-  // The first level that did not sum up to what was written.
-  std::optional<size_t> wrong_level() const { return wrong_; }
-
- private:
-  void sum_words(std::span<const std::byte> bytes) {
-    const auto* words = reinterpret_cast<const uint32_t*>(bytes.data());
-    sum_ += indexed_sum(at_ / sizeof(uint32_t), {words, bytes.size() / sizeof(uint32_t)});
-  }
-  void end_level() {
-    if (sum_ != levels_[level_].sum && !wrong_) wrong_ = level_;
-    ++level_;
-    at_ = sum_ = 0;
-  }
-
-  std::span<const GlobalLevel> levels_;
-  size_t level_ = 0;
-  uint64_t at_ = 0;  // bytes of the level so far, padding included
-  uint64_t sum_ = 0;
-  std::optional<size_t> wrong_;
-};
-
 }  // namespace
 
 struct GlobalFileWriter::State {
@@ -102,10 +59,11 @@ struct GlobalFileWriter::State {
   const uint32_t hash_bits;
   std::unique_ptr<WritableFile> file;  // once there is a level, or a header
   std::vector<GlobalLevel> levels;     // that ended, from the bricks upwards
+  BlockSums sums;                      // of them and of the open one
+  uint64_t summed_words = 0;           // of the open level
   bool level_open = false;
-  std::atomic<uint64_t> open_sum = 0;  // of the open level
-  bool kept = false;                   // the partial file is to stay
-  uint64_t end = kPageBytes;           // where the open level, the next one, or the table begins
+  bool kept = false;          // the partial file is to stay
+  uint64_t end = kPageBytes;  // where the open level, the next one, or the table begins
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }
   // The open level, or the next one.
@@ -114,15 +72,19 @@ struct GlobalFileWriter::State {
   void create_file() {
     if (!file) file = files.create(partial_path);
   }
-  std::vector<uint64_t> block_checksums(const CancelToken& cancel) const;
   HeaderPage header(uint64_t voxels, uint64_t svo_nodes, std::span<const std::byte> table) const;
   std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
                      const CancelToken& cancel) const;
+  [[noreturn]] void damaged(uint64_t at) const {
+    throw Error(ErrorCode::kCorrupt, partial_path + " from byte " + std::to_string(at) +
+                                         " on is not what was written: the disk gave back other "
+                                         "bytes");
+  }
 };
 
 GlobalFileWriter::GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid,
                                    uint32_t hash_bits)
-    : state_(new State{files, path, path + ".partial", grid, hash_bits, nullptr, {}}) {}
+    : state_(new State{files, path, path + ".partial", grid, hash_bits, nullptr, {}, {}}) {}
 
 GlobalFileWriter::~GlobalFileWriter() {
   if (state_->kept || !state_->file) return;
@@ -136,16 +98,27 @@ GlobalFileWriter::~GlobalFileWriter() {
 
 const std::string& GlobalFileWriter::path() const { return state_->path; }
 
-std::span<const GlobalLevel> GlobalFileWriter::levels() const { return state_->levels; }
+GlobalProgress GlobalFileWriter::progress() const {
+  return {state_->levels, state_->sums.checksums()};
+}
 
-void GlobalFileWriter::go_on(std::span<const GlobalLevel> levels) {
+void GlobalFileWriter::go_on(const GlobalProgress& progress) {
   State& s = *state_;
   uint64_t end = kPageBytes;
-  for (const GlobalLevel& level : levels) end += round_up_to_page(bytes_of(level));
-  if (s.files.open_read(s.partial_path)->size() < end || levels.size() > s.brick_level() + 1)
+  for (const GlobalLevel& level : progress.levels) end += round_up_to_page(bytes_of(level));
+  const auto written = s.files.open_read(s.partial_path);
+  const uint64_t whole_blocks = (end - kPageBytes) / kBlockBytes;
+  if (written->size() < end || progress.levels.size() > s.brick_level() + 1 ||
+      progress.checksums.size() < whole_blocks)
     throw Error(ErrorCode::kCorrupt, s.partial_path + " does not hold the levels that were merged");
+  BlockSums sums(std::span(progress.checksums).first(whole_blocks));
+  const uint64_t last_block = kPageBytes + whole_blocks * kBlockBytes;
+  read_through(*written, last_block, end, CancelToken(),
+               [&](std::span<const std::byte> piece) { sums.add(piece); });
+  if (sums.checksums() != progress.checksums) s.damaged(last_block);
+  s.sums = std::move(sums);
   s.file = s.files.open_write(s.partial_path);
-  s.levels.assign(levels.begin(), levels.end());
+  s.levels = progress.levels;
   s.end = end;
   s.kept = true;
 }
@@ -163,8 +136,13 @@ void GlobalFileWriter::begin_level(uint32_t level) {
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(level) +
                                          " does not follow the levels before it");
   s.create_file();
-  s.open_sum = 0;
+  s.summed_words = 0;
   s.level_open = true;
+}
+
+void GlobalFileWriter::sum_words(std::span<const uint32_t> words) {
+  state_->sums.add(std::as_bytes(words));
+  state_->summed_words += words.size();
 }
 
 void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> words) {
@@ -172,7 +150,6 @@ void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> wor
   if (first > kMaxLevelWords || words.size() > kMaxLevelWords - first)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
                                        " is over the format's limit of 2^32 words a level");
-  s.open_sum += indexed_sum(first, words);
   s.file->write_at(s.end + sizeof(uint32_t) * first, std::as_bytes(words));
 }
 
@@ -182,33 +159,19 @@ void GlobalFileWriter::end_level(uint64_t nodes, uint64_t words) {
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
                                        " has " + std::to_string(words) +
                                        " words, the format's limit is 2^32 a level");
-  if (!s.level_open || nodes == 0 || words < 2 * nodes)
+  if (!s.level_open || nodes == 0 || words < 2 * nodes || words != s.summed_words)
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(s.current_level()) +
                                          " has " + std::to_string(nodes) + " nodes in " +
-                                         std::to_string(words) + " words");
-  s.levels.push_back({nodes, words, s.open_sum});
+                                         std::to_string(words) + " words, of which " +
+                                         std::to_string(s.summed_words) + " were summed");
+  s.levels.push_back({nodes, words});
   const uint64_t level_end = s.end + bytes_of(s.levels.back());
   s.end = round_up_to_page(level_end);
   const std::byte zeros[kPageBytes] = {};
-  s.file->write_at(level_end, std::span(zeros).first(s.end - level_end));
+  const auto padding = std::span(zeros).first(s.end - level_end);
+  s.sums.add(padding);
+  s.file->write_at(level_end, padding);
   s.level_open = false;
-}
-
-std::vector<uint64_t> GlobalFileWriter::State::block_checksums(const CancelToken& cancel) const {
-  std::vector<uint64_t> checksums;
-  LevelSums sums(levels);
-  read_through(*files.open_read(partial_path), kPageBytes, end, cancel,
-               [&](std::span<const std::byte> piece) {
-                 for (size_t at = 0; at < piece.size(); at += kBlockBytes)
-                   checksums.push_back(checksum64(
-                       piece.subspan(at, std::min<size_t>(kBlockBytes, piece.size() - at))));
-                 sums.add(piece);
-               });
-  if (const auto wrong = sums.wrong_level())
-    throw Error(ErrorCode::kCorrupt,
-                partial_path + ": level " + std::to_string(brick_level() - *wrong) +
-                    " is not what was written: the disk gave back other bytes");
-  return checksums;
 }
 
 HeaderPage GlobalFileWriter::State::header(uint64_t voxels, uint64_t svo_nodes,
@@ -249,30 +212,25 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
                                             std::span<const uint64_t> checksums,
                                             const CancelToken& cancel) const {
   const auto written = files.open_read(partial_path);
-  const auto table = std::as_bytes(checksums);
   Sha256 digest;
-  bool sound = true;
   const auto add_expected = [&](uint64_t begin, std::span<const std::byte> expected) {
     read_through(*written, begin, begin + expected.size(), cancel,
                  [&](std::span<const std::byte> piece) {
                    digest.add(piece);
-                   sound = sound && std::ranges::equal(piece, expected.first(piece.size()));
+                   if (!std::ranges::equal(piece, expected.first(piece.size()))) damaged(begin);
                    expected = expected.subspan(piece.size());
                  });
   };
   add_expected(0, header.bytes());
-  size_t block = 0;
+  BlockSums read_back;
   read_through(*written, kPageBytes, end, cancel, [&](std::span<const std::byte> piece) {
     digest.add(piece);
-    for (size_t at = 0; at < piece.size(); at += kBlockBytes)
-      sound = sound && block < checksums.size() &&
-              checksums[block++] ==
-                  checksum64(piece.subspan(at, std::min<size_t>(kBlockBytes, piece.size() - at)));
+    read_back.add(piece);
   });
-  add_expected(end, table);
-  if (!sound)
-    throw Error(ErrorCode::kCorrupt,
-                partial_path + " is not what was written: the disk gave back other bytes");
+  const auto found = read_back.checksums();
+  const auto wrong = std::ranges::mismatch(found, checksums).in1 - found.begin();
+  if (static_cast<size_t>(wrong) < checksums.size()) damaged(kPageBytes + wrong * kBlockBytes);
+  add_expected(end, std::as_bytes(checksums));
   return digest.finish();
 }
 
@@ -291,7 +249,7 @@ GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes,
     throw Error(ErrorCode::kCorrupt,
                 s.path + ": level " + std::to_string(s.current_level()) + " is not finished");
   s.create_file();
-  const std::vector<uint64_t> checksums = s.block_checksums(cancel);
+  const std::vector<uint64_t> checksums = s.sums.checksums();
   const auto table = std::as_bytes(std::span(checksums));
   s.file->write_at(s.end, table);
   const HeaderPage header = s.header(voxels, svo_nodes, table);

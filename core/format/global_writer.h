@@ -6,14 +6,15 @@
 // words (low half of the mask first), a node is its child mask followed by the word offsets of its
 // children in the next level. Nothing in the file varies with time, place or machine.
 //
-// Every level is summed as it is written and again when the file is sealed, and the sealed file is
-// read back: what a disk gives back wrong is Error{kCorrupt} and never gets a checksum of its own.
+// Checksums are made of the words as they come from the merge, never of what a file gives back, and
+// the sealed file is read back: what a disk gives back wrong is Error{kCorrupt}.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/base/cancel_token.h"
 #include "core/geometry/grid.h"
@@ -30,7 +31,12 @@ struct GlobalFileSummary {
 struct GlobalLevel {
   uint64_t nodes = 0;
   uint64_t words = 0;
-  uint64_t sum = 0;  // indexed_sum() of its words
+};
+
+// What there is of a file that is not finished.
+struct GlobalProgress {
+  std::vector<GlobalLevel> levels;  // that ended, from the bricks upwards
+  std::vector<uint64_t> checksums;  // of their blocks, the last one as far as it got
 };
 
 // Whether the file at `path` begins as a global file does.
@@ -45,21 +51,25 @@ class GlobalFileWriter {
   ~GlobalFileWriter();
 
   const std::string& path() const;
-  // Goes on after the levels that an earlier writer wrote to the same path and synced. Throws
-  // Error{kNotFound} or Error{kCorrupt} if the partial file is not there or too short; what its
-  // levels hold is checked by seal().
-  void go_on(std::span<const GlobalLevel> levels);
-  // Those that ended, from the bricks upwards.
-  std::span<const GlobalLevel> levels() const;
+  // Goes on where an earlier writer was that wrote to the same path and synced. Throws
+  // Error{kNotFound} or Error{kCorrupt} if the partial file is not there or too short; what it
+  // holds is checked by seal(), but for the last block, which is read here.
+  void go_on(const GlobalProgress& progress);
+  // No level is open.
+  GlobalProgress progress() const;
   // All levels that ended are on the disk from here on, and stay there for go_on().
   void sync();
 
   // Levels must come as L-2, L-3, ..., 0; none at all for a scene without voxels.
   void begin_level(uint32_t level);
+  // The words of the current level from its first to its last, by one thread at a time, for the
+  // checksums: they are not written here.
+  void sum_words(std::span<const uint32_t> words);
   // Words [first, first + words.size()) of the current level; disjoint ranges in any order, also
   // from several threads at once.
   void write_words(uint64_t first, std::span<const uint32_t> words);
-  // All `words` of the level were written. A level over 2^32 words is Error{kLimit} naming it.
+  // All `words` of the level were summed and written. A level over 2^32 words is Error{kLimit}
+  // naming it.
   void end_level(uint64_t nodes, uint64_t words);
 
   // Adds checksums and header and syncs.

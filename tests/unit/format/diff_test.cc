@@ -75,11 +75,13 @@ TEST_F(DiffTest, CountsBeyond32BitsInAMoment) {
     GlobalFileWriter writer(system_files(), path, grid, 64);
     const uint32_t words[2] = {static_cast<uint32_t>(brick), static_cast<uint32_t>(brick >> 32)};
     writer.begin_level(18);
+    writer.sum_words(words);
     writer.write_words(0, words);
     writer.end_level(1, 2);
     const uint32_t node[9] = {255};
     for (uint32_t level = 18; level-- > 0;) {
       writer.begin_level(level);
+      writer.sum_words(node);
       writer.write_words(0, node);
       writer.end_level(1, 9);
     }

@@ -82,6 +82,7 @@ TEST_F(GlobalWriterTest, OrderAndThreadsDoNotShow) {
   for (size_t i = 0; i < levels.size(); ++i) {
     writer.begin_level(static_cast<uint32_t>(5 - i));
     const std::span<const uint32_t> words = levels[i];
+    writer.sum_words(words);
     std::vector<std::thread> threads;
     for (size_t t = 0; t < 3; ++t)
       threads.emplace_back([&, t] {
@@ -139,6 +140,7 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
     const auto levels = level_words(dag);
     for (size_t i = 0; i < levels.size(); ++i) {
       writer.begin_level(static_cast<uint32_t>(2 - i));
+      writer.sum_words(levels[i]);
       writer.write_words(0, levels[i]);
       writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
     }
@@ -166,17 +168,18 @@ TEST_F(GlobalWriterTest, GoesOnAfterAnyLevel) {
   const auto levels = level_words(dag);
   const auto write_level = [&](GlobalFileWriter& writer, size_t i) {
     writer.begin_level(static_cast<uint32_t>(3 - i));
+    writer.sum_words(levels[i]);
     writer.write_words(0, levels[i]);
     writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
   };
   for (size_t done = 1; done <= levels.size(); ++done) {
     SCOPED_TRACE(done);
-    std::vector<GlobalLevel> kept;
+    GlobalProgress kept;
     {
       GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
       for (size_t i = 0; i < done; ++i) write_level(writer, i);
       writer.sync();
-      kept.assign(writer.levels().begin(), writer.levels().end());
+      kept = writer.progress();
       if (done < levels.size()) writer.begin_level(static_cast<uint32_t>(3 - done));
     }
     GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
@@ -195,6 +198,7 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
   const auto write = [&](GlobalFileWriter& writer) {
     for (size_t i = 0; i < levels.size(); ++i) {
       writer.begin_level(static_cast<uint32_t>(3 - i));
+      writer.sum_words(levels[i]);
       writer.write_words(0, levels[i]);
       writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
     }
@@ -209,18 +213,22 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
     write_bytes(partial, bytes);
     const Error error = error_of([&] { writer.seal(dag.voxels, dag.svo_nodes); });
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
-    EXPECT_THAT(error.message(), HasSubstr("level " + std::to_string(3 - i)));
+    EXPECT_THAT(error.message(), HasSubstr("is not what was written"));
     at += (4 * levels[i].size() + kPageBytes - 1) / kPageBytes * kPageBytes;
   }
-  std::vector<GlobalLevel> kept;
+  GlobalProgress kept;
   {
     GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
     write(writer);
     writer.sync();
-    kept.assign(writer.levels().begin(), writer.levels().end());
+    kept = writer.progress();
   }
-  std::filesystem::resize_file(partial, at - 1);
+  ByteString bytes = read_bytes(partial);
+  bytes[at - kPageBytes] ^= 1;  // in the block that the next level goes on with
+  write_bytes(partial, bytes);
   GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
+  EXPECT_EQ(error_of([&] { writer.go_on(kept); }).code(), ErrorCode::kCorrupt);
+  std::filesystem::resize_file(partial, at - 1);
   EXPECT_EQ(error_of([&] { writer.go_on(kept); }).code(), ErrorCode::kCorrupt);
 }
 
@@ -246,6 +254,7 @@ TEST_F(GlobalWriterTest, LevelsOutOfTurnAreRefused) {
   EXPECT_THROW(writer.begin_level(1), Error);
   EXPECT_THROW(writer.end_level(0, 0), Error);
   const uint32_t brick[2] = {1, 0};
+  writer.sum_words(brick);
   writer.write_words(0, brick);
   writer.end_level(1, 2);
   EXPECT_THROW(writer.finish(1, 3), Error);
