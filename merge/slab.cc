@@ -107,8 +107,4 @@ uint64_t SlabMemory::bytes() const {
          (words_.size() + positions_.size()) * sizeof(uint32_t);
 }
 
-uint64_t Slab::first_hash(size_t range) const {
-  return range == 0 ? interval_.first : ((interval_.first >> range_bits_) + range) << range_bits_;
-}
-
 }  // namespace voxdag

@@ -104,7 +104,9 @@ class Slab {
   class Loader;
 
   // The first hash of a range; ranges() is one past the last.
-  uint64_t first_hash(size_t range) const;
+  uint64_t first_hash(size_t range) const {
+    return range == 0 ? interval_.first : ((interval_.first >> range_bits_) + range) << range_bits_;
+  }
 
   std::span<const LevelRun* const> runs_;
   std::vector<SlabPiece> pieces_;

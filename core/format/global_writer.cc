@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <future>
 
 #include "core/base/error.h"
 #include "core/dag/brick.h"
@@ -254,8 +255,10 @@ GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes,
   s.file->write_at(s.end, table);
   const HeaderPage header = s.header(voxels, svo_nodes, table);
   s.file->write_at(0, header.bytes());
+  // The disk writes while we read back; where there is no thread to wait for it, afterwards.
+  std::future<void> synced = std::async([&] { s.file->sync(); });
   const GlobalFileSummary summary{s.end + table.size(), s.digest(header, checksums, cancel)};
-  s.file->sync();
+  synced.get();
   return summary;
 }
 
