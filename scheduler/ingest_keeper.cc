@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <system_error>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
@@ -143,12 +144,17 @@ void IngestKeeper::save_soon(IngestState& state, TriangleBins& bins) {
   const std::shared_ptr<TriangleFile> file = bins.kept_file();
   state.chunks = bins.write_chain();
   state.file_end = file->end();
-  pending_ = std::async(std::launch::async, [this, state, file] {
+  const auto checkpoint = [this, state, file] {
     file->sync();
     const Extent old = record_->state.top_tree;
     commit(state);
     if (old.bytes && old.offset != state.top_tree.offset) file->release(old);
-  });
+  };
+  try {
+    pending_ = std::async(std::launch::async, checkpoint);
+  } catch (const std::system_error&) {
+    checkpoint();  // The system has no thread left.
+  }
   // Tests want a checkpoint after every batch.
   if (spec_.run.checkpoint_interval_s == 0) settle();
 }

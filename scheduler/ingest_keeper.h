@@ -9,6 +9,7 @@
 //      read, unchanged: same inode, size and times, and those so old when it was opened that any
 //      later change shows in them.
 //   3. What does not count, or is damaged, is forgotten: the scene is read again.
+// Used by one thread.
 #pragma once
 
 #include <cstdint>
