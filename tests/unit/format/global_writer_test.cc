@@ -161,13 +161,20 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
 }
 
 // A file whose levels were synced is gone on with by another writer, after any level, and is the
-// same.
+// same; levels end within blocks and blocks within levels.
 TEST_F(GlobalWriterTest, GoesOnAfterAnyLevel) {
-  const oracle::Dag dag = oracle::build_dag(random_voxels(4, 32), 64);
-  const std::string expected = write_global(path_, dag, grid_of(32)).sha256;
+  oracle::Random random(4);
+  oracle::Voxels voxels(128);
+  for (int i = 0; i < 60000; ++i) {
+    const auto coordinate = [&] { return static_cast<int>(random.between(0, 127)); };
+    voxels.set(coordinate(), coordinate(), coordinate());
+  }
+  const oracle::Dag dag = oracle::build_dag(voxels, 64);
+  const std::string expected = write_global(path_, dag, grid_of(128)).sha256;
   const auto levels = level_words(dag);
+  ASSERT_GT(levels[0].size() * sizeof(uint32_t), kBlockBytes);
   const auto write_level = [&](GlobalFileWriter& writer, size_t i) {
-    writer.begin_level(static_cast<uint32_t>(3 - i));
+    writer.begin_level(static_cast<uint32_t>(5 - i));
     writer.sum_words(levels[i]);
     writer.write_words(0, levels[i]);
     writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
@@ -176,13 +183,13 @@ TEST_F(GlobalWriterTest, GoesOnAfterAnyLevel) {
     SCOPED_TRACE(done);
     GlobalProgress kept;
     {
-      GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
+      GlobalFileWriter writer(system_files(), path_, grid_of(128), 64);
       for (size_t i = 0; i < done; ++i) write_level(writer, i);
       writer.sync();
       kept = writer.progress();
-      if (done < levels.size()) writer.begin_level(static_cast<uint32_t>(3 - done));
+      if (done < levels.size()) writer.begin_level(static_cast<uint32_t>(5 - done));
     }
-    GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
+    GlobalFileWriter writer(system_files(), path_, grid_of(128), 64);
     writer.go_on(kept);
     for (size_t i = done; i < levels.size(); ++i) write_level(writer, i);
     EXPECT_EQ(writer.finish(dag.voxels, dag.svo_nodes).sha256, expected);
