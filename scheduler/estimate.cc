@@ -82,6 +82,14 @@ double grow_as_dag(const std::vector<PilotCounts>& pilots, uint32_t doublings) {
   return result;
 }
 
+// What must be spilled is there already. A large scene is kept beside it where there is room; it
+// goes piece by piece while artifacts come.
+Figure triangles_on_disk(const PreparedScene& scene) {
+  const double spilled = static_cast<double>(scene.bins->spilled_bytes());
+  return {spilled, std::max(spilled, scene.most_kept_bytes / 2),
+          std::max(spilled, scene.most_kept_bytes)};
+}
+
 }  // namespace
 
 Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsigned threads,
@@ -115,8 +123,8 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
   estimate.file_bytes = bytes * estimate.dag_nodes + exactly(8192);
 
   const Figure artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
-  estimate.disk_bytes = estimate.file_bytes + kArtifactBytesANode * artifact_nodes +
-                        exactly(static_cast<double>(scene.bins->spilled_bytes()));
+  estimate.disk_bytes =
+      estimate.file_bytes + kArtifactBytesANode * artifact_nodes + triangles_on_disk(scene);
   const double triangle_bytes =
       static_cast<double>(scene.bins->record_bytes()) * static_cast<double>(scene.counts.triangles);
   estimate.memory_bytes = kMemoryBytesANode * estimate.dag_nodes + exactly(triangle_bytes);
@@ -136,7 +144,7 @@ double most_disk_bytes(const PreparedScene& scene) {
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.counts.triangles);
   const double octree_nodes = 2 * bricks + scene.grid.levels * triangles;
-  return kMostDiskBytesANode * octree_nodes + static_cast<double>(scene.bins->spilled_bytes());
+  return kMostDiskBytesANode * octree_nodes + triangles_on_disk(scene).high;
 }
 
 Estimate plan_build(const BuildSpec& spec, const Seams& seams) {

@@ -40,6 +40,10 @@ bool fits_in_memory(const BuildSpec& spec, uint64_t triangles) {
 
 }  // namespace
 
+double most_kept_bytes(const BuildSpec& spec, uint64_t triangles) {
+  return triangles < spec.run.kept_from_triangles ? 0 : copies_bytes(spec, triangles);
+}
+
 int64_t unix_ns() {
   timespec now{};
   clock_gettime(CLOCK_REALTIME, &now);
@@ -89,7 +93,7 @@ std::optional<IngestState> IngestKeeper::resume() {
 
 bool IngestKeeper::wants(const TriangleSource& scene) const {
   const uint64_t triangles = scene.declared_triangles();
-  if (gave_up_ || triangles < spec_.run.kept_from_triangles) return false;
+  if (gave_up_ || most_kept_bytes(spec_, triangles) == 0) return false;
   return !fits_in_memory(spec_, triangles) ||
          kRoom / kCopies * copies_bytes(spec_, triangles) <=
              static_cast<double>(seams_.files.free_space(work_.path()));

@@ -83,6 +83,9 @@ class IngestKeeper {
   bool gave_up_ = false;
 };
 
+// Bytes that the kept triangles of a scene take at most, while they are handed down; 0 if it is too
+// small to be kept.
+double most_kept_bytes(const BuildSpec& spec, uint64_t triangles);
 // The Unix time from which on a change of these files shows in their identities; INT64_MAX if one
 // of them is not known.
 int64_t settled_ns(const std::vector<SourceFile>& files);

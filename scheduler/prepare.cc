@@ -78,6 +78,7 @@ class Preparation {
     open_bins(spill_path);
     if (state_.stage < IngestStage::kReady) take_in();
     prepared_.counts = state_.counts;
+    prepared_.most_kept_bytes = most_kept_bytes(spec_, state_.declared_triangles);
     prepared_.sha256 = state_.digest.hex();
     clock.finish("ingest");
     return std::move(prepared_);

@@ -36,6 +36,7 @@ struct PreparedScene {
   std::unique_ptr<TriangleBins> bins;
   BinId whole = 0;                  // the bin that holds all triangles, until they are handed down
   std::vector<SubvolumePlan> plan;  // of those that are not handed down
+  double most_kept_bytes = 0;       // on the disk, in a build
   // What is kept, if anything.
   IngestState state;
   std::vector<KeptBin> kept_bins;

@@ -12,8 +12,9 @@ namespace {
 constexpr char kWhat[] = "a subvolume";
 constexpr size_t kPage = size_t{4} << 10;
 constexpr size_t kLargestPower = size_t{4} << 20;
-// Of a budget, what is kept from one subvolume to the next at most: an eighth, or this if more.
+// What is kept from one subvolume to the next: an eighth of the budget, within these.
 constexpr uint64_t kKeptInAnyCase = uint64_t{8} << 20;
+constexpr uint64_t kMostKept = uint64_t{128} << 20;
 constexpr size_t kMostBlocks = 64;
 
 }  // namespace
@@ -31,14 +32,14 @@ PagePool::Block PagePool::take_kept(size_t bytes, size_t most) {
       best = block;
   if (best == kept_.end()) return {};
   const Block found = *best;
-  *best = kept_.back();
-  kept_.pop_back();
+  kept_.erase(best);
   kept_bytes_ -= found.bytes;
   return found;
 }
 
 void PagePool::give_back(Block block, size_t most_kept) noexcept {
-  if (kept_bytes_ + block.bytes <= most_kept && kept_.size() < kMostBlocks) {
+  if (block.bytes <= most_kept) {
+    while (kept_bytes_ + block.bytes > most_kept || kept_.size() == kMostBlocks) free_oldest();
     try {
       kept_.push_back(block);
       kept_bytes_ += block.bytes;
@@ -49,10 +50,14 @@ void PagePool::give_back(Block block, size_t most_kept) noexcept {
   free_pages(block.pages, block.bytes);
 }
 
+void PagePool::free_oldest() noexcept {
+  free_pages(kept_.front().pages, kept_.front().bytes);
+  kept_bytes_ -= kept_.front().bytes;
+  kept_.erase(kept_.begin());
+}
+
 void PagePool::clear() noexcept {
-  for (const Block& block : kept_) free_pages(block.pages, block.bytes);
-  kept_.clear();
-  kept_bytes_ = 0;
+  while (!kept_.empty()) free_oldest();
 }
 
 void Memory::charge(size_t bytes) {
@@ -98,7 +103,7 @@ void Memory::grow(PagePool::Block& block, size_t bytes) {
 }
 
 void Memory::give_back(PagePool::Block block) noexcept {
-  pool.give_back(block, std::max(budget.limit() / 8, kKeptInAnyCase));
+  pool.give_back(block, std::clamp(budget.limit() / 8, kKeptInAnyCase, kMostKept));
   budget.release(block.bytes);
 }
 

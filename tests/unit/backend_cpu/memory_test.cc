@@ -44,6 +44,17 @@ TEST_F(CpuMemory, KeptPagesStayWithinTheBudget) {
   EXPECT_EQ(pool_.kept_bytes(), 0u);
 }
 
+// Of what was kept the oldest makes way for the newest.
+TEST_F(CpuMemory, OldPagesMakeWayForNew) {
+  for (const size_t mib : {5u, 2u}) {
+    const Buffer<uint8_t> used(memory_, mib << 20);
+  }
+  EXPECT_EQ(pool_.kept_bytes(), 7u << 20);
+  { const Buffer<uint8_t> zeroed(memory_, 4 << 20, Buffer<uint8_t>::kZero); }
+  EXPECT_EQ(pool_.kept_bytes(), 6u << 20);
+  EXPECT_EQ(pool_.take_kept(5 << 20, 5 << 20).pages, nullptr);
+}
+
 // What must be zero is as large as was asked for: tables rely on that.
 TEST_F(CpuMemory, ZeroedBlocksAreExact) {
   { const Buffer<uint8_t> used(memory_, 7 << 20); }
