@@ -19,8 +19,7 @@
 
 #include <type_traits>
 
-#include "core/backend/cpu/columns_avx2.h"
-#include "core/backend/cpu/draw_portable.h"
+#include "core/backend/cpu/draw_by_columns.h"
 #include "core/backend/cpu/heights_avx2.h"
 #include "core/backend/cpu/sides_avx2.h"
 
@@ -89,6 +88,21 @@ struct EdgeColumns : Columns<D, EdgeSet> {
         lanes, _mm256_or_si256(outside<kP<D>>(number & 15), outside<kQ<D>>(number >> 4)));
   }
 
+  template <class Visit>
+  VOXDAG_INLINE void for_each_inner(Visit visit) const {
+    this->edge.for_each([&](int number) __attribute__((always_inline)) {
+      look_at(
+          number, [&](auto count, uint64_t crossing,
+                      const int64_t(&most)[3]) __attribute__((always_inline)) {
+            const __m256i outside_edges = outer<count()>(number, crossing, most);
+            // A byte per column, in the halves' lower eight.
+            const uint32_t bytes = ~static_cast<uint32_t>(
+                _mm256_movemask_epi8(_mm256_packs_epi16(outside_edges, _mm256_setzero_si256())));
+            visit(number, (bytes & 0xff) | (bytes >> 8 & 0xff00));
+          });
+    });
+  }
+
  private:
   template <int Axis>
   VOXDAG_INLINE __m256i outside(int brick) const {
@@ -97,31 +111,6 @@ struct EdgeColumns : Columns<D, EdgeSet> {
     return load(kOutside.lanes[Axis == kQ<D>][low > 0 ? low : 0][high < 3 ? high : 3]);
   }
 };
-
-// A triangle across D, in one layer of voxels: their columns are all that matters.
-template <int D>
-VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
-  const EdgeColumns<D> columns(t);
-  const int z = t.first_voxel[D];
-  const uint32_t at_height = kBrickIndex<D>.of_height[z / 4];
-  const uint64_t layer = kLayers.voxels[D][z % 4];
-  columns.edge.for_each([&](int number) __attribute__((always_inline)) {
-    columns.look_at(
-        number, [&](auto count, uint64_t crossing,
-                    const int64_t(&most)[3]) __attribute__((always_inline)) {
-          const __m256i outer = columns.template outer<count()>(number, crossing, most);
-          // A byte per column, in the halves' lower eight.
-          const uint32_t bytes = ~static_cast<uint32_t>(
-              _mm256_movemask_epi8(_mm256_packs_epi16(outer, _mm256_setzero_si256())));
-          uint32_t inner = (bytes & 0xff) | (bytes >> 8 & 0xff00);
-          if constexpr (kP < D >> kQ<D>) inner = transposed(inner);
-          tile.add(kBrickIndex<D>.of_column[number] | at_height, _pdep_u64(inner, layer));
-        });
-  });
-  columns.plain.for_each([&](int number) __attribute__((always_inline)) {
-    tile.add(kBrickIndex<D>.of_column[number] | at_height, layer);
-  });
-}
 
 template <int D>
 class ColumnWalk {
@@ -146,27 +135,20 @@ class ColumnWalk {
   // Edges: how many there are in the set `crossing`; those are tested.
   template <int Edges>
   VOXDAG_INLINE void column(int number, uint64_t crossing, const int64_t (&most)[3]) {
-    const int p = number & 15, q = number >> 4;
-    const int64_t height = heights.origin + heights.step_p * p + heights.step_q * q;
-    int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
-    int64_t to = (height + heights.reach) >> (kColumnBits + 2);
-    from = from > columns.first[D] ? from : columns.first[D];
-    to = to < columns.last[D] ? to : columns.last[D];
-    if (from > to) return;
-    const int brick = static_cast<int>(height >> (kColumnBits + 2));
-    const int within =
-        static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1);
+    const auto at = heights.column(number & 15, number >> 4, columns.first[D], columns.last[D]);
+    if (at.from > at.to) return;
     __m256i outer = _mm256_setzero_si256();
     if constexpr (Edges > 0) outer = columns.template outer<Edges>(number, crossing, most);
     if (Edges > 1 && _mm256_movemask_epi8(outer) == -1) return;
-    HeightBounds bounds = heights.bounds(p, q, brick, within, outer);
+    HeightBounds bounds = heights.bounds(at, outer);
     for (int k = 0; k < Edges; ++k)
-      bounds = _mm256_max_epu8(bounds, sides.bounds(kEdgeLists.edges[crossing][k], p, q, brick));
-    if constexpr (Edges > 1) bounds = _mm256_max_epu8(bounds, box_bounds(brick));
+      bounds = _mm256_max_epu8(bounds,
+                               sides.bounds(kEdgeLists.edges[crossing][k], at.p, at.q, at.brick));
+    if constexpr (Edges > 1) bounds = _mm256_max_epu8(bounds, box_bounds(at.brick));
     const auto spread = heights.spread(bounds);
     const uint32_t index = kBrickIndex<D>.of_column[number];
-    for (int64_t z = from; z <= to; ++z)
-      tile.add(index | kBrickIndex<D>.of_height[z], spread.mask(static_cast<int>(z - brick)));
+    for (int64_t z = at.from; z <= at.to; ++z)
+      tile.add(index | kBrickIndex<D>.of_height[z], spread.mask(static_cast<int>(z - at.brick)));
   }
 
   // The triangle's box as bounds of the heights.
@@ -184,24 +166,10 @@ class ColumnWalk {
   Sides<D> sides;  // edges seen along the axes other than D
 };
 
-template <int D>
-VOXDAG_INLINE void draw_along(const TileTriangle<int32_t>& t, TileBricks& tile) {
-  if ((t.normal[kP<D>] | t.normal[kQ<D>]) == 0)
-    draw_flat<D>(t, tile);
-  else
-    ColumnWalk<D>(t, tile).run();
-}
-
 }  // namespace
 
 void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile) {
-  if (triangle.normal[triangle.dominant] == 0) return draw_exactly(triangle, tile);
-  if (triangle.dominant == 0)
-    draw_along<0>(triangle, tile);
-  else if (triangle.dominant == 1)
-    draw_along<1>(triangle, tile);
-  else
-    draw_along<2>(triangle, tile);
+  draw_by_columns<EdgeColumns, ColumnWalk>(triangle, tile);
 }
 
 }  // namespace voxdag::cpu

@@ -5,9 +5,8 @@
 #if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && \
     defined(__AVX512VL__) && defined(__AVX512VBMI__) && defined(__BMI2__)
 
-#include "core/backend/cpu/columns_avx2.h"
 #include "core/backend/cpu/columns_avx512.h"
-#include "core/backend/cpu/draw_portable.h"
+#include "core/backend/cpu/draw_by_columns.h"
 #include "core/backend/cpu/heights_avx2.h"
 
 namespace voxdag::cpu {
@@ -20,6 +19,13 @@ struct EdgeColumns : Columns<D, EdgeSet512> {
     if (triangle.inside) return;
     leave_out<kP<D>>(outside_p_, kLowP);
     leave_out<kQ<D>>(outside_q_, kLowQ);
+  }
+
+  template <class Visit>
+  VOXDAG_INLINE void for_each_inner(Visit visit) const {
+    this->edge.for_each([&](int number) __attribute__((always_inline)) {
+      visit(number, outer(number) ^ 0xffff);
+    });
   }
 
   // The voxel columns of column `number` that are outside an edge or the triangle's box.
@@ -46,23 +52,6 @@ struct EdgeColumns : Columns<D, EdgeSet512> {
   uint16_t outside_p_[16] = {}, outside_q_[16] = {};  // by brick
 };
 
-// A triangle across D, in one layer of voxels: their columns are all that matters.
-template <int D>
-VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
-  const EdgeColumns<D> columns(t);
-  const int z = t.first_voxel[D];
-  const uint32_t at_height = kBrickIndex<D>.of_height[z / 4];
-  const uint64_t layer = kLayers.voxels[D][z % 4];
-  columns.edge.for_each([&](int number) __attribute__((always_inline)) {
-    uint32_t inner = columns.outer(number) ^ 0xffff;
-    if constexpr (kP < D >> kQ<D>) inner = transposed(inner);
-    tile.add(kBrickIndex<D>.of_column[number] | at_height, _pdep_u64(inner, layer));
-  });
-  columns.plain.for_each([&](int number) __attribute__((always_inline)) {
-    tile.add(kBrickIndex<D>.of_column[number] | at_height, layer);
-  });
-}
-
 template <int D>
 class ColumnWalk {
  public:
@@ -81,24 +70,16 @@ class ColumnWalk {
  private:
   template <bool Edges>
   VOXDAG_INLINE void column(int number) {
-    const int p = number & 15, q = number >> 4;
-    const int64_t height = heights.origin + heights.step_p * p + heights.step_q * q;
-    int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
-    int64_t to = (height + heights.reach) >> (kColumnBits + 2);
-    from = from > columns.first[D] ? from : columns.first[D];
-    to = to < columns.last[D] ? to : columns.last[D];
-    if (from > to) return;
-    const int brick = static_cast<int>(height >> (kColumnBits + 2));
-    const int within =
-        static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1);
+    const auto at = heights.column(number & 15, number >> 4, columns.first[D], columns.last[D]);
+    if (at.from > at.to) return;
     __m256i outer = _mm256_setzero_si256();
     if constexpr (Edges) outer = _mm256_movm_epi16(static_cast<__mmask16>(columns.outer(number)));
-    HeightBounds bounds = heights.bounds(p, q, brick, within, outer);
-    if constexpr (Edges) bounds = _mm256_max_epu8(bounds, sides.bounds(p, q, brick));
+    HeightBounds bounds = heights.bounds(at, outer);
+    if constexpr (Edges) bounds = _mm256_max_epu8(bounds, sides.bounds(at.p, at.q, at.brick));
     const Spread512<D> spread(bounds);
     const uint32_t index = kBrickIndex<D>.of_column[number];
-    for (int64_t z = from; z <= to; ++z)
-      tile.add(index | kBrickIndex<D>.of_height[z], spread.mask(z - brick));
+    for (int64_t z = at.from; z <= at.to; ++z)
+      tile.add(index | kBrickIndex<D>.of_height[z], spread.mask(z - at.brick));
   }
 
   TileBricks& tile;
@@ -107,24 +88,10 @@ class ColumnWalk {
   Sides512 sides;
 };
 
-template <int D>
-VOXDAG_INLINE void draw_along(const TileTriangle<int32_t>& t, TileBricks& tile) {
-  if ((t.normal[kP<D>] | t.normal[kQ<D>]) == 0)
-    draw_flat<D>(t, tile);
-  else
-    ColumnWalk<D>(t, tile).run();
-}
-
 }  // namespace
 
 void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile) {
-  if (triangle.normal[triangle.dominant] == 0) return draw_exactly(triangle, tile);
-  if (triangle.dominant == 0)
-    draw_along<0>(triangle, tile);
-  else if (triangle.dominant == 1)
-    draw_along<1>(triangle, tile);
-  else
-    draw_along<2>(triangle, tile);
+  draw_by_columns<EdgeColumns, ColumnWalk>(triangle, tile);
 }
 
 }  // namespace voxdag::cpu

@@ -87,30 +87,43 @@ class Heights {
     const int64_t np = t.normal[P], nq = t.normal[Q];
     const double inverse = 1.0 / static_cast<double>(t.normal[D]);
     const double column_unit = inverse * static_cast<double>(int64_t{1} << kColumnBits);
-    step_p = static_cast<int64_t>(-4.0 * static_cast<double>(np) * column_unit);
-    step_q = static_cast<int64_t>(-4.0 * static_cast<double>(nq) * column_unit);
+    step_p_ = static_cast<int64_t>(-4.0 * static_cast<double>(np) * column_unit);
+    step_q_ = static_cast<int64_t>(-4.0 * static_cast<double>(nq) * column_unit);
     const int64_t lowest = t.lowest + 3 * (above_zero(np) + above_zero(nq));
-    origin = static_cast<int64_t>(-static_cast<double>(lowest) * column_unit -
-                                  kLowered * (int64_t{1} << (kColumnBits - kHeightBits)));
+    origin_ = static_cast<int64_t>(-static_cast<double>(lowest) * column_unit -
+                                   kLowered * (int64_t{1} << (kColumnBits - kHeightBits)));
     const double unit = inverse * (1 << kHeightBits);
     const float sp = static_cast<float>(static_cast<double>(magnitude(np)) * unit);
     const float sq = static_cast<float>(static_cast<double>(magnitude(nq)) * unit);
     const float width = static_cast<float>(static_cast<double>(t.width) * unit);
-    reach = static_cast<int64_t>(3.0f * (sp + sq) + width + kTopRaised + 2.0f)
-            << (kColumnBits - kHeightBits);
+    reach_ = static_cast<int64_t>(3.0f * (sp + sq) + width + kTopRaised + 2.0f)
+             << (kColumnBits - kHeightBits);
     set_lanes(np > 0, sp, nq > 0, sq, width);
   }
 
-  // The height of a column of bricks: that of its lowest voxel column, kLowered units of 16-bit
-  // lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
-  int64_t origin, step_p, step_q;
-  // From there to the highest top of the column, or higher.
-  int64_t reach;
+  // Where the plane passes a column of bricks.
+  struct Column {
+    int p, q;
+    int64_t from, to;  // the bricks that it may touch; none if from > to
+    int brick;         // in which the lowest voxel column begins,
+    int within;        // so many units of 16-bit lanes above its floor
+  };
+  // With bricks from `first` to `last` only.
+  VOXDAG_INLINE Column column(int p, int q, int first, int last) const {
+    const int64_t height = origin_ + step_p_ * p + step_q_ * q;
+    const int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
+    const int64_t to = (height + reach_) >> (kColumnBits + 2);
+    return {p,
+            q,
+            from > first ? from : first,
+            to < last ? to : last,
+            static_cast<int>(height >> (kColumnBits + 2)),
+            static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1)};
+  }
 
-  // For the column of bricks (p, q) that begins in `brick`, `within` units above its floor; lanes
-  // of `outer` that are all ones have no voxels.
-  VOXDAG_INLINE HeightBounds bounds(int p, int q, int brick, int within, __m256i outer) const {
-    const __m256i base = _mm256_set1_epi16(static_cast<int16_t>(within));
+  // Lanes of `outer` that are all ones have no voxels.
+  VOXDAG_INLINE HeightBounds bounds(const Column& c, __m256i outer) const {
+    const __m256i base = _mm256_set1_epi16(static_cast<int16_t>(c.within));
     __m256i below = _mm256_add_epi16(base, below_lanes_);
     __m256i top = _mm256_add_epi16(base, top_lanes_);
     const __m256i raised = _mm256_add_epi16(below, _mm256_set1_epi16(kBelowDoubt));
@@ -119,7 +132,7 @@ class Heights {
     const __m256i differ =
         _mm256_or_si256(_mm256_xor_si256(raised, below), _mm256_xor_si256(lowered, top));
     if (!_mm256_testz_si256(differ, whole)) [[unlikely]]
-      settle(p, q, brick, _mm256_and_si256(differ, whole), below, top);
+      settle(c.p, c.q, c.brick, _mm256_and_si256(differ, whole), below, top);
     below = _mm256_or_si256(below, outer);
     // Of the top its distance from the highest voxel: all four bits turned over.
     return _mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
@@ -197,6 +210,11 @@ class Heights {
   }
 
   const TileTriangle<int32_t>& t;
+  // The height of a column of bricks: that of its lowest voxel column, kLowered units of 16-bit
+  // lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
+  int64_t origin_, step_p_, step_q_;
+  // From there to the highest top of the column, or higher.
+  int64_t reach_;
   __m256i below_lanes_, top_lanes_;
 };
 
