@@ -5,6 +5,7 @@
 #include <immintrin.h>
 
 #include "core/backend/cpu/draw_avx2.h"
+#include "core/backend/cpu/list_blocks_avx2.h"
 #include "core/backend/cpu/octant_test.h"
 
 namespace voxdag::cpu {
@@ -34,11 +35,12 @@ Octants test_octants(const NarrowTriangle& triangle, const Box& cube, bool insid
   return OctantTest<Avx2Quad, int32_t>(triangle, cube).run(inside);
 }
 
-__m256i* halves(Block& block) { return reinterpret_cast<__m256i*>(&block); }
 const __m256i* halves(const Block& block) { return reinterpret_cast<const __m256i*>(&block); }
 
-// As block_key(), four bricks at once.
-uint64_t key_of(__m256i low, __m256i high) {
+// block_key() of four bricks at once.
+SeenBlock see(const Block& block) {
+  const __m256i low = _mm256_load_si256(halves(block));
+  const __m256i high = _mm256_load_si256(halves(block) + 1);
   const auto products = [](__m256i bricks, const uint64_t* add) {
     const __m256i sums =
         _mm256_add_epi32(bricks, _mm256_load_si256(reinterpret_cast<const __m256i*>(add)));
@@ -46,34 +48,13 @@ uint64_t key_of(__m256i low, __m256i high) {
   };
   const __m256i four =
       _mm256_add_epi64(products(low, kBlockKeys.add), products(high, kBlockKeys.add + 4));
-  const __m128i two =
-      _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
-  return static_cast<uint64_t>(_mm_cvtsi128_si64(two)) +
-         static_cast<uint64_t>(_mm_extract_epi64(two, 1));
+  const __m256i any = _mm256_or_si256(low, high);
+  return {sum_of(four), _mm256_testz_si256(any, any) == 0};
 }
 
 int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
                 uint64_t* keys) {
-  int count = 0;
-  for (int group = 0; group < groups; ++group) {
-    uint64_t touched, bits = 0;
-    __builtin_memcpy(&touched, tile.touched + 8 * group, 8);
-    __builtin_memset(tile.touched + 8 * group, 0, 8);
-    for (; touched != 0; touched &= touched - 1) {
-      const int i = __builtin_ctzll(touched) / 8;
-      const __m256i* const half = halves(tile.blocks[8 * group + i]);
-      const __m256i low = _mm256_load_si256(half), high = _mm256_load_si256(half + 1);
-      const __m256i any = _mm256_or_si256(low, high);
-      // Written in any case, kept if there is something.
-      numbers[count] = static_cast<uint16_t>(8 * group + i);
-      keys[count] = key_of(low, high);
-      const int there = 1 - _mm256_testz_si256(any, any);
-      count += there;
-      bits |= static_cast<uint64_t>(there) << i;
-    }
-    existing[group] = static_cast<uint8_t>(bits);
-  }
-  return count;
+  return list_blocks_seen(tile, groups, existing, numbers, keys, see);
 }
 
 BlockContent unpack(const Block& block, uint64_t* bricks) {
