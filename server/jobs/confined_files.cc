@@ -18,7 +18,7 @@ bool lies_in(const std::string& path, const std::string& place) {
 }
 
 ConfinedFiles::ConfinedFiles(FileSystem& files, const std::vector<std::string>& readable)
-    : files_(files) {
+    : ForwardingFiles(files) {
   for (const std::string& place : readable) {
     std::string resolved = resolved_path(place);
     if (resolved.empty()) continue;
@@ -29,9 +29,9 @@ ConfinedFiles::ConfinedFiles(FileSystem& files, const std::vector<std::string>& 
 
 std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) {
   const std::string resolved = resolved_path(path);
-  if (resolved.empty()) return files_.open_read(path);  // says what is missing
+  if (resolved.empty()) return ForwardingFiles::open_read(path);  // says what is missing
   for (const std::string& place : readable_)
-    if (lies_in(resolved, place)) return files_.open_read(resolved);
+    if (lies_in(resolved, place)) return ForwardingFiles::open_read(resolved);
   throw Error(
       ErrorCode::kInvalidInput,
       path + " lies outside the scene's folder: expected a scene that needs no other files");

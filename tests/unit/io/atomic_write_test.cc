@@ -3,65 +3,51 @@
 #include <algorithm>
 
 #include "core/base/error.h"
-#include "core/io/file_system.h"
+#include "core/io/forwarding_files.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag {
 namespace {
 
 // The real disk, except that call number `fails_at` fails; remembers the calls.
-class FailingDisk : public FileSystem {
+class FailingDisk : public ForwardingFiles {
  public:
-  explicit FailingDisk(int fails_at) : fails_at_(fails_at) {}
+  explicit FailingDisk(int fails_at) : ForwardingFiles(system_files()), fails_at_(fails_at) {}
   std::vector<std::string> calls;
 
-  std::unique_ptr<ReadableFile> open_read(const std::string& p) override {
-    return disk_.open_read(p);
-  }
-  std::unique_ptr<WritableFile> create(const std::string& p) override {
+  std::unique_ptr<WritableFile> create(const std::string& path) override {
     step("create");
-    return std::make_unique<File>(*this, disk_.create(p));
+    return std::make_unique<File>(*this, ForwardingFiles::create(path));
   }
-  std::unique_ptr<WritableFile> open_write(const std::string& p) override { return create(p); }
-  bool exists(const std::string& p) override { return disk_.exists(p); }
   void rename(const std::string& from, const std::string& to) override {
     step("rename");
-    disk_.rename(from, to);
+    ForwardingFiles::rename(from, to);
   }
-  void remove(const std::string& p) override { disk_.remove(p); }
-  void make_directories(const std::string& p) override { disk_.make_directories(p); }
-  void remove_directory(const std::string& p) override { disk_.remove_directory(p); }
-  std::vector<DirectoryEntry> list(const std::string& p) override { return disk_.list(p); }
-  void touch(const std::string& p) override { disk_.touch(p); }
-  void sync_directory(const std::string& p) override {
+  void sync_directory(const std::string& path) override {
     step("sync_directory");
-    disk_.sync_directory(p);
+    ForwardingFiles::sync_directory(path);
   }
-  std::unique_ptr<FileLock> try_lock(const std::string& p) override { return disk_.try_lock(p); }
-  uint64_t free_space(const std::string& p) override { return disk_.free_space(p); }
 
  private:
-  class File : public WritableFile {
+  class File : public ForwardingWriter {
    public:
     File(FailingDisk& disk, std::unique_ptr<WritableFile> file)
-        : disk_(disk), file_(std::move(file)) {}
-    const std::string& path() const override { return file_->path(); }
+        : ForwardingWriter(std::move(file)), disk_(disk) {}
     void write_at(uint64_t offset, std::span<const std::byte> data) override {
       disk_.step("write");
-      file_->write_at(offset, data);
+      ForwardingWriter::write_at(offset, data);
     }
     void sync() override {
       disk_.step("sync");
-      file_->sync();
+      ForwardingWriter::sync();
     }
     void close() override {
       disk_.step("close");
-      file_->close();
+      ForwardingWriter::close();
     }
 
    private:
     FailingDisk& disk_;
-    std::unique_ptr<WritableFile> file_;
   };
 
   void step(const char* call) {
@@ -70,7 +56,6 @@ class FailingDisk : public FileSystem {
       throw Error(ErrorCode::kIo, std::string(call) + " failed");
   }
 
-  FileSystem& disk_ = system_files();
   const int fails_at_;
 };
 

@@ -1,0 +1,75 @@
+// A file system and its files that hand every call on to others: bases for those that change a few.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/io/file_system.h"
+
+namespace voxdag {
+
+class ForwardingFiles : public FileSystem {
+ public:
+  // `files` must outlive this.
+  explicit ForwardingFiles(FileSystem& files) : files_(files) {}
+
+  std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
+    return files_.open_read(path);
+  }
+  std::unique_ptr<WritableFile> create(const std::string& path) override {
+    return files_.create(path);
+  }
+  std::unique_ptr<WritableFile> open_write(const std::string& path) override {
+    return files_.open_write(path);
+  }
+  bool exists(const std::string& path) override { return files_.exists(path); }
+  void rename(const std::string& from, const std::string& to) override { files_.rename(from, to); }
+  void remove(const std::string& path) override { files_.remove(path); }
+  void make_directories(const std::string& path) override { files_.make_directories(path); }
+  void remove_directory(const std::string& path) override { files_.remove_directory(path); }
+  std::vector<DirectoryEntry> list(const std::string& path) override { return files_.list(path); }
+  void touch(const std::string& path) override { files_.touch(path); }
+  void sync_directory(const std::string& path) override { files_.sync_directory(path); }
+  std::unique_ptr<FileLock> try_lock(const std::string& path) override {
+    return files_.try_lock(path);
+  }
+  uint64_t free_space(const std::string& path) override { return files_.free_space(path); }
+
+ private:
+  FileSystem& files_;
+};
+
+class ForwardingReader : public ReadableFile {
+ public:
+  explicit ForwardingReader(std::unique_ptr<ReadableFile> file) : file_(std::move(file)) {}
+
+  const std::string& path() const override { return file_->path(); }
+  uint64_t size() const override { return file_->size(); }
+  FileIdentity identity() const override { return file_->identity(); }
+  void read_at(uint64_t offset, std::span<std::byte> out) const override {
+    file_->read_at(offset, out);
+  }
+
+ private:
+  const std::unique_ptr<ReadableFile> file_;
+};
+
+class ForwardingWriter : public WritableFile {
+ public:
+  explicit ForwardingWriter(std::unique_ptr<WritableFile> file) : file_(std::move(file)) {}
+
+  const std::string& path() const override { return file_->path(); }
+  void write_at(uint64_t offset, std::span<const std::byte> data) override {
+    file_->write_at(offset, data);
+  }
+  void release(uint64_t offset, uint64_t bytes) override { file_->release(offset, bytes); }
+  void sync() override { file_->sync(); }
+  void close() override { file_->close(); }
+
+ private:
+  const std::unique_ptr<WritableFile> file_;
+};
+
+}  // namespace voxdag
