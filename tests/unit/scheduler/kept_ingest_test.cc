@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/scene/generate/generate.h"
 #include "scheduler/ingest_keeper.h"
 #include "tests/unit/io/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
 #include "tests/unit/scheduler/metered_files.h"
+#include "tests/unit/scheduler/spheres_build.h"
 
 namespace voxdag {
 namespace {
@@ -34,14 +34,7 @@ class KeptIngestTest : public testing::Test {
     EXPECT_FALSE(files_.bytes_written.contains(kept()));
     std::filesystem::remove(output());
   }
-  void make_scene(uint64_t seed) const {
-    GenerateOptions options;
-    options.kind = SceneKind::kSpheres;
-    options.triangles = 24000;
-    options.seed = seed;
-    NoProgress progress;
-    generate_scene(system_files(), scene(), options, progress, CancelToken{});
-  }
+  void make_scene(uint64_t seed) const { write_spheres(scene(), 24000, seed); }
   std::string scene() const { return folder_.file("scene.glb"); }
   std::string output() const { return folder_.file("out.vdag"); }
   std::string work() const { return output() + ".work"; }
@@ -49,13 +42,7 @@ class KeptIngestTest : public testing::Test {
 
   // Keeps the scene at the ends of scan, ingest and hand-down.
   BuildSpec spec() const {
-    BuildSpec spec;
-    spec.geometry.scenes = {scene()};
-    spec.geometry.resolution = 1024;
-    spec.run.output = output();
-    spec.run.memory_bytes = uint64_t{256} << 20;
-    spec.run.threads = 1;
-    spec.run.subvolume_edge = 128;
+    BuildSpec spec = spheres_build(scene(), output());
     spec.run.checkpoint_interval_s = 1e9;
     spec.run.kept_from_triangles = 1;
     return spec;

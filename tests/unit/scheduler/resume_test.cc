@@ -7,7 +7,6 @@
 #include <thread>
 
 #include "core/base/error.h"
-#include "core/scene/generate/generate.h"
 #include "scheduler/job_status.h"
 #include "scheduler/job_store.h"
 #include "scheduler/output_lock.h"
@@ -15,34 +14,19 @@
 #include "scheduler/work_folder.h"
 #include "tests/unit/io/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
+#include "tests/unit/scheduler/spheres_build.h"
 
 namespace voxdag {
 namespace {
 
 class ResumeTest : public testing::Test {
  protected:
-  void SetUp() override {
-    GenerateOptions options;
-    options.kind = SceneKind::kSpheres;
-    options.triangles = 20000;
-    NoProgress progress;
-    CancelToken cancel;
-    generate_scene(system_files(), scene(), options, progress, cancel);
-  }
+  void SetUp() override { write_spheres(scene(), 20000); }
   std::string scene() const { return folder_.path() + "/scene.glb"; }
   std::string output() const { return folder_.path() + "/out.vdag"; }
   std::string work() const { return output() + ".work"; }
 
-  BuildSpec spec() const {
-    BuildSpec spec;
-    spec.geometry.scenes = {scene()};
-    spec.geometry.resolution = 1024;
-    spec.run.output = output();
-    spec.run.memory_bytes = uint64_t{256} << 20;
-    spec.run.threads = 1;
-    spec.run.subvolume_edge = 128;
-    return spec;
-  }
+  BuildSpec spec() const { return spheres_build(scene(), output()); }
   static BuildReport build(const BuildSpec& spec) {
     NoProgress progress;
     CancelToken cancel;
