@@ -16,7 +16,7 @@ namespace {
 
 // Bytes of half-filled chunks while one subvolume is split.
 constexpr size_t kSplitBufferBytes = size_t{512} << 10;
-// Pages that a backend keeps from one subvolume to the next, no longer charged.
+// Pages that a backend may keep uncharged beside a full share; more make way for what is charged.
 constexpr uint64_t kPagesAWorkerKeeps = uint64_t{8} << 20;
 // No more than this many files are held open for writing.
 constexpr uint64_t kMostWorkers = 256;

@@ -5,9 +5,8 @@
 // Invariants:
 //   1. The row names nothing in the file that was not synced before.
 //   2. A row counts only where the same was asked for and every file of the scene is the one that
-//   was
-//      read, unchanged: same inode, size and times, and those so old when it was opened that any
-//      later change shows in them.
+//      was read, unchanged: same inode, size and times, and those so old when it was opened that
+//      any later change shows in them.
 //   3. What does not count, or is damaged, is forgotten: the scene is read again.
 // Used by one thread.
 #pragma once
