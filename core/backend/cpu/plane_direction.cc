@@ -1,9 +1,9 @@
 #include "core/backend/cpu/plane_direction.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <limits>
 
-#include "core/backend/cpu/plane_brick.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
@@ -28,19 +28,27 @@ void PlaneDirection::set_up(const Plane& plane) {
     int64_t k[3];
     for (int a = 0; a < 3; ++a)
       k[a] = (m >> a & 1) | (m >> (a + 3) & 1) << 1 | (m >> (a + 6) & 1) << 2;
-    tile_offsets_[m] = 8 * (n_[0] * k[0] + n_[1] * k[1] + n_[2] * k[2]);
+    voxel_offsets_[m] = n_[0] * k[0] + n_[1] * k[1] + n_[2] * k[2];
+    tile_offsets_[m] = 8 * voxel_offsets_[m];
   }
   std::fill(known_, known_ + kCorners, Known{});
 }
 
-void PlaneDirection::make(int64_t f, SubDagTables& tables, Known& known) const {
+void PlaneDirection::make(int64_t f, SubDagTables& tables, const Kernels& kernels,
+                          Known& known) const {
   const OctreeCounts before = tables.counts();
-  NodeRef bricks[8];
-  for (int c = 0; c < 8; ++c) {
-    int64_t at_brick = f;
-    for (int a = 0; a < 3; ++a) at_brick += (c >> a & 1) * 4 * n_[a];
-    bricks[c] = tables.add_brick(plane_brick(n_, at_brick, true));
+  // Over a voxel's corners the value rises to n.k + f + rising, and falls below that by `size`: one
+  // less than that counts, since offsets leave a remainder.
+  int64_t rising = 0, size = 0;
+  for (const int64_t x : n_) {
+    rising += std::max<int64_t>(x, 0);
+    size += std::abs(x);
   }
+  const int64_t least = -(f + rising);
+  uint64_t masks[8];
+  kernels.find_in_range(voxel_offsets_, 512, least, least + size - 1, masks);
+  NodeRef bricks[8];
+  for (int c = 0; c < 8; ++c) bricks[c] = tables.add_brick(masks[c]);
   const NodeRef node = tables.add_node(kSizeLog2, bricks);
   const OctreeCounts counts = tables.counts() - before;
   tables.counts() = before;

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "core/backend/cpu/kernels.h"
 #include "core/backend/cpu/plane.h"
 #include "core/backend/cpu/sub_dag_tables.h"
 
@@ -36,9 +37,9 @@ class PlaneDirection {
   int64_t most_offset() const { return values_[kCorners - 1] - 1; }
 
   // The node at an offset within [least, most].
-  const Known& node(int64_t f, SubDagTables& tables) {
+  const Known& node(int64_t f, SubDagTables& tables, const Kernels& kernels) {
     Known& known = known_[interval(f)];
-    if (known.nodes == 0) make(f, tables, known);
+    if (known.nodes == 0) make(f, tables, kernels, known);
     return known;
   }
 
@@ -55,11 +56,12 @@ class PlaneDirection {
   int bucket(int64_t f) const {
     return static_cast<int>(static_cast<double>(f - values_[0]) * buckets_per_unit_);
   }
-  void make(int64_t f, SubDagTables& tables, Known& known) const;
+  void make(int64_t f, SubDagTables& tables, const Kernels& kernels, Known& known) const;
 
   int64_t n_[3];
   double buckets_per_unit_;
   int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
+  int64_t voxel_offsets_[512];    // n.k for the voxels k of a node, in Morton order
   int64_t tile_offsets_[512];
   uint16_t bucket_[kBuckets + 1];  // the last value that no f of the bucket is below
   Known known_[kCorners];

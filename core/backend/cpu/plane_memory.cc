@@ -118,7 +118,7 @@ NodeRef PlaneMemory::tile_node(PlaneDirection& direction, int64_t f, int size_lo
   OctreeCounts counts;
   const NodeRef found = reducer_.reduce_nodes(
       crossed, PlaneDirection::kSizeLog2, size_log2, [&](int m) -> const PlaneDirection::Known& {
-        const PlaneDirection::Known& known = direction.node(f + offsets[m], tables_);
+        const PlaneDirection::Known& known = direction.node(f + offsets[m], tables_, kernels_);
         counts += {known.nodes, known.voxels};
         return known;
       });
