@@ -21,9 +21,10 @@ void BrickTable::grow(uint64_t bricks) {
 }
 
 std::span<const BrickTable::Slot> BrickTable::sort_slots(uint32_t hash_bits) {
+  const auto tag = [](const Slot& slot) { return slot.tag; };
   const std::span<Slot> slots = compact_slots(
       std::span(slots_.begin(), slots_.end()), [](const Slot& slot) { return slot.mask != 0; },
-      [](const Slot& slot) { return slot.tag; });
+      tag);
   const auto less = [hash_bits](const Slot& a, const Slot& b) {
     const uint64_t hash_a = cut_hash(hash_brick(a.mask), hash_bits);
     const uint64_t hash_b = cut_hash(hash_brick(b.mask), hash_bits);
@@ -32,9 +33,7 @@ std::span<const BrickTable::Slot> BrickTable::sort_slots(uint32_t hash_bits) {
   if (hash_bits < 64)
     std::sort(slots.begin(), slots.end(), less);
   else
-    sort_nearly_sorted(slots, [&](const Slot& a, const Slot& b) {
-      return a.tag != b.tag ? a.tag < b.tag : less(a, b);
-    });
+    sort_nearly_sorted(slots, tag, less);
   return slots;
 }
 

@@ -51,14 +51,14 @@ bool NodeTable::less(uint64_t slot_a, uint64_t slot_b) {
 }
 
 std::span<const uint64_t> NodeTable::sort_slots(bool hashes_changed) {
+  const auto tag = [](uint64_t slot) { return static_cast<uint32_t>(slot >> 32); };
   const std::span<uint64_t> slots = compact_slots(
-      std::span(slots_.begin(), slots_.end()), [](uint64_t slot) { return slot != 0; },
-      [](uint64_t slot) { return static_cast<uint32_t>(slot >> 32); });
+      std::span(slots_.begin(), slots_.end()), [](uint64_t slot) { return slot != 0; }, tag);
+  const auto is_less = [this](uint64_t a, uint64_t b) { return less(a, b); };
   if (hashes_changed)
-    std::sort(slots.begin(), slots.end(), [this](uint64_t a, uint64_t b) { return less(a, b); });
+    std::sort(slots.begin(), slots.end(), is_less);
   else
-    sort_nearly_sorted(
-        slots, [this](uint64_t a, uint64_t b) { return a >> 32 != b >> 32 ? a < b : less(a, b); });
+    sort_nearly_sorted(slots, tag, is_less);
   return slots;
 }
 

@@ -23,26 +23,48 @@ inline uint64_t slots_for(uint64_t entries) {
 template <class Slot, class InUse, class Tag>
 std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   std::vector<Slot> wrapped;
-  size_t count = 0;
-  for (size_t i = 0; i < slots.size(); ++i) {
-    if (!in_use(slots[i])) continue;
-    if (tag(slots[i]) >> 31 && i < slots.size() / 4)
+  size_t count = 0, i = 0;
+  for (; i < slots.size() && in_use(slots[i]); ++i) {
+    if (tag(slots[i]) >> 31)
       wrapped.push_back(slots[i]);
     else
       slots[count++] = slots[i];
+  }
+  // Written in any case, kept if it is in use: the processor would guess wrong every other time.
+  for (; i < slots.size(); ++i) {
+    const bool kept = in_use(slots[i]);
+    slots[count] = slots[i];
+    count += kept;
   }
   std::copy(wrapped.begin(), wrapped.end(), slots.begin() + count);
   return slots.first(count + wrapped.size());
 }
 
-// Insertion sort: no slot is further from its place than a cluster of the table is long.
-template <class Slot, class Less>
-void sort_nearly_sorted(std::span<Slot> slots, Less less) {
+// No slot is further from its place than a cluster of the table is long. `tag` as above; `less`
+// agrees with it.
+template <class Slot, class Tag, class Less>
+void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
+  if (slots.empty()) return;
+  // Most of the work, hardly with branches: each slot goes down past all with larger tags, until
+  // another goes down from there.
+  Slot down = slots.back();
+  for (size_t i = slots.size() - 1; i-- > 0;) {
+    const Slot other = slots[i];
+    const bool passes = tag(down) < tag(other);
+    slots[i + 1] = passes ? other : down;
+    down = passes ? down : other;
+  }
+  slots.front() = down;
+  // The rest: insertion sort.
   for (size_t i = 1; i < slots.size(); ++i) {
-    if (!less(slots[i], slots[i - 1])) continue;
+    const auto before = tag(slots[i - 1]), here = tag(slots[i]);
+    if (before < here) continue;
     const Slot slot = slots[i];
+    const auto is_less = [&](const Slot& other) {
+      return here != tag(other) ? here < tag(other) : less(slot, other);
+    };
     size_t at = i;
-    for (; at > 0 && less(slot, slots[at - 1]); --at) slots[at] = slots[at - 1];
+    for (; at > 0 && is_less(slots[at - 1]); --at) slots[at] = slots[at - 1];
     slots[at] = slot;
   }
 }
