@@ -1,49 +1,88 @@
 #include "scheduler/journal.h"
 
+#include <chrono>
+#include <utility>
+
 #include "core/base/clock.h"
 #include "core/base/error.h"
 
 namespace voxdag {
 namespace {
 
-// What a crash may cost beside the tasks in flight.
+// What a crash may cost beside the tasks in flight and a group on its way to the disk; and what may
+// be left to write when all is built, which nothing is built beside.
 constexpr double kCommitInterval_s = 1;
+constexpr uint64_t kCommitBytes = uint64_t{16} << 20;
 
 }  // namespace
 
 void Journal::built(const StoredSubvolume& subvolume, std::optional<BinId> kept) {
-  if (pending_.empty() && last_commit_s_ == 0) last_commit_s_ = wall_seconds();
-  pending_.push_back(subvolume);
-  if (kept) pending_releases_.push_back(*kept);
-  if (wall_seconds() - last_commit_s_ >= kCommitInterval_s) commit();
+  if (next_.subvolumes.empty() && begun_s_ == 0) begun_s_ = wall_seconds();
+  next_.subvolumes.push_back(subvolume);
+  if (kept) next_.releases.push_back(*kept);
+  if (is_due()) begin_commit();
 }
 
 void Journal::commit() {
-  if (pending_.empty()) return;
+  begin_commit();
+  settle();
+}
+
+bool Journal::is_due() const {
+  if (wall_seconds() - begun_s_ < kCommitInterval_s &&
+      segment_.size() - begun_bytes_ < kCommitBytes)
+    return false;
+  return !commit_.valid() ||
+         commit_.wait_for(std::chrono::seconds(0)) != std::future_status::timeout;
+}
+
+void Journal::begin_commit() {
+  settle();
+  if (next_.subvolumes.empty()) return;
+  begun_s_ = wall_seconds();
+  begun_bytes_ = segment_.size();
+  under_way_ = std::exchange(next_, {});
   try {
-    segment_.sync();
+    segment_.flush();
   } catch (const Error&) {
     salvage();
     throw;
   }
-  store_.record_built(pending_);
-  pending_.clear();
-  for (const BinId bin : pending_releases_) bins_.release(bin);
-  pending_releases_.clear();
-  last_commit_s_ = wall_seconds();
+  // Where the system has no thread left, settle() does it.
+  commit_ = std::async([this] { record_under_way(); });
+}
+
+void Journal::record_under_way() {
+  segment_.sync_written();
+  store_.record_built(under_way_.subvolumes);
+  for (const BinId bin : under_way_.releases) bins_.release(bin);
+}
+
+void Journal::settle() {
+  if (!commit_.valid()) return;
+  try {
+    commit_.get();
+  } catch (const Error&) {
+    salvage();
+    throw;
+  }
+  under_way_ = {};
 }
 
 void Journal::salvage() {
+  Group group = std::exchange(under_way_, {});
+  const Group later = std::exchange(next_, {});
+  group.subvolumes.insert(group.subvolumes.end(), later.subvolumes.begin(), later.subvolumes.end());
   try {
+    segment_.release_unwritten();
     segment_.sync_written();
-    std::erase_if(pending_, [&](const StoredSubvolume& s) {
+    std::erase_if(group.subvolumes, [&](const StoredSubvolume& s) {
       return s.artifact.offset + s.artifact.bytes > segment_.written();
     });
-    store_.record_built(pending_);
+    store_.record_built(group.subvolumes);
   } catch (const Error&) {
     // Then they are built again.
   }
-  pending_.clear();
 }
 
 }  // namespace voxdag

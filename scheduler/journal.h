@@ -1,7 +1,9 @@
-// Records what one worker finished: artifacts are made durable in groups, about once a second, and
-// only then named in the job store. Used by one thread.
+// Records what one worker finished: artifacts are made durable in groups, and only then named in
+// the job store. That happens on a thread of its own, so that the disk keeps no worker waiting.
+// Used by one thread.
 #pragma once
 
+#include <future>
 #include <optional>
 #include <vector>
 
@@ -17,21 +19,33 @@ class Journal {
       : store_(store), segment_(segment), bins_(bins) {}
 
   // The subvolume is built; its artifact, if it has one, is in the worker's segment. Once that is
-  // recorded, the kept bin that its triangles came from, if any, is released.
+  // recorded, the kept bin that its triangles came from, if any, is released. What went wrong with
+  // an earlier group is thrown here.
   void built(const StoredSubvolume& subvolume, std::optional<BinId> kept);
   // Makes durable all that was built so far.
   void commit();
 
  private:
+  struct Group {
+    std::vector<StoredSubvolume> subvolumes;
+    std::vector<BinId> releases;
+  };
+
+  bool is_due() const;
+  void begin_commit();
+  void record_under_way();
+  // Waits for the group under way.
+  void settle();
   // The disk is full: what it did take is made durable and recorded.
   void salvage();
 
   JobStore& store_;
   SegmentWriter& segment_;
   TriangleBins& bins_;
-  std::vector<StoredSubvolume> pending_;
-  std::vector<BinId> pending_releases_;
-  double last_commit_s_ = 0;
+  Group next_, under_way_;
+  double begun_s_ = 0;        // when the last group began to be recorded, or this one to fill
+  uint64_t begun_bytes_ = 0;  // of the segment, then
+  std::future<void> commit_;
 };
 
 }  // namespace voxdag

@@ -72,9 +72,13 @@ class SegmentWriter {
   void flush();
   // Writes the buffer out and returns once all bytes so far, and the file's name, are on the disk.
   void sync();
-  // The same for what is out of the buffer already, which are the first written() bytes.
+  // The same for what is out of the buffer already. May run beside another thread's calls other
+  // than sync() and this.
   void sync_written();
+  // Bytes that are out of the buffer.
   uint64_t written() const { return written_; }
+  // Gives back the space of what a flush left behind that failed for want of it.
+  void release_unwritten();
 
  private:
   friend class ArtifactWriter;

@@ -67,11 +67,11 @@ void SegmentWriter::sync() {
 }
 
 void SegmentWriter::sync_written() {
-  // What a flush left behind that failed for want of space: it is room for the job store's row.
-  file_->release(written_, buffered_);
   file_->sync();
   if (!name_synced_) files_.sync_directory(folder_);
   name_synced_ = true;
 }
+
+void SegmentWriter::release_unwritten() { file_->release(written_, buffered_); }
 
 }  // namespace voxdag

@@ -4,7 +4,8 @@
 // Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT), kIo; the message names the call, the path, the
 // offset where there is one, and the system's reason. Short reads and writes and EINTR are handled
 // inside. Objects are used by one thread at a time, except that ReadableFile::read_at and
-// WritableFile::write_at may be called by several threads at once.
+// WritableFile::write_at may be called by several threads at once, and WritableFile::sync beside
+// them.
 #pragma once
 
 #include <cstddef>

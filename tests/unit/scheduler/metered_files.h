@@ -1,10 +1,12 @@
 // The machine's files, with a meter on what is read and written, and a disk that is full or fails
-// where a test wants it to. Syncs are only counted: no test cuts the power.
+// where a test wants it to. Syncs are only counted: no test cuts the power. Counts are read when no
+// build is under way.
 #pragma once
 
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -46,12 +48,23 @@ class MeteredFiles : public ForwardingFiles {
   }
 
  private:
+  uint64_t add(std::map<std::string, uint64_t>& counts, const std::string& path, uint64_t more) {
+    std::lock_guard lock(mutex_);
+    return counts[path] += more;
+  }
+  uint64_t failing_sync_of(const std::string& path) const {
+    const auto found = failing_sync.find(path);
+    return found == failing_sync.end() ? 0 : found->second;
+  }
+
+  std::mutex mutex_;
+
   class Reader : public ForwardingReader {
    public:
     Reader(MeteredFiles& files, std::unique_ptr<ReadableFile> file)
         : ForwardingReader(std::move(file)), files_(files) {}
     void read_at(uint64_t offset, std::span<std::byte> out) const override {
-      files_.bytes_read[path()] += out.size();
+      files_.add(files_.bytes_read, path(), out.size());
       ForwardingReader::read_at(offset, out);
     }
 
@@ -66,15 +79,15 @@ class MeteredFiles : public ForwardingFiles {
     void write_at(uint64_t offset, std::span<const std::byte> data) override {
       if (path() == files_.full_for)
         throw Error(ErrorCode::kNoSpace, "write " + path() + ": the test's disk is full");
-      files_.bytes_written[path()] += data.size();
+      files_.add(files_.bytes_written, path(), data.size());
       ForwardingWriter::write_at(offset, data);
     }
     void release(uint64_t offset, uint64_t bytes) override {
-      files_.bytes_released[path()] += bytes;
+      files_.add(files_.bytes_released, path(), bytes);
       ForwardingWriter::release(offset, bytes);
     }
     void sync() override {
-      if (++files_.syncs[path()] == files_.failing_sync[path()])
+      if (files_.add(files_.syncs, path(), 1) == files_.failing_sync_of(path()))
         throw Error(ErrorCode::kIo, "sync " + path() + ": the test's disk is broken");
     }
 
