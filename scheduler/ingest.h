@@ -22,9 +22,10 @@ void scan(TriangleSource& scene, IngestState& state, const Seams& seams,
 // The cube that the geometry options ask for, of a scene with these bounds.
 Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
 
-// Streams the scene into the only bin of `writer` and counts it into `top`. Throws Error{kLimit}
-// for a triangle that reaches into the grid from beyond the coordinate limit.
-void ingest(TriangleSource& scene, IngestState& state, BinWriter& writer, TopTree& top,
-            const Seams& seams, const AfterBatch& after_batch);
+// Streams the scene into the only bin of `writer` and counts it into `top`, on two threads if there
+// may be two: one reads, the other, which calls `after_batch`, does all the rest. Throws
+// Error{kLimit} for a triangle that reaches into the grid from beyond the coordinate limit.
+void ingest(TriangleSource& scene, unsigned threads, IngestState& state, BinWriter& writer,
+            TopTree& top, const Seams& seams, const AfterBatch& after_batch);
 
 }  // namespace voxdag

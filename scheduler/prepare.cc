@@ -159,7 +159,7 @@ class Preparation {
       prepared_.bins->kept_file()->read(state_.top_tree, top.fill(state_.top_tree_weight));
     if (state_.stage == IngestStage::kIngest) {
       BinWriter writer(*prepared_.bins, {prepared_.whole}, size_t{1} << 20);
-      ingest(*scene_, state_, writer, top, seams_, [&] {
+      ingest(*scene_, spec_.run.threads, state_, writer, top, seams_, [&] {
         if (!keeper_ || !keeper_->is_due()) return;
         writer.flush();
         append(top);
