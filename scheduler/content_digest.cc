@@ -4,6 +4,8 @@
 
 #include <openssl/sha.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <type_traits>
 
@@ -19,8 +21,37 @@ ContentDigest::ContentDigest(const Grid& grid) {
   add_bytes(std::as_bytes(std::span(numbers)));
 }
 
+// Nine coordinates of 32 bits, which are half as much to digest; where they do not suffice, the
+// smallest such number, which is never one of those, and then nine of 64 bits.
 void ContentDigest::add(std::span<const FixedTriangle> triangles) {
-  add_bytes(std::as_bytes(triangles));
+  constexpr int32_t kWide = INT32_MIN;
+  constexpr size_t kMostBytes = sizeof kWide + sizeof(FixedTriangle), kAtOnce = 64;
+  std::array<std::byte, kMostBytes * kAtOnce> buffer;
+  while (!triangles.empty()) {
+    size_t bytes = 0;
+    const auto put = [&](const void* from, size_t size) {
+      std::memcpy(&buffer[bytes], from, size);
+      bytes += size;
+    };
+    const auto portion = triangles.first(std::min(kAtOnce, triangles.size()));
+    for (const FixedTriangle& triangle : portion) {
+      int32_t narrow[9];
+      bool fits = true;
+      for (int i = 0; i < 9; ++i) {
+        const int64_t coordinate = triangle.v[i / 3][i % 3];
+        narrow[i] = static_cast<int32_t>(coordinate);
+        fits &= narrow[i] == coordinate && narrow[i] != kWide;
+      }
+      if (fits) {
+        put(narrow, sizeof narrow);
+      } else {
+        put(&kWide, sizeof kWide);
+        put(&triangle, sizeof triangle);
+      }
+    }
+    add_bytes(std::span(buffer).first(bytes));
+    triangles = triangles.subspan(portion.size());
+  }
 }
 
 std::string ContentDigest::hex() const {

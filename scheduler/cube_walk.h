@@ -11,6 +11,35 @@
 
 namespace voxdag {
 
+// The cells of a level that a triangle's box reaches.
+struct CellBox {
+  CellBox(const FixedTriangle& triangle, uint32_t grid_levels, uint32_t cell_level)
+      : level(cell_level) {
+    const int shift = kUnitBits + static_cast<int>(grid_levels - cell_level);
+    for (int a = 0; a < 3; ++a) {
+      low[a] = triangle.low(a) >> shift;
+      high[a] = triangle.high(a) >> shift;
+    }
+  }
+  bool is_inside_grid() const {
+    bool inside = true;
+    for (int a = 0; a < 3; ++a) inside &= low[a] >= 0 && high[a] >> level == 0;
+    return inside;
+  }
+  // The smallest cube that holds all of them, which must be inside the grid.
+  Cube cube_around() const {
+    uint32_t up = 0;
+    for (int a = 0; a < 3; ++a)
+      while (low[a] >> up != high[a] >> up) ++up;
+    return {level - up,
+            {static_cast<uint32_t>(low[0] >> up), static_cast<uint32_t>(low[1] >> up),
+             static_cast<uint32_t>(low[2] >> up)}};
+  }
+
+  uint32_t level;
+  int64_t low[3], high[3];
+};
+
 // Bit c is set if the triangle touches child c of the cube, `parent_units` being the cube's edge in
 // lattice units. The triangle must touch the cube itself.
 inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube,

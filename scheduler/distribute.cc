@@ -1,11 +1,14 @@
 #include "scheduler/distribute.h"
 
+#include <algorithm>
+
 namespace voxdag {
 
 CubeTree::CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves)
-    : grid_levels_(grid_levels), root_(root), nodes_(1) {
+    : grid_levels_(grid_levels), root_(root), deepest_(root.level), nodes_(1) {
   for (size_t leaf = 0; leaf < leaves.size(); ++leaf) {
     const Cube& cube = leaves[leaf];
+    deepest_ = std::max(deepest_, cube.level);
     int32_t node = 0;
     for (uint32_t level = root.level + 1; level <= cube.level; ++level) {
       const uint32_t up = cube.level - level;

@@ -19,7 +19,19 @@ class CubeTree {
   // Calls visit(index into leaves) for every leaf that the triangle touches.
   template <class Visit>
   void for_each_touched(const FixedTriangle& triangle, const Visit& visit) const {
-    descend(0, root_, triangle, visit);
+    int32_t node = 0;
+    Cube cube = root_;
+    // As far as one cube holds all of the triangle, it touches that one and no other.
+    const CellBox box(triangle, grid_levels_, deepest_);
+    if (const Cube around = box.is_inside_grid() ? box.cube_around() : Cube{}; holds(around))
+      while (cube.level < around.level && nodes_[node].leaf == kNone) {
+        const uint32_t up = around.level - cube.level - 1;
+        cube = {cube.level + 1,
+                {around.position[0] >> up, around.position[1] >> up, around.position[2] >> up}};
+        node = nodes_[node].child[cube.child_index()];
+        if (node == kNone) return;
+      }
+    descend(node, cube, triangle, visit);
   }
 
  private:
@@ -29,6 +41,13 @@ class CubeTree {
     int32_t leaf = kNone;  // index of the leaf that this node is, if it is one
   };
 
+  bool holds(const Cube& cube) const {
+    if (cube.level < root_.level) return false;
+    const uint32_t up = cube.level - root_.level;
+    return cube.position[0] >> up == root_.position[0] &&
+           cube.position[1] >> up == root_.position[1] &&
+           cube.position[2] >> up == root_.position[2];
+  }
   template <class Visit>
   void descend(int32_t node, const Cube& cube, const FixedTriangle& triangle,
                const Visit& visit) const {
@@ -43,6 +62,7 @@ class CubeTree {
 
   uint32_t grid_levels_;
   Cube root_;
+  uint32_t deepest_;  // level of the smallest leaves
   std::vector<Node> nodes_;
 };
 

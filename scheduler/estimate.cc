@@ -139,7 +139,7 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
 
 double most_disk_bytes(const PreparedScene& scene) {
   // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
-  // (expected_bricks()): over all levels twice its bricks, and one cube a level.
+  // (expected_work()): over all levels twice its bricks, and one cube a level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.counts.triangles);

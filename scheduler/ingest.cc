@@ -67,8 +67,9 @@ class Taker {
   void take(const SnappedBatch& batch) {
     seams_.cancel.check();
     for (const FixedTriangle& triangle : batch.inside) {
-      state_.counts.expected_voxels += expected_voxels(triangle);
-      top_.add(triangle);
+      const ExpectedWork work = expected_work(triangle);
+      state_.counts.expected_voxels += work.voxels;
+      top_.add(triangle, work.bricks);
       writer_.append(0, triangle);
     }
     state_.counts.triangles += batch.inside.size();

@@ -9,7 +9,7 @@ namespace voxdag {
 namespace {
 
 // Another one for every change of what follows it.
-constexpr uint64_t kRecordVersion = 1;
+constexpr uint64_t kRecordVersion = 2;
 
 void put_bytes(std::vector<std::byte>& out, std::span<const std::byte> bytes) {
   const size_t at = out.size();

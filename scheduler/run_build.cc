@@ -26,8 +26,8 @@ namespace {
 constexpr uint32_t kLevelsWorthAnEstimate = 12;
 // The pilot of the check before a build is this much coarser, so that it costs next to nothing.
 constexpr uint32_t kLevelsBelowForTheCheck = 5;
-// Of artifacts and job store; another number is another job.
-constexpr int64_t kWorkFormatVersion = 1;
+// Of artifacts, job store and digests of scenes; another number is another job.
+constexpr int64_t kWorkFormatVersion = 2;
 // How often damaged artifacts are built again before the disk is to blame.
 constexpr int kMostAttempts = 3;
 

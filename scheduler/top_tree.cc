@@ -14,30 +14,23 @@ namespace {
 // Cells are no smaller, in voxels an edge: finer ones cost more than they tell about a scene.
 constexpr int64_t kLeastCellEdge = 2 * kSmallestEdge;
 
-// Cubes of 2^shift units an edge.
-double expected_cubes(const FixedTriangle& t, int shift) {
-  const double scale = 1.0 / static_cast<double>(int64_t{1} << shift);
-  double e[2][3], extents = 0;
+}  // namespace
+
+ExpectedWork expected_work(const FixedTriangle& t) {
+  constexpr double kVoxel = 1.0 / kUnitsPerVoxel, kBrick = 1.0 / kBrickEdge;
+  double e[2][3], extents = 0;  // in voxels
   for (int a = 0; a < 3; ++a) {
-    e[0][a] = static_cast<double>(t.v[1][a] - t.v[0][a]) * scale;
-    e[1][a] = static_cast<double>(t.v[2][a] - t.v[0][a]) * scale;
-    extents += static_cast<double>(t.high(a) - t.low(a)) * scale;
+    e[0][a] = static_cast<double>(t.v[1][a] - t.v[0][a]) * kVoxel;
+    e[1][a] = static_cast<double>(t.v[2][a] - t.v[0][a]) * kVoxel;
+    extents += static_cast<double>(t.high(a) - t.low(a)) * kVoxel;
   }
   double area = 0;  // of the three projections, summed: area * (|nx| + |ny| + |nz|)
   for (int a = 0; a < 3; ++a) {
     const int b = (a + 1) % 3, c = (a + 2) % 3;
     area += 0.5 * std::abs(e[0][b] * e[1][c] - e[0][c] * e[1][b]);
   }
-  return area + extents + 1;
+  return {area + extents + 1, area * kBrick * kBrick + extents * kBrick + 1};
 }
-
-}  // namespace
-
-double expected_bricks(const FixedTriangle& t) {
-  return expected_cubes(t, kUnitBits + kBrickLevels);
-}
-
-double expected_voxels(const FixedTriangle& t) { return expected_cubes(t, kUnitBits); }
 
 uint32_t TopTree::depth_within(uint32_t grid_levels, uint64_t bytes) {
   uint32_t depth = 0;
@@ -52,35 +45,38 @@ TopTree::TopTree(uint32_t grid_levels, uint32_t depth, MemoryBudget& budget)
       depth_(depth),
       cells_(budget, size_t{1} << (3 * depth), "the top tree's counters") {}
 
-void TopTree::add(const FixedTriangle& triangle) {
+void TopTree::add(const FixedTriangle& triangle, double weight) {
   touched_.clear();
-  // Straight to the smallest cube that holds the triangle's box, if that is inside the grid.
-  Cube cube;
-  const int shift = kUnitBits + static_cast<int>(grid_levels_ - depth_);
-  const int64_t end = int64_t{1} << depth_;
-  uint32_t differ = 0;
-  bool inside = true;
-  uint32_t cell[3] = {};
-  for (int a = 0; a < 3; ++a) {
-    const int64_t low = triangle.low(a) >> shift, high = triangle.high(a) >> shift;
-    inside &= low >= 0 && high < end;
-    cell[a] = static_cast<uint32_t>(low);
-    differ |= static_cast<uint32_t>(low ^ high);
-  }
-  if (inside) {
-    uint32_t up = 0;
-    while (differ >> up) ++up;
-    cube = {depth_ - up, {cell[0] >> up, cell[1] >> up, cell[2] >> up}};
-  }
-  collect(triangle, cube, morton_encode(cube.position[0], cube.position[1], cube.position[2]));
+  find_touched(triangle);
   if (touched_.empty()) return;
-  const double weight = expected_bricks(triangle);
   const float each = static_cast<float>(weight / static_cast<double>(touched_.size()));
   for (const uint64_t code : touched_) {
     cells_[code].weight += each;
     if (cells_[code].triangles < UINT32_MAX) ++cells_[code].triangles;
   }
   total_weight_ += weight;
+}
+
+void TopTree::find_touched(const FixedTriangle& triangle) {
+  const CellBox box(triangle, grid_levels_, depth_);
+  if (!box.is_inside_grid()) return collect(triangle, Cube{}, 0);
+  int64_t cells = 1;
+  for (int a = 0; a < 3; ++a) cells *= box.high[a] - box.low[a] + 1;
+  if (cells > 8) {
+    const Cube cube = box.cube_around();
+    return collect(triangle, cube,
+                   morton_encode(cube.position[0], cube.position[1], cube.position[2]));
+  }
+  // One holds it; of two it crosses the face between; of more each is asked.
+  const int64_t units = (kUnitsPerVoxel << grid_levels_) >> depth_;
+  for (int64_t x = box.low[0]; x <= box.high[0]; ++x)
+    for (int64_t y = box.low[1]; y <= box.high[1]; ++y)
+      for (int64_t z = box.low[2]; z <= box.high[2]; ++z) {
+        const int64_t corner[3] = {x * units, y * units, z * units};
+        if (cells <= 2 || triangle_touches_cube(triangle, corner, units))
+          touched_.push_back(morton_encode(static_cast<uint32_t>(x), static_cast<uint32_t>(y),
+                                           static_cast<uint32_t>(z)));
+      }
 }
 
 void TopTree::collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code) {

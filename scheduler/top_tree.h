@@ -14,11 +14,13 @@
 
 namespace voxdag {
 
-// Bricks that a triangle is expected to touch: the volume, in bricks, of the Minkowski sum of the
-// triangle and a brick, that is area * (|nx| + |ny| + |nz|) + the extents along the axes + 1.
-double expected_bricks(const FixedTriangle& triangle);
-// The same in voxels.
-double expected_voxels(const FixedTriangle& triangle);
+// Voxels and bricks that a triangle is expected to touch: for bricks the volume, in bricks, of the
+// Minkowski sum of the triangle and a brick, that is area * (|nx| + |ny| + |nz|) + the extents
+// along the axes + 1.
+struct ExpectedWork {
+  double voxels, bricks;
+};
+ExpectedWork expected_work(const FixedTriangle& triangle);
 
 struct SubvolumePlan {
   Cube cube;
@@ -36,7 +38,8 @@ class TopTree {
   // The deepest tree whose counters take at most `bytes`.
   static uint32_t depth_within(uint32_t grid_levels, uint64_t bytes);
 
-  void add(const FixedTriangle& triangle);
+  // `weight`: the bricks that the triangle is expected to touch.
+  void add(const FixedTriangle& triangle, double weight);
   double total_weight() const { return total_weight_; }
   // What was counted, apart from the total: plain bytes that another top tree of the same shape can
   // be filled with.
@@ -61,6 +64,8 @@ class TopTree {
     uint32_t triangles = 0;
   };
 
+  // Fills touched_.
+  void find_touched(const FixedTriangle& triangle);
   void collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code);
   template <class KeepWhole>
   SubvolumePlan gather(const Cube& cube, uint64_t code, const KeepWhole& keep_whole,
@@ -68,8 +73,8 @@ class TopTree {
 
   const uint32_t grid_levels_;
   const uint32_t depth_;
-  PageBuffer<Cell> cells_;  // by Morton code
-  std::vector<uint64_t> touched_;
+  PageBuffer<Cell> cells_;         // by Morton code
+  std::vector<uint64_t> touched_;  // by the last triangle
   double total_weight_ = 0;
 };
 

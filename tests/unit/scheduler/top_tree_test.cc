@@ -38,6 +38,8 @@ std::vector<size_t> touched_by_brute_force(const FixedTriangle& t,
   return touched;
 }
 
+void add(TopTree& top, const FixedTriangle& t) { top.add(t, expected_work(t).bricks); }
+
 // Every triangle reaches every subvolume that it touches, wherever the cuts are, and the plan has a
 // subvolume wherever a triangle is.
 TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
@@ -47,7 +49,7 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
     TopTree top(kLevels, TopTree::depth_within(kLevels, 1 << 20), budget);
     std::vector<FixedTriangle> triangles;
     for (int i = 0; i < 60; ++i) triangles.push_back(triangle_near(random, size));
-    for (const FixedTriangle& t : triangles) top.add(t);
+    for (const FixedTriangle& t : triangles) add(top, t);
     for (const auto& leaves :
          {top.subvolumes_by_edge(256), top.subvolumes_by_edge(64), top.subvolumes_by_edge(2048),
           top.subvolumes_by_weight(top.total_weight() / 20)}) {
@@ -72,6 +74,64 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   }
 }
 
+// The same for the parts of a cube that is split, of triangles that reach beyond it.
+TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
+  const Cube whole{2, {1, 2, 1}};
+  std::vector<SubvolumePlan> parts;
+  std::vector<Cube> cubes;
+  for (int c = 0; c < 8; ++c) {
+    cubes.push_back(whole.child(c));
+    parts.push_back({cubes.back(), 0, 0});
+  }
+  const CubeTree tree(kLevels, whole, cubes);
+  const int64_t units = whole.edge_voxels(kLevels) * kUnitsPerVoxel;
+  int64_t low[3];
+  for (int a = 0; a < 3; ++a) low[a] = static_cast<int64_t>(whole.position[a]) * units;
+  std::mt19937_64 random(7);
+  int touching = 0, beyond = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const FixedTriangle t = triangle_near(random, i % 2 == 0 ? 4000 : 200000);
+    if (!triangle_touches_cube(t, low, units)) continue;
+    ++touching;
+    for (int a = 0; a < 3; ++a)
+      if (t.low(a) < low[a] || t.high(a) > low[a] + units) {
+        ++beyond;
+        break;
+      }
+    std::vector<size_t> got;
+    tree.for_each_touched(t, [&](size_t leaf) { got.push_back(leaf); });
+    std::sort(got.begin(), got.end());
+    EXPECT_EQ(got, touched_by_brute_force(t, parts));
+  }
+  EXPECT_GT(touching, 50);
+  EXPECT_GT(beyond, 20);
+}
+
+// What a triangle weighs goes to the cells that it touches, and to no others, however large it is.
+TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
+  constexpr uint32_t kDepth = 4;
+  std::mt19937_64 random(11);
+  for (const int64_t size : {int64_t{3000}, int64_t{30000}, int64_t{120000}, int64_t{900000}})
+    for (int i = 0; i < 100; ++i) {
+      MemoryBudget budget(uint64_t{1} << 30);
+      TopTree top(kLevels, kDepth, budget);
+      const FixedTriangle t = triangle_near(random, size);
+      add(top, t);
+      const int64_t units = (int64_t{kUnitsPerVoxel} << kLevels) >> kDepth;
+      uint64_t touched = 0;
+      for (int64_t x = 0; x < 1 << kDepth; ++x)
+        for (int64_t y = 0; y < 1 << kDepth; ++y)
+          for (int64_t z = 0; z < 1 << kDepth; ++z) {
+            const int64_t corner[3] = {x * units, y * units, z * units};
+            touched += triangle_touches_cube(t, corner, units);
+          }
+      // Beyond the grid's face a box inside one cell is not tested.
+      if (touched > 0) {
+        EXPECT_EQ(top.occupied_cells(), touched) << "size " << size << ", " << i;
+      }
+    }
+}
+
 // Cubes of a plan are disjoint, in Morton order, and no heavier than asked for unless they are
 // single cells.
 TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
@@ -79,7 +139,7 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   std::mt19937_64 random(3);
   const uint32_t depth = TopTree::depth_within(kLevels, 1 << 20);
   TopTree top(kLevels, depth, budget);
-  for (int i = 0; i < 2000; ++i) top.add(triangle_near(random, 5000));
+  for (int i = 0; i < 2000; ++i) add(top, triangle_near(random, 5000));
   const double most = top.total_weight() / 100;
   const auto plan = top.subvolumes_by_weight(most);
   EXPECT_GT(plan.size(), 100u);
@@ -106,8 +166,8 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
 // known in closed form.
 TEST(TopTree, ExpectedVoxelsOfAnAxisAlignedTriangle) {
   FixedTriangle t{{{1, 1, 1}, {1 + 256 * 100, 1, 1}, {1, 1 + 256 * 50, 1}}};
-  EXPECT_NEAR(expected_voxels(t), 0.5 * 100 * 50 + 100 + 50 + 1, 1e-6);
-  EXPECT_NEAR(expected_bricks(t), 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
+  EXPECT_NEAR(expected_work(t).voxels, 0.5 * 100 * 50 + 100 + 50 + 1, 1e-6);
+  EXPECT_NEAR(expected_work(t).bricks, 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
 }
 
 // Filled with the cells of another, a top tree goes on as that one would have: the plans are equal.
@@ -120,8 +180,8 @@ TEST(TopTree, GoesOnFromTheCellsOfAnother) {
   for (int i = 0; i < 2000; ++i) {
     const FixedTriangle triangle = triangle_near(random, 5000);
     if (i == 700) std::ranges::copy(first.cells(), rest.fill(first.total_weight()).begin());
-    whole.add(triangle);
-    (i < 700 ? first : rest).add(triangle);
+    add(whole, triangle);
+    add(i < 700 ? first : rest, triangle);
   }
   EXPECT_EQ(rest.total_weight(), whole.total_weight());
   const auto plan = whole.subvolumes_by_weight(whole.total_weight() / 50);
