@@ -1,10 +1,7 @@
 #include "scheduler/ingest.h"
 
-#include <exception>
 #include <span>
 #include <string>
-#include <system_error>
-#include <thread>
 #include <vector>
 
 #include "core/base/error.h"
@@ -88,51 +85,8 @@ class Taker {
   const AfterBatch& after_batch_;
 };
 
-void take_in_turn(TriangleSource& scene, uint64_t first, Snapper& snapper, Taker& taker) {
-  SnappedBatch snapped;
-  scene.for_each_batch_from(first, [&](std::span<const WorldTriangle> batch) {
-    snapper.snap(batch, snapped);
-    taker.take(snapped);
-  });
-}
-
 // Batches on their way from one thread to the other, a third of a MiB each.
 constexpr size_t kBatchesUnderWay = 3;
-
-// The scene is read by this thread while another one takes in the batches before.
-void take_at_once(TriangleSource& scene, uint64_t first, Snapper& snapper, Taker& taker) {
-  struct TakerFailed {};
-  SlotRing<SnappedBatch, kBatchesUnderWay> ring;
-  std::exception_ptr of_taker, of_reader;
-  std::thread taking;
-  try {
-    taking = std::thread([&] {
-      try {
-        for (; const SnappedBatch* batch = ring.front(); ring.pop()) taker.take(*batch);
-      } catch (...) {
-        of_taker = std::current_exception();
-        ring.give_up();
-      }
-    });
-  } catch (const std::system_error&) {  // the system has no thread left
-    return take_in_turn(scene, first, snapper, taker);
-  }
-  try {
-    scene.for_each_batch_from(first, [&](std::span<const WorldTriangle> batch) {
-      SnappedBatch* const slot = ring.free_slot();
-      if (!slot) throw TakerFailed{};
-      snapper.snap(batch, *slot);
-      ring.push();
-    });
-  } catch (const TakerFailed&) {
-  } catch (...) {
-    of_reader = std::current_exception();
-  }
-  ring.end();
-  taking.join();
-  if (of_taker) std::rethrow_exception(of_taker);
-  if (of_reader) std::rethrow_exception(of_reader);
-}
 
 }  // namespace
 
@@ -167,7 +121,15 @@ void ingest(TriangleSource& scene, unsigned threads, IngestState& state, BinWrit
   seams.progress.advance(state.position);
   Snapper snapper(scene, state);
   Taker taker(state, writer, top, seams, after_batch);
-  (threads > 1 ? take_at_once : take_in_turn)(scene, state.position, snapper, taker);
+  const uint64_t first = state.position;
+  make_and_take<SnappedBatch, kBatchesUnderWay>(
+      threads,
+      [&](auto pass) {
+        scene.for_each_batch_from(first, [&](std::span<const WorldTriangle> batch) {
+          pass([&](SnappedBatch& snapped) { snapper.snap(batch, snapped); });
+        });
+      },
+      [&](const SnappedBatch& batch) { taker.take(batch); });
   writer.flush();
   state.counts.dropped_invalid =
       state.declared_triangles - state.counts.triangles - state.counts.dropped_outside;

@@ -110,7 +110,8 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
 
 void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
   seams_.progress.begin_stage("write", 1, "files");
-  const GlobalFileSummary file = out.seal(report.voxels, report.svo_nodes, seams_.cancel);
+  const GlobalFileSummary file =
+      out.seal(report.voxels, report.svo_nodes, report.threads, seams_.cancel);
   store_.record_result({report.output, file.sha256, file.bytes, report.voxels, report.svo_nodes,
                         report.dag_nodes, report.merge_rounds, report.merge_ranges,
                         report.merge_streamed_groups});

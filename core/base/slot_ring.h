@@ -1,11 +1,14 @@
-// Passes items from one thread to another through a few slots, which are used again and again, as
-// is the memory that items hold.
+// Two halves of a piece of work on two threads: one makes items, the other takes them. They go
+// through a few slots, which are used again and again, as is the memory that items hold.
 #pragma once
 
 #include <array>
 #include <condition_variable>
 #include <cstddef>
+#include <exception>
 #include <mutex>
+#include <system_error>
+#include <thread>
 
 namespace voxdag {
 
@@ -58,5 +61,52 @@ class SlotRing {
   size_t pushed_ = 0, popped_ = 0;
   bool ended_ = false, gave_up_ = false;
 };
+
+// Calls make(pass) on this thread, which calls pass(fill) for every item, which calls fill(item),
+// the item as it was left when it was last used; and take(item) for each, in order, on another
+// thread, or on this one if there may be one only or the system has no other. After an exception of
+// take() the next pass() does not return. Throws what take() threw, or else what make() did.
+template <class Item, size_t kSlots, class Make, class Take>
+void make_and_take(unsigned threads, Make make, Take take) {
+  struct GaveUp {};
+  SlotRing<Item, kSlots> ring;
+  std::exception_ptr of_make, of_take;
+  std::thread taker;
+  const auto take_all = [&] {
+    try {
+      for (; const Item* item = ring.front(); ring.pop()) take(*item);
+    } catch (...) {
+      of_take = std::current_exception();
+      ring.give_up();
+    }
+  };
+  try {
+    if (threads > 1) taker = std::thread(take_all);
+  } catch (const std::system_error&) {  // as if one were asked for
+  }
+  if (!taker.joinable()) {
+    Item item;
+    make([&](auto fill) {
+      fill(item);
+      take(item);
+    });
+    return;
+  }
+  try {
+    make([&](auto fill) {
+      Item* const slot = ring.free_slot();
+      if (!slot) throw GaveUp{};
+      fill(*slot);
+      ring.push();
+    });
+  } catch (const GaveUp&) {
+  } catch (...) {
+    of_make = std::current_exception();
+  }
+  ring.end();
+  taker.join();
+  if (of_take) std::rethrow_exception(of_take);
+  if (of_make) std::rethrow_exception(of_make);
+}
 
 }  // namespace voxdag

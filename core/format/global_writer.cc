@@ -5,6 +5,7 @@
 #include <future>
 
 #include "core/base/error.h"
+#include "core/base/slot_ring.h"
 #include "core/dag/brick.h"
 #include "core/format/block_sums.h"
 #include "core/format/bytes.h"
@@ -17,6 +18,7 @@ using namespace global_layout;
 
 namespace {
 
+constexpr size_t kPiecesUnderWay = 2;  // from the thread that reads to the one that digests
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;  // a multiple of the block
 static_assert(kReadBytes % kBlockBytes == 0);
 
@@ -75,7 +77,7 @@ struct GlobalFileWriter::State {
   }
   HeaderPage header(uint64_t voxels, uint64_t svo_nodes, std::span<const std::byte> table) const;
   std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
-                     const CancelToken& cancel) const;
+                     unsigned threads, const CancelToken& cancel) const;
   [[noreturn]] void damaged(uint64_t at) const {
     throw Error(ErrorCode::kCorrupt, partial_path + " from byte " + std::to_string(at) +
                                          " on is not what was written: the disk gave back other "
@@ -210,7 +212,7 @@ HeaderPage GlobalFileWriter::State::header(uint64_t voxels, uint64_t svo_nodes,
 
 // Of the whole file, which must be what was written.
 std::string GlobalFileWriter::State::digest(const HeaderPage& header,
-                                            std::span<const uint64_t> checksums,
+                                            std::span<const uint64_t> checksums, unsigned threads,
                                             const CancelToken& cancel) const {
   const auto written = files.open_read(partial_path);
   Sha256 digest;
@@ -224,10 +226,19 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   };
   add_expected(0, header.bytes());
   BlockSums read_back;
-  read_through(*written, kPageBytes, end, cancel, [&](std::span<const std::byte> piece) {
-    digest.add(piece);
-    read_back.add(piece);
-  });
+  // The digest is what takes long.
+  make_and_take<std::vector<std::byte>, kPiecesUnderWay>(
+      threads,
+      [&](auto pass) {
+        for (uint64_t at = kPageBytes; at < end; at += kReadBytes)
+          pass([&](std::vector<std::byte>& piece) {
+            cancel.check();
+            piece.resize(std::min(kReadBytes, end - at));
+            written->read_at(at, piece);
+            read_back.add(piece);
+          });
+      },
+      [&](const std::vector<std::byte>& piece) { digest.add(piece); });
   const auto found = read_back.checksums();
   const auto wrong = std::ranges::mismatch(found, checksums).in1 - found.begin();
   if (static_cast<size_t>(wrong) < checksums.size()) damaged(kPageBytes + wrong * kBlockBytes);
@@ -243,7 +254,7 @@ bool is_global_file(FileSystem& files, const std::string& path) {
   return magic == kMagic;
 }
 
-GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes,
+GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes, unsigned threads,
                                          const CancelToken& cancel) {
   State& s = *state_;
   if (s.level_open || !s.complete())
@@ -257,7 +268,8 @@ GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes,
   s.file->write_at(0, header.bytes());
   // The disk writes while we read back; where there is no thread to wait for it, afterwards.
   std::future<void> synced = std::async([&] { s.file->sync(); });
-  const GlobalFileSummary summary{s.end + table.size(), s.digest(header, checksums, cancel)};
+  const GlobalFileSummary summary{s.end + table.size(),
+                                  s.digest(header, checksums, threads, cancel)};
   synced.get();
   return summary;
 }

@@ -72,14 +72,13 @@ class GlobalFileWriter {
   // naming it.
   void end_level(uint64_t nodes, uint64_t words);
 
-  // Adds checksums and header and syncs.
-  GlobalFileSummary seal(uint64_t voxels, uint64_t svo_nodes,
+  // Adds checksums and header, syncs, and reads all back.
+  GlobalFileSummary seal(uint64_t voxels, uint64_t svo_nodes, unsigned threads = 1,
                          const CancelToken& cancel = CancelToken());
   // Renames the sealed file to its final name and syncs the folder.
   void publish();
-  GlobalFileSummary finish(uint64_t voxels, uint64_t svo_nodes,
-                           const CancelToken& cancel = CancelToken()) {
-    const GlobalFileSummary summary = seal(voxels, svo_nodes, cancel);
+  GlobalFileSummary finish(uint64_t voxels, uint64_t svo_nodes) {
+    const GlobalFileSummary summary = seal(voxels, svo_nodes);
     publish();
     return summary;
   }

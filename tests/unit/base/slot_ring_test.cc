@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -59,6 +60,59 @@ TEST(SlotRing, TellsThatTheReaderGaveUp) {
   EXPECT_EQ(ring.free_slot(), nullptr);
   reader.join();
 }
+
+class MakeAndTake : public testing::TestWithParam<unsigned> {
+ protected:
+  static constexpr int kItems = 1000;
+
+  // Makes items up to kItems, takes them into `taken`; either throws at the item of that number.
+  void run(int make_throws_at, int take_throws_at) {
+    make_and_take<std::vector<int>, 3>(
+        GetParam(),
+        [&](auto pass) {
+          for (int i = 0; i < kItems; ++i) {
+            if (i == make_throws_at) throw std::runtime_error("make");
+            pass([&](std::vector<int>& item) {
+              item.assign(1, i);
+              ++made_;
+            });
+          }
+        },
+        [&](const std::vector<int>& item) {
+          if (item[0] == take_throws_at) throw std::logic_error("take");
+          taken_.push_back(item[0]);
+        });
+  }
+  void expect_taken(int count) {
+    ASSERT_EQ(taken_.size(), static_cast<size_t>(count));
+    for (int i = 0; i < count; ++i) EXPECT_EQ(taken_[i], i);
+  }
+
+  int made_ = 0;
+  std::vector<int> taken_;
+};
+
+TEST_P(MakeAndTake, TakesAllInOrder) {
+  run(-1, -1);
+  expect_taken(kItems);
+}
+
+TEST_P(MakeAndTake, WhatWasMadeBeforeAFailureIsTaken) {
+  EXPECT_THROW(run(500, -1), std::runtime_error);
+  expect_taken(500);
+}
+
+TEST_P(MakeAndTake, MakesNoMoreOnceTakingFailed) {
+  EXPECT_THROW(run(-1, 500), std::logic_error);
+  expect_taken(500);
+  EXPECT_LE(made_, 505);
+}
+
+// Both fail: what was taken wrongly came first.
+TEST_P(MakeAndTake, ThrowsWhatTakingThrew) { EXPECT_THROW(run(501, 500), std::logic_error); }
+
+INSTANTIATE_TEST_SUITE_P(Threads, MakeAndTake, testing::Values(1, 2),
+                         testing::PrintToStringParamName());
 
 }  // namespace
 }  // namespace voxdag
