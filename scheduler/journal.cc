@@ -9,10 +9,11 @@
 namespace voxdag {
 namespace {
 
-// What a crash may cost beside the tasks in flight and a group on its way to the disk; and what may
-// be left to write when all is built, which nothing is built beside.
-constexpr double kCommitInterval_s = 1;
-constexpr uint64_t kCommitBytes = uint64_t{16} << 20;
+// What a crash may cost beside the tasks in flight and the group on its way to the disk; and what
+// may be left to write when all is built, which nothing is built beside.
+constexpr double kGroupInterval_s = 1;
+// Groups that one may grow to while the disk does not keep up.
+constexpr uint64_t kMostGroupsBehind = 4;
 
 }  // namespace
 
@@ -29,9 +30,9 @@ void Journal::commit() {
 }
 
 bool Journal::is_due() const {
-  if (wall_seconds() - begun_s_ < kCommitInterval_s &&
-      segment_.size() - begun_bytes_ < kCommitBytes)
-    return false;
+  const uint64_t bytes = segment_.size() - begun_bytes_;
+  if (bytes >= kMostGroupsBehind * group_bytes_) return true;
+  if (wall_seconds() - begun_s_ < kGroupInterval_s && bytes < group_bytes_) return false;
   return !commit_.valid() ||
          commit_.wait_for(std::chrono::seconds(0)) != std::future_status::timeout;
 }
@@ -44,12 +45,12 @@ void Journal::begin_commit() {
   under_way_ = std::exchange(next_, {});
   try {
     segment_.flush();
-  } catch (const Error&) {
+    // Where the system has no thread left, settle() does it.
+    commit_ = std::async([this] { record_under_way(); });
+  } catch (...) {
     salvage();
     throw;
   }
-  // Where the system has no thread left, settle() does it.
-  commit_ = std::async([this] { record_under_way(); });
 }
 
 void Journal::record_under_way() {
@@ -62,7 +63,7 @@ void Journal::settle() {
   if (!commit_.valid()) return;
   try {
     commit_.get();
-  } catch (const Error&) {
+  } catch (...) {
     salvage();
     throw;
   }
@@ -80,7 +81,7 @@ void Journal::salvage() {
       return s.artifact.offset + s.artifact.bytes > segment_.written();
     });
     store_.record_built(group.subvolumes);
-  } catch (const Error&) {
+  } catch (const std::exception&) {
     // Then they are built again.
   }
 }

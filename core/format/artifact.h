@@ -73,7 +73,8 @@ class SegmentWriter {
   // Writes the buffer out and returns once all bytes so far, and the file's name, are on the disk.
   void sync();
   // The same for what is out of the buffer already. May run beside another thread's calls other
-  // than sync() and this.
+  // than sync() and this. Once it has failed it always does: the system tells only once that it
+  // lost what it should have written.
   void sync_written();
   // Bytes that are out of the buffer.
   uint64_t written() const { return written_; }
@@ -98,6 +99,7 @@ class SegmentWriter {
   uint64_t written_ = 0;  // bytes in the file
   size_t buffered_ = 0;
   bool name_synced_ = false;
+  bool sync_failed_ = false;
 };
 
 // Writes one artifact, level by level from the bricks upwards, any number of rows at a time.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/base/error.h"
 #include "core/format/artifact.h"
 #include "core/format/artifact_index.h"
 #include "core/format/checksum.h"
@@ -67,7 +68,11 @@ void SegmentWriter::sync() {
 }
 
 void SegmentWriter::sync_written() {
+  if (sync_failed_)
+    throw Error(ErrorCode::kIo, "sync " + file_->path() + ": an earlier sync failed");
+  sync_failed_ = true;
   file_->sync();
+  sync_failed_ = false;
   if (!name_synced_) files_.sync_directory(folder_);
   name_synced_ = true;
 }

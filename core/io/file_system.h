@@ -3,9 +3,9 @@
 //
 // Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT), kIo; the message names the call, the path, the
 // offset where there is one, and the system's reason. Short reads and writes and EINTR are handled
-// inside. Objects are used by one thread at a time, except that ReadableFile::read_at and
-// WritableFile::write_at may be called by several threads at once, and WritableFile::sync beside
-// them.
+// inside. A FileSystem may be called by several threads at once; a file by one at a time, except
+// that ReadableFile::read_at and WritableFile::write_at may be called by several, and
+// WritableFile::sync and release beside them.
 #pragma once
 
 #include <cstddef>
