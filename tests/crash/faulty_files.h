@@ -13,7 +13,7 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "core/io/file_system.h"
+#include "core/io/forwarding_files.h"
 
 namespace crash {
 
@@ -33,36 +33,31 @@ struct FaultPlan {
   uint64_t at = 0;  // the operation's number; for kReadError, the read's
 };
 
-class FaultyFiles : public voxdag::FileSystem {
+class FaultyFiles : public voxdag::ForwardingFiles {
  public:
-  explicit FaultyFiles(FaultPlan plan) : plan_(plan) {}
+  explicit FaultyFiles(FaultPlan plan)
+      : voxdag::ForwardingFiles(voxdag::system_files()), plan_(plan) {}
   uint64_t operations() const { return operations_; }
   uint64_t reads() const { return reads_; }
 
   std::unique_ptr<voxdag::ReadableFile> open_read(const std::string& path) override;
   std::unique_ptr<voxdag::WritableFile> create(const std::string& path) override;
   std::unique_ptr<voxdag::WritableFile> open_write(const std::string& path) override;
-  bool exists(const std::string& path) override { return disk_.exists(path); }
   void rename(const std::string& from, const std::string& to) override;
   void remove(const std::string& path) override;
-  void make_directories(const std::string& path) override { disk_.make_directories(path); }
-  void remove_directory(const std::string& path) override { disk_.remove_directory(path); }
-  std::vector<voxdag::DirectoryEntry> list(const std::string& path) override {
-    return disk_.list(path);
-  }
-  void touch(const std::string& path) override { disk_.touch(path); }
   void sync_directory(const std::string& path) override;
-  std::unique_ptr<voxdag::FileLock> try_lock(const std::string& path) override {
-    return disk_.try_lock(path);
-  }
-  uint64_t free_space(const std::string& path) override { return disk_.free_space(path); }
 
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
-  // Runs one operation, or what the plan has in its place.
+  // Runs one operation, which is told its number, or what the plan has in its place; `half` is what
+  // an operation does that the disk gives up on.
+  template <class Operation, class Half>
+  void operate(const Operation& operation, const Half& half);
   template <class Operation>
-  void operate(const Operation& operation);
+  void operate(const Operation& operation) {
+    operate([&](uint64_t) { operation(); }, [] {});
+  }
   // Runs a write: `half` is one that the disk gives up on, `flipped` one that it gets wrong.
   template <class Operation, class Half, class Flipped>
   void write(const Operation& operation, const Half& half, const Flipped& flipped);
@@ -70,7 +65,6 @@ class FaultyFiles : public voxdag::FileSystem {
   // Files back to what was synced of them, names to what was synced of their folders; SIGKILL.
   void cut_power();
 
-  voxdag::FileSystem& disk_ = voxdag::system_files();
   const FaultPlan plan_;
   std::atomic<uint64_t> operations_{0};
   std::atomic<uint64_t> reads_{0};
