@@ -1,7 +1,7 @@
-// The inner loops that exist three times, portable, for AVX2 with BMI2, and for AVX-512 (F, BW, DQ,
-// VL, VBMI), chosen at run time; they give the same voxels. Sources named *_avx2.cc and *_avx512.cc
-// are compiled for these instruction sets, so nothing of them, inline functions of shared headers
-// included, may run before the choice is made.
+// The inner loops that exist several times, portable, for AVX2 with BMI2, and some of them for
+// AVX-512 (F, BW, DQ, VL, VBMI), chosen at run time; they give the same voxels. Sources named
+// *_avx2.cc and *_avx512.cc are compiled for these instruction sets, so nothing of them, inline
+// functions of shared headers included, may run before the choice is made.
 #pragma once
 
 #include <cstdint>

@@ -15,6 +15,8 @@ constexpr size_t kLargestPower = size_t{4} << 20;
 // What is kept from one subvolume to the next: an eighth of the budget, within these.
 constexpr uint64_t kKeptInAnyCase = uint64_t{8} << 20;
 constexpr uint64_t kMostKept = uint64_t{128} << 20;
+// A subvolume takes up to some hundred blocks; with fewer the small ones, which come back last,
+// would drive out the large.
 constexpr size_t kMostBlocks = 1024;
 
 }  // namespace

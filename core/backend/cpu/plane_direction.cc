@@ -1,9 +1,9 @@
 #include "core/backend/cpu/plane_direction.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <limits>
 
+#include "core/backend/cpu/plane_brick.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
@@ -37,16 +37,9 @@ void PlaneDirection::set_up(const Plane& plane) {
 void PlaneDirection::make(int64_t f, SubDagTables& tables, const Kernels& kernels,
                           Known& known) const {
   const OctreeCounts before = tables.counts();
-  // Over a voxel's corners the value rises to n.k + f + rising, and falls below that by `size`: one
-  // less than that counts, since offsets leave a remainder.
-  int64_t rising = 0, size = 0;
-  for (const int64_t x : n_) {
-    rising += std::max<int64_t>(x, 0);
-    size += std::abs(x);
-  }
-  const int64_t least = -(f + rising);
+  const PlaneRange crossed(n_, f, true);
   uint64_t masks[8];
-  kernels.find_in_range(voxel_offsets_, 512, least, least + size - 1, masks);
+  kernels.find_in_range(voxel_offsets_, 512, crossed.least, crossed.most, masks);
   NodeRef bricks[8];
   for (int c = 0; c < 8; ++c) bricks[c] = tables.add_brick(masks[c]);
   const NodeRef node = tables.add_node(kSizeLog2, bricks);
