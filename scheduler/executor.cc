@@ -106,7 +106,9 @@ class Worker {
     const auto triangles = bins_.open(queued.bin);
     std::optional<std::string> key;
     if (options_.cache) {
-      key = ArtifactCache::key(task, *triangles, share_);
+      // The backend's pages do not make way for it.
+      MemoryBudget beside_pages(share_.limit() / 8 * 7, &share_);
+      key = ArtifactCache::key(task, *triangles, beside_pages);
       StoredSubvolume copied = subvolume;
       if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
         bins_.drop(queued.bin);
