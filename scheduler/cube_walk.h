@@ -11,6 +11,12 @@
 
 namespace voxdag {
 
+// The cube of this level, none below the cube's own, that holds it.
+inline Cube ancestor(const Cube& cube, uint32_t level) {
+  const uint32_t up = cube.level - level;
+  return {level, {cube.position[0] >> up, cube.position[1] >> up, cube.position[2] >> up}};
+}
+
 // The cells of a level that a triangle's box reaches.
 struct CellBox {
   CellBox(const FixedTriangle& triangle, uint32_t grid_levels, uint32_t cell_level)
@@ -31,9 +37,10 @@ struct CellBox {
     uint32_t up = 0;
     for (int a = 0; a < 3; ++a)
       while (low[a] >> up != high[a] >> up) ++up;
-    return {level - up,
-            {static_cast<uint32_t>(low[0] >> up), static_cast<uint32_t>(low[1] >> up),
-             static_cast<uint32_t>(low[2] >> up)}};
+    const Cube lowest{level,
+                      {static_cast<uint32_t>(low[0]), static_cast<uint32_t>(low[1]),
+                       static_cast<uint32_t>(low[2])}};
+    return ancestor(lowest, level - up);
   }
 
   uint32_t level;

@@ -11,10 +11,7 @@ CubeTree::CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube>
     deepest_ = std::max(deepest_, cube.level);
     int32_t node = 0;
     for (uint32_t level = root.level + 1; level <= cube.level; ++level) {
-      const uint32_t up = cube.level - level;
-      const Cube ancestor{level,
-                          {cube.position[0] >> up, cube.position[1] >> up, cube.position[2] >> up}};
-      const int c = ancestor.child_index();
+      const int c = ancestor(cube, level).child_index();
       if (nodes_[node].child[c] == kNone) {
         nodes_[node].child[c] = static_cast<int32_t>(nodes_.size());
         nodes_.emplace_back();

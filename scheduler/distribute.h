@@ -25,9 +25,7 @@ class CubeTree {
     const CellBox box(triangle, grid_levels_, deepest_);
     if (const Cube around = box.is_inside_grid() ? box.cube_around() : Cube{}; holds(around))
       while (cube.level < around.level && nodes_[node].leaf == kNone) {
-        const uint32_t up = around.level - cube.level - 1;
-        cube = {cube.level + 1,
-                {around.position[0] >> up, around.position[1] >> up, around.position[2] >> up}};
+        cube = ancestor(around, cube.level + 1);
         node = nodes_[node].child[cube.child_index()];
         if (node == kNone) return;
       }
@@ -42,11 +40,7 @@ class CubeTree {
   };
 
   bool holds(const Cube& cube) const {
-    if (cube.level < root_.level) return false;
-    const uint32_t up = cube.level - root_.level;
-    return cube.position[0] >> up == root_.position[0] &&
-           cube.position[1] >> up == root_.position[1] &&
-           cube.position[2] >> up == root_.position[2];
+    return cube.level >= root_.level && ancestor(cube, root_.level) == root_;
   }
   template <class Visit>
   void descend(int32_t node, const Cube& cube, const FixedTriangle& triangle,

@@ -152,11 +152,7 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
     for (size_t j = 0; j < i; ++j) {
       const Cube *a = &plan[i].cube, *b = &plan[j].cube;
       if (a->level < b->level) std::swap(a, b);
-      const uint32_t up = a->level - b->level;
-      const bool nested = a->position[0] >> up == b->position[0] &&
-                          a->position[1] >> up == b->position[1] &&
-                          a->position[2] >> up == b->position[2];
-      EXPECT_FALSE(nested);
+      EXPECT_FALSE(ancestor(*a, b->level) == *b);
     }
   }
   EXPECT_NEAR(sum, top.total_weight(), 0.01 * top.total_weight());
