@@ -16,6 +16,7 @@
 #include "core/format/global_writer.h"
 #include "tests/oracle/dag.h"
 #include "tests/oracle/scenes.h"
+#include "tests/unit/base/error_of.h"
 
 namespace voxdag {
 
@@ -121,18 +122,6 @@ inline GlobalFileSummary write_global(const std::string& path, const oracle::Vox
                                       uint32_t hash_bits = 64) {
   return write_global(path, oracle::build_dag(voxels, static_cast<int>(hash_bits)),
                       grid_of(voxels.edge()), hash_bits);
-}
-
-// The Error that `run` throws; a test failure, and an empty message, if it throws none.
-template <class Run>
-Error error_of(Run run) {
-  try {
-    run();
-  } catch (const Error& error) {
-    return error;
-  }
-  ADD_FAILURE() << "expected an Error";
-  return Error(ErrorCode::kIo, "");
 }
 
 }  // namespace voxdag

@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
+#include "tests/unit/base/error_of.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag {
@@ -54,6 +55,9 @@ class IngestTest : public testing::TestWithParam<unsigned> {
     ingest(scene_, threads, state_, writer, top_, {system_files(), progress_, cancel_},
            after_batch);
   }
+  Error error_of_ingest(const AfterBatch& after_batch) {
+    return error_of([&] { ingest_on(GetParam(), after_batch); });
+  }
 
   Diagonal scene_;
   IngestState state_;
@@ -87,25 +91,16 @@ TEST_P(IngestTest, TakesInTheSceneInOrder) {
 // What was read before the scene failed is taken in, and spoken of by the state.
 TEST_P(IngestTest, ASceneThatFailsIsAnError) {
   scene_.fails_at = 30;
-  try {
-    ingest_on(GetParam(), [] {});
-    FAIL() << "ingest went through";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kIo);
-  }
+  EXPECT_EQ(error_of_ingest([] {}).code(), ErrorCode::kIo);
   EXPECT_EQ(state_.position, 30 * Diagonal::kBatch);
 }
 
 TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
   scene_.too_far_at = 30;
-  try {
-    ingest_on(GetParam(), [] {});
-    FAIL() << "ingest went through";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kLimit);
-    EXPECT_NE(error.message().find("triangle 3007 of the scene"), std::string::npos)
-        << error.message();
-  }
+  const Error error = error_of_ingest([] {});
+  EXPECT_EQ(error.code(), ErrorCode::kLimit);
+  EXPECT_NE(error.message().find("triangle 3007 of the scene"), std::string::npos)
+      << error.message();
 }
 
 // A full disk, say, at a checkpoint: the scene is not read to its end.
@@ -121,12 +116,7 @@ TEST_P(IngestTest, WhatTakingInThrowsStopsReading) {
 }
 
 TEST_P(IngestTest, IsCancelled) {
-  try {
-    ingest_on(GetParam(), [&] { cancel_.cancel(); });
-    FAIL() << "ingest went through";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kCancelled);
-  }
+  EXPECT_EQ(error_of_ingest([&] { cancel_.cancel(); }).code(), ErrorCode::kCancelled);
   EXPECT_EQ(state_.position, Diagonal::kBatch);
 }
 
