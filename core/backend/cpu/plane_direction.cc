@@ -28,8 +28,7 @@ void PlaneDirection::set_up(const Plane& plane) {
     int64_t k[3];
     for (int a = 0; a < 3; ++a)
       k[a] = (m >> a & 1) | (m >> (a + 3) & 1) << 1 | (m >> (a + 6) & 1) << 2;
-    voxel_offsets_[m] = n_[0] * k[0] + n_[1] * k[1] + n_[2] * k[2];
-    tile_offsets_[m] = 8 * voxel_offsets_[m];
+    offsets_[m] = n_[0] * k[0] + n_[1] * k[1] + n_[2] * k[2];
   }
   std::fill(known_, known_ + kCorners, Known{});
 }
@@ -39,7 +38,7 @@ void PlaneDirection::make(int64_t f, SubDagTables& tables, const Kernels& kernel
   const OctreeCounts before = tables.counts();
   const PlaneRange crossed(n_, f, true);
   uint64_t masks[8];
-  kernels.find_in_range(voxel_offsets_, 512, crossed.least, crossed.most, masks);
+  kernels.find_in_range(offsets_, 512, crossed.least, crossed.most, masks);
   NodeRef bricks[8];
   for (int c = 0; c < 8; ++c) bricks[c] = tables.add_brick(masks[c]);
   const NodeRef node = tables.add_node(kSizeLog2, bricks);

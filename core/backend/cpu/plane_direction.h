@@ -30,8 +30,8 @@ class PlaneDirection {
     return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2];
   }
 
-  // n.(8 k) for the 512 nodes k of a tile, in Morton order.
-  const int64_t* tile_offsets() const { return tile_offsets_; }
+  // n.k for k of a cube of 8, in Morton order: the voxels of a node; times 8 the nodes of a tile.
+  const int64_t* offsets() const { return offsets_; }
   // Offsets f at which a plane crosses a node, [least, most]; nothing is crossed at others.
   int64_t least_offset() const { return values_[0]; }
   int64_t most_offset() const { return values_[kCorners - 1] - 1; }
@@ -61,8 +61,7 @@ class PlaneDirection {
   int64_t n_[3];
   double buckets_per_unit_;
   int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
-  int64_t voxel_offsets_[512];    // n.k for the voxels k of a node, in Morton order
-  int64_t tile_offsets_[512];
+  int64_t offsets_[512];
   uint16_t bucket_[kBuckets + 1];  // the last value that no f of the bucket is below
   Known known_[kCorners];
 };

@@ -111,14 +111,18 @@ NodeRef PlaneMemory::node(const Plane& plane, PlaneDirection& direction, int64_t
 }
 
 NodeRef PlaneMemory::tile_node(PlaneDirection& direction, int64_t f, int size_log2) {
-  const int64_t* offsets = direction.tile_offsets();
+  constexpr int kLog2 = PlaneDirection::kSizeLog2;
+  // A node's plane has the offset f and its own corner's, an eighth of which stands in `offsets`.
+  const int64_t* offsets = direction.offsets();
+  const int64_t least = direction.least_offset() - f, most = direction.most_offset() - f;
   uint64_t crossed[8];
-  kernels_.find_in_range(offsets, 1 << 3 * (size_log2 - PlaneDirection::kSizeLog2),
-                         direction.least_offset() - f, direction.most_offset() - f, crossed);
+  kernels_.find_in_range(offsets, 1 << 3 * (size_log2 - kLog2), (least + (1 << kLog2) - 1) >> kLog2,
+                         most >> kLog2, crossed);
   OctreeCounts counts;
-  const NodeRef found = reducer_.reduce_nodes(
-      crossed, PlaneDirection::kSizeLog2, size_log2, [&](int m) -> const PlaneDirection::Known& {
-        const PlaneDirection::Known& known = direction.node(f + offsets[m], tables_, kernels_);
+  const NodeRef found =
+      reducer_.reduce_nodes(crossed, kLog2, size_log2, [&](int m) -> const PlaneDirection::Known& {
+        const int64_t at_node = f + offsets[m] * (1 << kLog2);
+        const PlaneDirection::Known& known = direction.node(at_node, tables_, kernels_);
         counts += {known.nodes, known.voxels};
         return known;
       });
