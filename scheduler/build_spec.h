@@ -35,8 +35,7 @@ struct RunOptions {
   std::string method;            // "" for the backend's own, consing, pointers or hashes
   std::string cache_folder;      // "" for none
   uint64_t cache_bytes = uint64_t{16} << 30;
-  // Time that is worth a checkpoint: CPU time of the merge, wall time of what comes before the
-  // build.
+  // Time that is worth a checkpoint: CPU time of the merge, wall time of what comes before it.
   double checkpoint_interval_s = 2;
   // Scenes of at least so many triangles are kept once ingested: about two CPU seconds of work.
   uint64_t kept_from_triangles = uint64_t{4} << 20;

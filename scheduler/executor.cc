@@ -9,7 +9,6 @@
 
 #include "core/base/error.h"
 #include "scheduler/distribute.h"
-#include "scheduler/journal.h"
 
 namespace voxdag {
 namespace {
@@ -70,6 +69,7 @@ class Queue {
       changed_.notify_all();
     }
   }
+  bool has_failed() const { return failure_ != nullptr; }
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
   }
@@ -92,8 +92,12 @@ class Worker {
         files_(seams.files),
         cancel_(seams.cancel),
         share_(share_bytes, &budget),
-        segment_(seams.files, options.segment_folder, options.first_segment_id + number, budget),
-        journal_(store, segment_, bins),
+        journal_(std::make_unique<Journal>(
+            store,
+            std::make_unique<SegmentWriter>(seams.files, options.segment_folder,
+                                            options.first_segment_id + number, budget),
+            bins, options.checkpoint_interval_s)),
+        segment_(journal_->segment()),
         backend_(options.open_backend()) {}
 
   // Builds one subvolume, or answers with the eight that replace it.
@@ -113,7 +117,7 @@ class Worker {
       if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
         bins_.drop(queued.bin);
         ++counts.cached;
-        journal_.built(copied, queued.kept);
+        journal_->built(copied, queued.kept);
         return {};
       }
     }
@@ -129,11 +133,11 @@ class Worker {
       built.artifact = artifact.finish({&root, 1});
       if (key) share(*key, built.artifact);
     }
-    journal_.built(built, queued.kept);
+    journal_->built(built, queued.kept);
     return {};
   }
-  // What was built is durable and readable from here on.
-  void finish() { journal_.commit(); }
+  Journal& journal() { return *journal_; }
+  std::unique_ptr<Journal> take_journal() { return std::move(journal_); }
 
   ExecutorCounts counts;
 
@@ -185,8 +189,8 @@ class Worker {
   FileSystem& files_;
   const CancelToken& cancel_;
   MemoryBudget share_;
-  SegmentWriter segment_;
-  Journal journal_;
+  std::unique_ptr<Journal> journal_;
+  SegmentWriter& segment_;
   std::unique_ptr<Backend> backend_;
   std::unique_ptr<ReadableFile> written_segment_;
 };
@@ -194,8 +198,8 @@ class Worker {
 }  // namespace
 
 ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> heap,
-                                TriangleBins& bins, JobStore& store, MemoryBudget& budget,
-                                const Seams& seams) {
+                                TriangleBins& bins, JobStore& store, OpenJournals& open,
+                                MemoryBudget& budget, const Seams& seams) {
   uint64_t total = heap.size();
   Queue queue(std::move(heap));
   const unsigned worker_count = workers_within(budget.available(), options.threads);
@@ -221,18 +225,20 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<Queu
   std::vector<std::thread> threads;
   queue.guard([&] {
     for (const auto& worker : workers)
-      threads.emplace_back([&work, &queue, &worker] {
-        queue.guard([&] { work(*worker); });
-        // Also after a failure: what is finished is not lost.
-        queue.guard([&] { worker->finish(); });
-      });
+      threads.emplace_back([&work, &queue, &worker] { queue.guard([&] { work(*worker); }); });
   });
   for (std::thread& thread : threads) thread.join();
+  for (const auto& worker : workers)
+    if (!queue.has_failed()) queue.guard([&] { worker->journal().announce(); });
+  // What is finished is not lost.
+  for (const auto& worker : workers)
+    if (queue.has_failed()) queue.guard([&] { worker->journal().commit(); });
   queue.rethrow_failure();
   ExecutorCounts sum;
   for (const auto& worker : workers) {
     sum.split += worker->counts.split;
     sum.cached += worker->counts.cached;
+    open.add(worker->take_journal());
   }
   return sum;
 }

@@ -14,6 +14,7 @@
 #include "scheduler/artifact_cache.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/job_store.h"
+#include "scheduler/journal.h"
 #include "scheduler/triangle_bins.h"
 
 namespace voxdag {
@@ -36,6 +37,7 @@ struct ExecutorOptions {
   std::function<std::unique_ptr<Backend>()> open_backend;
   std::string segment_folder;
   uint32_t first_segment_id = 0;
+  double checkpoint_interval_s = 2;
   ArtifactCache* cache = nullptr;  // if artifacts are shared between builds
 };
 
@@ -44,11 +46,11 @@ struct ExecutorCounts {
   uint64_t cached = 0;  // copied from the cache instead of built
 };
 
-// Builds all of `queue`, each result recorded in `store`; the bins are dropped as they are used up.
-// Throws the first Error of any worker after all have
-// stopped and what was finished is recorded.
+// Builds all of `queue`; the bins are dropped as they are used up. Each result is recorded in
+// `store`, but for the last ones, which are announced there and recorded by `open`. Throws the
+// first Error of any worker after all have stopped and what was finished is recorded.
 ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> queue,
-                                TriangleBins& bins, JobStore& store, MemoryBudget& budget,
-                                const Seams& seams);
+                                TriangleBins& bins, JobStore& store, OpenJournals& open,
+                                MemoryBudget& budget, const Seams& seams);
 
 }  // namespace voxdag

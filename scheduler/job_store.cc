@@ -105,7 +105,9 @@ std::vector<StoredSubvolume> JobStore::leaves() {
   std::vector<StoredSubvolume> leaves;
   while (query.step()) {
     const StoredSubvolume subvolume = read_row(query);
-    if (subvolume.state != SubvolumeState::kSplit) leaves.push_back(subvolume);
+    if (subvolume.state == SubvolumeState::kSplit) continue;
+    const auto announced = announced_.find(subvolume.id);
+    leaves.push_back(announced == announced_.end() ? subvolume : announced->second);
   }
   return leaves;
 }
@@ -118,6 +120,14 @@ void JobStore::record_built(std::span<const StoredSubvolume> built) {
     update_row(subvolume);
   }
   transaction.commit();
+  for (const StoredSubvolume& subvolume : built) announced_.erase(subvolume.id);
+}
+
+void JobStore::announce_built(std::span<const StoredSubvolume> built) {
+  std::lock_guard lock(mutex_);
+  for (const StoredSubvolume& subvolume : built)
+    announced_.insert_or_assign(subvolume.id, subvolume).first->second.state =
+        SubvolumeState::kBuilt;
 }
 
 std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,

@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -97,6 +98,9 @@ class JobStore {
   // All that are not split, in the order of their ids.
   std::vector<StoredSubvolume> leaves();
   void record_built(std::span<const StoredSubvolume> built);
+  // They are built but not durable yet: leaves() of this object tells of them, no row does before
+  // record_built().
+  void announce_built(std::span<const StoredSubvolume> built);
   // Returns the ids of the parts, in their order.
   std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
   // Its artifact turned out damaged: it is planned again. What is kept of ingest is forgotten,
@@ -125,8 +129,9 @@ class JobStore {
  private:
   void update_row(const StoredSubvolume& subvolume);
 
-  std::mutex mutex_;  // guards the connection
+  std::mutex mutex_;  // guards all below
   SqlDatabase database_;
+  std::map<SubvolumeId, StoredSubvolume> announced_;
 };
 
 }  // namespace voxdag

@@ -1,9 +1,11 @@
-// Records what one worker finished: artifacts are made durable in groups, and only then named in
-// the job store. That happens on a thread of its own, so that the disk keeps no worker waiting.
-// Used by one thread.
+// A worker's segment, and the record of what is in it: artifacts are made durable in groups, and
+// only then named in the job store. That happens on a thread of its own, so that the disk keeps no
+// worker waiting; and what was built since the last group is made durable only if the build goes on
+// long enough to be worth it. Used by one thread.
 #pragma once
 
 #include <future>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -15,19 +17,29 @@ namespace voxdag {
 
 class Journal {
  public:
-  // A group is begun about once a second or after so many bytes.
-  static constexpr uint64_t kGroupBytes = uint64_t{16} << 20;
+  static constexpr uint64_t kGroupBytes = uint64_t{256} << 20;
 
-  Journal(JobStore& store, SegmentWriter& segment, TriangleBins& bins,
-          uint64_t group_bytes = kGroupBytes)
-      : store_(store), segment_(segment), bins_(bins), group_bytes_(group_bytes) {}
+  // A group is begun after so many seconds, unless the last one is still under way, or so many
+  // bytes. The first is what a crash may cost beside the tasks in flight and the group under way.
+  Journal(JobStore& store, std::unique_ptr<SegmentWriter> segment, TriangleBins& bins,
+          double interval_s, uint64_t group_bytes = kGroupBytes)
+      : store_(store),
+        segment_(std::move(segment)),
+        bins_(bins),
+        interval_s_(interval_s),
+        group_bytes_(group_bytes) {}
+
+  SegmentWriter& segment() { return *segment_; }
 
   // The subvolume is built; its artifact, if it has one, is in the worker's segment. Once that is
   // recorded, the kept bin that its triangles came from, if any, is released. What went wrong with
-  // an earlier group is thrown here. Waits for the disk where four groups would wait for it.
+  // an earlier group is thrown here. Waits for a disk that is a group of so many bytes behind.
   void built(const StoredSubvolume& subvolume, std::optional<BinId> kept);
   // Makes durable all that was built so far.
   void commit();
+  // The last call but commit(): the segment is complete, and what was built since the last group is
+  // announced to the job store, durable only after commit(). The bins are not used any more.
+  void announce();
 
  private:
   struct Group {
@@ -44,13 +56,27 @@ class Journal {
   void salvage();
 
   JobStore& store_;
-  SegmentWriter& segment_;
+  const std::unique_ptr<SegmentWriter> segment_;
   TriangleBins& bins_;
+  const double interval_s_;
   const uint64_t group_bytes_;
   Group next_, under_way_;
   double begun_s_ = 0;        // when the last group began to be recorded, or this one to fill
   uint64_t begun_bytes_ = 0;  // of the segment, then
   std::future<void> commit_;
+};
+
+// Journals of workers that are done, whose last groups are not durable yet.
+class OpenJournals {
+ public:
+  void add(std::unique_ptr<Journal> journal) { journals_.push_back(std::move(journal)); }
+  // Makes all of it durable. Afterwards there are none, also if one of them failed.
+  void commit();
+  // They are of no use any more.
+  void drop() { journals_.clear(); }
+
+ private:
+  std::vector<std::unique_ptr<Journal>> journals_;
 };
 
 }  // namespace voxdag

@@ -17,13 +17,15 @@ constexpr size_t kMostWarnings = 5;
 // Keeps a merge's state in the job store.
 class StoredCheckpoint : public Checkpoint {
  public:
-  StoredCheckpoint(JobStore& store, WorkFolder& work) : store_(store), work_(work) {}
+  StoredCheckpoint(JobStore& store, OpenJournals& journals, WorkFolder& work)
+      : store_(store), journals_(journals), work_(work) {}
   std::optional<std::vector<std::byte>> load() override {
     auto stored = store_.merge();
     if (!stored) return std::nullopt;
     return std::move(stored->state);
   }
   void save(uint32_t level, std::span<const std::byte> state) override {
+    journals_.commit();
     store_.save_merge(level, state);
   }
   void forget() override { store_.forget_merge(); }
@@ -33,6 +35,7 @@ class StoredCheckpoint : public Checkpoint {
 
  private:
   JobStore& store_;
+  OpenJournals& journals_;
   WorkFolder& work_;
 };
 
@@ -92,7 +95,7 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
   inputs.open_segment = [&](uint32_t id) { return work_.open_segment(id); };
   inputs.scratch_folder = work_.scratch_path();
   inputs.checkpoint_interval_s = options.checkpoint_interval_s;
-  StoredCheckpoint checkpoint(store_, work_);
+  StoredCheckpoint checkpoint(store_, journals_, work_);
   const MergeReport merged = merge_sub_dags(inputs, seams_.files, out, budget_, report.threads,
                                             seams_.progress, seams_.cancel, &checkpoint);
   report.voxels = merged.voxels;
@@ -125,6 +128,7 @@ void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
 
 // Plans damaged subvolumes again; if none is, what the merge made itself is at fault.
 bool MergeStage::heal(const Error& error) {
+  journals_.commit();
   const auto merge = store_.merge();
   const auto damaged = find_damaged(
       store_.leaves(), merge ? merge->level : UINT32_MAX,

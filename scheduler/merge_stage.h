@@ -1,11 +1,13 @@
 // The last stages of a build: the artifacts are merged into the global file, which then gets its
 // name. What an earlier run of the job merged is gone on with; what turns out damaged is healed.
+// What was built last is made durable before anything durable refers to it.
 #pragma once
 
 #include "core/base/memory_budget.h"
 #include "core/format/global_writer.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/job_store.h"
+#include "scheduler/journal.h"
 #include "scheduler/run_build.h"
 #include "scheduler/stage_clock.h"
 #include "scheduler/work_folder.h"
@@ -14,9 +16,14 @@ namespace voxdag {
 
 class MergeStage {
  public:
-  MergeStage(JobStore& store, WorkFolder& work, MemoryBudget& budget, StageClock& clock,
-             const Seams& seams)
-      : store_(store), work_(work), budget_(budget), clock_(clock), seams_(seams) {}
+  MergeStage(JobStore& store, OpenJournals& journals, WorkFolder& work, MemoryBudget& budget,
+             StageClock& clock, const Seams& seams)
+      : store_(store),
+        journals_(journals),
+        work_(work),
+        budget_(budget),
+        clock_(clock),
+        seams_(seams) {}
 
   // Makes the file that `options` name and fills in the report. False if something turned out
   // damaged that another call may get right, once subvolumes that are planned again are built.
@@ -29,6 +36,7 @@ class MergeStage {
   bool heal(const Error& error);
 
   JobStore& store_;
+  OpenJournals& journals_;
   WorkFolder& work_;
   MemoryBudget& budget_;
   StageClock& clock_;

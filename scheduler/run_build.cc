@@ -56,6 +56,7 @@ class Build {
     try {
       return run_to_the_end();
     } catch (const Error& error) {
+      commit_what_can_be();
       // With a job, or a part of a scene that is not at fault, the folder is what goes on.
       const bool scene_is_at_fault =
           error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
@@ -90,6 +91,15 @@ class Build {
     return std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild);
   }
 
+  // What is finished is not lost.
+  void commit_what_can_be() {
+    try {
+      journals_.commit();
+    } catch (const Error&) {
+      // What went wrong first is what matters.
+    }
+  }
+
   BuildReport run_to_the_end() {
     const double start = wall_seconds();
     if (start_over_)
@@ -98,7 +108,7 @@ class Build {
       refuse_other_options();
     work_.remove_spilled();
     build_missing();
-    MergeStage merge(*store_, work_, budget_, clock_, seams_);
+    MergeStage merge(*store_, journals_, work_, budget_, clock_, seams_);
     for (int attempt = 1; !merge.run(spec_.run, report_); ++attempt) {
       if (attempt == kMostAttempts)
         throw Error(ErrorCode::kCorrupt, work_.path() +
@@ -106,6 +116,7 @@ class Build {
                                              "expected a disk that gives back what was written");
       if (any_planned()) build_missing();
     }
+    if (spec_.run.keep_work) journals_.commit();
     report_.stages = clock_.stages();
     report_.wall_s = wall_seconds() - start;
     report_.cpu_s = process_cpu_seconds();
@@ -141,6 +152,7 @@ class Build {
 
   void remove_work() {
     progress_.detach();
+    journals_.drop();
     store_.reset();
     work_.remove();
   }
@@ -251,10 +263,11 @@ class Build {
       options.longest_edge = static_cast<int64_t>(spec_.run.subvolume_edge);
     options.segment_folder = work_.path();
     options.first_segment_id = work_.next_segment_id();
+    options.checkpoint_interval_s = spec_.run.checkpoint_interval_s;
     if (cache_) options.cache = &*cache_;
     seams_.progress.begin_stage("build", queue.size(), "subvolumes");
-    const ExecutorCounts counts =
-        build_subvolumes(options, std::move(queue), *scene.bins, *store_, budget_, seams_);
+    const ExecutorCounts counts = build_subvolumes(options, std::move(queue), *scene.bins, *store_,
+                                                   journals_, budget_, seams_);
     keeper_.finish();
     report_.subvolumes_split += counts.split;
     report_.subvolumes_cached += counts.cached;
@@ -285,6 +298,7 @@ class Build {
   WorkFolder work_;
   std::optional<ArtifactCache> cache_;
   std::unique_ptr<JobStore> store_;
+  OpenJournals journals_;
   StageClock clock_{[this](const StageTime& stage) { store_->add_stage_time(stage); }};
   JobProgress progress_;
   const Seams seams_;

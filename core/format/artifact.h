@@ -70,6 +70,8 @@ class SegmentWriter {
   uint64_t size() const { return written_ + buffered_; }
   // Writes the buffer out without waiting for the disk; readers see all bytes from here on.
   void flush();
+  // Nothing more is appended: writes the buffer out and gives back its memory.
+  void complete();
   // Writes the buffer out and returns once all bytes so far, and the file's name, are on the disk.
   void sync();
   // The same for what is out of the buffer already. May run beside another thread's calls other

@@ -62,6 +62,13 @@ void SegmentWriter::flush() {
   buffered_ = 0;
 }
 
+void SegmentWriter::complete() {
+  flush();
+  buffer_ = {};
+  frame_charge_ = {};
+  encoder_.reset();
+}
+
 void SegmentWriter::sync() {
   flush();
   sync_written();

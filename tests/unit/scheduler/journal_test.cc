@@ -12,6 +12,7 @@
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
 #include "core/io/forwarding_files.h"
+#include "tests/unit/base/error_of.h"
 #include "tests/unit/format/test_artifacts.h"
 #include "tests/unit/io/temporary_folder.h"
 
@@ -31,6 +32,10 @@ class SlowDisk : public ForwardingFiles {
   }
   void fail_writes_from(int number) { failing_write_ = number; }  // from 1
   void fail_next_sync() { failing_sync_ = true; }
+  int begun_syncs() {
+    std::lock_guard lock(mutex_);
+    return begun_;
+  }
   // Returns once so many syncs were begun.
   void wait_for_syncs(int count) {
     std::unique_lock lock(mutex_);
@@ -85,6 +90,7 @@ class JournalTest : public testing::Test {
   static constexpr uint32_t kLevels = 10, kBits = 64;
   static constexpr size_t kSubvolumes = 200;
   static constexpr uint64_t kGroup = 60000;  // bytes: a few artifacts
+  static constexpr double kNever_s = 1e9;
 
   JournalTest() {
     std::vector<StoredSubvolume> plan(kSubvolumes);
@@ -93,10 +99,11 @@ class JournalTest : public testing::Test {
     planned_ = store_.leaves();
   }
   // Writes the next subvolume's artifact and tells the journal.
+  void build_one() { build_one(journal_); }
   void build_one(Journal& journal) {
     StoredSubvolume built = planned_[next_++];
     const SubDag rows = random_rows(next_, 500, kLevels, 2, kBits);
-    ArtifactWriter writer(segment_, kLevels, kBits);
+    ArtifactWriter writer(journal.segment(), kLevels, kBits);
     writer.bricks({rows.brick_masks});
     for (const SubDag::Nodes& nodes : rows.levels) writer.nodes(nodes.view());
     built.artifact = writer.finish({});
@@ -104,18 +111,23 @@ class JournalTest : public testing::Test {
     journal.built(built, std::nullopt);
   }
   // Builds until a sync is begun.
-  void build_a_group(Journal& journal) {
-    for (const uint64_t before = segment_.size(); segment_.size() - before < kGroup;)
-      build_one(journal);
+  void build_a_group() {
+    for (const uint64_t before = segment_.size(); segment_.size() - before < kGroup;) build_one();
     disk_.wait_for_syncs(1);
   }
+  // In rows that others see.
   size_t recorded() {
+    return built_in(JobStore(folder_.file("job.db"), JobStore::Access::kLook).leaves());
+  }
+  size_t announced() { return built_in(store_.leaves()) - recorded(); }
+  size_t built_in(const std::vector<StoredSubvolume>& leaves) const {
     size_t built = 0;
-    for (const StoredSubvolume& s : store_.leaves()) {
+    for (const StoredSubvolume& s : leaves) {
       if (s.state != SubvolumeState::kBuilt) continue;
       ++built;
       // Readable: its bytes are in the file.
-      ArtifactReader(system_files().open_read(segment_path(folder_.path(), 0)), s.artifact);
+      ArtifactReader(system_files().open_read(segment_path(folder_.path(), s.artifact.segment)),
+                     s.artifact);
     }
     return built;
   }
@@ -125,73 +137,103 @@ class JournalTest : public testing::Test {
   MemoryBudget budget_{uint64_t{64} << 20};
   JobStore store_{folder_.file("job.db"), JobStore::Access::kBuild};
   TriangleBins bins_{system_files(), folder_.file("spill"), false, budget_};
-  SegmentWriter segment_{disk_, folder_.path(), 0, budget_};
+  Journal journal_{store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 0, budget_),
+                   bins_, kNever_s, kGroup};
+  SegmentWriter& segment_ = journal_.segment();
   std::vector<StoredSubvolume> planned_;
   size_t next_ = 0;
 };
 
 TEST_F(JournalTest, TheWorkerBuildsOnWhileTheDiskWrites) {
-  Journal journal(store_, segment_, bins_, kGroup);
   disk_.hold_syncs();
-  build_a_group(journal);
+  build_a_group();
   const size_t begun_with = next_;
-  build_one(journal);
-  build_one(journal);
+  build_one();
+  build_one();
   EXPECT_EQ(recorded(), 0u) << "a row came before its bytes were on the disk";
   disk_.let_syncs_through();
-  journal.commit();
+  journal_.commit();
   EXPECT_EQ(recorded(), begun_with + 2);
 }
 
 // A group does not grow for ever behind a disk that does not keep up.
 TEST_F(JournalTest, WaitsForADiskThatFallsBehind) {
-  Journal journal(store_, segment_, bins_, kGroup);
   disk_.hold_syncs();
-  build_a_group(journal);
+  build_a_group();
   const size_t first_group = next_;
   std::thread disk([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     disk_.let_syncs_through();
   });
   const uint64_t behind = segment_.size();
-  while (segment_.size() - behind < 6 * kGroup) build_one(journal);
+  while (segment_.size() - behind < 6 * kGroup) build_one();
   EXPECT_GE(recorded(), first_group);
   disk.join();
-  journal.commit();
+  journal_.commit();
   EXPECT_EQ(recorded(), next_);
 }
 
 // A sync that failed is not tried again: the second would say that all is well.
 TEST_F(JournalTest, WhatAFailedSyncLostIsNotRecorded) {
-  Journal journal(store_, segment_, bins_, kGroup);
   disk_.fail_next_sync();
   bool told = false;
   for (int i = 0; i < 20 && !told; ++i) try {
-      build_one(journal);
-      journal.commit();
+      build_one();
+      journal_.commit();
     } catch (const Error& error) {
       told = true;
       EXPECT_EQ(error.code(), ErrorCode::kIo);
     }
   EXPECT_TRUE(told);
-  journal.commit();
+  journal_.commit();
   EXPECT_EQ(recorded(), 0u);
-  build_one(journal);
-  EXPECT_THROW(journal.commit(), Error);
+  build_one();
+  EXPECT_THROW(journal_.commit(), Error);
   EXPECT_EQ(recorded(), 0u);
+}
+
+// The last group can be merged at once, and waits for the disk only if it is asked to.
+TEST_F(JournalTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
+  disk_.hold_syncs();
+  for (int i = 0; i < 3; ++i) build_one();
+  journal_.announce();
+  EXPECT_EQ(announced(), 3u);
+  EXPECT_EQ(recorded(), 0u);
+  EXPECT_EQ(disk_.begun_syncs(), 0);
+  disk_.let_syncs_through();
+  journal_.commit();
+  EXPECT_EQ(announced(), 0u);
+  EXPECT_EQ(recorded(), 3u);
+}
+
+// One that fails keeps no other from becoming durable.
+TEST_F(JournalTest, OpenJournalsBecomeDurableEachForItself) {
+  OpenJournals open;
+  for (uint32_t id = 1; id <= 3; ++id) {
+    auto segment = std::make_unique<SegmentWriter>(disk_, folder_.path(), id, budget_);
+    auto journal = std::make_unique<Journal>(store_, std::move(segment), bins_, kNever_s);
+    build_one(*journal);
+    journal->announce();
+    open.add(std::move(journal));
+  }
+  EXPECT_EQ(announced(), 3u);
+  disk_.fail_next_sync();
+  EXPECT_EQ(error_of([&] { open.commit(); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(recorded(), 2u);
+  open.commit();
+  EXPECT_EQ(recorded(), 2u);
 }
 
 // What a full disk did take is recorded, and readable.
 TEST_F(JournalTest, WhatAFullDiskTookIsRecorded) {
-  Journal journal(store_, segment_, bins_, kGroup);
-  build_a_group(journal);
-  journal.commit();
+  build_a_group();
+  journal_.commit();
   const size_t before = next_;
   disk_.fail_writes_from(2);
   EXPECT_THROW(
       {
-        while (next_ < kSubvolumes) build_one(journal);
-        journal.commit();
+        while (next_ < kSubvolumes) build_one();
+        journal_.commit();
       },
       Error);
   EXPECT_GE(recorded(), before + 1);

@@ -53,16 +53,18 @@ TEST_F(ResumeTest, GoesOnAfterAnInterruptionInAnyStage) {
   struct Moment {
     const char* stage;
     uint64_t after;
-    bool reuses;
+    enum { kNothing, kSome, kAll } reused;
   };
   for (const Moment& moment :
-       {Moment{"scan", 1, false}, Moment{"ingest", 1, false}, Moment{"build", 1, true},
-        Moment{"build", 40, true}, Moment{"merge", 0, true}, Moment{"merge", 1, true}}) {
+       {Moment{"scan", 1, Moment::kNothing}, Moment{"ingest", 1, Moment::kNothing},
+        Moment{"build", 1, Moment::kSome}, Moment{"build", 40, Moment::kSome},
+        Moment{"merge", 0, Moment::kAll}, Moment{"merge", 1, Moment::kAll}}) {
     SCOPED_TRACE(std::string(moment.stage) + " after " + std::to_string(moment.after));
     build_until(spec(), moment.stage, moment.after);
     const BuildReport report = build(spec());
     EXPECT_EQ(report.sha256, expected);
-    EXPECT_EQ(report.subvolumes_reused > 0, moment.reuses);
+    EXPECT_EQ(report.subvolumes_reused > 0, moment.reused != Moment::kNothing);
+    EXPECT_EQ(report.subvolumes_reused == report.subvolumes, moment.reused == Moment::kAll);
     EXPECT_FALSE(std::filesystem::exists(work()));
     std::filesystem::remove(output());
   }
