@@ -49,6 +49,7 @@ void Merger::run(GlobalFileWriter& out) {
     seams_.progress.set_total(rows_swept() + (fit_at_once() ? rows_ : 2 * rows_));
   }
   merge_last(out);
+  journal_.settle();
   seams_.progress.end();
 }
 
@@ -103,11 +104,12 @@ void Merger::reduce() {
   survey(merged);
   std::erase_if(segments_, [&](const auto& entry) { return entry.first != segment.id(); });
   if (!due) return;
-  journal_.save(0, state_of(merged), {segment.path()});
-  for (const SurveyedArtifact& artifact : before)
-    if (!is_round_segment(artifact.ref.segment))
-      journal_.release(artifact.ref.segment, artifact.ref.offset,
-                       artifact.ref.index_offset - artifact.ref.offset);
+  std::vector<MergedBytes> rows;
+  for (const auto& artifact : before)
+    if (const ArtifactRef& ref = artifact.ref; !is_round_segment(ref.segment))
+      rows.push_back({ref.segment, ref.offset, ref.index_offset - ref.offset});
+  journal_.save_soon(
+      0, state_of(merged), {segment.path()}, [] {}, std::move(rows));
 }
 
 void Merger::merge_last(GlobalFileWriter& out) {
@@ -115,9 +117,7 @@ void Merger::merge_last(GlobalFileWriter& out) {
   const ArtifactSet artifacts = open(0, artifacts_.size());
   if (progress_.level) seams_.progress.set_total(rows_above(artifacts.readers()));
   const auto after_level = [&](const RoundProgress& progress) {
-    if (!journal_.due()) return;
-    save_level(progress, out);
-    release_levels(artifacts.readers(), *progress.level);
+    if (journal_.due()) save_level(progress, artifacts.readers(), out);
   };
   for (const ArtifactRoot& root : merge(artifacts.readers(), true, output, after_level)) {
     seams_.report.voxels += root.voxels;

@@ -46,10 +46,11 @@ class Merger {
   MergeState state_of(std::vector<ArtifactRef> merged) const;
   // In the midst of a round: `merged` replace the artifacts before `next`.
   void save_round(RoundSegment& segment, std::vector<ArtifactRef> merged, size_t next);
-  void save_level(const RoundProgress& progress, GlobalFileWriter& out);
-  // Frames of the inputs' levels down from `level` are not needed any more. An artifact's levels
-  // lie one after the other, the bricks first.
-  void release_levels(std::span<const ArtifactReader> readers, uint32_t level);
+  void save_level(const RoundProgress& progress, std::span<const ArtifactReader> readers,
+                  GlobalFileWriter& out);
+  // Frames of the inputs' levels down from `level`, but for those that were told of before. An
+  // artifact's levels lie one after the other, the bricks first.
+  std::vector<MergedBytes> take_merged(std::span<const ArtifactReader> readers, uint32_t level);
   // The levels of the inputs that are still read end above `level`, unless a round was finished:
   // then none is.
   uint32_t level_read(uint32_t level) const;
@@ -67,7 +68,7 @@ class Merger {
   std::map<uint32_t, std::unique_ptr<RoundSegment>> segments_;  // that artifacts lie in
   RoundProgress progress_;                                      // of the last round, when restored
   bool last_round_begun_ = false;
-  std::vector<uint64_t> released_ends_;  // of the space that each artifact gave back
+  std::vector<uint64_t> merged_ends_;  // of what take_merged() told of, in each artifact
 };
 
 }  // namespace voxdag

@@ -107,13 +107,13 @@ void Merger::save_round(RoundSegment& segment, std::vector<ArtifactRef> merged, 
   segment.writer().sync();
   for (size_t i = next; i < artifacts_.size(); ++i)
     if (is_round_segment(artifacts_[i].ref.segment)) merged.push_back(artifacts_[i].ref);
-  journal_.save(level_read(inputs_.grid_levels), state_of(std::move(merged)), segment_paths());
+  journal_.save_soon(level_read(inputs_.grid_levels), state_of(std::move(merged)), segment_paths(),
+                     [] {}, {});
 }
 
-void Merger::save_level(const RoundProgress& progress, GlobalFileWriter& out) {
-  out.sync();
-  const auto map = progress.maps->synced_file(seams_.scratch);
-  seams_.scratch.files().sync_directory(seams_.scratch.path());
+void Merger::save_level(const RoundProgress& progress, std::span<const ArtifactReader> readers,
+                        GlobalFileWriter& out) {
+  const auto map = progress.maps->file(seams_.scratch);
   std::vector<ArtifactRef> merged;
   for (const SurveyedArtifact& artifact : artifacts_)
     if (is_round_segment(artifact.ref.segment)) merged.push_back(artifact.ref);
@@ -123,11 +123,19 @@ void Merger::save_level(const RoundProgress& progress, GlobalFileWriter& out) {
                      map->record(),   progress.placed, progress.roots};
   auto named = segment_paths();
   named.push_back(map->path());
-  journal_.save(level_read(*progress.level), std::move(state), std::move(named));
+  const auto sync = [&out, map, &scratch = seams_.scratch] {
+    out.sync();
+    map->sync();
+    scratch.files().sync_directory(scratch.path());
+  };
+  journal_.save_soon(level_read(*progress.level), std::move(state), std::move(named), sync,
+                     take_merged(readers, *progress.level));
 }
 
-void Merger::release_levels(std::span<const ArtifactReader> readers, uint32_t level) {
-  released_ends_.resize(readers.size());
+std::vector<MergedBytes> Merger::take_merged(std::span<const ArtifactReader> readers,
+                                             uint32_t level) {
+  std::vector<MergedBytes> taken;
+  merged_ends_.resize(readers.size());
   for (size_t i = 0; i < readers.size(); ++i) {
     const ArtifactRef& ref = artifacts_[i].ref;
     if (is_round_segment(ref.segment)) continue;
@@ -135,11 +143,12 @@ void Merger::release_levels(std::span<const ArtifactReader> readers, uint32_t le
     for (const ArtifactLevel& merged : readers[i].levels())
       if (merged.level >= level && !merged.frames.empty())
         end = merged.frames.back().offset + merged.frames.back().bytes;
-    const uint64_t begin = std::max(ref.offset, released_ends_[i]);
+    const uint64_t begin = std::max(ref.offset, merged_ends_[i]);
     if (end < begin + kLeastReleasedBytes) continue;
-    journal_.release(ref.segment, begin, end - begin);
-    released_ends_[i] = end;
+    taken.push_back({ref.segment, begin, end - begin});
+    merged_ends_[i] = end;
   }
+  return taken;
 }
 
 uint32_t Merger::level_read(uint32_t level) const {

@@ -24,14 +24,11 @@ PositionMaps::PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<Scrat
   file_.reset();
 }
 
-std::shared_ptr<ScratchFile> PositionMaps::synced_file(MergeScratch& scratch) const {
-  std::shared_ptr<ScratchFile> file = file_;
-  if (!file) {
-    file = std::make_shared<ScratchFile>(scratch);
-    file->write(0, {values_.data(), values_.size()});
-  }
-  file->sync();
-  return file;
+std::shared_ptr<ScratchFile> PositionMaps::file(MergeScratch& scratch) const {
+  if (file_) return file_;
+  auto copy = std::make_shared<ScratchFile>(scratch);
+  copy->write(0, {values_.data(), values_.size()});
+  return copy;
 }
 
 std::vector<uint64_t> PositionMaps::rows() const {

@@ -41,8 +41,8 @@ class PositionMaps {
   void load(size_t run, uint64_t first, std::span<uint32_t> positions) const;
   uint32_t at(size_t run, uint64_t row) const;
 
-  // A file that holds all maps and is on the disk: their own, or a copy.
-  std::shared_ptr<ScratchFile> synced_file(MergeScratch& scratch) const;
+  // A file that holds all maps: their own, or a copy.
+  std::shared_ptr<ScratchFile> file(MergeScratch& scratch) const;
   std::vector<uint64_t> rows() const;
 
  private:

@@ -125,15 +125,16 @@ void WorkFolder::release(uint32_t segment, uint64_t offset, uint64_t bytes) {
 }
 
 void WorkFolder::empty_scratch() {
-  remove_scratch();
+  for (const std::string& path : scratch_files()) files_.remove(path);
   files_.make_directories(scratch_path());
 }
 
-void WorkFolder::remove_scratch() {
-  if (!files_.exists(scratch_path())) return;
+std::vector<std::string> WorkFolder::scratch_files() const {
+  std::vector<std::string> paths;
+  if (!files_.exists(scratch_path())) return paths;
   for (const DirectoryEntry& entry : files_.list(scratch_path()))
-    if (is_scratch(entry)) files_.remove(scratch_path() + "/" + entry.name);
-  files_.remove_directory(scratch_path());
+    if (is_scratch(entry)) paths.push_back(scratch_path() + "/" + entry.name);
+  return paths;
 }
 
 void WorkFolder::remove_silently(const std::string& path) {
@@ -147,12 +148,13 @@ void WorkFolder::remove_silently(const std::string& path) {
 void WorkFolder::remove() {
   released_.clear();
   try {
-    remove_scratch();
     // The lock goes last: until then nobody else may take the folder for theirs.
-    std::vector<std::string> others;
+    std::vector<std::string> others = scratch_files();
     for (const DirectoryEntry& entry : files_.list(path_))
-      if (is_ours(entry) && entry.name != kLockName) others.push_back(path_ + "/" + entry.name);
+      if (is_ours(entry) && !entry.is_directory && entry.name != kLockName)
+        others.push_back(path_ + "/" + entry.name);
     parallel_for(kRemovers, others.size(), [&](unsigned, size_t i) { files_.remove(others[i]); });
+    if (files_.exists(scratch_path())) files_.remove_directory(scratch_path());
     files_.remove(path_ + "/" + std::string(kLockName));
     files_.remove_directory(path_);
   } catch (const Error&) {

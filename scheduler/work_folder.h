@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/io/file_system.h"
 
@@ -54,7 +55,7 @@ class WorkFolder {
 
  private:
   void check_is_ours() const;
-  void remove_scratch();
+  std::vector<std::string> scratch_files() const;
   void remove_silently(const std::string& path);
 
   FileSystem& files_;

@@ -26,6 +26,7 @@ struct MergeOptions {
   CancelToken* cancel = nullptr;
   Checkpoint* checkpoint = nullptr;
   Progress* progress = nullptr;
+  double checkpoint_interval_s = 0;  // after every level, and the merge waits for it
 };
 
 struct Merged {
@@ -142,7 +143,7 @@ class MergeHarness {
       return system_files().open_read(segment_path(folder_.path(), id));
     };
     inputs.scratch_folder = scratch_folder();
-    inputs.checkpoint_interval_s = 0;
+    inputs.checkpoint_interval_s = options.checkpoint_interval_s;
     MemoryBudget budget(options.budget_bytes);
     GlobalFileWriter out(system_files(), folder_.file("merged.vdag"), grid_, hash_bits_);
     NoProgress silent;

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "merge/merge_state.h"
 #include "tests/unit/merge/merge_harness.h"
@@ -121,6 +124,59 @@ TEST_P(MergeResume, GoesOnWithOtherMemory) {
     EXPECT_EQ(harness.merge(other).file.sha256, expected);
     EXPECT_EQ(checkpoint.forgotten, 0u);
   }
+}
+
+// The same where states are saved beside the merge, as many as there is time for.
+TEST_P(MergeResume, GoesOnAfterSavesBesideIt) {
+  const oracle::Voxels voxels = noise_voxels(35, 256);
+  MergeHarness harness(8, GetParam().hash_bits);
+  harness.add(voxels, equal_cubes(GetParam().cubes_level));
+  const std::string expected = harness.merge({.budget_bytes = GetParam().budget_bytes}).file.sha256;
+  DyingCheckpoint checkpoint(harness.segment());
+  MergeOptions beside = options(checkpoint);
+  beside.checkpoint_interval_s = 1e-9;
+  uint64_t deaths = 0;
+  for (std::string sha256; sha256 != expected; ++deaths) {
+    ASSERT_LT(deaths, 100u);
+    checkpoint.die_before = deaths % 2 == 1;
+    checkpoint.die_at = checkpoint.saves + 1 + checkpoint.die_before;
+    try {
+      sha256 = harness.merge(beside).file.sha256;
+      ASSERT_EQ(sha256, expected);
+    } catch (const Error& error) {
+      ASSERT_EQ(error.code(), ErrorCode::kIo) << error.what();
+    }
+  }
+  EXPECT_GE(deaths, 2u);
+  EXPECT_EQ(checkpoint.forgotten, 0u);
+}
+
+// A save does not keep the merge waiting.
+TEST(MergeCheckpoint, TheMergeGoesOnWhileAStateIsSaved) {
+  MergeHarness harness(8, 64);
+  harness.add(noise_voxels(36, 256), equal_cubes(1));
+  const std::string expected = harness.merge().file.sha256;
+  struct Rows : NoProgress {
+    void advance(uint64_t count) override { done += count; }
+    std::atomic<uint64_t> done{0};
+  } rows;
+  struct SlowCheckpoint : DyingCheckpoint {
+    explicit SlowCheckpoint(const Rows& merged) : rows(merged) {}
+    // The first state waits until more is merged.
+    void save(uint32_t level, std::span<const std::byte> bytes) override {
+      const uint64_t before = rows.done;
+      for (int i = 0; saves == 0 && i < 2000 && rows.done == before; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      if (saves == 0) merged_beside = rows.done - before;
+      DyingCheckpoint::save(level, bytes);
+    }
+    const Rows& rows;
+    uint64_t merged_beside = 0;
+  } checkpoint(rows);
+  const Merged merged =
+      harness.merge({.checkpoint = &checkpoint, .progress = &rows, .checkpoint_interval_s = 1e-9});
+  EXPECT_EQ(merged.file.sha256, expected);
+  EXPECT_GT(checkpoint.merged_beside, 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, MergeResume,
