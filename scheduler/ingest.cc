@@ -13,6 +13,7 @@ namespace {
 // A batch of the scene, snapped.
 struct SnappedBatch {
   std::vector<FixedTriangle> inside;  // those that may touch the grid
+  std::vector<ExpectedWork> work;     // of each of these
   uint64_t dropped_outside = 0;
   uint64_t position = 0;  // of the scene, behind the batch
 };
@@ -27,6 +28,7 @@ class Snapper {
 
   void snap(std::span<const WorldTriangle> batch, SnappedBatch& out) {
     out.inside.clear();
+    out.work.clear();
     out.dropped_outside = 0;
     out.position = scene_.position();
     for (const WorldTriangle& world : batch) {
@@ -42,6 +44,7 @@ class Snapper {
                           "expected coordinates within 2^40 / 256 voxels (--bounds)");
         case SnapResult::kInside:
           out.inside.push_back(triangle);
+          out.work.push_back(expected_work(triangle));
           break;
       }
       ++snapped_;
@@ -63,11 +66,10 @@ class Taker {
 
   void take(const SnappedBatch& batch) {
     seams_.cancel.check();
-    for (const FixedTriangle& triangle : batch.inside) {
-      const ExpectedWork work = expected_work(triangle);
-      state_.counts.expected_voxels += work.voxels;
-      top_.add(triangle, work.bricks);
-      writer_.append(0, triangle);
+    for (size_t i = 0; i < batch.inside.size(); ++i) {
+      state_.counts.expected_voxels += batch.work[i].voxels;
+      top_.add(batch.inside[i], batch.work[i].bricks);
+      writer_.append(0, batch.inside[i]);
     }
     state_.counts.triangles += batch.inside.size();
     state_.counts.dropped_outside += batch.dropped_outside;
@@ -85,7 +87,7 @@ class Taker {
   const AfterBatch& after_batch_;
 };
 
-// Batches on their way from one thread to the other, a third of a MiB each.
+// Batches on their way from one thread to the other, less than half a MiB each.
 constexpr size_t kBatchesUnderWay = 3;
 
 }  // namespace
