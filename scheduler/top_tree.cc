@@ -97,6 +97,13 @@ uint64_t TopTree::occupied_cells() const {
   return occupied;
 }
 
+bool TopTree::is_empty(uint64_t code) const {
+  constexpr uint64_t kCells = uint64_t{1} << 3 * kSkippedLevels;
+  uint64_t any = 0;
+  for (uint64_t i = code * kCells; i < (code + 1) * kCells; ++i) any |= cells_[i].triangles;
+  return any == 0;
+}
+
 // Bottom-up: a cube whose children all came back whole, and that `keep_whole` accepts, replaces
 // them.
 template <class KeepWhole>
@@ -104,6 +111,7 @@ SubvolumePlan TopTree::gather(const Cube& cube, uint64_t code, const KeepWhole& 
                               std::vector<SubvolumePlan>& out) const {
   SubvolumePlan sum;
   sum.cube = cube;
+  if (cube.level + kSkippedLevels == depth_ && is_empty(code)) return sum;
   const size_t first = out.size();
   if (cube.level == depth_) {
     sum.weight = cells_[code].weight;

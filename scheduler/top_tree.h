@@ -64,6 +64,9 @@ class TopTree {
     uint32_t triangles = 0;
   };
 
+  // Most of the grid is empty: cubes so many levels above the cells are looked at first.
+  static constexpr uint32_t kSkippedLevels = 2;
+  bool is_empty(uint64_t code) const;
   // Fills touched_.
   void find_touched(const FixedTriangle& triangle);
   void collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code);
