@@ -50,6 +50,8 @@ struct MergeInputs {
 class Checkpoint {
  public:
   virtual ~Checkpoint() = default;
+  // save() and release() are called by threads beside the merge, one call at a time.
+
   // The state saved last, if there is one.
   virtual std::optional<std::vector<std::byte>> load() = 0;
   // Replaces it; durable on return. Of the inputs' levels only those above `level` (of smaller

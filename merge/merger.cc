@@ -99,6 +99,7 @@ void Merger::reduce() {
   }
   segment.finish();
   ++seams_.report.rounds;
+  journal_.settle();  // so that what this round merged is given back soon
   const bool due = journal_.due();
   const std::vector<SurveyedArtifact> before = std::move(artifacts_);
   survey(merged);

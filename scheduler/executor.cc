@@ -69,6 +69,7 @@ class Queue {
       changed_.notify_all();
     }
   }
+  // These two once all workers have stopped.
   bool has_failed() const { return failure_ != nullptr; }
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
@@ -228,18 +229,16 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<Queu
       threads.emplace_back([&work, &queue, &worker] { queue.guard([&] { work(*worker); }); });
   });
   for (std::thread& thread : threads) thread.join();
-  for (const auto& worker : workers)
-    if (!queue.has_failed()) queue.guard([&] { worker->journal().announce(); });
-  // What is finished is not lost.
-  for (const auto& worker : workers)
-    if (queue.has_failed()) queue.guard([&] { worker->journal().commit(); });
-  queue.rethrow_failure();
   ExecutorCounts sum;
   for (const auto& worker : workers) {
     sum.split += worker->counts.split;
     sum.cached += worker->counts.cached;
+    if (!queue.has_failed()) queue.guard([&] { worker->journal().announce(); });
     open.add(worker->take_journal());
   }
+  // What is finished is not lost.
+  if (queue.has_failed()) queue.guard([&] { open.commit(); });
+  queue.rethrow_failure();
   return sum;
 }
 

@@ -97,6 +97,7 @@ void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> pl
     write_row(database_, subvolume, std::nullopt);
   }
   transaction.commit();
+  announced_.clear();
 }
 
 std::vector<StoredSubvolume> JobStore::leaves() {
@@ -161,6 +162,7 @@ void JobStore::record_lost(const StoredSubvolume& lost) {
   update_row(planned);
   database_.execute("DELETE FROM ingest");
   transaction.commit();
+  announced_.erase(lost.id);
 }
 
 void JobStore::update_row(const StoredSubvolume& subvolume) {

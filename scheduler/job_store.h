@@ -9,7 +9,8 @@
 //   3. Every subvolume's row carries a checksum; one that fails it is Error{kCorrupt}.
 //   4. All rows of one call are committed together or not at all.
 // The writer is one process (the work folder's lock sees to that) and may call from any thread;
-// readers (`voxdag status`) open the same file at any time.
+// readers (`voxdag status`) open the same file at any time. The writer's leaves() also tell of what
+// is built and about to become durable.
 #pragma once
 
 #include <cstddef>
@@ -98,7 +99,7 @@ class JobStore {
   // All that are not split, in the order of their ids.
   std::vector<StoredSubvolume> leaves();
   void record_built(std::span<const StoredSubvolume> built);
-  // They are built but not durable yet: leaves() of this object tells of them, no row does before
+  // They are built but not durable yet: leaves() of this object tell of them, no row does before
   // record_built().
   void announce_built(std::span<const StoredSubvolume> built);
   // Returns the ids of the parts, in their order.
@@ -131,7 +132,7 @@ class JobStore {
 
   std::mutex mutex_;  // guards all below
   SqlDatabase database_;
-  std::map<SubvolumeId, StoredSubvolume> announced_;
+  std::map<SubvolumeId, StoredSubvolume> announced_;  // and not recorded
 };
 
 }  // namespace voxdag

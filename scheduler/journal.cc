@@ -10,14 +10,13 @@
 namespace voxdag {
 
 void Journal::built(const StoredSubvolume& subvolume, std::optional<BinId> kept) {
-  if (next_.subvolumes.empty() && begun_s_ == 0) begun_s_ = wall_seconds();
   next_.subvolumes.push_back(subvolume);
   if (kept) next_.releases.push_back(*kept);
-  if (is_due()) begin_commit();
+  if (is_due()) commit_soon();
 }
 
 void Journal::commit() {
-  begin_commit();
+  commit_soon();
   settle();
 }
 
@@ -36,7 +35,7 @@ bool Journal::is_due() const {
          commit_.wait_for(std::chrono::seconds(0)) != std::future_status::timeout;
 }
 
-void Journal::begin_commit() {
+void Journal::commit_soon() {
   settle();
   if (next_.subvolumes.empty()) return;
   begun_s_ = wall_seconds();
@@ -79,19 +78,30 @@ void Journal::salvage() {
     std::erase_if(group.subvolumes, [&](const StoredSubvolume& s) {
       return s.artifact.offset + s.artifact.bytes > segment_->written();
     });
+  } catch (const std::exception&) {
+    return;  // Then they are built again.
+  }
+  try {
     store_.record_built(group.subvolumes);
   } catch (const std::exception&) {
-    // Then they are built again.
+    // Durable, and recorded once the job store has room.
+    next_.subvolumes = std::move(group.subvolumes);
   }
+}
+
+void OpenJournals::commit_soon() {
+  for (const auto& journal : journals_) journal->commit_soon();
 }
 
 void OpenJournals::commit() {
   std::exception_ptr failure;
-  for (const auto& journal : std::exchange(journals_, {})) {
-    try {
-      journal->commit();
-    } catch (...) {
-      if (!failure) failure = std::current_exception();
+  for (const auto step : {&Journal::commit_soon, &Journal::commit}) {
+    for (const auto& journal : journals_) {
+      try {
+        ((*journal).*step)();
+      } catch (...) {
+        if (!failure) failure = std::current_exception();
+      }
     }
   }
   if (failure) std::rethrow_exception(failure);

@@ -1,7 +1,7 @@
 // A worker's segment, and the record of what is in it: artifacts are made durable in groups, and
 // only then named in the job store. That happens on a thread of its own, so that the disk keeps no
 // worker waiting; and what was built since the last group is made durable only if the build goes on
-// long enough to be worth it. Used by one thread.
+// long enough to be worth it. Used by one thread at a time.
 #pragma once
 
 #include <future>
@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/clock.h"
 #include "core/format/artifact.h"
 #include "scheduler/job_store.h"
 #include "scheduler/triangle_bins.h"
@@ -35,9 +36,12 @@ class Journal {
   // recorded, the kept bin that its triangles came from, if any, is released. What went wrong with
   // an earlier group is thrown here. Waits for a disk that is a group of so many bytes behind.
   void built(const StoredSubvolume& subvolume, std::optional<BinId> kept);
-  // Makes durable all that was built so far.
+  // Begins to make durable all that was built so far.
+  void commit_soon();
+  // Returns once it is. What fails is thrown once; what the disk took is tried again by the next
+  // call.
   void commit();
-  // The last call but commit(): the segment is complete, and what was built since the last group is
+  // Nothing more is built: the segment is complete, and what was built since the last group is
   // announced to the job store, durable only after commit(). The bins are not used any more.
   void announce();
 
@@ -48,11 +52,10 @@ class Journal {
   };
 
   bool is_due() const;
-  void begin_commit();
   void record_under_way();
   // Waits for the group under way.
   void settle();
-  // The disk is full: what it did take is made durable and recorded.
+  // A group failed: what the disk did take is made durable and recorded.
   void salvage();
 
   JobStore& store_;
@@ -61,16 +64,17 @@ class Journal {
   const double interval_s_;
   const uint64_t group_bytes_;
   Group next_, under_way_;
-  double begun_s_ = 0;        // when the last group began to be recorded, or this one to fill
-  uint64_t begun_bytes_ = 0;  // of the segment, then
+  double begun_s_ = wall_seconds();  // when this group began to fill
+  uint64_t begun_bytes_ = 0;         // of the segment, then
   std::future<void> commit_;
 };
 
-// Journals of workers that are done, whose last groups are not durable yet.
+// Journals of workers that are done, whose last groups may not be durable yet.
 class OpenJournals {
  public:
   void add(std::unique_ptr<Journal> journal) { journals_.push_back(std::move(journal)); }
-  // Makes all of it durable. Afterwards there are none, also if one of them failed.
+  void commit_soon();
+  // All of them, whichever fails; throws what failed first.
   void commit();
   // They are of no use any more.
   void drop() { journals_.clear(); }

@@ -71,6 +71,9 @@ class Build {
         told = Error(error.code(), error.message() + "; run the same command again to go on");
       progress_.record_failure(told);
       throw told;
+    } catch (...) {
+      commit_what_can_be();
+      throw;
     }
   }
 
@@ -95,7 +98,7 @@ class Build {
   void commit_what_can_be() {
     try {
       journals_.commit();
-    } catch (const Error&) {
+    } catch (const std::exception&) {
       // What went wrong first is what matters.
     }
   }
@@ -108,6 +111,7 @@ class Build {
       refuse_other_options();
     work_.remove_spilled();
     build_missing();
+    if (spec_.run.keep_work) journals_.commit_soon();
     MergeStage merge(*store_, journals_, work_, budget_, clock_, seams_);
     for (int attempt = 1; !merge.run(spec_.run, report_); ++attempt) {
       if (attempt == kMostAttempts)

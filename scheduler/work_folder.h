@@ -38,7 +38,7 @@ class WorkFolder {
   // Bytes of all files in the folder, for reports.
   uint64_t bytes() const;
 
-  // Nothing reads these bytes of a segment any more: gives their space back.
+  // Nothing reads these bytes of a segment any more: gives their space back. One call at a time.
   void release(uint32_t segment, uint64_t offset, uint64_t bytes);
 
   // Removes segments that `is_named` does not know: what an interrupted build left and no row of

@@ -57,7 +57,8 @@ class GlobalFileWriter {
   void go_on(const GlobalProgress& progress);
   // No level is open.
   GlobalProgress progress() const;
-  // All levels that ended are on the disk from here on, and stay there for go_on().
+  // All levels that ended are on the disk from here on, and stay there for go_on(). May run beside
+  // the writing of the next ones.
   void sync();
 
   // Levels must come as L-2, L-3, ..., 0; none at all for a scene without voxels.

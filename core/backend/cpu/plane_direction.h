@@ -12,7 +12,7 @@
 
 namespace voxdag::cpu {
 
-// Plain memory, of 32 KiB. For planes whose offsets leave a remainder only.
+// Plain memory, of 24 KiB. For planes whose offsets leave a remainder only.
 class PlaneDirection {
  public:
   static constexpr int kSizeLog2 = 3;  // of the nodes
@@ -65,6 +65,6 @@ class PlaneDirection {
   uint16_t bucket_[kBuckets + 1];  // the last value that no f of the bucket is below
   Known known_[kCorners];
 };
-static_assert(sizeof(PlaneDirection) <= 32 << 10);
+static_assert(sizeof(PlaneDirection) <= 24 << 10);
 
 }  // namespace voxdag::cpu

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <fstream>
-#include <thread>
+#include <mutex>
 
 #include "merge/merge_state.h"
 #include "tests/unit/merge/merge_harness.h"
@@ -151,32 +151,47 @@ TEST_P(MergeResume, GoesOnAfterSavesBesideIt) {
   EXPECT_EQ(checkpoint.forgotten, 0u);
 }
 
-// A save does not keep the merge waiting.
+// A save does not keep the merge waiting: the first one and the level above wait for each other.
 TEST(MergeCheckpoint, TheMergeGoesOnWhileAStateIsSaved) {
   MergeHarness harness(8, 64);
   harness.add(noise_voxels(36, 256), equal_cubes(1));
   const std::string expected = harness.merge().file.sha256;
-  struct Rows : NoProgress {
-    void advance(uint64_t count) override { done += count; }
-    std::atomic<uint64_t> done{0};
-  } rows;
-  struct SlowCheckpoint : DyingCheckpoint {
-    explicit SlowCheckpoint(const Rows& merged) : rows(merged) {}
-    // The first state waits until more is merged.
+  struct Meeting {
+    // Returns once both are there; false if the other does not come.
+    bool meet(bool& here, const bool& there) {
+      std::unique_lock lock(mutex);
+      here = true;
+      changed.notify_all();
+      return changed.wait_for(lock, std::chrono::seconds(20), [&] { return there; });
+    }
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool saving = false, merging = false;
+  } meeting;
+  struct MeetingCheckpoint : DyingCheckpoint {
+    explicit MeetingCheckpoint(Meeting& with) : meeting(with) {}
     void save(uint32_t level, std::span<const std::byte> bytes) override {
-      const uint64_t before = rows.done;
-      for (int i = 0; saves == 0 && i < 2000 && rows.done == before; ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      if (saves == 0) merged_beside = rows.done - before;
+      met = meeting.meet(meeting.saving, meeting.merging) && met;
       DyingCheckpoint::save(level, bytes);
     }
-    const Rows& rows;
-    uint64_t merged_beside = 0;
-  } checkpoint(rows);
-  const Merged merged =
-      harness.merge({.checkpoint = &checkpoint, .progress = &rows, .checkpoint_interval_s = 1e-9});
+    Meeting& meeting;
+    bool met = true;
+  } checkpoint(meeting);
+  struct MeetingProgress : NoProgress {
+    MeetingProgress(Meeting& with, std::string folder)
+        : meeting(with), scratch_folder(std::move(folder)) {}
+    // A file in the scratch folder: a state was made.
+    void advance(uint64_t) override {
+      if (!std::filesystem::is_empty(scratch_folder)) meeting.meet(meeting.merging, meeting.saving);
+    }
+    Meeting& meeting;
+    const std::string scratch_folder;
+  } progress(meeting, harness.scratch_folder());
+  const Merged merged = harness.merge(
+      {.checkpoint = &checkpoint, .progress = &progress, .checkpoint_interval_s = 1e-9});
   EXPECT_EQ(merged.file.sha256, expected);
-  EXPECT_GT(checkpoint.merged_beside, 0u);
+  EXPECT_GT(checkpoint.saves, 0u);
+  EXPECT_TRUE(checkpoint.met);
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, MergeResume,

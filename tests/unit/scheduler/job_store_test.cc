@@ -76,6 +76,34 @@ TEST_F(JobStoreTest, SplitsAndLosses) {
   EXPECT_TRUE(leaves[2].summary.empty());
 }
 
+// What is built but not recorded yet: no row tells of it, and what is lost is planned again.
+TEST_F(JobStoreTest, AnnouncedIsKnownToTheWriterOnly) {
+  JobStore store(path(), JobStore::Access::kBuild);
+  store.start(job_, plan(3));
+  std::vector<StoredSubvolume> announced;
+  for (const StoredSubvolume& leaf : store.leaves()) announced.push_back(built(leaf));
+  const auto states = [](JobStore& of) {
+    std::vector<SubvolumeState> found;
+    for (const StoredSubvolume& leaf : of.leaves()) found.push_back(leaf.state);
+    return found;
+  };
+  constexpr auto kPlanned = SubvolumeState::kPlanned, kBuilt = SubvolumeState::kBuilt;
+  const auto seen = [&] {
+    JobStore looker(path(), JobStore::Access::kLook);
+    return states(looker);
+  };
+  store.announce_built(announced);
+  EXPECT_EQ(states(store), std::vector(3, kBuilt));
+  EXPECT_EQ(store.leaves()[2].artifact, announced[2].artifact);
+  EXPECT_EQ(seen(), std::vector(3, kPlanned));
+  store.record_built({announced.data(), 1});
+  store.record_lost(announced[1]);
+  EXPECT_EQ(states(store), (std::vector{kBuilt, kPlanned, kBuilt}));
+  EXPECT_EQ(seen(), (std::vector{kBuilt, kPlanned, kPlanned}));
+  store.start(job_, plan(3));
+  EXPECT_EQ(states(store), std::vector(3, kPlanned));
+}
+
 // A new job replaces the old one with all its rows.
 TEST_F(JobStoreTest, StartingOverForgets) {
   JobStore store(path(), JobStore::Access::kBuild);

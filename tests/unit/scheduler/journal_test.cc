@@ -224,6 +224,22 @@ TEST_F(JournalTest, OpenJournalsBecomeDurableEachForItself) {
   EXPECT_EQ(recorded(), 2u);
 }
 
+// What is durable when the job store has no room is recorded once it has.
+TEST_F(JournalTest, WhatTheJobStoreCannotTakeIsRecordedLater) {
+  SqlDatabase store(folder_.file("job.db"), SqlDatabase::Mode::kReadWrite);
+  store.execute(
+      "CREATE TRIGGER full BEFORE UPDATE ON subvolume BEGIN SELECT RAISE(ABORT, 'full'); END");
+  store.execute(
+      "CREATE TRIGGER full2 BEFORE INSERT ON subvolume BEGIN SELECT RAISE(ABORT, 'full'); END");
+  for (int i = 0; i < 3; ++i) build_one();
+  journal_.announce();
+  EXPECT_THROW(journal_.commit(), Error);
+  EXPECT_EQ(recorded(), 0u);
+  store.execute("DROP TRIGGER full; DROP TRIGGER full2");
+  journal_.commit();
+  EXPECT_EQ(recorded(), 3u);
+}
+
 // What a full disk did take is recorded, and readable.
 TEST_F(JournalTest, WhatAFullDiskTookIsRecorded) {
   build_a_group();
