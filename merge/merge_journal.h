@@ -2,6 +2,7 @@
 // the files which that names stay.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <future>
@@ -74,7 +75,7 @@ class MergeJournal {
       checkpoint_->save(level, encode_state(std::move(state)));
       named_.erase(named_.begin(), named_.begin() + before);
       for (const auto& [segment, offset, bytes] : merged)
-        checkpoint_->release(segment, offset, bytes);
+        if (!ends_) checkpoint_->release(segment, offset, bytes);
     });
     // Tests want a state after every level.
     if (interval_s_ == 0) settle();
@@ -83,12 +84,18 @@ class MergeJournal {
   void settle() {
     if (save_.valid()) save_.get();
   }
+  // The same when all is merged: what is not released yet need not be any more.
+  void finish() {
+    ends_ = true;
+    settle();
+  }
 
  private:
   Checkpoint* const checkpoint_;
   const double interval_s_;
   double saved_s_ = process_cpu_seconds();
   std::vector<std::shared_ptr<ScratchPath>> named_;  // that of the thread that saves, while it does
+  std::atomic<bool> ends_ = false;
   std::future<void> save_;
 };
 

@@ -49,7 +49,7 @@ void Merger::run(GlobalFileWriter& out) {
     seams_.progress.set_total(rows_swept() + (fit_at_once() ? rows_ : 2 * rows_));
   }
   merge_last(out);
-  journal_.settle();
+  journal_.finish();
   seams_.progress.end();
 }
 
