@@ -58,11 +58,12 @@ class DiskWatch:
 
     def look(self):
         total = 0
-        for path in self.folder.rglob("*"):
-            try:
-                total += path.stat().st_blocks * 512
-            except FileNotFoundError:
-                pass  # gone since it was listed
+        for folder, _, names in os.walk(self.folder):  # which passes over folders that go meanwhile
+            for name in names:
+                try:
+                    total += os.stat(os.path.join(folder, name)).st_blocks * 512
+                except FileNotFoundError:
+                    pass  # gone since it was listed
         self.peak_bytes = max(self.peak_bytes, total)
 
     def watch(self):
