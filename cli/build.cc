@@ -2,8 +2,8 @@
 #include <memory>
 
 #include "cli/build_options.h"
-#include "cli/progress_bar.h"
-#include "cli/size.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/base/text.h"
 #include "scheduler/run_build.h"
 
 namespace voxdag::cli {

@@ -3,8 +3,8 @@
 #include <charconv>
 #include <sstream>
 
-#include "cli/size.h"
 #include "core/base/error.h"
+#include "core/base/text.h"
 
 namespace voxdag::cli {
 namespace {

@@ -1,12 +1,12 @@
-#include "core/format/diff.h"
+#include "core/format/global/diff.h"
 
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
-#include "cli/size.h"
-#include "core/format/open_global.h"
+#include "core/base/text.h"
+#include "core/format/global/open_global.h"
 
 namespace voxdag::cli {
 namespace {

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
-#include "cli/progress_bar.h"
-#include "cli/size.h"
+#include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
+#include "core/base/text.h"
 
 namespace voxdag::cli {
 namespace {

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "cli/command.h"
-#include "cli/size.h"
+#include "core/base/text.h"
 #include "core/format/checksum.h"
-#include "core/format/open_global.h"
+#include "core/format/global/open_global.h"
 
 namespace voxdag::cli {
 namespace {

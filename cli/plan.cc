@@ -2,9 +2,9 @@
 #include <memory>
 
 #include "cli/build_options.h"
-#include "cli/progress_bar.h"
-#include "cli/size.h"
-#include "scheduler/estimate.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/base/text.h"
+#include "scheduler/plan/estimate.h"
 
 namespace voxdag::cli {
 namespace {

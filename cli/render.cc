@@ -8,12 +8,12 @@
 #include <thread>
 
 #include "cli/command.h"
-#include "cli/progress_bar.h"
-#include "cli/render/renderer.h"
-#include "cli/render/views.h"
-#include "cli/size.h"
+#include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
-#include "core/format/open_global.h"
+#include "core/base/text.h"
+#include "core/format/global/open_global.h"
+#include "query/render/renderer.h"
+#include "query/render/views.h"
 
 namespace voxdag::cli {
 namespace {
@@ -27,7 +27,7 @@ struct RenderCommand {
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
   std::string size = "1280x720";
-  render::RenderOptions options;
+  query::RenderOptions options;
   bool json = false;
 };
 
@@ -49,27 +49,27 @@ std::array<Number, kCount> parse_list(const std::string& text, char separator,
 }
 
 // From world space to voxel units.
-render::Vec parse_point(const std::string& text, const std::string& option,
-                        const voxdag_reader::File& file) {
+query::Vec parse_point(const std::string& text, const std::string& option,
+                       const voxdag_reader::File& file) {
   const auto world = parse_list<double, 3>(text, ',', option + " X,Y,Z");
   for (const double coordinate : world)
     if (!std::isfinite(coordinate))
       throw Error(ErrorCode::kInvalidInput, option + " " + text + ": expected finite numbers");
   const double scale = static_cast<double>(file.resolution()) / file.edge();
-  render::Vec point;
+  query::Vec point;
   for (int axis = 0; axis < 3; ++axis)
     point[axis] = (world[static_cast<size_t>(axis)] - file.origin()[axis]) * scale;
   return point;
 }
 
-render::Placement place_camera(const RenderCommand& command, const voxdag_reader::File& file,
-                               const render::DagView& dag) {
-  render::Placement placement{{{0, 0, 1}}, {{0, 0, 0}}};
+query::Placement place_camera(const RenderCommand& command, const voxdag_reader::File& file,
+                              const query::DagView& dag) {
+  query::Placement placement{{{0, 0, 1}}, {{0, 0, 0}}};
   const double aspect = static_cast<double>(command.options.width) / command.options.height;
   if (!dag.empty()) {
-    const render::RayCaster caster(dag);
-    placement = render::named_view(command.view, caster, dag, render::occupied_box(dag), aspect,
-                                   command.fov_degrees);
+    const query::RayCaster caster(dag);
+    placement = query::named_view(command.view, caster, dag, query::occupied_box(dag), aspect,
+                                  command.fov_degrees);
   }
   if (!command.camera.empty()) {
     placement.eye = parse_point(command.camera, "--camera", file);
@@ -79,7 +79,7 @@ render::Placement place_camera(const RenderCommand& command, const voxdag_reader
   return placement;
 }
 
-std::array<double, 3> world_point(const render::Vec& point, const voxdag_reader::File& file) {
+std::array<double, 3> world_point(const query::Vec& point, const voxdag_reader::File& file) {
   const double voxel = file.edge() / static_cast<double>(file.resolution());
   std::array<double, 3> world{};
   for (int axis = 0; axis < 3; ++axis)
@@ -87,7 +87,7 @@ std::array<double, 3> world_point(const render::Vec& point, const voxdag_reader:
   return world;
 }
 
-void report(const RenderCommand& command, const render::Placement& placement,
+void report(const RenderCommand& command, const query::Placement& placement,
             const voxdag_reader::File& file, double wall_s) {
   const auto eye = world_point(placement.eye, file), target = world_point(placement.target, file);
   if (command.json) {
@@ -118,13 +118,13 @@ void run(RenderCommand& command, CommandContext& context) {
   command.options.height = height;
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
-  const render::DagView dag(*file);
+  const query::DagView dag(*file);
   if (dag.empty()) progress->warn(command.input + " has no voxels");
   const double start_s = wall_seconds();
-  const render::Placement placement = place_camera(command, *file, dag);
-  const render::Picture picture =
-      render::render_picture(dag, placement, command.options, *progress, context.cancel);
-  render::write_png(context.files, command.output, picture);
+  const query::Placement placement = place_camera(command, *file, dag);
+  const query::Picture picture =
+      query::render_picture(dag, placement, command.options, *progress, context.cancel);
+  query::write_png(context.files, command.output, picture);
   report(command, placement, *file, wall_seconds() - start_s);
 }
 
@@ -137,7 +137,7 @@ void add_render_command(CLI::App& app, CommandContext& context) {
   command->add_option("input", state->input, "the .vdag file")->required();
   command->add_option("-o,--output", state->output, "the .png file to make")->required();
   auto* view = command->add_option("--view", state->view, "from where to look")
-                   ->check(CLI::IsMember(render::view_names()))
+                   ->check(CLI::IsMember(query::view_names()))
                    ->capture_default_str();
   auto* camera = command->add_option("--camera", state->camera, "X,Y,Z of the eye, in scene units");
   auto* target = command->add_option("--target", state->target, "X,Y,Z that it looks at");

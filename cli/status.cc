@@ -4,9 +4,9 @@
 #include <thread>
 
 #include "cli/command.h"
-#include "cli/size.h"
-#include "scheduler/job_status.h"
-#include "scheduler/work_folder.h"
+#include "core/base/text.h"
+#include "scheduler/job/job_status.h"
+#include "scheduler/job/work_folder.h"
 
 namespace voxdag::cli {
 namespace {

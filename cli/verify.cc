@@ -1,4 +1,4 @@
-#include "core/format/verify.h"
+#include "core/format/global/verify.h"
 
 #include <cstdio>
 #include <memory>
@@ -7,12 +7,14 @@
 #include <vector>
 
 #include "cli/command.h"
-#include "cli/progress_bar.h"
-#include "cli/size.h"
-#include "cli/surface_sample.h"
-#include "core/format/open_global.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/base/text.h"
+#include "core/format/global/open_global.h"
+#include "query/surface_sample.h"
 
 namespace voxdag::cli {
+
+using namespace voxdag::query;
 namespace {
 
 constexpr uint64_t kSceneMemory = uint64_t{64} << 20;  // windows of the scene's buffers

@@ -1,8 +1,8 @@
 #include "merge/merge.h"
 
-#include "merge/memory_plan.h"
+#include "merge/load/scratch.h"
 #include "merge/merger.h"
-#include "merge/scratch.h"
+#include "merge/plan/memory_plan.h"
 
 namespace voxdag {
 

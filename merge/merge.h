@@ -21,8 +21,8 @@
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
-#include "core/format/artifact.h"
-#include "core/format/global_writer.h"
+#include "core/format/artifact/artifact.h"
+#include "core/format/global/global_writer.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 

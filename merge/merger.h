@@ -9,11 +9,11 @@
 #include <memory>
 #include <vector>
 
-#include "merge/artifact_set.h"
-#include "merge/level_output.h"
-#include "merge/merge_journal.h"
-#include "merge/round.h"
-#include "merge/round_segment.h"
+#include "merge/checkpoint/merge_journal.h"
+#include "merge/output/level_output.h"
+#include "merge/output/pass_segment.h"
+#include "merge/plan/artifact_set.h"
+#include "merge/plan/merge_pass.h"
 
 namespace voxdag {
 

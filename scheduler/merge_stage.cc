@@ -6,7 +6,7 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "merge/merge.h"
-#include "scheduler/damage.h"
+#include "scheduler/execute/damage.h"
 
 namespace voxdag {
 namespace {

@@ -4,13 +4,13 @@
 #pragma once
 
 #include "core/base/memory_budget.h"
-#include "core/format/global_writer.h"
+#include "core/base/stage_clock.h"
+#include "core/format/global/global_writer.h"
 #include "scheduler/build_spec.h"
-#include "scheduler/job_store.h"
-#include "scheduler/journal.h"
+#include "scheduler/execute/commit_queue.h"
+#include "scheduler/job/job_store.h"
+#include "scheduler/job/work_folder.h"
 #include "scheduler/run_build.h"
-#include "scheduler/stage_clock.h"
-#include "scheduler/work_folder.h"
 
 namespace voxdag {
 

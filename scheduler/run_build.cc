@@ -9,15 +9,15 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "scheduler/estimate.h"
-#include "scheduler/hand_down.h"
-#include "scheduler/job_progress.h"
-#include "scheduler/memory_limits.h"
+#include "core/base/process_limits.h"
+#include "scheduler/execute/open_backend.h"
+#include "scheduler/job/job_progress.h"
+#include "scheduler/job/output_lock.h"
+#include "scheduler/job/work_folder.h"
 #include "scheduler/merge_stage.h"
-#include "scheduler/open_backend.h"
-#include "scheduler/output_lock.h"
-#include "scheduler/prepare.h"
-#include "scheduler/work_folder.h"
+#include "scheduler/plan/estimate.h"
+#include "scheduler/plan/prepare.h"
+#include "scheduler/triangles/partition.h"
 
 namespace voxdag {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "core/base/stage_clock.h"
 #include "core/geometry/grid.h"
 #include "scheduler/build_spec.h"
-#include "scheduler/stage_clock.h"
 
 namespace voxdag {
 

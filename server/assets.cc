@@ -1,6 +1,6 @@
 #include "server/assets.h"
 
-#include "server/digest.h"
+#include "server/api/digest.h"
 
 namespace voxdag::server {
 namespace {

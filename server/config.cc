@@ -4,10 +4,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "cli/size.h"
 #include "core/base/error.h"
-#include "scheduler/memory_limits.h"
-#include "server/http/listener.h"
+#include "core/base/process_limits.h"
+#include "core/base/text.h"
+#include "server/http/connection/listener.h"
 
 namespace voxdag::server {
 namespace {
@@ -51,7 +51,7 @@ void take(const json& value, const std::string& name, unsigned& out) {
 // Sizes may have a unit.
 void take(const json& value, const std::string& name, uint64_t& out) {
   if (value.is_string()) {
-    out = cli::parse_size(value.get<std::string>(), name);
+    out = parse_size(value.get<std::string>(), name);
   } else {
     take_integer(value, name, out);
   }

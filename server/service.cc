@@ -7,11 +7,11 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "server/api/access/access_control.h"
 #include "server/api/context.h"
-#include "server/api/router.h"
-#include "server/gate.h"
+#include "server/api/problem.h"
+#include "server/api/routes/router.h"
 #include "server/http/http_server.h"
-#include "server/problem.h"
 
 namespace voxdag::server {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/memory_stream.h"
-#include "core/format/artifact.h"
+#include "core/format/artifact/artifact.h"
 
 namespace voxdag {
 namespace {

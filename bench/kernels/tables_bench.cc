@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "core/backend/cpu/brick_table.h"
-#include "core/backend/cpu/node_table.h"
+#include "core/backend/cpu/tables/brick_table.h"
+#include "core/backend/cpu/tables/node_table.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {

@@ -7,10 +7,10 @@
 #include <memory>
 
 #include "bench/merge/synthetic_runs.h"
-#include "merge/artifact_set.h"
-#include "merge/level_merge.h"
+#include "merge/load/slab.h"
 #include "merge/merge.h"
-#include "merge/slab.h"
+#include "merge/plan/artifact_set.h"
+#include "merge/sort/level_merge.h"
 
 namespace voxdag {
 namespace {

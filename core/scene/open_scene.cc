@@ -4,7 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
-#include "core/scene/gltf/read_document.h"
+#include "core/scene/gltf/document/read_document.h"
 #include "core/scene/gltf/triangle_stream.h"
 #include "core/scene/triangle_source.h"
 

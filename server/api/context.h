@@ -6,13 +6,13 @@
 #include <mutex>
 #include <string>
 
+#include "server/api/access/concurrency_limiter.h"
+#include "server/api/metrics.h"
 #include "server/config.h"
 #include "server/jobs/dispatcher.h"
-#include "server/jobs/task_maker.h"
-#include "server/metrics.h"
+#include "server/jobs/task_resolver.h"
 #include "server/queue/job_queue.h"
 #include "server/scenes/scene_store.h"
-#include "server/slots.h"
 
 namespace voxdag::server {
 

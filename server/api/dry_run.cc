@@ -2,9 +2,9 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "server/api/router.h"
-#include "server/jobs/child_process.h"
-#include "server/problem.h"
+#include "server/api/problem.h"
+#include "server/api/routes/router.h"
+#include "server/jobs/process/child_process.h"
 #include "server/random_id.h"
 
 namespace voxdag::server {

@@ -6,9 +6,9 @@
 
 #include <string>
 
-#include "server/http/connection.h"
+#include "server/api/problem.h"
+#include "server/http/connection/connection.h"
 #include "server/http/message.h"
-#include "server/problem.h"
 
 namespace voxdag::server {
 

@@ -9,13 +9,13 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "server/http/connection.h"
-#include "server/http/connection_table.h"
+#include "server/api/problem.h"
+#include "server/http/connection/connection.h"
+#include "server/http/connection/connection_table.h"
+#include "server/http/connection/listener.h"
+#include "server/http/connection/thread_pool.h"
+#include "server/http/connection/tls.h"
 #include "server/http/exchange.h"
-#include "server/http/listener.h"
-#include "server/http/thread_crew.h"
-#include "server/http/tls.h"
-#include "server/problem.h"
 
 namespace voxdag::server {
 namespace {

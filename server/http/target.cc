@@ -1,6 +1,6 @@
 #include "server/http/target.h"
 
-#include "server/problem.h"
+#include "server/api/problem.h"
 
 namespace voxdag::server {
 namespace {

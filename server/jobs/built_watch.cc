@@ -5,8 +5,8 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "scheduler/job_store.h"
-#include "scheduler/work_folder.h"
+#include "scheduler/job/job_store.h"
+#include "scheduler/job/work_folder.h"
 
 namespace voxdag::server {
 namespace {

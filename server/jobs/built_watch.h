@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "core/io/file_system.h"
-#include "server/jobs/job_folder.h"
-#include "server/jobs/report_pipe.h"
+#include "server/jobs/process/job_folder.h"
+#include "server/jobs/process/progress_pipe.h"
 
 namespace voxdag::server {
 

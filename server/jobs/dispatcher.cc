@@ -7,8 +7,8 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "server/api/problem.h"
 #include "server/jobs/settlement.h"
-#include "server/problem.h"
 
 namespace voxdag::server {
 namespace {

@@ -16,10 +16,10 @@
 #include <thread>
 
 #include "server/config.h"
-#include "server/jobs/child_process.h"
-#include "server/jobs/job_folder.h"
 #include "server/jobs/live_job.h"
-#include "server/jobs/task_maker.h"
+#include "server/jobs/process/child_process.h"
+#include "server/jobs/process/job_folder.h"
+#include "server/jobs/task_resolver.h"
 #include "server/queue/job_queue.h"
 
 namespace voxdag::server {

@@ -7,10 +7,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "cli/size.h"
 #include "core/base/error.h"
-#include "scheduler/memory_limits.h"
-#include "server/problem.h"
+#include "core/base/process_limits.h"
+#include "core/base/text.h"
+#include "server/api/problem.h"
 
 namespace voxdag::server {
 namespace {
@@ -95,7 +95,7 @@ uint64_t memory_of(const ordered_json& value) {
   uint64_t bytes = 0;
   if (value.is_string()) {
     try {
-      bytes = cli::parse_size(text_of(value, "memory"), "memory");
+      bytes = parse_size(text_of(value, "memory"), "memory");
     } catch (const Error&) {
       fail("memory", "a size such as \"2GiB\", or bytes as a number");
     }

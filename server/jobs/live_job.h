@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/jobs/task.h"
+#include "server/jobs/process/task.h"
 
 namespace voxdag::server {
 

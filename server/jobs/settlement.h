@@ -2,8 +2,8 @@
 #pragma once
 
 #include "server/config.h"
-#include "server/jobs/child_process.h"
 #include "server/jobs/live_job.h"
+#include "server/jobs/process/child_process.h"
 #include "server/queue/job.h"
 
 namespace voxdag::server {

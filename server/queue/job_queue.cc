@@ -4,7 +4,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "server/problem.h"
+#include "server/api/problem.h"
 #include "server/queue/job_rows.h"
 #include "server/random_id.h"
 

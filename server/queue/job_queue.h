@@ -17,7 +17,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "scheduler/sqlite.h"
+#include "core/db/sqlite.h"
 #include "server/queue/job.h"
 
 namespace voxdag::server {

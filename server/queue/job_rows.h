@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "scheduler/sqlite.h"
+#include "core/db/sqlite.h"
 #include "server/queue/job.h"
 
 namespace voxdag::server {

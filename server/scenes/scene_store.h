@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "core/db/sqlite.h"
 #include "core/io/file_system.h"
-#include "scheduler/sqlite.h"
 
 namespace voxdag::server {
 

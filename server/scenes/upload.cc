@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.h"
-#include "server/problem.h"
+#include "server/api/problem.h"
 
 namespace voxdag::server {
 namespace {

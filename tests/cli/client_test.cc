@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <thread>
 
-#include "server/http_client.h"
+#include "client/http_client.h"
 #include "tests/cli/command_line.h"
 #include "tests/cli/serve_process.h"
 
@@ -61,10 +61,10 @@ class Client : public CommandLine {
     const size_t at = text.find("\n" + name + " ");
     return at == std::string::npos ? -1 : std::stod(text.substr(at + name.size() + 2));
   }
-  voxdag::server::HttpClient http() {
-    voxdag::server::ClientOptions options;
+  voxdag::client::HttpClient http() {
+    voxdag::client::ClientOptions options;
     options.url = server_->url();
-    return voxdag::server::HttpClient(options);
+    return voxdag::client::HttpClient(options);
   }
 
   std::unique_ptr<ServeProcess> server_;

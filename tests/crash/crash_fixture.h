@@ -15,8 +15,8 @@
 #include <thread>
 #include <vector>
 
-#include "core/format/verify.h"
-#include "core/format/voxdag_reader.h"
+#include "core/format/global/verify.h"
+#include "core/format/global/voxdag_reader.h"
 #include "core/scene/generate/generate.h"
 #include "scheduler/run_build.h"
 #include "tests/crash/faulty_files.h"

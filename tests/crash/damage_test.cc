@@ -2,7 +2,7 @@
 #include <fstream>
 
 #include "core/base/error.h"
-#include "scheduler/job_store.h"
+#include "scheduler/job/job_store.h"
 #include "tests/crash/crash_fixture.h"
 
 namespace crash {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/format/voxdag_reader.h"
+#include "core/format/global/voxdag_reader.h"
 #include "scheduler/run_build.h"
 #include "tests/oracle/dag.h"
 #include "tests/oracle/scenes.h"

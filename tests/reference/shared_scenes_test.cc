@@ -2,7 +2,7 @@
 // options.
 #include <filesystem>
 
-#include "core/format/diff.h"
+#include "core/format/global/diff.h"
 #include "tests/reference/reference_build.h"
 
 namespace reference {

@@ -1,7 +1,7 @@
 #include <filesystem>
 
 #include "core/base/error.h"
-#include "server/digest.h"
+#include "server/api/digest.h"
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {
@@ -62,7 +62,7 @@ TEST_F(Api, ServesPartsOfTheFile) {
   const std::string path = "/api/v1/jobs/" + id + "/dag";
   const ClientResponse whole = http_->get(path);
   const std::string tag = whole.header("ETag"), size = std::to_string(whole.body.size());
-  const auto get = [&](const HeaderMap& headers) { return http_->get(path, headers); };
+  const auto get = [&](const client::HeaderMap& headers) { return http_->get(path, headers); };
 
   ClientResponse part = get({{"Range", "bytes=10-19"}});
   EXPECT_EQ(part.status, 206);
@@ -100,7 +100,7 @@ TEST_F(Api, GoesOnWithABrokenUpload) {
       not_problem(post("/api/v1/jobs", {{"scene", "m.glb"}, {"resolution", 64}}), 409, "conflict"),
       "");
   const auto range = [&](const std::string& first) {
-    return HeaderMap{
+    return client::HeaderMap{
         {"Content-Range", "bytes " + first + "-" + std::to_string(bytes.size() - 1) + "/" + size}};
   };
   const std::string rest = bytes.substr(bytes.size() / 2);
@@ -108,7 +108,7 @@ TEST_F(Api, GoesOnWithABrokenUpload) {
       put_scene("m.glb", rest.substr(1), range(std::to_string(bytes.size() / 2 + 1)));
   EXPECT_EQ(not_problem(wrong, 409, "conflict"), "");
   EXPECT_EQ(wrong.header("Upload-Offset"), half);
-  HeaderMap headers = range(half);
+  client::HeaderMap headers = range(half);
   headers.emplace("Repr-Digest", digest_field(sha256_hex(bytes)));
   const ClientResponse done = put_scene("m.glb", rest, headers);
   EXPECT_EQ(done.status, 201) << done.body;
@@ -117,7 +117,7 @@ TEST_F(Api, GoesOnWithABrokenUpload) {
 
 TEST_F(Api, RefusesAWrongChecksum) {
   start();
-  const HeaderMap wrong = {{"Content-Digest", digest_field(sha256_hex("other"))}};
+  const client::HeaderMap wrong = {{"Content-Digest", digest_field(sha256_hex("other"))}};
   EXPECT_EQ(not_problem(put_scene("m.glb", "hello", wrong), 400, "invalid_input"), "");
   EXPECT_EQ(http_->get("/api/v1/scenes/m.glb").status, 404);
 }
@@ -126,7 +126,7 @@ TEST_F(Api, AnswersARepetitionOnce) {
   start();
   put_scene("m.glb", scene_bytes());
   const Json body = {{"scene", "m.glb"}, {"resolution", 64}};
-  const HeaderMap key = {{"Idempotency-Key", "k1"}};
+  const client::HeaderMap key = {{"Idempotency-Key", "k1"}};
   const ClientResponse first = post("/api/v1/jobs", body, key);
   const ClientResponse again = post("/api/v1/jobs", body, key);
   EXPECT_EQ(again.status, 202);
@@ -184,7 +184,7 @@ TEST_F(Api, StreamsEvents) {
   start();
   put_scene("m.glb", scene_bytes());
   const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 512}});
-  const auto follow = [&](const HeaderMap& headers) {
+  const auto follow = [&](const client::HeaderMap& headers) {
     std::string text;
     const ClientResponse response = http_->stream(
         "/api/v1/jobs/" + id + "/events", headers,

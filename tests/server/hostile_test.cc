@@ -4,7 +4,7 @@
 #include <random>
 
 #include "core/base/clock.h"
-#include "server/tokens.h"
+#include "server/api/access/tokens.h"
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {
@@ -71,7 +71,7 @@ TEST_F(Hostile, BodiesOverTheirLimitAreRefused) {
 // httplib takes multipart bodies apart by itself, which nobody here asked for.
 TEST_F(Hostile, AFormIsABodyLikeOthers) {
   start();
-  const HeaderMap form = {{"Content-Type", "multipart/form-data; boundary=x"}};
+  const client::HeaderMap form = {{"Content-Type", "multipart/form-data; boundary=x"}};
   EXPECT_EQ(status("PUT /api/v1/scenes/a.glb HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n"
                    "Content-Type: multipart/form-data; boundary=x\r\n\r\n--x\r\n"),
             201);

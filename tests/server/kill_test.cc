@@ -9,7 +9,7 @@
 #include <random>
 
 #include "core/base/clock.h"
-#include "server/digest.h"
+#include "server/api/digest.h"
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {

@@ -61,14 +61,14 @@ std::string RunningService::scene_bytes() {
 }
 
 ClientResponse RunningService::put_scene(const std::string& name, const std::string& bytes,
-                                         const HeaderMap& headers) {
+                                         const client::HeaderMap& headers) {
   return http_->upload(
       "/api/v1/scenes/" + name, bytes.size(),
       [&](uint64_t offset, uint64_t most) { return bytes.substr(offset, most); }, headers);
 }
 
 ClientResponse RunningService::post(const std::string& path, const Json& body,
-                                    const HeaderMap& headers) {
+                                    const client::HeaderMap& headers) {
   return http_->send("POST", path, body.is_null() ? "" : body.dump(), headers);
 }
 

@@ -10,13 +10,16 @@
 #include <string>
 #include <thread>
 
-#include "server/http_client.h"
+#include "client/http_client.h"
 #include "server/service.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag::server {
 
 using Json = nlohmann::json;
+using client::ClientOptions;
+using client::ClientResponse;
+using client::HttpClient;
 
 class RunningService : public testing::Test {
  protected:
@@ -30,9 +33,9 @@ class RunningService : public testing::Test {
   // Menger's sponge, 36 096 triangles.
   std::string scene_bytes();
   ClientResponse put_scene(const std::string& name, const std::string& bytes,
-                           const HeaderMap& headers = {});
+                           const client::HeaderMap& headers = {});
   ClientResponse post(const std::string& path, const Json& body = nullptr,
-                      const HeaderMap& headers = {});
+                      const client::HeaderMap& headers = {});
   // Posts a job and expects it to be taken; returns its id.
   std::string post_job(const Json& body);
   Json job(const std::string& id);

@@ -6,9 +6,9 @@
 
 #include <cstdint>
 
-#include "core/backend/cpu/block.h"
-#include "core/backend/cpu/tile_bricks.h"
-#include "core/backend/cpu/tile_triangle.h"
+#include "core/backend/cpu/memo/voxel_block.h"
+#include "core/backend/cpu/raster/tile_bricks.h"
+#include "core/backend/cpu/raster/tile_triangle.h"
 #include "core/backend/cpu/triangle_set.h"
 
 namespace voxdag::cpu {

@@ -4,9 +4,9 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/draw_avx2.h"
-#include "core/backend/cpu/list_blocks_avx2.h"
-#include "core/backend/cpu/octant_test.h"
+#include "core/backend/cpu/raster/draw_avx2.h"
+#include "core/backend/cpu/raster/list_blocks_avx2.h"
+#include "core/backend/cpu/raster/octant_test.h"
 
 namespace voxdag::cpu {
 namespace {

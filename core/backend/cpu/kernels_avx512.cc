@@ -5,8 +5,8 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/draw_avx512.h"
-#include "core/backend/cpu/list_blocks_avx2.h"
+#include "core/backend/cpu/raster/draw_avx512.h"
+#include "core/backend/cpu/raster/list_blocks_avx2.h"
 
 namespace voxdag::cpu {
 namespace {

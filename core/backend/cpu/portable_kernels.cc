@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/backend/cpu/draw_portable.h"
 #include "core/backend/cpu/kernels.h"
-#include "core/backend/cpu/octant_test.h"
+#include "core/backend/cpu/raster/draw_portable.h"
+#include "core/backend/cpu/raster/octant_test.h"
 
 namespace voxdag::cpu {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/cpu/kernels.h"
-#include "core/backend/cpu/plane_memory.h"
-#include "core/backend/cpu/sub_dag_tables.h"
-#include "core/backend/cpu/tile_reducer.h"
+#include "core/backend/cpu/memo/plane_memo.h"
+#include "core/backend/cpu/tables/sub_dag_tables.h"
+#include "core/backend/cpu/tables/tile_reducer.h"
 #include "core/backend/cpu/triangle_set.h"
 
 namespace voxdag::cpu {

@@ -10,13 +10,13 @@
 #include <utility>
 
 #include "core/backend/backend.h"
-#include "core/backend/parallel/brick_list.h"
-#include "core/backend/parallel/dag_by_hashes.h"
-#include "core/backend/parallel/dag_by_pointers.h"
-#include "core/backend/parallel/host_levels.h"
-#include "core/backend/parallel/octree.h"
-#include "core/backend/parallel/tiles.h"
-#include "core/backend/parallel/voxel_list.h"
+#include "core/backend/parallel/dag/dag_by_hashes.h"
+#include "core/backend/parallel/dag/dag_by_pointers.h"
+#include "core/backend/parallel/dag/host_levels.h"
+#include "core/backend/parallel/dag/octree.h"
+#include "core/backend/parallel/voxelize/brick_list.h"
+#include "core/backend/parallel/voxelize/tiles.h"
+#include "core/backend/parallel/voxelize/voxel_list.h"
 
 namespace voxdag::parallel {
 

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "core/scene/gltf/batch.h"
-#include "core/scene/gltf/corner_reader.h"
-#include "core/scene/gltf/instance_reader.h"
-#include "core/scene/gltf/node_walk.h"
-#include "core/scene/gltf/vertex_cache.h"
+#include "core/scene/gltf/geometry/corner_reader.h"
+#include "core/scene/gltf/geometry/instance_reader.h"
+#include "core/scene/gltf/geometry/node_walk.h"
+#include "core/scene/gltf/geometry/vertex_cache.h"
 
 namespace voxdag::gltf {
 

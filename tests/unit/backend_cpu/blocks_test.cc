@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/backend/cpu/block_memo.h"
+#include "core/backend/cpu/memo/block_memo.h"
 #include "core/dag/brick.h"
 #include "core/dag/node_hash.h"
 #include "tests/unit/backend_cpu/tiles.h"

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <memory>
 
-#include "core/backend/cpu/plane_memory.h"
+#include "core/backend/cpu/memo/plane_memo.h"
 #include "tests/unit/backend_cpu/tiles.h"
 
 namespace voxdag::cpu {

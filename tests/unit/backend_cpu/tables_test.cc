@@ -4,8 +4,8 @@
 #include <map>
 #include <vector>
 
-#include "core/backend/cpu/brick_table.h"
-#include "core/backend/cpu/node_table.h"
+#include "core/backend/cpu/tables/brick_table.h"
+#include "core/backend/cpu/tables/node_table.h"
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
 #include "tests/oracle/scenes.h"

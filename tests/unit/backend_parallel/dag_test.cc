@@ -1,11 +1,11 @@
 // The two DAG constructions against each other, and the sweep that makes the second one exact.
 #include <gtest/gtest.h>
 
-#include "core/backend/parallel/dag_by_hashes.h"
-#include "core/backend/parallel/dag_by_pointers.h"
-#include "core/backend/parallel/host_levels.h"
+#include "core/backend/parallel/dag/dag_by_hashes.h"
+#include "core/backend/parallel/dag/dag_by_pointers.h"
+#include "core/backend/parallel/dag/host_levels.h"
+#include "core/backend/parallel/dag/octree.h"
 #include "core/backend/parallel/host_space.h"
-#include "core/backend/parallel/octree.h"
 #include "core/dag/brick.h"
 #include "tests/oracle/scenes.h"
 

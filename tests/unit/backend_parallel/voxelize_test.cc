@@ -5,8 +5,8 @@
 #include <map>
 
 #include "core/backend/parallel/host_space.h"
-#include "core/backend/parallel/tiles.h"
-#include "core/backend/parallel/voxel_list.h"
+#include "core/backend/parallel/voxelize/tiles.h"
+#include "core/backend/parallel/voxelize/voxel_list.h"
 #include "tests/oracle/core_types.h"
 #include "tests/oracle/scenes.h"
 #include "tests/oracle/voxels.h"

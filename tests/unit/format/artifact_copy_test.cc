@@ -1,4 +1,4 @@
-#include "core/format/artifact_copy.h"
+#include "core/format/artifact/artifact_copy.h"
 
 #include <gtest/gtest.h>
 

@@ -4,11 +4,11 @@
 
 #include <cstring>
 
-#include "core/format/artifact.h"
-#include "core/format/artifact_index.h"
+#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/artifact_index.h"
+#include "core/format/artifact/frame_codec.h"
+#include "core/format/artifact/row_order.h"
 #include "core/format/checksum.h"
-#include "core/format/frame_codec.h"
-#include "core/format/row_order.h"
 #include "tests/unit/format/test_artifacts.h"
 #include "tests/unit/format/test_files.h"
 

@@ -1,8 +1,8 @@
-#include "core/format/artifact.h"
+#include "core/format/artifact/artifact.h"
 
 #include <gmock/gmock.h>
 
-#include "core/format/artifact_index.h"
+#include "core/format/artifact/artifact_index.h"
 #include "core/format/checksum.h"
 #include "tests/oracle/core_types.h"
 #include "tests/unit/format/test_artifacts.h"

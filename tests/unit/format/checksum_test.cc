@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/format/voxdag_reader.h"
+#include "core/format/global/voxdag_reader.h"
 
 namespace voxdag {
 namespace {

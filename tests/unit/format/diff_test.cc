@@ -1,8 +1,8 @@
-#include "core/format/diff.h"
+#include "core/format/global/diff.h"
 
 #include <gmock/gmock.h>
 
-#include "core/format/open_global.h"
+#include "core/format/global/open_global.h"
 #include "tests/unit/format/test_files.h"
 
 namespace voxdag {

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "core/dag/node_hash.h"
-#include "core/format/global_layout.h"
+#include "core/format/global/global_layout.h"
 #include "tests/unit/format/test_files.h"
 
 namespace voxdag {

@@ -1,4 +1,4 @@
-#include "core/format/global_writer.h"
+#include "core/format/global/global_writer.h"
 
 #include <gmock/gmock.h>
 
@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "core/format/checksum.h"
-#include "core/format/global_layout.h"
+#include "core/format/global/global_layout.h"
 #include "tests/unit/format/test_files.h"
 #include "tests/unit/format/watched_files.h"
 

@@ -2,8 +2,8 @@
 // making the same bytes.
 #include <gmock/gmock.h>
 
-#include "core/format/open_global.h"
-#include "core/format/verify.h"
+#include "core/format/global/open_global.h"
+#include "core/format/global/verify.h"
 #include "tests/unit/format/golden_files.h"
 
 namespace voxdag {

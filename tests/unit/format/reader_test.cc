@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "core/format/voxdag_reader.h"
+#include "core/format/global/voxdag_reader.h"
 #include "tests/unit/format/test_files.h"
 
 namespace voxdag {

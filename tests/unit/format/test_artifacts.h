@@ -7,7 +7,7 @@
 
 #include "core/dag/node_hash.h"
 #include "core/dag/sub_dag.h"
-#include "core/format/artifact.h"
+#include "core/format/artifact/artifact.h"
 #include "tests/oracle/scenes.h"
 
 namespace voxdag {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/format/global_writer.h"
+#include "core/format/global/global_writer.h"
 #include "tests/oracle/dag.h"
 #include "tests/oracle/scenes.h"
 #include "tests/unit/base/error_of.h"

@@ -1,4 +1,4 @@
-#include "core/format/verify.h"
+#include "core/format/global/verify.h"
 
 #include <gmock/gmock.h>
 
@@ -8,9 +8,9 @@
 #include <functional>
 
 #include "core/format/checksum.h"
-#include "core/format/diff.h"
-#include "core/format/global_layout.h"
-#include "core/format/open_global.h"
+#include "core/format/global/diff.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/open_global.h"
 #include "tests/unit/format/test_files.h"
 
 namespace voxdag {

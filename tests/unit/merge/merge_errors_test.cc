@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "merge/turnstile.h"
+#include "merge/sort/sequencer.h"
 #include "tests/unit/merge/merge_harness.h"
 
 namespace voxdag {

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "core/format/artifact.h"
-#include "core/format/global_writer.h"
+#include "core/format/artifact/artifact.h"
+#include "core/format/global/global_writer.h"
 #include "merge/merge.h"
 #include "tests/oracle/core_types.h"
 #include "tests/oracle/dag.h"

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <mutex>
 
-#include "merge/merge_state.h"
+#include "merge/checkpoint/merge_state.h"
 #include "tests/unit/merge/merge_harness.h"
 
 namespace voxdag {

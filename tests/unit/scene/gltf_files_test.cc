@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "core/scene/gltf/base64.h"
+#include "core/scene/gltf/geometry/base64.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {

@@ -1,4 +1,4 @@
-#include "scheduler/content_digest.h"
+#include "scheduler/ingest/content_digest.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Ingest on one thread and on two gives the same; what goes wrong on either comes through.
-#include "scheduler/ingest.h"
+#include "scheduler/ingest/ingest.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "scheduler/job_store.h"
+#include "scheduler/job/job_store.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "scheduler/open_backend.h"
+#include "scheduler/execute/open_backend.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "scheduler/backend_check.h"
+#include "scheduler/execute/backend_check.h"
 
 namespace voxdag {
 namespace {

@@ -7,11 +7,11 @@
 #include <thread>
 
 #include "core/base/error.h"
-#include "scheduler/job_status.h"
-#include "scheduler/job_store.h"
-#include "scheduler/output_lock.h"
+#include "scheduler/job/job_status.h"
+#include "scheduler/job/job_store.h"
+#include "scheduler/job/output_lock.h"
+#include "scheduler/job/work_folder.h"
 #include "scheduler/run_build.h"
-#include "scheduler/work_folder.h"
 #include "tests/unit/io/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
 #include "tests/unit/scheduler/spheres_build.h"

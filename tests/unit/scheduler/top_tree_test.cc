@@ -1,11 +1,11 @@
-#include "scheduler/top_tree.h"
+#include "scheduler/plan/top_tree.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "scheduler/distribute.h"
+#include "scheduler/triangles/distribute.h"
 
 namespace voxdag {
 namespace {

@@ -1,4 +1,4 @@
-#include "scheduler/triangle_bins.h"
+#include "scheduler/triangles/triangle_bins.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

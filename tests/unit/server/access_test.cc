@@ -2,14 +2,14 @@
 
 #include <filesystem>
 
+#include "server/api/access/access_control.h"
+#include "server/api/access/concurrency_limiter.h"
+#include "server/api/access/rate_limiter.h"
+#include "server/api/access/tokens.h"
+#include "server/api/digest.h"
+#include "server/api/problem.h"
 #include "server/config.h"
-#include "server/digest.h"
-#include "server/gate.h"
 #include "server/jobs/job_request.h"
-#include "server/problem.h"
-#include "server/rate_limiter.h"
-#include "server/slots.h"
-#include "server/tokens.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag::server {

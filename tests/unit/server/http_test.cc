@@ -1,10 +1,10 @@
 #include <gtest/gtest.h>
 
+#include "server/api/problem.h"
 #include "server/http/byte_range.h"
-#include "server/http/connection_table.h"
+#include "server/http/connection/connection_table.h"
 #include "server/http/headers.h"
 #include "server/http/target.h"
-#include "server/problem.h"
 
 namespace voxdag::server {
 namespace {

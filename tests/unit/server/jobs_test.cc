@@ -3,11 +3,11 @@
 #include <csignal>
 #include <filesystem>
 
-#include "server/jobs/confined_files.h"
+#include "server/api/problem.h"
 #include "server/jobs/job_request.h"
+#include "server/jobs/process/confined_files.h"
+#include "server/jobs/process/task.h"
 #include "server/jobs/settlement.h"
-#include "server/jobs/task.h"
-#include "server/problem.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag::server {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "server/problem.h"
+#include "server/api/problem.h"
 #include "server/queue/job_queue.h"
 #include "tests/unit/io/temporary_folder.h"
 

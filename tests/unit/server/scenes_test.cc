@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "server/digest.h"
-#include "server/problem.h"
+#include "server/api/digest.h"
+#include "server/api/problem.h"
 #include "server/scenes/scene_store.h"
 #include "server/scenes/upload.h"
 #include "tests/unit/io/temporary_folder.h"

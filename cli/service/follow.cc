@@ -1,0 +1,90 @@
+#include "cli/service/follow.h"
+
+#include "cli/service/job_text.h"
+#include "cli/terminal/progress_line.h"
+#include "core/base/clock.h"
+
+namespace voxdag::cli {
+namespace {
+
+constexpr double kPause_s = 0.5;
+
+// Shows what changed from one look at a job to the next.
+class JobView {
+ public:
+  void show(const Json& job) {
+    const std::string state = job.at("state");
+    if (state != state_ && state != "running") line_.note(state_line(job));
+    state_ = state;
+    const Json& warnings = job.at("warnings");
+    for (; warnings_ < warnings.size(); ++warnings_)
+      line_.warn(printable(warnings[warnings_].get<std::string>()));
+    if (job.at("progress").is_object()) show_progress(job, job.at("progress"));
+  }
+
+ private:
+  void show_progress(const Json& job, const Json& progress) {
+    if (job.at("attempts") != attempt_) {  // it began anew
+      attempt_ = job.at("attempts");
+      ended_ = 0;
+    }
+    const Json& stages = progress.at("stages");
+    for (; ended_ < stages.size() && stages[ended_].at("ended").get<bool>(); ++ended_)
+      show_stage(stages[ended_], true, average_rate(stages[ended_]), 0);
+    const double now = wall_seconds();
+    if (state_ != "running" || ended_ >= stages.size() || now - shown_s_ < line_.interval_s())
+      return;
+    shown_s_ = now;
+    show_stage(stages[ended_], false, progress.at("rate"), progress.at("eta_s"));
+  }
+
+  void show_stage(const Json& stage, bool ended, double rate, double eta_s) {
+    const std::string name = stage.at("name"), unit = stage.at("unit");
+    line_.show({name, unit, stage.at("done"), stage.at("total"), stage.at("wall_s"), rate, eta_s},
+               ended);
+  }
+
+  static double average_rate(const Json& stage) {
+    return stage.at("done").get<double>() / std::max(stage.at("wall_s").get<double>(), 1e-9);
+  }
+
+  ProgressLine line_;
+  std::string state_;
+  Json attempt_;
+  size_t warnings_ = 0;  // that were shown
+  size_t ended_ = 0;     // stages whose end was shown
+  double shown_s_ = 0;
+};
+
+ErrorCode code_named(const std::string& name) {
+  for (int i = 0; i <= static_cast<int>(ErrorCode::kLimit); ++i)
+    if (name == error_name(static_cast<ErrorCode>(i))) return static_cast<ErrorCode>(i);
+  return ErrorCode::kIo;
+}
+
+}  // namespace
+
+Json follow_job(Server& server, const std::string& id) {
+  try {
+    for (JobView view;; server.pause(kPause_s)) {
+      Json job = server.job(id);
+      view.show(job);
+      if (has_ended(job)) return job;
+    }
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCancelled) throw;
+    throw Error(ErrorCode::kCancelled, "no longer watching job " + id + ", which goes on");
+  }
+}
+
+void check_succeeded(const Json& job) {
+  const std::string state = job.at("state"), id = job.at("id");
+  if (state == "succeeded") return;
+  if (state == "canceled") throw Error(ErrorCode::kCancelled, "job " + id + " was canceled");
+  if (!job.at("error").is_object()) throw Error(ErrorCode::kIo, "job " + id + " failed");
+  const Json& error = job.at("error");
+  throw Error(code_named(error.at("code")),
+              "job " + id + " failed: " + printable(error.at("message").get<std::string>()));
+}
+
+}  // namespace voxdag::cli

@@ -1,0 +1,80 @@
+#include "cli/service/job_text.h"
+
+#include <cstdio>
+
+#include "core/base/text.h"
+
+namespace voxdag::cli {
+namespace {
+
+std::string percent_text(const Json& progress) {
+  const double total = progress.at("total"), done = progress.at("done");
+  if (total <= 0) return "";
+  return " " + std::to_string(static_cast<int>(100 * std::min(1.0, done / total))) + " %";
+}
+
+std::string error_code(const Json& job) {
+  return job.at("error").is_object() ? job.at("error").at("code").get<std::string>() : "";
+}
+
+}  // namespace
+
+std::string printable(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = '?';
+  return text;
+}
+
+bool has_ended(const Json& job) {
+  const std::string state = job.at("state");
+  return state == "succeeded" || state == "failed" || state == "canceled";
+}
+
+std::string job_title(const Json& job) {
+  std::string title = job.at("name");
+  if (!title.empty()) return printable(title);
+  for (const Json& scene : job.at("scene")) {
+    const std::string path = scene;
+    title += (title.empty() ? "" : " + ") + path.substr(path.rfind('/') + 1);
+  }
+  return printable(title);
+}
+
+std::string state_line(const Json& job) {
+  const std::string state = job.at("state");
+  std::string line = "job " + job.at("id").get<std::string>() + ": " + state;
+  if (job.at("position").is_number())
+    line += ", number " + job.at("position").dump() + " in the queue";
+  if (state == "queued" && !error_code(job).empty())
+    line += ", tries again after " + printable(error_code(job));
+  return line;
+}
+
+std::string progress_text(const Json& job) {
+  const std::string state = job.at("state");
+  const Json& progress = job.at("progress");
+  if (state == "succeeded") return size_text(job.at("result").at("bytes"));
+  if (state == "failed") return printable(error_code(job));
+  if (state == "queued" && job.at("position").is_number())
+    return "number " + job.at("position").dump();
+  if (!progress.is_object()) return "";
+  std::string text = printable(progress.at("stage")) + percent_text(progress);
+  const double left_s = progress.at("eta_s");
+  if (state == "running" && left_s > 0) text += ", " + duration_text(left_s) + " left";
+  return text;
+}
+
+void print_result(const Json& job) {
+  const Json& r = job.at("result");
+  const auto count = [&](const char* name) { return count_text(r.at(name)); };
+  std::printf("job %s: %s, sha256 %s\n", job.at("id").get<std::string>().c_str(),
+              size_text(r.at("bytes")).c_str(), r.at("sha256").get<std::string>().c_str());
+  std::printf("  %s triangles in a grid of %s^3\n", count("triangles").c_str(),
+              job.at("resolution").dump().c_str());
+  std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count("voxels").c_str(),
+              count("svo_nodes").c_str(), count("dag_nodes").c_str());
+  std::printf("  %s wall, %s CPU, peak memory %s\n", duration_text(r.at("wall_s")).c_str(),
+              duration_text(r.at("cpu_s")).c_str(), size_text(r.at("peak_rss_bytes")).c_str());
+}
+
+}  // namespace voxdag::cli

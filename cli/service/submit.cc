@@ -1,0 +1,95 @@
+#include <sys/random.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "cli/build_options.h"
+#include "cli/service/follow.h"
+#include "cli/service/job_text.h"
+#include "cli/service/upload.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct SubmitCommand {
+  BuildOptions build;
+  ServerOptions server;
+  std::string name;
+  int priority = 0;
+  bool wait = false;
+  bool json = false;
+};
+
+// The options that were given, as the API takes them.
+Json options_json(const BuildSpec& spec) {
+  const GeometryOptions& g = spec.geometry;
+  const RunOptions& r = spec.run;
+  Json options = Json::object();
+  if (g.bounds) options["bounds"] = *g.bounds;
+  if (g.voxel_size) options["voxel_size"] = *g.voxel_size;
+  if (g.skip_invalid) options["skip_invalid"] = true;
+  if (g.hash_bits != GeometryOptions{}.hash_bits) options["hash_bits"] = g.hash_bits;
+  if (r.memory_bytes != 0) options["memory"] = r.memory_bytes;
+  if (r.threads != 0) options["threads"] = r.threads;
+  if (r.subvolume_edge != 0) options["subvolume"] = r.subvolume_edge;
+  if (r.backend != RunOptions{}.backend) options["backend"] = r.backend;
+  if (!r.method.empty()) options["method"] = r.method;
+  return options;
+}
+
+// A scene that is a file here is uploaded; any other is the server's.
+Json scenes_json(const std::vector<std::string>& scenes, Server& server) {
+  Json names = Json::array();
+  for (const std::string& scene : scenes)
+    names.push_back(server.files().exists(scene) ? upload_scene(server, scene) : scene);
+  return names;
+}
+
+// So that an answer that was lost on its way does not make a second job.
+std::string random_key() {
+  unsigned char bytes[16];
+  if (getrandom(bytes, sizeof bytes, 0) != sizeof bytes)
+    throw Error(ErrorCode::kIo, "getrandom: no random bytes");
+  std::string key;
+  for (const unsigned char byte : bytes) {
+    char digits[3];
+    std::snprintf(digits, sizeof digits, "%02x", byte);
+    key += digits;
+  }
+  return key;
+}
+
+void run(const SubmitCommand& command, Server& server) {
+  const BuildSpec spec = command.build.spec();
+  Json body = {{"scene", scenes_json(spec.geometry.scenes, server)},
+               {"resolution", spec.geometry.resolution},
+               {"options", options_json(spec)}};
+  if (!command.name.empty()) body["name"] = command.name;
+  if (command.priority != 0) body["priority"] = command.priority;
+  Json job = server.post("/api/v1/jobs", body, {{"Idempotency-Key", random_key()}});
+  if (!command.json) std::printf("%s\n", state_line(job).c_str());
+  std::fflush(stdout);
+  if (command.wait) job = follow_job(server, job.at("id"));
+  if (command.json) std::printf("%s\n", job.dump().c_str());
+  if (!command.wait) return;
+  check_succeeded(job);
+  if (!command.json) print_result(job);
+}
+
+}  // namespace
+
+void add_submit_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("submit", "build a scene on a server");
+  const auto state = std::make_shared<SubmitCommand>();
+  state->build.declare(*command);
+  state->server.declare(*command);
+  command->add_option("--name", state->name, "what people shall call the job");
+  command->add_option("--priority", state->priority, "-100 to 100; higher runs earlier");
+  command->add_flag("--wait", state->wait, "follow the job to its end, as watch does");
+  command->add_flag("--json", state->json, "the job as one JSON object on standard output");
+  command->callback([state, &context] {
+    with_server(state->server, context, [&](Server& server) { run(*state, server); });
+  });
+}
+
+}  // namespace voxdag::cli

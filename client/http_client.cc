@@ -1,0 +1,183 @@
+#include "client/http_client.h"
+
+#include <httplib.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+
+namespace voxdag::client {
+namespace {
+
+constexpr uint64_t kUploadStep = 256 << 10;
+
+// ASCII only, whatever the locale.
+std::string lower_case(std::string_view name) {
+  std::string lower(name);
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + ('a' - 'A'));
+  return lower;
+}
+
+httplib::Headers to_httplib(const HeaderMap& headers) {
+  return httplib::Headers(headers.begin(), headers.end());
+}
+
+ClientResponse from_httplib(const httplib::Response& response) {
+  ClientResponse result;
+  result.status = response.status;
+  for (const auto& [name, value] : response.headers)
+    result.headers.emplace(lower_case(name), value);
+  result.body = response.body;
+  return result;
+}
+
+void check_url(const std::string& url) {
+  for (const std::string_view scheme : {"http://", "https://"})
+    if (url.starts_with(scheme) && url.size() > scheme.size() &&
+        url.find('/', scheme.size()) == std::string::npos)
+      return;
+  throw Error(ErrorCode::kInvalidInput,
+              "server '" + url + "': expected http://HOST:PORT or https://HOST[:PORT]");
+}
+
+ErrorCode code_of(const std::string& name, int status) {
+  for (const ErrorCode code :
+       {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kCorrupt,
+        ErrorCode::kUnsupportedVersion, ErrorCode::kIo, ErrorCode::kNoSpace,
+        ErrorCode::kOutOfMemory, ErrorCode::kDevice, ErrorCode::kCancelled, ErrorCode::kLimit})
+    if (name == error_name(code)) return code;
+  return status >= 500 ? ErrorCode::kIo : ErrorCode::kInvalidInput;
+}
+
+}  // namespace
+
+std::string ClientResponse::header(std::string_view name) const {
+  const auto found = headers.find(lower_case(name));
+  return found == headers.end() ? "" : found->second;
+}
+
+struct HttpClient::Impl {
+  explicit Impl(const ClientOptions& options) : url(options.url), http(options.url) {
+    if (!http.is_valid())
+      throw Error(ErrorCode::kInvalidInput, "server '" + url + "': the address cannot be used");
+    const auto timeout = std::chrono::microseconds(static_cast<int64_t>(options.timeout_s * 1e6));
+    http.set_connection_timeout(timeout);
+    http.set_read_timeout(timeout);
+    http.set_write_timeout(timeout);
+    http.set_keep_alive(true);
+    http.set_tcp_nodelay(true);
+    http.set_decompress(false);
+    http.set_url_encode(false);  // paths come encoded
+    if (!options.token.empty()) http.set_bearer_token_auth(options.token.c_str());
+    if (!options.ca_file.empty()) http.set_ca_cert_path(options.ca_file.c_str());
+  }
+
+  ClientResponse check(const httplib::Result& result) const {
+    if (!result)
+      throw Error(ErrorCode::kIo, "server " + url + ": " + httplib::to_string(result.error()) +
+                                      ": expected an answer");
+    return from_httplib(*result);
+  }
+
+  const std::string url;
+  httplib::Client http;
+};
+
+HttpClient::HttpClient(const ClientOptions& options) {
+  check_url(options.url);
+  impl_ = std::make_unique<Impl>(options);
+}
+HttpClient::~HttpClient() = default;
+
+ClientResponse HttpClient::get(const std::string& path, const HeaderMap& headers) {
+  return impl_->check(impl_->http.Get(path, to_httplib(headers)));
+}
+
+ClientResponse HttpClient::head(const std::string& path, const HeaderMap& headers) {
+  return impl_->check(impl_->http.Head(path, to_httplib(headers)));
+}
+
+ClientResponse HttpClient::send(const std::string& method, const std::string& path,
+                                const std::string& body, const HeaderMap& headers) {
+  httplib::Request request;
+  request.method = method;
+  request.path = path;
+  request.headers = to_httplib(headers);
+  request.body = body;
+  if (!body.empty()) request.set_header("Content-Type", "application/json");
+  return impl_->check(impl_->http.send(request));
+}
+
+ClientResponse HttpClient::upload(const std::string& path, uint64_t size, const Source& source,
+                                  const HeaderMap& headers) {
+  // What a source throws must not pass through httplib.
+  std::exception_ptr failure;
+  const auto provider = [&](size_t offset, size_t length, httplib::DataSink& sink) {
+    try {
+      const std::string piece = source(offset, std::min<uint64_t>(length, kUploadStep));
+      return sink.write(piece.data(), piece.size());
+    } catch (...) {
+      failure = std::current_exception();
+      return false;
+    }
+  };
+  const auto result = impl_->http.Put(path, to_httplib(headers), static_cast<size_t>(size),
+                                      provider, "application/octet-stream");
+  if (failure) std::rethrow_exception(failure);
+  return impl_->check(result);
+}
+
+ClientResponse HttpClient::stream(const std::string& path, const HeaderMap& headers,
+                                  const Begin& begin, const Sink& sink) {
+  ClientResponse head;
+  std::string refusal;
+  bool hung_up = false;
+  std::exception_ptr failure;
+  // What begin or sink throw must not pass through httplib.
+  const auto guarded = [&](const auto& step) {
+    try {
+      if (step()) return true;
+      hung_up = true;
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    return false;
+  };
+  const auto result = impl_->http.Get(
+      path, to_httplib(headers),
+      [&](const httplib::Response& response) {
+        head = from_httplib(response);
+        return guarded([&] { return begin(head); });
+      },
+      [&](const char* data, size_t size) {
+        const std::string_view piece(data, size);
+        if (head.status < 400) return guarded([&] { return sink(piece); });
+        refusal += piece;
+        return refusal.size() < (1 << 20);
+      });
+  if (failure) std::rethrow_exception(failure);
+  if (!hung_up) head = impl_->check(result);
+  if (!refusal.empty()) head.body = refusal;
+  return head;
+}
+
+void throw_if_problem(const ClientResponse& response) {
+  if (response.status < 400) return;
+  const auto json = nlohmann::json::parse(response.body, nullptr, false);
+  std::string code, detail = "the server answered with status " + std::to_string(response.status);
+  // What answers may be another server, or a proxy before ours.
+  const auto text = [&](const char* name, const std::string& otherwise) {
+    const auto found = json.find(name);
+    return found != json.end() && found->is_string() ? found->get<std::string>() : otherwise;
+  };
+  if (json.is_object()) {
+    code = text("code", "");
+    detail = text("detail", detail);
+    if (code_of(code, response.status) == ErrorCode::kInvalidInput && code != "invalid_input")
+      detail += " (" + code + ")";
+  }
+  throw Error(code_of(code, response.status), detail);
+}
+
+}  // namespace voxdag::client

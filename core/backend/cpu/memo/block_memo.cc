@@ -1,0 +1,45 @@
+#include "core/backend/cpu/memo/block_memo.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+namespace voxdag::cpu {
+namespace {
+
+constexpr uint64_t kLeastSlots = 64;
+constexpr uint64_t kFirstSlots = 4096;
+constexpr uint64_t kMostSlots = uint64_t{1} << 16;  // more would leave the caches
+
+}  // namespace
+
+BlockMemo::BlockMemo(Memory& memory) : memory_(memory) {
+  set_slots(affordable(kFirstSlots) ? kFirstSlots : kLeastSlots);
+}
+
+bool BlockMemo::affordable(uint64_t slots) const {
+  return slots * (sizeof(Block) + sizeof(Node)) <= memory_.budget.available() / 16;
+}
+
+void BlockMemo::set_slots(uint64_t slots) {
+  blocks_ = Buffer<Block>(memory_, slots, Buffer<Block>::kZero);
+  nodes_ = Buffer<Node>(memory_, slots);
+  slots_ = slots;
+  shift_ = 64 - std::countr_zero(slots);
+}
+
+void BlockMemo::grow() {
+  remembered_ = 0;
+  const uint64_t old_slots = slots_, slots = 4 * slots_;
+  if (slots > kMostSlots || !affordable(slots)) return;
+  const Buffer<Block> blocks = std::move(blocks_);
+  const Buffer<Node> nodes = std::move(nodes_);
+  set_slots(slots);
+  for (uint64_t i = 0; i < old_slots; ++i) {
+    const uint64_t slot = slot_of(block_key(blocks[i]));
+    blocks_[slot] = blocks[i];
+    nodes_[slot] = nodes[i];
+  }
+}
+
+}  // namespace voxdag::cpu

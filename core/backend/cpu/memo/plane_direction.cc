@@ -1,0 +1,51 @@
+#include "core/backend/cpu/memo/plane_direction.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/backend/cpu/memo/plane_brick.h"
+#include "core/dag/node_hash.h"
+
+namespace voxdag::cpu {
+
+void PlaneDirection::set_up(const Plane& plane) {
+  std::copy(plane.n, plane.n + 3, n_);
+  int count = 0;
+  for (int z = 0; z <= 8; ++z)
+    for (int y = 0; y <= 8; ++y)
+      for (int x = 0; x <= 8; ++x) values_[count++] = -(n_[0] * x + n_[1] * y + n_[2] * z);
+  std::sort(values_, values_ + kCorners);
+  values_[kCorners] = std::numeric_limits<int64_t>::max();
+  const int64_t span = values_[kCorners - 1] - values_[0];
+  buckets_per_unit_ = kBuckets / (static_cast<double>(span) + 1.0);
+  int i = 0;
+  for (int b = 0; b <= kBuckets; ++b) {
+    // The first value of this bucket or a later one may lie above an f of this bucket: one less.
+    while (i < kCorners && bucket(values_[i]) < b) ++i;
+    bucket_[b] = static_cast<uint16_t>(std::max(i - 1, 0));
+  }
+  for (int m = 0; m < 512; ++m) {
+    int64_t k[3];
+    for (int a = 0; a < 3; ++a)
+      k[a] = (m >> a & 1) | (m >> (a + 3) & 1) << 1 | (m >> (a + 6) & 1) << 2;
+    offsets_[m] = n_[0] * k[0] + n_[1] * k[1] + n_[2] * k[2];
+  }
+  std::fill(known_, known_ + kCorners, Known{});
+}
+
+void PlaneDirection::make(int64_t f, SubDagTables& tables, const Kernels& kernels,
+                          Known& known) const {
+  const OctreeCounts before = tables.counts();
+  const PlaneRange crossed(n_, f, true);
+  uint64_t masks[8];
+  kernels.find_in_range(offsets_, 512, crossed.least, crossed.most, masks);
+  NodeRef bricks[8];
+  for (int c = 0; c < 8; ++c) bricks[c] = tables.add_brick(masks[c]);
+  const NodeRef node = tables.add_node(kSizeLog2, bricks);
+  const OctreeCounts counts = tables.counts() - before;
+  tables.counts() = before;
+  known = {node.hash, node.id, static_cast<uint16_t>(counts.voxels),
+           static_cast<uint8_t>(counts.nodes)};
+}
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,70 @@
+// All nodes of 8 voxels that the planes of one direction can make. Whether a plane passes above or
+// below a voxel corner k depends on whether f >= -n.k; a cube of 8 voxels has 729 corners, so the
+// sorted values -n.k cut all offsets f into at most 730 intervals, and in each the node is the
+// same: found once, then looked up.
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/memo/plane.h"
+#include "core/backend/cpu/tables/sub_dag_tables.h"
+
+namespace voxdag::cpu {
+
+// Plain memory, of 24 KiB. For planes whose offsets leave a remainder only.
+class PlaneDirection {
+ public:
+  static constexpr int kSizeLog2 = 3;  // of the nodes
+  static constexpr int kCorners = 9 * 9 * 9;
+
+  struct Known {
+    uint64_t hash;
+    uint32_t id;
+    uint16_t voxels;
+    uint8_t nodes;  // 0: not known yet
+  };
+
+  void set_up(const Plane& plane);
+  bool is_direction_of(const Plane& plane) const {
+    return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2];
+  }
+
+  // n.k for k of a cube of 8, in Morton order: the voxels of a node; times 8 the nodes of a tile.
+  const int64_t* offsets() const { return offsets_; }
+  // Offsets f at which a plane crosses a node, [least, most]; nothing is crossed at others.
+  int64_t least_offset() const { return values_[0]; }
+  int64_t most_offset() const { return values_[kCorners - 1] - 1; }
+
+  // The node at an offset within [least, most].
+  const Known& node(int64_t f, SubDagTables& tables, const Kernels& kernels) {
+    Known& known = known_[interval(f)];
+    if (known.nodes == 0) make(f, tables, kernels, known);
+    return known;
+  }
+
+ private:
+  static constexpr int kBuckets = 256;
+
+  // How many values are <= f, less one.
+  int interval(int64_t f) const {
+    int i = bucket_[bucket(f)];
+    while (values_[i + 1] <= f) ++i;
+    return i;
+  }
+  // Rises with f; the same arithmetic made the buckets, so rounding does not matter.
+  int bucket(int64_t f) const {
+    return static_cast<int>(static_cast<double>(f - values_[0]) * buckets_per_unit_);
+  }
+  void make(int64_t f, SubDagTables& tables, const Kernels& kernels, Known& known) const;
+
+  int64_t n_[3];
+  double buckets_per_unit_;
+  int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
+  int64_t offsets_[512];
+  uint16_t bucket_[kBuckets + 1];  // the last value that no f of the bucket is below
+  Known known_[kCorners];
+};
+static_assert(sizeof(PlaneDirection) <= 24 << 10);
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,186 @@
+#include "core/backend/cpu/memo/plane_memo.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/backend/cpu/memo/plane_brick.h"
+
+namespace voxdag::cpu {
+namespace {
+
+constexpr int64_t kSmallNormal = 64;    // sum of magnitudes
+constexpr uint64_t kLeastMemos = 1024;  // slots; a power of two
+constexpr uint64_t kSpareMemos = 64;    // more than are made before the next reserve_memo()
+constexpr uint32_t kMostPlanes = 1 << 20;
+
+// The whole question of small_node(): 24 + 1 + 5 + 28 bits, and one so that no key is 0.
+uint64_t memo_key(const Plane& plane, int64_t f, int size_log2) {
+  uint64_t key = 1;
+  for (const int64_t x : plane.n) key = key << 8 | static_cast<uint64_t>(x + kSmallNormal);
+  key = key << 1 | (plane.fractional ? 1 : 0);
+  key = key << 5 | static_cast<uint64_t>(size_log2);
+  // |f| <= 64 * 2^20 where the plane crosses the cube.
+  return key << 28 | static_cast<uint64_t>(f + (1 << 27));
+}
+
+}  // namespace
+
+bool PlaneMemory::build(const TriangleSet& triangles, Entry entry, const Box& cube, int size_log2,
+                        NodeRef& node_out) {
+  node_out = {};
+  int64_t f;
+  if (const auto plane = entry.wide() ? axis_aligned_plane(triangles.wide(entry))
+                                      : axis_aligned_plane(triangles.narrow(entry))) {
+    if (plane->offset_from(cube, size_log2, f)) node_out = small_node(*plane, f, size_log2);
+    return true;
+  }
+  const int tiles_log2 = 2 * (size_log2 - kTileLog2);
+  const Remembered* known = find(triangles, entry, tiles_log2 < 0 ? 0 : uint64_t{1} << tiles_log2);
+  if (known == nullptr || !known->plane.fits(size_log2)) return false;
+  const Plane plane = known->plane;
+  PlaneDirection* const direction = known->direction;
+  if (!plane.offset_from(cube, size_log2, f)) return true;
+  node_out = direction == nullptr ? small_node(plane, f, size_log2)
+                                  : node(plane, *direction, f, size_log2);
+  return true;
+}
+
+bool PlaneMemory::remembers(const TriangleSet& triangles, Entry entry) {
+  if (entry.wide()) return axis_aligned_plane(triangles.wide(entry)).has_value();
+  return axis_aligned_plane(triangles.narrow(entry)).has_value() ||
+         find(triangles, entry, 0) != nullptr;
+}
+
+const PlaneMemory::Remembered* PlaneMemory::find(const TriangleSet& triangles, Entry entry,
+                                                 uint64_t tiles) {
+  if (entry.wide()) return nullptr;
+  if (known_.size() == 0) {
+    if (!affordable(triangles.narrow_count() * sizeof(uint32_t))) return nullptr;
+    known_ = Buffer<uint32_t>(memory_, triangles.narrow_count(), Buffer<uint32_t>::kZero);
+  }
+  uint32_t& known = known_[entry.number()];
+  if (known < kWorthwhile) {
+    if (known + tiles < kWorthwhile) {
+      known += static_cast<uint32_t>(tiles);
+      return nullptr;
+    }
+    known = remember(plane_of(triangles.narrow(entry)));
+  }
+  return known == kNever ? nullptr : &planes_[known - kWorthwhile];
+}
+
+uint32_t PlaneMemory::remember(const Plane& plane) {
+  PlaneDirection* direction = nullptr;
+  if (plane.rising() - plane.falling() > kSmallNormal) {
+    direction = plane.fractional ? direction_of(plane) : nullptr;
+    if (direction == nullptr) return kNever;
+  }
+  if (plane_count_ == kMostPlanes) return kNever;
+  if (plane_count_ == planes_.size()) {
+    if (!affordable((plane_count_ + 256) * sizeof(Remembered))) return kNever;
+    planes_.grow(memory_, plane_count_ + 256);
+  }
+  planes_[plane_count_] = {plane, direction};
+  return kWorthwhile + plane_count_++;
+}
+
+PlaneDirection* PlaneMemory::direction_of(const Plane& plane) {
+  for (Buffer<PlaneDirection>& direction : directions_)
+    if (direction[0].is_direction_of(plane)) return direction.data();
+  if (!affordable((directions_.size() + 1) * sizeof(PlaneDirection))) return nullptr;
+  directions_.emplace_back(memory_, 1);
+  directions_.back()[0].set_up(plane);
+  return directions_.back().data();
+}
+
+bool PlaneMemory::affordable(uint64_t bytes) const {
+  return bytes <= memory_.budget.limit() / 16 && bytes <= memory_.budget.available() / 8;
+}
+
+NodeRef PlaneMemory::node(const Plane& plane, PlaneDirection& direction, int64_t f, int size_log2) {
+  if (size_log2 <= kTileLog2) return tile_node(direction, f, size_log2);
+  NodeRef children[8];
+  const int64_t half = int64_t{1} << (size_log2 - 1);
+  for (int c = 0; c < 8; ++c) {
+    int64_t at_child = f;
+    for (int a = 0; a < 3; ++a) at_child += (c >> a & 1) * half * plane.n[a];
+    if (plane.crosses(at_child, size_log2 - 1))
+      children[c] = node(plane, direction, at_child, size_log2 - 1);
+  }
+  return tables_.add_node(size_log2, children);
+}
+
+NodeRef PlaneMemory::tile_node(PlaneDirection& direction, int64_t f, int size_log2) {
+  constexpr int kLog2 = PlaneDirection::kSizeLog2;
+  // A node's plane has the offset f and its own corner's, an eighth of which stands in `offsets`.
+  const int64_t* offsets = direction.offsets();
+  const int64_t least = direction.least_offset() - f, most = direction.most_offset() - f;
+  uint64_t crossed[8];
+  kernels_.find_in_range(offsets, 1 << 3 * (size_log2 - kLog2), (least + (1 << kLog2) - 1) >> kLog2,
+                         most >> kLog2, crossed);
+  OctreeCounts counts;
+  const NodeRef found =
+      reducer_.reduce_nodes(crossed, kLog2, size_log2, [&](int m) -> const PlaneDirection::Known& {
+        const int64_t at_node = f + offsets[m] * (1 << kLog2);
+        const PlaneDirection::Known& known = direction.node(at_node, tables_, kernels_);
+        counts += {known.nodes, known.voxels};
+        return known;
+      });
+  tables_.counts() += counts;
+  return found;
+}
+
+NodeRef PlaneMemory::small_node(const Plane& plane, int64_t f, int size_log2) {
+  if (!plane.crosses(f, size_log2)) return {};
+  if (size_log2 == kBrickLevels)
+    return tables_.add_brick(plane_brick(plane.n, f, plane.fractional));
+  reserve_memo();
+  const uint64_t key = memo_key(plane, f, size_log2);
+  if (const Memo& memo = memo_slot(key); memo.key == key) {
+    tables_.counts() += memo.counts;
+    return {memo.hash, memo.id, true};
+  }
+  const OctreeCounts before = tables_.counts();
+  const NodeRef made = make_small_node(plane, f, size_log2);
+  memo_slot(key) = {key, made.hash, tables_.counts() - before, made.id};
+  ++memo_count_;
+  return made;
+}
+
+NodeRef PlaneMemory::make_small_node(const Plane& plane, int64_t f, int size_log2) {
+  NodeRef children[8];
+  const int64_t half = int64_t{1} << (size_log2 - 1);
+  for (int c = 0; c < 8; ++c) {
+    int64_t at_child = f;
+    for (int a = 0; a < 3; ++a) at_child += (c >> a & 1) * half * plane.n[a];
+    children[c] = small_node(plane, at_child, size_log2 - 1);
+  }
+  return tables_.add_node(size_log2, children);
+}
+
+void PlaneMemory::reserve_memo() {
+  if ((memo_count_ + kSpareMemos) * 2 <= memo_slots_) return;
+  const uint64_t slots = memo_slots_ == 0 ? kLeastMemos : 2 * memo_slots_;
+  if (memo_slots_ != 0 && !affordable(slots * sizeof(Memo))) {
+    std::fill(memo_.begin(), memo_.end(), Memo{});
+    memo_count_ = 0;
+    return;
+  }
+  const Buffer<Memo> old = std::move(memo_);
+  const uint64_t old_slots = std::exchange(memo_slots_, slots);
+  memo_ = Buffer<Memo>(memory_, slots, Buffer<Memo>::kZero);
+  for (uint64_t i = 0; i < old_slots; ++i)
+    if (old[i].key != 0) memo_slot(old[i].key) = old[i];
+}
+
+// Where a key is or would be.
+PlaneMemory::Memo& PlaneMemory::memo_slot(uint64_t key) {
+  uint64_t at = key * 0x9e3779b97f4a7c15ull >> 20;
+  while (true) {
+    Memo& memo = memo_[at & (memo_slots_ - 1)];
+    if (memo.key == key || memo.key == 0) return memo;
+    ++at;
+  }
+}
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,85 @@
+// Columns of bricks in a tile, along the axis D of the normal's largest component, and where their
+// bricks and voxels lie.
+//
+// Only included by sources compiled for one instruction set; all of it has internal linkage.
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/cpu/raster/tile_bricks.h"
+
+#define VOXDAG_INLINE __attribute__((always_inline)) inline
+
+namespace voxdag::cpu {
+namespace {
+
+// The axes of the footprint of columns along D. A voxel column has the number p + 2 q (low bits of
+// p, q) + 4 p + 8 q (high bits). Q is chosen so that the high bit of q is one of the two highest of
+// a brick's bits.
+template <int D>
+constexpr int kP = D == 0 ? 2 : 0;
+template <int D>
+constexpr int kQ = D == 2   ? 1
+                   : D == 1 ? 2
+                            : 1;
+
+constexpr int column_p(int column) { return (column & 1) | (column >> 1 & 2); }
+constexpr int column_q(int column) { return (column >> 1 & 1) | (column >> 2 & 2); }
+
+// [axis][coordinate]: the voxels of a brick in one layer.
+struct Layers {
+  uint64_t voxels[3][4] = {};
+  constexpr Layers() {
+    for (int voxel = 0; voxel < 64; ++voxel)
+      for (int axis = 0; axis < 3; ++axis)
+        voxels[axis][(voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1] |= uint64_t{1} << voxel;
+  }
+};
+constexpr Layers kLayers;
+
+// Columns of bricks: bit p of row q, visited as number p + 16 q. Visited from one loop, whose
+// length the processor need not guess row by row.
+struct ColumnSet {
+  alignas(32) uint16_t rows[16] = {};
+
+  template <class Visit>
+  VOXDAG_INLINE void for_each(Visit visit) const {
+    for (int part = 0; part < 4; ++part) {
+      uint64_t bits;
+      __builtin_memcpy(&bits, rows + 4 * part, 8);
+      for (; bits != 0; bits &= bits - 1) {
+        const int number = 64 * part + __builtin_ctzll(bits);
+        visit(number);
+      }
+    }
+  }
+  // Bits from..to, none if from > to; -16 <= to, from <= 16.
+  static VOXDAG_INLINE uint16_t bits(int from, int to) {
+    return static_cast<uint16_t>(0xffffu >> (15 - to) & 0xffffu << from);
+  }
+};
+
+// Parts of a brick's Morton index in the tile: its column's, by number, and its height's.
+template <int D>
+struct BrickIndex {
+  uint16_t of_column[256] = {};
+  uint16_t of_height[16] = {};
+  constexpr BrickIndex() {
+    for (int i = 0; i < 256; ++i)
+      of_column[i] = static_cast<uint16_t>(kSpread[i % 16] << kP<D> | kSpread[i / 16] << kQ<D>);
+    for (int z = 0; z < 16; ++z) of_height[z] = static_cast<uint16_t>(kSpread[z] << D);
+  }
+};
+template <int D>
+inline constexpr BrickIndex<D> kBrickIndex;
+
+// Bits of 4 x 4 voxel columns in Morton order, with the axes exchanged.
+VOXDAG_INLINE uint32_t transposed(uint32_t columns) {
+  const uint32_t low = (columns >> 1 ^ columns) & 0x2222;
+  columns ^= low | low << 1;
+  const uint32_t high = (columns >> 4 ^ columns) & 0x00f0;
+  return columns ^ (high | high << 4);
+}
+
+}  // namespace
+}  // namespace voxdag::cpu

@@ -1,0 +1,136 @@
+// The portable rasteriser: brick after brick of the triangle's box, each voxel of a brick tested by
+// the integer tests of tile_triangle.h.
+#include "core/backend/cpu/raster/draw_portable.h"
+
+#include <algorithm>
+
+#include "core/backend/cpu/kernels.h"
+
+namespace voxdag::cpu {
+namespace {
+
+// Voxels of a brick are numbered in Morton order: axis a owns bits a and a + 3.
+constexpr int low_bit(int axis) { return 1 << axis; }
+constexpr int high_bit(int axis) { return 8 << axis; }
+constexpr int voxel_bits(int axis, int k) {
+  return (k & 1 ? low_bit(axis) : 0) | (k & 2 ? high_bit(axis) : 0);
+}
+constexpr int voxel_coordinate(int axis, int voxel) {
+  return (voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1;
+}
+
+// The four voxels of the line along `axis` that starts at voxel 0.
+constexpr uint64_t line_along(int axis) {
+  return 1 | uint64_t{1} << low_bit(axis) | uint64_t{1} << high_bit(axis) |
+         uint64_t{1} << (low_bit(axis) + high_bit(axis));
+}
+
+// What the 64 voxels of a brick add to the plane's value at its first.
+template <class Int>
+struct VoxelOffsets {
+  Int of[64];
+
+  explicit VoxelOffsets(const Int (&normal)[3]) {
+    for (int voxel = 0; voxel < 64; ++voxel) {
+      of[voxel] = 0;
+      for (int a = 0; a < 3; ++a) of[voxel] += normal[a] * voxel_coordinate(a, voxel);
+    }
+  }
+};
+
+template <class Int>
+uint64_t plane_mask(const VoxelOffsets<Int>& offsets, Int at_first, Int width) {
+  uint64_t mask = 0;
+  for (int voxel = 0; voxel < 64; ++voxel) {
+    const Int value = at_first + offsets.of[voxel];
+    mask |= static_cast<uint64_t>((value >= 0) & (value <= width)) << voxel;
+  }
+  return mask;
+}
+
+// Removes the voxels whose column along `axis` is on the outer side of an edge. Most edges cross
+// few bricks: one whose least value over the brick is not negative takes nothing.
+template <class Edge>
+void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint64_t& mask) {
+  const int p = (axis + 1) % 3, q = (axis + 2) % 3;
+  for (const Edge& edge : edges) {
+    const int64_t at_first = edge.a * (4 * brick[p]) + edge.b * (4 * brick[q]) + edge.c;
+    if (at_first + 3 * (std::min<int64_t>(edge.a, 0) + std::min<int64_t>(edge.b, 0)) >= 0) continue;
+    for (int i = 0; i < 16; ++i)
+      if (at_first + edge.a * (i & 3) + edge.b * (i >> 2) < 0)
+        mask &= ~(line_along(axis) << (voxel_bits(p, i & 3) | voxel_bits(q, i >> 2)));
+  }
+}
+
+// The voxels of a brick within [first, last] along an axis, counted from the brick's first.
+uint64_t range_mask(int axis, int first, int last) {
+  if (first <= 0 && last >= 3) return ~uint64_t{0};
+  const int p = (axis + 1) % 3, q = (axis + 2) % 3;
+  uint64_t mask = 0;
+  for (int k = std::max(first, 0); k <= std::min(last, 3); ++k)
+    for (int i = 0; i < 16; ++i)
+      mask |= uint64_t{1} << (voxel_bits(axis, k) | voxel_bits(p, i & 3) | voxel_bits(q, i >> 2));
+  return mask;
+}
+
+template <class Coordinate>
+uint64_t brick_mask(const TileTriangle<Coordinate>& t,
+                    const VoxelOffsets<typename TileTriangle<Coordinate>::Int>& offsets,
+                    const int (&brick)[3]) {
+  auto at_first = t.lowest;
+  for (int a = 0; a < 3; ++a) at_first += t.normal[a] * (4 * brick[a]);
+  uint64_t mask = plane_mask(offsets, at_first, t.width);
+  for (int a = 0; a < 3 && mask != 0; ++a) {
+    mask &= range_mask(a, t.first_voxel[a] - 4 * brick[a], t.last_voxel[a] - 4 * brick[a]);
+    if (!t.inside) cut_by_edges(t.edges[a], a, brick, mask);
+  }
+  return mask;
+}
+
+// False if no voxel of the brick can be touched: the plane or an edge leaves all of it out.
+template <class Coordinate>
+bool may_touch(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
+  auto least = t.lowest, most = t.lowest;
+  for (int a = 0; a < 3; ++a) {
+    const auto near = t.normal[a] * (4 * brick[a]), far = near + 3 * t.normal[a];
+    least += std::min(near, far);
+    most += std::max(near, far);
+  }
+  if (most < 0 || least > t.width) return false;
+  if (t.inside) return true;
+  for (int d = 0; d < 3; ++d)
+    for (const auto& edge : t.edges[d])
+      if (edge.c + edge.a * (4 * brick[(d + 1) % 3] + (edge.a > 0 ? 3 : 0)) +
+              edge.b * (4 * brick[(d + 2) % 3] + (edge.b > 0 ? 3 : 0)) <
+          0)
+        return false;
+  return true;
+}
+
+}  // namespace
+
+template <class Coordinate>
+void draw_exactly(const TileTriangle<Coordinate>& t, TileBricks& tile) {
+  int first[3], last[3];
+  for (int a = 0; a < 3; ++a) {
+    first[a] = t.first_voxel[a] / 4;
+    last[a] = t.last_voxel[a] / 4;
+  }
+  const VoxelOffsets offsets(t.normal);
+  int brick[3];
+  for (brick[2] = first[2]; brick[2] <= last[2]; ++brick[2])
+    for (brick[1] = first[1]; brick[1] <= last[1]; ++brick[1])
+      for (brick[0] = first[0]; brick[0] <= last[0]; ++brick[0])
+        if (may_touch(t, brick))
+          tile.add(kSpread[brick[0]] | kSpread[brick[1]] << 1 | kSpread[brick[2]] << 2,
+                   brick_mask(t, offsets, brick));
+}
+
+template void draw_exactly(const TileTriangle<int32_t>&, TileBricks&);
+template void draw_exactly(const TileTriangle<int64_t>&, TileBricks&);
+
+void draw_wide(const TileTriangle<int64_t>& triangle, TileBricks& tile) {
+  draw_exactly(triangle, tile);
+}
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,222 @@
+// The plane test of the AVX2 rasteriser (draw_avx2.cc): between which heights the plane passes each
+// of the 16 voxel columns of a column of bricks, and the bits of the voxels between them.
+//
+// Along the axis D of the normal's largest component a column is touched at the heights z with
+//     0 <= n_D z + n.(p, q) + lowest <= width       (tile_triangle.h), that is
+//     y <= z <= y + width / n_D                     with y = -(n.(p, q) + lowest) / n_D
+// at most four voxels, since width <= 3 n_D. Lanes hold y in 16 bits, 12 of them below the voxel,
+// relative to the brick where the column begins: y spans 0..4 for the lowest of the 16, up to 6
+// more for the others, up to 3 more above. It is rounded downwards, the upper bound upwards, by
+// little more than 2 units; a lane that is then so near to a whole number that the true height may
+// lie beyond it, is settled by division (2 columns of bricks in 100 have one).
+//
+// Only included by sources compiled for AVX2; all of it has internal linkage.
+#pragma once
+
+#include <immintrin.h>
+
+#include "core/backend/cpu/raster/edges_avx2.h"
+#include "core/backend/cpu/raster/sides_avx2.h"
+#include "core/backend/cpu/raster/tile_triangle.h"
+
+namespace voxdag::cpu {
+namespace {
+
+constexpr int kHeightBits = 12;  // below the voxel, in 16-bit lanes
+constexpr int kColumnBits = 40;  // below the voxel, per column of bricks in 64 bits
+
+// A brick's 64 voxels as bytes of two vectors: bit 5 of a voxel's number chooses the vector, bit 4
+// its half. Axis a owns bits a and a + 3 of the number.
+template <int D>
+struct ByteOrder {
+  alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel's column
+  alignas(32) int8_t height[4][2][32] = {};  // of the voxel above the first of four bricks
+  alignas(32) int8_t depth[4][2][32] = {};   // below the highest voxel of the four
+  constexpr ByteOrder() {
+    for (int voxel = 0; voxel < 64; ++voxel) {
+      const auto coordinate = [voxel](int axis) {
+        return (voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1;
+      };
+      const int p = coordinate(kP<D>), q = coordinate(kQ<D>);
+      column[voxel / 32][voxel % 32] = static_cast<int8_t>((p & 1) | (q & 1) << 1 | (p & 2) << 1);
+      for (int brick = 0; brick < 4; ++brick) {
+        const int z = 4 * brick + coordinate(D);
+        height[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(z);
+        depth[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(kMostHeight - z);
+      }
+    }
+  }
+};
+template <int D>
+inline constexpr ByteOrder<D> kByteOrder;
+
+VOXDAG_INLINE __m256i load(const void* at) {
+  return _mm256_load_si256(static_cast<const __m256i*>(at));
+}
+
+// [column]: all ones in its 16-bit lane.
+struct SingleLanes {
+  alignas(32) uint16_t only[16][16] = {};
+  constexpr SingleLanes() {
+    for (int i = 0; i < 16; ++i) only[i][i] = 0xffff;
+  }
+};
+constexpr SingleLanes kLanes;
+
+template <int D>
+class Heights {
+ public:
+  // Bounds of columns (HeightBounds), a byte per voxel of a brick.
+  struct Spread {
+    __m256i below[2], over[2];
+
+    // The voxels of the brick that is `up` bricks above the one where the column begins, up < 4.
+    VOXDAG_INLINE uint64_t mask(int up) const {
+      uint32_t half[2];
+      for (int i = 0; i < 2; ++i) {
+        const __m256i z = load(kByteOrder<D>.height[up][i]);
+        const __m256i depth = load(kByteOrder<D>.depth[up][i]);
+        half[i] = static_cast<uint32_t>(_mm256_movemask_epi8(_mm256_andnot_si256(
+            _mm256_cmpgt_epi8(over[i], depth), _mm256_cmpgt_epi8(z, below[i]))));
+      }
+      return half[0] | static_cast<uint64_t>(half[1]) << 32;
+    }
+  };
+
+  VOXDAG_INLINE explicit Heights(const TileTriangle<int32_t>& triangle) : t(triangle) {
+    const int64_t np = t.normal[P], nq = t.normal[Q];
+    const double inverse = 1.0 / static_cast<double>(t.normal[D]);
+    const double column_unit = inverse * static_cast<double>(int64_t{1} << kColumnBits);
+    step_p_ = static_cast<int64_t>(-4.0 * static_cast<double>(np) * column_unit);
+    step_q_ = static_cast<int64_t>(-4.0 * static_cast<double>(nq) * column_unit);
+    const int64_t lowest = t.lowest + 3 * (above_zero(np) + above_zero(nq));
+    origin_ = static_cast<int64_t>(-static_cast<double>(lowest) * column_unit -
+                                   kLowered * (int64_t{1} << (kColumnBits - kHeightBits)));
+    const double unit = inverse * (1 << kHeightBits);
+    const float sp = static_cast<float>(static_cast<double>(magnitude(np)) * unit);
+    const float sq = static_cast<float>(static_cast<double>(magnitude(nq)) * unit);
+    const float width = static_cast<float>(static_cast<double>(t.width) * unit);
+    reach_ = static_cast<int64_t>(3.0f * (sp + sq) + width + kTopRaised + 2.0f)
+             << (kColumnBits - kHeightBits);
+    set_lanes(np > 0, sp, nq > 0, sq, width);
+  }
+
+  // Where the plane passes a column of bricks.
+  struct Column {
+    int p, q;
+    int64_t from, to;  // the bricks that it may touch; none if from > to
+    int brick;         // in which the lowest voxel column begins,
+    int within;        // so many units of 16-bit lanes above its floor
+  };
+  // With bricks from `first` to `last` only.
+  VOXDAG_INLINE Column column(int p, int q, int first, int last) const {
+    const int64_t height = origin_ + step_p_ * p + step_q_ * q;
+    const int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
+    const int64_t to = (height + reach_) >> (kColumnBits + 2);
+    return {p,
+            q,
+            from > first ? from : first,
+            to < last ? to : last,
+            static_cast<int>(height >> (kColumnBits + 2)),
+            static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1)};
+  }
+
+  // Lanes of `outer` that are all ones have no voxels.
+  VOXDAG_INLINE HeightBounds bounds(const Column& c, __m256i outer) const {
+    const __m256i base = _mm256_set1_epi16(static_cast<int16_t>(c.within));
+    __m256i below = _mm256_add_epi16(base, below_lanes_);
+    __m256i top = _mm256_add_epi16(base, top_lanes_);
+    const __m256i raised = _mm256_add_epi16(below, _mm256_set1_epi16(kBelowDoubt));
+    const __m256i lowered = _mm256_sub_epi16(top, _mm256_set1_epi16(kTopDoubt));
+    const __m256i whole = _mm256_set1_epi16(static_cast<int16_t>(0xffff << kHeightBits));
+    const __m256i differ =
+        _mm256_or_si256(_mm256_xor_si256(raised, below), _mm256_xor_si256(lowered, top));
+    if (!_mm256_testz_si256(differ, whole)) [[unlikely]]
+      settle(c.p, c.q, c.brick, _mm256_and_si256(differ, whole), below, top);
+    below = _mm256_or_si256(below, outer);
+    // Of the top its distance from the highest voxel: all four bits turned over.
+    return _mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
+                               _mm256_srli_epi16(_mm256_andnot_si256(top, whole), kHeightBits));
+  }
+
+  // The half of a column is its high bit of q: for D = 1 that is the vector of its voxels,
+  // otherwise their half.
+  static VOXDAG_INLINE Spread spread(HeightBounds bounds) {
+    const __m256i order0 = load(kByteOrder<D>.column[0]), order1 = load(kByteOrder<D>.column[1]);
+    const __m256i eight = _mm256_set1_epi8(8);
+    const __m256i half0 = D == 1 ? _mm256_permute4x64_epi64(bounds, 0x44) : bounds;
+    const __m256i half1 = D == 1 ? _mm256_permute4x64_epi64(bounds, 0xee) : bounds;
+    return {{_mm256_shuffle_epi8(half0, order0), _mm256_shuffle_epi8(half1, order1)},
+            {_mm256_shuffle_epi8(half0, _mm256_add_epi8(order0, eight)),
+             _mm256_shuffle_epi8(half1, _mm256_add_epi8(order1, eight))}};
+  }
+
+ private:
+  static constexpr int P = kP<D>, Q = kQ<D>;
+
+  // In units of 16-bit lanes, with 0.02 to spare for rounding in floats. What is within a column's
+  // base is cut to a whole unit, below_lanes_ are rounded, top_lanes_ cut:
+  //   below   in (y - 2.02, y - 0.02]             so a whole number in doubt is 1 or 2 above it
+  //   top     in (y + width / n_D + 0.02, ... + 2.02]                 and 0, 1 or 2 below it
+  static constexpr double kLowered = 0.52;
+  static constexpr float kTopRaised = 2.54f;
+  static constexpr int16_t kBelowDoubt = 2, kTopDoubt = 3;
+
+  // How far each column is above the lowest one; sp, sq are the slopes' magnitudes.
+  VOXDAG_INLINE void set_lanes(bool p_falls, float sp, bool q_falls, float sq, float width) {
+    const __m256 p_low =
+        p_falls ? _mm256_setr_ps(3, 2, 3, 2, 3, 2, 3, 2) : _mm256_setr_ps(0, 1, 0, 1, 0, 1, 0, 1);
+    const __m256 p_high = _mm256_add_ps(p_low, _mm256_set1_ps(p_falls ? -2.0f : 2.0f));
+    const __m256 q_both =
+        q_falls ? _mm256_setr_ps(3, 3, 2, 2, 1, 1, 0, 0) : _mm256_setr_ps(0, 0, 1, 1, 2, 2, 3, 3);
+    const __m256 from_q = _mm256_mul_ps(q_both, _mm256_set1_ps(sq));
+    const __m256 low = _mm256_add_ps(_mm256_mul_ps(p_low, _mm256_set1_ps(sp)), from_q);
+    const __m256 high = _mm256_add_ps(_mm256_mul_ps(p_high, _mm256_set1_ps(sp)), from_q);
+    const auto lanes = [&](float more) {
+      const __m256 vmore = _mm256_set1_ps(more);
+      return _mm256_packus_epi32(_mm256_cvttps_epi32(_mm256_add_ps(low, vmore)),
+                                 _mm256_cvttps_epi32(_mm256_add_ps(high, vmore)));
+    };
+    below_lanes_ = lanes(0.5f);
+    top_lanes_ = lanes(width + kTopRaised);
+  }
+
+  // Makes the columns exact whose lanes in `doubtful` are not 0.
+  [[gnu::noinline]] void settle(int p, int q, int brick, __m256i doubtful, __m256i& below,
+                                __m256i& top) const {
+    const __m256i certain = _mm256_cmpeq_epi16(doubtful, _mm256_setzero_si256());
+    const int64_t n = t.normal[D];
+    // Two bits per lane.
+    for (uint32_t rest = ~static_cast<uint32_t>(_mm256_movemask_epi8(certain)) & 0x55555555u;
+         rest != 0; rest &= rest - 1) {
+      const int column = __builtin_ctz(rest) / 2;
+      const int64_t at_zero = t.lowest + t.normal[P] * (4 * p + column_p(column)) +
+                              t.normal[Q] * (4 * q + column_q(column));
+      const int64_t exact_below = floor_divide(-at_zero - 1, n) - 4 * brick;
+      const int64_t exact_top = floor_divide(t.width - at_zero, n) - 4 * brick;
+      const __m256i lane = load(kLanes.only[column]);
+      const auto put = [lane](__m256i& into, int64_t height) {
+        into = _mm256_blendv_epi8(
+            into, _mm256_set1_epi16(static_cast<int16_t>(height << kHeightBits)), lane);
+      };
+      put(below, exact_below);
+      put(top, exact_top);
+    }
+  }
+
+  static int64_t floor_divide(int64_t a, int64_t b) {
+    const int64_t quotient = a / b;
+    return quotient - (quotient * b > a ? 1 : 0);
+  }
+
+  const TileTriangle<int32_t>& t;
+  // The height of a column of bricks: that of its lowest voxel column, kLowered units of 16-bit
+  // lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
+  int64_t origin_, step_p_, step_q_;
+  // From there to the highest top of the column, or higher.
+  int64_t reach_;
+  __m256i below_lanes_, top_lanes_;
+};
+
+}  // namespace
+}  // namespace voxdag::cpu

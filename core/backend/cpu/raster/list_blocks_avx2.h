@@ -1,0 +1,51 @@
+// list_blocks() of the kernels, by what vectors of one length or another see in a block.
+//
+// Only included by sources compiled for AVX2; all of it has internal linkage.
+#pragma once
+
+#include <immintrin.h>
+
+#include "core/backend/cpu/raster/column_set.h"
+#include "core/backend/cpu/raster/tile_bricks.h"
+
+namespace voxdag::cpu {
+namespace {
+
+VOXDAG_INLINE uint64_t sum_of(__m256i four) {
+  const __m128i two =
+      _mm_add_epi64(_mm256_castsi256_si128(four), _mm256_extracti128_si256(four, 1));
+  return static_cast<uint64_t>(_mm_cvtsi128_si64(two)) +
+         static_cast<uint64_t>(_mm_extract_epi64(two, 1));
+}
+
+struct SeenBlock {
+  uint64_t key;
+  bool has_voxels;
+};
+
+// `see`: from a block to a SeenBlock.
+template <class See>
+VOXDAG_INLINE int list_blocks_seen(TileBricks& tile, int groups, uint8_t* existing,
+                                   uint16_t* numbers, uint64_t* keys, See see) {
+  int count = 0;
+  for (int group = 0; group < groups; ++group) {
+    uint64_t touched;
+    uint32_t bits = 0;
+    __builtin_memcpy(&touched, tile.touched + 8 * group, 8);
+    __builtin_memset(tile.touched + 8 * group, 0, 8);
+    for (; touched != 0; touched &= touched - 1) {
+      const int i = __builtin_ctzll(touched) / 8;
+      const SeenBlock block = see(tile.blocks[8 * group + i]);
+      // Written in any case, kept if there is something.
+      numbers[count] = static_cast<uint16_t>(8 * group + i);
+      keys[count] = block.key;
+      count += block.has_voxels;
+      bits |= uint32_t{block.has_voxels} << i;
+    }
+    existing[group] = static_cast<uint8_t>(bits);
+  }
+  return count;
+}
+
+}  // namespace
+}  // namespace voxdag::cpu

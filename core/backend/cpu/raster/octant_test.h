@@ -1,0 +1,156 @@
+// Which of a cube's eight children a triangle may touch: the overlap test for all eight at once, in
+// doubles. Four numbers of a quad are, in turn, the three edges of the triangle (the fourth idles)
+// or four children.
+//
+// Culling need not be exact, since bricks are: a child that is touched must never be left out, one
+// that is not may stay. "Inside" must never be claimed wrongly. Both hold because every sum is
+// widened, or narrowed, by more than its rounding error: vertices and edges are exact in doubles
+// (below 2^42), normals are made in integers and rounded once, and what follows are sums of at most
+// eight products, each off by at most 3 * 2^-53 of |coefficient| * |distance|.
+//
+// Quad is a vector of four doubles with load(coordinates, origin), arithmetic and
+//   rotated()        elements 1, 2, 0, 3
+//   above_zero()     max(x, 0)
+//   negative()       the sign bits, one per element
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/tables/child_mask.h"
+#include "core/base/integers.h"
+
+namespace voxdag::cpu {
+
+// [projection][set of columns, bit = first axis + 2 * second]: the children in these columns.
+struct ColumnTable {
+  uint8_t children[3][16] = {};
+  constexpr ColumnTable() {
+    for (int d = 0; d < 3; ++d)
+      for (int set = 0; set < 16; ++set)
+        for (int c = 0; c < 8; ++c) {
+          const int column = (c >> (d + 1) % 3 & 1) | (c >> (d + 2) % 3 & 1) << 1;
+          children[d][set] |= static_cast<uint8_t>((set >> column & 1) << c);
+        }
+  }
+};
+inline constexpr ColumnTable kColumns;
+inline constexpr uint8_t kLowChildren[3] = {0x55, 0x33, 0x0f};
+inline constexpr double kRoundingSlack = 0x1p-47;
+
+template <class Quad, class Coordinate>
+struct OctantTest {
+  using Int = typename TileTriangle<Coordinate>::Int;
+
+  const Triangle<Coordinate>& t;
+  const Box& cube;
+  double half;        // edge of a child
+  double reach;       // no coordinate relative to the cube's low corner is larger
+  int long_axes = 0;  // along which the triangle is as long as a child
+  double normal[3];
+
+  OctantTest(const Triangle<Coordinate>& triangle, const Box& box) : t(triangle), cube(box) {
+    half = static_cast<double>(cube.edge / 2);
+  }
+
+  // Children that the triangle's box touches, exactly; sets `reach` and `long_axes`.
+  uint32_t box_test() {
+    uint32_t touched = 0xff;
+    int64_t farthest = cube.edge;
+    for (int a = 0; a < 3; ++a) {
+      const int64_t v0 = t.v[a][0] - cube.low[a], v1 = t.v[a][1] - cube.low[a],
+                    v2 = t.v[a][2] - cube.low[a];
+      int64_t low = v0 < v1 ? v0 : v1, high = v0 < v1 ? v1 : v0;
+      low = v2 < low ? v2 : low;
+      high = v2 > high ? v2 : high;
+      if (low > cube.edge / 2) touched &= ~kLowChildren[a];
+      if (high < cube.edge / 2) touched &= kLowChildren[a];
+      farthest = high > farthest ? high : farthest;
+      farthest = -low > farthest ? -low : farthest;
+      long_axes += high - low >= cube.edge / 2;
+    }
+    reach = static_cast<double>(farthest);
+    return touched & 0xff;
+  }
+
+  void set_normal() {
+    Int e[3][2];
+    for (int a = 0; a < 3; ++a)
+      for (int i = 0; i < 2; ++i) e[a][i] = static_cast<Int>(t.v[a][i + 1]) - t.v[a][i];
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, c = (a + 2) % 3;
+      normal[a] = static_cast<double>(e[b][0] * e[c][1] - e[c][0] * e[b][1]);
+    }
+  }
+
+  // Children that the plane may cross.
+  uint32_t plane_test() const {
+    double rising = 0, falling = 0, at_low = 0;
+    for (int a = 0; a < 3; ++a) {
+      (normal[a] > 0 ? rising : falling) += normal[a];
+      at_low -= normal[a] * static_cast<double>(t.v[a][0] - cube.low[a]);
+    }
+    const double slack = (rising - falling) * reach * kRoundingSlack;
+    const Quad columns = Quad(0, normal[0], normal[1], normal[0] + normal[1]) * Quad(half);
+    uint32_t touched = 0;
+    for (int k = 0; k < 2; ++k) {
+      const double base = at_low + k * half * normal[2];
+      const Quad most = columns + Quad(base + half * rising + slack);
+      const Quad least = Quad(slack - base - half * falling) - columns;
+      touched |= (most.negative() | least.negative()) << 4 * k;
+    }
+    return ~touched & 0xff;
+  }
+
+  // Children on the inner side of the edges in projection `d`; if `inside` is given, also those
+  // that are so with their whole area.
+  uint32_t edge_test(int d, uint32_t* inside) const {
+    const int p = (d + 1) % 3, q = (d + 2) % 3;
+    const Quad vp = Quad::load(t.v[p], cube.low[p]), vq = Quad::load(t.v[q], cube.low[q]);
+    const Quad sign(normal[d] < 0 ? -1.0 : 1.0);
+    const Quad a = (vq - vq.rotated()) * sign, b = (vp.rotated() - vp) * sign;
+    const Quad at_low = Quad(0.0) - (a * vp + b * vq);
+    const Quad rise_a = a.above_zero(), rise_b = b.above_zero();
+    const Quad size = rise_a + rise_b + (rise_a - a) + (rise_b - b);
+    const Quad slack = size * Quad(reach * kRoundingSlack), half4(half);
+    const Quad most = at_low + (rise_a + rise_b) * half4 + slack;
+    const Quad step_a = a * half4, step_b = b * half4, step_ab = step_a + step_b;
+    uint32_t columns = 0;
+    columns |= (most.negative() & 7) == 0 ? 1 : 0;
+    columns |= ((most + step_a).negative() & 7) == 0 ? 2 : 0;
+    columns |= ((most + step_b).negative() & 7) == 0 ? 4 : 0;
+    columns |= ((most + step_ab).negative() & 7) == 0 ? 8 : 0;
+    if (inside != nullptr) {
+      const Quad least = most - size * half4 - (slack + slack);
+      uint32_t covered = 0;
+      covered |= (least.negative() & 7) == 0 ? 1 : 0;
+      covered |= ((least + step_a).negative() & 7) == 0 ? 2 : 0;
+      covered |= ((least + step_b).negative() & 7) == 0 ? 4 : 0;
+      covered |= ((least + step_ab).negative() & 7) == 0 ? 8 : 0;
+      *inside = kColumns.children[d][covered];
+    }
+    return kColumns.children[d][columns];
+  }
+
+  Octants run(bool whole_cube_inside) {
+    Octants out{box_test(), 0};
+    // A small triangle covers no child, and where its box is in two it most likely touches both.
+    if (!whole_cube_inside && kChildCounts.of[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
+    set_normal();
+    out.touched &= plane_test();
+    if (whole_cube_inside) return {out.touched, out.touched};
+    const double size[3] = {normal[0] < 0 ? -normal[0] : normal[0],
+                            normal[1] < 0 ? -normal[1] : normal[1],
+                            normal[2] < 0 ? -normal[2] : normal[2]};
+    int dominant = size[1] > size[0] ? 1 : 0;
+    if (size[2] > size[dominant]) dominant = 2;
+    for (int d = 0; d < 3 && out.touched != 0; ++d) {
+      const bool covers = d == dominant && size[d] > 0;
+      out.touched &= edge_test(d, covers ? &out.inside : nullptr);
+    }
+    out.inside &= out.touched;
+    return out;
+  }
+};
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,131 @@
+// From tables to level arrays, from the bricks up. Each level in three passes: records get their
+// children's places in the array below (in the order of adding, where neighbours are neighbours),
+// slots are sorted, records are copied out in that order and learn their own places.
+#include <algorithm>
+#include <cstring>
+
+#include "core/backend/cpu/tables/sub_dag_tables.h"
+#include "core/dag/node_hash.h"
+
+namespace voxdag::cpu {
+namespace {
+
+constexpr size_t kPrefetchAhead = 12;  // records, on their way from memory
+
+class LevelEmitter {
+ public:
+  LevelEmitter(SubDagTables& tables, uint32_t grid_levels, uint32_t hash_bits, SubDagSink& sink)
+      : tables_(tables), grid_levels_(grid_levels), hash_bits_(hash_bits), sink_(sink) {
+    uint64_t most_nodes = 0, most_children = 0, most_hashes = tables.bricks().size();
+    for (int s = kBrickLevels + 1; s <= tables.size_log2(); ++s) {
+      most_nodes = std::max(most_nodes, tables.nodes(s).size());
+      most_children = std::max(most_children, tables.nodes(s).total_children());
+    }
+    most_hashes = std::max(most_hashes, most_nodes);
+    Memory& memory = tables.memory();
+    brick_places_ = Buffer<uint32_t>(memory, tables.bricks().size());
+    hashes_ = Buffer<uint64_t>(memory, most_hashes);
+    masks_ = Buffer<uint8_t>(memory, most_nodes);
+    children_ = Buffer<uint32_t>(memory, most_children + 8);
+  }
+
+  SubDagSummary run() {
+    SubDagSummary summary{tables_.counts().voxels, tables_.counts().nodes, tables_.bricks().size(),
+                          0};
+    if (hash_bits_ < 64) cut_hashes();
+    emit_bricks();
+    summary.root_hash = cut_hash(hash_brick(hashes_[0]), hash_bits_);
+    for (int s = kBrickLevels + 1; s <= tables_.size_log2(); ++s) {
+      emit_nodes(s);
+      summary.dag_nodes += tables_.nodes(s).size();
+      summary.root_hash = hashes_[0];
+    }
+    return summary;
+  }
+
+ private:
+  // Makes the hashes of all records those of --hash-bits, from the bricks up.
+  void cut_hashes() {
+    Buffer<uint64_t> brick_hashes(tables_.memory(), tables_.bricks().size());
+    tables_.bricks().for_each([&](uint64_t mask, uint32_t id) {
+      brick_hashes[id] = cut_hash(hash_brick(mask), hash_bits_);
+    });
+    for (int s = kBrickLevels + 1; s <= tables_.size_log2(); ++s)
+      tables_.nodes(s).for_each_record([&](NodeTable::Record record) {
+        uint64_t hash = node_hash_begin(record.mask());
+        for (int i = 0; i < record.child_count(); ++i) {
+          const uint32_t child = record.children()[i];
+          hash = node_hash_add(hash, s == kBrickLevels + 1
+                                         ? brick_hashes[child]
+                                         : tables_.nodes(s - 1).record(child).hash());
+        }
+        record.set_hash(cut_hash(node_hash_end(hash), hash_bits_));
+      });
+  }
+
+  void emit_bricks() {
+    const std::span<const BrickTable::Slot> slots = tables_.bricks().sort_slots(hash_bits_);
+    for (uint32_t i = 0; i < slots.size(); ++i) {
+      hashes_[i] = slots[i].mask;
+      brick_places_[slots[i].id] = i;
+    }
+    sink_.bricks({std::span(hashes_.data(), slots.size())});
+  }
+
+  void place_children(int size_log2) {
+    NodeTable& table = tables_.nodes(size_log2);
+    if (size_log2 == kBrickLevels + 1) {
+      table.for_each_record([&](NodeTable::Record record) {
+        for (int i = 0; i < record.child_count(); ++i)
+          record.children()[i] = brick_places_[record.children()[i]];
+      });
+      return;
+    }
+    NodeTable& below = tables_.nodes(size_log2 - 1);
+    table.for_each_record([&](NodeTable::Record record) {
+      for (int i = 0; i < record.child_count(); ++i)
+        record.children()[i] = below.record(record.children()[i]).place();
+    });
+  }
+
+  void emit_nodes(int size_log2) {
+    NodeTable& table = tables_.nodes(size_log2);
+    place_children(size_log2);
+    const std::span<const uint64_t> slots = table.sort_slots(hash_bits_ < 64);
+    size_t at = 0;
+    for (uint32_t i = 0; i < slots.size(); ++i) {
+      if (i + kPrefetchAhead < slots.size())
+        __builtin_prefetch(table.record(static_cast<uint32_t>(slots[i + kPrefetchAhead])).words, 1);
+      NodeTable::Record record = table.record(static_cast<uint32_t>(slots[i]));
+      hashes_[i] = record.hash();
+      masks_[i] = static_cast<uint8_t>(record.mask());
+      // Always eight: what is too many is overwritten by the next node. Tables and arrays have
+      // room.
+      std::memcpy(&children_[at], record.children(), 8 * sizeof(uint32_t));
+      at += record.child_count();
+      record.set_place(i);
+    }
+    sink_.nodes({grid_levels_ - static_cast<uint32_t>(size_log2),
+                 std::span(hashes_.data(), slots.size()), std::span(masks_.data(), slots.size()),
+                 std::span(children_.data(), at)});
+  }
+
+  SubDagTables& tables_;
+  const uint32_t grid_levels_;
+  const uint32_t hash_bits_;
+  SubDagSink& sink_;
+  Buffer<uint32_t> brick_places_;  // by brick id
+  Buffer<uint64_t> hashes_;        // of a level's nodes; masks of the bricks
+  Buffer<uint8_t> masks_;
+  Buffer<uint32_t> children_;
+};
+
+}  // namespace
+
+SubDagSummary emit_levels(SubDagTables& tables, uint32_t grid_levels, uint32_t hash_bits,
+                          SubDagSink& sink) {
+  if (tables.bricks().size() == 0) return {};
+  return LevelEmitter(tables, grid_levels, hash_bits, sink).run();
+}
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,124 @@
+// The unique nodes of one level of one subvolume: hash-consing.
+//
+//   slots     [tag | id]  [tag | id] ...           8 bytes each; tag: upper half of the node's hash
+//   records   hash (2 words), child mask, children        words of 32 bits; id = word of its start
+//
+// Slots are indexed by the top bits of the hash and probed linearly. So growing is one streaming
+// pass over the tags, and the slots from first to last are almost in the order of the hash: the
+// level array is made by sorting a nearly sorted array (sort_slots()). A record stays where it is,
+// and neighbours in space are neighbours in memory.
+// Not thread-safe. Throws Outgrown when the budget, or 2^32 words, cannot hold more.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/backend/cpu/memory.h"
+#include "core/backend/cpu/tables/child_mask.h"
+
+namespace voxdag::cpu {
+
+// [count]: all ones in the first words.
+struct FirstWords {
+  alignas(32) uint32_t of[9][8] = {};
+  constexpr FirstWords() {
+    for (int count = 0; count <= 8; ++count)
+      for (int i = 0; i < count; ++i) of[count][i] = UINT32_MAX;
+  }
+};
+inline constexpr FirstWords kFirstWords;
+
+class NodeTable {
+ public:
+  // A record, in place. Once its level is emitted its place in the level array stands where the
+  // low half of its hash was.
+  struct Record {
+    static constexpr uint32_t kWords = 3;  // before the children
+
+    uint32_t* words;
+    uint64_t hash() const { return words[0] | uint64_t{words[1]} << 32; }
+    void set_hash(uint64_t hash) {
+      words[0] = static_cast<uint32_t>(hash);
+      words[1] = static_cast<uint32_t>(hash >> 32);
+    }
+    uint32_t place() const { return words[0]; }
+    void set_place(uint32_t index) { words[0] = index; }
+    uint32_t mask() const { return words[2]; }
+    uint32_t* children() { return words + kWords; }
+    int child_count() const { return child_count_of(mask()); }
+  };
+
+  explicit NodeTable(Memory& memory) : memory_(memory) {}
+
+  uint64_t size() const { return count_; }
+  uint64_t total_children() const { return used_ - count_ * Record::kWords; }
+  Record record(uint32_t id) { return {&records_[id]}; }
+
+  // Makes room for `more` nodes; must precede the calls below. Eight children can be read from any
+  // record, however many it has.
+  void reserve(uint64_t more) {
+    if (count_ + more > capacity_) grow_slots(count_ + more);
+    const uint64_t words = kFirstId + used_ + more * (Record::kWords + 8);
+    if (words > records_.size()) grow_records(words);
+  }
+
+  void prefetch_slot(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
+  // The record that lookup() will most likely look at.
+  void prefetch_record(uint64_t hash) const {
+    __builtin_prefetch(&records_[static_cast<uint32_t>(slots_[hash >> shift_])]);
+  }
+
+  // The id of a node: its mask, not 0, and its popcount(mask) children, of which eight can be read
+  // however many there are. `hash` is its hash.
+  uint32_t find_or_add(uint64_t hash, uint32_t mask, const uint32_t* children, int child_count) {
+    uint64_t at = hash >> shift_;
+    while (const uint64_t slot = slots_[at]) {
+      const uint32_t id = static_cast<uint32_t>(slot);
+      if (slot >> 32 == hash >> 32 && is_node(id, mask, children, child_count)) return id;
+      at = (at + 1) & (slots_.size() - 1);
+    }
+    return add(at, hash, mask, children, child_count);
+  }
+
+  // Calls visit(Record) for every node in the order in which they were added.
+  template <class Visit>
+  void for_each_record(Visit visit) {
+    for (uint64_t at = kFirstId; at < used_ + kFirstId;) {
+      Record found = record(static_cast<uint32_t>(at));
+      visit(found);
+      at += Record::kWords + found.child_count();
+    }
+  }
+
+  // All slots in use; the lower half of each is an id. In the order of (hash, mask, children) of
+  // the records, whose hashes are those that they were added with unless `hashes_changed`. Ends the
+  // table's life as a table.
+  std::span<const uint64_t> sort_slots(bool hashes_changed);
+
+ private:
+  static constexpr uint64_t kFirstId = 1;  // so that no slot in use is 0
+
+  bool is_node(uint32_t id, uint32_t mask, const uint32_t* children, int child_count) const {
+    const uint32_t* words = &records_[id + 2];
+    // All eight at once: the processor would often guess wrong where the children end.
+    const uint32_t(&compared)[8] = kFirstWords.of[child_count];
+    uint32_t differ = words[0] ^ mask;
+    for (int i = 0; i < 8; ++i) differ |= (words[1 + i] ^ children[i]) & compared[i];
+    return differ == 0;
+  }
+  uint32_t add(uint64_t at, uint64_t hash, uint32_t mask, const uint32_t* children,
+               int child_count);
+  void grow_slots(uint64_t nodes);
+  void grow_records(uint64_t words);
+  bool less(uint64_t slot_a, uint64_t slot_b);
+
+  Memory& memory_;
+  Buffer<uint64_t> slots_;  // 0: free
+  Buffer<uint32_t> records_;
+  uint64_t capacity_ = 0;
+  int shift_ = 64;  // index of a hash = hash >> shift_
+  uint64_t count_ = 0;
+  uint64_t used_ = 0;  // words of records, from kFirstId on
+};
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,94 @@
+// From the bricks of a tile to one node, level by level. Blocks that were there before are known as
+// a whole. All other nodes of a level are hashed, then their slots and records fetched ahead, then
+// looked up, so that waits for memory overlap.
+//
+// Which cubes of a level exist is a bit set in Morton order: its bytes are the child masks of the
+// nodes above, and which bytes are not 0 is the bit set of the next level.
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/memo/block_memo.h"
+#include "core/backend/cpu/raster/tile_bricks.h"
+#include "core/backend/cpu/tables/child_mask.h"
+#include "core/backend/cpu/tables/sub_dag_tables.h"
+
+namespace voxdag::cpu {
+
+class TileReducer {
+ public:
+  TileReducer(SubDagTables& tables, const Kernels& kernels)
+      : tables_(tables), kernels_(kernels), memo_(tables.memory()) {}
+
+  // The node of a tile of 2^size_log2 voxels; its octree nodes and voxels are added to the tables'
+  // counts. Leaves the tile empty.
+  NodeRef reduce_bricks(TileBricks& tile, int size_log2);
+
+  // The same for a cube whose nodes of 2^from_log2 voxels are known: those whose bits are set in
+  // `existing`, in Morton order; next(m) gives the id and hash of the m-th. They are counted
+  // already.
+  template <class Next>
+  NodeRef reduce_nodes(const uint64_t* existing, int from_log2, int size_log2, Next next) {
+    const int words = words_of(size_log2 - from_log2);
+    int count = 0;
+    for (int w = 0; w < words; ++w) {
+      existing_.words[w] = existing[w];
+      for (uint64_t rest = existing[w]; rest != 0; rest &= rest - 1) {
+        const auto& node = next(64 * w + lowest_bit(rest));
+        ids_[count] = node.id;
+        hashes_[count++] = node.hash;
+      }
+    }
+    return reduce(words, count, from_log2, size_log2);
+  }
+
+ private:
+  // Nodes that are looked up together: child masks, and where their children begin in a list.
+  struct Parents {
+    int count = 0, children = 0;
+    uint16_t first_child[kTileBlocks];
+    uint8_t masks[kTileBlocks];
+
+    void add(uint32_t mask) {
+      masks[count] = static_cast<uint8_t>(mask);
+      first_child[count++] = static_cast<uint16_t>(children);
+      children += child_count_of(mask);
+    }
+  };
+
+  // Words of the bit set of all cubes `levels` levels below one.
+  static int words_of(int levels) { return levels > 2 ? 1 << (3 * levels - 6) : 1; }
+  // Ids and hashes of the blocks listed, the tile's memory of them cleared.
+  void find_blocks(TileBricks& tile, int count);
+  void find_new_blocks(TileBricks& tile, int count, bool remember);
+  NodeRef reduce(int words, int count, int from_log2, int size_log2);
+  // Children's hashes and ids make way for the parents'.
+  static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
+
+  static constexpr int kMostBricks = kTileBlocks * kBlockBricks;
+  static constexpr int kChildren = 8;  // that can be read wherever those of a node begin
+
+  SubDagTables& tables_;
+  const Kernels& kernels_;
+  BlockMemo memo_;
+  // The current level: which cubes exist, and their ids and hashes, one after the other.
+  union {
+    uint64_t words[kTileBlocks / 64];
+    uint8_t bytes[kTileBlocks / 8];
+  } existing_;
+  uint32_t ids_[kTileBlocks + kChildren] = {};
+  uint64_t hashes_[kTileBlocks];
+  Parents parents_;  // the level above
+  // Blocks of a tile: numbers and keys, and which of them (by place in this list) are new.
+  uint16_t blocks_[kTileBlocks + 1];
+  uint64_t keys_[kTileBlocks + 1];
+  uint16_t new_blocks_[kTileBlocks];
+  uint16_t new_voxels_[kTileBlocks];
+  // Bricks of the new blocks.
+  uint64_t bricks_[kMostBricks];
+  uint64_t brick_hashes_[kMostBricks];
+  uint32_t brick_ids_[kMostBricks + kChildren] = {};
+};
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,62 @@
+// The DAG of a subvolume in a space: levels as DESIGN's level arrays, in the total order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/backend/parallel/dag/octree.h"
+#include "core/backend/parallel/space.h"
+#include "core/dag/node_hash.h"
+
+namespace voxdag::parallel {
+
+template <class Space>
+struct DagBricks {
+  uint32_t count = 0;
+  Buffer<Space, uint64_t> masks;
+};
+
+template <class Space>
+struct DagLevel {
+  uint32_t count = 0, child_count = 0;
+  Buffer<Space, uint64_t> hashes;  // cut
+  Buffer<Space, uint8_t> masks;
+  Buffer<Space, uint32_t> children;  // positions in the level below
+};
+
+template <class Space>
+struct Dag {
+  DagBricks<Space> bricks;
+  std::vector<DagLevel<Space>> levels;  // from the bricks' parents up to the root
+  uint64_t root_hash = 0;
+
+  uint64_t node_count() const {
+    uint64_t count = bricks.count;
+    for (const auto& level : levels) count += level.count;
+    return count;
+  }
+};
+
+struct HashBrick {
+  const uint64_t* masks;
+  uint32_t hash_bits;
+  uint64_t* hashes;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    hashes[i] = cut_hash(hash_brick(masks[i]), hash_bits);
+  }
+};
+
+// Bits [64 - hash_bits, 64) are all that a cut hash has.
+inline int first_hash_bit(uint32_t hash_bits) { return 64 - static_cast<int>(hash_bits); }
+
+// How many children each of some octree nodes has: to be scanned for where they begin.
+struct CountChildren {
+  OctreeNodes nodes;
+  const uint32_t* items;
+  uint32_t* counts;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    counts[i] = static_cast<uint32_t>(popcount64(nodes.masks[items[i]]));
+  }
+};
+
+}  // namespace voxdag::parallel

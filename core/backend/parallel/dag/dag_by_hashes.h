@@ -1,0 +1,237 @@
+// The tutorial's second DAG construction: every octree node is hashed from the leaves up, then from
+// the top down each level's nodes that still have a parent are sorted by hash, doubles are dropped
+// and parents rewired. Children of dropped nodes are never looked at again, so that sorting follows
+// the largest level of the DAG, not of the octree.
+//
+// A verification sweep makes it exact: on every level every octree node, dropped or not, is
+// compared with the survivor of its hash (brick masks; above, mask and list of child hashes). If
+// all agree on all levels, equal hash implies equal subtree, by induction from the bricks: the
+// children of two equal nodes have equal hashes, so are equal. Then a level's hashes are all
+// different, and their order is the total order. Any mismatch, and the DAG is made by pointers
+// instead.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/backend/parallel/dag/dag.h"
+#include "core/backend/parallel/dag/order.h"
+#include "core/backend/parallel/thread_block.h"
+
+namespace voxdag::parallel {
+
+struct HashOctreeNode {
+  OctreeNodes nodes;
+  const uint64_t* child_hashes;  // of the octree's level below
+  uint32_t hash_bits;
+  uint64_t* hashes;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    const uint32_t mask = nodes.masks[i];
+    hashes[i] = cut_hash(hash_node(mask, child_hashes + nodes.first_child[i]), hash_bits);
+  }
+};
+
+// The octree nodes that the survivors above have as children, with their hashes.
+struct EmitCandidates {
+  OctreeNodes nodes;
+  const uint32_t* parents;  // octree nodes
+  const uint64_t* hashes;   // of the octree's level below
+  uint32_t* candidates;
+  uint64_t* candidate_hashes;
+  VOXDAG_HD void operator()(uint32_t source, uint32_t rank, uint32_t output) const {
+    const uint32_t child = nodes.first_child[parents[source]] + rank;
+    candidates[output] = child;
+    candidate_hashes[output] = hashes[child];
+  }
+};
+
+struct MarkFirstOfHash {
+  const uint64_t* candidate_hashes;
+  const uint32_t* items;
+  uint32_t* marks;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    marks[i] = i == 0 || candidate_hashes[items[i - 1]] != candidate_hashes[items[i]];
+  }
+};
+
+// original index (item) -> sorted index (i) -> compact index (marked[i + 1] - 1): survivors are
+// taken, and all candidates' places in their parents' child lists are rewired.
+struct DropDoubles {
+  const uint32_t* marked;
+  const uint32_t* items;
+  const uint32_t* candidates;
+  const uint64_t* candidate_hashes;
+  uint32_t* survivors;
+  uint64_t* hashes;
+  uint32_t* children;  // of the level above, one for each candidate
+  VOXDAG_HD void operator()(uint32_t i) const {
+    const uint32_t item = items[i], compact = marked[i + 1] - 1;
+    children[item] = compact;
+    if (marked[i + 1] == marked[i]) return;
+    survivors[compact] = candidates[item];
+    hashes[compact] = candidate_hashes[item];
+  }
+};
+
+// The position of `hash` in an ascending array, or `count`.
+VOXDAG_HD inline uint32_t find_hash(const uint64_t* hashes, uint32_t count, uint64_t hash) {
+  uint32_t begin = 0, end = count;
+  while (begin < end) {
+    const uint32_t middle = begin + (end - begin) / 2;
+    if (hashes[middle] < hash)
+      begin = middle + 1;
+    else
+      end = middle;
+  }
+  return begin < count && hashes[begin] == hash ? begin : count;
+}
+
+struct VerifyBrick {
+  const uint64_t* masks;
+  uint32_t hash_bits;
+  const uint64_t* survivor_hashes;
+  const uint32_t* survivors;
+  uint32_t survivor_count;
+  uint32_t* mismatch;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    const uint64_t hash = cut_hash(hash_brick(masks[i]), hash_bits);
+    const uint32_t at = find_hash(survivor_hashes, survivor_count, hash);
+    if (at == survivor_count || masks[survivors[at]] != masks[i]) raise_flag(mismatch);
+  }
+};
+
+struct VerifyNode {
+  OctreeNodes nodes;
+  const uint64_t* hashes;        // of the octree's level
+  const uint64_t* child_hashes;  // of the octree's level below
+  const uint64_t* survivor_hashes;
+  const uint32_t* survivors;
+  uint32_t survivor_count;
+  uint32_t* mismatch;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    const uint32_t at = find_hash(survivor_hashes, survivor_count, hashes[i]);
+    if (at == survivor_count || !same(i, survivors[at])) raise_flag(mismatch);
+  }
+  VOXDAG_HD bool same(uint32_t a, uint32_t b) const {
+    if (nodes.masks[a] != nodes.masks[b]) return false;
+    const uint64_t* of_a = child_hashes + nodes.first_child[a];
+    const uint64_t* of_b = child_hashes + nodes.first_child[b];
+    const int count = popcount64(nodes.masks[a]);
+    for (int rank = 0; rank < count; ++rank)
+      if (of_a[rank] != of_b[rank]) return false;
+    return true;
+  }
+};
+
+// Hashes of all octree nodes: [0] of the bricks, [l + 1] of tree.levels[l].
+template <class Space>
+std::vector<Buffer<Space, uint64_t>> hash_octree(Space& space, const Octree<Space>& tree,
+                                                 uint32_t hash_bits) {
+  std::vector<Buffer<Space, uint64_t>> hashes;
+  hashes.emplace_back(space, tree.brick_count);
+  space.for_each(tree.brick_count, HashBrick{tree.brick_masks.data(), hash_bits, hashes[0].data()});
+  for (const OctreeLevel<Space>& level : tree.levels) {
+    Buffer<Space, uint64_t> here(space, level.count);
+    space.for_each(level.count, HashOctreeNode{{level.first_child.data(), level.masks.data()},
+                                               hashes.back().data(),
+                                               hash_bits,
+                                               here.data()});
+    hashes.push_back(std::move(here));
+  }
+  return hashes;
+}
+
+// What remains of one level of the octree.
+template <class Space>
+struct Survivors {
+  uint32_t count = 0;
+  Buffer<Space, uint32_t> nodes;   // octree nodes, in the order of their hashes
+  Buffer<Space, uint64_t> hashes;  // ascending, all different
+};
+
+// The children of `parents`, doubles dropped; `level` gets mask and child list of each parent.
+template <class Space>
+Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
+                                 const Survivors<Space>& parents, const uint64_t* octree_hashes,
+                                 uint32_t hash_bits, DagLevel<Space>& level) {
+  level.count = parents.count;
+  level.masks = Buffer<Space, uint8_t>(space, parents.count);
+  space.for_each(parents.count,
+                 Gather<uint8_t>{parents.nodes.data(), nodes.masks, level.masks.data()});
+  Buffer<Space, uint32_t> offsets(space, parents.count + 1);
+  space.for_each(parents.count, CountChildren{nodes, parents.nodes.data(), offsets.data()});
+  space.scan(offsets.data(), parents.count);
+  const uint32_t n = level.child_count = space.value(offsets.data() + parents.count);
+  Buffer<Space, uint32_t> candidates(space, n);
+  Buffer<Space, uint64_t> candidate_hashes(space, n);
+  space.expand(offsets.data(), 0, parents.count, n,
+               EmitCandidates{nodes, parents.nodes.data(), octree_hashes, candidates.data(),
+                              candidate_hashes.data()});
+  offsets = {};
+
+  Order<Space> order(space, n);
+  order.sort_by(KeyAt{candidate_hashes.data()}, first_hash_bit(hash_bits), 64);
+  Buffer<Space, uint32_t> marked(space, n + 1);
+  space.for_each(n, MarkFirstOfHash{candidate_hashes.data(), order.items(), marked.data()});
+  space.scan(marked.data(), n);
+  Survivors<Space> out;
+  out.count = space.value(marked.data() + n);
+  out.nodes = Buffer<Space, uint32_t>(space, out.count);
+  out.hashes = Buffer<Space, uint64_t>(space, out.count);
+  level.children = Buffer<Space, uint32_t>(space, n);
+  space.for_each(
+      n, DropDoubles{marked.data(), order.items(), candidates.data(), candidate_hashes.data(),
+                     out.nodes.data(), out.hashes.data(), level.children.data()});
+  return out;
+}
+
+// The octree's root, as the only survivor of its level.
+template <class Space>
+Survivors<Space> surviving_root(Space& space, const Buffer<Space, uint64_t>& root_hash) {
+  Survivors<Space> root;
+  root.count = 1;
+  root.nodes = Buffer<Space, uint32_t>(space, 1);
+  root.hashes = Buffer<Space, uint64_t>(space, 1);
+  space.for_each(1, CountUp{root.nodes.data()});
+  space.copy(root_hash.data(), root.hashes.data(), 1);
+  return root;
+}
+
+// Nothing if two different nodes have the same hash.
+template <class Space>
+std::optional<Dag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& tree,
+                                             uint32_t hash_bits) {
+  auto hashes = hash_octree(space, tree, hash_bits);
+  Buffer<Space, uint32_t> mismatch(space, 1);
+  const uint32_t none = 0;
+  space.upload(&none, mismatch.data(), 1);
+  Survivors<Space> survivors = surviving_root(space, hashes.back());
+  Dag<Space> dag;
+  dag.root_hash = space.value(survivors.hashes.data());
+  dag.levels.resize(tree.levels.size());
+  for (size_t l = tree.levels.size(); l-- > 0;) {
+    const OctreeLevel<Space>& level = tree.levels[l];
+    const OctreeNodes nodes{level.first_child.data(), level.masks.data()};
+    space.for_each(level.count, VerifyNode{nodes, hashes[l + 1].data(), hashes[l].data(),
+                                           survivors.hashes.data(), survivors.nodes.data(),
+                                           survivors.count, mismatch.data()});
+    hashes.pop_back();
+    Survivors<Space> below =
+        reduce_children(space, nodes, survivors, hashes[l].data(), hash_bits, dag.levels[l]);
+    dag.levels[l].hashes = std::move(survivors.hashes);
+    survivors = std::move(below);
+  }
+  space.for_each(tree.brick_count,
+                 VerifyBrick{tree.brick_masks.data(), hash_bits, survivors.hashes.data(),
+                             survivors.nodes.data(), survivors.count, mismatch.data()});
+  if (space.value(mismatch.data()) != 0) return std::nullopt;
+  dag.bricks.count = survivors.count;
+  dag.bricks.masks = Buffer<Space, uint64_t>(space, survivors.count);
+  space.for_each(survivors.count, Gather<uint64_t>{survivors.nodes.data(), tree.brick_masks.data(),
+                                                   dag.bricks.masks.data()});
+  return dag;
+}
+
+}  // namespace voxdag::parallel

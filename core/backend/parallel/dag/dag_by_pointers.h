@@ -1,0 +1,248 @@
+// The tutorial's first DAG construction, bottom-up: the nodes of a level are sorted by their (up to
+// eight) child pointers, equal neighbours become one node, and parents are rewired through
+//
+//     original index -> sorted index -> compact index
+//
+// Exact without hashes. Here child pointers already count in the total order of the level below, so
+// nodes sorted by (child pointers, then stably by hash) are in the total order of theirs.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <utility>
+
+#include "core/backend/parallel/dag/dag.h"
+#include "core/backend/parallel/dag/order.h"
+
+namespace voxdag::parallel {
+
+// One level reduced: which octree nodes remain and what became of the others.
+template <class Space>
+struct Reduced {
+  uint32_t count = 0;
+  Buffer<Space, uint32_t> survivors;  // octree nodes, in the total order
+  Buffer<Space, uint64_t> hashes;     // of the survivors
+  Buffer<Space, uint32_t> index_of;   // of each octree node: its survivor's position
+};
+
+// A level's nodes as child lists of the level below, already reduced.
+struct LinkedNodes {
+  OctreeNodes nodes;
+  const uint32_t* index_of;  // of the octree nodes below
+
+  VOXDAG_HD uint32_t child(uint32_t node, uint32_t rank) const {
+    return index_of[nodes.first_child[node] + rank];
+  }
+  // 0 where there is no child, otherwise its position + 1.
+  VOXDAG_HD uint64_t pointer(uint32_t node, uint32_t slot) const {
+    const uint32_t mask = nodes.masks[node];
+    if (!(mask >> slot & 1)) return 0;
+    return uint64_t{child(node, static_cast<uint32_t>(popcount64(mask & ((1u << slot) - 1))))} + 1;
+  }
+};
+
+// As many child pointers, of `bits` bits each, as fit a sort key: slots [first, end), the first one
+// most significant.
+struct PointerKey {
+  LinkedNodes links;
+  uint32_t first, end;
+  int bits;
+  VOXDAG_HD uint64_t operator()(uint32_t node) const {
+    uint64_t key = 0;
+    for (uint32_t slot = first; slot < end; ++slot) key = key << bits | links.pointer(node, slot);
+    return key;
+  }
+};
+
+struct MaskKey {
+  const uint8_t* masks;
+  VOXDAG_HD uint64_t operator()(uint32_t node) const { return masks[node]; }
+};
+
+struct SameBrick {
+  const uint64_t* masks;
+  VOXDAG_HD bool operator()(uint32_t a, uint32_t b) const { return masks[a] == masks[b]; }
+};
+
+struct SameNode {
+  LinkedNodes links;
+  VOXDAG_HD bool operator()(uint32_t a, uint32_t b) const {
+    const uint32_t mask = links.nodes.masks[a];
+    if (mask != links.nodes.masks[b]) return false;
+    const uint32_t count = static_cast<uint32_t>(popcount64(mask));
+    for (uint32_t rank = 0; rank < count; ++rank)
+      if (links.child(a, rank) != links.child(b, rank)) return false;
+    return true;
+  }
+};
+
+// 1 where a sorted item differs from the one before.
+template <class Same>
+struct MarkFirstOfEquals {
+  Same same;
+  const uint32_t* items;
+  uint32_t* marks;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    marks[i] = i == 0 || !same(items[i - 1], items[i]);
+  }
+};
+
+// With marks scanned, sorted position i belongs to group marked[i + 1] - 1.
+struct TakeFirstOfEquals {
+  const uint32_t* marked;
+  const uint32_t* items;
+  uint32_t* firsts;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    if (marked[i + 1] != marked[i]) firsts[marked[i]] = items[i];
+  }
+};
+
+struct RewireThroughGroups {
+  const uint32_t* marked;
+  const uint32_t* items;
+  const uint32_t* place_of_group;
+  uint32_t* index_of;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    index_of[items[i]] = place_of_group[marked[i + 1] - 1];
+  }
+};
+
+struct HashSurvivorBrick {
+  const uint64_t* masks;
+  uint32_t hash_bits;
+  const uint32_t* survivors;
+  uint64_t* hashes;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    hashes[i] = cut_hash(hash_brick(masks[survivors[i]]), hash_bits);
+  }
+};
+
+struct HashSurvivorNode {
+  LinkedNodes links;
+  const uint64_t* child_hashes;  // of the survivors below
+  uint32_t hash_bits;
+  const uint32_t* survivors;
+  uint64_t* hashes;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    const uint32_t node = survivors[i], mask = links.nodes.masks[node];
+    const uint32_t count = static_cast<uint32_t>(popcount64(mask));
+    uint64_t hash = node_hash_begin(mask);
+    for (uint32_t rank = 0; rank < count; ++rank)
+      hash = node_hash_add(hash, child_hashes[links.child(node, rank)]);
+    hashes[i] = cut_hash(node_hash_end(hash), hash_bits);
+  }
+};
+
+struct EmitChildren {
+  LinkedNodes links;
+  const uint32_t* survivors;
+  uint32_t* children;
+  VOXDAG_HD void operator()(uint32_t source, uint32_t rank, uint32_t output) const {
+    children[output] = links.child(survivors[source], rank);
+  }
+};
+
+// `order` has equal items side by side, ascending by all of the total order but the hash. `hash`
+// makes a functor that hashes survivors: hash(survivors, hashes).
+template <class Space, class Same, class MakeHash>
+Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same, uint32_t hash_bits,
+                             MakeHash hash) {
+  const uint32_t n = order.count();
+  Buffer<Space, uint32_t> marked(space, n + 1);
+  space.for_each(n, MarkFirstOfEquals<Same>{same, order.items(), marked.data()});
+  space.scan(marked.data(), n);
+  Reduced<Space> out;
+  out.count = space.value(marked.data() + n);
+  Buffer<Space, uint32_t> firsts(space, out.count);
+  space.for_each(n, TakeFirstOfEquals{marked.data(), order.items(), firsts.data()});
+  Buffer<Space, uint64_t> hashes(space, out.count);
+  space.for_each(out.count, hash(firsts.data(), hashes.data()));
+
+  Order<Space> by_hash(space, out.count);
+  by_hash.sort_by(KeyAt{hashes.data()}, first_hash_bit(hash_bits), 64);
+  out.survivors = Buffer<Space, uint32_t>(space, out.count);
+  out.hashes = Buffer<Space, uint64_t>(space, out.count);
+  space.for_each(out.count, Gather<uint32_t>{by_hash.items(), firsts.data(), out.survivors.data()});
+  space.for_each(out.count, Gather<uint64_t>{by_hash.items(), hashes.data(), out.hashes.data()});
+  const Buffer<Space, uint32_t> place_of_group = by_hash.places();
+  out.index_of = Buffer<Space, uint32_t>(space, n);
+  space.for_each(n, RewireThroughGroups{marked.data(), order.items(), place_of_group.data(),
+                                        out.index_of.data()});
+  return out;
+}
+
+template <class Space>
+Reduced<Space> reduce_bricks(Space& space, const Octree<Space>& tree, uint32_t hash_bits) {
+  const uint64_t* masks = tree.brick_masks.data();
+  Order<Space> order(space, tree.brick_count);
+  order.sort_by(KeyAt{masks}, 0, 64);
+  return reduce_sorted(space, order, SameBrick{masks}, hash_bits,
+                       [&](const uint32_t* survivors, uint64_t* hashes) {
+                         return HashSurvivorBrick{masks, hash_bits, survivors, hashes};
+                       });
+}
+
+// `child_hashes`: of the level below, `child_count` nodes.
+template <class Space>
+Reduced<Space> reduce_nodes(Space& space, uint32_t node_count, const LinkedNodes& links,
+                            const uint64_t* child_hashes, uint32_t child_count,
+                            uint32_t hash_bits) {
+  Order<Space> order(space, node_count);
+  const int bits = std::bit_width(child_count);  // of 0 (none) to child_count
+  const uint32_t slots = std::min(8u, 64u / static_cast<uint32_t>(bits));
+  for (uint32_t end = 8; end > 0;) {
+    const uint32_t first = end > slots ? end - slots : 0;
+    order.sort_by(PointerKey{links, first, end, bits}, 0, bits * static_cast<int>(end - first));
+    end = first;
+  }
+  order.sort_by(MaskKey{links.nodes.masks}, 0, 8);
+  return reduce_sorted(space, order, SameNode{links}, hash_bits,
+                       [&](const uint32_t* survivors, uint64_t* hashes) {
+                         return HashSurvivorNode{links, child_hashes, hash_bits, survivors, hashes};
+                       });
+}
+
+// The level array of the nodes that remain.
+template <class Space>
+DagLevel<Space> make_level(Space& space, const LinkedNodes& links, Reduced<Space>& reduced) {
+  DagLevel<Space> level;
+  const uint32_t* survivors = reduced.survivors.data();
+  level.count = reduced.count;
+  level.hashes = std::move(reduced.hashes);
+  level.masks = Buffer<Space, uint8_t>(space, level.count);
+  space.for_each(level.count, Gather<uint8_t>{survivors, links.nodes.masks, level.masks.data()});
+  Buffer<Space, uint32_t> offsets(space, level.count + 1);
+  space.for_each(level.count, CountChildren{links.nodes, survivors, offsets.data()});
+  space.scan(offsets.data(), level.count);
+  level.child_count = space.value(offsets.data() + level.count);
+  level.children = Buffer<Space, uint32_t>(space, level.child_count);
+  space.expand(offsets.data(), 0, level.count, level.child_count,
+               EmitChildren{links, survivors, level.children.data()});
+  return level;
+}
+
+template <class Space>
+Dag<Space> make_dag_by_pointers(Space& space, const Octree<Space>& tree, uint32_t hash_bits) {
+  Dag<Space> dag;
+  Reduced<Space> reduced = reduce_bricks(space, tree, hash_bits);
+  dag.bricks.count = reduced.count;
+  dag.bricks.masks = Buffer<Space, uint64_t>(space, reduced.count);
+  space.for_each(reduced.count, Gather<uint64_t>{reduced.survivors.data(), tree.brick_masks.data(),
+                                                 dag.bricks.masks.data()});
+  const Buffer<Space, uint64_t> brick_hashes = std::move(reduced.hashes);
+  const uint64_t* child_hashes = brick_hashes.data();
+  for (const OctreeLevel<Space>& level : tree.levels) {
+    const LinkedNodes links{{level.first_child.data(), level.masks.data()},
+                            reduced.index_of.data()};
+    Reduced<Space> here =
+        reduce_nodes(space, level.count, links, child_hashes, reduced.count, hash_bits);
+    dag.levels.push_back(make_level(space, links, here));
+    child_hashes = dag.levels.back().hashes.data();
+    reduced = std::move(here);
+  }
+  dag.root_hash = space.value(child_hashes);
+  return dag;
+}
+
+}  // namespace voxdag::parallel

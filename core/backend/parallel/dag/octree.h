@@ -1,0 +1,99 @@
+// The octree of a subvolume from its sorted brick codes, bottom-up, as in the tutorial: mark the
+// first child of each parent, prefix sum, child masks and pointers, level by level.
+//
+// Codes are sorted, so the children of a node lie side by side in the level below: a node is its
+// child mask and the position of its first child.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "core/backend/parallel/space.h"
+#include "core/backend/parallel/voxelize/brick_list.h"
+
+namespace voxdag::parallel {
+
+template <class Space>
+struct OctreeLevel {
+  uint32_t count = 0;
+  Buffer<Space, uint32_t> first_child;
+  Buffer<Space, uint8_t> masks;
+};
+
+// What functors see of a level of the octree.
+struct OctreeNodes {
+  const uint32_t* first_child;
+  const uint8_t* masks;
+};
+
+template <class Space>
+struct Octree {
+  uint32_t brick_count = 0;
+  Buffer<Space, uint64_t> brick_masks;
+  std::vector<OctreeLevel<Space>> levels;  // from the bricks' parents up to the root
+
+  uint64_t node_count() const {
+    uint64_t count = brick_count;
+    for (const auto& level : levels) count += level.count;
+    return count;
+  }
+};
+
+struct MarkFirstChild {
+  const uint64_t* codes;
+  uint8_t* flags;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    flags[i] = i == 0 || codes[i] >> 3 != codes[i - 1] >> 3;
+  }
+};
+
+// Child mask and code of the node whose children begin at first_child[i].
+struct MakeParent {
+  const uint64_t* codes;
+  uint32_t child_count, parent_count;  // of the whole levels
+  const uint32_t* first_child;
+  uint8_t* masks;
+  uint64_t* parent_codes;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    const uint32_t first = first_child[i];
+    const uint32_t end = i + 1 < parent_count ? first_child[i + 1] : child_count;
+    uint32_t mask = 0;
+    for (uint32_t c = first; c < end; ++c) mask |= 1u << (codes[c] & 7);
+    masks[i] = static_cast<uint8_t>(mask);
+    parent_codes[i] = codes[first] >> 3;
+  }
+};
+
+// `level_count` levels above the bricks. The list is merged and not empty, and given up.
+template <class Space>
+Octree<Space> make_octree(Space& space, BrickList<Space>& bricks, uint32_t level_count) {
+  Octree<Space> tree;
+  tree.brick_count = bricks.size();
+  Buffer<Space, uint64_t> codes = bricks.take_codes();
+  tree.brick_masks = bricks.take_masks();
+  uint32_t child_count = tree.brick_count;
+  for (uint32_t l = 0; l < level_count; ++l) {
+    Buffer<Space, uint32_t> first_child(space, child_count);
+    OctreeLevel<Space> level;
+    {
+      Buffer<Space, uint8_t> flags(space, child_count);
+      space.for_each(child_count, MarkFirstChild{codes.data(), flags.data()});
+      level.count = space.select(flags.data(), child_count, first_child.data());
+    }
+    level.first_child = Buffer<Space, uint32_t>(space, level.count);
+    space.copy(first_child.data(), level.first_child.data(), level.count);
+    first_child = {};
+    level.masks = Buffer<Space, uint8_t>(space, level.count);
+    Buffer<Space, uint64_t> parent_codes(space, level.count);
+    space.for_each(level.count,
+                   MakeParent{codes.data(), child_count, level.count, level.first_child.data(),
+                              level.masks.data(), parent_codes.data()});
+    codes = std::move(parent_codes);
+    child_count = level.count;
+    tree.levels.push_back(std::move(level));
+  }
+  return tree;
+}
+
+}  // namespace voxdag::parallel

@@ -1,0 +1,217 @@
+// Voxelization by work expansion: (triangle, cube) pairs, handed from a cube to the children that
+// the triangle touches, level by level, by count -> scan -> emit.
+//
+// Each level has a frame of fixed size. A frame that is full is handed on in slices that the next
+// one can hold, deepest first, so that memory is bounded whatever the triangles are.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "core/backend/backend.h"
+#include "core/backend/parallel/space.h"
+#include "core/backend/parallel/voxelize/touched_cells.h"
+#include "core/dag/brick.h"
+
+namespace voxdag::parallel {
+
+// The position of the set bit that has `rank` set bits below it.
+VOXDAG_HD inline int select_bit(uint64_t mask, uint32_t rank) {
+  int at = 0;
+  for (int width = 32; width > 0; width /= 2) {
+    const uint64_t low_half = mask >> at & ((uint64_t{1} << width) - 1);
+    const uint32_t below = static_cast<uint32_t>(popcount64(low_half));
+    if (rank >= below) {
+      rank -= below;
+      at += width;
+    }
+  }
+  return at;
+}
+
+// Where cubes of a subvolume lie: cube `code` of edge 2^shift units has its low corner at the
+// subvolume's origin plus (code, decoded) * 2^shift.
+struct CubePlace {
+  int64_t origin[3];
+
+  explicit CubePlace(const SubvolumeTask& task) {
+    const int64_t edge = task.cube.edge_voxels(task.grid_levels) * kUnitsPerVoxel;
+    for (int a = 0; a < 3; ++a) origin[a] = task.cube.position[a] * edge;
+  }
+  VOXDAG_HD void low(uint64_t code, int shift, int64_t (&out)[3]) const {
+    uint32_t k[3];
+    morton_decode(code, k[0], k[1], k[2]);
+    for (int a = 0; a < 3; ++a) out[a] = origin[a] + (static_cast<int64_t>(k[a]) << shift);
+  }
+};
+
+// count: the parts of each pair's cube that its triangle touches. N = 2: children, 4: a brick's
+// voxels.
+template <int N>
+struct CountParts {
+  CubePlace place;
+  int shift;  // of a part
+  const FixedTriangle* triangles;
+  const uint64_t* codes;
+  const uint32_t* pair_triangles;
+  uint64_t* parts;
+  uint32_t* counts;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    int64_t low[3];
+    place.low(codes[i], shift + (N == 2 ? 1 : 2), low);
+    parts[i] = touched_cells<N>(triangles[pair_triangles[i]], low, shift);
+    counts[i] = static_cast<uint32_t>(popcount64(parts[i]));
+  }
+};
+
+// emit: one new pair for each part. Voxels are codes alone: `out_triangles` may be null.
+struct EmitParts {
+  int code_bits;  // 3 for children, 6 for voxels of a brick
+  const uint64_t* codes;
+  const uint32_t* pair_triangles;
+  const uint64_t* parts;
+  uint64_t* out_codes;
+  uint32_t* out_triangles;
+  VOXDAG_HD void operator()(uint32_t source, uint32_t rank, uint32_t output) const {
+    out_codes[output] =
+        codes[source] << code_bits | static_cast<uint64_t>(select_bit(parts[source], rank));
+    if (out_triangles) out_triangles[output] = pair_triangles[source];
+  }
+};
+
+// The pairs to begin with: every triangle with the whole subvolume.
+struct StartPairs {
+  uint32_t first_triangle;
+  uint64_t* codes;
+  uint32_t* pair_triangles;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    codes[i] = 0;
+    pair_triangles[i] = first_triangle + i;
+  }
+};
+
+// The end of the longest slice of sources, from `first` on, with at most `room` outputs; and how
+// many outputs it has.
+struct FindSlice {
+  const uint32_t* offsets;
+  uint32_t first, count, room;
+  uint32_t* answer;  // [2]
+  VOXDAG_HD void operator()(uint32_t) const {
+    uint32_t last = first, end = count + 1;
+    while (end - last > 1) {
+      const uint32_t middle = last + (end - last) / 2;
+      (offsets[middle] - offsets[first] <= room ? last : end) = middle;
+    }
+    answer[0] = last;
+    answer[1] = offsets[last] - offsets[first];
+  }
+};
+
+// Where the pairs of the last level go.
+struct PairSpan {
+  uint64_t* codes;
+  uint32_t* triangles;  // null where only codes are wanted
+  uint32_t room;
+};
+
+template <class Space>
+class PairExpansion {
+ public:
+  // Pairs are handed down `depths` levels from the subvolume; if `to_voxels`, bricks lie there, and
+  // one step more makes the pairs voxels. `window`: pairs a frame holds, at least 64.
+  PairExpansion(Space& space, const SubvolumeTask& task, int depths, bool to_voxels,
+                uint32_t window)
+      : space_(space),
+        place_(task),
+        top_shift_(static_cast<int>(task.grid_levels - task.cube.level) + kUnitBits),
+        to_voxels_(to_voxels),
+        window_(window),
+        slice_(space, 2) {
+    for (int i = 0; i < depths + (to_voxels ? 1 : 0); ++i) frames_.emplace_back(space, window);
+  }
+
+  static constexpr uint64_t kBytesPerPair = sizeof(uint64_t) * 2 + sizeof(uint32_t) * 2;
+  uint32_t window() const { return window_; }
+
+  // `out` says where pairs go: PairSpan out.span() for the next ones, out.took(n) when n are there,
+  // out.flush() when there was no room for any. Triangles [first, last) of `triangles`, as many as
+  // the window holds at most.
+  template <class Out>
+  void run(const FixedTriangle* triangles, uint32_t first, uint32_t last, Out& out) {
+    triangles_ = triangles;
+    Frame& top = frames_[0];
+    space_.for_each(last - first, StartPairs{first, top.codes.data(), top.pair_triangles.data()});
+    hand_on(0, last - first, out);
+  }
+
+ private:
+  struct Frame {
+    Frame(Space& space, uint32_t window)
+        : codes(space, window),
+          parts(space, window),
+          pair_triangles(space, window),
+          offsets(space, window + 1) {}
+    Buffer<Space, uint64_t> codes, parts;
+    Buffer<Space, uint32_t> pair_triangles, offsets;
+  };
+  struct Slice {
+    uint32_t end, outputs;
+  };
+
+  bool is_last(size_t depth) const { return depth + 1 == frames_.size(); }
+  bool makes_voxels(size_t depth) const { return to_voxels_ && is_last(depth); }
+
+  template <int N>
+  void count_parts(Frame& f, int shift, uint32_t count) {
+    space_.for_each(
+        count, CountParts<N>{place_, shift, triangles_, f.codes.data(), f.pair_triangles.data(),
+                             f.parts.data(), f.offsets.data()});
+  }
+
+  template <class Out>
+  void hand_on(size_t depth, uint32_t count, Out& out) {
+    Frame& f = frames_[depth];
+    const int shift = top_shift_ - static_cast<int>(depth);
+    makes_voxels(depth) ? count_parts<4>(f, shift - 2, count) : count_parts<2>(f, shift - 1, count);
+    space_.scan(f.offsets.data(), count);
+    for (uint32_t first = 0; first < count;) {
+      const PairSpan to = is_last(depth) ? out.span() : next_frame(depth);
+      const Slice slice = find_slice(f, first, count, to.room);
+      if (slice.outputs > 0)
+        space_.expand(f.offsets.data(), first, slice.end, slice.outputs,
+                      EmitParts{makes_voxels(depth) ? 6 : 3, f.codes.data(),
+                                f.pair_triangles.data(), f.parts.data(), to.codes, to.triangles});
+      if (slice.end == first)
+        out.flush();
+      else if (is_last(depth))
+        out.took(slice.outputs);
+      else if (slice.outputs > 0)
+        hand_on(depth + 1, slice.outputs, out);
+      first = slice.end;
+    }
+  }
+
+  PairSpan next_frame(size_t depth) {
+    Frame& next = frames_[depth + 1];
+    return {next.codes.data(), next.pair_triangles.data(), window_};
+  }
+
+  Slice find_slice(Frame& f, uint32_t first, uint32_t count, uint32_t room) {
+    space_.for_each(1, FindSlice{f.offsets.data(), first, count, room, slice_.data()});
+    uint32_t answer[2];
+    space_.download(slice_.data(), answer, 2);
+    return {answer[0], answer[1]};
+  }
+
+  Space& space_;
+  const CubePlace place_;
+  const int top_shift_;  // log2 of the subvolume's edge in lattice units
+  const bool to_voxels_;
+  const uint32_t window_;
+  const FixedTriangle* triangles_ = nullptr;
+  std::vector<Frame> frames_;
+  Buffer<Space, uint32_t> slice_;
+};
+
+}  // namespace voxdag::parallel

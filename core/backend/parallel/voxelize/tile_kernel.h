@@ -1,0 +1,150 @@
+// The bricks of one tile of 64^3 voxels, drawn by one block: 4096 brick masks stay in the block's
+// shared memory while all its triangles are drawn into them, then those not empty go out in Morton
+// order.
+//
+// What is drawn are (triangle, cell) pairs, a cell being a cube of 16^3 voxels that the triangle
+// touches: one thread finds the bricks of its cell, then the voxels of each. Masks are ORed
+// together, which has no order, so the result has none.
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/parallel/thread_block.h"
+#include "core/backend/parallel/voxelize/pairs.h"
+#include "core/backend/parallel/voxelize/touched_cells.h"
+
+namespace voxdag::parallel {
+
+inline constexpr int kTileLevels = 6;  // log2 of a tile's edge in voxels
+inline constexpr int kCellLevels = 4;  // of a cell's
+inline constexpr uint32_t kTileBricks = 1u << 3 * (kTileLevels - kBrickLevels);
+inline constexpr int kTileCodeBits = 3 * (kTileLevels - kCellLevels);  // of a cell within its tile
+
+struct DrawTile {
+  static constexpr uint32_t kThreads = 256;
+  static constexpr int kBlocksAtOnce = 2;
+  static constexpr int kPhases = 5;
+  static constexpr uint32_t kRun = kTileBricks / kThreads;  // bricks that a thread sends out
+  static constexpr uint32_t kGroup = 16;                    // threads whose counts are added up
+
+  struct Shared {
+    uint64_t masks[kTileBricks + kThreads];  // at slot()
+    uint32_t counts[kThreads];               // bricks not empty, of each thread's run
+    uint32_t groups[kThreads / kGroup];      // of each group of threads
+  };
+  // A word is left out after each thread's run, so that threads side by side meet different banks.
+  VOXDAG_HD static uint32_t slot(uint32_t brick) { return brick + brick / kRun; }
+
+  CubePlace place;
+  const FixedTriangle* triangles;
+  const uint64_t* codes;  // of the pairs' cells, sorted by tile
+  const uint32_t* pair_triangles;
+  const uint32_t* tile_starts;  // first pair of each tile
+  uint32_t tile_count, pair_count, first_tile;
+
+  // Room for kTileBricks of each block, and how many there are.
+  uint64_t* brick_codes;
+  uint64_t* brick_masks;
+  uint32_t* brick_counts;
+
+  VOXDAG_HD void operator()(int phase, uint32_t block, uint32_t thread, Shared& shared) const {
+    switch (phase) {
+      case 0:
+        for (uint32_t i = thread; i < kTileBricks + kThreads; i += kThreads) shared.masks[i] = 0;
+        return;
+      case 1:
+        return draw_pairs(first_tile + block, thread, shared);
+      case 2:
+        return count_run(thread, shared);
+      case 3:
+        return add_group(thread, shared);
+      default:
+        return send_run(block, thread, shared);
+    }
+  }
+
+  VOXDAG_HD void draw_pairs(uint32_t tile, uint32_t thread, Shared& shared) const {
+    const uint32_t end = tile + 1 < tile_count ? tile_starts[tile + 1] : pair_count;
+    for (uint32_t pair = tile_starts[tile] + thread; pair < end; pair += kThreads)
+      draw(triangles[pair_triangles[pair]], codes[pair], shared);
+  }
+
+  VOXDAG_HD void draw(const FixedTriangle& triangle, uint64_t cell, Shared& shared) const {
+    constexpr int kBrickShift = kUnitBits + kBrickLevels;
+    int64_t low[3];
+    place.low(cell, kUnitBits + kCellLevels, low);
+    const uint64_t bricks = touched_cells<4>(triangle, low, kBrickShift);
+    const uint32_t first = static_cast<uint32_t>(cell % (kTileBricks / 64)) * 64;
+    if (!is_narrow(triangle)) return draw_wide(triangle, low, bricks, first, shared);
+    const TriangleOnLattice on_voxels(triangle, low, kUnitBits);
+    for (uint64_t left = bricks; left != 0; left &= left - 1) {
+      const int brick = lowest_bit(left);
+      int at[3];
+      for (int a = 0; a < 3; ++a) at[a] = kBrickEdge * brick_coordinate(brick, a);
+      draw(on_voxels.touched<4>(at), first + static_cast<uint32_t>(brick), shared);
+    }
+  }
+  VOXDAG_HD void draw_wide(const FixedTriangle& triangle, const int64_t (&low)[3], uint64_t bricks,
+                           uint32_t first, Shared& shared) const {
+    constexpr int kBrickShift = kUnitBits + kBrickLevels;
+    for (; bricks != 0; bricks &= bricks - 1) {
+      const int brick = lowest_bit(bricks);
+      int64_t brick_low[3];
+      for (int a = 0; a < 3; ++a)
+        brick_low[a] = low[a] + (static_cast<int64_t>(brick_coordinate(brick, a)) << kBrickShift);
+      draw(touched_cells<4>(triangle, brick_low, kUnitBits), first + static_cast<uint32_t>(brick),
+           shared);
+    }
+  }
+  VOXDAG_HD void draw(uint64_t voxels, uint32_t brick, Shared& shared) const {
+    or_shared(shared.masks[slot(brick)], voxels);
+  }
+  // Along one axis, in bricks, of brick 0 to 63 of a cell.
+  VOXDAG_HD static int brick_coordinate(int brick, int axis) {
+    const int bits = brick >> (2 - axis);
+    return (bits & 1) | (bits >> 2 & 2);
+  }
+
+  VOXDAG_HD void count_run(uint32_t thread, Shared& shared) const {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < kRun; ++i) count += shared.masks[slot(thread * kRun + i)] != 0;
+    shared.counts[thread] = count;
+  }
+
+  VOXDAG_HD void add_group(uint32_t thread, Shared& shared) const {
+    if (thread >= kThreads / kGroup) return;
+    uint32_t sum = 0;
+    for (uint32_t i = 0; i < kGroup; ++i) sum += shared.counts[thread * kGroup + i];
+    shared.groups[thread] = sum;
+  }
+
+  VOXDAG_HD void send_run(uint32_t block, uint32_t thread, const Shared& shared) const {
+    uint32_t at = 0;
+    for (uint32_t g = 0; g < thread / kGroup; ++g) at += shared.groups[g];
+    for (uint32_t t = thread / kGroup * kGroup; t < thread; ++t) at += shared.counts[t];
+    if (thread == kThreads - 1) brick_counts[block] = at + shared.counts[thread];
+    const uint64_t tile_code = codes[tile_starts[first_tile + block]] >> kTileCodeBits;
+    for (uint32_t i = 0; i < kRun; ++i) {
+      const uint32_t brick = thread * kRun + i;
+      const uint64_t mask = shared.masks[slot(brick)];
+      if (mask == 0) continue;
+      brick_codes[uint64_t{block} * kTileBricks + at] = tile_code * kTileBricks + brick;
+      brick_masks[uint64_t{block} * kTileBricks + at++] = mask;
+    }
+  }
+};
+
+// From each block's room to the list of all bricks.
+struct MoveBricks {
+  const uint64_t* codes;
+  const uint64_t* masks;
+  uint64_t* out_codes;
+  uint64_t* out_masks;
+  VOXDAG_HD void operator()(uint32_t block, uint32_t rank, uint32_t output) const {
+    const uint64_t from = uint64_t{block} * kTileBricks + rank;
+    out_codes[output] = codes[from];
+    out_masks[output] = masks[from];
+  }
+};
+
+}  // namespace voxdag::parallel

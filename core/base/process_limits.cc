@@ -1,0 +1,78 @@
+#include "core/base/process_limits.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <string>
+
+namespace voxdag {
+namespace {
+
+uint64_t number_in(const std::string& path) {
+  std::ifstream file(path);
+  uint64_t bytes = 0;
+  return file >> bytes ? bytes : UINT64_MAX;  // "max" does not parse: no limit
+}
+
+// The least limit from the group at `path` up to the root of the hierarchy.
+uint64_t least_up_from(const std::string& root, std::string path, const std::string& file) {
+  uint64_t least = UINT64_MAX;
+  for (;;) {
+    least = std::min(least, number_in(root + path + "/" + file));
+    const size_t slash = path.find_last_of('/');
+    if (path.empty() || slash == std::string::npos) return least;
+    path.resize(slash);
+  }
+}
+
+// A size that the kernel tells about this process; 0 where it does not.
+uint64_t status_bytes(const std::string& name) {
+  std::ifstream status("/proc/self/status");
+  std::string line;
+  while (std::getline(status, line)) {
+    if (!line.starts_with(name)) continue;
+    std::istringstream fields(line.substr(name.size()));
+    uint64_t kib = 0;
+    fields >> kib;
+    return kib << 10;
+  }
+  return 0;
+}
+
+}  // namespace
+
+// A line is "<id>:<controllers>:<path>"; version 2 has no controllers there.
+uint64_t cgroup_memory(const std::string& membership, const std::string& mount) {
+  uint64_t least = UINT64_MAX;
+  std::istringstream lines(membership);
+  std::string line;
+  while (std::getline(lines, line)) {
+    const size_t first = line.find(':'), second = line.find(':', first + 1);
+    if (first == std::string::npos || second == std::string::npos) continue;
+    const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";
+    const std::string path = line.substr(second + 1);
+    if (controllers == ",,") {
+      for (const char* root : {"", "/unified"})
+        least = std::min(least, least_up_from(mount + root, path, "memory.max"));
+    } else if (controllers.find(",memory,") != std::string::npos) {
+      least = std::min(least, least_up_from(mount + "/memory", path, "memory.limit_in_bytes"));
+    }
+  }
+  return least;
+}
+
+uint64_t default_memory() {
+  const uint64_t ram = static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) *
+                       static_cast<uint64_t>(sysconf(_SC_PAGE_SIZE));
+  std::ifstream file("/proc/self/cgroup");
+  const std::string membership{std::istreambuf_iterator<char>(file), {}};
+  return std::max(kLeastMemory, std::min(ram, cgroup_memory(membership, "/sys/fs/cgroup")) / 2);
+}
+
+uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }
+uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
+
+}  // namespace voxdag

@@ -1,0 +1,70 @@
+#include "core/base/text.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+namespace {
+
+constexpr const char* kUnits[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
+
+// How far to shift for a unit ("", "B", "K", "KiB", "kB", ...), or -1.
+int unit_shift(std::string unit) {
+  if (unit.ends_with("B") || unit.ends_with("b")) unit.pop_back();
+  if (unit.ends_with("i")) unit.pop_back();
+  if (unit.empty()) return 0;
+  if (unit.size() != 1) return -1;
+  const size_t at = std::string("KMGTP").find(static_cast<char>(std::toupper(unit[0])));
+  return at == std::string::npos ? -1 : 10 * static_cast<int>(at + 1);
+}
+
+}  // namespace
+
+uint64_t parse_size(const std::string& text, const std::string& option) {
+  double number = 0;
+  const auto [rest, failure] = std::from_chars(text.data(), text.data() + text.size(), number);
+  std::string unit(rest, text.data() + text.size());
+  while (!unit.empty() && unit.front() == ' ') unit.erase(0, 1);
+  const int shift = unit_shift(unit);
+  const double bytes = shift < 0 ? -1 : std::ldexp(number, shift);
+  if (failure != std::errc{} || !(bytes >= 0) || bytes >= 0x1p63)
+    throw Error(ErrorCode::kInvalidInput,
+                option + " '" + text + "': expected a size such as 512MiB or 8GiB");
+  return static_cast<uint64_t>(bytes);
+}
+
+std::string size_text(uint64_t bytes) {
+  double value = static_cast<double>(bytes);
+  int unit = 0;
+  for (; value >= 1024 && unit < 5; ++unit) value /= 1024;
+  char text[48];
+  std::snprintf(text, sizeof text, unit == 0 ? "%.0f %s" : "%.2f %s", value, kUnits[unit]);
+  return text;
+}
+
+std::string count_text(uint64_t count) {
+  const std::string digits = std::to_string(count);
+  std::string text;
+  for (size_t i = 0; i < digits.size(); ++i) {
+    if (i > 0 && (digits.size() - i) % 3 == 0) text += ' ';
+    text += digits[i];
+  }
+  return text;
+}
+
+std::string duration_text(double seconds) {
+  char text[48];
+  const long whole = std::lround(seconds);
+  if (whole >= 3600)
+    std::snprintf(text, sizeof text, "%ld h %02ld m", whole / 3600, whole / 60 % 60);
+  else if (whole >= 60)
+    std::snprintf(text, sizeof text, "%ld m %02ld s", whole / 60, whole % 60);
+  else
+    std::snprintf(text, sizeof text, "%.1f s", seconds);
+  return text;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,157 @@
+#include "core/db/sqlite.h"
+
+#include <sqlite3.h>
+
+#include <cerrno>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+namespace {
+
+[[noreturn]] void fail(sqlite3* database, int result) {
+  ErrorCode code = ErrorCode::kIo;
+  switch (result & 0xff) {
+    case SQLITE_FULL:
+      code = ErrorCode::kNoSpace;
+      break;
+    case SQLITE_CORRUPT:
+    case SQLITE_NOTADB:
+    case SQLITE_CONSTRAINT:
+    case SQLITE_MISMATCH:
+      code = ErrorCode::kCorrupt;
+      break;
+    case SQLITE_NOMEM:
+      code = ErrorCode::kOutOfMemory;
+      break;
+    default:
+      break;
+  }
+  const int reason = database ? sqlite3_system_errno(database) : 0;
+  if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT)) code = ErrorCode::kNoSpace;
+  const char* path = database ? sqlite3_db_filename(database, "main") : nullptr;
+  throw Error(code, std::string("job store ") + (path ? path : "") + ": " +
+                        (database ? sqlite3_errmsg(database) : sqlite3_errstr(result)));
+}
+
+}  // namespace
+
+void SqlStatement::Finalize::operator()(sqlite3_stmt* statement) const {
+  sqlite3_finalize(statement);
+}
+
+SqlStatement::SqlStatement(sqlite3* database, std::string_view sql) : database_(database) {
+  sqlite3_stmt* statement = nullptr;
+  const int result =
+      sqlite3_prepare_v2(database, sql.data(), static_cast<int>(sql.size()), &statement, nullptr);
+  if (result != SQLITE_OK) fail(database, result);
+  statement_.reset(statement);
+}
+
+SqlStatement& SqlStatement::bind(int parameter, int64_t value) {
+  const int result = sqlite3_bind_int64(statement_.get(), parameter + 1, value);
+  if (result != SQLITE_OK) fail(database_, result);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind(int parameter, double value) {
+  const int result = sqlite3_bind_double(statement_.get(), parameter + 1, value);
+  if (result != SQLITE_OK) fail(database_, result);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind(int parameter, std::string_view text) {
+  const int result = sqlite3_bind_text(statement_.get(), parameter + 1, text.data(),
+                                       static_cast<int>(text.size()), SQLITE_TRANSIENT);
+  if (result != SQLITE_OK) fail(database_, result);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind(int parameter, std::span<const std::byte> bytes) {
+  // No bytes are an empty blob, not NULL.
+  const void* data = bytes.empty() ? static_cast<const void*>("") : bytes.data();
+  const int result =
+      sqlite3_bind_blob64(statement_.get(), parameter + 1, data, bytes.size(), SQLITE_STATIC);
+  if (result != SQLITE_OK) fail(database_, result);
+  return *this;
+}
+
+bool SqlStatement::step() {
+  const int result = sqlite3_step(statement_.get());
+  if (result == SQLITE_ROW) return true;
+  if (result != SQLITE_DONE) fail(database_, result);
+  return false;
+}
+
+void SqlStatement::run() {
+  step();
+  reset();
+}
+
+void SqlStatement::reset() { sqlite3_reset(statement_.get()); }
+
+int64_t SqlStatement::integer(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+double SqlStatement::real(int column) const {
+  return sqlite3_column_double(statement_.get(), column);
+}
+
+std::string SqlStatement::text(int column) const {
+  const auto* bytes = sqlite3_column_text(statement_.get(), column);
+  const int size = sqlite3_column_bytes(statement_.get(), column);
+  return bytes ? std::string(reinterpret_cast<const char*>(bytes), static_cast<size_t>(size)) : "";
+}
+
+std::vector<std::byte> SqlStatement::bytes(int column) const {
+  const auto* bytes = static_cast<const std::byte*>(sqlite3_column_blob(statement_.get(), column));
+  const int size = sqlite3_column_bytes(statement_.get(), column);
+  return bytes ? std::vector<std::byte>(bytes, bytes + size) : std::vector<std::byte>();
+}
+
+void SqlDatabase::Close::operator()(sqlite3* database) const { sqlite3_close_v2(database); }
+
+SqlDatabase::SqlDatabase(const std::string& path, Mode mode, int busy_ms) {
+  sqlite3* database = nullptr;
+  const int flags =
+      mode == Mode::kReadOnly ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  const int result = sqlite3_open_v2(path.c_str(), &database, flags, nullptr);
+  handle_.reset(database);
+  if (result != SQLITE_OK) fail(database, result);
+  sqlite3_busy_timeout(database, busy_ms);
+}
+
+void SqlDatabase::execute(const std::string& sql) {
+  const int result = sqlite3_exec(handle_.get(), sql.c_str(), nullptr, nullptr, nullptr);
+  if (result != SQLITE_OK) fail(handle_.get(), result);
+}
+
+int64_t SqlDatabase::integer(const std::string& sql) {
+  SqlStatement statement = prepare(sql);
+  if (!statement.step()) throw Error(ErrorCode::kCorrupt, "job store: no answer to " + sql);
+  return statement.integer(0);
+}
+
+SqlTransaction::SqlTransaction(SqlDatabase& database, Durable durable) : database_(database) {
+  // In WAL mode FULL syncs the log at each commit; NORMAL leaves it to the next that does.
+  database_.execute(durable == Durable::kNow ? "PRAGMA synchronous = FULL"
+                                             : "PRAGMA synchronous = NORMAL");
+  database_.execute("BEGIN IMMEDIATE");
+}
+
+SqlTransaction::~SqlTransaction() {
+  if (!open_) return;
+  try {
+    database_.execute("ROLLBACK");
+  } catch (const Error&) {
+    // The connection is gone or already rolled back: nothing was committed either way.
+  }
+}
+
+void SqlTransaction::commit() {
+  database_.execute("COMMIT");
+  open_ = false;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,106 @@
+#include "core/format/artifact/artifact_copy.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+#include "core/format/artifact/artifact_index.h"
+#include "core/format/bytes.h"
+#include "core/format/checksum.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kEntryMagic = 0x0a48434147414456;  // "VDAGACH\n"
+constexpr size_t kFooterBytes = 48;
+constexpr uint64_t kCopyBytes = uint64_t{256} << 10;
+
+[[noreturn]] void corrupt(const std::string& where, const std::string& what) {
+  throw Error(ErrorCode::kCorrupt, where + ": " + what);
+}
+
+// The checked index of an artifact of one subvolume.
+ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref) {
+  if (ref.bytes > file.size() || ref.offset > file.size() - ref.bytes ||
+      ref.index_offset < ref.offset || ref.index_offset - ref.offset > ref.bytes)
+    corrupt(file.path(), "the file ends before its artifact does");
+  std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
+  file.read_at(ref.index_offset, bytes);
+  ArtifactIndex index = decode_index(bytes, ref, file.path());
+  if (index.roots.size() != 1) corrupt(file.path(), "the artifact is not that of one subvolume");
+  return index;
+}
+
+}  // namespace
+
+ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
+                          uint32_t grid_levels, SegmentWriter& to) {
+  ArtifactIndex index = read_single_index(from, ref);
+  if (index.grid_levels - index.roots[0].cube.level != grid_levels - cube.level)
+    corrupt(from.path(), "the artifact is that of a cube of another size");
+  index.grid_levels = grid_levels;
+  index.roots[0].cube = cube;
+  const uint64_t first = to.size();
+  std::vector<std::byte> bytes;
+  for (size_t i = 0; i < index.levels.size(); ++i) {
+    index.levels[i].level = grid_levels - kBrickLevels - static_cast<uint32_t>(i);
+    for (const FrameInfo& frame : index.levels[i].frames) {
+      bytes.resize(frame.bytes);
+      from.read_at(frame.offset, bytes);
+      if (checksum64(bytes) != frame.checksum) corrupt(from.path(), "a frame fails its checksum");
+      to.append(bytes);
+    }
+  }
+  return to.append_index(first, encode_index(index));
+}
+
+uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
+                           const ReadableFile& from, const ArtifactRef& ref) {
+  const auto file = files.create(partial);
+  const std::vector<std::byte> header = encode_segment_header(0);
+  file->write_at(0, header);
+  const uint64_t begin = header.size(), end = begin + ref.bytes;
+  std::vector<std::byte> piece;
+  for (uint64_t at = begin; at < end; at += piece.size()) {
+    piece.resize(std::min<uint64_t>(end - at, kCopyBytes));
+    from.read_at(ref.offset + at - begin, piece);
+    file->write_at(at, piece);
+  }
+  std::vector<std::byte> footer;
+  ByteSink sink(footer);
+  sink.put(kEntryMagic);
+  sink.put(begin);
+  sink.put(ref.bytes);
+  sink.put(uint64_t{ref.index_offset - ref.offset + begin});
+  sink.put(ref.checksum);
+  sink.put(checksum64(footer));
+  file->write_at(end, footer);
+  file->close();
+  files.rename(partial, path);
+  return end + footer.size();
+}
+
+CacheEntry read_cache_entry(FileSystem& files, const std::string& path) {
+  CacheEntry entry;
+  entry.file = files.open_read(path);
+  if (entry.file->size() < kSegmentHeaderBytes + kFooterBytes) corrupt(path, "it is too short");
+  std::byte header[kSegmentHeaderBytes];
+  entry.file->read_at(0, header);
+  check_segment_header(header, 0, path);
+  std::byte footer[kFooterBytes];
+  entry.file->read_at(entry.file->size() - kFooterBytes, footer);
+  ByteSource source(footer);
+  if (source.get<uint64_t>() != kEntryMagic) corrupt(path, "it is not a cache entry");
+  entry.ref.offset = source.get<uint64_t>();
+  entry.ref.bytes = source.get<uint64_t>();
+  entry.ref.index_offset = source.get<uint64_t>();
+  entry.ref.checksum = source.get<uint64_t>();
+  if (source.get<uint64_t>() != checksum64(std::span(footer).first(kFooterBytes - 8)))
+    corrupt(path, "its footer fails its checksum");
+  const ArtifactIndex index = read_single_index(*entry.file, entry.ref);
+  entry.root = index.roots[0];
+  for (const ArtifactLevel& level : index.levels) entry.dag_nodes += level.rows;
+  return entry;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,205 @@
+#include "core/format/artifact/artifact_index.h"
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+#include "core/dag/node_hash.h"
+#include "core/format/bytes.h"
+#include "core/format/checksum.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kFixedBytes = 40, kRootBytes = 48, kLevelBytes = 24, kFrameBytes = 32;
+
+[[noreturn]] void corrupt(const std::string& where, const std::string& what) {
+  throw Error(ErrorCode::kCorrupt, where + ": " + what);
+}
+
+void check_version(uint32_t version, const std::string& where) {
+  if (version == kSegmentVersion) return;
+  throw Error(ErrorCode::kUnsupportedVersion, where + ": segment format version " +
+                                                  std::to_string(version) + ", expected " +
+                                                  std::to_string(kSegmentVersion));
+}
+
+void put_root(ByteSink& sink, const ArtifactRoot& root) {
+  sink.put(root.cube.level);
+  for (const uint32_t p : root.cube.position) sink.put(p);
+  sink.put(root.index);
+  sink.put(uint32_t{0});
+  sink.put(root.hash);
+  sink.put(root.voxels);
+  sink.put(root.svo_nodes);
+}
+
+ArtifactRoot get_root(ByteSource& source, const std::string& where) {
+  ArtifactRoot root;
+  root.cube.level = source.get<uint32_t>();
+  for (uint32_t& p : root.cube.position) p = source.get<uint32_t>();
+  root.index = source.get<uint32_t>();
+  if (source.get<uint32_t>() != 0) corrupt(where, "a reserved field of a root is not 0");
+  root.hash = source.get<uint64_t>();
+  root.voxels = source.get<uint64_t>();
+  root.svo_nodes = source.get<uint64_t>();
+  return root;
+}
+
+void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std::string& where) {
+  const uint32_t level = root.cube.level, brick_level = index.grid_levels - kBrickLevels;
+  const bool has_level = level <= brick_level && brick_level - level < index.levels.size();
+  if (!has_level || root.index >= index.levels[brick_level - level].rows)
+    corrupt(where, "a root is not in the artifact's levels");
+  for (const uint32_t p : root.cube.position)
+    if (p >> level != 0) corrupt(where, "a root's cube is outside the grid");
+  if (root.voxels == 0 || root.svo_nodes == 0) corrupt(where, "a root is empty");
+  if (cut_hash(root.hash, index.hash_bits) != root.hash)
+    corrupt(where, "a root's hash has bits below the cut");
+}
+
+// Reads the frames of one level; `offset` moves from its first byte to past its last.
+void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& level,
+                uint64_t& offset, const std::string& where) {
+  const std::string here = where + ", level " + std::to_string(level.level);
+  level.frames.reserve(count);
+  uint64_t rows = 0, children = 0, hash = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    FrameInfo frame;
+    frame.first_row = rows;
+    frame.first_child = children;
+    frame.offset = offset;
+    frame.bytes = source.get<uint32_t>();
+    frame.rows = source.get<uint32_t>();
+    frame.children = source.get<uint32_t>();
+    const uint32_t reserved = source.get<uint32_t>();
+    frame.first_hash = source.get<uint64_t>();
+    frame.checksum = source.get<uint64_t>();
+    if (reserved != 0) corrupt(here, "a reserved field of a frame is not 0");
+    if (frame.rows == 0 || frame.rows > kFrameRows || (i + 1 < count && frame.rows != kFrameRows))
+      corrupt(here, "frame " + std::to_string(i) + " has " + std::to_string(frame.rows) + " rows");
+    if (bricks ? frame.children != 0
+               : frame.children < frame.rows || frame.children > 8 * frame.rows)
+      corrupt(here, "frame " + std::to_string(i) + " has " + std::to_string(frame.children) +
+                        " children");
+    if (frame.first_hash < hash) corrupt(here, "frames are not in the order of their hashes");
+    hash = frame.first_hash;
+    rows += frame.rows;
+    children += frame.children;
+    offset += frame.bytes;
+    level.frames.push_back(frame);
+  }
+  if (rows != level.rows || children != level.children || rows == 0 || rows > uint64_t{1} << 32)
+    corrupt(here, "the frames do not add up to the level's rows and children");
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_index(const ArtifactIndex& index) {
+  std::vector<std::byte> bytes;
+  ByteSink sink(bytes);
+  uint64_t frames = 0, frame_bytes = 0;
+  for (const ArtifactLevel& level : index.levels) {
+    frames += level.frames.size();
+    for (const FrameInfo& frame : level.frames) frame_bytes += frame.bytes;
+  }
+  if (index.roots.size() > UINT32_MAX || frames > UINT32_MAX)
+    throw Error(ErrorCode::kLimit, "an artifact holds at most 2^32-1 roots and frames");
+  sink.put(kIndexMagic);
+  sink.put(kSegmentVersion);
+  sink.put(index.grid_levels);
+  sink.put(index.hash_bits);
+  sink.put(static_cast<uint32_t>(index.roots.size()));
+  sink.put(static_cast<uint32_t>(index.levels.size()));
+  sink.put(static_cast<uint32_t>(frames));
+  sink.put(frame_bytes);
+  for (const ArtifactRoot& root : index.roots) put_root(sink, root);
+  for (const ArtifactLevel& level : index.levels) {
+    sink.put(level.level);
+    sink.put(static_cast<uint32_t>(level.frames.size()));
+    sink.put(level.rows);
+    sink.put(level.children);
+  }
+  for (const ArtifactLevel& level : index.levels)
+    for (const FrameInfo& frame : level.frames) {
+      sink.put(frame.bytes);
+      sink.put(frame.rows);
+      sink.put(frame.children);
+      sink.put(uint32_t{0});
+      sink.put(frame.first_hash);
+      sink.put(frame.checksum);
+    }
+  return bytes;
+}
+
+ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& ref,
+                           const std::string& where) {
+  if (checksum64(bytes) != ref.checksum) corrupt(where, "the index fails its checksum");
+  ByteSource source(bytes);
+  if (source.get<uint64_t>() != kIndexMagic) corrupt(where, "no index begins here");
+  check_version(source.get<uint32_t>(), where);
+  ArtifactIndex index;
+  index.grid_levels = source.get<uint32_t>();
+  index.hash_bits = source.get<uint32_t>();
+  const uint64_t roots = source.get<uint32_t>();
+  const uint64_t levels = source.get<uint32_t>();
+  const uint64_t frames = source.get<uint32_t>();
+  const uint64_t frame_bytes = source.get<uint64_t>();
+  if (index.grid_levels < kMinGridLevels || index.grid_levels > kMaxGridLevels)
+    corrupt(where, "a grid of 2^" + std::to_string(index.grid_levels) + " voxels an edge");
+  if (index.hash_bits < 4 || index.hash_bits > 64)
+    corrupt(where, std::to_string(index.hash_bits) + " hash bits, expected 4 to 64");
+  if (levels > index.grid_levels - kBrickLevels + 1)
+    corrupt(where, std::to_string(levels) + " levels are too many for the grid");
+  // Everything allocated below is bounded by bytes that are really there.
+  if (bytes.size() !=
+      kFixedBytes + roots * kRootBytes + levels * kLevelBytes + frames * kFrameBytes)
+    corrupt(where, "the index is not as long as its counts say");
+  if (frame_bytes != ref.index_offset - ref.offset)
+    corrupt(where, "the frames are not as long as the index says");
+
+  for (uint64_t i = 0; i < roots; ++i) index.roots.push_back(get_root(source, where));
+  std::vector<uint32_t> frame_counts;
+  uint64_t frames_of_levels = 0;
+  for (uint64_t i = 0; i < levels; ++i) {
+    ArtifactLevel level;
+    level.level = source.get<uint32_t>();
+    frame_counts.push_back(source.get<uint32_t>());
+    level.rows = source.get<uint64_t>();
+    level.children = source.get<uint64_t>();
+    if (level.level != index.grid_levels - kBrickLevels - i)
+      corrupt(where, "levels do not follow one another");
+    frames_of_levels += frame_counts.back();
+    index.levels.push_back(std::move(level));
+  }
+  if (frames_of_levels != frames) corrupt(where, "the levels' frames are not as many as counted");
+  uint64_t offset = ref.offset;
+  for (uint64_t i = 0; i < levels; ++i)
+    get_frames(source, frame_counts[i], i == 0, index.levels[i], offset, where);
+  if (offset != ref.index_offset) corrupt(where, "the frames do not end where the index begins");
+  for (const ArtifactRoot& root : index.roots) check_root(root, index, where);
+  return index;
+}
+
+std::vector<std::byte> encode_segment_header(uint32_t id) {
+  std::vector<std::byte> bytes;
+  ByteSink sink(bytes);
+  sink.put(kSegmentMagic);
+  sink.put(kSegmentVersion);
+  sink.put(id);
+  sink.put(uint64_t{0});
+  sink.put(checksum64(bytes));
+  return bytes;
+}
+
+void check_segment_header(std::span<const std::byte> bytes, uint32_t id, const std::string& where) {
+  ByteSource source(bytes);
+  if (source.get<uint64_t>() != kSegmentMagic) corrupt(where, "not a voxdag segment file");
+  check_version(source.get<uint32_t>(), where);
+  const uint32_t found_id = source.get<uint32_t>();
+  source.get<uint64_t>();
+  if (source.get<uint64_t>() != checksum64(bytes.first(kSegmentHeaderBytes - sizeof(uint64_t))))
+    corrupt(where, "the segment header fails its checksum");
+  if (found_id != id)
+    corrupt(where, "segment " + std::to_string(found_id) + ", expected " + std::to_string(id));
+}
+
+}  // namespace voxdag

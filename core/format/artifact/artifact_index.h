@@ -1,0 +1,38 @@
+// The index at an artifact's end: its roots, its levels and their frames. docs/format.md, "Artifact
+// index", is the byte layout.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/format/artifact/artifact.h"
+
+namespace voxdag {
+
+// Of segments and artifacts alike.
+inline constexpr uint32_t kSegmentVersion = 1;
+inline constexpr uint64_t kSegmentMagic = 0x0a47455347414456;  // "VDAGSEG\n"
+inline constexpr uint64_t kIndexMagic = 0x0a58444947414456;    // "VDAGIDX\n"
+inline constexpr size_t kSegmentHeaderBytes = 32;
+
+struct ArtifactIndex {
+  uint32_t grid_levels = 0;
+  uint32_t hash_bits = 64;
+  std::vector<ArtifactRoot> roots;
+  std::vector<ArtifactLevel> levels;  // from L-2 upwards
+};
+
+std::vector<std::byte> encode_index(const ArtifactIndex& index);
+
+// Throws Error{kCorrupt} or Error{kUnsupportedVersion} beginning with `where`, unless every field
+// keeps the rules that docs/format.md gives: nothing in a decoded index needs another check.
+ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& ref,
+                           const std::string& where);
+
+std::vector<std::byte> encode_segment_header(uint32_t id);
+void check_segment_header(std::span<const std::byte> bytes, uint32_t id, const std::string& where);
+
+}  // namespace voxdag

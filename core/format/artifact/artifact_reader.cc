@@ -1,0 +1,80 @@
+#include <string>
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/artifact_index.h"
+#include "core/format/artifact/frame_codec.h"
+#include "core/format/artifact/row_order.h"
+#include "core/format/checksum.h"
+
+namespace voxdag {
+namespace {
+
+// The index's bytes, which `ref` says lie within the file.
+std::vector<std::byte> read_index(const ReadableFile& file, const ArtifactRef& ref,
+                                  const std::string& where) {
+  const uint64_t size = file.size();
+  const bool inside = ref.offset >= kSegmentHeaderBytes && ref.index_offset >= ref.offset &&
+                      ref.offset <= size && ref.bytes <= size - ref.offset &&
+                      ref.index_offset - ref.offset <= ref.bytes;
+  if (!inside)
+    throw Error(ErrorCode::kCorrupt, where + ": the file ends at byte " + std::to_string(size) +
+                                         ", before the artifact of " + std::to_string(ref.bytes) +
+                                         " bytes does");
+  std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
+  file.read_at(ref.index_offset, bytes);
+  return bytes;
+}
+
+}  // namespace
+
+ArtifactReader::ArtifactReader(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref)
+    : file_(std::move(segment)) {
+  const std::string where = file_->path() + ", artifact at byte " + std::to_string(ref.offset);
+  if (file_->size() < kSegmentHeaderBytes)
+    throw Error(ErrorCode::kCorrupt, file_->path() + ": too short for a segment header");
+  std::byte header[kSegmentHeaderBytes];
+  file_->read_at(0, header);
+  check_segment_header(header, ref.segment, file_->path());
+  ArtifactIndex index = decode_index(read_index(*file_, ref, where), ref, where);
+  grid_levels_ = index.grid_levels;
+  hash_bits_ = index.hash_bits;
+  roots_ = std::move(index.roots);
+  levels_ = std::move(index.levels);
+}
+
+const ArtifactLevel* ArtifactReader::level(uint32_t level) const {
+  const uint32_t brick_level = grid_levels_ - kBrickLevels;
+  if (level > brick_level || brick_level - level >= levels_.size()) return nullptr;
+  return &levels_[brick_level - level];
+}
+
+void ArtifactReader::damaged(uint32_t level, size_t frame, const std::string& what) const {
+  throw Error(ErrorCode::kCorrupt, file_->path() + ", level " + std::to_string(level) + ", frame " +
+                                       std::to_string(frame) + ": " + what);
+}
+
+void ArtifactReader::read_frame(uint32_t level, size_t index, Frame& out) const {
+  const size_t place = grid_levels_ - kBrickLevels - level;
+  const std::vector<FrameInfo>& frames = levels_[place].frames;
+  const FrameInfo& info = frames[index];
+  out.scratch.resize(info.bytes);
+  file_->read_at(info.offset, out.scratch);
+  if (checksum64(out.scratch) != info.checksum) damaged(level, index, "the checksum is wrong");
+
+  const bool bricks = place == 0;
+  const char* wrong = bricks ? decode_brick_frame(out.scratch, info.rows, hash_bits_, out)
+                             : decode_node_frame(out.scratch, info.rows, info.children, out);
+  LastRow last;
+  if (!wrong)
+    wrong = bricks ? check_brick_order(out.hashes, out.brick_masks, last)
+                   : check_node_order({level, out.hashes, out.masks, out.children},
+                                      levels_[place - 1].rows, hash_bits_, last);
+  if (wrong) damaged(level, index, wrong);
+  if (out.hashes.front() != info.first_hash) damaged(level, index, "not the frame of its index");
+  if (index + 1 < frames.size() && last.hash > frames[index + 1].first_hash)
+    damaged(level, index, "its hashes run into those of the next frame");
+}
+
+}  // namespace voxdag

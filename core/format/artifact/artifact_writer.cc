@@ -1,0 +1,177 @@
+#include <algorithm>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+#include "core/dag/node_hash.h"
+#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/artifact_index.h"
+#include "core/format/artifact/frame_codec.h"
+#include "core/format/artifact/row_order.h"
+#include "core/format/checksum.h"
+
+namespace voxdag {
+
+struct ArtifactWriter::State {
+  SegmentWriter& segment;
+  uint64_t offset;
+  ArtifactIndex index;
+  bool level_open = false;
+  uint64_t child_rows = 0;  // rows of the level below the open one
+  LastRow last;
+  // Rows of the frame in the making.
+  std::vector<uint64_t> values;  // hashes; of the brick level masks
+  std::vector<uint8_t> masks;
+  std::vector<uint32_t> children;
+
+  State(SegmentWriter& s, uint32_t grid_levels, uint32_t hash_bits)
+      : segment(s), offset(s.size()), index{grid_levels, hash_bits, {}, {}} {
+    values.reserve(kFrameRows);
+    masks.reserve(kFrameRows);
+    children.reserve(8 * kFrameRows);
+  }
+
+  uint32_t brick_level() const { return index.grid_levels - kBrickLevels; }
+
+  [[noreturn]] void broken(const std::string& what) const {
+    const std::string level =
+        index.levels.empty() ? "" : ", level " + std::to_string(index.levels.back().level);
+    throw Error(ErrorCode::kCorrupt,
+                "artifact for segment " + std::to_string(segment.id()) + level + ": " + what);
+  }
+
+  void add_frame(std::span<const std::byte> bytes, uint64_t first_hash, size_t rows,
+                 size_t child_count) {
+    ArtifactLevel& level = index.levels.back();
+    FrameInfo frame;
+    frame.first_row = level.rows;
+    frame.first_child = level.children;
+    frame.first_hash = first_hash;
+    frame.offset = segment.size();
+    frame.bytes = static_cast<uint32_t>(bytes.size());
+    frame.rows = static_cast<uint32_t>(rows);
+    frame.children = static_cast<uint32_t>(child_count);
+    frame.checksum = checksum64(bytes);
+    segment.append(bytes);
+    level.frames.push_back(frame);
+    level.rows += rows;
+    level.children += child_count;
+    if (level.rows > uint64_t{1} << 32)
+      throw Error(ErrorCode::kLimit,
+                  "level " + std::to_string(level.level) + " of an artifact has over 2^32 nodes");
+  }
+
+  void add_brick_frame(std::span<const uint64_t> rows);
+  void add_node_frame(const NodeLevelView& rows);
+  void add_pending_frame();
+};
+
+void ArtifactWriter::State::add_brick_frame(std::span<const uint64_t> rows) {
+  uint64_t hashes[kFrameRows];
+  for (size_t i = 0; i < rows.size(); ++i)
+    hashes[i] = cut_hash(hash_brick(rows[i]), index.hash_bits);
+  if (const char* wrong = check_brick_order(std::span(hashes, rows.size()), rows, last))
+    broken(wrong);
+  add_frame(segment.encoder_->encode_bricks(rows), hashes[0], rows.size(), 0);
+}
+
+void ArtifactWriter::State::add_node_frame(const NodeLevelView& rows) {
+  if (const char* wrong = check_node_order(rows, child_rows, index.hash_bits, last)) broken(wrong);
+  add_frame(segment.encoder_->encode_nodes(rows), rows.hashes[0], rows.masks.size(),
+            rows.children.size());
+}
+
+void ArtifactWriter::State::add_pending_frame() {
+  if (values.empty()) return;
+  if (index.levels.size() == 1)
+    add_brick_frame(values);
+  else
+    add_node_frame({index.levels.back().level, values, masks, children});
+  values.clear();
+  masks.clear();
+  children.clear();
+}
+
+ArtifactWriter::ArtifactWriter(SegmentWriter& segment, uint32_t grid_levels, uint32_t hash_bits)
+    : state_(std::make_unique<State>(segment, grid_levels, hash_bits)) {}
+
+ArtifactWriter::~ArtifactWriter() = default;
+
+void ArtifactWriter::begin_level(uint32_t level) {
+  State& s = *state_;
+  if (s.level_open || level + s.index.levels.size() != s.brick_level())
+    s.broken("level " + std::to_string(level) + " does not follow");
+  s.child_rows = s.index.levels.empty() ? 0 : s.index.levels.back().rows;
+  s.last = {};
+  s.index.levels.push_back({level, 0, 0, {}});
+  s.level_open = true;
+}
+
+void ArtifactWriter::append_bricks(std::span<const uint64_t> masks) {
+  State& s = *state_;
+  if (!s.level_open || s.index.levels.size() != 1) s.broken("bricks outside the brick level");
+  while (!masks.empty()) {
+    const size_t n = std::min<size_t>(masks.size(), kFrameRows - s.values.size());
+    if (n == kFrameRows)
+      s.add_brick_frame(masks.first(n));
+    else
+      s.values.insert(s.values.end(), masks.begin(), masks.begin() + n);
+    if (s.values.size() == kFrameRows) s.add_pending_frame();
+    masks = masks.subspan(n);
+  }
+}
+
+void ArtifactWriter::append_nodes(const NodeLevelView& rows) {
+  State& s = *state_;
+  if (!s.level_open || s.index.levels.size() < 2) s.broken("nodes outside a node level");
+  if (rows.masks.size() != rows.hashes.size()) s.broken("masks and hashes disagree in number");
+  size_t at = 0, at_child = 0;
+  while (at < rows.masks.size()) {
+    const size_t n = std::min<size_t>(rows.masks.size() - at, kFrameRows - s.values.size());
+    size_t child_count = 0;
+    for (const uint8_t mask : rows.masks.subspan(at, n)) child_count += kChildCount[mask];
+    if (child_count > rows.children.size() - at_child) s.broken("children are missing");
+    const NodeLevelView part{rows.level, rows.hashes.subspan(at, n), rows.masks.subspan(at, n),
+                             rows.children.subspan(at_child, child_count)};
+    if (n == kFrameRows) {
+      s.add_node_frame(part);
+    } else {
+      s.values.insert(s.values.end(), part.hashes.begin(), part.hashes.end());
+      s.masks.insert(s.masks.end(), part.masks.begin(), part.masks.end());
+      s.children.insert(s.children.end(), part.children.begin(), part.children.end());
+    }
+    if (s.values.size() == kFrameRows) s.add_pending_frame();
+    at += n;
+    at_child += child_count;
+  }
+  if (at_child != rows.children.size()) s.broken("children are left over");
+}
+
+void ArtifactWriter::end_level() {
+  State& s = *state_;
+  if (!s.level_open) s.broken("no level is open");
+  s.add_pending_frame();
+  if (s.index.levels.back().rows == 0) s.broken("a level has no nodes");
+  s.level_open = false;
+}
+
+void ArtifactWriter::bricks(const BrickLevelView& level) {
+  begin_level(state_->brick_level());
+  append_bricks(level.masks);
+  end_level();
+}
+
+void ArtifactWriter::nodes(const NodeLevelView& level) {
+  begin_level(level.level);
+  append_nodes(level);
+  end_level();
+}
+
+ArtifactRef ArtifactWriter::finish(std::span<const ArtifactRoot> roots) {
+  State& s = *state_;
+  if (s.level_open) s.broken("a level is still open");
+  s.index.roots.assign(roots.begin(), roots.end());
+  return s.segment.append_index(s.offset, encode_index(s.index));
+}
+
+}  // namespace voxdag

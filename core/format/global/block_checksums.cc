@@ -1,0 +1,30 @@
+#include "core/format/global/block_checksums.h"
+
+#include <algorithm>
+
+#include "core/format/global/global_layout.h"
+
+namespace voxdag {
+
+using global_layout::kBlockBytes;
+
+void BlockSums::add(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const auto part = bytes.first(std::min<size_t>(bytes.size(), kBlockBytes - filled_));
+    block_.add(part);
+    filled_ += part.size();
+    bytes = bytes.subspan(part.size());
+    if (filled_ < kBlockBytes) return;
+    checksums_.push_back(block_.value());
+    block_.reset();
+    filled_ = 0;
+  }
+}
+
+std::vector<uint64_t> BlockSums::checksums() const {
+  std::vector<uint64_t> all = checksums_;
+  if (filled_ > 0) all.push_back(block_.value());
+  return all;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,40 @@
+// The global file through the reader that engines use, its errors as ours.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/format/global/voxdag_reader.h"
+
+namespace voxdag {
+
+inline Error as_error(const voxdag_reader::Error& error) {
+  switch (error.problem()) {
+    case voxdag_reader::Problem::kNotFound:
+      return Error(ErrorCode::kNotFound, error.what());
+    case voxdag_reader::Problem::kUnsupportedVersion:
+      return Error(ErrorCode::kUnsupportedVersion, error.what());
+    case voxdag_reader::Problem::kIo:
+      return Error(ErrorCode::kIo, error.what());
+    case voxdag_reader::Problem::kCorrupt:
+      break;
+  }
+  return Error(ErrorCode::kCorrupt, error.what());
+}
+
+// What `use()` returns; the reader's errors within it are thrown as Error.
+template <class Use>
+auto with_reader_errors(Use use) {
+  try {
+    return use();
+  } catch (const voxdag_reader::Error& error) {
+    throw as_error(error);
+  }
+}
+
+inline std::unique_ptr<voxdag_reader::File> open_global_file(const std::string& path) {
+  return with_reader_errors([&] { return std::make_unique<voxdag_reader::File>(path); });
+}
+
+}  // namespace voxdag

@@ -1,0 +1,226 @@
+#include "core/format/global/verify.h"
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/dag/level_array.h"
+#include "core/dag/node_hash.h"
+#include "core/format/artifact/frame_codec.h"
+#include "core/format/checksum.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/node_index.h"
+
+namespace voxdag {
+
+using namespace global_layout;
+
+namespace {
+
+constexpr uint64_t kNodesAtOnce = uint64_t{1} << 16;  // between looks at the cancel token
+
+class Verifier {
+ public:
+  Verifier(const voxdag_reader::File& file, MemoryBudget& budget, Progress& progress,
+           const CancelToken& cancel)
+      : file_(file),
+        budget_(budget),
+        progress_(progress),
+        cancel_(cancel),
+        indexes_(file.brick_level() + 1) {}
+
+  void run() {
+    check_header();
+    check_blocks();
+    check_padding();
+    if (!file_.empty()) {
+      progress_.begin_stage("verify nodes", file_.dag_nodes(), "nodes");
+      check_bricks();
+      for (uint32_t level = file_.brick_level(); level-- > 0;) check_nodes(level);
+      if (file_.level(0).node_count != 1)
+        broken(where(0), std::to_string(file_.level(0).node_count) + " roots, expected 1");
+      progress_.end_stage();
+    }
+    check_counts();
+  }
+
+ private:
+  [[noreturn]] void broken(const std::string& where, const std::string& what) const {
+    throw Error(ErrorCode::kCorrupt, where + ": " + what);
+  }
+  std::string where(uint32_t level) const {
+    return file_.path() + ": level " + std::to_string(level);
+  }
+  std::string where(uint32_t level, uint64_t word) const {
+    return where(level) + ", word " + std::to_string(word);
+  }
+  // Before node `i` of `count`: announces the nodes up to the next look at the cancel token.
+  void advance(uint64_t i, uint64_t count) {
+    if (i % kNodesAtOnce != 0) return;
+    cancel_.check();
+    progress_.advance(std::min(kNodesAtOnce, count - i));
+  }
+
+  void check_header() const;
+  void check_blocks();
+  void check_padding() const;
+  void check_zeros(uint64_t begin, uint64_t end, const std::string& what) const;
+  void check_bricks();
+  void check_nodes(uint32_t level);
+  void check_all_used(uint32_t level) const;
+  void check_counts() const;
+
+  const voxdag_reader::File& file_;
+  MemoryBudget& budget_;
+  Progress& progress_;
+  const CancelToken& cancel_;
+  std::vector<NodeIndex> indexes_;  // of the levels seen so far
+  PageBuffer<uint64_t> hashes_;     // cut, of the level last seen
+  PageBuffer<uint8_t> used_;        // by the level above it
+};
+
+void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what) const {
+  for (uint64_t at = begin; at < end; ++at)
+    if (file_.data()[at] != 0)
+      broken(file_.path() + ": byte " + std::to_string(at), what + ", expected 0");
+}
+
+// The reader has seen the fields that it needs; the rest is fixed.
+void Verifier::check_header() const {
+  uint32_t node_order;
+  std::memcpy(&node_order, file_.data() + kNodeOrderAt, sizeof(node_order));
+  if (node_order != kNodeOrderByHash)
+    throw Error(ErrorCode::kUnsupportedVersion,
+                file_.path() + ": node order " + std::to_string(node_order) + ", expected 1");
+  check_zeros(kAttributeCountAt, kLevelsAt, "attribute sections are reserved");
+  for (size_t level = 0; level < kMaxLevels; ++level) {
+    const size_t entry = kLevelsAt + level * kLevelEntryBytes;
+    const bool there = level <= file_.brick_level();
+    check_zeros(there ? entry + 24 : entry, entry + kLevelEntryBytes, "a reserved field");
+  }
+  check_zeros(kAttributesAt, kHeaderChecksumAt, "reserved");
+}
+
+void Verifier::check_blocks() {
+  const uint64_t table = file_.checksum_table_offset();
+  progress_.begin_stage("verify checksums", table - kPageBytes, "bytes");
+  for (uint64_t begin = kPageBytes, block = 0; begin < table; begin += kBlockBytes, ++block) {
+    const uint64_t size = std::min(kBlockBytes, table - begin);
+    uint64_t expected;
+    std::memcpy(&expected, file_.data() + table + 8 * block, sizeof(expected));
+    if (checksum64(std::as_bytes(std::span(file_.data() + begin, size))) != expected)
+      broken(file_.path() + ": bytes " + std::to_string(begin) + " to " +
+                 std::to_string(begin + size - 1),
+             "the block fails its checksum");
+    progress_.advance(size);
+    cancel_.check();
+  }
+  progress_.end_stage();
+}
+
+void Verifier::check_padding() const {
+  if (file_.empty()) return;
+  for (uint32_t level = 0; level <= file_.brick_level(); ++level) {
+    const voxdag_reader::Level& l = file_.level(level);
+    const uint64_t end = l.file_offset + sizeof(uint32_t) * l.word_count;
+    check_zeros(end, round_up_to_page(end), "padding after level " + std::to_string(level));
+  }
+}
+
+void Verifier::check_bricks() {
+  const uint32_t level = file_.brick_level();
+  const voxdag_reader::Level& bricks = file_.level(level);
+  indexes_[level] = NodeIndex(bricks, true, budget_, where(level));
+  hashes_ = PageBuffer<uint64_t>(budget_, bricks.node_count, "hashes of a level");
+  uint64_t last_mask = 0;
+  for (uint64_t i = 0; i < bricks.node_count; ++i) {
+    advance(i, bricks.node_count);
+    const uint64_t mask = file_.brick(static_cast<uint32_t>(2 * i));
+    const uint64_t hash = cut_hash(hash_brick(mask), file_.hash_bits());
+    if (mask == 0) broken(where(level, 2 * i), "the brick is empty");
+    if (i > 0 && (hash < hashes_[i - 1] || (hash == hashes_[i - 1] && mask <= last_mask)))
+      broken(where(level, 2 * i), "the brick does not follow the one before it by hash and mask");
+    hashes_[i] = hash;
+    last_mask = mask;
+  }
+}
+
+void Verifier::check_nodes(uint32_t level) {
+  const voxdag_reader::Level& nodes = file_.level(level);
+  const NodeIndex& below = indexes_[level + 1];
+  indexes_[level] = NodeIndex(nodes, false, budget_, where(level));
+  PageBuffer<uint64_t> hashes(budget_, nodes.node_count, "hashes of a level");
+  used_ = PageBuffer<uint8_t>(budget_, hashes_.size(), "parents of a level");
+  const uint32_t* previous = nullptr;
+  const uint32_t* word = nodes.words;
+  for (uint64_t i = 0; i < nodes.node_count; ++i) {
+    advance(i, nodes.node_count);
+    const uint64_t at = static_cast<uint64_t>(word - nodes.words);
+    const int children = kChildCount[*word];
+    uint64_t child_hashes[8];
+    for (int c = 0; c < children; ++c) {
+      const uint64_t child = below.find(word[1 + c]);
+      if (child == NodeIndex::kNone)
+        broken(where(level, at + 1 + c), "a child at word " + std::to_string(word[1 + c]) +
+                                             ", where no node of level " +
+                                             std::to_string(level + 1) + " begins");
+      child_hashes[c] = hashes_[child];
+      used_[child] = 1;
+    }
+    hashes[i] = cut_hash(hash_node(*word, child_hashes), file_.hash_bits());
+    if (previous &&
+        compare_nodes(hashes[i - 1], *previous, previous + 1, hashes[i], *word, word + 1) >= 0)
+      broken(where(level, at), "the node does not follow the one before it in the total order");
+    previous = word;
+    word += 1 + children;
+  }
+  check_all_used(level + 1);
+  hashes_ = std::move(hashes);
+}
+
+void Verifier::check_all_used(uint32_t level) const {
+  for (uint64_t i = 0; i < used_.size(); ++i)
+    if (!used_[i]) broken(where(level), "node " + std::to_string(i) + " has no parent");
+}
+
+// From the root down, how often each node occurs in the octree.
+void Verifier::check_counts() const {
+  uint64_t svo_nodes = 0, voxels = 0;
+  PageBuffer<uint64_t> times(budget_, file_.empty() ? 0 : 1, "counts of a level");
+  if (!file_.empty()) times[0] = 1;
+  for (uint32_t level = 0; level < file_.brick_level() && !file_.empty(); ++level) {
+    const NodeIndex& below = indexes_[level + 1];
+    PageBuffer<uint64_t> child_times(budget_, file_.level(level + 1).node_count,
+                                     "counts of a level");
+    const uint32_t* word = file_.level(level).words;
+    for (uint64_t i = 0; i < times.size(); ++i) {
+      svo_nodes += times[i];
+      const int children = kChildCount[*word++];
+      for (int c = 0; c < children; ++c) child_times[below.find(*word++)] += times[i];
+    }
+    times = std::move(child_times);
+    cancel_.check();
+  }
+  for (uint64_t i = 0; i < times.size(); ++i) {
+    svo_nodes += times[i];
+    voxels +=
+        times[i] * static_cast<uint64_t>(popcount64(file_.brick(static_cast<uint32_t>(2 * i))));
+  }
+  if (voxels != file_.voxels())
+    broken(file_.path() + ": header",
+           std::to_string(file_.voxels()) + " voxels, the DAG has " + std::to_string(voxels));
+  if (svo_nodes != file_.svo_nodes())
+    broken(file_.path() + ": header", std::to_string(file_.svo_nodes()) +
+                                          " octree nodes, the DAG has " +
+                                          std::to_string(svo_nodes));
+}
+
+}  // namespace
+
+void verify_global_file(const voxdag_reader::File& file, MemoryBudget& budget, Progress& progress,
+                        const CancelToken& cancel) {
+  Verifier(file, budget, progress, cancel).run();
+}
+
+}  // namespace voxdag

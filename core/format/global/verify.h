@@ -1,0 +1,29 @@
+// Checks every invariant of a global file:
+//
+//   1. Header, sizes, checksums, zeros in all that is reserved or padding.
+//   2. Every node: child mask within 1 to 255, children that begin nodes of the next level; no
+//   brick
+//      is empty.
+//   3. Levels strictly increase in the total order (hash, mask, child indices), hashes computed
+//      anew from the bricks up. So no two nodes of a level are equal.
+//   4. One root; every other node has a parent.
+//   5. The header's voxels and octree nodes are those of the DAG.
+//
+// Memory: 1.5 bits a word of the file, and 16 bytes a node of two levels, charged to the budget.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/base/progress.h"
+#include "core/format/global/voxdag_reader.h"
+
+namespace voxdag {
+
+// Throws Error{kCorrupt} saying what is wrong, where, and what was expected.
+void verify_global_file(const voxdag_reader::File& file, MemoryBudget& budget, Progress& progress,
+                        const CancelToken& cancel);
+
+}  // namespace voxdag

@@ -1,0 +1,129 @@
+#include "core/scene/gltf/document/accessor_checks.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+#include "core/base/integers.h"
+
+namespace voxdag::gltf {
+namespace {
+
+// Vertices are addressed by 32-bit indices, so more in one primitive are of no use; this also
+// bounds what an accessor without bytes (all zeros) can claim.
+constexpr uint64_t kMostElements = uint64_t{1} << 32;
+
+// `count` elements of `bytes` each, from `offset` of a view on.
+struct Extent {
+  int view;
+  uint64_t offset;
+  uint64_t count;
+  uint64_t bytes;
+  bool may_be_strided;
+};
+
+void check_view(Document& d, const BufferView& view, const std::string& where) {
+  check_index(d, d.buffers.size(), view.buffer, where, "buffer");
+  Buffer& buffer = d.buffers[static_cast<size_t>(view.buffer)];
+  const std::string name = "buffer " + std::to_string(view.buffer);
+  const uint128 end = static_cast<uint128>(view.byte_offset) + view.byte_length;
+  if (end > buffer.byte_length)
+    refuse(d.path,
+           where + " ends past the " + std::to_string(buffer.byte_length) + " bytes of " + name);
+  if (buffer.source == Buffer::Source::kNone)
+    refuse(d.path, where + ": " + name + " has no uri and is not in the file");
+  buffer.is_read = true;
+}
+
+void check_extent(Document& d, const Extent& extent, const std::string& where) {
+  check_index(d, d.views.size(), extent.view, where, "bufferView");
+  const BufferView& view = d.views[static_cast<size_t>(extent.view)];
+  const std::string name = "bufferView " + std::to_string(extent.view);
+  check_view(d, view, where + ": " + name);
+  if (view.byte_stride != 0 && !extent.may_be_strided)
+    refuse(d.path, where + ": " + name + " has a byteStride, which is for vertices only");
+  if (view.byte_stride != 0 && view.byte_stride < extent.bytes)
+    refuse(d.path, where + ": the byteStride of " + name + " is " +
+                       std::to_string(view.byte_stride) + ", less than an element of " +
+                       std::to_string(extent.bytes) + " bytes");
+  if (extent.count == 0) return;
+  const uint64_t stride = view.byte_stride != 0 ? view.byte_stride : extent.bytes;
+  const uint128 end =
+      static_cast<uint128>(extent.count - 1) * stride + extent.offset + extent.bytes;
+  if (end > view.byte_length)
+    refuse(d.path,
+           where + " ends past the " + std::to_string(view.byte_length) + " bytes of " + name);
+}
+
+void check_sparse(Document& d, const Accessor& accessor, const std::string& where) {
+  const Sparse& sparse = accessor.sparse;
+  if (sparse.count > accessor.count)
+    refuse(d.path, where + " replaces " + std::to_string(sparse.count) + " of " +
+                       std::to_string(accessor.count) + " elements");
+  if (sparse.index_type != kUnsignedByte && sparse.index_type != kUnsignedShort &&
+      sparse.index_type != kUnsignedInt)
+    refuse(d.path, where + ": its sparse indices are not unsigned integers");
+  const auto index_bytes = static_cast<uint64_t>(component_bytes(sparse.index_type));
+  check_extent(d, {sparse.index_view, sparse.index_offset, sparse.count, index_bytes, false},
+               where + ": its sparse indices");
+  check_extent(
+      d, {sparse.value_view, sparse.value_offset, sparse.count, element_bytes(accessor), false},
+      where + ": its sparse values");
+}
+
+void check_type(const Document& d, const Accessor& accessor, const AccessorUse& use,
+                const std::string& where) {
+  const auto among = [&](const std::vector<int>& types) {
+    return std::ranges::find(types, accessor.component_type) != types.end();
+  };
+  const std::string type = component_name(accessor.component_type);
+  if (accessor.components != use.components)
+    refuse(d.path, where + " has " + std::to_string(accessor.components) +
+                       " components, expected " + std::to_string(use.components));
+  if (!among(use.types)) {
+    std::string expected;
+    for (int t : use.types)
+      expected += (expected.empty() ? "" : " or ") + std::string(component_name(t));
+    refuse(d.path, where + " has components of type " + type + ", expected " + expected);
+  }
+  if (accessor.normalized && !among(use.may_be_normalized))
+    refuse(d.path,
+           where + " has normalized components of type " + type + ", expected them not normalized");
+}
+
+}  // namespace
+
+void check_accessor(Document& d, int index, const AccessorUse& use) {
+  if (index < 0) return;
+  check_index(d, d.accessors.size(), index, use.where, "accessor");
+  const Accessor& accessor = d.accessors[static_cast<size_t>(index)];
+  const std::string where = use.where + ": " + d.name_accessor(index);
+  check_type(d, accessor, use, where);
+  if (accessor.count > kMostElements)
+    throw Error(ErrorCode::kLimit, d.path + ": " + where + " has " +
+                                       std::to_string(accessor.count) +
+                                       " elements, the limit is 2^32");
+  const bool is_indices = use.components == 1;
+  if (accessor.view >= 0)
+    check_extent(
+        d,
+        {accessor.view, accessor.byte_offset, accessor.count, element_bytes(accessor), !is_indices},
+        where);
+  if (accessor.is_sparse) check_sparse(d, accessor, where);
+}
+
+void check_count(const Document& d, int index, uint64_t count, const std::string& where) {
+  if (index < 0) return;
+  const uint64_t found = d.accessors[static_cast<size_t>(index)].count;
+  if (found != count)
+    refuse(d.path, where + ": " + d.name_accessor(index) + " has " + std::to_string(found) +
+                       " elements, expected " + std::to_string(count));
+}
+
+void check_index(const Document& d, size_t size, int index, const std::string& where,
+                 const char* what) {
+  if (index < 0 || static_cast<size_t>(index) >= size)
+    refuse(d.path, where + ": " + what + " " + std::to_string(index) +
+                       " does not exist, there are " + std::to_string(size));
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,122 @@
+#include "core/scene/gltf/document/document.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+
+namespace voxdag::gltf {
+namespace {
+
+constexpr size_t kLongestName = 64;
+constexpr size_t kMostWarnings = 20;
+
+template <class T>
+std::string name_of(const char* kind, const std::vector<T>& all, int index) {
+  const size_t i = static_cast<size_t>(index);
+  return kind +
+         (index >= 0 && i < all.size() ? numbered(index, all[i].name) : std::to_string(index));
+}
+
+template <class T>
+uint64_t bytes_of(const std::vector<T>& v) {
+  return v.capacity() * sizeof(T);
+}
+
+}  // namespace
+
+std::string printable(const std::string& text) {
+  std::string shown = text.substr(0, kLongestName);
+  for (char& c : shown)
+    if (static_cast<unsigned char>(c) < 0x20 || c == '"' || c == 0x7f) c = '?';
+  return text.size() > kLongestName ? shown + "..." : shown;
+}
+
+std::string numbered(int index, const std::string& name) {
+  const std::string number = std::to_string(index);
+  return name.empty() ? number : number + " \"" + printable(name) + "\"";
+}
+
+void refuse(const std::string& path, const std::string& what) {
+  throw Error(ErrorCode::kInvalidInput, path + ": " + what);
+}
+
+void Document::warn(const std::string& what) {
+  if (warnings.size() < kMostWarnings)
+    warnings.push_back(path + ": " + what);
+  else
+    ++further_warnings;
+}
+
+std::string Document::name_node(int node) const { return name_of("node ", nodes, node); }
+std::string Document::name_mesh(int mesh) const { return name_of("mesh ", meshes, mesh); }
+std::string Document::name_skin(int skin) const { return name_of("skin ", skins, skin); }
+std::string Document::name_accessor(int accessor) const {
+  return name_of("accessor ", accessors, accessor);
+}
+
+uint64_t Document::memory_bytes() const {
+  uint64_t bytes = bytes_of(buffers) + bytes_of(views) + bytes_of(accessors) + bytes_of(meshes) +
+                   bytes_of(skins) + bytes_of(nodes) + bytes_of(roots);
+  for (const Buffer& b : buffers) bytes += b.uri.capacity() + b.characters.capacity();
+  for (const Accessor& a : accessors) bytes += a.name.capacity();
+  for (const Skin& s : skins) bytes += s.name.capacity() + bytes_of(s.joints);
+  for (const Node& n : nodes)
+    bytes += n.name.capacity() + bytes_of(n.children) + bytes_of(n.weights);
+  for (const Mesh& m : meshes) {
+    bytes += m.name.capacity() + bytes_of(m.primitives) + bytes_of(m.weights);
+    for (const Primitive& p : m.primitives) bytes += bytes_of(p.targets) + bytes_of(p.joint_sets);
+  }
+  return bytes;
+}
+
+int component_bytes(int component_type) {
+  switch (component_type) {
+    case kByte:
+    case kUnsignedByte:
+      return 1;
+    case kShort:
+    case kUnsignedShort:
+      return 2;
+    case kUnsignedInt:
+    case kFloat:
+      return 4;
+    default:
+      return 0;
+  }
+}
+
+const char* component_name(int component_type) {
+  switch (component_type) {
+    case kByte:
+      return "byte";
+    case kUnsignedByte:
+      return "unsigned byte";
+    case kShort:
+      return "short";
+    case kUnsignedShort:
+      return "unsigned short";
+    case kUnsignedInt:
+      return "unsigned int";
+    case kFloat:
+      return "float";
+    default:
+      return "unknown";
+  }
+}
+
+uint64_t triangle_count(const Document& document, const Primitive& primitive) {
+  if (!primitive.makes_triangles()) return 0;
+  const int source = primitive.indices >= 0 ? primitive.indices : primitive.position;
+  const uint64_t corners = document.accessors[static_cast<size_t>(source)].count;
+  if (primitive.mode == kTriangleList) return corners / 3;
+  return corners < 3 ? 0 : corners - 2;
+}
+
+uint64_t instance_count(const Document& document, const Node& node) {
+  if (!node.instancing.present) return 1;
+  const Instancing& i = node.instancing;
+  const int source = std::max({i.translation, i.rotation, i.scale});
+  return source < 0 ? 1 : document.accessors[static_cast<size_t>(source)].count;
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,119 @@
+#include "core/scene/gltf/geometry/buffer_reader.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/base/error.h"
+#include "core/scene/gltf/document/uri.h"
+#include "core/scene/gltf/geometry/base64.h"
+
+namespace voxdag::gltf {
+namespace {
+
+constexpr size_t kMostOpenFiles = 16;
+// A window that begins inside a group of three bytes and ends inside another.
+constexpr size_t kMostGroups = BufferReader::kWindowBytes / 3 + 2;
+
+// Base64 characters [begin, begin + out.size()) of a buffer.
+void read_characters(const ReadableFile& scene_file, const Buffer& buffer, uint64_t begin,
+                     std::span<std::byte> out) {
+  if (buffer.source == Buffer::Source::kBase64)
+    return scene_file.read_at(buffer.text.begin + begin, out);
+  const auto from = buffer.characters.begin() + static_cast<ptrdiff_t>(begin);
+  std::transform(from, from + static_cast<ptrdiff_t>(out.size()), out.begin(),
+                 [](char c) { return static_cast<std::byte>(c); });
+}
+
+uint64_t character_count(const Buffer& buffer) {
+  return buffer.source == Buffer::Source::kBase64 ? buffer.text.size : buffer.characters.size();
+}
+
+}  // namespace
+
+BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
+                           const Document& document, MemoryBudget& budget)
+    : files_(files),
+      scene_file_(scene_file),
+      document_(document),
+      budget_(budget),
+      window_(budget, 3 * kMostGroups, "the window over " + scene_file.path()) {
+  for (size_t i = 0; i < document.buffers.size(); ++i)
+    if (document.buffers[i].is_read) check_length(static_cast<int>(i));
+}
+
+std::span<const std::byte> BufferReader::window(int index, uint64_t offset, size_t size) {
+  const Buffer& buffer = document_.buffers[static_cast<size_t>(index)];
+  if (buffer.source == Buffer::Source::kBase64 || buffer.source == Buffer::Source::kMemory)
+    return decode_base64(index, offset, size);
+  const std::span<std::byte> bytes(window_.data(), size);
+  if (buffer.source == Buffer::Source::kFile)
+    scene_file_.read_at(buffer.text.begin + offset, bytes);
+  else
+    external(index).read_at(offset, bytes);
+  return bytes;
+}
+
+void BufferReader::check_length(int index) {
+  const Buffer& buffer = document_.buffers[static_cast<size_t>(index)];
+  uint64_t there = 0;
+  switch (buffer.source) {
+    case Buffer::Source::kNone:
+      return;
+    case Buffer::Source::kFile:
+      there = buffer.text.size;
+      break;
+    case Buffer::Source::kExternal:
+      there = external(index).size();
+      break;
+    case Buffer::Source::kBase64:
+    case Buffer::Source::kMemory: {
+      std::array<std::byte, 2> tail{};
+      const uint64_t characters = character_count(buffer);
+      const size_t n = static_cast<size_t>(std::min<uint64_t>(2, characters));
+      read_characters(scene_file_, buffer, characters - n, std::span(tail).first(n));
+      there = base64_bytes(characters, std::span(tail).first(n));
+      break;
+    }
+  }
+  if (there < buffer.byte_length)
+    refuse(document_.path, "buffer " + std::to_string(index) + " claims " +
+                               std::to_string(buffer.byte_length) + " bytes, " +
+                               std::to_string(there) + " are there" +
+                               (buffer.uri.empty() ? "" : " in " + printable(buffer.uri)));
+}
+
+const ReadableFile& BufferReader::external(int index) {
+  const auto found = std::ranges::find(open_, index, &OpenFile::buffer);
+  if (found != open_.end()) return *found->file;
+  const std::string where = document_.path + ": buffer " + std::to_string(index);
+  const std::string& uri = document_.buffers[static_cast<size_t>(index)].uri;
+  const std::string path = resolve_uri(document_.path, uri, where);
+  if (open_.size() == kMostOpenFiles) open_.erase(open_.begin());
+  try {
+    open_.push_back({index, files_.open_read(path)});
+  } catch (const Error& e) {
+    throw Error(e.code(), where + ": " + e.message());
+  }
+  const FileIdentity identity = open_.back().file->identity();
+  SourceFile& known = external_files_.try_emplace(index, SourceFile{path, identity}).first->second;
+  if (known.identity != identity) known.identity = {};
+  return *open_.back().file;
+}
+
+std::span<const std::byte> BufferReader::decode_base64(int index, uint64_t offset, size_t size) {
+  if (characters_.size() == 0)
+    characters_ = PageBuffer<std::byte>(budget_, 4 * kMostGroups, "base64 of " + document_.path);
+  const Buffer& buffer = document_.buffers[static_cast<size_t>(index)];
+  const uint64_t first_group = offset / 3;
+  const uint64_t group_count = (offset + size + 2) / 3 - first_group;
+  const uint64_t begin = 4 * first_group;
+  const uint64_t end = std::min(begin + 4 * group_count, character_count(buffer));
+  const std::span<std::byte> characters(characters_.data(), static_cast<size_t>(end - begin));
+  read_characters(scene_file_, buffer, begin, characters);
+  if (!gltf::decode_base64(characters, window_.data()))
+    refuse(document_.path,
+           "buffer " + std::to_string(index) + ": a character of its data: URI is not base64");
+  return {window_.data() + offset % 3, size};
+}
+
+}  // namespace voxdag::gltf

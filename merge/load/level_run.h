@@ -1,0 +1,76 @@
+// A run: the rows of one level of one artifact (or of the top tree) in frames, in the total order.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/format/artifact/artifact.h"
+#include "merge/sort/record.h"
+
+namespace voxdag {
+
+// All rows of a level whose hash lies in [first, last].
+struct HashInterval {
+  uint64_t first = 0;
+  uint64_t last = ~uint64_t{0};
+};
+
+// Frames [begin, end) of a run.
+struct FrameSpan {
+  size_t begin = 0;
+  size_t end = 0;
+};
+
+class LevelRun {
+ public:
+  virtual ~LevelRun() = default;
+  // Decodes a frame; several threads at once, each with its own `out`.
+  virtual void read_frame(size_t index, Frame& out) const = 0;
+
+  std::span<const FrameInfo> frames() const { return frames_; }
+  uint64_t rows() const { return rows_; }
+  bool bricks() const { return bricks_; }
+  // Children are positions already, not indices into the run's own level below.
+  bool rewired() const { return rewired_; }
+
+  // Rows, or words of rows, before frame `index`, which may be the end.
+  uint64_t rows_before(size_t index) const {
+    return index < frames_.size() ? frames_[index].first_row : rows_;
+  }
+  uint64_t words_before(size_t index) const {
+    if (bricks_) return kBrickWords * rows_before(index);
+    return index < frames_.size() ? frames_[index].first_child : children_;
+  }
+  // Those that may hold rows of the interval.
+  FrameSpan frames_within(const HashInterval& interval) const;
+
+ protected:
+  LevelRun(bool bricks, bool rewired) : bricks_(bricks), rewired_(rewired) {}
+  void set_frames(std::span<const FrameInfo> frames, uint64_t rows, uint64_t children) {
+    frames_ = frames;
+    rows_ = rows;
+    children_ = children;
+  }
+
+ private:
+  const bool bricks_;
+  const bool rewired_;
+  std::span<const FrameInfo> frames_;
+  uint64_t rows_ = 0;
+  uint64_t children_ = 0;
+};
+
+// A level of an artifact; without rows if the artifact does not reach that far up.
+class ArtifactRun : public LevelRun {
+ public:
+  ArtifactRun(const ArtifactReader& artifact, uint32_t level);
+  void read_frame(size_t index, Frame& out) const override {
+    artifact_.read_frame(level_, index, out);
+  }
+
+ private:
+  const ArtifactReader& artifact_;
+  const uint32_t level_;
+};
+
+}  // namespace voxdag

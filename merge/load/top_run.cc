@@ -1,0 +1,86 @@
+#include "merge/load/top_run.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/dag/node_hash.h"
+#include "core/geometry/morton.h"
+
+namespace voxdag {
+namespace {
+
+uint64_t morton_of(const PlacedNode& node) {
+  return morton_encode(node.cube.position[0], node.cube.position[1], node.cube.position[2]);
+}
+
+std::string describe(const Cube& cube) {
+  return "level " + std::to_string(cube.level) + ", position (" + std::to_string(cube.position[0]) +
+         ", " + std::to_string(cube.position[1]) + ", " + std::to_string(cube.position[2]) + ")";
+}
+
+}  // namespace
+
+TopRun::TopRun(uint32_t hash_bits, std::vector<PlacedNode> children) : LevelRun(false, true) {
+  std::ranges::sort(children, {}, morton_of);
+  add_parents(children, hash_bits);
+  std::ranges::sort(nodes_, [](const Node& a, const Node& b) {
+    return compare_nodes(a.hash, a.mask, a.children, b.hash, b.mask, b.children) < 0;
+  });
+  cut_frames();
+}
+
+// `children` in Morton order: siblings stand together, in child order.
+void TopRun::add_parents(const std::vector<PlacedNode>& children, uint32_t hash_bits) {
+  for (size_t begin = 0, end; begin < children.size(); begin = end) {
+    Node node;
+    node.cube = children[begin].cube.parent();
+    uint64_t hashes[8];
+    int count = 0;
+    for (end = begin; end < children.size() && children[end].cube.parent() == node.cube; ++end) {
+      const PlacedNode& child = children[end];
+      const uint8_t bit = static_cast<uint8_t>(1 << child.cube.child_index());
+      if (node.mask & bit)
+        throw Error(ErrorCode::kCorrupt, "two artifacts hold the cube at " + describe(child.cube) +
+                                             ", or one holds it and another a part of it: "
+                                             "expected subvolumes that do not overlap");
+      node.mask |= bit;
+      node.children[count] = child.position;
+      hashes[count++] = child.hash;
+    }
+    node.hash = cut_hash(hash_node(node.mask, hashes), hash_bits);
+    nodes_.push_back(node);
+  }
+}
+
+void TopRun::cut_frames() {
+  uint64_t children = 0;
+  for (size_t row = 0; row < nodes_.size(); ++row) {
+    if (row % kFrameRows == 0) {
+      FrameInfo frame;
+      frame.first_row = row;
+      frame.first_child = children;
+      frame.first_hash = nodes_[row].hash;
+      infos_.push_back(frame);
+    }
+    ++infos_.back().rows;
+    infos_.back().children += kRowWords[nodes_[row].mask];
+    children += kRowWords[nodes_[row].mask];
+  }
+  set_frames(infos_, nodes_.size(), children);
+}
+
+void TopRun::read_frame(size_t index, Frame& out) const {
+  out.rows = infos_[index].rows;
+  out.hashes.clear();
+  out.masks.clear();
+  out.children.clear();
+  const auto first = nodes_.begin() + static_cast<std::ptrdiff_t>(infos_[index].first_row);
+  for (auto node = first; node != first + out.rows; ++node) {
+    out.hashes.push_back(node->hash);
+    out.masks.push_back(node->mask);
+    out.children.insert(out.children.end(), node->children, node->children + kRowWords[node->mask]);
+  }
+}
+
+}  // namespace voxdag

@@ -1,0 +1,135 @@
+#include "merge/plan/artifact_set.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "core/geometry/morton.h"
+#include "merge/load/level_run.h"
+#include "merge/load/slab.h"
+
+namespace voxdag {
+namespace {
+
+// Opens artifacts, each segment file once.
+class Opener {
+ public:
+  Opener(const OpenSegment& open, uint32_t grid_levels, uint32_t hash_bits)
+      : open_(open), grid_levels_(grid_levels), hash_bits_(hash_bits) {}
+
+  ArtifactReader open(const ArtifactRef& ref) {
+    std::shared_ptr<ReadableFile>& file = files_[ref.segment];
+    if (!file) file = open_(ref.segment);
+    ArtifactReader reader(file, ref);
+    check(reader, file->path() + ", artifact at byte " + std::to_string(ref.offset) + ": ");
+    return reader;
+  }
+
+ private:
+  void check(const ArtifactReader& reader, const std::string& where) const {
+    if (reader.grid_levels() != grid_levels_ || reader.hash_bits() != hash_bits_)
+      throw Error(ErrorCode::kCorrupt,
+                  where + "made for " + std::to_string(reader.grid_levels()) + " grid levels and " +
+                      std::to_string(reader.hash_bits()) + " hash bits, expected " +
+                      std::to_string(grid_levels_) + " and " + std::to_string(hash_bits_));
+    if (reader.roots().empty()) throw Error(ErrorCode::kCorrupt, where + "has no root");
+    for (const ArtifactRoot& root : reader.roots()) {
+      const ArtifactLevel* const level = reader.level(root.cube.level);
+      if (!level || root.index >= level->rows)
+        throw Error(ErrorCode::kCorrupt,
+                    where + "a root on level " + std::to_string(root.cube.level) + " is not there");
+    }
+  }
+
+  const OpenSegment& open_;
+  const uint32_t grid_levels_;
+  const uint32_t hash_bits_;
+  std::map<uint32_t, std::shared_ptr<ReadableFile>> files_;
+};
+
+uint64_t index_bytes(const ArtifactReader& reader) {
+  uint64_t bytes = sizeof(ArtifactReader) + reader.roots().size_bytes();
+  for (const ArtifactLevel& level : reader.levels())
+    bytes += sizeof(level) + level.frames.size() * sizeof(FrameInfo);
+  return bytes;
+}
+
+uint64_t row_count(const ArtifactReader& reader) {
+  uint64_t rows = 0;
+  for (const ArtifactLevel& level : reader.levels()) rows += level.rows;
+  return rows;
+}
+
+uint64_t content_of(const ArtifactReader& reader) {
+  std::vector<uint64_t> words;
+  for (const ArtifactRoot& root : reader.roots()) {
+    words.insert(words.end(),
+                 {root.cube.level, root.cube.position[0], root.cube.position[1],
+                  root.cube.position[2], root.index, root.hash, root.voxels, root.svo_nodes});
+  }
+  for (const ArtifactLevel& level : reader.levels())
+    words.insert(words.end(), {level.level, level.rows, level.children});
+  return checksum64(std::as_bytes(std::span(words)));
+}
+
+// What a slab needs to hold any two neighbouring frames.
+uint64_t slab_bytes(const ArtifactReader& reader) {
+  uint64_t most = 0;
+  for (const ArtifactLevel& level : reader.levels()) {
+    const ArtifactRun run(reader, level.level);
+    for (size_t begin = 0; begin < level.frames.size(); ++begin) {
+      const size_t end = std::min(begin + 2, level.frames.size());
+      const uint64_t rows = run.rows_before(end) - run.rows_before(begin);
+      const uint64_t words = run.words_before(end) - run.words_before(begin);
+      most = std::max(most, Slab::bytes_for(rows, words, true));
+    }
+  }
+  return most;
+}
+
+// An artifact counts as at least this much, however small it is: so the number of runs that are
+// open at once, and the bookkeeping for each, is bounded by the budget too.
+constexpr uint64_t kLeastRunBytes = uint64_t{64} << 10;
+
+// The Morton code of the cube's low corner, in bricks of the largest grid.
+uint64_t place_of(const Cube& cube) {
+  const uint64_t code = morton_encode(cube.position[0], cube.position[1], cube.position[2]);
+  return code << 3 * (kMaxGridLevels - cube.level);
+}
+
+}  // namespace
+
+ArtifactSet::ArtifactSet(std::span<const SurveyedArtifact> artifacts, const OpenSegment& open,
+                         uint32_t grid_levels, uint32_t hash_bits, MemoryBudget& budget) {
+  Opener opener(open, grid_levels, hash_bits);
+  uint64_t bytes = 0;
+  for (const SurveyedArtifact& artifact : artifacts) {
+    readers_.push_back(opener.open(artifact.ref));
+    bytes += index_bytes(readers_.back());
+  }
+  charge_ = MemoryCharge(budget, bytes, "the artifacts' indexes");
+}
+
+ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
+                                uint32_t grid_levels, uint32_t hash_bits) {
+  Opener opener(open, grid_levels, hash_bits);
+  ArtifactSurvey survey;
+  std::vector<std::pair<uint64_t, SurveyedArtifact>> placed;
+  for (const ArtifactRef& ref : refs) {
+    const ArtifactReader reader = opener.open(ref);
+    survey.rows += row_count(reader);
+    SurveyedArtifact found{ref,
+                           std::max(kLeastRunBytes, index_bytes(reader) + slab_bytes(reader)),
+                           content_of(reader),
+                           {}};
+    for (const ArtifactRoot& root : reader.roots()) found.cubes.push_back(root.cube);
+    placed.emplace_back(place_of(found.cubes[0]), std::move(found));
+  }
+  std::ranges::stable_sort(placed, {}, &std::pair<uint64_t, SurveyedArtifact>::first);
+  for (auto& [place, artifact] : placed) survey.by_place.push_back(std::move(artifact));
+  return survey;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,123 @@
+#include "merge/plan/merge_pass.h"
+
+#include <algorithm>
+#include <memory>
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+
+namespace voxdag {
+namespace {
+
+class Round {
+ public:
+  Round(const MergeSeams& seams, const RoundTask& task, LevelOutput& output, RoundProgress progress)
+      : seams_(seams), task_(task), output_(output), done_(std::move(progress)) {}
+
+  std::vector<ArtifactRoot> run(const std::function<void(const RoundProgress&)>& after_level) {
+    const uint32_t highest = task_.with_top ? 0 : highest_root();
+    reserve_memory();
+    uint32_t level = done_.level.value_or(task_.grid_levels - kBrickLevels + 1);
+    while (level-- > highest) {
+      merge_level_of_all(level);
+      if (after_level) after_level(done_);
+    }
+    if (task_.with_top && done_.placed.size() != 1)
+      throw Error(ErrorCode::kCorrupt,
+                  "an artifact holds the whole grid and others a part of it: "
+                  "expected subvolumes that do not overlap");
+    return std::move(done_.roots);
+  }
+
+ private:
+  uint32_t highest_root() const {
+    uint32_t highest = task_.grid_levels;
+    for (const ArtifactReader& artifact : task_.artifacts)
+      for (const ArtifactRoot& root : artifact.roots())
+        highest = std::min(highest, root.cube.level);
+    return highest;
+  }
+
+  void merge_level_of_all(uint32_t level) {
+    std::vector<ArtifactRun> artifact_runs;
+    for (const ArtifactReader& artifact : task_.artifacts)
+      artifact_runs.emplace_back(artifact, level);
+    const TopRun top(task_.hash_bits,
+                     task_.with_top ? std::move(done_.placed) : std::vector<PlacedNode>());
+    seams_.progress.expect_more(top.rows());
+    std::vector<const LevelRun*> runs;
+    std::vector<uint64_t> rows;
+    for (const ArtifactRun& run : artifact_runs) runs.push_back(&run);
+    runs.push_back(&top);
+    for (const LevelRun* run : runs) rows.push_back(run->rows());
+
+    PositionMaps maps(rows, seams_.plan.resident_bytes, seams_.scratch, seams_.budget);
+    output_.begin_level(level);
+    const LevelExtent extent =
+        merge_level(seams_, {.level = level,
+                             .bricks = level + kBrickLevels == task_.grid_levels,
+                             .runs = runs,
+                             .child_maps = done_.maps ? &*done_.maps : nullptr,
+                             .maps = maps,
+                             .output = output_,
+                             .memory = memory_});
+    output_.end_level(extent.nodes, extent.positions);
+    if (task_.with_top) seams_.report.dag_nodes += extent.nodes;
+    place(level, top, maps);
+    done_.maps = std::move(maps);
+    done_.level = level;
+    if (seams_.budget.available() < memory_.bytes() / 4 + bytes_beside_slab()) memory_.release();
+  }
+
+  // Memory for the largest level from the start, where there is room for that.
+  void reserve_memory() {
+    std::vector<uint64_t> rows(task_.grid_levels), words(task_.grid_levels);
+    for (const ArtifactReader& artifact : task_.artifacts)
+      for (const ArtifactLevel& level : artifact.levels()) {
+        rows[level.level] += level.rows;
+        words[level.level] += std::max(level.children, kBrickWords * level.rows);
+      }
+    const uint64_t most_rows = std::ranges::max(rows), most_words = std::ranges::max(words);
+    const bool resident = most_rows * sizeof(uint32_t) <= seams_.plan.resident_bytes;
+    const uint64_t bytes = Slab::bytes_for(most_rows, most_words, false);
+    if (resident && bytes <= kLargestSlabBytes &&
+        bytes + bytes_beside_slab() + seams_.plan.resident_bytes <= seams_.budget.available())
+      memory_.reserve(most_rows, most_words, false, seams_.budget);
+  }
+
+  // What the next level may take, its runs' rows being in a slab.
+  uint64_t bytes_beside_slab() const {
+    return bytes_for_workers(seams_.plan) + seams_.plan.resident_bytes;
+  }
+
+  // Finds where this level's top nodes and subvolume roots went.
+  void place(uint32_t level, const TopRun& top, const PositionMaps& maps) {
+    done_.placed.clear();
+    for (size_t row = 0; row < top.rows(); ++row)
+      done_.placed.push_back({top.cube(row), top.hash(row), maps.at(task_.artifacts.size(), row)});
+    if (task_.with_top) seams_.report.svo_nodes += top.rows();
+    for (size_t run = 0; run < task_.artifacts.size(); ++run)
+      for (ArtifactRoot root : task_.artifacts[run].roots()) {
+        if (root.cube.level != level) continue;
+        root.index = maps.at(run, root.index);
+        done_.placed.push_back({root.cube, root.hash, root.index});
+        done_.roots.push_back(root);
+      }
+  }
+
+  const MergeSeams& seams_;
+  const RoundTask& task_;
+  LevelOutput& output_;
+  RoundProgress done_;
+  SlabMemory memory_;
+};
+
+}  // namespace
+
+std::vector<ArtifactRoot> merge_round(
+    const MergeSeams& seams, const RoundTask& task, LevelOutput& output, RoundProgress progress,
+    const std::function<void(const RoundProgress&)>& after_level) {
+  return Round(seams, task, output, std::move(progress)).run(after_level);
+}
+
+}  // namespace voxdag

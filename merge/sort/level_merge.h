@@ -1,0 +1,66 @@
+// Merges one level of all runs: slab after slab of the hash space, the rows rewired, swept,
+// written, and their positions kept for the level above.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/base/progress.h"
+#include "merge/load/level_run.h"
+#include "merge/load/position_maps.h"
+#include "merge/load/scratch.h"
+#include "merge/merge.h"
+#include "merge/output/level_output.h"
+#include "merge/plan/memory_plan.h"
+#include "merge/sort/sequencer.h"
+
+namespace voxdag {
+
+// Progress whose total is put right as more becomes known.
+class MergeProgress {
+ public:
+  explicit MergeProgress(Progress& progress) : progress_(progress) {}
+  void begin(uint64_t total) { progress_.begin_stage("merge", total_ = total, "nodes"); }
+  void set_total(uint64_t total) { progress_.set_total(total_ = total); }
+  void expect_more(uint64_t rows) {
+    if (rows > 0) set_total(total_ + rows);
+  }
+  void advance(uint64_t rows) { progress_.advance(rows); }
+  void end() { progress_.end_stage(); }
+  void warn(const std::string& message) { progress_.warn(message); }
+
+ private:
+  Progress& progress_;
+  uint64_t total_ = 0;
+};
+
+// What all levels of a merge share.
+struct MergeSeams {
+  MergeScratch& scratch;
+  MemoryBudget& budget;
+  MemoryPlan plan;
+  MergeProgress& progress;
+  const CancelToken& cancel;
+  MergeReport& report;
+};
+
+struct LevelTask {
+  uint32_t level = 0;
+  bool bricks = false;
+  std::span<const LevelRun* const> runs;
+  const PositionMaps* child_maps = nullptr;  // of the level below, run for run; null for bricks
+  PositionMaps& maps;                        // filled
+  LevelOutput& output;                       // between begin_level() and end_level()
+  SlabMemory& memory;                        // kept from level to level
+};
+
+// What the workers may take besides the slab and the maps.
+uint64_t bytes_for_workers(const MemoryPlan& plan);
+
+// Adds ranges, groups and rows to the report.
+LevelExtent merge_level(const MergeSeams& seams, const LevelTask& task);
+
+}  // namespace voxdag

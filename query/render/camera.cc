@@ -1,0 +1,72 @@
+#include "query/render/camera.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kMargin = 1.06;
+
+double half_tangent(double fov_degrees) { return std::tan(fov_degrees * kPi / 360); }
+
+// Right and up of a camera that looks along `forward`; looking straight down, up is -z.
+void picture_axes(const Vec& forward, Vec& right, Vec& up) {
+  const bool vertical = std::fabs(forward[1]) > 1 - 1e-9;
+  const Vec reference = vertical ? Vec{{0, 0, forward[1] < 0 ? -1.0 : 1.0}} : Vec{{0, 1, 0}};
+  right = normalized(cross(forward, reference));
+  up = cross(right, forward);
+}
+
+// How far the points reach along `axis`.
+double bound(const std::vector<Vec>& points, const Vec& axis) {
+  double reach = dot(points[0], axis);
+  for (const Vec& p : points) reach = std::max(reach, dot(p, axis));
+  return reach;
+}
+
+}  // namespace
+
+Camera::Camera(const Placement& p, int width, int height)
+    : eye_(p.eye), half_width_(width / 2.0), half_height_(height / 2.0) {
+  if (!(p.fov_degrees > 0 && p.fov_degrees < 180))
+    throw Error(ErrorCode::kInvalidInput, "the field of view must lie between 0 and 180 degrees");
+  if (!(length(p.target - p.eye) > 0))
+    throw Error(ErrorCode::kInvalidInput, "the camera stands on its target");
+  forward_ = normalized(p.target - p.eye);
+  picture_axes(forward_, right_, up_);
+  pixel_ = half_tangent(p.fov_degrees) / half_height_;
+}
+
+Ray Camera::ray(double x, double y) const {
+  const Vec offset = right_ * ((x - half_width_) * pixel_) + up_ * ((half_height_ - y) * pixel_);
+  return {eye_, normalized(forward_ + offset)};
+}
+
+Placement see_whole(const std::vector<Vec>& points, const Vec& towards_eye, double fov_degrees,
+                    double aspect) {
+  const Vec back = normalized(towards_eye);
+  Vec right, up;
+  picture_axes(back * -1.0, right, up);
+  const double tangent_up = half_tangent(fov_degrees) / kMargin;
+  // With the eye at e, point p is in the picture if |p.right - e.right| <= tangent (e.back -
+  // p.back), and likewise up: both sides of each are bounds on e, the tightest of which are met in
+  // the middle.
+  double e[2] = {0, 0}, distance = bound(points, back) + 1;
+  const Vec axes[2] = {right, up};
+  const double tangents[2] = {tangent_up * aspect, tangent_up};
+  for (int i = 0; i < 2; ++i) {
+    const double high = bound(points, axes[i] + back * tangents[i]);
+    const double low = bound(points, back * tangents[i] - axes[i]);
+    e[i] = (high - low) / 2;
+    distance = std::max(distance, (high + low) / (2 * tangents[i]));
+  }
+  double middle = 0;
+  for (const Vec& p : points) middle += dot(p, back) / static_cast<double>(points.size());
+  const Vec axis = right * e[0] + up * e[1];
+  return {axis + back * distance, axis + back * middle, fov_degrees};
+}
+
+}  // namespace voxdag::query

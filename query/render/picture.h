@@ -1,0 +1,28 @@
+// A picture of 8-bit sRGB pixels, and its PNG file.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/io/file_system.h"
+
+namespace voxdag::query {
+
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<uint8_t> rgb;  // rows from the top, 3 bytes a pixel
+
+  Picture(int w, int h)
+      : width(w), height(h), rgb(3 * static_cast<size_t>(w) * static_cast<size_t>(h)) {}
+  uint8_t* pixel(int x, int y) {
+    return &rgb[3 * (static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x))];
+  }
+};
+
+// Throws Error{kOutOfMemory} if libpng runs out of memory.
+std::string encode_png(const Picture& picture);
+// Under `path`, whole or not at all.
+void write_png(FileSystem& files, const std::string& path, const Picture& picture);
+
+}  // namespace voxdag::query

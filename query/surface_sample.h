@@ -1,0 +1,42 @@
+// A seeded sample of what a scene's triangles say of the voxels near its surface: small boxes of
+// voxels around random points of random triangles, half of them drawn alike, half by area (so that
+// neither a floor of two triangles nor a million leaves is missed). Two passes over the scene;
+// memory goes with the sample, not with the scene.
+#pragma once
+
+#include <bitset>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/progress.h"
+#include "core/format/global/voxdag_reader.h"
+#include "core/geometry/grid.h"
+#include "core/scene/triangle_source.h"
+
+namespace voxdag::query {
+
+inline constexpr int64_t kBoxEdge = 16;  // voxels, or the whole grid if that is smaller
+inline constexpr size_t kSampleBoxes = 256;
+
+struct SampleBox {
+  int64_t low[3];  // in voxels
+  int64_t edge;
+  std::bitset<kBoxEdge * kBoxEdge * kBoxEdge> set;  // bit (x * kBoxEdge + y) * kBoxEdge + z
+};
+
+// None if no triangle touches the grid.
+std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
+                                      Progress& progress, const CancelToken& cancel);
+
+struct SampleReport {
+  uint64_t boxes = 0;
+  uint64_t voxels = 0;  // compared
+  uint64_t set = 0;     // of them
+};
+
+// Throws Error{kCorrupt} if the file has any of these voxels otherwise, naming the first.
+SampleReport compare_with_sample(const voxdag_reader::File& file,
+                                 const std::vector<SampleBox>& boxes);
+
+}  // namespace voxdag::query

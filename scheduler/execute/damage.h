@@ -1,0 +1,31 @@
+// Finds artifacts that are damaged or gone, so that only their subvolumes are built again.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/error.h"
+#include "scheduler/job/job_store.h"
+
+namespace voxdag {
+
+struct DamagedSubvolume {
+  StoredSubvolume subvolume;
+  std::string what;  // what is wrong with its artifact
+};
+
+// Whether an error may mean that an artifact, or another file of ours, is damaged.
+bool speaks_of_damage(const Error& error);
+
+// Reads the artifacts of all built subvolumes, the levels above `level` (of smaller number): the
+// others are not needed any more and may be gone.
+std::vector<DamagedSubvolume> find_damaged(
+    std::span<const StoredSubvolume> subvolumes, uint32_t level,
+    const std::function<std::shared_ptr<ReadableFile>(uint32_t)>& open_segment,
+    const CancelToken& cancel);
+
+}  // namespace voxdag

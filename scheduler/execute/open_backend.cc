@@ -1,0 +1,92 @@
+#include "scheduler/execute/open_backend.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "core/base/error.h"
+#include "scheduler/execute/backend_check.h"
+
+namespace voxdag {
+namespace {
+
+// Workers a GPU: enough that transfers and host work of some overlap with kernels of others.
+constexpr unsigned kWorkersADevice = 4;
+// A CUDA context alone keeps some hundred MiB resident that no budget sees.
+constexpr uint64_t kLeastMemoryForGpu = uint64_t{2} << 30;
+
+[[noreturn]] void refuse(const std::string& what) { throw Error(ErrorCode::kInvalidInput, what); }
+
+Method method_of(const RunOptions& options) {
+  if (options.method == "pointers") return Method::kPointers;
+  if (options.method == "hashes") return Method::kHashes;
+  return Method::kFast;
+}
+
+BackendChoice cpu_choice() {
+  return {"cpu", [] { return make_cpu_backend(); }};
+}
+
+// Worker after worker takes the next GPU.
+BackendChoice gpu_choice(const Gpus& gpus) {
+  const auto turn = std::make_shared<std::atomic<int>>(0);
+  return {"cuda", [gpus, turn] { return gpus.open((*turn)++ % gpus.count); },
+          kWorkersADevice * static_cast<unsigned>(gpus.count)};
+}
+
+Gpus cuda_gpus(Method method) {
+  return {cuda_device_count(), [method](int device) { return make_cuda_backend(method, device); }};
+}
+
+// Why a GPU must not be used, "" if it may.
+std::string fault_of(const Gpus& gpus, int device) {
+  try {
+    return difference_from_cpu(*gpus.open(device));
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+}  // namespace
+
+void check_backend(const RunOptions& options) {
+  const std::string& backend = options.backend;
+  const std::string& method = options.method;
+  const bool parallel = backend == "parallel-host" || backend == "cuda";
+  if (!parallel && backend != "auto" && backend != "cpu")
+    refuse("backend '" + backend + "': expected auto, cpu, cuda or parallel-host");
+  if (!parallel && !method.empty() && method != "consing")
+    refuse("method '" + method + "': backend " + backend +
+           " has consing only; expected --backend parallel-host or cuda");
+  if (parallel && !method.empty() && method != "pointers" && method != "hashes")
+    refuse("method '" + method + "': backend " + backend + " has pointers and hashes");
+  if (backend == "cuda" && !cuda_device_available())
+    throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
+}
+
+BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
+  const Method method = method_of(options);
+  if (options.backend == "parallel-host")
+    return {"parallel-host", [method] { return make_parallel_host_backend(method); }};
+  if (options.backend == "cuda") return gpu_choice(cuda_gpus(method));
+  // A method that was asked for is the CPU backend's.
+  if (options.backend == "cpu" || !options.method.empty()) return cpu_choice();
+  return choose_automatically(cuda_gpus(method), options.memory_bytes, progress);
+}
+
+BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress) {
+  if (gpus.count == 0) return cpu_choice();
+  if (memory_bytes < kLeastMemoryForGpu) {
+    progress.warn("building on the CPU: a GPU needs --memory of 2 GiB at least");
+    return cpu_choice();
+  }
+  for (int device = 0; device < gpus.count; ++device) {
+    const std::string fault = fault_of(gpus, device);
+    if (fault.empty()) continue;
+    progress.warn("building on the CPU: GPU " + std::to_string(device) +
+                  " failed its check: " + fault);
+    return cpu_choice();
+  }
+  return gpu_choice(gpus);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,77 @@
+// libcrypto's EVP digests do not give out their state; its older interface is plain data.
+#define OPENSSL_SUPPRESS_DEPRECATED
+#include "scheduler/ingest/content_digest.h"
+
+#include <openssl/sha.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+namespace voxdag {
+
+ContentDigest::ContentDigest(const Grid& grid) {
+  static_assert(sizeof(SHA256_CTX) == sizeof state_ && std::is_trivially_copyable_v<SHA256_CTX>);
+  SHA256_CTX context;
+  SHA256_Init(&context);
+  std::memcpy(state_.data(), &context, sizeof context);
+  const double numbers[] = {static_cast<double>(grid.resolution()), grid.origin[0], grid.origin[1],
+                            grid.origin[2], grid.edge};
+  add_bytes(std::as_bytes(std::span(numbers)));
+}
+
+// Nine coordinates of 32 bits, which are half as much to digest; where they do not suffice, the
+// smallest such number, which is never one of those, and then nine of 64 bits.
+void ContentDigest::add(std::span<const FixedTriangle> triangles) {
+  constexpr int32_t kWide = INT32_MIN;
+  constexpr size_t kMostBytes = sizeof kWide + sizeof(FixedTriangle), kAtOnce = 64;
+  std::array<std::byte, kMostBytes * kAtOnce> buffer;
+  while (!triangles.empty()) {
+    size_t bytes = 0;
+    const auto put = [&](const void* from, size_t size) {
+      std::memcpy(&buffer[bytes], from, size);
+      bytes += size;
+    };
+    const auto portion = triangles.first(std::min(kAtOnce, triangles.size()));
+    for (const FixedTriangle& triangle : portion) {
+      int32_t narrow[9];
+      bool fits = true;
+      for (int i = 0; i < 9; ++i) {
+        const int64_t coordinate = triangle.v[i / 3][i % 3];
+        narrow[i] = static_cast<int32_t>(coordinate);
+        fits &= narrow[i] == coordinate && narrow[i] != kWide;
+      }
+      if (fits) {
+        put(narrow, sizeof narrow);
+      } else {
+        put(&kWide, sizeof kWide);
+        put(&triangle, sizeof triangle);
+      }
+    }
+    add_bytes(std::span(buffer).first(bytes));
+    triangles = triangles.subspan(portion.size());
+  }
+}
+
+std::string ContentDigest::hex() const {
+  SHA256_CTX context;
+  std::memcpy(&context, state_.data(), sizeof context);
+  unsigned char digest[SHA256_DIGEST_LENGTH];
+  SHA256_Final(digest, &context);
+  std::string hex;
+  for (const unsigned char byte : digest) {
+    hex += "0123456789abcdef"[byte >> 4];
+    hex += "0123456789abcdef"[byte & 15];
+  }
+  return hex;
+}
+
+void ContentDigest::add_bytes(std::span<const std::byte> bytes) {
+  SHA256_CTX context;
+  std::memcpy(&context, state_.data(), sizeof context);
+  SHA256_Update(&context, bytes.data(), bytes.size());
+  std::memcpy(state_.data(), &context, sizeof context);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,34 @@
+// A build's state, read from its work folder at any time, also while another process builds there.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/io/file_system.h"
+#include "scheduler/job/job_store.h"
+
+namespace voxdag {
+
+struct JobStatus {
+  bool running = false;  // a process holds the folder
+  std::string holder;    // which, if so
+  std::string geometry;  // options as JSON; "" before the job began
+  uint64_t subvolumes = 0;
+  uint64_t built = 0;
+  std::optional<ProgressSnapshot> progress;
+  std::vector<StageTime> stages;
+
+  // Units a second in the current stage, and seconds left at that rate; 0 when not known.
+  double rate() const;
+  double eta_s() const;
+};
+
+// Throws Error{kNotFound} if there is no job store in the folder.
+JobStatus read_job_status(FileSystem& files, const std::string& work_folder);
+
+// One JSON object, names as in docs/cli.md.
+std::string status_json(const JobStatus& status);
+
+}  // namespace voxdag

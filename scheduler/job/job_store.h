@@ -1,0 +1,138 @@
+// What is durable of a build: how far ingest is, the job, its subvolumes and their artifacts, the
+// unfinished merge, timings and progress, in one SQLite file of the work folder (WAL, synchronous =
+// FULL where it counts, foreign keys).
+//
+// Invariants:
+//   1. A row names an artifact only after the artifact's bytes were synced.
+//   2. Subvolumes form a forest: a split one has its eight parts (those with triangles) as
+//      children; the leaves are what is built.
+//   3. Every subvolume's row carries a checksum; one that fails it is Error{kCorrupt}.
+//   4. All rows of one call are committed together or not at all.
+// The writer is one process (the work folder's lock sees to that) and may call from any thread;
+// readers (`voxdag status`) open the same file at any time. The writer's leaves() also tell of what
+// is built and about to become durable.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/stage_clock.h"
+#include "core/dag/sub_dag.h"
+#include "core/db/sqlite.h"
+#include "core/format/artifact/artifact.h"
+#include "core/geometry/cube.h"
+
+namespace voxdag {
+
+// What must be the same for a build to go on where it was.
+struct JobIdentity {
+  std::string scene_sha256;  // of the grid and the snapped triangles
+  std::string geometry;      // geometry options as JSON, for messages
+  int64_t format_version = 0;
+  bool operator==(const JobIdentity&) const = default;
+};
+
+enum class SubvolumeState { kPlanned = 0, kBuilt = 1, kSplit = 2 };
+
+using SubvolumeId = int64_t;
+
+struct StoredSubvolume {
+  SubvolumeId id = 0;
+  Cube cube;
+  double weight = 0;
+  SubvolumeState state = SubvolumeState::kPlanned;
+  // Of the built ones; no artifact if `summary` is empty.
+  ArtifactRef artifact;
+  SubDagSummary summary;
+};
+
+// A merge that is not finished; see Checkpoint.
+struct StoredMerge {
+  uint32_t level = 0;  // of the artifacts' levels only those above it are still read
+  std::vector<std::byte> state;
+};
+
+// The global file, whole and about to get its name.
+struct JobResult {
+  std::string output;
+  std::string sha256;
+  uint64_t bytes = 0;
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;
+  uint64_t dag_nodes = 0;
+  uint32_t merge_rounds = 0;
+  uint64_t merge_ranges = 0;
+  uint64_t merge_streamed_groups = 0;
+};
+
+// How far a build is, for those who look at it from outside.
+struct ProgressSnapshot {
+  std::string stage;
+  std::string unit;
+  uint64_t done = 0;
+  uint64_t total = 0;
+  double stage_started_s = 0;  // Unix time
+  double updated_s = 0;
+  uint64_t memory_bytes = 0;  // resident
+  uint64_t disk_bytes = 0;    // in the work folder
+  std::string last_error;
+};
+
+class JobStore {
+ public:
+  enum class Access { kBuild, kLook };
+
+  // Opens the store; for kBuild creates it, or brings one of an earlier version up to date. Throws
+  // Error{kCorrupt} for a damaged one, Error{kInvalidInput} for a database that is not ours,
+  // Error{kUnsupportedVersion}.
+  JobStore(const std::string& path, Access access);
+
+  std::optional<JobIdentity> job();
+  // A new job replaces whatever was there; all its subvolumes are planned.
+  void start(const JobIdentity& job, std::span<const StoredSubvolume> plan);
+  // All that are not split, in the order of their ids.
+  std::vector<StoredSubvolume> leaves();
+  void record_built(std::span<const StoredSubvolume> built);
+  // They are built but not durable yet: leaves() of this object tell of them, no row does before
+  // record_built().
+  void announce_built(std::span<const StoredSubvolume> built);
+  // Returns the ids of the parts, in their order.
+  std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
+  // Its artifact turned out damaged: it is planned again. What is kept of ingest is forgotten,
+  // since the triangles of what was built are gone.
+  void record_lost(const StoredSubvolume& lost);
+
+  // How far scan, ingest and hand-down are, in the words of who saved it: of the job that is there,
+  // or of one that is about to start. Throws Error{kCorrupt} for one that fails its checksum.
+  std::optional<std::vector<std::byte>> ingest();
+  void save_ingest(std::span<const std::byte> record);
+  // Costs nothing if there is none.
+  void forget_ingest();
+
+  std::optional<StoredMerge> merge();
+  void save_merge(uint32_t level, std::span<const std::byte> state);
+  // Also of its result.
+  void forget_merge();
+  void record_result(const JobResult& result);
+  std::optional<JobResult> result();
+
+  void add_stage_time(const StageTime& time);
+  std::vector<StageTime> stage_times();
+  void set_progress(const ProgressSnapshot& progress);
+  std::optional<ProgressSnapshot> progress();
+
+ private:
+  void update_row(const StoredSubvolume& subvolume);
+
+  std::mutex mutex_;  // guards all below
+  SqlDatabase database_;
+  std::map<SubvolumeId, StoredSubvolume> announced_;  // and not recorded
+};
+
+}  // namespace voxdag

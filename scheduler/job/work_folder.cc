@@ -1,0 +1,165 @@
+#include "scheduler/job/work_folder.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <optional>
+#include <string_view>
+#include <thread>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/format/artifact/artifact.h"
+
+namespace voxdag {
+namespace {
+
+constexpr std::string_view kLockName = "lock";
+constexpr std::string_view kScratchName = "merge";
+// `voxdag status` holds the lock for an instant.
+constexpr int kLockRetries = 10;
+constexpr auto kLockPause = std::chrono::milliseconds(20);
+// Threads that remove files: half a second goes by for each GB of a file that is in memory.
+constexpr unsigned kRemovers = 4;
+
+// The id in "segment-<id>.vdseg".
+std::optional<uint32_t> segment_id(std::string_view name) {
+  constexpr std::string_view kBefore = "segment-", kAfter = ".vdseg";
+  if (!name.starts_with(kBefore) || !name.ends_with(kAfter)) return std::nullopt;
+  uint32_t id = 0;
+  const char* const end = name.data() + name.size() - kAfter.size();
+  const auto [rest, failure] = std::from_chars(name.data() + kBefore.size(), end, id);
+  if (failure != std::errc{} || rest != end) return std::nullopt;
+  return id;
+}
+
+bool is_scratch(const DirectoryEntry& entry) {
+  return !entry.is_directory && (segment_id(entry.name) || entry.name.starts_with("merge-"));
+}
+
+bool is_ours(const DirectoryEntry& entry) {
+  const std::string_view name = entry.name;
+  if (entry.is_directory) return name == kScratchName;
+  return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
+         name == "job.db-journal" || name.ends_with(".vdspill") || name.ends_with(".vdkept") ||
+         segment_id(name).has_value();
+}
+
+}  // namespace
+
+WorkFolder::WorkFolder(FileSystem& files, std::string path)
+    : files_(files), path_(std::move(path)) {
+  files_.make_directories(path_);
+  check_is_ours();
+  const std::string lock_path = path_ + "/" + std::string(kLockName);
+  was_there_ = files_.exists(lock_path);
+  lock_ = files_.try_lock(lock_path);
+  for (int i = 0; !lock_ && i < kLockRetries; ++i) {
+    std::this_thread::sleep_for(kLockPause);
+    lock_ = files_.try_lock(lock_path);
+  }
+  if (!lock_)
+    throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " is in use by " +
+                                              read_small_file(files_, lock_path, 1 << 12) +
+                                              ": expected to be the only build there");
+  char host[256] = "";
+  gethostname(host, sizeof host - 1);
+  const std::string holder = "process " + std::to_string(getpid()) + " on " + host;
+  // Emptied first: the last holder's name may have been longer.
+  files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
+}
+
+void WorkFolder::check_is_ours() const {
+  const auto refuse = [&](const std::string& name) {
+    throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " holds " + name +
+                                              ", which voxdag did not make: expected an empty "
+                                              "folder or that of an earlier build (--work)");
+  };
+  for (const DirectoryEntry& entry : files_.list(path_))
+    if (!is_ours(entry)) refuse(entry.name);
+  if (!files_.exists(scratch_path())) return;
+  for (const DirectoryEntry& entry : files_.list(scratch_path()))
+    if (!is_scratch(entry)) refuse(std::string(kScratchName) + "/" + entry.name);
+}
+
+std::string WorkFolder::holder(FileSystem& files, const std::string& folder) {
+  const std::string lock_path = folder + "/" + std::string(kLockName);
+  if (!files.exists(lock_path) || files.try_lock(lock_path)) return "";
+  return read_small_file(files, lock_path, 1 << 12);
+}
+
+std::shared_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {
+  return files_.open_read(segment_path(path_, id));
+}
+
+uint32_t WorkFolder::next_segment_id() const {
+  uint32_t next = 0;
+  for (const DirectoryEntry& entry : files_.list(path_))
+    if (const auto id = segment_id(entry.name)) next = std::max(next, *id + 1);
+  return next;
+}
+
+uint64_t WorkFolder::bytes() const {
+  uint64_t bytes = 0;
+  for (const std::string& folder : {path_, scratch_path()}) {
+    if (!files_.exists(folder)) continue;
+    for (const DirectoryEntry& entry : files_.list(folder))
+      if (!entry.is_directory) bytes += std::min(entry.bytes, entry.disk_bytes);
+  }
+  return bytes;
+}
+
+void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_named) {
+  for (const DirectoryEntry& entry : files_.list(path_)) {
+    const auto id = segment_id(entry.name);
+    if (id && !is_named(*id)) files_.remove(path_ + "/" + entry.name);
+  }
+}
+
+void WorkFolder::release(uint32_t segment, uint64_t offset, uint64_t bytes) {
+  std::unique_ptr<WritableFile>& file = released_[segment];
+  if (!file) file = files_.open_write(segment_path(path_, segment));
+  file->release(offset, bytes);
+}
+
+void WorkFolder::empty_scratch() {
+  for (const std::string& path : scratch_files()) files_.remove(path);
+  files_.make_directories(scratch_path());
+}
+
+std::vector<std::string> WorkFolder::scratch_files() const {
+  std::vector<std::string> paths;
+  if (!files_.exists(scratch_path())) return paths;
+  for (const DirectoryEntry& entry : files_.list(scratch_path()))
+    if (is_scratch(entry)) paths.push_back(scratch_path() + "/" + entry.name);
+  return paths;
+}
+
+void WorkFolder::remove_silently(const std::string& path) {
+  try {
+    if (files_.exists(path)) files_.remove(path);
+  } catch (const Error&) {
+    // Left behind: it costs space, and the next build there removes it.
+  }
+}
+
+void WorkFolder::remove() {
+  released_.clear();
+  try {
+    // The lock goes last: until then nobody else may take the folder for theirs.
+    std::vector<std::string> others = scratch_files();
+    for (const DirectoryEntry& entry : files_.list(path_))
+      if (is_ours(entry) && !entry.is_directory && entry.name != kLockName)
+        others.push_back(path_ + "/" + entry.name);
+    parallel_for(kRemovers, others.size(), [&](unsigned, size_t i) { files_.remove(others[i]); });
+    if (files_.exists(scratch_path())) files_.remove_directory(scratch_path());
+    files_.remove(path_ + "/" + std::string(kLockName));
+    files_.remove_directory(path_);
+  } catch (const Error&) {
+    // Left behind, as promised above.
+  }
+}
+
+}  // namespace voxdag

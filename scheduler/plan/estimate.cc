@@ -1,0 +1,234 @@
+#include "scheduler/plan/estimate.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/base/process_limits.h"
+#include "scheduler/job/work_folder.h"
+#include "scheduler/plan/pilot.h"
+
+namespace voxdag {
+namespace {
+
+// The growth of the DAG per doubling of R, above 2, falls by this factor per doubling: measured on
+// Sponza (2.98 at 2048 to 2.58 at 131072) and the dragon (2.77 to 3.17 and back to 2.74).
+constexpr double kGrowthDecay = 0.95;
+// Each doubling away from the pilot widens the range of node and byte figures by this factor.
+constexpr double kSpreadPerDoubling = 1.12;
+// Bytes a node of the global file: a pilot's are fewer, since coarse levels repeat more.
+constexpr double kMostBytesANode = 23;
+constexpr double kBytesGrowthPerDoubling = 1.04;
+// Measured on the shared scenes: nodes of all artifacts over unique ones, their compressed bytes,
+// and CPU time of a whole build over that of a pilot's nodes.
+constexpr double kArtifactNodesPerUnique = 1.5;
+constexpr double kArtifactBytesANode = 16;
+// Neither an artifact's row and its children, uncompressed, nor those of the file take as much.
+constexpr double kMostDiskBytesANode = 40;
+constexpr double kBuildOverPilotTime = 1.5;
+// Bytes a unique node that the merge holds at its peak, and what a process takes without a scene.
+constexpr double kMemoryBytesANode = 34;
+constexpr double kBaseMemoryBytes = 24e6;
+
+Figure exactly(double value) { return {value, value, value}; }
+Figure within(double value, double factor) { return {value / factor, value, value * factor}; }
+Figure operator+(const Figure& a, const Figure& b) {
+  return {a.low + b.low, a.likely + b.likely, a.high + b.high};
+}
+Figure operator*(double factor, const Figure& a) {
+  return {factor * a.low, factor * a.likely, factor * a.high};
+}
+
+// Pilots at up to three resolutions, a doubling apart, coarsest first.
+std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
+                                      MemoryBudget& budget, const CancelToken& cancel) {
+  const auto backend = make_cpu_backend();
+  MemoryBudget share(budget.available() * 3 / 4, &budget);
+  std::vector<PilotCounts> pilots;
+  const uint32_t finest = std::min(pilot_levels, scene.grid.levels);
+  const uint32_t coarsest = std::max<uint32_t>(kMinGridLevels, finest < 4 ? 2 : finest - 2);
+  for (uint32_t levels = coarsest; levels <= finest; ++levels) {
+    const auto pilot =
+        build_pilot(*scene.bins, scene.whole, scene.grid.levels, levels, *backend, share, cancel);
+    if (!pilot) break;  // the finer ones would not fit either
+    pilots.push_back(*pilot);
+  }
+  return pilots;
+}
+
+// a R^2 + b R through the last two pilots, at `doublings` past the last.
+double grow_as_surface(double coarse, double fine, uint32_t doublings) {
+  const double ratio = std::exp2(doublings);
+  const double square = 2 * (fine - 2 * coarse), linear = fine - square;  // of the fine pilot
+  if (square <= 0) return fine * ratio * ratio;
+  return std::max(square * ratio * ratio + linear * ratio, fine);
+}
+
+// Growth per doubling observed over the pilots (their geometric mean), falling from there.
+double grow_as_dag(const std::vector<PilotCounts>& pilots, uint32_t doublings) {
+  const double nodes = pilots.back().dag_nodes;
+  if (pilots.size() < 2 || nodes == 0) return nodes * std::exp2(1.5 * doublings);
+  const double steps = static_cast<double>(pilots.size() - 1);
+  double growth = std::pow(nodes / std::max(pilots.front().dag_nodes, 1.0), 1 / steps);
+  double result = nodes;
+  for (uint32_t i = 0; i < doublings; ++i) {
+    if (growth > 2) growth = 2 + (growth - 2) * kGrowthDecay;
+    result *= growth;
+  }
+  return result;
+}
+
+// What must be spilled is there already. A large scene is kept beside it where there is room; it
+// goes piece by piece while artifacts come.
+Figure triangles_on_disk(const PreparedScene& scene) {
+  const double spilled = static_cast<double>(scene.bins->spilled_bytes());
+  return {spilled, std::max(spilled, scene.most_kept_bytes / 2),
+          std::max(spilled, scene.most_kept_bytes)};
+}
+
+}  // namespace
+
+Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsigned threads,
+                        MemoryBudget& budget, const CancelToken& cancel) {
+  Estimate estimate;
+  estimate.triangles = scene.counts.triangles;
+  estimate.subvolumes = scene.plan.size();
+  estimate.free_memory = budget.limit();
+  const auto pilots = build_pilots(scene, pilot_levels, budget, cancel);
+  if (pilots.empty()) {
+    // Too many triangles even for a small grid: their own expected voxels bound what there will be.
+    estimate.voxels = {0, scene.counts.expected_voxels, scene.counts.expected_voxels};
+    return estimate;
+  }
+  const PilotCounts& last = pilots.back();
+  const PilotCounts& before = pilots[pilots.size() > 1 ? pilots.size() - 2 : 0];
+  const uint32_t doublings = scene.grid.levels - last.levels;
+  estimate.pilot_resolution = uint64_t{1} << last.levels;
+
+  const double surface_spread = 1 + 0.02 * doublings;
+  const double spread = std::pow(kSpreadPerDoubling, doublings);
+  estimate.voxels = within(grow_as_surface(before.voxels, last.voxels, doublings), surface_spread);
+  estimate.svo_nodes =
+      within(grow_as_surface(before.svo_nodes, last.svo_nodes, doublings), surface_spread);
+  const double nodes = std::min(grow_as_dag(pilots, doublings), estimate.svo_nodes.likely);
+  estimate.dag_nodes = within(nodes, spread);
+  const double pilot_bytes = last.dag_nodes > 0 ? last.file_bytes / last.dag_nodes : 0;
+  const double bytes = std::max(
+      pilot_bytes,
+      std::min(pilot_bytes * std::pow(kBytesGrowthPerDoubling, doublings), kMostBytesANode));
+  estimate.file_bytes = bytes * estimate.dag_nodes + exactly(8192);
+
+  const Figure artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
+  estimate.disk_bytes =
+      estimate.file_bytes + kArtifactBytesANode * artifact_nodes + triangles_on_disk(scene);
+  const double triangle_bytes =
+      static_cast<double>(scene.bins->record_bytes()) * static_cast<double>(scene.counts.triangles);
+  estimate.memory_bytes = kMemoryBytesANode * estimate.dag_nodes + exactly(triangle_bytes);
+  for (double* figure :
+       {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})
+    *figure = std::min(*figure, static_cast<double>(budget.limit())) + kBaseMemoryBytes;
+  const double growth = last.dag_nodes > 0 ? nodes / last.dag_nodes : 1;
+  estimate.cpu_s = within(last.cpu_s * growth * kBuildOverPilotTime, 1.5 * spread);
+  estimate.wall_s = (1.05 / std::max(1u, threads)) * estimate.cpu_s;
+  return estimate;
+}
+
+double most_disk_bytes(const PreparedScene& scene) {
+  // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
+  // (expected_work()): over all levels twice its bricks, and one cube a level.
+  double bricks = 0;
+  for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
+  const double triangles = static_cast<double>(scene.counts.triangles);
+  const double octree_nodes = 2 * bricks + scene.grid.levels * triangles;
+  return kMostDiskBytesANode * octree_nodes + triangles_on_disk(scene).high;
+}
+
+Estimate plan_build(const BuildSpec& spec, const Seams& seams) {
+  // A pilot of 2048^3 takes a second or two and holds for every resolution above.
+  constexpr uint32_t kPilotLevels = 11;
+  const BuildSpec full = checked(spec);
+  MemoryBudget budget(full.run.memory_bytes);
+  StageClock clock;
+  const char* temporary = std::getenv("TMPDIR");
+  std::string folder = full.run.work_folder;
+  if (folder.empty())
+    folder =
+        std::string(temporary ? temporary : "/tmp") + "/voxdag-plan-" + std::to_string(getpid());
+  WorkFolder work(seams.files, folder);
+  // The triangles that were spilled go again; a job that the folder holds is not touched.
+  struct Tidy {
+    WorkFolder& work;
+    const bool own_folder;
+    ~Tidy() { own_folder ? work.remove() : work.remove_spilled(); }
+  } tidy{work, full.run.work_folder.empty()};
+  const PreparedScene scene = prepare_scene(full, work.spill_path(), budget, clock, seams);
+  Estimate estimate = estimate_build(scene, kPilotLevels, full.run.threads, budget, seams.cancel);
+  estimate.free_disk = seams.files.free_space(work.path());
+  return estimate;
+}
+
+namespace {
+
+void check_disk(const char* what, const Figure& bytes, const std::string& folder, uint64_t free,
+                Progress& progress) {
+  const auto gigabytes = [](double count) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2f GB", count / 1e9);
+    return std::string(text);
+  };
+  const double free_bytes = static_cast<double>(free);
+  const std::string figures = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
+                              " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
+                              " has " + gigabytes(free_bytes) + " free";
+  if (bytes.low > free_bytes)
+    throw Error(ErrorCode::kNoSpace, figures + ": make room, or build anyway with --force");
+  if (bytes.high > free_bytes) progress.warn(figures);
+}
+
+}  // namespace
+
+void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
+                    const std::string& output_folder, Progress& progress) {
+  const uint64_t work_free = files.free_space(work_folder);
+  const uint64_t output_free = files.free_space(output_folder);
+  // Free to the very byte alike: one disk, on which the whole must fit.
+  if (work_free == output_free) {
+    check_disk("the build", estimate.disk_bytes, work_folder, work_free, progress);
+    return;
+  }
+  const Figure& all = estimate.disk_bytes;
+  const Figure& file = estimate.file_bytes;
+  check_disk("the build's work folder",
+             {all.low - file.low, all.likely - file.likely, all.high - file.high}, work_folder,
+             work_free, progress);
+  check_disk("the global file", file, output_folder, output_free, progress);
+}
+
+std::string estimate_json(const Estimate& e) {
+  using nlohmann::ordered_json;
+  const auto figure = [](const Figure& f) {
+    return ordered_json{{"low", f.low}, {"likely", f.likely}, {"high", f.high}};
+  };
+  return ordered_json{
+      {"triangles", e.triangles},
+      {"subvolumes", e.subvolumes},
+      {"pilot_resolution", e.pilot_resolution},
+      {"voxels", figure(e.voxels)},
+      {"svo_nodes", figure(e.svo_nodes)},
+      {"dag_nodes", figure(e.dag_nodes)},
+      {"file_bytes", figure(e.file_bytes)},
+      {"disk_bytes", figure(e.disk_bytes)},
+      {"memory_bytes", figure(e.memory_bytes)},
+      {"cpu_s", figure(e.cpu_s)},
+      {"wall_s", figure(e.wall_s)},
+      {"free_disk_bytes", e.free_disk},
+      {"memory_budget_bytes", e.free_memory},
+  }
+      .dump(2);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,149 @@
+#include "scheduler/plan/top_tree.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/backend/backend.h"
+#include "core/dag/brick.h"
+#include "core/geometry/morton.h"
+#include "core/geometry/octree_descent.h"
+
+namespace voxdag {
+namespace {
+
+// Cells are no smaller, in voxels an edge: finer ones cost more than they tell about a scene.
+constexpr int64_t kLeastCellEdge = 2 * kSmallestEdge;
+
+}  // namespace
+
+ExpectedWork expected_work(const FixedTriangle& t) {
+  constexpr double kVoxel = 1.0 / kUnitsPerVoxel, kBrick = 1.0 / kBrickEdge;
+  double e[2][3], extents = 0;  // in voxels
+  for (int a = 0; a < 3; ++a) {
+    e[0][a] = static_cast<double>(t.v[1][a] - t.v[0][a]) * kVoxel;
+    e[1][a] = static_cast<double>(t.v[2][a] - t.v[0][a]) * kVoxel;
+    extents += static_cast<double>(t.high(a) - t.low(a)) * kVoxel;
+  }
+  double area = 0;  // of the three projections, summed: area * (|nx| + |ny| + |nz|)
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    area += 0.5 * std::abs(e[0][b] * e[1][c] - e[0][c] * e[1][b]);
+  }
+  return {area + extents + 1, area * kBrick * kBrick + extents * kBrick + 1};
+}
+
+uint32_t TopTree::depth_within(uint32_t grid_levels, uint64_t bytes) {
+  uint32_t depth = 0;
+  while (depth < kDeepest && (int64_t{1} << (grid_levels - depth)) > kLeastCellEdge &&
+         (sizeof(Cell) << (3 * (depth + 1))) <= bytes)
+    ++depth;
+  return depth;
+}
+
+TopTree::TopTree(uint32_t grid_levels, uint32_t depth, MemoryBudget& budget)
+    : grid_levels_(grid_levels),
+      depth_(depth),
+      cells_(budget, size_t{1} << (3 * depth), "the top tree's counters") {}
+
+void TopTree::add(const FixedTriangle& triangle, double weight) {
+  touched_.clear();
+  find_touched(triangle);
+  if (touched_.empty()) return;
+  const float each = static_cast<float>(weight / static_cast<double>(touched_.size()));
+  for (const uint64_t code : touched_) {
+    cells_[code].weight += each;
+    if (cells_[code].triangles < UINT32_MAX) ++cells_[code].triangles;
+  }
+  total_weight_ += weight;
+}
+
+void TopTree::find_touched(const FixedTriangle& triangle) {
+  const CellBox box(triangle, grid_levels_, depth_);
+  if (!box.is_inside_grid()) return collect(triangle, Cube{}, 0);
+  int64_t cells = 1;
+  for (int a = 0; a < 3; ++a) cells *= box.high[a] - box.low[a] + 1;
+  if (cells > 8) {
+    const Cube cube = box.cube_around();
+    return collect(triangle, cube,
+                   morton_encode(cube.position[0], cube.position[1], cube.position[2]));
+  }
+  // One holds it; of two it crosses the face between; of more each is asked.
+  const int64_t units = (kUnitsPerVoxel << grid_levels_) >> depth_;
+  for (int64_t x = box.low[0]; x <= box.high[0]; ++x)
+    for (int64_t y = box.low[1]; y <= box.high[1]; ++y)
+      for (int64_t z = box.low[2]; z <= box.high[2]; ++z) {
+        const int64_t corner[3] = {x * units, y * units, z * units};
+        if (cells <= 2 || triangle_touches_cube(triangle, corner, units))
+          touched_.push_back(morton_encode(static_cast<uint32_t>(x), static_cast<uint32_t>(y),
+                                           static_cast<uint32_t>(z)));
+      }
+}
+
+void TopTree::collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code) {
+  if (cube.level == depth_) {
+    touched_.push_back(code);
+    return;
+  }
+  const int64_t units = cube.edge_voxels(grid_levels_) * kUnitsPerVoxel;
+  for (uint32_t mask = touched_children(triangle, cube, units); mask; mask &= mask - 1) {
+    const int c = lowest_bit(mask);
+    collect(triangle, cube.child(c), code * 8 + static_cast<uint64_t>(c));
+  }
+}
+
+uint64_t TopTree::occupied_cells() const {
+  uint64_t occupied = 0;
+  for (size_t i = 0; i < cells_.size(); ++i) occupied += cells_[i].triangles > 0;
+  return occupied;
+}
+
+bool TopTree::is_empty(uint64_t code) const {
+  constexpr uint64_t kCells = uint64_t{1} << 3 * kSkippedLevels;
+  uint64_t any = 0;
+  for (uint64_t i = code * kCells; i < (code + 1) * kCells; ++i) any |= cells_[i].triangles;
+  return any == 0;
+}
+
+// Bottom-up: a cube whose children all came back whole, and that `keep_whole` accepts, replaces
+// them.
+template <class KeepWhole>
+SubvolumePlan TopTree::gather(const Cube& cube, uint64_t code, const KeepWhole& keep_whole,
+                              std::vector<SubvolumePlan>& out) const {
+  SubvolumePlan sum;
+  sum.cube = cube;
+  if (cube.level + kSkippedLevels == depth_ && is_empty(code)) return sum;
+  const size_t first = out.size();
+  if (cube.level == depth_) {
+    sum.weight = cells_[code].weight;
+    sum.triangles = cells_[code].triangles;
+  } else {
+    for (int c = 0; c < 8; ++c) {
+      const SubvolumePlan part =
+          gather(cube.child(c), code * 8 + static_cast<uint64_t>(c), keep_whole, out);
+      sum.weight += part.weight;
+      sum.triangles += part.triangles;
+    }
+  }
+  if (sum.triangles > 0 && (cube.level == depth_ || keep_whole(sum))) {
+    out.resize(first);
+    out.push_back(sum);
+  }
+  return sum;
+}
+
+std::vector<SubvolumePlan> TopTree::subvolumes_by_weight(double most_weight) const {
+  std::vector<SubvolumePlan> out;
+  gather(
+      {}, 0, [&](const SubvolumePlan& s) { return s.weight <= most_weight; }, out);
+  return out;
+}
+
+std::vector<SubvolumePlan> TopTree::subvolumes_by_edge(int64_t edge_voxels) const {
+  std::vector<SubvolumePlan> out;
+  gather(
+      {}, 0,
+      [&](const SubvolumePlan& s) { return s.cube.edge_voxels(grid_levels_) <= edge_voxels; }, out);
+  return out;
+}
+
+}  // namespace voxdag

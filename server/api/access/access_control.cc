@@ -1,0 +1,91 @@
+#include "server/api/access/access_control.h"
+
+#include <algorithm>
+
+#include "core/base/clock.h"
+#include "server/api/problem.h"
+#include "server/http/connection/connection_table.h"
+
+namespace voxdag::server {
+namespace {
+
+// Guessing is hopeless at any rate; this keeps it out of the log.
+constexpr double kWrongTokensPerSecond = 5;
+
+std::string without_port(const std::string& host) {
+  const size_t bracket = host.rfind(']');
+  const size_t colon = host.rfind(':');
+  if (colon == std::string::npos || (bracket != std::string::npos && colon < bracket)) return host;
+  return host.substr(0, colon);
+}
+
+bool changes(const std::string& method) { return method != "GET" && method != "HEAD"; }
+
+Problem too_many(const std::string& detail) {
+  Problem problem(429, "too_many_requests", detail);
+  problem.headers.emplace("Retry-After", "1");
+  return problem;
+}
+
+Problem unauthorized(const std::string& detail) {
+  Problem problem(401, "unauthorized", detail);
+  problem.headers.emplace("WWW-Authenticate", "Bearer realm=\"voxdag\"");
+  return problem;
+}
+
+}  // namespace
+
+Gate::Gate(const ServerConfig& config, FileSystem& files)
+    : hosts_(config.hosts),
+      requests_(config.transfers.requests_per_s),
+      wrong_tokens_(kWrongTokensPerSecond) {
+  if (!config.token_file.empty()) tokens_ = Tokens::read(files, config.token_file);
+  hosts_.insert(hosts_.end(), {"localhost", "127.0.0.1", "[::1]", config.http.address});
+}
+
+// Without tokens the network is the wall, and a browser on this machine is a hole in it: any page
+// can send requests to the loopback, under a name of its own (DNS rebinding) or as another site's.
+void Gate::check_site(const Request& request) const {
+  const auto is_ours = [&](const std::string& host) {
+    return std::any_of(hosts_.begin(), hosts_.end(),
+                       [&](const std::string& name) { return equal_ignoring_case(name, host); });
+  };
+  const std::string host = request.header("Host");
+  if (!host.empty() && !is_ours(without_port(host)))
+    throw Problem(403, "forbidden", "the Host is none of this service's");
+  if (!changes(request.method)) return;
+  const std::string origin = request.header("Origin");
+  const size_t scheme = origin.find("://");
+  const bool foreign =
+      !origin.empty() && (scheme == std::string::npos || origin.substr(scheme + 3) != host);
+  if (foreign) throw Problem(403, "forbidden", "the request comes from another site");
+}
+
+Caller Gate::identify(const Request& request) {
+  const std::string header = request.header("Authorization");
+  constexpr std::string_view kScheme = "bearer ";
+  if (header.empty()) return {};
+  if (header.size() > kScheme.size() &&
+      equal_ignoring_case(std::string_view(header).substr(0, kScheme.size()), kScheme)) {
+    const auto caller = tokens_->find(trimmed(std::string_view(header).substr(kScheme.size())));
+    if (caller) return *caller;
+  }
+  if (!wrong_tokens_.take(request.peer, wall_seconds())) throw too_many("too many wrong tokens");
+  throw unauthorized("the token is not known here");
+}
+
+Caller Gate::admit(const Request& request, Role needed) {
+  if (!is_loopback(request.peer) && !requests_.take(request.peer, wall_seconds()))
+    throw too_many("more requests a second than one client may send");
+  if (!tokens_) {
+    check_site(request);
+    return {Role::kAdmin, "local"};
+  }
+  if (needed == Role::kNone) return {};
+  const Caller caller = identify(request);
+  if (caller.role == Role::kNone) throw unauthorized("expected Authorization: Bearer TOKEN");
+  if (caller.role < needed) throw Problem(403, "forbidden", "the token's role does not suffice");
+  return caller;
+}
+
+}  // namespace voxdag::server

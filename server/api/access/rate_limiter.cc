@@ -1,0 +1,30 @@
+#include "server/api/access/rate_limiter.h"
+
+#include <algorithm>
+
+namespace voxdag::server {
+namespace {
+
+constexpr double kDepth_s = 2;
+// Beyond so many clients those whose buckets are full again, who lose nothing, are forgotten.
+constexpr size_t kManyClients = 10000;
+
+}  // namespace
+
+bool RateLimiter::take(const std::string& client, double now_s) {
+  if (per_s_ <= 0) return true;
+  std::lock_guard lock(mutex_);
+  const double depth = std::max(1.0, per_s_ * kDepth_s);
+  if (buckets_.size() > kManyClients)
+    std::erase_if(buckets_, [&](const auto& entry) {
+      return entry.second.level + (now_s - entry.second.at_s) * per_s_ >= depth;
+    });
+  Bucket& bucket = buckets_.try_emplace(client, Bucket{depth, now_s}).first->second;
+  bucket.level = std::min(depth, bucket.level + (now_s - bucket.at_s) * per_s_);
+  bucket.at_s = now_s;
+  if (bucket.level < 1) return false;
+  bucket.level -= 1;
+  return true;
+}
+
+}  // namespace voxdag::server

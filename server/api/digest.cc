@@ -1,0 +1,59 @@
+#include "server/api/digest.h"
+
+#include <openssl/evp.h>
+
+#include <array>
+
+#include "core/format/checksum.h"
+#include "server/api/problem.h"
+#include "server/http/headers.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr size_t kDigestBytes = 32;
+constexpr size_t kBase64Chars = 44;
+constexpr char kHexDigits[] = "0123456789abcdef";
+
+}  // namespace
+
+std::string sha256_hex(std::string_view text) {
+  Sha256 sum;
+  sum.add(std::as_bytes(std::span(text)));
+  return sum.finish();
+}
+
+std::string digest_field(const std::string& sha256) {
+  std::array<unsigned char, kDigestBytes> bytes{};
+  for (size_t i = 0; i < kDigestBytes; ++i)
+    bytes[i] = static_cast<unsigned char>(std::stoi(sha256.substr(2 * i, 2), nullptr, 16));
+  std::array<unsigned char, kBase64Chars + 1> text{};
+  EVP_EncodeBlock(text.data(), bytes.data(), kDigestBytes);
+  return "sha-256=:" + std::string(reinterpret_cast<char*>(text.data()), kBase64Chars) + ":";
+}
+
+std::string parse_digest_field(const std::string& header) {
+  constexpr std::string_view kName = "sha-256=:";
+  std::string_view rest = header;
+  while (!rest.empty()) {
+    const size_t comma = std::min(rest.find(','), rest.size());
+    const std::string_view entry = trimmed(rest.substr(0, comma));
+    rest.remove_prefix(std::min(comma + 1, rest.size()));
+    if (!entry.starts_with(kName)) continue;  // another algorithm
+    std::array<unsigned char, kDigestBytes + 1> bytes{};
+    const std::string_view base64 = entry.substr(kName.size(), kBase64Chars);
+    if (entry.size() != kName.size() + kBase64Chars + 1 || !entry.ends_with("=:") ||
+        EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(base64.data()),
+                        kBase64Chars) != kDigestBytes + 1)
+      throw bad_request("a digest is broken: expected sha-256=:BASE64:");
+    std::string hex;
+    for (size_t i = 0; i < kDigestBytes; ++i) {
+      hex += kHexDigits[bytes[i] >> 4];
+      hex += kHexDigits[bytes[i] & 15];
+    }
+    return hex;
+  }
+  throw bad_request("a digest has no sha-256: expected sha-256=:BASE64:");
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,111 @@
+#include "server/api/routes/router.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "server/api/problem.h"
+
+namespace voxdag::server {
+namespace {
+
+bool is_wildcard(const std::string& part) { return part.starts_with('{'); }
+
+bool matches(const std::vector<std::string>& pattern, const std::vector<std::string>& segments,
+             std::vector<std::string>& names) {
+  if (pattern.size() != segments.size()) return false;
+  names.clear();
+  for (size_t i = 0; i < pattern.size(); ++i) {
+    if (is_wildcard(pattern[i]))
+      names.push_back(segments[i]);
+    else if (pattern[i] != segments[i])
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string Call::query(const std::string& name) const {
+  const auto found = request.target.query.find(name);
+  return found == request.target.query.end() ? "" : found->second;
+}
+
+uint64_t Call::query_count(const std::string& name, uint64_t standard, uint64_t least,
+                           uint64_t most) const {
+  const auto found = request.target.query.find(name);
+  if (found == request.target.query.end()) return standard;
+  const std::string& text = found->second;
+  uint64_t count = 0;
+  const auto parsed = std::from_chars(text.data(), text.data() + text.size(), count);
+  if (parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size() || count < least ||
+      count > most)
+    throw bad_request("'" + name + "': expected a whole number from " + std::to_string(least) +
+                      " to " + std::to_string(most));
+  return count;
+}
+
+void Call::allow_query(const std::vector<std::string>& allowed) const {
+  for (const auto& [name, value] : request.target.query)
+    if (std::find(allowed.begin(), allowed.end(), name) == allowed.end())
+      throw bad_request("a query parameter is not known here");
+}
+
+void Router::add(const std::string& method, const std::string& pattern, Role role,
+                 Handler handler) {
+  routes_.push_back({method, parse_target(pattern).segments, role, std::move(handler)});
+}
+
+Response Router::route(Request& request, Gate& gate) const {
+  const std::string method = request.method == "HEAD" ? "GET" : request.method;
+  std::string allowed;
+  Call call{request, {}, {}};
+  for (const Route& route : routes_) {
+    if (!matches(route.pattern, request.target.segments, call.names)) continue;
+    if (route.method == method) {
+      call.caller = gate.admit(request, route.role);
+      request.caller = call.caller.name;
+      return route.handler(call);
+    }
+    allowed += (allowed.empty() ? "" : ", ") + route.method;
+    if (route.method == "GET") allowed += ", HEAD";
+  }
+  gate.admit(request, Role::kNone);
+  if (allowed.empty()) throw not_found("nothing is here");
+  Problem problem(405, "method_not_allowed", "expected one of " + allowed);
+  problem.headers.emplace("Allow", allowed);
+  throw problem;
+}
+
+Response json_response(int status, std::string body) {
+  Response response;
+  response.status = status;
+  response.headers.emplace("Content-Type", "application/json");
+  response.headers.emplace("Cache-Control", "no-store");
+  response.body = std::move(body);
+  return response;
+}
+
+std::string read_json_body(Request& request, uint64_t most_bytes) {
+  const std::string type = request.header("Content-Type");
+  if (!equal_ignoring_case(trimmed(std::string_view(type).substr(0, type.find(';'))),
+                           "application/json"))
+    throw Problem(415, "unsupported_media_type", "expected Content-Type: application/json");
+  const Problem too_large(413, "too_large",
+                          "the body is over " + std::to_string(most_bytes) + " bytes");
+  if (request.content_length.value_or(0) > most_bytes) throw too_large;
+  std::string body;
+  const BodyEnd end = request.read_body([&](std::string_view piece) {
+    body += piece;
+    return body.size() <= most_bytes;
+  });
+  if (end == BodyEnd::kStopped) throw too_large;
+  if (end == BodyEnd::kTooSlow) throw Problem(408, "timeout", "the body came too slowly");
+  if (end == BodyEnd::kBroken) throw bad_request("the body broke off");
+  return body;
+}
+
+void expect_no_body(const Request& request) {
+  if (request.has_body) throw bad_request("expected a request without a body");
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,96 @@
+// The service about itself, and the files that travel in it.
+#include <unistd.h>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/base/process_limits.h"
+#include "server/api/context.h"
+#include "server/api/problem.h"
+#include "server/api/routes/router.h"
+#include "server/assets.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr const char* kPagePolicy =
+    "default-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'";
+
+Response get_asset(Call& call, const std::string& name) {
+  const auto asset = find_asset(name);
+  if (!asset) throw not_found("nothing is here");
+  Response response;
+  response.headers.emplace("ETag", asset->etag);
+  response.headers.emplace("Cache-Control", "no-cache");
+  response.headers.emplace("Content-Security-Policy", kPagePolicy);
+  if (call.request.header("If-None-Match") == asset->etag) {
+    response.status = 304;
+    return response;
+  }
+  response.headers.emplace("Content-Type", asset->type);
+  response.body = asset->contents;
+  return response;
+}
+
+// Writes and removes a file: the least that a job needs of the disk.
+void check_writable(Context& context) {
+  const std::string probe = context.config.data_folder + "/.ready-" + std::to_string(getpid());
+  context.files.create(probe)->close();
+  context.files.remove(probe);
+}
+
+Response get_ready(Context& context) {
+  if (context.draining) throw busy("the service is stopping");
+  const std::string& data = context.config.data_folder;
+  try {
+    if (context.files.free_space(data) < context.config.jobs.least_free_disk_bytes)
+      throw busy("the disk has less free space than is held in reserve", 60);
+    context.queue.counts();
+    check_writable(context);
+  } catch (const Error&) {
+    throw busy("the data folder cannot be written", 60);
+  }
+  return json_response(200, "{\"status\":\"ready\"}");
+}
+
+Response get_metrics(Context& context, double started_s) {
+  const std::vector<Gauge> gauges = {
+      {"voxdag_running_processes", "Processes that run jobs.",
+       static_cast<double>(context.dispatcher.running())},
+      {"voxdag_event_streams", "Event streams that are open.",
+       static_cast<double>(context.event_streams.taken())},
+      {"voxdag_transfers", "Uploads and downloads in flight.",
+       static_cast<double>(context.transfers.taken())},
+      {"voxdag_free_disk_bytes", "Free where the data folder lies.",
+       static_cast<double>(context.files.free_space(context.config.data_folder))},
+      {"voxdag_job_memory_bytes", "What running jobs may have together.",
+       static_cast<double>(context.tasks.memory_bytes())},
+      {"voxdag_resident_bytes", "Resident memory of the service, its jobs aside.",
+       static_cast<double>(resident_bytes())},
+      {"voxdag_cpu_seconds", "CPU time of the service, its jobs aside.", process_cpu_seconds()},
+      {"voxdag_uptime_seconds", "Since the service began.", wall_seconds() - started_s},
+  };
+  Response response;
+  response.headers.emplace("Content-Type", "text/plain; version=0.0.4; charset=utf-8");
+  response.headers.emplace("Cache-Control", "no-store");
+  response.body = context.metrics.text(context.queue.counts(), gauges);
+  return response;
+}
+
+}  // namespace
+
+void add_system_routes(Router& router, Context& context) {
+  router.add("GET", "/healthz", Role::kNone,
+             [](Call&) { return json_response(200, "{\"status\":\"ok\"}"); });
+  router.add("GET", "/readyz", Role::kNone, [&](Call&) { return get_ready(context); });
+  router.add("GET", "/version", Role::kNone, [](Call&) {
+    return json_response(200, "{\"version\":\"" VOXDAG_VERSION "\",\"api\":\"v1\"}");
+  });
+  router.add("GET", "/metrics", Role::kRead,
+             [&, started_s = wall_seconds()](Call&) { return get_metrics(context, started_s); });
+  router.add("GET", "/", Role::kNone, [](Call& call) { return get_asset(call, "index.html"); });
+  router.add("GET", "/{file}", Role::kNone,
+             [](Call& call) { return get_asset(call, call.names[0]); });
+}
+
+}  // namespace voxdag::server

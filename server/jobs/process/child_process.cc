@@ -1,0 +1,110 @@
+#include "server/jobs/process/child_process.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+
+#include "core/base/error.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr int kTick_ms = 100;
+constexpr size_t kLongestLine = 4 << 20;
+
+// In the child, between fork and exec: only what is async-signal-safe.
+[[noreturn]] void become(char* const* arguments, int output, const char* log_file, int nice,
+                         pid_t parent) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(127);  // it died before the line above
+  setpgid(0, 0);                        // Ctrl-C on a terminal is for the service
+  if (nice != 0) setpriority(PRIO_PROCESS, 0, nice);
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  const int null = open("/dev/null", O_RDONLY);
+  const int log = open(log_file, O_WRONLY | O_CREAT | O_APPEND, 0640);
+  if (null < 0 || log < 0 || dup2(null, 0) < 0 || dup2(output, 1) < 0 || dup2(log, 2) < 0)
+    _exit(127);
+  close_range(3, ~0U, 0);
+  execv(arguments[0], arguments);
+  _exit(127);
+}
+
+}  // namespace
+
+ChildProcess::ChildProcess(const Start& start) {
+  std::vector<char*> arguments;
+  for (const std::string& argument : start.command)
+    arguments.push_back(const_cast<char*>(argument.c_str()));
+  arguments.push_back(nullptr);
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw Error(ErrorCode::kIo, "a pipe: " + std::string(std::strerror(errno)));
+  const pid_t parent = getpid();
+  pid_ = fork();
+  if (pid_ == 0) become(arguments.data(), ends[1], start.log_file.c_str(), start.nice, parent);
+  const int reason = errno;
+  close(ends[1]);
+  output_ = ends[0];
+  if (pid_ < 0) {
+    close(output_);
+    throw Error(ErrorCode::kIo, "a process for the job: " + std::string(std::strerror(reason)));
+  }
+}
+
+ChildProcess::~ChildProcess() {
+  kill();
+  wait();
+  close(output_);
+}
+
+void ChildProcess::read_lines(const std::function<void(std::string_view)>& use,
+                              const std::function<bool()>& tick) {
+  std::string text;
+  char piece[16384];
+  for (;;) {
+    if (tick()) kill();
+    pollfd waiting{output_, POLLIN, 0};
+    const int ready = poll(&waiting, 1, kTick_ms);
+    if (ready == 0 || (ready < 0 && errno == EINTR)) continue;
+    const ssize_t got = read(output_, piece, sizeof piece);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return;
+    text.append(piece, static_cast<size_t>(got));
+    size_t begin = 0;
+    for (size_t end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1)
+      use(std::string_view(text).substr(begin, end - begin));
+    text.erase(0, begin);
+    if (text.size() > kLongestLine) text.clear();
+  }
+}
+
+void ChildProcess::signal(bool ask) {
+  std::lock_guard lock(mutex_);
+  if (pid_ > 0) ::kill(pid_, ask ? SIGTERM : SIGKILL);
+}
+
+ChildProcess::End ChildProcess::wait() {
+  if (pid_ <= 0) return {};
+  // Waits without reaping, so that nobody signals a process id that has become free.
+  siginfo_t info{};
+  while (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
+  }
+  std::lock_guard lock(mutex_);
+  int status = 0;
+  while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+  }
+  pid_ = -1;
+  if (WIFSIGNALED(status)) return {0, WTERMSIG(status)};
+  return {WEXITSTATUS(status), 0};
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,123 @@
+#include "query/render/picture.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "core/base/error.h"
+#include "query/render/renderer.h"
+#include "tests/unit/query/voxel_scene.h"
+
+using namespace voxdag;
+using namespace voxdag::query;
+
+namespace {
+
+uint32_t big_endian(const std::string& bytes, size_t at) {
+  uint32_t value = 0;
+  for (size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+  return value;
+}
+
+Picture render(const VoxelScene& scene, const Placement& placement, int threads) {
+  RenderOptions options;
+  options.width = 64;
+  options.height = 48;
+  options.threads = threads;
+  NoProgress progress;
+  const CancelToken cancel;
+  const DagView dag = scene.view();
+  return render_picture(dag, placement, options, progress, cancel);
+}
+
+VoxelScene block() {
+  std::set<VoxelScene::Voxel> voxels;
+  for (int64_t x = 6; x < 10; ++x)
+    for (int64_t y = 6; y < 10; ++y)
+      for (int64_t z = 6; z < 10; ++z) voxels.insert({x, y, z});
+  return VoxelScene(4, voxels);
+}
+
+const Placement kFromTheFront{{{8, 9, 24}}, {{8, 8, 8}}, 40};
+
+// Signature, then an IHDR chunk with the picture's size, 8 bits, red, green and blue; IEND last.
+TEST(Picture, IsAPngOfItsSize) {
+  Picture picture(123, 45);
+  picture.pixel(7, 9)[1] = 200;
+  const std::string png = encode_png(picture);
+  ASSERT_GT(png.size(), 57u);
+  EXPECT_EQ(png.substr(0, 8), "\x89PNG\r\n\x1a\n");
+  EXPECT_EQ(big_endian(png, 8), 13u);
+  EXPECT_EQ(png.substr(12, 4), "IHDR");
+  EXPECT_EQ(big_endian(png, 16), 123u);
+  EXPECT_EQ(big_endian(png, 20), 45u);
+  EXPECT_EQ(png[24], 8);
+  EXPECT_EQ(png[25], 2);
+  EXPECT_EQ(png.substr(png.size() - 8, 4), "IEND");
+}
+
+TEST(Picture, IsWrittenWhole) {
+  const auto folder = std::filesystem::temp_directory_path() / "voxdag_picture_test";
+  std::filesystem::create_directories(folder);
+  const std::string path = folder / "p.png";
+  const Picture picture(20, 10);
+  write_png(system_files(), path, picture);
+  std::ifstream in(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_EQ(bytes, encode_png(picture));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+  std::filesystem::remove_all(folder);
+}
+
+// The same pixels for any number of threads.
+TEST(Renderer, ThreadsDoNotChangeThePicture) {
+  EXPECT_EQ(render(block(), kFromTheFront, 1).rgb, render(block(), kFromTheFront, 3).rgb);
+}
+
+// The block is seen in the middle of the picture, lit, before a background that it does not reach.
+TEST(Renderer, ShowsTheBlockInTheMiddle) {
+  const VoxelScene nothing(4, {});
+  Picture with = render(block(), kFromTheFront, 2), without = render(nothing, kFromTheFront, 2);
+  const auto differs = [&](int x, int y) {
+    int sum = 0;
+    for (int c = 0; c < 3; ++c) sum += std::abs(with.pixel(x, y)[c] - without.pixel(x, y)[c]);
+    return sum > 24;
+  };
+  EXPECT_TRUE(differs(32, 24));
+  EXPECT_FALSE(differs(1, 1));
+  EXPECT_FALSE(differs(62, 1));
+  int pixels = 0;
+  for (int y = 0; y < 30; ++y)
+    for (int x = 0; x < 64; ++x) pixels += differs(x, y);
+  // A cube of edge 4 at distance 14: some 19 pixels wide.
+  EXPECT_GT(pixels, 150);
+  EXPECT_LT(pixels, 700);
+  // Neither black nor burnt out.
+  EXPECT_GT(with.pixel(32, 24)[0], 60);
+  EXPECT_LT(with.pixel(32, 24)[0], 250);
+}
+
+TEST(Renderer, StopsWhenCancelled) {
+  const VoxelScene scene = block();
+  const DagView dag = scene.view();
+  NoProgress progress;
+  CancelToken cancel;
+  cancel.cancel();
+  EXPECT_THROW(render_picture(dag, kFromTheFront, {}, progress, cancel), Error);
+}
+
+// An error on any thread ends the work and reaches the caller.
+TEST(Renderer, ReportsDamage) {
+  VoxelScene scene = block();
+  scene.level_words(1).at(1) = 0x7fffffff;
+  const DagView dag = scene.view();
+  NoProgress progress;
+  const CancelToken cancel;
+  RenderOptions options;
+  options.threads = 3;
+  EXPECT_THROW(render_picture(dag, kFromTheFront, options, progress, cancel), Error);
+}
+
+}  // namespace

@@ -1,0 +1,79 @@
+// DAGs for tests of the renderer, without a file: from a set of voxels, or a wall in a grid of any
+// size by hand.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "query/dag_view.h"
+
+// An octree (no two nodes are shared) of the voxels for which `set` says so.
+class VoxelScene {
+ public:
+  using Voxel = std::array<int64_t, 3>;
+
+  VoxelScene(uint32_t grid_levels, const std::set<Voxel>& voxels)
+      : grid_levels_(grid_levels), words_(grid_levels - 1) {
+    if (!voxels.empty()) add(0, {voxels.begin(), voxels.end()});
+  }
+
+  // The voxels with x == `plane`, all of them: one node a level, used by all four of its parent's
+  // children.
+  static VoxelScene wall(uint32_t grid_levels, int64_t plane) {
+    VoxelScene scene(grid_levels, {});
+    for (uint32_t level = 0; level + 2 < grid_levels; ++level) {
+      const bool upper = plane >> (grid_levels - 1 - level) & 1;
+      scene.words_[level] = {upper ? 0xf0u : 0x0fu, 0, 0, 0, 0};
+    }
+    uint64_t mask = 0;
+    for (int y = 0; y < 4; ++y)
+      for (int z = 0; z < 4; ++z)
+        mask |= uint64_t{1} << voxdag_reader::File::brick_bit(plane & 3, y, z);
+    scene.words_.back() = {static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)};
+    return scene;
+  }
+
+  std::vector<uint32_t>& level_words(uint32_t level) { return words_[level]; }
+  voxdag::query::DagView view() const {
+    std::vector<std::span<const uint32_t>> levels(words_.begin(), words_.end());
+    if (words_.back().empty()) levels.clear();
+    return voxdag::query::DagView(std::move(levels), grid_levels_);
+  }
+
+ private:
+  // The word offset of the new node or brick; `voxels` are the ones in its cube.
+  uint32_t add(uint32_t level, const std::vector<Voxel>& voxels) {
+    if (level + 2 == grid_levels_) return add_brick(voxels);
+    const uint32_t shift = grid_levels_ - 1 - level;
+    std::array<std::vector<Voxel>, 8> parts;
+    for (const Voxel& v : voxels)
+      parts[static_cast<size_t>((v[0] >> shift & 1) << 2 | (v[1] >> shift & 1) << 1 |
+                                (v[2] >> shift & 1))]
+          .push_back(v);
+    std::vector<uint32_t> words = {0};
+    for (size_t i = 0; i < 8; ++i) {
+      if (parts[i].empty()) continue;
+      words[0] |= 1u << i;
+      words.push_back(add(level + 1, parts[i]));
+    }
+    const auto offset = static_cast<uint32_t>(words_[level].size());
+    words_[level].insert(words_[level].end(), words.begin(), words.end());
+    return offset;
+  }
+
+  uint32_t add_brick(const std::vector<Voxel>& voxels) {
+    uint64_t mask = 0;
+    for (const Voxel& v : voxels)
+      mask |= uint64_t{1} << voxdag_reader::File::brick_bit(v[0], v[1], v[2]);
+    auto& bricks = words_.back();
+    bricks.push_back(static_cast<uint32_t>(mask));
+    bricks.push_back(static_cast<uint32_t>(mask >> 32));
+    return static_cast<uint32_t>(bricks.size() - 2);
+  }
+
+  uint32_t grid_levels_;
+  std::vector<std::vector<uint32_t>> words_;
+};

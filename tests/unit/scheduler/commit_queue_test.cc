@@ -1,0 +1,260 @@
+// Groups of artifacts become durable beside the worker, and rows never come before their bytes.
+#include "scheduler/execute/commit_queue.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "core/base/error.h"
+#include "core/base/memory_budget.h"
+#include "core/io/forwarding_files.h"
+#include "tests/unit/base/error_of.h"
+#include "tests/unit/format/test_artifacts.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace voxdag {
+namespace {
+
+// A disk whose syncs of files wait until they are let through, or fail.
+class SlowDisk : public ForwardingFiles {
+ public:
+  SlowDisk() : ForwardingFiles(system_files()) {}
+
+  void hold_syncs() {
+    set([&] { held_ = true; });
+  }
+  void let_syncs_through() {
+    set([&] { held_ = false; });
+  }
+  void fail_writes_from(int number) { failing_write_ = number; }  // from 1
+  void fail_next_sync() { failing_sync_ = true; }
+  int begun_syncs() {
+    std::lock_guard lock(mutex_);
+    return begun_;
+  }
+  // Returns once so many syncs were begun.
+  void wait_for_syncs(int count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return begun_ >= count; });
+  }
+  std::unique_ptr<WritableFile> create(const std::string& path) override {
+    return std::make_unique<File>(*this, ForwardingFiles::create(path));
+  }
+
+ private:
+  class File : public ForwardingWriter {
+   public:
+    File(SlowDisk& disk, std::unique_ptr<WritableFile> file)
+        : ForwardingWriter(std::move(file)), disk_(disk) {}
+    void write_at(uint64_t offset, std::span<const std::byte> data) override {
+      if (disk_.failing_write_ && ++disk_.writes_ >= *disk_.failing_write_)
+        throw Error(ErrorCode::kNoSpace, "the test's disk is full");
+      ForwardingWriter::write_at(offset, data);
+    }
+    void sync() override {
+      std::unique_lock lock(disk_.mutex_);
+      ++disk_.begun_;
+      disk_.changed_.notify_all();
+      disk_.changed_.wait(lock, [&] { return !disk_.held_; });
+      if (std::exchange(disk_.failing_sync_, false))
+        throw Error(ErrorCode::kIo, "the test's disk lost a write");
+      ForwardingWriter::sync();
+    }
+
+   private:
+    SlowDisk& disk_;
+  };
+
+  template <class Change>
+  void set(Change change) {
+    {
+      std::lock_guard lock(mutex_);
+      change();
+    }
+    changed_.notify_all();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int begun_ = 0, writes_ = 0;
+  bool held_ = false, failing_sync_ = false;
+  std::optional<int> failing_write_;
+};
+
+class JournalTest : public testing::Test {
+ protected:
+  static constexpr uint32_t kLevels = 10, kBits = 64;
+  static constexpr size_t kSubvolumes = 200;
+  static constexpr uint64_t kGroup = 60000;  // bytes: a few artifacts
+  static constexpr double kNever_s = 1e9;
+
+  JournalTest() {
+    std::vector<StoredSubvolume> plan(kSubvolumes);
+    for (size_t i = 0; i < plan.size(); ++i) plan[i].cube = {6, {static_cast<uint32_t>(i), 0, 0}};
+    store_.start({"scene", "{}", 1}, plan);
+    planned_ = store_.leaves();
+  }
+  // Writes the next subvolume's artifact and tells the journal.
+  void build_one() { build_one(journal_); }
+  void build_one(Journal& journal) {
+    StoredSubvolume built = planned_[next_++];
+    const SubDag rows = random_rows(next_, 500, kLevels, 2, kBits);
+    ArtifactWriter writer(journal.segment(), kLevels, kBits);
+    writer.bricks({rows.brick_masks});
+    for (const SubDag::Nodes& nodes : rows.levels) writer.nodes(nodes.view());
+    built.artifact = writer.finish({});
+    built.summary = {1, 1, 1, 1};
+    journal.built(built, std::nullopt);
+  }
+  // Builds until a sync is begun.
+  void build_a_group() {
+    for (const uint64_t before = segment_.size(); segment_.size() - before < kGroup;) build_one();
+    disk_.wait_for_syncs(1);
+  }
+  // In rows that others see.
+  size_t recorded() {
+    return built_in(JobStore(folder_.file("job.db"), JobStore::Access::kLook).leaves());
+  }
+  size_t announced() { return built_in(store_.leaves()) - recorded(); }
+  size_t built_in(const std::vector<StoredSubvolume>& leaves) const {
+    size_t built = 0;
+    for (const StoredSubvolume& s : leaves) {
+      if (s.state != SubvolumeState::kBuilt) continue;
+      ++built;
+      // Readable: its bytes are in the file.
+      ArtifactReader(system_files().open_read(segment_path(folder_.path(), s.artifact.segment)),
+                     s.artifact);
+    }
+    return built;
+  }
+
+  TemporaryFolder folder_;
+  SlowDisk disk_;
+  MemoryBudget budget_{uint64_t{64} << 20};
+  JobStore store_{folder_.file("job.db"), JobStore::Access::kBuild};
+  TriangleBins bins_{system_files(), folder_.file("spill"), false, budget_};
+  Journal journal_{store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 0, budget_),
+                   bins_, kNever_s, kGroup};
+  SegmentWriter& segment_ = journal_.segment();
+  std::vector<StoredSubvolume> planned_;
+  size_t next_ = 0;
+};
+
+TEST_F(JournalTest, TheWorkerBuildsOnWhileTheDiskWrites) {
+  disk_.hold_syncs();
+  build_a_group();
+  const size_t begun_with = next_;
+  build_one();
+  build_one();
+  EXPECT_EQ(recorded(), 0u) << "a row came before its bytes were on the disk";
+  disk_.let_syncs_through();
+  journal_.commit();
+  EXPECT_EQ(recorded(), begun_with + 2);
+}
+
+// A group does not grow for ever behind a disk that does not keep up.
+TEST_F(JournalTest, WaitsForADiskThatFallsBehind) {
+  disk_.hold_syncs();
+  build_a_group();
+  const size_t first_group = next_;
+  std::thread disk([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    disk_.let_syncs_through();
+  });
+  const uint64_t behind = segment_.size();
+  while (segment_.size() - behind < 6 * kGroup) build_one();
+  EXPECT_GE(recorded(), first_group);
+  disk.join();
+  journal_.commit();
+  EXPECT_EQ(recorded(), next_);
+}
+
+// A sync that failed is not tried again: the second would say that all is well.
+TEST_F(JournalTest, WhatAFailedSyncLostIsNotRecorded) {
+  disk_.fail_next_sync();
+  bool told = false;
+  for (int i = 0; i < 20 && !told; ++i) try {
+      build_one();
+      journal_.commit();
+    } catch (const Error& error) {
+      told = true;
+      EXPECT_EQ(error.code(), ErrorCode::kIo);
+    }
+  EXPECT_TRUE(told);
+  journal_.commit();
+  EXPECT_EQ(recorded(), 0u);
+  build_one();
+  EXPECT_THROW(journal_.commit(), Error);
+  EXPECT_EQ(recorded(), 0u);
+}
+
+// The last group can be merged at once, and waits for the disk only if it is asked to.
+TEST_F(JournalTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
+  disk_.hold_syncs();
+  for (int i = 0; i < 3; ++i) build_one();
+  journal_.announce();
+  EXPECT_EQ(announced(), 3u);
+  EXPECT_EQ(recorded(), 0u);
+  EXPECT_EQ(disk_.begun_syncs(), 0);
+  disk_.let_syncs_through();
+  journal_.commit();
+  EXPECT_EQ(announced(), 0u);
+  EXPECT_EQ(recorded(), 3u);
+}
+
+// One that fails keeps no other from becoming durable.
+TEST_F(JournalTest, OpenJournalsBecomeDurableEachForItself) {
+  OpenJournals open;
+  for (uint32_t id = 1; id <= 3; ++id) {
+    auto segment = std::make_unique<SegmentWriter>(disk_, folder_.path(), id, budget_);
+    auto journal = std::make_unique<Journal>(store_, std::move(segment), bins_, kNever_s);
+    build_one(*journal);
+    journal->announce();
+    open.add(std::move(journal));
+  }
+  EXPECT_EQ(announced(), 3u);
+  disk_.fail_next_sync();
+  EXPECT_EQ(error_of([&] { open.commit(); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(recorded(), 2u);
+  open.commit();
+  EXPECT_EQ(recorded(), 2u);
+}
+
+// What is durable when the job store has no room is recorded once it has.
+TEST_F(JournalTest, WhatTheJobStoreCannotTakeIsRecordedLater) {
+  SqlDatabase store(folder_.file("job.db"), SqlDatabase::Mode::kReadWrite);
+  store.execute(
+      "CREATE TRIGGER full BEFORE UPDATE ON subvolume BEGIN SELECT RAISE(ABORT, 'full'); END");
+  store.execute(
+      "CREATE TRIGGER full2 BEFORE INSERT ON subvolume BEGIN SELECT RAISE(ABORT, 'full'); END");
+  for (int i = 0; i < 3; ++i) build_one();
+  journal_.announce();
+  EXPECT_THROW(journal_.commit(), Error);
+  EXPECT_EQ(recorded(), 0u);
+  store.execute("DROP TRIGGER full; DROP TRIGGER full2");
+  journal_.commit();
+  EXPECT_EQ(recorded(), 3u);
+}
+
+// What a full disk did take is recorded, and readable.
+TEST_F(JournalTest, WhatAFullDiskTookIsRecorded) {
+  build_a_group();
+  journal_.commit();
+  const size_t before = next_;
+  disk_.fail_writes_from(2);
+  EXPECT_THROW(
+      {
+        while (next_ < kSubvolumes) build_one();
+        journal_.commit();
+      },
+      Error);
+  EXPECT_GE(recorded(), before + 1);
+  EXPECT_LT(recorded(), next_);
+}
+
+}  // namespace
+}  // namespace voxdag

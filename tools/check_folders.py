@@ -1,0 +1,173 @@
+#!/usr/bin/env python3
+"""Checks the structure of the tree (docs/architecture.md) over all tracked files.
+
+Who may include whom, for every folder; no cycle between folders; third-party headers in their one
+place; the size of files and folders. Prints one line per finding, as "file:line: what is wrong";
+exits 1 if there is any.
+"""
+
+import collections
+import re
+import subprocess
+import sys
+
+# Which folders a folder may include, itself aside. Nothing comes along: each edge is named.
+CORE_INCLUDES = {
+    "core/base": [],
+    "core/io": ["core/base"],
+    "core/db": ["core/base", "core/io"],
+    "core/geometry": ["core/base"],
+    "core/dag": ["core/base", "core/geometry"],
+    "core/backend": ["core/base", "core/geometry", "core/dag"],
+    "core/format": ["core/base", "core/io", "core/geometry", "core/dag"],
+    "core/scene": ["core/base", "core/io", "core/geometry"],
+}
+CORE = list(CORE_INCLUDES)
+PRODUCT_INCLUDES = CORE_INCLUDES | {
+    "merge": CORE,
+    "scheduler": CORE + ["merge"],
+    "query": CORE,
+    "client": ["core/base", "core/io"],
+    "server": CORE + ["scheduler", "query"],
+    "cli": CORE + ["scheduler", "query", "client", "server"],
+}
+# Tests mirror the folders, so they include what they test; nothing of the product includes them.
+ANYTHING = list(PRODUCT_INCLUDES)
+INCLUDES = PRODUCT_INCLUDES | {
+    "tests": ANYTHING,
+    "bench": ANYTHING + ["tests"],
+    "docs": ["core/format"],
+}
+# Folders that others include through one header only.
+PUBLIC_HEADERS = {"merge": ["merge/merge.h"]}
+# Tests and benchmarks look behind the public header of what they test.
+BEHIND_PUBLIC_HEADERS = ("tests", "bench")
+
+# Third-party headers, and the folders where each may be included.
+THIRD_PARTY = {
+    "zstd.h": ["core/format"],
+    "tiny_gltf.h": ["core/scene"],
+    "sqlite3.h": ["core/db"],
+    "httplib.h": ["server", "client"],
+    "png.h": ["query"],
+}
+# Folders that build with a C++20 compiler (and CUDA) alone.
+BARE = ["core/base", "core/geometry", "core/dag", "core/backend"]
+LIBRARY = re.compile(
+    r"(zstd|tiny_gltf|sqlite3|httplib|png|xxhash)\.h$|^(nlohmann|openssl|CLI|gtest|gmock|benchmark)/"
+)
+# The reader that users copy into their engine: the standard library is all it may need.
+STANDALONE_HEADER = "core/format/global/voxdag_reader.h"
+# Where code may ask which compiler is at work.
+CUDA_PLACES = ("core/base/host_device.h", "core/backend/")
+MAX_FILE_LINES = 500
+MAX_FOLDER_FILES = 20
+
+SOURCE = re.compile(r"\.(h|cc|cu|cuh)$")
+COUNTED = re.compile(r"\.(h|cc|cu|cuh|py|sh|js)$|^(tools|\.ci)/")
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+CUDA_MACRO = re.compile(r"\b__(CUDA|NVCC)\w*")
+
+
+def layer_of(path):
+    """The folder of the tables above that a file belongs to."""
+    parts = path.split("/")
+    return "/".join(parts[:2]) if parts[0] == "core" else parts[0]
+
+
+def folder_of(path):
+    return path.rpartition("/")[0]
+
+
+def check_include(path, bracket, header):
+    """What is wrong with this file including that header, or None."""
+    layer = layer_of(path)
+    if bracket == "<":
+        allowed = THIRD_PARTY.get(header)
+        if allowed and layer not in allowed:
+            return f"<{header}> is included in {' and '.join(allowed)} only"
+        if layer in BARE and LIBRARY.search(header):
+            return f"{layer} builds with a compiler alone, without <{header}>"
+        return None
+    if path == STANDALONE_HEADER:
+        return f'stands alone, yet includes "{header}"'
+    target = layer_of(header)
+    if target == layer or "/" not in header:
+        return None
+    if target not in INCLUDES[layer]:
+        return f"{layer} may not include {target}"
+    public = PUBLIC_HEADERS.get(target)
+    if public and header not in public and layer not in BEHIND_PUBLIC_HEADERS:
+        return f"{target} is included through {' or '.join(public)} only"
+    return None
+
+
+def check_file(path, edges):
+    with open(path, encoding="utf-8") as file:
+        lines = file.read().splitlines()
+    if COUNTED.search(path) and len(lines) > MAX_FILE_LINES:
+        yield 1, f"{len(lines)} lines: expected at most {MAX_FILE_LINES} in a file"
+    if not SOURCE.search(path):
+        return
+    if layer_of(path) not in INCLUDES:
+        yield 1, "lies in no folder of docs/architecture.md"
+        return
+    for number, line in enumerate(lines, start=1):
+        if match := INCLUDE.match(line):
+            if problem := check_include(path, *match.groups()):
+                yield number, problem
+            if match.group(1) == '"' and "/" in match.group(2):
+                edges.setdefault((folder_of(path), folder_of(match.group(2))), f"{path}:{number}")
+        if not path.startswith(CUDA_PLACES) and (match := CUDA_MACRO.search(line)):
+            yield number, f"{match.group()} belongs in {' or '.join(CUDA_PLACES)}"
+
+
+def is_nested(a, b):
+    """Whether one of two folders lies in the other: these may share the outer one's headers."""
+    return a == b or a.startswith(b + "/") or b.startswith(a + "/")
+
+
+def find_cycles(edges):
+    """Yields (place, folders) for every set of folders that include each other."""
+    graph = collections.defaultdict(set)
+    for source, target in edges:
+        if not is_nested(source, target):
+            graph[source].add(target)
+
+    def reachable(start):
+        seen, waiting = set(), [start]
+        while waiting:
+            for target in graph[waiting.pop()]:
+                if target not in seen:
+                    seen.add(target)
+                    waiting.append(target)
+        return seen
+
+    reach = {folder: reachable(folder) for folder in list(graph)}
+    for source, target in sorted(edges):
+        if not is_nested(source, target) and source in reach.get(target, ()):
+            yield edges[source, target], f"{source} and {target} include each other (a folder cycle)"
+
+
+def check_folder_sizes(paths):
+    counts = collections.Counter(folder_of(path) for path in paths)
+    for folder, count in sorted(counts.items()):
+        if count > MAX_FOLDER_FILES:
+            yield f"{folder or '.'}: {count} files: expected at most {MAX_FOLDER_FILES} in a folder"
+
+
+def main():
+    listing = subprocess.run(["git", "ls-files", "-z"], check=True, capture_output=True, text=True)
+    paths = list(filter(None, listing.stdout.split("\0")))
+    findings, edges = [], {}
+    for path in paths:
+        if SOURCE.search(path) or COUNTED.search(path):
+            findings += [f"{path}:{number}: {problem}" for number, problem in check_file(path, edges)]
+    findings += [f"{place}: {problem}" for place, problem in find_cycles(edges)]
+    findings += check_folder_sizes(paths)
+    print("\n".join(findings), end="\n" if findings else "")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
