@@ -24,7 +24,7 @@ def sponza(options, _folder):
 
 
 def large_file(options, folder):
-    """A terrain of 2 GiB, eight times the budget: 12 bytes a triangle."""
+    """A terrain of 2 GiB, eight times the budget: 12 bytes per triangle."""
     path = folder / "terrain.glb"
     measure.run([options.voxdag, "generate", "terrain", path, "--triangles", 180_000_000])
     return path

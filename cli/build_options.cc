@@ -49,13 +49,14 @@ void BuildOptions::declare(CLI::App& command) {
   RunOptions& r = spec_.run;
   command.add_option("scene", g.scenes, "glTF files (.glb, .gltf), together one scene")->required();
   command
-      .add_option("-r,--resolution", g.resolution, "voxels an edge, a power of two, 4 to 1048576")
+      .add_option("-r,--resolution", g.resolution, "voxels per edge, a power of two, 4 to 1048576")
       ->required();
   const char* geometry = "Geometry (decides the result's bytes)";
   auto* bounds = command.add_option("--bounds", bounds_, "the cube: low corner X,Y,Z and its EDGE")
                      ->group(geometry);
   command
-      .add_option("--voxel-size", g.voxel_size, "edge of a voxel; the cube is centred on the scene")
+      .add_option("--voxel-size", g.voxel_size,
+                  "edge of a voxel; the cube is centered on the scene")
       ->group(geometry)
       ->excludes(bounds);
   command.add_flag("--skip-invalid", g.skip_invalid, "drop and count invalid triangles")

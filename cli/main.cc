@@ -16,7 +16,7 @@ CancelToken g_cancel;
 
 // The first signal asks to stop; a second one is taken at its word.
 void on_signal(int signal) {
-  if (g_cancel.cancelled()) _Exit(128 + signal);
+  if (g_cancel.canceled()) _Exit(128 + signal);
   g_cancel.cancel();
 }
 

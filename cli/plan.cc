@@ -15,7 +15,7 @@ struct PlanCommand {
 };
 
 template <class Text>
-void print_figure(const char* name, const Figure& figure, const Text& text) {
+void print_figure(const char* name, const EstimateRange& figure, const Text& text) {
   std::printf("  %-16s %s   (%s to %s)\n", name, text(figure.likely).c_str(),
               text(figure.low).c_str(), text(figure.high).c_str());
 }

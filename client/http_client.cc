@@ -45,7 +45,7 @@ ErrorCode code_of(const std::string& name, int status) {
   for (const ErrorCode code :
        {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kCorrupt,
         ErrorCode::kUnsupportedVersion, ErrorCode::kIo, ErrorCode::kNoSpace,
-        ErrorCode::kOutOfMemory, ErrorCode::kDevice, ErrorCode::kCancelled, ErrorCode::kLimit})
+        ErrorCode::kOutOfMemory, ErrorCode::kDevice, ErrorCode::kCanceled, ErrorCode::kLimit})
     if (name == error_name(code)) return code;
   return status >= 500 ? ErrorCode::kIo : ErrorCode::kInvalidInput;
 }

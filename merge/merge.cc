@@ -13,9 +13,9 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
   if (inputs.artifacts.empty()) return report;
   MergeScratch scratch(files, inputs.scratch_folder);
   MergeProgress rows_swept(progress);
-  const MergeSeams seams{scratch,    budget, MemoryPlan::divide(budget.available(), threads),
-                         rows_swept, cancel, report};
-  Merger(inputs, seams, checkpoint).run(out);
+  const MergeContext context{scratch,    budget, MemoryPlan::divide(budget.available(), threads),
+                             rows_swept, cancel, report};
+  Merger(inputs, context, checkpoint).run(out);
   report.scratch_bytes += scratch.bytes_written();
   return report;
 }

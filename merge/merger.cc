@@ -14,10 +14,10 @@ std::vector<size_t> group_ends(std::span<const SurveyedArtifact> artifacts, uint
   std::vector<size_t> ends;
   uint64_t bytes = 0;
   for (size_t i = 0; i < artifacts.size(); ++i) {
-    bytes += artifacts[i].least_bytes;
+    bytes += artifacts[i].min_bytes;
     if (i > 0 && bytes > slab_bytes) {
       ends.push_back(i);
-      bytes = artifacts[i].least_bytes;
+      bytes = artifacts[i].min_bytes;
     }
   }
   ends.push_back(artifacts.size());
@@ -26,16 +26,16 @@ std::vector<size_t> group_ends(std::span<const SurveyedArtifact> artifacts, uint
 
 }  // namespace
 
-Merger::Merger(const MergeInputs& inputs, const MergeSeams& seams, Checkpoint* checkpoint)
+Merger::Merger(const MergeInputs& inputs, const MergeContext& context, Checkpoint* checkpoint)
     : inputs_(inputs),
-      seams_(seams),
+      context_(context),
       journal_(checkpoint, inputs.checkpoint_interval_s),
       open_([this](uint32_t id) {
         return is_round_segment(id) ? segments_.at(id)->open() : inputs_.open_segment(id);
       }),
       // Rounds before the last one also hold a segment's writer.
-      round_slab_bytes_(seams.plan.slab_bytes -
-                        std::min(seams.plan.slab_bytes, kSegmentWriterBytes)) {}
+      round_slab_bytes_(context.plan.slab_bytes -
+                        std::min(context.plan.slab_bytes, kSegmentWriterBytes)) {}
 
 void Merger::run(GlobalFileWriter& out) {
   survey(inputs_.artifacts);
@@ -43,14 +43,14 @@ void Merger::run(GlobalFileWriter& out) {
   for (const SurveyedArtifact& artifact : artifacts_) contents.push_back(artifact.content);
   inputs_checksum_ = checksum64(std::as_bytes(std::span(contents)));
   restore(out);
-  seams_.progress.begin(fit_at_once() ? rows_ : 2 * rows_);
+  context_.progress.begin(fit_at_once() ? rows_ : 2 * rows_);
   while (!last_round_begun_ && !fit_at_once()) {
     reduce();
-    seams_.progress.set_total(rows_swept() + (fit_at_once() ? rows_ : 2 * rows_));
+    context_.progress.set_total(rows_swept() + (fit_at_once() ? rows_ : 2 * rows_));
   }
   merge_last(out);
   journal_.finish();
-  seams_.progress.end();
+  context_.progress.end();
 }
 
 void Merger::survey(std::span<const ArtifactRef> refs) {
@@ -60,31 +60,31 @@ void Merger::survey(std::span<const ArtifactRef> refs) {
 }
 
 bool Merger::fit_at_once() const {
-  return artifacts_.size() < 2 || group_ends(artifacts_, seams_.plan.slab_bytes).size() == 1;
+  return artifacts_.size() < 2 || group_ends(artifacts_, context_.plan.slab_bytes).size() == 1;
 }
 
-uint64_t Merger::rows_swept() const { return seams_.report.input_nodes - rows_before_; }
+uint64_t Merger::rows_swept() const { return context_.report.input_nodes - rows_before_; }
 
 std::vector<ArtifactRoot> Merger::merge(
     std::span<const ArtifactReader> readers, bool last, LevelOutput& output,
     const std::function<void(const RoundProgress&)>& after_level) {
   const RoundTask task{inputs_.grid_levels, inputs_.hash_bits, last, readers};
-  return merge_round(seams_, task, output, last ? std::move(progress_) : RoundProgress(),
+  return merge_round(context_, task, output, last ? std::move(progress_) : RoundProgress(),
                      after_level);
 }
 
 ArtifactSet Merger::open(size_t begin, size_t end) const {
   return ArtifactSet({artifacts_.data() + begin, end - begin}, open_, inputs_.grid_levels,
-                     inputs_.hash_bits, seams_.budget);
+                     inputs_.hash_bits, context_.budget);
 }
 
 void Merger::reduce() {
   const std::vector<size_t> ends = group_ends(artifacts_, round_slab_bytes_);
   if (ends.size() == artifacts_.size())
     throw Error(ErrorCode::kOutOfMemory,
-                "out of memory: merging any two neighbouring subvolumes takes more than " +
-                    std::to_string(seams_.budget.available()) + " bytes");
-  auto made = std::make_unique<RoundSegment>(seams_.scratch, seams_.budget);
+                "out of memory: merging any two neighboring subvolumes takes more than " +
+                    std::to_string(context_.budget.available()) + " bytes");
+  auto made = std::make_unique<RoundSegment>(context_.scratch, context_.budget);
   RoundSegment& segment = *made;
   segments_[segment.id()] = std::move(made);
   std::vector<ArtifactRef> merged;
@@ -98,7 +98,7 @@ void Merger::reduce() {
     if (begin < artifacts_.size() && journal_.due()) save_round(segment, merged, begin);
   }
   segment.finish();
-  ++seams_.report.rounds;
+  ++context_.report.rounds;
   journal_.settle();  // so that what this round merged is given back soon
   const bool due = journal_.due();
   const std::vector<SurveyedArtifact> before = std::move(artifacts_);
@@ -116,15 +116,15 @@ void Merger::reduce() {
 void Merger::merge_last(GlobalFileWriter& out) {
   GlobalOutput output(out);
   const ArtifactSet artifacts = open(0, artifacts_.size());
-  if (progress_.level) seams_.progress.set_total(rows_above(artifacts.readers()));
+  if (progress_.level) context_.progress.set_total(rows_above(artifacts.readers()));
   const auto after_level = [&](const RoundProgress& progress) {
     if (journal_.due()) save_level(progress, artifacts.readers(), out);
   };
   for (const ArtifactRoot& root : merge(artifacts.readers(), true, output, after_level)) {
-    seams_.report.voxels += root.voxels;
-    seams_.report.svo_nodes += root.svo_nodes;
+    context_.report.voxels += root.voxels;
+    context_.report.svo_nodes += root.svo_nodes;
   }
-  ++seams_.report.rounds;
+  ++context_.report.rounds;
 }
 
 uint64_t Merger::rows_above(std::span<const ArtifactReader> readers) const {

@@ -19,7 +19,7 @@ namespace voxdag {
 
 class Merger {
  public:
-  Merger(const MergeInputs& inputs, const MergeSeams& seams, Checkpoint* checkpoint);
+  Merger(const MergeInputs& inputs, const MergeContext& context, Checkpoint* checkpoint);
   void run(GlobalFileWriter& out);
 
  private:
@@ -57,8 +57,8 @@ class Merger {
   std::vector<std::shared_ptr<ScratchPath>> segment_paths() const;
 
   const MergeInputs& inputs_;
-  const MergeSeams& seams_;
-  MergeJournal journal_;
+  const MergeContext& context_;
+  MergeCheckpointer journal_;
   const OpenSegment open_;
   const uint64_t round_slab_bytes_;
   uint64_t inputs_checksum_ = 0;

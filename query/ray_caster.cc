@@ -6,7 +6,7 @@ namespace voxdag::query {
 namespace {
 
 // Smaller components are as good as 0 and would only make infinities.
-constexpr double kLeastComponent = 1e-18;
+constexpr double kMinComponent = 1e-18;
 
 struct Times {
   double t[3];
@@ -19,7 +19,7 @@ class Walk {
       : dag_(dag), cone_(cone), t_max_(t_max) {
     for (int axis = 0; axis < 3; ++axis) {
       const double d = ray.direction[axis];
-      inverse_[axis] = 1 / std::max(std::fabs(d), kLeastComponent);
+      inverse_[axis] = 1 / std::max(std::fabs(d), kMinComponent);
       origin_[axis] = ray.origin[axis];
       if (d >= 0) continue;
       mirror_ |= 4 >> axis;

@@ -50,7 +50,7 @@ struct BuildSpec {
 };
 
 // The outside world of a build.
-struct Seams {
+struct BuildContext {
   FileSystem& files;
   Progress& progress;
   const CancelToken& cancel;

@@ -12,12 +12,12 @@ namespace voxdag {
 namespace {
 
 // More warnings than this say no more than their number.
-constexpr size_t kMostWarnings = 5;
+constexpr size_t kMaxWarnings = 5;
 
 // Keeps a merge's state in the job store.
 class StoredCheckpoint : public Checkpoint {
  public:
-  StoredCheckpoint(JobStore& store, OpenJournals& journals, WorkFolder& work)
+  StoredCheckpoint(JobStore& store, CommitQueues& journals, WorkFolder& work)
       : store_(store), journals_(journals), work_(work) {}
   std::optional<std::vector<std::byte>> load() override {
     auto stored = store_.merge();
@@ -35,7 +35,7 @@ class StoredCheckpoint : public Checkpoint {
 
  private:
   JobStore& store_;
-  OpenJournals& journals_;
+  CommitQueues& journals_;
   WorkFolder& work_;
 };
 
@@ -57,12 +57,12 @@ std::string sha256_of(FileSystem& files, const std::string& path, const CancelTo
 bool MergeStage::run(const RunOptions& options, BuildReport& report) {
   if (is_published(report)) return true;
   try {
-    GlobalFileWriter out(seams_.files, report.output, report.grid, report.hash_bits);
+    GlobalFileWriter out(context_.files, report.output, report.grid, report.hash_bits);
     merge(options, out, report);
     write(out, report);
     return true;
   } catch (const Error& error) {
-    if (!speaks_of_damage(error) || !heal(error)) throw;
+    if (!is_corruption(error) || !heal(error)) throw;
     return false;
   }
 }
@@ -70,8 +70,8 @@ bool MergeStage::run(const RunOptions& options, BuildReport& report) {
 // An earlier run may have been stopped when the file had its name already.
 bool MergeStage::is_published(BuildReport& report) {
   const auto result = store_.result();
-  if (!result || result->output != report.output || !seams_.files.exists(report.output) ||
-      sha256_of(seams_.files, report.output, seams_.cancel) != result->sha256)
+  if (!result || result->output != report.output || !context_.files.exists(report.output) ||
+      sha256_of(context_.files, report.output, context_.cancel) != result->sha256)
     return false;
   report.sha256 = result->sha256;
   report.bytes = result->bytes;
@@ -96,8 +96,8 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
   inputs.scratch_folder = work_.scratch_path();
   inputs.checkpoint_interval_s = options.checkpoint_interval_s;
   StoredCheckpoint checkpoint(store_, journals_, work_);
-  const MergeReport merged = merge_sub_dags(inputs, seams_.files, out, budget_, report.threads,
-                                            seams_.progress, seams_.cancel, &checkpoint);
+  const MergeReport merged = merge_sub_dags(inputs, context_.files, out, budget_, report.threads,
+                                            context_.progress, context_.cancel, &checkpoint);
   report.voxels = merged.voxels;
   report.svo_nodes = merged.svo_nodes;
   report.dag_nodes = merged.dag_nodes;
@@ -106,21 +106,21 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
   report.merge_streamed_groups = merged.streamed_groups;
   report.spill_bytes += merged.scratch_bytes;
   if (report.voxels == 0 && report.triangles > 0)
-    seams_.progress.warn("none of the " + std::to_string(report.triangles) +
-                         " triangles near the grid touches it: the file will have no nodes");
+    context_.progress.warn("none of the " + std::to_string(report.triangles) +
+                           " triangles near the grid touches it: the file will have no nodes");
   clock_.finish("merge");
 }
 
 void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
-  seams_.progress.begin_stage("write", 1, "files");
+  context_.progress.begin_stage("write", 1, "files");
   const GlobalFileSummary file =
-      out.seal(report.voxels, report.svo_nodes, report.threads, seams_.cancel);
+      out.seal(report.voxels, report.svo_nodes, report.threads, context_.cancel);
   store_.record_result({report.output, file.sha256, file.bytes, report.voxels, report.svo_nodes,
                         report.dag_nodes, report.merge_rounds, report.merge_ranges,
                         report.merge_streamed_groups});
   out.publish();
-  seams_.progress.advance(1);
-  seams_.progress.end_stage();
+  context_.progress.advance(1);
+  context_.progress.end_stage();
   report.bytes = file.bytes;
   report.sha256 = file.sha256;
   clock_.finish("write");
@@ -132,21 +132,21 @@ bool MergeStage::heal(const Error& error) {
   const auto merge = store_.merge();
   const auto damaged = find_damaged(
       store_.leaves(), merge ? merge->level : UINT32_MAX,
-      [&](uint32_t id) { return work_.open_segment(id); }, seams_.cancel);
+      [&](uint32_t id) { return work_.open_segment(id); }, context_.cancel);
   size_t warnings = 0;
   for (const DamagedSubvolume& d : damaged) {
-    if (++warnings <= kMostWarnings)
-      seams_.progress.warn("subvolume " + std::to_string(d.subvolume.id) +
-                           " is built again: " + d.what);
+    if (++warnings <= kMaxWarnings)
+      context_.progress.warn("subvolume " + std::to_string(d.subvolume.id) +
+                             " is built again: " + d.what);
     store_.record_lost(d.subvolume);
   }
-  if (warnings > kMostWarnings)
-    seams_.progress.warn("... and so are " + std::to_string(warnings - kMostWarnings) + " more");
+  if (warnings > kMaxWarnings)
+    context_.progress.warn("... and so are " + std::to_string(warnings - kMaxWarnings) + " more");
   if (!damaged.empty()) return true;
   if (started_over_) return false;
   started_over_ = true;
   store_.forget_merge();
-  seams_.progress.warn("the merge starts over: " + error.message());
+  context_.progress.warn("the merge starts over: " + error.message());
   return true;
 }
 

@@ -16,14 +16,14 @@ namespace voxdag {
 
 class MergeStage {
  public:
-  MergeStage(JobStore& store, OpenJournals& journals, WorkFolder& work, MemoryBudget& budget,
-             StageClock& clock, const Seams& seams)
+  MergeStage(JobStore& store, CommitQueues& journals, WorkFolder& work, MemoryBudget& budget,
+             StageClock& clock, const BuildContext& context)
       : store_(store),
         journals_(journals),
         work_(work),
         budget_(budget),
         clock_(clock),
-        seams_(seams) {}
+        context_(context) {}
 
   // Makes the file that `options` name and fills in the report. False if something turned out
   // damaged that another call may get right, once subvolumes that are planned again are built.
@@ -36,11 +36,11 @@ class MergeStage {
   bool heal(const Error& error);
 
   JobStore& store_;
-  OpenJournals& journals_;
+  CommitQueues& journals_;
   WorkFolder& work_;
   MemoryBudget& budget_;
   StageClock& clock_;
-  const Seams& seams_;
+  const BuildContext& context_;
   bool started_over_ = false;
 };
 

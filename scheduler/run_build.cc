@@ -29,23 +29,23 @@ constexpr uint32_t kLevelsBelowForTheCheck = 5;
 // Of artifacts, job store and digests of scenes; another number is another job.
 constexpr int64_t kWorkFormatVersion = 2;
 // How often damaged artifacts are built again before the disk is to blame.
-constexpr int kMostAttempts = 3;
+constexpr int kMaxAttempts = 3;
 
 // One build, stage by stage; what the work folder already has is not built again.
 class Build {
  public:
-  Build(const BuildSpec& spec, const Seams& seams)
+  Build(const BuildSpec& spec, const BuildContext& context)
       : spec_(checked(spec)),
         budget_(spec_.run.memory_bytes),
-        output_(seams.files, spec_.run.output),
-        work_(seams.files,
+        output_(context.files, spec_.run.output),
+        work_(context.files,
               spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder),
-        store_(open_store(seams.files)),
-        progress_(seams.progress, *store_, work_),
-        seams_{seams.files, progress_, seams.cancel},
-        keeper_(spec_, *store_, work_, seams_) {
+        store_(open_store(context.files)),
+        progress_(context.progress, *store_, work_),
+        context_{context.files, progress_, context.cancel},
+        keeper_(spec_, *store_, work_, context_) {
     if (!spec_.run.cache_folder.empty())
-      cache_.emplace(seams.files, spec_.run.cache_folder, spec_.run.cache_bytes);
+      cache_.emplace(context.files, spec_.run.cache_folder, spec_.run.cache_bytes);
     report_.output = spec_.run.output;
     report_.hash_bits = spec_.geometry.hash_bits;
     report_.threads = spec_.run.threads;
@@ -56,7 +56,7 @@ class Build {
     try {
       return run_to_the_end();
     } catch (const Error& error) {
-      commit_what_can_be();
+      commit_best_effort();
       // With a job, or a part of a scene that is not at fault, the folder is what goes on.
       const bool scene_is_at_fault =
           error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
@@ -66,13 +66,13 @@ class Build {
       }
       Error told = error;
       if (error.code() == ErrorCode::kNoSpace)
-        told = Error(error.code(), error.message() + room_needed());
-      if (error.code() == ErrorCode::kCancelled)
+        told = Error(error.code(), error.message() + space_required());
+      if (error.code() == ErrorCode::kCanceled)
         told = Error(error.code(), error.message() + "; run the same command again to go on");
       progress_.record_failure(told);
       throw told;
     } catch (...) {
-      commit_what_can_be();
+      commit_best_effort();
       throw;
     }
   }
@@ -95,7 +95,7 @@ class Build {
   }
 
   // What is finished is not lost.
-  void commit_what_can_be() {
+  void commit_best_effort() {
     try {
       journals_.commit();
     } catch (const std::exception&) {
@@ -112,9 +112,9 @@ class Build {
     work_.remove_spilled();
     build_missing();
     if (spec_.run.keep_work) journals_.commit_soon();
-    MergeStage merge(*store_, journals_, work_, budget_, clock_, seams_);
+    MergeStage merge(*store_, journals_, work_, budget_, clock_, context_);
     for (int attempt = 1; !merge.run(spec_.run, report_); ++attempt) {
-      if (attempt == kMostAttempts)
+      if (attempt == kMaxAttempts)
         throw Error(ErrorCode::kCorrupt, work_.path() +
                                              ": artifacts are damaged again and again: "
                                              "expected a disk that gives back what was written");
@@ -125,7 +125,7 @@ class Build {
     report_.wall_s = wall_seconds() - start;
     report_.cpu_s = process_cpu_seconds();
     report_.peak_rss_bytes = peak_resident_bytes();
-    write_file_atomically(seams_.files, spec_.run.output + ".report.json",
+    write_file_atomically(context_.files, spec_.run.output + ".report.json",
                           report_json(report_) + "\n");
     if (!spec_.run.keep_work) remove_work();
     return report_;
@@ -139,7 +139,7 @@ class Build {
 
   // What a full disk's user needs to know, reckoned from the subvolumes built so far: their
   // artifacts and a global file of about the same size.
-  std::string room_needed() {
+  std::string space_required() {
     double built = 0, planned = 0, bytes = 0;
     for (const StoredSubvolume& subvolume : store_->leaves()) {
       const bool is_built = subvolume.state == SubvolumeState::kBuilt;
@@ -168,13 +168,13 @@ class Build {
       try {
         return try_to_build_missing();
       } catch (const DamagedTriangles& damage) {
-        if (attempt == kMostAttempts) throw;
-        seams_.progress.warn(damage.message() + "; the scene is read again");
+        if (attempt == kMaxAttempts) throw;
+        context_.progress.warn(damage.message() + "; the scene is read again");
         keeper_.forget();
       } catch (const Error& error) {
         if (error.code() != ErrorCode::kNoSpace || !keeper_.is_optional()) throw;
-        seams_.progress.warn(error.message() +
-                             "; the scene is read again, to hold its triangles in memory");
+        context_.progress.warn(error.message() +
+                               "; the scene is read again, to hold its triangles in memory");
         keeper_.give_up();
       }
     }
@@ -184,13 +184,13 @@ class Build {
   // it returns.
   void try_to_build_missing() {
     PreparedScene scene =
-        prepare_scene(spec_, work_.spill_path(), budget_, clock_, seams_, &keeper_);
+        prepare_scene(spec_, work_.spill_path(), budget_, clock_, context_, &keeper_);
     report_.grid = scene.grid;
     report_.triangles = scene.counts.triangles;
     report_.dropped_outside = scene.counts.dropped_outside;
     report_.dropped_invalid = scene.counts.dropped_invalid;
     if (report_.triangles == 0)
-      seams_.progress.warn("the scene has no triangles in the grid: the file will have no nodes");
+      context_.progress.warn("the scene has no triangles in the grid: the file will have no nodes");
     start_or_resume(scene);
 
     std::vector<StoredSubvolume> leaves = store_->leaves();
@@ -234,7 +234,7 @@ class Build {
         refuse("its scene has other contents (SHA-256 " + stored->scene_sha256.substr(0, 16) +
                ", now " + scene.sha256.substr(0, 16) + ")");
     } else {
-      check_room(scene);
+      check_disk_space(scene);
       std::vector<StoredSubvolume> plan(scene.plan.size());
       for (size_t i = 0; i < plan.size(); ++i) {
         plan[i].cube = scene.plan[i].cube;
@@ -252,16 +252,16 @@ class Build {
 
   void build_subvolumes_of(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
     std::vector<QueuedSubvolume> queue =
-        hand_down(planned, scene, keeper_, budget_.limit() / 8, seams_.cancel);
+        partition_triangles(planned, scene, keeper_, budget_.limit() / 8, context_.cancel);
     const MemoryCharge lists(budget_, queue.size() * (sizeof queue[0] + sizeof planned[0]),
                              "lists of subvolumes");
     clock_.finish("distribute");
     ExecutorOptions options;
     options.grid_levels = scene.grid.levels;
     options.hash_bits = spec_.geometry.hash_bits;
-    const BackendChoice backend = choose_backend(spec_.run, seams_.progress);
+    const BackendChoice backend = choose_backend(spec_.run, context_.progress);
     report_.backend = backend.name;
-    options.threads = std::min(spec_.run.threads, backend.most_workers);
+    options.threads = std::min(spec_.run.threads, backend.max_workers);
     options.open_backend = backend.open;
     if (spec_.run.subvolume_edge)
       options.longest_edge = static_cast<int64_t>(spec_.run.subvolume_edge);
@@ -269,30 +269,30 @@ class Build {
     options.first_segment_id = work_.next_segment_id();
     options.checkpoint_interval_s = spec_.run.checkpoint_interval_s;
     if (cache_) options.cache = &*cache_;
-    seams_.progress.begin_stage("build", queue.size(), "subvolumes");
+    context_.progress.begin_stage("build", queue.size(), "subvolumes");
     const ExecutorCounts counts = build_subvolumes(options, std::move(queue), *scene.bins, *store_,
-                                                   journals_, budget_, seams_);
+                                                   journals_, budget_, context_);
     keeper_.finish();
     report_.subvolumes_split += counts.split;
     report_.subvolumes_cached += counts.cached;
     report_.subvolumes_reused += counts.cached;
-    seams_.progress.end_stage();
+    context_.progress.end_stage();
     clock_.finish("build");
   }
 
   uint64_t free_disk() const {
-    return std::min(seams_.files.free_space(work_.path()),
-                    seams_.files.free_space(parent_directory(spec_.run.output)));
+    return std::min(context_.files.free_space(work_.path()),
+                    context_.files.free_space(parent_directory(spec_.run.output)));
   }
 
   // Refuses a build that cannot fit before any work is done.
-  void check_room(const PreparedScene& scene) {
+  void check_disk_space(const PreparedScene& scene) {
     if (spec_.run.force || scene.grid.levels < kLevelsWorthAnEstimate) return;
-    if (most_disk_bytes(scene) < static_cast<double>(free_disk())) return;
+    if (max_disk_bytes(scene) < static_cast<double>(free_disk())) return;
     const Estimate estimate = estimate_build(scene, scene.grid.levels - kLevelsBelowForTheCheck,
-                                             spec_.run.threads, budget_, seams_.cancel);
-    check_estimate(estimate, seams_.files, work_.path(), parent_directory(spec_.run.output),
-                   seams_.progress);
+                                             spec_.run.threads, budget_, context_.cancel);
+    check_estimate(estimate, context_.files, work_.path(), parent_directory(spec_.run.output),
+                   context_.progress);
     clock_.finish("estimate");
   }
 
@@ -302,11 +302,11 @@ class Build {
   WorkFolder work_;
   std::optional<ArtifactCache> cache_;
   std::unique_ptr<JobStore> store_;
-  OpenJournals journals_;
+  CommitQueues journals_;
   StageClock clock_{[this](const StageTime& stage) { store_->add_stage_time(stage); }};
   JobProgress progress_;
-  const Seams seams_;
-  IngestKeeper keeper_;
+  const BuildContext context_;
+  IngestCheckpoint keeper_;
   BuildReport report_;
   bool start_over_ = spec_.run.restart;
 };
@@ -332,11 +332,11 @@ void check_output(FileSystem& files, const std::string& output) {
 
 }  // namespace
 
-BuildReport run_build(const BuildSpec& spec, const Seams& seams) {
+BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
   if (spec.run.output.empty())
     throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
-  check_output(seams.files, spec.run.output);
-  return Build(spec, seams).run();
+  check_output(context.files, spec.run.output);
+  return Build(spec, context).run();
 }
 
 }  // namespace voxdag

@@ -45,7 +45,7 @@ struct BuildReport {
 
 // Builds, or goes on with the build that the work folder holds, or throws Error; nothing is left
 // under the final name unless it is whole. The report is also written to output + ".report.json".
-BuildReport run_build(const BuildSpec& spec, const Seams& seams);
+BuildReport run_build(const BuildSpec& spec, const BuildContext& context);
 
 // One JSON object, names as in docs/cli.md.
 std::string report_json(const BuildReport& report);

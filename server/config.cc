@@ -85,18 +85,18 @@ class Members {
 Members members_of(ServerConfig& c) {
   Members tls, jobs, transfers, connections, retention, all;
   tls.add("certificate", c.http.certificate_file).add("key", c.http.key_file);
-  jobs.add("at_a_time", c.jobs.at_a_time)
+  jobs.add("max_concurrent", c.jobs.max_concurrent)
       .add("memory", c.jobs.memory_bytes)
       .add("threads", c.jobs.threads)
-      .add("least_free_disk", c.jobs.least_free_disk_bytes)
+      .add("min_free_disk", c.jobs.min_free_disk_bytes)
       .add("nice", c.jobs.nice)
       .add("attempts", c.jobs.attempts)
       .add("backoff_s", c.jobs.backoff_s)
-      .add("most_backoff_s", c.jobs.most_backoff_s)
+      .add("max_backoff_s", c.jobs.max_backoff_s)
       .add("grace_s", c.jobs.grace_s)
       .add("queued", c.jobs.queued)
       .add("plan_s", c.jobs.plan_s)
-      .add("plans_at_a_time", c.jobs.plans_at_a_time);
+      .add("max_concurrent_plans", c.jobs.max_concurrent_plans);
   transfers.add("scene", c.transfers.scene_bytes)
       .add("body", c.transfers.body_bytes)
       .add("transfers", c.transfers.transfers)
@@ -108,7 +108,7 @@ Members members_of(ServerConfig& c) {
       .add("header_s", c.http.limits.header_s)
       .add("idle_s", c.http.limits.idle_s)
       .add("grace_s", c.http.limits.grace_s)
-      .add("least_rate", c.http.limits.least_rate);
+      .add("min_bytes_per_s", c.http.limits.min_bytes_per_s);
   retention.add("finished_days", c.retention.finished_days)
       .add("finished_jobs", c.retention.finished_jobs)
       .add("upload_days", c.retention.upload_days);
@@ -153,12 +153,12 @@ void check_config(const ServerConfig& config) {
              " without tokens: anybody who can reach this port could build and delete. Make a "
              "token file (voxdag token --role admin --name you >> tokens) and name it (--tokens "
              "FILE), or listen on 127.0.0.1");
-  expect(config.jobs.at_a_time >= 1 && config.jobs.attempts >= 1,
-         "jobs.at_a_time and jobs.attempts: expected at least 1");
-  expect(config.http.limits.connections >= 8 && config.http.limits.least_rate > 0,
-         "connections.connections: expected at least 8, connections.least_rate: more than 0");
+  expect(config.jobs.max_concurrent >= 1 && config.jobs.attempts >= 1,
+         "jobs.max_concurrent and jobs.attempts: expected at least 1");
+  expect(config.http.limits.connections >= 8 && config.http.limits.min_bytes_per_s > 0,
+         "connections.connections: expected at least 8, connections.min_bytes_per_s: more than 0");
   expect(config.jobs.memory_bytes == 0 ||
-             config.jobs.memory_bytes / config.jobs.at_a_time >= kLeastMemory,
+             config.jobs.memory_bytes / config.jobs.max_concurrent >= kMinMemory,
          "jobs.memory: expected at least 64MiB for each job at a time");
   for (const std::string& root : config.scene_roots)
     expect(root.starts_with('/'), "scene_roots: '" + root + "': expected an absolute folder");

@@ -11,18 +11,18 @@
 namespace voxdag::server {
 
 struct JobLimits {
-  unsigned at_a_time = 1;
+  unsigned max_concurrent = 1;
   uint64_t memory_bytes = 0;  // of all running jobs together; 0: half of what the machine allows
   unsigned threads = 0;       // of each job unless it says less; 0: all cores
-  uint64_t least_free_disk_bytes = uint64_t{1} << 30;  // below it nothing is begun
-  int nice = 5;                                        // of the processes that build
+  uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // below it nothing is begun
+  int nice = 5;                                      // of the processes that build
   unsigned attempts = 5;
   double backoff_s = 15;  // before the second attempt; doubles each time
-  double most_backoff_s = 900;
+  double max_backoff_s = 900;
   double grace_s = 8;       // for a build to stop at a checkpoint
   uint64_t queued = 20000;  // jobs that have not ended
   double plan_s = 120;      // for a dry run
-  unsigned plans_at_a_time = 1;
+  unsigned max_concurrent_plans = 1;
 };
 
 struct TransferLimits {

@@ -138,10 +138,10 @@ class Service::Parts {
   const std::unique_ptr<FileLock> lock_;
   std::atomic<bool> draining_{false};
   Metrics metrics_;
-  Gate gate_;
+  AccessControl gate_;
   JobQueue queue_;
   SceneStore scenes_;
-  TaskMaker tasks_;
+  TaskResolver tasks_;
   HttpServer http_;
   Dispatcher dispatcher_;
   Context context_;

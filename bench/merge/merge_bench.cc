@@ -130,9 +130,9 @@ class OneLevel {
     MergeReport report;
     NoProgress silent;
     MergeProgress progress(silent);
-    const MergeSeams seams{scratch_, budget_, MemoryPlan::divide(budget_.available(), 1),
-                           progress, cancel_, report};
-    merge_level(seams, {1, bricks, pointers_, &*below_, *maps_, nowhere, memory_});
+    const MergeContext build_context{scratch_, budget_, MemoryPlan::divide(budget_.available(), 1),
+                                     progress, cancel_, report};
+    merge_level(build_context, {1, bricks, pointers_, &*below_, *maps_, nowhere, memory_});
   }
 
  private:

@@ -1,5 +1,5 @@
 // Artifacts for the merge's benchmarks, made up in a second: runs of random bricks and nodes in the
-// total order, part of them common to many runs, as neighbouring subvolumes share theirs.
+// total order, part of them common to many runs, as neighboring subvolumes share theirs.
 #pragma once
 
 #include <algorithm>

@@ -25,7 +25,7 @@ class Fetch {
     FileSystem& files = server_.files();
     files.make_directories(parent_directory(output_));
     const uint64_t resumed_at = bytes_there();
-    for (Patience patience(server_.cancel()); bytes_there() < size_;) {
+    for (RetryPolicy patience(server_.cancel()); bytes_there() < size_;) {
       const uint64_t before = bytes_there();
       std::string trouble = "server " + server_.url() + ": the download ended early";
       double wait_s = 0;
@@ -79,7 +79,7 @@ class Fetch {
       return true;
     };
     const client::ClientResponse answer = server_.http().stream(path_, headers, begin, sink);
-    const double wait_s = come_again_s(answer);
+    const double wait_s = retry_after_s(answer);
     if (wait_s >= 0) return wait_s;
     throw_if_problem(answer);
     if (offset == size_) progress->end_stage();

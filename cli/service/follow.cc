@@ -72,15 +72,15 @@ Json follow_job(Server& server, const std::string& id) {
       if (has_ended(job)) return job;
     }
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::kCancelled) throw;
-    throw Error(ErrorCode::kCancelled, "no longer watching job " + id + ", which goes on");
+    if (error.code() != ErrorCode::kCanceled) throw;
+    throw Error(ErrorCode::kCanceled, "no longer watching job " + id + ", which goes on");
   }
 }
 
 void check_succeeded(const Json& job) {
   const std::string state = job.at("state"), id = job.at("id");
   if (state == "succeeded") return;
-  if (state == "canceled") throw Error(ErrorCode::kCancelled, "job " + id + " was canceled");
+  if (state == "canceled") throw Error(ErrorCode::kCanceled, "job " + id + " was canceled");
   if (!job.at("error").is_object()) throw Error(ErrorCode::kIo, "job " + id + " failed");
   const Json& error = job.at("error");
   throw Error(code_named(error.at("code")),

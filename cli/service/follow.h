@@ -8,7 +8,7 @@
 namespace voxdag::cli {
 
 // The JOB as it ended: succeeded, failed or canceled. A server that restarts meanwhile is waited
-// for. Ctrl-C is Error{kCancelled}; the job goes on.
+// for. Ctrl-C is Error{kCanceled}; the job goes on.
 Json follow_job(Server& server, const std::string& id);
 
 // Throws the error of a job that failed or was canceled.

@@ -23,17 +23,17 @@ Json post_verb(Server& server, const std::string& id, const std::string& verb) {
       server.ask([&](client::HttpClient& http) { return http.send("POST", path, ""); }).body);
 }
 
-void add_job_deed_command(CLI::App& app, CommandContext& context, const std::string& name,
-                          const std::string& description, const Deed& deed) {
+void add_job_action_command(CLI::App& app, CommandContext& context, const std::string& name,
+                            const std::string& description, const JobAction& action) {
   CLI::App* command = app.add_subcommand(name, description);
   const auto state = std::make_shared<DeedCommand>();
   command->add_option("id", state->ids, "the job's id; several may be given")->required();
   state->server.declare(*command);
   command->add_flag("--json", state->json, "each job as one JSON object on standard output");
-  command->callback([state, deed, &context] {
+  command->callback([state, action, &context] {
     with_server(state->server, context, [&](Server& server) {
       for (const std::string& id : state->ids) {
-        const Json job = deed(server, id);
+        const Json job = action(server, id);
         std::printf("%s\n", state->json ? job.dump().c_str() : state_line(job).c_str());
       }
     });

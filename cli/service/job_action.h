@@ -9,10 +9,10 @@
 namespace voxdag::cli {
 
 // Asks for it and returns the JOB after it.
-using Deed = std::function<Json(Server& server, const std::string& id)>;
+using JobAction = std::function<Json(Server& server, const std::string& id)>;
 
-void add_job_deed_command(CLI::App& app, CommandContext& context, const std::string& name,
-                          const std::string& description, const Deed& deed);
+void add_job_action_command(CLI::App& app, CommandContext& context, const std::string& name,
+                            const std::string& description, const JobAction& action);
 
 // POSTs the verb ("cancel", ...) of the API.
 Json post_verb(Server& server, const std::string& id, const std::string& verb);

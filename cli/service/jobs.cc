@@ -47,7 +47,7 @@ void add_jobs_command(CLI::App& app, CommandContext& context) {
   state->server.declare(*command);
   command
       ->add_option("--state", state->states,
-                   "only these, with commas: queued, running, suspended, cancelling, canceled, "
+                   "only these, with commas: queued, running, suspended, canceling, canceled, "
                    "failed, succeeded")
       ->check(check_states);
   command->add_option("--limit", state->limit, "how many at most, 1 to 200 (default 50)");

@@ -12,8 +12,8 @@ Json resume(Server& server, const std::string& id) {
 }  // namespace
 
 void add_resume_command(CLI::App& app, CommandContext& context) {
-  add_job_deed_command(app, context, "resume",
-                       "go on with suspended jobs of a server, or try failed ones again", resume);
+  add_job_action_command(app, context, "resume",
+                         "go on with suspended jobs of a server, or try failed ones again", resume);
 }
 
 }  // namespace voxdag::cli

@@ -55,7 +55,7 @@ void serve(const ServeCommand& command, const CLI::App& app, CommandContext& con
   log_line("listening on " + service.url());
   // Signals set the token; nothing else may be done where they arrive.
   std::thread watcher([&] {
-    while (!context.cancel.cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    while (!context.cancel.canceled()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
     log_line("stopping: builds stop at a checkpoint, answers finish");
     service.stop();
   });

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kTimeout_s = 120;  // of silence: a whole scene may be looked at before an answer
 constexpr double kLongestPause_s = 10;
-constexpr double kPatience_s = 300;
+constexpr double kMaxWait_s = 300;
 constexpr double kStep_s = 0.05;  // between two looks at Ctrl-C
 constexpr uint64_t kLargestToken = 4096;
 
@@ -64,16 +64,16 @@ client::ClientOptions ServerOptions::client_options(FileSystem& files) const {
   return options;
 }
 
-bool Patience::wait(double at_least_s) {
-  if (waited_s_ >= kPatience_s) return false;
-  const double seconds = std::max(pause_s_, std::min(at_least_s, kPatience_s));
+bool RetryPolicy::wait(double min_wait_s) {
+  if (waited_s_ >= kMaxWait_s) return false;
+  const double seconds = std::max(pause_s_, std::min(min_wait_s, kMaxWait_s));
   sleep_for(seconds, cancel_);
   waited_s_ += seconds;
   pause_s_ = std::min(kLongestPause_s, 2 * pause_s_);
   return true;
 }
 
-double come_again_s(const client::ClientResponse& response) {
+double retry_after_s(const client::ClientResponse& response) {
   switch (response.status) {
     case 408:
     case 429:
@@ -102,7 +102,7 @@ Server::Server(const ServerOptions& options, CommandContext& context)
       http_(options.client_options(context.files)) {}
 
 client::ClientResponse Server::ask(const Request& request) {
-  for (Patience patience(cancel());;) {
+  for (RetryPolicy patience(cancel());;) {
     cancel().check();
     client::ClientResponse response;
     try {
@@ -112,7 +112,7 @@ client::ClientResponse Server::ask(const Request& request) {
       continue;
     }
     has_answered_ = true;
-    const double wait_s = come_again_s(response);
+    const double wait_s = retry_after_s(response);
     if (wait_s >= 0 && patience.wait(wait_s)) continue;
     throw_if_problem(response);
     return response;

@@ -26,11 +26,11 @@ class ServerOptions {
 };
 
 // When to try again: after half a second, then longer and longer, for about five minutes in all.
-class Patience {
+class RetryPolicy {
  public:
-  explicit Patience(const CancelToken& cancel) : cancel_(cancel) {}
-  // Waits; false if it has been tried for long enough. Throws Error{kCancelled} on Ctrl-C.
-  bool wait(double at_least_s = 0);
+  explicit RetryPolicy(const CancelToken& cancel) : cancel_(cancel) {}
+  // Waits; false if it has been tried for long enough. Throws Error{kCanceled} on Ctrl-C.
+  bool wait(double min_wait_s = 0);
   // Something went forward: from here it counts anew.
   void renew() { waited_s_ = 0, pause_s_ = kFirstPause_s; }
 
@@ -59,7 +59,7 @@ class Server {
   const std::string& url() const { return url_; }
   FileSystem& files() { return context_.files; }
   const CancelToken& cancel() const { return context_.cancel; }
-  // Sleeps; throws Error{kCancelled} on Ctrl-C.
+  // Sleeps; throws Error{kCanceled} on Ctrl-C.
   void pause(double seconds) const;
 
  private:
@@ -70,7 +70,7 @@ class Server {
 };
 
 // Seconds that a busy server asks to wait for, or -1 if the answer does not tell to come again.
-double come_again_s(const client::ClientResponse& response);
+double retry_after_s(const client::ClientResponse& response);
 // "/api/v1/jobs/ID"; throws Error{kInvalidInput} unless the id is 16 hex digits.
 std::string job_path(const std::string& id);
 

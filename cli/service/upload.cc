@@ -41,7 +41,7 @@ class Upload {
 
   std::string run() {
     uint64_t furthest = 0;
-    for (Patience patience(server_.cancel()); !is_there();) {
+    for (RetryPolicy patience(server_.cancel()); !is_there();) {
       if (offset_ > furthest) patience.renew();
       furthest = std::max(furthest, offset_);
       if (send_rest()) break;
@@ -107,7 +107,7 @@ class Upload {
       const uint64_t end = std::min(size_, offset_ + part);
       const auto answer = send_part(end, *progress);
       if (!answer) return false;
-      wait_s_ = come_again_s(*answer);
+      wait_s_ = retry_after_s(*answer);
       if (answer->status == 409 || wait_s_ >= 0) {
         trouble_ = "scene " + name_ + ": the server answered " + std::to_string(answer->status);
         return false;

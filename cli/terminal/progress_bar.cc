@@ -11,7 +11,7 @@
 namespace voxdag::cli {
 namespace {
 
-constexpr double kLeastPartToForesee = 0.01;  // a time left reckoned from less is a guess
+constexpr double kMinPartToForesee = 0.01;  // a time left reckoned from less is a guess
 
 class ProgressBar : public Progress {
  public:
@@ -53,7 +53,7 @@ class ProgressBar : public Progress {
     const double elapsed = std::max(now - start_s_, 1e-9);
     const double part =
         total_ ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total_)) : 0;
-    const double left = part >= kLeastPartToForesee ? elapsed / part - elapsed : 0;
+    const double left = part >= kMinPartToForesee ? elapsed / part - elapsed : 0;
     const double rate = static_cast<double>(done) / elapsed;
     line_.show({stage_, unit_, done, total_, elapsed, rate, left}, ended);
   }

@@ -12,7 +12,7 @@ struct StageView {
   uint64_t done = 0;
   uint64_t total = 0;  // 0 if unknown
   double elapsed_s = 0;
-  double rate = 0;   // units a second
+  double rate = 0;   // units per second
   double eta_s = 0;  // 0 if unknown
 };
 

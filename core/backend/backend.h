@@ -55,7 +55,7 @@ class Backend {
  public:
   virtual ~Backend() = default;
   virtual std::string_view name() const = 0;
-  // Builds one subvolume. Throws Error (kCancelled, kDevice, kOutOfMemory, or what the stream
+  // Builds one subvolume. Throws Error (kCanceled, kDevice, kOutOfMemory, or what the stream
   // throws); the backend stays usable.
   virtual BuildOutcome build(const SubvolumeTask& task, TriangleStream& triangles,
                              MemoryBudget& budget, const CancelToken& cancel, SubDagSink& sink,
@@ -65,7 +65,7 @@ class Backend {
 // Instruction sets that the CPU backend has kernels for, each more than the one before.
 enum class Simd { kNone, kAvx2, kAvx512 };
 
-// The CPU backend: bricks rasterised tile by tile, nodes hash-consed. Uses the largest instruction
+// The CPU backend: bricks rasterized tile by tile, nodes hash-consed. Uses the largest instruction
 // set up to `most` that the machine has, chosen at run time; the answer is the same.
 std::unique_ptr<Backend> make_cpu_backend(Simd most = Simd::kAvx512);
 

@@ -13,7 +13,7 @@
 namespace voxdag {
 
 template <class Item, size_t kSlots>
-class SlotRing {
+class BoundedQueue {
  public:
   // The writer's: the next slot to fill, once one is free, with what was in it before. Null if the
   // reader gave up.
@@ -67,9 +67,9 @@ class SlotRing {
 // thread, or on this one if there may be one only or the system has no other. After an exception of
 // take() the next pass() does not return. Throws what take() threw, or else what make() did.
 template <class Item, size_t kSlots, class Make, class Take>
-void make_and_take(unsigned threads, Make make, Take take) {
+void run_producer_consumer(unsigned threads, Make make, Take take) {
   struct GaveUp {};
-  SlotRing<Item, kSlots> ring;
+  BoundedQueue<Item, kSlots> ring;
   std::exception_ptr of_make, of_take;
   std::thread taker;
   const auto take_all = [&] {

@@ -11,15 +11,15 @@ namespace voxdag {
 class CancelToken {
  public:
   // Async-signal-safe.
-  void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
-  bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
-  // Throws Error{kCancelled} once cancel() was called.
+  void cancel() { canceled_.store(true, std::memory_order_relaxed); }
+  bool canceled() const { return canceled_.load(std::memory_order_relaxed); }
+  // Throws Error{kCanceled} once cancel() was called.
   void check() const {
-    if (cancelled()) throw Error(ErrorCode::kCancelled, "cancelled");
+    if (canceled()) throw Error(ErrorCode::kCanceled, "canceled");
   }
 
  private:
-  std::atomic<bool> cancelled_{false};
+  std::atomic<bool> canceled_{false};
   static_assert(std::atomic<bool>::is_always_lock_free, "cancel() runs in signal handlers");
 };
 

@@ -20,7 +20,7 @@ constexpr Row kTable[] = {
     {ErrorCode::kNoSpace, "no_space", 7, 507},
     {ErrorCode::kOutOfMemory, "out_of_memory", 8, 503},
     {ErrorCode::kDevice, "device", 9, 422},
-    {ErrorCode::kCancelled, "cancelled", 130, 409},
+    {ErrorCode::kCanceled, "canceled", 130, 409},
     {ErrorCode::kLimit, "limit", 10, 422},
 };
 

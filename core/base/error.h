@@ -17,7 +17,7 @@ enum class ErrorCode {
   kNoSpace,             // the disk is full
   kOutOfMemory,         // the memory budget or the machine cannot hold what is needed
   kDevice,              // the GPU or its driver failed
-  kCancelled,           // the user asked to stop
+  kCanceled,            // the user asked to stop
   kLimit,               // a limit of the format or of the arithmetic, named in the message
 };
 

@@ -18,7 +18,7 @@ uint64_t number_in(const std::string& path) {
 }
 
 // The least limit from the group at `path` up to the root of the hierarchy.
-uint64_t least_up_from(const std::string& root, std::string path, const std::string& file) {
+uint64_t min_up_from(const std::string& root, std::string path, const std::string& file) {
   uint64_t least = UINT64_MAX;
   for (;;) {
     least = std::min(least, number_in(root + path + "/" + file));
@@ -56,9 +56,9 @@ uint64_t cgroup_memory(const std::string& membership, const std::string& mount) 
     const std::string path = line.substr(second + 1);
     if (controllers == ",,") {
       for (const char* root : {"", "/unified"})
-        least = std::min(least, least_up_from(mount + root, path, "memory.max"));
+        least = std::min(least, min_up_from(mount + root, path, "memory.max"));
     } else if (controllers.find(",memory,") != std::string::npos) {
-      least = std::min(least, least_up_from(mount + "/memory", path, "memory.limit_in_bytes"));
+      least = std::min(least, min_up_from(mount + "/memory", path, "memory.limit_in_bytes"));
     }
   }
   return least;
@@ -69,7 +69,7 @@ uint64_t default_memory() {
                        static_cast<uint64_t>(sysconf(_SC_PAGE_SIZE));
   std::ifstream file("/proc/self/cgroup");
   const std::string membership{std::istreambuf_iterator<char>(file), {}};
-  return std::max(kLeastMemory, std::min(ram, cgroup_memory(membership, "/sys/fs/cgroup")) / 2);
+  return std::max(kMinMemory, std::min(ram, cgroup_memory(membership, "/sys/fs/cgroup")) / 2);
 }
 
 uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }

@@ -7,9 +7,9 @@
 namespace voxdag {
 
 // The least that --memory accepts.
-inline constexpr uint64_t kLeastMemory = uint64_t{64} << 20;
+inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;
 
-// Half of what RAM and cgroups allow, at least kLeastMemory.
+// Half of what RAM and cgroups allow, at least kMinMemory.
 uint64_t default_memory();
 // The least limit of the cgroups that `membership` (the text of /proc/self/cgroup) names and of
 // those above them, of version 2 or 1, mounted under `mount`; UINT64_MAX if there is none.

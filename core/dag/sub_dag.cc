@@ -40,7 +40,7 @@ void check_sub_dag(const SubDag& dag, uint32_t cube_level, uint32_t grid_levels,
   for (const SubDag::Nodes& nodes : dag.levels) {
     const uint32_t level = brick_level - 1 - static_cast<uint32_t>(&nodes - dag.levels.data());
     if (nodes.level != level || nodes.masks.size() != nodes.hashes.size())
-      broken(level, 0, "the level array is labelled or sized wrongly");
+      broken(level, 0, "the level array is labeled or sized wrongly");
     std::vector<bool> used(child_hashes.size(), false);
     size_t at = 0, previous_at = 0;
     for (size_t i = 0; i < nodes.masks.size(); ++i) {

@@ -14,10 +14,10 @@ void check_levels(uint32_t levels) {
   if (levels < static_cast<uint32_t>(kMinGridLevels) ||
       levels > static_cast<uint32_t>(kMaxGridLevels))
     throw Error(ErrorCode::kInvalidInput,
-                "a grid of 2^" + std::to_string(levels) + " voxels an edge: expected 2^2 to 2^20");
+                "a grid of 2^" + std::to_string(levels) + " voxels per edge: expected 2^2 to 2^20");
 }
 
-Grid centred(const WorldBounds& bounds, double edge, uint32_t levels) {
+Grid centered(const WorldBounds& bounds, double edge, uint32_t levels) {
   Grid grid;
   grid.levels = levels;
   grid.edge = edge;
@@ -50,7 +50,7 @@ void WorldBounds::add(const double (&point)[3]) {
 Grid Grid::around(const WorldBounds& bounds, uint32_t levels) {
   check_levels(levels);
   const double extent = largest_extent(bounds);
-  return centred(bounds, extent > 0 ? extent * (1.0 + 0x1p-15) : 1.0, levels);
+  return centered(bounds, extent > 0 ? extent * (1.0 + 0x1p-15) : 1.0, levels);
 }
 
 Grid Grid::given(const std::array<double, 3>& origin, double edge, uint32_t levels) {
@@ -77,7 +77,7 @@ Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_
                 "the scene's largest extent " + std::to_string(extent) +
                     " does not fit a grid of edge " + std::to_string(edge) + " (voxel size " +
                     std::to_string(voxel_size) + " times the resolution)");
-  return centred(bounds, edge, levels);
+  return centered(bounds, edge, levels);
 }
 
 SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out) {

@@ -39,7 +39,7 @@ struct Grid {
   static Grid around(const WorldBounds& bounds, uint32_t levels);
   // The cube that a user gave: its low corner and its edge, finite and edge > 0.
   static Grid given(const std::array<double, 3>& origin, double edge, uint32_t levels);
-  // Voxels of edge `voxel_size`, the cube centred on the scene; a scene that does not fit is
+  // Voxels of edge `voxel_size`, the cube centered on the scene; a scene that does not fit is
   // Error{kInvalidInput}.
   static Grid with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels);
 };

@@ -24,16 +24,16 @@ struct MergedBytes {
   uint64_t bytes = 0;
 };
 
-class MergeJournal {
+class MergeCheckpointer {
  public:
-  MergeJournal(Checkpoint* checkpoint, double interval_s)
+  MergeCheckpointer(Checkpoint* checkpoint, double interval_s)
       : checkpoint_(checkpoint), interval_s_(interval_s) {}
-  ~MergeJournal() {
+  ~MergeCheckpointer() {
     if (save_.valid()) save_.wait();
     for (const auto& path : named_) path->keep();
   }
-  MergeJournal(const MergeJournal&) = delete;
-  MergeJournal& operator=(const MergeJournal&) = delete;
+  MergeCheckpointer(const MergeCheckpointer&) = delete;
+  MergeCheckpointer& operator=(const MergeCheckpointer&) = delete;
 
   // Throws Error{kCorrupt} for one that is damaged.
   std::optional<MergeState> load() {

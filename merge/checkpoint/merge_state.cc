@@ -139,9 +139,9 @@ class Get {
   }
 
  private:
-  size_t count(size_t least_bytes) {
+  size_t count(size_t min_bytes) {
     const uint64_t n = in_.get<uint64_t>();
-    if (n <= in_.left() / least_bytes) return n;
+    if (n <= in_.left() / min_bytes) return n;
     in_.take(in_.left() + 1);  // not ok() from here on
     return 0;
   }

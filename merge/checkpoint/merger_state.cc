@@ -10,14 +10,14 @@ namespace voxdag {
 namespace {
 
 // Giving back less at a time costs more than it is worth.
-constexpr uint64_t kLeastReleasedBytes = uint64_t{32} << 10;
+constexpr uint64_t kMinReleasedBytes = uint64_t{32} << 10;
 
 std::tuple<uint32_t, uint32_t, uint32_t, uint32_t> key_of(const Cube& cube) {
   return {cube.level, cube.position[0], cube.position[1], cube.position[2]};
 }
 
 // A state that these speak of cannot be gone on with; other errors say nothing of it.
-bool speaks_of_damage(const Error& error) {
+bool is_corruption(const Error& error) {
   return error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kNotFound ||
          error.code() == ErrorCode::kUnsupportedVersion;
 }
@@ -29,8 +29,8 @@ void Merger::restore(GlobalFileWriter& out) {
     const std::optional<MergeState> state = journal_.load();
     if (state) go_on_from(*state, out);
   } catch (const Error& error) {
-    if (!speaks_of_damage(error)) throw;
-    seams_.progress.warn("the merge starts over: " + error.message());
+    if (!is_corruption(error)) throw;
+    context_.progress.warn("the merge starts over: " + error.message());
     journal_.forget();
     segments_.clear();
     progress_ = {};
@@ -38,22 +38,22 @@ void Merger::restore(GlobalFileWriter& out) {
   }
   std::set<std::string> named;
   for (const auto& path : journal_.named()) named.insert(path->name());
-  seams_.scratch.remove_all_but(named);
+  context_.scratch.remove_all_but(named);
 }
 
 void Merger::go_on_from(const MergeState& state, GlobalFileWriter& out) {
   if (state.inputs != inputs_checksum_)
     throw Error(ErrorCode::kCorrupt, "its subvolumes are not those that it began with");
-  seams_.scratch.set_next_id(state.next_scratch_id);
+  context_.scratch.set_next_id(state.next_scratch_id);
   for (const ArtifactRef& ref : state.merged) {
     auto& segment = segments_[ref.segment];
     if (segment) continue;
-    segment = std::make_unique<RoundSegment>(seams_.scratch, ref.segment);
+    segment = std::make_unique<RoundSegment>(context_.scratch, ref.segment);
     journal_.add_named(segment->path());
   }
   replace_inputs(state.merged);
   if (state.last_round) go_on_in_last_round(*state.last_round, out);
-  seams_.report = state.report;
+  context_.report = state.report;
   rows_before_ = state.report.input_nodes;
 }
 
@@ -79,15 +79,15 @@ void Merger::go_on_in_last_round(const LastRoundState& state, GlobalFileWriter& 
     throw Error(ErrorCode::kOutOfMemory,
                 "out of memory: the merge that goes on was begun with more: expected as much "
                 "memory as before (--memory), or --restart");
-  auto file = std::make_unique<ScratchFile>(seams_.scratch, state.map);
+  auto file = std::make_unique<ScratchFile>(context_.scratch, state.map);
   journal_.add_named(file->path());
   uint64_t map_rows = 0;
   for (const uint64_t rows : state.map_rows) map_rows += rows;
   if (state.map_rows.size() != artifacts_.size() + 1 || map_rows != state.map.words)
     throw Error(ErrorCode::kCorrupt, "its maps are not those of its subvolumes");
   progress_.level = state.level;
-  progress_.maps.emplace(state.map_rows, std::move(file), seams_.plan.resident_bytes,
-                         seams_.budget);
+  progress_.maps.emplace(state.map_rows, std::move(file), context_.plan.resident_bytes,
+                         context_.budget);
   progress_.placed = state.placed;
   progress_.roots = state.roots;
   out.go_on(state.file);
@@ -97,8 +97,8 @@ void Merger::go_on_in_last_round(const LastRoundState& state, GlobalFileWriter& 
 MergeState Merger::state_of(std::vector<ArtifactRef> merged) const {
   MergeState state;
   state.inputs = inputs_checksum_;
-  state.next_scratch_id = seams_.scratch.next_id();
-  state.report = seams_.report;
+  state.next_scratch_id = context_.scratch.next_id();
+  state.report = context_.report;
   state.merged = std::move(merged);
   return state;
 }
@@ -113,7 +113,7 @@ void Merger::save_round(RoundSegment& segment, std::vector<ArtifactRef> merged, 
 
 void Merger::save_level(const RoundProgress& progress, std::span<const ArtifactReader> readers,
                         GlobalFileWriter& out) {
-  const auto map = progress.maps->file(seams_.scratch);
+  const auto map = progress.maps->file(context_.scratch);
   std::vector<ArtifactRef> merged;
   for (const SurveyedArtifact& artifact : artifacts_)
     if (is_round_segment(artifact.ref.segment)) merged.push_back(artifact.ref);
@@ -123,7 +123,7 @@ void Merger::save_level(const RoundProgress& progress, std::span<const ArtifactR
                      map->record(),   progress.placed, progress.roots};
   auto named = segment_paths();
   named.push_back(map->path());
-  const auto sync = [&out, map, &scratch = seams_.scratch] {
+  const auto sync = [&out, map, &scratch = context_.scratch] {
     out.sync();
     map->sync();
     scratch.files().sync_directory(scratch.path());
@@ -144,7 +144,7 @@ std::vector<MergedBytes> Merger::take_merged(std::span<const ArtifactReader> rea
       if (merged.level >= level && !merged.frames.empty())
         end = merged.frames.back().offset + merged.frames.back().bytes;
     const uint64_t begin = std::max(ref.offset, merged_ends_[i]);
-    if (end < begin + kLeastReleasedBytes) continue;
+    if (end < begin + kMinReleasedBytes) continue;
     taken.push_back({ref.segment, begin, end - begin});
     merged_ends_[i] = end;
   }

@@ -20,12 +20,12 @@ struct GroupPiece {
 
 class GroupFile {
  public:
-  GroupFile(const MergeSeams& seams, const LevelTask& task, uint64_t hash, uint64_t bytes)
-      : seams_(seams), task_(task), hash_(hash), bytes_(bytes), file_(seams.scratch) {}
+  GroupFile(const MergeContext& context, const LevelTask& task, uint64_t hash, uint64_t bytes)
+      : context_(context), task_(task), hash_(hash), bytes_(bytes), file_(context.scratch) {}
 
   // Rewires all runs' rows of the group into the file.
   void fill() {
-    PageBuffer<uint32_t> buffer(seams_.budget, kBufferWords, "rows of a group of equal hashes");
+    PageBuffer<uint32_t> buffer(context_.budget, kBufferWords, "rows of a group of equal hashes");
     buffer_ = std::move(buffer);
     for (size_t run = 0; run < task_.runs.size(); ++run) {
       const FrameSpan frames = task_.runs[run]->frames_within({hash_, hash_});
@@ -62,9 +62,9 @@ class GroupFile {
 
   void add_frames(GroupPiece& piece, const FrameSpan& frames) {
     Slab slab(task_.runs, {{.run = piece.run, .frames = frames}}, {hash_, hash_}, kFrameRows, false,
-              task_.memory, seams_.budget);
-    slab.load(task_.child_maps, {seams_.plan.workers, seams_.plan.worker_bytes}, seams_.budget,
-              seams_.cancel);
+              task_.memory, context_.budget);
+    slab.load(task_.child_maps, {context_.plan.workers, context_.plan.worker_bytes},
+              context_.budget, context_.cancel);
     const SlabBound begin = slab.bound(0, 0), end = slab.bound(slab.ranges(), 0);
     if (begin.row == end.row) return;
     if (piece.rows == 0) piece.first_row = slab.pieces()[0].first_row + begin.row;
@@ -84,7 +84,7 @@ class GroupFile {
     buffered_ = 0;
   }
 
-  const MergeSeams& seams_;
+  const MergeContext& context_;
   const LevelTask& task_;
   const uint64_t hash_;
   const uint64_t bytes_;
@@ -155,16 +155,16 @@ class GroupCursor {
 
 }  // namespace
 
-LevelExtent stream_group(const MergeSeams& seams, const LevelTask& task, uint64_t hash,
+LevelExtent stream_group(const MergeContext& context, const LevelTask& task, uint64_t hash,
                          uint64_t first_position, uint64_t bytes) {
-  GroupFile group(seams, task, hash, bytes);
+  GroupFile group(context, task, hash, bytes);
   group.fill();
   task.memory.release();
   const auto pieces = group.pieces();
 
-  OrderedRows out(task.output, task.bricks, first_position, seams.budget);
+  OrderedRows out(task.output, task.bricks, first_position, context.budget);
   const size_t each = std::clamp<uint64_t>(bytes / 2 / sizeof(uint32_t) / pieces.size(), 64, 16384);
-  PageBuffer<uint32_t> buffers(seams.budget, each * pieces.size() + kLongestRowWords,
+  PageBuffer<uint32_t> buffers(context.budget, each * pieces.size() + kLongestRowWords,
                                "a group of equal hashes");
   std::vector<GroupCursor> cursors;
   for (size_t i = 0; i < pieces.size(); ++i) {
@@ -176,12 +176,12 @@ LevelExtent stream_group(const MergeSeams& seams, const LevelTask& task, uint64_
   merge_cursors(std::span(cursors), [&](size_t cursor, const RowKey& row) {
     cursors[cursor].keep(static_cast<uint32_t>(out.add(row)));
     if (++rows % kFrameRows != 0) return;
-    seams.cancel.check();
-    seams.progress.advance(kFrameRows);
+    context.cancel.check();
+    context.progress.advance(kFrameRows);
   });
   for (GroupCursor& cursor : cursors) cursor.flush();
   out.flush();
-  seams.progress.advance(rows % kFrameRows);
+  context.progress.advance(rows % kFrameRows);
   return {out.nodes(), out.end_position() - first_position};
 }
 

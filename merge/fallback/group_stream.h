@@ -11,7 +11,7 @@ namespace voxdag {
 
 // Merges all rows of hash `hash`; the first unique one goes to `first_position`. `bytes` of the
 // budget may be used.
-LevelExtent stream_group(const MergeSeams& seams, const LevelTask& task, uint64_t hash,
+LevelExtent stream_group(const MergeContext& context, const LevelTask& task, uint64_t hash,
                          uint64_t first_position, uint64_t bytes);
 
 }  // namespace voxdag

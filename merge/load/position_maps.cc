@@ -37,7 +37,7 @@ std::vector<uint64_t> PositionMaps::rows() const {
   return all;
 }
 
-uint64_t PositionMaps::most_rows() const {
+uint64_t PositionMaps::max_rows() const {
   uint64_t most = 0;
   for (size_t run = 0; run + 1 < first_.size(); ++run) most = std::max(most, rows(run));
   return most;

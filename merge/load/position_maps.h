@@ -31,7 +31,7 @@ class PositionMaps {
   bool resident() const { return file_ == nullptr; }
   uint64_t rows(size_t run) const { return first_[run + 1] - first_[run]; }
   // Rows of the longest map.
-  uint64_t most_rows() const;
+  uint64_t max_rows() const;
   // A whole map; only if resident.
   uint32_t* values(size_t run) { return values_.data() + first_[run]; }
   const uint32_t* values(size_t run) const { return values_.data() + first_[run]; }

@@ -20,10 +20,10 @@ Extent extent_of(const LevelRun& run, const FrameSpan& frames) {
 // the table of bounds takes at most a byte or two a row.
 unsigned choose_range_bits(const HashInterval& interval, uint64_t rows, uint64_t range_rows,
                            size_t pieces) {
-  const uint64_t most_ranges = std::max<uint64_t>(
+  const uint64_t max_ranges = std::max<uint64_t>(
       1, std::min(rows / std::max<uint64_t>(1, range_rows), rows / (4 * pieces + 1)));
   unsigned bits = 0;
-  while (bits < 63 && (interval.last >> bits) - (interval.first >> bits) >= 2 * most_ranges) ++bits;
+  while (bits < 63 && (interval.last >> bits) - (interval.first >> bits) >= 2 * max_ranges) ++bits;
   return bits;
 }
 

@@ -26,7 +26,7 @@ class Slab::Loader {
     uint64_t window_rows = 0;
     if (spilled_) {
       const uint64_t room = std::max(workers.bytes_each, kFrameMemory) - kFrameMemory;
-      window_rows = std::clamp<uint64_t>(room / sizeof(uint32_t), 1024, maps->most_rows() + 1024);
+      window_rows = std::clamp<uint64_t>(room / sizeof(uint32_t), 1024, maps->max_rows() + 1024);
     }
     for (Worker& worker : workers_) {
       worker.charge = MemoryCharge(budget, kFrameMemory, "a frame of the merge");

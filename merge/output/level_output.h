@@ -32,7 +32,7 @@ class GlobalOutput : public LevelOutput {
   explicit GlobalOutput(GlobalFileWriter& file) : file_(file) {}
   bool in_words() const override { return true; }
   void begin_level(uint32_t level) override { file_.begin_level(level); }
-  void add(const RecordBatch& batch) override { file_.sum_words(batch.words()); }
+  void add(const RecordBatch& batch) override { file_.checksum_words(batch.words()); }
   void write(uint64_t position, const RecordBatch& batch) override {
     file_.write_words(position, batch.words());
   }

@@ -74,7 +74,7 @@ uint64_t content_of(const ArtifactReader& reader) {
   return checksum64(std::as_bytes(std::span(words)));
 }
 
-// What a slab needs to hold any two neighbouring frames.
+// What a slab needs to hold any two neighboring frames.
 uint64_t slab_bytes(const ArtifactReader& reader) {
   uint64_t most = 0;
   for (const ArtifactLevel& level : reader.levels()) {
@@ -91,7 +91,7 @@ uint64_t slab_bytes(const ArtifactReader& reader) {
 
 // An artifact counts as at least this much, however small it is: so the number of runs that are
 // open at once, and the bookkeeping for each, is bounded by the budget too.
-constexpr uint64_t kLeastRunBytes = uint64_t{64} << 10;
+constexpr uint64_t kMinRunBytes = uint64_t{64} << 10;
 
 // The Morton code of the cube's low corner, in bricks of the largest grid.
 uint64_t place_of(const Cube& cube) {
@@ -121,7 +121,7 @@ ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSeg
     const ArtifactReader reader = opener.open(ref);
     survey.rows += row_count(reader);
     SurveyedArtifact found{ref,
-                           std::max(kLeastRunBytes, index_bytes(reader) + slab_bytes(reader)),
+                           std::max(kMinRunBytes, index_bytes(reader) + slab_bytes(reader)),
                            content_of(reader),
                            {}};
     for (const ArtifactRoot& root : reader.roots()) found.cubes.push_back(root.cube);

@@ -18,9 +18,9 @@ using OpenSegment = std::function<std::shared_ptr<ReadableFile>(uint32_t)>;
 
 struct SurveyedArtifact {
   ArtifactRef ref;
-  // The memory that it takes in a merge, at least: its index, and any two neighbouring frames of it
+  // The memory that it takes in a merge, at least: its index, and any two neighboring frames of it
   // in a slab.
-  uint64_t least_bytes = 0;
+  uint64_t min_bytes = 0;
   // Checksum of its roots and its levels' rows, the same wherever it lies.
   uint64_t content = 0;
   std::vector<Cube> cubes;  // of its roots
@@ -28,7 +28,7 @@ struct SurveyedArtifact {
 
 struct ArtifactSurvey {
   uint64_t rows = 0;
-  // In Morton order of their places: neighbours share most nodes, so a round that merges them
+  // In Morton order of their places: neighbors share most nodes, so a round that merges them
   // first leaves least to the next one.
   std::vector<SurveyedArtifact> by_place;
 };

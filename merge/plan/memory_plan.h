@@ -22,12 +22,12 @@ struct MemoryPlan {
   uint64_t slab_bytes = 0;
 
   static MemoryPlan divide(uint64_t bytes, unsigned threads) {
-    constexpr uint64_t kLeastWorkerBytes = kFrameMemory + (uint64_t{128} << 10);
+    constexpr uint64_t kMinWorkerBytes = kFrameMemory + (uint64_t{128} << 10);
     MemoryPlan plan;
     const uint64_t for_workers = bytes / 4;
     plan.workers = static_cast<unsigned>(
         std::clamp<uint64_t>(for_workers / (uint64_t{1} << 20), 1, std::max(1u, threads)));
-    plan.worker_bytes = std::max(for_workers / plan.workers, kLeastWorkerBytes);
+    plan.worker_bytes = std::max(for_workers / plan.workers, kMinWorkerBytes);
     plan.resident_bytes = bytes / 6;
     const uint64_t others = plan.workers * plan.worker_bytes + 2 * plan.resident_bytes;
     plan.slab_bytes = slab_within(bytes - std::min(bytes, others));

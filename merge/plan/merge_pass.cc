@@ -11,8 +11,9 @@ namespace {
 
 class Round {
  public:
-  Round(const MergeSeams& seams, const RoundTask& task, LevelOutput& output, RoundProgress progress)
-      : seams_(seams), task_(task), output_(output), done_(std::move(progress)) {}
+  Round(const MergeContext& context, const RoundTask& task, LevelOutput& output,
+        RoundProgress progress)
+      : context_(context), task_(task), output_(output), done_(std::move(progress)) {}
 
   std::vector<ArtifactRoot> run(const std::function<void(const RoundProgress&)>& after_level) {
     const uint32_t highest = task_.with_top ? 0 : highest_root();
@@ -44,29 +45,29 @@ class Round {
       artifact_runs.emplace_back(artifact, level);
     const TopRun top(task_.hash_bits,
                      task_.with_top ? std::move(done_.placed) : std::vector<PlacedNode>());
-    seams_.progress.expect_more(top.rows());
+    context_.progress.expect_more(top.rows());
     std::vector<const LevelRun*> runs;
     std::vector<uint64_t> rows;
     for (const ArtifactRun& run : artifact_runs) runs.push_back(&run);
     runs.push_back(&top);
     for (const LevelRun* run : runs) rows.push_back(run->rows());
 
-    PositionMaps maps(rows, seams_.plan.resident_bytes, seams_.scratch, seams_.budget);
+    PositionMaps maps(rows, context_.plan.resident_bytes, context_.scratch, context_.budget);
     output_.begin_level(level);
     const LevelExtent extent =
-        merge_level(seams_, {.level = level,
-                             .bricks = level + kBrickLevels == task_.grid_levels,
-                             .runs = runs,
-                             .child_maps = done_.maps ? &*done_.maps : nullptr,
-                             .maps = maps,
-                             .output = output_,
-                             .memory = memory_});
+        merge_level(context_, {.level = level,
+                               .bricks = level + kBrickLevels == task_.grid_levels,
+                               .runs = runs,
+                               .child_maps = done_.maps ? &*done_.maps : nullptr,
+                               .maps = maps,
+                               .output = output_,
+                               .memory = memory_});
     output_.end_level(extent.nodes, extent.positions);
-    if (task_.with_top) seams_.report.dag_nodes += extent.nodes;
+    if (task_.with_top) context_.report.dag_nodes += extent.nodes;
     place(level, top, maps);
     done_.maps = std::move(maps);
     done_.level = level;
-    if (seams_.budget.available() < memory_.bytes() / 4 + bytes_beside_slab()) memory_.release();
+    if (context_.budget.available() < memory_.bytes() / 4 + bytes_beside_slab()) memory_.release();
   }
 
   // Memory for the largest level from the start, where there is room for that.
@@ -77,17 +78,17 @@ class Round {
         rows[level.level] += level.rows;
         words[level.level] += std::max(level.children, kBrickWords * level.rows);
       }
-    const uint64_t most_rows = std::ranges::max(rows), most_words = std::ranges::max(words);
-    const bool resident = most_rows * sizeof(uint32_t) <= seams_.plan.resident_bytes;
-    const uint64_t bytes = Slab::bytes_for(most_rows, most_words, false);
+    const uint64_t max_rows = std::ranges::max(rows), max_words = std::ranges::max(words);
+    const bool resident = max_rows * sizeof(uint32_t) <= context_.plan.resident_bytes;
+    const uint64_t bytes = Slab::bytes_for(max_rows, max_words, false);
     if (resident && bytes <= kLargestSlabBytes &&
-        bytes + bytes_beside_slab() + seams_.plan.resident_bytes <= seams_.budget.available())
-      memory_.reserve(most_rows, most_words, false, seams_.budget);
+        bytes + bytes_beside_slab() + context_.plan.resident_bytes <= context_.budget.available())
+      memory_.reserve(max_rows, max_words, false, context_.budget);
   }
 
   // What the next level may take, its runs' rows being in a slab.
   uint64_t bytes_beside_slab() const {
-    return bytes_for_workers(seams_.plan) + seams_.plan.resident_bytes;
+    return bytes_for_workers(context_.plan) + context_.plan.resident_bytes;
   }
 
   // Finds where this level's top nodes and subvolume roots went.
@@ -95,7 +96,7 @@ class Round {
     done_.placed.clear();
     for (size_t row = 0; row < top.rows(); ++row)
       done_.placed.push_back({top.cube(row), top.hash(row), maps.at(task_.artifacts.size(), row)});
-    if (task_.with_top) seams_.report.svo_nodes += top.rows();
+    if (task_.with_top) context_.report.svo_nodes += top.rows();
     for (size_t run = 0; run < task_.artifacts.size(); ++run)
       for (ArtifactRoot root : task_.artifacts[run].roots()) {
         if (root.cube.level != level) continue;
@@ -105,7 +106,7 @@ class Round {
       }
   }
 
-  const MergeSeams& seams_;
+  const MergeContext& context_;
   const RoundTask& task_;
   LevelOutput& output_;
   RoundProgress done_;
@@ -115,9 +116,9 @@ class Round {
 }  // namespace
 
 std::vector<ArtifactRoot> merge_round(
-    const MergeSeams& seams, const RoundTask& task, LevelOutput& output, RoundProgress progress,
+    const MergeContext& context, const RoundTask& task, LevelOutput& output, RoundProgress progress,
     const std::function<void(const RoundProgress&)>& after_level) {
-  return Round(seams, task, output, std::move(progress)).run(after_level);
+  return Round(context, task, output, std::move(progress)).run(after_level);
 }
 
 }  // namespace voxdag

@@ -32,7 +32,7 @@ struct RoundProgress {
 
 // Goes on from `progress`, calling `after_level` (if there is one) with how far it is. Returns the
 // subvolumes' roots with their positions in `output` as index.
-std::vector<ArtifactRoot> merge_round(const MergeSeams& seams, const RoundTask& task,
+std::vector<ArtifactRoot> merge_round(const MergeContext& context, const RoundTask& task,
                                       LevelOutput& output, RoundProgress progress,
                                       const std::function<void(const RoundProgress&)>& after_level);
 

@@ -41,20 +41,20 @@ class PieceCursor {
 // Sweeps the ranges of one slab in parallel.
 class SlabSweep {
  public:
-  SlabSweep(const MergeSeams& seams, const LevelTask& task, Slab& slab, uint64_t first_position)
-      : seams_(seams), task_(task), slab_(slab), turnstile_(first_position) {}
+  SlabSweep(const MergeContext& context, const LevelTask& task, Slab& slab, uint64_t first_position)
+      : context_(context), task_(task), slab_(slab), turnstile_(first_position) {}
 
   LevelExtent run() {
     make_sweepers();
-    parallel_for(seams_.plan.workers, slab_.ranges(), [&](unsigned worker, size_t range) {
+    parallel_for(context_.plan.workers, slab_.ranges(), [&](unsigned worker, size_t range) {
       try {
-        seams_.cancel.check();
+        context_.cancel.check();
         const uint64_t rows = range_extent(range).rows;
         if (fits(range_extent(range)))
           sweep(sweepers_[worker], range);
         else
           merge_by_rows(range);
-        seams_.progress.advance(rows);
+        context_.progress.advance(rows);
       } catch (...) {
         turnstile_.close();
         throw;
@@ -80,8 +80,8 @@ class SlabSweep {
   }
 
   bool fits(const RangeExtent& range) const {
-    return range.rows <= RangeSweeper::kMostRows &&
-           RangeSweeper::bytes_for(range.rows, range.words) <= seams_.plan.worker_bytes;
+    return range.rows <= RangeSweeper::kMaxRows &&
+           RangeSweeper::bytes_for(range.rows, range.words) <= context_.plan.worker_bytes;
   }
 
   // One for each worker, large enough for every range that fits.
@@ -93,8 +93,8 @@ class SlabSweep {
       most.rows = std::max(most.rows, extent.rows);
       most.words = std::max(most.words, extent.words);
     }
-    for (unsigned worker = 0; worker < seams_.plan.workers; ++worker)
-      sweepers_.emplace_back(seams_.budget, task_.bricks, most.rows, most.words);
+    for (unsigned worker = 0; worker < context_.plan.workers; ++worker)
+      sweepers_.emplace_back(context_.budget, task_.bricks, most.rows, most.words);
   }
 
   void sweep(RangeSweeper& sweeper, size_t range) {
@@ -117,7 +117,7 @@ class SlabSweep {
   void merge_by_rows(size_t range) {
     const auto position = turnstile_.enter(range);
     if (!position) return;
-    OrderedRows out(task_.output, task_.bricks, *position, seams_.budget);
+    OrderedRows out(task_.output, task_.bricks, *position, context_.budget);
     std::vector<PieceCursor> cursors;
     std::vector<uint32_t*> to;
     for (size_t p = 0; p < slab_.pieces().size(); ++p) {
@@ -127,7 +127,7 @@ class SlabSweep {
     uint64_t rows = 0;
     merge_cursors(std::span(cursors), [&](size_t p, const RowKey& row) {
       *to[p]++ = static_cast<uint32_t>(out.add(row));
-      if (++rows % kFrameRows == 0) seams_.cancel.check();
+      if (++rows % kFrameRows == 0) context_.cancel.check();
     });
     out.flush();
     pass(out.nodes(), out.end_position() - *position);
@@ -157,27 +157,28 @@ class SlabSweep {
     }
   }
 
-  const MergeSeams& seams_;
+  const MergeContext& context_;
   const LevelTask& task_;
   Slab& slab_;
-  Turnstile turnstile_;
+  Sequencer turnstile_;
   std::vector<RangeSweeper> sweepers_;
   uint64_t nodes_ = 0, positions_ = 0;  // changed in turn
 };
 
-uint64_t range_rows(const MergeSeams& seams, size_t runs) {
+uint64_t range_rows(const MergeContext& context, size_t runs) {
   const uint64_t wanted = std::max<uint64_t>(kRangeRows, kRangeRowsEachRun * runs);
   // Half of what a worker's memory could take: ranges differ in size.
-  return std::min(wanted, seams.plan.worker_bytes / (2 * RangeSweeper::bytes_for(1, 8)));
+  return std::min(wanted, context.plan.worker_bytes / (2 * RangeSweeper::bytes_for(1, 8)));
 }
 
-LevelExtent merge_slab(const MergeSeams& seams, const LevelTask& task, const HashInterval& interval,
-                       uint64_t first_position) {
+LevelExtent merge_slab(const MergeContext& context, const LevelTask& task,
+                       const HashInterval& interval, uint64_t first_position) {
   Slab slab(task.runs, Slab::pieces_within(task.runs, interval), interval,
-            range_rows(seams, task.runs.size()), !task.maps.resident(), task.memory, seams.budget);
-  slab.load(task.child_maps, {seams.plan.workers, seams.plan.worker_bytes}, seams.budget,
-            seams.cancel);
-  return SlabSweep(seams, task, slab, first_position).run();
+            range_rows(context, task.runs.size()), !task.maps.resident(), task.memory,
+            context.budget);
+  slab.load(task.child_maps, {context.plan.workers, context.plan.worker_bytes}, context.budget,
+            context.cancel);
+  return SlabSweep(context, task, slab, first_position).run();
 }
 
 // The plan leaves room for two frames of every run: only a group of equal hashes that is longer
@@ -198,10 +199,10 @@ uint64_t bytes_for_workers(const MemoryPlan& plan) {
   return plan.workers * std::max(plan.worker_bytes, OrderedRows::bytes());
 }
 
-LevelExtent merge_level(const MergeSeams& seams, const LevelTask& task) {
-  for (const LevelRun* run : task.runs) seams.report.input_nodes += run->rows();
-  const uint64_t available = seams.budget.available() + task.memory.bytes();
-  const uint64_t for_workers = bytes_for_workers(seams.plan);
+LevelExtent merge_level(const MergeContext& context, const LevelTask& task) {
+  for (const LevelRun* run : task.runs) context.report.input_nodes += run->rows();
+  const uint64_t available = context.budget.available() + task.memory.bytes();
+  const uint64_t for_workers = bytes_for_workers(context.plan);
   const uint64_t slab_bytes = MemoryPlan::slab_within(available - std::min(available, for_workers));
   LevelExtent extent;
   HashInterval done{0, 0};
@@ -211,13 +212,13 @@ LevelExtent merge_level(const MergeSeams& seams, const LevelTask& task) {
     LevelExtent part;
     if (interval) {
       done = *interval;
-      part = merge_slab(seams, task, done, extent.positions);
-      ++seams.report.hash_ranges;
+      part = merge_slab(context, task, done, extent.positions);
+      ++context.report.hash_ranges;
     } else {
       check_many(task, first);
       done = {first, first};
-      part = stream_group(seams, task, first, extent.positions, slab_bytes);
-      ++seams.report.streamed_groups;
+      part = stream_group(context, task, first, extent.positions, slab_bytes);
+      ++context.report.streamed_groups;
     }
     extent.add(part.nodes, part.positions, task.level, task.output.in_words());
     if (done.last == ~uint64_t{0}) return extent;

@@ -38,7 +38,7 @@ class MergeProgress {
 };
 
 // What all levels of a merge share.
-struct MergeSeams {
+struct MergeContext {
   MergeScratch& scratch;
   MemoryBudget& budget;
   MemoryPlan plan;
@@ -61,6 +61,6 @@ struct LevelTask {
 uint64_t bytes_for_workers(const MemoryPlan& plan);
 
 // Adds ranges, groups and rows to the report.
-LevelExtent merge_level(const MergeSeams& seams, const LevelTask& task);
+LevelExtent merge_level(const MergeContext& context, const LevelTask& task);
 
 }  // namespace voxdag

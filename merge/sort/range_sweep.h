@@ -18,7 +18,7 @@ namespace voxdag {
 class RangeSweeper {
  public:
   // More rows than this are not swept at once.
-  static constexpr uint64_t kMostRows = uint64_t{1} << 20;
+  static constexpr uint64_t kMaxRows = uint64_t{1} << 20;
 
   // For ranges of up to `rows` rows with `words` words.
   RangeSweeper(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t words);
@@ -43,7 +43,7 @@ class RangeSweeper {
     uint32_t row() const { return row_and_mask & 0xffffff; }
     uint8_t mask() const { return static_cast<uint8_t>(row_and_mask >> 24); }
   };
-  static_assert(kMostRows <= uint64_t{1} << 24);
+  static_assert(kMaxRows <= uint64_t{1} << 24);
 
   void distribute(const Slab& slab, size_t range);
   void sort_buckets(size_t bucket_count);

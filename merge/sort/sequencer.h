@@ -29,9 +29,9 @@ struct LevelExtent {
   }
 };
 
-class Turnstile {
+class Sequencer {
  public:
-  explicit Turnstile(uint64_t first_position) : position_(first_position) {}
+  explicit Sequencer(uint64_t first_position) : position_(first_position) {}
 
   // Waits for the part's turn and returns its first position; none once the turnstile was closed.
   std::optional<uint64_t> enter(size_t part) {

@@ -10,7 +10,7 @@ namespace voxdag::query {
 
 struct Box {
   Vec low, high;
-  Vec centre() const { return mix(low, high, 0.5); }
+  Vec center() const { return mix(low, high, 0.5); }
   double diagonal() const { return length(high - low); }
 };
 

@@ -45,9 +45,9 @@ Ray Camera::ray(double x, double y) const {
   return {eye_, normalized(forward_ + offset)};
 }
 
-Placement see_whole(const std::vector<Vec>& points, const Vec& towards_eye, double fov_degrees,
+Placement see_whole(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
                     double aspect) {
-  const Vec back = normalized(towards_eye);
+  const Vec back = normalized(toward_eye);
   Vec right, up;
   picture_axes(back * -1.0, right, up);
   const double tangent_up = half_tangent(fov_degrees) / kMargin;

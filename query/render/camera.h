@@ -31,9 +31,9 @@ class Camera {
   double half_width_, half_height_;  // of the picture, in pixels
 };
 
-// Looks from `towards_eye` (need not be of length 1) with all of `points` in the picture's middle,
+// Looks from `toward_eye` (need not be of length 1) with all of `points` in the picture's middle,
 // from no farther than it takes. At least one point.
-Placement see_whole(const std::vector<Vec>& points, const Vec& towards_eye, double fov_degrees,
+Placement see_whole(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
                     double aspect);
 
 }  // namespace voxdag::query

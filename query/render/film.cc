@@ -7,8 +7,8 @@ namespace {
 
 constexpr Vec kAlbedo{{0.74, 0.70, 0.64}};
 constexpr Vec kLamplight{{3.6, 3.2, 2.6}};
-constexpr Vec kTopColour{{0.46, 0.54, 0.65}}, kBottomColour{{0.86, 0.87, 0.88}};
-constexpr double kMostHaze = 0.25;
+constexpr Vec kTopColor{{0.46, 0.54, 0.65}}, kBottomColor{{0.86, 0.87, 0.88}};
+constexpr double kMaxHaze = 0.25;
 
 Vec reflected(const LightPixel& p) {
   Vec out;
@@ -32,7 +32,7 @@ Vec film_curve(const Vec& light) {
 
 // The middle of what is seen comes out in the middle of the curve, its lightest tenth still short
 // of white.
-Film::Film(const std::vector<LightPixel>& seen, double extent, int height)
+ToneMapper::ToneMapper(const std::vector<LightPixel>& seen, double extent, int height)
     : extent_(std::max(extent, 1.0)), height_(height) {
   if (seen.empty()) return;
   std::vector<double> light;
@@ -45,11 +45,11 @@ Film::Film(const std::vector<LightPixel>& seen, double extent, int height)
   exposure_ = std::min(0.42 / light[light.size() / 2], 0.85 / light[light.size() * 9 / 10]);
 }
 
-Vec Film::colour(const LightPixel& p, int y) const {
-  const Vec background = mix(kTopColour, kBottomColour, (y + 0.5) / height_);
+Vec ToneMapper::color(const LightPixel& p, int y) const {
+  const Vec background = mix(kTopColor, kBottomColor, (y + 0.5) / height_);
   const double depth = std::max(0.0, (p.t - haze_start_) / extent_);
   const Vec surface = mix(film_curve(reflected(p) * exposure_), background,
-                          kMostHaze * (1 - std::exp(-depth * depth)));
+                          kMaxHaze * (1 - std::exp(-depth * depth)));
   return mix(background * p.floor, surface, p.coverage);
 }
 

@@ -1,4 +1,4 @@
-// Develops light into colours: an exposure for what is seen, a film's curve, a little haze with
+// Develops light into colors: an exposure for what is seen, a film's curve, a little haze with
 // distance, a plain background.
 #pragma once
 
@@ -9,13 +9,13 @@
 
 namespace voxdag::query {
 
-class Film {
+class ToneMapper {
  public:
   // `seen` is a sample of the pixels that show a surface; `extent` the scene's, in voxels.
-  Film(const std::vector<LightPixel>& seen, double extent, int height);
+  ToneMapper(const std::vector<LightPixel>& seen, double extent, int height);
 
   // Linear red, green, blue in [0, 1] of a pixel in row `y`.
-  Vec colour(const LightPixel& pixel, int y) const;
+  Vec color(const LightPixel& pixel, int y) const;
 
  private:
   double exposure_ = 1;

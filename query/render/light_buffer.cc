@@ -23,7 +23,7 @@ LightPixel LightBuffer::smoothed(const Camera& camera, int x, int y) const {
   const bool on_surface = pixel.coverage > 0;
   const Vec normal = normal_of(pixel);
   const Vec place = place_of(pixel, camera, x, y);
-  // How far off the plane a neighbour may lie.
+  // How far off the plane a neighbor may lie.
   const double slack = 3 * pixel.t * camera.pixel_spread();
   double weights = 0, floor = 0, near_weights = 0, lamp = 0;
   Vec sky, near_normal;

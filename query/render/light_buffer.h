@@ -1,5 +1,5 @@
-// The light that each pixel gathered, before it is developed into colours, and a filter that takes
-// the grain out of it: few rays to the sky are enough where neighbours on the same surface agree.
+// The light that each pixel gathered, before it is developed into colors, and a filter that takes
+// the grain out of it: few rays to the sky are enough where neighbors on the same surface agree.
 #pragma once
 
 #include <vector>
@@ -30,7 +30,7 @@ class LightBuffer {
   LightPixel& at(int x, int y) { return pixels_[index(x, y)]; }
   const LightPixel& at(int x, int y) const { return pixels_[index(x, y)]; }
 
-  // The pixel, its light from the sky averaged over the neighbours that lie on the plane of its
+  // The pixel, its light from the sky averaged over the neighbors that lie on the plane of its
   // surface (or, where it shows none, are on the floor); lamp and normal too, over fewer of them.
   LightPixel smoothed(const Camera& camera, int x, int y) const;
 

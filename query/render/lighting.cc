@@ -59,12 +59,12 @@ Vec Lighting::skylight(const Surface& s, int rays, Sampler& sampler) const {
 }
 
 double Lighting::lamplight(const Surface& s, Sampler& sampler) const {
-  const Vec towards = lamp_ - s.start;
-  const double distance = length(towards);
+  const Vec toward = lamp_ - s.start;
+  const double distance = length(toward);
   const Sampler::Pair p = sampler.pair();
-  if (dot(s.normal, towards) <= 0) return 0;
+  if (dot(s.normal, toward) <= 0) return 0;
   Vec u, w;
-  basis_around(towards * (1 / distance), u, w);
+  basis_around(toward * (1 / distance), u, w);
   const double r = kLampRadius * distance * std::sqrt(p.u), angle = 2 * kPi * p.v;
   const Vec part = lamp_ + u * (r * std::cos(angle)) + w * (r * std::sin(angle));
   if (!sees_lamp(s.start, s.size, part)) return 0;
@@ -72,8 +72,8 @@ double Lighting::lamplight(const Surface& s, Sampler& sampler) const {
 }
 
 double Lighting::facing_lamp(const Vec& place, const Vec& normal) const {
-  const Vec towards = lamp_ - place;
-  return std::max(0.0, dot(normal, towards) / length(towards));
+  const Vec toward = lamp_ - place;
+  return std::max(0.0, dot(normal, toward) / length(toward));
 }
 
 bool Lighting::sees_lamp(const Vec& from, double size, const Vec& lamp) const {
@@ -87,7 +87,7 @@ double Lighting::floor_light(const Ray& ray, Sampler& sampler) const {
   if (!has_floor_ || ray.direction[1] >= 0) return 1;
   const double t = (box_.low[1] - ray.origin[1]) / ray.direction[1];
   const Vec p = ray.at(t);
-  const double from_middle = length(p - box_.centre()) / box_.diagonal();
+  const double from_middle = length(p - box_.center()) / box_.diagonal();
   const double fade = std::exp(-1.6 * from_middle * from_middle);
   if (fade < 0.01) return 1;
   constexpr int kRays = 4;
@@ -122,12 +122,12 @@ void Lighting::place_sun(const std::vector<Surface>& seen, const Vec& back) {
   for (int i = 0; i < (has_floor_ ? 1 : kTurns * kHeights); ++i) {
     const double turn = behind + 0.9 - 2 * kPi * (i % kTurns) / kTurns;
     const double height = 0.65 + 0.25 * (i / kTurns);
-    const Vec towards{
+    const Vec toward{
         {std::cos(turn) * std::cos(height), std::sin(height), std::sin(turn) * std::cos(height)}};
-    const double lit = lit_share(seen, towards * far);
+    const double lit = lit_share(seen, toward * far);
     if (std::fabs(lit - kWanted) >= std::fabs(lit_ - kWanted)) continue;
     lit_ = lit;
-    lamp_ = towards * far;
+    lamp_ = toward * far;
   }
 }
 

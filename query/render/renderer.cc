@@ -109,7 +109,7 @@ std::vector<LightPixel> first_light(const Lighting& lighting, const std::vector<
 }
 
 void develop_row(const LightBuffer& light, const Camera& camera, const Lighting& lighting,
-                 const Film& film, int y, Picture& picture) {
+                 const ToneMapper& film, int y, Picture& picture) {
   constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
   for (int x = 0; x < picture.width; ++x) {
     LightPixel pixel = light.smoothed(camera, x, y);
@@ -117,9 +117,9 @@ void develop_row(const LightBuffer& light, const Camera& camera, const Lighting&
       pixel.lamp *= static_cast<float>(
           lighting.facing_lamp(camera.ray(x + 0.5, y + 0.5).at(pixel.t),
                                {{pixel.normal[0], pixel.normal[1], pixel.normal[2]}}));
-    const Vec colour = film.colour(pixel, y);
+    const Vec color = film.color(pixel, y);
     const double dither = (kBayer[y % 4][x % 4] + 0.5) / 16;
-    for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(colour[c], dither);
+    for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(color[c], dither);
   }
 }
 
@@ -154,7 +154,7 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
   const Box box = dag.empty() ? Box{} : occupied_box(dag);
   const std::vector<Surface> seen = first_look(dag, camera, width, height);
   const Lighting lighting(dag, box, camera, seen);
-  const Film film(first_light(lighting, seen), box.diagonal(), height);
+  const ToneMapper film(first_light(lighting, seen), box.diagonal(), height);
 
   LightBuffer light(width, height);
   progress.begin_stage("render", static_cast<uint64_t>(height), "rows");

@@ -15,7 +15,7 @@ struct RenderOptions {
   int threads = 1;
 };
 
-// Throws Error{kCorrupt} for a DAG that is damaged, Error{kCancelled}.
+// Throws Error{kCorrupt} for a DAG that is damaged, Error{kCanceled}.
 Picture render_picture(const DagView& dag, const Placement& placement, const RenderOptions& options,
                        Progress& progress, const CancelToken& cancel);
 

@@ -8,7 +8,7 @@
 namespace voxdag::query {
 
 // Pairs of numbers in [0, 1) that cover the unit square evenly (the R2 sequence). The sequences of
-// neighbouring pixels start far from one another, so that what noise is left is fine-grained.
+// neighboring pixels start far from one another, so that what noise is left is fine-grained.
 class Sampler {
  public:
   struct Pair {

@@ -13,9 +13,9 @@ struct Matrix {
 };
 
 // Weighted sums over the occupied cells of the hit cell's size around it.
-class Neighbourhood {
+class Neighborhood {
  public:
-  Neighbourhood(const DagView& dag, const Hit& hit) : dag_(dag), hit_(hit) {
+  Neighborhood(const DagView& dag, const Hit& hit) : dag_(dag), hit_(hit) {
     visit(0, 0, 0, 0, dag.root());
   }
 
@@ -129,7 +129,7 @@ Vec face_normal(const Hit& hit, const Vec& direction) {
 
 Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
   const Vec face = face_normal(hit, direction);
-  const Neighbourhood cells(dag, hit);
+  const Neighborhood cells(dag, hit);
   Vec normal;
   if (cells.weight() < 3 || !thinnest_direction(cells.covariance(), normal)) return face;
   return dot(normal, face - direction) < 0 ? normal * -1.0 : normal;

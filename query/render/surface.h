@@ -10,7 +10,7 @@ namespace voxdag::query {
 struct Surface {
   double t = 0;     // where the ray met it
   double size = 0;  // of the cell, in voxels
-  Vec normal;       // towards the side that the ray came from
+  Vec normal;       // toward the side that the ray came from
   Vec start;        // free space just before it, from where rays to the light set out
 };
 

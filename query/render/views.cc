@@ -14,7 +14,7 @@ constexpr double kEnclosureOfRooms = 0.1;
 
 struct NamedDirection {
   const char* name;
-  Vec towards_eye;
+  Vec toward_eye;
 };
 // glTF's front looks along +z; "iso" stands to its right, above it.
 const NamedDirection kDirections[] = {
@@ -90,7 +90,7 @@ class Glance {
   static constexpr int kColumns = 24, kRows = 14;
   static constexpr double kRays = kColumns * kRows;
 
-  // Whether three neighbouring rays do not end on one plane, along which 1/depth is linear.
+  // Whether three neighboring rays do not end on one plane, along which 1/depth is linear.
   static bool bends(double a, double b, double c) {
     return std::fabs(1 / a - 2 / b + 1 / c) * b > 0.03;
   }
@@ -114,7 +114,7 @@ Placement named_view(const std::string& name, const RayCaster& caster, const Dag
   if (name == "inside") return inside_view(caster, box, fov_degrees.value_or(kInsideFov));
   for (const NamedDirection& d : kDirections)
     if (name == d.name)
-      return see_whole(without_strays(occupied_points(dag)), d.towards_eye,
+      return see_whole(without_strays(occupied_points(dag)), d.toward_eye,
                        fov_degrees.value_or(kOutsideFov), aspect);
   std::string names;
   for (const std::string& known : view_names()) names += (names.empty() ? "" : ", ") + known;
@@ -144,7 +144,7 @@ Placement inside_view(const RayCaster& caster, const Box& box, double fov_degree
   constexpr int kPlaces = 400, kYaws = 8;
   Sampler sampler(2);
   const Vec extent = box.high - box.low;
-  Placement best{box.centre(), box.centre() + Vec{{1, 0, 0}}, fov_degrees};
+  Placement best{box.center(), box.center() + Vec{{1, 0, 0}}, fov_degrees};
   double best_score = 0;
   for (int i = 0; i < kPlaces; ++i) {
     const Sampler::Pair across = sampler.pair(), up = sampler.pair();

@@ -9,18 +9,18 @@
 
 namespace voxdag {
 
-void Journal::built(const StoredSubvolume& subvolume, std::optional<BinId> kept) {
+void CommitQueue::built(const StoredSubvolume& subvolume, std::optional<BinId> kept) {
   next_.subvolumes.push_back(subvolume);
   if (kept) next_.releases.push_back(*kept);
   if (is_due()) commit_soon();
 }
 
-void Journal::commit() {
+void CommitQueue::commit() {
   commit_soon();
   settle();
 }
 
-void Journal::announce() {
+void CommitQueue::announce() {
   // What is kept on the disk is not given back before its subvolumes are durable.
   if (!next_.releases.empty()) commit();
   settle();
@@ -28,14 +28,14 @@ void Journal::announce() {
   store_.announce_built(next_.subvolumes);
 }
 
-bool Journal::is_due() const {
+bool CommitQueue::is_due() const {
   if (segment_->size() - begun_bytes_ >= group_bytes_) return true;
   if (wall_seconds() - begun_s_ < interval_s_) return false;
   return !commit_.valid() ||
          commit_.wait_for(std::chrono::seconds(0)) != std::future_status::timeout;
 }
 
-void Journal::commit_soon() {
+void CommitQueue::commit_soon() {
   settle();
   if (next_.subvolumes.empty()) return;
   begun_s_ = wall_seconds();
@@ -51,13 +51,13 @@ void Journal::commit_soon() {
   }
 }
 
-void Journal::record_under_way() {
+void CommitQueue::record_under_way() {
   segment_->sync_written();
   store_.record_built(under_way_.subvolumes);
   for (const BinId bin : under_way_.releases) bins_.release(bin);
 }
 
-void Journal::settle() {
+void CommitQueue::settle() {
   if (!commit_.valid()) return;
   try {
     commit_.get();
@@ -68,7 +68,7 @@ void Journal::settle() {
   under_way_ = {};
 }
 
-void Journal::salvage() {
+void CommitQueue::salvage() {
   Group group = std::exchange(under_way_, {});
   const Group later = std::exchange(next_, {});
   group.subvolumes.insert(group.subvolumes.end(), later.subvolumes.begin(), later.subvolumes.end());
@@ -89,13 +89,13 @@ void Journal::salvage() {
   }
 }
 
-void OpenJournals::commit_soon() {
+void CommitQueues::commit_soon() {
   for (const auto& journal : journals_) journal->commit_soon();
 }
 
-void OpenJournals::commit() {
+void CommitQueues::commit() {
   std::exception_ptr failure;
-  for (const auto step : {&Journal::commit_soon, &Journal::commit}) {
+  for (const auto step : {&CommitQueue::commit_soon, &CommitQueue::commit}) {
     for (const auto& journal : journals_) {
       try {
         ((*journal).*step)();

@@ -16,14 +16,14 @@
 
 namespace voxdag {
 
-class Journal {
+class CommitQueue {
  public:
   static constexpr uint64_t kGroupBytes = uint64_t{256} << 20;
 
   // A group is begun after so many seconds, unless the last one is still under way, or so many
   // bytes. The first is what a crash may cost beside the tasks in flight and the group under way.
-  Journal(JobStore& store, std::unique_ptr<SegmentWriter> segment, TriangleBins& bins,
-          double interval_s, uint64_t group_bytes = kGroupBytes)
+  CommitQueue(JobStore& store, std::unique_ptr<SegmentWriter> segment, TriangleBins& bins,
+              double interval_s, uint64_t group_bytes = kGroupBytes)
       : store_(store),
         segment_(std::move(segment)),
         bins_(bins),
@@ -70,9 +70,9 @@ class Journal {
 };
 
 // Journals of workers that are done, whose last groups may not be durable yet.
-class OpenJournals {
+class CommitQueues {
  public:
-  void add(std::unique_ptr<Journal> journal) { journals_.push_back(std::move(journal)); }
+  void add(std::unique_ptr<CommitQueue> journal) { journals_.push_back(std::move(journal)); }
   void commit_soon();
   // All of them, whichever fails; throws what failed first.
   void commit();
@@ -80,7 +80,7 @@ class OpenJournals {
   void drop() { journals_.clear(); }
 
  private:
-  std::vector<std::unique_ptr<Journal>> journals_;
+  std::vector<std::unique_ptr<CommitQueue>> journals_;
 };
 
 }  // namespace voxdag

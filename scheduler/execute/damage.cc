@@ -19,7 +19,7 @@ void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
 
 }  // namespace
 
-bool speaks_of_damage(const Error& error) {
+bool is_corruption(const Error& error) {
   return error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kNotFound ||
          error.code() == ErrorCode::kUnsupportedVersion;
 }
@@ -38,7 +38,7 @@ std::vector<DamagedSubvolume> find_damaged(
       if (!segment) segment = open_segment(subvolume.artifact.segment);
       read_above(level, segment, subvolume);
     } catch (const Error& error) {
-      if (!speaks_of_damage(error)) throw;
+      if (!is_corruption(error)) throw;
       damaged.push_back({subvolume, error.message()});
     }
   }

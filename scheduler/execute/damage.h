@@ -19,7 +19,7 @@ struct DamagedSubvolume {
 };
 
 // Whether an error may mean that an artifact, or another file of ours, is damaged.
-bool speaks_of_damage(const Error& error);
+bool is_corruption(const Error& error);
 
 // Reads the artifacts of all built subvolumes, the levels above `level` (of smaller number): the
 // others are not needed any more and may be gone.

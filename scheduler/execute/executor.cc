@@ -16,15 +16,15 @@ namespace {
 // Bytes of half-filled chunks while one subvolume is split.
 constexpr size_t kSplitBufferBytes = size_t{512} << 10;
 // Pages that a backend may keep uncharged beside a full share; more make way for what is charged.
-constexpr uint64_t kPagesAWorkerKeeps = uint64_t{8} << 20;
+constexpr uint64_t kPageCacheBytesPerWorker = uint64_t{8} << 20;
 // No more than this many files are held open for writing.
-constexpr uint64_t kMostWorkers = 256;
+constexpr uint64_t kMaxWorkers = 256;
 
 // As many as were asked for, unless their shares would be too small for the smallest subvolume.
 unsigned workers_within(uint64_t bytes, unsigned wanted) {
-  const uint64_t least = kSmallestBudget + kSegmentWriterBytes + kPagesAWorkerKeeps;
+  const uint64_t least = kSmallestBudget + kSegmentWriterBytes + kPageCacheBytesPerWorker;
   return static_cast<unsigned>(
-      std::clamp<uint64_t>(bytes / least, 1, std::min<uint64_t>(wanted, kMostWorkers)));
+      std::clamp<uint64_t>(bytes / least, 1, std::min<uint64_t>(wanted, kMaxWorkers)));
 }
 
 bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) {
@@ -86,16 +86,16 @@ class Queue {
 class Worker {
  public:
   Worker(const ExecutorOptions& options, uint32_t number, TriangleBins& bins, JobStore& store,
-         MemoryBudget& budget, uint64_t share_bytes, const Seams& seams)
+         MemoryBudget& budget, uint64_t share_bytes, const BuildContext& context)
       : options_(options),
         bins_(bins),
         store_(store),
-        files_(seams.files),
-        cancel_(seams.cancel),
+        files_(context.files),
+        cancel_(context.cancel),
         share_(share_bytes, &budget),
-        journal_(std::make_unique<Journal>(
+        journal_(std::make_unique<CommitQueue>(
             store,
-            std::make_unique<SegmentWriter>(seams.files, options.segment_folder,
+            std::make_unique<SegmentWriter>(context.files, options.segment_folder,
                                             options.first_segment_id + number, budget),
             bins, options.checkpoint_interval_s)),
         segment_(journal_->segment()),
@@ -137,8 +137,8 @@ class Worker {
     journal_->built(built, queued.kept);
     return {};
   }
-  Journal& journal() { return *journal_; }
-  std::unique_ptr<Journal> take_journal() { return std::move(journal_); }
+  CommitQueue& journal() { return *journal_; }
+  std::unique_ptr<CommitQueue> take_journal() { return std::move(journal_); }
 
   ExecutorCounts counts;
 
@@ -153,10 +153,10 @@ class Worker {
   std::vector<QueuedSubvolume> split(const QueuedSubvolume& whole) {
     const StoredSubvolume& subvolume = whole.subvolume;
     if (subvolume.cube.edge_voxels(options_.grid_levels) <= kSmallestEdge)
-      throw Error(ErrorCode::kOutOfMemory, "a subvolume of " + std::to_string(kSmallestEdge) +
-                                               " voxels an edge does not fit a worker's share of " +
-                                               std::to_string(share_.limit()) +
-                                               " bytes: give it more memory (--memory)");
+      throw Error(ErrorCode::kOutOfMemory,
+                  "a subvolume of " + std::to_string(kSmallestEdge) +
+                      " voxels per edge does not fit a worker's share of " +
+                      std::to_string(share_.limit()) + " bytes: give it more memory (--memory)");
     std::vector<Cube> parts(8);
     std::vector<BinId> part_bins(8);
     for (int c = 0; c < 8; ++c) {
@@ -190,7 +190,7 @@ class Worker {
   FileSystem& files_;
   const CancelToken& cancel_;
   MemoryBudget share_;
-  std::unique_ptr<Journal> journal_;
+  std::unique_ptr<CommitQueue> journal_;
   SegmentWriter& segment_;
   std::unique_ptr<Backend> backend_;
   std::unique_ptr<ReadableFile> written_segment_;
@@ -199,17 +199,17 @@ class Worker {
 }  // namespace
 
 ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> heap,
-                                TriangleBins& bins, JobStore& store, OpenJournals& open,
-                                MemoryBudget& budget, const Seams& seams) {
+                                TriangleBins& bins, JobStore& store, CommitQueues& open,
+                                MemoryBudget& budget, const BuildContext& context) {
   uint64_t total = heap.size();
   Queue queue(std::move(heap));
   const unsigned worker_count = workers_within(budget.available(), options.threads);
   const uint64_t share_bytes =
-      budget.available() / worker_count - kSegmentWriterBytes - kPagesAWorkerKeeps;
+      budget.available() / worker_count - kSegmentWriterBytes - kPageCacheBytesPerWorker;
   std::vector<std::unique_ptr<Worker>> workers;
   for (unsigned i = 0; i < worker_count; ++i)
     workers.push_back(
-        std::make_unique<Worker>(options, i, bins, store, budget, share_bytes, seams));
+        std::make_unique<Worker>(options, i, bins, store, budget, share_bytes, context));
   std::mutex progress_mutex;
   const auto work = [&](Worker& worker) {
     while (const auto subvolume = queue.take()) {
@@ -217,9 +217,9 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<Queu
       queue.done(parts);
       std::lock_guard lock(progress_mutex);
       if (parts.empty()) {
-        seams.progress.advance(1);
+        context.progress.advance(1);
       } else {
-        seams.progress.set_total(total += parts.size() - 1);
+        context.progress.set_total(total += parts.size() - 1);
       }
     }
   };

@@ -50,7 +50,7 @@ struct ExecutorCounts {
 // `store`, but for the last ones, which are announced there and recorded by `open`. Throws the
 // first Error of any worker after all have stopped and what was finished is recorded.
 ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> queue,
-                                TriangleBins& bins, JobStore& store, OpenJournals& open,
-                                MemoryBudget& budget, const Seams& seams);
+                                TriangleBins& bins, JobStore& store, CommitQueues& open,
+                                MemoryBudget& budget, const BuildContext& context);
 
 }  // namespace voxdag

@@ -12,7 +12,7 @@ namespace {
 // Workers a GPU: enough that transfers and host work of some overlap with kernels of others.
 constexpr unsigned kWorkersADevice = 4;
 // A CUDA context alone keeps some hundred MiB resident that no budget sees.
-constexpr uint64_t kLeastMemoryForGpu = uint64_t{2} << 30;
+constexpr uint64_t kMinMemoryForGpu = uint64_t{2} << 30;
 
 [[noreturn]] void refuse(const std::string& what) { throw Error(ErrorCode::kInvalidInput, what); }
 
@@ -75,7 +75,7 @@ BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
 
 BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress) {
   if (gpus.count == 0) return cpu_choice();
-  if (memory_bytes < kLeastMemoryForGpu) {
+  if (memory_bytes < kMinMemoryForGpu) {
     progress.warn("building on the CPU: a GPU needs --memory of 2 GiB at least");
     return cpu_choice();
   }

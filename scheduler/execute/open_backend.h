@@ -15,7 +15,7 @@ struct BackendChoice {
   std::string name;
   // Opens one backend a call, one call a worker.
   std::function<std::unique_ptr<Backend>()> open;
-  unsigned most_workers = 256;  // more of them would not help
+  unsigned max_workers = 256;  // more of them would not help
 };
 
 // Throws Error{kInvalidInput} for a backend or method that does not exist or do not go together,

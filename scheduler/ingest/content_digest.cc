@@ -25,8 +25,8 @@ ContentDigest::ContentDigest(const Grid& grid) {
 // smallest such number, which is never one of those, and then nine of 64 bits.
 void ContentDigest::add(std::span<const FixedTriangle> triangles) {
   constexpr int32_t kWide = INT32_MIN;
-  constexpr size_t kMostBytes = sizeof kWide + sizeof(FixedTriangle), kAtOnce = 64;
-  std::array<std::byte, kMostBytes * kAtOnce> buffer;
+  constexpr size_t kMaxBytes = sizeof kWide + sizeof(FixedTriangle), kAtOnce = 64;
+  std::array<std::byte, kMaxBytes * kAtOnce> buffer;
   while (!triangles.empty()) {
     size_t bytes = 0;
     const auto put = [&](const void* from, size_t size) {

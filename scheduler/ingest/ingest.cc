@@ -60,12 +60,12 @@ class Snapper {
 // Counts and keeps what was snapped: the other half.
 class Taker {
  public:
-  Taker(IngestState& state, BinWriter& writer, TopTree& top, const Seams& seams,
+  Taker(IngestState& state, BinWriter& writer, TopTree& top, const BuildContext& context,
         const AfterBatch& after_batch)
-      : state_(state), writer_(writer), top_(top), seams_(seams), after_batch_(after_batch) {}
+      : state_(state), writer_(writer), top_(top), context_(context), after_batch_(after_batch) {}
 
   void take(const SnappedBatch& batch) {
-    seams_.cancel.check();
+    context_.cancel.check();
     for (size_t i = 0; i < batch.inside.size(); ++i) {
       state_.counts.expected_voxels += batch.work[i].voxels;
       top_.add(batch.inside[i], batch.work[i].bricks);
@@ -75,7 +75,7 @@ class Taker {
     state_.counts.dropped_outside += batch.dropped_outside;
     state_.digest.add(batch.inside);
     state_.position = batch.position;
-    seams_.progress.advance(batch.inside.size() + batch.dropped_outside);
+    context_.progress.advance(batch.inside.size() + batch.dropped_outside);
     after_batch_();
   }
 
@@ -83,7 +83,7 @@ class Taker {
   IngestState& state_;
   BinWriter& writer_;
   TopTree& top_;
-  const Seams& seams_;
+  const BuildContext& context_;
   const AfterBatch& after_batch_;
 };
 
@@ -92,19 +92,19 @@ constexpr size_t kBatchesUnderWay = 3;
 
 }  // namespace
 
-void scan(TriangleSource& scene, IngestState& state, const Seams& seams,
+void scan(TriangleSource& scene, IngestState& state, const BuildContext& context,
           const AfterBatch& after_batch) {
-  seams.progress.begin_stage("scan", state.declared_triangles, "triangles");
-  seams.progress.advance(state.position);
+  context.progress.begin_stage("scan", state.declared_triangles, "triangles");
+  context.progress.advance(state.position);
   scene.for_each_batch_from(state.position, [&](std::span<const WorldTriangle> batch) {
-    seams.cancel.check();
+    context.cancel.check();
     for (const WorldTriangle& triangle : batch)
       for (const auto& vertex : triangle.v) state.bounds.add(vertex);
     state.position = scene.position();
-    seams.progress.advance(batch.size());
+    context.progress.advance(batch.size());
     after_batch();
   });
-  seams.progress.end_stage();
+  context.progress.end_stage();
 }
 
 Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds) {
@@ -118,13 +118,13 @@ Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds) {
 }
 
 void ingest(TriangleSource& scene, unsigned threads, IngestState& state, BinWriter& writer,
-            TopTree& top, const Seams& seams, const AfterBatch& after_batch) {
-  seams.progress.begin_stage("ingest", state.declared_triangles, "triangles");
-  seams.progress.advance(state.position);
+            TopTree& top, const BuildContext& context, const AfterBatch& after_batch) {
+  context.progress.begin_stage("ingest", state.declared_triangles, "triangles");
+  context.progress.advance(state.position);
   Snapper snapper(scene, state);
-  Taker taker(state, writer, top, seams, after_batch);
+  Taker taker(state, writer, top, context, after_batch);
   const uint64_t first = state.position;
-  make_and_take<SnappedBatch, kBatchesUnderWay>(
+  run_producer_consumer<SnappedBatch, kBatchesUnderWay>(
       threads,
       [&](auto pass) {
         scene.for_each_batch_from(first, [&](std::span<const WorldTriangle> batch) {
@@ -135,7 +135,7 @@ void ingest(TriangleSource& scene, unsigned threads, IngestState& state, BinWrit
   writer.flush();
   state.counts.dropped_invalid =
       state.declared_triangles - state.counts.triangles - state.counts.dropped_outside;
-  seams.progress.end_stage();
+  context.progress.end_stage();
 }
 
 }  // namespace voxdag

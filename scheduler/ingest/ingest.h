@@ -16,7 +16,7 @@ namespace voxdag {
 using AfterBatch = std::function<void()>;
 
 // Adds the scene's triangles to the bounds of `state`.
-void scan(TriangleSource& scene, IngestState& state, const Seams& seams,
+void scan(TriangleSource& scene, IngestState& state, const BuildContext& context,
           const AfterBatch& after_batch);
 
 // The cube that the geometry options ask for, of a scene with these bounds.
@@ -26,6 +26,6 @@ Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
 // may be two: one reads, the other, which calls `after_batch`, does all the rest. Throws
 // Error{kLimit} for a triangle that reaches into the grid from beyond the coordinate limit.
 void ingest(TriangleSource& scene, unsigned threads, IngestState& state, BinWriter& writer,
-            TopTree& top, const Seams& seams, const AfterBatch& after_batch);
+            TopTree& top, const BuildContext& context, const AfterBatch& after_batch);
 
 }  // namespace voxdag

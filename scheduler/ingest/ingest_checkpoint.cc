@@ -40,7 +40,7 @@ bool fits_in_memory(const BuildSpec& spec, uint64_t triangles) {
 
 }  // namespace
 
-double most_kept_bytes(const BuildSpec& spec, uint64_t triangles) {
+double max_kept_bytes(const BuildSpec& spec, uint64_t triangles) {
   return triangles < spec.run.kept_from_triangles ? 0 : copies_bytes(spec, triangles);
 }
 
@@ -62,11 +62,11 @@ int64_t settled_ns(const std::vector<SourceFile>& files) {
   return settled;
 }
 
-IngestKeeper::IngestKeeper(const BuildSpec& spec, JobStore& store, WorkFolder& work,
-                           const Seams& seams)
-    : spec_(spec), store_(store), work_(work), seams_(seams) {}
+IngestCheckpoint::IngestCheckpoint(const BuildSpec& spec, JobStore& store, WorkFolder& work,
+                                   const BuildContext& context)
+    : spec_(spec), store_(store), work_(work), context_(context) {}
 
-std::optional<IngestState> IngestKeeper::resume() {
+std::optional<IngestState> IngestCheckpoint::resume() {
   settle();
   record_.reset();
   begun_s_ = wall_seconds();
@@ -75,7 +75,7 @@ std::optional<IngestState> IngestKeeper::resume() {
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion)
       throw;
-    seams_.progress.warn(error.message() + "; the scene is read again");
+    context_.progress.warn(error.message() + "; the scene is read again");
     store_.forget_ingest();
   }
   if (!record_) {
@@ -91,15 +91,15 @@ std::optional<IngestState> IngestKeeper::resume() {
   return std::nullopt;
 }
 
-bool IngestKeeper::wants(const TriangleSource& scene) const {
+bool IngestCheckpoint::wants(const TriangleSource& scene) const {
   const uint64_t triangles = scene.declared_triangles();
-  if (gave_up_ || most_kept_bytes(spec_, triangles) == 0) return false;
+  if (gave_up_ || max_kept_bytes(spec_, triangles) == 0) return false;
   return !fits_in_memory(spec_, triangles) ||
          kRoom / kCopies * copies_bytes(spec_, triangles) <=
-             static_cast<double>(seams_.files.free_space(work_.path()));
+             static_cast<double>(context_.files.free_space(work_.path()));
 }
 
-void IngestKeeper::begin(const TriangleSource& scene, int64_t opened_ns) {
+void IngestCheckpoint::begin(const TriangleSource& scene, int64_t opened_ns) {
   forget();
   std::vector<SourceFile> files = scene.files();
   if (settled_ns(files) > opened_ns) return;
@@ -108,15 +108,15 @@ void IngestKeeper::begin(const TriangleSource& scene, int64_t opened_ns) {
   begun_s_ = wall_seconds();
 }
 
-bool IngestKeeper::is_of(const std::vector<SourceFile>& files) const {
+bool IngestCheckpoint::is_of(const std::vector<SourceFile>& files) const {
   return record_ && record_->files == files;
 }
 
-std::unique_ptr<TriangleFile> IngestKeeper::open_file(uint64_t end) {
-  return std::make_unique<TriangleFile>(seams_.files, work_.kept_path(), end);
+std::unique_ptr<TriangleFile> IngestCheckpoint::open_file(uint64_t end) {
+  return std::make_unique<TriangleFile>(context_.files, work_.kept_path(), end);
 }
 
-bool IngestKeeper::is_due() {
+bool IngestCheckpoint::is_due() {
   if (pending_.valid()) {
     if (pending_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
     settle();
@@ -124,11 +124,11 @@ bool IngestKeeper::is_due() {
   return record_ && wall_seconds() - begun_s_ >= spec_.run.checkpoint_interval_s;
 }
 
-void IngestKeeper::settle() {
+void IngestCheckpoint::settle() {
   if (pending_.valid()) pending_.get();
 }
 
-void IngestKeeper::settle_whatever_comes() {
+void IngestCheckpoint::settle_whatever_comes() {
   try {
     settle();
   } catch (const Error&) {
@@ -136,12 +136,12 @@ void IngestKeeper::settle_whatever_comes() {
   }
 }
 
-void IngestKeeper::save(IngestState& state, TriangleBins& bins) {
+void IngestCheckpoint::save(IngestState& state, TriangleBins& bins) {
   save_soon(state, bins);
   settle();
 }
 
-void IngestKeeper::save_soon(IngestState& state, TriangleBins& bins) {
+void IngestCheckpoint::save_soon(IngestState& state, TriangleBins& bins) {
   settle();
   if (!record_) return;
   begun_s_ = wall_seconds();
@@ -163,12 +163,12 @@ void IngestKeeper::save_soon(IngestState& state, TriangleBins& bins) {
   if (spec_.run.checkpoint_interval_s == 0) settle();
 }
 
-void IngestKeeper::save_scan(const IngestState& state) {
+void IngestCheckpoint::save_scan(const IngestState& state) {
   begun_s_ = wall_seconds();
   if (record_) commit(state);
 }
 
-void IngestKeeper::finish() {
+void IngestCheckpoint::finish() {
   settle();
   if (!record_) return;
   IngestState state = record_->state;
@@ -178,7 +178,7 @@ void IngestKeeper::finish() {
   work_.remove_kept();
 }
 
-void IngestKeeper::commit(const IngestState& state) {
+void IngestCheckpoint::commit(const IngestState& state) {
   if (!files_are_unchanged()) {
     record_.reset();
     return forget_saved();
@@ -187,7 +187,7 @@ void IngestKeeper::commit(const IngestState& state) {
   store_.save_ingest(encode(*record_));
 }
 
-bool IngestKeeper::has_saved() {
+bool IngestCheckpoint::has_saved() {
   settle_whatever_comes();
   try {
     return store_.ingest().has_value();
@@ -196,32 +196,32 @@ bool IngestKeeper::has_saved() {
   }
 }
 
-void IngestKeeper::forget() {
+void IngestCheckpoint::forget() {
   settle_whatever_comes();
   record_.reset();
   forget_saved();
 }
 
-void IngestKeeper::forget_saved() {
+void IngestCheckpoint::forget_saved() {
   // The file first: that may be the room in which the job store commits.
   work_.remove_kept();
   store_.forget_ingest();
 }
 
-void IngestKeeper::give_up() {
+void IngestCheckpoint::give_up() {
   gave_up_ = true;
   forget();
 }
 
-bool IngestKeeper::is_optional() {
+bool IngestCheckpoint::is_optional() {
   settle_whatever_comes();
   return record_ && fits_in_memory(spec_, record_->state.declared_triangles);
 }
 
-bool IngestKeeper::files_are_unchanged() const {
+bool IngestCheckpoint::files_are_unchanged() const {
   try {
     return std::ranges::all_of(record_->files, [&](const SourceFile& file) {
-      return seams_.files.open_read(file.path)->identity() == file.identity;
+      return context_.files.open_read(file.path)->identity() == file.identity;
     });
   } catch (const Error&) {
     return false;  // Whoever reads the scene will say what is wrong.

@@ -25,9 +25,10 @@
 
 namespace voxdag {
 
-class IngestKeeper {
+class IngestCheckpoint {
  public:
-  IngestKeeper(const BuildSpec& spec, JobStore& store, WorkFolder& work, const Seams& seams);
+  IngestCheckpoint(const BuildSpec& spec, JobStore& store, WorkFolder& work,
+                   const BuildContext& context);
 
   // Where an earlier run left off with this scene, if it did. Begins to keep what follows.
   std::optional<IngestState> resume();
@@ -75,7 +76,7 @@ class IngestKeeper {
   const BuildSpec& spec_;
   JobStore& store_;
   WorkFolder& work_;
-  const Seams& seams_;
+  const BuildContext& context_;
   std::optional<IngestRecord> record_;  // as last saved
   double begun_s_ = 0;                  // the last checkpoint
   std::future<void> pending_;           // until it is settled, record_ belongs to its thread
@@ -84,7 +85,7 @@ class IngestKeeper {
 
 // Bytes that the kept triangles of a scene take at most, while they are handed down; 0 if it is too
 // small to be kept.
-double most_kept_bytes(const BuildSpec& spec, uint64_t triangles);
+double max_kept_bytes(const BuildSpec& spec, uint64_t triangles);
 // The Unix time from which on a change of these files shows in their identities; INT64_MAX if one
 // of them is not known.
 int64_t settled_ns(const std::vector<SourceFile>& files);

@@ -1,4 +1,4 @@
-// Passes a build's progress on, and writes it to the job store about once a second, so that
+// Passes a build's progress on, and writes it to the job store about once per second, so that
 // `voxdag status` can look on from another process. Thread-safe.
 #pragma once
 

@@ -21,25 +21,27 @@ constexpr double kGrowthDecay = 0.95;
 // Each doubling away from the pilot widens the range of node and byte figures by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
 // Bytes a node of the global file: a pilot's are fewer, since coarse levels repeat more.
-constexpr double kMostBytesANode = 23;
+constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
 // Measured on the shared scenes: nodes of all artifacts over unique ones, their compressed bytes,
 // and CPU time of a whole build over that of a pilot's nodes.
 constexpr double kArtifactNodesPerUnique = 1.5;
 constexpr double kArtifactBytesANode = 16;
 // Neither an artifact's row and its children, uncompressed, nor those of the file take as much.
-constexpr double kMostDiskBytesANode = 40;
+constexpr double kMaxDiskBytesPerNode = 40;
 constexpr double kBuildOverPilotTime = 1.5;
 // Bytes a unique node that the merge holds at its peak, and what a process takes without a scene.
 constexpr double kMemoryBytesANode = 34;
 constexpr double kBaseMemoryBytes = 24e6;
 
-Figure exactly(double value) { return {value, value, value}; }
-Figure within(double value, double factor) { return {value / factor, value, value * factor}; }
-Figure operator+(const Figure& a, const Figure& b) {
+EstimateRange exactly(double value) { return {value, value, value}; }
+EstimateRange within(double value, double factor) {
+  return {value / factor, value, value * factor};
+}
+EstimateRange operator+(const EstimateRange& a, const EstimateRange& b) {
   return {a.low + b.low, a.likely + b.likely, a.high + b.high};
 }
-Figure operator*(double factor, const Figure& a) {
+EstimateRange operator*(double factor, const EstimateRange& a) {
   return {factor * a.low, factor * a.likely, factor * a.high};
 }
 
@@ -84,10 +86,10 @@ double grow_as_dag(const std::vector<PilotCounts>& pilots, uint32_t doublings) {
 
 // What must be spilled is there already. A large scene is kept beside it where there is room; it
 // goes piece by piece while artifacts come.
-Figure triangles_on_disk(const PreparedScene& scene) {
+EstimateRange triangles_on_disk(const PreparedScene& scene) {
   const double spilled = static_cast<double>(scene.bins->spilled_bytes());
-  return {spilled, std::max(spilled, scene.most_kept_bytes / 2),
-          std::max(spilled, scene.most_kept_bytes)};
+  return {spilled, std::max(spilled, scene.max_kept_bytes / 2),
+          std::max(spilled, scene.max_kept_bytes)};
 }
 
 }  // namespace
@@ -119,10 +121,10 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
   const double pilot_bytes = last.dag_nodes > 0 ? last.file_bytes / last.dag_nodes : 0;
   const double bytes = std::max(
       pilot_bytes,
-      std::min(pilot_bytes * std::pow(kBytesGrowthPerDoubling, doublings), kMostBytesANode));
+      std::min(pilot_bytes * std::pow(kBytesGrowthPerDoubling, doublings), kMaxBytesPerNode));
   estimate.file_bytes = bytes * estimate.dag_nodes + exactly(8192);
 
-  const Figure artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
+  const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
   estimate.disk_bytes =
       estimate.file_bytes + kArtifactBytesANode * artifact_nodes + triangles_on_disk(scene);
   const double triangle_bytes =
@@ -137,17 +139,17 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
   return estimate;
 }
 
-double most_disk_bytes(const PreparedScene& scene) {
+double max_disk_bytes(const PreparedScene& scene) {
   // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
   // (expected_work()): over all levels twice its bricks, and one cube a level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.counts.triangles);
   const double octree_nodes = 2 * bricks + scene.grid.levels * triangles;
-  return kMostDiskBytesANode * octree_nodes + triangles_on_disk(scene).high;
+  return kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
 }
 
-Estimate plan_build(const BuildSpec& spec, const Seams& seams) {
+Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   // A pilot of 2048^3 takes a second or two and holds for every resolution above.
   constexpr uint32_t kPilotLevels = 11;
   const BuildSpec full = checked(spec);
@@ -158,23 +160,23 @@ Estimate plan_build(const BuildSpec& spec, const Seams& seams) {
   if (folder.empty())
     folder =
         std::string(temporary ? temporary : "/tmp") + "/voxdag-plan-" + std::to_string(getpid());
-  WorkFolder work(seams.files, folder);
+  WorkFolder work(context.files, folder);
   // The triangles that were spilled go again; a job that the folder holds is not touched.
   struct Tidy {
     WorkFolder& work;
     const bool own_folder;
     ~Tidy() { own_folder ? work.remove() : work.remove_spilled(); }
   } tidy{work, full.run.work_folder.empty()};
-  const PreparedScene scene = prepare_scene(full, work.spill_path(), budget, clock, seams);
-  Estimate estimate = estimate_build(scene, kPilotLevels, full.run.threads, budget, seams.cancel);
-  estimate.free_disk = seams.files.free_space(work.path());
+  const PreparedScene scene = prepare_scene(full, work.spill_path(), budget, clock, context);
+  Estimate estimate = estimate_build(scene, kPilotLevels, full.run.threads, budget, context.cancel);
+  estimate.free_disk = context.files.free_space(work.path());
   return estimate;
 }
 
 namespace {
 
-void check_disk(const char* what, const Figure& bytes, const std::string& folder, uint64_t free,
-                Progress& progress) {
+void check_disk(const char* what, const EstimateRange& bytes, const std::string& folder,
+                uint64_t free, Progress& progress) {
   const auto gigabytes = [](double count) {
     char text[32];
     std::snprintf(text, sizeof text, "%.2f GB", count / 1e9);
@@ -200,8 +202,8 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
     check_disk("the build", estimate.disk_bytes, work_folder, work_free, progress);
     return;
   }
-  const Figure& all = estimate.disk_bytes;
-  const Figure& file = estimate.file_bytes;
+  const EstimateRange& all = estimate.disk_bytes;
+  const EstimateRange& file = estimate.file_bytes;
   check_disk("the build's work folder",
              {all.low - file.low, all.likely - file.likely, all.high - file.high}, work_folder,
              work_free, progress);
@@ -210,7 +212,7 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
 
 std::string estimate_json(const Estimate& e) {
   using nlohmann::ordered_json;
-  const auto figure = [](const Figure& f) {
+  const auto figure = [](const EstimateRange& f) {
     return ordered_json{{"low", f.low}, {"likely", f.likely}, {"high", f.high}};
   };
   return ordered_json{

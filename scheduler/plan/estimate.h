@@ -2,7 +2,7 @@
 // resolutions, extrapolated to the one asked for.
 //
 // Voxels and octree nodes grow as a R^2 + b R (surfaces and their borders): two pilots give a and
-// b. DAG nodes grow by a factor per doubling of R that falls slowly towards 2 as surfaces flatten
+// b. DAG nodes grow by a factor per doubling of R that falls slowly toward 2 as surfaces flatten
 // under the voxel: three pilots give the factor and how fast it falls. The spread widens with the
 // distance.
 #pragma once
@@ -17,7 +17,7 @@
 namespace voxdag {
 
 // A figure with the range that it is expected to lie in.
-struct Figure {
+struct EstimateRange {
   double low = 0, likely = 0, high = 0;
 };
 
@@ -25,28 +25,28 @@ struct Estimate {
   uint64_t triangles = 0;
   uint64_t subvolumes = 0;
   uint64_t pilot_resolution = 0;
-  Figure voxels, svo_nodes, dag_nodes;
-  Figure file_bytes;    // of the global file
-  Figure disk_bytes;    // at the peak: spilled triangles, artifacts and the file
-  Figure memory_bytes;  // peak resident memory within the budget
-  Figure cpu_s;
-  Figure wall_s;
+  EstimateRange voxels, svo_nodes, dag_nodes;
+  EstimateRange file_bytes;    // of the global file
+  EstimateRange disk_bytes;    // at the peak: spilled triangles, artifacts and the file
+  EstimateRange memory_bytes;  // peak resident memory within the budget
+  EstimateRange cpu_s;
+  EstimateRange wall_s;
   uint64_t free_disk = 0;    // where the work folder lies; 0 if not looked at
   uint64_t free_memory = 0;  // the budget
 };
 
 // Estimates the build of a prepared scene (its triangles stay where they are). The pilots have at
-// most 2^pilot_levels voxels an edge: the finer, the better the estimate and the longer it takes.
+// most 2^pilot_levels voxels per edge: the finer, the better the estimate and the longer it takes.
 // They run on this thread within `budget`.
 Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsigned threads,
                         MemoryBudget& budget, const CancelToken& cancel);
 
 // Disk that no build of the scene needs, whatever its DAG, reckoned without pilots; several times
 // what it will need.
-double most_disk_bytes(const PreparedScene& scene);
+double max_disk_bytes(const PreparedScene& scene);
 
 // The whole of `voxdag plan`: reads the scene, plans, estimates, builds nothing.
-Estimate plan_build(const BuildSpec& spec, const Seams& seams);
+Estimate plan_build(const BuildSpec& spec, const BuildContext& context);
 
 // Throws Error{kNoSpace} with the figures if not even the low end fits on the disk of the work
 // folder, or the file on that of the output's folder; warns if the high end may not.

@@ -15,14 +15,14 @@ namespace {
 
 // Subvolumes are cut so that each is expected to touch at most this many bricks: a fraction of a
 // second of work, and tables that stay in the caches.
-constexpr double kMostBricksASubvolume = 4e6;
+constexpr double kMaxBricksPerSubvolume = 4e6;
 // ... but small builds are cut into at least about this many pieces, of at least this weight.
-constexpr double kLeastPieces = 64;
-constexpr double kLeastBricksASubvolume = 131072;
+constexpr double kMinPieces = 64;
+constexpr double kMinBricksPerSubvolume = 131072;
 // For so long a kept scene's files are waited for until their times can be trusted.
 constexpr int64_t kLongestWait_ns = 200'000'000;
 // More bins than this would make their buffers too small; finer cuts are made by splitting.
-constexpr size_t kMostBins = 8192;
+constexpr size_t kMaxBins = 8192;
 
 [[noreturn]] void refuse(const std::string& what) { throw Error(ErrorCode::kInvalidInput, what); }
 
@@ -30,13 +30,13 @@ std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const RunOption
   if (options.subvolume_edge) {
     int64_t edge = static_cast<int64_t>(options.subvolume_edge);
     auto plan = top.subvolumes_by_edge(edge);
-    while (plan.size() > kMostBins) plan = top.subvolumes_by_edge(edge *= 2);
+    while (plan.size() > kMaxBins) plan = top.subvolumes_by_edge(edge *= 2);
     return plan;
   }
   double most =
-      std::clamp(top.total_weight() / kLeastPieces, kLeastBricksASubvolume, kMostBricksASubvolume);
+      std::clamp(top.total_weight() / kMinPieces, kMinBricksPerSubvolume, kMaxBricksPerSubvolume);
   auto plan = top.subvolumes_by_weight(most);
-  while (plan.size() > kMostBins) plan = top.subvolumes_by_weight(most *= 2);
+  while (plan.size() > kMaxBins) plan = top.subvolumes_by_weight(most *= 2);
   return plan;
 }
 
@@ -50,7 +50,7 @@ BuildSpec checked(const BuildSpec& spec) {
   if (g.hash_bits < 4 || g.hash_bits > 64)
     refuse("hash bits " + std::to_string(g.hash_bits) + ": expected 4 to 64");
   if (g.bounds && g.voxel_size) refuse("bounds and a voxel size were both given: expected one");
-  if (r.memory_bytes && r.memory_bytes < kLeastMemory)
+  if (r.memory_bytes && r.memory_bytes < kMinMemory)
     refuse("memory " + std::to_string(r.memory_bytes) + " bytes: expected at least 64 MiB");
   const uint64_t edge = r.subvolume_edge;
   if (edge && ((edge & (edge - 1)) || edge < static_cast<uint64_t>(kSmallestEdge)))
@@ -66,8 +66,9 @@ namespace {
 
 class Preparation {
  public:
-  Preparation(const BuildSpec& spec, MemoryBudget& budget, const Seams& seams, IngestKeeper* keeper)
-      : spec_(spec), budget_(budget), seams_(seams), keeper_(keeper) {}
+  Preparation(const BuildSpec& spec, MemoryBudget& budget, const BuildContext& context,
+              IngestCheckpoint* keeper)
+      : spec_(spec), budget_(budget), context_(context), keeper_(keeper) {}
 
   PreparedScene run(const std::string& spill_path, StageClock& clock) {
     if (keeper_) state_ = keeper_->resume().value_or(IngestState{});
@@ -78,7 +79,7 @@ class Preparation {
     open_bins(spill_path);
     if (state_.stage < IngestStage::kReady) take_in();
     prepared_.counts = state_.counts;
-    prepared_.most_kept_bytes = most_kept_bytes(spec_, state_.declared_triangles);
+    prepared_.max_kept_bytes = max_kept_bytes(spec_, state_.declared_triangles);
     prepared_.sha256 = state_.digest.hex();
     clock.finish("ingest");
     return std::move(prepared_);
@@ -88,8 +89,8 @@ class Preparation {
   bool keeps() const { return keeper_ && keeper_->keeps(); }
 
   void open_again() {
-    scene_ = open_scene(seams_.files, spec_.geometry.scenes, {spec_.geometry.skip_invalid}, budget_,
-                        seams_.cancel);
+    scene_ = open_scene(context_.files, spec_.geometry.scenes, {spec_.geometry.skip_invalid},
+                        budget_, context_.cancel);
   }
 
   void open() {
@@ -100,7 +101,7 @@ class Preparation {
       begin_to_keep(opened_ns);
     }
     state_.declared_triangles = scene_->declared_triangles();
-    for (const std::string& warning : scene_->warnings()) seams_.progress.warn(warning);
+    for (const std::string& warning : scene_->warnings()) context_.progress.warn(warning);
   }
 
   // Waits until the scene's files are old enough to trust their times, if that is soon.
@@ -118,7 +119,7 @@ class Preparation {
 
   void find_grid() {
     if (!spec_.geometry.bounds)
-      scan(*scene_, state_, seams_, [&] {
+      scan(*scene_, state_, context_, [&] {
         if (keeper_ && keeper_->is_due()) keeper_->save_scan(state_);
       });
     state_.grid = choose_grid(spec_.geometry, state_.bounds);
@@ -134,7 +135,7 @@ class Preparation {
         std::make_unique<MemoryBudget>(triangle_share(budget_.limit()), &budget_);
     // By given bounds, triangles may reach far outside.
     prepared_.bins = std::make_unique<TriangleBins>(
-        seams_.files, spill_path, spec_.geometry.bounds.has_value(), *prepared_.bins_share);
+        context_.files, spill_path, spec_.geometry.bounds.has_value(), *prepared_.bins_share);
     TriangleBins& bins = *prepared_.bins;
     const bool all_built = state_.stage == IngestStage::kReady && state_.file_end == 0;
     if (!keeps() || all_built) {
@@ -159,7 +160,7 @@ class Preparation {
       prepared_.bins->kept_file()->read(state_.top_tree, top.fill(state_.top_tree_weight));
     if (state_.stage == IngestStage::kIngest) {
       BinWriter writer(*prepared_.bins, {prepared_.whole}, size_t{1} << 20);
-      ingest(*scene_, spec_.run.threads, state_, writer, top, seams_, [&] {
+      ingest(*scene_, spec_.run.threads, state_, writer, top, context_, [&] {
         if (!keeper_ || !keeper_->is_due()) return;
         writer.flush();
         append(top);
@@ -182,8 +183,8 @@ class Preparation {
 
   const BuildSpec& spec_;
   MemoryBudget& budget_;
-  const Seams& seams_;
-  IngestKeeper* const keeper_;
+  const BuildContext& context_;
+  IngestCheckpoint* const keeper_;
   std::unique_ptr<TriangleSource> scene_;
   PreparedScene prepared_;
   IngestState& state_ = prepared_.state;
@@ -192,9 +193,9 @@ class Preparation {
 }  // namespace
 
 PreparedScene prepare_scene(const BuildSpec& spec, const std::string& spill_path,
-                            MemoryBudget& budget, StageClock& clock, const Seams& seams,
-                            IngestKeeper* keeper) {
-  return Preparation(spec, budget, seams, keeper).run(spill_path, clock);
+                            MemoryBudget& budget, StageClock& clock, const BuildContext& context,
+                            IngestCheckpoint* keeper) {
+  return Preparation(spec, budget, context, keeper).run(spill_path, clock);
 }
 
 }  // namespace voxdag

@@ -36,7 +36,7 @@ struct PreparedScene {
   std::unique_ptr<TriangleBins> bins;
   BinId whole = 0;                  // the bin that holds all triangles, until they are handed down
   std::vector<SubvolumePlan> plan;  // of those that are not handed down
-  double most_kept_bytes = 0;       // on the disk, in a build
+  double max_kept_bytes = 0;        // on the disk, in a build
   // What is kept, if anything.
   IngestState state;
   std::vector<KeptBin> kept_bins;
@@ -46,7 +46,7 @@ struct PreparedScene {
 // their share of the budget go to `spill_path`. With a keeper, goes on where an earlier run left
 // off; the scene is not opened if that was past ingest. Throws DamagedTriangles if what it left is.
 PreparedScene prepare_scene(const BuildSpec& spec, const std::string& spill_path,
-                            MemoryBudget& budget, StageClock& clock, const Seams& seams,
-                            IngestKeeper* keeper = nullptr);
+                            MemoryBudget& budget, StageClock& clock, const BuildContext& context,
+                            IngestCheckpoint* keeper = nullptr);
 
 }  // namespace voxdag

@@ -11,8 +11,8 @@
 namespace voxdag {
 namespace {
 
-// Cells are no smaller, in voxels an edge: finer ones cost more than they tell about a scene.
-constexpr int64_t kLeastCellEdge = 2 * kSmallestEdge;
+// Cells are no smaller, in voxels per edge: finer ones cost more than they tell about a scene.
+constexpr int64_t kMinCellEdge = 2 * kSmallestEdge;
 
 }  // namespace
 
@@ -34,7 +34,7 @@ ExpectedWork expected_work(const FixedTriangle& t) {
 
 uint32_t TopTree::depth_within(uint32_t grid_levels, uint64_t bytes) {
   uint32_t depth = 0;
-  while (depth < kDeepest && (int64_t{1} << (grid_levels - depth)) > kLeastCellEdge &&
+  while (depth < kDeepest && (int64_t{1} << (grid_levels - depth)) > kMinCellEdge &&
          (sizeof(Cell) << (3 * (depth + 1))) <= bytes)
     ++depth;
   return depth;
@@ -131,10 +131,10 @@ SubvolumePlan TopTree::gather(const Cube& cube, uint64_t code, const KeepWhole& 
   return sum;
 }
 
-std::vector<SubvolumePlan> TopTree::subvolumes_by_weight(double most_weight) const {
+std::vector<SubvolumePlan> TopTree::subvolumes_by_weight(double max_weight) const {
   std::vector<SubvolumePlan> out;
   gather(
-      {}, 0, [&](const SubvolumePlan& s) { return s.weight <= most_weight; }, out);
+      {}, 0, [&](const SubvolumePlan& s) { return s.weight <= max_weight; }, out);
   return out;
 }
 

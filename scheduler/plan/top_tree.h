@@ -52,9 +52,9 @@ class TopTree {
   }
   uint64_t occupied_cells() const;
 
-  // The largest cubes of weight <= `most_weight` (single cells may weigh more), occupied ones only,
+  // The largest cubes of weight <= `max_weight` (single cells may weigh more), occupied ones only,
   // in Morton order.
-  std::vector<SubvolumePlan> subvolumes_by_weight(double most_weight) const;
+  std::vector<SubvolumePlan> subvolumes_by_weight(double max_weight) const;
   // Occupied cubes of this edge (or of the cells' edge, if that is larger), in Morton order.
   std::vector<SubvolumePlan> subvolumes_by_edge(int64_t edge_voxels) const;
 

@@ -33,7 +33,7 @@ std::vector<BinId> bins_of(std::span<const QueuedSubvolume> queue) {
 
 // From the whole bin into one kept bin for each cube, with a checkpoint now and then.
 void fill_kept_bins(std::span<const StoredSubvolume> planned, PreparedScene& scene,
-                    IngestKeeper& keeper, size_t buffer_bytes, const CancelToken& cancel) {
+                    IngestCheckpoint& keeper, size_t buffer_bytes, const CancelToken& cancel) {
   IngestState& state = scene.state;
   TriangleBins& bins = *scene.bins;
   if (scene.kept_bins.empty()) {
@@ -109,9 +109,9 @@ std::vector<QueuedSubvolume> take_from_kept_bins(std::span<const StoredSubvolume
 
 }  // namespace
 
-std::vector<QueuedSubvolume> hand_down(std::span<const StoredSubvolume> planned,
-                                       PreparedScene& scene, IngestKeeper& keeper,
-                                       size_t buffer_bytes, const CancelToken& cancel) {
+std::vector<QueuedSubvolume> partition_triangles(std::span<const StoredSubvolume> planned,
+                                                 PreparedScene& scene, IngestCheckpoint& keeper,
+                                                 size_t buffer_bytes, const CancelToken& cancel) {
   std::vector<QueuedSubvolume> queue;
   if (!scene.bins->kept_file() && scene.state.stage == IngestStage::kReady)
     throw DamagedTriangles("the triangles of what is not built were thought to be built");

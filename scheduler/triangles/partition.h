@@ -13,8 +13,8 @@ namespace voxdag {
 // What is kept goes on where an earlier run left it: a subvolume takes its triangles from the bin
 // of its cube or of the nearest cube around it. `buffer_bytes` may be used for half-filled chunks.
 // Throws DamagedTriangles if what is kept is not all that is needed.
-std::vector<QueuedSubvolume> hand_down(std::span<const StoredSubvolume> planned,
-                                       PreparedScene& scene, IngestKeeper& keeper,
-                                       size_t buffer_bytes, const CancelToken& cancel);
+std::vector<QueuedSubvolume> partition_triangles(std::span<const StoredSubvolume> planned,
+                                                 PreparedScene& scene, IngestCheckpoint& keeper,
+                                                 size_t buffer_bytes, const CancelToken& cancel);
 
 }  // namespace voxdag

@@ -9,10 +9,10 @@ namespace voxdag {
 namespace {
 
 constexpr size_t kCoordinates = 9;
-constexpr size_t kMostRecordsAChunk = 1024;
+constexpr size_t kMaxRecordsPerChunk = 1024;
 // Larger ones in a file that is kept: fewer pieces to name, to read and to give back.
-constexpr size_t kMostRecordsAKeptChunk = 16384;
-constexpr size_t kLeastRecordsAChunk = 16;
+constexpr size_t kMaxRecordsPerDurableChunk = 16384;
+constexpr size_t kMinRecordsPerChunk = 16;
 
 template <class Coordinate>
 void encode(const FixedTriangle& triangle, std::byte* out) {
@@ -83,7 +83,7 @@ void TriangleBins::release(BinId bin) {
 }
 
 void TriangleBins::give_back(Bin& bin) {
-  // Neighbours go together: only whole blocks of the disk can be given back.
+  // Neighbors go together: only whole blocks of the disk can be given back.
   Extent piece;
   TriangleFile* const file = bin.kept ? kept_file_.get() : spill_.get();
   for (const Chunk& chunk : bin.chunks) {
@@ -228,8 +228,8 @@ BinWriter::BinWriter(TriangleBins& bins, std::vector<BinId> targets, size_t buff
     : bins_(bins), targets_(std::move(targets)), tails_(targets_.size()) {
   const size_t records =
       buffer_bytes / (bins.record_bytes() * std::max<size_t>(targets_.size(), 1));
-  const size_t most = bins.kept_file() ? kMostRecordsAKeptChunk : kMostRecordsAChunk;
-  chunk_bytes_ = std::clamp(records, kLeastRecordsAChunk, most) * bins.record_bytes();
+  const size_t most = bins.kept_file() ? kMaxRecordsPerDurableChunk : kMaxRecordsPerChunk;
+  chunk_bytes_ = std::clamp(records, kMinRecordsPerChunk, most) * bins.record_bytes();
 }
 
 void BinWriter::append(size_t target, const FixedTriangle& triangle) {

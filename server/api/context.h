@@ -21,14 +21,14 @@ struct Context {
   FileSystem& files;
   JobQueue& queue;
   SceneStore& scenes;
-  TaskMaker& tasks;
+  TaskResolver& tasks;
   Dispatcher& dispatcher;
   Metrics& metrics;
   const std::atomic<bool>& draining;
 
-  Slots event_streams{config.transfers.event_streams};
-  Slots transfers{config.transfers.transfers};
-  Slots plans{config.jobs.plans_at_a_time};
+  ConcurrencyLimiter event_streams{config.transfers.event_streams};
+  ConcurrencyLimiter transfers{config.transfers.transfers};
+  ConcurrencyLimiter plans{config.jobs.max_concurrent_plans};
   // Held while a job begins to need a scene, or a scene goes or changes that none may need.
   std::mutex scene_use = {};
 };

@@ -46,7 +46,7 @@ std::string time_text(double unix_s) {
   return text;
 }
 
-std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsigned most_attempts) {
+std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsigned max_attempts) {
   const std::string progress = live ? live->progress_json() : "";
   const std::vector<std::string> warnings = live ? live->warnings() : job.warnings;
   // The request is an object of the members scene, resolution and options.
@@ -54,7 +54,7 @@ std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsign
   return "{\"id\":\"" + job.id + "\",\"name\":" + quoted(job.name) + ",\"state\":\"" +
          state_name(job.state) + "\"," + request + ",\"priority\":" + std::to_string(job.priority) +
          ",\"attempts\":" + std::to_string(job.attempts) +
-         ",\"max_attempts\":" + std::to_string(most_attempts) +
+         ",\"max_attempts\":" + std::to_string(max_attempts) +
          ",\"created_at\":" + time_member(job.created_s) +
          ",\"started_at\":" + time_member(job.started_s) +
          ",\"finished_at\":" + time_member(job.finished_s) +

@@ -14,6 +14,6 @@ namespace voxdag::server {
 std::string time_text(double unix_s);
 
 // `live` may be null; `place` is the job's in the queue, from 1, 0 if it has none.
-std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsigned most_attempts);
+std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsigned max_attempts);
 
 }  // namespace voxdag::server

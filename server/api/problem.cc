@@ -23,7 +23,7 @@ const char* public_text(ErrorCode code) {
       return "the service has not enough memory for this";
     case ErrorCode::kDevice:
       return "the GPU or its driver failed";
-    case ErrorCode::kCancelled:
+    case ErrorCode::kCanceled:
       return "stopped before it was done";
     case ErrorCode::kLimit:
       return "a limit is exceeded";

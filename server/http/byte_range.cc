@@ -9,7 +9,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kMostRanges = 16;
+constexpr size_t kMaxRanges = 16;
 
 // Digits only. A number over 64 bits counts as the largest: beyond the end of everything.
 std::optional<uint64_t> parse_number(std::string_view text) {
@@ -66,7 +66,7 @@ RangeAnswer parse_ranges(std::string_view header, uint64_t size) {
     if (text.empty()) continue;
     ByteRange range;
     const Parsed parsed = parse_range(text, size, range);
-    if (parsed == Parsed::kBroken || ++asked > kMostRanges) return {};
+    if (parsed == Parsed::kBroken || ++asked > kMaxRanges) return {};
     if (parsed == Parsed::kRange) answer.ranges.push_back(range);
   }
   if (asked == 0 || !is_reasonable(answer.ranges, size)) return {};

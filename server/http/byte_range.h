@@ -17,7 +17,7 @@ struct ByteRange {
 
 struct RangeAnswer {
   enum class Kind {
-    kWhole,          // no range is asked for, or not in a way that is to be honoured: 200
+    kWhole,          // no range is asked for, or not in a way that is to be honored: 200
     kPart,           // 206
     kUnsatisfiable,  // 416
   };

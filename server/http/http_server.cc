@@ -177,7 +177,7 @@ class HttpServer::Engine : private httplib::Server {
   ConnectionTable table_;
   std::atomic<bool> draining_{false};
   // Last: its threads use all of the above.
-  std::unique_ptr<ThreadCrew> crew_ = std::make_unique<ThreadCrew>();
+  std::unique_ptr<ThreadPool> crew_ = std::make_unique<ThreadPool>();
 };
 
 HttpServer::HttpServer(const HttpOptions& options, Handler handler, OnFault on_fault)

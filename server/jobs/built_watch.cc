@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kInterval_s = 1;
 // Looking takes at most this part of one core.
-constexpr double kMostShare = 0.01;
+constexpr double kMaxShare = 0.01;
 
 // {"resolution": R, "built": n, "total": n, "cubes": [[x, y, z, edge, built], ...]}
 std::string subvolumes_json(uint64_t resolution, const std::vector<StoredSubvolume>& leaves,
@@ -44,7 +44,7 @@ void put(FileSystem& files, const std::string& path, const std::string& contents
 }  // namespace
 
 BuiltWatch::BuiltWatch(FileSystem& files, const JobFolder& folder, uint64_t resolution,
-                       ReportPipe& pipe)
+                       ProgressPipe& pipe)
     : files_(files), folder_(folder), resolution_(resolution), pipe_(pipe) {
   thread_ = std::thread([this] { watch(); });
 }
@@ -67,7 +67,7 @@ void BuiltWatch::watch() {
     lock.unlock();
     const double start = thread_cpu_seconds();
     look();
-    pause_s = std::max(kInterval_s, (thread_cpu_seconds() - start) / kMostShare);
+    pause_s = std::max(kInterval_s, (thread_cpu_seconds() - start) / kMaxShare);
     lock.lock();
   }
 }

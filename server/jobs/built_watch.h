@@ -1,4 +1,4 @@
-// Looks at a running build's job store about once a second: reports what is built, and keeps
+// Looks at a running build's job store about once per second: reports what is built, and keeps
 // subvolumes.json, which the service hands out as it is. A last time when it goes.
 #pragma once
 
@@ -14,7 +14,7 @@ namespace voxdag::server {
 
 class BuiltWatch {
  public:
-  BuiltWatch(FileSystem& files, const JobFolder& folder, uint64_t resolution, ReportPipe& pipe);
+  BuiltWatch(FileSystem& files, const JobFolder& folder, uint64_t resolution, ProgressPipe& pipe);
   ~BuiltWatch();
 
  private:
@@ -25,7 +25,7 @@ class BuiltWatch {
   FileSystem& files_;
   const JobFolder folder_;
   const uint64_t resolution_;
-  ReportPipe& pipe_;
+  ProgressPipe& pipe_;
   uint64_t last_built_ = 0, last_total_ = 0;
   std::mutex mutex_;  // guards ends_
   std::condition_variable wake_;

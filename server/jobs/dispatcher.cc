@@ -29,7 +29,7 @@ Problem wrong_state(const Job& job, const std::string& detail) {
 }  // namespace
 
 Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue,
-                       TaskMaker& tasks, Log log, OnSettled on_settled)
+                       TaskResolver& tasks, Log log, OnSettled on_settled)
     : config_(config),
       files_(files),
       queue_(queue),
@@ -125,13 +125,13 @@ bool Dispatcher::start_next_job() {
     memory += worker.live->memory_bytes();
     running_jobs += key != kPreview;
   }
-  if (running_jobs >= config_.jobs.at_a_time) return false;
+  if (running_jobs >= config_.jobs.max_concurrent) return false;
   const auto job = queue_.next(unix_seconds(), present);
   if (!job) return false;
   const uint64_t asked = parse_job_request(job->request).spec.run.memory_bytes;
-  const uint64_t needed = asked ? asked : tasks_.memory_bytes() / config_.jobs.at_a_time;
+  const uint64_t needed = asked ? asked : tasks_.memory_bytes() / config_.jobs.max_concurrent;
   if (running_jobs > 0 && memory + needed > tasks_.memory_bytes()) return false;
-  if (files_.free_space(config_.data_folder) < config_.jobs.least_free_disk_bytes) return false;
+  if (files_.free_space(config_.data_folder) < config_.jobs.min_free_disk_bytes) return false;
   const Job started = queue_.change(job->id, [](Job& j) {
     if (!j.front) ++j.attempts;
     j.front = false;
@@ -191,7 +191,7 @@ void Dispatcher::begin(const std::string& key, std::shared_ptr<LiveJob> live,
 }
 
 ChildProcess::End Dispatcher::run_child(const ChildProcess::Start& start, LiveJob& live,
-                                        double most_s) {
+                                        double max_s) {
   ChildProcess child(start);
   bool asked = false;
   const double started_s = wall_seconds();
@@ -206,7 +206,7 @@ ChildProcess::End Dispatcher::run_child(const ChildProcess::Start& start, LiveJo
         const double stop_s = live.stop_asked_s(), now = wall_seconds();
         if (stop_s > 0 && !asked) child.ask_to_stop();
         asked = stop_s > 0;
-        return (asked && now > stop_s + config_.jobs.grace_s) || now > started_s + most_s;
+        return (asked && now > stop_s + config_.jobs.grace_s) || now > started_s + max_s;
       });
   return child.wait();
 }
@@ -297,11 +297,11 @@ Job Dispatcher::cancel(const std::string& id) {
   const Job job = queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kFailed || j.state == JobState::kSucceeded)
       throw wrong_state(j, "the job has ended");
-    if (j.state == JobState::kCancelling || j.state == JobState::kCanceled) return;
-    j.state = runs ? JobState::kCancelling : JobState::kCanceled;
+    if (j.state == JobState::kCanceling || j.state == JobState::kCanceled) return;
+    j.state = runs ? JobState::kCanceling : JobState::kCanceled;
     if (!runs) j.finished_s = unix_seconds();
   });
-  if (runs && job.state == JobState::kCancelling) worker->second.live->stop();
+  if (runs && job.state == JobState::kCanceling) worker->second.live->stop();
   if (job.state == JobState::kCanceled) remove_tree(files_, folder(id).work());
   return job;
 }
@@ -309,7 +309,7 @@ Job Dispatcher::cancel(const std::string& id) {
 Job Dispatcher::suspend(const std::string& id) {
   std::lock_guard lock(mutex_);
   const Job job = queue_.change(id, [&](Job& j) {
-    if (j.state == JobState::kCancelling || has_ended(j.state))
+    if (j.state == JobState::kCanceling || has_ended(j.state))
       throw wrong_state(j, "expected a job that is queued or running");
     j.state = JobState::kSuspended;
   });

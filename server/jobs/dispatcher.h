@@ -32,7 +32,7 @@ class Dispatcher {
   using OnSettled = std::function<void(const Job&)>;
 
   // Brings the queue and the folders in order after whatever ended the last service, then begins.
-  Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue, TaskMaker& tasks,
+  Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue, TaskResolver& tasks,
              Log log, OnSettled on_settled);
   // As stop().
   ~Dispatcher();
@@ -77,13 +77,13 @@ class Dispatcher {
   void run_job(const Job& job, LiveJob& live);
   void settle(const Job& job, LiveJob& live, const ChildProcess::End& end);
   void draw_preview(const Job& job, LiveJob& live);
-  // Until its end; asks it to stop when `live` is to, and kills it after `most_s` or a grace.
-  ChildProcess::End run_child(const ChildProcess::Start& start, LiveJob& live, double most_s);
+  // Until its end; asks it to stop when `live` is to, and kills it after `max_s` or a grace.
+  ChildProcess::End run_child(const ChildProcess::Start& start, LiveJob& live, double max_s);
 
   const ServerConfig& config_;
   FileSystem& files_;
   JobQueue& queue_;
-  TaskMaker& tasks_;
+  TaskResolver& tasks_;
   const Log log_;
   const OnSettled on_settled_;
   const std::string program_;

@@ -17,10 +17,10 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr size_t kMostScenes = 64;
+constexpr size_t kMaxScenes = 64;
 constexpr size_t kLongestText = 4096;
 constexpr size_t kLongestName = 200;
-constexpr int64_t kLeastSubvolume = 64;
+constexpr int64_t kMinSubvolume = 64;
 constexpr int64_t kLargestResolution = int64_t{1} << 20;
 constexpr int64_t kHighestPriority = 100;
 
@@ -46,7 +46,7 @@ size_t characters_of(const std::string& text) {
 
 std::vector<std::string> texts_of(const ordered_json& value, const std::string& member) {
   if (!value.is_array()) return {text_of(value, member)};
-  if (value.empty() || value.size() > kMostScenes) fail(member, "1 to 64 scenes");
+  if (value.empty() || value.size() > kMaxScenes) fail(member, "1 to 64 scenes");
   std::vector<std::string> texts;
   for (const ordered_json& item : value) texts.push_back(text_of(item, member));
   return texts;
@@ -102,7 +102,7 @@ uint64_t memory_of(const ordered_json& value) {
   } else {
     bytes = count_of(value, "memory", 0, INT64_MAX);
   }
-  if (bytes < kLeastMemory) fail("memory", "at least 64MiB");
+  if (bytes < kMinMemory) fail("memory", "at least 64MiB");
   return bytes;
 }
 
@@ -151,7 +151,7 @@ void take_options(const ordered_json& options, BuildSpec& spec) {
        {"threads",
         [&](const auto& v) { r.threads = static_cast<unsigned>(count_of(v, "threads", 1, 1024)); }},
        {"subvolume",
-        [&](const auto& v) { r.subvolume_edge = power_of_two(v, "subvolume", kLeastSubvolume); }},
+        [&](const auto& v) { r.subvolume_edge = power_of_two(v, "subvolume", kMinSubvolume); }},
        {"backend",
         [&](const auto& v) {
           r.backend = one_of(v, "backend", {"auto", "cpu", "cuda", "parallel-host"});
@@ -186,7 +186,7 @@ JobRequest parse_job_request(std::string_view body) {
        {"priority", [&](const auto& v) { request.priority = priority_of(v); }},
        {"options", [&](const auto& v) { take_options(v, request.spec); }}});
   if (request.scenes.empty()) fail("scene", "a scene");
-  if (resolution == 0) fail("resolution", "voxels an edge");
+  if (resolution == 0) fail("resolution", "voxels per edge");
   request.text = ordered_json{{"scene", request.scenes},
                               {"resolution", resolution},
                               {"options", json.value("options", ordered_json::object())}}

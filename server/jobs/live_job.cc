@@ -7,8 +7,8 @@
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kMostWarnings = 100;
-constexpr size_t kMostStages = 64;
+constexpr size_t kMaxWarnings = 100;
+constexpr size_t kMaxStages = 64;
 
 }  // namespace
 
@@ -21,7 +21,7 @@ bool LiveJob::take(const Report& report) {
   const double now = wall_seconds();
   switch (report.kind) {
     case Report::Kind::kStage:
-      if (stages_.size() == kMostStages) stages_.erase(stages_.begin());
+      if (stages_.size() == kMaxStages) stages_.erase(stages_.begin());
       stages_.push_back({report.text, report.unit, 0, report.total, now, 0, false});
       return true;
     case Report::Kind::kAdvance:
@@ -37,7 +37,7 @@ bool LiveJob::take(const Report& report) {
       built_ = report;
       return false;
     case Report::Kind::kWarning:
-      if (warnings_.size() < kMostWarnings) warnings_.push_back(report.text);
+      if (warnings_.size() < kMaxWarnings) warnings_.push_back(report.text);
       return true;
     case Report::Kind::kError:
       failure_ = report;

@@ -31,7 +31,7 @@ void finish(Job& job, JobState state, double now_s) {
 
 double pause_s(const JobLimits& limits, unsigned attempts) {
   const double exponent = std::min(attempts, 32u) - 1.0;
-  return std::min(limits.most_backoff_s, limits.backoff_s * std::exp2(std::max(0.0, exponent)));
+  return std::min(limits.max_backoff_s, limits.backoff_s * std::exp2(std::max(0.0, exponent)));
 }
 
 }  // namespace
@@ -42,17 +42,17 @@ void settle_job(Job& job, const LiveJob& live, const ChildProcess::End& end,
   job.progress = live.progress_json();
   const bool asked = live.stop_asked_s() > 0;
   if (const std::string result = live.result(); !result.empty()) {
-    if (job.state == JobState::kCancelling) return finish(job, JobState::kCanceled, now_s);
+    if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);
     job.result = result;
     job.error.reset();
     return finish(job, JobState::kSucceeded, now_s);
   }
   const JobError error = error_of(live, end, now_s);
-  const bool stopped = asked && (error.code == "cancelled" || end.signal == SIGKILL);
+  const bool stopped = asked && (error.code == "canceled" || end.signal == SIGKILL);
   if (!stopped) job.error = error;
-  if (job.state == JobState::kCancelling) return finish(job, JobState::kCanceled, now_s);
+  if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);
   if (job.state != JobState::kRunning) return;  // suspended, and perhaps resumed already
-  if (stopped || error.code == "cancelled") {
+  if (stopped || error.code == "canceled") {
     job.state = JobState::kQueued;
     job.front = true;
   } else if (error.transient && job.attempts < limits.attempts) {

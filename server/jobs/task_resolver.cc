@@ -14,12 +14,12 @@ bool is_path(const std::string& scene) { return scene.starts_with('/'); }
 
 }  // namespace
 
-TaskMaker::TaskMaker(const ServerConfig& config, SceneStore& scenes)
+TaskResolver::TaskResolver(const ServerConfig& config, SceneStore& scenes)
     : config_(config),
       scenes_(scenes),
       memory_bytes_(config.jobs.memory_bytes
                         ? config.jobs.memory_bytes
-                        : std::max(default_memory(), kLeastMemory * config.jobs.at_a_time)) {
+                        : std::max(default_memory(), kMinMemory * config.jobs.max_concurrent)) {
   for (const std::string& root : config.scene_roots) {
     const std::string resolved = resolved_path(root);
     if (resolved.empty())
@@ -28,14 +28,14 @@ TaskMaker::TaskMaker(const ServerConfig& config, SceneStore& scenes)
   }
 }
 
-std::vector<std::string> TaskMaker::uploads_of(const JobRequest& request) {
+std::vector<std::string> TaskResolver::uploads_of(const JobRequest& request) {
   std::vector<std::string> uploads;
   for (const std::string& scene : request.scenes)
     if (!is_path(scene)) uploads.push_back(scene);
   return uploads;
 }
 
-std::string TaskMaker::find_scene(const std::string& scene, std::vector<std::string>& readable) {
+std::string TaskResolver::find_scene(const std::string& scene, std::vector<std::string>& readable) {
   const Problem missing =
       not_found("no scene '" + scene.substr(0, 128) +
                 "': expected an uploaded one, or a path below one of the scene roots");
@@ -55,7 +55,7 @@ std::string TaskMaker::find_scene(const std::string& scene, std::vector<std::str
   return scenes_.path(scene);
 }
 
-Task TaskMaker::make(const JobRequest& request, Task::Kind kind) {
+Task TaskResolver::make(const JobRequest& request, Task::Kind kind) {
   Task task;
   task.kind = kind;
   task.text = request.text;
@@ -65,7 +65,7 @@ Task TaskMaker::make(const JobRequest& request, Task::Kind kind) {
   if (asked > memory_bytes_)
     throw problem(ErrorCode::kLimit, "'memory': a job of this service may have at most " +
                                          std::to_string(memory_bytes_) + " bytes");
-  task.memory_bytes = asked ? asked : memory_bytes_ / config_.jobs.at_a_time;
+  task.memory_bytes = asked ? asked : memory_bytes_ / config_.jobs.max_concurrent;
   task.threads = config_.jobs.threads;
   return task;
 }

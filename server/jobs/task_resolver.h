@@ -11,9 +11,9 @@
 
 namespace voxdag::server {
 
-class TaskMaker {
+class TaskResolver {
  public:
-  TaskMaker(const ServerConfig& config, SceneStore& scenes);
+  TaskResolver(const ServerConfig& config, SceneStore& scenes);
 
   // Throws Problem: 404 for a scene that is not there (or lies outside the configured roots: which
   // of the two is not said), 409 for one that is still arriving, 422 (`limit`) for more memory than

@@ -13,7 +13,7 @@ namespace voxdag::server {
 //             ┌── retry ──────────────────────────────┐
 //   queued ─▶ running ─▶ succeeded                    │
 //     ▲ ▲ │     │ │ └───▶ failed ─────────────────────┤
-//     │ │ │     │ └─ cancelling ─▶ canceled ──────────┘
+//     │ │ │     │ └─ canceling ─▶ canceled ──────────┘
 //     │ │ └─────┼──── cancel ───────▲   ▲
 //     │ └ resume ─ suspended ───────────┘
 //     └── transient error, restart of the service
@@ -21,14 +21,14 @@ enum class JobState {
   kQueued,
   kRunning,
   kSuspended,
-  kCancelling,
+  kCanceling,
   kCanceled,
   kFailed,
   kSucceeded,
 };
 
 inline constexpr std::array<const char*, 7> kJobStateNames = {
-    "queued", "running", "suspended", "cancelling", "canceled", "failed", "succeeded"};
+    "queued", "running", "suspended", "canceling", "canceled", "failed", "succeeded"};
 
 inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
 std::optional<JobState> parse_state(std::string_view name);

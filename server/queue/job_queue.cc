@@ -60,14 +60,14 @@ JobQueue::JobQueue(const std::string& path)
       reader_(path, SqlDatabase::Mode::kReadOnly),
       find_(reader_.prepare("SELECT " + std::string(kJobColumns) + " FROM job WHERE id = ?")) {}
 
-JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t most_open) {
+JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_open) {
   Added added;
   {
     std::lock_guard lock(write_mutex_);
     SqlTransaction transaction(writer_);
     if (auto known = job_of_key(writer_, key)) return {std::move(*known), true};
     if (static_cast<uint64_t>(writer_.integer("SELECT count(*) FROM job WHERE " + kOpen)) >=
-        most_open)
+        max_open)
       throw busy("the queue is full", 60);
     job.id = random_id();
     job.number = writer_.integer("SELECT coalesce(max(number), 0) + 1 FROM job");
@@ -209,10 +209,10 @@ std::optional<Job> JobQueue::next_without_preview(const std::set<std::string>& e
 std::vector<Job> JobQueue::recover() {
   std::vector<Job> canceled;
   for (const Job& found :
-       query("WHERE " + states_in({JobState::kRunning, JobState::kCancelling}) + " ORDER BY number",
+       query("WHERE " + states_in({JobState::kRunning, JobState::kCanceling}) + " ORDER BY number",
              {})) {
     const Job job = change(found.id, [](Job& j) {
-      const bool stops = j.state == JobState::kCancelling;
+      const bool stops = j.state == JobState::kCanceling;
       j.state = stops ? JobState::kCanceled : JobState::kQueued;
       j.front = !stops;
       if (stops) j.finished_s = unix_seconds();
@@ -252,9 +252,9 @@ uint64_t JobQueue::version() const {
   return version_;
 }
 
-void JobQueue::wait_for_change(uint64_t seen, double most_s) const {
+void JobQueue::wait_for_change(uint64_t seen, double max_s) const {
   std::unique_lock lock(version_mutex_);
-  changed_.wait_for(lock, std::chrono::duration<double>(most_s), [&] { return version_ != seen; });
+  changed_.wait_for(lock, std::chrono::duration<double>(max_s), [&] { return version_ != seen; });
 }
 
 void JobQueue::announce() {

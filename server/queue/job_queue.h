@@ -43,8 +43,8 @@ class JobQueue {
     bool replayed = false;
   };
   // Gives the job its id and number and queues it; or finds the one that has this key. Throws
-  // Problem: 422 if the key came with another request, 503 if `most_open` jobs have not ended.
-  Added add(Job job, const IdempotencyKey& key, uint64_t most_open);
+  // Problem: 422 if the key came with another request, 503 if `max_open` jobs have not ended.
+  Added add(Job job, const IdempotencyKey& key, uint64_t max_open);
 
   std::optional<Job> find(const std::string& id);
   // Newest first.
@@ -66,7 +66,7 @@ class JobQueue {
   std::optional<Job> next(double now_s, const std::set<std::string>& except);
   // One that succeeded and has no preview yet, and is not in `except`.
   std::optional<Job> next_without_preview(const std::set<std::string>& except);
-  // Running jobs are queued again, at the front; cancelling ones are canceled. Returns the latter.
+  // Running jobs are queued again, at the front; canceling ones are canceled. Returns the latter.
   std::vector<Job> recover();
   // Ended jobs that finished before `finished_before_s`, or are not among the newest `most`.
   std::vector<std::string> expired(double finished_before_s, uint64_t most);
@@ -79,8 +79,8 @@ class JobQueue {
   uint64_t version() const;
   // Counts the changes alone.
   uint64_t changes() const;
-  // Waits until version() differs from `seen`, or for `most_s` seconds.
-  void wait_for_change(uint64_t seen, double most_s) const;
+  // Waits until version() differs from `seen`, or for `max_s` seconds.
+  void wait_for_change(uint64_t seen, double max_s) const;
   // As a change does, for what is not in the database (progress).
   void announce();
 

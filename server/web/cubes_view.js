@@ -122,7 +122,7 @@ export class CubesView {
     pen.scale(scale, scale);
     pen.lineJoin = "round";
     const colors = this.colors();
-    const size = (kHeight - 2 * kMargin) / 2 / this.resolution;  // pixels a voxel
+    const size = (kHeight - 2 * kMargin) / 2 / this.resolution;  // pixels per voxel
     this.frame(pen, colors, size);
     for (const cube of this.cubes)
       if (cube.lit_at === null) this.draw_waiting(pen, colors, size, cube);

@@ -55,14 +55,14 @@ export function fact(name, ...value) {
   return h("div", {class: "fact"}, h("dt", {}, name), h("dd", {}, ...value));
 }
 
-// Asks in a modal dialog; resolves to true if the deed is confirmed.
-export function confirm_deed(title, text, deed) {
+// Asks in a modal dialog; resolves to true if the action is confirmed.
+export function confirm_deed(title, text, action) {
   const dialog = h("dialog", {class: "ask", "aria-labelledby": "ask-title"},
     h("form", {method: "dialog"},
       h("h2", {id: "ask-title"}, title), h("p", {}, text),
       h("div", {class: "buttons end"},
         h("button", {value: "no", class: "quiet"}, "Keep it"),
-        h("button", {value: "yes", class: "danger"}, deed))));
+        h("button", {value: "yes", class: "danger"}, action))));
   document.body.append(dialog);
   dialog.showModal();
   return new Promise((resolve) => dialog.addEventListener("close", () => {

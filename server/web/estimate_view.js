@@ -6,7 +6,7 @@ import {count_text, duration_text, range_text, short_count, size_text} from "./f
 import {problem_box} from "./parts.js";
 
 const kCalm_ms = 700;  // after the last change
-const kMostTries = 5;  // while the service is busy with others' plans
+const kMaxTries = 5;  // while the service is busy with others' plans
 
 const kFigures = [
   ["voxels", "Voxels", short_count],
@@ -60,7 +60,7 @@ export class EstimateView {
       try {
         return await send_json("POST", "/api/v1/jobs?dry_run=true", body, {signal});
       } catch (problem) {
-        if (signal.aborted || !problem.may_pass || tries === kMostTries) throw problem;
+        if (signal.aborted || !problem.may_pass || tries === kMaxTries) throw problem;
         await sleep(1000 * Math.max(1, problem.retry_after_s), signal);
       }
     }

@@ -85,7 +85,7 @@ export function title_text(job) {
 }
 
 export function state_text(state) {
-  return state === "cancelling" ? "cancelling…" : state;
+  return state === "canceling" ? "canceling…" : state;
 }
 
 export function has_ended(state) {

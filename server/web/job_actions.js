@@ -7,21 +7,21 @@ import {copy_button, problem_box} from "./parts.js";
 
 const kLargestInMemory = 2 ** 30;
 
-// `reload` is called after each deed.
+// `reload` is called after each action.
 export function actions(job, reload) {
   const trouble = h("div", {role: "alert"});
   const post = (verb) => async () => {
     await send_json("POST", `${job.links.self}/${verb}`);
     await reload();
   };
-  const button = (text, deed, kind = "") => {
-    const element = h("button", {type: "button", class: kind, "data-deed": text.toLowerCase()}, text);
+  const button = (text, action, kind = "") => {
+    const element = h("button", {type: "button", class: kind, "data-action": text.toLowerCase()}, text);
     element.addEventListener("click", async () => {
       if (element.hasAttribute("aria-busy")) return;
       element.setAttribute("aria-busy", "true");  // a disabled button would lose the focus
       clear(trouble);
       try {
-        await deed();
+        await action();
       } catch (problem) {
         if (problem.code === undefined) throw problem;
         clear(trouble, problem_box(problem));

@@ -4,7 +4,7 @@ import {Problem} from "./api.js";
 import {field, h} from "./dom.js";
 import {grid_text} from "./format.js";
 
-const kLeastLevel = 2, kMostLevel = 20;
+const kMinLevel = 2, kMaxLevel = 20;
 const kUsualLevel = 11;
 
 export class JobOptions {
@@ -14,7 +14,7 @@ export class JobOptions {
     const choice = (...options) => h("select", watch,
       options.map(([value, text]) => h("option", {value}, text)));
     const powers = (from, to) => Array.from({length: to - from + 1}, (_, i) => 2 ** (from + i));
-    this.resolution = choice(...powers(kLeastLevel, kMostLevel).map((r) => [r, grid_text(r)]));
+    this.resolution = choice(...powers(kMinLevel, kMaxLevel).map((r) => [r, grid_text(r)]));
     this.resolution.value = String(2 ** kUsualLevel);
     this.resolution_field = field("Resolution", this.resolution, "Voxels along an edge of the cube.");
 

@@ -24,7 +24,7 @@ export function jobs_page(_, query, signal) {
 
   const look = async () => {
     const path = new URLSearchParams({limit: kPageSize});
-    if (state) path.set("state", state === "running" ? "running,cancelling" : state);
+    if (state) path.set("state", state === "running" ? "running,canceling" : state);
     if (cursor) path.set("cursor", cursor);
     const {jobs, counts, next_cursor} = await get_json(`/api/v1/jobs?${path}`, signal);
     clear(trouble);
@@ -52,7 +52,7 @@ function nothing_text(state, cursor) {
 
 function show_filters(element, counts, chosen) {
   const total = Object.values(counts).reduce((sum, n) => sum + n, 0);
-  const count_of = (state) => (counts[state] || 0) + (state === "running" ? counts.cancelling || 0 : 0);
+  const count_of = (state) => (counts[state] || 0) + (state === "running" ? counts.canceling || 0 : 0);
   const entries = [[null, "all", total], ...kStates.map((state) => [state, state, count_of(state)])];
   if (!element.firstChild) {
     element.append(h("nav", {"aria-label": "Jobs by state"}, entries.map(([state, name]) =>

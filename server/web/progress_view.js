@@ -49,7 +49,7 @@ function headline(job) {
   switch (job.state) {
     case "queued": return job.position ? `Number ${job.position} in the queue` : "Waiting in the queue";
     case "suspended": return stage ? `Suspended in ${stage}` : "Suspended";
-    case "cancelling": return "Cancelling…";
+    case "canceling": return "Canceling…";
     case "canceled": return stage ? `Canceled in ${stage}` : "Canceled";
     case "failed": return stage ? `Failed in ${stage}` : "Failed";
     default: return stage || "Starting…";

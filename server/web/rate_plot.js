@@ -6,7 +6,7 @@ import {duration_text, short_count} from "./format.js";
 const kWidth = 520, kHeight = 170;
 const kLeft = 52, kRight = 8, kTop = 10, kBottom = 24;
 const kWindow_s = 2;       // a rate is taken over at least so long
-const kMostSamples = 600;  // then every other one is dropped
+const kMaxSamples = 600;  // then every other one is dropped
 
 const memory = new Map();  // job id -> series by stage: coming back to a job shows what was seen
 
@@ -39,7 +39,7 @@ export class RatePlot {
     const from = series.marks[0];
     if (time - from.time < 0.4) return;
     series.samples.push([time, (p.done - from.done) / (time - from.time)]);
-    if (series.samples.length > kMostSamples) series.samples = series.samples.filter((_, i) => i % 2 === 0);
+    if (series.samples.length > kMaxSamples) series.samples = series.samples.filter((_, i) => i % 2 === 0);
     this.present = p.stage;
   }
 

@@ -4,7 +4,7 @@
 import {authorization, Problem, request, sleep} from "./api.js";
 
 const kPart_bytes = 8 << 20;
-const kMostFailures = 6;  // in a row, each after a longer pause
+const kMaxFailures = 6;  // in a row, each after a longer pause
 
 export const kSceneName = /^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\.(glb|gltf)$/;
 
@@ -36,7 +36,7 @@ export async function upload(file, name, on_progress, signal) {
       const expected = Number(problem.headers?.get("Upload-Offset") ?? NaN);
       if (problem.status === 409 && expected >= 0 && expected !== offset) {
         offset = expected;
-      } else if (problem.may_pass && ++failures <= kMostFailures) {
+      } else if (problem.may_pass && ++failures <= kMaxFailures) {
         await sleep(Math.max(1000 * problem.retry_after_s, 500 * 2 ** failures), signal);
         if (signal.aborted) throw problem;
         offset = await offset_known(path, file, name, signal).catch(() => offset);

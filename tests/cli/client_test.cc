@@ -49,7 +49,7 @@ class Client : public CommandLine {
       if (job.at("id") == id) return job.at("state");
     return "";
   }
-  // Cancelling a job that runs takes it a moment.
+  // Canceling a job that runs takes it a moment.
   void expect_state_in_the_end(const std::string& id, const std::string& expected) {
     for (int i = 0; i < 1200 && state(id) != expected; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(50));

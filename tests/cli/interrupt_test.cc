@@ -45,7 +45,7 @@ TEST_F(Interrupt, StopsAndGoesOn) {
       const Answer answer = interrupt(signal, wait_ms);
       if (answer.status != 0) {
         ASSERT_EQ(answer.status, 130) << answer.err;
-        EXPECT_NE(answer.err.find("cancelled"), std::string::npos) << answer.err;
+        EXPECT_NE(answer.err.find("canceled"), std::string::npos) << answer.err;
         EXPECT_FALSE(exists("s.vdag"));
         EXPECT_FALSE(exists("s.vdag.report.json"));
         ++caught;

@@ -1,4 +1,4 @@
-// Subvolumes of every level, anywhere in grids of up to 2^20 voxels an edge.
+// Subvolumes of every level, anywhere in grids of up to 2^20 voxels per edge.
 #include "tests/conformance/harness.h"
 
 namespace voxdag {

@@ -133,14 +133,14 @@ TEST_P(Streams, ErrorsOfTheSinkComeThrough) {
 }
 
 // Goes on for very long, asks to stop after a number of reads, and counts those that follow.
-class CancellingStream : public TriangleStream {
+class CancelingStream : public TriangleStream {
  public:
-  CancellingStream(const oracle::Triangles& triangles, CancelToken& token, int reads)
+  CancelingStream(const oracle::Triangles& triangles, CancelToken& token, int reads)
       : triangles_(oracle::fixed(triangles)), token_(token), reads_(reads) {}
   uint64_t count() const override { return kReads * triangles_.size(); }
   void rewind() override { done_ = 0; }
   size_t read(std::span<FixedTriangle> out) override {
-    late_reads += token_.cancelled();
+    late_reads += token_.canceled();
     if (reads_-- == 0) token_.cancel();
     if (done_++ == kReads) return 0;
     const size_t n = std::min(out.size(), triangles_.size());
@@ -157,8 +157,8 @@ class CancellingStream : public TriangleStream {
   uint64_t done_ = 0;
 };
 
-// Cancelled before or while streaming: kCancelled soon, nothing sent, the backend usable.
-TEST_P(Streams, CanBeCancelled) {
+// Canceled before or while streaming: kCanceled soon, nothing sent, the backend usable.
+TEST_P(Streams, CanBeCanceled) {
   const auto backend = open();
   const SubvolumeTask smallest{12, {6, {9, 8, 7}}, 64};
   for (const SubvolumeTask& task : {kTask, smallest}) {
@@ -168,7 +168,7 @@ TEST_P(Streams, CanBeCancelled) {
       SCOPED_TRACE(testing::Message() << "level " << task.cube.level << ", reads " << reads);
       CancelToken token;
       if (reads < 0) token.cancel();
-      CancellingStream stream(scene, token, reads);
+      CancelingStream stream(scene, token, reads);
       MemoryBudget budget(kAmpleBudget);
       SubDag dag;
       SubDagSummary summary;
@@ -176,7 +176,7 @@ TEST_P(Streams, CanBeCancelled) {
         backend->build(task, stream, budget, token, dag, summary);
         ADD_FAILURE() << "no error";
       } catch (const Error& error) {
-        EXPECT_EQ(error.code(), ErrorCode::kCancelled);
+        EXPECT_EQ(error.code(), ErrorCode::kCanceled);
       }
       EXPECT_LT(stream.late_reads, 2000u);
       EXPECT_EQ(budget.used(), 0u);

@@ -15,7 +15,7 @@ std::pair<double, double> extent(const std::vector<WorldTriangle>& triangles, in
   return {*low, *high};
 }
 
-WorldCube centred(const std::vector<WorldTriangle>& triangles, double edge) {
+WorldCube centered(const std::vector<WorldTriangle>& triangles, double edge) {
   WorldCube cube;
   cube.edge = edge;
   for (int a = 0; a < 3; ++a) {
@@ -33,12 +33,12 @@ WorldCube default_cube(const std::vector<WorldTriangle>& triangles) {
     const auto [low, high] = extent(triangles, a);
     longest = std::max(longest, high - low);
   }
-  return centred(triangles, longest == 0 ? 1 : longest * (1 + 1 / 32768.0));
+  return centered(triangles, longest == 0 ? 1 : longest * (1 + 1 / 32768.0));
 }
 
 WorldCube cube_of_voxel_size(const std::vector<WorldTriangle>& triangles, double voxel_size,
                              int64_t resolution) {
-  return centred(triangles, voxel_size * static_cast<double>(resolution));
+  return centered(triangles, voxel_size * static_cast<double>(resolution));
 }
 
 Triangles snap(const std::vector<WorldTriangle>& triangles, const WorldCube& cube,

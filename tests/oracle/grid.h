@@ -19,7 +19,7 @@ struct WorldCube {
 
 // The default cube: around all vertices, a little larger than the longest side.
 WorldCube default_cube(const std::vector<WorldTriangle>& triangles);
-// Voxels of one size, centred on the scene.
+// Voxels of one size, centered on the scene.
 WorldCube cube_of_voxel_size(const std::vector<WorldTriangle>& triangles, double voxel_size,
                              int64_t resolution);
 

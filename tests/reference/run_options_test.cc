@@ -30,7 +30,7 @@ TEST_F(RunOptionsTest, NeverShow) {
     spec.run.subvolume_edge = 256;
     const auto whole = expect_right(scene, 256, spec);
     EXPECT_EQ(whole.subvolumes, 1u);
-    uint64_t most_subvolumes = 0;
+    uint64_t max_subvolumes = 0;
     for (const uint64_t edge : {0, 64, 128})
       for (const unsigned threads : {1u, 2u})
         for (const uint64_t memory : {64 * kMebibyte, 1024 * kMebibyte}) {
@@ -44,9 +44,9 @@ TEST_F(RunOptionsTest, NeverShow) {
           EXPECT_TRUE(contents(report.output) == contents(whole.output));
           EXPECT_EQ(report.threads, threads);
           EXPECT_EQ(report.memory_bytes, memory);
-          most_subvolumes = std::max(most_subvolumes, report.subvolumes);
+          max_subvolumes = std::max(max_subvolumes, report.subvolumes);
         }
-    EXPECT_GT(most_subvolumes, 40u);
+    EXPECT_GT(max_subvolumes, 40u);
   }
 }
 

@@ -15,7 +15,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kPatience_s = 600;
+constexpr double kMaxWait_s = 600;
 
 // How often to kill: a few times in the tests of every day.
 int rounds() {
@@ -39,7 +39,7 @@ class KilledService : public testing::Test {
             folder_.file("config.json").c_str(), nullptr);
       _exit(127);
     }
-    const double deadline = wall_seconds() + kPatience_s;
+    const double deadline = wall_seconds() + kMaxWait_s;
     constexpr std::string_view kMark = "listening on ";
     for (;;) {
       const std::string text = contents(log).substr(before);
@@ -75,7 +75,7 @@ class KilledService : public testing::Test {
     write_file_atomically(
         system_files(), folder_.file("config.json"),
         Json{{"data", folder_.file("data")},
-             {"jobs", {{"least_free_disk", 0}, {"memory", "256MiB"}, {"threads", 1}, {"nice", 0}}}}
+             {"jobs", {{"min_free_disk", 0}, {"memory", "256MiB"}, {"threads", 1}, {"nice", 0}}}}
             .dump());
     scene_ = contents(folder_.file("s.glb"));
     start();
@@ -123,7 +123,7 @@ TEST_F(KilledService, FinishesEveryJobInTheEnd) {
   std::map<int, std::string> expected;  // SHA-256 by resolution
   for (const auto& [id, resolution] : jobs_) {
     SCOPED_TRACE("resolution " + std::to_string(resolution));
-    const double deadline = wall_seconds() + kPatience_s;
+    const double deadline = wall_seconds() + kMaxWait_s;
     while (state(id) != "succeeded" && state(id) != "failed" && wall_seconds() < deadline)
       usleep(20000);
     const Json job = Json::parse(http_->get("/api/v1/jobs/" + id).body);
@@ -146,7 +146,7 @@ TEST_F(KilledService, DrainsAndGoesOn) {
   prepare();
   post_jobs();
   const std::string id = jobs_.back().id;
-  const double deadline = wall_seconds() + kPatience_s;
+  const double deadline = wall_seconds() + kMaxWait_s;
   while (state(jobs_.front().id) == "queued" && wall_seconds() < deadline) usleep(2000);
   EXPECT_EQ(end(SIGTERM), 0);
   EXPECT_NE(contents(folder_.file("log")).find("stopped"), std::string::npos);

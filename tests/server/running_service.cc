@@ -13,7 +13,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kPatience_s = 600;
+constexpr double kMaxWait_s = 600;
 
 }  // namespace
 
@@ -21,7 +21,7 @@ RunningService::RunningService() {
   config_.http.port = 0;
   config_.data_folder = folder_.file("data");
   config_.program = VOXDAG_BINARY;
-  config_.jobs.least_free_disk_bytes = 0;
+  config_.jobs.min_free_disk_bytes = 0;
   config_.jobs.memory_bytes = uint64_t{1} << 30;
   config_.jobs.threads = 2;
   config_.jobs.nice = 0;
@@ -88,7 +88,7 @@ Json RunningService::job(const std::string& id) {
 }
 
 bool RunningService::until(const std::function<bool()>& holds) {
-  const double deadline = wall_seconds() + kPatience_s;
+  const double deadline = wall_seconds() + kMaxWait_s;
   while (!holds()) {
     if (wall_seconds() > deadline) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));

@@ -14,10 +14,10 @@ constexpr size_t kPage = size_t{4} << 10;
 constexpr size_t kLargestPower = size_t{4} << 20;
 // What is kept from one subvolume to the next: an eighth of the budget, within these.
 constexpr uint64_t kKeptInAnyCase = uint64_t{8} << 20;
-constexpr uint64_t kMostKept = uint64_t{128} << 20;
+constexpr uint64_t kMaxKept = uint64_t{128} << 20;
 // A subvolume takes up to some hundred blocks; with fewer the small ones, which come back last,
 // would drive out the large.
-constexpr size_t kMostBlocks = 1024;
+constexpr size_t kMaxBlocks = 1024;
 
 }  // namespace
 
@@ -39,9 +39,9 @@ PagePool::Block PagePool::take_kept(size_t bytes, size_t most) {
   return found;
 }
 
-void PagePool::give_back(Block block, size_t most_kept) noexcept {
-  if (block.bytes <= most_kept) {
-    while (kept_bytes_ + block.bytes > most_kept || kept_.size() == kMostBlocks) free_oldest();
+void PagePool::give_back(Block block, size_t max_kept) noexcept {
+  if (block.bytes <= max_kept) {
+    while (kept_bytes_ + block.bytes > max_kept || kept_.size() == kMaxBlocks) free_oldest();
     try {
       kept_.push_back(block);
       kept_bytes_ += block.bytes;
@@ -105,7 +105,7 @@ void Memory::grow(PagePool::Block& block, size_t bytes) {
 }
 
 void Memory::give_back(PagePool::Block block) noexcept {
-  pool.give_back(block, std::clamp(budget.limit() / 8, kKeptInAnyCase, kMostKept));
+  pool.give_back(block, std::clamp(budget.limit() / 8, kKeptInAnyCase, kMaxKept));
   budget.release(block.bytes);
 }
 

@@ -33,8 +33,8 @@ class PagePool {
   static size_t block_bytes(size_t bytes);
   // The smallest kept block of `bytes` to `most` bytes. Null if there is none.
   Block take_kept(size_t bytes, size_t most);
-  // Keeps the block; those that were kept longest go where there would be more than `most_kept`.
-  void give_back(Block block, size_t most_kept) noexcept;
+  // Keeps the block; those that were kept longest go where there would be more than `max_kept`.
+  void give_back(Block block, size_t max_kept) noexcept;
   void clear() noexcept;
   size_t kept_bytes() const { return kept_bytes_; }
 

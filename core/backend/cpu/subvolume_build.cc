@@ -112,7 +112,7 @@ NodeRef SubvolumeBuild::build(int size_log2, const Box& cube, size_t first, size
 }
 
 bool SubvolumeBuild::worth_splitting(int size_log2, size_t first, size_t count) {
-  if (size_log2 <= PlaneMemory::kSmallestLog2 || count > kFewTriangles) return false;
+  if (size_log2 <= PlaneMemo::kSmallestLog2 || count > kFewTriangles) return false;
   for (size_t i = 0; i < count; ++i)
     if (!planes_.remembers(triangles_, entries_[first + i])) return false;
   return true;

@@ -49,7 +49,7 @@ class SubvolumeBuild {
   size_t entries_used_ = 0;
   SubDagTables tables_;
   TileReducer reducer_;
-  PlaneMemory planes_;
+  PlaneMemo planes_;
   TileBricks tile_;
 };
 

@@ -8,7 +8,7 @@ namespace voxdag {
 namespace cuda {
 namespace {
 
-constexpr int kLeastMajor = 8;  // compute capability of the oldest code in this build
+constexpr int kMinMajor = 8;  // compute capability of the oldest code in this build
 
 // The runtime's numbers of the devices that can run this build; if none, `problem` says why.
 std::vector<int> usable_devices(std::string& problem) {
@@ -26,7 +26,7 @@ std::vector<int> usable_devices(std::string& problem) {
     int major = 0, pools = 0;
     if (cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device) == cudaSuccess &&
         cudaDeviceGetAttribute(&pools, cudaDevAttrMemoryPoolsSupported, device) == cudaSuccess &&
-        major >= kLeastMajor && pools)
+        major >= kMinMajor && pools)
       usable.push_back(device);
   }
   if (usable.empty())

@@ -25,7 +25,7 @@
 //
 // Everything happens in the order of the calls. kWindow is how many items, and
 // kTilesAtOnce how many tiles, a space likes to work on at once; kOnHost says that its memory is
-// the host's. A space belongs to one build and one thread. Cancelled builds throw from any call.
+// the host's. A space belongs to one build and one thread. Canceled builds throw from any call.
 #pragma once
 
 #include <cstddef>
@@ -40,15 +40,15 @@ namespace voxdag::parallel {
 struct Outgrown {};
 
 // Elements of one buffer: positions are 32-bit.
-inline constexpr uint64_t kMostElements = uint64_t{1} << 31;
+inline constexpr uint64_t kMaxElements = uint64_t{1} << 31;
 
-// An array in a space, charged to the build's budget; uninitialised. Throws Outgrown.
+// An array in a space, charged to the build's budget; uninitialized. Throws Outgrown.
 template <class Space, class T>
 class Buffer {
  public:
   Buffer() = default;
   Buffer(Space& space, uint64_t size) : charge_(space.budget(), 0, "buffer"), size_(size) {
-    if (size > kMostElements || !charge_.try_resize(size * sizeof(T))) throw Outgrown{};
+    if (size > kMaxElements || !charge_.try_resize(size * sizeof(T))) throw Outgrown{};
     if (size > 0) data_ = static_cast<T*>(space.allocate(size * sizeof(T)));
     space_ = &space;
   }

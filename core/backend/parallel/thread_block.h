@@ -3,7 +3,7 @@
 // A kernel K has
 //   K::kThreads, K::kPhases      threads of a block, phases between which they wait for each other
 //   K::kBlocksAtOnce             blocks that a multiprocessor should have registers for
-//   K::Shared                    the block's memory: plain data, uninitialised
+//   K::Shared                    the block's memory: plain data, uninitialized
 //   operator()(phase, block, thread, Shared&)
 // On a GPU one thread block runs all threads side by side; on the host one thread runs them one
 // after the other, phase by phase, so that the tests see every index the device would.

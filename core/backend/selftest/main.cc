@@ -16,7 +16,7 @@ constexpr char kUsage[] =
     "usage: voxdag-gpu-selftest [--backend cuda|parallel-host] [--quick] [--bench [R]]\n"
     "                           [--workers N] [--subvolume EDGE]\n"
     "Builds scenes by the backend's three methods and by the CPU backend and compares every level\n"
-    "array. --quick: small scenes only. --bench: measures instead, at R voxels an edge (default\n"
+    "array. --quick: small scenes only. --bench: measures instead, at R voxels per edge (default\n"
     "4096), with N backends side by side (default 2).\n";
 
 struct Options {

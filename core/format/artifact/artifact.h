@@ -160,7 +160,7 @@ struct Frame {
 };
 
 // Reads one artifact. Immutable after construction: read_frame() may be called by several threads,
-// each with its own Frame. Memory: the index (56 bytes a frame), not charged.
+// each with its own Frame. Memory: the index (56 bytes per frame), not charged.
 class ArtifactReader {
  public:
   // `segment` must be the file that ref.segment names. Throws Error{kCorrupt} or

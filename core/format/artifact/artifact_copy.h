@@ -12,7 +12,7 @@
 namespace voxdag {
 
 // Appends the artifact that `from` holds at `ref` to `to`, as that of `cube` on a grid of
-// 2^grid_levels voxels an edge. Frames are copied as they are, their checksums verified. Throws
+// 2^grid_levels voxels per edge. Frames are copied as they are, their checksums verified. Throws
 // Error{kCorrupt} if it is damaged, not of one subvolume, or not of a cube of this size.
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
                           uint32_t grid_levels, SegmentWriter& to);

@@ -144,7 +144,7 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
   const uint64_t frames = source.get<uint32_t>();
   const uint64_t frame_bytes = source.get<uint64_t>();
   if (index.grid_levels < kMinGridLevels || index.grid_levels > kMaxGridLevels)
-    corrupt(where, "a grid of 2^" + std::to_string(index.grid_levels) + " voxels an edge");
+    corrupt(where, "a grid of 2^" + std::to_string(index.grid_levels) + " voxels per edge");
   if (index.hash_bits < 4 || index.hash_bits > 64)
     corrupt(where, std::to_string(index.hash_bits) + " hash bits, expected 4 to 64");
   if (levels > index.grid_levels - kBrickLevels + 1)

@@ -8,7 +8,7 @@
 // Hashes and the low byte plane of the children are random and lie as they are. The other columns
 // are compressed where that pays: measured on real sub-DAGs, zstd level 1 takes brick masks to
 // 50-60 %, child masks to 55-80 %, high child planes to nothing, middle ones to 60-90 %, for
-// 10-25 ns a row in and out together; a column that shrinks by less than a quarter is not tried
+// 10-25 ns per row in and out together; a column that shrinks by less than a quarter is not tried
 // again for a while.
 #pragma once
 

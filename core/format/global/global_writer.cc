@@ -143,7 +143,7 @@ void GlobalFileWriter::begin_level(uint32_t level) {
   s.level_open = true;
 }
 
-void GlobalFileWriter::sum_words(std::span<const uint32_t> words) {
+void GlobalFileWriter::checksum_words(std::span<const uint32_t> words) {
   state_->sums.add(std::as_bytes(words));
   state_->summed_words += words.size();
 }
@@ -152,7 +152,7 @@ void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> wor
   State& s = *state_;
   if (first > kMaxLevelWords || words.size() > kMaxLevelWords - first)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
-                                       " is over the format's limit of 2^32 words a level");
+                                       " is over the format's limit of 2^32 words per level");
   s.file->write_at(s.end + sizeof(uint32_t) * first, std::as_bytes(words));
 }
 
@@ -227,7 +227,7 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   add_expected(0, header.bytes());
   BlockSums read_back;
   // The digest is what takes long.
-  make_and_take<std::vector<std::byte>, kPiecesUnderWay>(
+  run_producer_consumer<std::vector<std::byte>, kPiecesUnderWay>(
       threads,
       [&](auto pass) {
         for (uint64_t at = kPageBytes; at < end; at += kReadBytes)

@@ -66,7 +66,7 @@ class GlobalFileWriter {
   void begin_level(uint32_t level);
   // The words of the current level from its first to its last, by one thread at a time, for the
   // checksums: they are not written here.
-  void sum_words(std::span<const uint32_t> words);
+  void checksum_words(std::span<const uint32_t> words);
   // Words [first, first + words.size()) of the current level; disjoint ranges in any order, also
   // from several threads at once.
   void write_words(uint64_t first, std::span<const uint32_t> words);

@@ -1,5 +1,5 @@
-// Which nodes a level of the global file has: from the word offset where a node begins to its index
-// in the level, at 1.5 bits a word. Immutable after construction.
+// Which nodes per level of the global file has: from the word offset where a node begins to its
+// index in the level, at 1.5 bits per word. Immutable after construction.
 #pragma once
 
 #include <cstdint>

@@ -9,7 +9,8 @@
 //   4. One root; every other node has a parent.
 //   5. The header's voxels and octree nodes are those of the DAG.
 //
-// Memory: 1.5 bits a word of the file, and 16 bytes a node of two levels, charged to the budget.
+// Memory: 1.5 bits per word of the file, and 16 bytes per node of two levels, charged to the
+// budget.
 #pragma once
 
 #include <cstdint>

@@ -33,14 +33,14 @@ class City {
  private:
   void make_block(uint64_t column, uint64_t row) {
     Random random(seed_, {column, row});
-    const Vec3 centre{
+    const Vec3 center{
         kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
         kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
-    make_ground(centre);
-    make_street(centre, random);
+    make_ground(center);
+    make_street(center, random);
     const double central = centrality(column, row);
-    if (random.chance(10)) return make_park(centre, random);
-    make_lots(centre, central, random);
+    if (random.chance(10)) return make_park(center, random);
+    make_lots(center, central, random);
   }
 
   // 1 in the middle of the city, 0 at its edge.
@@ -101,10 +101,10 @@ class City {
     const double usual = 2 + (across == 3 ? 2 : 22 * central * central + (across == 1 ? 12 : 3));
     for (int i = 0; i < across; ++i)
       for (int j = 0; j < across; ++j) {
-        const Vec3 centre{c.x + width * (2 * i - across + 1) / 2, kPavement,
+        const Vec3 center{c.x + width * (2 * i - across + 1) / 2, kPavement,
                           c.z + width * (2 * j - across + 1) / 2};
         const auto floors = static_cast<uint32_t>(usual * (0.5 + 0.75 * random.unit()) + 0.5);
-        const Lot lot{centre, width - 2.5, std::max(1u, floors)};
+        const Lot lot{center, width - 2.5, std::max(1u, floors)};
         if (across == 3 && random.chance(30))
           add_turned_house(scene_, lot, random);
         else

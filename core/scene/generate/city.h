@@ -1,4 +1,4 @@
-// The pieces of a generated city, in metres, y up. Sizes are small multiples of 1/64, so that a
+// The pieces of a generated city, in meters, y up. Sizes are small multiples of 1/64, so that a
 // window written out as triangles and the same window as an instance have exactly the same corners.
 #pragma once
 
@@ -20,7 +20,7 @@ struct CityParts {
 
 // The box that a building may fill.
 struct Lot {
-  Vec3 centre;  // on the ground
+  Vec3 center;  // on the ground
   double width = 0;
   uint32_t floors = 0;
 };

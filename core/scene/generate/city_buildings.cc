@@ -11,7 +11,7 @@ constexpr double kSlabHeight = 0.5;
 
 // A storey or more of a building: walls made of bays, a window in each.
 struct Tier {
-  double x = 0, z = 0;  // centre
+  double x = 0, z = 0;  // center
   double y = 0;
   uint32_t bays_x = 0, bays_z = 0, floors = 0;
   double bay = 3;
@@ -103,7 +103,7 @@ void add_roof(SceneBuilder& scene, const Tier& tier, bool tall, Random& random) 
 }  // namespace
 
 void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, Random& random) {
-  Tier tier{lot.centre.x, lot.centre.z, lot.centre.y, 0, 0, 0, 2.5 + 0.5 * random.below(3)};
+  Tier tier{lot.center.x, lot.center.z, lot.center.y, 0, 0, 0, 2.5 + 0.5 * random.below(3)};
   const auto most = static_cast<int>(lot.width / tier.bay);
   tier.bays_x = static_cast<uint32_t>(random.between(most * 5 / 8, most));
   tier.bays_z = static_cast<uint32_t>(random.between(most * 5 / 8, most));
@@ -127,8 +127,8 @@ void add_turned_house(SceneBuilder& scene, const Lot& lot, Random& random) {
   const double x = lot.width * (0.25 + 0.09375 * random.unit());
   const double z = lot.width * (0.25 + 0.09375 * random.unit());
   const double height = kFloorHeight * lot.floors;
-  scene.room(8, 10).turned_box(lot.centre, {x, height, z}, turn);
-  const Vec3 eaves{lot.centre.x, lot.centre.y + height, lot.centre.z};
+  scene.room(8, 10).turned_box(lot.center, {x, height, z}, turn);
+  const Vec3 eaves{lot.center.x, lot.center.y + height, lot.center.z};
   scene.room(5, 4).pyramid(eaves, {x + 0.5, (x + z) * (0.375 + 0.25 * random.unit()), z + 0.5},
                            turn);
 }

@@ -18,14 +18,14 @@ constexpr SceneKindInfo kKinds[] = {
 
 constexpr uint32_t kMaxMengerLevel = 5;
 // Of a terrain, which packs its triangles best.
-constexpr uint64_t kLeastBytesPerTriangle = 12;
+constexpr uint64_t kMinBytesPerTriangle = 12;
 
 // What can be said without counting; GlbLayout says the rest.
 void check_size(const GenerateOptions& options) {
   const bool is_menger = options.kind == SceneKind::kMenger;
   const bool fits =
       is_menger ? options.level <= kMaxMengerLevel
-                : options.instances || options.triangles <= kMaxGlbBytes / kLeastBytesPerTriangle;
+                : options.instances || options.triangles <= kMaxGlbBytes / kMinBytesPerTriangle;
   if (!fits)
     throw Error(ErrorCode::kLimit,
                 "a .glb holds at most 4 294 967 295 bytes: ask for " +

@@ -17,9 +17,9 @@ void add_box_faces(Mesh& mesh, uint32_t first, bool bottom) {
   }
 }
 
-Vec3 turned(const Vec3& centre, double x, double y, double z, const Turn& turn) {
-  return {centre.x + (turn.cosine * x + turn.sine * z), centre.y + y,
-          centre.z + (turn.cosine * z - turn.sine * x)};
+Vec3 turned(const Vec3& center, double x, double y, double z, const Turn& turn) {
+  return {center.x + (turn.cosine * x + turn.sine * z), center.y + y,
+          center.z + (turn.cosine * z - turn.sine * x)};
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ class Batch {
     if (size_ > 0) visit_(std::span<const WorldTriangle>(triangles_.data(), size_));
     size_ = 0;
   }
-  void check_cancelled() const { cancel_.check(); }
+  void check_canceled() const { cancel_.check(); }
 
  private:
   const Visitor& visit_;

@@ -79,7 +79,7 @@ void TriangleStream::bind(const Node& node, size_t primitive_index) {
 }
 
 void TriangleStream::draw_instance(const Transform& world, uint64_t first_triangle) {
-  batch_.check_cancelled();
+  batch_.check_canceled();
   for (uint64_t first = first_triangle; first < triangle_count_; first += Batch::kTriangles) {
     const auto count =
         static_cast<size_t>(std::min<uint64_t>(Batch::kTriangles, triangle_count_ - first));

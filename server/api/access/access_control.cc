@@ -35,7 +35,7 @@ Problem unauthorized(const std::string& detail) {
 
 }  // namespace
 
-Gate::Gate(const ServerConfig& config, FileSystem& files)
+AccessControl::AccessControl(const ServerConfig& config, FileSystem& files)
     : hosts_(config.hosts),
       requests_(config.transfers.requests_per_s),
       wrong_tokens_(kWrongTokensPerSecond) {
@@ -45,7 +45,7 @@ Gate::Gate(const ServerConfig& config, FileSystem& files)
 
 // Without tokens the network is the wall, and a browser on this machine is a hole in it: any page
 // can send requests to the loopback, under a name of its own (DNS rebinding) or as another site's.
-void Gate::check_site(const Request& request) const {
+void AccessControl::check_site(const Request& request) const {
   const auto is_ours = [&](const std::string& host) {
     return std::any_of(hosts_.begin(), hosts_.end(),
                        [&](const std::string& name) { return equal_ignoring_case(name, host); });
@@ -61,7 +61,7 @@ void Gate::check_site(const Request& request) const {
   if (foreign) throw Problem(403, "forbidden", "the request comes from another site");
 }
 
-Caller Gate::identify(const Request& request) {
+Caller AccessControl::identify(const Request& request) {
   const std::string header = request.header("Authorization");
   constexpr std::string_view kScheme = "bearer ";
   if (header.empty()) return {};
@@ -74,9 +74,9 @@ Caller Gate::identify(const Request& request) {
   throw unauthorized("the token is not known here");
 }
 
-Caller Gate::admit(const Request& request, Role needed) {
+Caller AccessControl::admit(const Request& request, Role needed) {
   if (!is_loopback(request.peer) && !requests_.take(request.peer, wall_seconds()))
-    throw too_many("more requests a second than one client may send");
+    throw too_many("more requests per second than one client may send");
   if (!tokens_) {
     check_site(request);
     return {Role::kAdmin, "local"};

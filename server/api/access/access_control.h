@@ -12,10 +12,10 @@
 
 namespace voxdag::server {
 
-class Gate {
+class AccessControl {
  public:
   // Reads the token file, if there is one.
-  Gate(const ServerConfig& config, FileSystem& files);
+  AccessControl(const ServerConfig& config, FileSystem& files);
 
   // Throws Problem unless the request may do what takes `needed`. Says who it is.
   Caller admit(const Request& request, Role needed);

@@ -7,9 +7,10 @@
 
 namespace voxdag::server {
 
-class Slots {
+class ConcurrencyLimiter {
  public:
-  explicit Slots(size_t most) : counter_(std::make_shared<std::atomic<size_t>>(0)), most_(most) {}
+  explicit ConcurrencyLimiter(size_t most)
+      : counter_(std::make_shared<std::atomic<size_t>>(0)), most_(most) {}
 
   // Taken until the pointer goes; null if all are.
   std::shared_ptr<void> take() {

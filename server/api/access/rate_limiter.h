@@ -1,5 +1,5 @@
-// How often each client may do a thing: a bucket of tokens a client, refilled steadily, as deep as
-// two seconds' worth. Thread-safe.
+// How often each client may do a thing: a bucket of tokens per client, refilled steadily, as deep
+// as two seconds' worth. Thread-safe.
 #pragma once
 
 #include <map>

@@ -13,7 +13,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kMostListed = 200;
+constexpr size_t kMaxListed = 200;
 constexpr size_t kLongestKey = 255;
 
 std::string describe(Context& context, const Job& job) {
@@ -60,7 +60,7 @@ Response post_job(Context& context, Call& call) {
   Job job;
   job.name = request.name;
   job.request = request.text;
-  job.scenes = TaskMaker::uploads_of(request);
+  job.scenes = TaskResolver::uploads_of(request);
   job.posted_by = call.caller.name;
   job.priority = request.priority;
   const JobQueue::Added added = context.queue.add(job, key, context.config.jobs.queued);
@@ -70,7 +70,7 @@ Response post_job(Context& context, Call& call) {
 JobFilter filter_of(const Call& call) {
   call.allow_query({"state", "limit", "cursor"});
   JobFilter filter;
-  filter.limit = call.query_count("limit", filter.limit, 1, kMostListed);
+  filter.limit = call.query_count("limit", filter.limit, 1, kMaxListed);
   filter.before =
       static_cast<int64_t>(call.query_count("cursor", INT64_MAX, 1, uint64_t{INT64_MAX}));
   if (!call.request.target.query.contains("state")) return filter;

@@ -55,7 +55,7 @@ void Router::add(const std::string& method, const std::string& pattern, Role rol
   routes_.push_back({method, parse_target(pattern).segments, role, std::move(handler)});
 }
 
-Response Router::route(Request& request, Gate& gate) const {
+Response Router::route(Request& request, AccessControl& gate) const {
   const std::string method = request.method == "HEAD" ? "GET" : request.method;
   std::string allowed;
   Call call{request, {}, {}};
@@ -85,18 +85,18 @@ Response json_response(int status, std::string body) {
   return response;
 }
 
-std::string read_json_body(Request& request, uint64_t most_bytes) {
+std::string read_json_body(Request& request, uint64_t max_bytes) {
   const std::string type = request.header("Content-Type");
   if (!equal_ignoring_case(trimmed(std::string_view(type).substr(0, type.find(';'))),
                            "application/json"))
     throw Problem(415, "unsupported_media_type", "expected Content-Type: application/json");
   const Problem too_large(413, "too_large",
-                          "the body is over " + std::to_string(most_bytes) + " bytes");
-  if (request.content_length.value_or(0) > most_bytes) throw too_large;
+                          "the body is over " + std::to_string(max_bytes) + " bytes");
+  if (request.content_length.value_or(0) > max_bytes) throw too_large;
   std::string body;
   const BodyEnd end = request.read_body([&](std::string_view piece) {
     body += piece;
-    return body.size() <= most_bytes;
+    return body.size() <= max_bytes;
   });
   if (end == BodyEnd::kStopped) throw too_large;
   if (end == BodyEnd::kTooSlow) throw Problem(408, "timeout", "the body came too slowly");

@@ -33,7 +33,7 @@ class Router {
   // `pattern` like "/api/v1/jobs/{id}/dag". HEAD is answered where GET is.
   void add(const std::string& method, const std::string& pattern, Role role, Handler handler);
   // Throws Problem: 404, 405 with Allow, what the gate throws, and what the handler throws.
-  Response route(Request& request, Gate& gate) const;
+  Response route(Request& request, AccessControl& gate) const;
 
  private:
   struct Route {
@@ -49,7 +49,7 @@ class Router {
 Response json_response(int status, std::string body);
 // The body of a request, at most so large. Throws Problem: 413, 415 unless it says that it is JSON,
 // 400 or 408 if it breaks off.
-std::string read_json_body(Request& request, uint64_t most_bytes);
+std::string read_json_body(Request& request, uint64_t max_bytes);
 // Throws Problem (400) if there is a body.
 void expect_no_body(const Request& request);
 

@@ -12,7 +12,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kMostListed = 200;
+constexpr size_t kMaxListed = 200;
 constexpr size_t kStandardListed = 100;
 
 nlohmann::ordered_json scene_json(const Scene& scene) {
@@ -74,13 +74,13 @@ Part part_of(const Request& request) {
   return {range.begin, range.end, total};
 }
 
-void check_room(Context& context, const Part& part) {
+void check_disk_space(Context& context, const Part& part) {
   const uint64_t most = context.config.transfers.scene_bytes;
   const uint64_t size = part.total.value_or(0);
   if (size > most)
     throw Problem(413, "too_large", "a scene may have at most " + std::to_string(most) + " bytes");
   const uint64_t free = context.files.free_space(context.config.data_folder);
-  if (free < context.config.jobs.least_free_disk_bytes + (size - std::min(size, part.first)))
+  if (free < context.config.jobs.min_free_disk_bytes + (size - std::min(size, part.first)))
     throw problem(ErrorCode::kNoSpace, "the service has no room for this scene");
 }
 
@@ -112,7 +112,7 @@ Response put_scene(Context& context, Call& call) {
   if (!slot) throw busy("too many transfers at a time", 5);
   const Part part = part_of(call.request);
   if (!call.request.has_body) throw bad_request("expected the scene's bytes as body");
-  check_room(context, part);
+  check_disk_space(context, part);
   check_unused(context, name);
   const std::string part_digest = digest_of(call.request, "Content-Digest");
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
@@ -138,7 +138,7 @@ Response put_scene(Context& context, Call& call) {
 
 Response list_scenes(Context& context, Call& call) {
   call.allow_query({"limit", "cursor"});
-  const size_t limit = call.query_count("limit", kStandardListed, 1, kMostListed);
+  const size_t limit = call.query_count("limit", kStandardListed, 1, kMaxListed);
   const std::string cursor = call.query("cursor");
   if (call.request.target.query.contains("cursor") && !is_scene_name(cursor))
     throw bad_request("'cursor': expected a next_cursor");

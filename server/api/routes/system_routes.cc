@@ -43,7 +43,7 @@ Response get_ready(Context& context) {
   if (context.draining) throw busy("the service is stopping");
   const std::string& data = context.config.data_folder;
   try {
-    if (context.files.free_space(data) < context.config.jobs.least_free_disk_bytes)
+    if (context.files.free_space(data) < context.config.jobs.min_free_disk_bytes)
       throw busy("the disk has less free space than is held in reserve", 60);
     context.queue.counts();
     check_writable(context);

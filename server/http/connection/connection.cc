@@ -64,7 +64,8 @@ double Connection::read_deadline() const {
     case Phase::kExchange:
       break;
   }
-  return phase_start_s_ + limits_.grace_s + static_cast<double>(consumed_) / limits_.least_rate;
+  return phase_start_s_ + limits_.grace_s +
+         static_cast<double>(consumed_) / limits_.min_bytes_per_s;
 }
 
 bool Connection::wait(short events, double deadline_s) {
@@ -135,7 +136,8 @@ ssize_t Connection::write(const char* data, size_t size) {
       trouble_ = Trouble::kBroken;
       return -1;
     }
-    const double allowed_s = limits_.grace_s + static_cast<double>(written_) / limits_.least_rate;
+    const double allowed_s =
+        limits_.grace_s + static_cast<double>(written_) / limits_.min_bytes_per_s;
     if (!wait(reads ? POLLIN : POLLOUT, answer_start_s_ + allowed_s)) return -1;
   }
   last_write_s_ = wall_seconds();

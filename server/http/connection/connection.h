@@ -2,8 +2,8 @@
 // than its phase allows, plain or TLS.
 //
 // Phases: waiting (idle_s for the next request), header (header_s and header_bytes for all of it),
-// exchange (grace_s + bytes / least_rate for the body, the same for the answer). What comes too
-// late or grows too large breaks the connection; problem() says why. Used by one thread.
+// exchange (grace_s + bytes / min_bytes_per_s for the body, the same for the answer). What comes
+// too late or grows too large breaks the connection; problem() says why. Used by one thread.
 #pragma once
 
 #include <httplib.h>

@@ -2,7 +2,7 @@
 
 namespace voxdag::server {
 
-ThreadCrew::~ThreadCrew() {
+ThreadPool::~ThreadPool() {
   {
     std::lock_guard lock(mutex_);
     ends_ = true;
@@ -11,14 +11,14 @@ ThreadCrew::~ThreadCrew() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void ThreadCrew::run(std::function<void()> work) {
+void ThreadPool::run(std::function<void()> work) {
   std::lock_guard lock(mutex_);
   if (idle_ <= waiting_.size()) threads_.emplace_back([this] { work_on(); });
   waiting_.push_back(std::move(work));
   wake_.notify_one();
 }
 
-void ThreadCrew::work_on() {
+void ThreadPool::work_on() {
   std::unique_lock lock(mutex_);
   for (;;) {
     ++idle_;

@@ -11,11 +11,11 @@
 
 namespace voxdag::server {
 
-class ThreadCrew {
+class ThreadPool {
  public:
-  ThreadCrew() = default;
+  ThreadPool() = default;
   // Waits for all work to end.
-  ~ThreadCrew();
+  ~ThreadPool();
 
   // `work` must not throw. Throws std::system_error if there is no thread for it.
   void run(std::function<void()> work);

@@ -27,7 +27,7 @@ using nlohmann::ordered_json;
 constexpr uint64_t kLargestReport = uint64_t{4} << 20;
 
 // Should memory run out, the system takes this process and not the service.
-void volunteer_for_the_oom_killer() { std::ofstream("/proc/self/oom_score_adj") << 500; }
+void raise_oom_score() { std::ofstream("/proc/self/oom_score_adj") << 500; }
 
 JobRequest request_of(const Task& task) {
   try {
@@ -70,7 +70,7 @@ std::string result_of(FileSystem& files, const JobFolder& folder) {
   return result.dump();
 }
 
-std::string build(FileSystem& files, const Task& task, const JobFolder& folder, ReportPipe& pipe,
+std::string build(FileSystem& files, const Task& task, const JobFolder& folder, ProgressPipe& pipe,
                   const CancelToken& cancel) {
   // The report is written last: where it is, only the tidying up was interrupted.
   if (!files.exists(folder.report())) {
@@ -82,7 +82,7 @@ std::string build(FileSystem& files, const Task& task, const JobFolder& folder, 
   return result;
 }
 
-std::string plan(FileSystem& files, const Task& task, const JobFolder& folder, ReportPipe& pipe,
+std::string plan(FileSystem& files, const Task& task, const JobFolder& folder, ProgressPipe& pipe,
                  const CancelToken& cancel) {
   return estimate_json(plan_build(spec_of(task, folder), {files, pipe, cancel}));
 }
@@ -102,8 +102,8 @@ std::vector<std::pair<std::string, std::string>> private_paths(const Task& task,
 }  // namespace
 
 int run_job(FileSystem& files, const std::string& path, const CancelToken& cancel) {
-  volunteer_for_the_oom_killer();
-  ReportPipe pipe;
+  raise_oom_score();
+  ProgressPipe pipe;
   const JobFolder folder{path};
   const auto fail = [&](ErrorCode code, const std::string& message) {
     pipe.fail(error_name(code), message);

@@ -24,12 +24,12 @@ void write_all(int file, const std::string& text) {
 
 }  // namespace
 
-void ReportPipe::hide(std::vector<std::pair<std::string, std::string>> texts) {
+void ProgressPipe::hide(std::vector<std::pair<std::string, std::string>> texts) {
   std::lock_guard lock(mutex_);
   hidden_ = std::move(texts);
 }
 
-void ReportPipe::begin_stage(std::string_view stage, uint64_t total, std::string_view unit) {
+void ProgressPipe::begin_stage(std::string_view stage, uint64_t total, std::string_view unit) {
   std::lock_guard lock(mutex_);
   stage_ = stage;
   unit_ = unit;
@@ -44,19 +44,19 @@ void ReportPipe::begin_stage(std::string_view stage, uint64_t total, std::string
   send(report);
 }
 
-void ReportPipe::advance(uint64_t count) {
+void ProgressPipe::advance(uint64_t count) {
   std::lock_guard lock(mutex_);
   done_ += count;
   send_advance(false);
 }
 
-void ReportPipe::set_total(uint64_t total) {
+void ProgressPipe::set_total(uint64_t total) {
   std::lock_guard lock(mutex_);
   total_ = total;
   send_advance(false);
 }
 
-void ReportPipe::end_stage() {
+void ProgressPipe::end_stage() {
   std::lock_guard lock(mutex_);
   send_advance(true);
   Report report;
@@ -67,7 +67,7 @@ void ReportPipe::end_stage() {
   log(stage_ + ": " + std::to_string(done_) + " " + unit_ + " in " + took);
 }
 
-void ReportPipe::warn(std::string_view message) {
+void ProgressPipe::warn(std::string_view message) {
   std::lock_guard lock(mutex_);
   Report report;
   report.kind = Report::Kind::kWarning;
@@ -76,22 +76,22 @@ void ReportPipe::warn(std::string_view message) {
   log("warning: " + report.text);
 }
 
-void ReportPipe::built(const Report& report) {
+void ProgressPipe::built(const Report& report) {
   std::lock_guard lock(mutex_);
   send(report);
 }
 
-void ReportPipe::fail(const std::string& code, const std::string& message) {
+void ProgressPipe::fail(const std::string& code, const std::string& message) {
   std::lock_guard lock(mutex_);
   Report report;
   report.kind = Report::Kind::kError;
   report.code = code;
   report.text = hidden(message);
   send(report);
-  log((code == "cancelled" ? "stopped: " : "error: ") + report.text);
+  log((code == "canceled" ? "stopped: " : "error: ") + report.text);
 }
 
-void ReportPipe::finish(const std::string& result) {
+void ProgressPipe::finish(const std::string& result) {
   std::lock_guard lock(mutex_);
   Report report;
   report.kind = Report::Kind::kResult;
@@ -100,11 +100,11 @@ void ReportPipe::finish(const std::string& result) {
   log("done");
 }
 
-void ReportPipe::send(const Report& report) {
+void ProgressPipe::send(const Report& report) {
   write_all(STDOUT_FILENO, report_line(report) + "\n");
 }
 
-void ReportPipe::send_advance(bool at_once) {
+void ProgressPipe::send_advance(bool at_once) {
   const double now = wall_seconds();
   if (!at_once && now - last_sent_s_ < kInterval_s) return;
   last_sent_s_ = now;
@@ -115,7 +115,7 @@ void ReportPipe::send_advance(bool at_once) {
   send(report);
 }
 
-void ReportPipe::log(const std::string& text) {
+void ProgressPipe::log(const std::string& text) {
   const time_t now = time(nullptr);
   tm parts{};
   gmtime_r(&now, &parts);
@@ -124,7 +124,7 @@ void ReportPipe::log(const std::string& text) {
   write_all(STDERR_FILENO, stamp + text + "\n");
 }
 
-std::string ReportPipe::hidden(std::string text) const {
+std::string ProgressPipe::hidden(std::string text) const {
   for (const auto& [from, to] : hidden_)
     for (size_t at = text.find(from); !from.empty() && at != std::string::npos;
          at = text.find(from, at + to.size()))

@@ -12,7 +12,7 @@
 
 namespace voxdag::server {
 
-class ReportPipe : public Progress {
+class ProgressPipe : public Progress {
  public:
   // Texts that are to be replaced in all that is said.
   void hide(std::vector<std::pair<std::string, std::string>> texts);

@@ -13,7 +13,7 @@ namespace voxdag::test {
 namespace {
 
 // A mutation may turn a count of instances into a large one; that is no reason to draw them all.
-constexpr uint64_t kMostTriangles = 200000;
+constexpr uint64_t kMaxTriangles = 200000;
 
 SceneBuilder everything() {
   SceneBuilder scene = one_triangle();
@@ -81,7 +81,7 @@ void run(const std::string& original, int count, uint32_t seed, Outcomes& outcom
     SCOPED_TRACE("seed " + std::to_string(seed) + ", mutation " + std::to_string(i));
     try {
       OpenScene open(file, {.skip_invalid = i % 2 == 0}, uint64_t{16} << 20);
-      if (open.source->declared_triangles() <= kMostTriangles) open.triangles();
+      if (open.source->declared_triangles() <= kMaxTriangles) open.triangles();
       ++outcomes.worked;
     } catch (const Error& e) {
       ++outcomes.refused;
@@ -145,7 +145,7 @@ TEST(FuzzScene, MutatedNumbers) {
     changed.insert(1, R"("buffers":[{"byteLength":)" + std::to_string(bin.size()) + "}],");
     try {
       OpenScene open(make_glb(changed, bin), {.skip_invalid = i % 2 == 0}, uint64_t{16} << 20);
-      if (open.source->declared_triangles() <= kMostTriangles) open.triangles();
+      if (open.source->declared_triangles() <= kMaxTriangles) open.triangles();
     } catch (const Error& e) {
       EXPECT_NE(e.message(), "");
     } catch (const std::exception& e) {

@@ -20,7 +20,7 @@ struct Workshop {
   Memory memory{budget, pool};
   SubDagTables tables;
   TileReducer reducer;
-  PlaneMemory planes;
+  PlaneMemo planes;
 };
 
 // The node of a cube that the triangle covers, tile by tile.
@@ -74,7 +74,7 @@ int compare(Workshop& by_memory, Workshop& by_drawing, const TriangleSet& set, c
   EXPECT_EQ(counts.voxels, drawn_counts.voxels);
   EXPECT_EQ(counts.nodes, drawn_counts.nodes);
   int compared = 1;
-  if (size_log2 > PlaneMemory::kSmallestLog2 && !testing::Test::HasFailure())
+  if (size_log2 > PlaneMemo::kSmallestLog2 && !testing::Test::HasFailure())
     for (int c = 0; c < 8; c += 3)
       compared += compare(by_memory, by_drawing, set, box.child(c), size_log2 - 1, tile);
   return compared;

@@ -110,8 +110,8 @@ TEST_F(NodeTables, NodesAreFoundAgainWhateverTheirHashes) {
   }
 }
 
-// Slots come out in the total order (hash, mask, children), ties and wrapped clusters included;
-// the same when hashes were changed behind the table's back.
+// ConcurrencyLimiter come out in the total order (hash, mask, children), ties and wrapped clusters
+// included; the same when hashes were changed behind the table's back.
 TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
   for (const int distinct : {1, 20, 100000})
     for (const bool changed : {false, true}) {

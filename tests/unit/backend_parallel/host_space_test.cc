@@ -179,7 +179,7 @@ TEST_P(HostSpaceTest, BuffersAreCharged) {
     const Buffer<HostSpace, uint64_t> half(here, (1 << 20) / 16);
     EXPECT_EQ(small.used(), uint64_t{1} << 19);
     EXPECT_THROW((Buffer<HostSpace, uint8_t>(here, (1 << 19) + 1)), Outgrown);
-    EXPECT_THROW((Buffer<HostSpace, uint8_t>(space, kMostElements + 1)), Outgrown);
+    EXPECT_THROW((Buffer<HostSpace, uint8_t>(space, kMaxElements + 1)), Outgrown);
   }
   EXPECT_EQ(small.used(), 0u);
 }

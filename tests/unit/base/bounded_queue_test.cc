@@ -10,9 +10,9 @@ namespace voxdag {
 namespace {
 
 // Items arrive once each, in order, however fast either side is.
-TEST(SlotRing, PassesAllInOrder) {
+TEST(BoundedQueue, PassesAllInOrder) {
   constexpr int kItems = 10000;
-  SlotRing<int, 3> ring;
+  BoundedQueue<int, 3> ring;
   std::thread writer([&] {
     for (int i = 0; i < kItems; ++i) {
       *ring.free_slot() = i;
@@ -27,8 +27,8 @@ TEST(SlotRing, PassesAllInOrder) {
   for (int i = 0; i < kItems; ++i) ASSERT_EQ(got[i], i);
 }
 
-TEST(SlotRing, WaitsForAFreeSlot) {
-  SlotRing<int, 2> ring;
+TEST(BoundedQueue, WaitsForAFreeSlot) {
+  BoundedQueue<int, 2> ring;
   for (int i = 0; i < 2; ++i) {
     *ring.free_slot() = i;
     ring.push();
@@ -40,8 +40,8 @@ TEST(SlotRing, WaitsForAFreeSlot) {
   EXPECT_EQ(*ring.front(), 1);
 }
 
-TEST(SlotRing, GivesWhatWasPushedBeforeTheEnd) {
-  SlotRing<int, 3> ring;
+TEST(BoundedQueue, GivesWhatWasPushedBeforeTheEnd) {
+  BoundedQueue<int, 3> ring;
   *ring.free_slot() = 7;
   ring.push();
   ring.end();
@@ -52,8 +52,8 @@ TEST(SlotRing, GivesWhatWasPushedBeforeTheEnd) {
 }
 
 // A writer that waits learns that nobody reads any more.
-TEST(SlotRing, TellsThatTheReaderGaveUp) {
-  SlotRing<int, 1> ring;
+TEST(BoundedQueue, TellsThatTheReaderGaveUp) {
+  BoundedQueue<int, 1> ring;
   *ring.free_slot() = 0;
   ring.push();
   std::thread reader([&] { ring.give_up(); });
@@ -67,7 +67,7 @@ class MakeAndTake : public testing::TestWithParam<unsigned> {
 
   // Makes items up to kItems, takes them into `taken`; either throws at the item of that number.
   void run(int make_throws_at, int take_throws_at) {
-    make_and_take<std::vector<int>, 3>(
+    run_producer_consumer<std::vector<int>, 3>(
         GetParam(),
         [&](auto pass) {
           for (int i = 0; i < kItems; ++i) {

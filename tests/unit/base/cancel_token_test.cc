@@ -7,19 +7,19 @@
 namespace voxdag {
 namespace {
 
-// A token says nothing until it is set, and then keeps saying kCancelled.
+// A token says nothing until it is set, and then keeps saying kCanceled.
 TEST(CancelToken, ThrowsOnceSet) {
   CancelToken token;
-  EXPECT_FALSE(token.cancelled());
+  EXPECT_FALSE(token.canceled());
   EXPECT_NO_THROW(token.check());
   token.cancel();
   for (int i = 0; i < 2; ++i) {
-    EXPECT_TRUE(token.cancelled());
+    EXPECT_TRUE(token.canceled());
     try {
       token.check();
       FAIL() << "check() returned";
     } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::kCancelled);
+      EXPECT_EQ(error.code(), ErrorCode::kCanceled);
     }
   }
 }

@@ -26,7 +26,7 @@ constexpr Row kPromised[] = {
     {ErrorCode::kOutOfMemory, "out_of_memory", 8, 503},
     {ErrorCode::kDevice, "device", 9, 422},
     {ErrorCode::kLimit, "limit", 10, 422},
-    {ErrorCode::kCancelled, "cancelled", 130, 409},
+    {ErrorCode::kCanceled, "canceled", 130, 409},
 };
 
 // Names and statuses are an interface: none may change unnoticed.
@@ -47,7 +47,7 @@ TEST(ErrorTable, ExitStatusesAreDistinctAndNotTheShells) {
     const int status = exit_status(row.code);
     EXPECT_TRUE(seen.insert(status).second) << status;
     EXPECT_GT(status, 1);
-    EXPECT_TRUE(status < 126 || row.code == ErrorCode::kCancelled) << status;
+    EXPECT_TRUE(status < 126 || row.code == ErrorCode::kCanceled) << status;
   }
 }
 

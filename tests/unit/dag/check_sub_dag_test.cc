@@ -57,7 +57,7 @@ const std::vector<Damage> kDamages = {
     {"a level too few", "2 node levels, expected 3", [](SubDag& d) { d.levels.pop_back(); }},
     {"a level too many", "4 node levels, expected 3",
      [](SubDag& d) { d.levels.push_back(d.levels.back()); }},
-    {"a wrong level number", "labelled", [](SubDag& d) { d.levels[1].level = 6; }},
+    {"a wrong level number", "labeled", [](SubDag& d) { d.levels[1].level = 6; }},
     {"a hash too many", "sized", [](SubDag& d) { d.levels[1].hashes.push_back(0); }},
     {"a hash too few", "sized", [](SubDag& d) { d.levels[1].hashes.pop_back(); }},
     {"no bricks", "level 6, node 0: a child index", [](SubDag& d) { d.brick_masks.clear(); }},

@@ -22,7 +22,7 @@ class ArtifactCopyTest : public testing::Test {
     write_cache_entry(system_files(), entry_path_, entry_path_ + ".partial",
                       *system_files().open_read(segment_path(folder_.path(), 0)), ref);
   }
-  // Reads the entry and copies its artifact for `cube` of a grid of 2^14 voxels an edge.
+  // Reads the entry and copies its artifact for `cube` of a grid of 2^14 voxels per edge.
   ArtifactReader copy(const Cube& cube) {
     const CacheEntry entry = read_cache_entry(system_files(), entry_path_);
     SegmentWriter segment(system_files(), folder_.path(), 1, budget_);

@@ -66,7 +66,7 @@ TEST_F(DiffTest, EmptyScenes) {
   EXPECT_EQ(diff().only_b, voxels.count());
 }
 
-// A solid cube of 2^20 voxels an edge has one node a level and 2^60 voxels: the walk visits pairs,
+// A solid cube of 2^20 voxels per edge has one node a level and 2^60 voxels: the walk visits pairs,
 // and counts in 64 bits.
 TEST_F(DiffTest, CountsBeyond32BitsInAMoment) {
   const auto write_solid = [](const std::string& path, uint64_t brick) {
@@ -75,13 +75,13 @@ TEST_F(DiffTest, CountsBeyond32BitsInAMoment) {
     GlobalFileWriter writer(system_files(), path, grid, 64);
     const uint32_t words[2] = {static_cast<uint32_t>(brick), static_cast<uint32_t>(brick >> 32)};
     writer.begin_level(18);
-    writer.sum_words(words);
+    writer.checksum_words(words);
     writer.write_words(0, words);
     writer.end_level(1, 2);
     const uint32_t node[9] = {255};
     for (uint32_t level = 18; level-- > 0;) {
       writer.begin_level(level);
-      writer.sum_words(node);
+      writer.checksum_words(node);
       writer.write_words(0, node);
       writer.end_level(1, 9);
     }

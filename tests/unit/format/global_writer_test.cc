@@ -82,7 +82,7 @@ TEST_F(GlobalWriterTest, OrderAndThreadsDoNotShow) {
   for (size_t i = 0; i < levels.size(); ++i) {
     writer.begin_level(static_cast<uint32_t>(5 - i));
     const std::span<const uint32_t> words = levels[i];
-    writer.sum_words(words);
+    writer.checksum_words(words);
     std::vector<std::thread> threads;
     for (size_t t = 0; t < 3; ++t)
       threads.emplace_back([&, t] {
@@ -140,7 +140,7 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
     const auto levels = level_words(dag);
     for (size_t i = 0; i < levels.size(); ++i) {
       writer.begin_level(static_cast<uint32_t>(2 - i));
-      writer.sum_words(levels[i]);
+      writer.checksum_words(levels[i]);
       writer.write_words(0, levels[i]);
       writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
     }
@@ -175,7 +175,7 @@ TEST_F(GlobalWriterTest, GoesOnAfterAnyLevel) {
   ASSERT_GT(levels[0].size() * sizeof(uint32_t), kBlockBytes);
   const auto write_level = [&](GlobalFileWriter& writer, size_t i) {
     writer.begin_level(static_cast<uint32_t>(5 - i));
-    writer.sum_words(levels[i]);
+    writer.checksum_words(levels[i]);
     writer.write_words(0, levels[i]);
     writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
   };
@@ -205,7 +205,7 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
   const auto write = [&](GlobalFileWriter& writer) {
     for (size_t i = 0; i < levels.size(); ++i) {
       writer.begin_level(static_cast<uint32_t>(3 - i));
-      writer.sum_words(levels[i]);
+      writer.checksum_words(levels[i]);
       writer.write_words(0, levels[i]);
       writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
     }
@@ -261,7 +261,7 @@ TEST_F(GlobalWriterTest, LevelsOutOfTurnAreRefused) {
   EXPECT_THROW(writer.begin_level(1), Error);
   EXPECT_THROW(writer.end_level(0, 0), Error);
   const uint32_t brick[2] = {1, 0};
-  writer.sum_words(brick);
+  writer.checksum_words(brick);
   writer.write_words(0, brick);
   writer.end_level(1, 2);
   EXPECT_THROW(writer.finish(1, 3), Error);

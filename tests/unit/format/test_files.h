@@ -111,7 +111,7 @@ inline GlobalFileSummary write_global(const std::string& path, const oracle::Dag
   const auto levels = level_words(dag);
   for (size_t i = 0; i < levels.size(); ++i, --level) {
     writer.begin_level(level);
-    writer.sum_words(levels[i]);
+    writer.checksum_words(levels[i]);
     writer.write_words(0, levels[i]);
     writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
   }

@@ -114,7 +114,7 @@ TEST(Grid, GivenCube) {
     expect_error(ErrorCode::kInvalidInput, [&] { Grid::given({0, x, 0}, 1, 5); });
 }
 
-// --voxel-size: edge = V R, centred; a scene that fills it or more does not fit.
+// --voxel-size: edge = V R, centered; a scene that fills it or more does not fit.
 TEST(Grid, OfAVoxelSize) {
   const WorldBounds b = bounds({0, 10, 20}, {4, 11, 21});
   const Grid grid = Grid::with_voxel_size(b, 0.5, 4);
@@ -127,7 +127,7 @@ TEST(Grid, OfAVoxelSize) {
     expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, size, 4); });
 }
 
-// Four to 2^20 voxels an edge, powers of two only.
+// Four to 2^20 voxels per edge, powers of two only.
 TEST(Grid, ResolutionsAreLimited) {
   for (uint32_t levels = 2; levels <= 20; ++levels) {
     EXPECT_EQ(levels_of_resolution(uint64_t{1} << levels), levels);

@@ -76,10 +76,10 @@ TEST_F(MergeErrors, ArtifactsOfOtherHashBitsAreCorrupt) {
   merge_fails(ErrorCode::kCorrupt);
 }
 
-TEST_F(MergeErrors, CancelledMergesStop) {
+TEST_F(MergeErrors, CanceledMergesStop) {
   CancelToken cancel;
   cancel.cancel();
-  merge_fails(ErrorCode::kCancelled, {.cancel = &cancel});
+  merge_fails(ErrorCode::kCanceled, {.cancel = &cancel});
 }
 
 // Positions are 32 bits wide: the level that would need more is named.

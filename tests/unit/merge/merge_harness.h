@@ -166,7 +166,7 @@ class MergeHarness {
     uint32_t level = grid_levels_ - 2;
     const auto end_level = [&](size_t nodes) {
       out.begin_level(level--);
-      out.sum_words(words);
+      out.checksum_words(words);
       out.write_words(0, words);
       out.end_level(nodes, words.size());
       below = std::move(offsets);

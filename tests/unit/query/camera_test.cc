@@ -58,8 +58,8 @@ TEST(Camera, SeesAThingWholeAndLarge) {
   for (int i = 0; i < 8; ++i)
     points.push_back({{i & 4 ? 900.0 : 100, i & 2 ? 250.0 : 200, i & 1 ? 500.0 : 0}});
   constexpr int kWidth = 320, kHeight = 180;
-  for (const Vec& towards : {Vec{{0.6, 0.5, 1}}, Vec{{-1, 0.1, 0}}, Vec{{1, 3, 0.2}}}) {
-    const Placement p = see_whole(points, towards, 32, 16.0 / 9);
+  for (const Vec& toward : {Vec{{0.6, 0.5, 1}}, Vec{{-1, 0.1, 0}}, Vec{{1, 3, 0.2}}}) {
+    const Placement p = see_whole(points, toward, 32, 16.0 / 9);
     double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
     for (const Vec& point : points) {
       double x = 0, y = 0;

@@ -99,7 +99,7 @@ TEST(Renderer, ShowsTheBlockInTheMiddle) {
   EXPECT_LT(with.pixel(32, 24)[0], 250);
 }
 
-TEST(Renderer, StopsWhenCancelled) {
+TEST(Renderer, StopsWhenCanceled) {
   const VoxelScene scene = block();
   const DagView dag = scene.view();
   NoProgress progress;

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kFar = 1e30;
 
-Vec towards(const Vec& from, const Vec& to) { return normalized(to - from); }
+Vec toward(const Vec& from, const Vec& to) { return normalized(to - from); }
 
 // A single voxel in a single brick is hit where it lies, on the face that looks at the ray.
 TEST(RayCaster, HitsAVoxelOfABrick) {
@@ -129,7 +129,7 @@ TEST(RayCaster, SeesNoCracksAtHighResolution) {
     }
     if (!(target[1] > 1 && target[2] > 1)) continue;
     Hit hit;
-    ASSERT_TRUE(caster.cast({origin, towards(origin, target)}, {}, 0, kFar, hit)) << "ray " << i;
+    ASSERT_TRUE(caster.cast({origin, toward(origin, target)}, {}, 0, kFar, hit)) << "ray " << i;
     ASSERT_EQ(hit.cell[0], kPlane) << "ray " << i;
     ASSERT_EQ(hit.depth, kLevels);
     ASSERT_NEAR(hit.t, length(target - origin), 1e-5 * edge);

@@ -270,7 +270,7 @@ TEST(GltfWindows, LargerThanTheBudget) {
   std::vector<float> positions(3 * kVertices);
   for (float& p : positions) p = static_cast<float>(random() % 100000);
   std::vector<uint32_t> corners(3 * kTriangles);
-  // Neighbours, with a jump to anywhere now and then.
+  // Neighbors, with a jump to anywhere now and then.
   for (size_t i = 0; i < corners.size(); ++i)
     corners[i] = random() % 50 ? static_cast<uint32_t>(i % kVertices) : random() % kVertices;
   SceneBuilder scene;
@@ -312,8 +312,8 @@ TEST(GltfWindows, TooSmallABudgetIsAnError) {
   }
 }
 
-// Opening and streaming both stop once they are cancelled.
-TEST(GltfWindows, Cancelled) {
+// Opening and streaming both stop once they are canceled.
+TEST(GltfWindows, Canceled) {
   OpenScene open(one_triangle().glb());
   open.cancel.cancel();
   const auto code_of = [](const auto& action) {
@@ -324,10 +324,10 @@ TEST(GltfWindows, Cancelled) {
     }
     return ErrorCode::kInvalidInput;
   };
-  EXPECT_EQ(code_of([&] { open.triangles(); }), ErrorCode::kCancelled);
+  EXPECT_EQ(code_of([&] { open.triangles(); }), ErrorCode::kCanceled);
   EXPECT_EQ(
       code_of([&] { open_scene(open.files, {"folder/scene"}, {}, open.budget, open.cancel); }),
-      ErrorCode::kCancelled);
+      ErrorCode::kCanceled);
 }
 
 // Batches hold 1 to 4096 triangles, gathered across nodes.

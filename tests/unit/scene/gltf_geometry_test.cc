@@ -141,7 +141,7 @@ TEST(GltfGeometry, ManySparseVertices) {
 }
 
 // Normalized integers are divided by the largest of their type in doubles, and the most negative
-// one is -1 like its neighbour; others are taken as they are.
+// one is -1 like its neighbor; others are taken as they are.
 TEST(GltfGeometry, QuantizedPositions) {
   const auto first_corner = [](auto values, int type, bool normalized) {
     SceneBuilder scene;

@@ -91,7 +91,7 @@ TEST(GltfNodes, GpuInstances) {
       {"TRANSLATION", scene.add_accessor<float>("VEC3", kF32, translations)},
       {"ROTATION", scene.add_accessor<int16_t>("VEC4", kI16, rotations, {{"normalized", true}})},
       {"SCALE", scene.add_accessor<float>("VEC3", kF32, scales)},
-      {"_COLOUR", 12345}};
+      {"_COLOR", 12345}};
   scene.add_root({{"mesh", 0},
                   {"scale", {10, 10, 10}},
                   {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", attributes}}}}}});

@@ -123,7 +123,7 @@ TEST_P(EveryKind, AFullDiskLeavesNothing) {
   EXPECT_TRUE(files.files.empty());
 }
 
-TEST_P(EveryKind, CancellingLeavesNothing) {
+TEST_P(EveryKind, CancelingLeavesNothing) {
   MemoryFiles files;
   NoProgress progress;
   CancelToken cancel;

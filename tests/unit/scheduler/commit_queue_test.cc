@@ -100,7 +100,7 @@ class JournalTest : public testing::Test {
   }
   // Writes the next subvolume's artifact and tells the journal.
   void build_one() { build_one(journal_); }
-  void build_one(Journal& journal) {
+  void build_one(CommitQueue& journal) {
     StoredSubvolume built = planned_[next_++];
     const SubDag rows = random_rows(next_, 500, kLevels, 2, kBits);
     ArtifactWriter writer(journal.segment(), kLevels, kBits);
@@ -137,8 +137,8 @@ class JournalTest : public testing::Test {
   MemoryBudget budget_{uint64_t{64} << 20};
   JobStore store_{folder_.file("job.db"), JobStore::Access::kBuild};
   TriangleBins bins_{system_files(), folder_.file("spill"), false, budget_};
-  Journal journal_{store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 0, budget_),
-                   bins_, kNever_s, kGroup};
+  CommitQueue journal_{store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 0, budget_),
+                       bins_, kNever_s, kGroup};
   SegmentWriter& segment_ = journal_.segment();
   std::vector<StoredSubvolume> planned_;
   size_t next_ = 0;
@@ -208,10 +208,10 @@ TEST_F(JournalTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
 
 // One that fails keeps no other from becoming durable.
 TEST_F(JournalTest, OpenJournalsBecomeDurableEachForItself) {
-  OpenJournals open;
+  CommitQueues open;
   for (uint32_t id = 1; id <= 3; ++id) {
     auto segment = std::make_unique<SegmentWriter>(disk_, folder_.path(), id, budget_);
-    auto journal = std::make_unique<Journal>(store_, std::move(segment), bins_, kNever_s);
+    auto journal = std::make_unique<CommitQueue>(store_, std::move(segment), bins_, kNever_s);
     build_one(*journal);
     journal->announce();
     open.add(std::move(journal));

@@ -115,8 +115,8 @@ TEST_P(IngestTest, WhatTakingInThrowsStopsReading) {
   EXPECT_LT(scene_.position(), scene_.declared_triangles());
 }
 
-TEST_P(IngestTest, IsCancelled) {
-  EXPECT_EQ(error_of_ingest([&] { cancel_.cancel(); }).code(), ErrorCode::kCancelled);
+TEST_P(IngestTest, IsCanceled) {
+  EXPECT_EQ(error_of_ingest([&] { cancel_.cancel(); }).code(), ErrorCode::kCanceled);
   EXPECT_EQ(state_.position, Diagonal::kBatch);
 }
 

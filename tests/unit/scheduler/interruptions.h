@@ -13,9 +13,9 @@
 namespace voxdag {
 
 // Cancels once a stage has done so much.
-class CancellingProgress : public NoProgress {
+class CancelingProgress : public NoProgress {
  public:
-  CancellingProgress(CancelToken& cancel, std::string stage, uint64_t after)
+  CancelingProgress(CancelToken& cancel, std::string stage, uint64_t after)
       : cancel_(cancel), stage_(std::move(stage)), left_(after) {}
   void begin_stage(std::string_view stage, uint64_t, std::string_view) override {
     active_ = stage == stage_;
@@ -38,12 +38,12 @@ class CancellingProgress : public NoProgress {
 inline void build_until(const BuildSpec& spec, const std::string& stage, uint64_t after,
                         FileSystem& files = system_files()) {
   CancelToken cancel;
-  CancellingProgress progress(cancel, stage, after);
+  CancelingProgress progress(cancel, stage, after);
   try {
     run_build(spec, {files, progress, cancel});
     FAIL() << "the build was not interrupted";
   } catch (const Error& error) {
-    ASSERT_EQ(error.code(), ErrorCode::kCancelled) << error.what();
+    ASSERT_EQ(error.code(), ErrorCode::kCanceled) << error.what();
   }
   EXPECT_FALSE(std::filesystem::exists(spec.run.output));
 }

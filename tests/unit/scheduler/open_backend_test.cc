@@ -62,7 +62,7 @@ TEST(OpenBackend, AutoTakesTheGpusThatAreRight) {
                   }};
   const BackendChoice choice = choose_automatically(gpus, kPlenty, warnings);
   EXPECT_EQ(choice.name, "cuda");
-  EXPECT_GE(choice.most_workers, 6u);
+  EXPECT_GE(choice.max_workers, 6u);
   EXPECT_EQ(opened, (std::vector<int>{0, 1, 2}));  // each was checked
   opened.clear();
   for (int i = 0; i < 5; ++i) choice.open();

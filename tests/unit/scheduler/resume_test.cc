@@ -253,7 +253,7 @@ TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
 // Told to stop, a build says how to go on.
 TEST_F(ResumeTest, SaysHowToGoOn) {
   CancelToken cancel;
-  CancellingProgress progress(cancel, "build", 5);
+  CancelingProgress progress(cancel, "build", 5);
   try {
     run_build(spec(), {system_files(), progress, cancel});
     FAIL() << "the build was not interrupted";
@@ -272,7 +272,7 @@ TEST_F(ResumeTest, TellsItsStatus) {
   EXPECT_GT(status.subvolumes, status.built);
   ASSERT_TRUE(status.progress.has_value());
   EXPECT_EQ(status.progress->stage, "build");
-  EXPECT_NE(status.progress->last_error.find("cancelled"), std::string::npos);
+  EXPECT_NE(status.progress->last_error.find("canceled"), std::string::npos);
 }
 
 }  // namespace

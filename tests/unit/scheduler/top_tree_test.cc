@@ -15,11 +15,11 @@ constexpr uint32_t kLevels = 11;  // R = 2048
 FixedTriangle triangle_near(std::mt19937_64& random, int64_t size_units) {
   const int64_t grid = int64_t{kUnitsPerVoxel} << kLevels;
   FixedTriangle t;
-  int64_t centre[3];
-  for (int64_t& c : centre) c = static_cast<int64_t>(random() % static_cast<uint64_t>(grid));
+  int64_t center[3];
+  for (int64_t& c : center) c = static_cast<int64_t>(random() % static_cast<uint64_t>(grid));
   for (auto& vertex : t.v)
     for (int a = 0; a < 3; ++a)
-      vertex[a] = (centre[a] + static_cast<int64_t>(random() % static_cast<uint64_t>(size_units)) -
+      vertex[a] = (center[a] + static_cast<int64_t>(random() % static_cast<uint64_t>(size_units)) -
                    size_units / 2) |
                   1;
   return t;

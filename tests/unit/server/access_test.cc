@@ -61,7 +61,7 @@ class GateTest : public testing::Test {
     r.peer = peer;
     return r;
   }
-  int status(Gate& gate, const Request& r, Role role) {
+  int status(AccessControl& gate, const Request& r, Role role) {
     return status_of([&] { gate.admit(r, role); });
   }
   ServerConfig config_;
@@ -70,7 +70,7 @@ class GateTest : public testing::Test {
 
 // A page of another site, or one that calls this machine by its own name, gets nothing done.
 TEST_F(GateTest, WithoutTokensKeepsOtherSitesOut) {
-  Gate gate(config_, system_files());
+  AccessControl gate(config_, system_files());
   EXPECT_EQ(status(gate, request("GET", {{"Host", "localhost:8080"}}), Role::kAdmin), 0);
   EXPECT_EQ(status(gate, request("GET", {{"Host", "[::1]:8080"}}), Role::kRead), 0);
   EXPECT_EQ(status(gate, request("GET", {{"Host", "evil.example"}}), Role::kRead), 403);
@@ -88,7 +88,7 @@ TEST_F(GateTest, WithTokensAsksForOneThatSuffices) {
   const NewToken reader = make_token("read", "r"), admin = make_token("admin", "a");
   write_file_atomically(system_files(), folder_.file("t"), reader.line + "\n" + admin.line);
   config_.token_file = folder_.file("t");
-  Gate gate(config_, system_files());
+  AccessControl gate(config_, system_files());
   const auto with = [&](const std::string& header, Role role) {
     return status(gate, request("GET", {{"Authorization", header}}), role);
   };
@@ -116,7 +116,7 @@ TEST(RateLimiterTest, RefillsWithTime) {
 }
 
 TEST(SlotsTest, AreGivenBack) {
-  Slots slots(1);
+  ConcurrencyLimiter slots(1);
   auto first = slots.take();
   EXPECT_TRUE(first);
   EXPECT_FALSE(slots.take());
@@ -159,7 +159,7 @@ TEST(Configs, AreRefusedByName) {
       {"{\"port\": \"x\"}", "'port'"},
       {"{\"port\": 1e99}", "'port'"},
       {"{\"jobs\": {\"memory\": \"many\"}}", "memory"},
-      {"{\"jobs\": {\"at_a_time\": -1}}", "'at_a_time'"},
+      {"{\"jobs\": {\"max_concurrent\": -1}}", "'max_concurrent'"},
       {"{\"tls\": []}", "'tls'"},
       {"{\"scene_roots\": \"/x\"}", "'scene_roots'"}};
   for (const auto& [text, part] : texts) {

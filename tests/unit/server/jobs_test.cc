@@ -191,12 +191,12 @@ TEST_F(Settlement, ACrashIsNoSecret) {
 
 TEST_F(Settlement, WhatWasStoppedBecomesWhatWasAskedFor) {
   live_.stop();
-  fail("cancelled");
+  fail("canceled");
   settle();
   EXPECT_EQ(job_.state, JobState::kQueued) << "the service stops";
   EXPECT_TRUE(job_.front);
   EXPECT_FALSE(job_.error);
-  job_.state = JobState::kCancelling;
+  job_.state = JobState::kCanceling;
   settle();
   EXPECT_EQ(job_.state, JobState::kCanceled);
   job_.state = JobState::kSuspended;

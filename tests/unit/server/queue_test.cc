@@ -92,7 +92,7 @@ TEST_F(Queue, WaitsUntilAJobMayBeTriedAgain) {
 TEST_F(Queue, RecoversWhatWasRunning) {
   const std::string waiting = post().id, running = post().id, stopping = post().id;
   set_state(running, JobState::kRunning);
-  set_state(stopping, JobState::kCancelling);
+  set_state(stopping, JobState::kCanceling);
   reopen();
   const auto canceled = queue_->recover();
   ASSERT_EQ(canceled.size(), 1u);

@@ -7,14 +7,14 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr uint64_t kLeastSlots = 64;
+constexpr uint64_t kMinSlots = 64;
 constexpr uint64_t kFirstSlots = 4096;
-constexpr uint64_t kMostSlots = uint64_t{1} << 16;  // more would leave the caches
+constexpr uint64_t kMaxSlots = uint64_t{1} << 16;  // more would leave the caches
 
 }  // namespace
 
 BlockMemo::BlockMemo(Memory& memory) : memory_(memory) {
-  set_slots(affordable(kFirstSlots) ? kFirstSlots : kLeastSlots);
+  set_slots(affordable(kFirstSlots) ? kFirstSlots : kMinSlots);
 }
 
 bool BlockMemo::affordable(uint64_t slots) const {
@@ -31,7 +31,7 @@ void BlockMemo::set_slots(uint64_t slots) {
 void BlockMemo::grow() {
   remembered_ = 0;
   const uint64_t old_slots = slots_, slots = 4 * slots_;
-  if (slots > kMostSlots || !affordable(slots)) return;
+  if (slots > kMaxSlots || !affordable(slots)) return;
   const Buffer<Block> blocks = std::move(blocks_);
   const Buffer<Node> nodes = std::move(nodes_);
   set_slots(slots);

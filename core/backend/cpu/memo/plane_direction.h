@@ -33,8 +33,8 @@ class PlaneDirection {
   // n.k for k of a cube of 8, in Morton order: the voxels of a node; times 8 the nodes of a tile.
   const int64_t* offsets() const { return offsets_; }
   // Offsets f at which a plane crosses a node, [least, most]; nothing is crossed at others.
-  int64_t least_offset() const { return values_[0]; }
-  int64_t most_offset() const { return values_[kCorners - 1] - 1; }
+  int64_t min_offset() const { return values_[0]; }
+  int64_t max_offset() const { return values_[kCorners - 1] - 1; }
 
   // The node at an offset within [least, most].
   const Known& node(int64_t f, SubDagTables& tables, const Kernels& kernels) {

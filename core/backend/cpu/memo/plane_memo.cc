@@ -8,10 +8,10 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr int64_t kSmallNormal = 64;    // sum of magnitudes
-constexpr uint64_t kLeastMemos = 1024;  // slots; a power of two
-constexpr uint64_t kSpareMemos = 64;    // more than are made before the next reserve_memo()
-constexpr uint32_t kMostPlanes = 1 << 20;
+constexpr int64_t kSmallNormal = 64;  // sum of magnitudes
+constexpr uint64_t kMinMemos = 1024;  // slots; a power of two
+constexpr uint64_t kSpareMemos = 64;  // more than are made before the next reserve_memo()
+constexpr uint32_t kMaxPlanes = 1 << 20;
 
 // The whole question of small_node(): 24 + 1 + 5 + 28 bits, and one so that no key is 0.
 uint64_t memo_key(const Plane& plane, int64_t f, int size_log2) {
@@ -25,8 +25,8 @@ uint64_t memo_key(const Plane& plane, int64_t f, int size_log2) {
 
 }  // namespace
 
-bool PlaneMemory::build(const TriangleSet& triangles, Entry entry, const Box& cube, int size_log2,
-                        NodeRef& node_out) {
+bool PlaneMemo::build(const TriangleSet& triangles, Entry entry, const Box& cube, int size_log2,
+                      NodeRef& node_out) {
   node_out = {};
   int64_t f;
   if (const auto plane = entry.wide() ? axis_aligned_plane(triangles.wide(entry))
@@ -45,14 +45,14 @@ bool PlaneMemory::build(const TriangleSet& triangles, Entry entry, const Box& cu
   return true;
 }
 
-bool PlaneMemory::remembers(const TriangleSet& triangles, Entry entry) {
+bool PlaneMemo::remembers(const TriangleSet& triangles, Entry entry) {
   if (entry.wide()) return axis_aligned_plane(triangles.wide(entry)).has_value();
   return axis_aligned_plane(triangles.narrow(entry)).has_value() ||
          find(triangles, entry, 0) != nullptr;
 }
 
-const PlaneMemory::Remembered* PlaneMemory::find(const TriangleSet& triangles, Entry entry,
-                                                 uint64_t tiles) {
+const PlaneMemo::Remembered* PlaneMemo::find(const TriangleSet& triangles, Entry entry,
+                                             uint64_t tiles) {
   if (entry.wide()) return nullptr;
   if (known_.size() == 0) {
     if (!affordable(triangles.narrow_count() * sizeof(uint32_t))) return nullptr;
@@ -69,13 +69,13 @@ const PlaneMemory::Remembered* PlaneMemory::find(const TriangleSet& triangles, E
   return known == kNever ? nullptr : &planes_[known - kWorthwhile];
 }
 
-uint32_t PlaneMemory::remember(const Plane& plane) {
+uint32_t PlaneMemo::remember(const Plane& plane) {
   PlaneDirection* direction = nullptr;
   if (plane.rising() - plane.falling() > kSmallNormal) {
     direction = plane.fractional ? direction_of(plane) : nullptr;
     if (direction == nullptr) return kNever;
   }
-  if (plane_count_ == kMostPlanes) return kNever;
+  if (plane_count_ == kMaxPlanes) return kNever;
   if (plane_count_ == planes_.size()) {
     if (!affordable((plane_count_ + 256) * sizeof(Remembered))) return kNever;
     planes_.grow(memory_, plane_count_ + 256);
@@ -84,7 +84,7 @@ uint32_t PlaneMemory::remember(const Plane& plane) {
   return kWorthwhile + plane_count_++;
 }
 
-PlaneDirection* PlaneMemory::direction_of(const Plane& plane) {
+PlaneDirection* PlaneMemo::direction_of(const Plane& plane) {
   for (Buffer<PlaneDirection>& direction : directions_)
     if (direction[0].is_direction_of(plane)) return direction.data();
   if (!affordable((directions_.size() + 1) * sizeof(PlaneDirection))) return nullptr;
@@ -93,11 +93,11 @@ PlaneDirection* PlaneMemory::direction_of(const Plane& plane) {
   return directions_.back().data();
 }
 
-bool PlaneMemory::affordable(uint64_t bytes) const {
+bool PlaneMemo::affordable(uint64_t bytes) const {
   return bytes <= memory_.budget.limit() / 16 && bytes <= memory_.budget.available() / 8;
 }
 
-NodeRef PlaneMemory::node(const Plane& plane, PlaneDirection& direction, int64_t f, int size_log2) {
+NodeRef PlaneMemo::node(const Plane& plane, PlaneDirection& direction, int64_t f, int size_log2) {
   if (size_log2 <= kTileLog2) return tile_node(direction, f, size_log2);
   NodeRef children[8];
   const int64_t half = int64_t{1} << (size_log2 - 1);
@@ -110,11 +110,11 @@ NodeRef PlaneMemory::node(const Plane& plane, PlaneDirection& direction, int64_t
   return tables_.add_node(size_log2, children);
 }
 
-NodeRef PlaneMemory::tile_node(PlaneDirection& direction, int64_t f, int size_log2) {
+NodeRef PlaneMemo::tile_node(PlaneDirection& direction, int64_t f, int size_log2) {
   constexpr int kLog2 = PlaneDirection::kSizeLog2;
   // A node's plane has the offset f and its own corner's, an eighth of which stands in `offsets`.
   const int64_t* offsets = direction.offsets();
-  const int64_t least = direction.least_offset() - f, most = direction.most_offset() - f;
+  const int64_t least = direction.min_offset() - f, most = direction.max_offset() - f;
   uint64_t crossed[8];
   kernels_.find_in_range(offsets, 1 << 3 * (size_log2 - kLog2), (least + (1 << kLog2) - 1) >> kLog2,
                          most >> kLog2, crossed);
@@ -130,7 +130,7 @@ NodeRef PlaneMemory::tile_node(PlaneDirection& direction, int64_t f, int size_lo
   return found;
 }
 
-NodeRef PlaneMemory::small_node(const Plane& plane, int64_t f, int size_log2) {
+NodeRef PlaneMemo::small_node(const Plane& plane, int64_t f, int size_log2) {
   if (!plane.crosses(f, size_log2)) return {};
   if (size_log2 == kBrickLevels)
     return tables_.add_brick(plane_brick(plane.n, f, plane.fractional));
@@ -147,7 +147,7 @@ NodeRef PlaneMemory::small_node(const Plane& plane, int64_t f, int size_log2) {
   return made;
 }
 
-NodeRef PlaneMemory::make_small_node(const Plane& plane, int64_t f, int size_log2) {
+NodeRef PlaneMemo::make_small_node(const Plane& plane, int64_t f, int size_log2) {
   NodeRef children[8];
   const int64_t half = int64_t{1} << (size_log2 - 1);
   for (int c = 0; c < 8; ++c) {
@@ -158,9 +158,9 @@ NodeRef PlaneMemory::make_small_node(const Plane& plane, int64_t f, int size_log
   return tables_.add_node(size_log2, children);
 }
 
-void PlaneMemory::reserve_memo() {
+void PlaneMemo::reserve_memo() {
   if ((memo_count_ + kSpareMemos) * 2 <= memo_slots_) return;
-  const uint64_t slots = memo_slots_ == 0 ? kLeastMemos : 2 * memo_slots_;
+  const uint64_t slots = memo_slots_ == 0 ? kMinMemos : 2 * memo_slots_;
   if (memo_slots_ != 0 && !affordable(slots * sizeof(Memo))) {
     std::fill(memo_.begin(), memo_.end(), Memo{});
     memo_count_ = 0;
@@ -174,7 +174,7 @@ void PlaneMemory::reserve_memo() {
 }
 
 // Where a key is or would be.
-PlaneMemory::Memo& PlaneMemory::memo_slot(uint64_t key) {
+PlaneMemo::Memo& PlaneMemo::memo_slot(uint64_t key) {
   uint64_t at = key * 0x9e3779b97f4a7c15ull >> 20;
   while (true) {
     Memo& memo = memo_[at & (memo_slots_ - 1)];

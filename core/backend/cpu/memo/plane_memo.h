@@ -20,9 +20,9 @@
 
 namespace voxdag::cpu {
 
-class PlaneMemory {
+class PlaneMemo {
  public:
-  PlaneMemory(Memory& memory, SubDagTables& tables, TileReducer& reducer, const Kernels& kernels)
+  PlaneMemo(Memory& memory, SubDagTables& tables, TileReducer& reducer, const Kernels& kernels)
       : memory_(memory), tables_(tables), reducer_(reducer), kernels_(kernels) {}
 
   // The smallest cube that is worth asking for.

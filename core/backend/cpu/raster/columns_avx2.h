@@ -1,4 +1,4 @@
-// Which columns of bricks a triangle may touch: shared by the rasterisers for AVX2 and AVX-512.
+// Which columns of bricks per triangle may touch: shared by the rasterizers for AVX2 and AVX-512.
 //
 // Only included by sources compiled for AVX2; all of it has internal linkage.
 #pragma once

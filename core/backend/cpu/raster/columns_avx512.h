@@ -1,4 +1,4 @@
-// The voxels of a column of bricks in the AVX-512 rasteriser (draw_avx512.cc): bounds of heights by
+// The voxels of a column of bricks in the AVX-512 rasterizer (draw_avx512.cc): bounds of heights by
 // all edges at once, whether they cross the column or not, and the bits of the voxels between the
 // bounds. The reckoning is that of sides_avx2.h and heights_avx2.h, where rounding is argued.
 //
@@ -47,7 +47,7 @@ class Sides512 {
         _mm512_mask_mov_pd(_mm512_div_pd(_mm512_set1_pd(1.0), _mm512_abs_pd(up)),
                            _mm512_cmp_pd_mask(up, zero, _CMP_EQ_OQ), _mm512_set1_pd(0x1p60));
     const __m512d more = _mm512_mask_mov_pd(_mm512_set1_pd(-0x1p-30), falling,
-                                            _mm512_set1_pd(kMostHeight + 1 - 0x1p-30));
+                                            _mm512_set1_pd(kMaxHeight + 1 - 0x1p-30));
     for (int i = 0; i < 3; ++i) {
       const __m512i lanes = _mm512_set_epi64(4 + i, 4 + i, 4 + i, 4 + i, i, i, i, i);
       const auto spread = [lanes](__m512d x) __attribute__((always_inline)) {
@@ -62,7 +62,7 @@ class Sides512 {
                                         (falling >> (4 + i) & 1 ? 0xf0 : 0));
     }
     low_ = t.first_voxel[D] - 1;
-    high_ = kMostHeight - t.last_voxel[D];
+    high_ = kMaxHeight - t.last_voxel[D];
   }
 
   // In the column of bricks (p, q), counted from the floor of `brick`.
@@ -121,7 +121,7 @@ struct VoxelBytes {
       for (int brick = 0; brick < 4; ++brick) {
         const int z = 4 * brick + coordinate(D);
         height[brick][voxel] = static_cast<uint8_t>(z);
-        depth[brick][voxel] = static_cast<uint8_t>(kMostHeight - z);
+        depth[brick][voxel] = static_cast<uint8_t>(kMaxHeight - z);
       }
     }
   }

@@ -1,4 +1,4 @@
-// The rasteriser for AVX2 and BMI2. Bricks are visited in columns along the axis of the normal's
+// The rasterizer for AVX2 and BMI2. Bricks are visited in columns along the axis of the normal's
 // largest component ("height"), where the plane passes a voxel column within a few voxels.
 //
 //   1. Edges bound the columns of bricks in each row. In a column that no edge crosses only the
@@ -154,7 +154,7 @@ class ColumnWalk {
   // The triangle's box as bounds of the heights.
   VOXDAG_INLINE HeightBounds box_bounds(int brick) const {
     const int below = t.first_voxel[D] - 1 - 4 * brick;
-    const int above = kMostHeight - t.last_voxel[D] + 4 * brick;
+    const int above = kMaxHeight - t.last_voxel[D] + 4 * brick;
     return _mm256_unpacklo_epi64(_mm256_set1_epi8(static_cast<int8_t>(below > 0 ? below : 0)),
                                  _mm256_set1_epi8(static_cast<int8_t>(above > 0 ? above : 0)));
   }

@@ -1,4 +1,4 @@
-// The rasteriser for AVX-512: as draw_avx2.cc, but the edges that cross a column of bricks are not
+// The rasterizer for AVX-512: as draw_avx2.cc, but the edges that cross a column of bricks are not
 // sorted out. All are tested, which in vectors of this length costs less than the branches.
 #include "core/backend/cpu/raster/draw_avx512.h"
 

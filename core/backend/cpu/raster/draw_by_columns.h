@@ -1,4 +1,4 @@
-// What the rasterisers for AVX2 and AVX-512 have in common: the axis that columns run along, and
+// What the rasterizers for AVX2 and AVX-512 have in common: the axis that columns run along, and
 // triangles across it. Of its own each has
 //   EdgeColumns<D>   Columns, with for_each_inner(visit), which calls visit(number, inner) for each
 //                    column of bricks that edges cross, `inner` a bit per voxel column inside

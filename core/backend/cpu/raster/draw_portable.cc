@@ -1,4 +1,4 @@
-// The portable rasteriser: brick after brick of the triangle's box, each voxel of a brick tested by
+// The portable rasterizer: brick after brick of the triangle's box, each voxel of a brick tested by
 // the integer tests of tile_triangle.h.
 #include "core/backend/cpu/raster/draw_portable.h"
 

@@ -1,4 +1,4 @@
-// Edge tests of the AVX2 rasteriser (draw_avx2.cc), for columns of bricks and for 16 voxel columns
+// Edge tests of the AVX2 rasterizer (draw_avx2.cc), for columns of bricks and for 16 voxel columns
 // at once.
 //
 // 32 bits suffice for voxel columns: |a|, |b| <= 2^27, so over a brick an edge's value differs by

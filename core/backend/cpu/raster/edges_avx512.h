@@ -1,4 +1,4 @@
-// Edge tests of the AVX-512 rasteriser (draw_avx512.cc), for columns of bricks and for 16 voxel
+// Edge tests of the AVX-512 rasterizer (draw_avx512.cc), for columns of bricks and for 16 voxel
 // columns at once. What edges_avx2.h does for one edge, or one row, after the other is done here
 // for all at once. Values of edges over columns of bricks are whole numbers below 2^53, so exact in
 // doubles, fused or not.

@@ -1,4 +1,4 @@
-// The plane test of the AVX2 rasteriser (draw_avx2.cc): between which heights the plane passes each
+// The plane test of the AVX2 rasterizer (draw_avx2.cc): between which heights the plane passes each
 // of the 16 voxel columns of a column of bricks, and the bits of the voxels between them.
 //
 // Along the axis D of the normal's largest component a column is touched at the heights z with
@@ -42,7 +42,7 @@ struct ByteOrder {
       for (int brick = 0; brick < 4; ++brick) {
         const int z = 4 * brick + coordinate(D);
         height[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(z);
-        depth[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(kMostHeight - z);
+        depth[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(kMaxHeight - z);
       }
     }
   }

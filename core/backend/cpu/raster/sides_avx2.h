@@ -1,4 +1,4 @@
-// The edge tests of the AVX2 rasteriser (draw_avx2.cc) in the two projections that show the height:
+// The edge tests of the AVX2 rasterizer (draw_avx2.cc) in the two projections that show the height:
 // as bounds of the heights in each voxel column, so that they are made once for all bricks of a
 // column of bricks.
 //
@@ -27,7 +27,7 @@ namespace {
 // columns, first `below`, then `over`. Both are 0 where nothing bounds, so bounds are joined by
 // their maximum; 15 and more in `below`, 16 and more in `over` leave nothing.
 using HeightBounds = __m256i;
-constexpr int kMostHeight = 15;
+constexpr int kMaxHeight = 15;
 
 // From the four bounds by q, then four by p, to those of columns: [of p][of over].
 struct SideOrder {
@@ -80,7 +80,7 @@ class Sides {
             _mm256_mul_pd(_mm256_set1_pd(static_cast<double>(-across)), _mm256_setr_pd(0, 1, 2, 3));
         inverse[i] = up == 0 ? 0x1p60 : 1.0 / static_cast<double>(magnitude(up));
         // `below` is ceil(...) - 1 = floor(... - 2^-30); `over` is 15 + ceil(...).
-        more[i] = (up < 0 ? kMostHeight + 1 : 0) - 0x1p-30;
+        more[i] = (up < 0 ? kMaxHeight + 1 : 0) - 0x1p-30;
       }
     }
     VOXDAG_INLINE __m128i bounds(int i, int k, int brick) const {

@@ -1,4 +1,4 @@
-// A triangle as the rasterisers see it: exact integer tests on the voxels of one tile.
+// A triangle as the rasterizers see it: exact integer tests on the voxels of one tile.
 //
 // With vertices v relative to the tile's low corner, n the quarter normal (vertices are odd, so
 // edges are even, and half-edges cross to a quarter of the normal) and k a voxel of the tile:

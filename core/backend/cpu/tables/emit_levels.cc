@@ -1,5 +1,5 @@
 // From tables to level arrays, from the bricks up. Each level in three passes: records get their
-// children's places in the array below (in the order of adding, where neighbours are neighbours),
+// children's places in the array below (in the order of adding, where neighbors are neighbors),
 // slots are sorted, records are copied out in that order and learn their own places.
 #include <algorithm>
 #include <cstring>
@@ -16,17 +16,17 @@ class LevelEmitter {
  public:
   LevelEmitter(SubDagTables& tables, uint32_t grid_levels, uint32_t hash_bits, SubDagSink& sink)
       : tables_(tables), grid_levels_(grid_levels), hash_bits_(hash_bits), sink_(sink) {
-    uint64_t most_nodes = 0, most_children = 0, most_hashes = tables.bricks().size();
+    uint64_t max_nodes = 0, max_children = 0, max_hashes = tables.bricks().size();
     for (int s = kBrickLevels + 1; s <= tables.size_log2(); ++s) {
-      most_nodes = std::max(most_nodes, tables.nodes(s).size());
-      most_children = std::max(most_children, tables.nodes(s).total_children());
+      max_nodes = std::max(max_nodes, tables.nodes(s).size());
+      max_children = std::max(max_children, tables.nodes(s).total_children());
     }
-    most_hashes = std::max(most_hashes, most_nodes);
+    max_hashes = std::max(max_hashes, max_nodes);
     Memory& memory = tables.memory();
     brick_places_ = Buffer<uint32_t>(memory, tables.bricks().size());
-    hashes_ = Buffer<uint64_t>(memory, most_hashes);
-    masks_ = Buffer<uint8_t>(memory, most_nodes);
-    children_ = Buffer<uint32_t>(memory, most_children + 8);
+    hashes_ = Buffer<uint64_t>(memory, max_hashes);
+    masks_ = Buffer<uint8_t>(memory, max_nodes);
+    children_ = Buffer<uint32_t>(memory, max_children + 8);
   }
 
   SubDagSummary run() {

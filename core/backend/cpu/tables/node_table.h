@@ -3,11 +3,11 @@
 //   slots     [tag | id]  [tag | id] ...           8 bytes each; tag: upper half of the node's hash
 //   records   hash (2 words), child mask, children        words of 32 bits; id = word of its start
 //
-// Slots are indexed by the top bits of the hash and probed linearly. So growing is one streaming
-// pass over the tags, and the slots from first to last are almost in the order of the hash: the
-// level array is made by sorting a nearly sorted array (sort_slots()). A record stays where it is,
-// and neighbours in space are neighbours in memory.
-// Not thread-safe. Throws Outgrown when the budget, or 2^32 words, cannot hold more.
+// ConcurrencyLimiter are indexed by the top bits of the hash and probed linearly. So growing is one
+// streaming pass over the tags, and the slots from first to last are almost in the order of the
+// hash: the level array is made by sorting a nearly sorted array (sort_slots()). A record stays
+// where it is, and neighbors in space are neighbors in memory. Not thread-safe. Throws Outgrown
+// when the budget, or 2^32 words, cannot hold more.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,7 @@
 
 namespace voxdag::cpu {
 
-// Slots are at most 5/8 full, and a power of two.
+// ConcurrencyLimiter are at most 5/8 full, and a power of two.
 inline uint64_t entries_for(uint64_t slots) { return slots / 8 * 5; }
 inline uint64_t slots_for(uint64_t entries) {
   uint64_t slots = 512;

@@ -66,7 +66,7 @@ class TileReducer {
   // Children's hashes and ids make way for the parents'.
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
-  static constexpr int kMostBricks = kTileBlocks * kBlockBricks;
+  static constexpr int kMaxBricks = kTileBlocks * kBlockBricks;
   static constexpr int kChildren = 8;  // that can be read wherever those of a node begin
 
   SubDagTables& tables_;
@@ -86,9 +86,9 @@ class TileReducer {
   uint16_t new_blocks_[kTileBlocks];
   uint16_t new_voxels_[kTileBlocks];
   // Bricks of the new blocks.
-  uint64_t bricks_[kMostBricks];
-  uint64_t brick_hashes_[kMostBricks];
-  uint32_t brick_ids_[kMostBricks + kChildren] = {};
+  uint64_t bricks_[kMaxBricks];
+  uint64_t brick_hashes_[kMaxBricks];
+  uint32_t brick_ids_[kMaxBricks + kChildren] = {};
 };
 
 }  // namespace voxdag::cpu

@@ -58,7 +58,7 @@ struct MarkFirstOfHash {
 
 // original index (item) -> sorted index (i) -> compact index (marked[i + 1] - 1): survivors are
 // taken, and all candidates' places in their parents' child lists are rewired.
-struct DropDoubles {
+struct DropDuplicates {
   const uint32_t* marked;
   const uint32_t* items;
   const uint32_t* candidates;
@@ -182,8 +182,8 @@ Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
   out.hashes = Buffer<Space, uint64_t>(space, out.count);
   level.children = Buffer<Space, uint32_t>(space, n);
   space.for_each(
-      n, DropDoubles{marked.data(), order.items(), candidates.data(), candidate_hashes.data(),
-                     out.nodes.data(), out.hashes.data(), level.children.data()});
+      n, DropDuplicates{marked.data(), order.items(), candidates.data(), candidate_hashes.data(),
+                        out.nodes.data(), out.hashes.data(), level.children.data()});
   return out;
 }
 

@@ -1,5 +1,5 @@
 // The tutorial's first DAG construction, bottom-up: the nodes of a level are sorted by their (up to
-// eight) child pointers, equal neighbours become one node, and parents are rewired through
+// eight) child pointers, equal neighbors become one node, and parents are rewired through
 //
 //     original index -> sorted index -> compact index
 //

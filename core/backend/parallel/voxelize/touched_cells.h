@@ -1,7 +1,7 @@
 // Which cells of a block of N x N x N cubes a triangle touches, all at once: the exact test of
 // core/geometry/overlap.h with what the cells have in common computed once.
 //
-// Let `low` be a corner of the lattice of cells, 2^shift units an edge, and k a cell's position on
+// Let `low` be a corner of the lattice of cells, 2^shift units per edge, and k a cell's position on
 // it. Every test asks for the sign of
 //
 //     g . k * 2^shift + c     for an integer vector g;   2^shift i + c >= 0  <=>  i + floor(c /

@@ -10,7 +10,7 @@ namespace {
 
 // Vertices are addressed by 32-bit indices, so more in one primitive are of no use; this also
 // bounds what an accessor without bytes (all zeros) can claim.
-constexpr uint64_t kMostElements = uint64_t{1} << 32;
+constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 
 // `count` elements of `bytes` each, from `offset` of a view on.
 struct Extent {
@@ -98,7 +98,7 @@ void check_accessor(Document& d, int index, const AccessorUse& use) {
   const Accessor& accessor = d.accessors[static_cast<size_t>(index)];
   const std::string where = use.where + ": " + d.name_accessor(index);
   check_type(d, accessor, use, where);
-  if (accessor.count > kMostElements)
+  if (accessor.count > kMaxElements)
     throw Error(ErrorCode::kLimit, d.path + ": " + where + " has " +
                                        std::to_string(accessor.count) +
                                        " elements, the limit is 2^32");

@@ -8,7 +8,7 @@ namespace voxdag::gltf {
 namespace {
 
 constexpr size_t kLongestName = 64;
-constexpr size_t kMostWarnings = 20;
+constexpr size_t kMaxWarnings = 20;
 
 template <class T>
 std::string name_of(const char* kind, const std::vector<T>& all, int index) {
@@ -41,7 +41,7 @@ void refuse(const std::string& path, const std::string& what) {
 }
 
 void Document::warn(const std::string& what) {
-  if (warnings.size() < kMostWarnings)
+  if (warnings.size() < kMaxWarnings)
     warnings.push_back(path + ": " + what);
   else
     ++further_warnings;

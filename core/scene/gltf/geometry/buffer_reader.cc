@@ -10,9 +10,9 @@
 namespace voxdag::gltf {
 namespace {
 
-constexpr size_t kMostOpenFiles = 16;
+constexpr size_t kMaxOpenFiles = 16;
 // A window that begins inside a group of three bytes and ends inside another.
-constexpr size_t kMostGroups = BufferReader::kWindowBytes / 3 + 2;
+constexpr size_t kMaxGroups = BufferReader::kWindowBytes / 3 + 2;
 
 // Base64 characters [begin, begin + out.size()) of a buffer.
 void read_characters(const ReadableFile& scene_file, const Buffer& buffer, uint64_t begin,
@@ -36,7 +36,7 @@ BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
       scene_file_(scene_file),
       document_(document),
       budget_(budget),
-      window_(budget, 3 * kMostGroups, "the window over " + scene_file.path()) {
+      window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()) {
   for (size_t i = 0; i < document.buffers.size(); ++i)
     if (document.buffers[i].is_read) check_length(static_cast<int>(i));
 }
@@ -88,7 +88,7 @@ const ReadableFile& BufferReader::external(int index) {
   const std::string where = document_.path + ": buffer " + std::to_string(index);
   const std::string& uri = document_.buffers[static_cast<size_t>(index)].uri;
   const std::string path = resolve_uri(document_.path, uri, where);
-  if (open_.size() == kMostOpenFiles) open_.erase(open_.begin());
+  if (open_.size() == kMaxOpenFiles) open_.erase(open_.begin());
   try {
     open_.push_back({index, files_.open_read(path)});
   } catch (const Error& e) {
@@ -102,7 +102,7 @@ const ReadableFile& BufferReader::external(int index) {
 
 std::span<const std::byte> BufferReader::decode_base64(int index, uint64_t offset, size_t size) {
   if (characters_.size() == 0)
-    characters_ = PageBuffer<std::byte>(budget_, 4 * kMostGroups, "base64 of " + document_.path);
+    characters_ = PageBuffer<std::byte>(budget_, 4 * kMaxGroups, "base64 of " + document_.path);
   const Buffer& buffer = document_.buffers[static_cast<size_t>(index)];
   const uint64_t first_group = offset / 3;
   const uint64_t group_count = (offset + size + 2) / 3 - first_group;
