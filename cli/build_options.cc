@@ -1,6 +1,5 @@
 #include "cli/build_options.h"
 
-#include <charconv>
 #include <sstream>
 
 #include "core/base/error.h"
@@ -13,18 +12,11 @@ constexpr uint64_t kLargestConfig = uint64_t{1} << 20;
 constexpr const char* kRunGroup = "Run (never changes the result)";
 
 std::array<double, 4> parse_bounds(const std::string& text) {
-  std::array<double, 4> numbers{};
-  const char* at = text.data();
-  const char* const end = text.data() + text.size();
-  for (size_t i = 0; i < 4; ++i) {
-    const auto [rest, failure] = std::from_chars(at, end, numbers[i]);
-    const bool last = i == 3;
-    if (failure != std::errc{} || (last ? rest != end : rest == end || *rest != ','))
-      throw Error(ErrorCode::kInvalidInput,
-                  "--bounds '" + text + "': expected four numbers X,Y,Z,EDGE");
-    at = rest + 1;
-  }
-  return numbers;
+  const auto numbers = parse_numbers<double, 4>(text, ',');
+  if (!numbers)
+    throw Error(ErrorCode::kInvalidInput,
+                "--bounds '" + text + "': expected four numbers X,Y,Z,EDGE");
+  return *numbers;
 }
 
 // Options from a TOML or INI file, for those that the command line does not give. CLI11 reads such

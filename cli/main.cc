@@ -1,5 +1,3 @@
-#include <malloc.h>
-
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -75,10 +73,6 @@ int run(int argc, char** argv) {
 }  // namespace voxdag::cli
 
 int main(int argc, char** argv) {
-  // Freed memory goes back to the system at once: resident memory is a promise (--memory).
-  mallopt(M_MMAP_THRESHOLD, 256 << 10);
-  mallopt(M_TRIM_THRESHOLD, 1 << 20);
-  mallopt(M_ARENA_MAX, 2);
   voxdag::cli::catch_signals();
   return voxdag::cli::run(argc, argv);
 }

@@ -1,5 +1,4 @@
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -35,17 +34,9 @@ struct RenderCommand {
 template <class Number, size_t kCount>
 std::array<Number, kCount> parse_list(const std::string& text, char separator,
                                       const std::string& expected) {
-  std::array<Number, kCount> numbers{};
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (size_t i = 0; i < kCount; ++i) {
-    const auto [stop, error] = std::from_chars(at, end, numbers[i]);
-    const bool last = i + 1 == kCount;
-    if (error != std::errc() || (last ? stop != end : stop == end || *stop != separator))
-      throw Error(ErrorCode::kInvalidInput, "\"" + text + "\": expected " + expected);
-    at = stop + (last ? 0 : 1);
-  }
-  return numbers;
+  const auto numbers = parse_numbers<Number, kCount>(text, separator);
+  if (!numbers) throw Error(ErrorCode::kInvalidInput, "\"" + text + "\": expected " + expected);
+  return *numbers;
 }
 
 // From world space to voxel units.

@@ -8,6 +8,7 @@
 
 #include "cli/command.h"
 #include "cli/terminal/progress_bar.h"
+#include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
 #include "query/surface_sample.h"
@@ -34,6 +35,7 @@ Grid grid_of(const voxdag_reader::File& file) {
 
 SampleReport check_against(const VerifyCommand& command, const voxdag_reader::File& file,
                            Progress& progress, CommandContext& context) {
+  return_freed_memory_to_system();
   MemoryBudget budget(kSceneMemory);
   const auto scene =
       open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);

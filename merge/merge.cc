@@ -2,7 +2,7 @@
 
 #include "merge/load/scratch.h"
 #include "merge/merger.h"
-#include "merge/plan/memory_plan.h"
+#include "merge/plan/merge_memory.h"
 
 namespace voxdag {
 
@@ -13,7 +13,7 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
   if (inputs.artifacts.empty()) return report;
   MergeScratch scratch(files, inputs.scratch_folder);
   MergeProgress rows_swept(progress);
-  const MergeContext context{scratch,    budget, MemoryPlan::divide(budget.available(), threads),
+  const MergeContext context{scratch,    budget, MergeMemory::divide(budget.available(), threads),
                              rows_swept, cancel, report};
   Merger(inputs, context, checkpoint).run(out);
   report.scratch_bytes += scratch.bytes_written();

@@ -8,22 +8,14 @@
 // Immutable; any number of threads may read.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "core/base/popcount8.h"
 #include "core/format/global/voxdag_reader.h"
 
 namespace voxdag::query {
-
-// Bits set in a byte: without a processor option std::popcount is a call.
-inline constexpr auto kBitCount = [] {
-  std::array<uint8_t, 256> counts{};
-  for (size_t i = 1; i < counts.size(); ++i)
-    counts[i] = static_cast<uint8_t>(counts[i / 2] + i % 2);
-  return counts;
-}();
 
 class DagView {
  public:
@@ -53,7 +45,7 @@ class DagView {
   uint64_t content(uint32_t depth, const Children& children, int index) const {
     if (depth + kBrickLevels < grid_levels_) {
       const uint32_t before = children.mask & ((1u << index) - 1);
-      const uint32_t offset = children.offsets_[kBitCount[before]];
+      const uint32_t offset = children.offsets_[kPopcount8[before]];
       return depth + kBrickLevels + 1 == grid_levels_ ? brick(offset) : offset;
     }
     return depth + kBrickLevels == grid_levels_ ? children.bits_ >> (8 * index) & 255 : 1;
@@ -76,7 +68,7 @@ inline DagView::Children DagView::children(uint32_t depth, uint64_t content) con
     if (content >= words.size()) corrupt(depth, content);
     c.mask = words[content];
     c.offsets_ = words.data() + content + 1;
-    if (c.mask == 0 || c.mask > 255 || kBitCount[c.mask] >= words.size() - content)
+    if (c.mask == 0 || c.mask > 255 || kPopcount8[c.mask] >= words.size() - content)
       corrupt(depth, content);
     return c;
   }

@@ -138,7 +138,7 @@ bool MergeStage::heal(const Error& error) {
     if (++warnings <= kMaxWarnings)
       context_.progress.warn("subvolume " + std::to_string(d.subvolume.id) +
                              " is built again: " + d.what);
-    store_.record_lost(d.subvolume);
+    store_.mark_for_rebuild(d.subvolume);
   }
   if (warnings > kMaxWarnings)
     context_.progress.warn("... and so are " + std::to_string(warnings - kMaxWarnings) + " more");

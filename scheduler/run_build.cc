@@ -14,6 +14,7 @@
 #include "scheduler/job/job_progress.h"
 #include "scheduler/job/output_lock.h"
 #include "scheduler/job/work_folder.h"
+#include "scheduler/memory_plan.h"
 #include "scheduler/merge_stage.h"
 #include "scheduler/plan/estimate.h"
 #include "scheduler/plan/prepare.h"
@@ -251,8 +252,8 @@ class Build {
   }
 
   void build_subvolumes_of(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
-    std::vector<QueuedSubvolume> queue =
-        partition_triangles(planned, scene, keeper_, budget_.limit() / 8, context_.cancel);
+    std::vector<QueuedSubvolume> queue = partition_triangles(
+        planned, scene, keeper_, memory_.partition_buffer_bytes, context_.cancel);
     const MemoryCharge lists(budget_, queue.size() * (sizeof queue[0] + sizeof planned[0]),
                              "lists of subvolumes");
     clock_.finish("distribute");
@@ -298,6 +299,7 @@ class Build {
 
   const BuildSpec spec_;
   MemoryBudget budget_;
+  const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
   const OutputLock output_;
   WorkFolder work_;
   std::optional<ArtifactCache> cache_;
@@ -336,6 +338,7 @@ BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
   if (spec.run.output.empty())
     throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
   check_output(context.files, spec.run.output);
+  return_freed_memory_to_system();
   return Build(spec, context).run();
 }
 

@@ -2,8 +2,12 @@
 
 #include <sys/random.h>
 
+#include <array>
+#include <bit>
 #include <cstdint>
 #include <random>
+
+#include "core/base/text.h"
 
 namespace voxdag::server {
 
@@ -13,12 +17,7 @@ std::string random_id() {
     std::random_device device;
     bits = (uint64_t{device()} << 32) | device();
   }
-  std::string text(16, '0');
-  for (char& digit : text) {
-    digit = "0123456789abcdef"[bits & 15];
-    bits >>= 4;
-  }
-  return text;
+  return hex_text(std::bit_cast<std::array<unsigned char, sizeof bits>>(bits));
 }
 
 }  // namespace voxdag::server

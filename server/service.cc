@@ -7,6 +7,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 #include "server/api/access/access_control.h"
 #include "server/api/context.h"
 #include "server/api/problem.h"
@@ -155,7 +156,10 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
 Service::~Service() = default;
 int Service::port() const { return parts_->port(); }
 std::string Service::url() const { return parts_->url(); }
-void Service::run() { parts_->run(); }
+void Service::run() {
+  return_freed_memory_to_system();
+  parts_->run();
+}
 void Service::stop() { parts_->stop(); }
 
 }  // namespace voxdag::server

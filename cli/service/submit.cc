@@ -7,6 +7,7 @@
 #include "cli/service/follow.h"
 #include "cli/service/job_text.h"
 #include "cli/service/upload.h"
+#include "core/base/text.h"
 
 namespace voxdag::cli {
 namespace {
@@ -50,13 +51,7 @@ std::string random_key() {
   unsigned char bytes[16];
   if (getrandom(bytes, sizeof bytes, 0) != sizeof bytes)
     throw Error(ErrorCode::kIo, "getrandom: no random bytes");
-  std::string key;
-  for (const unsigned char byte : bytes) {
-    char digits[3];
-    std::snprintf(digits, sizeof digits, "%02x", byte);
-    key += digits;
-  }
-  return key;
+  return hex_text(bytes);
 }
 
 void run(const SubmitCommand& command, Server& server) {

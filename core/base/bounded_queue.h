@@ -1,5 +1,5 @@
-// Two halves of a piece of work on two threads: one makes items, the other takes them. They go
-// through a few slots, which are used again and again, as is the memory that items hold.
+// A bounded queue of one producer and one consumer, and a loop that runs both on two threads. Items
+// go through a fixed ring of slots, so the memory that an item owns is reused.
 #pragma once
 
 #include <array>
@@ -12,37 +12,38 @@
 
 namespace voxdag {
 
-template <class Item, size_t kSlots>
+template <class Item, size_t kCapacity>
 class BoundedQueue {
  public:
-  // The writer's: the next slot to fill, once one is free, with what was in it before. Null if the
-  // reader gave up.
+  // For the producer: waits for a free slot, which still has its earlier contents. Null once stop()
+  // was called.
   Item* free_slot() {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return gave_up_ || pushed_ - popped_ < kSlots; });
-    return gave_up_ ? nullptr : &slots_[pushed_ % kSlots];
+    changed_.wait(lock, [&] { return stopped_ || pushed_ - popped_ < kCapacity; });
+    return stopped_ ? nullptr : &slots_[pushed_ % kCapacity];
   }
-  // Hands the slot over.
+  // Appends the slot of free_slot() to the queue.
   void push() {
     change([&] { ++pushed_; });
   }
-  // Nothing more comes.
+  // The producer has pushed its last item.
   void end() {
     change([&] { ended_ = true; });
   }
 
-  // The reader's: the next item, once there is one. Null after the last.
+  // For the consumer: waits for the next item. Null after the last.
   Item* front() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return ended_ || popped_ < pushed_; });
-    return popped_ < pushed_ ? &slots_[popped_ % kSlots] : nullptr;
+    return popped_ < pushed_ ? &slots_[popped_ % kCapacity] : nullptr;
   }
-  // The item is no longer needed.
+  // Frees the slot of the item of front().
   void pop() {
     change([&] { ++popped_; });
   }
-  void give_up() {
-    change([&] { gave_up_ = true; });
+  // The consumer takes no more items.
+  void stop() {
+    change([&] { stopped_ = true; });
   }
 
  private:
@@ -55,58 +56,61 @@ class BoundedQueue {
     changed_.notify_all();
   }
 
-  std::array<Item, kSlots> slots_;
+  std::array<Item, kCapacity> slots_;
   std::mutex mutex_;
   std::condition_variable changed_;
   size_t pushed_ = 0, popped_ = 0;
-  bool ended_ = false, gave_up_ = false;
+  bool ended_ = false, stopped_ = false;
 };
 
-// Calls make(pass) on this thread, which calls pass(fill) for every item, which calls fill(item),
-// the item as it was left when it was last used; and take(item) for each, in order, on another
-// thread, or on this one if there may be one only or the system has no other. After an exception of
-// take() the next pass() does not return. Throws what take() threw, or else what make() did.
-template <class Item, size_t kSlots, class Make, class Take>
-void run_producer_consumer(unsigned threads, Make make, Take take) {
-  struct GaveUp {};
-  BoundedQueue<Item, kSlots> ring;
-  std::exception_ptr of_make, of_take;
-  std::thread taker;
-  const auto take_all = [&] {
+// Runs produce(pass) on this thread and consume(item) on another, or both on this one if `threads`
+// is 1 or the system has no other thread. For every item produce() calls pass(fill), which calls
+// fill(item) with an item in the state of its last use; consume() gets the items in that order.
+// Once consume() has thrown, the next pass() does not return. Throws what consume() threw, or else
+// what produce() threw.
+template <class Item, size_t kCapacity, class Produce, class Consume>
+void run_producer_consumer(unsigned threads, Produce produce, Consume consume) {
+  struct Stopped {};
+  BoundedQueue<Item, kCapacity> queue;
+  std::exception_ptr produce_failure, consume_failure;
+  std::thread consumer;
+  const auto consume_all = [&] {
     try {
-      for (; const Item* item = ring.front(); ring.pop()) take(*item);
+      for (; const Item* item = queue.front(); queue.pop()) consume(*item);
     } catch (...) {
-      of_take = std::current_exception();
-      ring.give_up();
+      consume_failure = std::current_exception();
+      queue.stop();
     }
   };
   try {
-    if (threads > 1) taker = std::thread(take_all);
-  } catch (const std::system_error&) {  // as if one were asked for
+    if (threads > 1) consumer = std::thread(consume_all);
+  } catch (const std::system_error&) {
+    // One thread does both.
   }
-  if (!taker.joinable()) {
+  if (!consumer.joinable()) {
     Item item;
-    make([&](auto fill) {
+    produce([&](auto fill) {
       fill(item);
-      take(item);
+      consume(item);
     });
     return;
   }
   try {
-    make([&](auto fill) {
-      Item* const slot = ring.free_slot();
-      if (!slot) throw GaveUp{};
+    produce([&](auto fill) {
+      Item* const slot = queue.free_slot();
+      if (!slot) throw Stopped{};
       fill(*slot);
-      ring.push();
+      queue.push();
     });
-  } catch (const GaveUp&) {
+  } catch (const Stopped&) {
+    // consume_failure says why.
   } catch (...) {
-    of_make = std::current_exception();
+    produce_failure = std::current_exception();
   }
-  ring.end();
-  taker.join();
-  if (of_take) std::rethrow_exception(of_take);
-  if (of_make) std::rethrow_exception(of_make);
+  queue.end();
+  consumer.join();
+  if (consume_failure) std::rethrow_exception(consume_failure);
+  if (produce_failure) std::rethrow_exception(produce_failure);
 }
 
 }  // namespace voxdag

@@ -1,5 +1,5 @@
-// Asks long work to stop. Set from a signal handler or another thread; looked at by the work at
-// least every few milliseconds.
+// A request to stop long work, made by a signal handler or another thread. The work checks it
+// every few milliseconds. Thread-safe.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,5 @@
 // VOXDAG_HD marks a function that runs on the host and, in CUDA sources, on the device too.
-// Only this file and core/backend/ ask which compiler is at work.
+// Only this file and core/backend/ test which compiler is used.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// 128-bit integers (both g++, clang and nvcc have them) and the one
-// operation on them that the node hash needs.
+// 128-bit integers, which g++, clang and nvcc have, and the one operation on them that the node
+// hash needs.
 #pragma once
 
 #include <cstdint>

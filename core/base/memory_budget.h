@@ -1,9 +1,9 @@
-// The memory promise, kept by bookkeeping: every large buffer is charged here before it is
-// allocated, and what does not fit is spilled, split or refused by whoever asked.
+// Accounts for large buffers, so that a build stays within --memory: each is charged here before it
+// is allocated, and its owner spills, splits or refuses what does not fit.
 //
 // Invariants:
 //   1. used() <= limit() at any time.
-//   2. A budget may be a share of a parent's: what it charges, the parent is charged too.
+//   2. A budget may be a share of a parent: every charge is charged to the parent too.
 // Thread-safe.
 #pragma once
 
@@ -39,7 +39,7 @@ class MemoryBudget {
   std::atomic<uint64_t> peak_{0};
 };
 
-// A charge that is given back when it goes out of scope.
+// A charge that is released when it goes out of scope.
 class MemoryCharge {
  public:
   MemoryCharge() = default;

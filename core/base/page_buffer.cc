@@ -15,8 +15,8 @@ void* check_pages(void* pages, size_t bytes, std::string_view what) {
     throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " +
                                              std::to_string(bytes) + " bytes for " +
                                              std::string(what));
-  // Random access to tables of this size waits for page tables otherwise. A huge page never reaches
-  // beyond the pages that were asked for, so no more becomes resident than is charged.
+  // Huge pages spare random access to large tables most address translations. None reaches beyond
+  // the mapping, so no more becomes resident than is charged.
   if (bytes >= (size_t{2} << 20)) madvise(pages, bytes, MADV_HUGEPAGE);
   return pages;
 }

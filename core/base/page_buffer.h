@@ -1,6 +1,6 @@
-// A large array straight from the system: zero-filled pages, given back at once when released,
-// huge pages asked for where that helps. The general allocator keeps freed memory, which would
-// break the memory promise; tables and level arrays live here instead. Not thread-safe.
+// A large array of zero-filled pages straight from the system, in huge pages where that helps. They
+// return to the system as soon as they are freed, which the general allocator does not promise;
+// tables and level arrays therefore live here. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -17,13 +17,14 @@ namespace voxdag {
 
 // Throws Error{kOutOfMemory} naming `what` when the system has no pages left.
 void* allocate_pages(size_t bytes, std::string_view what);
-// Moves pages, if need be, to where more zero-filled ones follow them; their bytes are not copied.
+// Appends zero-filled pages, moving all of them to other addresses where necessary; no bytes are
+// copied.
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what);
 void free_pages(void* pages, size_t bytes);
 
 template <class T>
 class PageBuffer {
-  static_assert(std::is_trivially_copyable_v<T>, "pages are handed out zero-filled");
+  static_assert(std::is_trivially_copyable_v<T>, "the pages are zero-filled");
 
  public:
   PageBuffer() = default;
@@ -49,8 +50,8 @@ class PageBuffer {
     if (data_) free_pages(data_, size_ * sizeof(T));
   }
 
-  // Grows a buffer that is not empty, contents kept, new elements zero. Throws Error{kOutOfMemory}
-  // naming `what`, and is unchanged, if it does not fit.
+  // Makes a buffer that is not empty larger; the new elements are zero. Throws Error{kOutOfMemory}
+  // naming `what` if it does not fit; the buffer is then unchanged.
   void grow(size_t size, std::string_view what) {
     const uint64_t old_bytes = charge_.bytes();
     if (!charge_.try_resize(byte_count(size)))
@@ -73,7 +74,7 @@ class PageBuffer {
   T* end() { return data_ + size_; }
 
  private:
-  // Where 64 bits do not hold it: more than there ever is.
+  // UINT64_MAX, which never fits, if the product overflows.
   static uint64_t byte_count(size_t size) {
     return size <= SIZE_MAX / sizeof(T) ? size * sizeof(T) : UINT64_MAX;
   }

@@ -1,4 +1,4 @@
-// A loop whose items are handed out to threads one by one, in order.
+// A loop over items on several threads; each thread takes the next item when it is done with one.
 #pragma once
 
 #include <atomic>
@@ -12,8 +12,8 @@
 namespace voxdag {
 
 // Calls body(worker, item) for every item below `count`, on up to `workers` threads, the caller's
-// among them; `worker` tells the threads apart. After an exception no further items are handed out,
-// and once all threads have stopped the first exception is thrown again.
+// among them; `worker` is the number of the thread, from 0. After an exception no further item is
+// started; the first exception is rethrown once all threads have stopped.
 template <class Body>
 void parallel_for(unsigned workers, size_t count, Body&& body) {
   std::atomic<size_t> next{0};
@@ -34,7 +34,7 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
     for (unsigned worker = 1; worker < workers && worker < count; ++worker)
       threads.emplace_back(work, worker);
   } catch (const std::system_error&) {
-    // The system gives no more threads: those that there are, this one at least, do all the work.
+    // The system has no more threads: those that were started, and this one, do all the work.
   }
   work(0);
   for (std::thread& thread : threads) thread.join();

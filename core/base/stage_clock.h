@@ -1,4 +1,4 @@
-// Times the stages of a build as they follow one another.
+// Measures the stages of a build, which follow one another. Not thread-safe.
 #pragma once
 
 #include <functional>
@@ -18,11 +18,11 @@ struct StageTime {
 
 class StageClock {
  public:
-  // `on_finish`, if there is one, hears of every stage that ended.
+  // `on_finish`, if there is one, is called with every stage that ended.
   explicit StageClock(std::function<void(const StageTime&)> on_finish = {})
       : on_finish_(std::move(on_finish)) {}
 
-  // The time since the last stage ended was that of `name`.
+  // Ends stage `name`, which began when the one before it ended.
   void finish(const std::string& name) {
     const double wall = wall_seconds(), cpu = process_cpu_seconds();
     stages_.push_back({name, wall - wall_, cpu - cpu_});

@@ -1,6 +1,5 @@
 #include "core/base/text.h"
 
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 
@@ -19,6 +18,14 @@ int unit_shift(std::string unit) {
   if (unit.size() != 1) return -1;
   const size_t at = std::string("KMGTP").find(static_cast<char>(std::toupper(unit[0])));
   return at == std::string::npos ? -1 : 10 * static_cast<int>(at + 1);
+}
+
+// The value of a hexadecimal digit, or -1.
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
 }
 
 }  // namespace
@@ -65,6 +72,32 @@ std::string duration_text(double seconds) {
   else
     std::snprintf(text, sizeof text, "%.1f s", seconds);
   return text;
+}
+
+std::string hex_text(std::span<const unsigned char> bytes) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (const unsigned char byte : bytes) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 15];
+  }
+  return text;
+}
+
+std::optional<std::string> percent_decoded(std::string_view text) {
+  std::string bytes;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '%') {
+      bytes += text[i];
+      continue;
+    }
+    const int high = i + 2 < text.size() ? hex_digit(text[i + 1]) : -1;
+    const int low = high >= 0 ? hex_digit(text[i + 2]) : -1;
+    if (low < 0) return std::nullopt;
+    bytes += static_cast<char>(high * 16 + low);
+    i += 2;
+  }
+  return bytes;
 }
 
 }  // namespace voxdag

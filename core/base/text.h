@@ -1,12 +1,21 @@
-// Sizes as people write them: "512MiB", "8GiB", "64M" (binary), "1000000".
+// Text from and for people and protocols: sizes, counts, durations, lists of numbers, hexadecimal
+// and percent-encoded bytes. Pure functions.
 #pragma once
 
+#include <array>
+#include <charconv>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <system_error>
 
 namespace voxdag {
 
-// Throws Error{kInvalidInput} naming `option` unless the text is a number with an optional unit.
+// Bytes of a size as people write it: "512MiB", "8GiB", "64M" (binary), "1000000". Throws
+// Error{kInvalidInput} naming `option` unless the text is a number with an optional unit.
 uint64_t parse_size(const std::string& text, const std::string& option);
 // "1.25 GiB"
 std::string size_text(uint64_t bytes);
@@ -14,5 +23,26 @@ std::string size_text(uint64_t bytes);
 std::string count_text(uint64_t count);
 // "1 m 04 s", "12.3 s"
 std::string duration_text(double seconds);
+
+// Two lower-case hexadecimal digits per byte.
+std::string hex_text(std::span<const unsigned char> bytes);
+// The bytes that a percent-encoded text stands for (RFC 3986); nothing if an escape is broken.
+std::optional<std::string> percent_decoded(std::string_view text);
+
+// All of `text` as kCount numbers with `separator` between them; nothing if it is anything else.
+template <class Number, size_t kCount>
+std::optional<std::array<Number, kCount>> parse_numbers(std::string_view text, char separator) {
+  std::array<Number, kCount> numbers{};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (size_t i = 0; i < kCount; ++i) {
+    if (i > 0 && (at == end || *at++ != separator)) return std::nullopt;
+    const auto [stop, failure] = std::from_chars(at, end, numbers[i]);
+    if (failure != std::errc{}) return std::nullopt;
+    at = stop;
+  }
+  if (at != end) return std::nullopt;
+  return numbers;
+}
 
 }  // namespace voxdag

@@ -30,7 +30,7 @@ namespace {
   const int reason = database ? sqlite3_system_errno(database) : 0;
   if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT)) code = ErrorCode::kNoSpace;
   const char* path = database ? sqlite3_db_filename(database, "main") : nullptr;
-  throw Error(code, std::string("job store ") + (path ? path : "") + ": " +
+  throw Error(code, std::string("database ") + (path ? path : "") + ": " +
                         (database ? sqlite3_errmsg(database) : sqlite3_errstr(result)));
 }
 
@@ -90,6 +90,10 @@ void SqlStatement::run() {
 
 void SqlStatement::reset() { sqlite3_reset(statement_.get()); }
 
+bool SqlStatement::is_null(int column) const {
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+}
+
 int64_t SqlStatement::integer(int column) const {
   return sqlite3_column_int64(statement_.get(), column);
 }
@@ -129,7 +133,7 @@ void SqlDatabase::execute(const std::string& sql) {
 
 int64_t SqlDatabase::integer(const std::string& sql) {
   SqlStatement statement = prepare(sql);
-  if (!statement.step()) throw Error(ErrorCode::kCorrupt, "job store: no answer to " + sql);
+  if (!statement.step()) throw Error(ErrorCode::kCorrupt, "database: no answer to " + sql);
   return statement.integer(0);
 }
 

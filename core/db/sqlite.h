@@ -1,5 +1,6 @@
-// The little of SQLite that the job store needs: a connection that cleans up, statements that bind
-// and step, and errors as voxdag::Error. sqlite3.h is included in sqlite.cc alone.
+// The little of SQLite that is needed here: a connection that closes itself, statements that bind
+// and step, and errors as voxdag::Error. row.h reads and writes whole rows. Not thread-safe: one
+// thread at a time may use a connection and its statements. Only sqlite.cc includes sqlite3.h.
 #pragma once
 
 #include <cstddef>
@@ -32,10 +33,11 @@ class SqlStatement {
 
   // True if there is a row to read.
   bool step();
-  // Steps a statement that gives no rows, and makes it ready to be bound again.
+  // Runs a statement that has no rows, after which it can be bound again.
   void run();
   void reset();
 
+  bool is_null(int column) const;
   int64_t integer(int column) const;
   uint64_t word(int column) const { return static_cast<uint64_t>(integer(column)); }
   double real(int column) const;
@@ -53,12 +55,13 @@ class SqlStatement {
 class SqlDatabase {
  public:
   enum class Mode { kReadWrite, kReadOnly };
-  // Opens (and for kReadWrite creates) a database. Waits up to `busy_ms` for other processes.
+  // Opens (and for kReadWrite creates) a database. Its statements wait up to `busy_ms` for other
+  // processes.
   SqlDatabase(const std::string& path, Mode mode, int busy_ms = 5000);
 
   void execute(const std::string& sql);
   SqlStatement prepare(std::string_view sql) { return SqlStatement(handle_.get(), sql); }
-  // The single integer that a query gives.
+  // The single integer that a query answers.
   int64_t integer(const std::string& sql);
 
  private:
@@ -68,10 +71,10 @@ class SqlDatabase {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
-// kLater is for what may be lost in a power cut: it becomes durable with the next kNow, in order.
+// What is committed with kLater may be lost in a power cut until the next commit with kNow.
 enum class Durable { kNow, kLater };
 
-// Commits when told to, rolls back otherwise.
+// Rolls back unless commit() was called.
 class SqlTransaction {
  public:
   explicit SqlTransaction(SqlDatabase& database, Durable durable = Durable::kNow);

@@ -6,6 +6,7 @@
 #include <new>
 
 #include "core/base/error.h"
+#include "core/base/text.h"
 
 namespace voxdag {
 
@@ -74,13 +75,7 @@ std::string Sha256::finish() {
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned size = 0;
   check(EVP_DigestFinal_ex(context_->md, digest, &size));
-  static const char* kDigits = "0123456789abcdef";
-  std::string hex;
-  for (unsigned i = 0; i < size; ++i) {
-    hex += kDigits[digest[i] >> 4];
-    hex += kDigits[digest[i] & 15];
-  }
-  return hex;
+  return hex_text({digest, size});
 }
 
 }  // namespace voxdag

@@ -6,6 +6,7 @@
 // Child index = 4x + 2y + z of the child's position in its parent (Morton order).
 #pragma once
 
+#include <compare>
 #include <cstdint>
 
 #include "core/base/host_device.h"
@@ -39,6 +40,8 @@ struct Cube {
     return level == o.level && position[0] == o.position[0] && position[1] == o.position[1] &&
            position[2] == o.position[2];
   }
+  // By level, then x, y and z: an order for containers, without meaning in the octree.
+  std::strong_ordering operator<=>(const Cube&) const = default;
 };
 
 }  // namespace voxdag

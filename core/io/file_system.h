@@ -1,11 +1,11 @@
-// All file access of voxdag goes through here, so that tests can put a disk in its place that is
-// full, forgets what was not synced, or flips bits. Paths are plain byte strings.
+// All file access of voxdag goes through here, so that tests can replace the disk by one that is
+// full, loses what was not synced, or flips bits. Paths are plain byte strings.
 //
 // Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT), kIo; the message names the call, the path, the
 // offset where there is one, and the system's reason. Short reads and writes and EINTR are handled
 // inside. A FileSystem may be called by several threads at once; a file by one at a time, except
 // that ReadableFile::read_at and WritableFile::write_at may be called by several, and
-// WritableFile::sync and release beside them.
+// WritableFile::sync and release concurrently with them.
 #pragma once
 
 #include <cstddef>
@@ -17,13 +17,13 @@
 
 namespace voxdag {
 
-// What changes when a file does: whoever finds it as it was finds the same bytes, unless they were
-// changed so soon before that the clock of the times had not moved on.
+// Changes when a file does: equal identities mean equal bytes, unless the file was changed so soon
+// before that the file system's clock had not advanced.
 struct FileIdentity {
   uint64_t inode = 0;
   uint64_t bytes = 0;
   int64_t modified_ns = 0;  // Unix time, of the contents
-  int64_t changed_ns = 0;   // ... and of names and times too: nobody can set it back
+  int64_t changed_ns = 0;   // of contents, names and times; no program can set it back
   bool operator==(const FileIdentity&) const = default;
 };
 
@@ -44,8 +44,8 @@ class WritableFile {
   virtual const std::string& path() const = 0;
   // Writes all of `data` at `offset`, growing the file as needed.
   virtual void write_at(uint64_t offset, std::span<const std::byte> data) = 0;
-  // Gives the space of a range back whose content is no longer needed: it reads as zeros from then
-  // on, or as before where the disk cannot do that.
+  // Frees the space of a range whose contents are no longer needed. It reads as zeros afterwards,
+  // or as before where the file system cannot do that.
   virtual void release(uint64_t /*offset*/, uint64_t /*bytes*/) {}
   // Returns once all that was written is on the disk.
   virtual void sync() = 0;
@@ -61,7 +61,7 @@ struct DirectoryEntry {
   double modified_s = 0;    // Unix time
 };
 
-// An exclusive lock, held until this is destroyed or the process ends, however it ends.
+// An exclusive lock, released when this is destroyed or the process ends, however it ends.
 class FileLock {
  public:
   virtual ~FileLock() = default;
@@ -73,12 +73,12 @@ class FileSystem {
   virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
   // An empty file under `path`; one that was there is emptied.
   virtual std::unique_ptr<WritableFile> create(const std::string& path) = 0;
-  // A file that is there, or an empty one, for writing without emptying it.
+  // The file under `path` with its contents, or an empty one if there is none.
   virtual std::unique_ptr<WritableFile> open_write(const std::string& path) = 0;
   virtual bool exists(const std::string& path) = 0;
   virtual void rename(const std::string& from, const std::string& to) = 0;
   virtual void remove(const std::string& path) = 0;
-  // The directory and those above it that are missing.
+  // Makes the directory and those above it that are missing.
   virtual void make_directories(const std::string& path) = 0;
   // Removes an empty directory.
   virtual void remove_directory(const std::string& path) = 0;
@@ -87,20 +87,21 @@ class FileSystem {
   virtual void touch(const std::string& path) = 0;
   // Makes renames and new names in the directory survive a power cut.
   virtual void sync_directory(const std::string& path) = 0;
-  // Locks the file at `path`, made if it is not there; nullptr if somebody else holds it.
+  // Locks the file at `path`, made if it is not there; nullptr if another holder has it.
   virtual std::unique_ptr<FileLock> try_lock(const std::string& path) = 0;
-  // Bytes an ordinary user may still write on the disk that holds `path`.
+  // Bytes that an unprivileged user may still write to the disk of `path`.
   virtual uint64_t free_space(const std::string& path) = 0;
 };
 
-// The machine's own.
+// The file system of this machine.
 FileSystem& system_files();
 
 // The directory part of a path, "." if it has none.
 std::string parent_directory(const std::string& path);
 // The whole of a small file; one larger than `limit_bytes` is Error{kLimit}.
 std::string read_small_file(FileSystem& files, const std::string& path, uint64_t limit_bytes);
-// `contents` under `path`, whole or not at all: written beside it, synced, renamed, synced.
+// Puts `contents` under `path`, whole or not at all: writes path + ".partial", syncs it, renames it
+// and syncs the directory.
 void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents);
 
 }  // namespace voxdag

@@ -1,4 +1,4 @@
-// A file system and its files that hand every call on to others: bases for those that change a few.
+// A file system and files that forward every call to others: bases for those that change a few.
 #pragma once
 
 #include <memory>

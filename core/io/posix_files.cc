@@ -99,7 +99,7 @@ class PosixWritableFile : public WritableFile {
       data = data.subspan(static_cast<size_t>(n));
     }
   }
-  // In whole blocks: zeros written into parts of them would cost more than they give back.
+  // Whole blocks only: of a part of one the system would write zeros, which frees nothing.
   void release(uint64_t offset, uint64_t bytes) override {
     constexpr uint64_t kBlock = 4096;
     const uint64_t begin = (offset + kBlock - 1) / kBlock * kBlock;
@@ -194,7 +194,7 @@ class PosixFileSystem : public FileSystem {
       if (errno != EWOULDBLOCK) fail("lock", path, errno);
       return nullptr;
     }
-    // The last holder may have removed the file between our two calls: then this locks nothing.
+    // Another holder may have removed the file between open and flock: its name is then unlocked.
     struct stat held {
     }, named{};
     const bool same = fstat(fd, &held) == 0 && stat(path.c_str(), &named) == 0 &&

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <set>
 #include <string>
-#include <tuple>
 
 #include "core/base/error.h"
 #include "merge/merger.h"
@@ -11,10 +10,6 @@ namespace {
 
 // Giving back less at a time costs more than it is worth.
 constexpr uint64_t kMinReleasedBytes = uint64_t{32} << 10;
-
-std::tuple<uint32_t, uint32_t, uint32_t, uint32_t> key_of(const Cube& cube) {
-  return {cube.level, cube.position[0], cube.position[1], cube.position[2]};
-}
 
 // A state that these speak of cannot be gone on with; other errors say nothing of it.
 bool is_corruption(const Error& error) {
@@ -59,14 +54,14 @@ void Merger::go_on_from(const MergeState& state, GlobalFileWriter& out) {
 
 void Merger::replace_inputs(const std::vector<ArtifactRef>& merged) {
   if (merged.empty()) return;
-  std::set<std::tuple<uint32_t, uint32_t, uint32_t, uint32_t>> held;
+  std::set<Cube> held;
   const std::vector<SurveyedArtifact> inputs = std::move(artifacts_);
   survey(merged);
   for (const SurveyedArtifact& artifact : artifacts_)
-    for (const Cube& cube : artifact.cubes) held.insert(key_of(cube));
+    for (const Cube& cube : artifact.cubes) held.insert(cube);
   std::vector<ArtifactRef> refs = merged;
   for (const SurveyedArtifact& input : inputs)
-    if (!held.contains(key_of(input.cubes[0]))) refs.push_back(input.ref);
+    if (!held.contains(input.cubes[0])) refs.push_back(input.ref);
   survey(refs);
 }
 

@@ -195,7 +195,7 @@ void check_many(const LevelTask& task, uint64_t hash) {
 
 }  // namespace
 
-uint64_t bytes_for_workers(const MemoryPlan& plan) {
+uint64_t bytes_for_workers(const MergeMemory& plan) {
   return plan.workers * std::max(plan.worker_bytes, OrderedRows::bytes());
 }
 
@@ -203,7 +203,8 @@ LevelExtent merge_level(const MergeContext& context, const LevelTask& task) {
   for (const LevelRun* run : task.runs) context.report.input_nodes += run->rows();
   const uint64_t available = context.budget.available() + task.memory.bytes();
   const uint64_t for_workers = bytes_for_workers(context.plan);
-  const uint64_t slab_bytes = MemoryPlan::slab_within(available - std::min(available, for_workers));
+  const uint64_t slab_bytes =
+      MergeMemory::slab_within(available - std::min(available, for_workers));
   LevelExtent extent;
   HashInterval done{0, 0};
   for (uint64_t first = 0;; first = done.last + 1) {

@@ -14,7 +14,7 @@
 #include "merge/load/scratch.h"
 #include "merge/merge.h"
 #include "merge/output/level_output.h"
-#include "merge/plan/memory_plan.h"
+#include "merge/plan/merge_memory.h"
 #include "merge/sort/sequencer.h"
 
 namespace voxdag {
@@ -41,7 +41,7 @@ class MergeProgress {
 struct MergeContext {
   MergeScratch& scratch;
   MemoryBudget& budget;
-  MemoryPlan plan;
+  MergeMemory plan;
   MergeProgress& progress;
   const CancelToken& cancel;
   MergeReport& report;
@@ -58,7 +58,7 @@ struct LevelTask {
 };
 
 // What the workers may take besides the slab and the maps.
-uint64_t bytes_for_workers(const MemoryPlan& plan);
+uint64_t bytes_for_workers(const MergeMemory& plan);
 
 // Adds ranges, groups and rows to the report.
 LevelExtent merge_level(const MergeContext& context, const LevelTask& task);

@@ -9,13 +9,13 @@
 // row is copied without asking how many it has: that would be a branch as good as random.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <cstring>
 #include <span>
 
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
+#include "core/base/popcount8.h"
 #include "core/dag/level_array.h"
 
 namespace voxdag {
@@ -24,13 +24,8 @@ inline constexpr uint8_t kBrickRowMask = 3;
 inline constexpr uint32_t kBrickWords = 2;
 inline constexpr uint32_t kLongestRowWords = 8;
 
-// Words of a row by its mask; a table, since baseline x86-64 has no popcount.
-inline constexpr std::array<uint8_t, 256> kRowWords = [] {
-  std::array<uint8_t, 256> table{};
-  for (unsigned mask = 1; mask < 256; ++mask)
-    table[mask] = static_cast<uint8_t>(table[mask >> 1] + (mask & 1));
-  return table;
-}();
+// Words of a row by its mask.
+inline constexpr auto& kRowWords = kPopcount8;
 
 struct RowKey {
   uint64_t hash = 0;

@@ -34,7 +34,7 @@ Vec random_cell(const DagView& dag, Sampler& sampler, double& size) {
     int weights[8] = {}, sum = 0;
     for (int i = 0; i < 8; ++i)
       if (children.has(i))
-        sum += weights[i] = kBitCount[dag.children(d + 1, dag.content(d, children, i)).mask];
+        sum += weights[i] = kPopcount8[dag.children(d + 1, dag.content(d, children, i)).mask];
     auto left = static_cast<int>(sampler.pair().u * sum);
     int index = 0;
     while (left >= weights[index]) left -= weights[index++];

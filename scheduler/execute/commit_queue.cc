@@ -25,7 +25,7 @@ void CommitQueue::announce() {
   if (!next_.releases.empty()) commit();
   settle();
   segment_->complete();
-  store_.announce_built(next_.subvolumes);
+  store_.mark_built_in_memory(next_.subvolumes);
 }
 
 bool CommitQueue::is_due() const {

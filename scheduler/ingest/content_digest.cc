@@ -9,6 +9,8 @@
 #include <cstring>
 #include <type_traits>
 
+#include "core/base/text.h"
+
 namespace voxdag {
 
 ContentDigest::ContentDigest(const Grid& grid) {
@@ -59,12 +61,7 @@ std::string ContentDigest::hex() const {
   std::memcpy(&context, state_.data(), sizeof context);
   unsigned char digest[SHA256_DIGEST_LENGTH];
   SHA256_Final(digest, &context);
-  std::string hex;
-  for (const unsigned char byte : digest) {
-    hex += "0123456789abcdef"[byte >> 4];
-    hex += "0123456789abcdef"[byte & 15];
-  }
-  return hex;
+  return hex_text(digest);
 }
 
 void ContentDigest::add_bytes(std::span<const std::byte> bytes) {

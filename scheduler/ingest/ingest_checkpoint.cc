@@ -6,8 +6,8 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "scheduler/memory_plan.h"
 #include "scheduler/plan/prepare.h"
-#include "scheduler/run_build.h"
 
 namespace voxdag {
 namespace {
@@ -35,7 +35,7 @@ double copies_bytes(const BuildSpec& spec, uint64_t triangles) {
 
 bool fits_in_memory(const BuildSpec& spec, uint64_t triangles) {
   return copies_bytes(spec, triangles) <=
-         static_cast<double>(triangle_share(spec.run.memory_bytes));
+         static_cast<double>(MemoryPlan::divide(spec.run.memory_bytes).triangle_bytes);
 }
 
 }  // namespace

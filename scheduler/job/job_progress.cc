@@ -6,28 +6,49 @@
 namespace voxdag {
 namespace {
 
-constexpr double kRecordInterval_s = 1;
-
-double unix_seconds() { return clock_seconds(CLOCK_REALTIME); }
+constexpr double kWriteInterval_s = 1;
 
 }  // namespace
 
+template <class Change>
+void JobProgress::update(bool at_once, const Change& change) {
+  std::unique_lock lock(mutex_);
+  change(snapshot_);
+  const double now = wall_seconds();
+  if (!at_once && now - last_written_s_ < kWriteInterval_s) return;
+  last_written_s_ = now;
+  const ProgressSnapshot snapshot = snapshot_;
+  lock.unlock();
+  write(snapshot);
+}
+
+void JobProgress::write(ProgressSnapshot snapshot) {
+  std::lock_guard lock(store_mutex_);
+  if (!store_) return;
+  snapshot.updated_s = unix_seconds();
+  snapshot.memory_bytes = resident_bytes();
+  snapshot.disk_bytes = work_.bytes();
+  try {
+    store_->set_progress(snapshot);
+  } catch (const Error&) {
+    // Nothing depends on this row; where the store cannot be written, the build itself will fail.
+  }
+}
+
 void JobProgress::begin_stage(std::string_view stage, uint64_t total, std::string_view unit) {
   shown_.begin_stage(stage, total, unit);
-  std::lock_guard lock(mutex_);
-  snapshot_.stage = stage;
-  snapshot_.unit = unit;
-  snapshot_.done = 0;
-  snapshot_.total = total;
-  snapshot_.stage_started_s = unix_seconds();
-  record(true);
+  update(true, [&](ProgressSnapshot& s) {
+    s.stage = stage;
+    s.unit = unit;
+    s.done = 0;
+    s.total = total;
+    s.stage_started_s = unix_seconds();
+  });
 }
 
 void JobProgress::advance(uint64_t count) {
   shown_.advance(count);
-  std::lock_guard lock(mutex_);
-  snapshot_.done += count;
-  record(false);
+  update(false, [&](ProgressSnapshot& s) { s.done += count; });
 }
 
 void JobProgress::set_total(uint64_t total) {
@@ -38,33 +59,18 @@ void JobProgress::set_total(uint64_t total) {
 
 void JobProgress::end_stage() {
   shown_.end_stage();
-  std::lock_guard lock(mutex_);
-  record(true);
+  update(true, [](ProgressSnapshot&) {});
 }
 
 void JobProgress::record_failure(const Error& error) {
-  std::lock_guard lock(mutex_);
-  snapshot_.last_error = std::string(error_name(error.code())) + ": " + error.message();
-  record(true);
+  update(true, [&](ProgressSnapshot& s) {
+    s.last_error = std::string(error_name(error.code())) + ": " + error.message();
+  });
 }
 
 void JobProgress::detach() {
-  std::lock_guard lock(mutex_);
+  std::lock_guard lock(store_mutex_);
   store_ = nullptr;
-}
-
-void JobProgress::record(bool at_once) {
-  const double now = wall_seconds();
-  if (!store_ || (!at_once && now - last_recorded_s_ < kRecordInterval_s)) return;
-  last_recorded_s_ = now;
-  snapshot_.updated_s = unix_seconds();
-  snapshot_.memory_bytes = resident_bytes();
-  snapshot_.disk_bytes = work_.bytes();
-  try {
-    store_->set_progress(snapshot_);
-  } catch (const Error&) {
-    // Looking on is a comfort; a store that cannot be written will say so when it matters.
-  }
 }
 
 }  // namespace voxdag

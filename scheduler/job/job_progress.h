@@ -1,5 +1,8 @@
 // Passes a build's progress on, and writes it to the job store about once per second, so that
-// `voxdag status` can look on from another process. Thread-safe.
+// `voxdag status` can show it from another process. Thread-safe.
+//
+// The thread whose call is due lists the work folder and writes the row; no other thread waits for
+// it. That is little enough not to need a thread of its own.
 #pragma once
 
 #include <mutex>
@@ -14,7 +17,7 @@ namespace voxdag {
 class JobProgress : public Progress {
  public:
   JobProgress(Progress& shown, JobStore& store, const WorkFolder& work)
-      : shown_(shown), store_(&store), work_(work) {}
+      : shown_(shown), work_(work), store_(&store) {}
 
   void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
   void advance(uint64_t count) override;
@@ -22,19 +25,22 @@ class JobProgress : public Progress {
   void end_stage() override;
   void warn(std::string_view message) override { shown_.warn(message); }
   void record_failure(const Error& error);
-  // The store is about to close: only passes on from here.
+  // From here on progress is only passed on: the store is about to close.
   void detach();
 
  private:
-  // Writes the snapshot if there is a job to write it for and enough time went by.
-  void record(bool at_once);
+  // Changes the snapshot, and writes it if that is due or `at_once`.
+  template <class Change>
+  void update(bool at_once, const Change& change);
+  void write(ProgressSnapshot snapshot);
 
   Progress& shown_;
-  std::mutex mutex_;  // guards all below
-  JobStore* store_;
   const WorkFolder& work_;
+  std::mutex mutex_;  // guards the next two
   ProgressSnapshot snapshot_;
-  double last_recorded_s_ = 0;
+  double last_written_s_ = 0;
+  std::mutex store_mutex_;  // guards the store, locked without mutex_
+  JobStore* store_;
 };
 
 }  // namespace voxdag

@@ -7,10 +7,10 @@
 namespace voxdag {
 namespace {
 
-// "vdag": tells our databases from others.
+// "vdag": marks a database as a job store.
 constexpr int64_t kApplicationId = 0x76646167;
 
-// What makes a store of version i + 1 of one of version i; version 0 is an empty database. These
+// Entry i migrates a store from version i to version i + 1; version 0 is an empty database. Entries
 // never change: a new version is a new entry.
 constexpr const char* kMigrations[] = {
     R"sql(
@@ -32,7 +32,7 @@ CREATE TABLE subvolume (
   root_hash INTEGER NOT NULL,
   row_checksum INTEGER NOT NULL
 );
--- Replacing a row looks for rows that refer to it: without an index, through all of them.
+-- Replacing a row searches for rows that refer to it: without an index, all of them.
 CREATE INDEX subvolume_by_parent ON subvolume (parent);
 CREATE TABLE stage_time (
   id INTEGER PRIMARY KEY,
@@ -60,7 +60,7 @@ CREATE TABLE result (
   merge_streamed_groups INTEGER NOT NULL
 );
 )sql",
-    // How far scan, ingest and hand-down are; the triangles are in a file.
+    // The progress of scan, ingest and partition; the triangles are in a file.
     R"sql(
 CREATE TABLE ingest (
   id INTEGER PRIMARY KEY CHECK (id = 1),

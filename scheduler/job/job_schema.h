@@ -1,4 +1,4 @@
-// The job store's tables, and how a store of an earlier version becomes one of this.
+// The job store's tables, and the migrations from earlier versions.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@ namespace voxdag {
 
 inline constexpr int64_t kSchemaVersion = 3;
 
-// Makes the tables of an empty database, or brings those of an earlier version up to date: all of
-// it or nothing. Throws Error{kCorrupt} for a damaged database, Error{kInvalidInput} for one that
-// is not ours, Error{kUnsupportedVersion} for one of a later version.
+// Creates the tables in an empty database, or migrates those of an earlier version, in one
+// transaction. Throws Error{kCorrupt} for a damaged database, Error{kInvalidInput} for one that
+// is not a job store, Error{kUnsupportedVersion} for one of a later version.
 void prepare_schema(SqlDatabase& database, const std::string& path);
-// For those who only read: any version that there was will do.
+// Checks a store that is only read: it may have any version up to this one. Throws likewise.
 void check_schema(SqlDatabase& database, const std::string& path);
 
 }  // namespace voxdag

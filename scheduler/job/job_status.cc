@@ -22,11 +22,11 @@ JobStatus read_job_status(FileSystem& files, const std::string& work_folder) {
   const std::string store_path = WorkFolder::store_path(work_folder);
   if (!files.exists(store_path))
     throw Error(ErrorCode::kNotFound,
-                work_folder + " holds no job of voxdag: expected the work folder of a build");
+                work_folder + " has no job of voxdag: expected the work folder of a build");
   JobStatus status;
   status.holder = WorkFolder::holder(files, work_folder);
   status.running = !status.holder.empty();
-  JobStore store(store_path, JobStore::Access::kLook);
+  JobStore store(store_path, JobStore::Access::kRead);
   if (const auto job = store.job()) status.geometry = job->geometry;
   for (const StoredSubvolume& subvolume : store.leaves()) {
     ++status.subvolumes;

@@ -1,4 +1,5 @@
-// A build's state, read from its work folder at any time, also while another process builds there.
+// The state of a build, read from its work folder at any time, even while another process builds
+// there.
 #pragma once
 
 #include <cstdint>
@@ -12,20 +13,20 @@
 namespace voxdag {
 
 struct JobStatus {
-  bool running = false;  // a process holds the folder
-  std::string holder;    // which, if so
+  bool running = false;  // a process has locked the folder
+  std::string holder;    // that process
   std::string geometry;  // options as JSON; "" before the job began
   uint64_t subvolumes = 0;
   uint64_t built = 0;
   std::optional<ProgressSnapshot> progress;
   std::vector<StageTime> stages;
 
-  // Units a second in the current stage, and seconds left at that rate; 0 when not known.
+  // Units per second in the current stage, and seconds left at that rate; 0 if unknown.
   double rate() const;
   double eta_s() const;
 };
 
-// Throws Error{kNotFound} if there is no job store in the folder.
+// Throws Error{kNotFound} if the folder has no job store.
 JobStatus read_job_status(FileSystem& files, const std::string& work_folder);
 
 // One JSON object, names as in docs/cli.md.

@@ -1,6 +1,7 @@
 #include "scheduler/job/job_store.h"
 
 #include "core/base/error.h"
+#include "core/db/row.h"
 #include "core/format/checksum.h"
 #include "scheduler/job/job_schema.h"
 
@@ -28,41 +29,111 @@ uint64_t row_checksum(const StoredSubvolume& s) {
   return checksum64(std::as_bytes(std::span(words)));
 }
 
-// The one way a subvolume's row is written.
-void write_row(SqlDatabase& database, const StoredSubvolume& s, std::optional<SubvolumeId> parent) {
-  auto insert = database.prepare(
-      "INSERT OR REPLACE INTO subvolume VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
-      "?)");
-  insert.bind(0, s.id);
-  if (parent) insert.bind(1, *parent);
-  insert.bind(2, int64_t{s.cube.level});
-  for (int a = 0; a < 3; ++a) insert.bind(3 + a, int64_t{s.cube.position[a]});
-  insert.bind(6, s.weight).bind(7, static_cast<int64_t>(s.state));
-  insert.bind(8, int64_t{s.artifact.segment}).bind_word(9, s.artifact.offset);
-  insert.bind_word(10, s.artifact.bytes).bind_word(11, s.artifact.index_offset);
-  insert.bind_word(12, s.artifact.checksum).bind_word(13, s.summary.voxels);
-  insert.bind_word(14, s.summary.svo_nodes).bind_word(15, s.summary.dag_nodes);
-  insert.bind_word(16, s.summary.root_hash).bind_word(17, row_checksum(s));
-  insert.run();
+struct SubvolumeRow {
+  StoredSubvolume subvolume;
+  std::optional<SubvolumeId> parent;
+  uint64_t checksum = 0;
+};
+
+template <class Row>
+void columns(Row& row, SubvolumeRow& r) {
+  StoredSubvolume& s = r.subvolume;
+  row("id", s.id);
+  row("parent", r.parent);
+  row("level", s.cube.level);
+  row("x", s.cube.position[0]);
+  row("y", s.cube.position[1]);
+  row("z", s.cube.position[2]);
+  row("weight", s.weight);
+  row("state", s.state);
+  row("segment", s.artifact.segment);
+  row("offset", s.artifact.offset);
+  row("bytes", s.artifact.bytes);
+  row("index_offset", s.artifact.index_offset);
+  row("checksum", s.artifact.checksum);
+  row("voxels", s.summary.voxels);
+  row("svo_nodes", s.summary.svo_nodes);
+  row("dag_nodes", s.summary.dag_nodes);
+  row("root_hash", s.summary.root_hash);
+  row("row_checksum", r.checksum);
 }
 
-StoredSubvolume read_row(const SqlStatement& row) {
-  StoredSubvolume s;
-  s.id = row.integer(0);
-  s.cube.level = static_cast<uint32_t>(row.integer(2));
-  for (int a = 0; a < 3; ++a) s.cube.position[a] = static_cast<uint32_t>(row.integer(3 + a));
-  s.weight = row.real(6);
-  s.state = static_cast<SubvolumeState>(row.integer(7));
-  s.artifact = {static_cast<uint32_t>(row.integer(8)), row.word(9), row.word(10), row.word(11),
-                row.word(12)};
-  s.summary = {row.word(13), row.word(14), row.word(15), row.word(16)};
-  if (row.word(17) != row_checksum(s))
-    throw Error(ErrorCode::kCorrupt, "job store: the row of subvolume " + std::to_string(s.id) +
+struct IngestRow {
+  std::vector<std::byte> record;
+  uint64_t checksum = 0;
+};
+
+template <class Row>
+void columns(Row& row, IngestRow& r) {
+  row.fixed("id", 1);
+  row("record", r.record);
+  row("row_checksum", r.checksum);
+}
+
+void write_subvolume(SqlDatabase& database, const StoredSubvolume& s,
+                     std::optional<SubvolumeId> parent) {
+  put_row(database, "subvolume", SubvolumeRow{s, parent, row_checksum(s)});
+}
+
+StoredSubvolume verified(const SubvolumeRow& row) {
+  if (row.checksum != row_checksum(row.subvolume))
+    throw Error(ErrorCode::kCorrupt, "job store: the row of subvolume " +
+                                         std::to_string(row.subvolume.id) +
                                          " fails its checksum: start over with --restart");
-  return s;
+  return row.subvolume;
 }
 
 }  // namespace
+
+template <class Row>
+void columns(Row& row, JobIdentity& job) {
+  row.fixed("id", 1);
+  row("scene_sha256", job.scene_sha256);
+  row("geometry", job.geometry);
+  row("format_version", job.format_version);
+}
+
+template <class Row>
+void columns(Row& row, StoredMerge& merge) {
+  row.fixed("id", 1);
+  row("level", merge.level);
+  row("state", merge.state);
+}
+
+template <class Row>
+void columns(Row& row, JobResult& result) {
+  row.fixed("id", 1);
+  row("output", result.output);
+  row("sha256", result.sha256);
+  row("bytes", result.bytes);
+  row("voxels", result.voxels);
+  row("svo_nodes", result.svo_nodes);
+  row("dag_nodes", result.dag_nodes);
+  row("merge_rounds", result.merge_rounds);
+  row("merge_ranges", result.merge_ranges);
+  row("merge_streamed_groups", result.merge_streamed_groups);
+}
+
+template <class Row>
+void columns(Row& row, StageTime& time) {
+  row("name", time.name);
+  row("wall_s", time.wall_s);
+  row("cpu_s", time.cpu_s);
+}
+
+template <class Row>
+void columns(Row& row, ProgressSnapshot& progress) {
+  row.fixed("id", 1);
+  row("stage", progress.stage);
+  row("unit", progress.unit);
+  row("done", progress.done);
+  row("total", progress.total);
+  row("stage_started_s", progress.stage_started_s);
+  row("updated_s", progress.updated_s);
+  row("memory_bytes", progress.memory_bytes);
+  row("disk_bytes", progress.disk_bytes);
+  row("last_error", progress.last_error);
+}
 
 JobStore::JobStore(const std::string& path, Access access)
     : database_(path, access == Access::kBuild ? SqlDatabase::Mode::kReadWrite
@@ -75,9 +146,7 @@ JobStore::JobStore(const std::string& path, Access access)
 
 std::optional<JobIdentity> JobStore::job() {
   std::lock_guard lock(mutex_);
-  auto query = database_.prepare("SELECT scene_sha256, geometry, format_version FROM job");
-  if (!query.step()) return std::nullopt;
-  return JobIdentity{query.text(0), query.text(1), query.integer(2)};
+  return find_row<JobIdentity>(database_, "job");
 }
 
 void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> plan) {
@@ -86,29 +155,25 @@ void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> pl
   database_.execute("UPDATE subvolume SET parent = NULL; DELETE FROM subvolume;");
   database_.execute(
       "DELETE FROM job; DELETE FROM progress; DELETE FROM merge; DELETE FROM result;");
-  database_.prepare("INSERT INTO job VALUES (1, ?, ?, ?)")
-      .bind(0, job.scene_sha256)
-      .bind(1, job.geometry)
-      .bind(2, job.format_version)
-      .run();
+  put_row(database_, "job", job);
   SubvolumeId next = 1;
   for (StoredSubvolume subvolume : plan) {
     subvolume.id = next++;
-    write_row(database_, subvolume, std::nullopt);
+    write_subvolume(database_, subvolume, std::nullopt);
   }
   transaction.commit();
-  announced_.clear();
+  built_in_memory_.clear();
 }
 
 std::vector<StoredSubvolume> JobStore::leaves() {
   std::lock_guard lock(mutex_);
-  auto query = database_.prepare("SELECT * FROM subvolume ORDER BY id");
+  auto rows = select_rows<SubvolumeRow>(database_, "subvolume", "ORDER BY id");
   std::vector<StoredSubvolume> leaves;
-  while (query.step()) {
-    const StoredSubvolume subvolume = read_row(query);
+  while (rows.step()) {
+    const StoredSubvolume subvolume = verified(read_row<SubvolumeRow>(rows));
     if (subvolume.state == SubvolumeState::kSplit) continue;
-    const auto announced = announced_.find(subvolume.id);
-    leaves.push_back(announced == announced_.end() ? subvolume : announced->second);
+    const auto built = built_in_memory_.find(subvolume.id);
+    leaves.push_back(built == built_in_memory_.end() ? subvolume : built->second);
   }
   return leaves;
 }
@@ -121,13 +186,13 @@ void JobStore::record_built(std::span<const StoredSubvolume> built) {
     update_row(subvolume);
   }
   transaction.commit();
-  for (const StoredSubvolume& subvolume : built) announced_.erase(subvolume.id);
+  for (const StoredSubvolume& subvolume : built) built_in_memory_.erase(subvolume.id);
 }
 
-void JobStore::announce_built(std::span<const StoredSubvolume> built) {
+void JobStore::mark_built_in_memory(std::span<const StoredSubvolume> built) {
   std::lock_guard lock(mutex_);
   for (const StoredSubvolume& subvolume : built)
-    announced_.insert_or_assign(subvolume.id, subvolume).first->second.state =
+    built_in_memory_.insert_or_assign(subvolume.id, subvolume).first->second.state =
         SubvolumeState::kBuilt;
 }
 
@@ -145,14 +210,14 @@ std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
     part.id = next++;
     part.cube = cube;
     part.weight = whole.weight / static_cast<double>(parts.size());
-    write_row(database_, part, whole.id);
+    write_subvolume(database_, part, whole.id);
     ids.push_back(part.id);
   }
   transaction.commit();
   return ids;
 }
 
-void JobStore::record_lost(const StoredSubvolume& lost) {
+void JobStore::mark_for_rebuild(const StoredSubvolume& lost) {
   std::lock_guard lock(mutex_);
   StoredSubvolume planned;
   planned.id = lost.id;
@@ -162,33 +227,29 @@ void JobStore::record_lost(const StoredSubvolume& lost) {
   update_row(planned);
   database_.execute("DELETE FROM ingest");
   transaction.commit();
-  announced_.erase(lost.id);
+  built_in_memory_.erase(lost.id);
 }
 
 void JobStore::update_row(const StoredSubvolume& subvolume) {
-  auto query = database_.prepare("SELECT parent FROM subvolume WHERE id = ? AND parent NOT NULL");
-  query.bind(0, subvolume.id);
-  const bool has_parent = query.step();
-  write_row(database_, subvolume, has_parent ? std::optional(query.integer(0)) : std::nullopt);
+  auto rows = select_rows<SubvolumeRow>(database_, "subvolume", "WHERE id = ?");
+  rows.bind(0, subvolume.id);
+  write_subvolume(database_, subvolume,
+                  rows.step() ? read_row<SubvolumeRow>(rows).parent : std::nullopt);
 }
 
 std::optional<std::vector<std::byte>> JobStore::ingest() {
   std::lock_guard lock(mutex_);
-  auto query = database_.prepare("SELECT record, row_checksum FROM ingest");
-  if (!query.step()) return std::nullopt;
-  std::vector<std::byte> record = query.bytes(0);
-  if (checksum64(record) != query.word(1))
+  auto row = find_row<IngestRow>(database_, "ingest");
+  if (!row) return std::nullopt;
+  if (checksum64(row->record) != row->checksum)
     throw Error(ErrorCode::kCorrupt, "job store: the row of what was ingested fails its checksum");
-  return record;
+  return std::move(row->record);
 }
 
 void JobStore::save_ingest(std::span<const std::byte> record) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
-  database_.prepare("INSERT OR REPLACE INTO ingest VALUES (1, ?, ?)")
-      .bind(0, record)
-      .bind_word(1, checksum64(record))
-      .run();
+  put_row(database_, "ingest", IngestRow{{record.begin(), record.end()}, checksum64(record)});
   transaction.commit();
 }
 
@@ -202,18 +263,13 @@ void JobStore::forget_ingest() {
 
 std::optional<StoredMerge> JobStore::merge() {
   std::lock_guard lock(mutex_);
-  auto query = database_.prepare("SELECT level, state FROM merge");
-  if (!query.step()) return std::nullopt;
-  return StoredMerge{static_cast<uint32_t>(query.integer(0)), query.bytes(1)};
+  return find_row<StoredMerge>(database_, "merge");
 }
 
 void JobStore::save_merge(uint32_t level, std::span<const std::byte> state) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
-  database_.prepare("INSERT OR REPLACE INTO merge VALUES (1, ?, ?)")
-      .bind(0, int64_t{level})
-      .bind(1, state)
-      .run();
+  put_row(database_, "merge", StoredMerge{level, {state.begin(), state.end()}});
   transaction.commit();
 }
 
@@ -227,81 +283,40 @@ void JobStore::forget_merge() {
 void JobStore::record_result(const JobResult& result) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
-  database_.prepare("INSERT OR REPLACE INTO result VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
-      .bind(0, result.output)
-      .bind(1, result.sha256)
-      .bind_word(2, result.bytes)
-      .bind_word(3, result.voxels)
-      .bind_word(4, result.svo_nodes)
-      .bind_word(5, result.dag_nodes)
-      .bind(6, int64_t{result.merge_rounds})
-      .bind_word(7, result.merge_ranges)
-      .bind_word(8, result.merge_streamed_groups)
-      .run();
+  put_row(database_, "result", result);
   transaction.commit();
 }
 
 std::optional<JobResult> JobStore::result() {
   std::lock_guard lock(mutex_);
-  auto query = database_.prepare(
-      "SELECT output, sha256, bytes, voxels, svo_nodes, dag_nodes, merge_rounds, merge_ranges, "
-      "merge_streamed_groups FROM result");
-  if (!query.step()) return std::nullopt;
-  return JobResult{query.text(0),
-                   query.text(1),
-                   query.word(2),
-                   query.word(3),
-                   query.word(4),
-                   query.word(5),
-                   static_cast<uint32_t>(query.integer(6)),
-                   query.word(7),
-                   query.word(8)};
+  return find_row<JobResult>(database_, "result");
 }
 
 void JobStore::add_stage_time(const StageTime& time) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_, Durable::kLater);
-  database_.prepare("INSERT INTO stage_time (name, wall_s, cpu_s) VALUES (?, ?, ?)")
-      .bind(0, time.name)
-      .bind(1, time.wall_s)
-      .bind(2, time.cpu_s)
-      .run();
+  put_row(database_, "stage_time", time);
   transaction.commit();
 }
 
 std::vector<StageTime> JobStore::stage_times() {
   std::lock_guard lock(mutex_);
-  auto query = database_.prepare("SELECT name, wall_s, cpu_s FROM stage_time ORDER BY id");
+  auto rows = select_rows<StageTime>(database_, "stage_time", "ORDER BY id");
   std::vector<StageTime> times;
-  while (query.step()) times.push_back({query.text(0), query.real(1), query.real(2)});
+  while (rows.step()) times.push_back(read_row<StageTime>(rows));
   return times;
 }
 
 void JobStore::set_progress(const ProgressSnapshot& p) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_, Durable::kLater);
-  database_.prepare("INSERT OR REPLACE INTO progress VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
-      .bind(0, p.stage)
-      .bind(1, p.unit)
-      .bind_word(2, p.done)
-      .bind_word(3, p.total)
-      .bind(4, p.stage_started_s)
-      .bind(5, p.updated_s)
-      .bind_word(6, p.memory_bytes)
-      .bind_word(7, p.disk_bytes)
-      .bind(8, p.last_error)
-      .run();
+  put_row(database_, "progress", p);
   transaction.commit();
 }
 
 std::optional<ProgressSnapshot> JobStore::progress() {
   std::lock_guard lock(mutex_);
-  auto query = database_.prepare(
-      "SELECT stage, unit, done, total, stage_started_s, updated_s, memory_bytes, disk_bytes, "
-      "last_error FROM progress");
-  if (!query.step()) return std::nullopt;
-  return ProgressSnapshot{query.text(0), query.text(1), query.word(2), query.word(3), query.real(4),
-                          query.real(5), query.word(6), query.word(7), query.text(8)};
+  return find_row<ProgressSnapshot>(database_, "progress");
 }
 
 }  // namespace voxdag

@@ -1,6 +1,6 @@
-// What is durable of a build: how far ingest is, the job, its subvolumes and their artifacts, the
-// unfinished merge, timings and progress, in one SQLite file of the work folder (WAL, synchronous =
-// FULL where it counts, foreign keys).
+// The durable state of a build in one SQLite file of the work folder (WAL, synchronous = FULL where
+// it matters, foreign keys): the progress of ingest, the job, its subvolumes and their artifacts,
+// the unfinished merge, timings and progress.
 //
 // Invariants:
 //   1. A row names an artifact only after the artifact's bytes were synced.
@@ -8,9 +8,9 @@
 //      children; the leaves are what is built.
 //   3. Every subvolume's row carries a checksum; one that fails it is Error{kCorrupt}.
 //   4. All rows of one call are committed together or not at all.
-// The writer is one process (the work folder's lock sees to that) and may call from any thread;
-// readers (`voxdag status`) open the same file at any time. The writer's leaves() also tell of what
-// is built and about to become durable.
+// Thread-safe. One process writes, which the work folder's lock ensures; readers (`voxdag status`)
+// may open the same file at any time. Only the writer's leaves() include what is built but not yet
+// durable.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@
 
 namespace voxdag {
 
-// What must be the same for a build to go on where it was.
+// What must be the same for a build to be resumed.
 struct JobIdentity {
   std::string scene_sha256;  // of the grid and the snapped triangles
   std::string geometry;      // geometry options as JSON, for messages
@@ -54,11 +54,11 @@ struct StoredSubvolume {
 
 // A merge that is not finished; see Checkpoint.
 struct StoredMerge {
-  uint32_t level = 0;  // of the artifacts' levels only those above it are still read
+  uint32_t level = 0;  // only levels of the artifacts above this one are still read
   std::vector<std::byte> state;
 };
 
-// The global file, whole and about to get its name.
+// A complete global file that is about to be renamed to its final name.
 struct JobResult {
   std::string output;
   std::string sha256;
@@ -71,7 +71,7 @@ struct JobResult {
   uint64_t merge_streamed_groups = 0;
 };
 
-// How far a build is, for those who look at it from outside.
+// The progress of a build as other processes see it.
 struct ProgressSnapshot {
   std::string stage;
   std::string unit;
@@ -86,38 +86,38 @@ struct ProgressSnapshot {
 
 class JobStore {
  public:
-  enum class Access { kBuild, kLook };
+  enum class Access { kBuild, kRead };
 
-  // Opens the store; for kBuild creates it, or brings one of an earlier version up to date. Throws
-  // Error{kCorrupt} for a damaged one, Error{kInvalidInput} for a database that is not ours,
+  // Opens the store; for kBuild creates it, or migrates one of an earlier version. Throws
+  // Error{kCorrupt} for a damaged one, Error{kInvalidInput} for another kind of database,
   // Error{kUnsupportedVersion}.
   JobStore(const std::string& path, Access access);
 
   std::optional<JobIdentity> job();
-  // A new job replaces whatever was there; all its subvolumes are planned.
+  // Replaces all that the store has by a new job whose subvolumes are all planned.
   void start(const JobIdentity& job, std::span<const StoredSubvolume> plan);
   // All that are not split, in the order of their ids.
   std::vector<StoredSubvolume> leaves();
   void record_built(std::span<const StoredSubvolume> built);
-  // They are built but not durable yet: leaves() of this object tell of them, no row does before
-  // record_built().
-  void announce_built(std::span<const StoredSubvolume> built);
+  // Makes leaves() of this object return these subvolumes as built, although they become durable
+  // only with record_built().
+  void mark_built_in_memory(std::span<const StoredSubvolume> built);
   // Returns the ids of the parts, in their order.
   std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
-  // Its artifact turned out damaged: it is planned again. What is kept of ingest is forgotten,
-  // since the triangles of what was built are gone.
-  void record_lost(const StoredSubvolume& lost);
+  // Plans a subvolume again whose artifact turned out to be damaged. The progress of ingest is
+  // forgotten too, since the triangles of built subvolumes are gone.
+  void mark_for_rebuild(const StoredSubvolume& lost);
 
-  // How far scan, ingest and hand-down are, in the words of who saved it: of the job that is there,
-  // or of one that is about to start. Throws Error{kCorrupt} for one that fails its checksum.
+  // The progress of scan, ingest and partition as save_ingest() stored it, of the present job or of
+  // one that is about to start. Throws Error{kCorrupt} if it fails its checksum.
   std::optional<std::vector<std::byte>> ingest();
   void save_ingest(std::span<const std::byte> record);
-  // Costs nothing if there is none.
+  // Writes nothing if none is stored.
   void forget_ingest();
 
   std::optional<StoredMerge> merge();
   void save_merge(uint32_t level, std::span<const std::byte> state);
-  // Also of its result.
+  // Forgets the state of the merge and its result.
   void forget_merge();
   void record_result(const JobResult& result);
   std::optional<JobResult> result();
@@ -132,7 +132,7 @@ class JobStore {
 
   std::mutex mutex_;  // guards all below
   SqlDatabase database_;
-  std::map<SubvolumeId, StoredSubvolume> announced_;  // and not recorded
+  std::map<SubvolumeId, StoredSubvolume> built_in_memory_;  // not yet recorded
 };
 
 }  // namespace voxdag

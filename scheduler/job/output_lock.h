@@ -1,4 +1,4 @@
-// Keeps two builds from writing one output: whoever holds the partial file beside it may.
+// Prevents two builds from writing the same output: a build must lock the output's partial file.
 #pragma once
 
 #include <memory>
@@ -23,7 +23,7 @@ class OutputLock {
     try {
       if (files_.exists(path_) && files_.open_read(path_)->size() == 0) files_.remove(path_);
     } catch (const Error&) {
-      // An empty file stays behind: the next build there takes it over.
+      // An empty file is left, which the next build there locks again.
     }
   }
   OutputLock(const OutputLock&) = delete;

@@ -18,10 +18,10 @@ namespace {
 
 constexpr std::string_view kLockName = "lock";
 constexpr std::string_view kScratchName = "merge";
-// `voxdag status` holds the lock for an instant.
+// `voxdag status` locks the folder for an instant.
 constexpr int kLockRetries = 10;
 constexpr auto kLockPause = std::chrono::milliseconds(20);
-// Threads that remove files: half a second goes by for each GB of a file that is in memory.
+// Threads that remove files, which takes half a second per GB of a file that is cached.
 constexpr unsigned kRemovers = 4;
 
 // The id in "segment-<id>.vdseg".
@@ -67,7 +67,7 @@ WorkFolder::WorkFolder(FileSystem& files, std::string path)
   char host[256] = "";
   gethostname(host, sizeof host - 1);
   const std::string holder = "process " + std::to_string(getpid()) + " on " + host;
-  // Emptied first: the last holder's name may have been longer.
+  // create() empties the file: the last name may have been longer.
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
 }
 
@@ -141,14 +141,14 @@ void WorkFolder::remove_silently(const std::string& path) {
   try {
     if (files_.exists(path)) files_.remove(path);
   } catch (const Error&) {
-    // Left behind: it costs space, and the next build there removes it.
+    // A file that is left costs space; the next build in this folder removes it.
   }
 }
 
 void WorkFolder::remove() {
   released_.clear();
   try {
-    // The lock goes last: until then nobody else may take the folder for theirs.
+    // The lock file is removed last: until then no other build may use the folder.
     std::vector<std::string> others = scratch_files();
     for (const DirectoryEntry& entry : files_.list(path_))
       if (is_ours(entry) && !entry.is_directory && entry.name != kLockName)
@@ -158,7 +158,7 @@ void WorkFolder::remove() {
     files_.remove(path_ + "/" + std::string(kLockName));
     files_.remove_directory(path_);
   } catch (const Error&) {
-    // Left behind, as promised above.
+    // Files that are left cost only space.
   }
 }
 

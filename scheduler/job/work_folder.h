@@ -1,6 +1,6 @@
-// The folder of a build's job store and temporary files, owned by one process at a time. Only files
-// that voxdag made, known by their names, are ever removed from it; the folder itself goes when
-// nothing else is left.
+// The folder of a build's job store and temporary files, locked by one process at a time. Only
+// files that voxdag made, known by their names, are ever removed from it; the folder itself is
+// removed when nothing else is left.
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,17 @@ namespace voxdag {
 
 class WorkFolder {
  public:
-  // Makes the folder and locks it, waiting a moment for those who only look. Throws
-  // Error{kInvalidInput} if another process holds it (saying which) or if it holds files of
-  // somebody else.
+  // Makes the folder and locks it, waiting a moment for `voxdag status`. Throws
+  // Error{kInvalidInput} if another process has locked it (saying which) or if it has files that
+  // are not voxdag's.
   WorkFolder(FileSystem& files, std::string path);
 
   const std::string& path() const { return path_; }
-  // Whether an earlier build had it.
+  // Whether an earlier build used the folder.
   bool was_there() const { return was_there_; }
   std::string store_path() const { return store_path(path_); }
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
-  // Who holds the folder: "process 17 on box"; "" if nobody does.
+  // The process that has locked the folder: "process 17 on box"; "" if none has.
   static std::string holder(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
   // Triangles that are kept from one run to the next.
@@ -38,18 +38,18 @@ class WorkFolder {
   // Bytes of all files in the folder, for reports.
   uint64_t bytes() const;
 
-  // Nothing reads these bytes of a segment any more: gives their space back. One call at a time.
+  // Frees the space of bytes of a segment that are no longer read. One call at a time.
   void release(uint32_t segment, uint64_t offset, uint64_t bytes);
 
-  // Removes segments that `is_named` does not know: what an interrupted build left and no row of
-  // the store names.
+  // Removes the segments for which `is_named` is false: an interrupted build left them, and no row
+  // of the store names them.
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
   // Removes merge data.
   void empty_scratch();
   // Removes spilled triangles; kept ones. Silent, like remove().
   void remove_spilled() { remove_silently(spill_path()); }
   void remove_kept() { remove_silently(kept_path()); }
-  // Removes all that is ours, and the folder if it is empty then. Silent: what cannot be removed
+  // Removes all files of voxdag, and the folder if it is empty then. Silent: what cannot be removed
   // costs space, not correctness.
   void remove();
 

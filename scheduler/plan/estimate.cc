@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "scheduler/job/work_folder.h"
+#include "scheduler/memory_plan.h"
 #include "scheduler/plan/pilot.h"
 
 namespace voxdag {
@@ -18,20 +19,20 @@ namespace {
 // The growth of the DAG per doubling of R, above 2, falls by this factor per doubling: measured on
 // Sponza (2.98 at 2048 to 2.58 at 131072) and the dragon (2.77 to 3.17 and back to 2.74).
 constexpr double kGrowthDecay = 0.95;
-// Each doubling away from the pilot widens the range of node and byte figures by this factor.
+// Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
-// Bytes a node of the global file: a pilot's are fewer, since coarse levels repeat more.
+// Bytes per node of the global file: a pilot has fewer, since coarse levels repeat more.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
-// Measured on the shared scenes: nodes of all artifacts over unique ones, their compressed bytes,
-// and CPU time of a whole build over that of a pilot's nodes.
+// Measured on real scenes: nodes of all artifacts over unique ones, their compressed bytes, and CPU
+// time of a whole build over that of a pilot's nodes.
 constexpr double kArtifactNodesPerUnique = 1.5;
-constexpr double kArtifactBytesANode = 16;
-// Neither an artifact's row and its children, uncompressed, nor those of the file take as much.
+constexpr double kArtifactBytesPerNode = 16;
+// More than an uncompressed node takes, in an artifact or in the global file.
 constexpr double kMaxDiskBytesPerNode = 40;
 constexpr double kBuildOverPilotTime = 1.5;
-// Bytes a unique node that the merge holds at its peak, and what a process takes without a scene.
-constexpr double kMemoryBytesANode = 34;
+// Peak memory of the merge per unique node, and memory of a process without a scene.
+constexpr double kMemoryBytesPerNode = 34;
 constexpr double kBaseMemoryBytes = 24e6;
 
 EstimateRange exactly(double value) { return {value, value, value}; }
@@ -49,7 +50,7 @@ EstimateRange operator*(double factor, const EstimateRange& a) {
 std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
                                       MemoryBudget& budget, const CancelToken& cancel) {
   const auto backend = make_cpu_backend();
-  MemoryBudget share(budget.available() * 3 / 4, &budget);
+  MemoryBudget share(MemoryPlan::pilot_bytes(budget.available()), &budget);
   std::vector<PilotCounts> pilots;
   const uint32_t finest = std::min(pilot_levels, scene.grid.levels);
   const uint32_t coarsest = std::max<uint32_t>(kMinGridLevels, finest < 4 ? 2 : finest - 2);
@@ -84,8 +85,8 @@ double grow_as_dag(const std::vector<PilotCounts>& pilots, uint32_t doublings) {
   return result;
 }
 
-// What must be spilled is there already. A large scene is kept beside it where there is room; it
-// goes piece by piece while artifacts come.
+// What must be spilled is spilled already. A large scene is also stored durably where the disk has
+// space; it is freed piece by piece while artifacts are written.
 EstimateRange triangles_on_disk(const PreparedScene& scene) {
   const double spilled = static_cast<double>(scene.bins->spilled_bytes());
   return {spilled, std::max(spilled, scene.max_kept_bytes / 2),
@@ -102,7 +103,7 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
   estimate.free_memory = budget.limit();
   const auto pilots = build_pilots(scene, pilot_levels, budget, cancel);
   if (pilots.empty()) {
-    // Too many triangles even for a small grid: their own expected voxels bound what there will be.
+    // Too many triangles even for a small grid: their expected voxels are an upper bound.
     estimate.voxels = {0, scene.counts.expected_voxels, scene.counts.expected_voxels};
     return estimate;
   }
@@ -126,10 +127,10 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
 
   const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
   estimate.disk_bytes =
-      estimate.file_bytes + kArtifactBytesANode * artifact_nodes + triangles_on_disk(scene);
+      estimate.file_bytes + kArtifactBytesPerNode * artifact_nodes + triangles_on_disk(scene);
   const double triangle_bytes =
       static_cast<double>(scene.bins->record_bytes()) * static_cast<double>(scene.counts.triangles);
-  estimate.memory_bytes = kMemoryBytesANode * estimate.dag_nodes + exactly(triangle_bytes);
+  estimate.memory_bytes = kMemoryBytesPerNode * estimate.dag_nodes + exactly(triangle_bytes);
   for (double* figure :
        {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})
     *figure = std::min(*figure, static_cast<double>(budget.limit())) + kBaseMemoryBytes;
@@ -141,7 +142,7 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
 
 double max_disk_bytes(const PreparedScene& scene) {
   // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
-  // (expected_work()): over all levels twice its bricks, and one cube a level.
+  // (expected_work()): over all levels twice its bricks, and one cube per level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.counts.triangles);
@@ -153,6 +154,7 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   // A pilot of 2048^3 takes a second or two and holds for every resolution above.
   constexpr uint32_t kPilotLevels = 11;
   const BuildSpec full = checked(spec);
+  return_freed_memory_to_system();
   MemoryBudget budget(full.run.memory_bytes);
   StageClock clock;
   const char* temporary = std::getenv("TMPDIR");
@@ -161,12 +163,12 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
     folder =
         std::string(temporary ? temporary : "/tmp") + "/voxdag-plan-" + std::to_string(getpid());
   WorkFolder work(context.files, folder);
-  // The triangles that were spilled go again; a job that the folder holds is not touched.
-  struct Tidy {
+  // Removes spilled triangles; a job in the given work folder stays as it is.
+  struct Cleanup {
     WorkFolder& work;
     const bool own_folder;
-    ~Tidy() { own_folder ? work.remove() : work.remove_spilled(); }
-  } tidy{work, full.run.work_folder.empty()};
+    ~Cleanup() { own_folder ? work.remove() : work.remove_spilled(); }
+  } cleanup{work, full.run.work_folder.empty()};
   const PreparedScene scene = prepare_scene(full, work.spill_path(), budget, clock, context);
   Estimate estimate = estimate_build(scene, kPilotLevels, full.run.threads, budget, context.cancel);
   estimate.free_disk = context.files.free_space(work.path());
@@ -183,12 +185,12 @@ void check_disk(const char* what, const EstimateRange& bytes, const std::string&
     return std::string(text);
   };
   const double free_bytes = static_cast<double>(free);
-  const std::string figures = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
-                              " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
-                              " has " + gigabytes(free_bytes) + " free";
+  const std::string need = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
+                           " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
+                           " has " + gigabytes(free_bytes) + " free";
   if (bytes.low > free_bytes)
-    throw Error(ErrorCode::kNoSpace, figures + ": make room, or build anyway with --force");
-  if (bytes.high > free_bytes) progress.warn(figures);
+    throw Error(ErrorCode::kNoSpace, need + ": free some, or build anyway with --force");
+  if (bytes.high > free_bytes) progress.warn(need);
 }
 
 }  // namespace
@@ -197,7 +199,7 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
                     const std::string& output_folder, Progress& progress) {
   const uint64_t work_free = files.free_space(work_folder);
   const uint64_t output_free = files.free_space(output_folder);
-  // Free to the very byte alike: one disk, on which the whole must fit.
+  // Equal to the byte: taken for one disk, which must hold everything.
   if (work_free == output_free) {
     check_disk("the build", estimate.disk_bytes, work_folder, work_free, progress);
     return;
@@ -212,21 +214,21 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
 
 std::string estimate_json(const Estimate& e) {
   using nlohmann::ordered_json;
-  const auto figure = [](const EstimateRange& f) {
-    return ordered_json{{"low", f.low}, {"likely", f.likely}, {"high", f.high}};
+  const auto range = [](const EstimateRange& r) {
+    return ordered_json{{"low", r.low}, {"likely", r.likely}, {"high", r.high}};
   };
   return ordered_json{
       {"triangles", e.triangles},
       {"subvolumes", e.subvolumes},
       {"pilot_resolution", e.pilot_resolution},
-      {"voxels", figure(e.voxels)},
-      {"svo_nodes", figure(e.svo_nodes)},
-      {"dag_nodes", figure(e.dag_nodes)},
-      {"file_bytes", figure(e.file_bytes)},
-      {"disk_bytes", figure(e.disk_bytes)},
-      {"memory_bytes", figure(e.memory_bytes)},
-      {"cpu_s", figure(e.cpu_s)},
-      {"wall_s", figure(e.wall_s)},
+      {"voxels", range(e.voxels)},
+      {"svo_nodes", range(e.svo_nodes)},
+      {"dag_nodes", range(e.dag_nodes)},
+      {"file_bytes", range(e.file_bytes)},
+      {"disk_bytes", range(e.disk_bytes)},
+      {"memory_bytes", range(e.memory_bytes)},
+      {"cpu_s", range(e.cpu_s)},
+      {"wall_s", range(e.wall_s)},
       {"free_disk_bytes", e.free_disk},
       {"memory_budget_bytes", e.free_memory},
   }

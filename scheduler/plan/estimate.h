@@ -1,5 +1,5 @@
-// What a build will take, before it is built: pilot builds of the same scene at coarser
-// resolutions, extrapolated to the one asked for.
+// What a build will need, estimated before it is built: pilot builds of the same scene at coarser
+// resolutions, extrapolated to the requested one.
 //
 // Voxels and octree nodes grow as a R^2 + b R (surfaces and their borders): two pilots give a and
 // b. DAG nodes grow by a factor per doubling of R that falls slowly toward 2 as surfaces flatten
@@ -16,7 +16,7 @@
 
 namespace voxdag {
 
-// A figure with the range that it is expected to lie in.
+// A quantity and the range in which it is expected.
 struct EstimateRange {
   double low = 0, likely = 0, high = 0;
 };
@@ -31,7 +31,7 @@ struct Estimate {
   EstimateRange memory_bytes;  // peak resident memory within the budget
   EstimateRange cpu_s;
   EstimateRange wall_s;
-  uint64_t free_disk = 0;    // where the work folder lies; 0 if not looked at
+  uint64_t free_disk = 0;    // on the disk of the work folder; 0 if unknown
   uint64_t free_memory = 0;  // the budget
 };
 
@@ -41,15 +41,15 @@ struct Estimate {
 Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsigned threads,
                         MemoryBudget& budget, const CancelToken& cancel);
 
-// Disk that no build of the scene needs, whatever its DAG, reckoned without pilots; several times
-// what it will need.
+// An upper bound for the disk that a build of the scene needs, computed without pilots: several
+// times what it will need.
 double max_disk_bytes(const PreparedScene& scene);
 
 // The whole of `voxdag plan`: reads the scene, plans, estimates, builds nothing.
 Estimate plan_build(const BuildSpec& spec, const BuildContext& context);
 
-// Throws Error{kNoSpace} with the figures if not even the low end fits on the disk of the work
-// folder, or the file on that of the output's folder; warns if the high end may not.
+// Throws Error{kNoSpace} with the estimate if not even its low end fits on the disk of the work
+// folder, or the file's on that of the output's folder; warns if the high end may not fit.
 void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
                     const std::string& output_folder, Progress& progress);
 

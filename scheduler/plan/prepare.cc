@@ -9,6 +9,7 @@
 #include "core/base/process_limits.h"
 #include "scheduler/execute/open_backend.h"
 #include "scheduler/ingest/ingest.h"
+#include "scheduler/memory_plan.h"
 
 namespace voxdag {
 namespace {
@@ -126,13 +127,12 @@ class Preparation {
     state_.stage = IngestStage::kIngest;
     state_.position = 0;
     state_.digest = ContentDigest(state_.grid);
-    state_.top_tree_depth = TopTree::depth_within(state_.grid.levels, budget_.limit() / 16);
+    state_.top_tree_depth = TopTree::depth_within(state_.grid.levels, memory_.top_tree_bytes);
     if (keeps()) keeper_->save_scan(state_);
   }
 
   void open_bins(const std::string& spill_path) {
-    prepared_.bins_share =
-        std::make_unique<MemoryBudget>(triangle_share(budget_.limit()), &budget_);
+    prepared_.bins_share = std::make_unique<MemoryBudget>(memory_.triangle_bytes, &budget_);
     // By given bounds, triangles may reach far outside.
     prepared_.bins = std::make_unique<TriangleBins>(
         context_.files, spill_path, spec_.geometry.bounds.has_value(), *prepared_.bins_share);
@@ -159,7 +159,7 @@ class Preparation {
     if (state_.top_tree.bytes)
       prepared_.bins->kept_file()->read(state_.top_tree, top.fill(state_.top_tree_weight));
     if (state_.stage == IngestStage::kIngest) {
-      BinWriter writer(*prepared_.bins, {prepared_.whole}, size_t{1} << 20);
+      BinWriter writer(*prepared_.bins, {prepared_.whole}, MemoryPlan::kIngestBufferBytes);
       ingest(*scene_, spec_.run.threads, state_, writer, top, context_, [&] {
         if (!keeper_ || !keeper_->is_due()) return;
         writer.flush();
@@ -183,6 +183,7 @@ class Preparation {
 
   const BuildSpec& spec_;
   MemoryBudget& budget_;
+  const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
   const BuildContext& context_;
   IngestCheckpoint* const keeper_;
   std::unique_ptr<TriangleSource> scene_;

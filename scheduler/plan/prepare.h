@@ -19,9 +19,6 @@ namespace voxdag {
 // not there) naming the option that is wrong.
 BuildSpec checked(const BuildSpec& spec);
 
-// Of a budget, what triangles may take.
-inline uint64_t triangle_share(uint64_t memory_bytes) { return memory_bytes / 3; }
-
 // The kept bin of a subvolume's triangles.
 struct KeptBin {
   Cube cube;

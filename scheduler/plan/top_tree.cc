@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// Cells are no smaller, in voxels per edge: finer ones cost more than they tell about a scene.
+// The smallest edge of a cell in voxels: finer ones cost more than they improve the plan.
 constexpr int64_t kMinCellEdge = 2 * kSmallestEdge;
 
 }  // namespace
@@ -34,7 +34,7 @@ ExpectedWork expected_work(const FixedTriangle& t) {
 
 uint32_t TopTree::depth_within(uint32_t grid_levels, uint64_t bytes) {
   uint32_t depth = 0;
-  while (depth < kDeepest && (int64_t{1} << (grid_levels - depth)) > kMinCellEdge &&
+  while (depth < kMaxDepth && (int64_t{1} << (grid_levels - depth)) > kMinCellEdge &&
          (sizeof(Cell) << (3 * (depth + 1))) <= bytes)
     ++depth;
   return depth;
@@ -67,7 +67,7 @@ void TopTree::find_touched(const FixedTriangle& triangle) {
     return collect(triangle, cube,
                    morton_encode(cube.position[0], cube.position[1], cube.position[2]));
   }
-  // One holds it; of two it crosses the face between; of more each is asked.
+  // A box within one cell touches it; one across two crosses their common face; more are tested.
   const int64_t units = (kUnitsPerVoxel << grid_levels_) >> depth_;
   for (int64_t x = box.low[0]; x <= box.high[0]; ++x)
     for (int64_t y = box.low[1]; y <= box.high[1]; ++y)
@@ -104,31 +104,31 @@ bool TopTree::is_empty(uint64_t code) const {
   return any == 0;
 }
 
-// Bottom-up: a cube whose children all came back whole, and that `keep_whole` accepts, replaces
-// them.
-template <class KeepWhole>
-SubvolumePlan TopTree::gather(const Cube& cube, uint64_t code, const KeepWhole& keep_whole,
+// Appends the subvolumes of a cube to `out`, bottom-up: a cube that `is_small_enough` replaces its
+// parts.
+template <class IsSmallEnough>
+SubvolumePlan TopTree::gather(const Cube& cube, uint64_t code, const IsSmallEnough& is_small_enough,
                               std::vector<SubvolumePlan>& out) const {
-  SubvolumePlan sum;
-  sum.cube = cube;
-  if (cube.level + kSkippedLevels == depth_ && is_empty(code)) return sum;
+  SubvolumePlan whole;
+  whole.cube = cube;
+  if (cube.level + kSkippedLevels == depth_ && is_empty(code)) return whole;
   const size_t first = out.size();
   if (cube.level == depth_) {
-    sum.weight = cells_[code].weight;
-    sum.triangles = cells_[code].triangles;
+    whole.weight = cells_[code].weight;
+    whole.triangles = cells_[code].triangles;
   } else {
     for (int c = 0; c < 8; ++c) {
       const SubvolumePlan part =
-          gather(cube.child(c), code * 8 + static_cast<uint64_t>(c), keep_whole, out);
-      sum.weight += part.weight;
-      sum.triangles += part.triangles;
+          gather(cube.child(c), code * 8 + static_cast<uint64_t>(c), is_small_enough, out);
+      whole.weight += part.weight;
+      whole.triangles += part.triangles;
     }
   }
-  if (sum.triangles > 0 && (cube.level == depth_ || keep_whole(sum))) {
+  if (whole.triangles > 0 && (cube.level == depth_ || is_small_enough(whole))) {
     out.resize(first);
-    out.push_back(sum);
+    out.push_back(whole);
   }
-  return sum;
+  return whole;
 }
 
 std::vector<SubvolumePlan> TopTree::subvolumes_by_weight(double max_weight) const {

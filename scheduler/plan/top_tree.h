@@ -1,5 +1,6 @@
 // The dense top tree: for every cell of a coarse level, how many triangles touch it and how much
-// work they are. It decides which cubes of the grid become subvolumes.
+// work they are expected to be. It decides which cubes of the grid become subvolumes. Not
+// thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -30,9 +31,9 @@ struct SubvolumePlan {
 
 class TopTree {
  public:
-  static constexpr uint32_t kDeepest = 7;  // 128^3 cells
+  static constexpr uint32_t kMaxDepth = 7;  // 128^3 cells
 
-  // Cells of `depth`, at most kDeepest and at least the smallest subvolume in size; the counters
+  // Cells of `depth`, at most kMaxDepth and at least the smallest subvolume in size; the counters
   // are charged to `budget`.
   TopTree(uint32_t grid_levels, uint32_t depth, MemoryBudget& budget);
   // The deepest tree whose counters take at most `bytes`.
@@ -41,8 +42,8 @@ class TopTree {
   // `weight`: the bricks that the triangle is expected to touch.
   void add(const FixedTriangle& triangle, double weight);
   double total_weight() const { return total_weight_; }
-  // What was counted, apart from the total: plain bytes that another top tree of the same shape can
-  // be filled with.
+  // The counters as plain bytes, with which another top tree of the same depth can be filled; the
+  // total is separate.
   std::span<const std::byte> cells() const {
     return std::as_bytes(std::span(cells_.data(), cells_.size()));
   }
@@ -64,14 +65,14 @@ class TopTree {
     uint32_t triangles = 0;
   };
 
-  // Most of the grid is empty: cubes so many levels above the cells are looked at first.
+  // Most of the grid is empty: gather() first tests cubes this many levels above the cells.
   static constexpr uint32_t kSkippedLevels = 2;
   bool is_empty(uint64_t code) const;
-  // Fills touched_.
+  // Sets touched_ to the cells that the triangle touches.
   void find_touched(const FixedTriangle& triangle);
   void collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code);
-  template <class KeepWhole>
-  SubvolumePlan gather(const Cube& cube, uint64_t code, const KeepWhole& keep_whole,
+  template <class IsSmallEnough>
+  SubvolumePlan gather(const Cube& cube, uint64_t code, const IsSmallEnough& is_small_enough,
                        std::vector<SubvolumePlan>& out) const;
 
   const uint32_t grid_levels_;

@@ -1,10 +1,8 @@
 #include "scheduler/triangles/partition.h"
 
-#include <malloc.h>
-
-#include <array>
 #include <map>
 
+#include "core/base/process_limits.h"
 #include "scheduler/triangles/distribute.h"
 
 namespace voxdag {
@@ -62,14 +60,11 @@ void fill_kept_bins(std::span<const StoredSubvolume> planned, PreparedScene& sce
   bins.release(scene.whole);
 }
 
-using CubeKey = std::array<uint32_t, 4>;
-CubeKey key_of(const Cube& c) { return {c.level, c.position[0], c.position[1], c.position[2]}; }
-
 // The kept bin of the cube or of the nearest one around it.
-const KeptBin& nearest(const std::map<CubeKey, const KeptBin*>& kept_bins,
+const KeptBin& nearest(const std::map<Cube, const KeptBin*>& kept_bins,
                        const StoredSubvolume& subvolume) {
   for (Cube cube = subvolume.cube;; cube = cube.parent()) {
-    const auto found = kept_bins.find(key_of(cube));
+    const auto found = kept_bins.find(cube);
     if (found != kept_bins.end()) return *found->second;
     if (cube.level == 0)
       throw DamagedTriangles("subvolume " + std::to_string(subvolume.id) +
@@ -81,8 +76,8 @@ std::vector<QueuedSubvolume> take_from_kept_bins(std::span<const StoredSubvolume
                                                  PreparedScene& scene, size_t buffer_bytes,
                                                  const CancelToken& cancel) {
   TriangleBins& bins = *scene.bins;
-  std::map<CubeKey, const KeptBin*> by_cube;
-  for (const KeptBin& kept : scene.kept_bins) by_cube[key_of(kept.cube)] = &kept;
+  std::map<Cube, const KeptBin*> by_cube;
+  for (const KeptBin& kept : scene.kept_bins) by_cube[kept.cube] = &kept;
   std::vector<QueuedSubvolume> queue;
   std::map<const KeptBin*, std::vector<StoredSubvolume>> parts;
   for (const StoredSubvolume& subvolume : planned) {
@@ -125,7 +120,7 @@ std::vector<QueuedSubvolume> partition_triangles(std::span<const StoredSubvolume
                bins_of(queue), buffer_bytes, cancel);
   }
   // Chunks of triangles are small blocks of the heap, which would keep them resident.
-  malloc_trim(0);
+  trim_heap();
   return queue;
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "core/base/text.h"
 #include "core/format/checksum.h"
 #include "server/api/problem.h"
 #include "server/http/headers.h"
@@ -13,7 +14,6 @@ namespace {
 
 constexpr size_t kDigestBytes = 32;
 constexpr size_t kBase64Chars = 44;
-constexpr char kHexDigits[] = "0123456789abcdef";
 
 }  // namespace
 
@@ -46,12 +46,7 @@ std::string parse_digest_field(const std::string& header) {
         EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(base64.data()),
                         kBase64Chars) != kDigestBytes + 1)
       throw bad_request("a digest is broken: expected sha-256=:BASE64:");
-    std::string hex;
-    for (size_t i = 0; i < kDigestBytes; ++i) {
-      hex += kHexDigits[bytes[i] >> 4];
-      hex += kHexDigits[bytes[i] & 15];
-    }
-    return hex;
+    return hex_text(std::span(bytes).first(kDigestBytes));
   }
   throw bad_request("a digest has no sha-256: expected sha-256=:BASE64:");
 }

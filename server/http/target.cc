@@ -1,36 +1,21 @@
 #include "server/http/target.h"
 
+#include <algorithm>
+
+#include "core/base/text.h"
 #include "server/api/problem.h"
 
 namespace voxdag::server {
 namespace {
 
-int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-std::string decode(std::string_view text, bool plus_is_blank) {
-  std::string out;
-  out.reserve(text.size());
-  for (size_t i = 0; i < text.size(); ++i) {
-    char c = text[i];
-    if (c == '%') {
-      const int high = i + 2 < text.size() ? hex_digit(text[i + 1]) : -1;
-      const int low = high >= 0 ? hex_digit(text[i + 2]) : -1;
-      if (low < 0) throw bad_request("the target has a broken percent escape");
-      c = static_cast<char>(high * 16 + low);
-      i += 2;
-    } else if (c == '+' && plus_is_blank) {
-      c = ' ';
-    }
+std::string decode(std::string text, bool plus_is_blank) {
+  if (plus_is_blank) std::ranges::replace(text, '+', ' ');
+  auto out = percent_decoded(text);
+  if (!out) throw bad_request("the target has a broken percent escape");
+  for (const char c : *out)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
       throw bad_request("the target has a control character");
-    out += c;
-  }
-  return out;
+  return std::move(*out);
 }
 
 // Calls use(part) for each part between separators.
@@ -49,8 +34,8 @@ void parse_query(std::string_view text, std::map<std::string, std::string>& quer
     const size_t equals = std::min(pair.find('='), pair.size());
     const std::string_view value =
         equals < pair.size() ? pair.substr(equals + 1) : std::string_view{};
-    const auto [at, is_new] =
-        query.emplace(decode(pair.substr(0, equals), true), decode(value, true));
+    const auto [at, is_new] = query.emplace(decode(std::string(pair.substr(0, equals)), true),
+                                            decode(std::string(value), true));
     if (!is_new) throw bad_request("a query parameter is given twice");
   });
 }
@@ -74,8 +59,9 @@ Target parse_target(std::string_view text) {
   const size_t mark = std::min(text.find('?'), text.size());
   target.path = text.substr(0, mark);
   if (target.path.size() > 1)
-    split(text.substr(1, mark - 1), '/',
-          [&](std::string_view part) { target.segments.push_back(decode(part, false)); });
+    split(text.substr(1, mark - 1), '/', [&](std::string_view part) {
+      target.segments.push_back(decode(std::string(part), false));
+    });
   if (mark < text.size()) parse_query(text.substr(mark + 1), target.query);
   return target;
 }

@@ -76,7 +76,7 @@ void BuiltWatch::look() {
   const std::string path = WorkFolder::store_path(folder_.work());
   try {
     if (!files_.exists(path)) return;
-    JobStore store(path, JobStore::Access::kLook);
+    JobStore store(path, JobStore::Access::kRead);
     const std::vector<StoredSubvolume> leaves = store.leaves();
     Report report;
     report.kind = Report::Kind::kBuilt;

@@ -47,8 +47,6 @@ Problem no_job(const std::string& id) {
 
 }  // namespace
 
-double unix_seconds() { return clock_seconds(CLOCK_REALTIME); }
-
 std::optional<JobState> parse_state(std::string_view name) {
   for (size_t i = 0; i < kJobStateNames.size(); ++i)
     if (name == kJobStateNames[i]) return static_cast<JobState>(i);

@@ -106,6 +106,4 @@ class JobQueue {
   uint64_t queue_version_ = 1;  // counts those that may move jobs in the queue
 };
 
-double unix_seconds();
-
 }  // namespace voxdag::server

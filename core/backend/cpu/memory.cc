@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 
+#include "core/backend/backend_memory.h"
 #include "core/base/page_buffer.h"
 
 namespace voxdag::cpu {
@@ -12,9 +13,6 @@ namespace {
 constexpr char kWhat[] = "a subvolume";
 constexpr size_t kPage = size_t{4} << 10;
 constexpr size_t kLargestPower = size_t{4} << 20;
-// What is kept from one subvolume to the next: an eighth of the budget, within these.
-constexpr uint64_t kKeptInAnyCase = uint64_t{8} << 20;
-constexpr uint64_t kMaxKept = uint64_t{128} << 20;
 // A subvolume takes up to some hundred blocks; with fewer the small ones, which come back last,
 // would drive out the large.
 constexpr size_t kMaxBlocks = 1024;
@@ -105,7 +103,7 @@ void Memory::grow(PagePool::Block& block, size_t bytes) {
 }
 
 void Memory::give_back(PagePool::Block block) noexcept {
-  pool.give_back(block, std::clamp(budget.limit() / 8, kKeptInAnyCase, kMaxKept));
+  pool.give_back(block, BackendMemory::page_bytes(budget.limit()));
   budget.release(block.bytes);
 }
 

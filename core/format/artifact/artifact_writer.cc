@@ -2,6 +2,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/popcount8.h"
 #include "core/dag/brick.h"
 #include "core/dag/node_hash.h"
 #include "core/format/artifact/artifact.h"
@@ -129,7 +130,7 @@ void ArtifactWriter::append_nodes(const NodeLevelView& rows) {
   while (at < rows.masks.size()) {
     const size_t n = std::min<size_t>(rows.masks.size() - at, kFrameRows - s.values.size());
     size_t child_count = 0;
-    for (const uint8_t mask : rows.masks.subspan(at, n)) child_count += kChildCount[mask];
+    for (const uint8_t mask : rows.masks.subspan(at, n)) child_count += kPopcount8[mask];
     if (child_count > rows.children.size() - at_child) s.broken("children are missing");
     const NodeLevelView part{rows.level, rows.hashes.subspan(at, n), rows.masks.subspan(at, n),
                              rows.children.subspan(at_child, child_count)};

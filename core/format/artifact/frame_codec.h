@@ -23,14 +23,6 @@
 
 namespace voxdag {
 
-// Children of a node by its child mask; a table, since baseline x86-64 has no popcount.
-inline constexpr std::array<uint8_t, 256> kChildCount = [] {
-  std::array<uint8_t, 256> table{};
-  for (unsigned mask = 1; mask < 256; ++mask)
-    table[mask] = static_cast<uint8_t>(table[mask >> 1] + (mask & 1));
-  return table;
-}();
-
 class FrameEncoder {
  public:
   FrameEncoder();

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "core/base/host_device.h"
+#include "core/base/popcount8.h"
 #include "core/dag/node_hash.h"
 #include "core/format/artifact/frame_codec.h"
 
@@ -21,7 +22,7 @@ uint64_t children_of(std::span<const uint8_t> masks, bool& any_empty) {
     empty |= (eight - kOnes) & ~eight & kTops;  // not 0 iff a byte is
   }
   for (const uint8_t mask : masks) {
-    children += kChildCount[mask];
+    children += kPopcount8[mask];
     empty |= mask == 0;
   }
   any_empty = empty != 0;
@@ -60,7 +61,7 @@ bool are_in_total_order(const NodeLevelView& rows, const LastRow& last) {
     hash = rows.hashes[i];
     mask = rows.masks[i];
     previous = children;
-    children += kChildCount[mask];
+    children += kPopcount8[mask];
   }
   return true;
 }
@@ -90,7 +91,7 @@ const char* check_node_order(const NodeLevelView& rows, uint64_t child_rows, uin
   const bool by_hash =
       (!last.present || last.hash < rows.hashes.front()) && strictly_increase(rows.hashes);
   if (!by_hash && !are_in_total_order(rows, last)) return "nodes are not in the total order";
-  std::copy(rows.children.end() - kChildCount[rows.masks.back()], rows.children.end(),
+  std::copy(rows.children.end() - kPopcount8[rows.masks.back()], rows.children.end(),
             last.children);
   last.present = true;
   last.hash = rows.hashes.back();

@@ -1,7 +1,7 @@
 #include "core/format/global/node_index.h"
 
 #include "core/base/error.h"
-#include "core/format/artifact/frame_codec.h"
+#include "core/base/popcount8.h"
 
 namespace voxdag {
 
@@ -25,7 +25,7 @@ NodeIndex::NodeIndex(const voxdag_reader::Level& level, bool bricks, MemoryBudge
       throw Error(ErrorCode::kCorrupt, where + ", word " + std::to_string(at) + ": child mask " +
                                            std::to_string(mask) + ", expected 1 to 255");
     starts_[at / 64] |= uint64_t{1} << at % 64;
-    at += 1 + uint64_t{kChildCount[mask]};
+    at += 1 + uint64_t{kPopcount8[mask]};
   }
   if (at != words_)
     throw Error(ErrorCode::kCorrupt, where + ": its last node ends at word " + std::to_string(at) +

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/popcount8.h"
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
-#include "core/format/artifact/frame_codec.h"
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/node_index.h"
@@ -157,7 +157,7 @@ void Verifier::check_nodes(uint32_t level) {
   for (uint64_t i = 0; i < nodes.node_count; ++i) {
     advance(i, nodes.node_count);
     const uint64_t at = static_cast<uint64_t>(word - nodes.words);
-    const int children = kChildCount[*word];
+    const int children = kPopcount8[*word];
     uint64_t child_hashes[8];
     for (int c = 0; c < children; ++c) {
       const uint64_t child = below.find(word[1 + c]);
@@ -196,7 +196,7 @@ void Verifier::check_counts() const {
     const uint32_t* word = file_.level(level).words;
     for (uint64_t i = 0; i < times.size(); ++i) {
       svo_nodes += times[i];
-      const int children = kChildCount[*word++];
+      const int children = kPopcount8[*word++];
       for (int c = 0; c < children; ++c) child_times[below.find(*word++)] += times[i];
     }
     times = std::move(child_times);

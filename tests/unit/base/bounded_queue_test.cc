@@ -40,7 +40,7 @@ TEST(BoundedQueue, WaitsForAFreeSlot) {
   EXPECT_EQ(*ring.front(), 1);
 }
 
-TEST(BoundedQueue, GivesWhatWasPushedBeforeTheEnd) {
+TEST(BoundedQueue, ReturnsWhatWasPushedBeforeTheEnd) {
   BoundedQueue<int, 3> ring;
   *ring.free_slot() = 7;
   ring.push();
@@ -51,21 +51,22 @@ TEST(BoundedQueue, GivesWhatWasPushedBeforeTheEnd) {
   EXPECT_EQ(ring.front(), nullptr);
 }
 
-// A writer that waits learns that nobody reads any more.
-TEST(BoundedQueue, TellsThatTheReaderGaveUp) {
+// A producer that waits for a slot learns that the consumer has stopped.
+TEST(BoundedQueue, StopsAWaitingProducer) {
   BoundedQueue<int, 1> ring;
   *ring.free_slot() = 0;
   ring.push();
-  std::thread reader([&] { ring.give_up(); });
+  std::thread reader([&] { ring.stop(); });
   EXPECT_EQ(ring.free_slot(), nullptr);
   reader.join();
 }
 
-class MakeAndTake : public testing::TestWithParam<unsigned> {
+class ProducerConsumer : public testing::TestWithParam<unsigned> {
  protected:
   static constexpr int kItems = 1000;
 
-  // Makes items up to kItems, takes them into `taken`; either throws at the item of that number.
+  // Produces items up to kItems and consumes them into taken_; either throws at the item of that
+  // number.
   void run(int make_throws_at, int take_throws_at) {
     run_producer_consumer<std::vector<int>, 3>(
         GetParam(),
@@ -92,26 +93,28 @@ class MakeAndTake : public testing::TestWithParam<unsigned> {
   std::vector<int> taken_;
 };
 
-TEST_P(MakeAndTake, TakesAllInOrder) {
+TEST_P(ProducerConsumer, ConsumesAllInOrder) {
   run(-1, -1);
   expect_taken(kItems);
 }
 
-TEST_P(MakeAndTake, WhatWasMadeBeforeAFailureIsTaken) {
+TEST_P(ProducerConsumer, ConsumesWhatWasProducedBeforeAFailure) {
   EXPECT_THROW(run(500, -1), std::runtime_error);
   expect_taken(500);
 }
 
-TEST_P(MakeAndTake, MakesNoMoreOnceTakingFailed) {
+TEST_P(ProducerConsumer, ProducesNoMoreOnceConsumingFailed) {
   EXPECT_THROW(run(-1, 500), std::logic_error);
   expect_taken(500);
   EXPECT_LE(made_, 505);
 }
 
 // Both fail: what was taken wrongly came first.
-TEST_P(MakeAndTake, ThrowsWhatTakingThrew) { EXPECT_THROW(run(501, 500), std::logic_error); }
+TEST_P(ProducerConsumer, ThrowsWhatConsumingThrew) {
+  EXPECT_THROW(run(501, 500), std::logic_error);
+}
 
-INSTANTIATE_TEST_SUITE_P(Threads, MakeAndTake, testing::Values(1, 2),
+INSTANTIATE_TEST_SUITE_P(Threads, ProducerConsumer, testing::Values(1, 2),
                          testing::PrintToStringParamName());
 
 }  // namespace

@@ -27,7 +27,7 @@ TEST(MemoryBudget, ChargesUpToItsLimit) {
   EXPECT_EQ(budget.peak(), 100u);
 }
 
-// Sizes near 2^64 must not wrap round to something that fits.
+// Sizes near 2^64 must not wrap around to something that fits.
 TEST(MemoryBudget, RefusesSizesThatWouldWrap) {
   MemoryBudget budget(100);
   ASSERT_TRUE(budget.try_charge(50));
@@ -39,7 +39,7 @@ TEST(MemoryBudget, RefusesSizesThatWouldWrap) {
   EXPECT_FALSE(endless.try_charge(2));
 }
 
-// The error says what wanted how much of how much.
+// The error names the buffer, its size, what is free and the limit.
 TEST(MemoryBudget, NamesWhatDidNotFit) {
   MemoryBudget budget(1000);
   budget.charge(300, "the first");
@@ -75,8 +75,8 @@ TEST(MemoryBudget, SharesChargeTheirParents) {
   EXPECT_EQ(whole.used(), 65u);
 }
 
-// A charge follows its owner: moved, resized, overwritten, and given back exactly once.
-TEST(MemoryCharge, IsGivenBackOnce) {
+// A charge follows its owner: moved, resized, overwritten, and released exactly once.
+TEST(MemoryCharge, IsReleasedOnce) {
   MemoryBudget budget(100);
   {
     MemoryCharge a(budget, 40, "a");
@@ -104,8 +104,8 @@ TEST(MemoryCharge, WithoutBudgetHoldsNothing) {
   EXPECT_EQ(none.bytes(), 0u);
 }
 
-// Many threads on shares of one budget: the limit holds at every instant and all is given back.
-TEST(MemoryBudget, HoldsItsLimitUnderThreads) {
+// Many threads on shares of one budget: the limit is never exceeded and all is released.
+TEST(MemoryBudget, IsNotExceededByThreads) {
   constexpr uint64_t kLimit = 1000;
   MemoryBudget whole(kLimit);
   std::atomic<bool> over{false};

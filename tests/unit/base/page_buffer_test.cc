@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// Pages come zero-filled, also those of a buffer that was just given back dirty.
+// Pages come zero-filled, also those of a buffer that was just freed with other contents.
 TEST(PageBuffer, IsZeroFilled) {
   MemoryBudget budget(uint64_t{64} << 20);
   for (int round = 0; round < 3; ++round) {
@@ -19,7 +19,7 @@ TEST(PageBuffer, IsZeroFilled) {
   }
 }
 
-// Bytes are charged while a buffer lives, whoever holds it.
+// Bytes are charged while a buffer lives, whoever owns it.
 TEST(PageBuffer, ChargesWhatItHolds) {
   MemoryBudget budget(10000);
   {
@@ -41,7 +41,7 @@ TEST(PageBuffer, ChargesWhatItHolds) {
   EXPECT_EQ(budget.used(), 0u);
 }
 
-// Growing keeps the contents, zero-fills the rest and charges it; what does not fit changes
+// Growing retains the contents, zero-fills the rest and charges it; what does not fit changes
 // nothing.
 TEST(PageBuffer, Grows) {
   MemoryBudget budget(uint64_t{1} << 20);

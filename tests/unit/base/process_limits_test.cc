@@ -22,7 +22,7 @@ class CgroupMemoryTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// Version 2: the least limit of the process's group and of all above it; siblings do not count.
+// Version 2: the lowest limit of the process's group and of all above it; siblings do not count.
 TEST_F(CgroupMemoryTest, WalksUpInVersion2) {
   write("slice/box/memory.max", "max\n");
   write("slice/memory.max", "3000000000\n");
@@ -37,7 +37,7 @@ TEST_F(CgroupMemoryTest, WalksUpInVersion2) {
   EXPECT_EQ(cgroup_memory("0::/not/there\n", mount()), 500000000u);
 }
 
-// Version 1, alone or beside version 2, and what is no membership at all.
+// Version 1, alone or together with version 2, and what is no membership at all.
 TEST_F(CgroupMemoryTest, WalksUpInVersion1) {
   write("memory/pool/job/memory.limit_in_bytes", "9223372036854771712\n");
   write("memory/pool/memory.limit_in_bytes", "700000000\n");

@@ -60,7 +60,7 @@ class FailingDisk : public ForwardingFiles {
 };
 
 // The order that survives a power cut: the contents are on the disk before they get the name, and
-// the name before anybody is told.
+// the name before the call returns.
 TEST(AtomicWrite, SyncsBeforeRenaming) {
   TemporaryFolder folder;
   FailingDisk disk(0);
@@ -68,7 +68,7 @@ TEST(AtomicWrite, SyncsBeforeRenaming) {
   EXPECT_EQ(disk.calls, (std::vector<std::string>{"create", "write", "sync", "close", "rename",
                                                   "sync_directory"}));
   EXPECT_EQ(read_small_file(disk, folder.file("f"), 100), "contents");
-  EXPECT_EQ(disk.list(folder.path()).size(), 1u) << "something was left beside the file";
+  EXPECT_EQ(disk.list(folder.path()).size(), 1u) << "something was left next to the file";
 }
 
 // Whichever call fails, the error comes through and the name holds the old or the new contents.

@@ -117,7 +117,7 @@ class JournalTest : public testing::Test {
   }
   // In rows that others see.
   size_t recorded() {
-    return built_in(JobStore(folder_.file("job.db"), JobStore::Access::kLook).leaves());
+    return built_in(JobStore(folder_.file("job.db"), JobStore::Access::kRead).leaves());
   }
   size_t announced() { return built_in(store_.leaves()) - recorded(); }
   size_t built_in(const std::vector<StoredSubvolume>& leaves) const {

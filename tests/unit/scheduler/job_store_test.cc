@@ -57,7 +57,7 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
 }
 
 // A split subvolume is replaced by its parts; a lost one is planned again; both survive.
-TEST_F(JobStoreTest, SplitsAndLosses) {
+TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(2));
   const StoredSubvolume whole = store.leaves()[0];
@@ -69,15 +69,15 @@ TEST_F(JobStoreTest, SplitsAndLosses) {
   EXPECT_EQ(leaves[1].cube, parts[0]);
   EXPECT_EQ(leaves[2].id, ids[1]);
   store.record_built(std::vector{built(leaves[2])});
-  store.record_lost(store.leaves()[2]);
+  store.mark_for_rebuild(store.leaves()[2]);
   leaves = store.leaves();
   EXPECT_EQ(leaves[2].state, SubvolumeState::kPlanned);
   EXPECT_EQ(leaves[2].cube, parts[1]);
   EXPECT_TRUE(leaves[2].summary.empty());
 }
 
-// What is built but not recorded yet: no row tells of it, and what is lost is planned again.
-TEST_F(JobStoreTest, AnnouncedIsKnownToTheWriterOnly) {
+// What is built but not recorded yet is in no row; what is lost is planned again.
+TEST_F(JobStoreTest, BuiltInMemoryIsKnownToTheWriterOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(3));
   std::vector<StoredSubvolume> announced;
@@ -89,15 +89,15 @@ TEST_F(JobStoreTest, AnnouncedIsKnownToTheWriterOnly) {
   };
   constexpr auto kPlanned = SubvolumeState::kPlanned, kBuilt = SubvolumeState::kBuilt;
   const auto seen = [&] {
-    JobStore looker(path(), JobStore::Access::kLook);
+    JobStore looker(path(), JobStore::Access::kRead);
     return states(looker);
   };
-  store.announce_built(announced);
+  store.mark_built_in_memory(announced);
   EXPECT_EQ(states(store), std::vector(3, kBuilt));
   EXPECT_EQ(store.leaves()[2].artifact, announced[2].artifact);
   EXPECT_EQ(seen(), std::vector(3, kPlanned));
   store.record_built({announced.data(), 1});
-  store.record_lost(announced[1]);
+  store.mark_for_rebuild(announced[1]);
   EXPECT_EQ(states(store), (std::vector{kBuilt, kPlanned, kBuilt}));
   EXPECT_EQ(seen(), (std::vector{kBuilt, kPlanned, kPlanned}));
   store.start(job_, plan(3));
@@ -115,7 +115,7 @@ TEST_F(JobStoreTest, StartingOverForgets) {
   EXPECT_EQ(store.leaves().size(), 2u);
 }
 
-// Files that are not ours, or of another version, are refused by what they are.
+// Files of another kind or version are refused, and the error says which it is.
 TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
   std::ofstream(path()) << "this is no database at all, whatever its name may say";
   try {
@@ -143,9 +143,9 @@ TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
   }
 }
 
-// A store as version 1 left it, without the tables that came later, is brought up to date with all
-// that it holds; who only looks reads it as it is.
-TEST_F(JobStoreTest, BringsAnEarlierVersionUpToDate) {
+// A store as version 1 left it, without the tables that came later, is migrated with all
+// its rows; a reader reads it as it is.
+TEST_F(JobStoreTest, MigratesAnEarlierVersion) {
   {
     JobStore store(path(), JobStore::Access::kBuild);
     store.start(job_, plan(3));
@@ -153,7 +153,7 @@ TEST_F(JobStoreTest, BringsAnEarlierVersionUpToDate) {
   }
   SqlDatabase(path(), SqlDatabase::Mode::kReadWrite)
       .execute("DROP TABLE merge; DROP TABLE result; DROP TABLE ingest; PRAGMA user_version = 1");
-  EXPECT_EQ(JobStore(path(), JobStore::Access::kLook).leaves().size(), 3u);
+  EXPECT_EQ(JobStore(path(), JobStore::Access::kRead).leaves().size(), 3u);
   for (int opened = 1; opened <= 2; ++opened) {
     JobStore store(path(), JobStore::Access::kBuild);
     EXPECT_EQ(store.job(), job_);
@@ -189,7 +189,7 @@ TEST_F(JobStoreTest, RemembersTheMerge) {
   EXPECT_FALSE(store.merge().has_value());
 }
 
-// SQLite would hand out a row that rotted on the disk; the row's own checksum does not.
+// SQLite would return a row that was damaged on the disk; the row's own checksum detects it.
 TEST_F(JobStoreTest, NoticesARowThatChanged) {
   for (const char* change : {"x = x + 1", "state = 1", "voxels = 12", "checksum = checksum + 1"}) {
     SCOPED_TRACE(change);
@@ -207,11 +207,11 @@ TEST_F(JobStoreTest, NoticesARowThatChanged) {
   }
 }
 
-// A looker reads while the builder's connection is open, and cannot write.
-TEST_F(JobStoreTest, CanBeLookedAtMeanwhile) {
+// Another connection reads while the builder's is open, and cannot write.
+TEST_F(JobStoreTest, CanBeReadDuringABuild) {
   JobStore builder(path(), JobStore::Access::kBuild);
   builder.start(job_, plan(2));
-  JobStore looker(path(), JobStore::Access::kLook);
+  JobStore looker(path(), JobStore::Access::kRead);
   EXPECT_EQ(looker.leaves().size(), 2u);
   ProgressSnapshot progress;
   progress.stage = "build";
@@ -222,9 +222,9 @@ TEST_F(JobStoreTest, CanBeLookedAtMeanwhile) {
   EXPECT_THROW(looker.set_progress(progress), Error);
 }
 
-// How far ingest is outlives the start of a job and is forgotten when told to, and when an artifact
-// is lost whose triangles are gone; a row that rotted is told from a sound one.
-TEST_F(JobStoreTest, RemembersHowFarIngestIs) {
+// The progress of ingest outlives the start of a job and is forgotten on request, and when an
+// artifact is lost whose triangles are gone; a damaged row is detected.
+TEST_F(JobStoreTest, RemembersTheProgressOfIngest) {
   const std::vector<std::byte> record = {std::byte{3}, std::byte{0}, std::byte{200}};
   JobStore store(path(), JobStore::Access::kBuild);
   EXPECT_FALSE(store.ingest().has_value());
@@ -234,7 +234,7 @@ TEST_F(JobStoreTest, RemembersHowFarIngestIs) {
   EXPECT_EQ(store.ingest(), record);
   store.record_built(std::vector{built(store.leaves()[1])});
   EXPECT_EQ(store.ingest(), record);
-  store.record_lost(store.leaves()[1]);
+  store.mark_for_rebuild(store.leaves()[1]);
   EXPECT_FALSE(store.ingest().has_value());
   store.save_ingest(record);
   store.forget_ingest();

@@ -166,8 +166,9 @@ TEST(TopTree, ExpectedVoxelsOfAnAxisAlignedTriangle) {
   EXPECT_NEAR(expected_work(t).bricks, 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
 }
 
-// Filled with the cells of another, a top tree goes on as that one would have: the plans are equal.
-TEST(TopTree, GoesOnFromTheCellsOfAnother) {
+// Filled with the cells of another, a top tree continues as that one would have: the plans are
+// equal.
+TEST(TopTree, ContinuesFromTheCellsOfAnother) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(4);
   const uint32_t depth = TopTree::depth_within(kLevels, 1 << 20);

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "core/base/clock.h"
 #include "server/api/problem.h"
 #include "server/queue/job_queue.h"
 #include "tests/unit/io/temporary_folder.h"

@@ -4,6 +4,8 @@
 #include <bit>
 #include <utility>
 
+#include "core/backend/backend_memory.h"
+
 namespace voxdag::cpu {
 namespace {
 
@@ -18,7 +20,8 @@ BlockMemo::BlockMemo(Memory& memory) : memory_(memory) {
 }
 
 bool BlockMemo::affordable(uint64_t slots) const {
-  return slots * (sizeof(Block) + sizeof(Node)) <= memory_.budget.available() / 16;
+  return slots * (sizeof(Block) + sizeof(Node)) <=
+         BackendMemory::block_memo_bytes(memory_.budget.available());
 }
 
 void BlockMemo::set_slots(uint64_t slots) {

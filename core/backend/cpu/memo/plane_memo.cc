@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/backend/backend_memory.h"
 #include "core/backend/cpu/memo/plane_brick.h"
 
 namespace voxdag::cpu {
@@ -94,7 +95,8 @@ PlaneDirection* PlaneMemo::direction_of(const Plane& plane) {
 }
 
 bool PlaneMemo::affordable(uint64_t bytes) const {
-  return bytes <= memory_.budget.limit() / 16 && bytes <= memory_.budget.available() / 8;
+  return bytes <=
+         BackendMemory::plane_table_bytes(memory_.budget.limit(), memory_.budget.available());
 }
 
 NodeRef PlaneMemo::node(const Plane& plane, PlaneDirection& direction, int64_t f, int size_log2) {

@@ -17,8 +17,8 @@
 #include <cstdint>
 
 #include "core/backend/cpu/kernels.h"
-#include "core/backend/cpu/tables/child_mask.h"
 #include "core/base/integers.h"
+#include "core/base/popcount8.h"
 
 namespace voxdag::cpu {
 
@@ -135,7 +135,7 @@ struct OctantTest {
   Octants run(bool whole_cube_inside) {
     Octants out{box_test(), 0};
     // A small triangle covers no child, and where its box is in two it most likely touches both.
-    if (!whole_cube_inside && kChildCounts.of[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
+    if (!whole_cube_inside && kPopcount8[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
     set_normal();
     out.touched &= plane_test();
     if (whole_cube_inside) return {out.touched, out.touched};

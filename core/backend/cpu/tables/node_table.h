@@ -14,7 +14,7 @@
 #include <span>
 
 #include "core/backend/cpu/memory.h"
-#include "core/backend/cpu/tables/child_mask.h"
+#include "core/base/popcount8.h"
 
 namespace voxdag::cpu {
 
@@ -45,7 +45,7 @@ class NodeTable {
     void set_place(uint32_t index) { words[0] = index; }
     uint32_t mask() const { return words[2]; }
     uint32_t* children() { return words + kWords; }
-    int child_count() const { return child_count_of(mask()); }
+    int child_count() const { return popcount8(mask()); }
   };
 
   explicit NodeTable(Memory& memory) : memory_(memory) {}

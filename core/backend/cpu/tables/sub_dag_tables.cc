@@ -1,5 +1,6 @@
 #include "core/backend/cpu/tables/sub_dag_tables.h"
 
+#include "core/backend/backend_memory.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
@@ -12,7 +13,7 @@ constexpr uint64_t kBytesPerEntry = 80;  // of a table, at most, records include
 SubDagTables::SubDagTables(Memory& memory, int size_log2, const TableSizes& expected)
     : memory_(memory), bricks_(memory) {
   // Only so much that a cube which turns out smaller has room to spare.
-  uint64_t affordable = memory.budget.available() / 4;
+  uint64_t affordable = BackendMemory::table_bytes(memory.budget.available());
   const auto reserve = [&](auto& table, int s) {
     const uint64_t bytes = expected.entries[s] * kBytesPerEntry;
     if (bytes == 0 || bytes > affordable) return;

@@ -74,7 +74,7 @@ void TileReducer::find_new_blocks(TileBricks& tile, int count, bool remember) {
     ids_[at] = brick_ids_[i];
     hashes_[at] = brick_hashes_[i];
     const BlockMemo::Node node{hashes_[at], ids_[at], new_voxels_[i],
-                               static_cast<uint16_t>(child_count_of(parents_.masks[i]))};
+                               static_cast<uint16_t>(popcount8(parents_.masks[i]))};
     tables_.counts() += {node.bricks, node.voxels};
     Block& block = tile.blocks[blocks_[at]];
     if (remember) memo_.remember(keys_[at], block, node);
@@ -110,15 +110,15 @@ void TileReducer::look_up(const Parents& parents, NodeTable& table, uint64_t* ha
   table.reserve(static_cast<uint64_t>(count));
   // A node's children stand at or behind its own place.
   for (int i = 0; i < count; ++i) {
-    hashes[i] = hash_of(parents.masks[i], child_count_of(parents.masks[i]),
-                        &hashes[parents.first_child[i]]);
+    hashes[i] =
+        hash_of(parents.masks[i], popcount8(parents.masks[i]), &hashes[parents.first_child[i]]);
     table.prefetch_slot(hashes[i]);
   }
   if (count > 4)
     for (int i = 0; i < count; ++i) table.prefetch_record(hashes[i]);
   for (int i = 0; i < count; ++i)
     ids[i] = table.find_or_add(hashes[i], parents.masks[i], &ids[parents.first_child[i]],
-                               child_count_of(parents.masks[i]));
+                               popcount8(parents.masks[i]));
 }
 
 }  // namespace voxdag::cpu

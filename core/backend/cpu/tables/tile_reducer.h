@@ -11,8 +11,8 @@
 #include "core/backend/cpu/kernels.h"
 #include "core/backend/cpu/memo/block_memo.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
-#include "core/backend/cpu/tables/child_mask.h"
 #include "core/backend/cpu/tables/sub_dag_tables.h"
+#include "core/base/popcount8.h"
 
 namespace voxdag::cpu {
 
@@ -53,7 +53,7 @@ class TileReducer {
     void add(uint32_t mask) {
       masks[count] = static_cast<uint8_t>(mask);
       first_child[count++] = static_cast<uint16_t>(children);
-      children += child_count_of(mask);
+      children += popcount8(mask);
     }
   };
 

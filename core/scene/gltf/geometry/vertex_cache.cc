@@ -7,7 +7,7 @@ namespace voxdag::gltf {
 VertexCache::VertexCache(MemoryBudget& budget, uint64_t vertices) {
   constexpr uint64_t kSlotBytes = kBlockVertices * 3 * sizeof(double);
   const uint64_t wanted = std::bit_ceil((vertices + kBlockVertices - 1) / kBlockVertices);
-  const uint64_t affordable = std::bit_floor(budget.available() / 4 / kSlotBytes);
+  const uint64_t affordable = std::bit_floor(budget.available() / kShareOfFree / kSlotBytes);
   const uint64_t slots = std::clamp<uint64_t>(std::min(wanted, affordable), 1, wanted);
   positions_ = PageBuffer<double>(budget, static_cast<size_t>(slots * kBlockVertices * 3),
                                   "vertices of a scene");

@@ -14,7 +14,10 @@ namespace voxdag::gltf {
 
 class VertexCache {
  public:
-  // Room for `vertices`, or as much of it as a quarter of what the budget has free.
+  // The cache takes at most one part in so many of what the budget has free.
+  static constexpr uint64_t kShareOfFree = 4;
+
+  // Room for `vertices`, or for as many as fit that share.
   VertexCache(MemoryBudget& budget, uint64_t vertices);
 
   // Forgets everything and serves `source` from now on, which must outlive its use.

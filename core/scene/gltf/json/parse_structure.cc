@@ -4,11 +4,8 @@
 #include <array>
 #include <exception>
 
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
-
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 #include "core/scene/gltf/document/read_document.h"
 
 namespace voxdag::gltf {
@@ -220,10 +217,7 @@ void parse_structure(const FilteredJson& json, MemoryBudget& budget, const Cance
   set_indices(json.indices, document);
   reserved.try_resize(document.memory_bytes());
   document.charge = std::move(reserved);
-#ifdef __GLIBC__
-  // Many small blocks were freed; the allocator would keep their pages.
-  malloc_trim(0);
-#endif
+  trim_heap();  // many small blocks were freed
 }
 
 }  // namespace voxdag::gltf

@@ -1,4 +1,4 @@
-// How a merge divides the memory that it is given.
+// How a merge divides the memory that it is given; scheduler/memory_plan.h has the other stages.
 //
 //   position maps   of the level below and of this one, up to resident_bytes each; else spilled
 //   workers         frames, windows of spilled maps, what a range sweep needs
@@ -15,15 +15,15 @@
 
 namespace voxdag {
 
-struct MemoryPlan {
+struct MergeMemory {
   unsigned workers = 1;
   uint64_t worker_bytes = 0;    // each
   uint64_t resident_bytes = 0;  // position maps of one level
   uint64_t slab_bytes = 0;
 
-  static MemoryPlan divide(uint64_t bytes, unsigned threads) {
+  static MergeMemory divide(uint64_t bytes, unsigned threads) {
     constexpr uint64_t kMinWorkerBytes = kFrameMemory + (uint64_t{128} << 10);
-    MemoryPlan plan;
+    MergeMemory plan;
     const uint64_t for_workers = bytes / 4;
     plan.workers = static_cast<unsigned>(
         std::clamp<uint64_t>(for_workers / (uint64_t{1} << 20), 1, std::max(1u, threads)));

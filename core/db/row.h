@@ -1,0 +1,133 @@
+// A table's columns, described once for both directions. For a record type `Record`, its namespace
+// has
+//
+//   template <class Row>
+//   void columns(Row& row, Record& record) {
+//     row.fixed("id", 1);           // the same in every row; not read
+//     row("name", record.name);     // integers, words, enums, double, text, bytes, optional
+//     integers
+//   }
+//
+// from which put_row() and select_rows() make their SQL, so that no column is known by its number.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/db/sqlite.h"
+
+namespace voxdag {
+
+// The names of the columns, separated by commas.
+class ColumnNames {
+ public:
+  void fixed(const char* name, int64_t) { add(name); }
+  template <class Value>
+  void operator()(const char* name, const Value&) {
+    add(name);
+  }
+  const std::string& text() const { return text_; }
+  int count() const { return count_; }
+
+ private:
+  void add(const char* name) { text_ += (count_++ ? ", " : "") + std::string(name); }
+
+  std::string text_;
+  int count_ = 0;
+};
+
+// Binds the columns to the parameters of a statement, in order.
+class RowWriter {
+ public:
+  explicit RowWriter(SqlStatement& statement) : statement_(statement) {}
+  void fixed(const char*, int64_t value) { statement_.bind(next_++, value); }
+  template <class Value>
+  void operator()(const char*, const Value& value) {
+    if constexpr (std::is_integral_v<Value> || std::is_enum_v<Value>)
+      statement_.bind(next_, static_cast<int64_t>(value));
+    else
+      statement_.bind(next_, value);
+    ++next_;
+  }
+  void operator()(const char*, const std::optional<int64_t>& value) {
+    if (value) statement_.bind(next_, *value);  // what is not bound is NULL
+    ++next_;
+  }
+
+ private:
+  SqlStatement& statement_;
+  int next_ = 0;
+};
+
+// Reads the columns of a statement's row, in order.
+class RowReader {
+ public:
+  explicit RowReader(const SqlStatement& row) : row_(row) {}
+  void fixed(const char*, int64_t) { ++next_; }
+  template <class Value>
+  void operator()(const char*, Value& value) {
+    value = static_cast<Value>(row_.integer(next_++));
+  }
+  void operator()(const char*, double& value) { value = row_.real(next_++); }
+  void operator()(const char*, std::string& value) { value = row_.text(next_++); }
+  void operator()(const char*, std::vector<std::byte>& value) { value = row_.bytes(next_++); }
+  void operator()(const char*, std::optional<int64_t>& value) {
+    value = row_.is_null(next_) ? std::nullopt : std::optional(row_.integer(next_));
+    ++next_;
+  }
+
+ private:
+  const SqlStatement& row_;
+  int next_ = 0;
+};
+
+template <class Record>
+ColumnNames column_names() {
+  ColumnNames names;
+  Record record;
+  columns(names, record);
+  return names;
+}
+
+// Inserts the record's row into `table`, in place of one with the same key.
+template <class Record>
+void put_row(SqlDatabase& database, const std::string& table, Record record) {
+  const ColumnNames names = column_names<Record>();
+  std::string parameters = "?";
+  for (int i = 1; i < names.count(); ++i) parameters += ", ?";
+  SqlStatement insert = database.prepare("INSERT OR REPLACE INTO " + table + " (" + names.text() +
+                                         ") VALUES (" + parameters + ")");
+  RowWriter writer(insert);
+  columns(writer, record);
+  insert.run();
+}
+
+// The rows of `table`; `rest` may filter and order them.
+template <class Record>
+SqlStatement select_rows(SqlDatabase& database, const std::string& table,
+                         const std::string& rest = "") {
+  return database.prepare("SELECT " + column_names<Record>().text() + " FROM " + table + " " +
+                          rest);
+}
+
+// The row that a statement of select_rows() stands at.
+template <class Record>
+Record read_row(const SqlStatement& statement) {
+  Record record;
+  RowReader reader(statement);
+  columns(reader, record);
+  return record;
+}
+
+// The first row of `table`, if there is one.
+template <class Record>
+std::optional<Record> find_row(SqlDatabase& database, const std::string& table) {
+  SqlStatement rows = select_rows<Record>(database, table);
+  if (!rows.step()) return std::nullopt;
+  return read_row<Record>(rows);
+}
+
+}  // namespace voxdag
