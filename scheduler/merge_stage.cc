@@ -62,7 +62,7 @@ bool MergeStage::run(const RunOptions& options, BuildReport& report) {
     write(out, report);
     return true;
   } catch (const Error& error) {
-    if (!is_corruption(error) || !heal(error)) throw;
+    if (!error.is_corruption() || !heal(error)) throw;
     return false;
   }
 }

@@ -16,12 +16,6 @@ std::tuple<uint32_t, uint32_t, uint32_t, uint32_t> key_of(const Cube& cube) {
   return {cube.level, cube.position[0], cube.position[1], cube.position[2]};
 }
 
-// A state that these speak of cannot be gone on with; other errors say nothing of it.
-bool is_corruption(const Error& error) {
-  return error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kNotFound ||
-         error.code() == ErrorCode::kUnsupportedVersion;
-}
-
 }  // namespace
 
 void Merger::restore(GlobalFileWriter& out) {
@@ -29,7 +23,7 @@ void Merger::restore(GlobalFileWriter& out) {
     const std::optional<MergeState> state = journal_.load();
     if (state) go_on_from(*state, out);
   } catch (const Error& error) {
-    if (!is_corruption(error)) throw;
+    if (!error.is_corruption()) throw;
     context_.progress.warn("the merge starts over: " + error.message());
     journal_.forget();
     segments_.clear();
