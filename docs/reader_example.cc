@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
   }
   try {
     const voxdag_reader::File dag(argv[1]);
-    dag.check_blocks();
+    dag.verify_checksums();
     const double voxel_edge = dag.edge() / static_cast<double>(dag.resolution());
     std::printf("%llu voxels of edge %g in %llu nodes\n",
                 static_cast<unsigned long long>(dag.voxels()), voxel_edge,

@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "merge/load/slab.h"
+#include "merge/load/hash_partition.h"
 
 namespace voxdag {
 
@@ -22,7 +22,7 @@ struct MemoryPlan {
   uint64_t slab_bytes = 0;
 
   static MemoryPlan divide(uint64_t bytes, unsigned threads) {
-    constexpr uint64_t kMinWorkerBytes = kFrameMemory + (uint64_t{128} << 10);
+    constexpr uint64_t kMinWorkerBytes = kFrameMemoryBytes + (uint64_t{128} << 10);
     MemoryPlan plan;
     const uint64_t for_workers = bytes / 4;
     plan.workers = static_cast<unsigned>(

@@ -2,6 +2,8 @@
 
 #include <map>
 
+#include "core/format/artifact/artifact_reader.h"
+
 namespace voxdag {
 namespace {
 

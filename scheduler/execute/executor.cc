@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/base/error.h"
+#include "core/format/artifact/artifact_writer.h"
 #include "scheduler/triangles/distribute.h"
 
 namespace voxdag {

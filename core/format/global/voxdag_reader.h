@@ -13,9 +13,9 @@
 // with child index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
 //
 // Opening checks the header and that all it names lies within the file. Whatever else is in a
-// damaged file, no access leaves the mapping: a bad offset is an Error. check_blocks() compares the
-// data with its checksums. The file is mapped, or read whole where mmap fails or Access::kRead is
-// asked for; a mapped file must not be shortened while it is open. Immutable after opening: any
+// damaged file, no access leaves the mapping: a bad offset is an Error. verify_checksums() compares
+// the data with its checksums. The file is mapped, or read whole where mmap fails or Access::kRead
+// is asked for; a mapped file must not be shortened while it is open. Immutable after opening: any
 // number of threads may read.
 #pragma once
 
@@ -228,20 +228,20 @@ class File {
   uint64_t first_damaged_block() const {
     const unsigned char* const table = data() + table_offset_;
     for (uint64_t block = 0; block < block_count(); ++block) {
-      const uint64_t begin = kPageBytes + block * kBlockBytes;
-      const uint64_t size = std::min<uint64_t>(kBlockBytes, table_offset_ - begin);
+      const uint64_t begin = kPageBytes + block * kChecksumBlockBytes;
+      const uint64_t size = std::min<uint64_t>(kChecksumBlockBytes, table_offset_ - begin);
       if (xxh64(data() + begin, static_cast<size_t>(size)) != get<uint64_t>(table + 8 * block))
         return begin;
     }
     return 0;
   }
-  void check_blocks() const {
+  void verify_checksums() const {
     if (const uint64_t block = first_damaged_block())
       corrupt("the block at byte " + std::to_string(block) + " fails its checksum");
   }
 
  private:
-  static constexpr uint64_t kPageBytes = 4096, kBlockBytes = 65536;
+  static constexpr uint64_t kPageBytes = 4096, kChecksumBlockBytes = 65536;
   static constexpr uint32_t kMaxBrickLevel = 18;
 
   template <class T>
@@ -296,8 +296,9 @@ class File {
            "its checksum is wrong");
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
-    expect(get<uint32_t>(page + 12) == kPageBytes && get<uint32_t>(page + 28) == kBlockBytes,
-           "expected pages of 4096 bytes and blocks of 65536");
+    expect(
+        get<uint32_t>(page + 12) == kPageBytes && get<uint32_t>(page + 28) == kChecksumBlockBytes,
+        "expected pages of 4096 bytes and blocks of 65536");
     expect(grid_levels_ >= 2 && grid_levels_ <= 20, "expected a resolution of 2^2 to 2^20");
     expect(hash_bits_ >= 4 && hash_bits_ <= 64, "expected 4 to 64 hash bits");
     std::memcpy(origin_, page + 32, sizeof(origin_));
@@ -345,7 +346,8 @@ class File {
   }
 
   void read_table(const unsigned char* page) const {
-    const uint64_t blocks = (table_offset_ - kPageBytes + kBlockBytes - 1) / kBlockBytes;
+    const uint64_t blocks =
+        (table_offset_ - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
     expect(get<uint64_t>(page + 96) == table_offset_ && get<uint64_t>(page + 104) == blocks &&
                bytes_.size() - table_offset_ == 8 * blocks,
            "the checksum table is not where the levels end, or not as long as they need");

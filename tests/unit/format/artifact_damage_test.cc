@@ -4,8 +4,9 @@
 
 #include <cstring>
 
-#include "core/format/artifact/artifact.h"
 #include "core/format/artifact/artifact_index.h"
+#include "core/format/artifact/artifact_reader.h"
+#include "core/format/artifact/artifact_writer.h"
 #include "core/format/artifact/frame_codec.h"
 #include "core/format/artifact/row_order.h"
 #include "core/format/checksum.h"

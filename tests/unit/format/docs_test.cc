@@ -1,4 +1,4 @@
-// The documents of this room say what the code does.
+// docs/format.md and its example agree with the code.
 #include <gmock/gmock.h>
 
 #include <cstdlib>
@@ -71,7 +71,7 @@ TEST(FormatDocTest, HeaderTableIsTheLayout) {
                                                 {"L", kGridLevelsAt},
                                                 {"hash bits", kHashBitsAt},
                                                 {"node order", kNodeOrderAt},
-                                                {"block bytes", kBlockBytesAt},
+                                                {"block bytes", kChecksumBlockBytesAt},
                                                 {"origin", kOriginAt},
                                                 {"edge", kEdgeAt},
                                                 {"voxels", kVoxelsAt},

@@ -1,5 +1,5 @@
-// Files of version 1, kept in tests/golden: they must stay readable, and the writer must go on
-// making the same bytes.
+// Files of version 1 in tests/golden: they must stay readable, and the writer must still make the
+// same bytes.
 #include <gmock/gmock.h>
 
 #include "core/format/global/open_global.h"
@@ -39,7 +39,7 @@ TEST(GoldenTest, SceneIsRead) {
         EXPECT_EQ(file->voxel(x, y, z), y == 0 || (x == 0 && z == 0)) << x << y << z;
 }
 
-// One way of damage each, and what the user is told.
+// One kind of damage each, and the error that is reported.
 TEST(GoldenTest, CorruptVariantsAreNamed) {
   struct Variant {
     const char* what;
