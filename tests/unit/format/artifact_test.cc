@@ -18,7 +18,7 @@ class ArtifactTest : public testing::Test {
   ArtifactReader open(const ArtifactRef& ref) {
     return ArtifactReader(system_files().open_read(segment_path(folder_.path(), ref.segment)), ref);
   }
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   MemoryBudget budget_{uint64_t{64} << 20};
 };
 

@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 class GlobalWriterTest : public testing::Test {
  protected:
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   const std::string path_ = folder_.file("out.vdag");
 };
 

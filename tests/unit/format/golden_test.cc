@@ -20,7 +20,7 @@ void verify(const std::string& path) {
 }
 
 TEST(GoldenTest, WriterMakesTheSameBytes) {
-  ScratchFolder folder;
+  TemporaryFolder folder;
   const GlobalFileSummary summary =
       write_global(folder.file("new.vdag"), floor_and_pillar(), floor_and_pillar_grid());
   EXPECT_EQ(read_bytes(folder.file("new.vdag")), read_bytes(kScene));
@@ -58,7 +58,7 @@ TEST(GoldenTest, CorruptVariantsAreNamed) {
       {"root", 8192, 0x36, ErrorCode::kCorrupt, "bytes 4096 to 12287: the block fails"},
       {"table", 12288, 0, ErrorCode::kCorrupt, "the checksum table fails its own checksum"},
   };
-  ScratchFolder folder;
+  TemporaryFolder folder;
   const std::string path = folder.file("damaged.vdag");
   for (const Variant& variant : variants) {
     SCOPED_TRACE(variant.what);

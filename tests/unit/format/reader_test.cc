@@ -11,7 +11,7 @@ using voxdag_reader::File;
 
 class ReaderTest : public testing::Test {
  protected:
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   const std::string path_ = folder_.file("scene.vdag");
 };
 

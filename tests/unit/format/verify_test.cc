@@ -55,7 +55,7 @@ void reseal(ByteString& bytes) {
 
 class VerifyTest : public testing::Test {
  protected:
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   const std::string path_ = folder_.file("scene.vdag");
 };
 
