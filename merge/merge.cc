@@ -18,8 +18,8 @@ class Merger {
       : inputs_(inputs),
         context_(context),
         // Passes before the final one also have the writer of a segment in memory.
-        pass_bytes_(context.plan.slab_bytes -
-                    std::min(context.plan.slab_bytes, kSegmentWriterBytes)),
+        pass_bytes_(context.plan.partition_bytes -
+                    std::min(context.plan.partition_bytes, kSegmentWriterBytes)),
         pending_(inputs),
         recovery_(inputs, context, pending_, checkpoint) {}
 
@@ -41,7 +41,7 @@ class Merger {
   }
 
  private:
-  bool fit_at_once() const { return pending_.fit_at_once(context_.plan.slab_bytes); }
+  bool fit_at_once() const { return pending_.fit_at_once(context_.plan.partition_bytes); }
 
   // Merges groups of neighboring artifacts into one artifact each.
   void run_pass() {
@@ -114,7 +114,7 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
   if (inputs.artifacts.empty()) return report;
   ScratchFolder scratch(files, inputs.scratch_folder);
   MergeProgress rows_merged(progress);
-  const MergeContext context{scratch,     budget, MemoryPlan::divide(budget.available(), threads),
+  const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
                              rows_merged, cancel, report};
   Merger(inputs, context, checkpoint).run(out);
   report.scratch_bytes += scratch.bytes_written();

@@ -4,9 +4,8 @@
 // Levels are merged from the bricks up. The nodes above the subvolumes (the top tree) are one more
 // run of their level. A level is merged one hash partition at a time (usually one is enough):
 //
-//   load     the rows of all runs whose hash lies in the partition are read, and their child
-//   indices
-//            are replaced by the positions of the children in the merged level below (rewiring)
+//   load     the rows of all runs whose hash lies in the partition are read, and their children
+//            are replaced by their positions in the merged level below (rewiring)
 //   sort     the rows are divided into buckets by the next bits of the hash; several threads sort
 //            one bucket each and deduplicate its rows
 //   output   buckets are written in the order of their hashes, and the position of every row is

@@ -14,7 +14,7 @@
 #include "merge/load/scratch_file.h"
 #include "merge/merge.h"
 #include "merge/output/level_output.h"
-#include "merge/plan/memory_plan.h"
+#include "merge/plan/merge_memory.h"
 
 namespace voxdag {
 
@@ -39,7 +39,7 @@ class MergeProgress {
 struct MergeContext {
   ScratchFolder& scratch;
   MemoryBudget& budget;
-  MemoryPlan plan;
+  MergeMemory plan;
   MergeProgress& progress;
   const CancelToken& cancel;
   MergeReport& report;

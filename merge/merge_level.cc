@@ -202,7 +202,7 @@ void check_group_is_large(const LevelTask& task, uint64_t hash) {
 
 }  // namespace
 
-uint64_t bytes_for_workers(const MemoryPlan& plan) {
+uint64_t bytes_for_workers(const MergeMemory& plan) {
   return plan.workers * std::max(plan.worker_bytes, OrderedRowWriter::bytes());
 }
 
@@ -211,7 +211,7 @@ LevelExtent merge_level(const MergeContext& context, const LevelTask& task) {
   const uint64_t available = context.budget.available() + task.memory.bytes();
   const uint64_t for_workers = bytes_for_workers(context.plan);
   const uint64_t partition_bytes =
-      MemoryPlan::slab_within(available - std::min(available, for_workers));
+      MergeMemory::partition_bytes_within(available - std::min(available, for_workers));
   LevelExtent extent;
   HashInterval done{0, 0};
   for (uint64_t first = 0;; first = done.last + 1) {

@@ -8,7 +8,7 @@
 namespace voxdag {
 
 // The memory that the workers may take besides the partition and the maps.
-uint64_t bytes_for_workers(const MemoryPlan& plan);
+uint64_t bytes_for_workers(const MergeMemory& plan);
 
 // Adds partitions, groups and rows to the report.
 LevelExtent merge_level(const MergeContext& context, const LevelTask& task);

@@ -130,7 +130,7 @@ class OneLevel {
     MergeReport report;
     NoProgress silent;
     MergeProgress progress(silent);
-    const MergeContext context{scratch_, budget_, MemoryPlan::divide(budget_.available(), 1),
+    const MergeContext context{scratch_, budget_, MergeMemory::divide(budget_.available(), 1),
                                progress, cancel_, report};
     merge_level(context, {1, bricks, pointers_, &*below_, *maps_, nowhere, memory_});
   }

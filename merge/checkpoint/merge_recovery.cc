@@ -52,7 +52,7 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
     throw Error(ErrorCode::kInvalidInput, "the merge to resume has begun to write " + state.output +
                                               ", not " + out.path() +
                                               ": expected the same output, or --restart");
-  if (!pending_.fit_at_once(context_.plan.slab_bytes))
+  if (!pending_.fit_at_once(context_.plan.partition_bytes))
     throw Error(ErrorCode::kOutOfMemory,
                 "out of memory: the merge to resume was begun with more: expected as much memory "
                 "as before (--memory), or --restart");

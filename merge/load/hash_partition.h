@@ -1,10 +1,10 @@
 // A hash partition: all rows of one level whose hash lies in an interval, from all runs, in memory,
 // their children replaced by positions.
 //
-//   columns:   [slice of run 0] [slice of run 1] ...     a slice is whole frames of a run, so that
-//   a
-//                                                        few rows at its ends may lie outside
+//   columns:   [slice of run 0] [slice of run 1] ...
 //   buckets:   the interval, divided into shares of 2^bucket_bits hashes
+//
+// A slice is whole frames of a run, so a few rows at its ends may lie outside of the interval.
 //
 // Within a slice rows are in the order of their hashes, so each bucket is a contiguous part of
 // every slice: from bucket_begin(b, slice) to bucket_begin(b + 1, slice). Usually one partition is

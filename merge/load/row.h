@@ -2,13 +2,11 @@
 //
 //   row             one node or brick of one artifact: hash, mask and words
 //   run             the rows of one level of one artifact (or of the top tree), in the total order
-//   hash partition  a contiguous range of the hash space, merged as one unit: its rows from all
-//   runs
-//                   are in memory together
+//   hash partition  a contiguous range of the hash space, merged as one unit: its rows
+//                   from all runs are in memory together
 //   bucket          an equal share of a hash partition's range, whose rows one thread sorts
-//   position        where a row lies in the merged level: a word offset in the global file, an
-//   index
-//                   in an artifact
+//   position        where a row lies in the merged level: a word offset in the global file,
+//                   an index in an artifact
 //
 // A node's words are its children. A brick is held as a node of mask 3 whose two words are the high
 // and the low half of its voxel mask, so that one order, (hash, mask, words lexicographically), is

@@ -3,9 +3,8 @@
 //   1. Header, sizes, checksums, zeros in all reserved fields and padding.
 //   2. Every node has a child mask of 1 to 255, and its children begin nodes of the next level. No
 //      brick is empty.
-//   3. Levels strictly increase in the total order (hash, mask, child indices), with hashes
-//   computed
-//      from the bricks up. So no two nodes of a level are equal.
+//   3. Levels strictly increase in the total order (hash, mask, child indices), the hashes
+//      computed from the bricks up. So no two nodes of a level are equal.
 //   4. One root; every other node has a parent.
 //   5. The header's voxels and octree nodes are those of the DAG.
 //

@@ -1,0 +1,43 @@
+// How a merge divides the memory that it is given; scheduler/memory_plan.h has the other stages.
+//
+//   position maps    of the level below and of this one, up to resident_bytes each; else spilled
+//   workers          frames, windows of spilled maps, what sorting a bucket needs
+//   hash partition   all the rest, at least partition_bytes
+//
+// The fan-in is bounded by the hash partition: it must hold two frames of every run, so that,
+// whatever the hashes, the rows of any one hash fit unless they are many.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "merge/load/hash_partition.h"
+
+namespace voxdag {
+
+struct MergeMemory {
+  unsigned workers = 1;
+  uint64_t worker_bytes = 0;    // each
+  uint64_t resident_bytes = 0;  // position maps of one level
+  uint64_t partition_bytes = 0;
+
+  static MergeMemory divide(uint64_t bytes, unsigned threads) {
+    constexpr uint64_t kMinWorkerBytes = kFrameMemoryBytes + (uint64_t{128} << 10);
+    MergeMemory plan;
+    const uint64_t for_workers = bytes / 4;
+    plan.workers = static_cast<unsigned>(
+        std::clamp<uint64_t>(for_workers / (uint64_t{1} << 20), 1, std::max(1u, threads)));
+    plan.worker_bytes = std::max(for_workers / plan.workers, kMinWorkerBytes);
+    plan.resident_bytes = bytes / 6;
+    const uint64_t others = plan.workers * plan.worker_bytes + 2 * plan.resident_bytes;
+    plan.partition_bytes = partition_bytes_within(bytes - std::min(bytes, others));
+    return plan;
+  }
+
+  // The hash partition that free memory allows; the rest is for its bucket begins and the indexes.
+  static uint64_t partition_bytes_within(uint64_t free_bytes) {
+    return free_bytes - free_bytes / 16;
+  }
+};
+
+}  // namespace voxdag
