@@ -1,5 +1,5 @@
-// Opens a .vdag file, says what it holds and finds its highest voxel, with nothing but the reader:
-//     c++ -std=c++17 -I core/format docs/reader_example.cc -o reader_example
+// Opens a .vdag file, prints its counts and finds its highest voxel, using only the reader:
+//     c++ -std=c++17 -I core/format/global docs/reader_example.cc -o reader_example
 //     ./reader_example scene.vdag
 #include <cstdio>
 
@@ -7,7 +7,7 @@
 
 namespace {
 
-// Passes over every subtree that lies below what was found already.
+// Skips every subtree that lies below the highest voxel found so far.
 struct HighestVoxel {
   explicit HighestVoxel(const voxdag_reader::File& file) : dag(file) {}
 
@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
   }
   try {
     const voxdag_reader::File dag(argv[1]);
-    dag.check_blocks();
+    dag.verify_checksums();
     const double voxel_edge = dag.edge() / static_cast<double>(dag.resolution());
     std::printf("%llu voxels of edge %g in %llu nodes\n",
                 static_cast<unsigned long long>(dag.voxels()), voxel_edge,

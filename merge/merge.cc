@@ -1,20 +1,121 @@
 #include "merge/merge.h"
 
-#include "merge/load/scratch.h"
-#include "merge/merger.h"
-#include "merge/plan/merge_memory.h"
+#include <algorithm>
+#include <string>
+
+#include "core/base/error.h"
+#include "merge/checkpoint/merge_recovery.h"
+#include "merge/merge_pass.h"
+#include "merge/plan/pending_artifacts.h"
 
 namespace voxdag {
+namespace {
+
+// Merges in passes while not all artifacts fit at once, then into the global file.
+class Merger {
+ public:
+  Merger(const MergeInputs& inputs, const MergeContext& context, Checkpoint* checkpoint)
+      : inputs_(inputs),
+        context_(context),
+        // Passes before the final one also have the writer of a segment in memory.
+        pass_bytes_(context.plan.partition_bytes -
+                    std::min(context.plan.partition_bytes, kSegmentWriterBytes)),
+        pending_(inputs),
+        recovery_(inputs, context, pending_, checkpoint) {}
+
+  void run(GlobalFileWriter& out) {
+    PassProgress progress = recovery_.restore(out);
+    const uint64_t rows_before = context_.report.input_nodes;
+    const auto rows_to_merge = [&] {
+      const uint64_t merged = context_.report.input_nodes - rows_before;
+      return merged + (fit_at_once() ? 1 : 2) * pending_.rows();
+    };
+    context_.progress.begin(rows_to_merge());
+    while (!progress.level && !fit_at_once()) {
+      run_pass();
+      context_.progress.set_total(rows_to_merge());
+    }
+    run_final_pass(out, std::move(progress));
+    recovery_.finish();
+    context_.progress.end();
+  }
+
+ private:
+  bool fit_at_once() const { return pending_.fit_at_once(context_.plan.partition_bytes); }
+
+  // Merges groups of neighboring artifacts into one artifact each.
+  void run_pass() {
+    const std::vector<size_t> ends = pending_.group_ends(pass_bytes_);
+    if (ends.size() == pending_.size())
+      throw Error(ErrorCode::kOutOfMemory,
+                  "out of memory: merging any two neighboring subvolumes takes more than " +
+                      std::to_string(context_.budget.available()) + " bytes");
+    PassSegment& segment =
+        pending_.add_segment(std::make_unique<PassSegment>(context_.scratch, context_.budget));
+    std::vector<ArtifactRef> merged;
+    size_t begin = 0;
+    for (const size_t end : ends) {
+      ArtifactWriter writer(segment.writer(), inputs_.grid_levels, inputs_.hash_bits);
+      ArtifactOutput output(writer);
+      const ArtifactSet group = pending_.open(begin, end, context_.budget);
+      const PassTask task{inputs_.grid_levels, inputs_.hash_bits, false, group.readers()};
+      merged.push_back(writer.finish(run_merge_pass(context_, task, output, {}, {})));
+      begin = end;
+      if (begin < pending_.size() && recovery_.due())
+        recovery_.save_in_pass(segment, merged, begin);
+    }
+    segment.finish();
+    ++context_.report.passes;
+    recovery_.wait();  // so that the bytes which this pass merged are released soon
+    const bool due = recovery_.due();
+    const std::vector<SurveyedArtifact> before = pending_.replace_all(merged, segment);
+    if (due) recovery_.save_pass(segment, merged, before);
+  }
+
+  void run_final_pass(GlobalFileWriter& out, PassProgress progress) {
+    GlobalOutput output(out);
+    const ArtifactSet artifacts = pending_.open(0, pending_.size(), context_.budget);
+    if (progress.level)
+      context_.progress.set_total(rows_above(*progress.level, artifacts.readers()));
+    const auto after_level = [&](const PassProgress& done) {
+      if (recovery_.due()) recovery_.save_level(done, artifacts.readers(), out);
+    };
+    const PassTask task{inputs_.grid_levels, inputs_.hash_bits, true, artifacts.readers()};
+    for (const ArtifactRoot& root :
+         run_merge_pass(context_, task, output, std::move(progress), after_level)) {
+      context_.report.voxels += root.voxels;
+      context_.report.svo_nodes += root.svo_nodes;
+    }
+    ++context_.report.passes;
+  }
+
+  // Rows of the levels above `level`.
+  static uint64_t rows_above(uint32_t level, std::span<const ArtifactReader> readers) {
+    uint64_t rows = 0;
+    for (const ArtifactReader& reader : readers)
+      for (const ArtifactLevel& l : reader.levels())
+        if (l.level < level) rows += l.rows;
+    return rows;
+  }
+
+  const MergeInputs& inputs_;
+  const MergeContext& context_;
+  const uint64_t pass_bytes_;
+  PendingArtifacts pending_;
+  MergeRecovery recovery_;
+};
+
+}  // namespace
 
 MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
                            MemoryBudget& budget, unsigned threads, Progress& progress,
                            const CancelToken& cancel, Checkpoint* checkpoint) {
   MergeReport report;
   if (inputs.artifacts.empty()) return report;
-  MergeScratch scratch(files, inputs.scratch_folder);
-  MergeProgress rows_swept(progress);
-  const MergeContext context{scratch,    budget, MergeMemory::divide(budget.available(), threads),
-                             rows_swept, cancel, report};
+  ScratchFolder scratch(files, inputs.scratch_folder);
+  MergeProgress rows_merged(progress);
+  const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
+                             rows_merged, cancel, report};
   Merger(inputs, context, checkpoint).run(out);
   report.scratch_bytes += scratch.bytes_written();
   return report;

@@ -1,12 +1,21 @@
-// The merger's one public function: many sub-DAGs and the top tree above them become one global
+// The one public function of the merge: many sub-DAGs and the top tree above them become one global
 // DAG.
 //
-// Level by level from the bricks up, two streaming steps each (DESIGN: "why the merge is right"):
-//   rewire   each run's child indices go through its own old -> new map, which is strictly
-//            increasing, so the run stays sorted by (hash, mask, children)
-//   sweep    the sorted runs are merged by the full key, equal nodes dropped, maps emitted
-// The nodes above the subvolumes (the top tree) are one more run in the sweep of their level. What
-// is in memory is bounded by the budget, never by the scene: hash ranges, then rounds.
+// Levels are merged from the bricks up. The nodes above the subvolumes (the top tree) are one more
+// run of their level. A level is merged one hash partition at a time (usually one is enough):
+//
+//   load     the rows of all runs whose hash lies in the partition are read, and their children
+//            are replaced by their positions in the merged level below (rewiring)
+//   sort     the rows are divided into buckets by the next bits of the hash; several threads sort
+//            one bucket each and deduplicate its rows
+//   output   buckets are written in the order of their hashes, and the position of every row is
+//            stored for the level above
+//
+// The order within the runs is used to find the frames of a partition and the rows of a bucket, and
+// by the k-way heap merge for rows that a sort cannot hold (truncated hashes). What is in memory is
+// bounded by the budget, never by the scene: if not all runs fit at once, neighboring artifacts are
+// first merged with each other, in one or more passes. docs/architecture.md, "Why the merge is
+// right", has the proof; merge/load/row.h defines the terms.
 #pragma once
 
 #include <cstddef>
@@ -31,35 +40,36 @@ namespace voxdag {
 struct MergeInputs {
   uint32_t grid_levels = 2;
   uint32_t hash_bits = 64;
-  // The subvolumes' artifacts, cubes disjoint, in any order; none for an empty scene.
+  // The artifacts of the subvolumes, in any order; none for an empty scene. Their cubes are
+  // disjoint.
   std::vector<ArtifactRef> artifacts;
-  // Opens the segment file of an id.
+  // Opens the segment file with an id.
   std::function<std::shared_ptr<ReadableFile>(uint32_t)> open_segment;
-  // A folder of its own for what does not fit in memory: maps and the artifacts of merge rounds.
-  // What it holds at the end is what a checkpoint names.
+  // A folder for what does not fit in memory, used by this merge alone. After the merge it has only
+  // the files that the state in the checkpoint names.
   std::string scratch_folder;
-  // Less work than this, in CPU seconds, is not worth a checkpoint.
+  // The least CPU time between two checkpoints, in seconds.
   double checkpoint_interval_s = 2;
 };
 
-// Where the state of an unfinished merge is kept, so that it can go on there.
+// Where the state of an unfinished merge is stored, so that it can be resumed.
 //
-// A state is some hundred KB that only the merge understands; it names files of the scratch folder
-// and the global file's partial one, all synced before save(). It knows the inputs by their
-// content, so an artifact that was built again in between does no harm.
+// A state is some hundred KB that only the merge understands. It names files of the scratch folder
+// and the partial global file, all of which are synced before save(). It identifies the inputs by
+// their content, so it still fits after an artifact was built again. save() and release() are
+// called by background threads, one call at a time.
 class Checkpoint {
  public:
   virtual ~Checkpoint() = default;
-  // save() and release() are called by threads beside the merge, one call at a time.
 
   // The state saved last, if there is one.
   virtual std::optional<std::vector<std::byte>> load() = 0;
-  // Replaces it; durable on return. Of the inputs' levels only those above `level` (of smaller
-  // number) are read from here on.
+  // Replaces the state; it is durable on return. From here on only the levels of the inputs above
+  // `level` (with smaller numbers) are read.
   virtual void save(uint32_t level, std::span<const std::byte> state) = 0;
-  // It is of no use any more.
+  // Discards the state.
   virtual void forget() = 0;
-  // Nothing reads these bytes of an input's segment any more: their space may be given back.
+  // These bytes of the segment of an input are never read again: their space may be freed.
   virtual void release(uint32_t segment, uint64_t offset, uint64_t bytes) = 0;
 };
 
@@ -67,16 +77,16 @@ struct MergeReport {
   uint64_t voxels = 0;
   uint64_t svo_nodes = 0;  // top tree included
   uint64_t dag_nodes = 0;
-  uint64_t input_nodes = 0;  // rows of all runs of all rounds
-  uint32_t rounds = 0;       // 1 if all runs were swept at once
+  uint64_t input_nodes = 0;  // rows of all runs of all passes
+  uint32_t passes = 0;       // 1 if all runs were merged at once
   uint64_t scratch_bytes = 0;
-  uint64_t hash_ranges = 0;      // slabs of the hash space that were swept one after the other
-  uint64_t streamed_groups = 0;  // groups of equal hashes too large for memory, swept row by row
+  uint64_t hash_partitions = 0;
+  uint64_t streamed_groups = 0;  // groups of equal hashes that did not fit in memory
 };
 
-// Throws Error. `files` is where scratch files go; `out` gets all levels but is not sealed. With a
-// checkpoint, goes on from the state that it has; a state that does not fit is forgotten with a
-// warning, and the merge starts over.
+// Scratch files go through `files`; `out` gets all levels but is not sealed. Resumes the state that
+// `checkpoint` has; a state that does not fit is discarded with a warning, and the merge starts
+// over. Throws Error.
 MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
                            MemoryBudget& budget, unsigned threads, Progress& progress,
                            const CancelToken& cancel, Checkpoint* checkpoint = nullptr);

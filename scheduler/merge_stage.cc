@@ -62,7 +62,7 @@ bool MergeStage::run(const RunOptions& options, BuildReport& report) {
     write(out, report);
     return true;
   } catch (const Error& error) {
-    if (!is_corruption(error) || !heal(error)) throw;
+    if (!error.is_corruption() || !heal(error)) throw;
     return false;
   }
 }
@@ -101,8 +101,8 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
   report.voxels = merged.voxels;
   report.svo_nodes = merged.svo_nodes;
   report.dag_nodes = merged.dag_nodes;
-  report.merge_rounds = merged.rounds;
-  report.merge_ranges = merged.hash_ranges;
+  report.merge_rounds = merged.passes;
+  report.merge_ranges = merged.hash_partitions;
   report.merge_streamed_groups = merged.streamed_groups;
   report.spill_bytes += merged.scratch_bytes;
   if (report.voxels == 0 && report.triangles > 0)

@@ -8,7 +8,8 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/memory_stream.h"
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/artifact_reader.h"
+#include "core/format/artifact/artifact_writer.h"
 
 namespace voxdag {
 namespace {

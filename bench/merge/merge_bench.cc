@@ -1,4 +1,4 @@
-// How fast a core merges: rows of all runs per CPU second, and what its steps take.
+// How fast one core merges: rows of all runs per CPU second, for the whole merge and for its steps.
 #include <benchmark/benchmark.h>
 #include <stdlib.h>
 
@@ -7,10 +7,10 @@
 #include <memory>
 
 #include "bench/merge/synthetic_runs.h"
-#include "merge/load/slab.h"
+#include "merge/load/hash_partition.h"
 #include "merge/merge.h"
+#include "merge/merge_level.h"
 #include "merge/plan/artifact_set.h"
-#include "merge/sort/level_merge.h"
 
 namespace voxdag {
 namespace {
@@ -67,9 +67,9 @@ void BM_Merge(benchmark::State& state) {
     report = merge_sub_dags(inputs, system_files(), out, budget, 1, progress, cancel);
   }
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * report.input_nodes));
-  state.counters["rounds"] = report.rounds;
-  state.counters["ranges"] = static_cast<double>(report.hash_ranges);
-  state.counters["kept"] =
+  state.counters["passes"] = report.passes;
+  state.counters["partitions"] = static_cast<double>(report.hash_partitions);
+  state.counters["unique"] =
       static_cast<double>(report.dag_nodes) / static_cast<double>(report.input_nodes);
 }
 BENCHMARK(BM_Merge)
@@ -87,7 +87,7 @@ class OneLevel {
   OneLevel(size_t runs, uint32_t levels_above_bricks)
       : source_(fixtures().of(runs)),
         survey_(survey_artifacts(source_.refs(), open(), SyntheticRuns::kGridLevels, 64)),
-        artifacts_(survey_.by_place, open(), SyntheticRuns::kGridLevels, 64, budget_) {
+        artifacts_(survey_.in_morton_order, open(), SyntheticRuns::kGridLevels, 64, budget_) {
     const uint32_t level = SyntheticRuns::kGridLevels - 2 - levels_above_bricks;
     std::vector<uint64_t> rows, rows_below;
     for (const ArtifactReader& artifact : artifacts_.readers()) {
@@ -104,12 +104,12 @@ class OneLevel {
         below_->values(run)[row] = static_cast<uint32_t>(7 * row);
   }
 
-  Slab slab() {
-    Slab made(pointers_, Slab::pieces_within(pointers_, {}), {},
-              std::max<uint64_t>(8192, 8 * pointers_.size()), false, memory_, budget_);
+  HashPartition partition() {
+    HashPartition made(pointers_, HashPartition::slices_within(pointers_, {}), {},
+                       std::max<uint64_t>(8192, 8 * pointers_.size()), false, memory_, budget_);
     return made;
   }
-  void load(Slab& slab) { slab.load(&*below_, {1, kGiB}, budget_, cancel_); }
+  void load(HashPartition& partition) { partition.load(&*below_, {1, kGiB}, budget_, cancel_); }
   uint64_t rows() const { return total_; }
 
   // Decodes all frames and does nothing with them.
@@ -118,21 +118,21 @@ class OneLevel {
     for (const auto& run : runs_)
       for (size_t f = 0; f < run->frames().size(); ++f) run->read_frame(f, frame);
   }
-  // Everything, into an output that forgets.
+  // Merges the level into an output that discards it.
   void merge(bool bricks) {
     struct Nowhere : LevelOutput {
       bool in_words() const override { return true; }
       void begin_level(uint32_t) override {}
-      void add(const RecordBatch&) override {}
-      void write(uint64_t, const RecordBatch&) override {}
+      void add(const MergedRows&) override {}
+      void write(uint64_t, const MergedRows&) override {}
       void end_level(uint64_t, uint64_t) override {}
     } nowhere;
     MergeReport report;
     NoProgress silent;
     MergeProgress progress(silent);
-    const MergeContext build_context{scratch_, budget_, MergeMemory::divide(budget_.available(), 1),
-                                     progress, cancel_, report};
-    merge_level(build_context, {1, bricks, pointers_, &*below_, *maps_, nowhere, memory_});
+    const MergeContext context{scratch_, budget_, MergeMemory::divide(budget_.available(), 1),
+                               progress, cancel_, report};
+    merge_level(context, {1, bricks, pointers_, &*below_, *maps_, nowhere, memory_});
   }
 
  private:
@@ -142,14 +142,14 @@ class OneLevel {
 
   const SyntheticRuns& source_;
   MemoryBudget budget_{8 * kGiB};
-  MergeScratch scratch_{system_files(), fixtures().folder() + "/scratch"};
+  ScratchFolder scratch_{system_files(), fixtures().folder() + "/scratch"};
   CancelToken cancel_;
   ArtifactSurvey survey_;
   ArtifactSet artifacts_;
   std::vector<std::unique_ptr<ArtifactRun>> runs_;
   std::vector<const LevelRun*> pointers_;
   std::optional<PositionMaps> maps_, below_;
-  SlabMemory memory_;
+  PartitionMemory memory_;
   uint64_t total_ = 0;
 };
 
@@ -160,18 +160,18 @@ void BM_Decode(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
 }
 
-// Decoding and rewiring into a slab.
-void BM_Rewire(benchmark::State& state) {
+// Decodes and rewires the rows of a level into a hash partition.
+void BM_LoadPartition(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
   for (auto _ : state) {
-    Slab slab = level.slab();
-    level.load(slab);
+    HashPartition partition = level.partition();
+    level.load(partition);
   }
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
 }
 
-// Decoding, rewiring and sweeping, nothing written.
-void BM_Sweep(benchmark::State& state) {
+// Merges a level without writing it.
+void BM_MergeLevel(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
   for (auto _ : state) level.merge(state.range(1) == 0);
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
@@ -183,8 +183,8 @@ void levels(benchmark::internal::Benchmark* benchmark) {
   benchmark->Unit(benchmark::kMillisecond);
 }
 BENCHMARK(BM_Decode)->Apply(levels);
-BENCHMARK(BM_Rewire)->Apply(levels);
-BENCHMARK(BM_Sweep)->Apply(levels);
+BENCHMARK(BM_LoadPartition)->Apply(levels);
+BENCHMARK(BM_MergeLevel)->Apply(levels);
 
 }  // namespace
 }  // namespace voxdag

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/dag/node_hash.h"
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/artifact_writer.h"
 
 namespace voxdag {
 

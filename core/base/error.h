@@ -27,6 +27,12 @@ class Error : public std::exception {
   Error(ErrorCode code, std::string message) : code_(code), message_(std::move(message)) {}
   ErrorCode code() const { return code_; }
   const std::string& message() const { return message_; }
+  // Whether a file of ours may be damaged, missing or of another version: work that depends on it
+  // has to be done again. All other errors say nothing about the files.
+  bool is_corruption() const {
+    return code_ == ErrorCode::kCorrupt || code_ == ErrorCode::kNotFound ||
+           code_ == ErrorCode::kUnsupportedVersion;
+  }
   const char* what() const noexcept override { return message_.c_str(); }
 
  private:

@@ -1,5 +1,5 @@
-// Little-endian fields in and out of byte buffers. Columns and words are copied as they lie in
-// memory, so the host must be little-endian.
+// Reads and writes little-endian fields in byte buffers. Bytes are copied from and to memory
+// without conversion, so the host must be little-endian.
 #pragma once
 
 #include <bit>
@@ -11,7 +11,7 @@
 
 namespace voxdag {
 
-static_assert(std::endian::native == std::endian::little, "files are read and written in place");
+static_assert(std::endian::native == std::endian::little, "fields are copied without conversion");
 
 // Appends fields to a buffer.
 class ByteSink {

@@ -36,12 +36,12 @@ uint64_t Checksum64::value() const { return XXH64_digest(state_->hash); }
 
 void Checksum64::reset() { XXH64_reset(state_->hash, 0); }
 
-uint64_t indexed_sum(uint64_t first, std::span<const uint32_t> words) {
+uint64_t indexed_checksum(uint64_t first, std::span<const uint32_t> words) {
   constexpr uint64_t kOdd = 0x9e3779b97f4a7c15;
   uint64_t sum = 0;
   for (size_t i = 0; i < words.size(); ++i) {
     const uint64_t mixed = (first + i) * kOdd;
-    // An odd weight: no change of a word leaves its product as it was.
+    // The weight is odd, so every change of a word changes its product.
     const uint64_t weight = (mixed ^ (mixed >> 29)) | 1;
     sum += (words[i] + kOdd) * weight;
   }

@@ -1,5 +1,5 @@
-// The two digests of our files: XXH64 against damage (short, and simple enough that the header-only
-// reader carries its own), SHA-256 to name contents.
+// XXH64 to detect damage (simple enough that the header-only reader has its own), SHA-256 to
+// identify contents, and a checksum of words that can be computed in parts.
 #pragma once
 
 #include <cstddef>
@@ -21,9 +21,9 @@ class Checksum64 {
   Checksum64& operator=(Checksum64&&) noexcept;
   ~Checksum64();
   void add(std::span<const std::byte> bytes);
-  // Of what was added so far.
+  // The checksum of all bytes added so far.
   uint64_t value() const;
-  // As if nothing had been added.
+  // Forgets all bytes that were added.
   void reset();
 
  private:
@@ -31,9 +31,10 @@ class Checksum64 {
   std::unique_ptr<State> state_;
 };
 
-// A sum over 32-bit words, each weighted by its index, modulo 2^64: the parts of a whole may be
-// summed in any order, by any number of threads, and added up. `first` is the index of words[0].
-uint64_t indexed_sum(uint64_t first, std::span<const uint32_t> words);
+// A checksum of 32-bit words that can be computed in parts, in any order and by any number of
+// threads: the sum over all words, weighted by their indices, modulo 2^64. The checksum of the
+// whole is the sum of those of its parts. `first` is the index of words[0].
+uint64_t indexed_checksum(uint64_t first, std::span<const uint32_t> words);
 
 // A running SHA-256.
 class Sha256 {
@@ -41,7 +42,7 @@ class Sha256 {
   Sha256();
   ~Sha256();
   void add(std::span<const std::byte> bytes);
-  // 64 lower-case hex digits; nothing may be added afterwards.
+  // Returns 64 lower-case hex digits. Nothing may be added after it.
   std::string finish();
 
  private:

@@ -12,7 +12,7 @@ namespace {
 constexpr uint64_t kMagic = 0x0a4752454d474456;  // "VDGMERG\n"
 constexpr uint32_t kVersion = 2;
 
-// One description of every field for both directions: `code(field)` puts or gets it.
+// The fields are described once for both directions: `code(field)` puts or gets one.
 template <class Code, class T>
 void code_all(Code& code, std::vector<T>& items) {
   code.resize(items);
@@ -67,37 +67,37 @@ void code_fields(Code& code, MergeReport& report) {
   code(report.svo_nodes);
   code(report.dag_nodes);
   code(report.input_nodes);
-  code(report.rounds);
+  code(report.passes);
   code(report.scratch_bytes);
-  code(report.hash_ranges);
+  code(report.hash_partitions);
   code(report.streamed_groups);
 }
 
 template <class Code>
-void code_fields(Code& code, LastRoundState& round) {
-  code(round.level);
-  code.text(round.output);
-  code_all(code, round.file.levels);
-  code_all(code, round.file.checksums);
-  code_all(code, round.map_rows);
-  code(round.map.id);
-  code(round.map.words);
-  code_all(code, round.map.sums);
-  code_all(code, round.placed);
-  code_all(code, round.roots);
+void code_fields(Code& code, FinalPassState& pass) {
+  code(pass.level);
+  code.text(pass.output);
+  code_all(code, pass.file.levels);
+  code_all(code, pass.file.checksums);
+  code_all(code, pass.map_rows);
+  code(pass.map.id);
+  code(pass.map.words);
+  code_all(code, pass.map.checksums);
+  code_all(code, pass.placed);
+  code_all(code, pass.roots);
 }
 
 template <class Code>
 void code_state(Code& code, MergeState& state) {
-  code(state.inputs);
+  code(state.inputs_checksum);
   code(state.next_scratch_id);
   code_fields(code, state.report);
-  code_all(code, state.merged);
-  uint8_t in_last_round = state.last_round.has_value();
-  code(in_last_round);
-  if (!in_last_round) return;
-  if (!state.last_round) state.last_round.emplace();
-  code_fields(code, *state.last_round);
+  code_all(code, state.intermediates);
+  uint8_t in_final_pass = state.final_pass.has_value();
+  code(in_final_pass);
+  if (!in_final_pass) return;
+  if (!state.final_pass) state.final_pass.emplace();
+  code_fields(code, *state.final_pass);
 }
 
 class Put {
@@ -127,7 +127,7 @@ class Get {
   void operator()(T& field) {
     field = in_.get<T>();
   }
-  // Every item takes at least 8 bytes: a count that the bytes cannot hold makes none.
+  // Every item takes at least 8 bytes, so a damaged count cannot allocate more than the bytes hold.
   template <class T>
   void resize(std::vector<T>& items) {
     items.resize(count(8));
@@ -142,7 +142,7 @@ class Get {
   size_t count(size_t min_bytes) {
     const uint64_t n = in_.get<uint64_t>();
     if (n <= in_.left() / min_bytes) return n;
-    in_.take(in_.left() + 1);  // not ok() from here on
+    in_.take(in_.left() + 1);  // makes ok() false
     return 0;
   }
 

@@ -1,8 +1,8 @@
-// The durable state of an unfinished merge: what was merged, and what going on needs of it.
+// The durable state of an unfinished merge, and its encoding.
 //
-// A merge reduces a set of artifacts, its inputs at first, to fewer in rounds, and then merges
-// those left into the global file, level by level. Its state is that set and, in the last round,
-// how far that is.
+// A merge reduces a set of artifacts to fewer ones in passes, and writes those that are left into
+// the global file, level by level, in the final pass. Its state is that set and, during the final
+// pass, how far the pass is.
 #pragma once
 
 #include <cstddef>
@@ -14,35 +14,35 @@
 
 #include "core/format/artifact/artifact.h"
 #include "core/format/global/global_writer.h"
-#include "merge/load/scratch.h"
-#include "merge/load/top_run.h"
+#include "merge/load/scratch_file.h"
+#include "merge/load/top_tree_run.h"
 #include "merge/merge.h"
 
 namespace voxdag {
 
-// How far the last round is; see RoundProgress.
-struct LastRoundState {
+// How far the final pass is; see PassProgress.
+struct FinalPassState {
   uint32_t level = 0;
   std::string output;  // path of the global file
-  GlobalProgress file;
+  GlobalFileProgress file;
   std::vector<uint64_t> map_rows;
-  ScratchRecord map;
+  ScratchFileState map;
   std::vector<PlacedNode> placed;
   std::vector<ArtifactRoot> roots;
 };
 
 struct MergeState {
-  uint64_t inputs = 0;  // checksum of what is merged
+  uint64_t inputs_checksum = 0;
   uint32_t next_scratch_id = 0;
   MergeReport report;
-  // Made by rounds, in segments of the scratch folder: they replace the inputs whose roots they
-  // hold.
-  std::vector<ArtifactRef> merged;
-  std::optional<LastRoundState> last_round;
+  // Artifacts that passes made, in segments of the scratch folder. They replace the inputs whose
+  // roots they hold.
+  std::vector<ArtifactRef> intermediates;
+  std::optional<FinalPassState> final_pass;
 };
 
 std::vector<std::byte> encode_state(MergeState state);
-// Throws Error{kCorrupt} if the bytes are not those of a state of this version.
+// Throws Error{kCorrupt} if the bytes are not a state of this version.
 MergeState decode_state(std::span<const std::byte> bytes);
 
 }  // namespace voxdag

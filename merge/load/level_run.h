@@ -1,15 +1,16 @@
-// A run: the rows of one level of one artifact (or of the top tree) in frames, in the total order.
+// Runs: the rows of one level of one artifact (or of the top tree), stored in frames, in the total
+// order. Immutable; several threads may read.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
-#include "core/format/artifact/artifact.h"
-#include "merge/sort/record.h"
+#include "core/format/artifact/artifact_reader.h"
+#include "merge/load/row.h"
 
 namespace voxdag {
 
-// All rows of a level whose hash lies in [first, last].
+// The hashes from `first` to `last`, both included.
 struct HashInterval {
   uint64_t first = 0;
   uint64_t last = ~uint64_t{0};
@@ -24,24 +25,25 @@ struct FrameSpan {
 class LevelRun {
  public:
   virtual ~LevelRun() = default;
-  // Decodes a frame; several threads at once, each with its own `out`.
+  // Decodes a frame. Several threads may call it at once, each with its own `out`.
   virtual void read_frame(size_t index, Frame& out) const = 0;
 
   std::span<const FrameInfo> frames() const { return frames_; }
   uint64_t rows() const { return rows_; }
   bool bricks() const { return bricks_; }
-  // Children are positions already, not indices into the run's own level below.
+  // Whether children are positions already, not indices into the run's own level below.
   bool rewired() const { return rewired_; }
 
-  // Rows, or words of rows, before frame `index`, which may be the end.
+  // Rows before frame `index`, which may be the end.
   uint64_t rows_before(size_t index) const {
     return index < frames_.size() ? frames_[index].first_row : rows_;
   }
+  // Words of those rows.
   uint64_t words_before(size_t index) const {
     if (bricks_) return kBrickWords * rows_before(index);
     return index < frames_.size() ? frames_[index].first_child : children_;
   }
-  // Those that may hold rows of the interval.
+  // The frames that may hold rows of the interval, found by their first hashes.
   FrameSpan frames_within(const HashInterval& interval) const;
 
  protected:
@@ -60,7 +62,7 @@ class LevelRun {
   uint64_t children_ = 0;
 };
 
-// A level of an artifact; without rows if the artifact does not reach that far up.
+// A level of an artifact; without rows if the artifact does not reach up to that level.
 class ArtifactRun : public LevelRun {
  public:
   ArtifactRun(const ArtifactReader& artifact, uint32_t level);

@@ -5,7 +5,7 @@
 namespace voxdag {
 
 PositionMaps::PositionMaps(std::span<const uint64_t> rows, uint64_t resident_bytes,
-                           MergeScratch& scratch, MemoryBudget& budget)
+                           ScratchFolder& scratch, MemoryBudget& budget)
     : first_{0} {
   for (const uint64_t count : rows) first_.push_back(first_.back() + count);
   if (total_rows() * sizeof(uint32_t) <= resident_bytes)
@@ -24,7 +24,7 @@ PositionMaps::PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<Scrat
   file_.reset();
 }
 
-std::shared_ptr<ScratchFile> PositionMaps::file(MergeScratch& scratch) const {
+std::shared_ptr<ScratchFile> PositionMaps::file(ScratchFolder& scratch) const {
   if (file_) return file_;
   auto copy = std::make_shared<ScratchFile>(scratch);
   copy->write(0, {values_.data(), values_.size()});
@@ -38,9 +38,9 @@ std::vector<uint64_t> PositionMaps::rows() const {
 }
 
 uint64_t PositionMaps::max_rows() const {
-  uint64_t most = 0;
-  for (size_t run = 0; run + 1 < first_.size(); ++run) most = std::max(most, rows(run));
-  return most;
+  uint64_t max = 0;
+  for (size_t run = 0; run + 1 < first_.size(); ++run) max = std::max(max, rows(run));
+  return max;
 }
 
 void PositionMaps::store(size_t run, uint64_t first, std::span<const uint32_t> positions) {

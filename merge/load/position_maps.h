@@ -1,11 +1,11 @@
-// Where the rows of one level went: for every run, row -> position in the merged level.
+// The positions of a level's rows in the merged level: one map, row -> position, for every run.
 //
-// A position is what parents refer to: a word offset in the global file, an index in an artifact.
-// Either way it fits 32 bits and grows with the row, so a run whose children are replaced by their
-// positions stays in order. All runs' maps lie one after the other, in memory if they fit a limit
-// and otherwise in a scratch file, from which one run's map, or a part of it, is loaded at a time.
+// Positions are what parents refer to. They fit in 32 bits and increase with the row, so a run
+// whose children are replaced by their positions stays in the total order. The maps of all runs are
+// stored one after the other: in memory if they fit a limit, otherwise in a scratch file, from
+// which one run's map, or a part of it, is loaded at a time.
 //
-// Different rows may be stored from several threads at once; loads follow the last store.
+// Different rows may be stored by several threads at once; loads come after the last store.
 #pragma once
 
 #include <cstdint>
@@ -15,21 +15,23 @@
 
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
-#include "merge/load/scratch.h"
+#include "merge/load/scratch_file.h"
 
 namespace voxdag {
 
 class PositionMaps {
  public:
-  // One map for each entry of `rows`. Kept in memory if all of them take at most `resident_bytes`.
-  PositionMaps(std::span<const uint64_t> rows, uint64_t resident_bytes, MergeScratch& scratch,
+  // One map for each entry of `rows`; in memory if all of them take at most `resident_bytes`.
+  PositionMaps(std::span<const uint64_t> rows, uint64_t resident_bytes, ScratchFolder& scratch,
                MemoryBudget& budget);
-  // Those that an earlier merge left in `file`.
+  // The maps that an earlier merge left in `file`.
   PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<ScratchFile> file,
                uint64_t resident_bytes, MemoryBudget& budget);
 
+  // Whether the maps are in memory.
   bool resident() const { return file_ == nullptr; }
   uint64_t rows(size_t run) const { return first_[run + 1] - first_[run]; }
+  std::vector<uint64_t> rows() const;
   // Rows of the longest map.
   uint64_t max_rows() const;
   // A whole map; only if resident.
@@ -41,14 +43,13 @@ class PositionMaps {
   void load(size_t run, uint64_t first, std::span<uint32_t> positions) const;
   uint32_t at(size_t run, uint64_t row) const;
 
-  // A file that holds all maps: their own, or a copy.
-  std::shared_ptr<ScratchFile> file(MergeScratch& scratch) const;
-  std::vector<uint64_t> rows() const;
+  // A file that holds all maps: the one they are in, or a copy.
+  std::shared_ptr<ScratchFile> file(ScratchFolder& scratch) const;
 
  private:
   uint64_t total_rows() const { return first_.back(); }
 
-  std::vector<uint64_t> first_;  // where each run's map begins, and the end of the last
+  std::vector<uint64_t> first_;  // where the map of each run begins, and the end of the last
   PageBuffer<uint32_t> values_;
   std::shared_ptr<ScratchFile> file_;
 };

@@ -11,15 +11,15 @@ void ArtifactOutput::begin_level(uint32_t level) {
 
 void ArtifactOutput::end_level(uint64_t, uint64_t) { artifact_.end_level(); }
 
-void ArtifactOutput::add(const RecordBatch& batch) {
-  if (batch.bricks())
-    write_bricks(batch);
+void ArtifactOutput::add(const MergedRows& rows) {
+  if (rows.bricks())
+    write_bricks(rows);
   else
-    write_nodes(batch);
+    write_nodes(rows);
 }
 
-void ArtifactOutput::write_bricks(const RecordBatch& batch) {
-  const auto words = batch.words();
+void ArtifactOutput::write_bricks(const MergedRows& rows) {
+  const auto words = rows.words();
   for (size_t i = 0; i < words.size();) {
     brick_masks_.clear();
     for (; i < words.size() && brick_masks_.size() < kFrameRows; i += kBrickWords)
@@ -28,18 +28,18 @@ void ArtifactOutput::write_bricks(const RecordBatch& batch) {
   }
 }
 
-void ArtifactOutput::write_nodes(const RecordBatch& batch) {
-  const uint32_t* word = batch.words().data();
-  for (size_t row = 0; row < batch.row_count(); row += masks_.size()) {
+void ArtifactOutput::write_nodes(const MergedRows& rows) {
+  const uint32_t* word = rows.words().data();
+  for (size_t row = 0; row < rows.row_count(); row += masks_.size()) {
     masks_.clear();
     children_.clear();
-    for (size_t i = row; i < batch.row_count() && masks_.size() < kFrameRows; ++i) {
+    for (size_t i = row; i < rows.row_count() && masks_.size() < kFrameRows; ++i) {
       masks_.push_back(static_cast<uint8_t>(*word++));
       const uint32_t* const end = word + kRowWords[masks_.back()];
       children_.insert(children_.end(), word, end);
       word = end;
     }
-    artifact_.append_nodes({level_, batch.hashes().subspan(row, masks_.size()), masks_, children_});
+    artifact_.append_nodes({level_, rows.hashes().subspan(row, masks_.size()), masks_, children_});
   }
 }
 

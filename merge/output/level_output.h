@@ -1,29 +1,48 @@
-// Where the merged rows of a level go: the global file in the last round, an artifact before.
+// The output of a merge pass, level by level: the global file in the final pass, an artifact in
+// earlier ones.
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
-#include "core/format/artifact/artifact.h"
+#include "core/base/error.h"
+#include "core/format/artifact/artifact_writer.h"
 #include "core/format/global/global_writer.h"
-#include "merge/sort/record.h"
+#include "merge/output/merged_rows.h"
 
 namespace voxdag {
 
-// Positions of a level end below this: they are kept in 32 bits.
+// Positions of a level are below this: they are stored in 32 bits.
 inline constexpr uint64_t kPositionLimit = uint64_t{1} << 32;
+
+// The size of a merged level, or of a part of it.
+struct LevelExtent {
+  uint64_t nodes = 0;
+  uint64_t positions = 0;
+
+  // Throws Error{kLimit} naming the level if positions would not fit in 32 bits.
+  void add(const LevelExtent& part, uint32_t level, bool in_words) {
+    nodes += part.nodes;
+    positions += part.positions;
+    if (positions > kPositionLimit)
+      throw Error(ErrorCode::kLimit, "level " + std::to_string(level) + " of the merged DAG has " +
+                                         "over 2^32 " + (in_words ? "words" : "nodes") +
+                                         ", the limit of a level");
+  }
+};
 
 class LevelOutput {
  public:
   virtual ~LevelOutput() = default;
-  // Positions count words, otherwise rows.
+  // Whether positions count words; otherwise they count rows.
   virtual bool in_words() const = 0;
   virtual void begin_level(uint32_t level) = 0;
-  // Unique rows come in order, one batch at a time.
-  virtual void add(const RecordBatch& batch) = 0;
-  // What need not be done in turn: every batch that was added comes once more, the first of its
-  // rows at `position`, in any order, also from several threads at once.
-  virtual void write(uint64_t position, const RecordBatch& batch) = 0;
+  // Gets all rows of the level in order, by one thread at a time.
+  virtual void add(const MergedRows& rows) = 0;
+  // Gets the same rows once more, the first one at `position`, in any order and by several threads
+  // at once: the part of the work that needs no order.
+  virtual void write(uint64_t position, const MergedRows& rows) = 0;
   virtual void end_level(uint64_t nodes, uint64_t positions) = 0;
 };
 
@@ -32,9 +51,9 @@ class GlobalOutput : public LevelOutput {
   explicit GlobalOutput(GlobalFileWriter& file) : file_(file) {}
   bool in_words() const override { return true; }
   void begin_level(uint32_t level) override { file_.begin_level(level); }
-  void add(const RecordBatch& batch) override { file_.checksum_words(batch.words()); }
-  void write(uint64_t position, const RecordBatch& batch) override {
-    file_.write_words(position, batch.words());
+  void add(const MergedRows& rows) override { file_.checksum_words(rows.words()); }
+  void write(uint64_t position, const MergedRows& rows) override {
+    file_.write_words(position, rows.words());
   }
   void end_level(uint64_t nodes, uint64_t positions) override { file_.end_level(nodes, positions); }
 
@@ -47,13 +66,13 @@ class ArtifactOutput : public LevelOutput {
   explicit ArtifactOutput(ArtifactWriter& artifact) : artifact_(artifact) {}
   bool in_words() const override { return false; }
   void begin_level(uint32_t level) override;
-  void add(const RecordBatch& batch) override;
-  void write(uint64_t, const RecordBatch&) override {}
+  void add(const MergedRows& rows) override;
+  void write(uint64_t, const MergedRows&) override {}
   void end_level(uint64_t nodes, uint64_t positions) override;
 
  private:
-  void write_bricks(const RecordBatch& batch);
-  void write_nodes(const RecordBatch& batch);
+  void write_bricks(const MergedRows& rows);
+  void write_nodes(const MergedRows& rows);
 
   ArtifactWriter& artifact_;
   uint32_t level_ = 0;

@@ -7,8 +7,8 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/geometry/morton.h"
+#include "merge/load/hash_partition.h"
 #include "merge/load/level_run.h"
-#include "merge/load/slab.h"
 
 namespace voxdag {
 namespace {
@@ -62,7 +62,7 @@ uint64_t row_count(const ArtifactReader& reader) {
   return rows;
 }
 
-uint64_t content_of(const ArtifactReader& reader) {
+uint64_t content_checksum(const ArtifactReader& reader) {
   std::vector<uint64_t> words;
   for (const ArtifactRoot& root : reader.roots()) {
     words.insert(words.end(),
@@ -74,27 +74,27 @@ uint64_t content_of(const ArtifactReader& reader) {
   return checksum64(std::as_bytes(std::span(words)));
 }
 
-// What a slab needs to hold any two neighboring frames.
-uint64_t slab_bytes(const ArtifactReader& reader) {
-  uint64_t most = 0;
+// What a hash partition needs to hold any two neighboring frames.
+uint64_t min_partition_bytes(const ArtifactReader& reader) {
+  uint64_t max = 0;
   for (const ArtifactLevel& level : reader.levels()) {
     const ArtifactRun run(reader, level.level);
     for (size_t begin = 0; begin < level.frames.size(); ++begin) {
       const size_t end = std::min(begin + 2, level.frames.size());
       const uint64_t rows = run.rows_before(end) - run.rows_before(begin);
       const uint64_t words = run.words_before(end) - run.words_before(begin);
-      most = std::max(most, Slab::bytes_for(rows, words, true));
+      max = std::max(max, HashPartition::bytes_for(rows, words, true));
     }
   }
-  return most;
+  return max;
 }
 
-// An artifact counts as at least this much, however small it is: so the number of runs that are
-// open at once, and the bookkeeping for each, is bounded by the budget too.
+// Every artifact counts as at least this much, so that the budget also bounds the number of runs
+// that are open at once.
 constexpr uint64_t kMinRunBytes = uint64_t{64} << 10;
 
 // The Morton code of the cube's low corner, in bricks of the largest grid.
-uint64_t place_of(const Cube& cube) {
+uint64_t morton_code_of(const Cube& cube) {
   const uint64_t code = morton_encode(cube.position[0], cube.position[1], cube.position[2]);
   return code << 3 * (kMaxGridLevels - cube.level);
 }
@@ -116,19 +116,20 @@ ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSeg
                                 uint32_t grid_levels, uint32_t hash_bits) {
   Opener opener(open, grid_levels, hash_bits);
   ArtifactSurvey survey;
-  std::vector<std::pair<uint64_t, SurveyedArtifact>> placed;
+  std::vector<std::pair<uint64_t, SurveyedArtifact>> by_code;
   for (const ArtifactRef& ref : refs) {
     const ArtifactReader reader = opener.open(ref);
     survey.rows += row_count(reader);
-    SurveyedArtifact found{ref,
-                           std::max(kMinRunBytes, index_bytes(reader) + slab_bytes(reader)),
-                           content_of(reader),
-                           {}};
+    SurveyedArtifact found{
+        ref,
+        std::max(kMinRunBytes, index_bytes(reader) + min_partition_bytes(reader)),
+        content_checksum(reader),
+        {}};
     for (const ArtifactRoot& root : reader.roots()) found.cubes.push_back(root.cube);
-    placed.emplace_back(place_of(found.cubes[0]), std::move(found));
+    by_code.emplace_back(morton_code_of(found.cubes[0]), std::move(found));
   }
-  std::ranges::stable_sort(placed, {}, &std::pair<uint64_t, SurveyedArtifact>::first);
-  for (auto& [place, artifact] : placed) survey.by_place.push_back(std::move(artifact));
+  std::ranges::stable_sort(by_code, {}, &std::pair<uint64_t, SurveyedArtifact>::first);
+  for (auto& [code, artifact] : by_code) survey.in_morton_order.push_back(std::move(artifact));
   return survey;
 }
 

@@ -1,4 +1,4 @@
-// Artifacts that are merged together: the scheduler's, or those of an earlier round.
+// Artifacts that are merged together: the inputs, or those of an earlier merge pass.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/memory_budget.h"
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/artifact_reader.h"
 #include "merge/merge.h"
 
 namespace voxdag {
@@ -18,25 +18,26 @@ using OpenSegment = std::function<std::shared_ptr<ReadableFile>(uint32_t)>;
 
 struct SurveyedArtifact {
   ArtifactRef ref;
-  // The memory that it takes in a merge, at least: its index, and any two neighboring frames of it
-  // in a slab.
+  // The least memory that it takes in a merge pass: its index, and a hash partition that holds any
+  // two neighboring frames of it.
   uint64_t min_bytes = 0;
-  // Checksum of its roots and its levels' rows, the same wherever it lies.
-  uint64_t content = 0;
+  // Checksum of its roots and of the counts of its levels, independent of its place in a file.
+  uint64_t content_checksum = 0;
   std::vector<Cube> cubes;  // of its roots
 };
 
 struct ArtifactSurvey {
   uint64_t rows = 0;
-  // In Morton order of their places: neighbors share most nodes, so a round that merges them
-  // first leaves least to the next one.
-  std::vector<SurveyedArtifact> by_place;
+  // In Morton order of their cubes: neighbors share the most nodes, so a pass that merges neighbors
+  // leaves the fewest rows to the next one.
+  std::vector<SurveyedArtifact> in_morton_order;
 };
 
 class ArtifactSet {
  public:
-  // Opens the artifacts, each segment file once. Throws Error{kCorrupt} for one that was made for
-  // another grid or other hash bits, or whose roots are not there. The indexes are charged.
+  // Opens the artifacts, each segment file once, and charges their indexes to the budget. Throws
+  // Error{kCorrupt} for an artifact of another grid or of other hash bits, or whose roots are
+  // missing.
   ArtifactSet(std::span<const SurveyedArtifact> artifacts, const OpenSegment& open,
               uint32_t grid_levels, uint32_t hash_bits, MemoryBudget& budget);
 
@@ -47,7 +48,7 @@ class ArtifactSet {
   MemoryCharge charge_;
 };
 
-// Looks into all artifacts, one after the other.
+// Reads the indexes of all artifacts, one after the other.
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
                                 uint32_t grid_levels, uint32_t hash_bits);
 

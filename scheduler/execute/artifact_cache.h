@@ -15,7 +15,7 @@
 #include <string>
 
 #include "core/backend/backend.h"
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/segment_writer.h"
 #include "core/io/file_system.h"
 #include "scheduler/job/job_store.h"
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/base/clock.h"
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/segment_writer.h"
 #include "scheduler/job/job_store.h"
 #include "scheduler/triangles/triangle_bins.h"
 

@@ -2,6 +2,8 @@
 
 #include <map>
 
+#include "core/format/artifact/artifact_reader.h"
+
 namespace voxdag {
 namespace {
 
@@ -19,11 +21,6 @@ void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
 
 }  // namespace
 
-bool is_corruption(const Error& error) {
-  return error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kNotFound ||
-         error.code() == ErrorCode::kUnsupportedVersion;
-}
-
 std::vector<DamagedSubvolume> find_damaged(
     std::span<const StoredSubvolume> subvolumes, uint32_t level,
     const std::function<std::shared_ptr<ReadableFile>(uint32_t)>& open_segment,
@@ -38,7 +35,7 @@ std::vector<DamagedSubvolume> find_damaged(
       if (!segment) segment = open_segment(subvolume.artifact.segment);
       read_above(level, segment, subvolume);
     } catch (const Error& error) {
-      if (!is_corruption(error)) throw;
+      if (!error.is_corruption()) throw;
       damaged.push_back({subvolume, error.message()});
     }
   }

@@ -18,9 +18,6 @@ struct DamagedSubvolume {
   std::string what;  // what is wrong with its artifact
 };
 
-// Whether an error may mean that an artifact, or another file of ours, is damaged.
-bool is_corruption(const Error& error);
-
 // Reads the artifacts of all built subvolumes, the levels above `level` (of smaller number): the
 // others are not needed any more and may be gone.
 std::vector<DamagedSubvolume> find_damaged(

@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "scheduler/memory_plan.h"
+#include "core/format/artifact/artifact_writer.h"
 #include "scheduler/triangles/distribute.h"
 
 namespace voxdag {

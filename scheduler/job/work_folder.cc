@@ -11,7 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/segment_writer.h"
 
 namespace voxdag {
 namespace {

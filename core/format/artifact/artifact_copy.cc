@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint64_t kEntryMagic = 0x0a48434147414456;  // "VDAGACH\n"
 constexpr size_t kFooterBytes = 48;
-constexpr uint64_t kCopyBytes = uint64_t{256} << 10;
+constexpr uint64_t kChunkBytes = uint64_t{256} << 10;
 
 [[noreturn]] void corrupt(const std::string& where, const std::string& what) {
   throw Error(ErrorCode::kCorrupt, where + ": " + what);
@@ -60,11 +60,11 @@ uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std
   const std::vector<std::byte> header = encode_segment_header(0);
   file->write_at(0, header);
   const uint64_t begin = header.size(), end = begin + ref.bytes;
-  std::vector<std::byte> piece;
-  for (uint64_t at = begin; at < end; at += piece.size()) {
-    piece.resize(std::min<uint64_t>(end - at, kCopyBytes));
-    from.read_at(ref.offset + at - begin, piece);
-    file->write_at(at, piece);
+  std::vector<std::byte> chunk;
+  for (uint64_t at = begin; at < end; at += chunk.size()) {
+    chunk.resize(std::min<uint64_t>(end - at, kChunkBytes));
+    from.read_at(ref.offset + at - begin, chunk);
+    file->write_at(at, chunk);
   }
   std::vector<std::byte> footer;
   ByteSink sink(footer);

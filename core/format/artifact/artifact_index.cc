@@ -53,10 +53,10 @@ void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std:
     if (p >> level != 0) corrupt(where, "a root's cube is outside the grid");
   if (root.voxels == 0 || root.svo_nodes == 0) corrupt(where, "a root is empty");
   if (cut_hash(root.hash, index.hash_bits) != root.hash)
-    corrupt(where, "a root's hash has bits below the cut");
+    corrupt(where, "a root's hash has bits beyond the hash bits");
 }
 
-// Reads the frames of one level; `offset` moves from its first byte to past its last.
+// Reads the frames of one level, and advances `offset` from its first byte to past its last.
 void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& level,
                 uint64_t& offset, const std::string& where) {
   const std::string here = where + ", level " + std::to_string(level.level);
@@ -149,7 +149,7 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
     corrupt(where, std::to_string(index.hash_bits) + " hash bits, expected 4 to 64");
   if (levels > index.grid_levels - kBrickLevels + 1)
     corrupt(where, std::to_string(levels) + " levels are too many for the grid");
-  // Everything allocated below is bounded by bytes that are really there.
+  // So everything allocated below is bounded by the size of `bytes`.
   if (bytes.size() !=
       kFixedBytes + roots * kRootBytes + levels * kLevelBytes + frames * kFrameBytes)
     corrupt(where, "the index is not as long as its counts say");

@@ -12,7 +12,7 @@
 
 namespace voxdag {
 
-// Of segments and artifacts alike.
+// The version of segments and of artifacts.
 inline constexpr uint32_t kSegmentVersion = 1;
 inline constexpr uint64_t kSegmentMagic = 0x0a47455347414456;  // "VDAGSEG\n"
 inline constexpr uint64_t kIndexMagic = 0x0a58444947414456;    // "VDAGIDX\n"
@@ -27,8 +27,8 @@ struct ArtifactIndex {
 
 std::vector<std::byte> encode_index(const ArtifactIndex& index);
 
-// Throws Error{kCorrupt} or Error{kUnsupportedVersion} beginning with `where`, unless every field
-// keeps the rules that docs/format.md gives: nothing in a decoded index needs another check.
+// Throws Error{kCorrupt} or Error{kUnsupportedVersion} beginning with `where` unless every field
+// obeys the rules of docs/format.md, so that a decoded index needs no further check.
 ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& ref,
                            const std::string& where);
 

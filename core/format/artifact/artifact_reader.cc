@@ -1,8 +1,9 @@
+#include "core/format/artifact/artifact_reader.h"
+
 #include <string>
 
 #include "core/base/error.h"
 #include "core/dag/brick.h"
-#include "core/format/artifact/artifact.h"
 #include "core/format/artifact/artifact_index.h"
 #include "core/format/artifact/frame_codec.h"
 #include "core/format/artifact/row_order.h"
@@ -11,7 +12,7 @@
 namespace voxdag {
 namespace {
 
-// The index's bytes, which `ref` says lie within the file.
+// The bytes of the index.
 std::vector<std::byte> read_index(const ReadableFile& file, const ArtifactRef& ref,
                                   const std::string& where) {
   const uint64_t size = file.size();
@@ -59,13 +60,13 @@ void ArtifactReader::read_frame(uint32_t level, size_t index, Frame& out) const 
   const size_t place = grid_levels_ - kBrickLevels - level;
   const std::vector<FrameInfo>& frames = levels_[place].frames;
   const FrameInfo& info = frames[index];
-  out.scratch.resize(info.bytes);
-  file_->read_at(info.offset, out.scratch);
-  if (checksum64(out.scratch) != info.checksum) damaged(level, index, "the checksum is wrong");
+  out.stored.resize(info.bytes);
+  file_->read_at(info.offset, out.stored);
+  if (checksum64(out.stored) != info.checksum) damaged(level, index, "it fails its checksum");
 
   const bool bricks = place == 0;
-  const char* wrong = bricks ? decode_brick_frame(out.scratch, info.rows, hash_bits_, out)
-                             : decode_node_frame(out.scratch, info.rows, info.children, out);
+  const char* wrong = bricks ? decode_brick_frame(out.stored, info.rows, hash_bits_, out)
+                             : decode_node_frame(out.stored, info.rows, info.children, out);
   LastRow last;
   if (!wrong)
     wrong = bricks ? check_brick_order(out.hashes, out.brick_masks, last)

@@ -1,3 +1,5 @@
+#include "core/format/artifact/artifact_writer.h"
+
 #include <algorithm>
 #include <string>
 
@@ -5,7 +7,6 @@
 #include "core/base/popcount8.h"
 #include "core/dag/brick.h"
 #include "core/dag/node_hash.h"
-#include "core/format/artifact/artifact.h"
 #include "core/format/artifact/artifact_index.h"
 #include "core/format/artifact/frame_codec.h"
 #include "core/format/artifact/row_order.h"
@@ -20,8 +21,8 @@ struct ArtifactWriter::State {
   bool level_open = false;
   uint64_t child_rows = 0;  // rows of the level below the open one
   LastRow last;
-  // Rows of the frame in the making.
-  std::vector<uint64_t> values;  // hashes; of the brick level masks
+  // Rows of the frame that is not complete yet.
+  std::vector<uint64_t> values;  // hashes; on the brick level masks
   std::vector<uint8_t> masks;
   std::vector<uint32_t> children;
 

@@ -12,9 +12,10 @@
 namespace voxdag {
 namespace {
 
-constexpr int kZstdLevel = -1;  // 1 makes artifacts an eighth smaller and a build 5 % slower
+// Level 1 makes artifacts an eighth smaller and a build 5 % slower.
+constexpr int kZstdLevel = -1;
 constexpr uint32_t kCompressedFlag = 0x80000000u;
-constexpr uint32_t kFramesToSkip = 15;  // after a column that shrank too little
+constexpr uint32_t kFramesToSkip = 15;  // after one in which a column shrank too little
 constexpr size_t kBrickColumn = 0, kMaskColumn = 1;
 
 // Byte `plane` of each value.
@@ -39,7 +40,7 @@ uint32_t plane_count(std::span<const uint32_t> children) {
   return all > 0xffffff ? 4 : all > 0xffff ? 3 : all > 0xff ? 2 : 1;
 }
 
-// One decompression context a thread: read_frame() runs on many at once.
+// One decompression context per thread, since several threads read frames at once.
 ZSTD_DCtx* decompression_context() {
   struct Deleter {
     void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
@@ -49,8 +50,8 @@ ZSTD_DCtx* decompression_context() {
   return context.get();
 }
 
-// The column's `expected` bytes, as they lie in `source` or decompressed into `buffer`; empty when
-// they are not there.
+// The `expected` bytes of a column, in `source` or decompressed into `buffer`; empty if there are
+// not that many.
 std::span<const std::byte> take_column(ByteSource& source, size_t expected,
                                        std::vector<std::byte>& buffer) {
   const uint32_t head = source.get<uint32_t>();
@@ -131,7 +132,7 @@ const char* decode_brick_frame(std::span<const std::byte> bytes, uint32_t rows, 
                                Frame& out) {
   ByteSource source(bytes);
   const auto planes = take_column(source, rows * sizeof(uint64_t), out.planes);
-  if (planes.empty() || source.left() != 0) return "the brick column is not whole";
+  if (planes.empty() || source.left() != 0) return "the brick column is incomplete";
   out.rows = rows;
   out.masks.clear();
   out.children.clear();
@@ -150,19 +151,19 @@ const char* decode_node_frame(std::span<const std::byte> bytes, uint32_t rows, u
   const uint32_t planes = source.get<uint32_t>();
   if (planes < 1 || planes > sizeof(uint32_t)) return "expected 1 to 4 child planes";
   const auto hashes = source.take(rows * sizeof(uint64_t));
-  if (hashes.empty()) return "the hash column is not whole";
+  if (hashes.empty()) return "the hash column is incomplete";
   out.rows = rows;
   out.brick_masks.clear();
   out.hashes.resize(rows);
   std::memcpy(out.hashes.data(), hashes.data(), hashes.size());
   const auto masks = take_column(source, rows, out.planes);
-  if (masks.empty()) return "the mask column is not whole";
+  if (masks.empty()) return "the mask column is incomplete";
   out.masks.resize(rows);
   std::memcpy(out.masks.data(), masks.data(), masks.size());
   out.children.resize(children);
   for (unsigned plane = 0; plane < planes; ++plane) {
     const auto column = take_column(source, children, out.planes);
-    if (column.empty()) return "a child column is not whole";
+    if (column.empty()) return "a child column is incomplete";
     add_plane(column.data(), plane, std::span(out.children));
   }
   return source.left() == 0 ? nullptr : "bytes are left over";

@@ -1,15 +1,15 @@
-// One frame: up to kFrameRows rows of one level as columns, the bytes between a FrameInfo's offset
-// and its end. docs/format.md, "Frame", is the byte layout.
+// Encodes and decodes one frame: up to kFrameRows rows of one level as columns. docs/format.md,
+// "Frame", is the byte layout.
 //
 //   bricks:   column(mask byte planes)
 //   nodes:    plane count, hashes, column(masks), column(children, byte plane 0), ...
 //   column:   [stored size, high bit: zstd] [bytes]
 //
-// Hashes and the low byte plane of the children are random and lie as they are. The other columns
-// are compressed where that pays: measured on real sub-DAGs, zstd level 1 takes brick masks to
-// 50-60 %, child masks to 55-80 %, high child planes to nothing, middle ones to 60-90 %, for
-// 10-25 ns per row in and out together; a column that shrinks by less than a quarter is not tried
-// again for a while.
+// Hashes and the low byte plane of the children are random and are stored as they are. The other
+// columns are compressed where that pays: measured on real sub-DAGs, zstd level 1 reduces brick
+// masks to 50-60 %, child masks to 55-80 %, high child planes to nothing, middle ones to 60-90 %,
+// for 10-25 ns per row in both directions together. A column that shrinks by less than a quarter is
+// not compressed in the next frames.
 #pragma once
 
 #include <array>
@@ -19,6 +19,7 @@
 #include <span>
 #include <vector>
 
+#include "core/dag/level_array.h"
 #include "core/format/artifact/artifact.h"
 
 namespace voxdag {
@@ -28,12 +29,12 @@ class FrameEncoder {
   FrameEncoder();
   ~FrameEncoder();
 
-  // The frame of these rows; valid until the next call.
+  // Return the bytes of the frame, valid until the next call.
   std::span<const std::byte> encode_bricks(std::span<const uint64_t> masks);
   std::span<const std::byte> encode_nodes(const NodeLevelView& rows);
 
  private:
-  // Which columns have lately been worth compressing: bricks, child masks, child planes 1 to 3.
+  // Columns that may be compressed: brick masks, child masks, child planes 1 to 3.
   static constexpr size_t kColumns = 5;
   struct Context;
 
@@ -45,10 +46,11 @@ class FrameEncoder {
   std::vector<std::byte> out_;
 };
 
-// Decodes `bytes` into `out` (all but `scratch`, which is where `bytes` may lie). Returns nullptr,
-// or what is wrong with them. Bricks get their hashes, cut to `hash_bits`.
+// Decodes `bytes`, which may lie in `out.stored`, and computes the hashes of the bricks, truncated
+// to `hash_bits`. Returns nullptr, or what is wrong with the bytes.
 const char* decode_brick_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t hash_bits,
                                Frame& out);
+// Decodes `bytes`, which may lie in `out.stored`. Returns nullptr, or what is wrong with the bytes.
 const char* decode_node_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t children,
                               Frame& out);
 

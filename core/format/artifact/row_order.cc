@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// How many children masks have, eight masks at once; `any_empty` if one has none.
+// The number of children of all masks, eight masks at a time; sets `any_empty` if a mask is 0.
 uint64_t children_of(std::span<const uint8_t> masks, bool& any_empty) {
   constexpr uint64_t kOnes = 0x0101010101010101, kTops = 0x8080808080808080;
   uint64_t children = 0, empty = 0;
@@ -19,7 +19,7 @@ uint64_t children_of(std::span<const uint8_t> masks, bool& any_empty) {
     uint64_t eight;
     std::memcpy(&eight, masks.data(), 8);
     children += static_cast<uint64_t>(popcount64(eight));
-    empty |= (eight - kOnes) & ~eight & kTops;  // not 0 iff a byte is
+    empty |= (eight - kOnes) & ~eight & kTops;  // not 0 iff a byte is 0
   }
   for (const uint8_t mask : masks) {
     children += kPopcount8[mask];
@@ -45,7 +45,7 @@ const char* check_counts(const NodeLevelView& rows, uint64_t child_rows, uint32_
   if (highest >= child_rows) return "a child index is beyond the next level";
   uint64_t all_hashes = 0;
   for (const uint64_t hash : rows.hashes) all_hashes |= hash;
-  if (cut_hash(all_hashes, hash_bits) != all_hashes) return "a hash has bits below the cut";
+  if (cut_hash(all_hashes, hash_bits) != all_hashes) return "a hash has bits beyond the hash bits";
   return nullptr;
 }
 
@@ -87,7 +87,7 @@ const char* check_node_order(const NodeLevelView& rows, uint64_t child_rows, uin
   if (rows.masks.size() != rows.hashes.size()) return "masks and hashes disagree in number";
   if (const char* wrong = check_counts(rows, child_rows, hash_bits)) return wrong;
   if (rows.masks.empty()) return nullptr;
-  // Mostly the hashes tell.
+  // Mostly the hashes alone are in order.
   const bool by_hash =
       (!last.present || last.hash < rows.hashes.front()) && strictly_increase(rows.hashes);
   if (!by_hash && !are_in_total_order(rows, last)) return "nodes are not in the total order";

@@ -1,13 +1,14 @@
-// The invariants of consecutive rows of a level array, checked before a write and after a read.
+// Checks the invariants of consecutive rows of a level, before a write and after a read.
 #pragma once
 
 #include <cstdint>
+#include <span>
 
-#include "core/format/artifact/artifact.h"
+#include "core/dag/level_array.h"
 
 namespace voxdag {
 
-// The row before those to be checked; none at the start of a level.
+// The row before those that are checked; not present at the start of a level.
 struct LastRow {
   bool present = false;
   uint64_t hash = 0;
@@ -15,12 +16,13 @@ struct LastRow {
   uint32_t children[8] = {};
 };
 
-// All return nullptr, or what is wrong; `last` becomes the last row. Bricks: masks not 0, strictly
-// increasing by (hash, mask), where hashes[i] belongs to masks[i].
+// Bricks: masks not 0, strictly increasing by (hash, mask), where hashes[i] belongs to masks[i].
+// Returns nullptr, or what is wrong; `last` becomes the last row.
 const char* check_brick_order(std::span<const uint64_t> hashes, std::span<const uint64_t> masks,
                               LastRow& last);
-// Nodes: as many children as the masks say, each below `child_rows`; masks not 0; hashes cut to
-// `hash_bits`; strictly increasing in the total order.
+// Nodes: masks not 0, as many children as the masks have bits, each below `child_rows`, hashes
+// truncated to `hash_bits`, strictly increasing in the total order. Returns nullptr, or what is
+// wrong; `last` becomes the last row.
 const char* check_node_order(const NodeLevelView& rows, uint64_t child_rows, uint32_t hash_bits,
                              LastRow& last);
 

@@ -1,8 +1,9 @@
+#include "core/format/artifact/segment_writer.h"
+
 #include <algorithm>
 #include <cstring>
 
 #include "core/base/error.h"
-#include "core/format/artifact/artifact.h"
 #include "core/format/artifact/artifact_index.h"
 #include "core/format/artifact/frame_codec.h"
 #include "core/format/checksum.h"
@@ -49,7 +50,7 @@ ArtifactRef SegmentWriter::append_index(uint64_t first, std::span<const std::byt
   ref.index_offset = size();
   ref.bytes = ref.index_offset + index.size() - first;
   ref.checksum = checksum64(index);
-  // What a reader would refuse must not be named.
+  // An index that a reader would refuse must not be referred to.
   decode_index(index, ref, "artifact for segment " + std::to_string(id_));
   append(index);
   return ref;

@@ -1,4 +1,5 @@
-// The checksums of the global file's blocks, made as its bytes come; see global_layout.h.
+// Computes the checksums of the checksum blocks of the global file from its bytes in order; see
+// global_layout.h.
 #pragma once
 
 #include <cstddef>
@@ -10,21 +11,21 @@
 
 namespace voxdag {
 
-class BlockSums {
+class BlockChecksums {
  public:
-  BlockSums() = default;
-  // Goes on after blocks that have these.
-  explicit BlockSums(std::span<const uint64_t> whole_blocks)
+  BlockChecksums() = default;
+  // Continues after whole blocks with these checksums.
+  explicit BlockChecksums(std::span<const uint64_t> whole_blocks)
       : checksums_(whole_blocks.begin(), whole_blocks.end()) {}
 
   void add(std::span<const std::byte> bytes);
-  // Of all blocks, the last one as far as it got.
-  std::vector<uint64_t> checksums() const;
+  // The checksums of all blocks; that of the last one covers its bytes so far.
+  std::vector<uint64_t> values() const;
 
  private:
   std::vector<uint64_t> checksums_;  // of whole blocks
-  Checksum64 block_;                 // of the one after them
-  size_t filled_ = 0;                // bytes of it
+  Checksum64 block_;                 // of the block after them
+  size_t filled_ = 0;                // bytes of that block
 };
 
 }  // namespace voxdag

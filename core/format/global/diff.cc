@@ -15,34 +15,35 @@
 namespace voxdag {
 namespace {
 
-// No node begins at the last word there can be: even the smallest has two.
+// No node begins at the last possible word, since the smallest has two words.
 constexpr uint32_t kAbsent = ~uint32_t{0};
 
-// The pairs of one level that were met, and what came of them. Open addressing, at most 3/4 full.
+// The pairs of nodes of one level that were compared, with their results. Open addressing, at most
+// 3/4 full.
 class PairTable {
  public:
   explicit PairTable(MemoryBudget& budget) : budget_(&budget) { grow(64); }
 
   const DiffReport* find(uint32_t a, uint32_t b) const {
-    const Entry& entry = entries_[place(a, b)];
+    const Entry& entry = entries_[find_entry(a, b)];
     return entry.taken() ? &entry.report : nullptr;
   }
   void insert(uint32_t a, uint32_t b, const DiffReport& report) {
     if (4 * (count_ + 1) > 3 * entries_.size()) grow(2 * entries_.size());
-    entries_[place(a, b)] = {a + 1, b + 1, report};
+    entries_[find_entry(a, b)] = {a + 1, b + 1, report};
     ++count_;
   }
 
  private:
-  // Offsets plus one, so that absent is 0 and zeroed pages are free entries.
+  // Offsets are stored plus one, so that absent is 0 and zeroed pages are free entries.
   struct Entry {
     uint32_t a1 = 0, b1 = 0;
     DiffReport report;
     bool taken() const { return a1 != 0 || b1 != 0; }
   };
 
-  // Where the pair is, or would go.
-  size_t place(uint32_t a, uint32_t b) const {
+  // Index of the entry that has the pair, or of the free one where it belongs.
+  size_t find_entry(uint32_t a, uint32_t b) const {
     const uint32_t a1 = a + 1, b1 = b + 1;
     size_t at = hash_brick(static_cast<uint64_t>(a1) << 32 | b1) & (entries_.size() - 1);
     while (entries_[at].taken() && (entries_[at].a1 != a1 || entries_[at].b1 != b1))
@@ -53,7 +54,7 @@ class PairTable {
     PageBuffer<Entry> old(*budget_, size, "pairs of nodes");
     std::swap(old, entries_);
     for (const Entry& entry : old)
-      if (entry.taken()) entries_[place(entry.a1 - 1, entry.b1 - 1)] = entry;
+      if (entry.taken()) entries_[find_entry(entry.a1 - 1, entry.b1 - 1)] = entry;
   }
 
   MemoryBudget* budget_;
@@ -66,7 +67,7 @@ class Differ {
   Differ(const voxdag_reader::File& a, const voxdag_reader::File& b, MemoryBudget& budget,
          const CancelToken& cancel)
       : a_(a), b_(b), cancel_(cancel) {
-    for (uint32_t level = 0; level < a.brick_level(); ++level) met_.emplace_back(budget);
+    for (uint32_t level = 0; level < a.brick_level(); ++level) compared_.emplace_back(budget);
   }
   DiffReport run() { return compare(0, a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0); }
 
@@ -74,17 +75,17 @@ class Differ {
   DiffReport compare(uint32_t level, uint32_t a, uint32_t b) {
     if (a == kAbsent && b == kAbsent) return {};
     if (level == a_.brick_level()) return compare_bricks(a, b);
-    if (const DiffReport* known = met_[level].find(a, b)) return *known;
+    if (const DiffReport* known = compared_[level].find(a, b)) return *known;
     cancel_.check();
     const voxdag_reader::Node node_a = node(a_, level, a), node_b = node(b_, level, b);
-    DiffReport sum;
+    DiffReport total;
     for (int index = 0; index < 8; ++index) {
       const DiffReport part = compare(level + 1, child(node_a, index), child(node_b, index));
-      sum.only_a += part.only_a;
-      sum.only_b += part.only_b;
+      total.only_a += part.only_a;
+      total.only_b += part.only_b;
     }
-    met_[level].insert(a, b, sum);
-    return sum;
+    compared_[level].insert(a, b, total);
+    return total;
   }
 
   DiffReport compare_bricks(uint32_t a, uint32_t b) const {
@@ -103,10 +104,10 @@ class Differ {
 
   const voxdag_reader::File &a_, &b_;
   const CancelToken& cancel_;
-  std::vector<PairTable> met_;  // by level
+  std::vector<PairTable> compared_;  // by level
 };
 
-// Equal words are equal voxels; files of the same voxels and hash bits have them.
+// Equal words mean equal voxels. Files of the same voxels and hash bits have equal words.
 bool same_words(const voxdag_reader::File& a, const voxdag_reader::File& b) {
   for (uint32_t l = 0; l <= a.brick_level(); ++l) {
     const voxdag_reader::Level &in_a = a.level(l), &in_b = b.level(l);

@@ -1,6 +1,6 @@
-// The voxels in which two global files differ, by walking both DAGs together: a pair of nodes that
-// was met before is not walked again, so the cost goes with the DAGs and not with the voxels.
-// Hash bits and the order of the nodes may differ, grids may not.
+// Counts the voxels in which two global files differ by walking both DAGs together. A pair of nodes
+// is compared once, so the cost depends on the sizes of the DAGs, not on the number of voxels. The
+// files must have the same grid; hash bits and the order of the nodes may differ.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,13 @@
 namespace voxdag {
 
 struct DiffReport {
-  uint64_t only_a = 0;  // voxels
-  uint64_t only_b = 0;
+  uint64_t only_a = 0;  // voxels that only the first file has
+  uint64_t only_b = 0;  // voxels that only the second file has
   bool same() const { return only_a == 0 && only_b == 0; }
 };
 
 // Throws Error{kInvalidInput} for different resolutions or bounds, Error{kCorrupt} for a damaged
-// file. Memory: 24 to 48 bytes a pair of nodes, charged to the budget.
+// file. Memory: 24 to 48 bytes per pair of nodes, charged to the budget.
 DiffReport diff_global_files(const voxdag_reader::File& a, const voxdag_reader::File& b,
                              MemoryBudget& budget, const CancelToken& cancel);
 

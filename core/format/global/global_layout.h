@@ -1,10 +1,10 @@
-// Where the fields of the global file lie. docs/format.md, "The global file", is the same in words;
-// voxdag_reader.h, which includes nothing of ours, repeats the numbers it needs.
+// Offsets and sizes in the global file, as docs/format.md, "The global file", describes them.
+// voxdag_reader.h, which stands alone, repeats the numbers it needs.
 //
 //   [header page] [level L-2] [level L-3] ... [level 0] [checksum table]
 //
-// Levels begin at multiples of kPageBytes, zeros between them; the table has one XXH64 for each
-// 64 KiB block of what lies between the header page and itself.
+// Levels begin at multiples of kPageBytes, with zeros between them. The table has one XXH64 for
+// each checksum block: 64 KiB of the bytes between the header page and the table.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ inline constexpr uint64_t kMagic = 0x0a1a0a4741445689;  // 0x89 "VDAG" LF 0x1a L
 inline constexpr uint32_t kVersion = 1;
 inline constexpr uint32_t kNodeOrderByHash = 1;
 inline constexpr uint64_t kPageBytes = 4096;
-inline constexpr uint64_t kBlockBytes = uint64_t{1} << 16;
+inline constexpr uint64_t kChecksumBlockBytes = uint64_t{1} << 16;
 inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 32;
 
 // Offsets in the header page.
@@ -26,7 +26,7 @@ inline constexpr size_t kHeaderBytesAt = 12;
 inline constexpr size_t kGridLevelsAt = 16;
 inline constexpr size_t kHashBitsAt = 20;
 inline constexpr size_t kNodeOrderAt = 24;
-inline constexpr size_t kBlockBytesAt = 28;
+inline constexpr size_t kChecksumBlockBytesAt = 28;
 inline constexpr size_t kOriginAt = 32;  // three doubles
 inline constexpr size_t kEdgeAt = 56;
 inline constexpr size_t kVoxelsAt = 64;
@@ -36,10 +36,10 @@ inline constexpr size_t kFileBytesAt = 88;
 inline constexpr size_t kTableOffsetAt = 96;
 inline constexpr size_t kTableCountAt = 104;
 inline constexpr size_t kTableChecksumAt = 112;
-inline constexpr size_t kAttributeCountAt = 120;  // reserved: 0, and kAttributesAt zeros
+inline constexpr size_t kAttributeCountAt = 120;  // reserved: 0, as are the attributes
 inline constexpr size_t kLevelsAt = 128;          // entry l is level l
 inline constexpr size_t kLevelEntryBytes = 32;    // offset, nodes, words, 0
-inline constexpr size_t kMaxLevels = 32;          // room in the table; 19 are the most there are
+inline constexpr size_t kMaxLevels = 32;          // capacity of the table; 19 are used at most
 inline constexpr size_t kAttributesAt = kLevelsAt + kMaxLevels * kLevelEntryBytes;
 inline constexpr size_t kAttributeEntryBytes = 64;
 inline constexpr size_t kMaxAttributes = 16;

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <future>
 
+#include "core/base/background.h"
 #include "core/base/bounded_queue.h"
 #include "core/base/error.h"
 #include "core/dag/brick.h"
@@ -18,11 +19,11 @@ using namespace global_layout;
 
 namespace {
 
-constexpr size_t kPiecesUnderWay = 2;  // from the thread that reads to the one that digests
-constexpr uint64_t kReadBytes = uint64_t{1} << 20;  // a multiple of the block
-static_assert(kReadBytes % kBlockBytes == 0);
+constexpr size_t kQueuedChunks = 2;  // from the thread that reads to the one that digests
+constexpr uint64_t kReadBytes = uint64_t{1} << 20;
+static_assert(kReadBytes % kChecksumBlockBytes == 0);
 
-// The header page, zeros but for the fields put.
+// The header page; fields that are not put are zero.
 class HeaderPage {
  public:
   template <class T>
@@ -36,17 +37,17 @@ class HeaderPage {
   std::vector<std::byte> bytes_ = std::vector<std::byte>(kPageBytes);
 };
 
-// Calls `use` with bytes [begin, end) of the file, piece by piece.
+// Calls `use` with bytes [begin, end) of the file, in chunks.
 template <class Use>
 void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const CancelToken& cancel,
                   Use use) {
   std::vector<std::byte> buffer(std::min(kReadBytes, end - begin));
   while (begin < end) {
-    const auto piece = std::span(buffer).first(std::min<uint64_t>(buffer.size(), end - begin));
+    const auto chunk = std::span(buffer).first(std::min<uint64_t>(buffer.size(), end - begin));
     cancel.check();
-    file.read_at(begin, piece);
-    use(std::span<const std::byte>(piece));
-    begin += piece.size();
+    file.read_at(begin, chunk);
+    use(std::span<const std::byte>(chunk));
+    begin += chunk.size();
   }
 }
 
@@ -60,16 +61,16 @@ struct GlobalFileWriter::State {
   const std::string partial_path;
   const Grid grid;
   const uint32_t hash_bits;
-  std::unique_ptr<WritableFile> file;  // once there is a level, or a header
-  std::vector<GlobalLevel> levels;     // that ended, from the bricks upwards
-  BlockSums sums;                      // of them and of the open one
-  uint64_t summed_words = 0;           // of the open level
+  std::unique_ptr<WritableFile> file;  // none before the first level or the header
+  std::vector<GlobalLevel> levels;     // complete ones, from the bricks upwards
+  BlockChecksums block_checksums;      // of them and of the open one
+  uint64_t checksummed_words = 0;      // of the open level
   bool level_open = false;
-  bool kept = false;          // the partial file is to stay
+  bool retained = false;      // the partial file outlives the writer
   uint64_t end = kPageBytes;  // where the open level, the next one, or the table begins
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }
-  // The open level, or the next one.
+  // The open level, or the next one to open.
   uint32_t current_level() const { return brick_level() - static_cast<uint32_t>(levels.size()); }
   bool complete() const { return levels.empty() || levels.size() == brick_level() + 1; }
   void create_file() {
@@ -79,9 +80,8 @@ struct GlobalFileWriter::State {
   std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
                      unsigned threads, const CancelToken& cancel) const;
   [[noreturn]] void damaged(uint64_t at) const {
-    throw Error(ErrorCode::kCorrupt, partial_path + " from byte " + std::to_string(at) +
-                                         " on is not what was written: the disk gave back other "
-                                         "bytes");
+    throw Error(ErrorCode::kCorrupt,
+                partial_path + " from byte " + std::to_string(at) + " on is not what was written");
   }
 };
 
@@ -90,47 +90,47 @@ GlobalFileWriter::GlobalFileWriter(FileSystem& files, const std::string& path, c
     : state_(new State{files, path, path + ".partial", grid, hash_bits, nullptr, {}, {}}) {}
 
 GlobalFileWriter::~GlobalFileWriter() {
-  if (state_->kept || !state_->file) return;
+  if (state_->retained || !state_->file) return;
   state_->file.reset();
   try {
     state_->files.remove(state_->partial_path);
   } catch (const Error&) {
-    // A partial file that cannot be removed is emptied by the next attempt.
+    // The next writer empties the partial file.
   }
 }
 
 const std::string& GlobalFileWriter::path() const { return state_->path; }
 
-GlobalProgress GlobalFileWriter::progress() const {
-  return {state_->levels, state_->sums.checksums()};
+GlobalFileProgress GlobalFileWriter::progress() const {
+  return {state_->levels, state_->block_checksums.values()};
 }
 
-void GlobalFileWriter::go_on(const GlobalProgress& progress) {
+void GlobalFileWriter::resume(const GlobalFileProgress& progress) {
   State& s = *state_;
   uint64_t end = kPageBytes;
   for (const GlobalLevel& level : progress.levels) end += round_up_to_page(bytes_of(level));
   const auto written = s.files.open_read(s.partial_path);
-  const uint64_t whole_blocks = (end - kPageBytes) / kBlockBytes;
+  const uint64_t whole_blocks = (end - kPageBytes) / kChecksumBlockBytes;
   if (written->size() < end || progress.levels.size() > s.brick_level() + 1 ||
       progress.checksums.size() < whole_blocks)
     throw Error(ErrorCode::kCorrupt, s.partial_path + " does not hold the levels that were merged");
-  BlockSums sums(std::span(progress.checksums).first(whole_blocks));
-  const uint64_t last_block = kPageBytes + whole_blocks * kBlockBytes;
+  BlockChecksums checksums(std::span(progress.checksums).first(whole_blocks));
+  const uint64_t last_block = kPageBytes + whole_blocks * kChecksumBlockBytes;
   read_through(*written, last_block, end, CancelToken(),
-               [&](std::span<const std::byte> piece) { sums.add(piece); });
-  if (sums.checksums() != progress.checksums) s.damaged(last_block);
-  s.sums = std::move(sums);
+               [&](std::span<const std::byte> chunk) { checksums.add(chunk); });
+  if (checksums.values() != progress.checksums) s.damaged(last_block);
+  s.block_checksums = std::move(checksums);
   s.file = s.files.open_write(s.partial_path);
   s.levels = progress.levels;
   s.end = end;
-  s.kept = true;
+  s.retained = true;
 }
 
 void GlobalFileWriter::sync() {
   state_->create_file();
   state_->file->sync();
   state_->files.sync_directory(parent_directory(state_->path));
-  state_->kept = true;
+  state_->retained = true;
 }
 
 void GlobalFileWriter::begin_level(uint32_t level) {
@@ -139,13 +139,13 @@ void GlobalFileWriter::begin_level(uint32_t level) {
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(level) +
                                          " does not follow the levels before it");
   s.create_file();
-  s.summed_words = 0;
+  s.checksummed_words = 0;
   s.level_open = true;
 }
 
 void GlobalFileWriter::checksum_words(std::span<const uint32_t> words) {
-  state_->sums.add(std::as_bytes(words));
-  state_->summed_words += words.size();
+  state_->block_checksums.add(std::as_bytes(words));
+  state_->checksummed_words += words.size();
 }
 
 void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> words) {
@@ -162,17 +162,17 @@ void GlobalFileWriter::end_level(uint64_t nodes, uint64_t words) {
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
                                        " has " + std::to_string(words) +
                                        " words, the format's limit is 2^32 a level");
-  if (!s.level_open || nodes == 0 || words < 2 * nodes || words != s.summed_words)
+  if (!s.level_open || nodes == 0 || words < 2 * nodes || words != s.checksummed_words)
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(s.current_level()) +
                                          " has " + std::to_string(nodes) + " nodes in " +
                                          std::to_string(words) + " words, of which " +
-                                         std::to_string(s.summed_words) + " were summed");
+                                         std::to_string(s.checksummed_words) + " were checksummed");
   s.levels.push_back({nodes, words});
   const uint64_t level_end = s.end + bytes_of(s.levels.back());
   s.end = round_up_to_page(level_end);
   const std::byte zeros[kPageBytes] = {};
   const auto padding = std::span(zeros).first(s.end - level_end);
-  s.sums.add(padding);
+  s.block_checksums.add(padding);
   s.file->write_at(level_end, padding);
   s.level_open = false;
 }
@@ -186,7 +186,7 @@ HeaderPage GlobalFileWriter::State::header(uint64_t voxels, uint64_t svo_nodes,
   header.put(kGridLevelsAt, grid.levels);
   header.put(kHashBitsAt, hash_bits);
   header.put(kNodeOrderAt, kNodeOrderByHash);
-  header.put(kBlockBytesAt, static_cast<uint32_t>(kBlockBytes));
+  header.put(kChecksumBlockBytesAt, static_cast<uint32_t>(kChecksumBlockBytes));
   for (size_t axis = 0; axis < 3; ++axis)
     header.put(kOriginAt + axis * sizeof(double), grid.origin[axis]);
   header.put(kEdgeAt, grid.edge);
@@ -210,7 +210,7 @@ HeaderPage GlobalFileWriter::State::header(uint64_t voxels, uint64_t svo_nodes,
   return header;
 }
 
-// Of the whole file, which must be what was written.
+// Returns the SHA-256 of the whole file, which must be what was written.
 std::string GlobalFileWriter::State::digest(const HeaderPage& header,
                                             std::span<const uint64_t> checksums, unsigned threads,
                                             const CancelToken& cancel) const {
@@ -218,30 +218,31 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   Sha256 digest;
   const auto add_expected = [&](uint64_t begin, std::span<const std::byte> expected) {
     read_through(*written, begin, begin + expected.size(), cancel,
-                 [&](std::span<const std::byte> piece) {
-                   digest.add(piece);
-                   if (!std::ranges::equal(piece, expected.first(piece.size()))) damaged(begin);
-                   expected = expected.subspan(piece.size());
+                 [&](std::span<const std::byte> chunk) {
+                   digest.add(chunk);
+                   if (!std::ranges::equal(chunk, expected.first(chunk.size()))) damaged(begin);
+                   expected = expected.subspan(chunk.size());
                  });
   };
   add_expected(0, header.bytes());
-  BlockSums read_back;
-  // The digest is what takes long.
-  run_producer_consumer<std::vector<std::byte>, kPiecesUnderWay>(
+  BlockChecksums read_back;
+  // The digest takes longest, so it has a thread of its own.
+  run_producer_consumer<std::vector<std::byte>, kQueuedChunks>(
       threads,
       [&](auto pass) {
         for (uint64_t at = kPageBytes; at < end; at += kReadBytes)
-          pass([&](std::vector<std::byte>& piece) {
+          pass([&](std::vector<std::byte>& chunk) {
             cancel.check();
-            piece.resize(std::min(kReadBytes, end - at));
-            written->read_at(at, piece);
-            read_back.add(piece);
+            chunk.resize(std::min(kReadBytes, end - at));
+            written->read_at(at, chunk);
+            read_back.add(chunk);
           });
       },
-      [&](const std::vector<std::byte>& piece) { digest.add(piece); });
-  const auto found = read_back.checksums();
+      [&](const std::vector<std::byte>& chunk) { digest.add(chunk); });
+  const auto found = read_back.values();
   const auto wrong = std::ranges::mismatch(found, checksums).in1 - found.begin();
-  if (static_cast<size_t>(wrong) < checksums.size()) damaged(kPageBytes + wrong * kBlockBytes);
+  if (static_cast<size_t>(wrong) < checksums.size())
+    damaged(kPageBytes + wrong * kChecksumBlockBytes);
   add_expected(end, std::as_bytes(checksums));
   return digest.finish();
 }
@@ -261,13 +262,13 @@ GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes, un
     throw Error(ErrorCode::kCorrupt,
                 s.path + ": level " + std::to_string(s.current_level()) + " is not finished");
   s.create_file();
-  const std::vector<uint64_t> checksums = s.sums.checksums();
+  const std::vector<uint64_t> checksums = s.block_checksums.values();
   const auto table = std::as_bytes(std::span(checksums));
   s.file->write_at(s.end, table);
   const HeaderPage header = s.header(voxels, svo_nodes, table);
   s.file->write_at(0, header.bytes());
-  // The disk writes while we read back; where there is no thread to wait for it, afterwards.
-  std::future<void> synced = std::async([&] { s.file->sync(); });
+  // The file is read while the disk writes it.
+  std::future<void> synced = run_in_background([&s] { s.file->sync(); });
   const GlobalFileSummary summary{s.end + table.size(),
                                   s.digest(header, checksums, threads, cancel)};
   synced.get();
@@ -278,7 +279,7 @@ void GlobalFileWriter::publish() {
   State& s = *state_;
   s.file->close();
   s.files.rename(s.partial_path, s.path);
-  s.kept = true;  // there is none any more
+  s.retained = true;  // it has its final name
   s.files.sync_directory(parent_directory(s.path));
 }
 

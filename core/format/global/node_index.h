@@ -1,5 +1,5 @@
-// Which nodes per level of the global file has: from the word offset where a node begins to its
-// index in the level, at 1.5 bits per word. Immutable after construction.
+// Maps the word offset where a node of a level of the global file begins to its index in the level.
+// Takes 1.5 bits per word. Immutable after construction.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,9 @@ class NodeIndex {
   static constexpr uint64_t kNone = ~uint64_t{0};
 
   NodeIndex() = default;
-  // Walks the level's words: every child mask within 1 to 255, nodes as many as the header says and
-  // ending with the level. Otherwise throws Error{kCorrupt} beginning with `where`.
+  // Walks the words of the level. Throws Error{kCorrupt} beginning with `where` unless every child
+  // mask is 1 to 255, the last node ends with the level, and there are as many nodes as the header
+  // says.
   NodeIndex(const voxdag_reader::Level& level, bool bricks, MemoryBudget& budget,
             const std::string& where);
 
@@ -35,8 +36,8 @@ class NodeIndex {
  private:
   bool bricks_ = false;
   uint64_t words_ = 0;
-  PageBuffer<uint64_t> starts_;        // one bit a word: a node begins here
-  PageBuffer<uint32_t> nodes_before_;  // of each 64 words
+  PageBuffer<uint64_t> starts_;        // one bit per word: a node begins here
+  PageBuffer<uint32_t> nodes_before_;  // for each 64 words
 };
 
 }  // namespace voxdag

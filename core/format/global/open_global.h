@@ -1,4 +1,4 @@
-// The global file through the reader that engines use, its errors as ours.
+// Opens global files with the standalone reader, and translates its errors to Error.
 #pragma once
 
 #include <memory>
@@ -23,7 +23,7 @@ inline Error as_error(const voxdag_reader::Error& error) {
   return Error(ErrorCode::kCorrupt, error.what());
 }
 
-// What `use()` returns; the reader's errors within it are thrown as Error.
+// Returns what `use()` returns. Errors of the reader are thrown as Error.
 template <class Use>
 auto with_reader_errors(Use use) {
   try {

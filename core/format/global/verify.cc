@@ -18,7 +18,7 @@ using namespace global_layout;
 
 namespace {
 
-constexpr uint64_t kNodesAtOnce = uint64_t{1} << 16;  // between looks at the cancel token
+constexpr uint64_t kNodesPerCheck = uint64_t{1} << 16;  // of the cancel token
 
 class Verifier {
  public:
@@ -55,11 +55,11 @@ class Verifier {
   std::string where(uint32_t level, uint64_t word) const {
     return where(level) + ", word " + std::to_string(word);
   }
-  // Before node `i` of `count`: announces the nodes up to the next look at the cancel token.
+  // Called before node `i` of `count`: reports the nodes up to the next check of the cancel token.
   void advance(uint64_t i, uint64_t count) {
-    if (i % kNodesAtOnce != 0) return;
+    if (i % kNodesPerCheck != 0) return;
     cancel_.check();
-    progress_.advance(std::min(kNodesAtOnce, count - i));
+    progress_.advance(std::min(kNodesPerCheck, count - i));
   }
 
   void check_header() const;
@@ -75,8 +75,8 @@ class Verifier {
   MemoryBudget& budget_;
   Progress& progress_;
   const CancelToken& cancel_;
-  std::vector<NodeIndex> indexes_;  // of the levels seen so far
-  PageBuffer<uint64_t> hashes_;     // cut, of the level last seen
+  std::vector<NodeIndex> indexes_;  // of the levels checked so far
+  PageBuffer<uint64_t> hashes_;     // truncated, of the level checked last
   PageBuffer<uint8_t> used_;        // by the level above it
 };
 
@@ -86,7 +86,7 @@ void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what
       broken(file_.path() + ": byte " + std::to_string(at), what + ", expected 0");
 }
 
-// The reader has seen the fields that it needs; the rest is fixed.
+// The reader checked the fields that it needs; the others have fixed values.
 void Verifier::check_header() const {
   uint32_t node_order;
   std::memcpy(&node_order, file_.data() + kNodeOrderAt, sizeof(node_order));
@@ -105,8 +105,9 @@ void Verifier::check_header() const {
 void Verifier::check_blocks() {
   const uint64_t table = file_.checksum_table_offset();
   progress_.begin_stage("verify checksums", table - kPageBytes, "bytes");
-  for (uint64_t begin = kPageBytes, block = 0; begin < table; begin += kBlockBytes, ++block) {
-    const uint64_t size = std::min(kBlockBytes, table - begin);
+  for (uint64_t begin = kPageBytes, block = 0; begin < table;
+       begin += kChecksumBlockBytes, ++block) {
+    const uint64_t size = std::min(kChecksumBlockBytes, table - begin);
     uint64_t expected;
     std::memcpy(&expected, file_.data() + table + 8 * block, sizeof(expected));
     if (checksum64(std::as_bytes(std::span(file_.data() + begin, size))) != expected)
@@ -184,7 +185,7 @@ void Verifier::check_all_used(uint32_t level) const {
     if (!used_[i]) broken(where(level), "node " + std::to_string(i) + " has no parent");
 }
 
-// From the root down, how often each node occurs in the octree.
+// Counts how often each node occurs in the octree, from the root down, and from that the voxels.
 void Verifier::check_counts() const {
   uint64_t svo_nodes = 0, voxels = 0;
   PageBuffer<uint64_t> times(budget_, file_.empty() ? 0 : 1, "counts of a level");

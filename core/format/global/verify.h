@@ -1,11 +1,10 @@
 // Checks every invariant of a global file:
 //
-//   1. Header, sizes, checksums, zeros in all that is reserved or padding.
-//   2. Every node: child mask within 1 to 255, children that begin nodes of the next level; no
-//   brick
-//      is empty.
-//   3. Levels strictly increase in the total order (hash, mask, child indices), hashes computed
-//      anew from the bricks up. So no two nodes of a level are equal.
+//   1. Header, sizes, checksums, zeros in all reserved fields and padding.
+//   2. Every node has a child mask of 1 to 255, and its children begin nodes of the next level. No
+//      brick is empty.
+//   3. Levels strictly increase in the total order (hash, mask, child indices), the hashes
+//      computed from the bricks up. So no two nodes of a level are equal.
 //   4. One root; every other node has a parent.
 //   5. The header's voxels and octree nodes are those of the DAG.
 //

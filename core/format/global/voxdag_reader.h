@@ -3,7 +3,7 @@
 //
 //     voxdag_reader::File dag("scene.vdag");               // throws voxdag_reader::Error
 //     bool set = dag.voxel(x, y, z);                       // 0 <= x, y, z < dag.resolution()
-//     dag.walk(visitor);                                   // depth first, with pruning
+//     dag.walk(visitor);                                   // depth first, the visitor may prune
 //     const voxdag_reader::Level& level = dag.level(l);    // raw words, for an upload to the GPU
 //
 // Level l has cubes of edge R/2^l voxels, 0 is the root; bricks (4x4x4 voxels) are level
@@ -12,11 +12,11 @@
 //     node:   [child mask, 8 bits] [offset of each child in the next level, in child order]
 // with child index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
 //
-// Opening checks the header and that all it names lies within the file. Whatever else is in a
-// damaged file, no access leaves the mapping: a bad offset is an Error. check_blocks() compares the
-// data with its checksums. The file is mapped, or read whole where mmap fails or Access::kRead is
-// asked for; a mapped file must not be shortened while it is open. Immutable after opening: any
-// number of threads may read.
+// Opening checks the header, and that the levels and the checksum table lie within the file. Nodes
+// and bricks are checked when they are read: a bad offset in a damaged file is an Error, and no
+// access leaves the mapping. verify_checksums() compares all data with its checksums. The file is
+// mapped, or read into memory if mmap fails or Access::kRead is requested. A mapped file must not
+// be truncated while it is open. A File is immutable: any number of threads may use it.
 #pragma once
 
 #include <fcntl.h>
@@ -36,8 +36,10 @@
 
 namespace voxdag_reader {
 
+// What kind of error an Error is.
 enum class Problem { kNotFound, kIo, kCorrupt, kUnsupportedVersion };
 
+// The only exception that the reader throws, std::bad_alloc aside. Its message names the file.
 class Error : public std::runtime_error {
  public:
   Error(Problem problem, const std::string& message)
@@ -48,19 +50,21 @@ class Error : public std::runtime_error {
   Problem problem_;
 };
 
+// One level of the DAG. The words belong to the File.
 struct Level {
   const uint32_t* words = nullptr;
   uint64_t word_count = 0;
-  uint64_t node_count = 0;
-  uint64_t file_offset = 0;  // bytes
+  uint64_t node_count = 0;   // nodes, or bricks on brick_level()
+  uint64_t file_offset = 0;  // of the first word, in bytes
 };
 
+// A node of a level above the bricks. The children belong to the File.
 struct Node {
   uint32_t child_mask = 0;
   const uint32_t* children = nullptr;  // word offsets in the next level, in child order
 };
 
-// XXH64, seed 0.
+// The XXH64 of `size` bytes, with seed 0.
 inline uint64_t xxh64(const unsigned char* bytes, size_t size) {
   constexpr uint64_t p1 = 0x9e3779b185ebca87u, p2 = 0xc2b2ae3d27d4eb4fu, p3 = 0x165667b19e3779f9u,
                      p4 = 0x85ebca77c2b2ae63u, p5 = 0x27d4eb2f165667c5u;
@@ -70,15 +74,17 @@ inline uint64_t xxh64(const unsigned char* bytes, size_t size) {
     std::memcpy(&value, from, count);
     return value;
   };
-  const auto round = [&](uint64_t sum, uint64_t lane) { return rotate(sum + lane * p2, 31) * p1; };
+  const auto round = [&](uint64_t lane, uint64_t word) {
+    return rotate(lane + word * p2, 31) * p1;
+  };
   const unsigned char *at = bytes, *const end = bytes + size;
   uint64_t h = p5;
   if (size >= 32) {
-    uint64_t sums[4] = {p1 + p2, p2, 0, 0 - p1};
+    uint64_t lanes[4] = {p1 + p2, p2, 0, 0 - p1};
     for (; end - at >= 32; at += 32)
-      for (int i = 0; i < 4; ++i) sums[i] = round(sums[i], read(at + 8 * i, 8));
-    h = rotate(sums[0], 1) + rotate(sums[1], 7) + rotate(sums[2], 12) + rotate(sums[3], 18);
-    for (const uint64_t sum : sums) h = (h ^ round(0, sum)) * p1 + p4;
+      for (int i = 0; i < 4; ++i) lanes[i] = round(lanes[i], read(at + 8 * i, 8));
+    h = rotate(lanes[0], 1) + rotate(lanes[1], 7) + rotate(lanes[2], 12) + rotate(lanes[3], 18);
+    for (const uint64_t lane : lanes) h = (h ^ round(0, lane)) * p1 + p4;
   }
   h += size;
   for (; end - at >= 8; at += 8) h = rotate(h ^ round(0, read(at, 8)), 27) * p1 + p4;
@@ -92,9 +98,10 @@ inline uint64_t xxh64(const unsigned char* bytes, size_t size) {
   return h ^ h >> 32;
 }
 
+// kMap maps the file; kRead reads all of it into memory.
 enum class Access { kMap, kRead };
 
-// The bytes of a file, mapped or read.
+// The bytes of a file, mapped or in memory.
 class Bytes {
  public:
   Bytes(const std::string& path, Access access) {
@@ -117,7 +124,7 @@ class Bytes {
   ~Bytes() {
     if (map_) munmap(map_, size_);
   }
-  // 8-byte aligned.
+  // Aligned to 8 bytes.
   const unsigned char* data() const {
     return static_cast<const unsigned char*>(map_ ? map_ : copy_.data());
   }
@@ -151,36 +158,48 @@ class Bytes {
 
 class File {
  public:
+  // Throws Error if the file cannot be read, is no global file, has an unsupported version or a
+  // damaged header.
   explicit File(const std::string& path, Access access = Access::kMap)
       : path_(path), bytes_(path, access) {
     read_header();
   }
 
   const std::string& path() const { return path_; }
+  // The size of the file, and its bytes.
   uint64_t file_bytes() const { return bytes_.size(); }
   const unsigned char* data() const { return bytes_.data(); }
-  // Low corner of the grid in world space, and its edge; a voxel's edge is edge() / resolution().
+  // The low corner of the grid in world space.
   const double (&origin() const)[3] { return origin_; }
+  // The edge length of the grid in world space; that of a voxel is edge() / resolution().
   double edge() const { return edge_; }
+  // The resolution is 2^grid_levels() voxels per edge of the grid.
   uint32_t grid_levels() const { return grid_levels_; }
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
   uint32_t brick_level() const { return grid_levels_ - 2; }
+  // The bits of the node hash by which the nodes of a level are ordered, 4 to 64.
   uint32_t hash_bits() const { return hash_bits_; }
+  // Set voxels, nodes of the octree that the DAG represents, and nodes of the DAG; bricks count as
+  // nodes.
   uint64_t voxels() const { return voxels_; }
   uint64_t svo_nodes() const { return svo_nodes_; }
   uint64_t dag_nodes() const { return dag_nodes_; }
   bool empty() const { return dag_nodes_ == 0; }
+  // `l` is 0 (the root) to brick_level().
   const Level& level(uint32_t l) const { return levels_[l]; }
-  // Where the levels end and the checksums of their 64 KiB blocks begin, in bytes.
+  // Byte offset of the checksum table, which has one XXH64 for each checksum block: 64 KiB of the
+  // bytes between the header page (4096 bytes) and the table.
   uint64_t checksum_table_offset() const { return table_offset_; }
 
-  // The 64 voxels of a brick; `offset` counts words of level brick_level().
+  // The mask of the 64 voxels of the brick at word `offset` of level brick_level(). Throws Error if
+  // the offset lies outside the level.
   uint64_t brick(uint32_t offset) const {
     const Level& bricks = levels_[brick_level()];
     if (bricks.word_count < 2 || offset > bricks.word_count - 2) outside(brick_level(), offset);
     return bricks.words[offset] | static_cast<uint64_t>(bricks.words[offset + uint64_t{1}]) << 32;
   }
-  // A node of a level above the bricks.
+  // The node at word `offset` of level `l`, which is above the bricks. Throws Error if no node can
+  // begin there.
   Node node(uint32_t l, uint32_t offset) const {
     const Level& nodes = levels_[l];
     if (offset >= nodes.word_count) outside(l, offset);
@@ -190,16 +209,17 @@ class File {
       outside(l, offset);
     return {mask, nodes.words + offset + 1};
   }
-  // Word offset of child `index` (0 to 7), which must be in the mask.
+  // Word offset of child `index` (0 to 7) in the next level; the child mask must have it.
   static uint32_t child(const Node& node, int index) {
     return node.children[count_bits(node.child_mask & ((1u << index) - 1))];
   }
+  // The bit of a voxel in the mask of its brick; only the two low bits of each coordinate count.
   static int brick_bit(int64_t x, int64_t y, int64_t z) {
     return static_cast<int>((x & 2) << 4 | (y & 2) << 3 | (z & 2) << 2 | (x & 1) << 2 |
                             (y & 1) << 1 | (z & 1));
   }
 
-  // Whether a voxel is set; one outside the grid is not.
+  // Whether a voxel is set. Voxels outside the grid are not.
   bool voxel(int64_t x, int64_t y, int64_t z) const {
     const int64_t r = resolution();
     if (empty() || x < 0 || y < 0 || z < 0 || x >= r || y >= r || z >= r) return false;
@@ -215,33 +235,36 @@ class File {
     return brick(offset) >> brick_bit(x, y, z) & 1;
   }
 
-  // Depth first, children in child order. Positions are low corners in voxels.
-  //     bool visitor.node(level, x, y, z, offset)   false: its subtree is passed over
+  // Walks the octree depth first, children in child order, and calls
+  //     bool visitor.node(level, x, y, z, offset)   returns false to skip the subtree
   //     void visitor.brick(x, y, z, mask, offset)
+  // where x, y, z are the low corner in voxels and `offset` is the word offset in the level. Shared
+  // nodes are visited once per occurrence.
   template <class Visitor>
   void walk(Visitor&& visitor) const {
     if (!empty()) walk_from(visitor, 0, 0, 0, 0, 0);
   }
 
-  // Compares all blocks with their checksums; returns the byte offset of the first that differs, or
-  // 0 when all are right.
+  // Compares all checksum blocks with their checksums. Returns the byte offset of the first one
+  // that differs, or 0 if all are intact.
   uint64_t first_damaged_block() const {
     const unsigned char* const table = data() + table_offset_;
     for (uint64_t block = 0; block < block_count(); ++block) {
-      const uint64_t begin = kPageBytes + block * kBlockBytes;
-      const uint64_t size = std::min<uint64_t>(kBlockBytes, table_offset_ - begin);
+      const uint64_t begin = kPageBytes + block * kChecksumBlockBytes;
+      const uint64_t size = std::min<uint64_t>(kChecksumBlockBytes, table_offset_ - begin);
       if (xxh64(data() + begin, static_cast<size_t>(size)) != get<uint64_t>(table + 8 * block))
         return begin;
     }
     return 0;
   }
-  void check_blocks() const {
+  // Throws Error if any checksum block differs from its checksum.
+  void verify_checksums() const {
     if (const uint64_t block = first_damaged_block())
       corrupt("the block at byte " + std::to_string(block) + " fails its checksum");
   }
 
  private:
-  static constexpr uint64_t kPageBytes = 4096, kBlockBytes = 65536;
+  static constexpr uint64_t kPageBytes = 4096, kChecksumBlockBytes = 65536;
   static constexpr uint32_t kMaxBrickLevel = 18;
 
   template <class T>
@@ -296,8 +319,9 @@ class File {
            "its checksum is wrong");
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
-    expect(get<uint32_t>(page + 12) == kPageBytes && get<uint32_t>(page + 28) == kBlockBytes,
-           "expected pages of 4096 bytes and blocks of 65536");
+    expect(
+        get<uint32_t>(page + 12) == kPageBytes && get<uint32_t>(page + 28) == kChecksumBlockBytes,
+        "expected pages of 4096 bytes and checksum blocks of 65536");
     expect(grid_levels_ >= 2 && grid_levels_ <= 20, "expected a resolution of 2^2 to 2^20");
     expect(hash_bits_ >= 4 && hash_bits_ <= 64, "expected 4 to 64 hash bits");
     std::memcpy(origin_, page + 32, sizeof(origin_));
@@ -345,7 +369,8 @@ class File {
   }
 
   void read_table(const unsigned char* page) const {
-    const uint64_t blocks = (table_offset_ - kPageBytes + kBlockBytes - 1) / kBlockBytes;
+    const uint64_t blocks =
+        (table_offset_ - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
     expect(get<uint64_t>(page + 96) == table_offset_ && get<uint64_t>(page + 104) == blocks &&
                bytes_.size() - table_offset_ == 8 * blocks,
            "the checksum table is not where the levels end, or not as long as they need");

@@ -31,7 +31,7 @@ class ArtifactCopyTest : public testing::Test {
     return ArtifactReader(system_files().open_read(segment_path(folder_.path(), 1)), ref);
   }
 
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   MemoryBudget budget_{uint64_t{16} << 20};
   const oracle::Dag dag_ = oracle::build_dag(random_voxels(4, 32), 64);
   const std::string entry_path_ = folder_.file("entry.vdart");

@@ -4,8 +4,9 @@
 
 #include <cstring>
 
-#include "core/format/artifact/artifact.h"
 #include "core/format/artifact/artifact_index.h"
+#include "core/format/artifact/artifact_reader.h"
+#include "core/format/artifact/artifact_writer.h"
 #include "core/format/artifact/frame_codec.h"
 #include "core/format/artifact/row_order.h"
 #include "core/format/checksum.h"
@@ -38,7 +39,7 @@ SubDag read_all(const ByteString& bytes, const ArtifactRef& ref) {
 
 struct SmallSegment {
   explicit SmallSegment(size_t rows = 20) : dag(random_rows(9, rows, 8, 2, 64)) {
-    ScratchFolder folder;
+    TemporaryFolder folder;
     MemoryBudget budget(kSegmentWriterBytes);
     SegmentWriter segment(system_files(), folder.path(), 0, budget);
     const ArtifactRoot root{{4, {1, 2, 3}}, 1, 0, 10, 3};

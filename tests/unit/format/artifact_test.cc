@@ -1,8 +1,8 @@
-#include "core/format/artifact/artifact.h"
-
 #include <gmock/gmock.h>
 
 #include "core/format/artifact/artifact_index.h"
+#include "core/format/artifact/artifact_reader.h"
+#include "core/format/artifact/artifact_writer.h"
 #include "core/format/checksum.h"
 #include "tests/oracle/core_types.h"
 #include "tests/unit/format/test_artifacts.h"
@@ -18,7 +18,7 @@ class ArtifactTest : public testing::Test {
   ArtifactReader open(const ArtifactRef& ref) {
     return ArtifactReader(system_files().open_read(segment_path(folder_.path(), ref.segment)), ref);
   }
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   MemoryBudget budget_{uint64_t{64} << 20};
 };
 
@@ -187,7 +187,7 @@ TEST_F(ArtifactTest, WriterRefusesBrokenRows) {
   EXPECT_THAT(refusal(bad), HasSubstr("level 5 does not follow"));
   bad = random_rows(1, 50, 9, 1, 16);
   bad.levels[0].hashes[40] |= 1;
-  EXPECT_THAT(refusal(bad, 16), HasSubstr("bits below the cut"));
+  EXPECT_THAT(refusal(bad, 16), HasSubstr("bits beyond the hash bits"));
 }
 
 // Two rows equal in hash and mask are ordered by their children, also over a frame's end.

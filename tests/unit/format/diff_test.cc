@@ -18,7 +18,7 @@ class DiffTest : public testing::Test {
     EXPECT_EQ(budget.used(), 0u);
     return report;
   }
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   const std::string a_ = folder_.file("a.vdag"), b_ = folder_.file("b.vdag");
 };
 

@@ -1,4 +1,4 @@
-// The documents of this room say what the code does.
+// docs/format.md and its example agree with the code.
 #include <gmock/gmock.h>
 
 #include <cstdlib>
@@ -71,7 +71,7 @@ TEST(FormatDocTest, HeaderTableIsTheLayout) {
                                                 {"L", kGridLevelsAt},
                                                 {"hash bits", kHashBitsAt},
                                                 {"node order", kNodeOrderAt},
-                                                {"block bytes", kBlockBytesAt},
+                                                {"checksum block bytes", kChecksumBlockBytesAt},
                                                 {"origin", kOriginAt},
                                                 {"edge", kEdgeAt},
                                                 {"voxels", kVoxelsAt},
@@ -79,7 +79,7 @@ TEST(FormatDocTest, HeaderTableIsTheLayout) {
                                                 {"DAG nodes", kDagNodesAt},
                                                 {"file bytes", kFileBytesAt},
                                                 {"table offset", kTableOffsetAt},
-                                                {"block count", kTableCountAt},
+                                                {"checksum block count", kTableCountAt},
                                                 {"table checksum", kTableChecksumAt},
                                                 {"attribute sections", kAttributeCountAt},
                                                 {"levels", kLevelsAt},
@@ -139,10 +139,10 @@ TEST(ErrorsDocTest, TableIsThatOfTheCode) {
 // reader's folder, and finds the top of the pillar.
 TEST(ReaderExampleTest, CompilesOnItsOwnAndRuns) {
   if (std::system("c++ --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "no c++ on this machine";
-  ScratchFolder folder;
+  TemporaryFolder folder;
   const std::string program = folder.file("reader_example"), output = folder.file("output");
   ASSERT_EQ(std::system(("c++ -std=c++17 -pedantic -Wall -Wextra -Wshadow -Werror -I " + kSource +
-                         "/core/format " + kSource + "/docs/reader_example.cc -o " + program)
+                         "/core/format/global " + kSource + "/docs/reader_example.cc -o " + program)
                             .c_str()),
             0);
   ASSERT_EQ(std::system((program + " " + kScene + " > " + output).c_str()), 0);

@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 class GlobalWriterTest : public testing::Test {
  protected:
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   const std::string path_ = folder_.file("out.vdag");
 };
 
@@ -69,10 +69,11 @@ TEST_F(GlobalWriterTest, LaysOutWhatItIsGiven) {
     EXPECT_GE(bytes.find_first_not_of('\0', offset + size), end) << "padding";
   }
   EXPECT_EQ(field<uint64_t>(bytes, kTableOffsetAt), end);
-  EXPECT_EQ(bytes.size() - end, 8 * ((end - kPageBytes + kBlockBytes - 1) / kBlockBytes));
+  EXPECT_EQ(bytes.size() - end,
+            8 * ((end - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes));
 }
 
-// The same words written back to front, in small pieces and by several threads are the same file.
+// The same words written back to front, in small chunks and by several threads are the same file.
 TEST_F(GlobalWriterTest, OrderAndThreadsDoNotShow) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(2, 128), 64);
   const GlobalFileSummary expected = write_global(path_, dag, grid_of(128));
@@ -160,9 +161,9 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
   }
 }
 
-// A file whose levels were synced is gone on with by another writer, after any level, and is the
-// same; levels end within blocks and blocks within levels.
-TEST_F(GlobalWriterTest, GoesOnAfterAnyLevel) {
+// Another writer can resume a file whose levels were synced, after any level, and the bytes are the
+// same. Levels end within checksum blocks and blocks within levels.
+TEST_F(GlobalWriterTest, ResumesAfterAnyLevel) {
   oracle::Random random(4);
   oracle::Voxels voxels(128);
   for (int i = 0; i < 60000; ++i) {
@@ -172,7 +173,7 @@ TEST_F(GlobalWriterTest, GoesOnAfterAnyLevel) {
   const oracle::Dag dag = oracle::build_dag(voxels, 64);
   const std::string expected = write_global(path_, dag, grid_of(128)).sha256;
   const auto levels = level_words(dag);
-  ASSERT_GT(levels[0].size() * sizeof(uint32_t), kBlockBytes);
+  ASSERT_GT(levels[0].size() * sizeof(uint32_t), kChecksumBlockBytes);
   const auto write_level = [&](GlobalFileWriter& writer, size_t i) {
     writer.begin_level(static_cast<uint32_t>(5 - i));
     writer.checksum_words(levels[i]);
@@ -181,23 +182,23 @@ TEST_F(GlobalWriterTest, GoesOnAfterAnyLevel) {
   };
   for (size_t done = 1; done <= levels.size(); ++done) {
     SCOPED_TRACE(done);
-    GlobalProgress kept;
+    GlobalFileProgress saved;
     {
       GlobalFileWriter writer(system_files(), path_, grid_of(128), 64);
       for (size_t i = 0; i < done; ++i) write_level(writer, i);
       writer.sync();
-      kept = writer.progress();
+      saved = writer.progress();
       if (done < levels.size()) writer.begin_level(static_cast<uint32_t>(5 - done));
     }
     GlobalFileWriter writer(system_files(), path_, grid_of(128), 64);
-    writer.go_on(kept);
+    writer.resume(saved);
     for (size_t i = done; i < levels.size(); ++i) write_level(writer, i);
     EXPECT_EQ(writer.finish(dag.voxels, dag.svo_nodes).sha256, expected);
   }
 }
 
 // A bit that the disk flips before the file has its checksums is noticed, and so is a partial file
-// that was cut short.
+// that was truncated.
 TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(5, 32), 64);
   const auto levels = level_words(dag);
@@ -223,20 +224,20 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
     EXPECT_THAT(error.message(), HasSubstr("is not what was written"));
     at += (4 * levels[i].size() + kPageBytes - 1) / kPageBytes * kPageBytes;
   }
-  GlobalProgress kept;
+  GlobalFileProgress saved;
   {
     GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
     write(writer);
     writer.sync();
-    kept = writer.progress();
+    saved = writer.progress();
   }
   ByteString bytes = read_bytes(partial);
-  bytes[at - kPageBytes] ^= 1;  // in the block that the next level goes on with
+  bytes[at - kPageBytes] ^= 1;  // in the block where the next level continues
   write_bytes(partial, bytes);
   GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
-  EXPECT_EQ(error_of([&] { writer.go_on(kept); }).code(), ErrorCode::kCorrupt);
+  EXPECT_EQ(error_of([&] { writer.resume(saved); }).code(), ErrorCode::kCorrupt);
   std::filesystem::resize_file(partial, at - 1);
-  EXPECT_EQ(error_of([&] { writer.go_on(kept); }).code(), ErrorCode::kCorrupt);
+  EXPECT_EQ(error_of([&] { writer.resume(saved); }).code(), ErrorCode::kCorrupt);
 }
 
 // A level of over 2^32 words is a limit error that names the level, whichever way it is noticed.

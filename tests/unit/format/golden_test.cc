@@ -1,5 +1,5 @@
-// Files of version 1, kept in tests/golden: they must stay readable, and the writer must go on
-// making the same bytes.
+// Files of version 1 in tests/golden: they must stay readable, and the writer must still make the
+// same bytes.
 #include <gmock/gmock.h>
 
 #include "core/format/global/open_global.h"
@@ -20,7 +20,7 @@ void verify(const std::string& path) {
 }
 
 TEST(GoldenTest, WriterMakesTheSameBytes) {
-  ScratchFolder folder;
+  TemporaryFolder folder;
   const GlobalFileSummary summary =
       write_global(folder.file("new.vdag"), floor_and_pillar(), floor_and_pillar_grid());
   EXPECT_EQ(read_bytes(folder.file("new.vdag")), read_bytes(kScene));
@@ -39,7 +39,7 @@ TEST(GoldenTest, SceneIsRead) {
         EXPECT_EQ(file->voxel(x, y, z), y == 0 || (x == 0 && z == 0)) << x << y << z;
 }
 
-// One way of damage each, and what the user is told.
+// One kind of damage each, and the error that is reported.
 TEST(GoldenTest, CorruptVariantsAreNamed) {
   struct Variant {
     const char* what;
@@ -58,7 +58,7 @@ TEST(GoldenTest, CorruptVariantsAreNamed) {
       {"root", 8192, 0x36, ErrorCode::kCorrupt, "bytes 4096 to 12287: the block fails"},
       {"table", 12288, 0, ErrorCode::kCorrupt, "the checksum table fails its own checksum"},
   };
-  ScratchFolder folder;
+  TemporaryFolder folder;
   const std::string path = folder.file("damaged.vdag");
   for (const Variant& variant : variants) {
     SCOPED_TRACE(variant.what);

@@ -11,7 +11,7 @@ using voxdag_reader::File;
 
 class ReaderTest : public testing::Test {
  protected:
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   const std::string path_ = folder_.file("scene.vdag");
 };
 
@@ -53,7 +53,7 @@ TEST_F(ReaderTest, QueriesAndWalksGiveTheVoxels) {
           for (int z = 0; z < edge; ++z)
             ASSERT_EQ(file.voxel(x, y, z), voxels.at(x, y, z)) << x << ' ' << y << ' ' << z;
       EXPECT_FALSE(file.voxel(-1, 0, 0) || file.voxel(0, edge, 0) || file.voxel(0, 0, edge));
-      file.check_blocks();
+      file.verify_checksums();
     }
   }
 }
@@ -99,7 +99,7 @@ TEST_F(ReaderTest, EmptySceneHasNoVoxels) {
   Collector collector(32);
   file.walk(collector);
   EXPECT_EQ(collector.nodes, 0u);
-  file.check_blocks();
+  file.verify_checksums();
 }
 
 // What is no global file is told apart: not there, not ours, too new, damaged.

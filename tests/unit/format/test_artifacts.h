@@ -7,13 +7,14 @@
 
 #include "core/dag/node_hash.h"
 #include "core/dag/sub_dag.h"
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/artifact_reader.h"
+#include "core/format/artifact/artifact_writer.h"
 #include "tests/oracle/scenes.h"
 
 namespace voxdag {
 
-// Random rows that only an artifact's rules hold together (a merge round's artifacts have many
-// roots, so nobody asks for parents): `count` bricks, and as many nodes on each of `node_levels`.
+// Random rows that obey the rules of an artifact, but may lack parents (artifacts of a merge pass
+// have many roots): `count` bricks, and as many nodes on each of `node_levels`.
 inline SubDag random_rows(uint64_t seed, size_t count, uint32_t grid_levels, uint32_t node_levels,
                           uint32_t hash_bits) {
   oracle::Random random(seed);

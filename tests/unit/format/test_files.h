@@ -17,27 +17,9 @@
 #include "tests/oracle/dag.h"
 #include "tests/oracle/scenes.h"
 #include "tests/unit/base/error_of.h"
+#include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag {
-
-// A fresh folder of the running test, removed with it.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = testing::TempDir() + "voxdag_format_" + test->test_suite_name() + "_" + test->name();
-    for (char& c : path_)
-      if (c == '/' && &c > path_.data() + testing::TempDir().size()) c = '_';
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
-  }
-  ~ScratchFolder() { std::filesystem::remove_all(path_); }
-  const std::string& path() const { return path_; }
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
 
 using ByteString = std::string;
 

@@ -46,16 +46,16 @@ uint64_t checksum_of(const ByteString& bytes, size_t begin, size_t size) {
 // Makes all checksums right again: a file that lies with a straight face.
 void reseal(ByteString& bytes) {
   const size_t table = get<uint64_t>(bytes, kTableOffsetAt);
-  for (size_t begin = kPageBytes, i = 0; begin < table; begin += kBlockBytes, ++i)
+  for (size_t begin = kPageBytes, i = 0; begin < table; begin += kChecksumBlockBytes, ++i)
     put(bytes, table + 8 * i,
-        checksum_of(bytes, begin, std::min<size_t>(kBlockBytes, table - begin)));
+        checksum_of(bytes, begin, std::min<size_t>(kChecksumBlockBytes, table - begin)));
   put(bytes, kTableChecksumAt, checksum_of(bytes, table, bytes.size() - table));
   put(bytes, kHeaderChecksumAt, checksum_of(bytes, 0, kHeaderChecksumAt));
 }
 
 class VerifyTest : public testing::Test {
  protected:
-  ScratchFolder folder_;
+  TemporaryFolder folder_;
   const std::string path_ = folder_.file("scene.vdag");
 };
 
@@ -109,8 +109,8 @@ TEST_F(VerifyTest, DamagedBlockIsNamed) {
   for (int i = 0; i < 60000; ++i) noise.set(at_random(), at_random(), at_random());
   write_global(path_, noise);
   ByteString bytes = read_bytes(path_);
-  ASSERT_GT(bytes.size(), kPageBytes + 2 * kBlockBytes);
-  bytes[kPageBytes + kBlockBytes + 100] ^= 1;
+  ASSERT_GT(bytes.size(), kPageBytes + 2 * kChecksumBlockBytes);
+  bytes[kPageBytes + kChecksumBlockBytes + 100] ^= 1;
   write_bytes(path_, bytes);
   EXPECT_THAT(error_of([&] { verify(path_); }).message(),
               HasSubstr("bytes 69632 to 135167: the block fails its checksum"));

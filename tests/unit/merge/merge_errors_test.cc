@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "merge/sort/sequencer.h"
+#include "merge/output/level_output.h"
 #include "tests/unit/merge/merge_harness.h"
 
 namespace voxdag {
@@ -85,9 +85,9 @@ TEST_F(MergeErrors, CanceledMergesStop) {
 // Positions are 32 bits wide: the level that would need more is named.
 TEST(LevelExtentTest, ALevelOver2To32IsALimitError) {
   LevelExtent extent;
-  extent.add(1, kPositionLimit, 9, true);
+  extent.add({1, kPositionLimit}, 9, true);
   try {
-    extent.add(1, 2, 9, true);
+    extent.add({1, 2}, 9, true);
     FAIL() << "expected an Error";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kLimit);

@@ -1,6 +1,5 @@
-// Voxels cut into subvolumes, their sub-DAGs (the oracle's) as artifacts, merged into a global
-// file; and the file that the oracle's DAG of the whole makes, which must be the same byte for
-// byte.
+// Divides voxels into subvolumes, merges the artifacts of their sub-DAGs (made by the oracle) into
+// a global file, and compares it with the file of the oracle's DAG of the whole.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/artifact_writer.h"
 #include "core/format/global/global_writer.h"
 #include "merge/merge.h"
 #include "tests/oracle/core_types.h"
@@ -57,7 +56,7 @@ inline oracle::Voxels mixed_voxels(uint64_t seed, int edge) {
   return voxels;
 }
 
-// Every voxel set or not by the toss of a coin: hardly two bricks are alike.
+// Every voxel is set at random, so that almost no two bricks are equal.
 inline oracle::Voxels noise_voxels(uint64_t seed, int edge) {
   std::mt19937_64 random(seed);
   oracle::Voxels voxels(edge);
@@ -89,7 +88,7 @@ inline std::vector<Cube> equal_cubes(uint32_t level) {
   return cubes;
 }
 
-// Cubes of levels 1 to `deepest`, split by the toss of a coin, which tile the grid.
+// Cubes of levels 1 to `deepest`, split at random, which tile the grid.
 inline std::vector<Cube> mixed_cubes(uint64_t seed, uint32_t deepest) {
   oracle::Random random(seed);
   std::vector<Cube> waiting{Cube{}}, cubes;

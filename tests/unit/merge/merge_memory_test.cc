@@ -1,5 +1,5 @@
-// The merge under small budgets: same bytes, by hash ranges, rounds, spilled maps and streamed
-// groups, each of which the report must show to have happened.
+// The merge under small budgets: same bytes with several hash partitions, several passes, spilled
+// maps and streamed groups. The report must show that each of them happened.
 #include <gtest/gtest.h>
 
 #include "core/dag/node_hash.h"
@@ -10,8 +10,8 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// Cutting the hash space into slabs, and spilling maps, changes nothing.
-TEST(MergeMemory, HashRangesGiveTheSameBytes) {
+// Dividing the hash space into partitions and spilling maps change nothing.
+TEST(MergeMemory, HashPartitionsGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(1, 256);
   for (const uint32_t hash_bits : {16u, 64u}) {
     SCOPED_TRACE("hash bits " + std::to_string(hash_bits));
@@ -19,21 +19,21 @@ TEST(MergeMemory, HashRangesGiveTheSameBytes) {
     harness.add(voxels, equal_cubes(1));
     const Merged large = harness.merge();
     harness.expect_dag_of(voxels, large);
-    EXPECT_EQ(large.report.rounds, 1u);
-    EXPECT_EQ(large.report.hash_ranges, 7u);  // one a level
+    EXPECT_EQ(large.report.passes, 1u);
+    EXPECT_EQ(large.report.hash_partitions, 7u);  // one per level
     EXPECT_EQ(large.report.scratch_bytes, 0u);
     for (unsigned threads = 1; threads <= 3; ++threads) {
       const Merged small = harness.merge({.budget_bytes = 5 * kMiB, .threads = threads});
       EXPECT_EQ(small.file.sha256, large.file.sha256);
-      EXPECT_EQ(small.report.rounds, 1u);
-      EXPECT_GT(small.report.hash_ranges, 7u);
+      EXPECT_EQ(small.report.passes, 1u);
+      EXPECT_GT(small.report.hash_partitions, 7u);
       EXPECT_GT(small.report.scratch_bytes, 0u);
     }
   }
 }
 
-// Artifacts too many to be merged at once are merged in rounds.
-TEST(MergeMemory, RoundsGiveTheSameBytes) {
+// Artifacts too many to be merged at once are merged in several passes.
+TEST(MergeMemory, PassesGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(2, 256);
   for (const uint32_t hash_bits : {4u, 64u}) {
     SCOPED_TRACE("hash bits " + std::to_string(hash_bits));
@@ -41,12 +41,12 @@ TEST(MergeMemory, RoundsGiveTheSameBytes) {
     harness.add(voxels, equal_cubes(3));
     const Merged at_once = harness.merge();
     harness.expect_dag_of(voxels, at_once);
-    EXPECT_EQ(at_once.report.rounds, 1u);
-    for (const auto& [half_mib, rounds] : {std::pair{24, 2u}, {16, 3u}, {11, 4u}}) {
+    EXPECT_EQ(at_once.report.passes, 1u);
+    for (const auto& [half_mib, passes] : {std::pair{24, 2u}, {16, 3u}, {11, 4u}}) {
       SCOPED_TRACE(std::to_string(half_mib) + "/2 MiB");
       const Merged merged = harness.merge({.budget_bytes = half_mib * kMiB / 2});
       EXPECT_EQ(merged.file.sha256, at_once.file.sha256);
-      EXPECT_EQ(merged.report.rounds, rounds);
+      EXPECT_EQ(merged.report.passes, passes);
       EXPECT_GT(merged.report.scratch_bytes, 0u);
       EXPECT_GT(merged.report.input_nodes, at_once.report.input_nodes);
     }
@@ -65,8 +65,8 @@ TEST(MergeMemory, WindowsOfAMapGiveTheSameBytes) {
   EXPECT_GE(merged.report.scratch_bytes, kMiB);
 }
 
-// Bricks whose hashes all begin with the same four bits: with hashes cut there, one group of equal
-// hashes that is larger than all the memory that the merge has.
+// Bricks whose hashes all begin with the same four bits: with hashes truncated to these, one group
+// of equal hashes that is larger than the memory of the merge.
 TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
   constexpr uint64_t kBudgetBytes = 9 * kMiB / 2;
   const uint32_t hash_bits = 4;
@@ -93,8 +93,8 @@ TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
   EXPECT_GT(merged.report.streamed_groups, 0u);
 }
 
-// Few equal hashes in much memory: ranges too large for the range sweep are merged row by row.
-TEST(MergeMemory, RangesOfFewHashesGiveTheSameBytes) {
+// Few distinct hashes in much memory: buckets too large to be sorted are merged row by row.
+TEST(MergeMemory, BucketsOfFewHashesGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(5, 128);
   MergeHarness harness(7, 4);
   harness.add(voxels, mixed_cubes(5, 2));

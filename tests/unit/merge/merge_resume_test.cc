@@ -1,5 +1,5 @@
-// A merge that is interrupted goes on from what it saved, with the same bytes at the end; what it
-// cannot go on from is noticed, and the merge starts over or says that its inputs are gone.
+// An interrupted merge resumes from the state it saved, with the same bytes at the end. A damaged
+// state is detected, and the merge starts over or reports that its inputs are missing.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ void change_byte(const std::string& path, uint64_t at, char change) {
   file.put(byte);
 }
 
-// Keeps the state in memory; the process "dies" at the save of a given number, just before or just
+// Stores the state in memory; the process "dies" at the save of a given number, just before or just
 // after the state is durable.
 class DyingCheckpoint : public Checkpoint {
  public:
@@ -40,7 +40,7 @@ class DyingCheckpoint : public Checkpoint {
     state.reset();
     ++forgotten;
   }
-  // Takes the permission at its word, if it may: zeros.
+  // Overwrites the released bytes with zeros if it knows the segment.
   void release(uint32_t, uint64_t offset, uint64_t bytes) override {
     if (segment_.empty()) return;
     std::fstream file(segment_, std::ios::in | std::ios::out | std::ios::binary);
@@ -63,7 +63,7 @@ struct Case {
   uint64_t budget_bytes;
   uint32_t hash_bits;
   uint32_t cubes_level;
-  uint32_t rounds;
+  uint32_t passes;
 };
 
 class MergeResume : public testing::TestWithParam<Case> {
@@ -73,14 +73,14 @@ class MergeResume : public testing::TestWithParam<Case> {
   }
 };
 
-// Killed after every save in turn, also while it goes on, a merge ends with the same bytes and the
-// same counts, though the space of what it no longer needs was taken back.
-TEST_P(MergeResume, GoesOnAfterEverySave) {
+// Killed at every save in turn, also after it was resumed, a merge ends with the same bytes and the
+// same counts, although the bytes that it released were overwritten.
+TEST_P(MergeResume, ResumesAfterEverySave) {
   const oracle::Voxels voxels = noise_voxels(31, 256);
   MergeHarness harness(8, GetParam().hash_bits);
   harness.add(voxels, equal_cubes(GetParam().cubes_level));
   const Merged whole = harness.merge({.budget_bytes = GetParam().budget_bytes});
-  EXPECT_EQ(whole.report.rounds, GetParam().rounds);
+  EXPECT_EQ(whole.report.passes, GetParam().passes);
 
   DyingCheckpoint checkpoint(harness.segment());
   uint64_t deaths = 0;
@@ -101,18 +101,18 @@ TEST_P(MergeResume, GoesOnAfterEverySave) {
   }
   EXPECT_GE(deaths, 7u);  // the levels
   EXPECT_EQ(checkpoint.forgotten, 0u);
-  EXPECT_TRUE(checkpoint.released > 0 || whole.report.rounds > 1);
+  EXPECT_TRUE(checkpoint.released > 0 || whole.report.passes > 1);
   EXPECT_TRUE(std::ranges::is_sorted(checkpoint.levels, std::greater()));
   EXPECT_EQ(checkpoint.levels.back(), 0u);
 }
 
-// With more or less memory than before it goes on all the same, rounds done so far included.
-TEST_P(MergeResume, GoesOnWithOtherMemory) {
+// It resumes with more or less memory than before, also after passes that were finished.
+TEST_P(MergeResume, ResumesWithOtherMemory) {
   const oracle::Voxels voxels = noise_voxels(32, 256);
   MergeHarness harness(8, GetParam().hash_bits);
   harness.add(voxels, equal_cubes(GetParam().cubes_level));
   MergeOptions other;
-  other.budget_bytes = GetParam().rounds > 1 ? 64 * kMiB : GetParam().budget_bytes * 3 / 2;
+  other.budget_bytes = GetParam().passes > 1 ? 64 * kMiB : GetParam().budget_bytes * 3 / 2;
   other.threads = 1;
   const std::string expected = harness.merge(other).file.sha256;
   for (const uint64_t die_at : {1u, 2u, 4u}) {
@@ -126,22 +126,22 @@ TEST_P(MergeResume, GoesOnWithOtherMemory) {
   }
 }
 
-// The same where states are saved beside the merge, as many as there is time for.
-TEST_P(MergeResume, GoesOnAfterSavesBesideIt) {
+// The same with states that are saved in the background, as many as there is time for.
+TEST_P(MergeResume, ResumesAfterBackgroundSaves) {
   const oracle::Voxels voxels = noise_voxels(35, 256);
   MergeHarness harness(8, GetParam().hash_bits);
   harness.add(voxels, equal_cubes(GetParam().cubes_level));
   const std::string expected = harness.merge({.budget_bytes = GetParam().budget_bytes}).file.sha256;
   DyingCheckpoint checkpoint(harness.segment());
-  MergeOptions beside = options(checkpoint);
-  beside.checkpoint_interval_s = 1e-9;
+  MergeOptions background = options(checkpoint);
+  background.checkpoint_interval_s = 1e-9;
   uint64_t deaths = 0;
   for (std::string sha256; sha256 != expected; ++deaths) {
     ASSERT_LT(deaths, 100u);
     checkpoint.die_before = deaths % 2 == 1;
     checkpoint.die_at = checkpoint.saves + 1 + checkpoint.die_before;
     try {
-      sha256 = harness.merge(beside).file.sha256;
+      sha256 = harness.merge(background).file.sha256;
       ASSERT_EQ(sha256, expected);
     } catch (const Error& error) {
       ASSERT_EQ(error.code(), ErrorCode::kIo) << error.what();
@@ -151,8 +151,8 @@ TEST_P(MergeResume, GoesOnAfterSavesBesideIt) {
   EXPECT_EQ(checkpoint.forgotten, 0u);
 }
 
-// A save does not keep the merge waiting: the first one and the level above wait for each other.
-TEST(MergeCheckpoint, TheMergeGoesOnWhileAStateIsSaved) {
+// The merge does not wait for a save: here the first save and the level above wait for each other.
+TEST(MergeCheckpoint, TheMergeContinuesWhileAStateIsSaved) {
   MergeHarness harness(8, 64);
   harness.add(noise_voxels(36, 256), equal_cubes(1));
   const std::string expected = harness.merge().file.sha256;
@@ -198,12 +198,12 @@ INSTANTIATE_TEST_SUITE_P(Ways, MergeResume,
                          testing::Values(Case{"AtOnce", 1024 * kMiB, 64, 1, 1},
                                          Case{"SpilledMaps", 5 * kMiB, 64, 1, 1},
                                          Case{"EqualHashes", 5 * kMiB, 4, 1, 1},
-                                         Case{"ThreeRounds", 8 * kMiB, 64, 3, 3}),
+                                         Case{"ThreePasses", 8 * kMiB, 64, 3, 3}),
                          [](const auto& test) { return test.param.name; });
 
-// A state, a map, a round's artifact or a partial file with a flipped bit, or that is gone: never a
-// wrong DAG. With the inputs at hand the merge starts over.
-TEST(MergeDamage, WhatIsDoubtfulStartsOver) {
+// A state, a map, an intermediate artifact or a partial file with a flipped bit, or that is gone:
+// never a wrong DAG. With the inputs at hand the merge starts over.
+TEST(MergeDamage, DamageStartsOver) {
   const oracle::Voxels voxels = noise_voxels(33, 256);
   struct Way {
     uint64_t budget_bytes, die_at;
@@ -223,9 +223,10 @@ TEST(MergeDamage, WhatIsDoubtfulStartsOver) {
         EXPECT_THROW(harness.merge(options), Error);
         if (i == 0 && !gone) {
           const MergeState state = decode_state(*checkpoint.state);
-          if (!state.merged.empty())
-            places.push_back(segment_path(harness.scratch_folder(), state.merged[0].segment));
-          if (const auto& last = state.last_round) {
+          if (!state.intermediates.empty())
+            places.push_back(
+                segment_path(harness.scratch_folder(), state.intermediates[0].segment));
+          if (const auto& last = state.final_pass) {
             places.push_back(last->output + ".partial");
             places.push_back(harness.scratch_folder() + "/" + ScratchFile::name_of(last->map.id));
           }
@@ -239,7 +240,8 @@ TEST(MergeDamage, WhatIsDoubtfulStartsOver) {
           std::filesystem::remove(places[i]);
         else
           change_byte(places[i], 4096 + 100, 4);
-        // Noticed at once, or when it is read: then the next merge starts over.
+        // The damage is detected at once, or when the bytes are read: then the next merge starts
+        // over.
         try {
           EXPECT_EQ(harness.merge(options).file.sha256, expected);
           EXPECT_EQ(checkpoint.forgotten, 1u);
@@ -254,7 +256,7 @@ TEST(MergeDamage, WhatIsDoubtfulStartsOver) {
 }
 
 // Another set of inputs is another merge; the same content at other places is the same.
-TEST(MergeDamage, KnowsItsInputsByTheirContent) {
+TEST(MergeDamage, IdentifiesItsInputsByTheirContent) {
   const oracle::Voxels voxels = noise_voxels(34, 64);
   MergeHarness harness(6, 64);
   harness.add(voxels, equal_cubes(1));
@@ -278,12 +280,12 @@ TEST(MergeDamage, KnowsItsInputsByTheirContent) {
 // Any prefix of a state, and any flipped bit, is refused.
 TEST(MergeState, RefusesDamage) {
   MergeState state;
-  state.inputs = 5;
-  state.merged.push_back({1, 2, 3, 4, 5});
-  state.last_round.emplace();
-  state.last_round->output = "somewhere";
-  state.last_round->map_rows = {1, 2, 3};
-  state.last_round->roots.push_back({Cube{1, {0, 1, 0}}, 7, 8, 9, 10});
+  state.inputs_checksum = 5;
+  state.intermediates.push_back({1, 2, 3, 4, 5});
+  state.final_pass.emplace();
+  state.final_pass->output = "somewhere";
+  state.final_pass->map_rows = {1, 2, 3};
+  state.final_pass->roots.push_back({Cube{1, {0, 1, 0}}, 7, 8, 9, 10});
   const std::vector<std::byte> bytes = encode_state(state);
   EXPECT_EQ(encode_state(decode_state(bytes)), bytes);
   for (size_t size = 0; size < bytes.size(); ++size)

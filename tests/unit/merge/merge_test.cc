@@ -27,8 +27,8 @@ TEST(Merge, EqualSubvolumesGiveTheDagOfTheWhole) {
     }
 }
 
-// Subvolumes of different sizes: on a level, roots of some stand beside inner nodes of others and
-// nodes of the top tree.
+// Subvolumes of different sizes: a level has roots of some, inner nodes of others and nodes of the
+// top tree.
 TEST(Merge, SubvolumesOfDifferentSizesGiveTheDagOfTheWhole) {
   for (const uint32_t hash_bits : {4u, 16u, 64u})
     for (uint64_t seed = 10; seed < 16; ++seed) {
@@ -72,9 +72,9 @@ TEST(Merge, NoArtifactsGiveAFileWithoutNodes) {
   EXPECT_EQ(merged.file.sha256, harness.expected({}).sha256);
 }
 
-// The merger published with the tutorial left the child mask out of the hash: two sub-DAGs that are
-// alike but stand in different octants of different parents became one parent, and geometry moved.
-// Here two such pairs must keep their places over two merge levels.
+// The merger that was published with the tutorial left the child mask out of the hash: two sub-DAGs
+// that are alike but stand in different octants of different parents became one parent, and
+// geometry moved. Here two such pairs must keep their places over two merge levels.
 TEST(Merge, EqualSubDagsInDifferentOctantsKeepTheirPlaces) {
   oracle::Voxels voxels(32);
   const auto blob = [&](int x, int y, int z) {
@@ -96,7 +96,7 @@ TEST(Merge, EqualSubDagsInDifferentOctantsKeepTheirPlaces) {
     }
 }
 
-// Progress ends where its total says, in one round and in several.
+// Progress ends at its total, with one pass and with several.
 TEST(Merge, ProgressReachesItsTotal) {
   struct Counting : NoProgress {
     uint64_t total = 0;
@@ -111,7 +111,7 @@ TEST(Merge, ProgressReachesItsTotal) {
   for (const uint64_t budget_bytes : {uint64_t{1} << 30, uint64_t{8} << 20}) {
     Counting progress;
     const Merged merged = harness.merge({.budget_bytes = budget_bytes, .progress = &progress});
-    EXPECT_EQ(merged.report.rounds > 1, budget_bytes < uint64_t{1} << 30);
+    EXPECT_EQ(merged.report.passes > 1, budget_bytes < uint64_t{1} << 30);
     EXPECT_EQ(progress.done, progress.total);
     EXPECT_EQ(progress.done, merged.report.input_nodes);
   }

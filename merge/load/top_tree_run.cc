@@ -1,4 +1,4 @@
-#include "merge/load/top_run.h"
+#include "merge/load/top_tree_run.h"
 
 #include <algorithm>
 #include <string>
@@ -21,17 +21,18 @@ std::string describe(const Cube& cube) {
 
 }  // namespace
 
-TopRun::TopRun(uint32_t hash_bits, std::vector<PlacedNode> children) : LevelRun(false, true) {
+TopTreeRun::TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children)
+    : LevelRun(false, true) {
   std::ranges::sort(children, {}, morton_of);
   add_parents(children, hash_bits);
   std::ranges::sort(nodes_, [](const Node& a, const Node& b) {
     return compare_nodes(a.hash, a.mask, a.children, b.hash, b.mask, b.children) < 0;
   });
-  cut_frames();
+  divide_into_frames();
 }
 
-// `children` in Morton order: siblings stand together, in child order.
-void TopRun::add_parents(const std::vector<PlacedNode>& children, uint32_t hash_bits) {
+// `children` in Morton order: siblings are adjacent, in child order.
+void TopTreeRun::add_parents(const std::vector<PlacedNode>& children, uint32_t hash_bits) {
   for (size_t begin = 0, end; begin < children.size(); begin = end) {
     Node node;
     node.cube = children[begin].cube.parent();
@@ -53,7 +54,7 @@ void TopRun::add_parents(const std::vector<PlacedNode>& children, uint32_t hash_
   }
 }
 
-void TopRun::cut_frames() {
+void TopTreeRun::divide_into_frames() {
   uint64_t children = 0;
   for (size_t row = 0; row < nodes_.size(); ++row) {
     if (row % kFrameRows == 0) {
@@ -70,7 +71,7 @@ void TopRun::cut_frames() {
   set_frames(infos_, nodes_.size(), children);
 }
 
-void TopRun::read_frame(size_t index, Frame& out) const {
+void TopTreeRun::read_frame(size_t index, Frame& out) const {
   out.rows = infos_[index].rows;
   out.hashes.clear();
   out.masks.clear();

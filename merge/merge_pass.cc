@@ -1,29 +1,30 @@
-#include "merge/plan/merge_pass.h"
+#include "merge/merge_pass.h"
 
 #include <algorithm>
 #include <memory>
 
 #include "core/base/error.h"
 #include "core/dag/brick.h"
+#include "merge/merge_level.h"
 
 namespace voxdag {
 namespace {
 
-class Round {
+class Pass {
  public:
-  Round(const MergeContext& context, const RoundTask& task, LevelOutput& output,
-        RoundProgress progress)
+  Pass(const MergeContext& context, const PassTask& task, LevelOutput& output,
+       PassProgress progress)
       : context_(context), task_(task), output_(output), done_(std::move(progress)) {}
 
-  std::vector<ArtifactRoot> run(const std::function<void(const RoundProgress&)>& after_level) {
-    const uint32_t highest = task_.with_top ? 0 : highest_root();
+  std::vector<ArtifactRoot> run(const std::function<void(const PassProgress&)>& after_level) {
+    const uint32_t highest = task_.is_final ? 0 : highest_root();
     reserve_memory();
     uint32_t level = done_.level.value_or(task_.grid_levels - kBrickLevels + 1);
     while (level-- > highest) {
-      merge_level_of_all(level);
+      merge_all_runs(level);
       if (after_level) after_level(done_);
     }
-    if (task_.with_top && done_.placed.size() != 1)
+    if (task_.is_final && done_.placed.size() != 1)
       throw Error(ErrorCode::kCorrupt,
                   "an artifact holds the whole grid and others a part of it: "
                   "expected subvolumes that do not overlap");
@@ -39,12 +40,12 @@ class Round {
     return highest;
   }
 
-  void merge_level_of_all(uint32_t level) {
+  void merge_all_runs(uint32_t level) {
     std::vector<ArtifactRun> artifact_runs;
     for (const ArtifactReader& artifact : task_.artifacts)
       artifact_runs.emplace_back(artifact, level);
-    const TopRun top(task_.hash_bits,
-                     task_.with_top ? std::move(done_.placed) : std::vector<PlacedNode>());
+    const TopTreeRun top(task_.hash_bits,
+                         task_.is_final ? std::move(done_.placed) : std::vector<PlacedNode>());
     context_.progress.expect_more(top.rows());
     std::vector<const LevelRun*> runs;
     std::vector<uint64_t> rows;
@@ -63,14 +64,15 @@ class Round {
                                .output = output_,
                                .memory = memory_});
     output_.end_level(extent.nodes, extent.positions);
-    if (task_.with_top) context_.report.dag_nodes += extent.nodes;
+    if (task_.is_final) context_.report.dag_nodes += extent.nodes;
     place(level, top, maps);
     done_.maps = std::move(maps);
     done_.level = level;
-    if (context_.budget.available() < memory_.bytes() / 4 + bytes_beside_slab()) memory_.release();
+    if (context_.budget.available() < memory_.bytes() / 4 + bytes_besides_partition())
+      memory_.release();
   }
 
-  // Memory for the largest level from the start, where there is room for that.
+  // Reserves memory for the largest level from the start if the budget allows it.
   void reserve_memory() {
     std::vector<uint64_t> rows(task_.grid_levels), words(task_.grid_levels);
     for (const ArtifactReader& artifact : task_.artifacts)
@@ -80,23 +82,24 @@ class Round {
       }
     const uint64_t max_rows = std::ranges::max(rows), max_words = std::ranges::max(words);
     const bool resident = max_rows * sizeof(uint32_t) <= context_.plan.resident_bytes;
-    const uint64_t bytes = Slab::bytes_for(max_rows, max_words, false);
-    if (resident && bytes <= kLargestSlabBytes &&
-        bytes + bytes_beside_slab() + context_.plan.resident_bytes <= context_.budget.available())
+    const uint64_t bytes = HashPartition::bytes_for(max_rows, max_words, false);
+    if (resident && bytes <= kMaxPartitionBytes &&
+        bytes + bytes_besides_partition() + context_.plan.resident_bytes <=
+            context_.budget.available())
       memory_.reserve(max_rows, max_words, false, context_.budget);
   }
 
-  // What the next level may take, its runs' rows being in a slab.
-  uint64_t bytes_beside_slab() const {
+  // What a level may take besides its partition.
+  uint64_t bytes_besides_partition() const {
     return bytes_for_workers(context_.plan) + context_.plan.resident_bytes;
   }
 
-  // Finds where this level's top nodes and subvolume roots went.
-  void place(uint32_t level, const TopRun& top, const PositionMaps& maps) {
+  // Finds the positions of the top nodes and subvolume roots of this level.
+  void place(uint32_t level, const TopTreeRun& top, const PositionMaps& maps) {
     done_.placed.clear();
     for (size_t row = 0; row < top.rows(); ++row)
       done_.placed.push_back({top.cube(row), top.hash(row), maps.at(task_.artifacts.size(), row)});
-    if (task_.with_top) context_.report.svo_nodes += top.rows();
+    if (task_.is_final) context_.report.svo_nodes += top.rows();
     for (size_t run = 0; run < task_.artifacts.size(); ++run)
       for (ArtifactRoot root : task_.artifacts[run].roots()) {
         if (root.cube.level != level) continue;
@@ -107,18 +110,18 @@ class Round {
   }
 
   const MergeContext& context_;
-  const RoundTask& task_;
+  const PassTask& task_;
   LevelOutput& output_;
-  RoundProgress done_;
-  SlabMemory memory_;
+  PassProgress done_;
+  PartitionMemory memory_;
 };
 
 }  // namespace
 
-std::vector<ArtifactRoot> merge_round(
-    const MergeContext& context, const RoundTask& task, LevelOutput& output, RoundProgress progress,
-    const std::function<void(const RoundProgress&)>& after_level) {
-  return Round(context, task, output, std::move(progress)).run(after_level);
+std::vector<ArtifactRoot> run_merge_pass(
+    const MergeContext& context, const PassTask& task, LevelOutput& output, PassProgress progress,
+    const std::function<void(const PassProgress&)>& after_level) {
+  return Pass(context, task, output, std::move(progress)).run(after_level);
 }
 
 }  // namespace voxdag

@@ -1,4 +1,4 @@
-#include "merge/load/scratch.h"
+#include "merge/load/scratch_file.h"
 
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 
 namespace voxdag {
 
-void MergeScratch::remove_all_but(const std::set<std::string>& names) {
+void ScratchFolder::remove_all_but(const std::set<std::string>& names) {
   const auto is_ours = [](const std::string& name) {
     return name.starts_with("merge-") || name.starts_with("segment-");
   };
@@ -17,56 +17,58 @@ void MergeScratch::remove_all_but(const std::set<std::string>& names) {
 }
 
 ScratchPath::~ScratchPath() {
-  if (kept_) return;
+  if (retained_) return;
   try {
     folder_.files().remove(path());
   } catch (const Error&) {
-    // A file left over is garbage that the next merge there removes.
+    // The next merge in this folder removes the file.
   }
 }
 
-ScratchFile::ScratchFile(MergeScratch& folder)
+ScratchFile::ScratchFile(ScratchFolder& folder)
     : folder_(folder),
-      record_{folder.take_id(), 0, {}},
-      path_(std::make_shared<ScratchPath>(folder, name_of(record_.id))),
+      state_{folder.take_id(), 0, {}},
+      path_(std::make_shared<ScratchPath>(folder, name_of(state_.id))),
       out_(folder.files().create(path_->path())),
       in_(folder.files().open_read(path_->path())) {}
 
-ScratchFile::ScratchFile(MergeScratch& folder, ScratchRecord record)
+ScratchFile::ScratchFile(ScratchFolder& folder, ScratchFileState state)
     : folder_(folder),
-      record_(std::move(record)),
-      path_(std::make_shared<ScratchPath>(folder, name_of(record_.id))),
+      state_(std::move(state)),
+      path_(std::make_shared<ScratchPath>(folder, name_of(state_.id))),
       in_(folder.files().open_read(path_->path())) {}
 
 void ScratchFile::write(uint64_t first_word, std::span<const uint32_t> words) {
   out_->write_at(first_word * sizeof(uint32_t), std::as_bytes(words));
   folder_.count_written(words.size_bytes());
-  record_.words = std::max(record_.words, first_word + words.size());
-  record_.sums.resize((record_.words + kBlockWords - 1) / kBlockWords);
+  state_.words = std::max(state_.words, first_word + words.size());
+  state_.checksums.resize((state_.words + kBlockWords - 1) / kBlockWords);
   while (!words.empty()) {
     const auto part =
         words.first(std::min<uint64_t>(words.size(), kBlockWords - first_word % kBlockWords));
-    record_.sums[first_word / kBlockWords] += indexed_sum(first_word, part);
+    state_.checksums[first_word / kBlockWords] += indexed_checksum(first_word, part);
     words = words.subspan(part.size());
     first_word += part.size();
   }
 }
 
 void ScratchFile::read(uint64_t first_word, std::span<uint32_t> words) const {
-  if (first_word > record_.words || words.size() > record_.words - first_word)
-    throw Error(ErrorCode::kCorrupt, path_->path() + " holds fewer words than are looked for");
+  if (first_word > state_.words || words.size() > state_.words - first_word)
+    throw Error(ErrorCode::kCorrupt, path_->path() + ": expected at least " +
+                                         std::to_string(first_word + words.size()) +
+                                         " words, found " + std::to_string(state_.words));
   uint32_t block[kBlockWords];
   while (!words.empty()) {
     const uint64_t begin = first_word / kBlockWords * kBlockWords;
-    const std::span<uint32_t> whole(block, std::min(kBlockWords, record_.words - begin));
+    const std::span<uint32_t> whole(block, std::min(kBlockWords, state_.words - begin));
     in_->read_at(begin * sizeof(uint32_t), std::as_writable_bytes(whole));
-    if (indexed_sum(begin, whole) != record_.sums[begin / kBlockWords])
-      throw Error(ErrorCode::kCorrupt, path_->path() + " at byte " +
+    if (indexed_checksum(begin, whole) != state_.checksums[begin / kBlockWords])
+      throw Error(ErrorCode::kCorrupt, path_->path() + ": the words from byte " +
                                            std::to_string(begin * sizeof(uint32_t)) +
-                                           " is not what was written");
-    const auto wanted = whole.subspan(first_word - begin);
-    const size_t count = std::min(words.size(), wanted.size());
-    std::copy_n(wanted.begin(), count, words.begin());
+                                           " on fail their checksum");
+    const auto tail = whole.subspan(first_word - begin);
+    const size_t count = std::min(words.size(), tail.size());
+    std::copy_n(tail.begin(), count, words.begin());
     words = words.subspan(count);
     first_word += count;
   }

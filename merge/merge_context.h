@@ -1,5 +1,4 @@
-// Merges one level of all runs: slab after slab of the hash space, the rows rewired, swept,
-// written, and their positions kept for the level above.
+// What all steps of a merge share: the context of the whole merge, and the task of one level.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +8,17 @@
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
+#include "merge/load/hash_partition.h"
 #include "merge/load/level_run.h"
 #include "merge/load/position_maps.h"
-#include "merge/load/scratch.h"
+#include "merge/load/scratch_file.h"
 #include "merge/merge.h"
 #include "merge/output/level_output.h"
 #include "merge/plan/merge_memory.h"
-#include "merge/sort/sequencer.h"
 
 namespace voxdag {
 
-// Progress whose total is put right as more becomes known.
+// Progress whose total is corrected as more becomes known.
 class MergeProgress {
  public:
   explicit MergeProgress(Progress& progress) : progress_(progress) {}
@@ -37,9 +36,8 @@ class MergeProgress {
   uint64_t total_ = 0;
 };
 
-// What all levels of a merge share.
 struct MergeContext {
-  MergeScratch& scratch;
+  ScratchFolder& scratch;
   MemoryBudget& budget;
   MergeMemory plan;
   MergeProgress& progress;
@@ -54,13 +52,7 @@ struct LevelTask {
   const PositionMaps* child_maps = nullptr;  // of the level below, run for run; null for bricks
   PositionMaps& maps;                        // filled
   LevelOutput& output;                       // between begin_level() and end_level()
-  SlabMemory& memory;                        // kept from level to level
+  PartitionMemory& memory;                   // reused from level to level
 };
-
-// What the workers may take besides the slab and the maps.
-uint64_t bytes_for_workers(const MergeMemory& plan);
-
-// Adds ranges, groups and rows to the report.
-LevelExtent merge_level(const MergeContext& context, const LevelTask& task);
 
 }  // namespace voxdag

@@ -1,0 +1,43 @@
+// Reads one artifact. Immutable after construction: several threads may call read_frame(), each
+// with its own Frame. Memory: the index (56 bytes per frame), not charged.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/format/artifact/artifact.h"
+#include "core/io/file_system.h"
+
+namespace voxdag {
+
+class ArtifactReader {
+ public:
+  // `segment` must be the file that ref.segment names. Throws Error{kCorrupt} or
+  // Error{kUnsupportedVersion}.
+  ArtifactReader(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref);
+
+  uint32_t grid_levels() const { return grid_levels_; }
+  uint32_t hash_bits() const { return hash_bits_; }
+  std::span<const ArtifactRoot> roots() const { return roots_; }
+  // From the bricks upwards: level L-2 first.
+  std::span<const ArtifactLevel> levels() const { return levels_; }
+  // nullptr if the artifact does not reach up to `level`.
+  const ArtifactLevel* level(uint32_t level) const;
+  // Decodes frame `index` of `level`, which must exist. Throws Error{kCorrupt} naming segment,
+  // level and frame.
+  void read_frame(uint32_t level, size_t index, Frame& out) const;
+
+ private:
+  [[noreturn]] void damaged(uint32_t level, size_t frame, const std::string& what) const;
+
+  std::shared_ptr<ReadableFile> file_;
+  uint32_t grid_levels_ = 0;
+  uint32_t hash_bits_ = 64;
+  std::vector<ArtifactRoot> roots_;
+  std::vector<ArtifactLevel> levels_;
+};
+
+}  // namespace voxdag

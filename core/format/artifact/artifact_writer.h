@@ -1,0 +1,39 @@
+// Writes one artifact to a segment, level by level from the bricks upwards, any number of rows at a
+// time. Throws Error{kCorrupt} naming segment and level if rows break the rules of artifact.h.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "core/dag/level_array.h"
+#include "core/dag/sub_dag.h"
+#include "core/format/artifact/segment_writer.h"
+
+namespace voxdag {
+
+class ArtifactWriter : public SubDagSink {
+ public:
+  // A segment has at most one ArtifactWriter at a time. One that is destroyed without finish()
+  // leaves bytes in the segment that nothing refers to.
+  ArtifactWriter(SegmentWriter& segment, uint32_t grid_levels, uint32_t hash_bits);
+  ~ArtifactWriter() override;
+
+  void begin_level(uint32_t level);
+  void append_bricks(std::span<const uint64_t> masks);
+  void append_nodes(const NodeLevelView& rows);
+  void end_level();
+
+  // SubDagSink: a whole level at once.
+  void bricks(const BrickLevelView& level) override;
+  void nodes(const NodeLevelView& level) override;
+
+  // Writes the index. The artifact can be read once the segment was flushed.
+  ArtifactRef finish(std::span<const ArtifactRoot> roots);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace voxdag

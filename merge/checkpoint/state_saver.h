@@ -1,0 +1,67 @@
+// Saves the state of a merge in the background, and retains the scratch files that the durable
+// state names.
+//
+// One thread calls it. While a state is being saved, a thread of its own uses the checkpoint.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <future>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/clock.h"
+#include "merge/checkpoint/merge_state.h"
+
+namespace voxdag {
+
+// Bytes of the segment of an input that the merge reads no more.
+struct MergedBytes {
+  uint32_t segment = 0;
+  uint64_t offset = 0;
+  uint64_t bytes = 0;
+};
+
+class StateSaver {
+ public:
+  // Without a checkpoint nothing is loaded, due or saved.
+  StateSaver(Checkpoint* checkpoint, double interval_s)
+      : checkpoint_(checkpoint), interval_s_(interval_s) {}
+  // The files that the durable state names outlive the merge.
+  ~StateSaver();
+  StateSaver(const StateSaver&) = delete;
+  StateSaver& operator=(const StateSaver&) = delete;
+
+  // The durable state, if there is one. Throws Error{kCorrupt} if it is damaged.
+  std::optional<MergeState> load() const;
+  // Adds a file that the loaded state names.
+  void add_named(std::shared_ptr<ScratchPath> path) { named_.push_back(std::move(path)); }
+  std::span<const std::shared_ptr<ScratchPath>> named() const { return named_; }
+  // Discards the durable state and its files.
+  void forget();
+
+  // Whether the last save has finished and enough CPU time has passed since it began. Throws what
+  // that save threw.
+  bool due();
+  // Saves a state in the background. `named` are the scratch files that it names, which `sync`
+  // makes durable; the files of the state before are removed then, and `merged` is released.
+  void save(uint32_t level, MergeState state, std::vector<std::shared_ptr<ScratchPath>> named,
+            std::function<void()> sync, std::vector<MergedBytes> merged);
+  // Waits for the save in progress, and throws what it threw.
+  void wait();
+  // The same at the end of the merge. Bytes that are not released yet stay, since their files are
+  // removed soon.
+  void finish();
+
+ private:
+  Checkpoint* const checkpoint_;
+  const double interval_s_;
+  double saved_s_ = process_cpu_seconds();
+  std::vector<std::shared_ptr<ScratchPath>> named_;  // belongs to the save in progress, if any
+  std::atomic<bool> finishing_ = false;
+  std::future<void> save_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,81 @@
+// K-way heap merge, row by row, for what the bucket sort cannot hold: many rows with few distinct
+// hashes (truncated hashes). Each run is in the total order, so a heap with one cursor per run is
+// enough, whatever the number of equal hashes. Not thread-safe.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "merge/load/row.h"
+#include "merge/output/level_output.h"
+
+namespace voxdag {
+
+// Gets rows in the total order, deduplicates them and writes them.
+class OrderedRowWriter {
+ public:
+  // The first row goes to `first_position`.
+  OrderedRowWriter(LevelOutput& output, bool bricks, uint64_t first_position, MemoryBudget& budget)
+      : output_(output),
+        buffer_(budget, bricks, kBufferRows, uint64_t{kBufferRows} * kMaxRowWords),
+        flushed_(first_position) {}
+
+  // Returns the position of the row in the merged level.
+  uint64_t add(const RowKey& row) {
+    if (!any_ || compare_rows(last_, row) != 0) push(row);
+    return last_position_;
+  }
+  // Writes the rows that are still in the buffer.
+  void flush();
+
+  uint64_t nodes() const { return nodes_; }
+  // The position of the next new row.
+  uint64_t end_position() const { return flushed_ + buffered_positions(); }
+  static uint64_t bytes() {
+    return MergedRows::bytes_for(kBufferRows, uint64_t{kBufferRows} * kMaxRowWords);
+  }
+
+ private:
+  static constexpr uint32_t kBufferRows = 1024;
+
+  void push(const RowKey& row);
+  uint64_t buffered_positions() const {
+    return output_.in_words() ? buffer_.word_count() : buffer_.row_count();
+  }
+
+  LevelOutput& output_;
+  MergedRows buffer_;
+  uint64_t flushed_;  // the position after all rows that were written
+  uint64_t nodes_ = 0;
+  bool any_ = false;
+  RowKey last_;
+  uint32_t last_words_[kMaxRowWords] = {};
+  uint64_t last_position_ = 0;
+};
+
+// Calls visit(cursor index, row) for all rows of all cursors in the total order. A Cursor has
+// `bool at_end() const`, `RowKey row() const` (valid until it moves) and `void advance()`.
+template <class Cursor, class Visit>
+void merge_cursors(std::span<Cursor> cursors, Visit&& visit) {
+  std::vector<size_t> heap;
+  for (size_t i = 0; i < cursors.size(); ++i)
+    if (!cursors[i].at_end()) heap.push_back(i);
+  const auto later = [&](size_t a, size_t b) {
+    return compare_rows(cursors[a].row(), cursors[b].row()) > 0;
+  };
+  std::ranges::make_heap(heap, later);
+  while (!heap.empty()) {
+    std::ranges::pop_heap(heap, later);
+    Cursor& cursor = cursors[heap.back()];
+    visit(heap.back(), cursor.row());
+    cursor.advance();
+    if (cursor.at_end())
+      heap.pop_back();
+    else
+      std::ranges::push_heap(heap, later);
+  }
+}
+
+}  // namespace voxdag

@@ -1,0 +1,112 @@
+#include "merge/load/hash_partition.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace voxdag {
+namespace {
+
+struct Extent {
+  uint64_t rows = 0;
+  uint64_t words = 0;
+};
+
+Extent extent_of(const LevelRun& run, const FrameSpan& frames) {
+  return {run.rows_before(frames.end) - run.rows_before(frames.begin),
+          run.words_before(frames.end) - run.words_before(frames.begin)};
+}
+
+// The fewest bits for which buckets of evenly spread hashes have `bucket_rows` rows, and for which
+// the table of bucket begins takes at most a byte or two per row.
+unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_t bucket_rows,
+                            size_t slices) {
+  const uint64_t max_buckets = std::max<uint64_t>(
+      1, std::min(rows / std::max<uint64_t>(1, bucket_rows), rows / (4 * slices + 1)));
+  unsigned bits = 0;
+  while (bits < 63 && (interval.last >> bits) - (interval.first >> bits) >= 2 * max_buckets) ++bits;
+  return bits;
+}
+
+}  // namespace
+
+uint64_t HashPartition::bytes_for(uint64_t rows, uint64_t words, bool with_positions) {
+  // Hash, mask, bucket begins (see choose_bucket_bits); words, and a bit for each during rewiring.
+  return rows * (8 + 1 + 4 + (with_positions ? 4 : 0)) + words * 4 + words / 8;
+}
+
+std::vector<RunSlice> HashPartition::slices_within(std::span<const LevelRun* const> runs,
+                                                   const HashInterval& interval) {
+  std::vector<RunSlice> slices;
+  for (size_t run = 0; run < runs.size(); ++run) {
+    const FrameSpan frames = runs[run]->frames_within(interval);
+    if (frames.begin < frames.end) slices.push_back({.run = run, .frames = frames});
+  }
+  return slices;
+}
+
+std::optional<HashInterval> HashPartition::widest_interval(std::span<const LevelRun* const> runs,
+                                                           uint64_t first, uint64_t bytes,
+                                                           bool with_positions) {
+  bytes = std::min(bytes, kMaxPartitionBytes);
+  const auto fits = [&](uint64_t last) {
+    Extent total;
+    for (const LevelRun* run : runs) {
+      const Extent extent = extent_of(*run, run->frames_within({first, last}));
+      total.rows += extent.rows;
+      total.words += extent.words;
+    }
+    return bytes_for(total.rows, total.words, with_positions) <= bytes;
+  };
+  if (fits(~uint64_t{0})) return HashInterval{first, ~uint64_t{0}};
+  if (!fits(first)) return std::nullopt;
+  uint64_t last = first, too_far = ~uint64_t{0};
+  while (too_far - last > 1) {
+    const uint64_t middle = last + (too_far - last) / 2;
+    (fits(middle) ? last : too_far) = middle;
+  }
+  return HashInterval{first, last};
+}
+
+HashPartition::HashPartition(std::span<const LevelRun* const> runs, std::vector<RunSlice> slices,
+                             const HashInterval& interval, uint64_t bucket_rows,
+                             bool with_positions, PartitionMemory& memory, MemoryBudget& budget)
+    : runs_(runs), slices_(std::move(slices)), interval_(interval), memory_(memory) {
+  uint64_t rows = 0, words = 0;
+  for (RunSlice& slice : slices_) {
+    const LevelRun& run = *runs_[slice.run];
+    const Extent extent = extent_of(run, slice.frames);
+    slice.first_row = run.rows_before(slice.frames.begin);
+    slice.rows = extent.rows;
+    slice.words = extent.words;
+    slice.row_base = rows;
+    slice.word_base = words;
+    rows += extent.rows;
+    words += extent.words;
+  }
+  bucket_bits_ = choose_bucket_bits(interval_, rows, bucket_rows, slices_.size());
+  bucket_count_ = (interval_.last >> bucket_bits_) - (interval_.first >> bucket_bits_) + 1;
+  memory_.reserve(rows, words, with_positions, budget);
+  bucket_begins_ = PageBuffer<RowOffset>(budget, (bucket_count_ + 1) * slices_.size(),
+                                         "the buckets of a hash partition");
+}
+
+void PartitionMemory::reserve(uint64_t rows, uint64_t words, bool with_positions,
+                              MemoryBudget& budget) {
+  words += kMaxRowWords;
+  if (rows <= hashes_.size() && words <= words_.size() &&
+      (!with_positions || rows <= positions_.size()))
+    return;
+  release();  // all columns, so that the peak is what one partition takes
+  hashes_ = PageBuffer<uint64_t>(budget, rows, "a hash partition of the merge");
+  masks_ = PageBuffer<uint8_t>(budget, rows, "a hash partition of the merge");
+  words_ = PageBuffer<uint32_t>(budget, words, "a hash partition of the merge");
+  if (with_positions)
+    positions_ = PageBuffer<uint32_t>(budget, rows, "a hash partition of the merge");
+}
+
+uint64_t PartitionMemory::bytes() const {
+  return hashes_.size() * sizeof(uint64_t) + masks_.size() +
+         (words_.size() + positions_.size()) * sizeof(uint32_t);
+}
+
+}  // namespace voxdag

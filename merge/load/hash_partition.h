@@ -1,0 +1,124 @@
+// A hash partition: all rows of one level whose hash lies in an interval, from all runs, in memory,
+// their children replaced by positions.
+//
+//   columns:   [slice of run 0] [slice of run 1] ...
+//   buckets:   the interval, divided into shares of 2^bucket_bits hashes
+//
+// A slice is whole frames of a run, so a few rows at its ends may lie outside of the interval.
+//
+// Within a slice rows are in the order of their hashes, so each bucket is a contiguous part of
+// every slice: from bucket_begin(b, slice) to bucket_begin(b + 1, slice). Usually one partition is
+// the whole hash space.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "merge/load/level_run.h"
+#include "merge/load/position_maps.h"
+
+namespace voxdag {
+
+// The frames of one run that a partition holds, and where their rows begin in its columns.
+struct RunSlice {
+  size_t run = 0;
+  FrameSpan frames;
+  uint64_t first_row = 0;  // of the run
+  uint64_t rows = 0, words = 0;
+  uint64_t row_base = 0, word_base = 0;
+};
+
+// Rows of a slice before some row, and words of those rows.
+struct RowOffset {
+  uint32_t row = 0;
+  uint32_t word = 0;
+};
+
+// The memory of a partition's columns. It is reused by the next partition, since the system takes
+// as long to zero new pages as it takes to read rows into them.
+class PartitionMemory {
+ public:
+  // Makes space for `rows` rows of `words` words in all; what was in the columns is lost.
+  void reserve(uint64_t rows, uint64_t words, bool with_positions, MemoryBudget& budget);
+  void release() { *this = {}; }
+  uint64_t bytes() const;
+
+ private:
+  friend class HashPartition;
+  PageBuffer<uint64_t> hashes_;
+  PageBuffer<uint8_t> masks_;
+  PageBuffer<uint32_t> words_;
+  PageBuffer<uint32_t> positions_;
+};
+
+// The threads that load a partition, and the memory that each may use besides it.
+struct PartitionWorkers {
+  unsigned count = 1;
+  uint64_t bytes_each = 0;
+};
+
+// An upper bound of the memory of a Frame with kFrameRows rows.
+inline constexpr uint64_t kFrameMemoryBytes = uint64_t{640} << 10;
+// Below this, 32 bits count the words of a partition.
+inline constexpr uint64_t kMaxPartitionBytes = uint64_t{8} << 30;
+
+class HashPartition {
+ public:
+  // `with_positions`: the partition also has a position for each of its rows.
+  static uint64_t bytes_for(uint64_t rows, uint64_t words, bool with_positions);
+  // The widest interval that begins with hash `first` and whose partition takes at most `bytes`;
+  // none if not even the rows of that one hash fit.
+  static std::optional<HashInterval> widest_interval(std::span<const LevelRun* const> runs,
+                                                     uint64_t first, uint64_t bytes,
+                                                     bool with_positions);
+  // One slice for each run that has frames within the interval; the constructor sets their bases.
+  static std::vector<RunSlice> slices_within(std::span<const LevelRun* const> runs,
+                                             const HashInterval& interval);
+
+  // Buckets get about `bucket_rows` rows if hashes are spread evenly. `memory` is used by one
+  // partition at a time.
+  HashPartition(std::span<const LevelRun* const> runs, std::vector<RunSlice> slices,
+                const HashInterval& interval, uint64_t bucket_rows, bool with_positions,
+                PartitionMemory& memory, MemoryBudget& budget);
+
+  // Reads the rows and replaces their children by positions. `child_maps` may be null if no run
+  // needs them.
+  void load(const PositionMaps* child_maps, const PartitionWorkers& workers, MemoryBudget& budget,
+            const CancelToken& cancel);
+
+  std::span<const RunSlice> slices() const { return slices_; }
+  size_t bucket_count() const { return bucket_count_; }
+  unsigned bucket_bits() const { return bucket_bits_; }
+  // Where a bucket begins in a slice. bucket_count() is where the last bucket ends.
+  RowOffset bucket_begin(size_t bucket, size_t slice) const {
+    return bucket_begins_[bucket * slices_.size() + slice];
+  }
+  const uint64_t* hashes() const { return memory_.hashes_.data(); }
+  const uint8_t* masks() const { return memory_.masks_.data(); }
+  const uint32_t* words() const { return memory_.words_.data(); }
+  uint32_t* positions() { return memory_.positions_.data(); }
+
+ private:
+  class Loader;
+
+  // The first hash of a bucket; that of bucket_count() is one past the last.
+  uint64_t first_hash(size_t bucket) const {
+    return bucket == 0 ? interval_.first
+                       : ((interval_.first >> bucket_bits_) + bucket) << bucket_bits_;
+  }
+
+  std::span<const LevelRun* const> runs_;
+  std::vector<RunSlice> slices_;
+  HashInterval interval_;
+  unsigned bucket_bits_ = 0;
+  size_t bucket_count_ = 0;
+  PartitionMemory& memory_;
+  PageBuffer<RowOffset> bucket_begins_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,182 @@
+// Loads a hash partition: decodes its frames and replaces children by positions (rewires them).
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "core/base/parallel_for.h"
+#include "merge/load/hash_partition.h"
+
+namespace voxdag {
+namespace {
+
+// Frames of one work item when the maps are in memory: enough that the map of the run stays in the
+// cache of the thread.
+constexpr size_t kFramesPerItem = 16;
+
+void replace_all(std::span<const uint32_t> children, const uint32_t* map, uint32_t* out) {
+  for (size_t i = 0; i < children.size(); ++i) out[i] = map[children[i]];
+}
+
+}  // namespace
+
+class HashPartition::Loader {
+ public:
+  Loader(HashPartition& partition, const PositionMaps* maps, const PartitionWorkers& workers,
+         MemoryBudget& budget)
+      : partition_(partition),
+        maps_(maps),
+        spilled_(maps && !maps->resident()),
+        workers_(workers.count) {
+    uint64_t window_rows = 0;
+    if (spilled_) {
+      const uint64_t window_bytes =
+          std::max(workers.bytes_each, kFrameMemoryBytes) - kFrameMemoryBytes;
+      window_rows =
+          std::clamp<uint64_t>(window_bytes / sizeof(uint32_t), 1024, maps->max_rows() + 1024);
+    }
+    for (Worker& worker : workers_) {
+      worker.charge = MemoryCharge(budget, kFrameMemoryBytes, "a frame of the merge");
+      worker.window = PageBuffer<uint32_t>(budget, window_rows, "a window of a position map");
+    }
+  }
+
+  // Work items: frames of one slice each. A spilled map is loaded once for all frames of a slice.
+  std::vector<FrameSpan> items(std::vector<size_t>& slice_of_item) const {
+    std::vector<FrameSpan> spans;
+    for (size_t s = 0; s < partition_.slices_.size(); ++s) {
+      const FrameSpan frames = partition_.slices_[s].frames;
+      const size_t step = spilled_ ? frames.end - frames.begin : kFramesPerItem;
+      for (size_t begin = frames.begin; begin < frames.end; begin += step) {
+        spans.push_back({begin, std::min(begin + step, frames.end)});
+        slice_of_item.push_back(s);
+      }
+    }
+    return spans;
+  }
+
+  void load(unsigned worker_index, size_t slice_index, const FrameSpan& frames,
+            const CancelToken& cancel) {
+    Worker& worker = workers_[worker_index];
+    const RunSlice& slice = partition_.slices_[slice_index];
+    const LevelRun& run = *partition_.runs_[slice.run];
+    const bool rewire = !run.bricks() && !run.rewired();
+    const bool by_windows = rewire && spilled_ && maps_->rows(slice.run) > worker.window.size();
+    const uint32_t* map = nullptr;
+    if (rewire && !spilled_) map = maps_->values(slice.run);
+    if (rewire && spilled_ && !by_windows) {
+      maps_->load(slice.run, 0, {worker.window.data(), maps_->rows(slice.run)});
+      map = worker.window.data();
+    }
+    for (size_t f = frames.begin; f < frames.end; ++f) {
+      cancel.check();
+      run.read_frame(f, worker.frame);
+      place(slice, run, f, worker.frame, map);
+      mark_bucket_begins(slice_index, run, f, worker.frame);
+    }
+    if (by_windows) replace_by_windows(worker, slice, cancel);
+  }
+
+ private:
+  struct Worker {
+    MemoryCharge charge;
+    Frame frame;
+    PageBuffer<uint32_t> window;
+    std::vector<bool> replaced;  // for each word of a slice; see HashPartition::bytes_for()
+  };
+
+  // Copies a frame into the columns; without a map its children stay as they are.
+  void place(const RunSlice& slice, const LevelRun& run, size_t f, const Frame& frame,
+             const uint32_t* map) {
+    const uint64_t row = slice.row_base + run.rows_before(f) - slice.first_row;
+    const uint64_t word =
+        slice.word_base + run.words_before(f) - run.words_before(slice.frames.begin);
+    std::copy(frame.hashes.begin(), frame.hashes.end(), partition_.memory_.hashes_.data() + row);
+    uint32_t* out = partition_.memory_.words_.data() + word;
+    if (run.bricks()) {
+      std::fill_n(partition_.memory_.masks_.data() + row, frame.rows, kBrickRowMask);
+      for (const uint64_t mask : frame.brick_masks) {
+        *out++ = static_cast<uint32_t>(mask >> 32);
+        *out++ = static_cast<uint32_t>(mask);
+      }
+      return;
+    }
+    std::copy(frame.masks.begin(), frame.masks.end(), partition_.memory_.masks_.data() + row);
+    if (map)
+      replace_all(frame.children, map, out);
+    else
+      std::copy(frame.children.begin(), frame.children.end(), out);
+  }
+
+  // The number of bucket begins, that of bucket_count() included, at or before this hash.
+  size_t begins_up_to(uint64_t hash) const {
+    const HashInterval& interval = partition_.interval_;
+    if (hash < interval.first) return 0;
+    if (hash > interval.last) return partition_.bucket_count_ + 1;
+    return (hash >> partition_.bucket_bits_) - (interval.first >> partition_.bucket_bits_) + 1;
+  }
+
+  // Sets the bucket begins that lie after the first row of this frame, up to the first row of the
+  // next one.
+  void mark_bucket_begins(size_t slice_index, const LevelRun& run, size_t f, const Frame& frame) {
+    const RunSlice& slice = partition_.slices_[slice_index];
+    size_t next = f == slice.frames.begin ? 0 : begins_up_to(frame.hashes.front());
+    const size_t end = f + 1 < slice.frames.end ? begins_up_to(run.frames()[f + 1].first_hash)
+                                                : partition_.bucket_count_ + 1;
+    RowOffset here{
+        static_cast<uint32_t>(run.rows_before(f) - slice.first_row),
+        static_cast<uint32_t>(run.words_before(f) - run.words_before(slice.frames.begin))};
+    const auto mark = [&] {
+      partition_.bucket_begins_[next++ * partition_.slices_.size() + slice_index] = here;
+    };
+    const uint8_t* masks = partition_.memory_.masks_.data() + slice.row_base + here.row;
+    for (size_t i = 0; i < frame.rows && next < end; ++i) {
+      while (next < end && reached(next, frame.hashes[i])) mark();
+      ++here.row;
+      here.word += kRowWords[masks[i]];
+    }
+    if (next == end) return;
+    here.row = static_cast<uint32_t>(run.rows_before(f + 1) - slice.first_row);
+    here.word =
+        static_cast<uint32_t>(run.words_before(f + 1) - run.words_before(slice.frames.begin));
+    while (next < end) mark();
+  }
+
+  bool reached(size_t bucket, uint64_t hash) const {
+    return bucket < partition_.bucket_count_ ? hash >= partition_.first_hash(bucket)
+                                             : hash > partition_.interval_.last;
+  }
+
+  // For a map that is larger than the memory of a worker: loads one window of it at a time.
+  void replace_by_windows(Worker& worker, const RunSlice& slice, const CancelToken& cancel) {
+    worker.replaced.assign(slice.words, false);
+    uint32_t* const words = partition_.memory_.words_.data() + slice.word_base;
+    const uint64_t map_rows = maps_->rows(slice.run);
+    for (uint64_t first = 0; first < map_rows; first += worker.window.size()) {
+      cancel.check();
+      const uint64_t rows = std::min<uint64_t>(worker.window.size(), map_rows - first);
+      maps_->load(slice.run, first, {worker.window.data(), rows});
+      for (uint64_t i = 0; i < slice.words; ++i) {
+        if (worker.replaced[i] || words[i] < first || words[i] - first >= rows) continue;
+        words[i] = worker.window[words[i] - first];
+        worker.replaced[i] = true;
+      }
+    }
+  }
+
+  HashPartition& partition_;
+  const PositionMaps* const maps_;
+  const bool spilled_;
+  std::vector<Worker> workers_;
+};
+
+void HashPartition::load(const PositionMaps* child_maps, const PartitionWorkers& workers,
+                         MemoryBudget& budget, const CancelToken& cancel) {
+  Loader loader(*this, child_maps, workers, budget);
+  std::vector<size_t> slice_of_item;
+  const std::vector<FrameSpan> items = loader.items(slice_of_item);
+  parallel_for(workers.count, items.size(), [&](unsigned worker, size_t item) {
+    loader.load(worker, slice_of_item[item], items[item], cancel);
+  });
+}
+
+}  // namespace voxdag

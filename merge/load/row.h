@@ -1,0 +1,44 @@
+// A row of a level as the merge holds it, and the terms of the merge, each with one meaning:
+//
+//   row             one node or brick of one artifact: hash, mask and words
+//   run             the rows of one level of one artifact (or of the top tree), in the total order
+//   hash partition  a contiguous range of the hash space, merged as one unit: its rows
+//                   from all runs are in memory together
+//   bucket          an equal share of a hash partition's range, whose rows one thread sorts
+//   position        where a row lies in the merged level: a word offset in the global file,
+//                   an index in an artifact
+//
+// A node's words are its children. A brick is held as a node of mask 3 whose two words are the high
+// and the low half of its voxel mask, so that one order, (hash, mask, words lexicographically), is
+// the total order of both.
+//
+// Wherever the words of a row lie, kMaxRowWords words can be read from the first one on: a row is
+// then copied without a branch on its number of words, which would be as good as random.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/popcount8.h"
+#include "core/dag/level_array.h"
+
+namespace voxdag {
+
+inline constexpr uint8_t kBrickRowMask = 3;
+inline constexpr uint32_t kBrickWords = 2;
+inline constexpr uint32_t kMaxRowWords = 8;
+
+// Words of a row by its mask.
+inline constexpr auto& kRowWords = kPopcount8;
+
+struct RowKey {
+  uint64_t hash = 0;
+  uint8_t mask = 0;
+  const uint32_t* words = nullptr;
+};
+
+// Negative, 0 or positive as `a` is before, equal to or after `b` in the total order.
+inline int compare_rows(const RowKey& a, const RowKey& b) {
+  return compare_nodes(a.hash, a.mask, a.words, b.hash, b.mask, b.words);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,104 @@
+// Files in a folder of the merge's own, for what does not fit in memory or must survive a crash.
+//
+// A file is removed with the last object that refers to its path, unless it is retained for a later
+// run that resumes the merge. Reading returns the words that were written, or throws
+// Error{kCorrupt}.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/io/file_system.h"
+
+namespace voxdag {
+
+class ScratchFolder {
+ public:
+  // Makes the folder if it is missing.
+  ScratchFolder(FileSystem& files, const std::string& path) : files_(files), path_(path) {
+    files_.make_directories(path_);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  FileSystem& files() { return files_; }
+  const std::string& path() const { return path_; }
+  // All bytes that this merge wrote to files of the folder, removed files included.
+  uint64_t bytes_written() const { return bytes_written_; }
+  void count_written(uint64_t bytes) { bytes_written_ += bytes; }
+  // Returns every id once.
+  uint32_t take_id() { return next_id_++; }
+  uint32_t next_id() const { return next_id_; }
+  void set_next_id(uint32_t id) { next_id_ = id; }
+  // Removes the files that an earlier merge left, except `names`. Files with names that a merge
+  // never uses are not touched.
+  void remove_all_but(const std::set<std::string>& names);
+
+ private:
+  FileSystem& files_;
+  const std::string path_;
+  uint32_t next_id_ = 0;
+  std::atomic<uint64_t> bytes_written_{0};
+};
+
+// Owns the name of a file in the folder.
+class ScratchPath {
+ public:
+  ScratchPath(ScratchFolder& folder, std::string name) : folder_(folder), name_(std::move(name)) {}
+  // Removes the file unless it is retained.
+  ~ScratchPath();
+  ScratchPath(const ScratchPath&) = delete;
+  ScratchPath& operator=(const ScratchPath&) = delete;
+
+  const std::string& name() const { return name_; }
+  std::string path() const { return folder_.path() + "/" + name_; }
+  // The file outlives this object.
+  void retain() { retained_ = true; }
+
+ private:
+  ScratchFolder& folder_;
+  const std::string name_;
+  bool retained_ = false;
+};
+
+// What is needed to open a scratch file again.
+struct ScratchFileState {
+  uint32_t id = 0;
+  uint64_t words = 0;
+  std::vector<uint64_t> checksums;  // of each checksum block
+};
+
+// One file of 32-bit words without gaps, written and read by offset. Each word is written once, by
+// one thread at a time; several threads may read what was written before.
+class ScratchFile {
+ public:
+  explicit ScratchFile(ScratchFolder& folder);
+  // Opens the file that an earlier merge left.
+  ScratchFile(ScratchFolder& folder, ScratchFileState state);
+
+  void write(uint64_t first_word, std::span<const uint32_t> words);
+  // Throws Error{kCorrupt} if the disk returns other words than were written.
+  void read(uint64_t first_word, std::span<uint32_t> words) const;
+  void sync() { out_->sync(); }
+
+  const ScratchFileState& state() const { return state_; }
+  const std::shared_ptr<ScratchPath>& path() const { return path_; }
+  static std::string name_of(uint32_t id) { return "merge-" + std::to_string(id) + ".tmp"; }
+
+ private:
+  // Words of a checksum block; at 8 bytes per block, checksums take a thousandth of the file.
+  static constexpr uint64_t kBlockWords = 2048;
+
+  ScratchFolder& folder_;
+  ScratchFileState state_;
+  const std::shared_ptr<ScratchPath> path_;
+  std::unique_ptr<WritableFile> out_;
+  std::unique_ptr<ReadableFile> in_;
+};
+
+}  // namespace voxdag

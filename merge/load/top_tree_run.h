@@ -1,0 +1,45 @@
+// One level of the top tree: the nodes whose children are roots of subvolumes or other top nodes.
+// It is one more run of its level, its children already positions.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/cube.h"
+#include "merge/load/level_run.h"
+
+namespace voxdag {
+
+// A node whose cube of the grid and whose position in the merged level are known.
+struct PlacedNode {
+  Cube cube;
+  uint64_t hash = 0;  // truncated
+  uint32_t position = 0;
+};
+
+class TopTreeRun : public LevelRun {
+ public:
+  // Makes the parents of `children`, which are all top nodes and roots of the level below. Throws
+  // Error{kCorrupt} for two children with the same cube: their subvolumes overlap.
+  TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children);
+  void read_frame(size_t index, Frame& out) const override;
+
+  const Cube& cube(size_t row) const { return nodes_[row].cube; }
+  uint64_t hash(size_t row) const { return nodes_[row].hash; }
+
+ private:
+  struct Node {
+    Cube cube;
+    uint64_t hash = 0;
+    uint8_t mask = 0;
+    uint32_t children[8] = {};
+  };
+
+  void add_parents(const std::vector<PlacedNode>& children, uint32_t hash_bits);
+  void divide_into_frames();
+
+  std::vector<Node> nodes_;  // in the total order, equal ones included
+  std::vector<FrameInfo> infos_;
+};
+
+}  // namespace voxdag

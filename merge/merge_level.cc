@@ -1,0 +1,236 @@
+#include "merge/merge_level.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "merge/fallback/hash_group_merge.h"
+#include "merge/fallback/heap_merge.h"
+#include "merge/sort/bucket_sorter.h"
+#include "merge/sort/sequencer.h"
+
+namespace voxdag {
+namespace {
+
+// What stays in the own cache of a core while it is sorted.
+constexpr uint64_t kBucketRows = 8192;
+// With many runs buckets are larger, so that the share of each run is worth a visit.
+constexpr uint64_t kMinBucketRowsPerRun = 16;
+
+// Walks the rows of one slice within one bucket.
+class SliceCursor {
+ public:
+  SliceCursor(const HashPartition& partition, size_t slice, size_t bucket) : partition_(partition) {
+    const RunSlice& s = partition.slices()[slice];
+    row_ = s.row_base + partition.bucket_begin(bucket, slice).row;
+    end_ = s.row_base + partition.bucket_begin(bucket + 1, slice).row;
+    word_ = s.word_base + partition.bucket_begin(bucket, slice).word;
+  }
+  bool at_end() const { return row_ == end_; }
+  RowKey row() const {
+    return {partition_.hashes()[row_], partition_.masks()[row_], partition_.words() + word_};
+  }
+  void advance() { word_ += kRowWords[partition_.masks()[row_++]]; }
+
+ private:
+  const HashPartition& partition_;
+  uint64_t row_, end_, word_;
+};
+
+// Merges the buckets of one hash partition in parallel.
+class PartitionMerge {
+ public:
+  PartitionMerge(const MergeContext& context, const LevelTask& task, HashPartition& partition,
+                 uint64_t first_position)
+      : context_(context), task_(task), partition_(partition), sequencer_(first_position) {}
+
+  LevelExtent run() {
+    make_sorters();
+    const auto merge_bucket = [&](unsigned worker, size_t bucket) {
+      try {
+        context_.cancel.check();
+        const BucketSize size = size_of(bucket);
+        if (fits(size))
+          sort(sorters_[worker], bucket);
+        else
+          merge_by_rows(bucket);
+        context_.progress.advance(size.rows);
+      } catch (...) {
+        sequencer_.close();
+        throw;
+      }
+    };
+    parallel_for(context_.plan.workers, partition_.bucket_count(), merge_bucket);
+    if (!task_.maps.resident()) store_positions();
+    return extent_;
+  }
+
+ private:
+  struct BucketSize {
+    uint64_t rows = 0;
+    uint64_t words = 0;
+  };
+
+  BucketSize size_of(size_t bucket) const {
+    BucketSize size;
+    for (size_t s = 0; s < partition_.slices().size(); ++s) {
+      const RowOffset begin = partition_.bucket_begin(bucket, s);
+      const RowOffset end = partition_.bucket_begin(bucket + 1, s);
+      size.rows += end.row - begin.row;
+      size.words += end.word - begin.word;
+    }
+    return size;
+  }
+
+  // Whether a worker can sort a bucket of this size.
+  bool fits(const BucketSize& size) const {
+    return size.rows <= BucketSorter::kMaxRows &&
+           BucketSorter::bytes_for(size.rows, size.words) <= context_.plan.worker_bytes;
+  }
+
+  // One for each worker, large enough for every bucket that fits.
+  void make_sorters() {
+    BucketSize max;
+    for (size_t bucket = 0; bucket < partition_.bucket_count(); ++bucket) {
+      const BucketSize size = size_of(bucket);
+      if (!fits(size)) continue;
+      max.rows = std::max(max.rows, size.rows);
+      max.words = std::max(max.words, size.words);
+    }
+    for (unsigned worker = 0; worker < context_.plan.workers; ++worker)
+      sorters_.emplace_back(context_.budget, task_.bricks, max.rows, max.words);
+  }
+
+  void sort(BucketSorter& sorter, size_t bucket) {
+    sorter.sort(partition_, bucket, task_.output.in_words());
+    const auto position = sequencer_.wait_for_turn(bucket);
+    if (!position) return;
+    task_.output.add(sorter.unique());
+    end_turn({sorter.unique().row_count(), sorter.extent()});
+    task_.output.write(*position, sorter.unique());
+    const uint32_t* from = sorter.positions().data();
+    for (size_t s = 0; s < partition_.slices().size(); ++s) {
+      const uint32_t rows =
+          partition_.bucket_begin(bucket + 1, s).row - partition_.bucket_begin(bucket, s).row;
+      uint32_t* const to = positions_of(bucket, s);
+      for (uint32_t i = 0; i < rows; ++i) to[i] = static_cast<uint32_t>(*position) + from[i];
+      from += rows;
+    }
+  }
+
+  void merge_by_rows(size_t bucket) {
+    const auto position = sequencer_.wait_for_turn(bucket);
+    if (!position) return;
+    OrderedRowWriter out(task_.output, task_.bricks, *position, context_.budget);
+    std::vector<SliceCursor> cursors;
+    std::vector<uint32_t*> to;
+    for (size_t s = 0; s < partition_.slices().size(); ++s) {
+      cursors.emplace_back(partition_, s, bucket);
+      to.push_back(positions_of(bucket, s));
+    }
+    uint64_t rows = 0;
+    merge_cursors(std::span(cursors), [&](size_t s, const RowKey& row) {
+      *to[s]++ = static_cast<uint32_t>(out.add(row));
+      if (++rows % kFrameRows == 0) context_.cancel.check();
+    });
+    out.flush();
+    end_turn({out.nodes(), out.end_position() - *position});
+  }
+
+  // Called in the turn of the bucket that has this extent.
+  void end_turn(const LevelExtent& bucket) {
+    extent_.nodes += bucket.nodes;
+    extent_.positions += bucket.positions;
+    sequencer_.end_turn(bucket.positions);
+  }
+
+  // Where the positions of the rows of a slice in a bucket are stored.
+  uint32_t* positions_of(size_t bucket, size_t s) {
+    const RunSlice& slice = partition_.slices()[s];
+    const uint32_t row = partition_.bucket_begin(bucket, s).row;
+    return task_.maps.resident() ? task_.maps.values(slice.run) + slice.first_row + row
+                                 : partition_.positions() + slice.row_base + row;
+  }
+
+  void store_positions() {
+    for (size_t s = 0; s < partition_.slices().size(); ++s) {
+      const RunSlice& slice = partition_.slices()[s];
+      const uint32_t begin = partition_.bucket_begin(0, s).row;
+      const uint32_t end = partition_.bucket_begin(partition_.bucket_count(), s).row;
+      task_.maps.store(slice.run, slice.first_row + begin,
+                       {partition_.positions() + slice.row_base + begin, end - begin});
+    }
+  }
+
+  const MergeContext& context_;
+  const LevelTask& task_;
+  HashPartition& partition_;
+  Sequencer sequencer_;
+  std::vector<BucketSorter> sorters_;
+  LevelExtent extent_;  // changed in turn
+};
+
+uint64_t bucket_rows(const MergeContext& context, size_t runs) {
+  const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * runs);
+  // Half of what the memory of a worker can hold, since buckets differ in size.
+  return std::min(rows, context.plan.worker_bytes / (2 * BucketSorter::bytes_for(1, kMaxRowWords)));
+}
+
+LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,
+                            const HashInterval& interval, uint64_t first_position) {
+  HashPartition partition(task.runs, HashPartition::slices_within(task.runs, interval), interval,
+                          bucket_rows(context, task.runs.size()), !task.maps.resident(),
+                          task.memory, context.budget);
+  partition.load(task.child_maps, {context.plan.workers, context.plan.worker_bytes}, context.budget,
+                 context.cancel);
+  return PartitionMerge(context, task, partition, first_position).run();
+}
+
+// The plan has space for two frames of every run, so only a group of equal hashes that is longer
+// than that in some run may fail to fit. Throws Error{kOutOfMemory} if no run has one.
+void check_group_is_large(const LevelTask& task, uint64_t hash) {
+  for (const LevelRun* run : task.runs) {
+    const FrameSpan frames = run->frames_within({hash, hash});
+    if (frames.end - frames.begin > 2) return;
+  }
+  throw Error(ErrorCode::kOutOfMemory, "out of memory: level " + std::to_string(task.level) +
+                                           " of " + std::to_string(task.runs.size()) +
+                                           " runs does not fit the merge's memory");
+}
+
+}  // namespace
+
+uint64_t bytes_for_workers(const MergeMemory& plan) {
+  return plan.workers * std::max(plan.worker_bytes, OrderedRowWriter::bytes());
+}
+
+LevelExtent merge_level(const MergeContext& context, const LevelTask& task) {
+  for (const LevelRun* run : task.runs) context.report.input_nodes += run->rows();
+  const uint64_t available = context.budget.available() + task.memory.bytes();
+  const uint64_t for_workers = bytes_for_workers(context.plan);
+  const uint64_t partition_bytes =
+      MergeMemory::partition_bytes_within(available - std::min(available, for_workers));
+  LevelExtent extent;
+  HashInterval done{0, 0};
+  for (uint64_t first = 0;; first = done.last + 1) {
+    const auto interval =
+        HashPartition::widest_interval(task.runs, first, partition_bytes, !task.maps.resident());
+    LevelExtent part;
+    if (interval) {
+      done = *interval;
+      part = merge_partition(context, task, done, extent.positions);
+      ++context.report.hash_partitions;
+    } else {
+      check_group_is_large(task, first);
+      done = {first, first};
+      part = merge_hash_group(context, task, first, extent.positions, partition_bytes);
+      ++context.report.streamed_groups;
+    }
+    extent.add(part, task.level, task.output.in_words());
+    if (done.last == ~uint64_t{0}) return extent;
+  }
+}
+
+}  // namespace voxdag

@@ -1,0 +1,40 @@
+// One merge pass: all levels of some artifacts, from the bricks up, into one output.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/format/artifact/artifact_reader.h"
+#include "merge/load/top_tree_run.h"
+#include "merge/merge_context.h"
+
+namespace voxdag {
+
+struct PassTask {
+  uint32_t grid_levels = 2;
+  uint32_t hash_bits = 64;
+  // In the final pass the top tree is added and the last level is the root; in earlier passes it is
+  // that of the highest subvolume.
+  bool is_final = false;
+  std::span<const ArtifactReader> artifacts;
+};
+
+// How far a pass is: all that the levels above need to know of the merged ones.
+struct PassProgress {
+  std::optional<uint32_t> level;     // merged last; none before the bricks
+  std::optional<PositionMaps> maps;  // of that level
+  std::vector<PlacedNode> placed;    // on that level
+  // Of subvolumes on that level and below, `index` being their position in the output.
+  std::vector<ArtifactRoot> roots;
+};
+
+// Continues from `progress`, and calls `after_level`, if there is one, after every level. Returns
+// the roots of the subvolumes, `index` being their position in `output`.
+std::vector<ArtifactRoot> run_merge_pass(
+    const MergeContext& context, const PassTask& task, LevelOutput& output, PassProgress progress,
+    const std::function<void(const PassProgress&)>& after_level);
+
+}  // namespace voxdag

@@ -1,0 +1,56 @@
+// Unique rows of a level in the total order, with their hashes, as they go to the output.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "merge/load/row.h"
+
+namespace voxdag {
+
+// Rows are encoded as in the global file: a node is its mask followed by its children, a brick its
+// low half followed by its high half.
+class MergedRows {
+ public:
+  // Has space for `rows` rows of `row_words` words in all.
+  MergedRows(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t row_words)
+      : bricks_(bricks),
+        words_(budget, row_words + (bricks ? 0 : rows) + kMaxRowWords, "the merge's output"),
+        hashes_(budget, rows, "the merge's output") {}
+  static uint64_t bytes_for(uint64_t rows, uint64_t row_words) { return 12 * rows + 4 * row_words; }
+
+  void clear() { word_count_ = row_count_ = 0; }
+  // The row must fit.
+  void push(uint64_t hash, uint8_t mask, const uint32_t* row_words) {
+    hashes_[row_count_++] = hash;
+    uint32_t* out = words_.data() + word_count_;
+    if (bricks_) {
+      out[0] = row_words[1];
+      out[1] = row_words[0];
+      word_count_ += kBrickWords;
+      return;
+    }
+    out[0] = mask;
+    std::memcpy(out + 1, row_words, kMaxRowWords * sizeof(uint32_t));
+    word_count_ += 1 + kRowWords[mask];
+  }
+
+  bool bricks() const { return bricks_; }
+  bool full() const { return row_count_ == hashes_.size(); }
+  uint64_t row_count() const { return row_count_; }
+  uint64_t word_count() const { return word_count_; }
+  std::span<const uint32_t> words() const { return {words_.data(), word_count_}; }
+  std::span<const uint64_t> hashes() const { return {hashes_.data(), row_count_}; }
+
+ private:
+  bool bricks_;
+  PageBuffer<uint32_t> words_;
+  PageBuffer<uint64_t> hashes_;
+  uint64_t word_count_ = 0;
+  uint64_t row_count_ = 0;
+};
+
+}  // namespace voxdag

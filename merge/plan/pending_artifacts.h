@@ -1,0 +1,64 @@
+// The artifacts that the next merge pass reads: inputs at first, then artifacts of earlier passes
+// (intermediates), together with the segment files that hold the intermediates.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "merge/merge.h"
+#include "merge/output/pass_segment.h"
+#include "merge/plan/artifact_set.h"
+
+namespace voxdag {
+
+class PendingArtifacts {
+ public:
+  // All inputs. Throws Error{kCorrupt} as survey_artifacts() does.
+  explicit PendingArtifacts(const MergeInputs& inputs);
+  PendingArtifacts(const PendingArtifacts&) = delete;
+  PendingArtifacts& operator=(const PendingArtifacts&) = delete;
+
+  // In Morton order.
+  std::span<const SurveyedArtifact> artifacts() const { return artifacts_; }
+  size_t size() const { return artifacts_.size(); }
+  // Rows of all of them.
+  uint64_t rows() const { return rows_; }
+  bool has_inputs() const;
+  // Identifies the inputs by their content.
+  uint64_t inputs_checksum() const { return inputs_checksum_; }
+  // Where to end consecutive groups of artifacts so that each can be merged within
+  // `partition_bytes`; a group has at least one artifact.
+  std::vector<size_t> group_ends(uint64_t partition_bytes) const;
+  bool fit_at_once(uint64_t partition_bytes) const {
+    return size() < 2 || group_ends(partition_bytes).size() == 1;
+  }
+  ArtifactSet open(size_t begin, size_t end, MemoryBudget& budget) const;
+
+  // Adds the segment that a pass writes next.
+  PassSegment& add_segment(std::unique_ptr<PassSegment> segment);
+  // The scratch files of all segments.
+  std::vector<std::shared_ptr<ScratchPath>> segment_paths() const;
+  // After a pass: `merged`, which all lie in `segment`, replace all artifacts, which are returned.
+  std::vector<SurveyedArtifact> replace_all(const std::vector<ArtifactRef>& merged,
+                                            const PassSegment& segment);
+  // When a merge is resumed: `intermediates`, whose segments were added, replace the inputs whose
+  // roots they hold.
+  void replace_inputs(const std::vector<ArtifactRef>& intermediates);
+  // All inputs again, without intermediates.
+  void reset();
+
+ private:
+  void survey(std::span<const ArtifactRef> refs);
+
+  const MergeInputs& inputs_;
+  const OpenSegment open_;
+  std::map<uint32_t, std::unique_ptr<PassSegment>> segments_;
+  std::vector<SurveyedArtifact> artifacts_;
+  uint64_t rows_ = 0;
+  uint64_t inputs_checksum_ = 0;
+};
+
+}  // namespace voxdag

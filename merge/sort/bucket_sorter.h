@@ -1,0 +1,65 @@
+// Sorts one bucket of a hash partition: brings its rows, from all runs, into the total order and
+// deduplicates them. This is the inner loop of the merge.
+//
+// Unless hashes are truncated they are spread evenly, so one pass that distributes the rows by the
+// bits of the hash below those of the bucket leaves almost nothing to sort. Rows of equal hash are
+// then compared as a whole. One sorter is used by one thread.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "merge/load/hash_partition.h"
+#include "merge/output/merged_rows.h"
+
+namespace voxdag {
+
+class BucketSorter {
+ public:
+  // Rows of a bucket: the limit for sort().
+  static constexpr uint64_t kMaxRows = uint64_t{1} << 20;
+
+  // For buckets of up to `rows` rows with `words` words in all.
+  BucketSorter(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t words);
+  static uint64_t bytes_for(uint64_t rows, uint64_t words);
+
+  // Positions count words if `in_words`, else rows.
+  void sort(const HashPartition& partition, size_t bucket, bool in_words);
+
+  // The unique rows of the bucket that was sorted last.
+  const MergedRows& unique() const { return unique_; }
+  // The position of every row, relative to the first position of the bucket: slice after slice, in
+  // the order of each slice.
+  std::span<const uint32_t> positions() const { return {positions_.data(), row_count_}; }
+  // How many positions the unique rows take.
+  uint64_t extent() const { return extent_; }
+
+ private:
+  struct Entry {
+    uint64_t hash;
+    uint32_t row_and_mask;  // the mask above, the row in the order of positions() below
+    uint32_t word;          // the first one, in the partition
+
+    uint32_t row() const { return row_and_mask & 0xffffff; }
+    uint8_t mask() const { return static_cast<uint8_t>(row_and_mask >> 24); }
+  };
+  static_assert(kMaxRows <= uint64_t{1} << 24);
+
+  void distribute(const HashPartition& partition, size_t bucket);
+  void sort_digits(size_t digit_count);
+  void emit_unique(bool in_words);
+  bool same_row(const Entry& a, const Entry& b) const;
+
+  PageBuffer<Entry> entries_;
+  PageBuffer<uint32_t> positions_;
+  PageBuffer<uint32_t> digit_ends_;
+  MergedRows unique_;
+  const uint32_t* words_ = nullptr;
+  size_t row_count_ = 0;
+  uint64_t extent_ = 0;
+};
+
+}  // namespace voxdag
