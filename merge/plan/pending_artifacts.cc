@@ -6,9 +6,6 @@
 #include "core/format/checksum.h"
 
 namespace voxdag {
-namespace {
-
-}  // namespace
 
 PendingArtifacts::PendingArtifacts(const MergeInputs& inputs)
     : inputs_(inputs), open_([this](uint32_t id) {
