@@ -9,6 +9,7 @@
 
 #include "core/base/cancel_token.h"
 #include "core/base/error.h"
+#include "core/io/file_system.h"
 #include "scheduler/job/job_store.h"
 
 namespace voxdag {
