@@ -1,17 +1,8 @@
+#include "scheduler/build_report.h"
+
 #include <nlohmann/json.hpp>
 
-#include "scheduler/run_build.h"
-
 namespace voxdag {
-
-std::string geometry_json(const GeometryOptions& options) {
-  nlohmann::ordered_json json = {{"resolution", options.resolution},
-                                 {"hash_bits", options.hash_bits},
-                                 {"skip_invalid", options.skip_invalid}};
-  if (options.bounds) json["bounds"] = *options.bounds;
-  if (options.voxel_size) json["voxel_size"] = *options.voxel_size;
-  return json.dump();
-}
 
 std::string report_json(const BuildReport& report) {
   using nlohmann::ordered_json;

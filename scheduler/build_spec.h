@@ -1,4 +1,4 @@
-// What a build is asked to do, what it answers, and the one entry for cli and server.
+// What a build is asked to do, and what it needs of its surroundings.
 #pragma once
 
 #include <array>
@@ -24,7 +24,11 @@ struct GeometryOptions {
   uint32_t hash_bits = 64;
 };
 
-// Run options never do.
+// Geometry options as one line of JSON, to compare jobs and for messages. Scenes are left out: only
+// their content counts.
+std::string geometry_json(const GeometryOptions& options);
+
+// Run options never change the bytes of the global file.
 struct RunOptions {
   std::string output;            // the global file
   std::string work_folder;       // "" for output + ".work"

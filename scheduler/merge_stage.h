@@ -6,11 +6,11 @@
 #include "core/base/memory_budget.h"
 #include "core/base/stage_clock.h"
 #include "core/format/global/global_writer.h"
+#include "scheduler/build_report.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/execute/commit_queue.h"
 #include "scheduler/job/job_store.h"
 #include "scheduler/job/work_folder.h"
-#include "scheduler/run_build.h"
 
 namespace voxdag {
 

@@ -7,7 +7,6 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "scheduler/plan/prepare.h"
-#include "scheduler/run_build.h"
 
 namespace voxdag {
 namespace {

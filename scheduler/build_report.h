@@ -1,0 +1,47 @@
+// The report of a finished build. A plain value.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/stage_clock.h"
+#include "core/geometry/grid.h"
+
+namespace voxdag {
+
+struct BuildReport {
+  std::string output;
+  std::string sha256;
+  Grid grid;
+  uint32_t hash_bits = 64;
+  uint64_t bytes = 0;
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;
+  uint64_t dag_nodes = 0;
+  uint64_t triangles = 0;  // that may touch the grid
+  uint64_t dropped_outside = 0;
+  uint64_t dropped_invalid = 0;
+  uint64_t subvolumes = 0;  // built, empty ones included
+  uint64_t subvolumes_split = 0;
+  uint64_t subvolumes_reused = 0;  // from an earlier run of this job, or from the cache
+  uint64_t subvolumes_cached = 0;  // those from the cache
+  uint64_t artifact_bytes = 0;
+  uint64_t artifact_nodes = 0;
+  uint64_t spill_bytes = 0;
+  uint32_t merge_rounds = 0;
+  uint64_t merge_ranges = 0;
+  uint64_t merge_streamed_groups = 0;
+  uint64_t memory_bytes = 0;
+  unsigned threads = 0;
+  std::string backend;  // that built what was not reused
+  std::vector<StageTime> stages;
+  double wall_s = 0;
+  double cpu_s = 0;
+  uint64_t peak_rss_bytes = 0;
+};
+
+// One JSON object; docs/cli.md lists its names.
+std::string report_json(const BuildReport& report);
+
+}  // namespace voxdag
