@@ -1,7 +1,5 @@
 #include "scheduler/prepare.h"
 
-#include <malloc.h>
-
 #include <algorithm>
 #include <chrono>
 #include <span>
@@ -11,6 +9,7 @@
 #include "core/base/process_limits.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/ingest/ingest.h"
+#include "scheduler/memory_plan.h"
 #include "scheduler/triangles/partition.h"
 
 namespace voxdag {
@@ -124,13 +123,12 @@ class Preparation {
     state_.stage = IngestStage::kIngest;
     state_.position = 0;
     state_.digest = ContentDigest(state_.grid);
-    state_.top_tree_depth = TopTree::depth_within(state_.grid.levels, budget_.limit() / 16);
+    state_.top_tree_depth = TopTree::depth_within(state_.grid.levels, memory_.top_tree_bytes);
     checkpoint_.save(state_);
   }
 
   void open_store() {
-    prepared_.triangle_budget =
-        std::make_unique<MemoryBudget>(triangle_share(budget_.limit()), &budget_);
+    prepared_.triangle_budget = std::make_unique<MemoryBudget>(memory_.triangle_bytes, &budget_);
     prepared_.triangles = checkpoint_.open_store(state_, *prepared_.triangle_budget);
     if (state_.stage == IngestStage::kReady) prepared_.triangles->release(kSceneBin);
   }
@@ -139,7 +137,7 @@ class Preparation {
     TopTree top(state_.grid.levels, state_.top_tree_depth, budget_);
     checkpoint_.load_top_tree(state_, top);
     if (state_.stage == IngestStage::kIngest) {
-      BinWriter writer(*prepared_.triangles, {kSceneBin}, size_t{1} << 20);
+      BinWriter writer(*prepared_.triangles, {kSceneBin}, MemoryPlan::kIngestBufferBytes);
       ingest(*scene_, spec_.run.threads, state_, writer, top, context_, [&] {
         if (!checkpoint_.is_due()) return;
         writer.flush();
@@ -154,6 +152,7 @@ class Preparation {
 
   const BuildSpec& spec_;
   MemoryBudget& budget_;
+  const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
   const BuildContext& context_;
   IngestCheckpoint& checkpoint_;
   std::unique_ptr<TriangleSource> scene_;
@@ -188,7 +187,7 @@ std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube
   }
   const auto bins = assign_bins(triangles, state.grid.levels, cubes, buffer_bytes, cancel);
   // Chunks of triangles are small blocks of the heap, which would keep them resident.
-  malloc_trim(0);
+  trim_heap();
   return bins;
 }
 

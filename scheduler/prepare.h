@@ -20,9 +20,6 @@ namespace voxdag {
 // Error{kDevice} for a backend whose device is missing.
 BuildSpec checked(const BuildSpec& spec);
 
-// Of a budget, what triangles may take.
-inline uint64_t triangle_share(uint64_t memory_bytes) { return memory_bytes / 3; }
-
 // A scene after ingest: its triangles, and the subvolumes they are to be partitioned to.
 struct PreparedScene {
   IngestState state;

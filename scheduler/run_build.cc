@@ -15,6 +15,7 @@
 #include "scheduler/job/job_progress.h"
 #include "scheduler/job/output_lock.h"
 #include "scheduler/job/work_folder.h"
+#include "scheduler/memory_plan.h"
 #include "scheduler/merge_stage.h"
 #include "scheduler/prepare.h"
 
@@ -191,8 +192,8 @@ class Build {
   void build_subvolumes_of(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
     std::vector<Cube> cubes;
     for (const StoredSubvolume& subvolume : planned) cubes.push_back(subvolume.cube);
-    const std::vector<BinId> bins =
-        partition_prepared(scene, cubes, checkpoint_, budget_.limit() / 8, context_.cancel);
+    const std::vector<BinId> bins = partition_prepared(
+        scene, cubes, checkpoint_, memory_.partition_buffer_bytes, context_.cancel);
     std::vector<QueuedSubvolume> queue;
     for (size_t i = 0; i < planned.size(); ++i) queue.push_back({planned[i], bins[i]});
     const MemoryCharge lists(budget_, queue.size() * (sizeof queue[0] + sizeof planned[0]),
@@ -292,6 +293,7 @@ class Build {
 
   const BuildSpec spec_;
   MemoryBudget budget_;
+  const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
   const OutputLock output_lock_;
   WorkFolder work_;
   std::optional<ArtifactCache> cache_;
@@ -309,6 +311,7 @@ class Build {
 
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
   check_output(context.files, spec.run.output);
+  return_freed_memory_to_system();
   return Build(spec, context).run();
 }
 

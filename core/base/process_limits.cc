@@ -1,5 +1,6 @@
 #include "core/base/process_limits.h"
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,18 +18,18 @@ uint64_t number_in(const std::string& path) {
   return file >> bytes ? bytes : UINT64_MAX;  // "max" does not parse: no limit
 }
 
-// The least limit from the group at `path` up to the root of the hierarchy.
+// The lowest limit from the group at `path` up to the root of the hierarchy.
 uint64_t min_up_from(const std::string& root, std::string path, const std::string& file) {
-  uint64_t least = UINT64_MAX;
+  uint64_t lowest = UINT64_MAX;
   for (;;) {
-    least = std::min(least, number_in(root + path + "/" + file));
+    lowest = std::min(lowest, number_in(root + path + "/" + file));
     const size_t slash = path.find_last_of('/');
-    if (path.empty() || slash == std::string::npos) return least;
+    if (path.empty() || slash == std::string::npos) return lowest;
     path.resize(slash);
   }
 }
 
-// A size that the kernel tells about this process; 0 where it does not.
+// A size in the kernel's status of this process; 0 where it is absent.
 uint64_t status_bytes(const std::string& name) {
   std::ifstream status("/proc/self/status");
   std::string line;
@@ -46,7 +47,7 @@ uint64_t status_bytes(const std::string& name) {
 
 // A line is "<id>:<controllers>:<path>"; version 2 has no controllers there.
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount) {
-  uint64_t least = UINT64_MAX;
+  uint64_t lowest = UINT64_MAX;
   std::istringstream lines(membership);
   std::string line;
   while (std::getline(lines, line)) {
@@ -56,12 +57,12 @@ uint64_t cgroup_memory(const std::string& membership, const std::string& mount) 
     const std::string path = line.substr(second + 1);
     if (controllers == ",,") {
       for (const char* root : {"", "/unified"})
-        least = std::min(least, min_up_from(mount + root, path, "memory.max"));
+        lowest = std::min(lowest, min_up_from(mount + root, path, "memory.max"));
     } else if (controllers.find(",memory,") != std::string::npos) {
-      least = std::min(least, min_up_from(mount + "/memory", path, "memory.limit_in_bytes"));
+      lowest = std::min(lowest, min_up_from(mount + "/memory", path, "memory.limit_in_bytes"));
     }
   }
-  return least;
+  return lowest;
 }
 
 uint64_t default_memory() {
@@ -74,5 +75,19 @@ uint64_t default_memory() {
 
 uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }
 uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
+
+void return_freed_memory_to_system() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 256 << 10);
+  mallopt(M_TRIM_THRESHOLD, 1 << 20);
+  mallopt(M_ARENA_MAX, 2);
+#endif
+}
+
+void trim_heap() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
 
 }  // namespace voxdag

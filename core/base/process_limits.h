@@ -1,4 +1,5 @@
-// How much memory the machine lets a build have, and how much it took.
+// How much memory the machine lets a build have, how much this process holds, and the allocator
+// settings without which it would hold more than it was charged. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -6,17 +7,25 @@
 
 namespace voxdag {
 
-// The least that --memory accepts.
+// The smallest --memory that is accepted, in bytes.
 inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;
 
-// Half of what RAM and cgroups allow, at least kMinMemory.
+// Half of what RAM and cgroups allow, at least kMinMemory; bytes.
 uint64_t default_memory();
-// The least limit of the cgroups that `membership` (the text of /proc/self/cgroup) names and of
-// those above them, of version 2 or 1, mounted under `mount`; UINT64_MAX if there is none.
+// The lowest limit of the cgroups that `membership` (the text of /proc/self/cgroup) names and of
+// their ancestors, of version 2 or 1, mounted under `mount`; UINT64_MAX if there is none.
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount);
 // Largest resident set of this process so far (VmHWM), in bytes.
 uint64_t peak_resident_bytes();
-// What it holds now (VmRSS), in bytes.
+// Resident set of this process now (VmRSS), in bytes.
 uint64_t resident_bytes();
+
+// Tells the C library to return freed memory to the system at once instead of retaining it, so that
+// resident memory follows what a MemoryBudget has charged. Process-wide; repeated calls are
+// harmless. No effect without glibc.
+void return_freed_memory_to_system();
+// Returns the pages of small freed blocks, which the C library retains despite the settings above;
+// for use after many of them were freed. No effect without glibc.
+void trim_heap();
 
 }  // namespace voxdag

@@ -8,24 +8,11 @@
 #include <thread>
 
 #include "core/base/error.h"
+#include "scheduler/memory_plan.h"
 #include "scheduler/triangles/partition.h"
 
 namespace voxdag {
 namespace {
-
-// Bytes of half-filled chunks while one subvolume is split.
-constexpr size_t kSplitBufferBytes = size_t{512} << 10;
-// Pages that a backend may keep uncharged beside a full share; more make way for what is charged.
-constexpr uint64_t kPageCacheBytesPerWorker = uint64_t{8} << 20;
-// No more than this many files are held open for writing.
-constexpr uint64_t kMaxWorkers = 256;
-
-// As many as were asked for, unless their shares would be too small for the smallest subvolume.
-unsigned workers_within(uint64_t bytes, unsigned wanted) {
-  const uint64_t least = kSmallestBudget + kSegmentWriterBytes + kPageCacheBytesPerWorker;
-  return static_cast<unsigned>(
-      std::clamp<uint64_t>(bytes / least, 1, std::min<uint64_t>(wanted, kMaxWorkers)));
-}
 
 bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) {
   return a.subvolume.weight < b.subvolume.weight;
@@ -113,9 +100,8 @@ class Worker {
     const auto triangles = triangles_.open(queued.bin);
     std::optional<std::string> key;
     if (options_.cache) {
-      // The backend's pages do not make way for it.
-      MemoryBudget beside_pages(share_.limit() / 8 * 7, &share_);
-      key = ArtifactCache::key(task, *triangles, beside_pages);
+      MemoryBudget key_share(WorkerMemory::key_bytes(share_.limit()), &share_);
+      key = ArtifactCache::key(task, *triangles, key_share);
       StoredSubvolume copied = subvolume;
       if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
         ++counts.cached;
@@ -163,7 +149,7 @@ class Worker {
       part_bins[c] = triangles_.add_part(whole.bin);
     }
     const CubeTree tree(options_.grid_levels, subvolume.cube, parts);
-    partition(triangles_, whole.bin, tree, part_bins, kSplitBufferBytes, cancel_);
+    partition(triangles_, whole.bin, tree, part_bins, MemoryPlan::kSplitBufferBytes, cancel_);
     std::vector<QueuedSubvolume> queued;
     std::vector<Cube> cubes;
     for (int c = 0; c < 8; ++c) {
@@ -203,13 +189,11 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options,
                                 const BuildContext& context) {
   uint64_t total = subvolumes.size();
   Queue queue(std::move(subvolumes));
-  const unsigned worker_count = workers_within(budget.available(), options.threads);
-  const uint64_t share_bytes =
-      budget.available() / worker_count - kSegmentWriterBytes - kPageCacheBytesPerWorker;
+  const auto memory = WorkerMemory::divide(budget.available(), options.threads);
   std::vector<std::unique_ptr<Worker>> workers;
-  for (unsigned i = 0; i < worker_count; ++i)
+  for (unsigned i = 0; i < memory.workers; ++i)
     workers.push_back(
-        std::make_unique<Worker>(options, i, triangles, jobs, budget, share_bytes, context));
+        std::make_unique<Worker>(options, i, triangles, jobs, budget, memory.share_bytes, context));
   std::mutex progress_mutex;
   const auto work = [&](Worker& worker) {
     while (const auto subvolume = queue.pop()) {

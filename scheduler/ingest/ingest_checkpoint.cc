@@ -6,7 +6,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "scheduler/prepare.h"
+#include "scheduler/memory_plan.h"
 #include "scheduler/triangles/memory_store.h"
 
 namespace voxdag {
@@ -37,7 +37,7 @@ double copies_bytes(const BuildSpec& spec, uint64_t triangles) {
 
 bool fits_in_memory(const BuildSpec& spec, uint64_t triangles) {
   return copies_bytes(spec, triangles) <=
-         static_cast<double>(triangle_share(spec.run.memory_bytes));
+         static_cast<double>(MemoryPlan::divide(spec.run.memory_bytes).triangle_bytes);
 }
 
 }  // namespace

@@ -65,20 +65,22 @@ DurableStoreState DurableStore::checkpoint() {
 
 BinId DurableStore::add_part(BinId whole) {
   const BinId source = source_of(whole);
-  const BinId bin = parts_.add_part(kSceneBin);
+  const BinId part = parts_.add_part(kSceneBin);
   std::lock_guard lock(mutex_);
   ++bins_[source]->references;
-  part_list_.push_back({bin, source});
-  return kFirstPart + static_cast<BinId>(part_list_.size() - 1);
+  sources_.resize(std::max<size_t>(sources_.size(), part + 1));
+  sources_[part] = source;
+  return kFirstPart + part;
 }
 
-DurableStore::Part DurableStore::part(BinId bin) const {
+BinId DurableStore::source_of(BinId bin) const {
+  if (!is_part(bin)) return bin;
   std::lock_guard lock(mutex_);
-  return part_list_[bin - kFirstPart];
+  return sources_[bin - kFirstPart];
 }
 
 void DurableStore::add_chunk(BinId bin, std::span<const std::byte> records) {
-  if (is_part(bin)) return parts_.add_chunk(part(bin).bin, records);
+  if (is_part(bin)) return parts_.add_chunk(bin - kFirstPart, records);
   const auto triangles = static_cast<uint32_t>(records.size() / record_bytes());
   const Extent extent = file_->append(records);
   std::lock_guard lock(mutex_);
@@ -89,31 +91,31 @@ void DurableStore::add_chunk(BinId bin, std::span<const std::byte> records) {
 }
 
 uint64_t DurableStore::count(BinId bin) const {
-  if (is_part(bin)) return parts_.count(part(bin).bin);
+  if (is_part(bin)) return parts_.count(bin - kFirstPart);
   std::lock_guard lock(mutex_);
   return bins_[bin]->list.triangles;
 }
 
 std::unique_ptr<TriangleStream> DurableStore::open(BinId bin, uint64_t first) const {
-  if (is_part(bin)) return parts_.open(part(bin).bin, first);
+  if (is_part(bin)) return parts_.open(bin - kFirstPart, first);
   std::lock_guard lock(mutex_);
   return open_chunks(bins_[bin]->list, file_.get(), record_bytes(), first);
 }
 
 bool DurableStore::drop(BinId bin) {
-  if (is_part(bin)) parts_.drop(part(bin).bin);
+  if (is_part(bin)) parts_.drop(bin - kFirstPart);
   return true;
 }
 
 void DurableStore::retain(BinId bin) {
-  if (is_part(bin)) parts_.retain(part(bin).bin);
+  if (is_part(bin)) parts_.retain(bin - kFirstPart);
   bin = source_of(bin);
   std::lock_guard lock(mutex_);
   ++bins_[bin]->references;
 }
 
 void DurableStore::release(BinId bin) {
-  if (is_part(bin)) parts_.release(part(bin).bin);
+  if (is_part(bin)) parts_.release(bin - kFirstPart);
   bin = source_of(bin);
   std::lock_guard lock(mutex_);
   Bin& released = *bins_[bin];

@@ -65,18 +65,13 @@ class DurableStore : public TriangleStore {
     ChunkList list;
     uint64_t references = 1;
   };
-  // A bin in parts_, and the durable bin that its triangles came from.
-  struct Part {
-    BinId bin = 0;
-    BinId source = 0;
-  };
-  // Parts have numbers from here on, durable bins below.
+  // A part has its number in parts_ plus this.
   static constexpr BinId kFirstPart = BinId{1} << 31;
 
   static bool is_part(BinId bin) { return bin >= kFirstPart; }
-  Part part(BinId bin) const;
   void add_bin() { bins_.push_back(std::make_unique<Bin>()); }
-  BinId source_of(BinId bin) const { return is_part(bin) ? part(bin).source : bin; }
+  // The bin itself, or the durable bin that a part was copied from.
+  BinId source_of(BinId bin) const;
   void set_cubes(std::span<const Cube> cubes, const Extent& extent);
   void read_chain();
 
@@ -87,7 +82,7 @@ class DurableStore : public TriangleStore {
   MemoryCharge charge_;       // for the lists of chunks
   mutable std::mutex mutex_;  // guards all below; the list of a filled bin no longer changes
   std::vector<std::unique_ptr<Bin>> bins_;
-  std::vector<Part> part_list_;
+  std::vector<BinId> sources_;  // of the parts, by their numbers in parts_
   uint64_t list_bytes_ = 0;
   std::vector<NamedChunk> unnamed_;  // chunks since the last link
   Extent last_link_;

@@ -102,7 +102,8 @@ class CommitQueueTest : public testing::Test {
   }
   // Writes the next subvolume's artifact and adds it to the queue.
   void build_one() { build_one(queue_); }
-  void build_one(CommitQueue& queue) {
+  void build_one(CommitQueue& queue) { build_one(queue, triangles_.add_part(kSceneBin)); }
+  void build_one(CommitQueue& queue, BinId bin) {
     StoredSubvolume built = planned_[next_++];
     const SubDag rows = random_rows(next_, 500, kLevels, 2, kBits);
     ArtifactWriter writer(queue.segment(), kLevels, kBits);
@@ -110,7 +111,7 @@ class CommitQueueTest : public testing::Test {
     for (const SubDag::Nodes& nodes : rows.levels) writer.nodes(nodes.view());
     built.artifact = writer.finish({});
     built.summary = {1, 1, 1, 1};
-    queue.add_built(built, triangles_.add_part(kSceneBin));
+    queue.add_built(built, bin);
   }
   // Builds until a sync is begun.
   void build_a_group() {
@@ -255,7 +256,7 @@ TEST_F(CommitQueueTest, DurableTrianglesStayUntilTheirSubvolumesAreRecorded) {
   CommitQueue queue(store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 1, budget_),
                     durable, kNever_s);
   disk_.block_syncs();
-  queue.add_built(planned_[0], bin);
+  build_one(queue, bin);
   queue.commit_in_background();
   disk_.wait_for_syncs(1);
   EXPECT_EQ(durable.count(bin), 1u);

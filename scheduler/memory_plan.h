@@ -1,0 +1,81 @@
+// How a build divides the memory that it is given (--memory): the page where every fraction of the
+// budget stands, or the struct of the layer that it belongs to.
+//
+//   stage         part                              size                         charged by
+//   ------------  --------------------------------  ---------------------------  -------------
+//   scan, ingest  vertices of an indexed mesh       up to 1/4 of what is free    VertexCache
+//                 top tree                          up to 1/16                   TopTree
+//   ingest until  triangles; the rest is spilled    up to 1/3                    TriangleBins
+//   built
+//   ingest        half-filled chunks of triangles   1 MiB                        nobody
+//   partition     half-filled chunks of triangles   1/8                          nobody
+//   estimate      pilot build, one at a time        3/4 of what is free          Backend
+//   build         WorkerMemory, for every worker    what is free / workers
+//                   segment writer                  1.5 MiB                      SegmentWriter
+//                   pages that a backend retains    8 MiB                        nobody
+//                   half-filled chunks of a split   512 KiB                      nobody
+//                   share: Backend::build()         the rest                     Backend
+//                     tables made in advance        1/4 of what is free of it    BackendMemory
+//                     each table of the plane memo  1/16, 1/8 of what is free    BackendMemory
+//                     block memo                    1/16 of what is free         BackendMemory
+//                     more pages that it retains    1/8, up to 128 MiB           nobody
+//                     or: key for the cache         what those pages leave       ArtifactCache
+//   merge         MergeMemory, of what is free
+//                   workers, together               1/4                          merge
+//                   positions of two levels         1/6 for each; then spilled   merge
+//                   slab                            the rest, less 1/16          merge
+//
+// "What is free" is what the budget could still give when the part is taken. Uncharged are, besides
+// the parts above, lists that grow with the number of subvolumes and frames: the indexes of the
+// artifacts that one merge pass reads (56 bytes per frame, for which the slab leaves its 1/16) and
+// the chunk lists of spilled triangles where the share of the triangles is full.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "core/backend/backend.h"
+#include "core/backend/backend_memory.h"
+#include "core/format/artifact/artifact.h"
+
+namespace voxdag {
+
+struct MemoryPlan {
+  static constexpr uint64_t kIngestBufferBytes = uint64_t{1} << 20;
+  static constexpr uint64_t kSplitBufferBytes = uint64_t{512} << 10;
+
+  uint64_t top_tree_bytes = 0;          // counters of the top tree
+  uint64_t triangle_bytes = 0;          // triangles in memory, from ingest until they are built
+  uint64_t partition_buffer_bytes = 0;  // chunks being filled, all subvolumes together; uncharged
+
+  static constexpr MemoryPlan divide(uint64_t budget_bytes) {
+    return {budget_bytes / 16, budget_bytes / 3, budget_bytes / 8};
+  }
+  // The budget of a pilot build, `free_bytes` being free.
+  static constexpr uint64_t pilot_bytes(uint64_t free_bytes) { return free_bytes * 3 / 4; }
+};
+
+// What the workers of the build stage get.
+struct WorkerMemory {
+  // Every worker has a segment file open.
+  static constexpr uint64_t kMaxWorkers = 256;
+  // What a worker needs besides its share.
+  static constexpr uint64_t kBesideShareBytes = kSegmentWriterBytes + BackendMemory::kMinPageBytes;
+
+  unsigned workers = 1;
+  uint64_t share_bytes = 0;  // of each, for Backend::build()
+
+  // As many workers as are wanted, unless their shares would be too small for the smallest
+  // subvolume.
+  static constexpr WorkerMemory divide(uint64_t free_bytes, unsigned wanted) {
+    constexpr uint64_t kMinBytes = kSmallestBudget + kBesideShareBytes;
+    const uint64_t workers =
+        std::clamp<uint64_t>(free_bytes / kMinBytes, 1, std::min<uint64_t>(wanted, kMaxWorkers));
+    const uint64_t each = free_bytes / workers;
+    return {static_cast<unsigned>(workers), each - std::min(each, kBesideShareBytes)};
+  }
+  // Of its share, what a worker may take for an artifact's key: the backend's pages stay.
+  static constexpr uint64_t key_bytes(uint64_t share_bytes) { return share_bytes / 8 * 7; }
+};
+
+}  // namespace voxdag
