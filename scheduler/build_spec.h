@@ -41,8 +41,8 @@ struct RunOptions {
   uint64_t cache_bytes = uint64_t{16} << 30;
   // Time that is worth a checkpoint: CPU time of the merge, wall time of what comes before it.
   double checkpoint_interval_s = 2;
-  // Scenes of at least so many triangles are kept once ingested: about two CPU seconds of work.
-  uint64_t kept_from_triangles = uint64_t{4} << 20;
+  // Triangles of a scene whose ingest, then about two CPU seconds, is worth checkpoints.
+  uint64_t durable_min_triangles = uint64_t{4} << 20;
   bool keep_work = false;
   bool restart = false;  // start over, whatever the work folder holds
   bool force = false;    // build though the estimate says that it cannot fit

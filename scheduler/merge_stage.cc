@@ -11,21 +11,21 @@
 namespace voxdag {
 namespace {
 
-// More warnings than this say no more than their number.
+// Damaged subvolumes that are named; of more only the number is.
 constexpr size_t kMaxWarnings = 5;
 
-// Keeps a merge's state in the job store.
+// Stores a merge's state in the job store.
 class StoredCheckpoint : public Checkpoint {
  public:
-  StoredCheckpoint(JobStore& store, CommitQueues& journals, WorkFolder& work)
-      : store_(store), journals_(journals), work_(work) {}
+  StoredCheckpoint(JobStore& store, CommitQueues& commits, WorkFolder& work)
+      : store_(store), commits_(commits), work_(work) {}
   std::optional<std::vector<std::byte>> load() override {
     auto stored = store_.merge();
     if (!stored) return std::nullopt;
     return std::move(stored->state);
   }
   void save(uint32_t level, std::span<const std::byte> state) override {
-    journals_.commit();
+    commits_.commit();
     store_.save_merge(level, state);
   }
   void forget() override { store_.forget_merge(); }
@@ -35,7 +35,7 @@ class StoredCheckpoint : public Checkpoint {
 
  private:
   JobStore& store_;
-  CommitQueues& journals_;
+  CommitQueues& commits_;
   WorkFolder& work_;
 };
 
@@ -67,7 +67,7 @@ bool MergeStage::run(const RunOptions& options, BuildReport& report) {
   }
 }
 
-// An earlier run may have been stopped when the file had its name already.
+// An earlier run may have been stopped after the file got its name.
 bool MergeStage::is_published(BuildReport& report) {
   const auto result = store_.result();
   if (!result || result->output != report.output || !context_.files.exists(report.output) ||
@@ -95,7 +95,7 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
   inputs.open_segment = [&](uint32_t id) { return work_.open_segment(id); };
   inputs.scratch_folder = work_.scratch_path();
   inputs.checkpoint_interval_s = options.checkpoint_interval_s;
-  StoredCheckpoint checkpoint(store_, journals_, work_);
+  StoredCheckpoint checkpoint(store_, commits_, work_);
   const MergeReport merged = merge_sub_dags(inputs, context_.files, out, budget_, report.threads,
                                             context_.progress, context_.cancel, &checkpoint);
   report.voxels = merged.voxels;
@@ -126,9 +126,10 @@ void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
   clock_.finish("write");
 }
 
-// Plans damaged subvolumes again; if none is, what the merge made itself is at fault.
+// Plans damaged subvolumes again. If none is damaged, a file of the merge must be: it restarts,
+// once.
 bool MergeStage::heal(const Error& error) {
-  journals_.commit();
+  commits_.commit();
   const auto merge = store_.merge();
   const auto damaged = find_damaged(
       store_.leaves(), merge ? merge->level : UINT32_MAX,
@@ -143,10 +144,10 @@ bool MergeStage::heal(const Error& error) {
   if (warnings > kMaxWarnings)
     context_.progress.warn("... and so are " + std::to_string(warnings - kMaxWarnings) + " more");
   if (!damaged.empty()) return true;
-  if (started_over_) return false;
-  started_over_ = true;
+  if (restarted_) return false;
+  restarted_ = true;
   store_.forget_merge();
-  context_.progress.warn("the merge starts over: " + error.message());
+  context_.progress.warn("the merge restarts: " + error.message());
   return true;
 }
 

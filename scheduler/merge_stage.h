@@ -1,6 +1,7 @@
 // The last stages of a build: the artifacts are merged into the global file, which then gets its
-// name. What an earlier run of the job merged is gone on with; what turns out damaged is healed.
-// What was built last is made durable before anything durable refers to it.
+// name. A merge that an earlier run began is resumed. Subvolumes whose artifacts turn out damaged
+// are planned again. The last groups of artifacts are made durable before a checkpoint refers to
+// them.
 #pragma once
 
 #include "core/base/memory_budget.h"
@@ -16,17 +17,17 @@ namespace voxdag {
 
 class MergeStage {
  public:
-  MergeStage(JobStore& store, CommitQueues& journals, WorkFolder& work, MemoryBudget& budget,
+  MergeStage(JobStore& store, CommitQueues& commits, WorkFolder& work, MemoryBudget& budget,
              StageClock& clock, const BuildContext& context)
       : store_(store),
-        journals_(journals),
+        commits_(commits),
         work_(work),
         budget_(budget),
         clock_(clock),
         context_(context) {}
 
-  // Makes the file that `options` name and fills in the report. False if something turned out
-  // damaged that another call may get right, once subvolumes that are planned again are built.
+  // Writes the output file and fills in the report. False if something turned out damaged, and the
+  // merge is to be run again once the subvolumes that were planned again are built.
   bool run(const RunOptions& options, BuildReport& report);
 
  private:
@@ -36,12 +37,12 @@ class MergeStage {
   bool heal(const Error& error);
 
   JobStore& store_;
-  CommitQueues& journals_;
+  CommitQueues& commits_;
   WorkFolder& work_;
   MemoryBudget& budget_;
   StageClock& clock_;
   const BuildContext& context_;
-  bool started_over_ = false;
+  bool restarted_ = false;
 };
 
 }  // namespace voxdag

@@ -3,48 +3,85 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <set>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
-#include "scheduler/execute/open_backend.h"
+#include "scheduler/disk_space.h"
+#include "scheduler/execute/choose_backend.h"
+#include "scheduler/execute/executor.h"
 #include "scheduler/job/job_progress.h"
 #include "scheduler/job/output_lock.h"
 #include "scheduler/job/work_folder.h"
 #include "scheduler/memory_plan.h"
 #include "scheduler/merge_stage.h"
-#include "scheduler/plan/estimate.h"
-#include "scheduler/plan/prepare.h"
-#include "scheduler/triangles/partition.h"
+#include "scheduler/prepare.h"
 
 namespace voxdag {
 namespace {
 
-// Below this resolution a build fits any disk that can hold its scene: no estimate is made.
-constexpr uint32_t kLevelsWorthAnEstimate = 12;
-// The pilot of the check before a build is this much coarser, so that it costs next to nothing.
-constexpr uint32_t kLevelsBelowForTheCheck = 5;
-// Of artifacts, job store and digests of scenes; another number is another job.
-constexpr int64_t kWorkFormatVersion = 2;
-// How often damaged artifacts are built again before the disk is to blame.
-constexpr int kMaxAttempts = 3;
+// Version of artifacts, job store and digests of scenes; a job of another version is refused.
+constexpr int64_t kWorkFormatVersion = 3;
+// How often the scene is read before its stored triangles may not be damaged again.
+constexpr int kMaxReads = 3;
+// How often the merge is run before artifacts may not be damaged again.
+constexpr int kMaxMerges = 3;
 
-// One build, stage by stage; what the work folder already has is not built again.
+// Refuses now an output that could not be written once all is built.
+void check_output(FileSystem& files, const std::string& output) {
+  if (output.empty())
+    throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
+  if (output.ends_with('/'))
+    throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a file, not a folder");
+  if (files.exists(output) && files.open_read(output)->size() > 0 && !is_global_file(files, output))
+    throw Error(ErrorCode::kInvalidInput,
+                output +
+                    " exists and is no global file of voxdag: expected a free name or that of an "
+                    "earlier result (-o)");
+  files.make_directories(parent_directory(output));
+  const std::string probe = output + ".probe-" + std::to_string(getpid());
+  files.create(probe)->close();
+  files.remove(probe);
+}
+
+// Opens the work folder's job store. With `restart`, one that cannot be read is replaced; so is one
+// that does not look like a job store, if an earlier build had the folder.
+std::unique_ptr<JobStore> open_job_store(FileSystem& files, const WorkFolder& work, bool restart) {
+  try {
+    return std::make_unique<JobStore>(work.store_path(), JobStore::Access::kBuild);
+  } catch (const Error& error) {
+    const bool is_not_ours = error.code() == ErrorCode::kInvalidInput;
+    const bool is_unreadable =
+        error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kUnsupportedVersion;
+    if (!restart || !(is_unreadable || (is_not_ours && work.was_there()))) throw;
+  }
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"})
+    if (files.exists(work.store_path() + suffix)) files.remove(work.store_path() + suffix);
+  return std::make_unique<JobStore>(work.store_path(), JobStore::Access::kBuild);
+}
+
+std::vector<StoredSubvolume> planned_leaves(JobStore& jobs) {
+  std::vector<StoredSubvolume> leaves = jobs.leaves();
+  std::erase_if(leaves,
+                [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });
+  return leaves;
+}
+
+// One build, stage by stage. What the work folder already has is not built again.
 class Build {
  public:
   Build(const BuildSpec& spec, const BuildContext& context)
       : spec_(checked(spec)),
         budget_(spec_.run.memory_bytes),
-        output_(context.files, spec_.run.output),
+        output_lock_(context.files, spec_.run.output),
         work_(context.files,
               spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder),
-        store_(open_store(context.files)),
-        progress_(context.progress, *store_, work_),
+        jobs_(open_job_store(context.files, work_, spec_.run.restart)),
+        progress_(context.progress, *jobs_, work_),
         context_{context.files, progress_, context.cancel},
-        keeper_(spec_, *store_, work_, context_) {
+        checkpoint_(spec_, jobs_.get(), work_, context_) {
     if (!spec_.run.cache_folder.empty())
       cache_.emplace(context.files, spec_.run.cache_folder, spec_.run.cache_bytes);
     report_.output = spec_.run.output;
@@ -55,23 +92,16 @@ class Build {
 
   BuildReport run() {
     try {
-      return run_to_the_end();
+      return run_stages();
     } catch (const Error& error) {
       commit_best_effort();
-      // With a job, or a part of a scene that is not at fault, the folder is what goes on.
-      const bool scene_is_at_fault =
-          error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
-      if (!store_->job() && (scene_is_at_fault || !keeper_.has_saved())) {
+      if (!is_worth_resuming(error)) {
         remove_work();
         throw;
       }
-      Error told = error;
-      if (error.code() == ErrorCode::kNoSpace)
-        told = Error(error.code(), error.message() + space_required());
-      if (error.code() == ErrorCode::kCanceled)
-        told = Error(error.code(), error.message() + "; run the same command again to go on");
-      progress_.record_failure(told);
-      throw told;
+      const Error reported(error.code(), error.message() + advice(error.code()));
+      progress_.record_failure(reported);
+      throw reported;
     } catch (...) {
       commit_best_effort();
       throw;
@@ -79,51 +109,19 @@ class Build {
   }
 
  private:
-  // A store that cannot be read is no obstacle to starting over; nor is one that does not look like
-  // ours, where we have been before.
-  std::unique_ptr<JobStore> open_store(FileSystem& files) const {
-    try {
-      return std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild);
-    } catch (const Error& error) {
-      const bool not_ours = error.code() == ErrorCode::kInvalidInput;
-      const bool unreadable =
-          error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kUnsupportedVersion;
-      if (!spec_.run.restart || !(unreadable || (not_ours && work_.was_there()))) throw;
-    }
-    for (const char* suffix : {"", "-wal", "-shm", "-journal"})
-      if (files.exists(work_.store_path() + suffix)) files.remove(work_.store_path() + suffix);
-    return std::make_unique<JobStore>(work_.store_path(), JobStore::Access::kBuild);
-  }
-
-  // What is finished is not lost.
-  void commit_best_effort() {
-    try {
-      journals_.commit();
-    } catch (const std::exception&) {
-      // What went wrong first is what matters.
-    }
-  }
-
-  BuildReport run_to_the_end() {
-    const double start = wall_seconds();
+  BuildReport run_stages() {
+    const double start_s = wall_seconds();
     if (start_over_)
-      keeper_.forget();
+      checkpoint_.forget();
     else
       refuse_other_options();
     work_.remove_spilled();
-    build_missing();
-    if (spec_.run.keep_work) journals_.commit_soon();
-    MergeStage merge(*store_, journals_, work_, budget_, clock_, context_);
-    for (int attempt = 1; !merge.run(spec_.run, report_); ++attempt) {
-      if (attempt == kMaxAttempts)
-        throw Error(ErrorCode::kCorrupt, work_.path() +
-                                             ": artifacts are damaged again and again: "
-                                             "expected a disk that gives back what was written");
-      if (any_planned()) build_missing();
-    }
-    if (spec_.run.keep_work) journals_.commit();
+    build_artifacts();
+    if (spec_.run.keep_work) commits_.commit_in_background();
+    merge_artifacts();
+    if (spec_.run.keep_work) commits_.commit();
     report_.stages = clock_.stages();
-    report_.wall_s = wall_seconds() - start;
+    report_.wall_s = wall_seconds() - start_s;
     report_.cpu_s = process_cpu_seconds();
     report_.peak_rss_bytes = peak_resident_bytes();
     write_file_atomically(context_.files, spec_.run.output + ".report.json",
@@ -132,136 +130,81 @@ class Build {
     return report_;
   }
 
-  bool any_planned() const {
-    const std::vector<StoredSubvolume> leaves = store_->leaves();
-    return std::ranges::any_of(
-        leaves, [](const StoredSubvolume& s) { return s.state == SubvolumeState::kPlanned; });
-  }
-
-  // What a full disk's user needs to know, reckoned from the subvolumes built so far: their
-  // artifacts and a global file of about the same size.
-  std::string space_required() {
-    double built = 0, planned = 0, bytes = 0;
-    for (const StoredSubvolume& subvolume : store_->leaves()) {
-      const bool is_built = subvolume.state == SubvolumeState::kBuilt;
-      (is_built ? built : planned) += subvolume.weight;
-      bytes += static_cast<double>(subvolume.artifact.bytes);
-    }
-    std::string needed;
-    if (built > 0) {
-      const double artifacts = bytes * (1 + planned / built);
-      needed = " for about " + std::to_string(std::llround((2 * artifacts - bytes) / 1e6)) + " MB";
-    }
-    return "; the job is paused: make room" + needed + " and run the same command again";
-  }
-
-  void remove_work() {
-    progress_.detach();
-    journals_.drop();
-    store_.reset();
-    work_.remove();
-  }
-
-  // Builds what is missing. Triangles that the disk gave back changed are read from the scene
-  // again; where it has no room for them, memory may.
-  void build_missing() {
-    for (int attempt = 1;; ++attempt) {
+  // Builds what is missing. If stored triangles turn out damaged, the scene is read again; so it is
+  // if the disk is full and memory can hold the triangles instead.
+  void build_artifacts() {
+    for (int read = 1;; ++read) {
       try {
-        return try_to_build_missing();
+        return read_and_build();
       } catch (const DamagedTriangles& damage) {
-        if (attempt == kMaxAttempts) throw;
+        if (read == kMaxReads) throw;
         context_.progress.warn(damage.message() + "; the scene is read again");
-        keeper_.forget();
+        checkpoint_.forget();
       } catch (const Error& error) {
-        if (error.code() != ErrorCode::kNoSpace || !keeper_.is_optional()) throw;
-        context_.progress.warn(error.message() +
-                               "; the scene is read again, to hold its triangles in memory");
-        keeper_.give_up();
+        if (error.code() != ErrorCode::kNoSpace || !checkpoint_.is_optional()) throw;
+        context_.progress.warn(error.message() + "; the scene is read again, into memory");
+        checkpoint_.disable();
       }
     }
   }
 
-  // Scan, ingest, and all subvolumes that are not built yet; what they hold in memory is gone when
-  // it returns.
-  void try_to_build_missing() {
-    PreparedScene scene =
-        prepare_scene(spec_, work_.spill_path(), budget_, clock_, context_, &keeper_);
-    report_.grid = scene.grid;
-    report_.triangles = scene.counts.triangles;
-    report_.dropped_outside = scene.counts.dropped_outside;
-    report_.dropped_invalid = scene.counts.dropped_invalid;
-    if (report_.triangles == 0)
+  // From the scene to artifacts of all subvolumes. The triangles are freed when it returns.
+  void read_and_build() {
+    PreparedScene scene = prepare_scene(spec_, budget_, clock_, context_, checkpoint_);
+    const IngestCounts& counts = scene.state.counts;
+    report_.grid = scene.state.grid;
+    report_.triangles = counts.triangles;
+    report_.dropped_outside = counts.dropped_outside;
+    report_.dropped_invalid = counts.dropped_invalid;
+    if (counts.triangles == 0)
       context_.progress.warn("the scene has no triangles in the grid: the file will have no nodes");
-    start_or_resume(scene);
-
-    std::vector<StoredSubvolume> leaves = store_->leaves();
-    const size_t leaf_count = leaves.size();
-    std::erase_if(leaves,
-                  [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });
-    report_.subvolumes_reused = leaf_count - leaves.size();
-    if (!leaves.empty()) build_subvolumes_of(scene, leaves);
-    report_.spill_bytes += scene.bins->spilled_bytes();
-    const std::vector<StoredSubvolume> all = store_->leaves();
-    report_.subvolumes = all.size();
-    report_.artifact_bytes = report_.artifact_nodes = 0;
-    for (const StoredSubvolume& subvolume : all) {
-      report_.artifact_bytes += subvolume.artifact.bytes;
-      report_.artifact_nodes += subvolume.summary.dag_nodes;
-    }
+    start_or_resume_job(scene);
+    const std::vector<StoredSubvolume> planned = planned_leaves(*jobs_);
+    report_.subvolumes_reused = jobs_->leaves().size() - planned.size();
+    if (!planned.empty()) build_subvolumes_of(scene, planned);
+    report_.spill_bytes += scene.triangles->file_bytes();
+    report_artifacts();
   }
 
-  [[noreturn]] void refuse(const std::string& difference) const {
-    throw Error(ErrorCode::kInvalidInput,
-                "the work folder " + work_.path() + " holds another job: " + difference +
-                    "; give another folder (--work) or start over (--restart)");
-  }
-
-  // Before the scene is read.
-  void refuse_other_options() const {
-    const auto stored = store_->job();
-    if (!stored) return;
-    if (stored->format_version != kWorkFormatVersion)
-      refuse("its format version is " + std::to_string(stored->format_version) +
-             ", this program's " + std::to_string(kWorkFormatVersion));
-    const std::string asked = geometry_json(spec_.geometry);
-    if (stored->geometry != asked)
-      refuse("its geometry options are " + stored->geometry + ", asked for are " + asked);
-  }
-
-  void start_or_resume(const PreparedScene& scene) {
-    const auto stored = store_->job();
+  void start_or_resume_job(const PreparedScene& scene) {
+    const auto stored = jobs_->job();
     if (stored && !start_over_) {
-      if (stored->scene_sha256 != scene.sha256)
-        refuse("its scene has other contents (SHA-256 " + stored->scene_sha256.substr(0, 16) +
-               ", now " + scene.sha256.substr(0, 16) + ")");
+      if (stored->scene_sha256 != scene.sha256())
+        refuse_job("its scene has other contents (SHA-256 " + stored->scene_sha256.substr(0, 16) +
+                   ", now " + scene.sha256().substr(0, 16) + ")");
     } else {
-      check_disk_space(scene);
+      if (check_disk_space(spec_, scene, work_, budget_, context_)) clock_.finish("estimate");
       std::vector<StoredSubvolume> plan(scene.plan.size());
       for (size_t i = 0; i < plan.size(); ++i) {
         plan[i].cube = scene.plan[i].cube;
         plan[i].weight = scene.plan[i].weight;
       }
-      store_->start({scene.sha256, geometry_json(spec_.geometry), kWorkFormatVersion}, plan);
+      jobs_->start({scene.sha256(), geometry_json(spec_.geometry), kWorkFormatVersion}, plan);
       start_over_ = false;
     }
     std::set<uint32_t> named;
-    for (const StoredSubvolume& subvolume : store_->leaves())
+    for (const StoredSubvolume& subvolume : jobs_->leaves())
       if (subvolume.state == SubvolumeState::kBuilt) named.insert(subvolume.artifact.segment);
     work_.remove_garbage([&](uint32_t segment) { return named.contains(segment); });
-    if (!store_->merge()) work_.empty_scratch();
+    if (!jobs_->merge()) work_.empty_scratch();
   }
 
   void build_subvolumes_of(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
-    std::vector<QueuedSubvolume> queue = partition_triangles(
-        planned, scene, keeper_, memory_.partition_buffer_bytes, context_.cancel);
+    std::vector<Cube> cubes;
+    for (const StoredSubvolume& subvolume : planned) cubes.push_back(subvolume.cube);
+    const std::vector<BinId> bins = partition_prepared(
+        scene, cubes, checkpoint_, memory_.partition_buffer_bytes, context_.cancel);
+    std::vector<QueuedSubvolume> queue;
+    for (size_t i = 0; i < planned.size(); ++i) queue.push_back({planned[i], bins[i]});
     const MemoryCharge lists(budget_, queue.size() * (sizeof queue[0] + sizeof planned[0]),
                              "lists of subvolumes");
-    clock_.finish("distribute");
-    ExecutorOptions options;
-    options.grid_levels = scene.grid.levels;
-    options.hash_bits = spec_.geometry.hash_bits;
+    clock_.finish("partition");
+
     const BackendChoice backend = choose_backend(spec_.run, context_.progress);
     report_.backend = backend.name;
+    ExecutorOptions options;
+    options.grid_levels = scene.state.grid.levels;
+    options.hash_bits = spec_.geometry.hash_bits;
     options.threads = std::min(spec_.run.threads, backend.max_workers);
     options.open_backend = backend.open;
     if (spec_.run.subvolume_edge)
@@ -271,9 +214,9 @@ class Build {
     options.checkpoint_interval_s = spec_.run.checkpoint_interval_s;
     if (cache_) options.cache = &*cache_;
     context_.progress.begin_stage("build", queue.size(), "subvolumes");
-    const ExecutorCounts counts = build_subvolumes(options, std::move(queue), *scene.bins, *store_,
-                                                   journals_, budget_, context_);
-    keeper_.finish();
+    const ExecutorCounts counts = build_subvolumes(options, std::move(queue), *scene.triangles,
+                                                   *jobs_, commits_, budget_, context_);
+    checkpoint_.finish();
     report_.subvolumes_split += counts.split;
     report_.subvolumes_cached += counts.cached;
     report_.subvolumes_reused += counts.cached;
@@ -281,62 +224,92 @@ class Build {
     clock_.finish("build");
   }
 
-  uint64_t free_disk() const {
-    return std::min(context_.files.free_space(work_.path()),
-                    context_.files.free_space(parent_directory(spec_.run.output)));
+  void report_artifacts() {
+    const std::vector<StoredSubvolume> leaves = jobs_->leaves();
+    report_.subvolumes = leaves.size();
+    report_.artifact_bytes = report_.artifact_nodes = 0;
+    for (const StoredSubvolume& subvolume : leaves) {
+      report_.artifact_bytes += subvolume.artifact.bytes;
+      report_.artifact_nodes += subvolume.summary.dag_nodes;
+    }
   }
 
-  // Refuses a build that cannot fit before any work is done.
-  void check_disk_space(const PreparedScene& scene) {
-    if (spec_.run.force || scene.grid.levels < kLevelsWorthAnEstimate) return;
-    if (max_disk_bytes(scene) < static_cast<double>(free_disk())) return;
-    const Estimate estimate = estimate_build(scene, scene.grid.levels - kLevelsBelowForTheCheck,
-                                             spec_.run.threads, budget_, context_.cancel);
-    check_estimate(estimate, context_.files, work_.path(), parent_directory(spec_.run.output),
-                   context_.progress);
-    clock_.finish("estimate");
+  void merge_artifacts() {
+    MergeStage merge(*jobs_, commits_, work_, budget_, clock_, context_);
+    for (int run = 1; !merge.run(spec_.run, report_); ++run) {
+      if (run == kMaxMerges)
+        throw Error(ErrorCode::kCorrupt, work_.path() +
+                                             ": artifacts are damaged repeatedly: expected a disk "
+                                             "that returns what was written");
+      if (!planned_leaves(*jobs_).empty()) build_artifacts();
+    }
+  }
+
+  [[noreturn]] void refuse_job(const std::string& difference) const {
+    throw Error(ErrorCode::kInvalidInput,
+                "the work folder " + work_.path() + " holds another job: " + difference +
+                    "; give another folder (--work) or start over (--restart)");
+  }
+
+  // Refuses a job with other geometry options before the scene is read.
+  void refuse_other_options() const {
+    const auto stored = jobs_->job();
+    if (!stored) return;
+    if (stored->format_version != kWorkFormatVersion)
+      refuse_job("its format version is " + std::to_string(stored->format_version) +
+                 ", this program's " + std::to_string(kWorkFormatVersion));
+    const std::string requested = geometry_json(spec_.geometry);
+    if (stored->geometry != requested)
+      refuse_job("its geometry options are " + stored->geometry + ", requested are " + requested);
+  }
+
+  // Records what is finished. The error that ends the build counts, not one of this.
+  void commit_best_effort() {
+    try {
+      commits_.commit();
+    } catch (const std::exception&) {
+    }
+  }
+
+  // Whether the work folder has a job, or a part of a scene that is not at fault itself.
+  bool is_worth_resuming(const Error& error) {
+    const bool scene_is_at_fault =
+        error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
+    return jobs_->job() || (!scene_is_at_fault && checkpoint_.has_saved());
+  }
+
+  std::string advice(ErrorCode code) {
+    if (code == ErrorCode::kNoSpace) return full_disk_advice(jobs_->leaves());
+    if (code == ErrorCode::kCanceled) return "; run the same command again to resume";
+    return "";
+  }
+
+  void remove_work() {
+    progress_.detach();
+    commits_.clear();
+    jobs_.reset();
+    work_.remove();
   }
 
   const BuildSpec spec_;
   MemoryBudget budget_;
   const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
-  const OutputLock output_;
+  const OutputLock output_lock_;
   WorkFolder work_;
   std::optional<ArtifactCache> cache_;
-  std::unique_ptr<JobStore> store_;
-  CommitQueues journals_;
-  StageClock clock_{[this](const StageTime& stage) { store_->add_stage_time(stage); }};
+  std::unique_ptr<JobStore> jobs_;
+  CommitQueues commits_;
+  StageClock clock_{[this](const StageTime& stage) { jobs_->add_stage_time(stage); }};
   JobProgress progress_;
   const BuildContext context_;
-  IngestCheckpoint keeper_;
+  IngestCheckpoint checkpoint_;
   BuildReport report_;
   bool start_over_ = spec_.run.restart;
 };
 
 }  // namespace
 
-namespace {
-
-// What would be refused only when all is built is refused now.
-void check_output(FileSystem& files, const std::string& output) {
-  if (output.ends_with('/'))
-    throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a file, not a folder");
-  if (files.exists(output) && files.open_read(output)->size() > 0 && !is_global_file(files, output))
-    throw Error(ErrorCode::kInvalidInput,
-                output +
-                    " is there and is no global file of voxdag: expected a free name or that "
-                    "of an earlier result (-o)");
-  files.make_directories(parent_directory(output));
-  const std::string probe = output + ".probe-" + std::to_string(getpid());
-  files.create(probe)->close();
-  files.remove(probe);
-}
-
-}  // namespace
-
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
-  if (spec.run.output.empty())
-    throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
   check_output(context.files, spec.run.output);
   return_freed_memory_to_system();
   return Build(spec, context).run();

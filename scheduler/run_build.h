@@ -6,8 +6,8 @@
 
 namespace voxdag {
 
-// Builds, or goes on with the build that the work folder holds, or throws Error; nothing is left
-// under the final name unless it is whole. The report is also written to output + ".report.json".
+// Builds, or resumes the build that the work folder holds, or throws Error. Nothing is left under
+// the final name unless it is whole. The report is also written to output + ".report.json".
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context);
 
 }  // namespace voxdag

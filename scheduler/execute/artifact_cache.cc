@@ -14,7 +14,7 @@
 namespace voxdag {
 namespace {
 
-// Changes with anything that changes artifacts of the same triangles.
+// Increased with every change that makes other artifacts of the same triangles.
 constexpr uint64_t kContentVersion = 1;
 
 using Corner = std::array<int64_t, 3>;
@@ -36,7 +36,7 @@ bool is_partial(const DirectoryEntry& entry) {
   return !entry.is_directory && entry.name.find(".vdart.partial") != std::string::npos;
 }
 
-// An entry is written in seconds: a partial one of this age has no writer any more.
+// An entry is written in seconds: a partial one of this age has lost its writer.
 constexpr double kAbandonedAfter_s = 3600;
 
 }  // namespace
@@ -93,7 +93,7 @@ bool ArtifactCache::find(const std::string& key, uint32_t grid_levels, StoredSub
     mark_used(key);
     return true;
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kNoSpace) throw;  // the segment's disk, not the cache's
+    if (error.code() == ErrorCode::kNoSpace) throw;  // the segment's disk is full, not the cache's
     return false;
   }
 }
@@ -102,7 +102,7 @@ void ArtifactCache::mark_used(const std::string& key) {
   try {
     files_.touch(path_of(key));
   } catch (const Error&) {
-    // A cache that may only be read: its age is not ours to keep.
+    // The cache is read-only here.
   }
 }
 
@@ -121,7 +121,7 @@ void ArtifactCache::add(const std::string& key, const ReadableFile& segment,
     known_bytes_ += bytes;
     if (known_bytes_ > limit_bytes_) evict();
   } catch (const Error&) {
-    // As promised: the build goes on without the entry.
+    // The build does not need the entry.
   }
 }
 
@@ -144,7 +144,7 @@ void ArtifactCache::remove(const DirectoryEntry& entry) {
   try {
     files_.remove(folder_ + "/" + entry.name);
   } catch (const Error&) {
-    // Another build was quicker.
+    // Another build removed it first.
   }
 }
 

@@ -2,10 +2,10 @@
 // place of the grid, is copied instead of built.
 //
 // The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube (each
-// with its corners sorted, all sorted, doubles dropped), the cube's edge, hash-bits and the
-// format's version. A folder of one file an entry; the least recently used go when the limit is
-// passed. Any number of builds may share it: entries appear whole, by renaming, and an entry that
-// vanishes or is damaged is a miss. Thread-safe.
+// with its corners sorted, all sorted, duplicates removed), the cube's edge, hash-bits and the
+// format's version. The cache is a folder with one file per entry; the least recently used are
+// removed when the limit is exceeded. Any number of builds may share it: entries appear whole, by
+// renaming, and an entry that vanishes or is damaged is a miss. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -25,15 +25,15 @@ class ArtifactCache {
  public:
   ArtifactCache(FileSystem& files, std::string folder, uint64_t limit_bytes);
 
-  // Nothing if the triangles do not fit `budget`: such a subvolume is not cached.
+  // The key of a subvolume; nothing if its triangles do not fit `budget`: it is not cached then.
   static std::optional<std::string> key(const SubvolumeTask& task, TriangleStream& triangles,
                                         MemoryBudget& budget);
   // Copies the entry of `key` into `segment` and fills in the subvolume's artifact and summary;
-  // false if there is none, or none that is sound.
+  // false if there is no entry, or it is
+  // damaged.
   bool find(const std::string& key, uint32_t grid_levels, StoredSubvolume& subvolume,
             SegmentWriter& segment);
-  // Adds the artifact, which lies flushed in `segment`. A cache that cannot be written is no error
-  // of the build: the entry is left out.
+  // Adds the artifact, which lies flushed in `segment`. Fails silently, since no build needs it.
   void add(const std::string& key, const ReadableFile& segment, const ArtifactRef& artifact);
 
  private:
@@ -41,15 +41,15 @@ class ArtifactCache {
   // A name that no other writer uses, in this process or another.
   std::string partial_of(const std::string& key);
   void mark_used(const std::string& key);
-  // Removes the least recently used entries down to nine tenths of the limit.
+  // Removes the least recently used entries until nine tenths of the limit are left.
   void evict();
   void remove(const DirectoryEntry& entry);
 
   FileSystem& files_;
   const std::string folder_;
   const uint64_t limit_bytes_;
-  std::mutex mutex_;          // guards the count
-  uint64_t known_bytes_ = 0;  // at the last look, plus what was added since
+  std::mutex mutex_;          // guards known_bytes_
+  uint64_t known_bytes_ = 0;  // when the folder was last listed, plus what was added since
   std::atomic<uint64_t> partials_{0};
 };
 

@@ -34,20 +34,20 @@ std::vector<FixedTriangle> check_triangles(int count) {
   return triangles;
 }
 
-struct Answer {
+struct Result {
   SubDag dag;
   SubDagSummary summary;
 };
 
-Answer answer_of(Backend& backend, const SubvolumeTask& task,
+Result result_of(Backend& backend, const SubvolumeTask& task,
                  std::span<const FixedTriangle> triangles) {
-  Answer answer;
+  Result result;
   MemoryStream stream(triangles);
   MemoryBudget budget(kBudgetBytes);
-  if (backend.build(task, stream, budget, CancelToken(), answer.dag, answer.summary) ==
+  if (backend.build(task, stream, budget, CancelToken(), result.dag, result.summary) ==
       BuildOutcome::kOutgrown)
-    answer.dag = {};
-  return answer;
+    result.dag = {};
+  return result;
 }
 
 bool same(const SubDagSummary& a, const SubDagSummary& b) {
@@ -65,13 +65,13 @@ std::string difference_from_cpu(Backend& backend) {
       SubvolumeTask task{kGridLevels, Cube{}, hash_bits};
       task.cube.level = level;
       for (uint32_t& p : task.cube.position) p = (uint32_t{1} << level) / 2;
-      const Answer expected = answer_of(*cpu, task, triangles);
-      const Answer found = answer_of(backend, task, triangles);
+      const Result expected = result_of(*cpu, task, triangles);
+      const Result found = result_of(backend, task, triangles);
       if (found.dag == expected.dag && same(found.summary, expected.summary)) continue;
       return "it built " + std::to_string(found.summary.voxels) + " voxels and " +
              std::to_string(found.summary.dag_nodes) + " nodes where the CPU built " +
              std::to_string(expected.summary.voxels) + " and " +
-             std::to_string(expected.summary.dag_nodes) + ", or others of the same number";
+             std::to_string(expected.summary.dag_nodes) + ", or as many, but different ones";
     }
   return "";
 }

@@ -1,5 +1,5 @@
-// Whether a backend can be believed on this machine: drivers and devices differ, and a wrong voxel
-// would not be seen.
+// Whether a backend gives correct results on this machine: drivers and devices differ, and nobody
+// would notice a wrong voxel.
 #pragma once
 
 #include <string>
@@ -8,9 +8,9 @@
 
 namespace voxdag {
 
-// Builds a few small subvolumes, a thousand triangles of all sizes and every hash length, by
-// `backend` and by the CPU backend. "" if all level arrays and counts are equal, else a sentence.
-// Throws what the backend throws. The CPU's part takes about 30 ms.
+// Builds a few small subvolumes, with a thousand triangles of all sizes and several hash lengths,
+// by `backend` and by the CPU backend. Returns "" if all level arrays and counts are equal, else a
+// sentence. Throws what the backend throws. The CPU's part takes about 30 ms.
 std::string difference_from_cpu(Backend& backend);
 
 }  // namespace voxdag

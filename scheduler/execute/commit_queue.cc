@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <exception>
+#include <system_error>
 #include <utility>
 
 #include "core/base/clock.h"
@@ -9,68 +10,71 @@
 
 namespace voxdag {
 
-void CommitQueue::built(const StoredSubvolume& subvolume, std::optional<BinId> kept) {
-  next_.subvolumes.push_back(subvolume);
-  if (kept) next_.releases.push_back(*kept);
-  if (is_due()) commit_soon();
+void CommitQueue::add_built(const StoredSubvolume& subvolume, BinId bin) {
+  next_group_.subvolumes.push_back(subvolume);
+  if (triangles_.drop(bin)) next_group_.bins.push_back(bin);
+  if (is_due()) commit_in_background();
 }
 
 void CommitQueue::commit() {
-  commit_soon();
-  settle();
+  commit_in_background();
+  wait();
 }
 
-void CommitQueue::announce() {
-  // What is kept on the disk is not given back before its subvolumes are durable.
-  if (!next_.releases.empty()) commit();
-  settle();
+void CommitQueue::finish() {
+  // Triangles that a later run could read stay until their subvolumes are durable.
+  if (!next_group_.bins.empty()) commit();
+  wait();
   segment_->complete();
-  store_.mark_built_in_memory(next_.subvolumes);
+  jobs_.mark_built_in_memory(next_group_.subvolumes);
 }
 
 bool CommitQueue::is_due() const {
-  if (segment_->size() - begun_bytes_ >= group_bytes_) return true;
-  if (wall_seconds() - begun_s_ < interval_s_) return false;
-  return !commit_.valid() ||
-         commit_.wait_for(std::chrono::seconds(0)) != std::future_status::timeout;
+  if (segment_->size() - group_offset_ >= group_bytes_) return true;
+  if (wall_seconds() - group_begun_s_ < interval_s_) return false;
+  return !pending_.valid() ||
+         pending_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
-void CommitQueue::commit_soon() {
-  settle();
-  if (next_.subvolumes.empty()) return;
-  begun_s_ = wall_seconds();
-  begun_bytes_ = segment_->size();
-  under_way_ = std::exchange(next_, {});
+void CommitQueue::commit_in_background() {
+  wait();
+  if (next_group_.subvolumes.empty()) return;
+  group_begun_s_ = wall_seconds();
+  group_offset_ = segment_->size();
+  pending_group_ = std::exchange(next_group_, {});
   try {
     segment_->flush();
-    // Where the system has no thread left, settle() does it.
-    commit_ = std::async([this] { record_under_way(); });
+    try {
+      pending_ = std::async(std::launch::async, [this] { commit_pending(); });
+    } catch (const std::system_error&) {
+      commit_pending();  // The system has no thread left.
+    }
   } catch (...) {
-    salvage();
+    recover();
     throw;
   }
 }
 
-void CommitQueue::record_under_way() {
+void CommitQueue::commit_pending() {
   segment_->sync_written();
-  store_.record_built(under_way_.subvolumes);
-  for (const BinId bin : under_way_.releases) bins_.release(bin);
+  jobs_.record_built(pending_group_.subvolumes);
+  for (const BinId bin : pending_group_.bins) triangles_.release(bin);
 }
 
-void CommitQueue::settle() {
-  if (!commit_.valid()) return;
+void CommitQueue::wait() {
+  if (!pending_.valid()) return;
   try {
-    commit_.get();
+    pending_.get();
   } catch (...) {
-    salvage();
+    recover();
     throw;
   }
-  under_way_ = {};
+  pending_group_ = {};
 }
 
-void CommitQueue::salvage() {
-  Group group = std::exchange(under_way_, {});
-  const Group later = std::exchange(next_, {});
+void CommitQueue::recover() {
+  Group group = std::exchange(pending_group_, {});
+  const Group later = std::exchange(next_group_, {});
   group.subvolumes.insert(group.subvolumes.end(), later.subvolumes.begin(), later.subvolumes.end());
   try {
     segment_->release_unwritten();
@@ -79,26 +83,26 @@ void CommitQueue::salvage() {
       return s.artifact.offset + s.artifact.bytes > segment_->written();
     });
   } catch (const std::exception&) {
-    return;  // Then they are built again.
+    return;  // They are built again.
   }
   try {
-    store_.record_built(group.subvolumes);
+    jobs_.record_built(group.subvolumes);
   } catch (const std::exception&) {
-    // Durable, and recorded once the job store has room.
-    next_.subvolumes = std::move(group.subvolumes);
+    // The artifacts are durable; the next commit records them.
+    next_group_.subvolumes = std::move(group.subvolumes);
   }
 }
 
-void CommitQueues::commit_soon() {
-  for (const auto& journal : journals_) journal->commit_soon();
+void CommitQueues::commit_in_background() {
+  for (const auto& queue : queues_) queue->commit_in_background();
 }
 
 void CommitQueues::commit() {
   std::exception_ptr failure;
-  for (const auto step : {&CommitQueue::commit_soon, &CommitQueue::commit}) {
-    for (const auto& journal : journals_) {
+  for (const auto step : {&CommitQueue::commit_in_background, &CommitQueue::commit}) {
+    for (const auto& queue : queues_) {
       try {
-        ((*journal).*step)();
+        ((*queue).*step)();
       } catch (...) {
         if (!failure) failure = std::current_exception();
       }

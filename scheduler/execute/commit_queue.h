@@ -1,18 +1,17 @@
 // A worker's segment, and the record of what is in it: artifacts are made durable in groups, and
-// only then named in the job store. That happens on a thread of its own, so that the disk keeps no
-// worker waiting; and what was built since the last group is made durable only if the build goes on
-// long enough to be worth it. Used by one thread at a time.
+// only then named in the job store. A thread of its own does that, so that the worker does not wait
+// for the disk. The last group is made durable only when commit() asks for it: a short build ends
+// before its artifacts are worth a sync. Used by one thread at a time.
 #pragma once
 
 #include <future>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "core/base/clock.h"
 #include "core/format/artifact/segment_writer.h"
 #include "scheduler/job/job_store.h"
-#include "scheduler/triangles/triangle_bins.h"
+#include "scheduler/triangles/triangle_store.h"
 
 namespace voxdag {
 
@@ -20,67 +19,69 @@ class CommitQueue {
  public:
   static constexpr uint64_t kGroupBytes = uint64_t{256} << 20;
 
-  // A group is begun after so many seconds, unless the last one is still under way, or so many
-  // bytes. The first is what a crash may cost beside the tasks in flight and the group under way.
-  CommitQueue(JobStore& store, std::unique_ptr<SegmentWriter> segment, TriangleBins& bins,
+  // A group is committed after `interval_s`, unless the one before is still being committed, or
+  // once it has `group_bytes`. A crash costs the tasks in flight, the group being filled and the
+  // group being committed.
+  CommitQueue(JobStore& jobs, std::unique_ptr<SegmentWriter> segment, TriangleStore& triangles,
               double interval_s, uint64_t group_bytes = kGroupBytes)
-      : store_(store),
+      : jobs_(jobs),
         segment_(std::move(segment)),
-        bins_(bins),
+        triangles_(triangles),
         interval_s_(interval_s),
         group_bytes_(group_bytes) {}
 
   SegmentWriter& segment() { return *segment_; }
 
-  // The subvolume is built; its artifact, if it has one, is in the worker's segment. Once that is
-  // recorded, the kept bin that its triangles came from, if any, is released. What went wrong with
-  // an earlier group is thrown here. Waits for a disk that is a group of so many bytes behind.
-  void built(const StoredSubvolume& subvolume, std::optional<BinId> kept);
+  // The subvolume is built from the triangles in `bin`; its artifact, if it has one, is in the
+  // segment. Drops the bin now, and releases it once the subvolume is recorded. Waits for a disk
+  // that is a whole group behind. Throws what went wrong with an earlier group.
+  void add_built(const StoredSubvolume& subvolume, BinId bin);
   // Begins to make durable all that was built so far.
-  void commit_soon();
-  // Returns once it is. What fails is thrown once; what the disk took is tried again by the next
-  // call.
+  void commit_in_background();
+  // Makes durable all that was built so far. An error is thrown once; what the disk could store is
+  // tried again by the next call.
   void commit();
-  // Nothing more is built: the segment is complete, and what was built since the last group is
-  // announced to the job store, durable only after commit(). The bins are not used any more.
-  void announce();
+  // Nothing more is built: completes the segment and shows the last group in the job store, durable
+  // only after commit(). The triangle store is not used any more.
+  void finish();
 
  private:
   struct Group {
     std::vector<StoredSubvolume> subvolumes;
-    std::vector<BinId> releases;
+    std::vector<BinId> bins;  // to be released
   };
 
   bool is_due() const;
-  void record_under_way();
-  // Waits for the group under way.
-  void settle();
-  // A group failed: what the disk did take is made durable and recorded.
-  void salvage();
+  // Makes pending_group_ durable.
+  void commit_pending();
+  // Waits for commit_pending() on the other thread, and throws what went wrong there.
+  void wait();
+  // After a failure: makes durable and records what the disk could store of both groups.
+  void recover();
 
-  JobStore& store_;
+  JobStore& jobs_;
   const std::unique_ptr<SegmentWriter> segment_;
-  TriangleBins& bins_;
+  TriangleStore& triangles_;
   const double interval_s_;
   const uint64_t group_bytes_;
-  Group next_, under_way_;
-  double begun_s_ = wall_seconds();  // when this group began to fill
-  uint64_t begun_bytes_ = 0;         // of the segment, then
-  std::future<void> commit_;
+  Group next_group_, pending_group_;
+  double group_begun_s_ = wall_seconds();  // when next_group_ began to fill
+  uint64_t group_offset_ = 0;              // the segment's size then
+  std::future<void> pending_;
 };
 
-// Journals of workers that are done, whose last groups may not be durable yet.
+// The queues of workers that are done, whose last groups may not be durable yet.
 class CommitQueues {
  public:
-  void add(std::unique_ptr<CommitQueue> journal) { journals_.push_back(std::move(journal)); }
-  void commit_soon();
-  // All of them, whichever fails; throws what failed first.
+  void add(std::unique_ptr<CommitQueue> queue) { queues_.push_back(std::move(queue)); }
+  void commit_in_background();
+  // Commits all of them, even if some fail; throws the first error.
   void commit();
-  // They are of no use any more.
-  void drop() { journals_.clear(); }
+  // Closes the segments: nothing is committed any more.
+  void clear() { queues_.clear(); }
 
  private:
-  std::vector<std::unique_ptr<CommitQueue>> journals_;
+  std::vector<std::unique_ptr<CommitQueue>> queues_;
 };
 
 }  // namespace voxdag

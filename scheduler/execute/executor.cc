@@ -10,7 +10,7 @@
 #include "core/base/error.h"
 #include "scheduler/memory_plan.h"
 #include "core/format/artifact/artifact_writer.h"
-#include "scheduler/triangles/distribute.h"
+#include "scheduler/triangles/partition.h"
 
 namespace voxdag {
 namespace {
@@ -19,14 +19,15 @@ bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) {
   return a.subvolume.weight < b.subvolume.weight;
 }
 
-// The subvolumes left, shared by the workers. It ends when none is left and none is being built,
-// since building one may give eight more.
+// The subvolumes that are left, heaviest first, for all workers. It ends when none is left and none
+// is being built, since one that is built may be split.
 class Queue {
  public:
   explicit Queue(std::vector<QueuedSubvolume> heap) : heap_(std::move(heap)) {
     std::make_heap(heap_.begin(), heap_.end(), lighter);
   }
-  std::optional<QueuedSubvolume> take() {
+  // The next one to build; nothing at the end.
+  std::optional<QueuedSubvolume> pop() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return failure_ || !heap_.empty() || in_flight_ == 0; });
     if (failure_ || heap_.empty()) return std::nullopt;
@@ -36,7 +37,7 @@ class Queue {
     ++in_flight_;
     return next;
   }
-  // `parts` replace the subvolume that was taken (none if it was built).
+  // `parts` replace a subvolume that was popped; there are none if it was built.
   void done(const std::vector<QueuedSubvolume>& parts) {
     std::lock_guard lock(mutex_);
     --in_flight_;
@@ -46,7 +47,7 @@ class Queue {
     }
     changed_.notify_all();
   }
-  // Runs a worker's code; what it throws stops all workers.
+  // Runs a worker's code; an exception stops all workers.
   template <class Code>
   void guard(const Code& code) {
     try {
@@ -57,8 +58,9 @@ class Queue {
       changed_.notify_all();
     }
   }
-  // These two once all workers have stopped.
+  // To be called once all workers have stopped.
   bool has_failed() const { return failure_ != nullptr; }
+  // To be called once all workers have stopped.
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
   }
@@ -73,39 +75,38 @@ class Queue {
 
 class Worker {
  public:
-  Worker(const ExecutorOptions& options, uint32_t number, TriangleBins& bins, JobStore& store,
+  Worker(const ExecutorOptions& options, uint32_t number, TriangleStore& triangles, JobStore& jobs,
          MemoryBudget& budget, uint64_t share_bytes, const BuildContext& context)
       : options_(options),
-        bins_(bins),
-        store_(store),
+        triangles_(triangles),
+        jobs_(jobs),
         files_(context.files),
         cancel_(context.cancel),
         share_(share_bytes, &budget),
-        journal_(std::make_unique<CommitQueue>(
-            store,
+        commits_(std::make_unique<CommitQueue>(
+            jobs,
             std::make_unique<SegmentWriter>(context.files, options.segment_folder,
                                             options.first_segment_id + number, budget),
-            bins, options.checkpoint_interval_s)),
-        segment_(journal_->segment()),
+            triangles, options.checkpoint_interval_s)),
+        segment_(commits_->segment()),
         backend_(options.open_backend()) {}
 
-  // Builds one subvolume, or answers with the eight that replace it.
+  // Builds one subvolume, or returns the up to eight that replace it.
   std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
     cancel_.check();
     const StoredSubvolume& subvolume = queued.subvolume;
     const int64_t edge = subvolume.cube.edge_voxels(options_.grid_levels);
     if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
     const SubvolumeTask task{options_.grid_levels, subvolume.cube, options_.hash_bits};
-    const auto triangles = bins_.open(queued.bin);
+    const auto triangles = triangles_.open(queued.bin);
     std::optional<std::string> key;
     if (options_.cache) {
       MemoryBudget key_share(WorkerMemory::key_bytes(share_.limit()), &share_);
       key = ArtifactCache::key(task, *triangles, key_share);
       StoredSubvolume copied = subvolume;
       if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
-        bins_.drop(queued.bin);
         ++counts.cached;
-        journal_->built(copied, queued.kept);
+        commits_->add_built(copied, queued.bin);
         return {};
       }
     }
@@ -114,23 +115,21 @@ class Worker {
     if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
         BuildOutcome::kOutgrown)
       return split(queued);
-    bins_.drop(queued.bin);
     if (!built.summary.empty()) {
       const ArtifactRoot root{subvolume.cube, 0, built.summary.root_hash, built.summary.voxels,
                               built.summary.svo_nodes};
       built.artifact = artifact.finish({&root, 1});
-      if (key) share(*key, built.artifact);
+      if (key) add_to_cache(*key, built.artifact);
     }
-    journal_->built(built, queued.kept);
+    commits_->add_built(built, queued.bin);
     return {};
   }
-  CommitQueue& journal() { return *journal_; }
-  std::unique_ptr<CommitQueue> take_journal() { return std::move(journal_); }
+  std::unique_ptr<CommitQueue> release_commits() { return std::move(commits_); }
 
   ExecutorCounts counts;
 
  private:
-  void share(const std::string& key, const ArtifactRef& artifact) {
+  void add_to_cache(const std::string& key, const ArtifactRef& artifact) {
     segment_.flush();
     if (!written_segment_)
       written_segment_ = files_.open_read(segment_path(options_.segment_folder, segment_.id()));
@@ -148,36 +147,36 @@ class Worker {
     std::vector<BinId> part_bins(8);
     for (int c = 0; c < 8; ++c) {
       parts[c] = subvolume.cube.child(c);
-      part_bins[c] = bins_.add_bin();
+      part_bins[c] = triangles_.add_part(whole.bin);
     }
     const CubeTree tree(options_.grid_levels, subvolume.cube, parts);
-    distribute(bins_, whole.bin, tree, part_bins, MemoryPlan::kSplitBufferBytes, cancel_);
+    partition(triangles_, whole.bin, tree, part_bins, MemoryPlan::kSplitBufferBytes, cancel_);
     std::vector<QueuedSubvolume> queued;
     std::vector<Cube> cubes;
     for (int c = 0; c < 8; ++c) {
-      if (bins_.count(part_bins[c]) == 0) continue;
+      if (triangles_.count(part_bins[c]) == 0) {
+        triangles_.release(part_bins[c]);
+        continue;
+      }
       cubes.push_back(parts[c]);
-      queued.push_back({StoredSubvolume{}, part_bins[c], whole.kept});
+      queued.push_back({StoredSubvolume{}, part_bins[c]});
       queued.back().subvolume.cube = parts[c];
       queued.back().subvolume.weight = subvolume.weight / 8;
     }
-    const std::vector<SubvolumeId> ids = store_.record_split(subvolume, cubes);
+    const std::vector<SubvolumeId> ids = jobs_.record_split(subvolume, cubes);
     for (size_t i = 0; i < ids.size(); ++i) queued[i].subvolume.id = ids[i];
-    if (whole.kept) {
-      bins_.hold(*whole.kept, queued.size());
-      bins_.release(*whole.kept);
-    }
+    triangles_.release(whole.bin);
     ++counts.split;
     return queued;
   }
 
   const ExecutorOptions& options_;
-  TriangleBins& bins_;
-  JobStore& store_;
+  TriangleStore& triangles_;
+  JobStore& jobs_;
   FileSystem& files_;
   const CancelToken& cancel_;
   MemoryBudget share_;
-  std::unique_ptr<CommitQueue> journal_;
+  std::unique_ptr<CommitQueue> commits_;
   SegmentWriter& segment_;
   std::unique_ptr<Backend> backend_;
   std::unique_ptr<ReadableFile> written_segment_;
@@ -185,19 +184,20 @@ class Worker {
 
 }  // namespace
 
-ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> heap,
-                                TriangleBins& bins, JobStore& store, CommitQueues& open,
-                                MemoryBudget& budget, const BuildContext& context) {
-  uint64_t total = heap.size();
-  Queue queue(std::move(heap));
+ExecutorCounts build_subvolumes(const ExecutorOptions& options,
+                                std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
+                                JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,
+                                const BuildContext& context) {
+  uint64_t total = subvolumes.size();
+  Queue queue(std::move(subvolumes));
   const auto memory = WorkerMemory::divide(budget.available(), options.threads);
   std::vector<std::unique_ptr<Worker>> workers;
   for (unsigned i = 0; i < memory.workers; ++i)
     workers.push_back(
-        std::make_unique<Worker>(options, i, bins, store, budget, memory.share_bytes, context));
+        std::make_unique<Worker>(options, i, triangles, jobs, budget, memory.share_bytes, context));
   std::mutex progress_mutex;
   const auto work = [&](Worker& worker) {
-    while (const auto subvolume = queue.take()) {
+    while (const auto subvolume = queue.pop()) {
       const auto parts = worker.build(*subvolume);
       queue.done(parts);
       std::lock_guard lock(progress_mutex);
@@ -214,17 +214,18 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<Queu
       threads.emplace_back([&work, &queue, &worker] { queue.guard([&] { work(*worker); }); });
   });
   for (std::thread& thread : threads) thread.join();
-  ExecutorCounts sum;
+  ExecutorCounts counts;
   for (const auto& worker : workers) {
-    sum.split += worker->counts.split;
-    sum.cached += worker->counts.cached;
-    if (!queue.has_failed()) queue.guard([&] { worker->journal().announce(); });
-    open.add(worker->take_journal());
+    counts.split += worker->counts.split;
+    counts.cached += worker->counts.cached;
+    auto commits = worker->release_commits();
+    if (!queue.has_failed()) queue.guard([&] { commits->finish(); });
+    unfinished.add(std::move(commits));
   }
-  // What is finished is not lost.
-  if (queue.has_failed()) queue.guard([&] { open.commit(); });
+  // A failure does not lose what is finished.
+  if (queue.has_failed()) queue.guard([&] { unfinished.commit(); });
   queue.rethrow_failure();
-  return sum;
+  return counts;
 }
 
 }  // namespace voxdag

@@ -1,12 +1,11 @@
 // Builds subvolumes on worker threads: each takes the heaviest one left, builds it with its own
-// backend, appends the artifact to its own segment file and journals it. A subvolume that outgrows
-// the worker's share of memory is split in eight and comes back as eight.
+// backend, appends the artifact to its own segment file and commits it. A subvolume that outgrows
+// the worker's share of memory is split in eight, which are queued in its place.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "core/backend/backend.h"
@@ -15,17 +14,14 @@
 #include "scheduler/execute/artifact_cache.h"
 #include "scheduler/execute/commit_queue.h"
 #include "scheduler/job/job_store.h"
-#include "scheduler/triangles/triangle_bins.h"
+#include "scheduler/triangles/triangle_store.h"
 
 namespace voxdag {
 
-// A subvolume as the executor holds it: what defines it, and where its triangles lie. Heavier ones
-// go first.
+// A subvolume that is to be built, and the bin of its triangles.
 struct QueuedSubvolume {
   StoredSubvolume subvolume;
   BinId bin = 0;
-  std::optional<BinId>
-      kept;  // the kept bin, this one or another, from which it can be filled again
 };
 
 struct ExecutorOptions {
@@ -38,7 +34,7 @@ struct ExecutorOptions {
   std::string segment_folder;
   uint32_t first_segment_id = 0;
   double checkpoint_interval_s = 2;
-  ArtifactCache* cache = nullptr;  // if artifacts are shared between builds
+  ArtifactCache* cache = nullptr;  // null if builds share no artifacts
 };
 
 struct ExecutorCounts {
@@ -46,11 +42,12 @@ struct ExecutorCounts {
   uint64_t cached = 0;  // copied from the cache instead of built
 };
 
-// Builds all of `queue`; the bins are dropped as they are used up. Each result is recorded in
-// `store`, but for the last ones, which are announced there and recorded by `open`. Throws the
-// first Error of any worker after all have stopped and what was finished is recorded.
-ExecutorCounts build_subvolumes(const ExecutorOptions& options, std::vector<QueuedSubvolume> queue,
-                                TriangleBins& bins, JobStore& store, CommitQueues& open,
-                                MemoryBudget& budget, const BuildContext& context);
+// Builds all of `subvolumes` and uses up their bins. The results are recorded in `jobs`, those of
+// the last groups once `unfinished`, to which the workers' queues are added, is committed. Throws
+// the first Error of any worker after all have stopped and what was finished is recorded.
+ExecutorCounts build_subvolumes(const ExecutorOptions& options,
+                                std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
+                                JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,
+                                const BuildContext& context);
 
 }  // namespace voxdag

@@ -1,4 +1,4 @@
-// libcrypto's EVP digests do not give out their state; its older interface is plain data.
+// The state of libcrypto's EVP digests cannot be stored; that of its older interface is plain data.
 #define OPENSSL_SUPPRESS_DEPRECATED
 #include "scheduler/ingest/content_digest.h"
 
@@ -23,8 +23,9 @@ ContentDigest::ContentDigest(const Grid& grid) {
   add_bytes(std::as_bytes(std::span(numbers)));
 }
 
-// Nine coordinates of 32 bits, which are half as much to digest; where they do not suffice, the
-// smallest such number, which is never one of those, and then nine of 64 bits.
+// A triangle is nine coordinates of 32 bits, which are half as much to digest; where they do not
+// suffice it is the smallest 32-bit number, which never occurs as a coordinate, and nine of 64
+// bits.
 void ContentDigest::add(std::span<const FixedTriangle> triangles) {
   constexpr int32_t kWide = INT32_MIN;
   constexpr size_t kMaxBytes = sizeof kWide + sizeof(FixedTriangle), kAtOnce = 64;

@@ -1,5 +1,5 @@
-// SHA-256 over the grid and the snapped triangles in their order: names the content of a scene. It
-// is plain data, so that it can be kept and gone on with.
+// SHA-256 over the grid and the snapped triangles in their order: names the content of a scene. A
+// plain value, so that a checkpoint can store it and a later run continue it.
 #pragma once
 
 #include <array>

@@ -10,15 +10,15 @@
 namespace voxdag {
 namespace {
 
-// A batch of the scene, snapped.
+// A batch of the scene after snapping.
 struct SnappedBatch {
   std::vector<FixedTriangle> inside;  // those that may touch the grid
-  std::vector<ExpectedWork> work;     // of each of these
+  std::vector<ExpectedWork> work;     // one for each of `inside`
   uint64_t dropped_outside = 0;
-  uint64_t position = 0;  // of the scene, behind the batch
+  uint64_t position = 0;  // in the scene, after the batch
 };
 
-// Reads the scene: one half of the work.
+// The producer: snaps what is read of the scene.
 class Snapper {
  public:
   Snapper(const TriangleSource& scene, const IngestState& state)
@@ -57,38 +57,21 @@ class Snapper {
   uint64_t snapped_;
 };
 
-// Counts and keeps what was snapped: the other half.
-class Taker {
- public:
-  Taker(IngestState& state, BinWriter& writer, TopTree& top, const BuildContext& context,
-        const AfterBatch& after_batch)
-      : state_(state), writer_(writer), top_(top), context_(context), after_batch_(after_batch) {}
-
-  void take(const SnappedBatch& batch) {
-    context_.cancel.check();
-    for (size_t i = 0; i < batch.inside.size(); ++i) {
-      state_.counts.expected_voxels += batch.work[i].voxels;
-      top_.add(batch.inside[i], batch.work[i].bricks);
-      writer_.append(0, batch.inside[i]);
-    }
-    state_.counts.triangles += batch.inside.size();
-    state_.counts.dropped_outside += batch.dropped_outside;
-    state_.digest.add(batch.inside);
-    state_.position = batch.position;
-    context_.progress.advance(batch.inside.size() + batch.dropped_outside);
-    after_batch_();
+// The consumer: counts and stores what was snapped.
+void consume(const SnappedBatch& batch, IngestState& state, BinWriter& writer, TopTree& top) {
+  for (size_t i = 0; i < batch.inside.size(); ++i) {
+    state.counts.expected_voxels += batch.work[i].voxels;
+    top.add(batch.inside[i], batch.work[i].bricks);
+    writer.append(0, batch.inside[i]);
   }
+  state.counts.triangles += batch.inside.size();
+  state.counts.dropped_outside += batch.dropped_outside;
+  state.digest.add(batch.inside);
+  state.position = batch.position;
+}
 
- private:
-  IngestState& state_;
-  BinWriter& writer_;
-  TopTree& top_;
-  const BuildContext& context_;
-  const AfterBatch& after_batch_;
-};
-
-// Batches on their way from one thread to the other, less than half a MiB each.
-constexpr size_t kBatchesUnderWay = 3;
+// Batches between the two threads, less than half a MiB each.
+constexpr size_t kQueuedBatches = 3;
 
 }  // namespace
 
@@ -122,16 +105,20 @@ void ingest(TriangleSource& scene, unsigned threads, IngestState& state, BinWrit
   context.progress.begin_stage("ingest", state.declared_triangles, "triangles");
   context.progress.advance(state.position);
   Snapper snapper(scene, state);
-  Taker taker(state, writer, top, context, after_batch);
   const uint64_t first = state.position;
-  run_producer_consumer<SnappedBatch, kBatchesUnderWay>(
+  run_producer_consumer<SnappedBatch, kQueuedBatches>(
       threads,
       [&](auto pass) {
         scene.for_each_batch_from(first, [&](std::span<const WorldTriangle> batch) {
           pass([&](SnappedBatch& snapped) { snapper.snap(batch, snapped); });
         });
       },
-      [&](const SnappedBatch& batch) { taker.take(batch); });
+      [&](const SnappedBatch& batch) {
+        context.cancel.check();
+        consume(batch, state, writer, top);
+        context.progress.advance(batch.inside.size() + batch.dropped_outside);
+        after_batch();
+      });
   writer.flush();
   state.counts.dropped_invalid =
       state.declared_triangles - state.counts.triangles - state.counts.dropped_outside;

@@ -7,20 +7,20 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "scheduler/memory_plan.h"
-#include "scheduler/plan/prepare.h"
+#include "scheduler/triangles/memory_store.h"
 
 namespace voxdag {
 namespace {
 
-// Clocks of file systems stand still for up to 10 ms; those that count whole seconds, for up to
-// two.
+// The clock of a file system's times advances in steps of up to 10 ms; where times are whole
+// seconds, in steps of up to two.
 constexpr int64_t kSecond_ns = 1'000'000'000;
 constexpr int64_t kTick_ns = kSecond_ns / 10;
 constexpr int64_t kCoarseTick_ns = 2 * kSecond_ns;
-// All triangles lie in the file twice while they are handed down, some more often.
+// At the end of the partition each triangle lies in the file twice, some more often.
 constexpr double kCopies = 2.2;
-// ... and that must leave as much again to the build.
-constexpr double kRoom = 2 * kCopies;
+// Free disk that a scene's triangles need, relative to their copies: the build needs as much again.
+constexpr double kFreePerCopy = 2;
 
 std::string request_of(const BuildSpec& spec) {
   std::string request = geometry_json(spec.geometry);
@@ -28,9 +28,11 @@ std::string request_of(const BuildSpec& spec) {
   return request;
 }
 
+bool is_wide(const BuildSpec& spec) { return spec.geometry.bounds.has_value(); }
+
 double copies_bytes(const BuildSpec& spec, uint64_t triangles) {
   return kCopies * static_cast<double>(triangles) *
-         static_cast<double>(TriangleBins::record_bytes(spec.geometry.bounds.has_value()));
+         static_cast<double>(triangle_record_bytes(is_wide(spec)));
 }
 
 bool fits_in_memory(const BuildSpec& spec, uint64_t triangles) {
@@ -40,8 +42,8 @@ bool fits_in_memory(const BuildSpec& spec, uint64_t triangles) {
 
 }  // namespace
 
-double max_kept_bytes(const BuildSpec& spec, uint64_t triangles) {
-  return triangles < spec.run.kept_from_triangles ? 0 : copies_bytes(spec, triangles);
+double max_durable_bytes(const BuildSpec& spec, uint64_t triangles) {
+  return triangles < spec.run.durable_min_triangles ? 0 : copies_bytes(spec, triangles);
 }
 
 int64_t unix_ns() {
@@ -50,132 +52,146 @@ int64_t unix_ns() {
   return now.tv_sec * kSecond_ns + now.tv_nsec;
 }
 
-int64_t settled_ns(const std::vector<SourceFile>& files) {
-  int64_t settled = 0;
+int64_t trusted_from_ns(const std::vector<SourceFile>& files) {
+  int64_t trusted = 0;
   for (const auto& [path, identity] : files) {
     if (identity == FileIdentity{}) return INT64_MAX;
     const bool whole_seconds =
         identity.modified_ns % kSecond_ns == 0 && identity.changed_ns % kSecond_ns == 0;
-    settled = std::max(settled, std::max(identity.modified_ns, identity.changed_ns) +
+    trusted = std::max(trusted, std::max(identity.modified_ns, identity.changed_ns) +
                                     (whole_seconds ? kCoarseTick_ns : kTick_ns));
   }
-  return settled;
+  return trusted;
 }
 
-IngestCheckpoint::IngestCheckpoint(const BuildSpec& spec, JobStore& store, WorkFolder& work,
+IngestCheckpoint::IngestCheckpoint(const BuildSpec& spec, JobStore* jobs, WorkFolder& work,
                                    const BuildContext& context)
-    : spec_(spec), store_(store), work_(work), context_(context) {}
+    : spec_(spec), jobs_(jobs), work_(work), context_(context), is_disabled_(!jobs) {}
 
 std::optional<IngestState> IngestCheckpoint::resume() {
-  settle();
+  wait();
+  store_ = nullptr;
   record_.reset();
-  begun_s_ = wall_seconds();
+  if (!jobs_) return std::nullopt;
+  last_save_s_ = wall_seconds();
   try {
-    if (const auto stored = store_.ingest()) record_ = decode_ingest_record(*stored);
+    if (const auto stored = jobs_->ingest()) record_ = decode_ingest_record(*stored);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion)
       throw;
     context_.progress.warn(error.message() + "; the scene is read again");
-    store_.forget_ingest();
+    jobs_->forget_ingest();
   }
   if (!record_) {
-    work_.remove_kept();
+    work_.remove_durable();
     return std::nullopt;
   }
-  // Without a job there is no plan that the triangles could have been handed down to.
+  // Without a job there is no plan for whose cubes the triangles could have been partitioned.
   if (record_->request == request_of(spec_) && files_are_unchanged() &&
-      (record_->state.stage != IngestStage::kReady || store_.job()))
+      (record_->state.stage != IngestStage::kReady || jobs_->job()))
     return record_->state;
-  // It stays until another scene is there to take its place: this one may only be out of reach.
+  // The saved checkpoint stays until another scene replaces it: this one may only be out of reach.
   record_.reset();
   return std::nullopt;
 }
 
-bool IngestCheckpoint::wants(const TriangleSource& scene) const {
+bool IngestCheckpoint::is_worthwhile(const TriangleSource& scene) const {
   const uint64_t triangles = scene.declared_triangles();
-  if (gave_up_ || max_kept_bytes(spec_, triangles) == 0) return false;
+  if (is_disabled_ || max_durable_bytes(spec_, triangles) == 0) return false;
   return !fits_in_memory(spec_, triangles) ||
-         kRoom / kCopies * copies_bytes(spec_, triangles) <=
+         kFreePerCopy * copies_bytes(spec_, triangles) <=
              static_cast<double>(context_.files.free_space(work_.path()));
 }
 
-void IngestCheckpoint::begin(const TriangleSource& scene, int64_t opened_ns) {
+void IngestCheckpoint::enable(const TriangleSource& scene, int64_t opened_ns) {
   forget();
   std::vector<SourceFile> files = scene.files();
-  if (settled_ns(files) > opened_ns) return;
+  if (trusted_from_ns(files) > opened_ns) return;
   record_ = IngestRecord{request_of(spec_), std::move(files), {}};
   record_->state.declared_triangles = scene.declared_triangles();
-  begun_s_ = wall_seconds();
+  last_save_s_ = wall_seconds();
 }
 
-bool IngestCheckpoint::is_of(const std::vector<SourceFile>& files) const {
+bool IngestCheckpoint::matches(const std::vector<SourceFile>& files) const {
   return record_ && record_->files == files;
 }
 
-std::unique_ptr<TriangleFile> IngestCheckpoint::open_file(uint64_t end) {
-  return std::make_unique<TriangleFile>(context_.files, work_.kept_path(), end);
+std::unique_ptr<TriangleStore> IngestCheckpoint::open_store(const IngestState& state,
+                                                            MemoryBudget& share) {
+  store_ = nullptr;
+  const bool is_finished = state.stage == IngestStage::kReady && state.triangles.file_end == 0;
+  if (!record_ || is_finished)
+    return std::make_unique<MemoryStore>(context_.files, work_.spill_path(), is_wide(spec_), share);
+  auto store = std::make_unique<DurableStore>(context_.files, work_.durable_path(), state.triangles,
+                                              work_.spill_path(), is_wide(spec_), share);
+  store_ = store.get();
+  return store;
+}
+
+void IngestCheckpoint::load_top_tree(const IngestState& state, TopTree& top) const {
+  if (store_ && state.top_tree.bytes)
+    store_->file()->read(state.top_tree, top.fill(state.top_tree_weight));
 }
 
 bool IngestCheckpoint::is_due() {
   if (pending_.valid()) {
     if (pending_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
-    settle();
+    wait();
   }
-  return record_ && wall_seconds() - begun_s_ >= spec_.run.checkpoint_interval_s;
+  return record_ && wall_seconds() - last_save_s_ >= spec_.run.checkpoint_interval_s;
 }
 
-void IngestCheckpoint::settle() {
+void IngestCheckpoint::wait() {
   if (pending_.valid()) pending_.get();
 }
 
-void IngestCheckpoint::settle_whatever_comes() {
+void IngestCheckpoint::wait_ignoring_errors() {
   try {
-    settle();
+    wait();
   } catch (const Error&) {
-    // The checkpoint before it counts.
+    // The checkpoint before counts.
   }
 }
 
-void IngestCheckpoint::save(IngestState& state, TriangleBins& bins) {
-  save_soon(state, bins);
-  settle();
+void IngestCheckpoint::save(IngestState& state, const TopTree* top) {
+  save_in_background(state, top);
+  wait();
 }
 
-void IngestCheckpoint::save_soon(IngestState& state, TriangleBins& bins) {
-  settle();
+void IngestCheckpoint::save_in_background(IngestState& state, const TopTree* top) {
+  wait();
   if (!record_) return;
-  begun_s_ = wall_seconds();
-  const std::shared_ptr<TriangleFile> file = bins.kept_file();
-  state.chunks = bins.write_chain();
-  state.file_end = file->end();
-  const auto checkpoint = [this, state, file] {
+  last_save_s_ = wall_seconds();
+  if (!store_) return commit(state);  // A scan has no triangles yet.
+  const std::shared_ptr<TriangleFile> file = store_->file();
+  if (top) {
+    state.top_tree = file->append(top->cells());
+    state.top_tree_weight = top->total_weight();
+  }
+  state.triangles = store_->checkpoint();
+  const auto sync_and_commit = [this, state, file] {
     file->sync();
     const Extent old = record_->state.top_tree;
     commit(state);
     if (old.bytes && old.offset != state.top_tree.offset) file->release(old);
   };
   try {
-    pending_ = std::async(std::launch::async, checkpoint);
+    pending_ = std::async(std::launch::async, sync_and_commit);
   } catch (const std::system_error&) {
-    checkpoint();  // The system has no thread left.
+    sync_and_commit();  // The system has no thread left.
   }
-  // Tests want a checkpoint after every batch.
-  if (spec_.run.checkpoint_interval_s == 0) settle();
-}
-
-void IngestCheckpoint::save_scan(const IngestState& state) {
-  begun_s_ = wall_seconds();
-  if (record_) commit(state);
+  // Tests need a checkpoint after every batch.
+  if (spec_.run.checkpoint_interval_s == 0) wait();
 }
 
 void IngestCheckpoint::finish() {
-  settle();
+  wait();
   if (!record_) return;
   IngestState state = record_->state;
-  state.chunks = state.cubes = state.top_tree = {};
-  state.file_end = 0;
+  state.top_tree = {};
+  state.triangles = {};
   commit(state);
-  work_.remove_kept();
+  work_.remove_durable();
 }
 
 void IngestCheckpoint::commit(const IngestState& state) {
@@ -184,37 +200,38 @@ void IngestCheckpoint::commit(const IngestState& state) {
     return forget_saved();
   }
   record_->state = state;
-  store_.save_ingest(encode(*record_));
+  jobs_->save_ingest(encode(*record_));
 }
 
 bool IngestCheckpoint::has_saved() {
-  settle_whatever_comes();
+  wait_ignoring_errors();
   try {
-    return store_.ingest().has_value();
+    return jobs_->ingest().has_value();
   } catch (const Error&) {
     return false;
   }
 }
 
 void IngestCheckpoint::forget() {
-  settle_whatever_comes();
+  wait_ignoring_errors();
   record_.reset();
   forget_saved();
 }
 
 void IngestCheckpoint::forget_saved() {
-  // The file first: that may be the room in which the job store commits.
-  work_.remove_kept();
-  store_.forget_ingest();
+  if (!jobs_) return;
+  // The file goes first: a full disk may have no other space in which the job store can commit.
+  work_.remove_durable();
+  jobs_->forget_ingest();
 }
 
-void IngestCheckpoint::give_up() {
-  gave_up_ = true;
+void IngestCheckpoint::disable() {
+  is_disabled_ = true;
   forget();
 }
 
 bool IngestCheckpoint::is_optional() {
-  settle_whatever_comes();
+  wait_ignoring_errors();
   return record_ && fits_in_memory(spec_, record_->state.declared_triangles);
 }
 
@@ -224,7 +241,7 @@ bool IngestCheckpoint::files_are_unchanged() const {
       return context_.files.open_read(file.path)->identity() == file.identity;
     });
   } catch (const Error&) {
-    return false;  // Whoever reads the scene will say what is wrong.
+    return false;  // Whoever reads the scene reports what is wrong.
   }
 }
 

@@ -1,13 +1,13 @@
-// Lets scan, ingest and hand-down of a large scene survive the process: about every two seconds
-// what was done is made durable, in a file of triangles and a row of the job store that says what
-// it holds, so that the next run goes on there.
+// Lets scan, ingest and partition of a large scene survive the process: about every two seconds
+// what was done is made durable, in the file of a DurableStore and a row of the job store that
+// refers to it, so that the next run resumes there. It decides which triangle store a build uses.
 //
 // Invariants:
-//   1. The row names nothing in the file that was not synced before.
-//   2. A row counts only where the same was asked for and every file of the scene is the one that
-//      was read, unchanged: same inode, size and times, and those so old when it was opened that
+//   1. The row refers to no bytes of the file that were not synced before.
+//   2. A row counts only for the same request, and if every file of the scene is the one that was
+//      read, unchanged: same inode, size and times, and these so old when the file was opened that
 //      any later change shows in them.
-//   3. What does not count, or is damaged, is forgotten: the scene is read again.
+//   3. A row that does not count, or is damaged, is forgotten: the scene is read again.
 // Used by one thread.
 #pragma once
 
@@ -15,80 +15,86 @@
 #include <future>
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "scheduler/build_spec.h"
 #include "scheduler/ingest/ingest_record.h"
 #include "scheduler/job/job_store.h"
 #include "scheduler/job/work_folder.h"
-#include "scheduler/triangles/triangle_bins.h"
+#include "scheduler/plan/top_tree.h"
+#include "scheduler/triangles/durable_store.h"
 
 namespace voxdag {
 
 class IngestCheckpoint {
  public:
-  IngestCheckpoint(const BuildSpec& spec, JobStore& store, WorkFolder& work,
+  // Without a job store there are no checkpoints, and no triangles outlive the process.
+  IngestCheckpoint(const BuildSpec& spec, JobStore* jobs, WorkFolder& work,
                    const BuildContext& context);
 
-  // Where an earlier run left off with this scene, if it did. Begins to keep what follows.
+  // The state of an earlier run with this scene, if there is one; enables checkpoints then.
   std::optional<IngestState> resume();
-  // Whether this scene is worth keeping, and the disk has room for it.
-  bool wants(const TriangleSource& scene) const;
-  // Begins to keep a scene that was opened at that Unix time; what was kept before is forgotten.
-  // Does nothing if a change since then might not show.
-  void begin(const TriangleSource& scene, int64_t opened_ns);
-  // Whether these are the files that the scene was read from so far.
-  bool is_of(const std::vector<SourceFile>& files) const;
+  // Whether the scene is large enough for checkpoints, and the disk has space for its triangles.
+  bool is_worthwhile(const TriangleSource& scene) const;
+  // Enables checkpoints for a scene that was opened at that Unix time, and forgets those of others.
+  // Does not enable them if a change of a file since then might not show in its times.
+  void enable(const TriangleSource& scene, int64_t opened_ns);
+  // Whether checkpoints are enabled, and for a scene of exactly these files.
+  bool matches(const std::vector<SourceFile>& files) const;
 
-  bool keeps() const { return record_.has_value(); }
-  std::unique_ptr<TriangleFile> open_file(uint64_t end);
+  // Opens the store for the triangles: as it was at the state's checkpoint if checkpoints are
+  // enabled, else an empty one in memory. Memory is charged to `share`. The store must live until
+  // the last save().
+  std::unique_ptr<TriangleStore> open_store(const IngestState& state, MemoryBudget& share);
+  // Fills `top` with what the state's checkpoint stored of it, if anything.
+  void load_top_tree(const IngestState& state, TopTree& top) const;
+
   // Whether it is time for a checkpoint, and the last one is durable.
   bool is_due();
-  // Makes durable what is in the kept bins, and that it is as `state` says; completes `state` by
-  // where it lies. Does nothing where nothing is kept, and gives up if the scene's files have
-  // changed.
-  void save(IngestState& state, TriangleBins& bins);
-  // The same on another thread, so that the disk does not keep ingest waiting: a crash costs the
-  // interval and what a sync takes. What goes wrong is thrown by the next call.
-  void save_soon(IngestState& state, TriangleBins& bins);
-  // Of a scan, which has no triangles.
-  void save_scan(const IngestState& state);
-  // All subvolumes are built and recorded: the triangles go, and that the scene is the same is all
-  // that stays to be known.
+  // Makes the triangles in the store durable, and then that they are as `state` says, along with
+  // `top` if given; sets the extents in `state`. Does nothing where checkpoints are not enabled,
+  // and disables them if a file of the scene has changed.
+  void save(IngestState& state, const TopTree* top = nullptr);
+  // The same on another thread, so that ingest does not wait for the disk. The next call throws
+  // what goes wrong there.
+  void save_in_background(IngestState& state, const TopTree* top = nullptr);
+  // All subvolumes are built and recorded: removes the triangles. What remains is the record that
+  // lets a later run know the scene without reading it.
   void finish();
 
-  // Whether there is something to go on with, of whatever scene.
+  // Whether the job store has a checkpoint, of whatever scene.
   bool has_saved();
+  // Removes all checkpoints, and disables them until the next enable().
   void forget();
-  // Forgets, and keeps nothing for the rest of this run.
-  void give_up();
-  // Whether the triangles fit in memory as well.
+  // The same for the rest of this run.
+  void disable();
+  // Whether checkpoints are enabled for triangles that memory could hold as well.
   bool is_optional();
 
  private:
-  // Waits for what save_soon() began.
-  void settle();
-  void settle_whatever_comes();
+  // Waits for save_in_background(), and throws what went wrong there.
+  void wait();
+  void wait_ignoring_errors();
   bool files_are_unchanged() const;
   void commit(const IngestState& state);
   void forget_saved();
 
   const BuildSpec& spec_;
-  JobStore& store_;
+  JobStore* const jobs_;
   WorkFolder& work_;
   const BuildContext& context_;
-  std::optional<IngestRecord> record_;  // as last saved
-  double begun_s_ = 0;                  // the last checkpoint
-  std::future<void> pending_;           // until it is settled, record_ belongs to its thread
-  bool gave_up_ = false;
+  bool is_disabled_;
+  DurableStore* store_ = nullptr;       // the open one, if it is durable
+  std::optional<IngestRecord> record_;  // as last saved; none while checkpoints are not enabled
+  double last_save_s_ = 0;
+  std::future<void> pending_;  // while valid, record_ belongs to its thread
 };
 
-// Bytes that the kept triangles of a scene take at most, while they are handed down; 0 if it is too
-// small to be kept.
-double max_kept_bytes(const BuildSpec& spec, uint64_t triangles);
+// Bytes of disk that the durable triangles of a scene take at most, reached at the end of the
+// partition; 0 if the scene is too small for checkpoints.
+double max_durable_bytes(const BuildSpec& spec, uint64_t triangles);
 // The Unix time from which on a change of these files shows in their identities; INT64_MAX if one
 // of them is not known.
-int64_t settled_ns(const std::vector<SourceFile>& files);
+int64_t trusted_from_ns(const std::vector<SourceFile>& files);
 int64_t unix_ns();
 
 }  // namespace voxdag

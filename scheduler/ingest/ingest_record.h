@@ -1,5 +1,5 @@
-// What is durable of scan, ingest and hand-down: which scene they were of and how far they are. One
-// row of the job store holds it; the triangles themselves lie in the kept file.
+// What a checkpoint of scan, ingest and partition records: which scene they read and how far they
+// are. One row of the job store holds it; the triangles themselves lie in the durable store.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 #include "core/geometry/grid.h"
 #include "core/scene/triangle_source.h"
 #include "scheduler/ingest/content_digest.h"
-#include "scheduler/triangles/triangle_file.h"
+#include "scheduler/triangles/durable_store.h"
 
 namespace voxdag {
 
@@ -19,17 +19,17 @@ struct IngestCounts {
   uint64_t triangles = 0;        // that may touch the grid
   uint64_t dropped_outside = 0;  // their boxes miss it
   uint64_t dropped_invalid = 0;
-  double expected_voxels = 0;  // each triangle's own, shared voxels counted twice
+  double expected_voxels = 0;  // the sum over the triangles; shared voxels count twice
 };
 
 enum class IngestStage : uint32_t {
-  kScan,      // the bounds of the triangles up to `position` are known
-  kIngest,    // the grid is known, and the triangles up to `position` are in the whole bin
-  kHandDown,  // all are; those of the whole bin up to `position` are in the subvolumes' bins, too
-  kReady,     // all are, and the whole bin is gone; so is the file once all subvolumes are built
+  kScan,       // the bounds of the triangles up to `position` are known
+  kIngest,     // the grid is known, and the triangles up to `position` are in the scene's bin
+  kPartition,  // all are, and the first `position` of them are in the cube bins, too
+  kReady,      // all are in the cube bins; the scene's bin is gone
 };
 
-// Plain data. What is not known yet is as it is here.
+// A plain value. What is not known yet has its default.
 struct IngestState {
   IngestStage stage = IngestStage::kScan;
   uint32_t top_tree_depth = 0;
@@ -39,23 +39,20 @@ struct IngestState {
   Grid grid;
   IngestCounts counts;
   ContentDigest digest;
-  // Pieces of the kept file, and its end.
-  Extent top_tree;  // its cells
+  Extent top_tree;  // its cells, in the durable store's file
   double top_tree_weight = 0;
-  Extent cubes;   // of the subvolumes' bins, which follow the whole bin in this order
-  Extent chunks;  // the last link of the chain
-  uint64_t file_end = 0;
+  DurableStoreState triangles;  // without a file once all subvolumes are recorded
 };
 
 struct IngestRecord {
-  std::string request;            // geometry options and scenes, as they were asked for
+  std::string request;            // the geometry options and scenes of the build
   std::vector<SourceFile> files;  // that the scene was read from
   IngestState state;
 };
 
 std::vector<std::byte> encode(const IngestRecord& record);
-// Throws Error{kCorrupt} for what encode() never gave, Error{kUnsupportedVersion} for what it gives
-// in another version.
+// Throws Error{kCorrupt} for bytes that encode() did not write, Error{kUnsupportedVersion} for
+// those of another version of it.
 IngestRecord decode_ingest_record(std::span<const std::byte> bytes);
 
 }  // namespace voxdag

@@ -43,7 +43,7 @@ bool is_ours(const DirectoryEntry& entry) {
   const std::string_view name = entry.name;
   if (entry.is_directory) return name == kScratchName;
   return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
-         name == "job.db-journal" || name.ends_with(".vdspill") || name.ends_with(".vdkept") ||
+         name == "job.db-journal" || name.ends_with(".vdspill") || name.ends_with(".vddurable") ||
          segment_id(name).has_value();
 }
 

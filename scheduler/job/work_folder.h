@@ -29,8 +29,8 @@ class WorkFolder {
   // The process that has locked the folder: "process 17 on box"; "" if none has.
   static std::string holder(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
-  // Triangles that are kept from one run to the next.
-  std::string kept_path() const { return path_ + "/triangles.vdkept"; }
+  // Triangles that outlive a run.
+  std::string durable_path() const { return path_ + "/triangles.vddurable"; }
   std::string scratch_path() const { return path_ + "/merge"; }
   std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
   // One more than the largest id of a segment that is there.
@@ -46,9 +46,10 @@ class WorkFolder {
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
   // Removes merge data.
   void empty_scratch();
-  // Removes spilled triangles; kept ones. Silent, like remove().
+  // Removes spilled triangles. Silent, like remove().
   void remove_spilled() { remove_silently(spill_path()); }
-  void remove_kept() { remove_silently(kept_path()); }
+  // Removes durable triangles. Silent, like remove().
+  void remove_durable() { remove_silently(durable_path()); }
   // Removes all files of voxdag, and the folder if it is empty then. Silent: what cannot be removed
   // costs space, not correctness.
   void remove();

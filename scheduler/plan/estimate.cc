@@ -52,11 +52,11 @@ std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot
   const auto backend = make_cpu_backend();
   MemoryBudget share(MemoryPlan::pilot_bytes(budget.available()), &budget);
   std::vector<PilotCounts> pilots;
-  const uint32_t finest = std::min(pilot_levels, scene.grid.levels);
+  const uint32_t finest = std::min(pilot_levels, scene.state.grid.levels);
   const uint32_t coarsest = std::max<uint32_t>(kMinGridLevels, finest < 4 ? 2 : finest - 2);
   for (uint32_t levels = coarsest; levels <= finest; ++levels) {
     const auto pilot =
-        build_pilot(*scene.bins, scene.whole, scene.grid.levels, levels, *backend, share, cancel);
+        build_pilot(*scene.triangles, scene.state.grid.levels, levels, *backend, share, cancel);
     if (!pilot) break;  // the finer ones would not fit either
     pilots.push_back(*pilot);
   }
@@ -88,9 +88,9 @@ double grow_as_dag(const std::vector<PilotCounts>& pilots, uint32_t doublings) {
 // What must be spilled is spilled already. A large scene is also stored durably where the disk has
 // space; it is freed piece by piece while artifacts are written.
 EstimateRange triangles_on_disk(const PreparedScene& scene) {
-  const double spilled = static_cast<double>(scene.bins->spilled_bytes());
-  return {spilled, std::max(spilled, scene.max_kept_bytes / 2),
-          std::max(spilled, scene.max_kept_bytes)};
+  const double spilled = static_cast<double>(scene.triangles->file_bytes());
+  return {spilled, std::max(spilled, scene.max_durable_bytes / 2),
+          std::max(spilled, scene.max_durable_bytes)};
 }
 
 }  // namespace
@@ -98,18 +98,18 @@ EstimateRange triangles_on_disk(const PreparedScene& scene) {
 Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsigned threads,
                         MemoryBudget& budget, const CancelToken& cancel) {
   Estimate estimate;
-  estimate.triangles = scene.counts.triangles;
+  estimate.triangles = scene.state.counts.triangles;
   estimate.subvolumes = scene.plan.size();
   estimate.free_memory = budget.limit();
   const auto pilots = build_pilots(scene, pilot_levels, budget, cancel);
   if (pilots.empty()) {
     // Too many triangles even for a small grid: their expected voxels are an upper bound.
-    estimate.voxels = {0, scene.counts.expected_voxels, scene.counts.expected_voxels};
+    estimate.voxels = {0, scene.state.counts.expected_voxels, scene.state.counts.expected_voxels};
     return estimate;
   }
   const PilotCounts& last = pilots.back();
   const PilotCounts& before = pilots[pilots.size() > 1 ? pilots.size() - 2 : 0];
-  const uint32_t doublings = scene.grid.levels - last.levels;
+  const uint32_t doublings = scene.state.grid.levels - last.levels;
   estimate.pilot_resolution = uint64_t{1} << last.levels;
 
   const double surface_spread = 1 + 0.02 * doublings;
@@ -128,8 +128,8 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
   const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
   estimate.disk_bytes =
       estimate.file_bytes + kArtifactBytesPerNode * artifact_nodes + triangles_on_disk(scene);
-  const double triangle_bytes =
-      static_cast<double>(scene.bins->record_bytes()) * static_cast<double>(scene.counts.triangles);
+  const double triangle_bytes = static_cast<double>(scene.triangles->record_bytes()) *
+                                static_cast<double>(scene.state.counts.triangles);
   estimate.memory_bytes = kMemoryBytesPerNode * estimate.dag_nodes + exactly(triangle_bytes);
   for (double* figure :
        {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})
@@ -145,8 +145,8 @@ double max_disk_bytes(const PreparedScene& scene) {
   // (expected_work()): over all levels twice its bricks, and one cube per level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
-  const double triangles = static_cast<double>(scene.counts.triangles);
-  const double octree_nodes = 2 * bricks + scene.grid.levels * triangles;
+  const double triangles = static_cast<double>(scene.state.counts.triangles);
+  const double octree_nodes = 2 * bricks + scene.state.grid.levels * triangles;
   return kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
 }
 
@@ -169,7 +169,8 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
     const bool own_folder;
     ~Cleanup() { own_folder ? work.remove() : work.remove_spilled(); }
   } cleanup{work, full.run.work_folder.empty()};
-  const PreparedScene scene = prepare_scene(full, work.spill_path(), budget, clock, context);
+  IngestCheckpoint no_checkpoints(full, nullptr, work, context);
+  const PreparedScene scene = prepare_scene(full, budget, clock, context, no_checkpoints);
   Estimate estimate = estimate_build(scene, kPilotLevels, full.run.threads, budget, context.cancel);
   estimate.free_disk = context.files.free_space(work.path());
   return estimate;

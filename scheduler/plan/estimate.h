@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "scheduler/build_spec.h"
-#include "scheduler/plan/prepare.h"
+#include "scheduler/prepare.h"
 
 namespace voxdag {
 

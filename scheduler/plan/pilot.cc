@@ -36,11 +36,11 @@ class CountingSink : public SubDagSink {
 
 }  // namespace
 
-std::optional<PilotCounts> build_pilot(const TriangleBins& bins, BinId bin, uint32_t grid_levels,
+std::optional<PilotCounts> build_pilot(const TriangleStore& triangles, uint32_t grid_levels,
                                        uint32_t pilot_levels, Backend& backend,
                                        MemoryBudget& budget, const CancelToken& cancel) {
   const double start = thread_cpu_seconds();
-  CoarserStream stream(bins.open(bin), grid_levels - pilot_levels);
+  CoarserStream stream(triangles.open(kSceneBin), grid_levels - pilot_levels);
   CountingSink sink;
   SubDagSummary summary;
   if (backend.build({pilot_levels, Cube{}, 64}, stream, budget, cancel, sink, summary) ==

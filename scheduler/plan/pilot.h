@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "core/backend/backend.h"
-#include "scheduler/triangles/triangle_bins.h"
+#include "scheduler/triangles/triangle_store.h"
 
 namespace voxdag {
 
@@ -18,9 +18,9 @@ struct PilotCounts {
   double cpu_s = 0;
 };
 
-// Builds the triangles of `bin`, snapped to 2^grid_levels, on a grid of 2^pilot_levels. Nothing if
+// Builds the scene's triangles, snapped to 2^grid_levels, on a grid of 2^pilot_levels. Nothing if
 // that does not fit the budget.
-std::optional<PilotCounts> build_pilot(const TriangleBins& bins, BinId bin, uint32_t grid_levels,
+std::optional<PilotCounts> build_pilot(const TriangleStore& triangles, uint32_t grid_levels,
                                        uint32_t pilot_levels, Backend& backend,
                                        MemoryBudget& budget, const CancelToken& cancel);
 

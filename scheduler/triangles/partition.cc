@@ -1,127 +1,117 @@
 #include "scheduler/triangles/partition.h"
 
+#include <algorithm>
+#include <array>
 #include <map>
+#include <string>
 
-#include "core/base/process_limits.h"
-#include "scheduler/triangles/distribute.h"
+#include "scheduler/triangles/triangle_file.h"
 
 namespace voxdag {
 namespace {
 
-std::vector<Cube> cubes_of(std::span<const StoredSubvolume> subvolumes) {
-  std::vector<Cube> cubes;
-  for (const StoredSubvolume& subvolume : subvolumes) cubes.push_back(subvolume.cube);
-  return cubes;
-}
-
-// New bins that are not kept, one for each of the subvolumes.
-std::vector<QueuedSubvolume> queue_up(std::span<const StoredSubvolume> subvolumes,
-                                      TriangleBins& bins, std::optional<BinId> kept) {
-  std::vector<QueuedSubvolume> queue;
-  for (const StoredSubvolume& subvolume : subvolumes)
-    queue.push_back({subvolume, bins.add_bin(), kept});
-  return queue;
-}
-
-std::vector<BinId> bins_of(std::span<const QueuedSubvolume> queue) {
-  std::vector<BinId> bins;
-  for (const QueuedSubvolume& queued : queue) bins.push_back(queued.bin);
-  return bins;
-}
-
-// From the whole bin into one kept bin for each cube, with a checkpoint now and then.
-void fill_kept_bins(std::span<const StoredSubvolume> planned, PreparedScene& scene,
-                    IngestCheckpoint& keeper, size_t buffer_bytes, const CancelToken& cancel) {
-  IngestState& state = scene.state;
-  TriangleBins& bins = *scene.bins;
-  if (scene.kept_bins.empty()) {
-    const std::vector<Cube> cubes = cubes_of(planned);
-    state.cubes = bins.kept_file()->append(std::as_bytes(std::span(cubes)));
-    for (const Cube& cube : cubes) scene.kept_bins.push_back({cube, bins.add_kept_bin()});
+void partition(TriangleStream& triangles, const CubeTree& tree, BinWriter& writer,
+               const CancelToken& cancel,
+               const std::function<void(size_t batch_size)>& after_batch = {}) {
+  std::vector<FixedTriangle> batch(1024);
+  while (const size_t n = triangles.read(batch)) {
+    cancel.check();
+    for (size_t i = 0; i < n; ++i)
+      tree.for_each_touched(batch[i], [&](size_t leaf) { writer.append(leaf, batch[i]); });
+    if (after_batch) after_batch(n);
   }
-  std::vector<Cube> cubes;
-  std::vector<BinId> targets;
-  for (const KeptBin& kept : scene.kept_bins) {
-    cubes.push_back(kept.cube);
-    targets.push_back(kept.bin);
-  }
-  const uint64_t first = state.position;
-  BinWriter writer(bins, targets, buffer_bytes);
-  distribute(*bins.open(scene.whole, first), CubeTree(scene.grid.levels, Cube{}, cubes), writer,
-             cancel, [&](uint64_t copied) {
-               state.position = first + copied;
-               if (!keeper.is_due()) return;
-               writer.flush();
-               keeper.save_soon(state, bins);
-             });
-  state.stage = IngestStage::kReady;
-  state.top_tree = {};
-  keeper.save(state, bins);
-  bins.release(scene.whole);
+  writer.flush();
 }
 
-// The kept bin of the cube or of the nearest one around it.
-const KeptBin& nearest(const std::map<Cube, const KeptBin*>& kept_bins,
-                       const StoredSubvolume& subvolume) {
-  for (Cube cube = subvolume.cube;; cube = cube.parent()) {
-    const auto found = kept_bins.find(cube);
-    if (found != kept_bins.end()) return *found->second;
+using BinsByCube = std::map<Cube, CubeBin>;
+
+// The bin of the cube or of the nearest cube around it.
+const CubeBin& nearest(const BinsByCube& bins, const Cube& wanted) {
+  for (Cube cube = wanted;; cube = cube.parent()) {
+    const auto found = bins.find(cube);
+    if (found != bins.end()) return found->second;
     if (cube.level == 0)
-      throw DamagedTriangles("subvolume " + std::to_string(subvolume.id) +
-                             " has no triangles among those that are kept");
+      throw DamagedTriangles("the stored triangles have no bin for a cube of level " +
+                             std::to_string(wanted.level));
   }
-}
-
-std::vector<QueuedSubvolume> take_from_kept_bins(std::span<const StoredSubvolume> planned,
-                                                 PreparedScene& scene, size_t buffer_bytes,
-                                                 const CancelToken& cancel) {
-  TriangleBins& bins = *scene.bins;
-  std::map<Cube, const KeptBin*> by_cube;
-  for (const KeptBin& kept : scene.kept_bins) by_cube[kept.cube] = &kept;
-  std::vector<QueuedSubvolume> queue;
-  std::map<const KeptBin*, std::vector<StoredSubvolume>> parts;
-  for (const StoredSubvolume& subvolume : planned) {
-    const KeptBin& kept = nearest(by_cube, subvolume);
-    bins.hold(kept.bin, 1);
-    if (kept.cube == subvolume.cube)
-      queue.push_back({subvolume, kept.bin, kept.bin});
-    else
-      parts[&kept].push_back(subvolume);
-  }
-  for (const auto& [kept, subvolumes] : parts) {
-    const auto split = queue_up(subvolumes, bins, kept->bin);
-    distribute(bins, kept->bin, CubeTree(scene.grid.levels, kept->cube, cubes_of(subvolumes)),
-               bins_of(split), buffer_bytes, cancel);
-    queue.insert(queue.end(), split.begin(), split.end());
-  }
-  // Those of subvolumes that are built may be there still.
-  for (const KeptBin& kept : scene.kept_bins) {
-    bins.hold(kept.bin, 1);
-    bins.release(kept.bin);
-  }
-  return queue;
 }
 
 }  // namespace
 
-std::vector<QueuedSubvolume> partition_triangles(std::span<const StoredSubvolume> planned,
-                                                 PreparedScene& scene, IngestCheckpoint& keeper,
-                                                 size_t buffer_bytes, const CancelToken& cancel) {
-  std::vector<QueuedSubvolume> queue;
-  if (!scene.bins->kept_file() && scene.state.stage == IngestStage::kReady)
-    throw DamagedTriangles("the triangles of what is not built were thought to be built");
-  if (scene.bins->kept_file()) {
-    if (scene.state.stage == IngestStage::kHandDown)
-      fill_kept_bins(planned, scene, keeper, buffer_bytes, cancel);
-    queue = take_from_kept_bins(planned, scene, buffer_bytes, cancel);
-  } else {
-    queue = queue_up(planned, *scene.bins, std::nullopt);
-    distribute(*scene.bins, scene.whole, CubeTree(scene.grid.levels, Cube{}, cubes_of(planned)),
-               bins_of(queue), buffer_bytes, cancel);
+CubeTree::CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves)
+    : grid_levels_(grid_levels), root_(root), deepest_(root.level), nodes_(1) {
+  for (size_t leaf = 0; leaf < leaves.size(); ++leaf) {
+    const Cube& cube = leaves[leaf];
+    deepest_ = std::max(deepest_, cube.level);
+    int32_t node = 0;
+    for (uint32_t level = root.level + 1; level <= cube.level; ++level) {
+      const int c = ancestor(cube, level).child_index();
+      if (nodes_[node].child[c] == kNone) {
+        nodes_[node].child[c] = static_cast<int32_t>(nodes_.size());
+        nodes_.emplace_back();
+      }
+      node = nodes_[node].child[c];
+    }
+    nodes_[node].leaf = static_cast<int32_t>(leaf);
   }
-  // Chunks of triangles are small blocks of the heap, which would keep them resident.
-  trim_heap();
-  return queue;
+}
+
+void partition(TriangleStore& store, BinId from, const CubeTree& tree,
+               const std::vector<BinId>& leaf_bins, size_t buffer_bytes,
+               const CancelToken& cancel) {
+  BinWriter writer(store, leaf_bins, buffer_bytes);
+  partition(*store.open(from), tree, writer, cancel);
+  store.drop(from);
+}
+
+void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const Cube> cubes,
+                     uint64_t first, size_t buffer_bytes, const CancelToken& cancel,
+                     const AfterPartitionBatch& after_batch) {
+  if (store.cube_bins().empty()) store.add_cube_bins(cubes);
+  std::vector<Cube> leaves;
+  std::vector<BinId> targets;
+  for (const CubeBin& bin : store.cube_bins()) {
+    leaves.push_back(bin.cube);
+    targets.push_back(bin.bin);
+  }
+  BinWriter writer(store, targets, buffer_bytes);
+  uint64_t copied = first;
+  partition(*store.open(kSceneBin, first), CubeTree(grid_levels, Cube{}, leaves), writer, cancel,
+            [&](size_t batch_size) { after_batch(copied += batch_size, writer); });
+  store.drop(kSceneBin);
+}
+
+std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
+                               std::span<const Cube> cubes, size_t buffer_bytes,
+                               const CancelToken& cancel) {
+  BinsByCube by_cube;
+  for (const CubeBin& bin : store.cube_bins()) by_cube[bin.cube] = bin;
+  std::vector<BinId> assigned(cubes.size());
+  std::map<Cube, std::vector<size_t>> parts;  // indexes into `cubes`, by the cube around them
+  for (size_t i = 0; i < cubes.size(); ++i) {
+    const CubeBin& found = nearest(by_cube, cubes[i]);
+    if (found.cube == cubes[i]) {
+      assigned[i] = found.bin;
+      store.retain(found.bin);
+    } else {
+      assigned[i] = store.add_part(found.bin);
+      parts[found.cube].push_back(i);
+    }
+  }
+  for (const auto& [key, indexes] : parts) {
+    const CubeBin& whole = by_cube[key];
+    std::vector<Cube> leaves;
+    std::vector<BinId> targets;
+    for (const size_t i : indexes) {
+      leaves.push_back(cubes[i]);
+      targets.push_back(assigned[i]);
+    }
+    partition(store, whole.bin, CubeTree(grid_levels, whole.cube, leaves), targets, buffer_bytes,
+              cancel);
+  }
+  // What was made of the others may be durable already.
+  for (const CubeBin& bin : store.cube_bins()) store.release(bin.bin);
+  return assigned;
 }
 
 }  // namespace voxdag

@@ -1,20 +1,86 @@
-// Hands the triangles of a prepared scene down to the planned subvolumes, which are then ready to
-// build.
+// Partitions triangles: copies them from one bin to the bins of the cubes that they touch.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
-#include "scheduler/execute/executor.h"
-#include "scheduler/plan/prepare.h"
+#include "core/base/cancel_token.h"
+#include "core/geometry/octree_descent.h"
+#include "scheduler/triangles/triangle_store.h"
 
 namespace voxdag {
 
-// What is kept goes on where an earlier run left it: a subvolume takes its triangles from the bin
-// of its cube or of the nearest cube around it. `buffer_bytes` may be used for half-filled chunks.
-// Throws DamagedTriangles if what is kept is not all that is needed.
-std::vector<QueuedSubvolume> partition_triangles(std::span<const StoredSubvolume> planned,
-                                                 PreparedScene& scene, IngestCheckpoint& keeper,
-                                                 size_t buffer_bytes, const CancelToken& cancel);
+// The tree above a set of disjoint cubes, to find which of them a triangle touches.
+class CubeTree {
+ public:
+  // All of `leaves` lie in `root`.
+  CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves);
+  // Calls visit(index into leaves) for every leaf that the triangle touches.
+  template <class Visit>
+  void for_each_touched(const FixedTriangle& triangle, const Visit& visit) const {
+    int32_t node = 0;
+    Cube cube = root_;
+    // A triangle inside one cube touches no other, so that no overlap test is needed that far.
+    const CellBox box(triangle, grid_levels_, deepest_);
+    if (const Cube around = box.is_inside_grid() ? box.cube_around() : Cube{}; contains(around))
+      while (cube.level < around.level && nodes_[node].leaf == kNone) {
+        cube = ancestor(around, cube.level + 1);
+        node = nodes_[node].child[cube.child_index()];
+        if (node == kNone) return;
+      }
+    descend(node, cube, triangle, visit);
+  }
+
+ private:
+  static constexpr int32_t kNone = -1;
+  struct Node {
+    int32_t child[8] = {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};
+    int32_t leaf = kNone;  // index of the leaf that this node is, if it is one
+  };
+
+  bool contains(const Cube& cube) const {
+    return cube.level >= root_.level && ancestor(cube, root_.level) == root_;
+  }
+  template <class Visit>
+  void descend(int32_t node, const Cube& cube, const FixedTriangle& triangle,
+               const Visit& visit) const {
+    if (nodes_[node].leaf != kNone) return visit(static_cast<size_t>(nodes_[node].leaf));
+    const int64_t units = cube.edge_voxels(grid_levels_) * kUnitsPerVoxel;
+    for (uint32_t mask = touched_children(triangle, cube, units); mask; mask &= mask - 1) {
+      const int c = lowest_bit(mask);
+      if (nodes_[node].child[c] != kNone)
+        descend(nodes_[node].child[c], cube.child(c), triangle, visit);
+    }
+  }
+
+  uint32_t grid_levels_;
+  Cube root_;
+  uint32_t deepest_;  // level of the smallest leaves
+  std::vector<Node> nodes_;
+};
+
+// Copies the triangles of bin `from` into `leaf_bins`, one for each leaf of the tree, and drops
+// `from`. Uses `buffer_bytes` for incomplete chunks.
+void partition(TriangleStore& store, BinId from, const CubeTree& tree,
+               const std::vector<BinId>& leaf_bins, size_t buffer_bytes, const CancelToken& cancel);
+
+// Called after each batch with the number of the scene's triangles that were copied so far; those
+// are in the bins after writer.flush().
+using AfterPartitionBatch = std::function<void(uint64_t copied, BinWriter& writer)>;
+
+// Copies the scene's triangles, from number `first` on, into the store's cube bins, created for
+// `cubes` if there are none yet. The scene's bin is dropped.
+void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const Cube> cubes,
+                     uint64_t first, size_t buffer_bytes, const CancelToken& cancel,
+                     const AfterPartitionBatch& after_batch);
+
+// For each of `cubes` a bin with its triangles, in the same order: that of the cube, or else a part
+// filled from the bin of the nearest cube around it. Each has one reference; cube bins that none of
+// them needs are released. Throws DamagedTriangles for a cube without any cube bin around it.
+std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
+                               std::span<const Cube> cubes, size_t buffer_bytes,
+                               const CancelToken& cancel);
 
 }  // namespace voxdag

@@ -31,7 +31,7 @@ Extent TriangleFile::append(std::span<const std::byte> bytes) {
 void TriangleFile::read(const Extent& extent, std::span<std::byte> out) const {
   const auto damaged = [&](const std::string& how) {
     return DamagedTriangles(path_ + " at offset " + std::to_string(extent.offset) + " " + how +
-                            ": the disk gave back other triangles than were written");
+                            ": expected the triangles that were written there");
   };
   try {
     reader_->read_at(extent.offset, out);

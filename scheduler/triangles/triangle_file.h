@@ -1,7 +1,7 @@
-// A file of bytes that are read back by where they lie, each piece with a checksum of its own:
-// triangles that memory did not take, or that are to outlive the process.
+// A file of pieces that are appended, and read back by offset; each has a checksum of its own.
+// Holds triangles that do not fit in memory, or that outlive the process.
 //
-// append() and release() may be called by several threads at once, and read() beside them.
+// append(), read() and release() may be called by several threads at once.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,8 @@ struct Extent {
   uint64_t checksum = 0;
 };
 
-// Error{kCorrupt}: the disk gave back other bytes than were written. What they were made of can be
-// read again.
+// Error{kCorrupt} about stored triangles. It is a type of its own because, unlike for any other
+// corruption, the build can help itself: it reads the scene again.
 class DamagedTriangles : public Error {
  public:
   explicit DamagedTriangles(const std::string& what) : Error(ErrorCode::kCorrupt, what) {}
@@ -31,17 +31,19 @@ class DamagedTriangles : public Error {
 
 class TriangleFile {
  public:
-  // Empty for `end` = 0; else goes on after the first `end` bytes of a file that has them.
+  // Creates the file for `end` = 0; else opens it to append after its first `end` bytes. Throws
+  // DamagedTriangles for a file that is shorter.
   TriangleFile(FileSystem& files, std::string path, uint64_t end = 0);
 
   Extent append(std::span<const std::byte> bytes);
-  // All of a piece; throws DamagedTriangles.
+  // Reads all of a piece; throws DamagedTriangles if it is not what was written.
   void read(const Extent& extent, std::span<std::byte> out) const;
-  // Gives back the space of a piece that nobody reads again.
+  // Frees the disk space of a piece that nobody reads again.
   void release(const Extent& extent);
-  // Returns once all that was appended, and the file's name, are on the disk.
+  // Returns once all that was appended, and the file's name, are durable.
   void sync();
   uint64_t end() const;
+  // Bytes appended since it was opened.
   uint64_t appended_bytes() const { return end() - first_; }
 
  private:

@@ -1,4 +1,4 @@
-// Builds of a small scene that meet all that disks and processes do, and how they must end.
+// Builds of a small scene that meet every fault of disks and processes, and how they must end.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ namespace crash {
 using voxdag::BuildReport;
 using voxdag::BuildSpec;
 
-// Remembers the last warning: a sound build that goes on has none to give.
+// Remembers the last warning: a sound build that is resumed has none.
 class Warnings : public voxdag::NoProgress {
  public:
   void warn(std::string_view message) override { last = message; }
@@ -40,16 +40,16 @@ inline uint64_t rounds() {
   return text ? std::strtoull(text, nullptr, 10) : 6;
 }
 
-// What becomes of the scene's triangles before they are built.
-enum class Ingested { kInMemory, kKept };
+// Where the scene's triangles lie until they are built.
+enum class Ingested { kInMemory, kDurable };
 
 class CrashTest : public testing::TestWithParam<Ingested> {
  protected:
   void SetUp() override {
     voxdag::GenerateOptions options;
     options.kind = voxdag::SceneKind::kCity;
-    // Ingest of a kept scene is to have a few batches.
-    options.triangles = is_kept() ? 20000 : 3000;
+    // Ingest with checkpoints needs a few batches.
+    options.triangles = is_durable() ? 20000 : 3000;
     voxdag::NoProgress progress;
     voxdag::CancelToken cancel;
     voxdag::generate_scene(voxdag::system_files(), folder_.file("scene.glb"), options, progress,
@@ -57,10 +57,10 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     expected_ = run(voxdag::system_files()).sha256;
     std::filesystem::remove(output());
   }
-  static bool is_kept() { return GetParam() == Ingested::kKept; }
+  static bool is_durable() { return GetParam() == Ingested::kDurable; }
   std::string output() const { return folder_.file("out.vdag"); }
 
-  // Small budget and several threads: spilling, splitting and merge rounds are all on the way.
+  // Small budget and several threads: spilling, splitting and merge passes all occur.
   virtual BuildSpec spec() const {
     BuildSpec spec;
     spec.geometry.scenes = {folder_.file("scene.glb")};
@@ -70,7 +70,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     spec.run.threads = 2;
     spec.run.subvolume_edge = 128;
     spec.run.checkpoint_interval_s = 0;  // after every batch of triangles and level of the merge
-    if (is_kept()) spec.run.kept_from_triangles = 1;
+    if (is_durable()) spec.run.durable_min_triangles = 1;
     return spec;
   }
   static BuildReport build(const BuildSpec& spec, voxdag::FileSystem& files) {
@@ -87,7 +87,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     return report;
   }
 
-  // Builds in a process of its own; true if it was killed on the way.
+  // Builds in a process of its own; true if it was killed before its end.
   bool killed(FaultPlan plan, std::chrono::microseconds after = {}) const {
     const pid_t child = fork();
     if (child == 0) {
@@ -110,7 +110,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
   }
 
   // Whatever happened before: run again, it ends as it should and leaves nothing behind.
-  void expect_to_go_on() {
+  void expect_to_resume() {
     if (std::filesystem::exists(output())) {
       // Only a whole file may ever have that name.
       const voxdag_reader::File file(output());
@@ -123,7 +123,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     std::filesystem::remove(output());
   }
 
-  // Numbers from 1 to `count`, all of them if there are few enough rounds' worth.
+  // Numbers from 1 to `count`: all of them, or a random choice of rounds().
   static std::vector<uint64_t> moments(uint64_t count) {
     std::vector<uint64_t> all(count);
     for (uint64_t i = 0; i < count; ++i) all[i] = i + 1;
@@ -146,7 +146,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
 };
 
 inline std::string name_of(const testing::TestParamInfo<Ingested>& info) {
-  return info.param == Ingested::kKept ? "Kept" : "InMemory";
+  return info.param == Ingested::kDurable ? "Durable" : "InMemory";
 }
 
 }  // namespace crash

@@ -1,5 +1,5 @@
 // A build that is killed, cut off from power, or has its disk fill up or fail, at any operation on
-// the disk, goes on when it is run again and ends with the very same bytes.
+// the disk, resumes when it is run again and ends with the same bytes.
 //
 // The short form that CI runs samples the operations. VOXDAG_CRASH_ROUNDS=N gives the number of
 // moments per fault; with N large, every operation is tried and as many random moments.
@@ -19,7 +19,7 @@ TEST_P(CrashTest, KilledAtAnyOperation) {
       SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(fault) << " at operation "
                                       << at << " of " << operations);
       kills += killed({fault, at});
-      expect_to_go_on();
+      expect_to_resume();
     }
     EXPECT_GT(kills, 0u);
   }
@@ -32,13 +32,14 @@ class FineCrashTest : public CrashTest {
     BuildSpec spec = CrashTest::spec();
     spec.geometry.resolution = 2048;
     spec.run.subvolume_edge = 512;
-    // Checkpoints while the triangles go on.
-    if (is_kept()) spec.run.checkpoint_interval_s = 1e-4;
+    // Checkpoints during the passes over the triangles.
+    if (is_durable()) spec.run.checkpoint_interval_s = 1e-4;
     return spec;
   }
 };
 
-// SIGKILL at moments that have nothing to do with our own calls: inside SQLite, or amid computing.
+// SIGKILL at moments that have nothing to do with our own calls: inside SQLite, or while it
+// computes.
 TEST_P(FineCrashTest, KilledAtRandomMoments) {
   const double start = voxdag::wall_seconds();
   run(voxdag::system_files());
@@ -49,9 +50,9 @@ TEST_P(FineCrashTest, KilledAtRandomMoments) {
     const auto after = std::chrono::microseconds(1000 + random() % whole_us);
     SCOPED_TRACE(testing::Message() << "after " << after.count() << " us of " << whole_us);
     killed({}, after);
-    // Killed again while it goes on.
+    // Killed again after it resumed.
     killed({}, after / 2);
-    expect_to_go_on();
+    expect_to_resume();
   }
 }
 
@@ -76,14 +77,14 @@ TEST_P(CrashTest, DiskFullOrBroken) {
       } catch (const voxdag::Error& error) {
         EXPECT_EQ(error.code(), c.code) << error.what();
       }
-      expect_to_go_on();
+      expect_to_resume();
     }
   }
 }
 
-// A disk that fills up while subvolumes are built keeps what it did take.
-TEST_P(CrashTest, AFullDiskLosesNothingThatItTook) {
-  if (is_kept()) GTEST_SKIP() << "counts the operations of a build that keeps nothing";
+// A disk that fills up while subvolumes are built loses nothing of what it could store.
+TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
+  if (is_durable()) GTEST_SKIP() << "counts the operations of a build without durable triangles";
   voxdag::GenerateOptions options;
   options.kind = voxdag::SceneKind::kSoup;
   options.triangles = 20000;
@@ -120,14 +121,14 @@ TEST_P(CrashTest, ReadsThatFail) {
     } catch (const voxdag::Error& error) {
       EXPECT_EQ(error.code(), voxdag::ErrorCode::kIo) << error.what();
     }
-    expect_to_go_on();
+    expect_to_resume();
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Ingested, CrashTest, testing::Values(Ingested::kInMemory, Ingested::kKept),
-                         name_of);
+INSTANTIATE_TEST_SUITE_P(Ingested, CrashTest,
+                         testing::Values(Ingested::kInMemory, Ingested::kDurable), name_of);
 INSTANTIATE_TEST_SUITE_P(Ingested, FineCrashTest,
-                         testing::Values(Ingested::kInMemory, Ingested::kKept), name_of);
+                         testing::Values(Ingested::kInMemory, Ingested::kDurable), name_of);
 
 }  // namespace
 }  // namespace crash

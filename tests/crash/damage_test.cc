@@ -136,7 +136,7 @@ TEST_P(DamageTest, BitsFlippedInSpilledTriangles) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ingested, DamageTest,
-                         testing::Values(Ingested::kInMemory, Ingested::kKept), name_of);
+                         testing::Values(Ingested::kInMemory, Ingested::kDurable), name_of);
 
 }  // namespace
 }  // namespace crash

@@ -56,7 +56,7 @@ TEST_P(MemoryTest, EndsUnderALimitOfAddressSpace) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ingested, MemoryTest,
-                         testing::Values(Ingested::kInMemory, Ingested::kKept), name_of);
+                         testing::Values(Ingested::kInMemory, Ingested::kDurable), name_of);
 
 }  // namespace
 }  // namespace crash

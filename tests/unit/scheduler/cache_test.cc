@@ -85,7 +85,7 @@ TEST_F(CacheTest, AMovedNodeCostsItsOwnSubvolumes) {
   EXPECT_LT(second.subvolumes_reused, second.subvolumes);
 }
 
-// A damaged entry is a miss; the cache keeps within its limit; what a build that died left there is
+// A damaged entry is a miss; the cache stays within its limit; what a killed build left there is
 // removed.
 TEST_F(CacheTest, DamageLimitAndLeftovers) {
   const std::string cache = folder_.file("cache");

@@ -1,4 +1,4 @@
-// Groups of artifacts become durable beside the worker, and rows never come before their bytes.
+// Groups of artifacts become durable in the background, and rows never come before their bytes.
 #include "scheduler/execute/commit_queue.h"
 
 #include <gtest/gtest.h>
@@ -12,6 +12,8 @@
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
 #include "core/io/forwarding_files.h"
+#include "scheduler/triangles/durable_store.h"
+#include "scheduler/triangles/memory_store.h"
 #include "tests/unit/base/error_of.h"
 #include "tests/unit/format/test_artifacts.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -19,16 +21,16 @@
 namespace voxdag {
 namespace {
 
-// A disk whose syncs of files wait until they are let through, or fail.
+// A disk whose file syncs can be blocked, or fail.
 class SlowDisk : public ForwardingFiles {
  public:
   SlowDisk() : ForwardingFiles(system_files()) {}
 
-  void hold_syncs() {
-    set([&] { held_ = true; });
+  void block_syncs() {
+    set([&] { blocked_ = true; });
   }
-  void let_syncs_through() {
-    set([&] { held_ = false; });
+  void unblock_syncs() {
+    set([&] { blocked_ = false; });
   }
   void fail_writes_from(int number) { failing_write_ = number; }  // from 1
   void fail_next_sync() { failing_sync_ = true; }
@@ -59,7 +61,7 @@ class SlowDisk : public ForwardingFiles {
       std::unique_lock lock(disk_.mutex_);
       ++disk_.begun_;
       disk_.changed_.notify_all();
-      disk_.changed_.wait(lock, [&] { return !disk_.held_; });
+      disk_.changed_.wait(lock, [&] { return !disk_.blocked_; });
       if (std::exchange(disk_.failing_sync_, false))
         throw Error(ErrorCode::kIo, "the test's disk lost a write");
       ForwardingWriter::sync();
@@ -81,41 +83,42 @@ class SlowDisk : public ForwardingFiles {
   std::mutex mutex_;
   std::condition_variable changed_;
   int begun_ = 0, writes_ = 0;
-  bool held_ = false, failing_sync_ = false;
+  bool blocked_ = false, failing_sync_ = false;
   std::optional<int> failing_write_;
 };
 
-class JournalTest : public testing::Test {
+class CommitQueueTest : public testing::Test {
  protected:
   static constexpr uint32_t kLevels = 10, kBits = 64;
   static constexpr size_t kSubvolumes = 200;
   static constexpr uint64_t kGroup = 60000;  // bytes: a few artifacts
   static constexpr double kNever_s = 1e9;
 
-  JournalTest() {
+  CommitQueueTest() {
     std::vector<StoredSubvolume> plan(kSubvolumes);
     for (size_t i = 0; i < plan.size(); ++i) plan[i].cube = {6, {static_cast<uint32_t>(i), 0, 0}};
     store_.start({"scene", "{}", 1}, plan);
     planned_ = store_.leaves();
   }
-  // Writes the next subvolume's artifact and tells the journal.
-  void build_one() { build_one(journal_); }
-  void build_one(CommitQueue& journal) {
+  // Writes the next subvolume's artifact and adds it to the queue.
+  void build_one() { build_one(queue_); }
+  void build_one(CommitQueue& queue) { build_one(queue, triangles_.add_part(kSceneBin)); }
+  void build_one(CommitQueue& queue, BinId bin) {
     StoredSubvolume built = planned_[next_++];
     const SubDag rows = random_rows(next_, 500, kLevels, 2, kBits);
-    ArtifactWriter writer(journal.segment(), kLevels, kBits);
+    ArtifactWriter writer(queue.segment(), kLevels, kBits);
     writer.bricks({rows.brick_masks});
     for (const SubDag::Nodes& nodes : rows.levels) writer.nodes(nodes.view());
     built.artifact = writer.finish({});
     built.summary = {1, 1, 1, 1};
-    journal.built(built, std::nullopt);
+    queue.add_built(built, bin);
   }
   // Builds until a sync is begun.
   void build_a_group() {
     for (const uint64_t before = segment_.size(); segment_.size() - before < kGroup;) build_one();
     disk_.wait_for_syncs(1);
   }
-  // In rows that others see.
+  // Subvolumes in rows that other processes see.
   size_t recorded() {
     return built_in(JobStore(folder_.file("job.db"), JobStore::Access::kRead).leaves());
   }
@@ -136,120 +139,144 @@ class JournalTest : public testing::Test {
   SlowDisk disk_;
   MemoryBudget budget_{uint64_t{64} << 20};
   JobStore store_{folder_.file("job.db"), JobStore::Access::kBuild};
-  TriangleBins bins_{system_files(), folder_.file("spill"), false, budget_};
-  CommitQueue journal_{store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 0, budget_),
-                       bins_, kNever_s, kGroup};
-  SegmentWriter& segment_ = journal_.segment();
+  MemoryStore triangles_{system_files(), folder_.file("spill"), false, budget_};
+  CommitQueue queue_{store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 0, budget_),
+                     triangles_, kNever_s, kGroup};
+  SegmentWriter& segment_ = queue_.segment();
   std::vector<StoredSubvolume> planned_;
   size_t next_ = 0;
 };
 
-TEST_F(JournalTest, TheWorkerBuildsOnWhileTheDiskWrites) {
-  disk_.hold_syncs();
+TEST_F(CommitQueueTest, TheWorkerContinuesWhileTheDiskWrites) {
+  disk_.block_syncs();
   build_a_group();
   const size_t begun_with = next_;
   build_one();
   build_one();
   EXPECT_EQ(recorded(), 0u) << "a row came before its bytes were on the disk";
-  disk_.let_syncs_through();
-  journal_.commit();
+  disk_.unblock_syncs();
+  queue_.commit();
   EXPECT_EQ(recorded(), begun_with + 2);
 }
 
 // A group does not grow for ever behind a disk that does not keep up.
-TEST_F(JournalTest, WaitsForADiskThatFallsBehind) {
-  disk_.hold_syncs();
+TEST_F(CommitQueueTest, WaitsForADiskThatFallsBehind) {
+  disk_.block_syncs();
   build_a_group();
   const size_t first_group = next_;
   std::thread disk([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    disk_.let_syncs_through();
+    disk_.unblock_syncs();
   });
   const uint64_t behind = segment_.size();
   while (segment_.size() - behind < 6 * kGroup) build_one();
   EXPECT_GE(recorded(), first_group);
   disk.join();
-  journal_.commit();
+  queue_.commit();
   EXPECT_EQ(recorded(), next_);
 }
 
-// A sync that failed is not tried again: the second would say that all is well.
-TEST_F(JournalTest, WhatAFailedSyncLostIsNotRecorded) {
+// A sync that failed is not tried again: the second one would succeed without the lost bytes.
+TEST_F(CommitQueueTest, WhatAFailedSyncLostIsNotRecorded) {
   disk_.fail_next_sync();
-  bool told = false;
-  for (int i = 0; i < 20 && !told; ++i) try {
+  bool reported = false;
+  for (int i = 0; i < 20 && !reported; ++i) try {
       build_one();
-      journal_.commit();
+      queue_.commit();
     } catch (const Error& error) {
-      told = true;
+      reported = true;
       EXPECT_EQ(error.code(), ErrorCode::kIo);
     }
-  EXPECT_TRUE(told);
-  journal_.commit();
+  EXPECT_TRUE(reported);
+  queue_.commit();
   EXPECT_EQ(recorded(), 0u);
   build_one();
-  EXPECT_THROW(journal_.commit(), Error);
+  EXPECT_THROW(queue_.commit(), Error);
   EXPECT_EQ(recorded(), 0u);
 }
 
 // The last group can be merged at once, and waits for the disk only if it is asked to.
-TEST_F(JournalTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
-  disk_.hold_syncs();
+TEST_F(CommitQueueTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
+  disk_.block_syncs();
   for (int i = 0; i < 3; ++i) build_one();
-  journal_.announce();
+  queue_.finish();
   EXPECT_EQ(announced(), 3u);
   EXPECT_EQ(recorded(), 0u);
   EXPECT_EQ(disk_.begun_syncs(), 0);
-  disk_.let_syncs_through();
-  journal_.commit();
+  disk_.unblock_syncs();
+  queue_.commit();
   EXPECT_EQ(announced(), 0u);
   EXPECT_EQ(recorded(), 3u);
 }
 
-// One that fails keeps no other from becoming durable.
-TEST_F(JournalTest, OpenJournalsBecomeDurableEachForItself) {
-  CommitQueues open;
+// A queue that fails does not stop the others from becoming durable.
+TEST_F(CommitQueueTest, FinishedQueuesBecomeDurableEachForItself) {
+  CommitQueues queues;
   for (uint32_t id = 1; id <= 3; ++id) {
     auto segment = std::make_unique<SegmentWriter>(disk_, folder_.path(), id, budget_);
-    auto journal = std::make_unique<CommitQueue>(store_, std::move(segment), bins_, kNever_s);
-    build_one(*journal);
-    journal->announce();
-    open.add(std::move(journal));
+    auto queue = std::make_unique<CommitQueue>(store_, std::move(segment), triangles_, kNever_s);
+    build_one(*queue);
+    queue->finish();
+    queues.add(std::move(queue));
   }
   EXPECT_EQ(announced(), 3u);
   disk_.fail_next_sync();
-  EXPECT_EQ(error_of([&] { open.commit(); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(error_of([&] { queues.commit(); }).code(), ErrorCode::kIo);
   EXPECT_EQ(recorded(), 2u);
-  open.commit();
+  queues.commit();
   EXPECT_EQ(recorded(), 2u);
 }
 
-// What is durable when the job store has no room is recorded once it has.
-TEST_F(JournalTest, WhatTheJobStoreCannotTakeIsRecordedLater) {
+// What is durable while the job store cannot be written is recorded once it can.
+TEST_F(CommitQueueTest, WhatTheJobStoreCannotStoreIsRecordedLater) {
   SqlDatabase store(folder_.file("job.db"), SqlDatabase::Mode::kReadWrite);
   store.execute(
       "CREATE TRIGGER full BEFORE UPDATE ON subvolume BEGIN SELECT RAISE(ABORT, 'full'); END");
   store.execute(
       "CREATE TRIGGER full2 BEFORE INSERT ON subvolume BEGIN SELECT RAISE(ABORT, 'full'); END");
   for (int i = 0; i < 3; ++i) build_one();
-  journal_.announce();
-  EXPECT_THROW(journal_.commit(), Error);
+  queue_.finish();
+  EXPECT_THROW(queue_.commit(), Error);
   EXPECT_EQ(recorded(), 0u);
   store.execute("DROP TRIGGER full; DROP TRIGGER full2");
-  journal_.commit();
+  queue_.commit();
   EXPECT_EQ(recorded(), 3u);
 }
 
-// What a full disk did take is recorded, and readable.
-TEST_F(JournalTest, WhatAFullDiskTookIsRecorded) {
+// Triangles that a later run could read are released only once their subvolumes are recorded, and
+// the last group waits for that.
+TEST_F(CommitQueueTest, DurableTrianglesStayUntilTheirSubvolumesAreRecorded) {
+  DurableStore durable(system_files(), folder_.file("triangles"), {}, folder_.file("spill"), false,
+                       budget_);
+  durable.add_cube_bins({&planned_[0].cube, 1});
+  const BinId bin = durable.cube_bins()[0].bin;
+  BinWriter writer(durable, {bin}, 1000);
+  writer.append(0, FixedTriangle{});
+  writer.flush();
+  CommitQueue queue(store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 1, budget_),
+                    durable, kNever_s);
+  disk_.block_syncs();
+  build_one(queue, bin);
+  queue.commit_in_background();
+  disk_.wait_for_syncs(1);
+  EXPECT_EQ(durable.count(bin), 1u);
+  EXPECT_EQ(recorded(), 0u);
+  disk_.unblock_syncs();
+  queue.finish();
+  EXPECT_EQ(durable.count(bin), 0u);
+  EXPECT_EQ(announced(), 0u);
+}
+
+// What a full disk could store is recorded, and readable.
+TEST_F(CommitQueueTest, WhatAFullDiskStoredIsRecorded) {
   build_a_group();
-  journal_.commit();
+  queue_.commit();
   const size_t before = next_;
   disk_.fail_writes_from(2);
   EXPECT_THROW(
       {
         while (next_ < kSubvolumes) build_one();
-        journal_.commit();
+        queue_.commit();
       },
       Error);
   EXPECT_GE(recorded(), before + 1);

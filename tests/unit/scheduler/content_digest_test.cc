@@ -10,7 +10,7 @@ namespace voxdag {
 namespace {
 
 // The digest is SHA-256 over the grid's five numbers and the triangles, in whatever portions they
-// come, and goes on from a copy of itself.
+// come, and continues from a copy of itself.
 TEST(ContentDigest, IsTheSha256OfGridAndTriangles) {
   const Grid grid{10, {1.5, -2, 0.25}, 7.5};
   std::vector<FixedTriangle> triangles(1000);

@@ -1,5 +1,5 @@
-// Scan, ingest and hand-down of a scene that is worth keeping survive an interruption: what was
-// done is not done again, and never mistaken for that of another scene.
+// Scan, ingest and partition of a large scene survive an interruption: what was done is not done
+// again, and never taken for that of another scene.
 #include "scheduler/ingest/ingest_checkpoint.h"
 
 #include <gtest/gtest.h>
@@ -22,33 +22,33 @@ class LastWarning : public NoProgress {
   std::string text;
 };
 
-class KeptIngestTest : public testing::Test {
+class IngestCheckpointTest : public testing::Test {
  protected:
   void SetUp() override {
     make_scene(1);
     BuildSpec plain = spec();
-    plain.run.kept_from_triangles = UINT64_MAX;
+    plain.run.durable_min_triangles = UINT64_MAX;
     const BuildReport report = build(plain);
     expected_ = report.sha256;
     subvolumes_ = report.subvolumes;
     whole_ = files_.bytes_read[scene()];
-    EXPECT_FALSE(files_.bytes_written.contains(kept()));
+    EXPECT_FALSE(files_.bytes_written.contains(durable()));
     std::filesystem::remove(output());
   }
   void make_scene(uint64_t seed) const { write_spheres(scene(), 24000, seed); }
   std::string scene() const { return folder_.file("scene.glb"); }
   std::string output() const { return folder_.file("out.vdag"); }
   std::string work() const { return output() + ".work"; }
-  std::string kept() const { return work() + "/triangles.vdkept"; }
+  std::string durable() const { return work() + "/triangles.vddurable"; }
 
-  // Keeps the scene at the ends of scan, ingest and hand-down.
+  // Has checkpoints at the ends of scan, ingest and partition.
   BuildSpec spec() const {
     BuildSpec spec = spheres_build(scene(), output());
     spec.run.checkpoint_interval_s = 1e9;
-    spec.run.kept_from_triangles = 1;
+    spec.run.durable_min_triangles = 1;
     return spec;
   }
-  // And after every batch of triangles.
+  // Has a checkpoint after every batch of triangles, too.
   BuildSpec often() const {
     BuildSpec often = spec();
     often.run.checkpoint_interval_s = 0;
@@ -60,8 +60,8 @@ class KeptIngestTest : public testing::Test {
     CancelToken cancel;
     return run_build(spec, {files_, last_warning_, cancel});
   }
-  // Goes on, to the right bytes, without a warning.
-  BuildReport expect_to_go_on(const BuildSpec& spec) {
+  // Builds to the right bytes, without a warning.
+  BuildReport expect_to_resume(const BuildSpec& spec) {
     const BuildReport report = build(spec);
     EXPECT_EQ(report.sha256, expected_);
     EXPECT_EQ(last_warning_.text, "");
@@ -69,7 +69,7 @@ class KeptIngestTest : public testing::Test {
     std::filesystem::remove(output());
     return report;
   }
-  // Of what a build reads of the scene that reads all of it.
+  // Bytes read of the scene, relative to those of a build that reads all of it.
   double part_read() {
     return static_cast<double>(files_.bytes_read[scene()]) / static_cast<double>(whole_);
   }
@@ -82,46 +82,46 @@ class KeptIngestTest : public testing::Test {
   uint64_t whole_ = 0;
 };
 
-// Interrupted at any point, a build goes on there: it reads what it had not read of the scene, and
-// nothing once that is ingested.
-TEST_F(KeptIngestTest, GoesOnWhereItWas) {
+// Interrupted at any point, a build resumes there: it reads the rest of the scene, and nothing once
+// the scene is ingested.
+TEST_F(IngestCheckpointTest, ResumesWhereItWas) {
   struct Moment {
     const char* stage;
     uint64_t after;
-    double least, most;  // part of the scene that is read afterwards
+    double min_read, max_read;  // part of the scene that is read afterwards
   };
   for (const Moment& moment :
        {Moment{"scan", 12000, 0.6, 0.9}, Moment{"ingest", 4096, 0.3, 0.6},
         Moment{"ingest", 20000, 0.01, 0.3}, Moment{"build", 0, 0, 0}, Moment{"merge", 0, 0, 0}}) {
     SCOPED_TRACE(std::string(moment.stage) + " after " + std::to_string(moment.after));
     build_until(often(), moment.stage, moment.after, files_);
-    expect_to_go_on(often());
-    EXPECT_GE(part_read(), moment.least);
-    EXPECT_LE(part_read(), moment.most);
+    expect_to_resume(often());
+    EXPECT_GE(part_read(), moment.min_read);
+    EXPECT_LE(part_read(), moment.max_read);
   }
 }
 
-// Hand-down, too, goes on from each of its checkpoints.
-TEST_F(KeptIngestTest, GoesOnAmidHandDown) {
+// The partition, too, resumes at each of its checkpoints.
+TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   build(often());
   std::filesystem::remove(output());
-  const uint64_t syncs = files_.syncs[kept()];
+  const uint64_t syncs = files_.syncs[durable()];
   ASSERT_GT(syncs, 20u);
   for (const uint64_t at : {syncs, syncs - 1, syncs - 12}) {
     SCOPED_TRACE(testing::Message() << "sync " << at << " of " << syncs);
-    files_.failing_sync[kept()] = at;
+    files_.failing_sync[durable()] = at;
     EXPECT_THROW(build(often()), Error);
     files_.failing_sync.clear();
-    const uint64_t first_run = files_.bytes_written[kept()];
-    expect_to_go_on(often());
+    const uint64_t first_run = files_.bytes_written[durable()];
+    expect_to_resume(often());
     EXPECT_EQ(part_read(), 0);
-    EXPECT_LT(files_.bytes_written[kept()], first_run);
+    EXPECT_LT(files_.bytes_written[durable()], first_run);
   }
 }
 
 // Run options may change in between: subvolumes that are split since find their triangles, and so
 // do those that were built before.
-TEST_F(KeptIngestTest, RunOptionsMayChange) {
+TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   for (const char* stage : {"ingest", "build"}) {
     SCOPED_TRACE(stage);
     build_until(spec(), stage, 10);
@@ -130,28 +130,28 @@ TEST_F(KeptIngestTest, RunOptionsMayChange) {
     other.run.memory_bytes = uint64_t{64} << 20;
     other.run.threads = 3;
     build_until(other, "build", 15);
-    const BuildReport report = expect_to_go_on(other);
+    const BuildReport report = expect_to_resume(other);
     EXPECT_GT(report.subvolumes_reused, 0u);
     EXPECT_GT(report.subvolumes, subvolumes_);
     EXPECT_EQ(part_read(), 0);
   }
 }
 
-// Space is given back as subvolumes are recorded.
-TEST_F(KeptIngestTest, GivesBackWhatIsBuilt) {
+// Disk space is freed as subvolumes are recorded.
+TEST_F(IngestCheckpointTest, FreesWhatIsBuilt) {
   build_until(spec(), "build", 0);
-  const uint64_t all = std::filesystem::file_size(kept());
+  const uint64_t all = std::filesystem::file_size(durable());
   build_until(spec(), "build", subvolumes_ / 2, files_);
-  EXPECT_GT(files_.bytes_released[kept()], all / 4);
-  EXPECT_TRUE(std::filesystem::exists(kept()));
+  EXPECT_GT(files_.bytes_released[durable()], all / 4);
+  EXPECT_TRUE(std::filesystem::exists(durable()));
   build_until(spec(), "merge", 0);
-  EXPECT_FALSE(std::filesystem::exists(kept()));
-  expect_to_go_on(spec());
+  EXPECT_FALSE(std::filesystem::exists(durable()));
+  expect_to_resume(spec());
 }
 
-// Another scene under the same name is refused, and takes nothing from the job; the first one, back
-// again, goes on though its times have changed.
-TEST_F(KeptIngestTest, KnowsItsSceneByContent) {
+// Another scene under the same name is refused, and does no harm to the job, which resumes once the
+// first scene is back, though its times have changed.
+TEST_F(IngestCheckpointTest, KnowsItsSceneByContent) {
   build_until(spec(), "build", 20);
   std::filesystem::rename(scene(), folder_.file("first.glb"));
   make_scene(2);
@@ -164,13 +164,13 @@ TEST_F(KeptIngestTest, KnowsItsSceneByContent) {
   }
   std::filesystem::copy(folder_.file("first.glb"), scene(),
                         std::filesystem::copy_options::overwrite_existing);
-  EXPECT_GE(expect_to_go_on(spec()).subvolumes_reused, 20u);
+  EXPECT_GE(expect_to_resume(spec()).subvolumes_reused, 20u);
   EXPECT_GE(part_read(), 1);
 }
 
 // A byte that changes in place, the time of modification set back, is a change; so is one that
-// comes amid ingest.
-TEST_F(KeptIngestTest, NoticesAChangeInPlace) {
+// comes during ingest.
+TEST_F(IngestCheckpointTest, NoticesAChangeInPlace) {
   for (const char* stage : {"scan", "ingest"}) {
     SCOPED_TRACE(stage);
     build_until(often(), stage, 10000);
@@ -185,15 +185,15 @@ TEST_F(KeptIngestTest, NoticesAChangeInPlace) {
     EXPECT_GE(part_read(), 1);
     BuildSpec fresh = spec();
     fresh.run.work_folder = folder_.file("fresh");
-    fresh.run.kept_from_triangles = UINT64_MAX;
+    fresh.run.durable_min_triangles = UINT64_MAX;
     EXPECT_EQ(report.sha256, build(fresh).sha256);
     std::filesystem::remove(output());
     make_scene(1);
   }
 }
 
-// So is a change of a buffer beside the scene.
-TEST_F(KeptIngestTest, NoticesAChangeOfABuffer) {
+// A change of a buffer in a file of its own is noticed.
+TEST_F(IngestCheckpointTest, NoticesAChangeOfABuffer) {
   const std::string glb = read_small_file(system_files(), scene(), UINT64_MAX);
   uint32_t json_size = 0;
   std::memcpy(&json_size, glb.data() + 12, sizeof json_size);
@@ -212,12 +212,12 @@ TEST_F(KeptIngestTest, NoticesAChangeOfABuffer) {
   EXPECT_GT(files_.bytes_read[buffer], std::filesystem::file_size(buffer));
 }
 
-// What the disk changes is named, and made again from the scene.
-TEST_F(KeptIngestTest, DamageIsHealed) {
-  // One bit in every so many bytes, but for the last few.
+// Damage is named in a warning, and the scene is read again.
+TEST_F(IngestCheckpointTest, DamageIsHealed) {
+  // Flips one bit in every `distance` bytes, but for the last few.
   const auto flip = [&](uint64_t distance) {
-    std::fstream file(kept(), std::ios::in | std::ios::out | std::ios::binary);
-    for (int64_t at = static_cast<int64_t>(std::filesystem::file_size(kept())) - 5; at > 0;
+    std::fstream file(durable(), std::ios::in | std::ios::out | std::ios::binary);
+    for (int64_t at = static_cast<int64_t>(std::filesystem::file_size(durable())) - 5; at > 0;
          at -= static_cast<int64_t>(distance)) {
       file.seekg(at);
       const char byte = static_cast<char>(file.get() ^ 0x20);
@@ -235,59 +235,60 @@ TEST_F(KeptIngestTest, DamageIsHealed) {
       build_until(often(), stage, stage == std::string("ingest") ? 20000 : 3, files_);
       if (kind == 0) flip(500);
       if (kind == 1) flip(UINT32_MAX);
-      if (kind == 2) std::filesystem::remove(kept());
-      if (kind == 3) std::filesystem::resize_file(kept(), 12345);
+      if (kind == 2) std::filesystem::remove(durable());
+      if (kind == 3) std::filesystem::resize_file(durable(), 12345);
       if (kind == 4) change_row();
       EXPECT_EQ(build(spec()).sha256, expected_);
-      EXPECT_NE(last_warning_.text.find(kind == 4 ? "row" : "triangles.vdkept"), std::string::npos)
+      EXPECT_NE(last_warning_.text.find(kind == 4 ? "row" : "triangles.vddurable"),
+                std::string::npos)
           << last_warning_.text;
       std::filesystem::remove(output());
     }
 }
 
-// An artifact that is damaged when the triangles are gone brings them back from the scene.
-TEST_F(KeptIngestTest, ReadsTheSceneForADamagedArtifact) {
+// For an artifact that is damaged after the triangles were removed, the scene is read again.
+TEST_F(IngestCheckpointTest, ReadsTheSceneForADamagedArtifact) {
   build_until(spec(), "merge", 0);
   std::filesystem::resize_file(work() + "/segment-0.vdseg", 1000);
   EXPECT_EQ(build(spec()).sha256, expected_);
   EXPECT_GE(part_read(), 1);
 }
 
-// Where the disk has no room for what memory can hold, nothing is kept; where it turns out to have
-// none, the triangles move to memory.
-TEST_F(KeptIngestTest, DoesWithoutRoomOnTheDisk) {
+// Without disk space for triangles that memory can hold, there are no checkpoints; if the disk
+// fills up later, the triangles are read again into memory.
+TEST_F(IngestCheckpointTest, DoesWithoutDiskSpace) {
   files_.free_bytes = 3'000'000;
-  expect_to_go_on(spec());
-  EXPECT_FALSE(files_.bytes_written.contains(kept()));
+  expect_to_resume(spec());
+  EXPECT_FALSE(files_.bytes_written.contains(durable()));
   files_.free_bytes = UINT64_MAX;
-  files_.full_for = kept();
+  files_.full_for = durable();
   EXPECT_EQ(build(spec()).sha256, expected_);
   EXPECT_NE(last_warning_.text.find("memory"), std::string::npos) << last_warning_.text;
 }
 
-// Starting over forgets what was ingested; a small scene has nothing kept.
-TEST_F(KeptIngestTest, StartsOverAndLeavesSmallScenesAlone) {
+// Starting over forgets what was ingested; a small scene has no checkpoints.
+TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   build_until(spec(), "build", 0);
   BuildSpec again = spec();
   again.run.restart = true;
-  expect_to_go_on(again);
+  expect_to_resume(again);
   EXPECT_GE(part_read(), 1);
   BuildSpec usual = spec();
-  usual.run.kept_from_triangles = BuildSpec{}.run.kept_from_triangles;
-  expect_to_go_on(usual);
-  EXPECT_FALSE(files_.bytes_written.contains(kept()));
+  usual.run.durable_min_triangles = BuildSpec{}.run.durable_min_triangles;
+  expect_to_resume(usual);
+  EXPECT_FALSE(files_.bytes_written.contains(durable()));
 }
 
-// Times are trusted once the clock has moved on since, by what it counts in.
-TEST(SettledFiles, AreOlderThanTheClockIsCoarse) {
+// A file's times are trusted once the clock of the file system has advanced since.
+TEST(TrustedFiles, AreOlderThanATickOfTheirClock) {
   constexpr int64_t kSecond = 1'000'000'000;
   const auto file = [](int64_t modified_ns, int64_t changed_ns) {
     return SourceFile{"a", FileIdentity{7, 100, modified_ns, changed_ns}};
   };
-  EXPECT_EQ(settled_ns({file(5 * kSecond + 1, 3 * kSecond)}), 5 * kSecond + 1 + kSecond / 10);
-  EXPECT_EQ(settled_ns({file(5, 9), file(3, 4)}), 9 + kSecond / 10);
-  EXPECT_EQ(settled_ns({file(4 * kSecond, 6 * kSecond)}), 8 * kSecond);
-  EXPECT_EQ(settled_ns({file(5, 9), SourceFile{"b", FileIdentity{}}}), INT64_MAX);
+  EXPECT_EQ(trusted_from_ns({file(5 * kSecond + 1, 3 * kSecond)}), 5 * kSecond + 1 + kSecond / 10);
+  EXPECT_EQ(trusted_from_ns({file(5, 9), file(3, 4)}), 9 + kSecond / 10);
+  EXPECT_EQ(trusted_from_ns({file(4 * kSecond, 6 * kSecond)}), 8 * kSecond);
+  EXPECT_EQ(trusted_from_ns({file(5, 9), SourceFile{"b", FileIdentity{}}}), INT64_MAX);
 }
 
 }  // namespace

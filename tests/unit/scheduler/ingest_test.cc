@@ -1,4 +1,4 @@
-// Ingest on one thread and on two gives the same; what goes wrong on either comes through.
+// Ingest on one thread and on two gives the same result, and reports the errors of both.
 #include "scheduler/ingest/ingest.h"
 
 #include <gtest/gtest.h>
@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
+#include "scheduler/triangles/memory_store.h"
 #include "tests/unit/base/error_of.h"
 #include "tests/unit/io/temporary_folder.h"
 
@@ -51,7 +52,7 @@ class IngestTest : public testing::TestWithParam<unsigned> {
     state_.declared_triangles = scene_.declared_triangles();
   }
   void ingest_on(unsigned threads, const AfterBatch& after_batch) {
-    BinWriter writer(bins_, {bin_}, size_t{1} << 20);
+    BinWriter writer(triangles_, {kSceneBin}, size_t{1} << 20);
     ingest(scene_, threads, state_, writer, top_, {system_files(), progress_, cancel_},
            after_batch);
   }
@@ -63,14 +64,13 @@ class IngestTest : public testing::TestWithParam<unsigned> {
   IngestState state_;
   TemporaryFolder folder_;
   MemoryBudget budget_{uint64_t{64} << 20};
-  TriangleBins bins_{system_files(), folder_.file("spill"), true, budget_};
-  BinId bin_ = bins_.add_bin();
+  MemoryStore triangles_{system_files(), folder_.file("spill"), true, budget_};
   TopTree top_{10, 4, budget_};
   NoProgress progress_;
   CancelToken cancel_;
 };
 
-TEST_P(IngestTest, TakesInTheSceneInOrder) {
+TEST_P(IngestTest, ReadsTheSceneInOrder) {
   std::vector<uint64_t> positions;
   ingest_on(GetParam(), [&] {
     positions.push_back(state_.position);
@@ -79,16 +79,16 @@ TEST_P(IngestTest, TakesInTheSceneInOrder) {
   ASSERT_EQ(positions.size(), Diagonal::kBatches);
   for (size_t i = 0; i < positions.size(); ++i) EXPECT_EQ(positions[i], (i + 1) * Diagonal::kBatch);
   EXPECT_EQ(state_.counts.dropped_outside, Diagonal::kBatches * Diagonal::kBatch / 10);
-  EXPECT_EQ(bins_.count(bin_), state_.counts.triangles);
+  EXPECT_EQ(triangles_.count(kSceneBin), state_.counts.triangles);
   // The triangles and their order, whatever the threads.
   ContentDigest digest(state_.grid);
   std::vector<FixedTriangle> triangles(state_.counts.triangles);
-  ASSERT_EQ(bins_.open(bin_)->read(triangles), triangles.size());
+  ASSERT_EQ(triangles_.open(kSceneBin)->read(triangles), triangles.size());
   digest.add(triangles);
   EXPECT_EQ(state_.digest.hex(), digest.hex());
 }
 
-// What was read before the scene failed is taken in, and spoken of by the state.
+// What was read before the scene failed is ingested, and the state covers it.
 TEST_P(IngestTest, ASceneThatFailsIsAnError) {
   scene_.fails_at = 30;
   EXPECT_EQ(error_of_ingest([] {}).code(), ErrorCode::kIo);
@@ -103,8 +103,8 @@ TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
       << error.message();
 }
 
-// A full disk, say, at a checkpoint: the scene is not read to its end.
-TEST_P(IngestTest, WhatTakingInThrowsStopsReading) {
+// An error at a checkpoint, say of a full disk, ends the reading of the scene.
+TEST_P(IngestTest, AnErrorOfTheConsumerStopsReading) {
   EXPECT_THROW(ingest_on(GetParam(),
                          [&] {
                            if (state_.position == 10 * Diagonal::kBatch)

@@ -12,7 +12,7 @@
 
 namespace voxdag {
 
-// Cancels once a stage has done so much.
+// Cancels once `stage` has done `after` units.
 class CancelingProgress : public NoProgress {
  public:
   CancelingProgress(CancelToken& cancel, std::string stage, uint64_t after)

@@ -45,9 +45,9 @@ class ResumeTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// Interrupted in any stage, the same call goes on, reuses what was built and ends with the same
-// bytes; afterwards nothing is left but the result and its report.
-TEST_F(ResumeTest, GoesOnAfterAnInterruptionInAnyStage) {
+// Interrupted in any stage, the same call resumes, reuses what was built and ends with the same
+// bytes; afterwards only the result and its report are left.
+TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   const std::string expected = build(spec()).sha256;
   std::filesystem::remove(output());
   struct Moment {
@@ -70,8 +70,8 @@ TEST_F(ResumeTest, GoesOnAfterAnInterruptionInAnyStage) {
   }
 }
 
-// Another scene, resolution or hash is another job: refused, saying what differs, until told to
-// start over. Run options may change between the runs.
+// Another scene, resolution or hash is another job: refused, with what differs, unless the
+// build is to start over. Run options may change between the runs.
 TEST_F(ResumeTest, RefusesAnotherJobInTheSameFolder) {
   build_until(spec(), "build", 5);
   BuildSpec other = spec();
@@ -102,8 +102,8 @@ TEST_F(ResumeTest, RefusesAnotherJobInTheSameFolder) {
   EXPECT_EQ(report.sha256, build(other).sha256);
 }
 
-// A damaged artifact, or a segment that is gone, costs its own subvolumes and nothing else.
-TEST_F(ResumeTest, BuildsDamagedArtifactsAgain) {
+// Of a damaged or missing segment only the subvolumes are built again.
+TEST_F(ResumeTest, RebuildsDamagedArtifacts) {
   const std::string expected = build(spec()).sha256;
   for (const bool whole_segment : {false, true}) {
     SCOPED_TRACE(whole_segment ? "segment removed" : "byte flipped");
@@ -128,7 +128,8 @@ TEST_F(ResumeTest, BuildsDamagedArtifactsAgain) {
   }
 }
 
-// One builder a folder; the second is told who holds it. Files of others are not touched.
+// Only one build at a time uses a folder; a second one gets an error that names the first. Files of
+// others are not touched.
 TEST_F(ResumeTest, OwnsItsFolderAlone) {
   {
     WorkFolder first(system_files(), work());
@@ -148,7 +149,7 @@ TEST_F(ResumeTest, OwnsItsFolderAlone) {
   EXPECT_TRUE(std::filesystem::exists(work() + "/letter.txt"));
 }
 
-// A folder of somebody else that happens to bear a name of ours is refused, and stays as it is.
+// A folder of somebody else that has a name of ours is refused, and stays as it is.
 TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   std::filesystem::create_directories(work() + "/merge");
   std::ofstream(work() + "/merge/thesis.txt") << "not ours";
@@ -157,7 +158,7 @@ TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(work()), {}), 1);
 }
 
-// Somebody who looks at the lock for an instant does not keep a build from starting.
+// A process that holds the lock for an instant, to read the status, does not prevent a build.
 TEST_F(ResumeTest, WaitsForThoseWhoLook) {
   std::filesystem::create_directories(work());
   auto looking = system_files().try_lock(work() + "/lock");
@@ -186,7 +187,7 @@ TEST_F(ResumeTest, OwnsItsOutputAlone) {
   EXPECT_GT(build(first).subvolumes_reused, 0u);
 }
 
-// A merge that goes on writes where it began to; its output cannot be changed any more.
+// A merge that is resumed writes where it began to; its output cannot be changed any more.
 TEST_F(ResumeTest, KeepsTheOutputOfAMergeThatBegan) {
   BuildSpec checkpointed = spec();
   checkpointed.run.work_folder = folder_.path() + "/work";
@@ -213,7 +214,7 @@ TEST_F(ResumeTest, NeedsAFolderToWriteIn) {
   EXPECT_FALSE(std::filesystem::exists(output() + ".partial"));
 }
 
-// A job of another program's version is refused by its number until told to start over.
+// A job of another program's version is refused with its number, unless the build is to start over.
 TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   const std::string expected = build(spec()).sha256;
   for (const char* change : {"PRAGMA user_version = 77", "UPDATE job SET format_version = 77"}) {
@@ -233,8 +234,8 @@ TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   }
 }
 
-// A job store that does not look like one any more, in a folder that an earlier build had, does not
-// stand in the way of starting over; where none had been, it is somebody else's.
+// A file that is no job store any more does not prevent starting over in a folder that an earlier
+// build had. In any other folder it belongs to somebody else.
 TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
   build_until(spec(), "build", 5);
   const std::string store = work() + "/job.db";
@@ -250,8 +251,8 @@ TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
   EXPECT_TRUE(std::filesystem::exists(store));
 }
 
-// Told to stop, a build says how to go on.
-TEST_F(ResumeTest, SaysHowToGoOn) {
+// A build that is canceled says how to resume it.
+TEST_F(ResumeTest, SaysHowToResume) {
   CancelToken cancel;
   CancelingProgress progress(cancel, "build", 5);
   try {
@@ -263,7 +264,7 @@ TEST_F(ResumeTest, SaysHowToGoOn) {
 }
 
 // The state of an interrupted build can be read by others.
-TEST_F(ResumeTest, TellsItsStatus) {
+TEST_F(ResumeTest, ReportsItsStatus) {
   EXPECT_THROW(read_job_status(system_files(), work()), Error);
   build_until(spec(), "build", 5);
   const JobStatus status = read_job_status(system_files(), work());

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-#include "scheduler/triangles/distribute.h"
+#include "scheduler/triangles/partition.h"
 
 namespace voxdag {
 namespace {

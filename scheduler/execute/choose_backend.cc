@@ -1,4 +1,4 @@
-#include "scheduler/execute/open_backend.h"
+#include "scheduler/execute/choose_backend.h"
 
 #include <algorithm>
 #include <atomic>
@@ -9,9 +9,9 @@
 namespace voxdag {
 namespace {
 
-// Workers a GPU: enough that transfers and host work of some overlap with kernels of others.
-constexpr unsigned kWorkersADevice = 4;
-// A CUDA context alone keeps some hundred MiB resident that no budget sees.
+// Workers per GPU: enough that transfers and host work of some overlap with kernels of others.
+constexpr unsigned kWorkersPerDevice = 4;
+// A CUDA context alone has some hundred MiB resident that are charged to no budget.
 constexpr uint64_t kMinMemoryForGpu = uint64_t{2} << 30;
 
 [[noreturn]] void refuse(const std::string& what) { throw Error(ErrorCode::kInvalidInput, what); }
@@ -26,18 +26,18 @@ BackendChoice cpu_choice() {
   return {"cpu", [] { return make_cpu_backend(); }};
 }
 
-// Worker after worker takes the next GPU.
+// The workers open the GPUs in turn.
 BackendChoice gpu_choice(const Gpus& gpus) {
-  const auto turn = std::make_shared<std::atomic<int>>(0);
-  return {"cuda", [gpus, turn] { return gpus.open((*turn)++ % gpus.count); },
-          kWorkersADevice * static_cast<unsigned>(gpus.count)};
+  const auto next = std::make_shared<std::atomic<int>>(0);
+  return {"cuda", [gpus, next] { return gpus.open((*next)++ % gpus.count); },
+          kWorkersPerDevice * static_cast<unsigned>(gpus.count)};
 }
 
 Gpus cuda_gpus(Method method) {
   return {cuda_device_count(), [method](int device) { return make_cuda_backend(method, device); }};
 }
 
-// Why a GPU must not be used, "" if it may.
+// Why a GPU must not be used; "" if it may be.
 std::string fault_of(const Gpus& gpus, int device) {
   try {
     return difference_from_cpu(*gpus.open(device));
@@ -68,7 +68,7 @@ BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
   if (options.backend == "parallel-host")
     return {"parallel-host", [method] { return make_parallel_host_backend(method); }};
   if (options.backend == "cuda") return gpu_choice(cuda_gpus(method));
-  // A method that was asked for is the CPU backend's.
+  // With `auto`, a method that is given is one of the CPU backend.
   if (options.backend == "cpu" || !options.method.empty()) return cpu_choice();
   return choose_automatically(cuda_gpus(method), options.memory_bytes, progress);
 }
@@ -76,7 +76,7 @@ BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
 BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress) {
   if (gpus.count == 0) return cpu_choice();
   if (memory_bytes < kMinMemoryForGpu) {
-    progress.warn("building on the CPU: a GPU needs --memory of 2 GiB at least");
+    progress.warn("building on the CPU: a GPU needs --memory of at least 2 GiB");
     return cpu_choice();
   }
   for (int device = 0; device < gpus.count; ++device) {

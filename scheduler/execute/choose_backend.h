@@ -1,4 +1,4 @@
-// Which backend a build's workers open.
+// Which backend a build's workers open. Thread-safe.
 #pragma once
 
 #include <functional>
@@ -13,9 +13,9 @@ namespace voxdag {
 
 struct BackendChoice {
   std::string name;
-  // Opens one backend a call, one call a worker.
+  // Opens one backend per call; every worker calls it once.
   std::function<std::unique_ptr<Backend>()> open;
-  unsigned max_workers = 256;  // more of them would not help
+  unsigned max_workers = 256;  // more of them gain nothing
 };
 
 // Throws Error{kInvalidInput} for a backend or method that does not exist or do not go together,
@@ -23,15 +23,16 @@ struct BackendChoice {
 void check_backend(const RunOptions& options);
 
 // The choice for options that passed check_backend() and have their memory filled in. `auto` takes
-// a GPU that is there, has the memory it needs and builds a few subvolumes like the CPU backend,
-// else the CPU. Why a GPU that is there was not taken is a warning.
+// the GPUs if there are any, the budget suffices for them and each builds a few subvolumes like the
+// CPU backend; else the CPU, with a warning if there is a GPU.
 BackendChoice choose_backend(const RunOptions& options, Progress& progress);
 
-// GPUs as `auto` sees them; tests have others.
+// The machine's GPUs; tests have others.
 struct Gpus {
   int count = 0;
   std::function<std::unique_ptr<Backend>(int device)> open;
 };
+// The choice for `auto`.
 BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress);
 
 }  // namespace voxdag

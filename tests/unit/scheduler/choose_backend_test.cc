@@ -1,4 +1,4 @@
-#include "scheduler/execute/open_backend.h"
+#include "scheduler/execute/choose_backend.h"
 
 #include <gtest/gtest.h>
 
@@ -51,8 +51,8 @@ TEST(BackendCheck, FindsOneVoxel) {
   EXPECT_NE(difference_from_cpu(forgetful), "");
 }
 
-// Without a GPU nothing is said; one that is right is taken, several in turn.
-TEST(OpenBackend, AutoTakesTheGpusThatAreRight) {
+// Without a GPU there is no warning. GPUs that are right are chosen, several in turn.
+TEST(ChooseBackend, AutoChoosesGpusThatAreRight) {
   Warnings warnings;
   EXPECT_EQ(choose_automatically({}, kPlenty, warnings).name, "cpu");
   std::vector<int> opened;
@@ -72,7 +72,7 @@ TEST(OpenBackend, AutoTakesTheGpusThatAreRight) {
 
 // A GPU that is wrong, cannot be opened or has too little memory leaves the build to the CPU, with
 // one warning that says why.
-TEST(OpenBackend, AutoFallsBackToTheCpu) {
+TEST(ChooseBackend, AutoFallsBackToTheCpu) {
   const auto expect_cpu = [](const Gpus& gpus, uint64_t memory_bytes, const std::string& why) {
     SCOPED_TRACE(why);
     Warnings warnings;
@@ -92,8 +92,8 @@ TEST(OpenBackend, AutoFallsBackToTheCpu) {
   expect_cpu({1, broken}, kPlenty, "cudaStreamCreate failed");
 }
 
-// Names are looked at before any work: what does not exist or does not go together is refused.
-TEST(OpenBackend, RefusesWhatDoesNotGoTogether) {
+// A backend or method that does not exist, or a pair that does not go together, is refused.
+TEST(ChooseBackend, RefusesWhatDoesNotGoTogether) {
   const auto refused = [](const std::string& backend, const std::string& method) {
     RunOptions options;
     options.backend = backend;

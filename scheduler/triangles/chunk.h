@@ -1,0 +1,51 @@
+// Triangles as they are stored: records of fixed size in chunks, each chunk in memory or in a
+// TriangleFile. Both triangle stores are made of these. Nothing here locks: a list of chunks is
+// written by one thread, and read by any number once it is complete.
+//
+// A record is nine coordinates: of 32 bits (36 bytes), or, where the grid was given by hand and
+// triangles may reach far outside of it, of 64 bits ("wide", 72 bytes).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/backend/backend.h"
+#include "scheduler/triangles/triangle_file.h"
+
+namespace voxdag {
+
+size_t triangle_record_bytes(bool wide);
+// `out` has room for one record of `record_bytes`.
+void encode_triangle(const FixedTriangle& triangle, size_t record_bytes, std::byte* out);
+
+struct Chunk {
+  std::vector<std::byte> memory;  // empty if the records are in a file
+  Extent extent;                  // in that file
+  uint32_t triangles = 0;
+};
+
+// Bytes that a growing list of chunks takes for each of them.
+inline constexpr uint64_t kChunkListBytes = 2 * sizeof(Chunk);
+
+struct ChunkList {
+  std::vector<Chunk> chunks;
+  uint64_t triangles = 0;
+
+  void add(Chunk chunk) {
+    triangles += chunk.triangles;
+    chunks.push_back(std::move(chunk));
+  }
+};
+
+// Streams the triangles of a complete list from number `first` on; chunks that are not in memory
+// are read from `file`, which throws DamagedTriangles. List and file must outlive the stream.
+std::unique_ptr<TriangleStream> open_chunks(const ChunkList& list, const TriangleFile* file,
+                                            size_t record_bytes, uint64_t first);
+
+// Releases the space in `file` of the chunks that are not in memory.
+void release_chunks(const ChunkList& list, TriangleFile* file);
+
+}  // namespace voxdag

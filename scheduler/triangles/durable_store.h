@@ -1,0 +1,91 @@
+// Triangles that outlive the process: the bins of the scene and of the plan's cubes lie in a file
+// from the start, so that a later run resumes with them. Parts of split subvolumes do not: they are
+// made again from the bin that they were copied from, which is released only with the last of them.
+//
+// The file's table of contents is a chain: each link names the chunks since the link before it, and
+// the extent of that link. checkpoint() appends a link; whoever records what it returns, after a
+// sync of the file, can open the store at that point again. Thread-safe as TriangleStore says, but
+// for checkpoint(), which the thread calls that fills the durable bins.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scheduler/triangles/chunk.h"
+#include "scheduler/triangles/memory_store.h"
+#include "scheduler/triangles/triangle_store.h"
+
+namespace voxdag {
+
+// What a store is opened with again. A plain value; all zeros for an empty store.
+struct DurableStoreState {
+  Extent cubes;   // of the cube bins, which follow the scene's bin in this order
+  Extent chunks;  // the last link of the chain
+  uint64_t file_end = 0;
+};
+
+class DurableStore : public TriangleStore {
+ public:
+  // Opens the store at `path` as it was at a checkpoint; throws DamagedTriangles. Parts go to
+  // memory and `spill_path` as in a MemoryStore with that share.
+  DurableStore(FileSystem& files, std::string path, const DurableStoreState& state,
+               std::string spill_path, bool wide, MemoryBudget& share);
+
+  size_t record_bytes() const override { return parts_.record_bytes(); }
+  // More than in memory: fewer chunks to name, to read and to release.
+  size_t max_chunk_records() const override { return 16384; }
+  void add_cube_bins(std::span<const Cube> cubes) override;
+  const std::vector<CubeBin>& cube_bins() const override { return cube_bins_; }
+  BinId add_part(BinId whole) override;
+  void add_chunk(BinId bin, std::span<const std::byte> records) override;
+  uint64_t count(BinId bin) const override;
+  std::unique_ptr<TriangleStream> open(BinId bin, uint64_t first = 0) const override;
+  bool drop(BinId bin) override;
+  void retain(BinId bin) override;
+  void release(BinId bin) override;
+  uint64_t file_bytes() const override;
+
+  // Names all chunks so far. What it returns counts once file() is synced.
+  DurableStoreState checkpoint();
+  // The file, for syncs in the background and for other data that belongs to a checkpoint.
+  const std::shared_ptr<TriangleFile>& file() const { return file_; }
+
+ private:
+  // A chunk as a link of the chain names it.
+  struct NamedChunk {
+    BinId bin = 0;
+    uint32_t triangles = 0;
+    Extent extent;
+  };
+  struct Bin {
+    ChunkList list;
+    uint64_t references = 1;
+  };
+  // A part has its number in parts_ plus this.
+  static constexpr BinId kFirstPart = BinId{1} << 31;
+
+  static bool is_part(BinId bin) { return bin >= kFirstPart; }
+  void add_bin() { bins_.push_back(std::make_unique<Bin>()); }
+  // The bin itself, or the durable bin that a part was copied from.
+  BinId source_of(BinId bin) const;
+  void set_cubes(std::span<const Cube> cubes, const Extent& extent);
+  void read_chain();
+
+  MemoryStore parts_;
+  const std::shared_ptr<TriangleFile> file_;
+  std::vector<CubeBin> cube_bins_;
+  Extent cubes_;
+  MemoryCharge charge_;       // for the lists of chunks
+  mutable std::mutex mutex_;  // guards all below; the list of a filled bin no longer changes
+  std::vector<std::unique_ptr<Bin>> bins_;
+  std::vector<BinId> sources_;  // of the parts, by their numbers in parts_
+  uint64_t list_bytes_ = 0;
+  std::vector<NamedChunk> unnamed_;  // chunks since the last link
+  Extent last_link_;
+};
+
+}  // namespace voxdag

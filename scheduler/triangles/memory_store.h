@@ -1,0 +1,56 @@
+// Triangles in memory as far as a share of the budget allows, and in a spill file beyond that. They
+// are gone with the process. Thread-safe as TriangleStore says.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scheduler/triangles/chunk.h"
+#include "scheduler/triangles/triangle_store.h"
+
+namespace voxdag {
+
+class MemoryStore : public TriangleStore {
+ public:
+  // Chunks are charged to `share`; what it refuses goes to a file at `spill_path`, created when
+  // needed. `wide` as in chunk.h.
+  MemoryStore(FileSystem& files, std::string spill_path, bool wide, MemoryBudget& share);
+
+  size_t record_bytes() const override { return record_bytes_; }
+  size_t max_chunk_records() const override { return 1024; }
+  void add_cube_bins(std::span<const Cube> cubes) override;
+  const std::vector<CubeBin>& cube_bins() const override { return cube_bins_; }
+  BinId add_part(BinId) override { return add_bin(); }
+  void add_chunk(BinId bin, std::span<const std::byte> records) override;
+  uint64_t count(BinId bin) const override;
+  std::unique_ptr<TriangleStream> open(BinId bin, uint64_t first = 0) const override;
+  bool drop(BinId bin) override;
+  void retain(BinId bin) override;
+  void release(BinId bin) override;
+  uint64_t file_bytes() const override;
+
+ private:
+  struct Bin {
+    ChunkList list;
+    uint64_t references = 1;
+  };
+
+  BinId add_bin();
+  void free(Bin& bin);
+
+  FileSystem& files_;
+  const std::string spill_path_;
+  const size_t record_bytes_;
+  std::vector<CubeBin> cube_bins_;
+  MemoryCharge charge_;
+  mutable std::mutex mutex_;  // guards all below; the list of a filled bin no longer changes
+  std::vector<std::unique_ptr<Bin>> bins_;
+  uint64_t memory_bytes_ = 0;  // of records and lists
+  std::unique_ptr<TriangleFile> spill_;
+};
+
+}  // namespace voxdag

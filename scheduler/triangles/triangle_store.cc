@@ -1,0 +1,40 @@
+#include "scheduler/triangles/triangle_store.h"
+
+#include <algorithm>
+
+#include "scheduler/triangles/chunk.h"
+
+namespace voxdag {
+namespace {
+
+constexpr size_t kMinChunkRecords = 16;
+
+}  // namespace
+
+BinWriter::BinWriter(TriangleStore& store, std::vector<BinId> targets, size_t buffer_bytes)
+    : store_(store),
+      targets_(std::move(targets)),
+      record_bytes_(store.record_bytes()),
+      tails_(targets_.size()) {
+  const size_t records = buffer_bytes / (record_bytes_ * std::max<size_t>(targets_.size(), 1));
+  chunk_bytes_ = std::clamp(records, kMinChunkRecords, store.max_chunk_records()) * record_bytes_;
+}
+
+void BinWriter::append(size_t target, const FixedTriangle& triangle) {
+  std::vector<std::byte>& tail = tails_[target];
+  const size_t at = tail.size();
+  tail.resize(at + record_bytes_);
+  encode_triangle(triangle, record_bytes_, tail.data() + at);
+  if (tail.size() < chunk_bytes_) return;
+  store_.add_chunk(targets_[target], tail);
+  tail.clear();
+}
+
+void BinWriter::flush() {
+  for (size_t i = 0; i < tails_.size(); ++i) {
+    if (!tails_[i].empty()) store_.add_chunk(targets_[i], tails_[i]);
+    tails_[i].clear();
+  }
+}
+
+}  // namespace voxdag

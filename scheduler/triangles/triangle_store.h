@@ -1,0 +1,84 @@
+// Where a build's snapped triangles lie from ingest until their subvolumes are built: in bins, one
+// for the whole scene, then one for each cube of the plan, then one for each part of a subvolume
+// that is split. MemoryStore holds them for this process, DurableStore for later ones as well; who
+// uses a store does not ask which one it is.
+//
+// Life of a bin:
+//   1. It is created with one reference, and filled by one BinWriter.
+//   2. Any number of streams read it.
+//   3. drop(): this run does not read it again. A store that no other run can read frees it.
+//   4. release(): what was made of it is durable. The last release() frees it.
+// Thread-safe, but for a bin being filled and read at a time.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/backend/backend.h"
+#include "core/geometry/cube.h"
+
+namespace voxdag {
+
+using BinId = uint32_t;
+
+// The bin of all triangles, in the scene's order. Every store has it.
+inline constexpr BinId kSceneBin = 0;
+
+// The bin of the triangles that touch a cube.
+struct CubeBin {
+  Cube cube;
+  BinId bin = 0;
+};
+
+class TriangleStore {
+ public:
+  virtual ~TriangleStore() = default;
+
+  virtual size_t record_bytes() const = 0;
+  // Records that a chunk should have at most.
+  virtual size_t max_chunk_records() const = 0;
+
+  // Creates the bins of the plan's cubes; once per store. A store that resumes may have them.
+  virtual void add_cube_bins(std::span<const Cube> cubes) = 0;
+  virtual const std::vector<CubeBin>& cube_bins() const = 0;
+  // Creates a bin for triangles that are copied from `whole`, which stays retained as long.
+  virtual BinId add_part(BinId whole) = 0;
+
+  virtual void add_chunk(BinId bin, std::span<const std::byte> records) = 0;
+  virtual uint64_t count(BinId bin) const = 0;
+  // Reads the bin's triangles from number `first` on. The store must outlive the stream.
+  virtual std::unique_ptr<TriangleStream> open(BinId bin, uint64_t first = 0) const = 0;
+
+  // Whether references remain, so that release() must be called once what was made of the bin is
+  // durable.
+  virtual bool drop(BinId bin) = 0;
+  virtual void retain(BinId bin) = 0;
+  // Does nothing for a bin that drop() has freed.
+  virtual void release(BinId bin) = 0;
+
+  // Bytes that this run wrote to files.
+  virtual uint64_t file_bytes() const = 0;
+};
+
+// Fills a set of bins from one thread, collecting triangles into chunks.
+class BinWriter {
+ public:
+  // Chunks are sized so that the incomplete ones of all bins take at most about `buffer_bytes`.
+  BinWriter(TriangleStore& store, std::vector<BinId> targets, size_t buffer_bytes);
+  // `target` is an index into `targets`.
+  void append(size_t target, const FixedTriangle& triangle);
+  // All that was appended is in the bins when this returns.
+  void flush();
+
+ private:
+  TriangleStore& store_;
+  const std::vector<BinId> targets_;
+  const size_t record_bytes_;
+  size_t chunk_bytes_;
+  std::vector<std::vector<std::byte>> tails_;
+};
+
+}  // namespace voxdag
