@@ -48,7 +48,7 @@ void TopRun::add_parents(const std::vector<PlacedNode>& children, uint32_t hash_
       node.children[count] = child.position;
       hashes[count++] = child.hash;
     }
-    node.hash = cut_hash(hash_node(node.mask, hashes), hash_bits);
+    node.hash = truncate_hash(hash_node(node.mask, hashes), hash_bits);
     nodes_.push_back(node);
   }
 }

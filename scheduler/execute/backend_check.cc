@@ -45,7 +45,7 @@ Answer answer_of(Backend& backend, const SubvolumeTask& task,
   MemoryStream stream(triangles);
   MemoryBudget budget(kBudgetBytes);
   if (backend.build(task, stream, budget, CancelToken(), answer.dag, answer.summary) ==
-      BuildOutcome::kOutgrown)
+      BuildOutcome::kNeedsSplit)
     answer.dag = {};
   return answer;
 }

@@ -125,7 +125,7 @@ class Worker {
     ArtifactWriter artifact(segment_, options_.grid_levels, options_.hash_bits);
     StoredSubvolume built = subvolume;
     if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
-        BuildOutcome::kOutgrown)
+        BuildOutcome::kNeedsSplit)
       return split(queued);
     bins_.drop(queued.bin);
     if (!built.summary.empty()) {

@@ -1,10 +1,11 @@
+// The number of children in a child mask.
 #pragma once
 
 #include <cstdint>
 
 namespace voxdag::cpu {
 
-// How many children a mask names. A table, since a plain x86-64 counts bits by calling a library.
+// popcount() of a child mask. A table, since the x86-64 baseline has no instruction for it.
 struct ChildCounts {
   uint8_t of[256] = {};
   constexpr ChildCounts() {
