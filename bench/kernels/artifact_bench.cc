@@ -16,7 +16,7 @@ namespace {
 
 constexpr uint32_t kLevels = 11;
 
-// Built once: random triangles of some 30 voxels, as of a scan.
+// Built once: random triangles of about 30 voxels, like those of a scan.
 struct Sample {
   MemoryBudget budget{uint64_t{4} << 30};
   SubDag dag;

@@ -1,11 +1,11 @@
-// How fast triangles become bricks: tests of the octree's cubes, and drawing into a tile.
+// The speed of rasterization: tests of the octree's cubes, and drawing into a tile.
 #include <benchmark/benchmark.h>
 
 #include <memory>
 #include <random>
 #include <vector>
 
-#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/raster/kernels.h"
 #include "core/dag/brick.h"
 
 namespace voxdag::cpu {
@@ -52,7 +52,7 @@ void draw(benchmark::State& state, const Kernels* k) {
           k->list_blocks(*tile, kTileBlocks / 8, existing.data(), blocks.data(), keys.data());
       for (int b = 0; b < count; ++b) {
         uint64_t there[kBlockBricks];
-        Block& block = tile->blocks[blocks[static_cast<size_t>(b)]];
+        VoxelBlock& block = tile->blocks[blocks[static_cast<size_t>(b)]];
         bricks += popcount64(k->unpack(block, there).mask);
         block = {};
       }

@@ -2,12 +2,12 @@
 //
 //   1. A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for one of the
 //      triangles and the voxel's closed cube. Triangles that miss the cube are harmless.
-//   2. The sub-DAG is the one and only: unique nodes, level arrays in the total order, whatever the
-//      order of the triangles, the memory, the method and what the backend remembers.
+//   2. The sub-DAG is unique: no two equal nodes, level arrays in the total order. It does not
+//      depend on the order of the triangles, the memory, the method or what the backend has cached.
 //   3. All large buffers are charged to the budget given. When it cannot hold the subvolume the
-//      answer is kOutgrown, before the sink was called; the caller splits the cube and tries again.
-//      A cube of kSmallestEdge voxels never outgrows kSmallestBudget.
-//   4. A backend lives over many subvolumes on one thread and may remember planes and tables.
+//      outcome is kNeedsSplit, and the sink was not called; the caller splits the cube and tries
+//      again. A cube of kSmallestEdge voxels never needs more than kSmallestBudget.
+//   4. A backend is used for many subvolumes, by one thread, and may cache planes and tables.
 //
 // tests/conformance runs over every backend.
 #pragma once
@@ -31,25 +31,30 @@ inline constexpr int64_t kSmallestEdge = 64;
 // Bytes that suffice for it, however many triangles stream through.
 inline constexpr uint64_t kSmallestBudget = uint64_t{8} << 20;
 
-// The triangles that may touch a subvolume, in no particular order, as often as asked for.
+// The triangles that may touch a subvolume, in no particular order; can be read repeatedly.
 class TriangleStream {
  public:
   virtual ~TriangleStream() = default;
   virtual uint64_t count() const = 0;
   // Starts again at the first triangle.
   virtual void rewind() = 0;
-  // Fills the front of `out`; returns how many, 0 at the end.
+  // Fills the front of `out`; returns the number of triangles read, 0 at the end.
   virtual size_t read(std::span<FixedTriangle> out) = 0;
 };
 
-// All that defines a subvolume task but its triangles.
+// Everything that defines a subvolume task except its triangles.
 struct SubvolumeTask {
   uint32_t grid_levels = 2;  // L
   Cube cube;                 // of level <= L-2
   uint32_t hash_bits = 64;   // 4 to 64
+
+  SubDagShape shape() const { return {cube.level, grid_levels, hash_bits}; }
 };
 
-enum class BuildOutcome { kBuilt, kOutgrown };
+enum class BuildOutcome {
+  kBuilt,
+  kNeedsSplit,  // the budget, or the device's memory, cannot hold the subvolume
+};
 
 class Backend {
  public:
@@ -62,28 +67,32 @@ class Backend {
                              SubDagSummary& summary) = 0;
 };
 
-// Instruction sets that the CPU backend has kernels for, each more than the one before.
+// Instruction sets that the CPU backend has kernels for; each includes the previous one.
 enum class Simd { kNone, kAvx2, kAvx512 };
 
-// The CPU backend: bricks rasterized tile by tile, nodes hash-consed. Uses the largest instruction
-// set up to `most` that the machine has, chosen at run time; the answer is the same.
-std::unique_ptr<Backend> make_cpu_backend(Simd most = Simd::kAvx512);
+// Whether this machine and this build can run the kernels for an instruction set.
+bool cpu_supports(Simd simd);
 
-// How the parallel backends go about it; the answer is the same.
+// The CPU backend: bricks rasterized tile by tile, nodes hash-consed. Uses the largest instruction
+// set up to `max_simd` that the machine supports, chosen at run time; the result is the same.
+std::unique_ptr<Backend> make_cpu_backend(Simd max_simd = Simd::kAvx512);
+
+// How the parallel backends work; the result is the same. kPointers and kHashes are the two
+// algorithms of Sintorn, "DAG Construction" (Eurographics 2018 tutorial).
 enum class Method {
-  kFast,      // bricks drawn tile by tile, DAG by hashes: what is fastest on a GPU
-  kPointers,  // voxel list, DAG by pointers: the tutorial's first version
-  kHashes,    // voxel list, DAG by hashes: the tutorial's second version
+  kFast,      // bricks drawn tile by tile, DAG by hashes: the fastest on a GPU
+  kPointers,  // voxel list, DAG by pointers
+  kHashes,    // voxel list, DAG by hashes
 };
 
-// The parallel pipeline on the host's threads (0 for all of them): for tests, and to compare with.
+// The parallel pipeline on the host's threads (0 for all of them): for tests and comparisons.
 std::unique_ptr<Backend> make_parallel_host_backend(Method method, unsigned threads = 1);
 
-// GPUs that make_cuda_backend() can open: 0 without CUDA in this build, driver or device. Never
-// throws.
+// The number of GPUs that make_cuda_backend() can open: 0 where this build has no CUDA, or the
+// machine no driver or device. Never throws.
 int cuda_device_count();
 inline bool cuda_device_available() { return cuda_device_count() > 0; }
-// Why there is none, in a sentence; empty if there is one.
+// Why there is no usable device, as a sentence; empty if there is one.
 std::string cuda_device_problem();
 
 // The parallel pipeline on a GPU, device memory charged to the build's budget like any other. It

@@ -1,4 +1,4 @@
-// Triangles that lie in memory, as a backend reads them.
+// A TriangleStream over triangles that are in memory.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace voxdag {
 
-// The triangles are not copied.
+// Does not copy the triangles, which must outlive the stream. Not thread-safe.
 class MemoryStream : public TriangleStream {
  public:
   explicit MemoryStream(std::span<const FixedTriangle> triangles) : triangles_(triangles) {}

@@ -19,4 +19,9 @@ VOXDAG_HD inline int brick_bit(int x, int y, int z) {
   return (x & 2) << 4 | (y & 2) << 3 | (z & 2) << 2 | (x & 1) << 2 | (y & 1) << 1 | (z & 1);
 }
 
+// The inverse of brick_bit(): the coordinate along an axis (0 is x) of a bit's voxel, 0 to 3.
+VOXDAG_HD constexpr int brick_coordinate(int bit, int axis) {
+  return (bit >> (2 - axis) & 1) | (bit >> (5 - axis) & 1) << 1;
+}
+
 }  // namespace voxdag

@@ -2,8 +2,8 @@
 //
 //     (hash, mask, child indices lexicographically)         bricks: (hash, mask)
 //
-// Child indices count nodes of the next level's array (bricks follow the last node level). Within a
-// level no two nodes are equal in mask and children. Not thread-safe.
+// Child indices are positions in the next level's array (bricks follow the last node level). Within
+// a level no two nodes are equal in mask and children. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,15 @@
 
 namespace voxdag {
 
-// Level L-2: masks in the order of (cut hash, mask). Hashes are not kept: hash_brick() gives them.
+// Level L-2: masks in the order of (truncated hash, mask). Hashes are not stored: hash_brick()
+// computes them.
 struct BrickLevelView {
   std::span<const uint64_t> masks;
 };
 
-// Any level above: node i has child mask masks[i] and hash hashes[i]; the children of all nodes
-// stand one node after the other, popcount(masks[i]) of them in child order.
+// Any level above the bricks: node i has child mask masks[i] and hash hashes[i]. `children` lists
+// the children of node 0, then those of node 1, and so on: popcount(masks[i]) of each node, in
+// child order.
 struct NodeLevelView {
   uint32_t level = 0;
   std::span<const uint64_t> hashes;
@@ -34,7 +36,7 @@ VOXDAG_HD inline int compare_children(const uint32_t* a, const uint32_t* b, int 
   return 0;
 }
 
-// The total order of nodes: < 0, 0 (equal: one and the same node) or > 0.
+// The total order of nodes: < 0, 0 (the same node) or > 0.
 VOXDAG_HD inline int compare_nodes(uint64_t hash_a, uint32_t mask_a, const uint32_t* children_a,
                                    uint64_t hash_b, uint32_t mask_b, const uint32_t* children_b) {
   if (hash_a != hash_b) return hash_a < hash_b ? -1 : 1;

@@ -1,5 +1,5 @@
-// Hashes of bricks and nodes: functions of the subtree alone, not of level, place or index. A hash
-// only brings candidates together; equality is always decided on masks and children.
+// Hashes of bricks and nodes: functions of the subtree alone, not of level, position or index. A
+// hash only finds candidates; equality is always decided on masks and children.
 // docs/format.md, "Node hash", is the specification; changing a constant is a new format version.
 #pragma once
 
@@ -11,7 +11,7 @@
 namespace voxdag {
 
 // A bijection of 64-bit words (two rounds of xor-shift and odd multiplication), so that two bricks
-// have the same uncut hash only if they are the same brick.
+// have the same full hash only if they are the same brick.
 VOXDAG_HD inline uint64_t hash_brick(uint64_t mask) {
   uint64_t h = mask ^ 0x9e3779b97f4a7c15ull;
   h = (h ^ h >> 32) * 0xd6e8feb86659fd93ull;
@@ -30,7 +30,7 @@ VOXDAG_HD inline uint64_t node_hash_end(uint64_t state) {
   return fold_multiply(state, 0x1d8e4e27c47d124full);
 }
 
-// Hashes of the children that `child_mask` names, in child order.
+// The hash of a node; `child_hashes` are those of the children in `child_mask`, in child order.
 VOXDAG_HD inline uint64_t hash_node(uint32_t child_mask, const uint64_t* child_hashes) {
   uint64_t h = node_hash_begin(child_mask);
   const int count = popcount64(child_mask);
@@ -38,9 +38,9 @@ VOXDAG_HD inline uint64_t hash_node(uint32_t child_mask, const uint64_t* child_h
   return node_hash_end(h);
 }
 
-// --hash-bits: the top `bits` (4 to 64) are kept, the others are 0. Parents are hashed from cut
-// hashes.
-VOXDAG_HD inline uint64_t cut_hash(uint64_t hash, uint32_t bits) {
+// --hash-bits: the top `bits` (4 to 64) of the hash, the others 0. Parents are hashed from the
+// truncated hashes of their children.
+VOXDAG_HD inline uint64_t truncate_hash(uint64_t hash, uint32_t bits) {
   return bits >= 64 ? hash : hash & ~(~uint64_t{0} >> bits);
 }
 

@@ -3,7 +3,6 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "core/dag/brick.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag {
@@ -21,18 +20,17 @@ void check_all_used(const std::vector<bool>& used, uint32_t level) {
 
 }  // namespace
 
-void check_sub_dag(const SubDag& dag, uint32_t cube_level, uint32_t grid_levels,
-                   uint32_t hash_bits) {
-  const uint32_t brick_level = grid_levels - kBrickLevels;
-  if (dag.levels.size() != brick_level - cube_level)
+void check_sub_dag(const SubDag& dag, const SubDagShape& shape) {
+  const uint32_t brick_level = shape.brick_level(), hash_bits = shape.hash_bits;
+  if (dag.levels.size() != brick_level - shape.cube_level)
     throw Error(ErrorCode::kCorrupt, "sub-DAG has " + std::to_string(dag.levels.size()) +
                                          " node levels, expected " +
-                                         std::to_string(brick_level - cube_level));
+                                         std::to_string(brick_level - shape.cube_level));
   std::vector<uint64_t> child_hashes(dag.brick_masks.size());
   for (size_t i = 0; i < dag.brick_masks.size(); ++i) {
     const uint64_t mask = dag.brick_masks[i];
     if (mask == 0) broken(brick_level, i, "the brick is empty");
-    child_hashes[i] = cut_hash(hash_brick(mask), hash_bits);
+    child_hashes[i] = truncate_hash(hash_brick(mask), hash_bits);
     if (i > 0 && (child_hashes[i - 1] > child_hashes[i] ||
                   (child_hashes[i - 1] == child_hashes[i] && dag.brick_masks[i - 1] >= mask)))
       broken(brick_level, i, "bricks are not in the order of hash and mask");
@@ -54,7 +52,7 @@ void check_sub_dag(const SubDag& dag, uint32_t cube_level, uint32_t grid_levels,
         used[child] = true;
         hashes[c] = child_hashes[child];
       }
-      if (cut_hash(hash_node(nodes.masks[i], hashes), hash_bits) != nodes.hashes[i])
+      if (truncate_hash(hash_node(nodes.masks[i], hashes), hash_bits) != nodes.hashes[i])
         broken(level, i, "the hash is not that of its mask and children");
       if (i > 0 &&
           compare_nodes(nodes.hashes[i - 1], nodes.masks[i - 1], &nodes.children[previous_at],
@@ -68,7 +66,7 @@ void check_sub_dag(const SubDag& dag, uint32_t cube_level, uint32_t grid_levels,
     child_hashes = nodes.hashes;
   }
   if (child_hashes.size() != 1)
-    broken(cube_level, 0, "expected one root, found " + std::to_string(child_hashes.size()));
+    broken(shape.cube_level, 0, "expected one root, found " + std::to_string(child_hashes.size()));
 }
 
 }  // namespace voxdag

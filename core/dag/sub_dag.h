@@ -1,26 +1,38 @@
-// A sub-DAG: what a backend makes of one subvolume, handed over level by level.
+// A sub-DAG: the DAG of one subvolume, which a backend delivers level by level.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "core/dag/brick.h"
 #include "core/dag/level_array.h"
 #include "core/geometry/cube.h"
 
 namespace voxdag {
 
-// What is known of a subvolume's octree once it is built. Counts are of the octree, not the DAG.
+// Where a sub-DAG stands in the grid's octree, and how its nodes are hashed. One struct, so that
+// callers name these numbers (`{.cube_level = 2, .grid_levels = 11, .hash_bits = 64}`) instead of
+// passing neighboring integers that could be swapped.
+struct SubDagShape {
+  uint32_t cube_level = 0;   // of the root
+  uint32_t grid_levels = 2;  // L; bricks are level L-2
+  uint32_t hash_bits = 64;   // 4 to 64
+
+  uint32_t brick_level() const { return grid_levels - kBrickLevels; }
+};
+
+// Totals of a subvolume that was built.
 struct SubDagSummary {
   uint64_t voxels = 0;     // set voxels in the cube
   uint64_t svo_nodes = 0;  // octree nodes from the cube's root to the bricks, both included
   uint64_t dag_nodes = 0;  // unique nodes, bricks included
-  uint64_t root_hash = 0;  // cut; 0 when empty
+  uint64_t root_hash = 0;  // truncated; 0 when empty
   bool empty() const { return voxels == 0; }
 };
 
-// Takes a sub-DAG from the bricks upwards: bricks() once, then nodes() for every level from L-3 up
-// to the cube's own level, where the array has exactly one node, the root. Nothing is called for an
-// empty subvolume. The views are only valid during the call.
+// Receives a sub-DAG from the bricks upwards: bricks() once, then nodes() for every level from L-3
+// up to the cube's own level, where the array has exactly one node, the root. Nothing is called for
+// an empty subvolume. The views are only valid during the call.
 class SubDagSink {
  public:
   virtual ~SubDagSink() = default;
@@ -28,7 +40,7 @@ class SubDagSink {
   virtual void nodes(const NodeLevelView& level) = 0;
 };
 
-// A whole sub-DAG in memory, for tests and small work.
+// A whole sub-DAG in memory, for tests and small subvolumes.
 struct SubDag : SubDagSink {
   struct Nodes {
     uint32_t level = 0;
@@ -55,11 +67,10 @@ struct SubDag : SubDagSink {
   }
 };
 
-// Checks every invariant of a sub-DAG rooted at a cube of `cube_level` on a grid of `grid_levels`:
-// levels complete, masks not 0, indices in range, total order without doubles, hashes right for
-// `hash_bits`, every node but the root used by a parent. Throws Error{kCorrupt} naming the first
-// level and node that break one.
-void check_sub_dag(const SubDag& dag, uint32_t cube_level, uint32_t grid_levels,
-                   uint32_t hash_bits);
+// Checks every invariant of a sub-DAG:
+// levels complete, masks not 0, indices in range, total order without duplicates, hashes right for
+// shape.hash_bits, every node but the root used by a parent. Throws Error{kCorrupt} naming the
+// first level and node that break one.
+void check_sub_dag(const SubDag& dag, const SubDagShape& shape);
 
 }  // namespace voxdag

@@ -16,6 +16,9 @@ namespace voxdag {
 inline constexpr int kMinGridLevels = 2;   // R = 4: the root is a brick
 inline constexpr int kMaxGridLevels = 20;  // R = 1 048 576
 
+// A child's coordinate in its parent along an axis, 0 or 1.
+VOXDAG_HD constexpr int child_coordinate(int index, int axis) { return index >> (2 - axis) & 1; }
+
 struct Cube {
   uint32_t level = 0;                // 0 is the whole grid
   uint32_t position[3] = {0, 0, 0};  // in cubes of this level, axis x, y, z

@@ -1,7 +1,7 @@
 // The voxel grid in world space and how world positions are snapped to its fixed-point lattice.
 //
-// All of it in IEEE doubles with + - * / only, compiled without fused multiply-add, so that every
-// machine snaps alike:
+// Computed in IEEE doubles with + - * / only, compiled without fused multiply-add, so that every
+// machine snaps to the same positions:
 //     edge   = max(hi - lo) * (1 + 2^-15)        origin = 0.5 * (lo + hi) - 0.5 * edge
 //     x      = ((w - origin) / edge) * R         u      = 2 * floor(128 * x) + 1
 // The default cube does not depend on R.
@@ -37,7 +37,7 @@ struct Grid {
   // The default cube around a scene. A scene without extent, or without triangles, gets edge 1.
   // Throws Error{kInvalidInput} for levels outside [2, 20].
   static Grid around(const WorldBounds& bounds, uint32_t levels);
-  // The cube that a user gave: its low corner and its edge, finite and edge > 0.
+  // A cube given by its low corner and its edge, finite and edge > 0.
   static Grid given(const std::array<double, 3>& origin, double edge, uint32_t levels);
   // Voxels of edge `voxel_size`, the cube centered on the scene; a scene that does not fit is
   // Error{kInvalidInput}.

@@ -1,5 +1,5 @@
-// Hands a triangle down the octree of cubes: which children of a cube does it touch? Exact (closed
-// triangle, closed cube), so walking a tree in two ways agrees on who touches what.
+// Descending the octree with a triangle: which children of a cube does it touch? Exact (closed
+// triangle, closed cube), so every way of walking the tree finds the same cubes.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace voxdag {
 
-// The cube of this level, none below the cube's own, that holds it.
+// The cube of `level`, at most cube.level, that contains `cube`.
 inline Cube ancestor(const Cube& cube, uint32_t level) {
   const uint32_t up = cube.level - level;
   return {level, {cube.position[0] >> up, cube.position[1] >> up, cube.position[2] >> up}};
@@ -32,7 +32,7 @@ struct CellBox {
     for (int a = 0; a < 3; ++a) inside &= low[a] >= 0 && high[a] >> level == 0;
     return inside;
   }
-  // The smallest cube that holds all of them, which must be inside the grid.
+  // The smallest cube that contains all of these cells, which must be inside the grid.
   Cube cube_around() const {
     uint32_t up = 0;
     for (int a = 0; a < 3; ++a)

@@ -1,7 +1,8 @@
 // The exact test of a closed triangle against a closed axis-aligned cube, both on the fixed-point
-// lattice: the separating-axis test as arranged by Schwarz & Seidel 2010, section 4.1 (bounding
-// box, plane, and three edge tests in each of the three projections), all in integers, so right for
-// slivers and degenerate triangles too. This is the definition that every faster kernel must equal.
+// lattice: the separating-axis test as arranged in Schwarz and Seidel, "Fast Parallel Surface and
+// Solid Voxelization on GPUs" (2010), section 4.1: bounding box, plane, and three edge tests in
+// each of the three projections. All in integers, so it is exact for slivers and degenerate
+// triangles too. This is the definition that every faster kernel must equal.
 #pragma once
 
 #include <cstdint>
@@ -27,14 +28,14 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
   }
 
   // Plane: n.(p - v0) changes sign, or vanishes, over the cube's corners.
-  Int least = 0, most = 0;
+  Int lowest = 0, highest = 0;
   for (int a = 0; a < 3; ++a) {
     const Int near = normal[a] * (low[a] - t.v[0][a]);
     const Int far = normal[a] * (low[a] + edge - t.v[0][a]);
-    least += near < far ? near : far;
-    most += near < far ? far : near;
+    lowest += near < far ? near : far;
+    highest += near < far ? far : near;
   }
-  if (least > 0 || most < 0) return false;
+  if (lowest > 0 || highest < 0) return false;
 
   // Edges in the projection along axis c onto (a, b): the triangle's inside is where all three edge
   // functions are >= 0, once oriented by the sign of the normal (fixed to + where that is 0).

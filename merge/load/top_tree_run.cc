@@ -49,7 +49,7 @@ void TopTreeRun::add_parents(const std::vector<PlacedNode>& children, uint32_t h
       node.children[count] = child.position;
       hashes[count++] = child.hash;
     }
-    node.hash = cut_hash(hash_node(node.mask, hashes), hash_bits);
+    node.hash = truncate_hash(hash_node(node.mask, hashes), hash_bits);
     nodes_.push_back(node);
   }
 }

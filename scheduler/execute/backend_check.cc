@@ -45,7 +45,7 @@ Result result_of(Backend& backend, const SubvolumeTask& task,
   MemoryStream stream(triangles);
   MemoryBudget budget(kBudgetBytes);
   if (backend.build(task, stream, budget, CancelToken(), result.dag, result.summary) ==
-      BuildOutcome::kOutgrown)
+      BuildOutcome::kNeedsSplit)
     result.dag = {};
   return result;
 }

@@ -113,7 +113,7 @@ class Worker {
     ArtifactWriter artifact(segment_, options_.grid_levels, options_.hash_bits);
     StoredSubvolume built = subvolume;
     if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
-        BuildOutcome::kOutgrown)
+        BuildOutcome::kNeedsSplit)
       return split(queued);
     if (!built.summary.empty()) {
       const ArtifactRoot root{subvolume.cube, 0, built.summary.root_hash, built.summary.voxels,

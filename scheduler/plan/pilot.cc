@@ -44,7 +44,7 @@ std::optional<PilotCounts> build_pilot(const TriangleStore& triangles, uint32_t 
   CountingSink sink;
   SubDagSummary summary;
   if (backend.build({pilot_levels, Cube{}, 64}, stream, budget, cancel, sink, summary) ==
-      BuildOutcome::kOutgrown)
+      BuildOutcome::kNeedsSplit)
     return std::nullopt;
   PilotCounts counts;
   counts.levels = pilot_levels;

@@ -1,5 +1,5 @@
-// Different nodes whose hashes agree in their upper 32 bits, all that a table may keep of a hash,
-// stay different nodes.
+// Different nodes with equal upper 32 bits of their hashes, which is all that a table may store,
+// remain different nodes.
 #include <unordered_map>
 
 #include "tests/conformance/harness.h"

@@ -78,7 +78,7 @@ TEST_P(Cubes, RegionsOfLargeCubes) {
     SCOPED_TRACE(oracle::kind_name(kind));
     const auto scene = oracle::make_scene(kind, 5, whole, 12);
     const Built built = build(*backend, {kGridLevels, cube, 64}, scene);
-    check_sub_dag(built.dag, cube.level, kGridLevels, 64);
+    check_sub_dag(built.dag, {.cube_level = cube.level, .grid_levels = kGridLevels});
     uint64_t compared = 0;
     for (int i = 0; i < 24; ++i) {
       oracle::Region region{whole.low, 32};
@@ -124,7 +124,7 @@ TEST_P(Cubes, MissedCubesAreEmpty) {
   oracle::Random random(23);
   oracle::Triangles scene;
   for (int i = 0; i < 300; ++i) {
-    // Beside, above or behind the cube, a unit away at best.
+    // Outside of the cube along some axis, at least one unit away.
     oracle::Triangle t;
     const int64_t axis = random.between(0, 2), near = random.coin() ? -1 : 64 * 256 + 1;
     for (oracle::Point& p : t)

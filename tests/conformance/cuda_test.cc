@@ -1,5 +1,5 @@
-// The CUDA backend is one of those under test where there is a device; elsewhere it says clearly
-// why it cannot be opened.
+// The CUDA backend is under test where there is a device; elsewhere its error says why it cannot be
+// opened.
 #include "core/base/error.h"
 #include "tests/conformance/harness.h"
 

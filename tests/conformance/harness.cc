@@ -8,18 +8,18 @@
 namespace voxdag {
 namespace {
 
-// Keeps what it is given, and minds the order of the calls.
+// Stores what it receives, and checks the order of the calls.
 class OrderedSink : public SubDagSink {
  public:
   OrderedSink(Built& built, const SubvolumeTask& task)
       : built_(built), next_level_(task.grid_levels - kBrickLevels) {}
   void bricks(const BrickLevelView& level) override {
-    EXPECT_FALSE(built_.sink_called) << "bricks() came late or twice";
+    EXPECT_FALSE(built_.sink_called) << "bricks() was called late or twice";
     built_.sink_called = true;
     built_.dag.bricks(level);
   }
   void nodes(const NodeLevelView& level) override {
-    EXPECT_TRUE(built_.sink_called) << "nodes() came before bricks()";
+    EXPECT_TRUE(built_.sink_called) << "nodes() was called before bricks()";
     EXPECT_EQ(level.level, --next_level_);
     built_.dag.nodes(level);
   }
@@ -71,7 +71,8 @@ struct Decoder {
 std::vector<BackendUnderTest> backends_under_test() {
   std::vector<BackendUnderTest> all = {
       {"cpu", [] { return make_cpu_backend(); }},
-      {"cpu_avx2", [] { return make_cpu_backend(Simd::kAvx2); }},
+      {"cpu_avx512", [] { return make_cpu_backend(Simd::kAvx512); }, Simd::kAvx512},
+      {"cpu_avx2", [] { return make_cpu_backend(Simd::kAvx2); }, Simd::kAvx2},
       {"cpu_portable", [] { return make_cpu_backend(Simd::kNone); }},
       {"parallel_host_fast", [] { return make_parallel_host_backend(Method::kFast, 2); }},
       {"parallel_host_hashes", [] { return make_parallel_host_backend(Method::kHashes); }},
@@ -91,7 +92,7 @@ Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,
   CancelToken never;
   OrderedSink sink(built, task);
   built.outcome = backend.build(task, stream, budget, never, sink, built.summary);
-  EXPECT_EQ(budget.used(), 0u) << "memory was not given back";
+  EXPECT_EQ(budget.used(), 0u) << "memory was not released";
   const bool has_dag = built.outcome == BuildOutcome::kBuilt && !built.summary.empty();
   EXPECT_EQ(built.sink_called, has_dag);
   return built;
@@ -119,7 +120,7 @@ void expect_equals(const Built& built, const oracle::Dag& truth, const Subvolume
     EXPECT_TRUE(got.children == want.children) << "children of level " << want.level << " differ";
   }
   if (truth.voxels == 0) return;
-  EXPECT_NO_THROW(check_sub_dag(built.dag, task.cube.level, task.grid_levels, task.hash_bits));
+  EXPECT_NO_THROW(check_sub_dag(built.dag, task.shape()));
 }
 
 void expect_right(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles) {

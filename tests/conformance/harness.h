@@ -1,6 +1,5 @@
-// What the conformance tests share: the backends under test, and builds that keep what came out.
-//
-// A new backend is one row of backends_under_test(); every test runs over every row.
+// The common part of the conformance tests: the backends under test, and builds that store their
+// results. A new backend is one row of backends_under_test(); every test runs for every row.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,6 +19,7 @@ namespace voxdag {
 struct BackendUnderTest {
   std::string name;
   std::function<std::unique_ptr<Backend>()> open;
+  Simd simd = Simd::kNone;  // that it needs
   friend std::ostream& operator<<(std::ostream& out, const BackendUnderTest& b) {
     return out << b.name;
   }
@@ -28,6 +28,10 @@ std::vector<BackendUnderTest> backends_under_test();
 
 class Conformance : public testing::TestWithParam<BackendUnderTest> {
  protected:
+  void SetUp() override {
+    if (!cpu_supports(GetParam().simd))
+      GTEST_SKIP() << GetParam().name << ": this machine, or this build, lacks the instruction set";
+  }
   std::unique_ptr<Backend> open() const { return GetParam().open(); }
 };
 
@@ -44,8 +48,8 @@ struct Built {
   bool sink_called = false;
 };
 
-// Builds, and checks what every build owes whatever its outcome: the sink is called in order, only
-// for what was built, and all memory is given back.
+// Builds, and checks what holds for every outcome: the sink is called in order, only for what was
+// built, and all memory is released.
 Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,
             uint64_t budget_bytes = kAmpleBudget);
 Built build(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles,

@@ -1,4 +1,4 @@
-// A grid too large for the oracle, where all that a build remembers comes into play (planes and
+// A grid too large for the oracle, where all memos of a build are used (planes and
 // their directions, grown tables, subvolumes of many tiles): implementations that share no inner
 // loop agree.
 #include "tests/conformance/harness.h"
@@ -40,8 +40,8 @@ TEST(LargeGrid, TheSameArraysFromAllThatRunHere) {
     const Built truth = build(*parallel, task, scene);
     ASSERT_EQ(truth.outcome, BuildOutcome::kBuilt);
     EXPECT_GT(truth.summary.voxels, 1'000'000u);
-    for (const Simd most : {Simd::kNone, Simd::kAvx2, Simd::kAvx512}) {
-      const Built built = build(*make_cpu_backend(most), task, scene);
+    for (const Simd simd : {Simd::kNone, Simd::kAvx2, Simd::kAvx512}) {
+      const Built built = build(*make_cpu_backend(simd), task, scene);
       ASSERT_EQ(built.outcome, BuildOutcome::kBuilt);
       EXPECT_EQ(built.summary.voxels, truth.summary.voxels);
       EXPECT_EQ(built.summary.svo_nodes, truth.summary.svo_nodes);

@@ -1,4 +1,5 @@
-// The memory promise of a backend: it outgrows politely, and the smallest cube always fits.
+// The memory guarantee of a backend: a cube that does not fit needs a split, the smallest always
+// fits.
 #include <malloc.h>
 
 #include <atomic>
@@ -9,8 +10,8 @@
 
 namespace {
 
-// Bytes that `new` has handed out and not got back, and the most there were: what a backend takes
-// without charging it must stay small.
+// Bytes allocated by `new` now, and their maximum: what a backend allocates without charging it
+// must be small.
 std::atomic<int64_t> g_heap{0}, g_heap_peak{0};
 
 void* counted(void* block) {
@@ -71,9 +72,9 @@ class EndlessStream : public TriangleStream {
   uint64_t count_, next_ = 0;
 };
 
-// The smallest cube never outgrows its budget, however many triangles stream through, and what is
-// not charged is small.
-TEST_P(Memory, SmallestCubeFitsWhateverStreams) {
+// The smallest cube fits the smallest budget, however many triangles there are, and what is not
+// charged is small.
+TEST_P(Memory, SmallestCubeFitsWithAnyTriangles) {
   const auto backend = open();
   const SubvolumeTask task{14, {8, {200, 3, 117}}, 64};  // 64 voxels
   const oracle::Region region = oracle::region_of(task.cube, task.grid_levels);
@@ -91,7 +92,7 @@ TEST_P(Memory, SmallestCubeFitsWhateverStreams) {
   }
 }
 
-// Its worst case: bricks that are all different, 4096 of them.
+// The worst case of the smallest cube: 4096 bricks that are all different.
 TEST_P(Memory, SmallestCubeFitsWithAllBricksDifferent) {
   const SubvolumeTask task{20, {14, {16383, 0, 5000}}, 64};
   const oracle::Region region = oracle::region_of(task.cube, task.grid_levels);
@@ -101,19 +102,18 @@ TEST_P(Memory, SmallestCubeFitsWithAllBricksDifferent) {
   expect_equals(build(*open(), task, scene, kSmallestBudget), truth, task);
 }
 
-// A cube that the budget cannot hold is outgrown before anything was sent; split down to where it
-// fits, its parts have the voxels of the whole.
+// Builds a cube, splitting it until the parts fit the smallest budget.
 class Splitter {
  public:
   Splitter(Backend& backend, uint32_t grid_levels, const oracle::Triangles& scene)
       : backend_(backend), grid_levels_(grid_levels), scene_(scene) {}
-  uint64_t outgrown = 0, voxels = 0;
+  uint64_t splits = 0, voxels = 0;
 
   void build_cube(const Cube& cube) {
     oracle::VectorStream stream(oracle::fixed(scene_));
     const Built built = build(backend_, {grid_levels_, cube, 64}, stream, kSmallestBudget);
-    if (built.outcome == BuildOutcome::kOutgrown) {
-      ++outgrown;
+    if (built.outcome == BuildOutcome::kNeedsSplit) {
+      ++splits;
       ASSERT_GT(cube.edge_voxels(grid_levels_), kSmallestEdge);
       for (int c = 0; c < 8; ++c) build_cube(cube.child(c));
       return;
@@ -127,7 +127,8 @@ class Splitter {
   const oracle::Triangles& scene_;
 };
 
-TEST_P(Memory, OutgrownCubesCanBeSplit) {
+// The parts of a cube that had to be split have the voxels of the whole.
+TEST_P(Memory, CubesThatNeedASplitCanBeSplit) {
   const auto backend = open();
   const Cube cube{1, {1, 1, 0}};  // 512 voxels
   const auto scene =
@@ -136,34 +137,34 @@ TEST_P(Memory, OutgrownCubesCanBeSplit) {
   ASSERT_EQ(whole.outcome, BuildOutcome::kBuilt);
   Splitter splitter(*backend, 10, scene);
   splitter.build_cube(cube);
-  EXPECT_GT(splitter.outgrown, 0u);
+  EXPECT_GT(splitter.splits, 0u);
   EXPECT_EQ(splitter.voxels, whole.summary.voxels);
 }
 
-// Whatever the budget, from far too little to ample: outgrown, or right. What `new` gives stays
-// within it.
-TEST_P(Memory, EveryBudgetIsOutgrownOrRight) {
+// With any budget, from far too small to ample, the cube needs a split or the result is right. The
+// memory from `new` is within the budget.
+TEST_P(Memory, AnyBudgetNeedsASplitOrGivesTheResult) {
   const auto backend = open();
   const SubvolumeTask task{9, {}, 16};
   const auto scene =
       oracle::make_scene(oracle::SceneKind::kSpanning, 12, oracle::region_of({}, 9), 60);
   const Built whole = build(*backend, task, scene);
-  int outgrown = 0, built = 0;
+  int too_small = 0, built = 0;
   for (uint64_t budget = kSmallestBudget / 64; budget <= kAmpleBudget; budget += budget / 2) {
     SCOPED_TRACE(budget);
     oracle::VectorStream stream(oracle::fixed(scene));
     const int64_t before = g_heap;
     g_heap_peak = before;
     const Built one = build(*backend, task, stream, budget);
-    if (one.outcome == BuildOutcome::kOutgrown) {
-      ++outgrown;
+    if (one.outcome == BuildOutcome::kNeedsSplit) {
+      ++too_small;
       EXPECT_LE(g_heap_peak - before, static_cast<int64_t>(budget) + kUncharged);
     } else {
       ++built;
       EXPECT_TRUE(one.dag == whole.dag);
     }
   }
-  EXPECT_GT(outgrown, 0);
+  EXPECT_GT(too_small, 0);
   EXPECT_GT(built, 0);
 }
 

@@ -29,7 +29,7 @@ void expect_same(const Built& a, const Built& b) {
   EXPECT_EQ(a.summary.root_hash, b.summary.root_hash);
 }
 
-// Shuffled, doubled, vertices turned round, dealt out one by one or all at once.
+// Triangles shuffled, duplicated, with rotated vertices, read one by one or all at once.
 TEST_P(Streams, OrderAndRepetitionDoNotShow) {
   const auto backend = open();
   oracle::Triangles scene = mixed_scene(1);
@@ -74,7 +74,8 @@ class FailingStream : public oracle::VectorStream {
   int good_reads_;
 };
 
-// An error of the stream is handed on as it is, the sink untouched, and the next build is right.
+// An error of the stream is rethrown unchanged, the sink is not called, and the next build is
+// right.
 TEST_P(Streams, ErrorsOfTheStreamComeThrough) {
   const auto backend = open();
   const oracle::Triangles scene = mixed_scene(3);
@@ -132,7 +133,8 @@ TEST_P(Streams, ErrorsOfTheSinkComeThrough) {
   }
 }
 
-// Goes on for very long, asks to stop after a number of reads, and counts those that follow.
+// A very long stream that cancels the build after a number of reads, and counts the reads after
+// that.
 class CancelingStream : public TriangleStream {
  public:
   CancelingStream(const oracle::Triangles& triangles, CancelToken& token, int reads)

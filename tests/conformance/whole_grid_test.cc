@@ -9,7 +9,7 @@ VOXDAG_FOR_ALL_BACKENDS(WholeGrid);
 
 constexpr uint32_t kHashBits[] = {4, 16, 64};
 
-// Every kind of scene, R from 4 to 64, few and many triangles, hashes cut and whole.
+// Every kind of scene, R from 4 to 64, few and many triangles, hashes truncated and full.
 TEST_P(WholeGrid, EqualsTheOracle) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds)

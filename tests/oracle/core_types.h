@@ -61,7 +61,7 @@ inline voxdag::SubDagSummary summary_of(const Dag& dag) {
   return {dag.voxels, dag.svo_nodes, dag.dag_nodes, dag.root_hash};
 }
 
-// Streams triangles from memory, at most `batch` at once.
+// Streams triangles from memory, at most `batch` per read.
 class VectorStream : public voxdag::TriangleStream {
  public:
   explicit VectorStream(std::vector<voxdag::FixedTriangle> triangles, size_t batch = 1000)

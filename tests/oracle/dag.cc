@@ -48,7 +48,7 @@ Node node_above(Places& below, const std::vector<uint64_t>& hashes, int x, int y
     node.children.push_back(child);
     child_hashes.push_back(hashes[child]);
   }
-  node.hash = cut(node_hash(node.mask, child_hashes), bits);
+  node.hash = truncated(node_hash(node.mask, child_hashes), bits);
   return node;
 }
 
@@ -88,7 +88,7 @@ uint64_t node_hash(uint32_t mask, const std::vector<uint64_t>& child_hashes) {
   return fold(h, 0x1d8e4e27c47d124f);
 }
 
-uint64_t cut(uint64_t hash, int bits) {
+uint64_t truncated(uint64_t hash, int bits) {
   return bits == 64 ? hash : hash >> (64 - bits) << (64 - bits);
 }
 
@@ -102,7 +102,7 @@ Dag build_dag(const Voxels& voxels, int hash_bits) {
   std::map<std::pair<uint64_t, uint64_t>, std::vector<size_t>> bricks;  // (hash, mask)
   for_each_place(places.edge, [&](size_t place, int x, int y, int z) {
     if (const uint64_t mask = brick_at(voxels, x, y, z)) {
-      bricks[{cut(brick_hash(mask), hash_bits), mask}].push_back(place);
+      bricks[{truncated(brick_hash(mask), hash_bits), mask}].push_back(place);
       ++dag.svo_nodes;
     }
   });

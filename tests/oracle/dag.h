@@ -13,11 +13,11 @@ namespace oracle {
 // The node hash as the format page has it, written a second time.
 uint64_t brick_hash(uint64_t mask);
 uint64_t node_hash(uint32_t mask, const std::vector<uint64_t>& child_hashes);
-// Keeps the top `bits`.
-uint64_t cut(uint64_t hash, int bits);
+// The top `bits` of a hash, the others 0.
+uint64_t truncated(uint64_t hash, int bits);
 
 struct Node {
-  uint64_t hash = 0;               // cut
+  uint64_t hash = 0;               // truncated
   uint32_t mask = 0;               // bit 4x + 2y + z for the child there
   std::vector<uint32_t> children;  // indices into the level below
   auto operator<=>(const Node&) const = default;
@@ -29,7 +29,7 @@ struct Dag {
   uint64_t voxels = 0;
   uint64_t svo_nodes = 0;  // of the octree, bricks included
   uint64_t dag_nodes = 0;  // unique ones, bricks included
-  uint64_t root_hash = 0;  // cut; 0 if there are no voxels
+  uint64_t root_hash = 0;  // truncated; 0 if there are no voxels
   bool operator==(const Dag&) const = default;
 };
 

@@ -5,7 +5,7 @@
 namespace oracle {
 namespace {
 
-// Room enough: a normal's components are below 2^83, a dot product with a point below 2^125.
+// No overflow: a normal's components are below 2^83, a dot product with a point below 2^125.
 __extension__ typedef __int128 Wide;
 using Axis = std::array<Wide, 3>;
 
@@ -19,12 +19,12 @@ Wide dot(const Axis& a, const Point& p) { return a[0] * p[0] + a[1] * p[1] + a[2
 
 template <class Points>
 std::pair<Wide, Wide> shadow(const Axis& axis, const Points& points) {
-  Wide least = dot(axis, points[0]), most = least;
+  Wide lowest = dot(axis, points[0]), highest = lowest;
   for (const Point& p : points) {
-    least = std::min(least, dot(axis, p));
-    most = std::max(most, dot(axis, p));
+    lowest = std::min(lowest, dot(axis, p));
+    highest = std::max(highest, dot(axis, p));
   }
-  return {least, most};
+  return {lowest, highest};
 }
 
 }  // namespace

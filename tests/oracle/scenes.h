@@ -17,7 +17,7 @@ enum class SceneKind {
   kWalls,           // axis-aligned rectangles
   kDiagonal,        // planes of 45 degrees that pass exactly through voxel edges
   kSpanning,        // from one side of the region to another
-  kCoincident,      // the same triangles again, vertices turned round
+  kCoincident,      // the same triangles again, with rotated vertices
   kThroughCorners,  // edges exactly through voxel corners
   kCrossing,        // partly or wholly outside the region
   kWide,            // through the region, vertices at the limit of the coordinates

@@ -1,4 +1,4 @@
-// The CPU backend: see subvolume_build.h for how a subvolume is built.
+// The CPU backend; subvolume_build.h describes how a subvolume is built.
 #include <memory>
 
 #include "core/backend/backend.h"
@@ -22,8 +22,8 @@ class CpuBackend : public Backend {
       summary = build->run(triangles, sink);
       table_sizes_ = build->table_sizes();
       return BuildOutcome::kBuilt;
-    } catch (const cpu::Outgrown&) {
-      return BuildOutcome::kOutgrown;
+    } catch (const OutOfBudget&) {
+      return BuildOutcome::kNeedsSplit;
     }
   }
 
@@ -35,9 +35,14 @@ class CpuBackend : public Backend {
 
 }  // namespace
 
-std::unique_ptr<Backend> make_cpu_backend(Simd most) {
-  const cpu::Kernels* kernels = most >= Simd::kAvx512 ? cpu::avx512_kernels() : nullptr;
-  if (!kernels && most >= Simd::kAvx2) kernels = cpu::avx2_kernels();
+bool cpu_supports(Simd simd) {
+  return simd == Simd::kNone || (simd == Simd::kAvx2 && cpu::avx2_kernels()) ||
+         (simd == Simd::kAvx512 && cpu::avx512_kernels());
+}
+
+std::unique_ptr<Backend> make_cpu_backend(Simd max_simd) {
+  const cpu::Kernels* kernels = max_simd >= Simd::kAvx512 ? cpu::avx512_kernels() : nullptr;
+  if (!kernels && max_simd >= Simd::kAvx2) kernels = cpu::avx2_kernels();
   return std::make_unique<CpuBackend>(kernels ? *kernels : cpu::portable_kernels());
 }
 

@@ -13,98 +13,99 @@ namespace {
 constexpr char kWhat[] = "a subvolume";
 constexpr size_t kPage = size_t{4} << 10;
 constexpr size_t kLargestPower = size_t{4} << 20;
-// A subvolume takes up to some hundred blocks; with fewer the small ones, which come back last,
-// would drive out the large.
-constexpr size_t kMaxBlocks = 1024;
+// A subvolume has up to some hundred arrays; with a lower limit the small ranges, which are freed
+// last, would evict the large ones.
+constexpr size_t kMaxRanges = 1024;
 
 }  // namespace
 
-size_t PagePool::block_bytes(size_t bytes) {
+size_t PagePool::range_bytes(size_t bytes) {
   if (bytes <= kLargestPower) return std::max(std::bit_ceil(bytes), kPage);
   return (bytes + kPage - 1) / kPage * kPage;
 }
 
-PagePool::Block PagePool::take_kept(size_t bytes, size_t most) {
-  auto best = kept_.end();
-  for (auto block = kept_.begin(); block != kept_.end(); ++block)
-    if (block->bytes >= bytes && block->bytes <= most &&
-        (best == kept_.end() || block->bytes < best->bytes))
-      best = block;
-  if (best == kept_.end()) return {};
-  const Block found = *best;
-  kept_.erase(best);
-  kept_bytes_ -= found.bytes;
+PagePool::Pages PagePool::take(size_t bytes, size_t max_bytes) {
+  auto best = cached_.end();
+  for (auto pages = cached_.begin(); pages != cached_.end(); ++pages)
+    if (pages->bytes >= bytes && pages->bytes <= max_bytes &&
+        (best == cached_.end() || pages->bytes < best->bytes))
+      best = pages;
+  if (best == cached_.end()) return {};
+  const Pages found = *best;
+  cached_.erase(best);
+  cached_bytes_ -= found.bytes;
   return found;
 }
 
-void PagePool::give_back(Block block, size_t max_kept) noexcept {
-  if (block.bytes <= max_kept) {
-    while (kept_bytes_ + block.bytes > max_kept || kept_.size() == kMaxBlocks) free_oldest();
+void PagePool::put(Pages pages, size_t max_cached) noexcept {
+  if (pages.bytes <= max_cached) {
+    while (cached_bytes_ + pages.bytes > max_cached || cached_.size() == kMaxRanges) free_oldest();
     try {
-      kept_.push_back(block);
-      kept_bytes_ += block.bytes;
+      cached_.push_back(pages);
+      cached_bytes_ += pages.bytes;
       return;
-    } catch (...) {  // no memory for the list: the block goes
+    } catch (...) {  // no memory for the list: the pages are freed
     }
   }
-  free_pages(block.pages, block.bytes);
+  free_pages(pages.data, pages.bytes);
 }
 
 void PagePool::free_oldest() noexcept {
-  free_pages(kept_.front().pages, kept_.front().bytes);
-  kept_bytes_ -= kept_.front().bytes;
-  kept_.erase(kept_.begin());
+  free_pages(cached_.front().data, cached_.front().bytes);
+  cached_bytes_ -= cached_.front().bytes;
+  cached_.erase(cached_.begin());
 }
 
 void PagePool::clear() noexcept {
-  while (!kept_.empty()) free_oldest();
+  while (!cached_.empty()) free_oldest();
 }
 
 void Memory::charge(size_t bytes) {
-  if (pool.kept_bytes() + bytes > budget.available()) pool.clear();
-  if (!budget.try_charge(bytes)) throw Outgrown{};
+  if (pool.cached_bytes() + bytes > budget.available()) pool.clear();
+  if (!budget.try_charge(bytes)) throw OutOfBudget{};
 }
 
-PagePool::Block Memory::take(size_t bytes, bool zero) {
-  const size_t least = PagePool::block_bytes(bytes);
-  PagePool::Block block = pool.take_kept(least, zero ? least : 2 * least);
-  const bool fresh = !block.pages;
-  if (fresh) block.bytes = least;
+PagePool::Pages Memory::allocate(size_t bytes, bool zero) {
+  const size_t needed = PagePool::range_bytes(bytes);
+  PagePool::Pages pages = pool.take(needed, zero ? needed : 2 * needed);
+  const bool fresh = !pages.data;
+  if (fresh) pages.bytes = needed;
   try {
-    charge(block.bytes);
+    charge(pages.bytes);
   } catch (...) {
-    if (!fresh) free_pages(block.pages, block.bytes);
+    if (!fresh) free_pages(pages.data, pages.bytes);
     throw;
   }
   if (!fresh) {
-    if (zero) std::memset(block.pages, 0, block.bytes);
-    return block;
+    if (zero) std::memset(pages.data, 0, pages.bytes);
+    return pages;
   }
   try {
-    block.pages = allocate_pages(block.bytes, kWhat);
+    pages.data = allocate_pages(pages.bytes, kWhat);
   } catch (...) {
-    budget.release(block.bytes);
+    budget.release(pages.bytes);
     throw;
   }
-  return block;
+  return pages;
 }
 
-void Memory::grow(PagePool::Block& block, size_t bytes) {
-  const size_t new_bytes = PagePool::block_bytes(bytes), more = new_bytes - block.bytes;
-  // Where the system cannot move the pages both are there for a moment; the charge is for one.
+void Memory::grow(PagePool::Pages& pages, size_t bytes) {
+  const size_t new_bytes = PagePool::range_bytes(bytes), more = new_bytes - pages.bytes;
+  // Where the system cannot move the pages, old and new ones exist for a moment; the charge is for
+  // one of them.
   charge(more);
   try {
-    block.pages = grow_pages(block.pages, block.bytes, new_bytes, kWhat);
+    pages.data = grow_pages(pages.data, pages.bytes, new_bytes, kWhat);
   } catch (...) {
     budget.release(more);
     throw;
   }
-  block.bytes = new_bytes;
+  pages.bytes = new_bytes;
 }
 
-void Memory::give_back(PagePool::Block block) noexcept {
-  pool.give_back(block, BackendMemory::page_bytes(budget.limit()));
-  budget.release(block.bytes);
+void Memory::free(PagePool::Pages pages) noexcept {
+  pool.put(pages, BackendMemory::page_bytes(budget.limit()));
+  budget.release(pages.bytes);
 }
 
 }  // namespace voxdag::cpu

@@ -6,12 +6,12 @@ namespace voxdag::cpu {
 namespace {
 
 constexpr size_t kBatch = 256;       // triangles read at once
-constexpr size_t kFewTriangles = 4;  // in a tile that remembered planes may be better for
+constexpr size_t kFewTriangles = 4;  // in a tile where the plane memo may be faster
 
 Box box_of(const SubvolumeTask& task) {
   Box box;
   box.edge = task.cube.edge_voxels(task.grid_levels) * kUnitsPerVoxel;
-  for (int a = 0; a < 3; ++a) box.low[a] = task.cube.position[2 - a] * box.edge;
+  for (int a = 0; a < 3; ++a) box.low[a] = task.cube.position[a] * box.edge;
   return box;
 }
 
@@ -43,7 +43,7 @@ SubDagSummary SubvolumeBuild::run(TriangleStream& stream, SubDagSink& sink) {
     entries_ = {};
     octants_ = {};
   }
-  return emit_levels(tables_, task_.grid_levels, task_.hash_bits, sink);
+  return emit_levels(tables_, task_.shape(), sink);
 }
 
 NodeRef SubvolumeBuild::build_streamed(TriangleStream& stream) {
@@ -51,7 +51,7 @@ NodeRef SubvolumeBuild::build_streamed(TriangleStream& stream) {
   std::vector<FixedTriangle> batch(kBatch);
   while (const size_t count = stream.read(batch)) {
     cancel_.check();
-    for (size_t i = 0; i < count; ++i) draw(reverse_axes(batch[i]), box);
+    for (size_t i = 0; i < count; ++i) draw(axis_major(batch[i]), box);
   }
   return reducer_.reduce_bricks(tile_, size_log2_of(task_));
 }
@@ -62,7 +62,7 @@ void SubvolumeBuild::read(TriangleStream& stream) {
   while (const size_t count = stream.read(batch)) {
     cancel_.check();
     for (size_t i = 0; i < count; ++i)
-      if (const WideTriangle triangle = reverse_axes(batch[i]); !box.misses(triangle))
+      if (const WideTriangle triangle = axis_major(batch[i]); !box.misses(triangle))
         triangles_.add(triangle);
   }
   const uint32_t narrow = triangles_.narrow_count(), wide = triangles_.wide_count();
@@ -114,7 +114,7 @@ NodeRef SubvolumeBuild::build(int size_log2, const Box& cube, size_t first, size
 bool SubvolumeBuild::worth_splitting(int size_log2, size_t first, size_t count) {
   if (size_log2 <= PlaneMemo::kSmallestLog2 || count > kFewTriangles) return false;
   for (size_t i = 0; i < count; ++i)
-    if (!planes_.remembers(triangles_, entries_[first + i])) return false;
+    if (!planes_.has_plane(triangles_, entries_[first + i])) return false;
   return true;
 }
 

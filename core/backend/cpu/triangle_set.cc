@@ -5,7 +5,7 @@ namespace voxdag::cpu {
 void TriangleSet::add(const WideTriangle& triangle) {
   const bool narrow = is_narrow(triangle);
   uint32_t& count = narrow ? narrow_count_ : wide_count_;
-  if (count + 1 >= Entry::kWide) throw Outgrown{};
+  if (count + 1 >= Entry::kWide) throw OutOfBudget{};
   if (narrow) {
     if (count + 2 > narrow_.size()) narrow_.grow(memory_, count + 2);
     narrow_[count] = narrowed(triangle);

@@ -1,6 +1,4 @@
-// The triangles of one subvolume in memory, compact. Inside this backend axes stand in reversed
-// order, axis 0 being z and axis 2 being x, so that axis a owns bit a of a child index and bits a
-// and a + 3 of a brick's bit number.
+// The triangles of one subvolume in memory, compact, and the cubes that they are tested against.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +9,8 @@
 
 namespace voxdag::cpu {
 
-// Lattice coordinates, [axis][vertex].
+// Lattice coordinates, [axis][vertex]. Axis 0 is x, as everywhere: axis a owns bit 2 - a of a child
+// index (child_coordinate()) and bits 2 - a and 5 - a of a brick's bit number (brick_coordinate()).
 template <class Int>
 struct Triangle {
   Int v[3][3];
@@ -20,15 +19,16 @@ struct Triangle {
   Int high(int axis) const { return std::max({v[axis][0], v[axis][1], v[axis][2]}); }
 };
 
-// Narrow: |coordinates| < 2^30 and an extent of at most 2^28 (2^20 voxels) along every axis, which
-// is every triangle inside the largest grid. Wide: the others, |coordinates| < 2^40.
+// A narrow triangle has |coordinates| < 2^30 and an extent of at most 2^28 (2^20 voxels) along
+// every axis, like every triangle inside the largest grid. Others are wide, with |coordinates| <
+// 2^40.
 using NarrowTriangle = Triangle<int32_t>;
 using WideTriangle = Triangle<int64_t>;
 
 inline constexpr int64_t kNarrowCoordinate = int64_t{1} << 30;
 inline constexpr int64_t kNarrowExtent = int64_t{1} << 28;
 
-// Lattice coordinates of a cube, axes reversed as above.
+// Lattice coordinates of a cube.
 struct Box {
   int64_t low[3];
   int64_t edge;
@@ -41,16 +41,16 @@ struct Box {
   }
   Box child(int index) const {
     const int64_t half = edge / 2;
-    return {{low[0] + (index & 1) * half, low[1] + (index >> 1 & 1) * half,
-             low[2] + (index >> 2) * half},
+    return {{low[0] + (index >> 2) * half, low[1] + (index >> 1 & 1) * half,
+             low[2] + (index & 1) * half},
             half};
   }
 };
 
-inline WideTriangle reverse_axes(const FixedTriangle& t) {
+inline WideTriangle axis_major(const FixedTriangle& t) {
   WideTriangle out;
   for (int a = 0; a < 3; ++a)
-    for (int i = 0; i < 3; ++i) out.v[a][i] = t.v[i][2 - a];
+    for (int i = 0; i < 3; ++i) out.v[a][i] = t.v[i][a];
   return out;
 }
 
@@ -70,7 +70,7 @@ inline NarrowTriangle narrowed(const WideTriangle& t) {
   return out;
 }
 
-// A triangle on its way down the octree: its number, and two flags.
+// A triangle during the descent of the octree: its number, and two flags.
 struct Entry {
   static constexpr uint32_t kInside = 1u << 31;  // covers the cube: only its plane matters there
   static constexpr uint32_t kWide = 1u << 30;    // number counts wide triangles
@@ -81,7 +81,7 @@ struct Entry {
   uint32_t number() const { return bits & (kWide - 1); }
 };
 
-// Not thread-safe. Throws Outgrown.
+// The triangles of one subvolume. Not thread-safe. Throws OutOfBudget.
 class TriangleSet {
  public:
   explicit TriangleSet(Memory& memory) : memory_(memory) {}
@@ -90,15 +90,15 @@ class TriangleSet {
   uint32_t narrow_count() const { return narrow_count_; }
   uint32_t wide_count() const { return wide_count_; }
   void add(const WideTriangle& triangle);
-  // Gives the memory back.
+  // Frees the memory.
   void clear();
   const NarrowTriangle& narrow(Entry entry) const { return narrow_[entry.number()]; }
   const WideTriangle& wide(Entry entry) const { return wide_[entry.number()]; }
 
  private:
   Memory& memory_;
-  Buffer<NarrowTriangle> narrow_;  // one more than used, so that four can be loaded for three
-  Buffer<WideTriangle> wide_;
+  PooledArray<NarrowTriangle> narrow_;  // one more than used, so that four can be loaded for three
+  PooledArray<WideTriangle> wide_;
   uint32_t narrow_count_ = 0;
   uint32_t wide_count_ = 0;
 };

@@ -8,7 +8,7 @@ std::unique_ptr<Backend> make_cuda_backend(Method method, int device) {
   try {
     return std::make_unique<parallel::ParallelBackend<cuda::CudaDevice>>(cuda::CudaDevice(device),
                                                                          method);
-  } catch (const parallel::Outgrown&) {
+  } catch (const OutOfBudget&) {
     throw Error(ErrorCode::kDevice,
                 "CUDA device " + std::to_string(device) + " has no memory left to open it");
   }

@@ -10,7 +10,8 @@ namespace {
 
 constexpr int kMinMajor = 8;  // compute capability of the oldest code in this build
 
-// The runtime's numbers of the devices that can run this build; if none, `problem` says why.
+// The runtime's numbers of the devices that can run this build; if there is none, `problem` says
+// why.
 std::vector<int> usable_devices(std::string& problem) {
   int count = 0, driver = 0;
   const cudaError_t status = cudaGetDeviceCount(&count);
@@ -60,9 +61,8 @@ CudaDevice::CudaDevice(int device)
   check_call(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreate", place_);
   stream_.reset(stream);
   check_call(cudaDeviceGetDefaultMemPool(&pool_, device_), "cudaDeviceGetDefaultMemPool", place_);
-  uint64_t keep_all =
-      UINT64_MAX;  // freed memory stays with the pool from one subvolume to the next
-  check_call(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &keep_all),
+  uint64_t retain_all = UINT64_MAX;  // the pool retains freed memory from one subvolume to the next
+  check_call(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &retain_all),
              "cudaMemPoolSetAttribute", place_);
   mailbox_ = make_pinned<uint64_t>(1, place_);
   for (Staging& staging : staging_) {
@@ -85,17 +85,18 @@ CudaSpace CudaDevice::open(const SubvolumeTask& task, MemoryBudget& budget,
 }
 
 std::span<FixedTriangle> CudaDevice::free_staging(const std::string& where) {
-  check_call(cudaEventSynchronize(staging_[turn_].copied.get()), "cudaEventSynchronize", where);
-  return {staging_[turn_].triangles.get(), kStagingTriangles};
+  check_call(cudaEventSynchronize(staging_[next_staging_].copied.get()), "cudaEventSynchronize",
+             where);
+  return {staging_[next_staging_].triangles.get(), kStagingTriangles};
 }
 
 void CudaDevice::send_staging(size_t count, FixedTriangle* to, const std::string& where) {
-  Staging& staging = staging_[turn_];
+  Staging& staging = staging_[next_staging_];
   check_call(cudaMemcpyAsync(to, staging.triangles.get(), count * sizeof(FixedTriangle),
                              cudaMemcpyHostToDevice, stream()),
              "cudaMemcpyAsync", where);
   check_call(cudaEventRecord(staging.copied.get(), stream()), "cudaEventRecord", where);
-  turn_ ^= 1;
+  next_staging_ ^= 1;
 }
 
 uint64_t CudaDevice::available(const std::string& where) const {
@@ -113,7 +114,7 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   void* memory = nullptr;
   cudaError_t status = cudaMallocAsync(&memory, bytes, stream());
   if (status == cudaErrorMemoryAllocation) {
-    // What the pool keeps may be in pieces: give it back to the device and ask once more.
+    // The memory that the pool retains may be fragmented: return it to the device and try again.
     cudaGetLastError();
     check_call(cudaStreamSynchronize(stream()), "cudaStreamSynchronize", where);
     check_call(cudaMemPoolTrimTo(pool_, 0), "cudaMemPoolTrimTo", where);

@@ -1,5 +1,5 @@
-// One GPU as one backend uses it: a stream of its own, pinned memory for what goes to and fro in
-// small pieces. Lives over many subvolumes; used by one thread.
+// One GPU as one backend uses it: a stream and pinned host memory for small transfers. Used for
+// many subvolumes, by one thread.
 #pragma once
 
 #include <cstdint>
@@ -29,17 +29,18 @@ class CudaDevice {
   CudaSpace open(const SubvolumeTask& task, MemoryBudget& budget, const CancelToken& cancel);
 
   cudaStream_t stream() const { return stream_.get(); }
-  // A pinned word, for single values on their way to the host.
+  // A pinned word that single values are copied to.
   void* mailbox() { return mailbox_.get(); }
 
-  // A pinned area that no copy reads any more.
+  // A pinned area; waits until the last copy from it is complete.
   std::span<FixedTriangle> free_staging(const std::string& where);
-  // Copies the front of the area that free_staging() gave last, in stream order.
+  // Copies the first `count` triangles of the area that free_staging() returned last, in stream
+  // order.
   void send_staging(size_t count, FixedTriangle* to, const std::string& where);
 
-  // Bytes of the device that nobody uses now, the pool's own included.
+  // Free bytes of the device, including those that its memory pool retains.
   uint64_t available(const std::string& where) const;
-  // Memory of the device in stream order. Throws Outgrown where there is none left.
+  // Allocates device memory in stream order. Throws OutOfBudget where there is not enough.
   void* allocate(uint64_t bytes, const std::string& where);
   void release(void* memory) noexcept;
 
@@ -55,7 +56,7 @@ class CudaDevice {
   cudaMemPool_t pool_ = nullptr;  // the device's own
   Pinned<uint64_t> mailbox_;
   Staging staging_[2];
-  int turn_ = 0;
+  int next_staging_ = 0;
 };
 
 }  // namespace voxdag::cuda

@@ -1,4 +1,4 @@
-// Owners of the CUDA runtime's handles.
+// RAII owners of the CUDA runtime's handles.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -20,7 +20,7 @@ struct FreePinned {
 
 using Stream = std::unique_ptr<std::remove_pointer_t<cudaStream_t>, DestroyStream>;
 using Event = std::unique_ptr<std::remove_pointer_t<cudaEvent_t>, DestroyEvent>;
-// Page-locked host memory, which the device copies from and to by itself.
+// Page-locked host memory, for asynchronous copies.
 template <class T>
 using Pinned = std::unique_ptr<T[], FreePinned>;
 

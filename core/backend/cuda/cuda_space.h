@@ -1,5 +1,5 @@
-// The GPU's space: loops are kernels on one stream, memory is the device's. See
-// core/backend/parallel/space.h for what the calls mean. Only for CUDA sources.
+// The GPU's space: loops are kernels on one stream, memory is the device's.
+// core/backend/parallel/space.h specifies the calls. Only for CUDA sources.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ __global__ void __launch_bounds__(kThreadsPerBlock) run_for_each(uint32_t n, F f
 }
 
 template <class Kernel>
-__global__ void __launch_bounds__(Kernel::kThreads, Kernel::kBlocksAtOnce)
+__global__ void __launch_bounds__(Kernel::kThreads, Kernel::kMinResidentBlocks)
     run_block(Kernel kernel) {
   __shared__ typename Kernel::Shared shared;
 #pragma unroll
@@ -33,7 +33,7 @@ __global__ void __launch_bounds__(Kernel::kThreads, Kernel::kBlocksAtOnce)
   }
 }
 
-// Output i of an expansion finds its source by bisection.
+// Output i of an expansion; its source is found by bisection.
 template <class F>
 struct ExpandOne {
   const uint32_t* offsets;
@@ -57,9 +57,9 @@ class CudaSpace {
  public:
   static constexpr bool kOnHost = false;
   static constexpr uint64_t kWindow = uint64_t{1} << 22;
-  static constexpr uint32_t kTilesAtOnce = 4096;
+  static constexpr uint32_t kMaxTiles = 4096;
   template <class T>
-  using Array = parallel::Buffer<CudaSpace, T>;
+  using Array = parallel::SpaceArray<CudaSpace, T>;
 
   CudaSpace(CudaDevice& device, std::string where, MemoryBudget& budget, const CancelToken& cancel)
       : device_(device), where_(std::move(where)), budget_(budget), cancel_(cancel) {}
@@ -80,7 +80,7 @@ class CudaSpace {
   }
 
   template <class Kernel>
-  void for_each_block(uint32_t blocks, Kernel kernel) {
+  void for_each_thread_block(uint32_t blocks, Kernel kernel) {
     cancel_.check();
     if (blocks == 0) return;
     run_block<<<blocks, Kernel::kThreads, 0, stream()>>>(kernel);
@@ -121,10 +121,10 @@ class CudaSpace {
     download(from, static_cast<T*>(device_.mailbox()), 1);
     return *static_cast<T*>(device_.mailbox());
   }
-  std::span<FixedTriangle> staging(FixedTriangle*, uint64_t most) {
+  std::span<FixedTriangle> staging(FixedTriangle*, uint64_t max_count) {
     cancel_.check();
     const auto area = device_.free_staging(where_);
-    return area.first(std::min<uint64_t>(area.size(), most));
+    return area.first(std::min<uint64_t>(area.size(), max_count));
   }
   void upload_staged(std::span<const FixedTriangle> area, FixedTriangle* to) {
     device_.send_staging(area.size(), to, where_);
@@ -139,8 +139,8 @@ class CudaSpace {
     if (n == 0) return;
     check(cudaMemcpyAsync(to, from, n * sizeof(T), kind, stream()), "cudaMemcpyAsync");
   }
-  // CUB's two phases: call(nullptr, bytes) asks for the temporary storage, call(storage, bytes)
-  // works. The storage is kept for the next call.
+  // CUB's two phases: call(nullptr, bytes) returns the size of the temporary storage, call(storage,
+  // bytes) does the work. The storage is retained for the next call.
   template <class Call>
   void with_storage(const char* name, Call call);
 
@@ -155,7 +155,7 @@ class CudaSpace {
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   Array<uint8_t> storage_;
-  Array<uint64_t> answer_;  // one word, for what reductions find
+  Array<uint64_t> answer_;  // one word, for the results of reductions
 };
 
 }  // namespace voxdag::cuda

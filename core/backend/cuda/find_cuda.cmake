@@ -1,5 +1,5 @@
-# Enables the CUDA language where nvcc is there, and says nothing where it is not. Included by the
-# root, so that every executable knows how to link what was compiled here.
+# Enables the CUDA language if nvcc is found. Included by the root, so that every executable can link
+# the CUDA sources.
 option(VOXDAG_CUDA "Build the CUDA backend where nvcc is found" ON)
 set(VOXDAG_HAS_CUDA OFF CACHE INTERNAL "The CUDA backend is built")
 
@@ -10,7 +10,7 @@ if(VOXDAG_CUDA AND NOT VOXDAG_SANITIZE)
       set(CMAKE_CUDA_COMPILER ${VOXDAG_NVCC})
     endif()
   endif()
-  # Machine code for A100- and H100-class devices, and PTX for what comes later.
+  # Machine code for A100- and H100-class devices, and PTX for later ones.
   if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
     set(CMAKE_CUDA_ARCHITECTURES 80-real 90-real 90-virtual)
   endif()
@@ -19,7 +19,7 @@ if(VOXDAG_CUDA AND NOT VOXDAG_SANITIZE)
   check_language(CUDA)
   if(CMAKE_CUDA_COMPILER)
     enable_language(CUDA)
-    # CMake 3.25 does not know that nvcc 12 and later speak C++20.
+    # CMake 3.25 does not know that nvcc 12 and later support C++20.
     if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)
       set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
     endif()

@@ -1,4 +1,4 @@
-// What stands in for the CUDA backend in builds without CUDA.
+// Replaces the CUDA backend in builds without CUDA.
 #include "core/backend/backend.h"
 #include "core/base/error.h"
 

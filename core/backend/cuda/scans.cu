@@ -21,7 +21,7 @@ struct Popcount {
 }  // namespace
 
 void CudaSpace::scan(uint32_t* counts, uint32_t n) {
-  // What stands in counts[n] is read, but only sums before it are written.
+  // CUB reads counts[n], but the sum that it writes there does not include it.
   with_storage("cub::DeviceScan::ExclusiveSum", [&](void* storage, size_t& bytes) {
     return cub::DeviceScan::ExclusiveSum(storage, bytes, counts, counts, n + 1, stream());
   });

@@ -23,7 +23,7 @@ void* HostSpace::allocate(uint64_t bytes) {
   try {
     return allocate_pages(bytes, "the parallel backend's buffers");
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kOutOfMemory) throw Outgrown{};
+    if (error.code() == ErrorCode::kOutOfMemory) throw OutOfBudget{};
     throw;
   }
 }
@@ -105,7 +105,7 @@ uint64_t HostSpace::count_bits(const uint64_t* masks, uint32_t n) {
   return std::accumulate(sums.begin(), sums.end(), uint64_t{0});
 }
 
-// Least significant digit first, 8 bits a pass; each part scatters to places of its own.
+// Least significant digit first, 8 bits per pass; each part scatters to its own positions.
 template <bool kWithValues>
 void HostSpace::radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch,
                            Array<uint32_t>* values, Array<uint32_t>* value_scratch, uint32_t n,

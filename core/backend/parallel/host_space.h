@@ -1,4 +1,4 @@
-// The host's space: loops over threads, plain memory. See space.h for what the calls mean.
+// The host's space: loops over threads, plain memory. space.h specifies the calls.
 #pragma once
 
 #include <algorithm>
@@ -17,9 +17,9 @@ class HostSpace {
  public:
   static constexpr bool kOnHost = true;
   static constexpr uint64_t kWindow = uint64_t{1} << 16;
-  static constexpr uint32_t kTilesAtOnce = 64;
+  static constexpr uint32_t kMaxTiles = 64;
   template <class T>
-  using Array = Buffer<HostSpace, T>;
+  using Array = SpaceArray<HostSpace, T>;
 
   HostSpace(MemoryBudget& budget, const CancelToken& cancel, unsigned threads)
       : budget_(budget), cancel_(cancel), threads_(threads) {}
@@ -37,7 +37,7 @@ class HostSpace {
   }
 
   template <class Kernel>
-  void for_each_block(uint32_t blocks, Kernel kernel) {
+  void for_each_thread_block(uint32_t blocks, Kernel kernel) {
     parallel_for(threads_, blocks, [&](unsigned, size_t block) {
       cancel_.check();
       typename Kernel::Shared shared;
@@ -87,14 +87,14 @@ class HostSpace {
   T value(const T* from) {
     return *from;
   }
-  std::span<FixedTriangle> staging(FixedTriangle* destination, uint64_t most) {
+  std::span<FixedTriangle> staging(FixedTriangle* destination, uint64_t max_count) {
     cancel_.check();
-    return {destination, most};
+    return {destination, max_count};
   }
   void upload_staged(std::span<const FixedTriangle>, FixedTriangle*) {}
 
  private:
-  // Calls body(begin, end) for parts of [0, n), small ones on the caller's thread alone.
+  // Calls body(begin, end) for parts of [0, n); a small n runs on the caller's thread alone.
   template <class Body>
   void for_chunks(uint64_t n, Body body) {
     constexpr uint64_t kChunk = 4096;
@@ -106,7 +106,7 @@ class HostSpace {
   template <bool kWithValues>
   void radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch, Array<uint32_t>* values,
                   Array<uint32_t>* value_scratch, uint32_t n, int begin_bit, int end_bit);
-  // How many parts to cut n items into where each part keeps its own counts.
+  // The number of parts to divide n items into where each part has its own counts.
   uint32_t part_count(uint32_t n) const;
 
   MemoryBudget& budget_;

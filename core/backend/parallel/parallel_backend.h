@@ -1,20 +1,20 @@
-// A Backend made of the parallel pipeline, over any space:
+// A Backend over any space, which runs the parallel pipeline:
 //
-//     triangles -> bricks (tiles.h, or the reference voxel_list.h) -> octree -> DAG (by hashes, or
+//     triangles -> bricks (tiles.h, or the reference voxel_list.h) -> octree -> DAG (by hashes or
 //     by pointers) -> level arrays on the host -> sink
 //
-// `Device` outlives the builds and opens a space for each: device.open(task, budget, cancel).
+// `Device` outlives the builds; device.open(task, budget, cancel) opens a space for one build.
 #pragma once
 
 #include <optional>
 #include <utility>
 
 #include "core/backend/backend.h"
+#include "core/backend/parallel/brick_list.h"
 #include "core/backend/parallel/dag/dag_by_hashes.h"
 #include "core/backend/parallel/dag/dag_by_pointers.h"
 #include "core/backend/parallel/dag/host_levels.h"
 #include "core/backend/parallel/dag/octree.h"
-#include "core/backend/parallel/voxelize/brick_list.h"
 #include "core/backend/parallel/voxelize/tiles.h"
 #include "core/backend/parallel/voxelize/voxel_list.h"
 
@@ -30,8 +30,8 @@ BrickList<Space> voxelize(Space& space, Method method, const SubvolumeTask& task
       BrickList<Space> bricks(space, code_bits);
       voxelize_by_tiles(space, task, triangles, bricks);
       return bricks;
-    } catch (const Outgrown&) {
-      // A larger cube is split; the smallest has to fit whatever streams through it.
+    } catch (const OutOfBudget&) {
+      // A larger cube is split; the smallest has to fit, however many triangles there are.
       if (cube_levels > kTileLevels) throw;
     }
   }
@@ -66,8 +66,8 @@ class ParallelBackend : public Backend {
       levels.send(task.grid_levels - kBrickLevels, sink);
       summary = found;
       return BuildOutcome::kBuilt;
-    } catch (const Outgrown&) {
-      return BuildOutcome::kOutgrown;
+    } catch (const OutOfBudget&) {
+      return BuildOutcome::kNeedsSplit;
     }
   }
 

@@ -1,12 +1,12 @@
-// Block kernels: a group of threads that work in phases on memory they share.
+// Thread block kernels: a group of threads that work in phases on memory they share.
 //
 // A kernel K has
 //   K::kThreads, K::kPhases      threads of a block, phases between which they wait for each other
-//   K::kBlocksAtOnce             blocks that a multiprocessor should have registers for
-//   K::Shared                    the block's memory: plain data, uninitialized
+//   K::kMinResidentBlocks        thread blocks that a multiprocessor should have registers for
+//   K::Shared                    the thread block's memory: plain data, uninitialized
 //   operator()(phase, block, thread, Shared&)
-// On a GPU one thread block runs all threads side by side; on the host one thread runs them one
-// after the other, phase by phase, so that the tests see every index the device would.
+// On a GPU the threads of a thread block run concurrently; on the host one thread runs them in
+// turn, phase by phase, so that the tests execute the same index computations as the device.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@
 
 namespace voxdag::parallel {
 
-// Sets bits of a word that the threads of a block share. An OR has no order, so the word is the
-// same whoever comes first.
+// Sets bits of a word that the threads of a thread block share. The order of ORs does not matter,
+// so the result is deterministic.
 VOXDAG_HD inline void or_shared(uint64_t& word, uint64_t bits) {
 #if defined(__CUDA_ARCH__)
   unsigned int* half = reinterpret_cast<unsigned int*>(&word);
@@ -29,7 +29,7 @@ VOXDAG_HD inline void or_shared(uint64_t& word, uint64_t bits) {
 #endif
 }
 
-// Sets a flag that any thread of any block may set, and none reads meanwhile.
+// Sets a flag that any thread of any thread block may set; nothing reads it during the kernel.
 VOXDAG_HD inline void raise_flag(uint32_t* flag) {
 #if defined(__CUDA_ARCH__)
   atomicOr(flag, 1u);

@@ -11,8 +11,8 @@
 namespace voxdag::selftest {
 namespace {
 
-// Looks at nothing: the sink's own work is not what is measured.
-class ForgetfulSink : public SubDagSink {
+// Does nothing: the cost of a sink is not measured.
+class NullSink : public SubDagSink {
  public:
   void bricks(const BrickLevelView&) override {}
   void nodes(const NodeLevelView&) override {}
@@ -30,7 +30,7 @@ bool touches(const FixedTriangle& t, const Cube& cube, uint32_t grid_levels) {
   return triangle_touches_cube(t, low, edge);
 }
 
-// Hands triangles down to cubes of the subvolumes' edge.
+// Partitions triangles to cubes of the subvolumes' edge.
 void divide(Subvolume whole, const BenchOptions& options, std::vector<Subvolume>& out) {
   if (whole.triangles.empty()) return;
   if (whole.cube.edge_voxels(options.grid_levels) <= options.subvolume_edge) {
@@ -45,19 +45,20 @@ void divide(Subvolume whole, const BenchOptions& options, std::vector<Subvolume>
   }
 }
 
-struct Sums {
-  uint64_t voxels = 0, svo_nodes = 0, dag_nodes = 0, outgrown = 0;
+struct Totals {
+  uint64_t voxels = 0, svo_nodes = 0, dag_nodes = 0, skipped = 0;
 };
 
-void build(Backend& backend, const Subvolume& subvolume, const BenchOptions& options, Sums& sums) {
+void build(Backend& backend, const Subvolume& subvolume, const BenchOptions& options,
+           Totals& sums) {
   MemoryStream stream(subvolume.triangles);
   MemoryBudget budget(options.worker_bytes);
   const CancelToken never;
-  ForgetfulSink sink;
+  NullSink sink;
   SubDagSummary summary;
   if (backend.build({options.grid_levels, subvolume.cube, 64}, stream, budget, never, sink,
-                    summary) == BuildOutcome::kOutgrown) {
-    ++sums.outgrown;
+                    summary) == BuildOutcome::kNeedsSplit) {
+    ++sums.skipped;
     return;
   }
   sums.voxels += summary.voxels;
@@ -70,21 +71,21 @@ void measure(const Subject& subject, unsigned workers, const std::string& scene,
   std::vector<std::unique_ptr<Backend>> backends;
   for (unsigned w = 0; w < workers; ++w) backends.push_back(subject.open());
   double best = 0;
-  Sums sums;
-  for (int round = 0; round < 3; ++round) {
-    std::vector<Sums> parts(workers);
+  Totals sums;
+  for (int repetition = 0; repetition < 3; ++repetition) {
+    std::vector<Totals> parts(workers);
     const double start = wall_seconds();
     parallel_for(workers, subvolumes.size(), [&](unsigned worker, size_t i) {
       build(*backends[worker], subvolumes[i], options, parts[worker]);
     });
     const double seconds = wall_seconds() - start;
-    if (round == 0 || seconds < best) best = seconds;
+    if (repetition == 0 || seconds < best) best = seconds;
     sums = {};
-    for (const Sums& part : parts) {
+    for (const Totals& part : parts) {
       sums.voxels += part.voxels;
       sums.svo_nodes += part.svo_nodes;
       sums.dag_nodes += part.dag_nodes;
-      sums.outgrown += part.outgrown;
+      sums.skipped += part.skipped;
     }
   }
   std::printf("%-10s %-22s %7u %10zu %14llu %12llu %12llu %9.3f %10.1f", scene.c_str(),
@@ -93,9 +94,9 @@ void measure(const Subject& subject, unsigned workers, const std::string& scene,
               static_cast<unsigned long long>(sums.svo_nodes),
               static_cast<unsigned long long>(sums.dag_nodes), best,
               1e-6 * static_cast<double>(sums.voxels) / best);
-  if (sums.outgrown)
-    std::printf("  (%llu subvolumes outgrown, not counted)",
-                static_cast<unsigned long long>(sums.outgrown));
+  if (sums.skipped)
+    std::printf("  (%llu subvolumes do not fit the budget, not counted)",
+                static_cast<unsigned long long>(sums.skipped));
   std::printf("\n");
   std::fflush(stdout);
 }

@@ -28,9 +28,9 @@ Built build(Backend& backend, const SubvolumeTask& task, const Scene& scene) {
   return built;
 }
 
-// What differs first, or "".
+// The first difference, or "" if there is none.
 std::string difference(const Built& a, const Built& b) {
-  if (a.outcome != b.outcome) return "outgrown";
+  if (a.outcome != b.outcome) return "outcome";
   if (a.summary.voxels != b.summary.voxels) return "voxel count";
   if (a.summary.svo_nodes != b.summary.svo_nodes) return "octree node count";
   if (a.dag.brick_masks != b.dag.brick_masks) return "bricks";

@@ -1,5 +1,5 @@
-// voxdag-gpu-selftest: does the GPU give what the CPU gives, and how fast? Needs nothing but a
-// compiler (and CUDA); see docs/gpu.md.
+// voxdag-gpu-selftest compares the GPU's results with the CPU's and measures both. It builds with a
+// compiler (and CUDA) alone; see docs/gpu.md.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -17,7 +17,7 @@ constexpr char kUsage[] =
     "                           [--workers N] [--subvolume EDGE]\n"
     "Builds scenes by the backend's three methods and by the CPU backend and compares every level\n"
     "array. --quick: small scenes only. --bench: measures instead, at R voxels per edge (default\n"
-    "4096), with N backends side by side (default 2).\n";
+    "4096), with N concurrent backends (default 2).\n";
 
 struct Options {
   bool cuda = true, quick = false, bench = false;

@@ -1,4 +1,4 @@
-// What the self-test does with backends: compare them, and time them.
+// The two modes of the self-test: comparing backends, and measuring them.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@
 
 namespace voxdag::selftest {
 
-// A backend by the name that tables show.
+// A backend to test, and its name in the tables.
 struct Subject {
   std::string name;
   std::function<std::unique_ptr<Backend>()> open;
 };
 
-// Builds scenes of every kind by the subject and by the CPU backend, compares every level array and
-// count, prints a table. `quick` takes small cubes only. True if all are equal.
+// Builds scenes of every kind with each subject and with the CPU backend, compares every level
+// array and count, and prints a table. `quick`: small cubes only. Returns whether all are equal.
 bool compare_with_cpu(const std::vector<Subject>& subjects, bool quick);
 
 struct BenchOptions {

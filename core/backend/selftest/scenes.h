@@ -1,5 +1,5 @@
-// Scenes for the self-test, made from a seed with nothing but the standard library: triangles on
-// the lattice of a grid of 2^grid_levels voxels.
+// Scenes for the self-test, made from a seed with the standard library alone: triangles on the
+// lattice of a grid of 2^grid_levels voxels.
 #pragma once
 
 #include <cstdint>
@@ -16,16 +16,16 @@ struct Scene {
   std::vector<FixedTriangle> triangles;
 };
 
-// Small scenes of every kind that exact voxelization has to get right, in and around `cube`: mixed,
+// Small scenes of every kind that is difficult to voxelize exactly, in and around `cube`: mixed,
 // degenerate, slivers, smaller than a voxel, walls, 45 degrees through voxel corners, spanning the
 // cube, vertices at the limit of the coordinates.
 std::vector<Scene> tricky_scenes(uint64_t seed, const Cube& cube, uint32_t grid_levels, int count);
 
-// A surface as scanners give them: small triangles all over a bumpy ball that fills the grid. About
-// `triangles` of them.
+// A surface like a scanner's: about `triangles` small triangles on a bumpy ball that fills the
+// grid.
 Scene scan(uint64_t triangles, uint32_t grid_levels);
 
-// A building: floors, walls, round columns and folded curtains; large triangles beside small ones.
+// A building: floors, walls, round columns and folded curtains; large and small triangles.
 Scene building(uint64_t triangles, uint32_t grid_levels);
 
 }  // namespace voxdag::selftest

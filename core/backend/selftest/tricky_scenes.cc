@@ -69,8 +69,8 @@ class Maker {
   }
 
  private:
-  int64_t between(int64_t least, int64_t most) {
-    return least + static_cast<int64_t>(random_() % static_cast<uint64_t>(most - least + 1));
+  int64_t between(int64_t low, int64_t high) {
+    return low + static_cast<int64_t>(random_() % static_cast<uint64_t>(high - low + 1));
   }
   bool coin() { return between(0, 1) == 1; }
   static int64_t odd(int64_t x) { return x | 1; }

@@ -52,7 +52,7 @@ void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std:
   for (const uint32_t p : root.cube.position)
     if (p >> level != 0) corrupt(where, "a root's cube is outside the grid");
   if (root.voxels == 0 || root.svo_nodes == 0) corrupt(where, "a root is empty");
-  if (cut_hash(root.hash, index.hash_bits) != root.hash)
+  if (truncate_hash(root.hash, index.hash_bits) != root.hash)
     corrupt(where, "a root's hash has bits beyond the hash bits");
 }
 

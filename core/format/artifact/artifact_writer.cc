@@ -71,7 +71,7 @@ struct ArtifactWriter::State {
 void ArtifactWriter::State::add_brick_frame(std::span<const uint64_t> rows) {
   uint64_t hashes[kFrameRows];
   for (size_t i = 0; i < rows.size(); ++i)
-    hashes[i] = cut_hash(hash_brick(rows[i]), index.hash_bits);
+    hashes[i] = truncate_hash(hash_brick(rows[i]), index.hash_bits);
   if (const char* wrong = check_brick_order(std::span(hashes, rows.size()), rows, last))
     broken(wrong);
   add_frame(segment.encoder_->encode_bricks(rows), hashes[0], rows.size(), 0);

@@ -141,7 +141,7 @@ const char* decode_brick_frame(std::span<const std::byte> bytes, uint32_t rows, 
     add_plane(planes.data() + plane * rows, plane, std::span(out.brick_masks));
   out.hashes.resize(rows);
   for (uint32_t i = 0; i < rows; ++i)
-    out.hashes[i] = cut_hash(hash_brick(out.brick_masks[i]), hash_bits);
+    out.hashes[i] = truncate_hash(hash_brick(out.brick_masks[i]), hash_bits);
   return nullptr;
 }
 

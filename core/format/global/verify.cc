@@ -138,7 +138,7 @@ void Verifier::check_bricks() {
   for (uint64_t i = 0; i < bricks.node_count; ++i) {
     advance(i, bricks.node_count);
     const uint64_t mask = file_.brick(static_cast<uint32_t>(2 * i));
-    const uint64_t hash = cut_hash(hash_brick(mask), file_.hash_bits());
+    const uint64_t hash = truncate_hash(hash_brick(mask), file_.hash_bits());
     if (mask == 0) broken(where(level, 2 * i), "the brick is empty");
     if (i > 0 && (hash < hashes_[i - 1] || (hash == hashes_[i - 1] && mask <= last_mask)))
       broken(where(level, 2 * i), "the brick does not follow the one before it by hash and mask");
@@ -169,7 +169,7 @@ void Verifier::check_nodes(uint32_t level) {
       child_hashes[c] = hashes_[child];
       used_[child] = 1;
     }
-    hashes[i] = cut_hash(hash_node(*word, child_hashes), file_.hash_bits());
+    hashes[i] = truncate_hash(hash_node(*word, child_hashes), file_.hash_bits());
     if (previous &&
         compare_nodes(hashes[i - 1], *previous, previous + 1, hashes[i], *word, word + 1) >= 0)
       broken(where(level, at), "the node does not follow the one before it in the total order");

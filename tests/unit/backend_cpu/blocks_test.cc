@@ -17,19 +17,19 @@ class Blocks : public testing::Test {
   oracle::Random random_{3};
 
   uint64_t word() { return hash_brick(static_cast<uint64_t>(random_.between(0, INT64_MAX - 1))); }
-  Block random_block() {
-    Block block{};
+  VoxelBlock random_block() {
+    VoxelBlock block{};
     for (uint64_t& brick : block.bricks)
       if (random_.between(0, 2) == 0) brick = word();
     return block;
   }
-  static bool equal(const Block& a, const Block& b) {
+  static bool equal(const VoxelBlock& a, const VoxelBlock& b) {
     return std::equal(a.bricks, a.bricks + kBlockBricks, b.bricks);
   }
 };
 
-// Listed are the blocks that have voxels, each with the key that growing a memo gives it, in order;
-// the marks are gone, those of blocks that were marked for nothing included.
+// list_blocks() lists the non-empty blocks in order, each with its block_key(), and clears all
+// marks, including those of empty blocks.
 TEST_F(Blocks, KernelsListThem) {
   for (const Kernels* kernels : all_kernels())
     for (int round = 0; round < 50; ++round) {
@@ -59,14 +59,14 @@ TEST_F(Blocks, KernelsListThem) {
     }
 }
 
-// Unpacked are the bricks that are there, in order.
+// unpack() copies the non-empty bricks in order.
 TEST_F(Blocks, KernelsUnpackThem) {
   for (const Kernels* kernels : all_kernels())
     for (int round = 0; round < 200; ++round) {
       SCOPED_TRACE(round);
-      const Block block = random_block();
+      const VoxelBlock block = random_block();
       uint64_t bricks[kBlockBricks];
-      const BlockContent content = kernels->unpack(block, bricks);
+      const VoxelBlockContent content = kernels->unpack(block, bricks);
       uint32_t mask = 0, voxels = 0;
       for (int i = 0, at = 0; i < kBlockBricks; ++i) {
         if (block.bricks[i] == 0) continue;
@@ -87,21 +87,21 @@ class Memos : public Blocks {
 };
 
 // A block is found with its own node or not at all, also where thousands have the same key; one
-// that was just remembered is found, growths included.
+// that was just inserted is found, even if the memo grew.
 TEST_F(Memos, FindWholeBlocksOnly) {
   for (const bool same_key : {false, true}) {
     SCOPED_TRACE(same_key);
     BlockMemo memo(memory_);
-    std::vector<Block> blocks;
-    const auto key_of = [&](const Block& block) { return same_key ? 77 : block_key(block); };
+    std::vector<VoxelBlock> blocks;
+    const auto key_of = [&](const VoxelBlock& block) { return same_key ? 77 : block_key(block); };
     for (uint32_t i = 0; i < 40000; ++i) {
       blocks.push_back(random_block());
       blocks.back().bricks[i % kBlockBricks] |= 1;
-      const Block& block = blocks.back();
+      const VoxelBlock& block = blocks.back();
       if (memo.find(key_of(block), block)) continue;
-      memo.remember(key_of(block), block, {word(), i, 1, 1});
+      memo.insert(key_of(block), block, {word(), i, 1, 1});
       const BlockMemo::Node* found = memo.find(key_of(block), block);
-      // A growth may have taken it to its true place.
+      // Growing may have moved it to the slot of its block_key().
       if (found == nullptr) found = memo.find(block_key(block), block);
       ASSERT_NE(found, nullptr) << i;
       ASSERT_EQ(found->id, i);
@@ -116,17 +116,17 @@ TEST_F(Memos, FindWholeBlocksOnly) {
   }
 }
 
-// Where nearly all is new it is left alone, for a while; where blocks repeat it never is.
+// The memo is bypassed for a while where nearly all blocks are new, never where blocks repeat.
 TEST_F(Memos, RestWhereTheyDoNotPay) {
   for (const bool repeating : {false, true}) {
     SCOPED_TRACE(repeating);
     BlockMemo memo(memory_);
     int asked = 0;
     for (int tile = 0; tile < 2000; ++tile) {
-      if (!memo.pays(64)) continue;
+      if (!memo.is_worthwhile(64)) continue;
       ++asked;
       for (int i = 0; i < (repeating ? 1 : 64); ++i)
-        memo.remember(word(), random_block(), {0, 0, 1, 1});
+        memo.insert(word(), random_block(), {0, 0, 1, 1});
     }
     if (repeating)
       EXPECT_EQ(asked, 2000);
@@ -136,7 +136,7 @@ TEST_F(Memos, RestWhereTheyDoNotPay) {
   }
 }
 
-// In a small budget it takes little, and nothing is left charged.
+// In a small budget the memo is small, and nothing is charged afterwards.
 TEST_F(Memos, FitSmallBudgets) {
   MemoryBudget small(64 << 10);
   Memory memory{small, pool_};
@@ -144,8 +144,8 @@ TEST_F(Memos, FitSmallBudgets) {
     BlockMemo memo(memory);
     EXPECT_LE(small.used(), 8u << 10);
     for (uint32_t i = 0; i < 5000; ++i) {
-      const Block block = random_block();
-      memo.remember(block_key(block), block, {0, i, 1, 1});
+      const VoxelBlock block = random_block();
+      memo.insert(block_key(block), block, {0, i, 1, 1});
     }
     EXPECT_LE(small.used(), 16u << 10);
   }

@@ -34,7 +34,7 @@ TEST(Draw, KernelsEqualOracle) {
   });
 }
 
-// And the path in 128 bits, for triangles that need it and for those that do not.
+// The 128-bit path sets the same voxels, for triangles that need it and for others.
 TEST(Draw, WideEqualsOracle) {
   int wide_ones = 0;
   for_many_triangles(40, [&](const oracle::Triangle& t, const oracle::Region& region) {
@@ -45,9 +45,9 @@ TEST(Draw, WideEqualsOracle) {
   EXPECT_GT(wide_ones, 50);
 }
 
-// Planes that pass exactly through voxel corners, or miss them by a hair, are where heights in
-// fixed point are in doubt: slopes that are ratios of small numbers, at every offset.
-TEST(Draw, HeightsInDoubtAreSettled) {
+// Fixed-point heights are ambiguous for planes that pass exactly through voxel corners or miss them
+// by very little: slopes that are ratios of small numbers, at every offset.
+TEST(Draw, AmbiguousHeightsAreExact) {
   oracle::Random random(2);
   const oracle::Region region{{512, 1024, 4096}, 16};
   for (int round = 0; round < 3000; ++round) {

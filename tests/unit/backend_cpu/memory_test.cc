@@ -14,76 +14,76 @@ class CpuMemory : public testing::Test {
   Memory memory_{budget_, pool_};
 };
 
-// A block that was used before is handed out zero where zero was asked for.
-TEST_F(CpuMemory, KeptPagesAreZeroedAgain) {
+// Cached pages are zeroed again where zeroed pages were requested.
+TEST_F(CpuMemory, CachedPagesAreZeroedAgain) {
   for (const size_t size : {1000u, 100000u, 3000000u}) {
     SCOPED_TRACE(size);
     {
-      Buffer<uint8_t> dirty(memory_, size);
+      PooledArray<uint8_t> dirty(memory_, size);
       std::fill(dirty.begin(), dirty.end(), 0xff);
     }
-    const Buffer<uint8_t> clean(memory_, size, Buffer<uint8_t>::kZero);
+    const PooledArray<uint8_t> clean(memory_, size, PooledArray<uint8_t>::kZero);
     EXPECT_TRUE(std::all_of(clean.begin(), clean.end(), [](uint8_t b) { return b == 0; }));
   }
 }
 
-// Pages that are kept make way for what the budget could not hold beside them, and are no more than
-// an eighth of a large budget.
-TEST_F(CpuMemory, KeptPagesStayWithinTheBudget) {
-  { const Buffer<uint8_t> used(memory_, 7 << 20); }
-  EXPECT_EQ(pool_.kept_bytes(), 7u << 20);
-  { const Buffer<uint8_t> more(memory_, 16 << 20); }
-  EXPECT_EQ(pool_.kept_bytes(), 7u << 20);
+// Cached pages are freed where the budget cannot hold them and an allocation together, and are at
+// most an eighth of a large budget.
+TEST_F(CpuMemory, CachedPagesStayWithinTheBudget) {
+  { const PooledArray<uint8_t> used(memory_, 7 << 20); }
+  EXPECT_EQ(pool_.cached_bytes(), 7u << 20);
+  { const PooledArray<uint8_t> more(memory_, 16 << 20); }
+  EXPECT_EQ(pool_.cached_bytes(), 7u << 20);
   {
-    const Buffer<uint8_t> again(memory_, 5 << 20);
+    const PooledArray<uint8_t> again(memory_, 5 << 20);
     EXPECT_EQ(again.size(), 7u << 20);
     EXPECT_EQ(budget_.used(), 7u << 20);
-    EXPECT_EQ(pool_.kept_bytes(), 0u);
+    EXPECT_EQ(pool_.cached_bytes(), 0u);
   }
-  const Buffer<uint8_t> most(memory_, 60 << 20);
-  EXPECT_EQ(pool_.kept_bytes(), 0u);
+  const PooledArray<uint8_t> most(memory_, 60 << 20);
+  EXPECT_EQ(pool_.cached_bytes(), 0u);
 }
 
-// Of what was kept the oldest makes way for the newest.
-TEST_F(CpuMemory, OldPagesMakeWayForNew) {
+// The oldest cached pages are evicted by newer ones.
+TEST_F(CpuMemory, NewPagesEvictOldOnes) {
   for (const size_t mib : {5u, 2u}) {
-    const Buffer<uint8_t> used(memory_, mib << 20);
+    const PooledArray<uint8_t> used(memory_, mib << 20);
   }
-  EXPECT_EQ(pool_.kept_bytes(), 7u << 20);
-  { const Buffer<uint8_t> zeroed(memory_, 4 << 20, Buffer<uint8_t>::kZero); }
-  EXPECT_EQ(pool_.kept_bytes(), 6u << 20);
-  EXPECT_EQ(pool_.take_kept(5 << 20, 5 << 20).pages, nullptr);
+  EXPECT_EQ(pool_.cached_bytes(), 7u << 20);
+  { const PooledArray<uint8_t> zeroed(memory_, 4 << 20, PooledArray<uint8_t>::kZero); }
+  EXPECT_EQ(pool_.cached_bytes(), 6u << 20);
+  EXPECT_EQ(pool_.take(5 << 20, 5 << 20).data, nullptr);
 }
 
-// What must be zero is as large as was asked for: tables rely on that.
-TEST_F(CpuMemory, ZeroedBlocksAreExact) {
-  { const Buffer<uint8_t> used(memory_, 7 << 20); }
-  const Buffer<uint8_t> table(memory_, 4 << 20, Buffer<uint8_t>::kZero);
+// A zeroed array has exactly the requested size: the hash tables rely on that.
+TEST_F(CpuMemory, ZeroedArraysAreExact) {
+  { const PooledArray<uint8_t> used(memory_, 7 << 20); }
+  const PooledArray<uint8_t> table(memory_, 4 << 20, PooledArray<uint8_t>::kZero);
   EXPECT_EQ(table.size(), 4u << 20);
 }
 
-// Growing keeps the contents, within kept sizes and beyond, and charges what the buffer has.
-TEST_F(CpuMemory, BuffersGrow) {
-  Buffer<uint32_t> buffer(memory_, 10);
+// Growing preserves the contents, on cached pages and on new ones, and charges the array's size.
+TEST_F(CpuMemory, ArraysGrow) {
+  PooledArray<uint32_t> array(memory_, 10);
   uint32_t filled = 0;
-  while (buffer.size() < 6000000) {
-    for (; filled < buffer.size(); ++filled) buffer[filled] = filled * 2654435761u;
-    buffer.grow(memory_, buffer.size() + 1);
-    ASSERT_EQ(budget_.used(), buffer.size() * sizeof(uint32_t));
-    for (uint32_t i = 0; i < filled; i += 97) ASSERT_EQ(buffer[i], i * 2654435761u);
+  while (array.size() < 6000000) {
+    for (; filled < array.size(); ++filled) array[filled] = filled * 2654435761u;
+    array.grow(memory_, array.size() + 1);
+    ASSERT_EQ(budget_.used(), array.size() * sizeof(uint32_t));
+    for (uint32_t i = 0; i < filled; i += 97) ASSERT_EQ(array[i], i * 2654435761u);
   }
 }
 
-// What does not fit is Outgrown; the buffer that would not grow is as it was.
-TEST_F(CpuMemory, TooLargeIsOutgrown) {
-  EXPECT_THROW(Buffer<uint64_t>(memory_, 9 << 20), Outgrown);
-  Buffer<uint64_t> buffer(memory_, 6 << 20);
-  buffer[0] = 42;
+// What does not fit throws OutOfBudget; the array that could not grow is unchanged.
+TEST_F(CpuMemory, TooLargeIsOutOfBudget) {
+  EXPECT_THROW(PooledArray<uint64_t>(memory_, 9 << 20), OutOfBudget);
+  PooledArray<uint64_t> array(memory_, 6 << 20);
+  array[0] = 42;
   const uint64_t used = budget_.used();
-  EXPECT_THROW(buffer.grow(memory_, 9 << 20), Outgrown);
+  EXPECT_THROW(array.grow(memory_, 9 << 20), OutOfBudget);
   EXPECT_EQ(budget_.used(), used);
-  EXPECT_EQ(buffer[0], 42u);
-  buffer = {};
+  EXPECT_EQ(array[0], 42u);
+  array = {};
   EXPECT_EQ(budget_.used(), 0u);
 }
 

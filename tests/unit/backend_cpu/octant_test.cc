@@ -7,7 +7,7 @@ namespace voxdag::cpu {
 namespace {
 
 struct Tally {
-  int touched = 0, kept = 0, inside = 0;
+  int touched = 0, reported = 0, inside = 0;
 };
 
 // Checks one answer: no child that the triangle touches is left out, and a child said to be inside
@@ -20,15 +20,15 @@ void check(const Octants& octants, const oracle::Triangle& t, const oracle::Regi
     for (int a = 0; a < 3; ++a) low[a] = region.low[a] * oracle::kUnits + (c >> (2 - a) & 1) * half;
     const bool touched = oracle::touches(t, low, half);
     tally.touched += touched;
-    tally.kept += octants.touched >> c & 1;
+    tally.reported += octants.touched >> c & 1;
     tally.inside += octants.inside >> c & 1;
     EXPECT_TRUE(!touched || (octants.touched >> c & 1)) << "child " << c;
   }
   EXPECT_EQ(octants.inside & ~octants.touched, 0u);
 }
 
-// Cubes of every size, up to the whole of the largest grid; culling misses nothing and keeps little
-// that it could leave out.
+// Cubes of every size, up to the whole of the largest grid; culling misses nothing and reports few
+// children that are not touched.
 TEST(Octants, NoTouchedChildIsLeftOut) {
   oracle::Random random(4);
   Tally portable, avx2, wide;
@@ -55,7 +55,7 @@ TEST(Octants, NoTouchedChildIsLeftOut) {
   for (const Tally& tally : {portable, avx2, wide}) {
     if (tally.touched == 0) continue;  // no AVX2
     EXPECT_GT(tally.inside, 20);
-    EXPECT_LT(tally.kept, tally.touched * 1.3);
+    EXPECT_LT(tally.reported, tally.touched * 1.3);
   }
 }
 

@@ -10,7 +10,7 @@
 namespace voxdag::cpu {
 namespace {
 
-// Tables and what works on them, as a build has them.
+// The tables of a build, with the reducer and the plane memo.
 struct Workshop {
   explicit Workshop(const Kernels& kernels)
       : tables(memory, 10), reducer(tables, kernels), planes(memory, tables, reducer, kernels) {}
@@ -49,7 +49,8 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
   const int64_t corners[3][2] = {{-reach, -reach}, {2 * reach, -reach}, {-reach, 2 * reach}};
   const int64_t offset = random.between(-region.edge * 100, region.edge * 100) * 2;
   for (int i = 0; i < 3; ++i) {
-    // Multiples of n[up] along p and q keep the height whole, so the plane is exactly this one.
+    // Multiples of n[up] along p and q make the height an integer, so the plane is exactly this
+    // one.
     const int64_t dp = corners[i][0] * 2 * n[up], dq = corners[i][1] * 2 * n[up];
     const int64_t middle = region.edge * 128 + 1;
     t[i][p] = region.low[p] * 256 + middle + dp;
@@ -59,13 +60,13 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
   return t;
 }
 
-// Compares a remembered cube with the same one drawn, and its children down to the smallest.
-int compare(Workshop& by_memory, Workshop& by_drawing, const TriangleSet& set, const Box& box,
+// Compares a cube from the memo with the same one drawn, and its children down to the smallest.
+int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, const Box& box,
             int size_log2, TileBricks& tile) {
-  const OctreeCounts before = by_memory.tables.counts();
+  const OctreeCounts before = by_memo.tables.counts();
   NodeRef node;
-  EXPECT_TRUE(by_memory.planes.build(set, {0}, box, size_log2, node));
-  const OctreeCounts counts = by_memory.tables.counts() - before;
+  EXPECT_TRUE(by_memo.planes.build(set, {0}, box, size_log2, node));
+  const OctreeCounts counts = by_memo.tables.counts() - before;
   const OctreeCounts drawn_before = by_drawing.tables.counts();
   const NodeRef truth = drawn_node(by_drawing, set.narrow({0}), box, size_log2, tile);
   const OctreeCounts drawn_counts = by_drawing.tables.counts() - drawn_before;
@@ -76,13 +77,13 @@ int compare(Workshop& by_memory, Workshop& by_drawing, const TriangleSet& set, c
   int compared = 1;
   if (size_log2 > PlaneMemo::kSmallestLog2 && !testing::Test::HasFailure())
     for (int c = 0; c < 8; c += 3)
-      compared += compare(by_memory, by_drawing, set, box.child(c), size_log2 - 1, tile);
+      compared += compare(by_memo, by_drawing, set, box.child(c), size_log2 - 1, tile);
   return compared;
 }
 
-// Nodes, hashes and counts of remembered planes are those of drawing the same planes: for walls,
+// Nodes, hashes and counts from the memo are those of drawing the same planes: for walls,
 // for small normals and for others.
-TEST(Planes, RememberedNodesEqualDrawnOnes) {
+TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
   oracle::Random random(6);
   const auto tile = std::make_unique<TileBricks>();
   int compared = 0;
@@ -98,25 +99,24 @@ TEST(Planes, RememberedNodesEqualDrawnOnes) {
     SCOPED_TRACE(testing::Message() << "round " << round << ", normal " << n[0] << ' ' << n[1]
                                     << ' ' << n[2] << ", edge " << region.edge);
     const std::vector<const Kernels*> kernels = all_kernels();
-    Workshop by_memory(*kernels[static_cast<size_t>(round) % kernels.size()]);
+    Workshop by_memo(*kernels[static_cast<size_t>(round) % kernels.size()]);
     Workshop by_drawing(portable_kernels());
-    TriangleSet set(by_memory.memory);
-    set.add(reverse_axes(oracle::fixed(t)));
-    // A triangle is remembered once it has covered enough tiles; a plane that meets lattice points
-    // exactly may never be.
+    TriangleSet set(by_memo.memory);
+    set.add(axis_major(oracle::fixed(t)));
+    // A triangle's plane is added once it has covered enough tiles; a plane that meets lattice
+    // points exactly may never be.
     NodeRef node;
-    bool remembered = false;
-    for (int i = 0; i < 40 && !remembered; ++i)
-      remembered = by_memory.planes.build(set, {0}, box_of(region), size_log2, node);
-    if (remembered)
-      compared += compare(by_memory, by_drawing, set, box_of(region), size_log2, *tile);
+    bool found = false;
+    for (int i = 0; i < 40 && !found; ++i)
+      found = by_memo.planes.build(set, {0}, box_of(region), size_log2, node);
+    if (found) compared += compare(by_memo, by_drawing, set, box_of(region), size_log2, *tile);
     if (HasFailure()) return;
   }
   EXPECT_GT(compared, 500);
 }
 
-// A plane whose coefficients are too large for 64 bits in a large cube is left alone there.
-TEST(Planes, HugeNormalsAreNotRememberedForLargeCubes) {
+// A plane whose coefficients are too large for 64 bits in a large cube is not used there.
+TEST(Planes, HugeNormalsAreNotUsedForLargeCubes) {
   const oracle::Triangle t{
       {{1, 1, 100000001}, {(1 << 28) - 1, 3, 7}, {5, (1 << 28) - 3, 100000007}}};
   const Padded<int32_t> narrow(t);

@@ -38,7 +38,7 @@ TEST_F(Tables, BricksAreFoundAgain) {
   EXPECT_EQ(table.size(), truth.size());
 }
 
-// The slots come out in the order of (cut hash, mask), for whole and for cut hashes.
+// Slots are sorted by (truncated hash, mask), for full and for truncated hashes.
 TEST_F(Tables, BricksAreSorted) {
   for (const uint32_t bits : {64u, 33u, 16u, 4u}) {
     SCOPED_TRACE(bits);
@@ -51,8 +51,8 @@ TEST_F(Tables, BricksAreSorted) {
     const auto slots = table.sort_slots(bits);
     ASSERT_EQ(slots.size(), table.size());
     for (size_t i = 1; i < slots.size(); ++i) {
-      const uint64_t a = cut_hash(hash_brick(slots[i - 1].mask), bits);
-      const uint64_t b = cut_hash(hash_brick(slots[i].mask), bits);
+      const uint64_t a = truncate_hash(hash_brick(slots[i - 1].mask), bits);
+      const uint64_t b = truncate_hash(hash_brick(slots[i].mask), bits);
       ASSERT_TRUE(a < b || (a == b && slots[i - 1].mask < slots[i].mask)) << i;
     }
   }
@@ -69,7 +69,7 @@ struct Node {
 // ones included, whose clusters run around the table's end.
 class NodeTables : public Tables {
  protected:
-  // What stands behind the children makes no difference.
+  // The elements behind the children are random: they must make no difference.
   uint32_t add(NodeTable& table, const Node& node) {
     uint32_t children[8];
     for (uint32_t& child : children) child = static_cast<uint32_t>(random_.between(0, 3));
@@ -110,7 +110,7 @@ TEST_F(NodeTables, NodesAreFoundAgainWhateverTheirHashes) {
   }
 }
 
-// ConcurrencyLimiter come out in the total order (hash, mask, children), ties and wrapped clusters
+// Slots are sorted in the total order (hash, mask, children), ties and wrapped clusters
 // included; the same when hashes were changed behind the table's back.
 TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
   for (const int distinct : {1, 20, 100000})
@@ -142,8 +142,8 @@ TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
     }
 }
 
-// Without room to grow the table says so, and nothing stays charged.
-TEST_F(NodeTables, OutgrowsItsBudget) {
+// A table that cannot grow throws OutOfBudget, and nothing is charged afterwards.
+TEST_F(NodeTables, ThrowsWithoutMemoryToGrow) {
   MemoryBudget small(64 << 10);
   Memory memory{small, pool_};
   {
@@ -154,7 +154,7 @@ TEST_F(NodeTables, OutgrowsItsBudget) {
           const uint32_t children[8] = {i};
           table.find_or_add(hash_brick(i), 1, children, 1);
         },
-        Outgrown);
+        OutOfBudget);
     EXPECT_GT(table.size(), 500u);
   }
   EXPECT_EQ(small.used(), 0u);

@@ -1,11 +1,11 @@
-// What the tests of drawing share: tiles anywhere in the largest grid, and the voxels in them.
+// Helpers of the tests of drawing: tiles anywhere in the largest grid, and the voxels in them.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/raster/kernels.h"
 #include "core/geometry/morton.h"
 #include "tests/oracle/core_types.h"
 #include "tests/oracle/scenes.h"
@@ -13,12 +13,12 @@
 
 namespace voxdag::cpu {
 
-// A triangle of the oracle as this backend holds it: axes reversed, a spare one behind it, since
-// kernels load four coordinates for three.
+// A triangle of the oracle as this backend stores it: by axis, and with a spare one behind it,
+// since kernels load four coordinates for three.
 template <class Coordinate>
 struct Padded {
   explicit Padded(const oracle::Triangle& t) {
-    const WideTriangle wide = reverse_axes(oracle::fixed(t));
+    const WideTriangle wide = axis_major(oracle::fixed(t));
     for (int a = 0; a < 3; ++a)
       for (int i = 0; i < 3; ++i) triangle.v[a][i] = static_cast<Coordinate>(wide.v[a][i]);
   }
@@ -34,13 +34,11 @@ inline std::vector<const Kernels*> all_kernels() {
   return all;
 }
 
-inline bool is_narrow(const oracle::Triangle& t) {
-  return is_narrow(reverse_axes(oracle::fixed(t)));
-}
+inline bool is_narrow(const oracle::Triangle& t) { return is_narrow(axis_major(oracle::fixed(t))); }
 
 inline Box box_of(const oracle::Region& region) {
   Box box;
-  for (int a = 0; a < 3; ++a) box.low[a] = region.low[2 - a] * kUnitsPerVoxel;
+  for (int a = 0; a < 3; ++a) box.low[a] = region.low[a] * kUnitsPerVoxel;
   box.edge = region.edge * kUnitsPerVoxel;
   return box;
 }

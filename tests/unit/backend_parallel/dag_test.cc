@@ -17,17 +17,17 @@ class ParallelDag : public testing::Test {
   // An octree of `levels` levels above its bricks, of which there are few different ones.
   Octree<HostSpace> random_octree(uint64_t seed, uint32_t levels, int64_t different_bricks) {
     oracle::Random random(seed);
-    const uint32_t most = 1u << 3 * levels;
+    const uint32_t max_count = 1u << 3 * levels;
     BrickList<HostSpace> bricks(space, static_cast<int>(3 * levels));
-    const uint32_t at = bricks.make_room(most);
+    const uint32_t at = bricks.reserve(max_count);
     uint32_t count = 0;
-    for (uint32_t code = 0; code < most; ++code) {
-      if (random.between(0, 3) == 0 && !(code + 1 == most && count == 0)) continue;
+    for (uint32_t code = 0; code < max_count; ++code) {
+      if (random.between(0, 3) == 0 && !(code + 1 == max_count && count == 0)) continue;
       bricks.codes()[at + count] = code;
       bricks.masks()[at + count++] =
           static_cast<uint64_t>(random.between(1, different_bricks)) * 0x9e3779b97f4a7c15ull;
     }
-    bricks.took(count, true);
+    bricks.commit(count, true);
     return make_octree(space, bricks, levels);
   }
   SubDag as_sub_dag(Dag<HostSpace>&& dag, uint32_t levels) {
@@ -53,14 +53,14 @@ TEST_F(ParallelDag, BothConstructionsAgreeAndAreInOrder) {
       EXPECT_EQ(by_hashes->node_count(), by_pointers.node_count());
       const SubDag a = as_sub_dag(std::move(*by_hashes), levels);
       EXPECT_TRUE(a == as_sub_dag(std::move(by_pointers), levels));
-      EXPECT_NO_THROW(check_sub_dag(a, 0, levels + kBrickLevels, 64));
+      EXPECT_NO_THROW(check_sub_dag(a, {.grid_levels = levels + kBrickLevels}));
     }
 }
 
-// Hashes cut so far that some octrees have different nodes of equal hash and some do not: what the
-// sweep lets through is the DAG, and it turns away whatever the hashes confuse.
-TEST_F(ParallelDag, TheSweepLetsNoConfusionThrough) {
-  int let_through = 0, turned_away = 0;
+// With hashes so short that some octrees have different nodes of equal hash and some do not, the
+// sweep accepts only right DAGs and rejects those with such nodes.
+TEST_F(ParallelDag, TheSweepRejectsCollisions) {
+  int accepted = 0, rejected = 0;
   for (uint64_t seed = 0; seed < 600; ++seed) {
     const uint32_t hash_bits = 6 + static_cast<uint32_t>(seed % 8);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", hash bits " << hash_bits);
@@ -69,17 +69,17 @@ TEST_F(ParallelDag, TheSweepLetsNoConfusionThrough) {
     auto by_pointers = make_dag_by_pointers(space, tree, hash_bits);
     const uint64_t nodes = by_pointers.node_count();
     const SubDag truth = as_sub_dag(std::move(by_pointers), 2);
-    ASSERT_NO_THROW(check_sub_dag(truth, 0, 4, hash_bits));
+    ASSERT_NO_THROW(check_sub_dag(truth, {.grid_levels = 4, .hash_bits = hash_bits}));
     if (!by_hashes) {
-      ++turned_away;
+      ++rejected;
       continue;
     }
-    ++let_through;
+    ++accepted;
     EXPECT_EQ(by_hashes->node_count(), nodes);
     ASSERT_TRUE(as_sub_dag(std::move(*by_hashes), 2) == truth);
   }
-  EXPECT_GT(let_through, 50);
-  EXPECT_GT(turned_away, 50);
+  EXPECT_GT(accepted, 50);
+  EXPECT_GT(rejected, 50);
 }
 
 // Two different bricks of equal 4-bit hash under two parents that are alike but for them, so that
@@ -87,14 +87,14 @@ TEST_F(ParallelDag, TheSweepLetsNoConfusionThrough) {
 // can see it.
 TEST_F(ParallelDag, TheSweepLooksAtDroppedNodes) {
   uint64_t one = 1, other = 2;
-  while (cut_hash(hash_brick(other), 4) != cut_hash(hash_brick(one), 4)) ++other;
+  while (truncate_hash(hash_brick(other), 4) != truncate_hash(hash_brick(one), 4)) ++other;
   BrickList<HostSpace> bricks(space, 6);
-  bricks.make_room(2);
+  bricks.reserve(2);
   const uint64_t codes[2] = {0 * 8 + 3, 5 * 8 + 3};
   for (int i = 0; i < 2; ++i) bricks.codes()[i] = codes[i];
   bricks.masks()[0] = one;
   bricks.masks()[1] = other;
-  bricks.took(2, true);
+  bricks.commit(2, true);
   const auto tree = make_octree(space, bricks, 2);
   EXPECT_FALSE(make_dag_by_hashes(space, tree, 4).has_value());
   EXPECT_EQ(make_dag_by_pointers(space, tree, 4).node_count(), 5u);

@@ -17,8 +17,8 @@ constexpr uint32_t kSizes[] = {0, 1, 2, 255, 4095, 4096, 4097, 8191, 8192, 20000
 class HostSpaceTest : public testing::TestWithParam<unsigned> {
  protected:
   template <class T>
-  Buffer<HostSpace, T> filled(const std::vector<T>& values, size_t extra = 0) {
-    Buffer<HostSpace, T> buffer(space, values.size() + extra);
+  SpaceArray<HostSpace, T> filled(const std::vector<T>& values, size_t extra = 0) {
+    SpaceArray<HostSpace, T> buffer(space, values.size() + extra);
     std::copy(values.begin(), values.end(), buffer.data());
     return buffer;
   }
@@ -63,7 +63,7 @@ TEST_P(HostSpaceTest, SelectKeepsFlaggedPositionsInOrder) {
     std::vector<uint32_t> expected;
     for (uint32_t i = 0; i < n; ++i)
       if (flags[i]) expected.push_back(i);
-    Buffer<HostSpace, uint32_t> out(space, n);
+    SpaceArray<HostSpace, uint32_t> out(space, n);
     ASSERT_EQ(space.select(flags.data(), n, out.data()), expected.size());
     EXPECT_TRUE(std::equal(expected.begin(), expected.end(), out.data())) << n;
   }
@@ -83,7 +83,7 @@ TEST_P(HostSpaceTest, MergeRunsOrsEqualKeys) {
         if (i == 0 || keys[i] != keys[i - 1]) out_keys.push_back(keys[i]), out_masks.push_back(0);
         out_masks.back() |= masks[i];
       }
-      Buffer<HostSpace, uint64_t> k(space, n), m(space, n);
+      SpaceArray<HostSpace, uint64_t> k(space, n), m(space, n);
       ASSERT_EQ(space.merge_runs(keys.data(), masks.data(), n, k.data(), m.data()),
                 out_keys.size());
       EXPECT_TRUE(std::equal(out_keys.begin(), out_keys.end(), k.data())) << n;
@@ -100,7 +100,7 @@ TEST_P(HostSpaceTest, CountBits) {
   }
 }
 
-// Whatever bits are sorted by, the others stay out of it and equal keys keep their order.
+// Sorting by any bits ignores the others and preserves the order of equal keys.
 TEST_P(HostSpaceTest, SortsAreStableByTheBitsGiven) {
   for (const uint32_t n : kSizes)
     for (const auto& [begin, end] : {std::pair{0, 64}, {0, 0}, {3, 4}, {5, 30}, {60, 64}, {0, 9}}) {
@@ -114,8 +114,8 @@ TEST_P(HostSpaceTest, SortsAreStableByTheBitsGiven) {
       };
       auto k = filled(keys), only_keys = filled(keys);
       auto v = filled(order);
-      Buffer<HostSpace, uint64_t> key_scratch(space, n);
-      Buffer<HostSpace, uint32_t> value_scratch(space, n);
+      SpaceArray<HostSpace, uint64_t> key_scratch(space, n);
+      SpaceArray<HostSpace, uint32_t> value_scratch(space, n);
       space.sort_pairs(k, key_scratch, v, value_scratch, n, begin, end);
       space.sort_keys(only_keys, key_scratch, n, begin, end);
       std::stable_sort(order.begin(), order.end(),
@@ -167,19 +167,19 @@ struct ReverseInBlocks {
 };
 TEST_P(HostSpaceTest, BlocksRunPhaseByPhase) {
   std::vector<uint32_t> out(9 * 32);
-  space.for_each_block(9, ReverseInBlocks{out.data()});
+  space.for_each_thread_block(9, ReverseInBlocks{out.data()});
   for (uint32_t i = 0; i < out.size(); ++i) EXPECT_EQ(out[i], 31 - i % 32 + 100 * (i / 32));
 }
 
-// What the budget cannot hold is Outgrown, and nothing stays charged.
+// What the budget cannot hold is OutOfBudget, and nothing stays charged.
 TEST_P(HostSpaceTest, BuffersAreCharged) {
   MemoryBudget small(1 << 20);
   HostSpace here(small, cancel, GetParam());
   {
-    const Buffer<HostSpace, uint64_t> half(here, (1 << 20) / 16);
+    const SpaceArray<HostSpace, uint64_t> half(here, (1 << 20) / 16);
     EXPECT_EQ(small.used(), uint64_t{1} << 19);
-    EXPECT_THROW((Buffer<HostSpace, uint8_t>(here, (1 << 19) + 1)), Outgrown);
-    EXPECT_THROW((Buffer<HostSpace, uint8_t>(space, kMaxElements + 1)), Outgrown);
+    EXPECT_THROW((SpaceArray<HostSpace, uint8_t>(here, (1 << 19) + 1)), OutOfBudget);
+    EXPECT_THROW((SpaceArray<HostSpace, uint8_t>(space, kMaxElements + 1)), OutOfBudget);
   }
   EXPECT_EQ(small.used(), 0u);
 }

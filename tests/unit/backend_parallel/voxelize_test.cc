@@ -30,7 +30,7 @@ Bricks bricks_of(const oracle::Voxels& voxels) {
 
 class Voxelize : public testing::Test {
  protected:
-  // The list's bricks, which must be in order and without doubles.
+  // The list's bricks, which must be in order and without duplicates.
   static Bricks merged(BrickList<HostSpace>& list) {
     list.merge();
     Bricks out;
@@ -63,8 +63,8 @@ TEST_F(Voxelize, ListAndTilesGiveTheOraclesBricks) {
   }
 }
 
-// The smallest windows that work: frames are handed on in many slices, voxels packed many times,
-// the list merged and grown on the way.
+// The smallest windows that work: frames are expanded in many slices, voxels packed many times, the
+// list merged and grown in between.
 TEST_F(Voxelize, TinyWindowsChangeNothing) {
   const auto scene = oracle::fixed(oracle::make_scene(oracle::SceneKind::kSoup, 2, region, 60));
   const uint32_t count = static_cast<uint32_t>(scene.size());
@@ -91,14 +91,14 @@ TEST_F(Voxelize, BrickListMergesWhatComesAgain) {
   Bricks truth;
   for (int part = 0; part < 400; ++part) {
     const uint32_t count = static_cast<uint32_t>(random.between(1, 200));
-    const uint32_t at = list.make_room(count);
+    const uint32_t at = list.reserve(count);
     ASSERT_EQ(at, list.size());
     for (uint32_t i = at; i < at + count; ++i) {
       list.codes()[i] = static_cast<uint64_t>(random.between(0, part < 200 ? 3000 : 32767));
       list.masks()[i] = uint64_t{1} << random.between(0, 63);
       truth[list.codes()[i]] |= list.masks()[i];
     }
-    list.took(count, false);
+    list.commit(count, false);
   }
   EXPECT_EQ(merged(list), truth);
 }

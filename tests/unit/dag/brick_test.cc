@@ -21,5 +21,13 @@ TEST(Brick, BitsAreMortonCodes) {
   EXPECT_EQ(kBrickEdge, 1 << kBrickLevels);
 }
 
+// brick_coordinate() is the inverse of brick_bit().
+TEST(Brick, BitsHaveCoordinates) {
+  for (int bit = 0; bit < 64; ++bit)
+    EXPECT_EQ(
+        brick_bit(brick_coordinate(bit, 0), brick_coordinate(bit, 1), brick_coordinate(bit, 2)),
+        bit);
+}
+
 }  // namespace
 }  // namespace voxdag

@@ -16,7 +16,9 @@ namespace {
 constexpr uint32_t kGridLevels = 9;
 constexpr uint32_t kCubeLevel = 4;  // 32 voxels: bricks on level 7, nodes on 6, 5 and 4
 
-// A right sub-DAG, with equal cut hashes where there are few bits.
+SubDagShape shape_of(uint32_t hash_bits) { return {kCubeLevel, kGridLevels, hash_bits}; }
+
+// A right sub-DAG, with equal truncated hashes where there are few bits.
 SubDag right_one(int hash_bits) {
   const oracle::Region region{{0, 0, 0}, 32};
   const auto scene = oracle::make_scene(oracle::SceneKind::kSoup, 3, region, 12);
@@ -43,8 +45,8 @@ uint64_t right_hash(const SubDag& dag, size_t level, size_t i, uint32_t bits) {
   const SubDag::Nodes& nodes = dag.levels[level];
   for (size_t k = first_child(nodes, i); k < first_child(nodes, i + 1); ++k)
     hashes.push_back(level ? dag.levels[level - 1].hashes[nodes.children[k]]
-                           : cut_hash(hash_brick(dag.brick_masks[nodes.children[k]]), bits));
-  return cut_hash(hash_node(nodes.masks[i], hashes.data()), bits);
+                           : truncate_hash(hash_brick(dag.brick_masks[nodes.children[k]]), bits));
+  return truncate_hash(hash_node(nodes.masks[i], hashes.data()), bits);
 }
 
 struct Damage {
@@ -98,7 +100,7 @@ const std::vector<Damage> kDamages = {
 
 void expect_corrupt(const SubDag& dag, uint32_t bits, const std::string& part) {
   try {
-    check_sub_dag(dag, kCubeLevel, kGridLevels, bits);
+    check_sub_dag(dag, shape_of(bits));
     ADD_FAILURE() << "passed the check";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
@@ -109,7 +111,7 @@ void expect_corrupt(const SubDag& dag, uint32_t bits, const std::string& part) {
 // Every invariant, broken on its own, is found and named.
 TEST(CheckSubDag, FindsEachBrokenInvariant) {
   const SubDag right = right_one(64);
-  ASSERT_NO_THROW(check_sub_dag(right, kCubeLevel, kGridLevels, 64));
+  ASSERT_NO_THROW(check_sub_dag(right, shape_of(64)));
   for (const Damage& damage : kDamages) {
     SCOPED_TRACE(damage.what);
     SubDag dag = right;
@@ -121,11 +123,11 @@ TEST(CheckSubDag, FindsEachBrokenInvariant) {
 // With 4 bits many nodes share a hash, and ties are in the order of mask and children.
 TEST(CheckSubDag, KnowsTheOrderOfTies) {
   const SubDag right = right_one(4);
-  ASSERT_NO_THROW(check_sub_dag(right, kCubeLevel, kGridLevels, 4));
+  ASSERT_NO_THROW(check_sub_dag(right, shape_of(4)));
   int ties = 0;
   for (size_t i = 1; i < right.brick_masks.size(); ++i) {
-    if (cut_hash(hash_brick(right.brick_masks[i - 1]), 4) !=
-        cut_hash(hash_brick(right.brick_masks[i]), 4))
+    if (truncate_hash(hash_brick(right.brick_masks[i - 1]), 4) !=
+        truncate_hash(hash_brick(right.brick_masks[i]), 4))
       continue;
     ++ties;
     SubDag dag = right;
@@ -135,8 +137,8 @@ TEST(CheckSubDag, KnowsTheOrderOfTies) {
   EXPECT_GT(ties, 10);
 }
 
-// Eight nodes of one mask, each with a brick of its own: some share a cut hash, and change places
-// without any hash becoming wrong.
+// Eight nodes of one mask, each with its own brick: some have equal truncated hashes and can be
+// exchanged without any hash becoming wrong.
 TEST(CheckSubDag, KnowsTheOrderOfTiedNodes) {
   oracle::Random random(2);
   oracle::Voxels voxels(16);
@@ -146,7 +148,7 @@ TEST(CheckSubDag, KnowsTheOrderOfTiedNodes) {
                  8 * (i / 2 % 2) + static_cast<int>(random.between(0, 3)),
                  8 * (i % 2) + static_cast<int>(random.between(0, 3)));
   const SubDag right = oracle::as_sub_dag(oracle::build_dag(voxels, 4), 4);
-  ASSERT_NO_THROW(check_sub_dag(right, 0, 4, 4));
+  ASSERT_NO_THROW(check_sub_dag(right, {.cube_level = 0, .grid_levels = 4, .hash_bits = 4}));
   int ties = 0;
   for (size_t i = 1; i < right.levels[0].masks.size(); ++i) {
     SubDag dag = right;
@@ -156,7 +158,7 @@ TEST(CheckSubDag, KnowsTheOrderOfTiedNodes) {
     ++ties;
     std::swap(nodes.children[i - 1], nodes.children[i]);
     try {
-      check_sub_dag(dag, 0, 4, 4);
+      check_sub_dag(dag, {.cube_level = 0, .grid_levels = 4, .hash_bits = 4});
       ADD_FAILURE() << "passed the check";
     } catch (const Error& error) {
       EXPECT_NE(error.message().find("not in the total order"), std::string::npos)
@@ -166,17 +168,17 @@ TEST(CheckSubDag, KnowsTheOrderOfTiedNodes) {
   EXPECT_GT(ties, 0);
 }
 
-// The cut belongs to the check: hashes of one cut are wrong under another.
+// The number of hash bits is checked: hashes truncated to another number are wrong.
 TEST(CheckSubDag, KnowsTheHashBits) {
   expect_corrupt(right_one(64), 16, "level ");
   expect_corrupt(right_one(16), 64, "level ");
 }
 
-// Nodes that nobody refers to are not part of the one and only DAG, wherever they are.
+// Nodes without a parent are not part of the DAG, on any level.
 TEST(CheckSubDag, FindsOrphans) {
   const SubDag right = right_one(64);
   SubDag bricks = right;
-  // A brick whose hash is beyond all others keeps the order right.
+  // A brick whose hash is beyond all others does not break the order.
   uint64_t mask = 1;
   while (hash_brick(mask) <= hash_brick(bricks.brick_masks.back())) ++mask;
   bricks.brick_masks.push_back(mask);
@@ -202,13 +204,13 @@ TEST(CheckSubDag, FindsOrphans) {
 TEST(CheckSubDag, BrickCubes) {
   SubDag dag;
   dag.brick_masks = {5};
-  EXPECT_NO_THROW(check_sub_dag(dag, 7, kGridLevels, 64));
-  EXPECT_NO_THROW(check_sub_dag(dag, 0, 2, 4));
-  EXPECT_THROW(check_sub_dag(dag, 6, kGridLevels, 64), Error);
-  EXPECT_THROW(check_sub_dag(dag, 8, kGridLevels, 64), Error);
-  EXPECT_THROW(check_sub_dag({}, 7, kGridLevels, 64), Error);
+  EXPECT_NO_THROW(check_sub_dag(dag, {.cube_level = 7, .grid_levels = kGridLevels}));
+  EXPECT_NO_THROW(check_sub_dag(dag, {.hash_bits = 4}));
+  EXPECT_THROW(check_sub_dag(dag, {.cube_level = 6, .grid_levels = kGridLevels}), Error);
+  EXPECT_THROW(check_sub_dag(dag, {.cube_level = 8, .grid_levels = kGridLevels}), Error);
+  EXPECT_THROW(check_sub_dag({}, {.cube_level = 7, .grid_levels = kGridLevels}), Error);
   dag.brick_masks.push_back(0);
-  EXPECT_THROW(check_sub_dag(dag, 7, kGridLevels, 64), Error);
+  EXPECT_THROW(check_sub_dag(dag, {.cube_level = 7, .grid_levels = kGridLevels}), Error);
 }
 
 }  // namespace

@@ -47,8 +47,8 @@ TEST(TotalOrder, StopsAtTheLastChild) {
   EXPECT_EQ(compare_children(a, b, 0), 0);
 }
 
-// Replacing child indices through a strictly increasing map keeps the order: what the merge rests
-// on.
+// Replacing child indices through a strictly increasing map preserves the order; the merge relies
+// on that.
 TEST(TotalOrder, SurvivesIncreasingMaps) {
   std::mt19937_64 random(9);
   std::vector<uint32_t> map(20);

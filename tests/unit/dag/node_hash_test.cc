@@ -41,7 +41,7 @@ TEST(NodeHash, EqualsTheOracle) {
     ASSERT_EQ(hash_node(child_mask, children.data()), oracle::node_hash(child_mask, children));
     ASSERT_EQ(node_hash_end(running), hash_node(child_mask, children.data()));
     const int bits = 4 + static_cast<int>(random() % 61);
-    ASSERT_EQ(cut_hash(mask, static_cast<uint32_t>(bits)), oracle::cut(mask, bits));
+    ASSERT_EQ(truncate_hash(mask, static_cast<uint32_t>(bits)), oracle::truncated(mask, bits));
   }
 }
 
@@ -53,12 +53,12 @@ TEST(NodeHash, SeesTheMask) {
   EXPECT_EQ(seen.size(), 255u);
 }
 
-// The top bits are kept, the others are 0.
+// Truncation preserves the top bits and clears the others.
 TEST(NodeHash, IsCutFromBelow) {
-  EXPECT_EQ(cut_hash(~uint64_t{0}, 64), ~uint64_t{0});
-  EXPECT_EQ(cut_hash(~uint64_t{0}, 63), ~uint64_t{1});
-  EXPECT_EQ(cut_hash(~uint64_t{0}, 16), 0xffff000000000000u);
-  EXPECT_EQ(cut_hash(~uint64_t{0}, 4), 0xf000000000000000u);
+  EXPECT_EQ(truncate_hash(~uint64_t{0}, 64), ~uint64_t{0});
+  EXPECT_EQ(truncate_hash(~uint64_t{0}, 63), ~uint64_t{1});
+  EXPECT_EQ(truncate_hash(~uint64_t{0}, 16), 0xffff000000000000u);
+  EXPECT_EQ(truncate_hash(~uint64_t{0}, 4), 0xf000000000000000u);
 }
 
 }  // namespace

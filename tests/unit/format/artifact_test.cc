@@ -75,7 +75,7 @@ TEST_F(ArtifactTest, ChildIndicesOfFourBytesComeBack) {
   std::vector<uint64_t> masks;
   uint64_t written = 0;
   for (uint64_t mask = 1; written < count; ++mask) {
-    if (cut_hash(hash_brick(mask), 4) != 0) continue;
+    if (truncate_hash(hash_brick(mask), 4) != 0) continue;
     masks.push_back(mask);
     if (masks.size() < 50000 && written + masks.size() < count) continue;
     writer.append_bricks(masks);

@@ -101,14 +101,14 @@ TEST(FormatDocTest, HeaderTableIsTheLayout) {
 TEST(FormatDocTest, NodeHashVectorsHold) {
   const uint64_t one = hash_brick(1), all = hash_brick(~uint64_t{0});
   const uint64_t two[] = {one, all}, eight[] = {all, all, all, all, all, all, all, all};
-  const uint64_t two_cut[] = {cut_hash(one, 16), cut_hash(all, 16)};
+  const uint64_t two_cut[] = {truncate_hash(one, 16), truncate_hash(all, 16)};
   const uint64_t expected[] = {one,
                                hash_brick(uint64_t{1} << 63),
                                all,
                                hash_node(0x01, &one),
                                hash_node(0x80, &one),
                                hash_node(0x81, two),
-                               cut_hash(hash_node(0x81, two_cut), 16),
+                               truncate_hash(hash_node(0x81, two_cut), 16),
                                hash_node(0xff, eight)};
   std::vector<uint64_t> found;
   for (const std::string& line : lines_of("format.md")) {

@@ -22,7 +22,7 @@ inline SubDag random_rows(uint64_t seed, size_t count, uint32_t grid_levels, uin
   std::vector<std::pair<uint64_t, uint64_t>> bricks;
   while (bricks.size() < count) {
     const uint64_t mask = static_cast<uint64_t>(random.between(1, INT64_MAX / 2));
-    bricks.emplace_back(cut_hash(hash_brick(mask), hash_bits), mask);
+    bricks.emplace_back(truncate_hash(hash_brick(mask), hash_bits), mask);
   }
   std::sort(bricks.begin(), bricks.end());
   bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
@@ -38,7 +38,7 @@ inline SubDag random_rows(uint64_t seed, size_t count, uint32_t grid_levels, uin
   for (uint32_t i = 0; i < node_levels; ++i) {
     std::vector<Row> rows;
     while (rows.size() < count) {
-      Row row{cut_hash(hash_brick(rows.size() + 77 * seed), hash_bits),
+      Row row{truncate_hash(hash_brick(rows.size() + 77 * seed), hash_bits),
               static_cast<uint8_t>(random.between(1, 255)),
               {}};
       for (int c = popcount64(row.mask); c > 0; --c)

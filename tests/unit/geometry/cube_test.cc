@@ -10,7 +10,8 @@
 namespace voxdag {
 namespace {
 
-// The eight children fill the cube, each knows its place, and each one's parent is the cube.
+// The eight children fill the cube, each has its child index and coordinates, and the cube as
+// parent.
 TEST(Cube, ChildrenFillTheirParent) {
   const Cube cube{3, {5, 0, 7}};
   std::set<std::tuple<uint32_t, uint32_t, uint32_t>> seen;
@@ -19,6 +20,9 @@ TEST(Cube, ChildrenFillTheirParent) {
     EXPECT_EQ(child.level, 4u);
     EXPECT_EQ(child.child_index(), c);
     EXPECT_EQ(child.parent(), cube);
+    for (int a = 0; a < 3; ++a)
+      EXPECT_EQ(child.position[a],
+                2 * cube.position[a] + static_cast<uint32_t>(child_coordinate(c, a)));
     seen.insert({child.position[0], child.position[1], child.position[2]});
   }
   EXPECT_EQ(seen.size(), 8u);

@@ -77,7 +77,7 @@ TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
     for (int y = 0; y < 512; y += 4)
       for (int z = 0; z < 160; z += 4) {
         uint64_t mask = random();
-        while (oracle::cut(oracle::brick_hash(mask), hash_bits) != uint64_t{11} << 60)
+        while (oracle::truncated(oracle::brick_hash(mask), hash_bits) != uint64_t{11} << 60)
           mask = random();
         for (int bit = 0; bit < 64; ++bit)
           if (mask >> bit & 1)

@@ -11,7 +11,7 @@ namespace {
 
 constexpr uint64_t kMinSlots = 64;
 constexpr uint64_t kFirstSlots = 4096;
-constexpr uint64_t kMaxSlots = uint64_t{1} << 16;  // more would leave the caches
+constexpr uint64_t kMaxSlots = uint64_t{1} << 16;  // more would exceed the CPU caches
 
 }  // namespace
 
@@ -20,23 +20,23 @@ BlockMemo::BlockMemo(Memory& memory) : memory_(memory) {
 }
 
 bool BlockMemo::affordable(uint64_t slots) const {
-  return slots * (sizeof(Block) + sizeof(Node)) <=
+  return slots * (sizeof(VoxelBlock) + sizeof(Node)) <=
          BackendMemory::block_memo_bytes(memory_.budget.available());
 }
 
 void BlockMemo::set_slots(uint64_t slots) {
-  blocks_ = Buffer<Block>(memory_, slots, Buffer<Block>::kZero);
-  nodes_ = Buffer<Node>(memory_, slots);
+  blocks_ = PooledArray<VoxelBlock>(memory_, slots, PooledArray<VoxelBlock>::kZero);
+  nodes_ = PooledArray<Node>(memory_, slots);
   slots_ = slots;
   shift_ = 64 - std::countr_zero(slots);
 }
 
 void BlockMemo::grow() {
-  remembered_ = 0;
+  inserted_ = 0;
   const uint64_t old_slots = slots_, slots = 4 * slots_;
   if (slots > kMaxSlots || !affordable(slots)) return;
-  const Buffer<Block> blocks = std::move(blocks_);
-  const Buffer<Node> nodes = std::move(nodes_);
+  const PooledArray<VoxelBlock> blocks = std::move(blocks_);
+  const PooledArray<Node> nodes = std::move(nodes_);
   set_slots(slots);
   for (uint64_t i = 0; i < old_slots; ++i) {
     const uint64_t slot = slot_of(block_key(blocks[i]));

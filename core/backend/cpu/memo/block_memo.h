@@ -1,21 +1,19 @@
-// What a build remembers of blocks: cubes of 8 voxels, whose eight bricks are 64 bytes. Most blocks
-// of a scene have been there before; one comparison then stands for a look-up of each of their
-// bricks and one of their node.
+// A cache from voxel blocks (8^3 voxels, eight bricks in 64 bytes) to their nodes. Most blocks of a
+// scene occur more than once; one comparison then replaces a lookup of each brick and of the node.
 //
 //   blocks    64 bytes each; all 0: free
-//   nodes     what the block of the same slot became
+//   nodes     the node of the block in the same slot
 //
-// Direct-mapped: a block that meets another one in its slot takes its place. Blocks are compared
-// whole, so what is found is right whatever their keys. Where few are found it is left alone for a
-// while: scans have hardly two blocks alike. Charged to the budget, of which it takes a sixteenth
-// at most beyond its least size.
-// Not thread-safe. Throws Outgrown when not even its least size fits.
+// It is direct-mapped: a block replaces the one in its slot. Blocks are compared as a whole, so a
+// hit is right for any keys. It is bypassed for a while when most lookups miss: in scans hardly two
+// blocks are equal. It is charged to the budget; beyond its minimum size it is at most a sixteenth
+// of it. Not thread-safe. Throws OutOfBudget if not even the minimum size fits.
 #pragma once
 
 #include <cstdint>
 
-#include "core/backend/cpu/memo/voxel_block.h"
 #include "core/backend/cpu/memory.h"
+#include "core/backend/cpu/raster/voxel_block.h"
 
 namespace voxdag::cpu {
 
@@ -30,53 +28,53 @@ class BlockMemo {
 
   explicit BlockMemo(Memory& memory);
 
-  // Whether to ask for the next `count` blocks at all.
-  bool pays(int count) {
-    if (resting_ > 0) {
-      resting_ -= count;
+  // Whether to use the memo for the next `count` blocks.
+  bool is_worthwhile(int count) {
+    if (bypassed_ > 0) {
+      bypassed_ -= count;
       return false;
     }
-    asked_ += count;
-    if (asked_ >= kWindow) {
-      if (missed_ > asked_ - asked_ / 4) resting_ = kRest;
-      asked_ = missed_ = 0;
+    lookups_ += count;
+    if (lookups_ >= kWindow) {
+      if (misses_ > lookups_ - lookups_ / 4) bypassed_ = kBypass;
+      lookups_ = misses_ = 0;
     }
     return true;
   }
   void prefetch(uint64_t key) const { __builtin_prefetch(&blocks_[slot_of(key)]); }
-  // Null if the block, which is not empty, is not remembered.
-  const Node* find(uint64_t key, const Block& block) const {
+  // Null if the block, which must not be empty, is not in the memo.
+  const Node* find(uint64_t key, const VoxelBlock& block) const {
     const uint64_t slot = slot_of(key);
     uint64_t differ = 0;
     for (int i = 0; i < kBlockBricks; ++i) differ |= blocks_[slot].bricks[i] ^ block.bricks[i];
     return differ == 0 ? &nodes_[slot] : nullptr;
   }
-  void remember(uint64_t key, const Block& block, const Node& node) {
+  void insert(uint64_t key, const VoxelBlock& block, const Node& node) {
     const uint64_t slot = slot_of(key);
     blocks_[slot] = block;
     nodes_[slot] = node;
-    ++missed_;
-    if (++remembered_ == slots_) grow();
+    ++misses_;
+    if (++inserted_ == slots_) grow();
   }
 
  private:
   static constexpr int64_t kWindow = 1024;  // blocks
-  static constexpr int64_t kRest = 16 * kWindow;
+  static constexpr int64_t kBypass = 16 * kWindow;
 
   uint64_t slot_of(uint64_t key) const { return key * 0x9e3779b97f4a7c15ull >> shift_; }
   bool affordable(uint64_t slots) const;
   void set_slots(uint64_t slots);
-  // Four times the slots, if the budget has room.
+  // Makes four times the slots if the budget has room for them.
   void grow();
 
   Memory& memory_;
-  Buffer<Block> blocks_;
-  Buffer<Node> nodes_;
-  uint64_t slots_ = 0;       // a power of two
-  uint64_t remembered_ = 0;  // since the last growth
+  PooledArray<VoxelBlock> blocks_;
+  PooledArray<Node> nodes_;
+  uint64_t slots_ = 0;     // a power of two
+  uint64_t inserted_ = 0;  // since the last growth
   int shift_ = 0;
-  int64_t asked_ = 0, missed_ = 0;  // in this window
-  int64_t resting_ = 0;             // blocks for which it is left alone
+  int64_t lookups_ = 0, misses_ = 0;  // in this window
+  int64_t bypassed_ = 0;              // blocks until the memo is used again
 };
 
 }  // namespace voxdag::cpu

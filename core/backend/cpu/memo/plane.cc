@@ -29,9 +29,9 @@ bool Plane::offset_from(const Box& cube, int size_log2, int64_t& f) const {
   int128 at_corner = c;
   for (int a = 0; a < 3; ++a) at_corner += static_cast<int128>(n[a]) * cube.low[a];
   const int128 floored = at_corner >> kUnitBits;
-  const int128 most = floored + (static_cast<int128>(rising()) << size_log2);
-  const int128 least = floored + (static_cast<int128>(falling()) << size_log2);
-  if (most < 0 || least + (fractional ? 1 : 0) > 0) return false;
+  const int128 highest = floored + (static_cast<int128>(rising()) << size_log2);
+  const int128 lowest = floored + (static_cast<int128>(falling()) << size_log2);
+  if (highest < 0 || lowest + (fractional ? 1 : 0) > 0) return false;
   f = static_cast<int64_t>(floored);
   return true;
 }

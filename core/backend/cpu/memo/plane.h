@@ -1,5 +1,5 @@
-// The plane of a triangle, as seen by cubes that the triangle covers: nothing but the plane's
-// direction and its offset from the cube's corner decides which voxels of such a cube are set.
+// The plane of a triangle. Which voxels are set in a cube that the triangle covers depends only on
+// the plane's direction and its offset from the cube's corner.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace voxdag::cpu {
 // n.p + c = 0 for lattice positions p, n without a common divisor. For a cube whose low corner is q
 // let f = floor((n.q + c) / 256): with voxels k counted from there, the plane is at or above a
 // voxel corner iff n.k + f >= 0 (256 i + c >= 0 <=> i + floor(c / 256) >= 0 for integers i), so
-// that f alone, and whether the division left a remainder, say all.
+// the voxels depend only on f and on whether the division left a remainder.
 struct Plane {
   int64_t n[3];
   int128 c;
@@ -31,8 +31,8 @@ struct Plane {
   bool offset_from(const Box& cube, int size_log2, int64_t& f) const;
 };
 
-// Whether all vertices have the same coordinate along an axis, which makes a plane of the simplest
-// kind, found without arithmetic.
+// The plane of a triangle whose vertices have equal coordinates along an axis; found without
+// arithmetic.
 template <class Int>
 std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
   for (int a = 0; a < 3; ++a) {
@@ -44,7 +44,7 @@ std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
   return {};
 }
 
-// Of any triangle that is not degenerate.
+// The plane of a triangle that is not degenerate.
 Plane plane_of(const NarrowTriangle& t);
 
 }  // namespace voxdag::cpu

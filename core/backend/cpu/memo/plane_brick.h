@@ -1,13 +1,15 @@
-// The voxels that a plane n.k + f (see plane.h) crosses.
+// The voxels of a brick that a plane n.k + f (plane.h) crosses.
 #pragma once
 
 #include <cstdint>
 
+#include "core/dag/brick.h"
+
 namespace voxdag::cpu {
 
-// The plane crosses voxel k iff n.k lies within [least, most].
+// The plane crosses voxel k iff low <= n.k <= high.
 struct PlaneRange {
-  int64_t least, most;
+  int64_t low, high;
 
   PlaneRange(const int64_t (&n)[3], int64_t f, bool fractional) {
     int64_t rising = 0, size = 0;
@@ -16,8 +18,8 @@ struct PlaneRange {
       size += x > 0 ? x : -x;
     }
     // Over a voxel's corners the value rises to n.k + f + rising, and falls below that by `size`.
-    least = -(f + rising);
-    most = least + size - (fractional ? 1 : 0);
+    low = -(f + rising);
+    high = low + size - (fractional ? 1 : 0);
   }
 };
 
@@ -26,8 +28,8 @@ inline uint64_t plane_brick(const int64_t (&n)[3], int64_t f, bool fractional) {
   uint64_t mask = 0;
   for (int voxel = 0; voxel < 64; ++voxel) {
     int64_t value = 0;
-    for (int a = 0; a < 3; ++a) value += n[a] * ((voxel >> a & 1) | (voxel >> (a + 3) & 1) << 1);
-    mask |= uint64_t{value >= crossed.least && value <= crossed.most} << voxel;
+    for (int a = 0; a < 3; ++a) value += n[a] * brick_coordinate(voxel, a);
+    mask |= uint64_t{value >= crossed.low && value <= crossed.high} << voxel;
   }
   return mask;
 }

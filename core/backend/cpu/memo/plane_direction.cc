@@ -20,14 +20,13 @@ void PlaneDirection::set_up(const Plane& plane) {
   buckets_per_unit_ = kBuckets / (static_cast<double>(span) + 1.0);
   int i = 0;
   for (int b = 0; b <= kBuckets; ++b) {
-    // The first value of this bucket or a later one may lie above an f of this bucket: one less.
+    // The first value of this bucket may be above an f of the same bucket: the one before is not.
     while (i < kCorners && bucket(values_[i]) < b) ++i;
     bucket_[b] = static_cast<uint16_t>(std::max(i - 1, 0));
   }
   for (int m = 0; m < 512; ++m) {
     int64_t k[3];
-    for (int a = 0; a < 3; ++a)
-      k[a] = (m >> a & 1) | (m >> (a + 3) & 1) << 1 | (m >> (a + 6) & 1) << 2;
+    for (int a = 0; a < 3; ++a) k[a] = brick_coordinate(m, a) | (m >> (8 - a) & 1) << 2;
     offsets_[m] = n_[0] * k[0] + n_[1] * k[1] + n_[2] * k[2];
   }
   std::fill(known_, known_ + kCorners, Known{});
@@ -38,7 +37,7 @@ void PlaneDirection::make(int64_t f, SubDagTables& tables, const Kernels& kernel
   const OctreeCounts before = tables.counts();
   const PlaneRange crossed(n_, f, true);
   uint64_t masks[8];
-  kernels.find_in_range(offsets_, 512, crossed.least, crossed.most, masks);
+  kernels.find_in_range(offsets_, 512, crossed.low, crossed.high, masks);
   NodeRef bricks[8];
   for (int c = 0; c < 8; ++c) bricks[c] = tables.add_brick(masks[c]);
   const NodeRef node = tables.add_node(kSizeLog2, bricks);

@@ -1,18 +1,19 @@
-// All nodes of 8 voxels that the planes of one direction can make. Whether a plane passes above or
-// below a voxel corner k depends on whether f >= -n.k; a cube of 8 voxels has 729 corners, so the
-// sorted values -n.k cut all offsets f into at most 730 intervals, and in each the node is the
-// same: found once, then looked up.
+// All nodes of 8^3 voxels that the planes of one direction can have. Whether a plane passes above
+// or below a voxel corner k depends on whether f >= -n.k. A cube of 8^3 voxels has 729 corners, so
+// the sorted values -n.k divide all offsets f into at most 730 intervals; within an interval the
+// node is the same, so it is made once and then looked up.
 #pragma once
 
 #include <cstdint>
 
-#include "core/backend/cpu/kernels.h"
 #include "core/backend/cpu/memo/plane.h"
+#include "core/backend/cpu/raster/kernels.h"
 #include "core/backend/cpu/tables/sub_dag_tables.h"
 
 namespace voxdag::cpu {
 
-// Plain memory, of 24 KiB. For planes whose offsets leave a remainder only.
+// Trivially copyable, 24 KiB. Only for planes whose offsets leave a remainder (Plane::fractional).
+// Not thread-safe.
 class PlaneDirection {
  public:
   static constexpr int kSizeLog2 = 3;  // of the nodes
@@ -22,7 +23,7 @@ class PlaneDirection {
     uint64_t hash;
     uint32_t id;
     uint16_t voxels;
-    uint8_t nodes;  // 0: not known yet
+    uint8_t nodes;  // 0: not made yet
   };
 
   void set_up(const Plane& plane);
@@ -30,13 +31,13 @@ class PlaneDirection {
     return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2];
   }
 
-  // n.k for k of a cube of 8, in Morton order: the voxels of a node; times 8 the nodes of a tile.
+  // n.k for the voxels k of a node in Morton order; times 8, for the nodes of a tile.
   const int64_t* offsets() const { return offsets_; }
-  // Offsets f at which a plane crosses a node, [least, most]; nothing is crossed at others.
+  // A plane crosses a node iff its offset f is within [min_offset(), max_offset()].
   int64_t min_offset() const { return values_[0]; }
   int64_t max_offset() const { return values_[kCorners - 1] - 1; }
 
-  // The node at an offset within [least, most].
+  // The node at an offset within [min_offset(), max_offset()].
   const Known& node(int64_t f, SubDagTables& tables, const Kernels& kernels) {
     Known& known = known_[interval(f)];
     if (known.nodes == 0) make(f, tables, kernels, known);
@@ -46,13 +47,13 @@ class PlaneDirection {
  private:
   static constexpr int kBuckets = 256;
 
-  // How many values are <= f, less one.
+  // The number of values <= f, minus one.
   int interval(int64_t f) const {
     int i = bucket_[bucket(f)];
     while (values_[i + 1] <= f) ++i;
     return i;
   }
-  // Rises with f; the same arithmetic made the buckets, so rounding does not matter.
+  // Monotonic in f. The table was made by the same arithmetic, so rounding does not matter.
   int bucket(int64_t f) const {
     return static_cast<int>(static_cast<double>(f - values_[0]) * buckets_per_unit_);
   }
@@ -62,7 +63,7 @@ class PlaneDirection {
   double buckets_per_unit_;
   int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
   int64_t offsets_[512];
-  uint16_t bucket_[kBuckets + 1];  // the last value that no f of the bucket is below
+  uint16_t bucket_[kBuckets + 1];  // the last value that is <= every f of the bucket
   Known known_[kCorners];
 };
 static_assert(sizeof(PlaneDirection) <= 24 << 10);

@@ -10,12 +10,12 @@ namespace voxdag::cpu {
 namespace {
 
 constexpr int64_t kSmallNormal = 64;  // sum of magnitudes
-constexpr uint64_t kMinMemos = 1024;  // slots; a power of two
-constexpr uint64_t kSpareMemos = 64;  // more than are made before the next reserve_memo()
+constexpr uint64_t kMinSlots = 1024;  // slots; a power of two
+constexpr uint64_t kSpareSlots = 64;  // more than are used before the next reserve_small_nodes()
 constexpr uint32_t kMaxPlanes = 1 << 20;
 
-// The whole question of small_node(): 24 + 1 + 5 + 28 bits, and one so that no key is 0.
-uint64_t memo_key(const Plane& plane, int64_t f, int size_log2) {
+// All inputs of small_node(): 24 + 1 + 5 + 28 bits, and one more so that no key is 0.
+uint64_t small_key(const Plane& plane, int64_t f, int size_log2) {
   uint64_t key = 1;
   for (const int64_t x : plane.n) key = key << 8 | static_cast<uint64_t>(x + kSmallNormal);
   key = key << 1 | (plane.fractional ? 1 : 0);
@@ -36,7 +36,7 @@ bool PlaneMemo::build(const TriangleSet& triangles, Entry entry, const Box& cube
     return true;
   }
   const int tiles_log2 = 2 * (size_log2 - kTileLog2);
-  const Remembered* known = find(triangles, entry, tiles_log2 < 0 ? 0 : uint64_t{1} << tiles_log2);
+  const KnownPlane* known = find(triangles, entry, tiles_log2 < 0 ? 0 : uint64_t{1} << tiles_log2);
   if (known == nullptr || !known->plane.fits(size_log2)) return false;
   const Plane plane = known->plane;
   PlaneDirection* const direction = known->direction;
@@ -46,18 +46,18 @@ bool PlaneMemo::build(const TriangleSet& triangles, Entry entry, const Box& cube
   return true;
 }
 
-bool PlaneMemo::remembers(const TriangleSet& triangles, Entry entry) {
+bool PlaneMemo::has_plane(const TriangleSet& triangles, Entry entry) {
   if (entry.wide()) return axis_aligned_plane(triangles.wide(entry)).has_value();
   return axis_aligned_plane(triangles.narrow(entry)).has_value() ||
          find(triangles, entry, 0) != nullptr;
 }
 
-const PlaneMemo::Remembered* PlaneMemo::find(const TriangleSet& triangles, Entry entry,
+const PlaneMemo::KnownPlane* PlaneMemo::find(const TriangleSet& triangles, Entry entry,
                                              uint64_t tiles) {
   if (entry.wide()) return nullptr;
   if (known_.size() == 0) {
     if (!affordable(triangles.narrow_count() * sizeof(uint32_t))) return nullptr;
-    known_ = Buffer<uint32_t>(memory_, triangles.narrow_count(), Buffer<uint32_t>::kZero);
+    known_ = PooledArray<uint32_t>(memory_, triangles.narrow_count(), PooledArray<uint32_t>::kZero);
   }
   uint32_t& known = known_[entry.number()];
   if (known < kWorthwhile) {
@@ -65,12 +65,12 @@ const PlaneMemo::Remembered* PlaneMemo::find(const TriangleSet& triangles, Entry
       known += static_cast<uint32_t>(tiles);
       return nullptr;
     }
-    known = remember(plane_of(triangles.narrow(entry)));
+    known = add_plane(plane_of(triangles.narrow(entry)));
   }
   return known == kNever ? nullptr : &planes_[known - kWorthwhile];
 }
 
-uint32_t PlaneMemo::remember(const Plane& plane) {
+uint32_t PlaneMemo::add_plane(const Plane& plane) {
   PlaneDirection* direction = nullptr;
   if (plane.rising() - plane.falling() > kSmallNormal) {
     direction = plane.fractional ? direction_of(plane) : nullptr;
@@ -78,7 +78,7 @@ uint32_t PlaneMemo::remember(const Plane& plane) {
   }
   if (plane_count_ == kMaxPlanes) return kNever;
   if (plane_count_ == planes_.size()) {
-    if (!affordable((plane_count_ + 256) * sizeof(Remembered))) return kNever;
+    if (!affordable((plane_count_ + 256) * sizeof(KnownPlane))) return kNever;
     planes_.grow(memory_, plane_count_ + 256);
   }
   planes_[plane_count_] = {plane, direction};
@@ -86,7 +86,7 @@ uint32_t PlaneMemo::remember(const Plane& plane) {
 }
 
 PlaneDirection* PlaneMemo::direction_of(const Plane& plane) {
-  for (Buffer<PlaneDirection>& direction : directions_)
+  for (PooledArray<PlaneDirection>& direction : directions_)
     if (direction[0].is_direction_of(plane)) return direction.data();
   if (!affordable((directions_.size() + 1) * sizeof(PlaneDirection))) return nullptr;
   directions_.emplace_back(memory_, 1);
@@ -105,7 +105,7 @@ NodeRef PlaneMemo::node(const Plane& plane, PlaneDirection& direction, int64_t f
   const int64_t half = int64_t{1} << (size_log2 - 1);
   for (int c = 0; c < 8; ++c) {
     int64_t at_child = f;
-    for (int a = 0; a < 3; ++a) at_child += (c >> a & 1) * half * plane.n[a];
+    for (int a = 0; a < 3; ++a) at_child += child_coordinate(c, a) * half * plane.n[a];
     if (plane.crosses(at_child, size_log2 - 1))
       children[c] = node(plane, direction, at_child, size_log2 - 1);
   }
@@ -114,12 +114,12 @@ NodeRef PlaneMemo::node(const Plane& plane, PlaneDirection& direction, int64_t f
 
 NodeRef PlaneMemo::tile_node(PlaneDirection& direction, int64_t f, int size_log2) {
   constexpr int kLog2 = PlaneDirection::kSizeLog2;
-  // A node's plane has the offset f and its own corner's, an eighth of which stands in `offsets`.
+  // The plane's offset from a node is f plus that of the node's corner, which is 8 times `offsets`.
   const int64_t* offsets = direction.offsets();
-  const int64_t least = direction.min_offset() - f, most = direction.max_offset() - f;
+  const int64_t low = direction.min_offset() - f, high = direction.max_offset() - f;
   uint64_t crossed[8];
-  kernels_.find_in_range(offsets, 1 << 3 * (size_log2 - kLog2), (least + (1 << kLog2) - 1) >> kLog2,
-                         most >> kLog2, crossed);
+  kernels_.find_in_range(offsets, 1 << 3 * (size_log2 - kLog2), (low + (1 << kLog2) - 1) >> kLog2,
+                         high >> kLog2, crossed);
   OctreeCounts counts;
   const NodeRef found =
       reducer_.reduce_nodes(crossed, kLog2, size_log2, [&](int m) -> const PlaneDirection::Known& {
@@ -136,16 +136,16 @@ NodeRef PlaneMemo::small_node(const Plane& plane, int64_t f, int size_log2) {
   if (!plane.crosses(f, size_log2)) return {};
   if (size_log2 == kBrickLevels)
     return tables_.add_brick(plane_brick(plane.n, f, plane.fractional));
-  reserve_memo();
-  const uint64_t key = memo_key(plane, f, size_log2);
-  if (const Memo& memo = memo_slot(key); memo.key == key) {
-    tables_.counts() += memo.counts;
-    return {memo.hash, memo.id, true};
+  reserve_small_nodes();
+  const uint64_t key = small_key(plane, f, size_log2);
+  if (const SmallNode& known = small_slot(key); known.key == key) {
+    tables_.counts() += known.counts;
+    return {known.hash, known.id, true};
   }
   const OctreeCounts before = tables_.counts();
   const NodeRef made = make_small_node(plane, f, size_log2);
-  memo_slot(key) = {key, made.hash, tables_.counts() - before, made.id};
-  ++memo_count_;
+  small_slot(key) = {key, made.hash, tables_.counts() - before, made.id};
+  ++small_count_;
   return made;
 }
 
@@ -154,33 +154,33 @@ NodeRef PlaneMemo::make_small_node(const Plane& plane, int64_t f, int size_log2)
   const int64_t half = int64_t{1} << (size_log2 - 1);
   for (int c = 0; c < 8; ++c) {
     int64_t at_child = f;
-    for (int a = 0; a < 3; ++a) at_child += (c >> a & 1) * half * plane.n[a];
+    for (int a = 0; a < 3; ++a) at_child += child_coordinate(c, a) * half * plane.n[a];
     children[c] = small_node(plane, at_child, size_log2 - 1);
   }
   return tables_.add_node(size_log2, children);
 }
 
-void PlaneMemo::reserve_memo() {
-  if ((memo_count_ + kSpareMemos) * 2 <= memo_slots_) return;
-  const uint64_t slots = memo_slots_ == 0 ? kMinMemos : 2 * memo_slots_;
-  if (memo_slots_ != 0 && !affordable(slots * sizeof(Memo))) {
-    std::fill(memo_.begin(), memo_.end(), Memo{});
-    memo_count_ = 0;
+void PlaneMemo::reserve_small_nodes() {
+  if ((small_count_ + kSpareSlots) * 2 <= small_slots_) return;
+  const uint64_t slots = small_slots_ == 0 ? kMinSlots : 2 * small_slots_;
+  if (small_slots_ != 0 && !affordable(slots * sizeof(SmallNode))) {
+    std::fill(small_nodes_.begin(), small_nodes_.end(), SmallNode{});
+    small_count_ = 0;
     return;
   }
-  const Buffer<Memo> old = std::move(memo_);
-  const uint64_t old_slots = std::exchange(memo_slots_, slots);
-  memo_ = Buffer<Memo>(memory_, slots, Buffer<Memo>::kZero);
+  const PooledArray<SmallNode> old = std::move(small_nodes_);
+  const uint64_t old_slots = std::exchange(small_slots_, slots);
+  small_nodes_ = PooledArray<SmallNode>(memory_, slots, PooledArray<SmallNode>::kZero);
   for (uint64_t i = 0; i < old_slots; ++i)
-    if (old[i].key != 0) memo_slot(old[i].key) = old[i];
+    if (old[i].key != 0) small_slot(old[i].key) = old[i];
 }
 
-// Where a key is or would be.
-PlaneMemo::Memo& PlaneMemo::memo_slot(uint64_t key) {
+// The slot of a key, or the free slot where it belongs.
+PlaneMemo::SmallNode& PlaneMemo::small_slot(uint64_t key) {
   uint64_t at = key * 0x9e3779b97f4a7c15ull >> 20;
   while (true) {
-    Memo& memo = memo_[at & (memo_slots_ - 1)];
-    if (memo.key == key || memo.key == 0) return memo;
+    SmallNode& slot = small_nodes_[at & (small_slots_ - 1)];
+    if (slot.key == key || slot.key == 0) return slot;
     ++at;
   }
 }

@@ -1,22 +1,19 @@
 // The portable rasterizer: brick after brick of the triangle's box, each voxel of a brick tested by
 // the integer tests of tile_triangle.h.
-#include "core/backend/cpu/raster/draw_portable.h"
-
 #include <algorithm>
 
-#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/raster/draw.h"
+#include "core/backend/cpu/raster/kernels.h"
+#include "core/dag/brick.h"
 
 namespace voxdag::cpu {
 namespace {
 
-// Voxels of a brick are numbered in Morton order: axis a owns bits a and a + 3.
-constexpr int low_bit(int axis) { return 1 << axis; }
-constexpr int high_bit(int axis) { return 8 << axis; }
+// Voxels of a brick are numbered in Morton order: axis a owns bits 2 - a and 5 - a.
+constexpr int low_bit(int axis) { return 4 >> axis; }
+constexpr int high_bit(int axis) { return 32 >> axis; }
 constexpr int voxel_bits(int axis, int k) {
   return (k & 1 ? low_bit(axis) : 0) | (k & 2 ? high_bit(axis) : 0);
-}
-constexpr int voxel_coordinate(int axis, int voxel) {
-  return (voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1;
 }
 
 // The four voxels of the line along `axis` that starts at voxel 0.
@@ -25,7 +22,7 @@ constexpr uint64_t line_along(int axis) {
          uint64_t{1} << (low_bit(axis) + high_bit(axis));
 }
 
-// What the 64 voxels of a brick add to the plane's value at its first.
+// The differences between the plane's value at the 64 voxels of a brick and at its first voxel.
 template <class Int>
 struct VoxelOffsets {
   Int of[64];
@@ -33,7 +30,7 @@ struct VoxelOffsets {
   explicit VoxelOffsets(const Int (&normal)[3]) {
     for (int voxel = 0; voxel < 64; ++voxel) {
       of[voxel] = 0;
-      for (int a = 0; a < 3; ++a) of[voxel] += normal[a] * voxel_coordinate(a, voxel);
+      for (int a = 0; a < 3; ++a) of[voxel] += normal[a] * brick_coordinate(voxel, a);
     }
   }
 };
@@ -49,7 +46,7 @@ uint64_t plane_mask(const VoxelOffsets<Int>& offsets, Int at_first, Int width) {
 }
 
 // Removes the voxels whose column along `axis` is on the outer side of an edge. Most edges cross
-// few bricks: one whose least value over the brick is not negative takes nothing.
+// few bricks: one whose smallest value over the brick is not negative removes nothing.
 template <class Edge>
 void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint64_t& mask) {
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;
@@ -87,16 +84,16 @@ uint64_t brick_mask(const TileTriangle<Coordinate>& t,
   return mask;
 }
 
-// False if no voxel of the brick can be touched: the plane or an edge leaves all of it out.
+// False if the plane or an edge excludes the whole brick.
 template <class Coordinate>
 bool may_touch(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
-  auto least = t.lowest, most = t.lowest;
+  auto low = t.lowest, high = t.lowest;
   for (int a = 0; a < 3; ++a) {
     const auto near = t.normal[a] * (4 * brick[a]), far = near + 3 * t.normal[a];
-    least += std::min(near, far);
-    most += std::max(near, far);
+    low += std::min(near, far);
+    high += std::max(near, far);
   }
-  if (most < 0 || least > t.width) return false;
+  if (high < 0 || low > t.width) return false;
   if (t.inside) return true;
   for (int d = 0; d < 3; ++d)
     for (const auto& edge : t.edges[d])
@@ -118,11 +115,11 @@ void draw_exactly(const TileTriangle<Coordinate>& t, TileBricks& tile) {
   }
   const VoxelOffsets offsets(t.normal);
   int brick[3];
-  for (brick[2] = first[2]; brick[2] <= last[2]; ++brick[2])
+  for (brick[0] = first[0]; brick[0] <= last[0]; ++brick[0])
     for (brick[1] = first[1]; brick[1] <= last[1]; ++brick[1])
-      for (brick[0] = first[0]; brick[0] <= last[0]; ++brick[0])
+      for (brick[2] = first[2]; brick[2] <= last[2]; ++brick[2])
         if (may_touch(t, brick))
-          tile.add(kSpread[brick[0]] | kSpread[brick[1]] << 1 | kSpread[brick[2]] << 2,
+          tile.add(kSpread[brick[0]] << 2 | kSpread[brick[1]] << 1 | kSpread[brick[2]],
                    brick_mask(t, offsets, brick));
 }
 

@@ -1,9 +1,9 @@
 // Which of a cube's eight children a triangle may touch: the overlap test for all eight at once, in
-// doubles. Four numbers of a quad are, in turn, the three edges of the triangle (the fourth idles)
+// doubles. The four numbers of a quad are the three edges of the triangle (the fourth is ignored)
 // or four children.
 //
-// Culling need not be exact, since bricks are: a child that is touched must never be left out, one
-// that is not may stay. "Inside" must never be claimed wrongly. Both hold because every sum is
+// Culling need not be exact, since the rasterizers are: a touched child must never be left out, one
+// that is not touched may remain. "Inside" must never be wrong. Both hold because every sum is
 // widened, or narrowed, by more than its rounding error: vertices and edges are exact in doubles
 // (below 2^42), normals are made in integers and rounded once, and what follows are sums of at most
 // eight products, each off by at most 3 * 2^-53 of |coefficient| * |distance|.
@@ -16,9 +16,10 @@
 
 #include <cstdint>
 
-#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/raster/kernels.h"
 #include "core/base/integers.h"
 #include "core/base/popcount8.h"
+#include "core/geometry/cube.h"
 
 namespace voxdag::cpu {
 
@@ -29,13 +30,14 @@ struct ColumnTable {
     for (int d = 0; d < 3; ++d)
       for (int set = 0; set < 16; ++set)
         for (int c = 0; c < 8; ++c) {
-          const int column = (c >> (d + 1) % 3 & 1) | (c >> (d + 2) % 3 & 1) << 1;
+          const int column = child_coordinate(c, (d + 1) % 3) | child_coordinate(c, (d + 2) % 3)
+                                                                    << 1;
           children[d][set] |= static_cast<uint8_t>((set >> column & 1) << c);
         }
   }
 };
 inline constexpr ColumnTable kColumns;
-inline constexpr uint8_t kLowChildren[3] = {0x55, 0x33, 0x0f};
+inline constexpr uint8_t kLowChildren[3] = {0x0f, 0x33, 0x55};
 inline constexpr double kRoundingSlack = 0x1p-47;
 
 template <class Quad, class Coordinate>
@@ -53,7 +55,7 @@ struct OctantTest {
     half = static_cast<double>(cube.edge / 2);
   }
 
-  // Children that the triangle's box touches, exactly; sets `reach` and `long_axes`.
+  // The children that the triangle's box touches, exactly; sets `reach` and `long_axes`.
   uint32_t box_test() {
     uint32_t touched = 0xff;
     int64_t farthest = cube.edge;
@@ -83,7 +85,7 @@ struct OctantTest {
     }
   }
 
-  // Children that the plane may cross.
+  // The children that the plane may cross.
   uint32_t plane_test() const {
     double rising = 0, falling = 0, at_low = 0;
     for (int a = 0; a < 3; ++a) {
@@ -91,19 +93,19 @@ struct OctantTest {
       at_low -= normal[a] * static_cast<double>(t.v[a][0] - cube.low[a]);
     }
     const double slack = (rising - falling) * reach * kRoundingSlack;
-    const Quad columns = Quad(0, normal[0], normal[1], normal[0] + normal[1]) * Quad(half);
+    const Quad columns = Quad(0, normal[2], normal[1], normal[1] + normal[2]) * Quad(half);
     uint32_t touched = 0;
     for (int k = 0; k < 2; ++k) {
-      const double base = at_low + k * half * normal[2];
-      const Quad most = columns + Quad(base + half * rising + slack);
-      const Quad least = Quad(slack - base - half * falling) - columns;
-      touched |= (most.negative() | least.negative()) << 4 * k;
+      const double base = at_low + k * half * normal[0];
+      const Quad highest = columns + Quad(base + half * rising + slack);
+      const Quad lowest = Quad(slack - base - half * falling) - columns;
+      touched |= (highest.negative() | lowest.negative()) << 4 * k;
     }
     return ~touched & 0xff;
   }
 
-  // Children on the inner side of the edges in projection `d`; if `inside` is given, also those
-  // that are so with their whole area.
+  // The children on the inner side of the edges in projection `d`; `inside`, if not null, receives
+  // those that are so with their whole area.
   uint32_t edge_test(int d, uint32_t* inside) const {
     const int p = (d + 1) % 3, q = (d + 2) % 3;
     const Quad vp = Quad::load(t.v[p], cube.low[p]), vq = Quad::load(t.v[q], cube.low[q]);
@@ -113,20 +115,20 @@ struct OctantTest {
     const Quad rise_a = a.above_zero(), rise_b = b.above_zero();
     const Quad size = rise_a + rise_b + (rise_a - a) + (rise_b - b);
     const Quad slack = size * Quad(reach * kRoundingSlack), half4(half);
-    const Quad most = at_low + (rise_a + rise_b) * half4 + slack;
+    const Quad highest = at_low + (rise_a + rise_b) * half4 + slack;
     const Quad step_a = a * half4, step_b = b * half4, step_ab = step_a + step_b;
     uint32_t columns = 0;
-    columns |= (most.negative() & 7) == 0 ? 1 : 0;
-    columns |= ((most + step_a).negative() & 7) == 0 ? 2 : 0;
-    columns |= ((most + step_b).negative() & 7) == 0 ? 4 : 0;
-    columns |= ((most + step_ab).negative() & 7) == 0 ? 8 : 0;
+    columns |= (highest.negative() & 7) == 0 ? 1 : 0;
+    columns |= ((highest + step_a).negative() & 7) == 0 ? 2 : 0;
+    columns |= ((highest + step_b).negative() & 7) == 0 ? 4 : 0;
+    columns |= ((highest + step_ab).negative() & 7) == 0 ? 8 : 0;
     if (inside != nullptr) {
-      const Quad least = most - size * half4 - (slack + slack);
+      const Quad lowest = highest - size * half4 - (slack + slack);
       uint32_t covered = 0;
-      covered |= (least.negative() & 7) == 0 ? 1 : 0;
-      covered |= ((least + step_a).negative() & 7) == 0 ? 2 : 0;
-      covered |= ((least + step_b).negative() & 7) == 0 ? 4 : 0;
-      covered |= ((least + step_ab).negative() & 7) == 0 ? 8 : 0;
+      covered |= (lowest.negative() & 7) == 0 ? 1 : 0;
+      covered |= ((lowest + step_a).negative() & 7) == 0 ? 2 : 0;
+      covered |= ((lowest + step_b).negative() & 7) == 0 ? 4 : 0;
+      covered |= ((lowest + step_ab).negative() & 7) == 0 ? 8 : 0;
       *inside = kColumns.children[d][covered];
     }
     return kColumns.children[d][columns];
@@ -134,7 +136,7 @@ struct OctantTest {
 
   Octants run(bool whole_cube_inside) {
     Octants out{box_test(), 0};
-    // A small triangle covers no child, and where its box is in two it most likely touches both.
+    // A small triangle covers no child; if its box touches two, the triangle most likely does too.
     if (!whole_cube_inside && kPopcount8[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
     set_normal();
     out.touched &= plane_test();

@@ -1,4 +1,5 @@
-// A triangle as the rasterizers see it: exact integer tests on the voxels of one tile.
+// A triangle prepared for the rasterizers: the overlap test of core/geometry/overlap.h (Schwarz and
+// Seidel 2010, section 4.1) as exact integer tests on the voxels of one tile.
 //
 // With vertices v relative to the tile's low corner, n the quarter normal (vertices are odd, so
 // edges are even, and half-edges cross to a quarter of the normal) and k a voxel of the tile:
@@ -7,8 +8,8 @@
 //   edge    the edge function's largest value over the box, in one of the three projections, is
 //           not negative                                       <=>   a k_p + b k_q + c >= 0
 //
-// since for an integer i and any c: 256 i + c >= 0 <=> i + floor(c / 256) >= 0. So no test below
-// ever sees the eight bits within a voxel.
+// since for an integer i and any c: 256 i + c >= 0 <=> i + floor(c / 256) >= 0. So the tests do not
+// need the eight bits within a voxel.
 //
 // Bounds. Narrow triangles: half-edges <= 2^27, |n_a| <= 2^54 (the triangle's shadow lies in its
 // box), sum of |n_a| <= 3 * 2^54. If the plane misses the tile there is nothing to draw; if not,

@@ -7,9 +7,9 @@
 namespace voxdag::cpu {
 
 void BrickTable::grow(uint64_t bricks) {
-  if (bricks > UINT32_MAX) throw Outgrown{};
-  Buffer<Slot> old = std::move(slots_);
-  slots_ = Buffer<Slot>(memory_, slots_for(bricks), Buffer<Slot>::kZero);
+  if (bricks > UINT32_MAX) throw OutOfBudget{};
+  PooledArray<Slot> old = std::move(slots_);
+  slots_ = PooledArray<Slot>(memory_, slots_for(bricks), PooledArray<Slot>::kZero);
   capacity_ = entries_for(slots_.size());
   shift_ = 64 - lowest_bit(slots_.size());
   for (const Slot& slot : old) {
@@ -26,8 +26,8 @@ std::span<const BrickTable::Slot> BrickTable::sort_slots(uint32_t hash_bits) {
       std::span(slots_.begin(), slots_.end()), [](const Slot& slot) { return slot.mask != 0; },
       tag);
   const auto less = [hash_bits](const Slot& a, const Slot& b) {
-    const uint64_t hash_a = cut_hash(hash_brick(a.mask), hash_bits);
-    const uint64_t hash_b = cut_hash(hash_brick(b.mask), hash_bits);
+    const uint64_t hash_a = truncate_hash(hash_brick(a.mask), hash_bits);
+    const uint64_t hash_b = truncate_hash(hash_brick(b.mask), hash_bits);
     return hash_a != hash_b ? hash_a < hash_b : a.mask < b.mask;
   };
   if (hash_bits < 64)

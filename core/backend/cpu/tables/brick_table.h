@@ -1,9 +1,9 @@
 // The unique bricks of one subvolume: an open-addressing table from masks to ids 0, 1, 2, ...
 //
-// ConcurrencyLimiter are indexed by the top bits of the brick's hash and probed linearly. So
-// growing is one streaming pass, and the slots from first to last are almost in the order of the
-// hash: the level array is made by sorting a nearly sorted array (sort_slots()). Not thread-safe.
-// Throws Outgrown when the budget cannot hold more.
+// Slots are indexed by the top bits of the brick's hash and probed linearly. So growing is one
+// streaming pass, and the slots from first to last are almost in the order of the hash: the level
+// array is made by sorting a nearly sorted array (sort_slots()). Not thread-safe. Throws
+// OutOfBudget when the budget cannot hold more.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ class BrickTable {
 
   uint64_t size() const { return count_; }
 
-  // Makes room for `more` bricks; must precede the calls below.
+  // Reserves slots for `more` bricks; must precede the calls below.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow(count_ + more);
   }
@@ -53,15 +53,15 @@ class BrickTable {
       if (slot.mask != 0) visit(slot.mask, slot.id);
   }
 
-  // All slots in use, in the order of (hash cut to `hash_bits`, mask). Ends the table's life as a
-  // table.
+  // All slots in use, in the order of (hash truncated to `hash_bits`, mask). The table can then no
+  // longer be searched.
   std::span<const Slot> sort_slots(uint32_t hash_bits);
 
  private:
   void grow(uint64_t bricks);
 
   Memory& memory_;
-  Buffer<Slot> slots_;
+  PooledArray<Slot> slots_;
   uint64_t capacity_ = 0;
   int shift_ = 64;  // index of a hash = hash >> shift_
   uint64_t count_ = 0;

@@ -1,6 +1,6 @@
-// From tables to level arrays, from the bricks up. Each level in three passes: records get their
-// children's places in the array below (in the order of adding, where neighbors are neighbors),
-// slots are sorted, records are copied out in that order and learn their own places.
+// From tables to level arrays, from the bricks up. Each level takes three passes: child ids in
+// records are replaced by positions in the array below (in the order of adding, where neighbors are
+// neighbors), slots are sorted, and records are copied in that order and given their own positions.
 #include <algorithm>
 #include <cstring>
 
@@ -10,12 +10,12 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr size_t kPrefetchAhead = 12;  // records, on their way from memory
+constexpr size_t kPrefetchAhead = 12;  // records
 
 class LevelEmitter {
  public:
-  LevelEmitter(SubDagTables& tables, uint32_t grid_levels, uint32_t hash_bits, SubDagSink& sink)
-      : tables_(tables), grid_levels_(grid_levels), hash_bits_(hash_bits), sink_(sink) {
+  LevelEmitter(SubDagTables& tables, const SubDagShape& shape, SubDagSink& sink)
+      : tables_(tables), grid_levels_(shape.grid_levels), hash_bits_(shape.hash_bits), sink_(sink) {
     uint64_t max_nodes = 0, max_children = 0, max_hashes = tables.bricks().size();
     for (int s = kBrickLevels + 1; s <= tables.size_log2(); ++s) {
       max_nodes = std::max(max_nodes, tables.nodes(s).size());
@@ -23,18 +23,18 @@ class LevelEmitter {
     }
     max_hashes = std::max(max_hashes, max_nodes);
     Memory& memory = tables.memory();
-    brick_places_ = Buffer<uint32_t>(memory, tables.bricks().size());
-    hashes_ = Buffer<uint64_t>(memory, max_hashes);
-    masks_ = Buffer<uint8_t>(memory, max_nodes);
-    children_ = Buffer<uint32_t>(memory, max_children + 8);
+    brick_places_ = PooledArray<uint32_t>(memory, tables.bricks().size());
+    hashes_ = PooledArray<uint64_t>(memory, max_hashes);
+    masks_ = PooledArray<uint8_t>(memory, max_nodes);
+    children_ = PooledArray<uint32_t>(memory, max_children + 8);
   }
 
   SubDagSummary run() {
     SubDagSummary summary{tables_.counts().voxels, tables_.counts().nodes, tables_.bricks().size(),
                           0};
-    if (hash_bits_ < 64) cut_hashes();
+    if (hash_bits_ < 64) truncate_hashes();
     emit_bricks();
-    summary.root_hash = cut_hash(hash_brick(hashes_[0]), hash_bits_);
+    summary.root_hash = truncate_hash(hash_brick(hashes_[0]), hash_bits_);
     for (int s = kBrickLevels + 1; s <= tables_.size_log2(); ++s) {
       emit_nodes(s);
       summary.dag_nodes += tables_.nodes(s).size();
@@ -44,11 +44,11 @@ class LevelEmitter {
   }
 
  private:
-  // Makes the hashes of all records those of --hash-bits, from the bricks up.
-  void cut_hashes() {
-    Buffer<uint64_t> brick_hashes(tables_.memory(), tables_.bricks().size());
+  // Replaces the hashes of all records by those of --hash-bits, from the bricks up.
+  void truncate_hashes() {
+    PooledArray<uint64_t> brick_hashes(tables_.memory(), tables_.bricks().size());
     tables_.bricks().for_each([&](uint64_t mask, uint32_t id) {
-      brick_hashes[id] = cut_hash(hash_brick(mask), hash_bits_);
+      brick_hashes[id] = truncate_hash(hash_brick(mask), hash_bits_);
     });
     for (int s = kBrickLevels + 1; s <= tables_.size_log2(); ++s)
       tables_.nodes(s).for_each_record([&](NodeTable::Record record) {
@@ -59,7 +59,7 @@ class LevelEmitter {
                                          ? brick_hashes[child]
                                          : tables_.nodes(s - 1).record(child).hash());
         }
-        record.set_hash(cut_hash(node_hash_end(hash), hash_bits_));
+        record.set_hash(truncate_hash(node_hash_end(hash), hash_bits_));
       });
   }
 
@@ -99,8 +99,8 @@ class LevelEmitter {
       NodeTable::Record record = table.record(static_cast<uint32_t>(slots[i]));
       hashes_[i] = record.hash();
       masks_[i] = static_cast<uint8_t>(record.mask());
-      // Always eight: what is too many is overwritten by the next node. Tables and arrays have
-      // room.
+      // Always eight: surplus ones are overwritten by the next node. Tables and arrays are large
+      // enough.
       std::memcpy(&children_[at], record.children(), 8 * sizeof(uint32_t));
       at += record.child_count();
       record.set_place(i);
@@ -114,18 +114,17 @@ class LevelEmitter {
   const uint32_t grid_levels_;
   const uint32_t hash_bits_;
   SubDagSink& sink_;
-  Buffer<uint32_t> brick_places_;  // by brick id
-  Buffer<uint64_t> hashes_;        // of a level's nodes; masks of the bricks
-  Buffer<uint8_t> masks_;
-  Buffer<uint32_t> children_;
+  PooledArray<uint32_t> brick_places_;  // by brick id
+  PooledArray<uint64_t> hashes_;        // of a level's nodes; masks of the bricks
+  PooledArray<uint8_t> masks_;
+  PooledArray<uint32_t> children_;
 };
 
 }  // namespace
 
-SubDagSummary emit_levels(SubDagTables& tables, uint32_t grid_levels, uint32_t hash_bits,
-                          SubDagSink& sink) {
+SubDagSummary emit_levels(SubDagTables& tables, const SubDagShape& shape, SubDagSink& sink) {
   if (tables.bricks().size() == 0) return {};
-  return LevelEmitter(tables, grid_levels, hash_bits, sink).run();
+  return LevelEmitter(tables, shape, sink).run();
 }
 
 }  // namespace voxdag::cpu

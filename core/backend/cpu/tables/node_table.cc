@@ -19,7 +19,7 @@ uint32_t NodeTable::add(uint64_t at, uint64_t hash, uint32_t mask, const uint32_
   Record added = record(id);
   added.set_hash(hash);
   added.words[2] = mask;
-  // Always eight: what is too many is overwritten by the next node.
+  // Always eight: surplus ones are overwritten by the next node.
   std::memcpy(added.children(), children, 8 * sizeof(uint32_t));
   slots_[at] = hash >> 32 << 32 | id;
   used_ += Record::kWords + static_cast<uint64_t>(child_count);
@@ -28,8 +28,8 @@ uint32_t NodeTable::add(uint64_t at, uint64_t hash, uint32_t mask, const uint32_
 }
 
 void NodeTable::grow_slots(uint64_t nodes) {
-  Buffer<uint64_t> old = std::move(slots_);
-  slots_ = Buffer<uint64_t>(memory_, slots_for(nodes), Buffer<uint64_t>::kZero);
+  PooledArray<uint64_t> old = std::move(slots_);
+  slots_ = PooledArray<uint64_t>(memory_, slots_for(nodes), PooledArray<uint64_t>::kZero);
   capacity_ = entries_for(slots_.size());
   shift_ = 64 - lowest_bit(slots_.size());
   for (const uint64_t slot : old) {
@@ -41,7 +41,7 @@ void NodeTable::grow_slots(uint64_t nodes) {
 }
 
 void NodeTable::grow_records(uint64_t words) {
-  if (words > kWordLimit) throw Outgrown{};
+  if (words > kWordLimit) throw OutOfBudget{};
   records_.grow(memory_, words);
 }
 

@@ -3,11 +3,11 @@
 //   slots     [tag | id]  [tag | id] ...           8 bytes each; tag: upper half of the node's hash
 //   records   hash (2 words), child mask, children        words of 32 bits; id = word of its start
 //
-// ConcurrencyLimiter are indexed by the top bits of the hash and probed linearly. So growing is one
-// streaming pass over the tags, and the slots from first to last are almost in the order of the
-// hash: the level array is made by sorting a nearly sorted array (sort_slots()). A record stays
-// where it is, and neighbors in space are neighbors in memory. Not thread-safe. Throws Outgrown
-// when the budget, or 2^32 words, cannot hold more.
+// Slots are indexed by the top bits of the hash and probed linearly. So growing is one streaming
+// pass over the tags, and the slots from first to last are almost in the order of the hash: the
+// level array is made by sorting a nearly sorted array (sort_slots()). Records never move, and
+// neighbors in space are neighbors in memory. Not thread-safe. Throws OutOfBudget when the budget,
+// or 2^32 words, cannot hold more.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace voxdag::cpu {
 
-// [count]: all ones in the first words.
+// [count]: all ones in the first `count` words.
 struct FirstWords {
   alignas(32) uint32_t of[9][8] = {};
   constexpr FirstWords() {
@@ -30,8 +30,8 @@ inline constexpr FirstWords kFirstWords;
 
 class NodeTable {
  public:
-  // A record, in place. Once its level is emitted its place in the level array stands where the
-  // low half of its hash was.
+  // A reference to a record. Once its level is emitted, its position in the level array replaces
+  // the low half of its hash.
   struct Record {
     static constexpr uint32_t kWords = 3;  // before the children
 
@@ -54,8 +54,8 @@ class NodeTable {
   uint64_t total_children() const { return used_ - count_ * Record::kWords; }
   Record record(uint32_t id) { return {&records_[id]}; }
 
-  // Makes room for `more` nodes; must precede the calls below. Eight children can be read from any
-  // record, however many it has.
+  // Reserves memory for `more` nodes; must precede the calls below. Eight children can be read from
+  // any record, however many it has.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow_slots(count_ + more);
     const uint64_t words = kFirstId + used_ + more * (Record::kWords + 8);
@@ -63,13 +63,13 @@ class NodeTable {
   }
 
   void prefetch_slot(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
-  // The record that lookup() will most likely look at.
+  // Prefetches the record that find_or_add() will most likely compare.
   void prefetch_record(uint64_t hash) const {
     __builtin_prefetch(&records_[static_cast<uint32_t>(slots_[hash >> shift_])]);
   }
 
-  // The id of a node: its mask, not 0, and its popcount(mask) children, of which eight can be read
-  // however many there are. `hash` is its hash.
+  // The id of a node with this hash, mask (not 0) and popcount(mask) children. Eight elements of
+  // `children` must be readable, however many there are.
   uint32_t find_or_add(uint64_t hash, uint32_t mask, const uint32_t* children, int child_count) {
     uint64_t at = hash >> shift_;
     while (const uint64_t slot = slots_[at]) {
@@ -90,9 +90,9 @@ class NodeTable {
     }
   }
 
-  // All slots in use; the lower half of each is an id. In the order of (hash, mask, children) of
-  // the records, whose hashes are those that they were added with unless `hashes_changed`. Ends the
-  // table's life as a table.
+  // All slots in use, in the order of (hash, mask, children) of their records; the lower half of a
+  // slot is an id. `hashes_changed`: records were given other hashes than they were added with. The
+  // table can then no longer be searched.
   std::span<const uint64_t> sort_slots(bool hashes_changed);
 
  private:
@@ -100,7 +100,7 @@ class NodeTable {
 
   bool is_node(uint32_t id, uint32_t mask, const uint32_t* children, int child_count) const {
     const uint32_t* words = &records_[id + 2];
-    // All eight at once: the processor would often guess wrong where the children end.
+    // All eight at once: a loop over the children would often be mispredicted.
     const uint32_t(&compared)[8] = kFirstWords.of[child_count];
     uint32_t differ = words[0] ^ mask;
     for (int i = 0; i < 8; ++i) differ |= (words[1 + i] ^ children[i]) & compared[i];
@@ -113,8 +113,8 @@ class NodeTable {
   bool less(uint64_t slot_a, uint64_t slot_b);
 
   Memory& memory_;
-  Buffer<uint64_t> slots_;  // 0: free
-  Buffer<uint32_t> records_;
+  PooledArray<uint64_t> slots_;  // 0: free
+  PooledArray<uint32_t> records_;
   uint64_t capacity_ = 0;
   int shift_ = 64;  // index of a hash = hash >> shift_
   uint64_t count_ = 0;

@@ -1,5 +1,5 @@
-// What the two hash tables share: how many slots they have, and how their slots, which linear
-// probing leaves nearly in the order of the hash, become sorted arrays.
+// The common part of the two hash tables: the number of their slots, and sorting the slots, which
+// linear probing leaves nearly in the order of the hash.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace voxdag::cpu {
 
-// ConcurrencyLimiter are at most 5/8 full, and a power of two.
+// Slots are at most 5/8 full, and a power of two.
 inline uint64_t entries_for(uint64_t slots) { return slots / 8 * 5; }
 inline uint64_t slots_for(uint64_t entries) {
   uint64_t slots = 512;
@@ -18,8 +18,8 @@ inline uint64_t slots_for(uint64_t entries) {
   return slots;
 }
 
-// Moves the slots in use to the front, keeping their order, but those that probing carried around
-// the end of the table to the back, where they belong. `tag(slot)` is the upper half of the hash.
+// Moves the slots in use to the front, in their order, and those that wrapped around the end of the
+// table behind them, where they belong. `tag(slot)` is the upper half of the hash.
 template <class Slot, class InUse, class Tag>
 std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   std::vector<Slot> wrapped;
@@ -30,23 +30,24 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
     else
       slots[count++] = slots[i];
   }
-  // Written in any case, kept if it is in use: the processor would guess wrong every other time.
+  // Always written, then overwritten if it is not in use: a branch would be mispredicted half the
+  // time.
   for (; i < slots.size(); ++i) {
-    const bool kept = in_use(slots[i]);
+    const bool used = in_use(slots[i]);
     slots[count] = slots[i];
-    count += kept;
+    count += used;
   }
   std::copy(wrapped.begin(), wrapped.end(), slots.begin() + count);
   return slots.first(count + wrapped.size());
 }
 
-// No slot is further from its place than a cluster of the table is long. `tag` as above; `less`
-// agrees with it.
+// Sorts slots that are no further from their position than the longest cluster of the table.
+// `tag(slot)` is the upper half of the hash; `less(a, b)` must be consistent with it.
 template <class Slot, class Tag, class Less>
 void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
   if (slots.empty()) return;
-  // Most of the work, hardly with branches: each slot goes down past all with larger tags, until
-  // another goes down from there.
+  // Most of the work, almost without branches: from the back, the slot with the smallest tag so far
+  // moves down until it meets a smaller one.
   Slot down = slots.back();
   for (size_t i = slots.size() - 1; i-- > 0;) {
     const Slot other = slots[i];
@@ -55,7 +56,7 @@ void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
     down = passes ? down : other;
   }
   slots.front() = down;
-  // The rest: insertion sort.
+  // The remaining work: insertion sort.
   for (size_t i = 1; i < slots.size(); ++i) {
     const auto before = tag(slots[i - 1]), here = tag(slots[i]);
     if (before < here) continue;

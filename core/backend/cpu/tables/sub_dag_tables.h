@@ -1,5 +1,5 @@
-// All unique nodes of one subvolume while it is being built, one table per level, and how many
-// octree nodes and voxels they stand for.
+// All unique nodes of one subvolume while it is being built, one table per level, and the number of
+// octree nodes and voxels that they represent. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace voxdag::cpu {
 
-// A node of a known level, or nothing at all (an empty cube): its id in that level's table and its
-// uncut hash, carried along so that hashing a parent need not look its children up.
+// A node of a known level, or none (an empty cube): its id in that level's table, and its full hash
+// so that hashing a parent needs no lookup of its children.
 struct NodeRef {
   uint64_t hash = 0;
   uint32_t id = 0;
@@ -35,28 +35,28 @@ struct OctreeCounts {
   }
 };
 
-// How many entries the tables of a cube had, by s: room that the next cube will want too.
+// The number of entries in the tables of a cube, by s; an estimate for the next cube.
 struct TableSizes {
   uint64_t entries[kMaxGridLevels + 1] = {};
 };
 
-// A cube of `size_log2` s has an edge of 2^s voxels; bricks are s = 2.
+// A cube of `size_log2` = s has an edge of 2^s voxels; bricks have s = 2.
 class SubDagTables {
  public:
   SubDagTables(Memory& memory, int size_log2, const TableSizes& expected = {});
 
   int size_log2() const { return kBrickLevels + static_cast<int>(nodes_.size()); }
   BrickTable& bricks() { return bricks_; }
-  // Of cubes of 2^size_log2 voxels, size_log2 > 2.
+  // The table for cubes of edge 2^size_log2, size_log2 > 2.
   NodeTable& nodes(int size_log2) { return nodes_[size_log2 - kBrickLevels - 1]; }
   Memory& memory() { return memory_; }
 
   OctreeCounts& counts() { return counts_; }
   TableSizes sizes() const;
 
-  // A brick that may be empty, counted as one octree node more if it is not.
+  // Adds a brick, which may be empty; counts one octree node if it is not.
   NodeRef add_brick(uint64_t mask);
-  // The node above eight cubes of half its size, counted as one octree node more.
+  // Adds the parent of eight cubes of half its size; counts one octree node if it is not empty.
   NodeRef add_node(int size_log2, const NodeRef (&children)[8]);
 
  private:
@@ -66,9 +66,8 @@ class SubDagTables {
   OctreeCounts counts_;
 };
 
-// Hands the level arrays to the sink and fills the rest of the summary. Throws Outgrown before the
-// first call of the sink when the budget cannot hold the largest level array beside the tables.
-SubDagSummary emit_levels(SubDagTables& tables, uint32_t grid_levels, uint32_t hash_bits,
-                          SubDagSink& sink);
+// Passes the level arrays to the sink and returns the totals. Throws OutOfBudget before the first
+// call of the sink if the budget cannot hold the largest level array in addition to the tables.
+SubDagSummary emit_levels(SubDagTables& tables, const SubDagShape& shape, SubDagSink& sink);
 
 }  // namespace voxdag::cpu

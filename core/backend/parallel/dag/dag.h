@@ -1,4 +1,4 @@
-// The DAG of a subvolume in a space: levels as DESIGN's level arrays, in the total order.
+// The DAG of a subvolume in a space, as level arrays in the total order (core/dag/level_array.h).
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ namespace voxdag::parallel {
 template <class Space>
 struct DagBricks {
   uint32_t count = 0;
-  Buffer<Space, uint64_t> masks;
+  SpaceArray<Space, uint64_t> masks;
 };
 
 template <class Space>
 struct DagLevel {
   uint32_t count = 0, child_count = 0;
-  Buffer<Space, uint64_t> hashes;  // cut
-  Buffer<Space, uint8_t> masks;
-  Buffer<Space, uint32_t> children;  // positions in the level below
+  SpaceArray<Space, uint64_t> hashes;  // truncated
+  SpaceArray<Space, uint8_t> masks;
+  SpaceArray<Space, uint32_t> children;  // positions in the level below
 };
 
 template <class Space>
@@ -42,14 +42,14 @@ struct HashBrick {
   uint32_t hash_bits;
   uint64_t* hashes;
   VOXDAG_HD void operator()(uint32_t i) const {
-    hashes[i] = cut_hash(hash_brick(masks[i]), hash_bits);
+    hashes[i] = truncate_hash(hash_brick(masks[i]), hash_bits);
   }
 };
 
-// Bits [64 - hash_bits, 64) are all that a cut hash has.
+// Only bits [64 - hash_bits, 64) of a truncated hash can be set.
 inline int first_hash_bit(uint32_t hash_bits) { return 64 - static_cast<int>(hash_bits); }
 
-// How many children each of some octree nodes has: to be scanned for where they begin.
+// The number of children of each of some octree nodes; the prefix sums are their first positions.
 struct CountChildren {
   OctreeNodes nodes;
   const uint32_t* items;

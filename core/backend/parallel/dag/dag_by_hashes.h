@@ -1,13 +1,13 @@
-// The tutorial's second DAG construction: every octree node is hashed from the leaves up, then from
-// the top down each level's nodes that still have a parent are sorted by hash, doubles are dropped
-// and parents rewired. Children of dropped nodes are never looked at again, so that sorting follows
-// the largest level of the DAG, not of the octree.
+// The second DAG construction of Sintorn, "DAG Construction" (2018): every octree node is hashed
+// from the leaves up; then, from the top down, each level's nodes that still have a parent are
+// sorted by hash, duplicates are removed and parents rewired. Children of removed nodes are never
+// visited, so that the cost of sorting follows the largest level of the DAG, not of the octree.
 //
-// A verification sweep makes it exact: on every level every octree node, dropped or not, is
+// A verification sweep makes it exact: on every level every octree node, removed or not, is
 // compared with the survivor of its hash (brick masks; above, mask and list of child hashes). If
 // all agree on all levels, equal hash implies equal subtree, by induction from the bricks: the
 // children of two equal nodes have equal hashes, so are equal. Then a level's hashes are all
-// different, and their order is the total order. Any mismatch, and the DAG is made by pointers
+// different, and their order is the total order. After any mismatch the DAG is made by pointers
 // instead.
 #pragma once
 
@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "core/backend/parallel/dag/dag.h"
-#include "core/backend/parallel/dag/order.h"
+#include "core/backend/parallel/order.h"
 #include "core/backend/parallel/thread_block.h"
 
 namespace voxdag::parallel {
@@ -29,7 +29,7 @@ struct HashOctreeNode {
   uint64_t* hashes;
   VOXDAG_HD void operator()(uint32_t i) const {
     const uint32_t mask = nodes.masks[i];
-    hashes[i] = cut_hash(hash_node(mask, child_hashes + nodes.first_child[i]), hash_bits);
+    hashes[i] = truncate_hash(hash_node(mask, child_hashes + nodes.first_child[i]), hash_bits);
   }
 };
 
@@ -57,8 +57,8 @@ struct MarkFirstOfHash {
 };
 
 // original index (item) -> sorted index (i) -> compact index (marked[i + 1] - 1): survivors are
-// taken, and all candidates' places in their parents' child lists are rewired.
-struct DropDuplicates {
+// copied, and the entries of all candidates in their parents' child lists are rewired.
+struct RemoveDuplicates {
   const uint32_t* marked;
   const uint32_t* items;
   const uint32_t* candidates;
@@ -96,7 +96,7 @@ struct VerifyBrick {
   uint32_t survivor_count;
   uint32_t* mismatch;
   VOXDAG_HD void operator()(uint32_t i) const {
-    const uint64_t hash = cut_hash(hash_brick(masks[i]), hash_bits);
+    const uint64_t hash = truncate_hash(hash_brick(masks[i]), hash_bits);
     const uint32_t at = find_hash(survivor_hashes, survivor_count, hash);
     if (at == survivor_count || masks[survivors[at]] != masks[i]) raise_flag(mismatch);
   }
@@ -125,15 +125,15 @@ struct VerifyNode {
   }
 };
 
-// Hashes of all octree nodes: [0] of the bricks, [l + 1] of tree.levels[l].
+// Hashes of all octree nodes: element 0 for the bricks, element l + 1 for tree.levels[l].
 template <class Space>
-std::vector<Buffer<Space, uint64_t>> hash_octree(Space& space, const Octree<Space>& tree,
-                                                 uint32_t hash_bits) {
-  std::vector<Buffer<Space, uint64_t>> hashes;
+std::vector<SpaceArray<Space, uint64_t>> hash_octree(Space& space, const Octree<Space>& tree,
+                                                     uint32_t hash_bits) {
+  std::vector<SpaceArray<Space, uint64_t>> hashes;
   hashes.emplace_back(space, tree.brick_count);
   space.for_each(tree.brick_count, HashBrick{tree.brick_masks.data(), hash_bits, hashes[0].data()});
   for (const OctreeLevel<Space>& level : tree.levels) {
-    Buffer<Space, uint64_t> here(space, level.count);
+    SpaceArray<Space, uint64_t> here(space, level.count);
     space.for_each(level.count, HashOctreeNode{{level.first_child.data(), level.masks.data()},
                                                hashes.back().data(),
                                                hash_bits,
@@ -143,29 +143,30 @@ std::vector<Buffer<Space, uint64_t>> hash_octree(Space& space, const Octree<Spac
   return hashes;
 }
 
-// What remains of one level of the octree.
+// The nodes of one level of the octree that remain in the DAG.
 template <class Space>
 struct Survivors {
   uint32_t count = 0;
-  Buffer<Space, uint32_t> nodes;   // octree nodes, in the order of their hashes
-  Buffer<Space, uint64_t> hashes;  // ascending, all different
+  SpaceArray<Space, uint32_t> nodes;   // octree nodes, in the order of their hashes
+  SpaceArray<Space, uint64_t> hashes;  // ascending, all different
 };
 
-// The children of `parents`, doubles dropped; `level` gets mask and child list of each parent.
+// The children of `parents` without duplicates; `level` receives mask and child list of each
+// parent.
 template <class Space>
 Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
                                  const Survivors<Space>& parents, const uint64_t* octree_hashes,
                                  uint32_t hash_bits, DagLevel<Space>& level) {
   level.count = parents.count;
-  level.masks = Buffer<Space, uint8_t>(space, parents.count);
+  level.masks = SpaceArray<Space, uint8_t>(space, parents.count);
   space.for_each(parents.count,
                  Gather<uint8_t>{parents.nodes.data(), nodes.masks, level.masks.data()});
-  Buffer<Space, uint32_t> offsets(space, parents.count + 1);
+  SpaceArray<Space, uint32_t> offsets(space, parents.count + 1);
   space.for_each(parents.count, CountChildren{nodes, parents.nodes.data(), offsets.data()});
   space.scan(offsets.data(), parents.count);
   const uint32_t n = level.child_count = space.value(offsets.data() + parents.count);
-  Buffer<Space, uint32_t> candidates(space, n);
-  Buffer<Space, uint64_t> candidate_hashes(space, n);
+  SpaceArray<Space, uint32_t> candidates(space, n);
+  SpaceArray<Space, uint64_t> candidate_hashes(space, n);
   space.expand(offsets.data(), 0, parents.count, n,
                EmitCandidates{nodes, parents.nodes.data(), octree_hashes, candidates.data(),
                               candidate_hashes.data()});
@@ -173,38 +174,38 @@ Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
 
   Order<Space> order(space, n);
   order.sort_by(KeyAt{candidate_hashes.data()}, first_hash_bit(hash_bits), 64);
-  Buffer<Space, uint32_t> marked(space, n + 1);
+  SpaceArray<Space, uint32_t> marked(space, n + 1);
   space.for_each(n, MarkFirstOfHash{candidate_hashes.data(), order.items(), marked.data()});
   space.scan(marked.data(), n);
   Survivors<Space> out;
   out.count = space.value(marked.data() + n);
-  out.nodes = Buffer<Space, uint32_t>(space, out.count);
-  out.hashes = Buffer<Space, uint64_t>(space, out.count);
-  level.children = Buffer<Space, uint32_t>(space, n);
+  out.nodes = SpaceArray<Space, uint32_t>(space, out.count);
+  out.hashes = SpaceArray<Space, uint64_t>(space, out.count);
+  level.children = SpaceArray<Space, uint32_t>(space, n);
   space.for_each(
-      n, DropDuplicates{marked.data(), order.items(), candidates.data(), candidate_hashes.data(),
-                        out.nodes.data(), out.hashes.data(), level.children.data()});
+      n, RemoveDuplicates{marked.data(), order.items(), candidates.data(), candidate_hashes.data(),
+                          out.nodes.data(), out.hashes.data(), level.children.data()});
   return out;
 }
 
 // The octree's root, as the only survivor of its level.
 template <class Space>
-Survivors<Space> surviving_root(Space& space, const Buffer<Space, uint64_t>& root_hash) {
+Survivors<Space> surviving_root(Space& space, const SpaceArray<Space, uint64_t>& root_hash) {
   Survivors<Space> root;
   root.count = 1;
-  root.nodes = Buffer<Space, uint32_t>(space, 1);
-  root.hashes = Buffer<Space, uint64_t>(space, 1);
+  root.nodes = SpaceArray<Space, uint32_t>(space, 1);
+  root.hashes = SpaceArray<Space, uint64_t>(space, 1);
   space.for_each(1, CountUp{root.nodes.data()});
   space.copy(root_hash.data(), root.hashes.data(), 1);
   return root;
 }
 
-// Nothing if two different nodes have the same hash.
+// The DAG, or nothing if two different nodes have the same hash.
 template <class Space>
 std::optional<Dag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& tree,
                                              uint32_t hash_bits) {
   auto hashes = hash_octree(space, tree, hash_bits);
-  Buffer<Space, uint32_t> mismatch(space, 1);
+  SpaceArray<Space, uint32_t> mismatch(space, 1);
   const uint32_t none = 0;
   space.upload(&none, mismatch.data(), 1);
   Survivors<Space> survivors = surviving_root(space, hashes.back());
@@ -228,7 +229,7 @@ std::optional<Dag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& 
                              survivors.nodes.data(), survivors.count, mismatch.data()});
   if (space.value(mismatch.data()) != 0) return std::nullopt;
   dag.bricks.count = survivors.count;
-  dag.bricks.masks = Buffer<Space, uint64_t>(space, survivors.count);
+  dag.bricks.masks = SpaceArray<Space, uint64_t>(space, survivors.count);
   space.for_each(survivors.count, Gather<uint64_t>{survivors.nodes.data(), tree.brick_masks.data(),
                                                    dag.bricks.masks.data()});
   return dag;

@@ -1,10 +1,12 @@
-// The tutorial's first DAG construction, bottom-up: the nodes of a level are sorted by their (up to
-// eight) child pointers, equal neighbors become one node, and parents are rewired through
+// The first DAG construction of Sintorn, "DAG Construction" (2018), after Kämpe, Sintorn and
+// Assarsson, "High Resolution Sparse Voxel DAGs" (2013): bottom-up, the nodes of a level are sorted
+// by their (up to eight) child pointers, equal neighbors become one node, and parents are rewired
+// through
 //
 //     original index -> sorted index -> compact index
 //
-// Exact without hashes. Here child pointers already count in the total order of the level below, so
-// nodes sorted by (child pointers, then stably by hash) are in the total order of theirs.
+// It is exact without hashes. Child pointers here are positions in the total order of the level
+// below, so nodes sorted by child pointers and then stably by hash are in their own total order.
 #pragma once
 
 #include <algorithm>
@@ -13,17 +15,17 @@
 #include <utility>
 
 #include "core/backend/parallel/dag/dag.h"
-#include "core/backend/parallel/dag/order.h"
+#include "core/backend/parallel/order.h"
 
 namespace voxdag::parallel {
 
-// One level reduced: which octree nodes remain and what became of the others.
+// One level reduced: the octree nodes that remain, and the survivor that replaces each other one.
 template <class Space>
 struct Reduced {
   uint32_t count = 0;
-  Buffer<Space, uint32_t> survivors;  // octree nodes, in the total order
-  Buffer<Space, uint64_t> hashes;     // of the survivors
-  Buffer<Space, uint32_t> index_of;   // of each octree node: its survivor's position
+  SpaceArray<Space, uint32_t> survivors;  // octree nodes, in the total order
+  SpaceArray<Space, uint64_t> hashes;     // of the survivors
+  SpaceArray<Space, uint32_t> index_of;   // of each octree node: its survivor's position
 };
 
 // A level's nodes as child lists of the level below, already reduced.
@@ -42,7 +44,7 @@ struct LinkedNodes {
   }
 };
 
-// As many child pointers, of `bits` bits each, as fit a sort key: slots [first, end), the first one
+// The child pointers of slots [first, end), of `bits` bits each, as one sort key; the first is the
 // most significant.
 struct PointerKey {
   LinkedNodes links;
@@ -114,7 +116,7 @@ struct HashSurvivorBrick {
   const uint32_t* survivors;
   uint64_t* hashes;
   VOXDAG_HD void operator()(uint32_t i) const {
-    hashes[i] = cut_hash(hash_brick(masks[survivors[i]]), hash_bits);
+    hashes[i] = truncate_hash(hash_brick(masks[survivors[i]]), hash_bits);
   }
 };
 
@@ -130,7 +132,7 @@ struct HashSurvivorNode {
     uint64_t hash = node_hash_begin(mask);
     for (uint32_t rank = 0; rank < count; ++rank)
       hash = node_hash_add(hash, child_hashes[links.child(node, rank)]);
-    hashes[i] = cut_hash(node_hash_end(hash), hash_bits);
+    hashes[i] = truncate_hash(node_hash_end(hash), hash_bits);
   }
 };
 
@@ -143,30 +145,30 @@ struct EmitChildren {
   }
 };
 
-// `order` has equal items side by side, ascending by all of the total order but the hash. `hash`
+// `order` is ascending in the total order without the hash, so equal items are neighbors. `hash`
 // makes a functor that hashes survivors: hash(survivors, hashes).
 template <class Space, class Same, class MakeHash>
 Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same, uint32_t hash_bits,
                              MakeHash hash) {
   const uint32_t n = order.count();
-  Buffer<Space, uint32_t> marked(space, n + 1);
+  SpaceArray<Space, uint32_t> marked(space, n + 1);
   space.for_each(n, MarkFirstOfEquals<Same>{same, order.items(), marked.data()});
   space.scan(marked.data(), n);
   Reduced<Space> out;
   out.count = space.value(marked.data() + n);
-  Buffer<Space, uint32_t> firsts(space, out.count);
+  SpaceArray<Space, uint32_t> firsts(space, out.count);
   space.for_each(n, TakeFirstOfEquals{marked.data(), order.items(), firsts.data()});
-  Buffer<Space, uint64_t> hashes(space, out.count);
+  SpaceArray<Space, uint64_t> hashes(space, out.count);
   space.for_each(out.count, hash(firsts.data(), hashes.data()));
 
   Order<Space> by_hash(space, out.count);
   by_hash.sort_by(KeyAt{hashes.data()}, first_hash_bit(hash_bits), 64);
-  out.survivors = Buffer<Space, uint32_t>(space, out.count);
-  out.hashes = Buffer<Space, uint64_t>(space, out.count);
+  out.survivors = SpaceArray<Space, uint32_t>(space, out.count);
+  out.hashes = SpaceArray<Space, uint64_t>(space, out.count);
   space.for_each(out.count, Gather<uint32_t>{by_hash.items(), firsts.data(), out.survivors.data()});
   space.for_each(out.count, Gather<uint64_t>{by_hash.items(), hashes.data(), out.hashes.data()});
-  const Buffer<Space, uint32_t> place_of_group = by_hash.places();
-  out.index_of = Buffer<Space, uint32_t>(space, n);
+  const SpaceArray<Space, uint32_t> place_of_group = by_hash.places();
+  out.index_of = SpaceArray<Space, uint32_t>(space, n);
   space.for_each(n, RewireThroughGroups{marked.data(), order.items(), place_of_group.data(),
                                         out.index_of.data()});
   return out;
@@ -203,20 +205,20 @@ Reduced<Space> reduce_nodes(Space& space, uint32_t node_count, const LinkedNodes
                        });
 }
 
-// The level array of the nodes that remain.
+// The level array of the surviving nodes.
 template <class Space>
 DagLevel<Space> make_level(Space& space, const LinkedNodes& links, Reduced<Space>& reduced) {
   DagLevel<Space> level;
   const uint32_t* survivors = reduced.survivors.data();
   level.count = reduced.count;
   level.hashes = std::move(reduced.hashes);
-  level.masks = Buffer<Space, uint8_t>(space, level.count);
+  level.masks = SpaceArray<Space, uint8_t>(space, level.count);
   space.for_each(level.count, Gather<uint8_t>{survivors, links.nodes.masks, level.masks.data()});
-  Buffer<Space, uint32_t> offsets(space, level.count + 1);
+  SpaceArray<Space, uint32_t> offsets(space, level.count + 1);
   space.for_each(level.count, CountChildren{links.nodes, survivors, offsets.data()});
   space.scan(offsets.data(), level.count);
   level.child_count = space.value(offsets.data() + level.count);
-  level.children = Buffer<Space, uint32_t>(space, level.child_count);
+  level.children = SpaceArray<Space, uint32_t>(space, level.child_count);
   space.expand(offsets.data(), 0, level.count, level.child_count,
                EmitChildren{links, survivors, level.children.data()});
   return level;
@@ -227,10 +229,10 @@ Dag<Space> make_dag_by_pointers(Space& space, const Octree<Space>& tree, uint32_
   Dag<Space> dag;
   Reduced<Space> reduced = reduce_bricks(space, tree, hash_bits);
   dag.bricks.count = reduced.count;
-  dag.bricks.masks = Buffer<Space, uint64_t>(space, reduced.count);
+  dag.bricks.masks = SpaceArray<Space, uint64_t>(space, reduced.count);
   space.for_each(reduced.count, Gather<uint64_t>{reduced.survivors.data(), tree.brick_masks.data(),
                                                  dag.bricks.masks.data()});
-  const Buffer<Space, uint64_t> brick_hashes = std::move(reduced.hashes);
+  const SpaceArray<Space, uint64_t> brick_hashes = std::move(reduced.hashes);
   const uint64_t* child_hashes = brick_hashes.data();
   for (const OctreeLevel<Space>& level : tree.levels) {
     const LinkedNodes links{{level.first_child.data(), level.masks.data()},

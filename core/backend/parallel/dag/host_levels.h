@@ -1,5 +1,5 @@
-// A DAG's level arrays on the host, ready for the sink: all of them fetched before the sink hears
-// of any, so that a subvolume that outgrows its memory does so in time.
+// A DAG's level arrays on the host. All of them are copied before the sink is called, since the
+// sink must not be called for a subvolume that does not fit.
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,12 @@
 
 namespace voxdag::parallel {
 
-// An array of a space, on the host: the array itself where the space is there, otherwise a copy.
+// An array of a space, on the host: the array itself if the space is HostSpace, otherwise a copy.
 template <class Space, class T>
 class HostArray {
  public:
   HostArray() = default;
-  HostArray(Space& space, Buffer<Space, T>&& array) {
+  HostArray(Space& space, SpaceArray<Space, T>&& array) {
     const uint64_t size = array.size();
     if constexpr (Space::kOnHost) {
       array_ = std::move(array);
@@ -38,12 +38,12 @@ class HostArray {
     try {
       return PageBuffer<T>(budget, size, "level arrays");
     } catch (const Error& error) {
-      if (error.code() == ErrorCode::kOutOfMemory) throw Outgrown{};
+      if (error.code() == ErrorCode::kOutOfMemory) throw OutOfBudget{};
       throw;
     }
   }
 
-  Buffer<Space, T> array_;
+  SpaceArray<Space, T> array_;
   PageBuffer<T> copy_;
   std::span<const T> view_;
 };

@@ -1,7 +1,8 @@
-// The octree of a subvolume from its sorted brick codes, bottom-up, as in the tutorial: mark the
-// first child of each parent, prefix sum, child masks and pointers, level by level.
+// The octree of a subvolume from its sorted brick codes, bottom-up, as in Sintorn, "DAG
+// Construction" (2018): mark the first child of each parent, prefix sum, child masks and pointers,
+// level by level.
 //
-// Codes are sorted, so the children of a node lie side by side in the level below: a node is its
+// Codes are sorted, so the children of a node are consecutive in the level below: a node is its
 // child mask and the position of its first child.
 #pragma once
 
@@ -9,19 +10,20 @@
 #include <utility>
 #include <vector>
 
+#include "core/backend/parallel/brick_list.h"
 #include "core/backend/parallel/space.h"
-#include "core/backend/parallel/voxelize/brick_list.h"
+#include "core/base/host_device.h"
 
 namespace voxdag::parallel {
 
 template <class Space>
 struct OctreeLevel {
   uint32_t count = 0;
-  Buffer<Space, uint32_t> first_child;
-  Buffer<Space, uint8_t> masks;
+  SpaceArray<Space, uint32_t> first_child;
+  SpaceArray<Space, uint8_t> masks;
 };
 
-// What functors see of a level of the octree.
+// The arrays of an octree level, for functors.
 struct OctreeNodes {
   const uint32_t* first_child;
   const uint8_t* masks;
@@ -30,7 +32,7 @@ struct OctreeNodes {
 template <class Space>
 struct Octree {
   uint32_t brick_count = 0;
-  Buffer<Space, uint64_t> brick_masks;
+  SpaceArray<Space, uint64_t> brick_masks;
   std::vector<OctreeLevel<Space>> levels;  // from the bricks' parents up to the root
 
   uint64_t node_count() const {
@@ -65,27 +67,28 @@ struct MakeParent {
   }
 };
 
-// `level_count` levels above the bricks. The list is merged and not empty, and given up.
+// Makes `level_count` levels above the bricks. `bricks` must be merged and not empty; it is
+// consumed.
 template <class Space>
 Octree<Space> make_octree(Space& space, BrickList<Space>& bricks, uint32_t level_count) {
   Octree<Space> tree;
   tree.brick_count = bricks.size();
-  Buffer<Space, uint64_t> codes = bricks.take_codes();
+  SpaceArray<Space, uint64_t> codes = bricks.take_codes();
   tree.brick_masks = bricks.take_masks();
   uint32_t child_count = tree.brick_count;
   for (uint32_t l = 0; l < level_count; ++l) {
-    Buffer<Space, uint32_t> first_child(space, child_count);
+    SpaceArray<Space, uint32_t> first_child(space, child_count);
     OctreeLevel<Space> level;
     {
-      Buffer<Space, uint8_t> flags(space, child_count);
+      SpaceArray<Space, uint8_t> flags(space, child_count);
       space.for_each(child_count, MarkFirstChild{codes.data(), flags.data()});
       level.count = space.select(flags.data(), child_count, first_child.data());
     }
-    level.first_child = Buffer<Space, uint32_t>(space, level.count);
+    level.first_child = SpaceArray<Space, uint32_t>(space, level.count);
     space.copy(first_child.data(), level.first_child.data(), level.count);
     first_child = {};
-    level.masks = Buffer<Space, uint8_t>(space, level.count);
-    Buffer<Space, uint64_t> parent_codes(space, level.count);
+    level.masks = SpaceArray<Space, uint8_t>(space, level.count);
+    SpaceArray<Space, uint64_t> parent_codes(space, level.count);
     space.for_each(level.count,
                    MakeParent{codes.data(), child_count, level.count, level.first_child.data(),
                               level.masks.data(), parent_codes.data()});

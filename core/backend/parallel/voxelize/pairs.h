@@ -1,8 +1,9 @@
-// Voxelization by work expansion: (triangle, cube) pairs, handed from a cube to the children that
-// the triangle touches, level by level, by count -> scan -> emit.
+// Voxelization by work expansion (Sintorn, "DAG Construction", 2018): (triangle, cube) pairs
+// descend from a cube to the children that the triangle touches, level by level, by count -> scan
+// -> emit.
 //
-// Each level has a frame of fixed size. A frame that is full is handed on in slices that the next
-// one can hold, deepest first, so that memory is bounded whatever the triangles are.
+// Each level has a frame of fixed size. A full frame is expanded in slices that fit the next one,
+// depth first, so that memory is bounded for any triangles.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +31,7 @@ VOXDAG_HD inline int select_bit(uint64_t mask, uint32_t rank) {
   return at;
 }
 
-// Where cubes of a subvolume lie: cube `code` of edge 2^shift units has its low corner at the
+// Positions of cubes in a subvolume: cube `code` of edge 2^shift units has its low corner at the
 // subvolume's origin plus (code, decoded) * 2^shift.
 struct CubePlace {
   int64_t origin[3];
@@ -46,8 +47,8 @@ struct CubePlace {
   }
 };
 
-// count: the parts of each pair's cube that its triangle touches. N = 2: children, 4: a brick's
-// voxels.
+// The count step: the parts of each pair's cube that its triangle touches. N = 2: children,
+// 4: a brick's voxels.
 template <int N>
 struct CountParts {
   CubePlace place;
@@ -65,7 +66,7 @@ struct CountParts {
   }
 };
 
-// emit: one new pair for each part. Voxels are codes alone: `out_triangles` may be null.
+// The emit step: one new pair for each part. `out_triangles` is null where only codes are wanted.
 struct EmitParts {
   int code_bits;  // 3 for children, 6 for voxels of a brick
   const uint64_t* codes;
@@ -80,7 +81,7 @@ struct EmitParts {
   }
 };
 
-// The pairs to begin with: every triangle with the whole subvolume.
+// The first pairs: every triangle with the whole subvolume.
 struct StartPairs {
   uint32_t first_triangle;
   uint64_t* codes;
@@ -91,35 +92,36 @@ struct StartPairs {
   }
 };
 
-// The end of the longest slice of sources, from `first` on, with at most `room` outputs; and how
-// many outputs it has.
+// The end of the longest slice of sources from `first` with at most `max_outputs` outputs, and the
+// number of its outputs.
 struct FindSlice {
   const uint32_t* offsets;
-  uint32_t first, count, room;
+  uint32_t first, count, max_outputs;
   uint32_t* answer;  // [2]
   VOXDAG_HD void operator()(uint32_t) const {
     uint32_t last = first, end = count + 1;
     while (end - last > 1) {
       const uint32_t middle = last + (end - last) / 2;
-      (offsets[middle] - offsets[first] <= room ? last : end) = middle;
+      (offsets[middle] - offsets[first] <= max_outputs ? last : end) = middle;
     }
     answer[0] = last;
     answer[1] = offsets[last] - offsets[first];
   }
 };
 
-// Where the pairs of the last level go.
+// The destination of the pairs of the last level.
 struct PairSpan {
   uint64_t* codes;
   uint32_t* triangles;  // null where only codes are wanted
-  uint32_t room;
+  uint32_t capacity;
 };
 
 template <class Space>
 class PairExpansion {
  public:
-  // Pairs are handed down `depths` levels from the subvolume; if `to_voxels`, bricks lie there, and
-  // one step more makes the pairs voxels. `window`: pairs a frame holds, at least 64.
+  // Pairs descend `depths` levels from the subvolume; if `to_voxels`, that is the level of bricks,
+  // and one more step turns the pairs into voxels. `window`: capacity of a frame in pairs, at
+  // least 64.
   PairExpansion(Space& space, const SubvolumeTask& task, int depths, bool to_voxels,
                 uint32_t window)
       : space_(space),
@@ -134,15 +136,15 @@ class PairExpansion {
   static constexpr uint64_t kBytesPerPair = sizeof(uint64_t) * 2 + sizeof(uint32_t) * 2;
   uint32_t window() const { return window_; }
 
-  // `out` says where pairs go: PairSpan out.span() for the next ones, out.took(n) when n are there,
-  // out.flush() when there was no room for any. Triangles [first, last) of `triangles`, as many as
-  // the window holds at most.
+  // Expands triangles [first, last) of `triangles`, at most a window of them. `out` receives the
+  // pairs: they are written to PairSpan out.span(), then counted by out.commit(n); out.flush()
+  // makes space where not even one source's pairs fit.
   template <class Out>
   void run(const FixedTriangle* triangles, uint32_t first, uint32_t last, Out& out) {
     triangles_ = triangles;
     Frame& top = frames_[0];
     space_.for_each(last - first, StartPairs{first, top.codes.data(), top.pair_triangles.data()});
-    hand_on(0, last - first, out);
+    descend(0, last - first, out);
   }
 
  private:
@@ -152,8 +154,8 @@ class PairExpansion {
           parts(space, window),
           pair_triangles(space, window),
           offsets(space, window + 1) {}
-    Buffer<Space, uint64_t> codes, parts;
-    Buffer<Space, uint32_t> pair_triangles, offsets;
+    SpaceArray<Space, uint64_t> codes, parts;
+    SpaceArray<Space, uint32_t> pair_triangles, offsets;
   };
   struct Slice {
     uint32_t end, outputs;
@@ -170,14 +172,14 @@ class PairExpansion {
   }
 
   template <class Out>
-  void hand_on(size_t depth, uint32_t count, Out& out) {
+  void descend(size_t depth, uint32_t count, Out& out) {
     Frame& f = frames_[depth];
     const int shift = top_shift_ - static_cast<int>(depth);
     makes_voxels(depth) ? count_parts<4>(f, shift - 2, count) : count_parts<2>(f, shift - 1, count);
     space_.scan(f.offsets.data(), count);
     for (uint32_t first = 0; first < count;) {
       const PairSpan to = is_last(depth) ? out.span() : next_frame(depth);
-      const Slice slice = find_slice(f, first, count, to.room);
+      const Slice slice = find_slice(f, first, count, to.capacity);
       if (slice.outputs > 0)
         space_.expand(f.offsets.data(), first, slice.end, slice.outputs,
                       EmitParts{makes_voxels(depth) ? 6 : 3, f.codes.data(),
@@ -185,9 +187,9 @@ class PairExpansion {
       if (slice.end == first)
         out.flush();
       else if (is_last(depth))
-        out.took(slice.outputs);
+        out.commit(slice.outputs);
       else if (slice.outputs > 0)
-        hand_on(depth + 1, slice.outputs, out);
+        descend(depth + 1, slice.outputs, out);
       first = slice.end;
     }
   }
@@ -197,8 +199,8 @@ class PairExpansion {
     return {next.codes.data(), next.pair_triangles.data(), window_};
   }
 
-  Slice find_slice(Frame& f, uint32_t first, uint32_t count, uint32_t room) {
-    space_.for_each(1, FindSlice{f.offsets.data(), first, count, room, slice_.data()});
+  Slice find_slice(Frame& f, uint32_t first, uint32_t count, uint32_t max_outputs) {
+    space_.for_each(1, FindSlice{f.offsets.data(), first, count, max_outputs, slice_.data()});
     uint32_t answer[2];
     space_.download(slice_.data(), answer, 2);
     return {answer[0], answer[1]};
@@ -211,7 +213,7 @@ class PairExpansion {
   const uint32_t window_;
   const FixedTriangle* triangles_ = nullptr;
   std::vector<Frame> frames_;
-  Buffer<Space, uint32_t> slice_;
+  SpaceArray<Space, uint32_t> slice_;
 };
 
 }  // namespace voxdag::parallel

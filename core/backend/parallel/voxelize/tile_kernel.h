@@ -1,10 +1,10 @@
-// The bricks of one tile of 64^3 voxels, drawn by one block: 4096 brick masks stay in the block's
-// shared memory while all its triangles are drawn into them, then those not empty go out in Morton
-// order.
+// The bricks of one tile of 64^3 voxels, drawn by one thread block: 4096 brick masks stay in its
+// shared memory while all triangles of the tile are drawn into them; then those that are not empty
+// are written in Morton order.
 //
-// What is drawn are (triangle, cell) pairs, a cell being a cube of 16^3 voxels that the triangle
-// touches: one thread finds the bricks of its cell, then the voxels of each. Masks are ORed
-// together, which has no order, so the result has none.
+// Drawn are (triangle, cell) pairs, a cell being a cube of 16^3 voxels that the triangle touches:
+// one thread finds the bricks of its cell, then the voxels of each. Masks are combined by OR, so
+// the result does not depend on the order.
 #pragma once
 
 #include <cstdint>
@@ -22,17 +22,17 @@ inline constexpr int kTileCodeBits = 3 * (kTileLevels - kCellLevels);  // of a c
 
 struct DrawTile {
   static constexpr uint32_t kThreads = 256;
-  static constexpr int kBlocksAtOnce = 2;
+  static constexpr int kMinResidentBlocks = 2;
   static constexpr int kPhases = 5;
-  static constexpr uint32_t kRun = kTileBricks / kThreads;  // bricks that a thread sends out
+  static constexpr uint32_t kRun = kTileBricks / kThreads;  // bricks that a thread writes
   static constexpr uint32_t kGroup = 16;                    // threads whose counts are added up
 
   struct Shared {
     uint64_t masks[kTileBricks + kThreads];  // at slot()
     uint32_t counts[kThreads];               // bricks not empty, of each thread's run
-    uint32_t groups[kThreads / kGroup];      // of each group of threads
+    uint32_t groups[kThreads / kGroup];      // sums over groups of threads
   };
-  // A word is left out after each thread's run, so that threads side by side meet different banks.
+  // One word of padding after each thread's run, so that neighboring threads use different banks.
   VOXDAG_HD static uint32_t slot(uint32_t brick) { return brick + brick / kRun; }
 
   CubePlace place;
@@ -42,7 +42,7 @@ struct DrawTile {
   const uint32_t* tile_starts;  // first pair of each tile
   uint32_t tile_count, pair_count, first_tile;
 
-  // Room for kTileBricks of each block, and how many there are.
+  // Space for kTileBricks of each thread block, and the number of bricks written.
   uint64_t* brick_codes;
   uint64_t* brick_masks;
   uint32_t* brick_counts;
@@ -57,9 +57,9 @@ struct DrawTile {
       case 2:
         return count_run(thread, shared);
       case 3:
-        return add_group(thread, shared);
+        return sum_group(thread, shared);
       default:
-        return send_run(block, thread, shared);
+        return write_run(block, thread, shared);
     }
   }
 
@@ -99,11 +99,6 @@ struct DrawTile {
   VOXDAG_HD void draw(uint64_t voxels, uint32_t brick, Shared& shared) const {
     or_shared(shared.masks[slot(brick)], voxels);
   }
-  // Along one axis, in bricks, of brick 0 to 63 of a cell.
-  VOXDAG_HD static int brick_coordinate(int brick, int axis) {
-    const int bits = brick >> (2 - axis);
-    return (bits & 1) | (bits >> 2 & 2);
-  }
 
   VOXDAG_HD void count_run(uint32_t thread, Shared& shared) const {
     uint32_t count = 0;
@@ -111,14 +106,14 @@ struct DrawTile {
     shared.counts[thread] = count;
   }
 
-  VOXDAG_HD void add_group(uint32_t thread, Shared& shared) const {
+  VOXDAG_HD void sum_group(uint32_t thread, Shared& shared) const {
     if (thread >= kThreads / kGroup) return;
     uint32_t sum = 0;
     for (uint32_t i = 0; i < kGroup; ++i) sum += shared.counts[thread * kGroup + i];
     shared.groups[thread] = sum;
   }
 
-  VOXDAG_HD void send_run(uint32_t block, uint32_t thread, const Shared& shared) const {
+  VOXDAG_HD void write_run(uint32_t block, uint32_t thread, const Shared& shared) const {
     uint32_t at = 0;
     for (uint32_t g = 0; g < thread / kGroup; ++g) at += shared.groups[g];
     for (uint32_t t = thread / kGroup * kGroup; t < thread; ++t) at += shared.counts[t];
@@ -134,7 +129,7 @@ struct DrawTile {
   }
 };
 
-// From each block's room to the list of all bricks.
+// Copies the bricks of each thread block to the list of all bricks.
 struct MoveBricks {
   const uint64_t* codes;
   const uint64_t* masks;

@@ -1,16 +1,16 @@
-// The fast voxelization: pairs are handed down to (triangle, 16^3 cell) only, grouped by tile, and
-// each tile's bricks are drawn by one block in shared memory (tile_kernel.h). No voxel is ever
-// listed, nothing smaller than a cell is sorted, and bricks come out in Morton order.
+// The fast voxelization: pairs descend to (triangle, 16^3 cell) only and are grouped by tile; each
+// tile's bricks are drawn by one thread block in shared memory (tile_kernel.h). There is no list of
+// voxels, nothing smaller than a cell is sorted, and bricks are made in Morton order.
 //
 // All triangles of the subvolume and their pairs are in memory at once; a subvolume where they do
-// not fit is outgrown. Only in the smallest, which must not be, does the voxel list take over,
-// which takes its triangles in batches.
+// not fit is split. The smallest subvolume cannot be: it is voxelized by voxel_list.h instead,
+// which reads its triangles in batches.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 
-#include "core/backend/parallel/voxelize/brick_list.h"
+#include "core/backend/parallel/brick_list.h"
 #include "core/backend/parallel/voxelize/pairs.h"
 #include "core/backend/parallel/voxelize/tile_kernel.h"
 #include "core/backend/parallel/voxelize/triangle_upload.h"
@@ -37,7 +37,7 @@ class CellPairs {
     return {codes_.data() + size_, triangles_.data() + size_,
             static_cast<uint32_t>(codes_.size()) - size_};
   }
-  void took(uint32_t count) { size_ += count; }
+  void commit(uint32_t count) { size_ += count; }
   void flush() { grow(); }
 
   uint32_t size() const { return size_; }
@@ -47,15 +47,15 @@ class CellPairs {
   // By tile; codes have `code_bits` bits.
   void sort(int code_bits) {
     if (size_ == 0 || code_bits == kTileCodeBits) return;
-    Buffer<Space, uint64_t> code_scratch(space_, codes_.size());
-    Buffer<Space, uint32_t> triangle_scratch(space_, codes_.size());
+    SpaceArray<Space, uint64_t> code_scratch(space_, codes_.size());
+    SpaceArray<Space, uint32_t> triangle_scratch(space_, codes_.size());
     space_.sort_pairs(codes_, code_scratch, triangles_, triangle_scratch, size_, kTileCodeBits,
                       code_bits);
   }
   // The first pair of each tile.
-  Buffer<Space, uint32_t> tile_starts(uint32_t& tile_count) {
-    Buffer<Space, uint8_t> flags(space_, size_);
-    Buffer<Space, uint32_t> starts(space_, size_);
+  SpaceArray<Space, uint32_t> tile_starts(uint32_t& tile_count) {
+    SpaceArray<Space, uint8_t> flags(space_, size_);
+    SpaceArray<Space, uint32_t> starts(space_, size_);
     space_.for_each(size_, MarkFirstOfTile{codes_.data(), flags.data()});
     tile_count = space_.select(flags.data(), size_, starts.data());
     return starts;
@@ -64,60 +64,60 @@ class CellPairs {
  private:
   void grow() {
     const uint64_t size = std::max<uint64_t>(2 * codes_.size(), 1 << 14);
-    Buffer<Space, uint64_t> codes(space_, size);
+    SpaceArray<Space, uint64_t> codes(space_, size);
     space_.copy(codes_.data(), codes.data(), size_);
     codes_ = std::move(codes);
-    Buffer<Space, uint32_t> triangles(space_, size);
+    SpaceArray<Space, uint32_t> triangles(space_, size);
     space_.copy(triangles_.data(), triangles.data(), size_);
     triangles_ = std::move(triangles);
   }
 
   Space& space_;
   uint32_t size_ = 0;
-  Buffer<Space, uint64_t> codes_;
-  Buffer<Space, uint32_t> triangles_;
+  SpaceArray<Space, uint64_t> codes_;
+  SpaceArray<Space, uint32_t> triangles_;
 };
 
 template <class Space>
 void draw_tiles(Space& space, const SubvolumeTask& task, const FixedTriangle* triangles,
                 CellPairs<Space>& pairs, BrickList<Space>& bricks) {
   uint32_t tile_count = 0;
-  const Buffer<Space, uint32_t> starts = pairs.tile_starts(tile_count);
+  const SpaceArray<Space, uint32_t> starts = pairs.tile_starts(tile_count);
   constexpr uint64_t kBytesPerTile = kTileBricks * 2 * sizeof(uint64_t);
   const uint32_t wave =
-      std::min({tile_count, items_that_fit(space, 4, kBytesPerTile, 1), Space::kTilesAtOnce});
-  Buffer<Space, uint64_t> codes(space, uint64_t{wave} * kTileBricks);
-  Buffer<Space, uint64_t> masks(space, uint64_t{wave} * kTileBricks);
-  Buffer<Space, uint32_t> counts(space, wave + 1);
+      std::min({tile_count, fitting_count(space, 4, kBytesPerTile, 1), Space::kMaxTiles});
+  SpaceArray<Space, uint64_t> codes(space, uint64_t{wave} * kTileBricks);
+  SpaceArray<Space, uint64_t> masks(space, uint64_t{wave} * kTileBricks);
+  SpaceArray<Space, uint32_t> counts(space, wave + 1);
   for (uint32_t first = 0; first < tile_count; first += wave) {
     const uint32_t blocks = std::min(wave, tile_count - first);
-    space.for_each_block(
+    space.for_each_thread_block(
         blocks,
         DrawTile{CubePlace(task), triangles, pairs.codes(), pairs.triangles(), starts.data(),
                  tile_count, pairs.size(), first, codes.data(), masks.data(), counts.data()});
     space.scan(counts.data(), blocks);
     const uint32_t count = space.value(counts.data() + blocks);
-    const uint32_t at = bricks.make_room(count);
+    const uint32_t at = bricks.reserve(count);
     space.expand(counts.data(), 0, blocks, count,
                  MoveBricks{codes.data(), masks.data(), bricks.codes() + at, bricks.masks() + at});
-    bricks.took(count, true);
+    bricks.commit(count, true);
   }
 }
 
-// Fills `bricks` with all that the triangles touch. The subvolume's edge is that of a tile at
-// least. Throws Outgrown, `bricks` empty or not, where it does not fit.
+// Fills `bricks` with all bricks that the triangles touch. The subvolume is at least as large as a
+// tile. Throws OutOfBudget where it does not fit; `bricks` is then undefined.
 template <class Space>
 void voxelize_by_tiles(Space& space, const SubvolumeTask& task, TriangleStream& stream,
                        BrickList<Space>& bricks) {
   const int cube_levels = static_cast<int>(task.grid_levels - task.cube.level);
   const int depths = cube_levels - kCellLevels;
-  Buffer<Space, FixedTriangle> triangles(space, stream.count());
+  SpaceArray<Space, FixedTriangle> triangles(space, stream.count());
   const uint32_t count = TriangleUpload<Space>(space, stream)
                              .read(triangles.data(), static_cast<uint32_t>(triangles.size()));
   CellPairs<Space> pairs(space);
   {
     const uint64_t bytes_each = static_cast<uint64_t>(depths) * PairExpansion<Space>::kBytesPerPair;
-    const uint32_t window = std::min<uint32_t>(items_that_fit(space, 6, bytes_each, 256),
+    const uint32_t window = std::min<uint32_t>(fitting_count(space, 6, bytes_each, 256),
                                                static_cast<uint32_t>(Space::kWindow));
     PairExpansion<Space> expansion(space, task, depths, false, window);
     for (uint32_t first = 0; first < count; first += window)

@@ -1,5 +1,6 @@
-// Which cells of a block of N x N x N cubes a triangle touches, all at once: the exact test of
-// core/geometry/overlap.h with what the cells have in common computed once.
+// Which cells of a group of N x N x N cubes a triangle touches, all at once: the exact test of
+// core/geometry/overlap.h (Schwarz and Seidel 2010, section 4.1), with what the cells have in
+// common computed once.
 //
 // Let `low` be a corner of the lattice of cells, 2^shift units per edge, and k a cell's position on
 // it. Every test asks for the sign of
@@ -45,7 +46,7 @@ VOXDAG_HD inline Int clamp_to(int128 x, Int bound) {
   return x > bound ? bound : x < -bound ? static_cast<Int>(-bound) : static_cast<Int>(x);
 }
 
-// A narrow triangle against the cells of a lattice, whose first block its bounding box touches.
+// A narrow triangle against the cells of a lattice, whose first group its bounding box touches.
 struct TriangleOnLattice {
   // In the projection along one axis, a cell is on the inner side of an edge iff
   // a k_a + b k_b + constant >= 0, along the two axes that follow.
@@ -88,7 +89,7 @@ struct TriangleOnLattice {
     }
   }
 
-  // The cells of the block at position `at` that the triangle touches.
+  // The cells of the group at position `at` that the triangle touches.
   template <int N>
   VOXDAG_HD uint64_t touched(const int (&at)[3]) const {
     uint64_t cells = ~uint64_t{0};

@@ -1,6 +1,6 @@
-// Triangles from the stream into a space: read into a staging area of the host, copied from there.
-// On a GPU two areas take turns, so that one is read into while the other is on its way; on the
-// host the staging area is the destination itself.
+// Copies triangles from the stream into a space, through a staging area of the host. On a GPU there
+// are two areas: one is filled while the other is copied. On the host the staging area is the
+// destination itself.
 #pragma once
 
 #include <algorithm>
@@ -17,11 +17,12 @@ class TriangleUpload {
     stream_.rewind();
   }
 
-  // Puts up to `most` triangles at `out`, in the space; returns how many, 0 at the stream's end.
-  uint32_t read(FixedTriangle* out, uint32_t most) {
+  // Copies up to `max_count` triangles to `out`, in the space; returns their number, 0 at the end
+  // of the stream.
+  uint32_t read(FixedTriangle* out, uint32_t max_count) {
     uint32_t count = 0;
-    while (count < most) {
-      const std::span<FixedTriangle> area = space_.staging(out + count, most - count);
+    while (count < max_count) {
+      const std::span<FixedTriangle> area = space_.staging(out + count, max_count - count);
       const size_t got = stream_.read(area);
       if (got == 0) break;
       space_.upload_staged(area.first(got), out + count);

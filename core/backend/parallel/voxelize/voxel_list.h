@@ -1,14 +1,14 @@
-// The tutorial's voxelization: triangles to a list of voxels, as Morton codes within the subvolume,
-// sorted and packed into bricks. The plain reference; tiles.h is the fast way to the same bricks.
+// Voxelization as in Sintorn, "DAG Construction" (2018): triangles to a list of voxels, as Morton
+// codes within the subvolume, sorted and packed into bricks. tiles.h makes the same bricks faster.
 //
-// Voxels are listed up to a fixed number, then packed and forgotten, so that memory follows the
-// bricks and not the triangles.
+// The list has a fixed capacity and is packed whenever it is full, so that the memory needed
+// follows the bricks, not the triangles.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 
-#include "core/backend/parallel/voxelize/brick_list.h"
+#include "core/backend/parallel/brick_list.h"
 #include "core/backend/parallel/voxelize/pairs.h"
 #include "core/backend/parallel/voxelize/triangle_upload.h"
 
@@ -39,7 +39,7 @@ class VoxelList {
   static constexpr uint64_t kBytesPerVoxel = 4 * sizeof(uint64_t);
 
   PairSpan span() { return {codes_.data() + size_, nullptr, capacity_ - size_}; }
-  void took(uint32_t count) { size_ += count; }
+  void commit(uint32_t count) { size_ += count; }
 
   // Sorts the voxels and packs them into bricks.
   void flush() {
@@ -48,10 +48,10 @@ class VoxelList {
     space_.for_each(size_, SplitVoxelCode{codes_.data(), bits_.data()});
     const uint32_t packed =
         space_.merge_runs(codes_.data(), bits_.data(), size_, scratch_.data(), packed_.data());
-    const uint32_t at = bricks_.make_room(packed);
+    const uint32_t at = bricks_.reserve(packed);
     space_.copy(scratch_.data(), bricks_.codes() + at, packed);
     space_.copy(packed_.data(), bricks_.masks() + at, packed);
-    bricks_.took(packed, at == 0);
+    bricks_.commit(packed, at == 0);
     size_ = 0;
   }
 
@@ -61,31 +61,31 @@ class VoxelList {
   const int code_bits_;
   const uint32_t capacity_;
   uint32_t size_ = 0;
-  Buffer<Space, uint64_t> codes_, scratch_, bits_, packed_;
+  SpaceArray<Space, uint64_t> codes_, scratch_, bits_, packed_;
 };
 
-// How many items of `bytes_each` fit a share of the memory that is left, between `least` and what
-// the space likes to work on at once.
+// The number of items of `bytes_each` that fit 1/share of the available memory, at least
+// `min_count` and at most 64 windows of the space.
 template <class Space>
-uint32_t items_that_fit(Space& space, uint64_t share, uint64_t bytes_each, uint64_t least) {
+uint32_t fitting_count(Space& space, uint64_t share, uint64_t bytes_each, uint64_t min_count) {
   return static_cast<uint32_t>(
-      std::clamp(space.available() / share / bytes_each, least, 64 * Space::kWindow));
+      std::clamp(space.available() / share / bytes_each, min_count, 64 * Space::kWindow));
 }
 
-// Fills `bricks` with all that the triangles touch, in batches.
+// Fills `bricks` with all bricks that the triangles touch; reads the triangles in batches.
 template <class Space>
 void voxelize_by_list(Space& space, const SubvolumeTask& task, TriangleStream& stream,
                       BrickList<Space>& bricks) {
   const int cube_levels = static_cast<int>(task.grid_levels - task.cube.level);
   const uint64_t frames = static_cast<uint64_t>(cube_levels) - kBrickLevels + 1;
-  const uint32_t window = std::min<uint32_t>(
-      items_that_fit(space, 6, frames * PairExpansion<Space>::kBytesPerPair, 256),
-      static_cast<uint32_t>(Space::kWindow));
-  const uint32_t voxels = items_that_fit(space, 6, VoxelList<Space>::kBytesPerVoxel, 4096);
-  const uint32_t batch = std::min(window, items_that_fit(space, 16, sizeof(FixedTriangle), 256));
+  const uint32_t window =
+      std::min<uint32_t>(fitting_count(space, 6, frames * PairExpansion<Space>::kBytesPerPair, 256),
+                         static_cast<uint32_t>(Space::kWindow));
+  const uint32_t voxels = fitting_count(space, 6, VoxelList<Space>::kBytesPerVoxel, 4096);
+  const uint32_t batch = std::min(window, fitting_count(space, 16, sizeof(FixedTriangle), 256));
   PairExpansion<Space> pairs(space, task, cube_levels - kBrickLevels, true, window);
   VoxelList<Space> list(space, bricks, 3 * cube_levels, voxels);
-  Buffer<Space, FixedTriangle> triangles(space, batch);
+  SpaceArray<Space, FixedTriangle> triangles(space, batch);
   TriangleUpload<Space> upload(space, stream);
   while (const uint32_t count = upload.read(triangles.data(), batch))
     pairs.run(triangles.data(), 0, count, list);

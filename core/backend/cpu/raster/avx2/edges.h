@@ -1,15 +1,15 @@
-// Edge tests of the AVX2 rasterizer (draw_avx2.cc), for columns of bricks and for 16 voxel columns
-// at once.
+// Edge tests of the AVX2 rasterizer (draw.cc), for columns of bricks and for 16 voxel columns at
+// once.
 //
 // 32 bits suffice for voxel columns: |a|, |b| <= 2^27, so over a brick an edge's value differs by
 // at most 3 (|a| + |b|) < 2^30 from its largest, which is computed in 64 bits and clamped to 2^30.
 //
-// Only included by sources compiled for AVX2; all of it has internal linkage.
+// Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/column_set.h"
+#include "core/backend/cpu/raster/avx2/column_set.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
 
 namespace voxdag::cpu {
@@ -23,8 +23,8 @@ VOXDAG_INLINE int64_t above_zero(int64_t a) { return a > 0 ? a : 0; }
 VOXDAG_INLINE int64_t magnitude(int64_t a) { return a < 0 ? -a : a; }
 
 // For each of 16 voxel columns p + 2 q (low bits of p, q) + 4 p + 8 q (high bits), in two vectors,
-// what a and b add to an edge's value less what they add at most: columns 0-3, 8-11 and 4-7, 12-15,
-// so that packing the two to 16 bits restores the order.
+// the difference between an edge's value and its largest over the columns: columns 0-3, 8-11 and
+// 4-7, 12-15, so that packing the two to 16 bits restores the order.
 struct EdgeLanes {
   __m256i low, high;
 
@@ -35,10 +35,10 @@ struct EdgeLanes {
     const __m256i va = _mm256_set1_epi32(static_cast<int32_t>(a));
     const __m256i vb = _mm256_set1_epi32(static_cast<int32_t>(b));
     const __m256i va2 = _mm256_add_epi32(va, va), vb2 = _mm256_add_epi32(vb, vb);
-    const __m256i most =
+    const __m256i highest =
         _mm256_set1_epi32(static_cast<int32_t>(3 * (above_zero(a) + above_zero(b))));
     __m256i base = _mm256_add_epi32(_mm256_and_si256(va, one_p), _mm256_and_si256(vb, one_q));
-    base = _mm256_sub_epi32(base, most);
+    base = _mm256_sub_epi32(base, highest);
     low = _mm256_add_epi32(base, _mm256_and_si256(vb2, upper));
     high = _mm256_add_epi32(low, va2);
   }
@@ -47,7 +47,7 @@ struct EdgeLanes {
 // The edges in the projection along the columns.
 struct EdgeSet {
   int64_t p4[3], q4[3], c[3];  // largest value over a brick: p4 brick_p + q4 brick_q + c
-  int64_t drop[3];             // from there to the least over the brick's whole footprint
+  int64_t drop[3];             // from there to the smallest over the brick's whole footprint
   EdgeLanes lanes[3];
 
   // `swap`: an edge's a belongs to axis q and b to p.
@@ -61,7 +61,7 @@ struct EdgeSet {
       lanes[i].set(a, b);
     }
   }
-  VOXDAG_INLINE int64_t most(int i, int p, int q) const { return c[i] + p4[i] * p + q4[i] * q; }
+  VOXDAG_INLINE int64_t highest(int i, int p, int q) const { return c[i] + p4[i] * p + q4[i] * q; }
 
   // The columns of bricks in the rows first_q..last_q, from first_p to last_p, that no edge
   // crosses, and those that perhaps one does.
@@ -69,12 +69,12 @@ struct EdgeSet {
                                   ColumnSet& plain, ColumnSet& edge) const;
 
   // Voxel columns on the outer side of one of the first Count edges named, whose largest values
-  // over the brick are `most`, not negative: all ones in their 16-bit lanes.
+  // over the brick are `highest`, not negative: all ones in their 16-bit lanes.
   template <int Count>
-  VOXDAG_INLINE __m256i outer(const uint8_t (&edges)[3], const int64_t (&most)[3]) const {
+  VOXDAG_INLINE __m256i outer(const uint8_t (&edges)[3], const int64_t (&highest)[3]) const {
     __m256i low = _mm256_setzero_si256(), high = low;
     for (int k = 0; k < Count; ++k) {
-      const int64_t value = most[edges[k]];
+      const int64_t value = highest[edges[k]];
       const __m256i base =
           _mm256_set1_epi32(static_cast<int32_t>(value < kEdgeClamp ? value : kEdgeClamp));
       low = _mm256_or_si256(low, _mm256_add_epi32(base, lanes[edges[k]].low));
@@ -85,8 +85,8 @@ struct EdgeSet {
 };
 
 // Which columns of bricks of a row (one q) the edges touch, and which of these no edge crosses.
-// All is estimated in doubles and widened, or narrowed, by more than the rounding error.
-// From 0 to 15, or empty with -16 <= to < from <= 16.
+// Bounds are computed in doubles and widened, or narrowed, by more than the rounding error. They
+// are from 0 to 15, or empty with -16 <= to < from <= 16.
 struct Row {
   int from, to;              // columns to look at: the others are outside
   int inner_from, inner_to;  // of these, those inside of all edges for certain
@@ -94,12 +94,13 @@ struct Row {
 
 class RowBounds {
  public:
-  // Rows run from p = first to last.
+  // For rows from p = first to last.
   VOXDAG_INLINE RowBounds(const EdgeSet& set, int first, int last) {
     limits_ = _mm256_setr_pd(first, -last, first, -last);
     for (int i = 0; i < 3; ++i) {
       // The largest value over a column of bricks, m = c + p4 p + q4 q, is 0 at p = at + step q.
-      // An edge parallel to the row bounds it all or nothing: any steep slope does.
+      // An edge parallel to the row excludes all of it or nothing; a nearly parallel one does the
+      // same.
       const double slope = set.p4[i] == 0 ? 0x1p-60 : static_cast<double>(set.p4[i]);
       const double inverse = -1.0 / slope;
       const double at = static_cast<double>(set.c[i]) * inverse;

@@ -1,11 +1,11 @@
-// list_blocks() of the kernels, by what vectors of one length or another see in a block.
+// list_blocks() of the kernels for AVX2 and AVX-512, which differ in how they read a voxel block.
 //
-// Only included by sources compiled for AVX2; all of it has internal linkage.
+// Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/column_set.h"
+#include "core/backend/cpu/raster/avx2/column_set.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
 
 namespace voxdag::cpu {
@@ -18,15 +18,15 @@ VOXDAG_INLINE uint64_t sum_of(__m256i four) {
          static_cast<uint64_t>(_mm_extract_epi64(two, 1));
 }
 
-struct SeenBlock {
+struct BlockSummary {
   uint64_t key;
   bool has_voxels;
 };
 
-// `see`: from a block to a SeenBlock.
-template <class See>
-VOXDAG_INLINE int list_blocks_seen(TileBricks& tile, int groups, uint8_t* existing,
-                                   uint16_t* numbers, uint64_t* keys, See see) {
+// `summarize(block)` returns a BlockSummary.
+template <class Summarize>
+VOXDAG_INLINE int list_blocks_with(TileBricks& tile, int groups, uint8_t* existing,
+                                   uint16_t* numbers, uint64_t* keys, Summarize summarize) {
   int count = 0;
   for (int group = 0; group < groups; ++group) {
     uint64_t touched;
@@ -35,8 +35,8 @@ VOXDAG_INLINE int list_blocks_seen(TileBricks& tile, int groups, uint8_t* existi
     __builtin_memset(tile.touched + 8 * group, 0, 8);
     for (; touched != 0; touched &= touched - 1) {
       const int i = __builtin_ctzll(touched) / 8;
-      const SeenBlock block = see(tile.blocks[8 * group + i]);
-      // Written in any case, kept if there is something.
+      const BlockSummary block = summarize(tile.blocks[8 * group + i]);
+      // Always written; overwritten by the next one if the block is empty.
       numbers[count] = static_cast<uint16_t>(8 * group + i);
       keys[count] = block.key;
       count += block.has_voxels;

@@ -1,16 +1,15 @@
-// Edge tests of the AVX-512 rasterizer (draw_avx512.cc), for columns of bricks and for 16 voxel
-// columns at once. What edges_avx2.h does for one edge, or one row, after the other is done here
-// for all at once. Values of edges over columns of bricks are whole numbers below 2^53, so exact in
-// doubles, fused or not.
+// Edge tests of the AVX-512 rasterizer (draw.cc), for columns of bricks and for 16 voxel columns at
+// once: those of avx2/edges.h for all edges, or all rows, at once. Values of edges over columns of
+// bricks are whole numbers below 2^53, so exact in doubles, fused or not.
 //
-// Only included by sources compiled for AVX-512 (F, BW, DQ, VL, VBMI); all of it has internal
+// Only included by sources compiled for AVX-512 (F, BW, DQ, VL, VBMI); everything has internal
 // linkage.
 #pragma once
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/column_set.h"
-#include "core/backend/cpu/raster/edges_avx2.h"
+#include "core/backend/cpu/raster/avx2/column_set.h"
+#include "core/backend/cpu/raster/avx2/edges.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -24,16 +23,16 @@ struct Doubles {
 };
 constexpr Doubles kDoubles;
 
-// Three edges, one a lane, the fourth idle: a, b, c.
+// Three edges, one per lane, the fourth lane unused: a, b, c.
 struct EdgeLanes512 {
   __m256d a, b, c;
 
   VOXDAG_INLINE explicit EdgeLanes512(const Edge (&edges)[3]) {
     static_assert(sizeof(Edge) == 3 * sizeof(int64_t));
-    const __m512i most = _mm512_loadu_si512(&edges[0]);  // all but the last c
-    const auto pick = [most](int first) __attribute__((always_inline)) {
+    const __m512i values = _mm512_loadu_si512(&edges[0]);  // all but the last c
+    const auto pick = [values](int first) __attribute__((always_inline)) {
       return _mm512_castsi512_si256(_mm512_permutexvar_epi64(
-          _mm512_set_epi64(0, 0, 0, 0, 0, (first + 6) & 7, first + 3, first), most));
+          _mm512_set_epi64(0, 0, 0, 0, 0, (first + 6) & 7, first + 3, first), values));
     };
     a = _mm256_cvtepi64_pd(pick(0));
     b = _mm256_cvtepi64_pd(pick(1));
@@ -76,7 +75,7 @@ class EdgeSet512 {
     }
   }
 
-  // As EdgeSet's, all rows at once: a lane is a row.
+  // EdgeSet::find_columns() for all rows at once, one per lane.
   VOXDAG_INLINE void find_columns(int first_p, int last_p, int first_q, int last_q,
                                   ColumnSet& plain, ColumnSet& edge) const {
     const Divided d(*this);
@@ -110,7 +109,7 @@ class EdgeSet512 {
   VOXDAG_INLINE uint32_t outer(int p, int q) const {
     const __m256d most = _mm256_fmadd_pd(p4_, _mm256_set1_pd(kDoubles.of[p]),
                                          _mm256_fmadd_pd(q4_, _mm256_set1_pd(kDoubles.of[q]), c_));
-    // What is too large becomes 2^30, what is too small the smallest integer.
+    // Values that are too large become 2^30, those that are too small the smallest integer.
     const __m512i values = _mm512_castsi128_si512(
         _mm256_cvttpd_epi32(_mm256_min_pd(most, _mm256_set1_pd(double{kEdgeClamp}))));
     const auto edge = [&](int i) __attribute__((always_inline)) {
@@ -121,7 +120,7 @@ class EdgeSet512 {
   }
 
  private:
-  // RowBounds (edges_avx2.h), a lane per edge: where a row meets it, at + step q, as lower bounds
+  // RowBounds (avx2/edges.h), one edge per lane: where a row meets it, at + step q, as lower bounds
   // of p for edges that rise along p, of -p for those that fall.
   struct Divided {
     __m256d step, outer, inner;
@@ -164,10 +163,10 @@ class EdgeSet512 {
     _mm256_store_si256(reinterpret_cast<__m256i*>(set.rows), rows);
   }
 
-  // By edge: the largest value over a brick is p4 brick_p + q4 brick_q + c, and drop less the
-  // least.
+  // By edge: the largest value over a brick is p4 brick_p + q4 brick_q + c; the smallest is lower
+  // by drop.
   __m256d p4_, q4_, c_, drop_;
-  __m512i less_[3];  // how much less the value is, at most, over each of 16 voxel columns
+  __m512i less_[3];  // by voxel column: the largest value over the brick less that over the column
 };
 
 }  // namespace

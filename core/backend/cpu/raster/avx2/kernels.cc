@@ -1,11 +1,11 @@
-#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/raster/kernels.h"
 
 #if defined(__AVX2__) && defined(__BMI2__)
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/draw_avx2.h"
-#include "core/backend/cpu/raster/list_blocks_avx2.h"
+#include "core/backend/cpu/raster/avx2/list_blocks.h"
+#include "core/backend/cpu/raster/draw.h"
 #include "core/backend/cpu/raster/octant_test.h"
 
 namespace voxdag::cpu {
@@ -17,7 +17,7 @@ struct Avx2Quad {
   explicit Avx2Quad(__m256d quad) : x(quad) {}
   explicit Avx2Quad(double all) : x(_mm256_set1_pd(all)) {}
   Avx2Quad(double x0, double x1, double x2, double x3) : x(_mm256_setr_pd(x0, x1, x2, x3)) {}
-  // Reads a fourth coordinate, which idles.
+  // Reads a fourth coordinate, which is ignored.
   static Avx2Quad load(const int32_t (&v)[3], int64_t origin) {
     const __m128i four = _mm_loadu_si128(reinterpret_cast<const __m128i*>(v));
     const __m128i local = _mm_sub_epi32(four, _mm_set1_epi32(static_cast<int32_t>(origin)));
@@ -35,10 +35,10 @@ Octants test_octants(const NarrowTriangle& triangle, const Box& cube, bool insid
   return OctantTest<Avx2Quad, int32_t>(triangle, cube).run(inside);
 }
 
-const __m256i* halves(const Block& block) { return reinterpret_cast<const __m256i*>(&block); }
+const __m256i* halves(const VoxelBlock& block) { return reinterpret_cast<const __m256i*>(&block); }
 
-// block_key() of four bricks at once.
-SeenBlock see(const Block& block) {
+// block_key(), of four bricks at once.
+BlockSummary summarize(const VoxelBlock& block) {
   const __m256i low = _mm256_load_si256(halves(block));
   const __m256i high = _mm256_load_si256(halves(block) + 1);
   const auto products = [](__m256i bricks, const uint64_t* add) {
@@ -54,10 +54,10 @@ SeenBlock see(const Block& block) {
 
 int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
                 uint64_t* keys) {
-  return list_blocks_seen(tile, groups, existing, numbers, keys, see);
+  return list_blocks_with(tile, groups, existing, numbers, keys, summarize);
 }
 
-BlockContent unpack(const Block& block, uint64_t* bricks) {
+VoxelBlockContent unpack(const VoxelBlock& block, uint64_t* bricks) {
   const auto empty = [](__m256i x) {
     return _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(x, _mm256_setzero_si256())));
   };
@@ -72,14 +72,15 @@ BlockContent unpack(const Block& block, uint64_t* bricks) {
   return {mask, static_cast<uint32_t>(voxels)};
 }
 
-void find_in_range(const int64_t* values, int count, int64_t least, int64_t most, uint64_t* bits) {
-  const __m256i low = _mm256_set1_epi64x(least), high = _mm256_set1_epi64x(most);
+void find_in_range(const int64_t* values, int count, int64_t low, int64_t high, uint64_t* bits) {
+  const __m256i lows = _mm256_set1_epi64x(low), highs = _mm256_set1_epi64x(high);
   for (int i = 0; i < count; i += 64) {
     uint64_t outside = 0;
     const int end = count - i < 64 ? count - i : 64;
     for (int j = 0; j < end; j += 4) {
       const __m256i x = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values + i + j));
-      const __m256i out = _mm256_or_si256(_mm256_cmpgt_epi64(low, x), _mm256_cmpgt_epi64(x, high));
+      const __m256i out =
+          _mm256_or_si256(_mm256_cmpgt_epi64(lows, x), _mm256_cmpgt_epi64(x, highs));
       outside |= static_cast<uint64_t>(_mm256_movemask_pd(_mm256_castsi256_pd(out))) << j;
     }
     bits[i / 64] = ~outside & (end < 64 ? (uint64_t{1} << end) - 1 : ~uint64_t{0});

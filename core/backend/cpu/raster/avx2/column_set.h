@@ -1,27 +1,26 @@
-// Columns of bricks in a tile, along the axis D of the normal's largest component, and where their
-// bricks and voxels lie.
+// Columns of bricks in a tile, along the axis D of the normal's largest component, and the
+// positions of their bricks and voxels.
 //
-// Only included by sources compiled for one instruction set; all of it has internal linkage.
+// Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
 
 #include <cstdint>
 
 #include "core/backend/cpu/raster/tile_bricks.h"
+#include "core/dag/brick.h"
 
 #define VOXDAG_INLINE __attribute__((always_inline)) inline
 
 namespace voxdag::cpu {
 namespace {
 
-// The axes of the footprint of columns along D. A voxel column has the number p + 2 q (low bits of
-// p, q) + 4 p + 8 q (high bits). Q is chosen so that the high bit of q is one of the two highest of
-// a brick's bits.
+// P and Q: the axes of the footprint of columns along D. A voxel column has the number p + 2 q (low
+// bits of p, q) + 4 p + 8 q (high bits). Q is chosen so that the high bit of q is one of the two
+// highest of a brick's bits.
 template <int D>
-constexpr int kP = D == 0 ? 2 : 0;
+constexpr int kP = D == 2 ? 0 : 2;
 template <int D>
-constexpr int kQ = D == 2   ? 1
-                   : D == 1 ? 2
-                            : 1;
+constexpr int kQ = D == 1 ? 0 : 1;
 
 constexpr int column_p(int column) { return (column & 1) | (column >> 1 & 2); }
 constexpr int column_q(int column) { return (column >> 1 & 1) | (column >> 2 & 2); }
@@ -32,13 +31,13 @@ struct Layers {
   constexpr Layers() {
     for (int voxel = 0; voxel < 64; ++voxel)
       for (int axis = 0; axis < 3; ++axis)
-        voxels[axis][(voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1] |= uint64_t{1} << voxel;
+        voxels[axis][brick_coordinate(voxel, axis)] |= uint64_t{1} << voxel;
   }
 };
 constexpr Layers kLayers;
 
-// Columns of bricks: bit p of row q, visited as number p + 16 q. Visited from one loop, whose
-// length the processor need not guess row by row.
+// A set of columns of bricks: bit p of row q is column number p + 16 q. for_each() is one loop over
+// all rows, since the length of a loop per row would be mispredicted.
 struct ColumnSet {
   alignas(32) uint16_t rows[16] = {};
 
@@ -66,8 +65,9 @@ struct BrickIndex {
   uint16_t of_height[16] = {};
   constexpr BrickIndex() {
     for (int i = 0; i < 256; ++i)
-      of_column[i] = static_cast<uint16_t>(kSpread[i % 16] << kP<D> | kSpread[i / 16] << kQ<D>);
-    for (int z = 0; z < 16; ++z) of_height[z] = static_cast<uint16_t>(kSpread[z] << D);
+      of_column[i] =
+          static_cast<uint16_t>(kSpread[i % 16] << (2 - kP<D>) | kSpread[i / 16] << (2 - kQ<D>));
+    for (int z = 0; z < 16; ++z) of_height[z] = static_cast<uint16_t>(kSpread[z] << (2 - D));
   }
 };
 template <int D>

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "core/backend/parallel/dag/order.h"
+#include "core/backend/parallel/order.h"
 #include "core/backend/parallel/space.h"
 
 namespace voxdag::parallel {
@@ -20,27 +20,27 @@ class BrickList {
   uint64_t* codes() { return codes_.data(); }
   uint64_t* masks() { return masks_.data(); }
 
-  // Makes room for `count` more behind the last one and returns its position there; took() adds.
-  // Where they do not fit, bricks that occur several times are merged first; the list grows before
-  // that would free little.
-  uint32_t make_room(uint32_t count) {
+  // Reserves `count` places behind the last brick and returns the position of the first; commit()
+  // adds what was written there. Where the places do not fit, bricks that occur several times are
+  // merged; the list grows where that frees too little.
+  uint32_t reserve(uint32_t count) {
     if (size_ + uint64_t{count} <= codes_.size()) return size_;
     merge();
     const uint64_t needed = size_ + uint64_t{count};
-    if (needed > codes_.size() / 4 * 3) grow(std::max(2 * needed, kLeast));
+    if (needed > codes_.size() / 4 * 3) grow(std::max(2 * needed, kMinSize));
     return size_;
   }
-  void took(uint32_t count, bool sorted) {
+  void commit(uint32_t count, bool sorted) {
     sorted_ = sorted_ && sorted;
     size_ += count;
   }
 
-  // Sorts by code and makes one brick of those with the same code.
+  // Sorts by code and combines bricks with the same code into one.
   void merge() {
     if (sorted_ || size_ == 0) return;
     Order<Space> order(space_, size_);
     order.sort_by(KeyAt{codes_.data()}, 0, code_bits_);
-    Buffer<Space, uint64_t> sorted_codes(space_, size_), sorted_masks(space_, size_);
+    SpaceArray<Space, uint64_t> sorted_codes(space_, size_), sorted_masks(space_, size_);
     space_.for_each(size_, Gather<uint64_t>{order.items(), codes_.data(), sorted_codes.data()});
     space_.for_each(size_, Gather<uint64_t>{order.items(), masks_.data(), sorted_masks.data()});
     size_ = space_.merge_runs(sorted_codes.data(), sorted_masks.data(), size_, codes_.data(),
@@ -48,18 +48,18 @@ class BrickList {
     sorted_ = true;
   }
 
-  Buffer<Space, uint64_t> take_codes() { return std::move(codes_); }
-  Buffer<Space, uint64_t> take_masks() { return std::move(masks_); }
+  SpaceArray<Space, uint64_t> take_codes() { return std::move(codes_); }
+  SpaceArray<Space, uint64_t> take_masks() { return std::move(masks_); }
 
  private:
-  static constexpr uint64_t kLeast = 4096;
+  static constexpr uint64_t kMinSize = 4096;
 
   void grow(uint64_t size) {
     grow(codes_, size);
     grow(masks_, size);
   }
-  void grow(Buffer<Space, uint64_t>& buffer, uint64_t size) {
-    Buffer<Space, uint64_t> larger(space_, size);
+  void grow(SpaceArray<Space, uint64_t>& buffer, uint64_t size) {
+    SpaceArray<Space, uint64_t> larger(space_, size);
     space_.copy(buffer.data(), larger.data(), size_);
     buffer = std::move(larger);
   }
@@ -68,7 +68,7 @@ class BrickList {
   const int code_bits_;
   uint32_t size_ = 0;
   bool sorted_ = true;  // ascending, no code twice
-  Buffer<Space, uint64_t> codes_, masks_;
+  SpaceArray<Space, uint64_t> codes_, masks_;
 };
 
 }  // namespace voxdag::parallel

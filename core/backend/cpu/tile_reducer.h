@@ -1,15 +1,15 @@
-// From the bricks of a tile to one node, level by level. Blocks that were there before are known as
-// a whole. All other nodes of a level are hashed, then their slots and records fetched ahead, then
-// looked up, so that waits for memory overlap.
+// Reduces the bricks of a tile to one node, level by level. Voxel blocks that occurred before are
+// found as a whole in the block memo. All other nodes of a level are hashed, then their slots and
+// records prefetched, then looked up, so that memory latencies overlap.
 //
-// Which cubes of a level exist is a bit set in Morton order: its bytes are the child masks of the
-// nodes above, and which bytes are not 0 is the bit set of the next level.
+// The non-empty cubes of a level are a bit set in Morton order: its bytes are the child masks of
+// the nodes above, and the bytes that are not 0 are the bit set of the next level. Not thread-safe.
 #pragma once
 
 #include <cstdint>
 
-#include "core/backend/cpu/kernels.h"
 #include "core/backend/cpu/memo/block_memo.h"
+#include "core/backend/cpu/raster/kernels.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
 #include "core/backend/cpu/tables/sub_dag_tables.h"
 #include "core/base/popcount8.h"
@@ -25,9 +25,8 @@ class TileReducer {
   // counts. Leaves the tile empty.
   NodeRef reduce_bricks(TileBricks& tile, int size_log2);
 
-  // The same for a cube whose nodes of 2^from_log2 voxels are known: those whose bits are set in
-  // `existing`, in Morton order; next(m) gives the id and hash of the m-th. They are counted
-  // already.
+  // The node of a cube whose nodes of 2^from_log2 voxels are known: those whose bits are set in
+  // `existing`, in Morton order; next(m) returns id and hash of the m-th, which is already counted.
   template <class Next>
   NodeRef reduce_nodes(const uint64_t* existing, int from_log2, int size_log2, Next next) {
     const int words = words_of(size_log2 - from_log2);
@@ -44,7 +43,8 @@ class TileReducer {
   }
 
  private:
-  // Nodes that are looked up together: child masks, and where their children begin in a list.
+  // Nodes that are looked up together: child masks, and the position of their first child in a
+  // list.
   struct Parents {
     int count = 0, children = 0;
     uint16_t first_child[kTileBlocks];
@@ -57,22 +57,22 @@ class TileReducer {
     }
   };
 
-  // Words of the bit set of all cubes `levels` levels below one.
+  // The number of words of the bit set of all cubes `levels` levels below a cube.
   static int words_of(int levels) { return levels > 2 ? 1 << (3 * levels - 6) : 1; }
-  // Ids and hashes of the blocks listed, the tile's memory of them cleared.
+  // Finds ids and hashes of the listed voxel blocks, and clears the blocks in the tile.
   void find_blocks(TileBricks& tile, int count);
-  void find_new_blocks(TileBricks& tile, int count, bool remember);
+  void find_new_blocks(TileBricks& tile, int count, bool insert);
   NodeRef reduce(int words, int count, int from_log2, int size_log2);
-  // Children's hashes and ids make way for the parents'.
+  // Overwrites hashes and ids of the children by those of the parents.
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
   static constexpr int kMaxBricks = kTileBlocks * kBlockBricks;
-  static constexpr int kChildren = 8;  // that can be read wherever those of a node begin
+  static constexpr int kChildren = 8;  // readable behind the first child of any node
 
   SubDagTables& tables_;
   const Kernels& kernels_;
   BlockMemo memo_;
-  // The current level: which cubes exist, and their ids and hashes, one after the other.
+  // The current level: the set of non-empty cubes, and their ids and hashes in this order.
   union {
     uint64_t words[kTileBlocks / 64];
     uint8_t bytes[kTileBlocks / 8];
@@ -80,12 +80,12 @@ class TileReducer {
   uint32_t ids_[kTileBlocks + kChildren] = {};
   uint64_t hashes_[kTileBlocks];
   Parents parents_;  // the level above
-  // Blocks of a tile: numbers and keys, and which of them (by place in this list) are new.
+  // Voxel blocks of a tile: numbers and keys, and the positions in this list of the new ones.
   uint16_t blocks_[kTileBlocks + 1];
   uint64_t keys_[kTileBlocks + 1];
   uint16_t new_blocks_[kTileBlocks];
   uint16_t new_voxels_[kTileBlocks];
-  // Bricks of the new blocks.
+  // Bricks of the new voxel blocks.
   uint64_t bricks_[kMaxBricks];
   uint64_t brick_hashes_[kMaxBricks];
   uint32_t brick_ids_[kMaxBricks + kChildren] = {};

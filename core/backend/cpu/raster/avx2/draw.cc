@@ -2,16 +2,16 @@
 // largest component ("height"), where the plane passes a voxel column within a few voxels.
 //
 //   1. Edges bound the columns of bricks in each row. In a column that no edge crosses only the
-//      plane matters. On the plane, an edge that does not cross holds throughout, so only those
-//      that do are tested; where two or three do, the triangle's box too, since a corner may be
-//      near.
+//      plane matters. An edge that does not cross the column is satisfied everywhere in it, so only
+//      those that do cross are tested; with two or three of them also the triangle's box, since a
+//      corner may be near.
 //   2. All 16 voxel columns of a column of bricks at once: the heights between which the plane
-//      passes them (heights_avx2.h), and those that the edges leave, seen along the two other axes
-//      (sides_avx2.h).
-//   3. From there one bit per voxel of each brick.
+//      passes them (heights.h), and the bounds of heights by the edges in the projections along the
+//      two other axes (sides.h).
+//   3. These bounds become one bit per voxel of each brick.
 //
-// A triangle across an axis is one layer of voxels: its columns are its voxels.
-#include "core/backend/cpu/raster/draw_avx2.h"
+// A triangle perpendicular to an axis is one layer of voxels: its columns are its voxels.
+#include "core/backend/cpu/raster/draw.h"
 
 #if defined(__AVX2__) && defined(__BMI2__)
 
@@ -19,14 +19,14 @@
 
 #include <type_traits>
 
-#include "core/backend/cpu/raster/draw_by_columns.h"
-#include "core/backend/cpu/raster/heights_avx2.h"
-#include "core/backend/cpu/raster/sides_avx2.h"
+#include "core/backend/cpu/raster/avx2/draw_by_columns.h"
+#include "core/backend/cpu/raster/avx2/heights.h"
+#include "core/backend/cpu/raster/avx2/sides.h"
 
 namespace voxdag::cpu {
 namespace {
 
-// The edges in a set of them, one bit each.
+// [set of edges]: the numbers of the edges whose bits are set.
 struct EdgeLists {
   uint8_t edges[8][3] = {};
   constexpr EdgeLists() {
@@ -53,36 +53,37 @@ struct OutsideLanes {
 };
 constexpr OutsideLanes kOutside;
 
-// Columns, and how the edges lie in one of them.
+// Columns, and the positions of the edges relative to one of them.
 template <int D>
 struct EdgeColumns : Columns<D, EdgeSet> {
   using Columns<D, EdgeSet>::Columns;
   using Columns<D, EdgeSet>::over;
 
-  // For a column of `edge`, calls visit(Count, crossing, most): how many edges cross it, as an
-  // integral_constant, their set, and the largest values of all edges over the column. Nothing if
-  // the column is outside.
+  // For a column of `edge`, calls visit(count, crossing, highest): the number of edges that cross
+  // it, as an integral_constant, their set, and the largest values of all edges over the column.
+  // Does nothing if the column is outside.
   template <class Visit>
-  VOXDAG_INLINE void look_at(int number, Visit visit) const {
+  VOXDAG_INLINE void with_edges(int number, Visit visit) const {
     const int p = number & 15, q = number >> 4;
-    const int64_t most[3] = {over.most(0, p, q), over.most(1, p, q), over.most(2, p, q)};
-    if ((most[0] | most[1] | most[2]) < 0) return;
-    const uint64_t crossing = static_cast<uint64_t>(most[0] - over.drop[0]) >> 63 |
-                              static_cast<uint64_t>(most[1] - over.drop[1]) >> 63 << 1 |
-                              static_cast<uint64_t>(most[2] - over.drop[2]) >> 63 << 2;
+    const int64_t highest[3] = {over.highest(0, p, q), over.highest(1, p, q),
+                                over.highest(2, p, q)};
+    if ((highest[0] | highest[1] | highest[2]) < 0) return;
+    const uint64_t crossing = static_cast<uint64_t>(highest[0] - over.drop[0]) >> 63 |
+                              static_cast<uint64_t>(highest[1] - over.drop[1]) >> 63 << 1 |
+                              static_cast<uint64_t>(highest[2] - over.drop[2]) >> 63 << 2;
     if ((crossing & (crossing - 1)) == 0)
-      visit(std::integral_constant<int, 1>(), crossing, most);
+      visit(std::integral_constant<int, 1>(), crossing, highest);
     else if (crossing != 7)
-      visit(std::integral_constant<int, 2>(), crossing, most);
+      visit(std::integral_constant<int, 2>(), crossing, highest);
     else
-      visit(std::integral_constant<int, 3>(), crossing, most);
+      visit(std::integral_constant<int, 3>(), crossing, highest);
   }
 
-  // All ones in the 16-bit lanes of voxel columns that the `Count` edges of the set `crossing`
-  // leave out; where there are several also those beyond the triangle's box.
+  // All ones in the 16-bit lanes of voxel columns outside one of the `Count` edges of the set
+  // `crossing`; with several edges also of those outside the triangle's box.
   template <int Count>
-  VOXDAG_INLINE __m256i outer(int number, uint64_t crossing, const int64_t (&most)[3]) const {
-    const __m256i lanes = over.template outer<Count>(kEdgeLists.edges[crossing], most);
+  VOXDAG_INLINE __m256i outer(int number, uint64_t crossing, const int64_t (&highest)[3]) const {
+    const __m256i lanes = over.template outer<Count>(kEdgeLists.edges[crossing], highest);
     if (Count == 1) return lanes;
     return _mm256_or_si256(
         lanes, _mm256_or_si256(outside<kP<D>>(number & 15), outside<kQ<D>>(number >> 4)));
@@ -91,10 +92,10 @@ struct EdgeColumns : Columns<D, EdgeSet> {
   template <class Visit>
   VOXDAG_INLINE void for_each_inner(Visit visit) const {
     this->edge.for_each([&](int number) __attribute__((always_inline)) {
-      look_at(
+      with_edges(
           number, [&](auto count, uint64_t crossing,
-                      const int64_t(&most)[3]) __attribute__((always_inline)) {
-            const __m256i outside_edges = outer<count()>(number, crossing, most);
+                      const int64_t(&highest)[3]) __attribute__((always_inline)) {
+            const __m256i outside_edges = outer<count()>(number, crossing, highest);
             // A byte per column, in the halves' lower eight.
             const uint32_t bytes = ~static_cast<uint32_t>(
                 _mm256_movemask_epi8(_mm256_packs_epi16(outside_edges, _mm256_setzero_si256())));
@@ -122,9 +123,9 @@ class ColumnWalk {
 
   VOXDAG_INLINE void run() {
     columns.edge.for_each([this](int number) __attribute__((always_inline)) {
-      columns.look_at(
-          number, [&](auto count, uint64_t crossing, const int64_t(&most)[3])
-                      __attribute__((always_inline)) { column<count()>(number, crossing, most); });
+      columns.with_edges(
+          number, [&](auto count, uint64_t crossing, const int64_t(&highest)[3]) __attribute__((
+                      always_inline)) { column<count()>(number, crossing, highest); });
     });
     columns.plain.for_each([this](int number) __attribute__((always_inline)) {
       column<0>(number, 0, {0, 0, 0});
@@ -132,13 +133,13 @@ class ColumnWalk {
   }
 
  private:
-  // Edges: how many there are in the set `crossing`; those are tested.
+  // `Edges`: the number of edges in the set `crossing`, which are tested.
   template <int Edges>
-  VOXDAG_INLINE void column(int number, uint64_t crossing, const int64_t (&most)[3]) {
+  VOXDAG_INLINE void column(int number, uint64_t crossing, const int64_t (&highest)[3]) {
     const auto at = heights.column(number & 15, number >> 4, columns.first[D], columns.last[D]);
     if (at.from > at.to) return;
     __m256i outer = _mm256_setzero_si256();
-    if constexpr (Edges > 0) outer = columns.template outer<Edges>(number, crossing, most);
+    if constexpr (Edges > 0) outer = columns.template outer<Edges>(number, crossing, highest);
     if (Edges > 1 && _mm256_movemask_epi8(outer) == -1) return;
     HeightBounds bounds = heights.bounds(at, outer);
     for (int k = 0; k < Edges; ++k)

@@ -1,10 +1,11 @@
 // A permutation of items, refined by stable radix sorts: sorting by the least significant part of a
-// key first, then by the more significant ones, gives the order of the whole key.
+// key first, then by the more significant parts, sorts by the whole key.
 #pragma once
 
 #include <cstdint>
 
 #include "core/backend/parallel/space.h"
+#include "core/base/host_device.h"
 
 namespace voxdag::parallel {
 
@@ -49,15 +50,15 @@ class Order {
   // Sorts stably by bits [begin_bit, end_bit) of key(item), a host+device functor.
   template <class Key>
   void sort_by(Key key, int begin_bit, int end_bit) {
-    Buffer<Space, uint64_t> key_scratch(space_, count_);
-    Buffer<Space, uint32_t> item_scratch(space_, count_);
+    SpaceArray<Space, uint64_t> key_scratch(space_, count_);
+    SpaceArray<Space, uint32_t> item_scratch(space_, count_);
     space_.for_each(count_, KeysInOrder<Key>{key, items_.data(), keys_.data()});
     space_.sort_pairs(keys_, key_scratch, items_, item_scratch, count_, begin_bit, end_bit);
   }
 
-  // Where each item stands.
-  Buffer<Space, uint32_t> places() {
-    Buffer<Space, uint32_t> place_of(space_, count_);
+  // The inverse permutation: the position of each item.
+  SpaceArray<Space, uint32_t> places() {
+    SpaceArray<Space, uint32_t> place_of(space_, count_);
     space_.for_each(count_, InvertOrder{items_.data(), place_of.data()});
     return place_of;
   }
@@ -65,8 +66,8 @@ class Order {
  private:
   Space& space_;
   const uint32_t count_;
-  Buffer<Space, uint64_t> keys_;
-  Buffer<Space, uint32_t> items_;
+  SpaceArray<Space, uint64_t> keys_;
+  SpaceArray<Space, uint32_t> items_;
 };
 
 struct KeyAt {

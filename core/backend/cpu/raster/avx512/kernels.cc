@@ -1,18 +1,18 @@
-#include "core/backend/cpu/kernels.h"
+#include "core/backend/cpu/raster/kernels.h"
 
 #if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && \
     defined(__AVX512VL__) && defined(__AVX512VBMI__) && defined(__BMI2__)
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/draw_avx512.h"
-#include "core/backend/cpu/raster/list_blocks_avx2.h"
+#include "core/backend/cpu/raster/avx2/list_blocks.h"
+#include "core/backend/cpu/raster/draw.h"
 
 namespace voxdag::cpu {
 namespace {
 
-// block_key() of eight bricks at once.
-SeenBlock see(const Block& block) {
+// block_key(), of eight bricks at once.
+BlockSummary summarize(const VoxelBlock& block) {
   const __m512i bricks = _mm512_load_si512(&block);
   const __m512i sums = _mm512_add_epi32(bricks, _mm512_load_si512(kBlockKeys.add));
   const __m512i eight = _mm512_mul_epu32(sums, _mm512_srli_epi64(sums, 32));
@@ -23,10 +23,10 @@ SeenBlock see(const Block& block) {
 
 int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
                 uint64_t* keys) {
-  return list_blocks_seen(tile, groups, existing, numbers, keys, see);
+  return list_blocks_with(tile, groups, existing, numbers, keys, summarize);
 }
 
-BlockContent unpack(const Block& block, uint64_t* out) {
+VoxelBlockContent unpack(const VoxelBlock& block, uint64_t* out) {
   const __m512i bricks = _mm512_load_si512(&block);
   const __mmask8 mask = _mm512_test_epi64_mask(bricks, bricks);
   _mm512_storeu_si512(out, _mm512_maskz_compress_epi64(mask, bricks));
@@ -45,12 +45,12 @@ const Kernels* avx512_kernels() {
       avx2_kernels() != nullptr;
   if (!supported) return nullptr;
   static const Kernels kernels = [] {
-    Kernels longer = *avx2_kernels();
-    longer.name = "avx512";
-    longer.draw = draw_avx512;
-    longer.list_blocks = list_blocks;
-    longer.unpack = unpack;
-    return longer;
+    Kernels table = *avx2_kernels();
+    table.name = "avx512";
+    table.draw = draw_avx512;
+    table.list_blocks = list_blocks;
+    table.unpack = unpack;
+    return table;
   }();
   return &kernels;
 }

@@ -1,31 +1,31 @@
-// The edge tests of the AVX2 rasterizer (draw_avx2.cc) in the two projections that show the height:
-// as bounds of the heights in each voxel column, so that they are made once for all bricks of a
-// column of bricks.
+// The edge tests of the AVX2 rasterizer (draw.cc) in the two projections that show the height: as
+// bounds of the heights in each voxel column, so that they are computed once for a whole column of
+// bricks.
 //
 // Seen along P an edge leaves the voxels (q, z) with across q + up z + c >= 0 (tile_triangle.h):
 //     up > 0:  z >= ceil(t / |up|)         with t = -(across q + c)
 //     up < 0:  z <= -ceil(t / |up|)
 //     up = 0:  all, or none if t > 0
 // t < 2^53 is exact in a double. t / |up| is a whole number or at least 2^-27 away from one, and
-// its error within the tile, where it is at most 2^7, is below 2^-44: with 2^-30 less its ceiling
-// is exact. Seen along Q likewise, with p.
+// its error within the tile, where it is at most 2^7, is below 2^-44: after subtracting 2^-30 its
+// ceiling is exact. Seen along Q likewise, with p.
 //
-// Only included by sources compiled for AVX2; all of it has internal linkage.
+// Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/column_set.h"
-#include "core/backend/cpu/raster/edges_avx2.h"
+#include "core/backend/cpu/raster/avx2/column_set.h"
+#include "core/backend/cpu/raster/avx2/edges.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
 
 namespace voxdag::cpu {
 namespace {
 
 // Bounds of the heights in the 16 columns of a column of bricks, one byte each, counted from the
-// floor of the brick where it begins: touched are below < z <= 15 - over. In either half eight
-// columns, first `below`, then `over`. Both are 0 where nothing bounds, so bounds are joined by
-// their maximum; 15 and more in `below`, 16 and more in `over` leave nothing.
+// floor of the brick where it begins: touched are below < z <= 15 - over. Each half has eight
+// columns, first `below`, then `over`. Both are 0 where there is no bound, so bounds are combined
+// by their maximum; 15 and more in `below`, 16 and more in `over` exclude everything.
 using HeightBounds = __m256i;
 constexpr int kMaxHeight = 15;
 
@@ -61,7 +61,7 @@ class Sides {
   }
 
  private:
-  // All edges in one projection.
+  // The three edges in one projection.
   struct Projection {
     __m256d lanes[3];            // -across times 0, 1, 2, 3
     double inverse[3], more[3];  // 1 / |up|, and what is added then
@@ -89,7 +89,7 @@ class Sides {
           _mm256_mul_pd(_mm256_add_pd(_mm256_set1_pd(static_cast<double>(t)), lanes[i]),
                         _mm256_set1_pd(inverse[i]));
       const __m256d bounds = _mm256_add_pd(quotients, _mm256_set1_pd(more[i]));
-      // What is negative or too small for an integer, also after the conversion, is no bound.
+      // A negative value, or one too small for an integer, is no bound after the conversion either.
       return _mm256_cvttpd_epi32(_mm256_min_pd(bounds, _mm256_set1_pd(100.0)));
     }
   };

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/backend/cpu/kernels.h"
-#include "core/backend/cpu/raster/draw_portable.h"
+#include "core/backend/cpu/raster/draw.h"
+#include "core/backend/cpu/raster/kernels.h"
 #include "core/backend/cpu/raster/octant_test.h"
 
 namespace voxdag::cpu {
@@ -52,7 +52,7 @@ int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbe
     for (int i = 0; i < 8; ++i) {
       const int number = 8 * group + i;
       if (!std::exchange(tile.touched[number], 0)) continue;
-      const Block& block = tile.blocks[number];
+      const VoxelBlock& block = tile.blocks[number];
       if (std::all_of(block.bricks, block.bricks + kBlockBricks, [](uint64_t b) { return b == 0; }))
         continue;
       bits |= 1u << i;
@@ -64,8 +64,8 @@ int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbe
   return count;
 }
 
-BlockContent unpack(const Block& block, uint64_t* bricks) {
-  BlockContent content{0, 0};
+VoxelBlockContent unpack(const VoxelBlock& block, uint64_t* bricks) {
+  VoxelBlockContent content{0, 0};
   for (int i = 0; i < kBlockBricks; ++i) {
     if (block.bricks[i] == 0) continue;
     content.mask |= 1u << i;
@@ -75,11 +75,11 @@ BlockContent unpack(const Block& block, uint64_t* bricks) {
   return content;
 }
 
-void find_in_range(const int64_t* values, int count, int64_t least, int64_t most, uint64_t* bits) {
+void find_in_range(const int64_t* values, int count, int64_t low, int64_t high, uint64_t* bits) {
   for (int i = 0; i < count; i += 64) {
     uint64_t word = 0;
     for (int j = 0; j < 64 && i + j < count; ++j)
-      word |= uint64_t{values[i + j] >= least && values[i + j] <= most} << j;
+      word |= uint64_t{values[i + j] >= low && values[i + j] <= high} << j;
     bits[i / 64] = word;
   }
 }

@@ -1,4 +1,4 @@
-#include "core/backend/cpu/tables/tile_reducer.h"
+#include "core/backend/cpu/tile_reducer.h"
 
 #include <utility>
 
@@ -30,14 +30,14 @@ NodeRef TileReducer::reduce_bricks(TileBricks& tile, int size_log2) {
 
 void TileReducer::find_blocks(TileBricks& tile, int count) {
   int missed = 0;
-  const bool ask = memo_.pays(count);
-  if (!ask) {
+  const bool use_memo = memo_.is_worthwhile(count);
+  if (!use_memo) {
     for (; missed < count; ++missed) new_blocks_[missed] = static_cast<uint16_t>(missed);
   } else {
     for (int i = 0; i < count; ++i) memo_.prefetch(keys_[i]);
     OctreeCounts counts;
     for (int i = 0; i < count; ++i) {
-      Block& block = tile.blocks[blocks_[i]];
+      VoxelBlock& block = tile.blocks[blocks_[i]];
       if (const BlockMemo::Node* node = memo_.find(keys_[i], block)) {
         ids_[i] = node->id;
         hashes_[i] = node->hash;
@@ -49,13 +49,13 @@ void TileReducer::find_blocks(TileBricks& tile, int count) {
     }
     tables_.counts() += counts;
   }
-  if (missed > 0) find_new_blocks(tile, missed, ask);
+  if (missed > 0) find_new_blocks(tile, missed, use_memo);
 }
 
-void TileReducer::find_new_blocks(TileBricks& tile, int count, bool remember) {
+void TileReducer::find_new_blocks(TileBricks& tile, int count, bool insert) {
   parents_.count = parents_.children = 0;
   for (int i = 0; i < count; ++i) {
-    const BlockContent content =
+    const VoxelBlockContent content =
         kernels_.unpack(tile.blocks[blocks_[new_blocks_[i]]], bricks_ + parents_.children);
     parents_.add(content.mask);
     new_voxels_[i] = static_cast<uint16_t>(content.voxels);
@@ -76,8 +76,8 @@ void TileReducer::find_new_blocks(TileBricks& tile, int count, bool remember) {
     const BlockMemo::Node node{hashes_[at], ids_[at], new_voxels_[i],
                                static_cast<uint16_t>(popcount8(parents_.masks[i]))};
     tables_.counts() += {node.bricks, node.voxels};
-    Block& block = tile.blocks[blocks_[at]];
-    if (remember) memo_.remember(keys_[at], block, node);
+    VoxelBlock& block = tile.blocks[blocks_[at]];
+    if (insert) memo_.insert(keys_[at], block, node);
     block = {};
   }
 }
@@ -108,7 +108,7 @@ void TileReducer::look_up(const Parents& parents, NodeTable& table, uint64_t* ha
                           uint32_t* ids) {
   const int count = parents.count;
   table.reserve(static_cast<uint64_t>(count));
-  // A node's children stand at or behind its own place.
+  // The children of a node are at or behind its own position, so they are read before overwritten.
   for (int i = 0; i < count; ++i) {
     hashes[i] =
         hash_of(parents.masks[i], popcount8(parents.masks[i]), &hashes[parents.first_child[i]]);

@@ -1,21 +1,21 @@
-// The voxels of a column of bricks in the AVX-512 rasterizer (draw_avx512.cc): bounds of heights by
-// all edges at once, whether they cross the column or not, and the bits of the voxels between the
-// bounds. The reckoning is that of sides_avx2.h and heights_avx2.h, where rounding is argued.
+// The voxels of a column of bricks in the AVX-512 rasterizer (draw.cc): bounds of heights by all
+// edges at once, whether they cross the column or not, and the bits of the voxels between the
+// bounds. The computation is that of avx2/sides.h and avx2/heights.h, where rounding is justified.
 //
-// Only included by sources compiled for AVX-512 (F, BW, DQ, VL, VBMI); all of it has internal
+// Only included by sources compiled for AVX-512 (F, BW, DQ, VL, VBMI); everything has internal
 // linkage.
 #pragma once
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/edges_avx512.h"
-#include "core/backend/cpu/raster/sides_avx2.h"
+#include "core/backend/cpu/raster/avx2/sides.h"
+#include "core/backend/cpu/raster/avx512/edges.h"
 
 namespace voxdag::cpu {
 namespace {
 
-// Where the bytes of the bounds by q (0..3) and by p (4..7), `below` and then 8 further `over`,
-// belong in HeightBounds: [of p].
+// The permutation of the bounds by q (bytes 0..3) and by p (4..7), `below` and 8 bytes later
+// `over`, to HeightBounds: [of p].
 struct SideBytes {
   alignas(32) uint8_t from[2][32] = {};
   constexpr SideBytes() {
@@ -29,10 +29,11 @@ struct SideBytes {
 };
 constexpr SideBytes kSideBytes;
 
-// The edges seen along P and along Q, as bounds of heights: eight lanes, by q and then by p.
+// The edges in the projections along P and along Q, as bounds of heights: eight lanes, four by q
+// and four by p.
 class Sides512 {
  public:
-  // Along the axes P and Q of the columns along D; box: heights of the triangle's.
+  // For columns along D.
   template <int D>
   VOXDAG_INLINE void set(const TileTriangle<int32_t>& t) {
     constexpr bool kSwapQ = (kP<D> + 1) % 3 == D, kSwapP = (kQ<D> + 1) % 3 == D;
@@ -79,7 +80,7 @@ class Sides512 {
       below = _mm512_mask_max_pd(below, static_cast<__mmask8>(~falls_[i]), below, bound);
       over = _mm512_mask_max_pd(over, falls_[i], over, bound);
     }
-    // What is too large for an integer becomes the largest.
+    // Values that are too large for an integer become the largest integer.
     const __m512i both = _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvttpd_epu32(below)),
                                             _mm512_cvttpd_epu32(over), 1);
     const __m256i bytes = _mm256_castsi128_si256(_mm512_cvtusepi32_epi8(both));
@@ -95,8 +96,8 @@ class Sides512 {
     return _mm256_load_si256(reinterpret_cast<const __m256i*>(kSideBytes.from[of_p]));
   }
 
-  // By edge: -across times 0..3, less c; what bricks across and upwards add; 1 / |up|, and what is
-  // added then; whether the edge bounds heights from above.
+  // By edge: -across times 0..3, less c; the increments per brick across and upwards; 1 / |up|, and
+  // the term added after the division; whether the edge bounds heights from above.
   __m512d start_[3], across4_[3], up4_[3], inverse_[3], more_[3];
   __mmask8 falls_[3];
   double low_, high_;  // bounds by the triangle's box
@@ -111,15 +112,12 @@ struct VoxelBytes {
   alignas(64) uint8_t depth[4][64] = {};   // below the highest voxel of the four
   constexpr VoxelBytes() {
     for (int voxel = 0; voxel < 64; ++voxel) {
-      const auto coordinate = [voxel](int axis) {
-        return (voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1;
-      };
-      const int p = coordinate(kP<D>), q = coordinate(kQ<D>);
+      const int p = brick_coordinate(voxel, kP<D>), q = brick_coordinate(voxel, kQ<D>);
       const int column = (p & 1) | (q & 1) << 1 | (p & 2) << 1 | (q & 2) << 2;
       below[voxel] = static_cast<uint8_t>(column / 8 * 16 + column % 8);
       over[voxel] = static_cast<uint8_t>(below[voxel] + 8);
       for (int brick = 0; brick < 4; ++brick) {
-        const int z = 4 * brick + coordinate(D);
+        const int z = 4 * brick + brick_coordinate(voxel, D);
         height[brick][voxel] = static_cast<uint8_t>(z);
         depth[brick][voxel] = static_cast<uint8_t>(kMaxHeight - z);
       }

@@ -1,4 +1,4 @@
-// A block: a cube of 8 voxels, eight bricks in a cache line.
+// A voxel block: a cube of 8^3 voxels, eight bricks in a cache line.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +9,13 @@ inline constexpr int kBlockLog2 = 3;
 inline constexpr int kBlockBricks = 8;
 
 // Brick masks in Morton order.
-struct alignas(64) Block {
+struct alignas(64) VoxelBlock {
   uint64_t bricks[kBlockBricks];
 };
 
-// Spreads blocks over slots: the sum of products of the bricks' halves, constants added (the hash
-// family NH of Black et al., "UMAC", 1999), which vectors of 32-bit lanes compute as fast as they
-// load them.
+// Constants of block_key(), the hash of voxel blocks: the sum of products of the bricks' halves
+// after adding constants (the hash family NH of Black et al., "UMAC", 1999), which vectors of
+// 32-bit lanes compute as fast as they load the bricks.
 struct BlockKeys {
   alignas(64) uint64_t add[kBlockBricks] = {};
   constexpr BlockKeys() {
@@ -25,7 +25,7 @@ struct BlockKeys {
 };
 inline constexpr BlockKeys kBlockKeys;
 
-inline uint64_t block_key(const Block& block) {
+inline uint64_t block_key(const VoxelBlock& block) {
   uint64_t key = 0;
   for (int i = 0; i < kBlockBricks; ++i) {
     const uint64_t brick = block.bricks[i], add = kBlockKeys.add[i];

@@ -1,4 +1,4 @@
-// The plane test of the AVX2 rasterizer (draw_avx2.cc): between which heights the plane passes each
+// The plane test of the AVX2 rasterizer (draw.cc): the heights between which the plane passes each
 // of the 16 voxel columns of a column of bricks, and the bits of the voxels between them.
 //
 // Along the axis D of the normal's largest component a column is touched at the heights z with
@@ -7,16 +7,16 @@
 // at most four voxels, since width <= 3 n_D. Lanes hold y in 16 bits, 12 of them below the voxel,
 // relative to the brick where the column begins: y spans 0..4 for the lowest of the 16, up to 6
 // more for the others, up to 3 more above. It is rounded downwards, the upper bound upwards, by
-// little more than 2 units; a lane that is then so near to a whole number that the true height may
-// lie beyond it, is settled by division (2 columns of bricks in 100 have one).
+// little more than 2 units. A lane so near to a whole number that the true height may be on the
+// other side of it is computed exactly by division (2 columns of bricks in 100 have one).
 //
-// Only included by sources compiled for AVX2; all of it has internal linkage.
+// Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/edges_avx2.h"
-#include "core/backend/cpu/raster/sides_avx2.h"
+#include "core/backend/cpu/raster/avx2/edges.h"
+#include "core/backend/cpu/raster/avx2/sides.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
 
 namespace voxdag::cpu {
@@ -26,7 +26,7 @@ constexpr int kHeightBits = 12;  // below the voxel, in 16-bit lanes
 constexpr int kColumnBits = 40;  // below the voxel, per column of bricks in 64 bits
 
 // A brick's 64 voxels as bytes of two vectors: bit 5 of a voxel's number chooses the vector, bit 4
-// its half. Axis a owns bits a and a + 3 of the number.
+// its half.
 template <int D>
 struct ByteOrder {
   alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel's column
@@ -34,13 +34,10 @@ struct ByteOrder {
   alignas(32) int8_t depth[4][2][32] = {};   // below the highest voxel of the four
   constexpr ByteOrder() {
     for (int voxel = 0; voxel < 64; ++voxel) {
-      const auto coordinate = [voxel](int axis) {
-        return (voxel >> axis & 1) | (voxel >> (axis + 3) & 1) << 1;
-      };
-      const int p = coordinate(kP<D>), q = coordinate(kQ<D>);
+      const int p = brick_coordinate(voxel, kP<D>), q = brick_coordinate(voxel, kQ<D>);
       column[voxel / 32][voxel % 32] = static_cast<int8_t>((p & 1) | (q & 1) << 1 | (p & 2) << 1);
       for (int brick = 0; brick < 4; ++brick) {
-        const int z = 4 * brick + coordinate(D);
+        const int z = 4 * brick + brick_coordinate(voxel, D);
         height[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(z);
         depth[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(kMaxHeight - z);
       }
@@ -101,14 +98,14 @@ class Heights {
     set_lanes(np > 0, sp, nq > 0, sq, width);
   }
 
-  // Where the plane passes a column of bricks.
+  // The heights at which the plane passes a column of bricks.
   struct Column {
     int p, q;
     int64_t from, to;  // the bricks that it may touch; none if from > to
     int brick;         // in which the lowest voxel column begins,
-    int within;        // so many units of 16-bit lanes above its floor
+    int within;        // units of 16-bit lanes above the floor of `brick`
   };
-  // With bricks from `first` to `last` only.
+  // Only bricks from `first` to `last` are considered.
   VOXDAG_INLINE Column column(int p, int q, int first, int last) const {
     const int64_t height = origin_ + step_p_ * p + step_q_ * q;
     const int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
@@ -132,15 +129,15 @@ class Heights {
     const __m256i differ =
         _mm256_or_si256(_mm256_xor_si256(raised, below), _mm256_xor_si256(lowered, top));
     if (!_mm256_testz_si256(differ, whole)) [[unlikely]]
-      settle(c.p, c.q, c.brick, _mm256_and_si256(differ, whole), below, top);
+      divide_exactly(c.p, c.q, c.brick, _mm256_and_si256(differ, whole), below, top);
     below = _mm256_or_si256(below, outer);
-    // Of the top its distance from the highest voxel: all four bits turned over.
+    // For the top, the distance from the highest voxel: all four bits inverted.
     return _mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
                                _mm256_srli_epi16(_mm256_andnot_si256(top, whole), kHeightBits));
   }
 
-  // The half of a column is its high bit of q: for D = 1 that is the vector of its voxels,
-  // otherwise their half.
+  // The half of a column is the high bit of its q: for D = 1 that bit selects the vector of its
+  // voxels, otherwise the half of a vector.
   static VOXDAG_INLINE Spread spread(HeightBounds bounds) {
     const __m256i order0 = load(kByteOrder<D>.column[0]), order1 = load(kByteOrder<D>.column[1]);
     const __m256i eight = _mm256_set1_epi8(8);
@@ -154,15 +151,15 @@ class Heights {
  private:
   static constexpr int P = kP<D>, Q = kQ<D>;
 
-  // In units of 16-bit lanes, with 0.02 to spare for rounding in floats. What is within a column's
-  // base is cut to a whole unit, below_lanes_ are rounded, top_lanes_ cut:
+  // Offsets in units of 16-bit lanes, including 0.02 for rounding in floats. The base of a column
+  // is truncated to a whole unit, below_lanes_ are rounded, top_lanes_ truncated:
   //   below   in (y - 2.02, y - 0.02]             so a whole number in doubt is 1 or 2 above it
   //   top     in (y + width / n_D + 0.02, ... + 2.02]                 and 0, 1 or 2 below it
   static constexpr double kLowered = 0.52;
   static constexpr float kTopRaised = 2.54f;
   static constexpr int16_t kBelowDoubt = 2, kTopDoubt = 3;
 
-  // How far each column is above the lowest one; sp, sq are the slopes' magnitudes.
+  // The height of each column above the lowest one; sp, sq are the slopes' magnitudes.
   VOXDAG_INLINE void set_lanes(bool p_falls, float sp, bool q_falls, float sq, float width) {
     const __m256 p_low =
         p_falls ? _mm256_setr_ps(3, 2, 3, 2, 3, 2, 3, 2) : _mm256_setr_ps(0, 1, 0, 1, 0, 1, 0, 1);
@@ -181,9 +178,9 @@ class Heights {
     top_lanes_ = lanes(width + kTopRaised);
   }
 
-  // Makes the columns exact whose lanes in `doubtful` are not 0.
-  [[gnu::noinline]] void settle(int p, int q, int brick, __m256i doubtful, __m256i& below,
-                                __m256i& top) const {
+  // Computes exactly the columns whose lanes in `doubtful` are not 0.
+  [[gnu::noinline]] void divide_exactly(int p, int q, int brick, __m256i doubtful, __m256i& below,
+                                        __m256i& top) const {
     const __m256i certain = _mm256_cmpeq_epi16(doubtful, _mm256_setzero_si256());
     const int64_t n = t.normal[D];
     // Two bits per lane.
@@ -213,7 +210,7 @@ class Heights {
   // The height of a column of bricks: that of its lowest voxel column, kLowered units of 16-bit
   // lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
   int64_t origin_, step_p_, step_q_;
-  // From there to the highest top of the column, or higher.
+  // An upper bound of the distance from there to the highest top of the column.
   int64_t reach_;
   __m256i below_lanes_, top_lanes_;
 };

@@ -1,29 +1,32 @@
-// What the rasterizers for AVX2 and AVX-512 have in common: the axis that columns run along, and
-// triangles across it. Of its own each has
+// The common part of the rasterizers for AVX2 and AVX-512: the choice of the columns' axis, and
+// triangles perpendicular to it. Each rasterizer supplies
 //   EdgeColumns<D>   Columns, with for_each_inner(visit), which calls visit(number, inner) for each
-//                    column of bricks that edges cross, `inner` a bit per voxel column inside
+//                    column of bricks that edges cross, `inner` having a bit per voxel column
+//                    inside
 //   ColumnWalk<D>    whose run() draws a triangle column by column
 //
-// Only included by sources compiled for AVX2 and BMI2; all of it has internal linkage.
+// Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/columns_avx2.h"
-#include "core/backend/cpu/raster/draw_portable.h"
+#include "core/backend/cpu/raster/avx2/brick_columns.h"
+#include "core/backend/cpu/raster/draw.h"
 
 namespace voxdag::cpu {
 namespace {
 
-// A triangle across D, in one layer of voxels: their columns are all that matters.
+// Draws a triangle perpendicular to D: one layer of voxels, which only the edges bound.
 template <int D, class EdgeColumns>
 VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
+  // The voxels of a layer are numbered with the axis of the larger index first.
+  constexpr bool kTranspose = (kP<D>) < (kQ<D>);
   const EdgeColumns columns(t);
   const int z = t.first_voxel[D];
   const uint32_t at_height = kBrickIndex<D>.of_height[z / 4];
   const uint64_t layer = kLayers.voxels[D][z % 4];
   columns.for_each_inner([&](int number, uint32_t inner) __attribute__((always_inline)) {
-    if constexpr (kP < D >> kQ<D>) inner = transposed(inner);
+    if constexpr (kTranspose) inner = transposed(inner);
     tile.add(kBrickIndex<D>.of_column[number] | at_height, _pdep_u64(inner, layer));
   });
   columns.plain.for_each([&](int number) __attribute__((always_inline)) {

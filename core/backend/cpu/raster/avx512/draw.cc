@@ -1,13 +1,13 @@
-// The rasterizer for AVX-512: as draw_avx2.cc, but the edges that cross a column of bricks are not
-// sorted out. All are tested, which in vectors of this length costs less than the branches.
-#include "core/backend/cpu/raster/draw_avx512.h"
+// The rasterizer for AVX-512: like avx2/draw.cc, but in every column of bricks all three edges are
+// tested, whether they cross it or not, which in vectors of this length costs less than branching.
+#include "core/backend/cpu/raster/draw.h"
 
 #if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && \
     defined(__AVX512VL__) && defined(__AVX512VBMI__) && defined(__BMI2__)
 
-#include "core/backend/cpu/raster/columns_avx512.h"
-#include "core/backend/cpu/raster/draw_by_columns.h"
-#include "core/backend/cpu/raster/heights_avx2.h"
+#include "core/backend/cpu/raster/avx2/draw_by_columns.h"
+#include "core/backend/cpu/raster/avx2/heights.h"
+#include "core/backend/cpu/raster/avx512/height_bounds.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -17,8 +17,8 @@ struct EdgeColumns : Columns<D, EdgeSet512> {
   VOXDAG_INLINE explicit EdgeColumns(const TileTriangle<int32_t>& triangle)
       : Columns<D, EdgeSet512>(triangle) {
     if (triangle.inside) return;
-    leave_out<kP<D>>(outside_p_, kLowP);
-    leave_out<kQ<D>>(outside_q_, kLowQ);
+    exclude_beyond_box<kP<D>>(outside_p_, kLowP);
+    exclude_beyond_box<kQ<D>>(outside_q_, kLowQ);
   }
 
   template <class Visit>
@@ -41,7 +41,7 @@ struct EdgeColumns : Columns<D, EdgeSet512> {
 
   // In the first and the last brick along an axis, the voxel columns beyond the triangle's box.
   template <int Axis>
-  VOXDAG_INLINE void leave_out(uint16_t (&bits)[16], const uint16_t (&columns)[4]) {
+  VOXDAG_INLINE void exclude_beyond_box(uint16_t (&bits)[16], const uint16_t (&columns)[4]) {
     const int low = this->t.first_voxel[Axis], high = this->t.last_voxel[Axis];
     for (int k = 0; k < 3; ++k) {
       bits[low / 4] |= k < low % 4 ? columns[k] : 0;

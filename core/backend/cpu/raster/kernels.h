@@ -1,0 +1,55 @@
+// The dispatch table of the inner loops: portable, for AVX2 with BMI2, and some of them for AVX-512
+// (F, BW, DQ, VL, VBMI), chosen at run time; all set the same voxels. Sources in avx2/ and avx512/
+// are compiled for these instruction sets, so nothing in them, including inline functions of shared
+// headers, may run before the choice is made. The kernels are stateless.
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/cpu/raster/tile_bricks.h"
+#include "core/backend/cpu/raster/tile_triangle.h"
+#include "core/backend/cpu/raster/voxel_block.h"
+#include "core/backend/cpu/triangle_set.h"
+
+namespace voxdag::cpu {
+
+// Bit masks of the children of a cube.
+struct Octants {
+  uint32_t touched;  // all that the triangle touches, and perhaps some that it does not
+  uint32_t inside;   // those of `touched` that the triangle covers: only its plane matters there
+};
+
+struct VoxelBlockContent {
+  uint32_t mask;  // of the bricks that are not empty
+  uint32_t voxels;
+};
+
+struct Kernels {
+  const char* name;
+  // Sets exactly the voxels of the tile that the triangle touches.
+  void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
+  // The triangle must touch the cube. `inside`: it covers the whole cube.
+  Octants (*test_octants)(const NarrowTriangle& triangle, const Box& cube, bool inside);
+  // Sets bit i of `bits` iff low <= values[i] <= high, for `count` values, a multiple of 4; the
+  // other bits of the last word are 0.
+  void (*find_in_range)(const int64_t* values, int count, int64_t low, int64_t high,
+                        uint64_t* bits);
+  // Lists numbers and keys of a tile's non-empty voxel blocks in Morton order, and sets their bits
+  // in `existing` (8 * groups bits). Clears all touched marks of the tile.
+  int (*list_blocks)(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
+                     uint64_t* keys);
+  // Copies the non-empty bricks of a voxel block to the front of `bricks`, which has space for
+  // eight.
+  VoxelBlockContent (*unpack)(const VoxelBlock& block, uint64_t* bricks);
+};
+
+const Kernels& portable_kernels();
+// The kernels for AVX2 and AVX-512; null if they were not built or this machine cannot run them.
+const Kernels* avx2_kernels();
+const Kernels* avx512_kernels();
+
+// Wide triangles have a portable implementation only.
+void draw_wide(const TileTriangle<int64_t>& triangle, TileBricks& tile);
+Octants test_octants_wide(const WideTriangle& triangle, const Box& cube, bool inside);
+
+}  // namespace voxdag::cpu
