@@ -66,8 +66,8 @@ std::string string_or_empty(const Json& object, const char* key) {
 
 ModelReader::ModelReader(const std::string& scene_path, MemoryBudget& budget)
     : model_(std::make_shared<tinygltf::Model>()),
-      model_charge_(budget, "the materials of " + scene_path),
-      parse_charge_(budget, "the materials of " + scene_path) {}
+      model_charge_(budget, "the description of the materials in " + scene_path),
+      parse_charge_(budget, "the description of the materials in " + scene_path) {}
 
 void ModelReader::add(const JsonElement& element) {
   check(element);

@@ -45,38 +45,48 @@ auto store(Document& document, std::deque<T>& array, T (*read)(const JsonElement
   };
 }
 
+// Reads all sections; returns the message of the first violation, or "".
 std::string read_structure(const ReadableFile& file, FileRange json, Document& d,
                            ModelReader& model, MemoryBudget& budget, const CancelToken& cancel) {
   const auto add_to_model = [&](const JsonElement& element) { model.add(element); };
-  return read_sections(
+  bool has_asset = false;
+  constexpr bool kArray = true, kWhole = false, kChecked = true, kUnchecked = false;
+  const std::string violation = read_sections(
       file, json,
-      {{"asset", false, add_to_model},
-       {"extensionsUsed", true, add_to_model},
-       {"extensionsRequired", true, add_to_model},
-       {"materials", true, add_to_model},
-       {"textures", true, add_to_model},
-       {"samplers", true, add_to_model},
-       {"images", true, [&](const JsonElement& element) { model.add_image(element); }},
-       {"buffers", true,
+      {{"asset", kWhole, kChecked,
+        [&](const JsonElement& element) {
+          has_asset = true;
+          model.add(element);
+        }},
+       {"extensionsUsed", kArray, kChecked, add_to_model},
+       {"extensionsRequired", kArray, kChecked, add_to_model},
+       {"materials", kArray, kUnchecked, add_to_model},
+       {"textures", kArray, kUnchecked, add_to_model},
+       {"samplers", kArray, kUnchecked, add_to_model},
+       {"images", kArray, kUnchecked,
+        [&](const JsonElement& element) { model.add_image(element); }},
+       {"buffers", kArray, kChecked,
         [&](const JsonElement& element) {
           BufferSource buffer = read_buffer(element, file, budget);
           d.charge.add(sizeof(buffer) + buffer.uri.capacity() + buffer.characters.capacity());
           d.buffers.push_back(std::move(buffer));
         }},
-       {"bufferViews", true, store(d, d.views, read_view)},
-       {"accessors", true, store(d, d.accessors, read_accessor)},
-       {"meshes", true, store(d, d.meshes, read_mesh)},
-       {"skins", true, store(d, d.skins, read_skin)},
-       {"nodes", true,
+       {"bufferViews", kArray, kChecked, store(d, d.views, read_view)},
+       {"accessors", kArray, kChecked, store(d, d.accessors, read_accessor)},
+       {"meshes", kArray, kChecked, store(d, d.meshes, read_mesh)},
+       {"skins", kArray, kChecked, store(d, d.skins, read_skin)},
+       {"nodes", kArray, kChecked,
         [&](const JsonElement& element) {
           const int index = static_cast<int>(d.nodes.size());
           Node node = read_node(element, index, d);
           d.charge.add(sizeof(node) + heap_bytes(node) + kCheckBytesPerNode);
           d.nodes.push_back(std::move(node));
         }},
-       {"scenes", true, store(d, d.scenes, read_scene)},
-       {"scene", false, [&](const JsonElement& element) { d.scene = element.as_index(); }}},
+       {"scenes", kArray, kChecked, store(d, d.scenes, read_scene)},
+       {"scene", kWhole, kChecked,
+        [&](const JsonElement& element) { d.scene = element.as_index(); }}},
       budget, cancel);
+  return violation.empty() && !has_asset ? "asset is missing" : violation;
 }
 
 }  // namespace

@@ -139,8 +139,8 @@ void AccessorReader::read_sparse_indices(uint64_t first, size_t count) {
 void AccessorReader::check_sparse_indices() {
   const std::string where = document_.name_accessor(index_) + ": its sparse index ";
   const uint64_t windows = (accessor_.sparse.count + kSparseWindow - 1) / kSparseWindow;
-  directory_charge_ =
-      MemoryCharge(buffers_.budget(), windows * sizeof(uint32_t), document_.path + ": " + where);
+  directory_charge_ = MemoryCharge(buffers_.budget(), windows * sizeof(uint32_t),
+                                   document_.path + ": " + document_.name_accessor(index_));
   sparse_directory_.reserve(static_cast<size_t>(windows));
   uint64_t next = 0;  // the smallest index that may follow
   for (uint64_t k = 0; k < accessor_.sparse.count; k += kSparseWindow) {

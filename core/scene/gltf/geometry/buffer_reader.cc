@@ -39,7 +39,7 @@ BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
       document_(document),
       budget_(budget),
       window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()),
-      external_files_charge_(budget, "the external files of " + scene_file.path()) {
+      external_files_charge_(budget, "the list of external files of " + scene_file.path()) {
   for (size_t i = 0; i < document.buffers.size(); ++i)
     if (document.buffers[i].is_read) check_length(static_cast<int>(i));
 }

@@ -48,7 +48,7 @@ class GlobalTransforms {
 
 PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buffers, int index) {
   const Skin& skin = document.skins[static_cast<size_t>(index)];
-  const std::string what = document.path + ": the joints of " + document.name_skin(index);
+  const std::string what = document.path + ": " + document.name_skin(index);
   PageBuffer<Transform> matrices(buffers.budget(), skin.joints.size(), what);
   GlobalTransforms globals(document, buffers.budget(), what);
   for (size_t i = 0; i < matrices.size(); ++i) matrices[i] = globals.of(skin.joints[i]);

@@ -3,7 +3,7 @@
 namespace voxdag::gltf {
 
 NodeWalk::NodeWalk(const Document& document, MemoryBudget& budget)
-    : document_(document), charge_(budget, "the nested nodes of " + document.path) {}
+    : document_(document), charge_(budget, "the node hierarchy of " + document.path) {}
 
 bool NodeWalk::next() {
   while (descend())

@@ -14,7 +14,7 @@ VertexSource::VertexSource(const Document& document, BufferReader& buffers,
                            std::span<const Transform> joints)
     : charge_(buffers.budget(),
               sizeof(Target) * weights.size() + sizeof(Influences) * primitive.joint_sets.size(),
-              document.path + ": the morph targets and joints of a primitive"),
+              document.path + ": a primitive with its morph targets and joints"),
       positions_(document, buffers, primitive.position),
       joints_(joints) {
   targets_.reserve(weights.size());

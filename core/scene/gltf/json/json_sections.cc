@@ -169,7 +169,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
     }
   }
   void violate(const std::string& message) {
-    if (violation_.empty()) violation_ = message;
+    if (violation_.empty() && (!in_root_ || section_->is_checked)) violation_ = message;
   }
 
   const std::string& path_;
