@@ -46,7 +46,7 @@ BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 # Third-party headers, and the folders where each may be included.
 THIRD_PARTY = {
     "zstd.h": ["core/format"],
-    "tiny_gltf.h": ["core/scene"],
+    "tiny_gltf.h": ["core/scene", "tests"],
     "sqlite3.h": ["core/db"],
     "httplib.h": ["server", "client"],
     "png.h": ["query"],

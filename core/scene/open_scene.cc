@@ -1,17 +1,18 @@
-// Scenes of glTF files, one after the other, each one's default scene.
+// Scenes that consist of the default scenes of glTF files, one after the other.
 #include <memory>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
+#include "core/scene/gltf/document/check_document.h"
 #include "core/scene/gltf/document/read_document.h"
-#include "core/scene/gltf/triangle_stream.h"
+#include "core/scene/gltf/triangle_reader.h"
 #include "core/scene/triangle_source.h"
 
 namespace voxdag {
 namespace {
 
-// One checked file, kept open.
+// An open scene file and its checked document.
 struct SceneFile {
   SceneFile(FileSystem& files, const std::string& path, MemoryBudget& budget,
             const CancelToken& cancel)
@@ -25,7 +26,7 @@ struct SceneFile {
   std::unique_ptr<gltf::BufferReader> buffers;
 };
 
-// Instances counted.
+// Declared triangles of the scene to draw, every instance counted.
 uint128 count_triangles(const gltf::Document& document, MemoryBudget& budget) {
   uint128 total = 0;
   gltf::NodeWalk walk(document, budget);
@@ -56,15 +57,15 @@ class GltfScene : public TriangleSource {
   }
 
   void for_each_batch_from(uint64_t first, const Visitor& visit) override {
-    passed_ = {};
-    gltf::Batch batch(visit, passed_, first, budget_, cancel_);
+    position_ = {};
+    gltf::Batch batch(visit, position_, first, budget_, cancel_);
     for (const auto& f : files_)
-      gltf::TriangleStream(f->document, *f->buffers, budget_, options_.skip_invalid, batch).run();
+      gltf::TriangleReader(f->document, *f->buffers, budget_, options_.skip_invalid, batch).run();
     batch.flush();
   }
-  uint64_t position() const override { return passed_.triangles; }
+  uint64_t position() const override { return position_.triangles; }
   uint64_t declared_triangles() const override { return declared_; }
-  uint64_t invalid_triangles() const override { return passed_.invalid; }
+  uint64_t invalid_triangles() const override { return position_.invalid; }
   std::vector<SourceFile> files() const override {
     std::vector<SourceFile> all;
     for (const auto& f : files_) all.push_back({f->file->path(), f->file->identity()});
@@ -89,7 +90,7 @@ class GltfScene : public TriangleSource {
   const CancelToken& cancel_;
   std::vector<std::unique_ptr<SceneFile>> files_;
   uint64_t declared_ = 0;
-  gltf::Passed passed_;
+  gltf::PassPosition position_;
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
 // A city of square blocks with streets between them: towers in the middle, houses at the edge,
-// some parks. The number of blocks follows from the triangles wanted.
+// some parks. The number of blocks follows from the requested triangles.
 #include "core/scene/generate/city.h"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ constexpr double kPitch = 64;         // from street to street
 constexpr double kBlock = 52;         // edge of a block, pavement included
 constexpr double kPavement = 0.1875;  // height
 constexpr double kBuilt = 48;         // edge of what lots may fill
-// Triangles of an average block, measured; makes `--triangles` come out about right.
+// Measured triangles of an average block, from which the number of blocks is estimated.
 constexpr uint64_t kTrianglesPerBlock = 9900;
 
 class City {
@@ -55,13 +55,13 @@ class City {
 
   void make_ground(const Vec3& c) {
     constexpr double kHalf = kPitch / 2, kHalfBlock = kBlock / 2;
-    scene_.room(4, 2).quad({c.x - kHalf, 0, c.z - kHalf}, {c.x - kHalf, 0, c.z + kHalf},
-                           {c.x + kHalf, 0, c.z + kHalf}, {c.x + kHalf, 0, c.z - kHalf});
-    scene_.room(8, 10).box({c.x - kHalfBlock, 0, c.z - kHalfBlock},
-                           {c.x + kHalfBlock, kPavement, c.z + kHalfBlock}, false);
+    scene_.mesh_for(4, 2).quad({c.x - kHalf, 0, c.z - kHalf}, {c.x - kHalf, 0, c.z + kHalf},
+                               {c.x + kHalf, 0, c.z + kHalf}, {c.x + kHalf, 0, c.z - kHalf});
+    scene_.mesh_for(8, 10).box({c.x - kHalfBlock, 0, c.z - kHalfBlock},
+                               {c.x + kHalfBlock, kPavement, c.z + kHalfBlock}, false);
   }
 
-  // Trees on the pavement, cars beside it.
+  // Adds trees on the pavement and cars next to it.
   void make_street(const Vec3& c, Random& random) {
     for (int side = 0; side < 4; ++side)
       for (int step = -2; step <= 2; ++step) {

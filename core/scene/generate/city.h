@@ -1,5 +1,5 @@
 // The pieces of a generated city, in meters, y up. Sizes are small multiples of 1/64, so that a
-// window written out as triangles and the same window as an instance have exactly the same corners.
+// window stored as triangles and the same window as an instance have exactly the same corners.
 #pragma once
 
 #include <cstdint>

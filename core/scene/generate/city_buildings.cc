@@ -21,7 +21,7 @@ struct Tier {
   double top() const { return y + kFloorHeight * floors; }
 };
 
-// One wall: bays counted from its left end as seen from outside.
+// Adds a wall, its bays counted from the left end as seen from outside.
 void add_wall(SceneBuilder& scene, const CityParts& parts, const Tier& tier, uint32_t direction) {
   static constexpr int kAlong[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};
   const auto [ax, az] = kAlong[direction];
@@ -38,15 +38,15 @@ void add_wall(SceneBuilder& scene, const CityParts& parts, const Tier& tier, uin
           scale);
 }
 
-// The walls, and a slab on top that juts out.
+// Adds the walls, and a slab on top that juts out.
 void add_tier(SceneBuilder& scene, const CityParts& parts, const Tier& tier) {
   for (uint32_t direction = 0; direction < 4; ++direction) add_wall(scene, parts, tier, direction);
   const double x = tier.half_x() + 0.375, z = tier.half_z() + 0.375;
-  scene.room(8, 12).box({tier.x - x, tier.top(), tier.z - z},
-                        {tier.x + x, tier.top() + kSlabHeight, tier.z + z});
+  scene.mesh_for(8, 12).box({tier.x - x, tier.top(), tier.z - z},
+                            {tier.x + x, tier.top() + kSlabHeight, tier.z + z});
 }
 
-// A ridge along the longer side, its ends cut off straight or sloping in (a hip).
+// Adds a roof with a ridge along the longer side, its ends upright or sloping (a hip).
 void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double y = tier.top() + kSlabHeight;
   const bool along_x = tier.bays_x >= tier.bays_z;
@@ -57,7 +57,7 @@ void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const auto at = [&](double l, double up, double c) {
     return along_x ? Vec3{tier.x + l, y + up, tier.z + c} : Vec3{tier.x + c, y + up, tier.z - l};
   };
-  Mesh& mesh = scene.room(6, 6);
+  Mesh& mesh = scene.mesh_for(6, 6);
   const uint32_t first = mesh.vertices();
   for (const Vec3& p : {at(-along, 0, across), at(along, 0, across), at(along, 0, -across),
                         at(-along, 0, -across), at(-ridge, height, 0), at(ridge, height, 0)})
@@ -67,18 +67,18 @@ void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   for (const auto& f : kFaces) mesh.add_triangle(first + f[0], first + f[1], first + f[2]);
 }
 
-// A box turned against the building, a pyramid turned once more on it.
+// Adds a box turned against the building, and a pyramid on it turned once more.
 void add_crown(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double half = std::min(tier.half_x(), tier.half_z());
   const double y = tier.top() + kSlabHeight;
   const Vec3 body{half * 0.625, half * 0.5, half * 0.625};
   const Turn turn = pythagorean_turn(random.below(12));
-  scene.room(8, 10).turned_box({tier.x, y, tier.z}, body, turn);
-  scene.room(5, 4).pyramid({tier.x, y + body.y, tier.z},
-                           {half * 0.6875, half * 1.25, half * 0.6875}, turn);
+  scene.mesh_for(8, 10).turned_box({tier.x, y, tier.z}, body, turn);
+  scene.mesh_for(5, 4).pyramid({tier.x, y + body.y, tier.z},
+                               {half * 0.6875, half * 1.25, half * 0.6875}, turn);
 }
 
-// Plant rooms at odd angles, sometimes a mast.
+// Adds plant rooms at odd angles, sometimes a mast.
 void add_flat_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double y = tier.top() + kSlabHeight;
   for (int i = random.between(1, 3); i > 0; --i) {
@@ -86,11 +86,11 @@ void add_flat_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
     const double z = tier.z + tier.half_z() * 0.5 * random.signed_unit();
     const Vec3 size{1.0 + random.unit(), 1.5 + random.unit(), 1.5 + random.unit()};
     const Turn turn = pythagorean_turn(random.below(12));
-    scene.room(8, 10).turned_box({x, y, z}, size, turn);
+    scene.mesh_for(8, 10).turned_box({x, y, z}, size, turn);
   }
   if (tier.floors > 4 && random.chance(40))
-    scene.room(8, 12).box({tier.x - 0.125, y, tier.z - 0.125},
-                          {tier.x + 0.125, y + 6 + random.below(8), tier.z + 0.125});
+    scene.mesh_for(8, 12).box({tier.x - 0.125, y, tier.z - 0.125},
+                              {tier.x + 0.125, y + 6 + random.below(8), tier.z + 0.125});
 }
 
 void add_roof(SceneBuilder& scene, const Tier& tier, bool tall, Random& random) {
@@ -109,7 +109,7 @@ void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, R
   tier.bays_z = static_cast<uint32_t>(random.between(most * 5 / 8, most));
   const bool tall = lot.floors > 9;
   for (uint32_t left = lot.floors;;) {
-    // Tall buildings draw in twice or more on their way up.
+    // Tall buildings become narrower twice or more on their way up.
     const bool last = !tall || left < 6 || tier.bays_x < 4 || tier.bays_z < 4;
     tier.floors = last ? left : left / 2 + random.below(left / 4);
     add_tier(scene, parts, tier);
@@ -127,10 +127,10 @@ void add_turned_house(SceneBuilder& scene, const Lot& lot, Random& random) {
   const double x = lot.width * (0.25 + 0.09375 * random.unit());
   const double z = lot.width * (0.25 + 0.09375 * random.unit());
   const double height = kFloorHeight * lot.floors;
-  scene.room(8, 10).turned_box(lot.center, {x, height, z}, turn);
+  scene.mesh_for(8, 10).turned_box(lot.center, {x, height, z}, turn);
   const Vec3 eaves{lot.center.x, lot.center.y + height, lot.center.z};
-  scene.room(5, 4).pyramid(eaves, {x + 0.5, (x + z) * (0.375 + 0.25 * random.unit()), z + 0.5},
-                           turn);
+  scene.mesh_for(5, 4).pyramid(eaves, {x + 0.5, (x + z) * (0.375 + 0.25 * random.unit()), z + 0.5},
+                               turn);
 }
 
 }  // namespace voxdag

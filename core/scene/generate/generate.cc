@@ -17,10 +17,10 @@ constexpr SceneKindInfo kKinds[] = {
 };
 
 constexpr uint32_t kMaxMengerLevel = 5;
-// Of a terrain, which packs its triangles best.
+// Bytes of a triangle of terrain, the kind that stores triangles most compactly.
 constexpr uint64_t kMinBytesPerTriangle = 12;
 
-// What can be said without counting; GlbLayout says the rest.
+// Refuses what is too large without counting; GlbLayout finds the rest.
 void check_size(const GenerateOptions& options) {
   const bool is_menger = options.kind == SceneKind::kMenger;
   const bool fits =
@@ -28,7 +28,7 @@ void check_size(const GenerateOptions& options) {
                 : options.instances || options.triangles <= kMaxGlbBytes / kMinBytesPerTriangle;
   if (!fits)
     throw Error(ErrorCode::kLimit,
-                "a .glb holds at most 4 294 967 295 bytes: ask for " +
+                "the limit of a .glb is 4 294 967 295 bytes: ask for " +
                     (is_menger ? "a level of at most " + std::to_string(kMaxMengerLevel)
                                : std::string("fewer triangles")));
 }
@@ -65,7 +65,7 @@ void make(const GenerateOptions& options, BlockSink& sink) {
   scene.finish();
 }
 
-// The layout, told about progress and looking at `cancel`.
+// The layout with progress and cancellation.
 class MeasuredLayout : public GlbLayout {
  public:
   MeasuredLayout(Progress& progress, const CancelToken& cancel)

@@ -13,7 +13,7 @@ using nlohmann::json;
 constexpr int kFloat = 5126, kUint16 = 5123;                // componentType
 constexpr int kVertexTarget = 34962, kIndexTarget = 34963;  // target of a bufferView
 
-// The bufferViews and accessors, array after array as they lie in the file.
+// The bufferViews and accessors of all arrays, in the order of the file.
 struct Arrays {
   json views = json::array(), accessors = json::array();
   uint64_t offset = 0;
@@ -79,12 +79,12 @@ void GlbLayout::add_bytes(uint64_t bytes) {
   bin_bytes_ += bytes;
   if (bin_bytes_ > kMaxGlbBytes)
     throw Error(ErrorCode::kLimit,
-                "a .glb holds at most 4 294 967 295 bytes, which this scene passes after " +
+                "the limit of a .glb is 4 294 967 295 bytes, which this scene exceeds after " +
                     std::to_string(stored_triangles_) + " triangles; ask for fewer");
 }
 
-// The parts first, so that part p is mesh p; then one mesh of all that is not instanced. A node for
-// the latter, and one for each block of instances.
+// The parts first, so that part p is mesh p; then one mesh of everything that is not instanced. One
+// node for that mesh, and one for each block of instances.
 std::string GlbLayout::json_text(const std::string& generator) const {
   Arrays arrays;
   json meshes = json::array(), nodes = json::array(), primitives = json::array();

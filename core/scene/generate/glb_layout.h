@@ -1,9 +1,9 @@
-// The first of the two passes over a generated scene: what lies where in the .glb, and the JSON
-// that says so.
+// The first of the two passes over a generated scene: the layout of the .glb and the JSON that
+// describes it.
 //
 //     header 12 | JSON chunk: head 8, text padded with spaces | BIN chunk: head 8, blocks
-//     mesh, part:  positions (12 bytes a vertex) | indices (2 bytes each), padded to 4
-//     instances:   translations (12 bytes each)  | scales (12 bytes each)
+//     mesh, part:  positions (12 bytes per vertex) | indices (2 bytes each), padded to 4
+//     instances:   translations (12 bytes each)    | scales (12 bytes each)
 //
 // Each array is a bufferView and an accessor of the same number.
 #pragma once
@@ -25,7 +25,8 @@ class GlbLayout : public BlockSink {
   void instances(uint32_t part, std::span<const Float3> translations,
                  std::span<const Float3> scales) override;
 
-  // The chunk's text, padded to a multiple of 4 with spaces. `generator` names who made the file.
+  // The text of the JSON chunk, padded to a multiple of 4 with spaces. `generator` becomes the
+  // asset's generator.
   std::string json_text(const std::string& generator) const;
   uint64_t bin_bytes() const { return bin_bytes_; }
   uint64_t triangles() const { return triangles_; }
@@ -36,9 +37,9 @@ class GlbLayout : public BlockSink {
   enum class Kind : uint8_t { kMesh, kPart, kInstances };
   struct Block {
     Kind kind;
-    uint32_t part;    // of instances
-    uint32_t first;   // vertices, or instances
-    uint32_t second;  // indices
+    uint32_t part;    // that a block of instances places
+    uint32_t first;   // number of vertices or of instances
+    uint32_t second;  // number of indices
     Float3 low, high;
   };
   void add_geometry(Kind kind, const Mesh& mesh);
@@ -52,7 +53,7 @@ class GlbLayout : public BlockSink {
   uint64_t instance_count_ = 0;
 };
 
-// Bytes that an array of `count` indices takes in the file.
+// Bytes of an array of `count` indices in the file.
 inline uint64_t padded_index_bytes(uint64_t count) { return (2 * count + 3) / 4 * 4; }
 
 }  // namespace voxdag

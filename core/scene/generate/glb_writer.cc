@@ -27,7 +27,7 @@ GlbWriter::GlbWriter(FileSystem& files, const std::string& path, const std::stri
       cancel_(cancel) {
   if (total_bytes_ > kMaxGlbBytes)
     throw Error(ErrorCode::kLimit, path +
-                                       ": a .glb holds at most 4 294 967 295 bytes, this scene "
+                                       ": the limit of a .glb is 4 294 967 295 bytes, this scene "
                                        "takes " +
                                        std::to_string(total_bytes_));
   file_ = files.create(path + ".partial");
@@ -46,7 +46,7 @@ GlbWriter::~GlbWriter() {
     file_.reset();
     files_.remove(path_ + ".partial");
   } catch (const Error&) {
-    // The error that brought us here is the one to report.
+    // The error that ended the writing is the one to report.
   }
 }
 

@@ -20,7 +20,7 @@ class GlbWriter : public BlockSink {
   // Writes the header and `json` at once. `progress` is advanced by stored triangles.
   GlbWriter(FileSystem& files, const std::string& path, const std::string& json, uint64_t bin_bytes,
             Progress& progress, const CancelToken& cancel);
-  // Without finish(): removes the partial file.
+  // Removes the partial file unless finish() has returned.
   ~GlbWriter() override;
 
   void mesh(const Mesh& mesh) override { write_geometry(mesh); }
@@ -28,7 +28,7 @@ class GlbWriter : public BlockSink {
   void instances(uint32_t part, std::span<const Float3> translations,
                  std::span<const Float3> scales) override;
 
-  // Syncs, gives the file its name, syncs the folder. Returns the file's size.
+  // Syncs the file, renames it, syncs the folder. Returns the size of the file.
   uint64_t finish();
 
  private:

@@ -1,5 +1,5 @@
-// The generators, one file each. Every one makes the same calls each time it is run with the same
-// options: generate_scene() runs it twice.
+// The generators, one file each. A generator that runs again with the same options makes the same
+// calls: generate_scene() runs it twice.
 #pragma once
 
 #include "core/scene/generate/generate.h"

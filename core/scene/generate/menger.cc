@@ -1,6 +1,6 @@
-// Menger's sponge of level n: a cube of 3^n unit cells, of which those are left that at no scale
-// lie in the middle of two or three axes. Every face between a cell that is left and one that is
-// not is a unit square with corners on the integer lattice: 2 * 20^n + 4 * 8^n squares.
+// Menger's sponge of level n: those of 3^n unit cells per axis that at no scale lie in the middle
+// of two or three axes. Every face between a cell of the sponge and one outside it is a unit square
+// with corners on the integer lattice: 2 * 20^n + 4 * 8^n squares.
 #include "core/scene/generate/kinds.h"
 
 namespace voxdag {
@@ -50,7 +50,7 @@ class Menger {
   void face(Cell c, const Vec3& corner, const Vec3& u, const Vec3& v) {
     const Vec3 p =
         corner + Vec3{static_cast<double>(c.x), static_cast<double>(c.y), static_cast<double>(c.z)};
-    scene_.room(4, 2).quad(p, p + u, p + u + v, p + v);
+    scene_.mesh_for(4, 2).quad(p, p + u, p + u + v, p + v);
   }
 
   SceneBuilder& scene_;

@@ -1,6 +1,6 @@
-// A small indexed mesh in memory, at most 65 535 vertices so that 16-bit indices do (the index
-// 65 535 is glTF's restart mark), and the few shapes that scenes are put together from. Coordinates
-// are computed in doubles and rounded to float once, when a vertex is added.
+// A small indexed mesh in memory, and the shapes that generated scenes consist of. It has at most
+// 65 535 vertices, so that 16-bit indices suffice (the index 65 535 is glTF's restart value).
+// Coordinates are computed in doubles and rounded to float once, when a vertex is added.
 #pragma once
 
 #include <array>
@@ -18,8 +18,8 @@ inline Vec3 operator*(const Vec3& a, double s) { return {a.x * s, a.y * s, a.z *
 
 using Float3 = std::array<float, 3>;
 
-// A rotation about the y axis whose cosine and sine are quotients of integers: the rotations of
-// generated scenes come from Pythagorean triples, since sin() differs between machines.
+// A rotation about the y axis whose cosine and sine are quotients of integers. They come from
+// Pythagorean triples, since sin() differs between machines.
 struct Turn {
   double cosine = 1, sine = 0;
 };
@@ -36,17 +36,19 @@ struct Mesh {
   uint32_t triangles() const { return static_cast<uint32_t>(indices.size() / 3); }
   void clear();
 
-  // The index of the new vertex.
+  // Returns the index of the new vertex.
   uint32_t add_vertex(const Vec3& p);
   void add_triangle(uint32_t a, uint32_t b, uint32_t c);
-  // Shapes with vertices of their own; quads counter-clockwise seen from outside.
-  void triangle(const Vec3& a, const Vec3& b, const Vec3& c);             // 3 vertices
-  void quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);  // 4 vertices
-  void box(const Vec3& low, const Vec3& high, bool bottom = true);        // 8, 10 or 12 triangles
-  // A box standing on `base`, its half extents in x and z turned about its axis.
-  void turned_box(const Vec3& base, const Vec3& half_and_height, const Turn& turn);  // 8, 10
-  // A pyramid on a turned rectangle.
-  void pyramid(const Vec3& base, const Vec3& half_and_height, const Turn& turn);  // 5, 4
+  // Adds a triangle with 3 new vertices.
+  void triangle(const Vec3& a, const Vec3& b, const Vec3& c);
+  // Adds a quad with 4 new vertices, counter-clockwise seen from outside.
+  void quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
+  // Adds a box: 8 new vertices, 12 triangles, or 10 without its bottom.
+  void box(const Vec3& low, const Vec3& high, bool bottom = true);
+  // Adds a box that stands on `base`, turned about its axis: 8 new vertices, 10 triangles.
+  void turned_box(const Vec3& base, const Vec3& half_and_height, const Turn& turn);
+  // Adds a pyramid on a turned rectangle: 5 new vertices, 4 triangles.
+  void pyramid(const Vec3& base, const Vec3& half_and_height, const Turn& turn);
 };
 
 }  // namespace voxdag

@@ -1,8 +1,8 @@
-// Random numbers for generated scenes: splitmix64, the same everywhere (std:: distributions are
-// not). A generator is made for each thing from the seed and the thing's coordinates, so that what
-// one thing looks like does not hang on how many numbers another took.
+// Random numbers for generated scenes: splitmix64, which is the same everywhere (std::
+// distributions are not). Each object of a scene has its own generator, made from the seed and the
+// object's coordinates, so that objects do not depend on each other's number of draws.
 //
-// Never draw twice among the arguments of one call: compilers differ in which they evaluate first.
+// Never draw twice among the arguments of one call: the order of their evaluation is unspecified.
 // (Within braces the order is fixed.)
 #pragma once
 
@@ -22,23 +22,23 @@ inline uint64_t mix_bits(uint64_t x) {
 
 class Random {
  public:
-  Random(uint64_t seed, std::initializer_list<uint64_t> thing) : state_(mix_bits(seed)) {
-    for (uint64_t coordinate : thing) state_ = mix_bits((state_ + kStep) ^ coordinate);
+  Random(uint64_t seed, std::initializer_list<uint64_t> coordinates) : state_(mix_bits(seed)) {
+    for (uint64_t coordinate : coordinates) state_ = mix_bits((state_ + kStep) ^ coordinate);
   }
 
   uint64_t bits() { return mix_bits(state_ += kStep); }
-  // 0 to count - 1.
+  // A number from 0 to count - 1.
   uint32_t below(uint32_t count) {
     return static_cast<uint32_t>((static_cast<uint128>(bits()) * count) >> 64);
   }
-  // low to high, both included.
+  // A number from low to high, both included.
   int between(int low, int high) {
     return low + static_cast<int>(below(static_cast<uint32_t>(high - low + 1)));
   }
   bool chance(uint32_t percent) { return below(100) < percent; }
   // A multiple of 2^-24 in [0, 1).
   double unit() { return static_cast<double>(bits() >> 40) * 0x1p-24; }
-  // In [-1, 1).
+  // A multiple of 2^-23 in [-1, 1).
   double signed_unit() { return 2.0 * unit() - 1.0; }
 
  private:

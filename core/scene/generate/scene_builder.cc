@@ -11,7 +11,7 @@ Float3 rounded(const Vec3& v) {
 
 }  // namespace
 
-Mesh& SceneBuilder::room(uint32_t vertices, uint32_t triangles) {
+Mesh& SceneBuilder::mesh_for(uint32_t vertices, uint32_t triangles) {
   if (mesh_.vertices() + vertices > Mesh::kMaxVertices ||
       mesh_.triangles() + triangles > Mesh::kMaxTriangles)
     flush_mesh();
@@ -33,7 +33,7 @@ void SceneBuilder::place(uint32_t part, const Vec3& translation, const Vec3& sca
 }
 
 void SceneBuilder::place_triangles(const Mesh& part, const Vec3& translation, const Vec3& scale) {
-  Mesh& mesh = room(part.vertices(), part.triangles());
+  Mesh& mesh = mesh_for(part.vertices(), part.triangles());
   const uint32_t first = mesh.vertices();
   for (const Float3& p : part.positions)
     mesh.add_vertex({p[0] * scale.x + translation.x, p[1] * scale.y + translation.y,

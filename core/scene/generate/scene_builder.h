@@ -1,5 +1,5 @@
-// Takes a scene from its generator piece by piece and hands it on in blocks of bounded size: meshes
-// with 16-bit indices, parts that are stored once, and instances of parts.
+// Collects the pieces of a scene from its generator into blocks of bounded size: meshes with 16-bit
+// indices, parts that are stored once, and instances of parts. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -10,30 +10,30 @@
 
 namespace voxdag {
 
-// Takes blocks in the order in which they lie in the file.
+// Receives blocks in the order of the file.
 class BlockSink {
  public:
   virtual ~BlockSink() = default;
-  // Triangles where they are: 1 to Mesh::kMaxTriangles.
+  // 1 to Mesh::kMaxTriangles triangles in world space.
   virtual void mesh(const Mesh& mesh) = 0;
-  // Part 0, 1, ...; comes before its instances.
+  // The next part, numbered from 0; precedes its instances.
   virtual void part(const Mesh& mesh) = 0;
-  // Instances of one part, each p -> p * scale + translation.
+  // Instances of one part, each of which maps p to p * scale + translation.
   virtual void instances(uint32_t part, std::span<const Float3> translations,
                          std::span<const Float3> scales) = 0;
 };
 
 class SceneBuilder {
  public:
-  // Without `instances` parts are written out triangle by triangle wherever they are placed.
+  // Without `instances`, parts are copied triangle by triangle to each place.
   SceneBuilder(BlockSink& sink, bool instances) : sink_(sink), instances_(instances) {}
 
-  // The current mesh, with room for these many more; a full one is handed on first. At most a
-  // whole mesh's vertices and triangles.
-  Mesh& room(uint32_t vertices, uint32_t triangles);
+  // A mesh that `vertices` and `triangles` more fit into: the current one, or an empty one after it
+  // was passed to the sink. At most Mesh::kMaxVertices and Mesh::kMaxTriangles.
+  Mesh& mesh_for(uint32_t vertices, uint32_t triangles);
   uint32_t add_part(Mesh mesh);
   void place(uint32_t part, const Vec3& translation, const Vec3& scale);
-  // Hands on what is left.
+  // Passes the incomplete blocks to the sink.
   void finish();
 
  private:

@@ -1,5 +1,5 @@
-// Random triangles in a cube: what no sensible model holds and a builder has to survive. Of a
-// thousand, about
+// Random triangles in a cube: cases that no sensible model has and every builder has to survive. Of
+// a thousand, about
 //     680  ordinary, their size from 1/16 to 1/16384 of the cube, each halving as likely as the
 //     next 160  slivers: two corners far apart, the third close to one of them or to the edge
 //     between
@@ -91,7 +91,7 @@ void make_soup(const GenerateOptions& options, SceneBuilder& scene) {
   for (uint64_t i = 0; i < options.triangles; ++i) {
     Random random(options.seed, {i});
     const Corners t = random_triangle(random);
-    scene.room(3, 1).triangle(t.a, t.b, t.c);
+    scene.mesh_for(3, 1).triangle(t.a, t.b, t.c);
   }
 }
 

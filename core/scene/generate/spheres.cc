@@ -1,5 +1,5 @@
-// Spheres of many sizes in a ball: octahedra cut into n^2 triangles a face, their vertices moved
-// out to the sphere. The larger a sphere, the finer.
+// Spheres of many sizes in a ball: octahedra with n^2 triangles per face, their vertices moved out
+// to the sphere. Larger spheres are finer.
 #include <cmath>
 
 #include "core/scene/generate/kinds.h"
@@ -11,7 +11,7 @@ namespace {
 constexpr double kBallRadius = 512;
 constexpr uint32_t kSizes = 7;  // radius 64 to 1 and a bit, 64 to 1 cuts an edge
 
-// A face of the octahedron, cut n times along each edge.
+// Adds a face of the octahedron, its edges divided into n parts.
 void add_face(Mesh& mesh, int n, const Vec3& sign) {
   const uint32_t first = mesh.vertices();
   for (int i = 0; i <= n; ++i)
@@ -62,7 +62,7 @@ void make_spheres(const GenerateOptions& options, SceneBuilder& scene) {
   uint64_t made = 0;
   for (uint64_t i = 0; made < options.triangles || i == 0; ++i) {
     Random random(options.seed, {i});
-    // Each size down is twice as frequent; the largest come up once in 127.
+    // Each smaller size is twice as frequent; the largest occurs once in 127.
     const uint32_t draw = random.below((1u << kSizes) - 1) + 1;
     uint32_t size = 0;
     while (draw >> (kSizes - 1 - size) == 0) ++size;

@@ -1,6 +1,6 @@
 // A fractal heightfield on a square of 1024 x 1024: octaves of gradient noise, ridged where the
 // land is high and smooth where it is low, its coordinates bent by two more so that valleys wind.
-// Each octave halves the size of what it shows, down to four cells of the field.
+// Each octave has half the wavelength of the one before, down to four cells of the field.
 #include <cmath>
 
 #include "core/scene/generate/kinds.h"
@@ -62,7 +62,7 @@ class Heights {
     const double x = 8 + 2.5 * s + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 100);
     const double z = 8 + 2.5 * t + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 101);
     const double land = 0.5 + 0.6 * noise_.at(x * 0.7, z * 0.7, 0);
-    // High land is rough; what an octave leaves smooth, the next ones do too.
+    // High land is rough; where one octave is smooth, the next ones are too.
     double weight = land < 0.15 ? 0.15 : land > 1 ? 1 : land;
     double sum = 0.55 * land, frequency = 1.5, amplitude = 0.42;
     for (uint64_t octave = 1; octave <= octaves_; ++octave) {
@@ -83,7 +83,7 @@ class Heights {
 
 void make_tile(SceneBuilder& scene, const Heights& heights, uint64_t i0, uint64_t j0,
                uint32_t width, uint32_t depth) {
-  Mesh& mesh = scene.room((width + 1) * (depth + 1), 2 * width * depth);
+  Mesh& mesh = scene.mesh_for((width + 1) * (depth + 1), 2 * width * depth);
   const uint32_t first = mesh.vertices();
   for (uint32_t i = 0; i <= width; ++i)
     for (uint32_t j = 0; j <= depth; ++j) mesh.add_vertex(heights.vertex(i0 + i, j0 + j));

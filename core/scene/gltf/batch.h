@@ -1,4 +1,4 @@
-// Gathers triangles until a batch is full and hands it to the visitor; counts what went by.
+// Collects triangles into batches for the visitor of a pass, and counts them. Not thread-safe.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 
 namespace voxdag::gltf {
 
-// Triangles of a pass, those that were jumped over and the invalid ones included.
-struct Passed {
-  uint64_t triangles = 0;
-  uint64_t invalid = 0;  // of those that were looked at
+// How far a pass over the triangles has come.
+struct PassPosition {
+  uint64_t triangles = 0;  // skipped and invalid ones included
+  uint64_t invalid = 0;    // skipped ones not included
 };
 
 class Batch {
@@ -24,33 +24,36 @@ class Batch {
   using Visitor = std::function<void(std::span<const WorldTriangle>)>;
   static constexpr size_t kTriangles = 4096;
 
-  // Counts into `passed`; the first `skipped` triangles are to be jumped over.
-  Batch(const Visitor& visit, Passed& passed, uint64_t skipped, MemoryBudget& budget,
+  // Counts in `position`. The first `skip_count` triangles of the pass are skipped.
+  Batch(const Visitor& visit, PassPosition& position, uint64_t skip_count, MemoryBudget& budget,
         const CancelToken& cancel)
       : visit_(visit),
-        passed_(passed),
-        left_to_skip_(skipped),
+        position_(position),
+        left_to_skip_(skip_count),
         cancel_(cancel),
         triangles_(budget, kTriangles, "a batch of triangles") {}
 
-  // How many of the next `count` triangles are to be jumped over, and counts them as passed.
+  // Skips the first of the next `count` triangles, as far as the pass requires, and returns how
+  // many.
   uint64_t skip(uint64_t count) {
     const uint64_t skipped = std::min(count, left_to_skip_);
     left_to_skip_ -= skipped;
-    passed_.triangles += skipped;
+    position_.triangles += skipped;
     return skipped;
   }
-  // Where the next triangle goes; it counts once keep() or drop() is called.
+  // The place of the next triangle, to be followed by add() or drop().
   WorldTriangle& next() { return triangles_[size_]; }
-  void keep() {
-    ++passed_.triangles;
+  // Adds the triangle in next() to the batch.
+  void add() {
+    ++position_.triangles;
     if (++size_ == kTriangles) flush();
   }
+  // Counts an invalid triangle.
   void drop() {
-    ++passed_.triangles;
-    ++passed_.invalid;
+    ++position_.triangles;
+    ++position_.invalid;
   }
-  // Call once at the end.
+  // Passes the triangles of an incomplete batch on. Call at the end of the pass.
   void flush() {
     cancel_.check();
     if (size_ > 0) visit_(std::span<const WorldTriangle>(triangles_.data(), size_));
@@ -60,7 +63,7 @@ class Batch {
 
  private:
   const Visitor& visit_;
-  Passed& passed_;
+  PassPosition& position_;
   uint64_t left_to_skip_;
   const CancelToken& cancel_;
   PageBuffer<WorldTriangle> triangles_;

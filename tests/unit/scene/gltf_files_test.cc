@@ -1,9 +1,11 @@
 // The files that a scene lies in: containers, external buffers, data: URIs, and reading them by
 // windows within a budget.
 #include <gtest/gtest.h>
+#include <tiny_gltf.h>
 
 #include <random>
 
+#include "core/scene/gltf/document/read_document.h"
 #include "core/scene/gltf/geometry/base64.h"
 #include "tests/unit/scene/scene_files.h"
 
@@ -32,7 +34,7 @@ Error error_among(const std::map<std::string, std::string>& contents) {
   return Error(ErrorCode::kInvalidInput, "");
 }
 
-// A GLB cut anywhere is refused, and none of its bytes is read past the end.
+// A GLB truncated anywhere is refused, and nothing is read past its end.
 TEST(GltfContainer, EveryTruncationIsRefused) {
   const std::string whole = one_triangle().glb();
   for (size_t size = 0; size < whole.size(); ++size) {
@@ -98,18 +100,22 @@ TEST(GltfContainer, JsonOfMoreThanTheLimit) {
   }
 }
 
-// Images, materials and the like are never looked at, however broken.
+// Images are never read, and broken images and materials do not matter to the geometry.
 TEST(GltfContainer, ImagesAreNeverRead) {
   SceneBuilder scene = one_triangle();
   scene.root["images"] = {{{"bufferView", 999}, {"mimeType", 7}}, {{"uri", "not there.png"}}};
   scene.root["textures"] = {{{"source", -1}}};
-  scene.root["materials"] = {{{"pbrMetallicRoughness", 3}}};
+  scene.root["materials"] = {{{"pbrMetallicRoughness", 3}},
+                             {{"pbrMetallicRoughness", {{"baseColorFactor", {1}}}}},
+                             {{"emissiveFactor", "red"}},
+                             7};
+  scene.root["samplers"] = Json::object();
   scene.root["meshes"][0]["primitives"][0]["material"] = 77;
   scene.root["nodes"][0]["extras"] = {{"deep", {1, 2, 3}}};
   EXPECT_EQ(triangles_of_file(scene.glb()).size(), 1u);
 }
 
-// An external buffer is found beside the scene, its name percent-encoded.
+// An external buffer is found in the folder of the scene, its name percent-encoded.
 TEST(GltfBuffers, External) {
   const SceneBuilder scene = one_triangle();
   EXPECT_EQ(triangles_among({{"folder/scene", scene.gltf("sub%20dir/my%2fb.bin")},
@@ -155,8 +161,8 @@ TEST(GltfBuffers, UrisThatAreNotFollowed) {
   }
 }
 
-// Strings of many megabytes, read or not, take no memory: the budget here is far smaller. Only what
-// must be gathered whole, escapes, is charged, and refused if it does not fit.
+// Strings of many megabytes, read or not, take no memory: the budget here is far smaller. Only
+// strings with escapes, which the parser collects, are charged and refused if they do not fit.
 TEST(GltfBuffers, LongStringsTakeNoMemory) {
   SceneBuilder scene = one_triangle();
   const std::string picture = "data:image/png;base64," + std::string(3000000, 'A');
@@ -169,8 +175,8 @@ TEST(GltfBuffers, LongStringsTakeNoMemory) {
   EXPECT_EQ(OpenScene(scene.glb(), {}, uint64_t{1} << 20).triangles().size(), 1u);
 }
 
-// Thousands of nodes, meshes and accessors go through the parser in slices, in their order.
-TEST(GltfBuffers, StructureInSlices) {
+// Thousands of nodes, meshes and accessors are read in their order within a small budget.
+TEST(GltfBuffers, LargeStructure) {
   constexpr int kCount = 20000;
   SceneBuilder scene;
   const int view = scene.add_view<float>(std::vector<float>(9 + kCount, 1));
@@ -185,7 +191,7 @@ TEST(GltfBuffers, StructureInSlices) {
   }
   const int indices = scene.add_accessor<uint16_t>("SCALAR", kU16, {0, 1, 2});
   for (Json& mesh : scene.root["meshes"]) mesh["primitives"][0]["indices"] = indices;
-  OpenScene open(scene.glb(), {}, uint64_t{40} << 20);
+  OpenScene open(scene.glb(), {}, uint64_t{24} << 20);
   const auto triangles = open.triangles();
   ASSERT_EQ(triangles.size(), size_t{kCount});
   for (int i = 0; i < kCount; ++i) ASSERT_EQ(triangles[static_cast<size_t>(i)][0][0], i + 1.0);
@@ -260,8 +266,8 @@ TEST(Base64, DecodesTheExamplesOfTheRfc) {
   }
 }
 
-// A mesh far larger than the budget, its triangles touching vertices all over it, comes out the
-// same as with room for all; the budget's peak never passes its limit.
+// A mesh far larger than the budget, whose triangles use vertices all over it, gives the same
+// triangles as with a budget that it fits; the budget's peak never exceeds its limit.
 TEST(GltfWindows, LargerThanTheBudget) {
   constexpr uint32_t kVertices = 120000;
   constexpr size_t kTriangles = 20000;
@@ -280,20 +286,20 @@ TEST(GltfWindows, LargerThanTheBudget) {
   const std::string file = scene.glb();
   ASSERT_GT(file.size(), size_t{1} << 20);
 
-  OpenScene roomy(file);
+  OpenScene ample(file);
   OpenScene tight(file, {}, uint64_t{1} << 20);
-  const auto expected = roomy.triangles();
+  const auto expected = ample.triangles();
   ASSERT_EQ(expected.size(), kTriangles);
   for (size_t t = 0; t < kTriangles; ++t)
     for (size_t k = 0; k < 3; ++k)
       ASSERT_EQ(expected[t][k][1], positions[3 * corners[3 * t + k] + 1]);
   EXPECT_EQ(tight.triangles(), expected);
-  EXPECT_GT(roomy.budget.peak(), tight.budget.limit());
+  EXPECT_GT(ample.budget.peak(), tight.budget.limit());
   EXPECT_LE(tight.budget.peak(), tight.budget.limit());
 }
 
-// What is charged while streaming is given back, and all of it with the scene.
-TEST(GltfWindows, ChargesAreGivenBack) {
+// Charges made while streaming are released at its end, and all others with the scene.
+TEST(GltfWindows, ChargesAreReleased) {
   OpenScene open(one_triangle().glb());
   const uint64_t resting = open.budget.used();
   EXPECT_GT(resting, 0u);
@@ -301,6 +307,136 @@ TEST(GltfWindows, ChargesAreGivenBack) {
   EXPECT_EQ(open.budget.used(), resting);
   open.source.reset();
   EXPECT_EQ(open.budget.used(), 0u);
+}
+
+// The error that a scene of this JSON ends with under a budget of `budget_bytes`, which must hold.
+std::string out_of_memory_message(std::string json, uint64_t budget_bytes) {
+  MemoryFiles files;
+  files.contents["folder/scene"] = std::move(json);
+  MemoryBudget budget(budget_bytes);
+  CancelToken cancel;
+  try {
+    triangles_of(*open_scene(files, {"folder/scene"}, {}, budget, cancel));
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kOutOfMemory) << e.message();
+    return e.message();
+  }
+  return "";
+}
+
+std::string repeated(const std::string& text, size_t count) {
+  std::string all;
+  for (size_t i = 0; i < count; ++i) all.append(i ? "," : "").append(text);
+  return all;
+}
+
+// Every array whose length a file chooses is charged: JSON of a few megabytes took many times its
+// size in memory, unnoticed by the budget.
+TEST(GltfMemory, HostileArraysAreCharged) {
+  const std::pair<const char*, const char*> arrays[] = {
+      {"buffers", R"({"byteLength":1})"},
+      {"extensionsUsed", R"("a")"},
+      {"extensionsRequired", R"("KHR_texture_transform")"},
+      {"materials", "{}"},
+      {"textures", R"({"extensions":{"a":[1,2,3]}})"},
+      {"images", "{}"},
+      {"scenes", "{}"},
+      {"nodes", "{}"},
+      {"skins", R"({"joints":[]})"},
+      {"meshes", R"({"primitives":[]})"},
+      {"bufferViews", R"({"buffer":0,"byteLength":1})"}};
+  for (const auto& [section, element] : arrays) {
+    const std::string json = R"({"asset":{"version":"2.0"},")" + std::string(section) + R"(":[)" +
+                             repeated(element, 100000) + "]}";
+    EXPECT_NE(out_of_memory_message(json, uint64_t{2} << 20), "") << section;
+  }
+}
+
+// One element with a large array is charged while it is read.
+TEST(GltfMemory, HostileElementsAreCharged) {
+  for (const char* section : {R"("nodes":[{"children":[)", R"("scenes":[{"nodes":[)",
+                              R"("skins":[{"joints":[)", R"("meshes":[{"primitives":[)"}) {
+    const std::string json =
+        R"({"asset":{"version":"2.0"},)" + std::string(section) + repeated("0", 100000) + "]}]}";
+    EXPECT_NE(out_of_memory_message(json, uint64_t{2} << 20)
+                  .find("an element in the JSON of folder/scene needs over"),
+              std::string::npos)
+        << section;
+  }
+}
+
+// The matrices of a skin with hundreds of thousands of joints were not charged.
+TEST(GltfMemory, HostileSkinIsCharged) {
+  SceneBuilder scene = one_triangle();
+  Json& attributes = scene.root["meshes"][0]["primitives"][0]["attributes"];
+  attributes["JOINTS_0"] = scene.add_accessor<uint8_t>("VEC4", kU8, std::vector<uint8_t>(12, 0));
+  attributes["WEIGHTS_0"] = scene.add_accessor<float>("VEC4", kF32, std::vector<float>(12, 0.25f));
+  scene.add("skins", {{"joints", Json::array({0})}});
+  scene.root["nodes"][0]["skin"] = 0;
+  EXPECT_EQ(OpenScene(scene.glb(), {}, uint64_t{8} << 20).triangles().size(), 1u);
+  scene.root["skins"][0]["joints"] = std::vector<int>(100000, 0);
+  OpenScene open(scene.glb(), {}, uint64_t{8} << 20);
+  try {
+    open.triangles();
+    FAIL() << "9.6 MB of matrices fit 8 MiB";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kOutOfMemory);
+    EXPECT_NE(e.message().find("folder/scene: skin 0 needs"), std::string::npos)
+        << e.message();
+  }
+}
+
+// Materials, textures, samplers and images arrive in tinygltf's model; images are not loaded, and a
+// data: URI is found in the file.
+TEST(GltfModel, HasTheMaterials) {
+  SceneBuilder scene = one_triangle();
+  const std::string uri = "data:image/png;base64," + std::string(100000, 'A');
+  scene.root["images"] = {{{"uri", uri}, {"name", "inside"}},
+                          {{"bufferView", 1}, {"mimeType", "image/png"}},
+                          {{"uri", "not%20there.png"}}};
+  scene.root["samplers"] = {{{"wrapS", 33071}}};
+  scene.root["textures"] = {{{"source", 2}, {"sampler", 0}}};
+  scene.root["materials"] = {
+      {{"name", "red"},
+       {"alphaMode", "MASK"},
+       {"pbrMetallicRoughness",
+        {{"baseColorFactor", {0.1, 0.25, 0.5, 1}},
+         {"baseColorTexture",
+          {{"index", 0},
+           {"texCoord", 1},
+           {"extensions", {{"KHR_texture_transform", {{"offset", {0.5, 2}}}}}}}}}}}};
+  scene.root["extensionsUsed"] = {"KHR_texture_transform"};
+  MemoryFiles files;
+  const std::string& text = files.contents["scene"] = scene.glb();
+  MemoryBudget budget(uint64_t{1} << 20);
+  const gltf::Document document =
+      gltf::read_document(*files.open_read("scene"), budget, CancelToken());
+  const tinygltf::Model& model = *document.model;
+
+  ASSERT_EQ(model.materials.size(), 1u);
+  EXPECT_EQ(model.materials[0].name, "red");
+  EXPECT_EQ(model.materials[0].alphaMode, "MASK");
+  const auto& pbr = model.materials[0].pbrMetallicRoughness;
+  EXPECT_EQ(pbr.baseColorFactor, (std::vector<double>{0.1, 0.25, 0.5, 1}));
+  EXPECT_EQ(pbr.baseColorTexture.index, 0);
+  EXPECT_EQ(pbr.baseColorTexture.texCoord, 1);
+  const auto& transform = pbr.baseColorTexture.extensions.at("KHR_texture_transform");
+  EXPECT_EQ(transform.Get("offset").Get(0).GetNumberAsDouble(), 0.5);
+  ASSERT_EQ(model.textures.size(), 1u);
+  EXPECT_EQ(model.textures[0].source, 2);
+  ASSERT_EQ(model.samplers.size(), 1u);
+  EXPECT_EQ(model.samplers[0].wrapS, 33071);
+  EXPECT_EQ(model.extensionsUsed, std::vector<std::string>{"KHR_texture_transform"});
+
+  ASSERT_EQ(model.images.size(), 3u);
+  EXPECT_EQ(model.images[0].name, "inside");
+  EXPECT_EQ(model.images[0].uri, "data:image/png;base64,");
+  const gltf::FileRange range = document.image_uris[0].characters;
+  EXPECT_EQ(text.substr(range.begin, range.size), uri);
+  EXPECT_EQ(model.images[1].bufferView, 1);
+  EXPECT_EQ(model.images[1].mimeType, "image/png");
+  EXPECT_EQ(model.images[2].uri, "not%20there.png");
+  for (const auto& image : model.images) EXPECT_TRUE(image.image.empty());
 }
 
 TEST(GltfWindows, TooSmallABudgetIsAnError) {
@@ -330,7 +466,7 @@ TEST(GltfWindows, Canceled) {
       ErrorCode::kCanceled);
 }
 
-// Batches hold 1 to 4096 triangles, gathered across nodes.
+// Batches have 1 to 4096 triangles, collected across nodes.
 TEST(GltfWindows, BatchesAreFull) {
   SceneBuilder scene = one_triangle();
   for (int i = 1; i < 5000; ++i) scene.add_root({{"mesh", 0}});

@@ -55,7 +55,7 @@ TEST(GltfGeometry, StripsAndFans) {
             (std::vector<Corners>{first_of_fan, second_of_fan}));
 }
 
-// A strip that is longer than a window of triangles goes on over its end without a gap.
+// A strip that is longer than a window of triangles continues after it without a gap.
 TEST(GltfGeometry, LongStripAndFanCrossWindows) {
   constexpr size_t kVertices = 10000;
   std::vector<float> line;
@@ -164,7 +164,7 @@ TEST(GltfGeometry, QuantizedPositions) {
   EXPECT_EQ(first_corner(u16, kU16, false), (Point{65535, 1, 0}));
 }
 
-// Points and lines make no triangles; the user is told. Their vertices may be anything.
+// Points and lines make no triangles, which a warning reports. Their vertices may be anything.
 TEST(GltfGeometry, PointsAndLinesAreNamedInAWarning) {
   SceneBuilder scene = one_triangle();
   const int positions = scene.add_positions({50, 50, 50, 60, 60, 60, 70, 70, 70});
@@ -178,7 +178,7 @@ TEST(GltfGeometry, PointsAndLinesAreNamedInAWarning) {
   EXPECT_NE(open.source->warnings()[0].find("4 primitives of points or lines"), std::string::npos);
 }
 
-// Corners that fill no triangle are left out, and the user is told.
+// Corners that fill no triangle are ignored with a warning.
 TEST(GltfGeometry, LeftoverCornersAreNamedInAWarning) {
   SceneBuilder scene;
   const int positions = scene.add_positions(kSquare);

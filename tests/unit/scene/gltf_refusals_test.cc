@@ -212,6 +212,13 @@ TEST(GltfRefusals, SparseIndicesWithoutBase) {
   EXPECT_EQ(triangles_of_file(scene.glb()), triangles_of_file(one_triangle().glb()));
 }
 
+// JSON that is not glTF at all.
+TEST(GltfRefusals, NoAsset) {
+  EXPECT_NE(error_of_file("{}").message().find("asset is missing"), std::string::npos);
+  EXPECT_NE(error_of_file("[]").message().find("the root is an array, expected an object"),
+            std::string::npos);
+}
+
 // A member given twice could mean either; it is refused.
 TEST(GltfRefusals, DuplicateMembers) {
   const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":1}]})";
@@ -226,10 +233,14 @@ TEST(GltfRefusals, DeeplyNestedJson) {
                 .message()
                 .find("nodes[0] is an array, expected an object"),
             std::string::npos);
+  EXPECT_EQ(
+      error_of_file(R"({"asset":{"version":"2.0"},"materials":[{"extensions":)" + deep + "}]}")
+          .message(),
+      "");
   EXPECT_NE(error_of_file(std::string(1000000, '[')).message(), "");
 }
 
-// Names from a file cannot forge lines of a log.
+// Names and keys from a file cannot forge lines of a log.
 TEST(GltfRefusals, NamesAreMadePrintable) {
   SceneBuilder scene = valid_scene();
   scene.root["nodes"][0]["name"] = "a\nb\"" + std::string(1000, 'x');
@@ -237,9 +248,13 @@ TEST(GltfRefusals, NamesAreMadePrintable) {
   const Error error = error_of_file(scene.glb());
   EXPECT_NE(error.message().find("node 0 \"a?b?x"), std::string::npos) << error.message();
   EXPECT_LT(error.message().size(), 200u);
+  const std::string key = error_of_file(R"({"asset":{"version":"2.0"},"meshes":[{"primitives":[)"
+                                        R"({"attributes":{"X\n2026\u001b[31m":"a"}}]}]})")
+                              .message();
+  EXPECT_NE(key.find("attributes.X?2026?[31m is a string"), std::string::npos) << key;
 }
 
-// Extensions that move no vertex may be required; optional ones that are not read are told of.
+// Extensions that move no vertex may be required; optional ones that are not read cause a warning.
 TEST(GltfRefusals, ExtensionsThatAreNot) {
   SceneBuilder scene = valid_scene();
   scene.root["extensionsRequired"] = {"KHR_materials_unlit", "KHR_texture_transform"};

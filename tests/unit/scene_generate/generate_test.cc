@@ -137,7 +137,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EveryKind,
                                          SceneKind::kSoup, SceneKind::kSpheres),
                          [](const auto& test) { return std::string(scene_kind(test.param).name); });
 
-// The bytes are a promise to everybody who keeps results made from them: a change here is one to
+// The bytes are a promise to everybody who stores results made from them: a change here is one to
 // announce. Any machine, any compiler.
 TEST(GenerateGolden, DigestsOfEveryKind) {
   const struct {
@@ -179,7 +179,7 @@ TEST(GenerateInstances, SpheresHaveAsManyTriangles) {
   EXPECT_GT(shared.report.instances, 10u);
 }
 
-// Soup gives exactly the triangles asked for, and holds all that it promises.
+// Soup has exactly the requested number of triangles, of all promised kinds.
 TEST(GenerateSoup, HoldsDegeneratesAndSlivers) {
   GenerateOptions options = small(SceneKind::kSoup);
   options.triangles = 50'007;
@@ -226,7 +226,7 @@ TEST(GenerateSize, IsAboutWhatWasAsked) {
 
 // A scene of 50 MB goes through a buffer of one: memory does not grow with the scene.
 TEST(GenerateMemory, StaysSmallForALargeScene) {
-  if (kSanitized) GTEST_SKIP() << "sanitizers keep freed memory";
+  if (kSanitized) GTEST_SKIP() << "sanitizers retain freed memory";
   MemoryFiles files;
   files.keep = false;
   NoProgress progress;

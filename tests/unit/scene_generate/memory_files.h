@@ -1,4 +1,4 @@
-// Files in memory, as much of FileSystem as writing a scene needs; can be told to be full.
+// Files in memory, as much of FileSystem as writing a scene needs; the disk can be full.
 #pragma once
 
 #include <map>

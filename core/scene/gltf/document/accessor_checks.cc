@@ -4,15 +4,16 @@
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
 
-// Vertices are addressed by 32-bit indices, so more in one primitive are of no use; this also
-// bounds what an accessor without bytes (all zeros) can claim.
+// Indices have 32 bits, so a primitive cannot use more vertices. The limit also bounds accessors
+// without bytes (all zeros), which could claim any count.
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 
-// `count` elements of `bytes` each, from `offset` of a view on.
+// `count` elements of `bytes` each, the first at `offset` of a view.
 struct Extent {
   int view;
   uint64_t offset;
@@ -23,13 +24,13 @@ struct Extent {
 
 void check_view(Document& d, const BufferView& view, const std::string& where) {
   check_index(d, d.buffers.size(), view.buffer, where, "buffer");
-  Buffer& buffer = d.buffers[static_cast<size_t>(view.buffer)];
+  BufferSource& buffer = d.buffers[static_cast<size_t>(view.buffer)];
   const std::string name = "buffer " + std::to_string(view.buffer);
   const uint128 end = static_cast<uint128>(view.byte_offset) + view.byte_length;
   if (end > buffer.byte_length)
     refuse(d.path,
            where + " ends past the " + std::to_string(buffer.byte_length) + " bytes of " + name);
-  if (buffer.source == Buffer::Source::kNone)
+  if (buffer.kind == BufferSource::Kind::kNone)
     refuse(d.path, where + ": " + name + " has no uri and is not in the file");
   buffer.is_read = true;
 }

@@ -1,4 +1,5 @@
-// Checks that an accessor is what its user expects, and that all of its bytes lie where they can.
+// Checks that an accessor has the type that its use requires, and that its bytes lie inside its
+// buffer.
 #pragma once
 
 #include <string>
@@ -8,7 +9,7 @@
 
 namespace voxdag::gltf {
 
-// How an accessor is used, and so the type it must have.
+// How an accessor is used, which determines the type it must have.
 struct AccessorUse {
   std::string where;  // "mesh 0: primitive 2: POSITION"
   int components;
@@ -16,12 +17,12 @@ struct AccessorUse {
   std::vector<int> may_be_normalized = {};
 };
 
-// Throws Error{kInvalidInput} unless accessor `index` exists, fits the use, and its elements lie
-// inside its view and its view inside what its buffer claims; Error{kLimit} for over 2^32 elements.
-// -1, no accessor, is always right. Marks the buffers it lies in as read.
+// Throws Error{kInvalidInput} unless accessor `index` exists, has a type of the use, its elements
+// lie inside its view, and its view inside the length that its buffer claims; Error{kLimit} for
+// over 2^32 elements. Accepts -1, no accessor. Marks the buffers of the accessor as read.
 void check_accessor(Document& document, int index, const AccessorUse& use);
 
-// Throws Error{kInvalidInput} unless accessor `index`, if there is one, has `count` elements.
+// Throws Error{kInvalidInput} unless accessor `index` has `count` elements or is -1.
 void check_count(const Document& document, int index, uint64_t count, const std::string& where);
 
 // Throws Error{kInvalidInput} unless index < size: "<where>: <what> <index> does not exist ...".

@@ -1,17 +1,19 @@
+#include "core/scene/gltf/document/check_document.h"
+
 #include "core/scene/gltf/document/accessor_checks.h"
 #include "core/scene/gltf/document/hierarchy.h"
-#include "core/scene/gltf/document/read_document.h"
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
 
-template <class T>
-int size_of(const std::vector<T>& v) {
-  return static_cast<int>(v.size());
+template <class Array>
+int size_of(const Array& a) {
+  return static_cast<int>(a.size());
 }
-template <class T>
-const T& at(const std::vector<T>& v, int i) {
-  return v[static_cast<size_t>(i)];
+template <class Array>
+const auto& at(const Array& a, int i) {
+  return a[static_cast<size_t>(i)];
 }
 
 AccessorUse position_use(const Document& d, const std::string& where) {

@@ -2,43 +2,21 @@
 
 #include <algorithm>
 
-#include "core/base/error.h"
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
 
-constexpr size_t kLongestName = 64;
 constexpr size_t kMaxWarnings = 20;
 
 template <class T>
-std::string name_of(const char* kind, const std::vector<T>& all, int index) {
+std::string name_of(const char* kind, const std::deque<T>& all, int index) {
   const size_t i = static_cast<size_t>(index);
   return kind +
          (index >= 0 && i < all.size() ? numbered(index, all[i].name) : std::to_string(index));
 }
 
-template <class T>
-uint64_t bytes_of(const std::vector<T>& v) {
-  return v.capacity() * sizeof(T);
-}
-
 }  // namespace
-
-std::string printable(const std::string& text) {
-  std::string shown = text.substr(0, kLongestName);
-  for (char& c : shown)
-    if (static_cast<unsigned char>(c) < 0x20 || c == '"' || c == 0x7f) c = '?';
-  return text.size() > kLongestName ? shown + "..." : shown;
-}
-
-std::string numbered(int index, const std::string& name) {
-  const std::string number = std::to_string(index);
-  return name.empty() ? number : number + " \"" + printable(name) + "\"";
-}
-
-void refuse(const std::string& path, const std::string& what) {
-  throw Error(ErrorCode::kInvalidInput, path + ": " + what);
-}
 
 void Document::warn(const std::string& what) {
   if (warnings.size() < kMaxWarnings)
@@ -52,21 +30,6 @@ std::string Document::name_mesh(int mesh) const { return name_of("mesh ", meshes
 std::string Document::name_skin(int skin) const { return name_of("skin ", skins, skin); }
 std::string Document::name_accessor(int accessor) const {
   return name_of("accessor ", accessors, accessor);
-}
-
-uint64_t Document::memory_bytes() const {
-  uint64_t bytes = bytes_of(buffers) + bytes_of(views) + bytes_of(accessors) + bytes_of(meshes) +
-                   bytes_of(skins) + bytes_of(nodes) + bytes_of(roots);
-  for (const Buffer& b : buffers) bytes += b.uri.capacity() + b.characters.capacity();
-  for (const Accessor& a : accessors) bytes += a.name.capacity();
-  for (const Skin& s : skins) bytes += s.name.capacity() + bytes_of(s.joints);
-  for (const Node& n : nodes)
-    bytes += n.name.capacity() + bytes_of(n.children) + bytes_of(n.weights);
-  for (const Mesh& m : meshes) {
-    bytes += m.name.capacity() + bytes_of(m.primitives) + bytes_of(m.weights);
-    for (const Primitive& p : m.primitives) bytes += bytes_of(p.targets) + bytes_of(p.joint_sets);
-  }
-  return bytes;
 }
 
 int component_bytes(int component_type) {

@@ -1,40 +1,43 @@
-// The part of a glTF 2.0 file that makes triangles, as plain structs. Filled by read_document()
-// and then checked once by check_document(); after that:
-//   1. every index is in range, or -1 where none is given;
-//   2. every accessor that is read has the type its use asks for, and its bytes lie inside its
-//      buffer view, its view inside its buffer, and its buffer inside the bytes that are there;
-//   3. nodes form trees, and `roots` are parentless.
+// A glTF 2.0 file without its geometry. The arrays that can have an element per node or mesh of a
+// large scene are compact structs, each charged to the memory budget; tinygltf's model holds what
+// else is used. Filled by read_document() and then checked once by check_document(); after that:
+//   1. every index is in range, or -1 if the file gives none;
+//   2. every accessor that is read has the type its use requires, and its bytes lie inside its
+//      buffer view, its view inside its buffer, and its buffer inside the existing bytes;
+//   3. nodes form trees, and `roots` have no parents.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "core/base/memory_budget.h"
-#include "core/scene/gltf/geometry/transform.h"
+#include "core/scene/gltf/growing_charge.h"
+#include "core/scene/gltf/json/file_range.h"
+#include "core/scene/gltf/transform.h"
+
+namespace tinygltf {
+class Model;
+}
 
 namespace voxdag::gltf {
 
-// Bytes [begin, begin + size) of a file.
-struct FileRange {
-  uint64_t begin = 0;
-  uint64_t size = 0;
-};
-
 // Where the bytes of a buffer come from.
-struct Buffer {
-  enum class Source {
-    kNone,      // no uri, and not the GLB's own: usable by extensions only
-    kFile,      // the scene file itself from `text.begin` on: the BIN chunk of a GLB
+struct BufferSource {
+  enum class Kind {
+    kNone,      // no uri, and not the BIN chunk: only extensions can use it
+    kBinChunk,  // the bytes `range` of the scene file
     kExternal,  // the file `uri`, percent-encoded and relative to the scene file
-    kBase64,    // base64 characters in the scene file at `text`
-    kMemory,    // base64 characters that had JSON escapes among them, in `characters`
+    kBase64,    // the base64 characters `range` of the scene file
+    kMemory,    // the base64 in `characters`, which has JSON escapes in the file
   };
-  Source source = Source::kNone;
+  Kind kind = Kind::kNone;
   uint64_t byte_length = 0;
-  bool is_read = false;  // some of it makes triangles; set by check_document()
-  FileRange text;
+  bool is_read = false;  // triangles use some of it; set by check_document()
+  FileRange range;
   std::string uri;
   std::string characters;
 };
@@ -43,7 +46,7 @@ struct BufferView {
   int buffer = -1;
   uint64_t byte_offset = 0;
   uint64_t byte_length = 0;
-  uint64_t byte_stride = 0;  // 0: elements are tightly packed
+  uint64_t byte_stride = 0;  // 0: elements are packed
 };
 
 enum ComponentType : int {
@@ -55,7 +58,7 @@ enum ComponentType : int {
   kFloat = 5126
 };
 
-// Elements that replace those of the base, by strictly increasing index.
+// Replacements of some elements of an accessor, at strictly increasing indices.
 struct Sparse {
   uint64_t count = 0;
   int index_view = -1;
@@ -77,20 +80,20 @@ struct Accessor {
   Sparse sparse;
 };
 
-// JOINTS_n and WEIGHTS_n of one n: four influences per vertex.
+// The accessors JOINTS_n and WEIGHTS_n of one n: four influences per vertex.
 struct JointSet {
   int joints = -1;
   int weights = -1;
 };
 
-// Primitive modes; the smaller ones are points and lines.
+// Primitive modes that make triangles; smaller ones are points and lines.
 enum Mode : int { kTriangleList = 4, kTriangleStrip = 5, kTriangleFan = 6 };
 
 struct Primitive {
   int mode = kTriangleList;
   int position = -1;
   int indices = -1;
-  std::vector<int> targets;  // POSITION of each morph target, -1 if it moves nothing
+  std::vector<int> targets;  // POSITION of each morph target, -1 if it has none
   std::vector<JointSet> joint_sets;
   bool draco = false;  // carries KHR_draco_mesh_compression
 
@@ -129,20 +132,31 @@ struct Skin {
 };
 
 struct Document {
+  Document(std::string scene_path, MemoryBudget& budget)
+      : path(std::move(scene_path)), charge(budget, "the structure of " + path) {}
+
   std::string path;
+  GrowingCharge charge;        // for the arrays
+  GrowingCharge model_charge;  // for the model
+
+  // tinygltf's reading of the asset, the extensions, materials, textures, samplers and images. Its
+  // other arrays are empty. Nothing of an image is loaded: a data: URI ends at its comma.
+  std::shared_ptr<tinygltf::Model> model;
+  std::vector<RawString> image_uris;  // for each image of the model; size 0 for one without uri
+
   bool quantized = false;  // KHR_mesh_quantization is used
-  std::vector<Buffer> buffers;
-  std::vector<BufferView> views;
-  std::vector<Accessor> accessors;
-  std::vector<Mesh> meshes;
-  std::vector<Skin> skins;
-  std::vector<Node> nodes;
-  std::vector<std::vector<int>> scenes;  // roots of each
-  int scene = -1;                        // the default one
-  std::vector<int> roots;                // of the scene to draw, set by check_document()
-  std::vector<std::string> warnings;     // the first few
+  // Deques, because a growing vector would need its memory twice.
+  std::deque<BufferSource> buffers;
+  std::deque<BufferView> views;
+  std::deque<Accessor> accessors;
+  std::deque<Mesh> meshes;
+  std::deque<Skin> skins;
+  std::deque<Node> nodes;
+  std::deque<std::vector<int>> scenes;  // the root nodes of each
+  int scene = -1;                       // the default scene
+  std::vector<int> roots;               // of the scene to draw, set by check_document()
+  std::vector<std::string> warnings;    // the first few
   uint64_t further_warnings = 0;
-  MemoryCharge charge;  // for memory_bytes()
 
   // Adds "<path>: <what>" to the warnings.
   void warn(const std::string& what);
@@ -152,12 +166,9 @@ struct Document {
   std::string name_mesh(int mesh) const;
   std::string name_accessor(int accessor) const;
   std::string name_skin(int skin) const;
-
-  // About what all of this takes.
-  uint64_t memory_bytes() const;
 };
 
-// Bytes of one component; 0 for what is no component type of glTF 2.0.
+// Bytes of one component; 0 if glTF 2.0 has no such component type.
 int component_bytes(int component_type);
 const char* component_name(int component_type);
 
@@ -165,18 +176,9 @@ inline uint64_t element_bytes(const Accessor& accessor) {
   return static_cast<uint64_t>(component_bytes(accessor.component_type) * accessor.components);
 }
 
-// Triangles of a primitive: whole ones only.
+// Whole triangles of a primitive.
 uint64_t triangle_count(const Document& document, const Primitive& primitive);
-// Times the node's mesh is drawn.
+// How often the mesh of the node is drawn.
 uint64_t instance_count(const Document& document, const Node& node);
-
-// A text from the file as messages show it: control characters replaced, cut if overlong.
-std::string printable(const std::string& text);
-
-// "16 \"name\"", or the bare number for what has no name.
-std::string numbered(int index, const std::string& name);
-
-// Throws Error{kInvalidInput}: "<scene file>: <what>".
-[[noreturn]] void refuse(const std::string& path, const std::string& what);
 
 }  // namespace voxdag::gltf

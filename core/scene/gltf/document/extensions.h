@@ -1,4 +1,4 @@
-// Which extensions of glTF a scene may ask for.
+// The extensions of glTF that voxdag reads, or that cannot change the geometry.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace voxdag::gltf {
 // that could change the geometry.
 void check_required_extensions(const std::string& path, const std::vector<std::string>& required);
 
-// Whether the geometry could be another if voxdag read the extension.
-bool may_matter(const std::string& extension);
+// Whether the geometry could be different if voxdag read the extension.
+bool may_change_geometry(const std::string& extension);
 
 }  // namespace voxdag::gltf

@@ -3,12 +3,13 @@
 #include <algorithm>
 
 #include "core/scene/gltf/document/accessor_checks.h"
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
 
-// Follows parents from every node; meeting a node of the same chain again is a cycle. Each node is
-// passed once, since a chain stops where an earlier one went.
+// Follows the parents of every node; a node that occurs twice in one chain is in a cycle. A chain
+// stops at a node of an earlier chain, so each node is visited once.
 void check_for_cycles(const Document& d) {
   std::vector<int> chain_of(d.nodes.size(), -1);
   for (int start = 0; start < static_cast<int>(d.nodes.size()); ++start) {

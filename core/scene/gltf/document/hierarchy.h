@@ -1,4 +1,4 @@
-// The node hierarchy of a document: who is whose parent, and which scene is drawn.
+// The node hierarchy of a document: the parents of nodes, and the roots of the scene to draw.
 #pragma once
 
 #include "core/scene/gltf/document/document.h"
@@ -9,8 +9,9 @@ namespace voxdag::gltf {
 // own ancestor.
 void link_parents(Document& document);
 
-// Sets the roots: of the default scene, else of the first; of a document without scenes, all nodes
-// that have no parent. Throws Error{kInvalidInput} for a scene that lists what is no root.
+// Sets the roots of the document: those of the default scene, else of the first scene, else all
+// nodes that have no parent. Throws Error{kInvalidInput} for a scene that lists a node with a
+// parent.
 void choose_scene(Document& document);
 
 }  // namespace voxdag::gltf

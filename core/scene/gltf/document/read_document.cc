@@ -1,52 +1,118 @@
 #include "core/scene/gltf/document/read_document.h"
 
-#include "core/base/error.h"
+#include <tiny_gltf.h>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include "core/scene/gltf/document/extensions.h"
+#include "core/scene/gltf/document/model_reader.h"
+#include "core/scene/gltf/document/read_elements.h"
+#include "core/scene/gltf/json/container.h"
+#include "core/scene/gltf/json/json_sections.h"
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
 
-// Of "2.0" and the like.
-int major_version(const std::string& version) {
-  return version.starts_with("2.") || version == "2" ? 2 : 0;
+void check_version(const std::string& path, const tinygltf::Asset& asset) {
+  if (asset.version != "2" && !asset.version.starts_with("2."))
+    refuse(path, "is glTF version " + printable(asset.version) + ", expected 2.0");
+  if (!asset.minVersion.empty() && asset.minVersion != "2.0")
+    refuse(path, "needs glTF version " + printable(asset.minVersion) + ", voxdag reads 2.0");
 }
 
-void check_version(const std::string& path, const FilteredJson& json) {
-  if (!json.version.empty() && major_version(json.version) != 2)
-    refuse(path, "is glTF version " + printable(json.version) + ", expected 2.0");
-  if (!json.min_version.empty() && json.min_version != "2.0")
-    refuse(path, "needs glTF version " + printable(json.min_version) + ", voxdag reads 2.0");
+// The BIN chunk is the first buffer, if that has no uri.
+void place_bin_chunk(const Container& container, Document& d) {
+  if (!container.has_bin || d.buffers.empty()) return;
+  BufferSource& first = d.buffers[0];
+  if (first.kind != BufferSource::Kind::kNone) return;
+  first.kind = BufferSource::Kind::kBinChunk;
+  first.range = container.bin;
 }
 
-// The GLB's own buffer is its first, if that has no uri.
-void place_bin_chunk(const Container& container, std::vector<Buffer>& buffers) {
-  if (!container.has_bin || buffers.empty()) return;
-  if (buffers[0].source != Buffer::Source::kNone) return;
-  buffers[0].source = Buffer::Source::kFile;
-  buffers[0].text = container.bin;
+// Memory of check_document(), which follows the parents of all nodes.
+constexpr uint64_t kCheckBytesPerNode = 2 * sizeof(int);
+
+// Charges the elements of an array of the document and stores them.
+template <class T>
+auto store(Document& document, std::deque<T>& array, T (*read)(const JsonElement&)) {
+  return [&, read](const JsonElement& element) {
+    T value = read(element);
+    document.charge.add(sizeof(T) + heap_bytes(value));
+    array.push_back(std::move(value));
+  };
+}
+
+// Reads all sections; returns the message of the first violation, or "".
+std::string read_structure(const ReadableFile& file, FileRange json, Document& d,
+                           ModelReader& model, MemoryBudget& budget, const CancelToken& cancel) {
+  const auto add_to_model = [&](const JsonElement& element) { model.add(element); };
+  bool has_asset = false;
+  constexpr bool kArray = true, kWhole = false, kChecked = true, kUnchecked = false;
+  const std::string violation = read_sections(
+      file, json,
+      {{"asset", kWhole, kChecked,
+        [&](const JsonElement& element) {
+          has_asset = true;
+          model.add(element);
+        }},
+       {"extensionsUsed", kArray, kChecked, add_to_model},
+       {"extensionsRequired", kArray, kChecked, add_to_model},
+       {"materials", kArray, kUnchecked, add_to_model},
+       {"textures", kArray, kUnchecked, add_to_model},
+       {"samplers", kArray, kUnchecked, add_to_model},
+       {"images", kArray, kUnchecked,
+        [&](const JsonElement& element) { model.add_image(element); }},
+       {"buffers", kArray, kChecked,
+        [&](const JsonElement& element) {
+          BufferSource buffer = read_buffer(element, file, budget);
+          d.charge.add(sizeof(buffer) + buffer.uri.capacity() + buffer.characters.capacity());
+          d.buffers.push_back(std::move(buffer));
+        }},
+       {"bufferViews", kArray, kChecked, store(d, d.views, read_view)},
+       {"accessors", kArray, kChecked, store(d, d.accessors, read_accessor)},
+       {"meshes", kArray, kChecked, store(d, d.meshes, read_mesh)},
+       {"skins", kArray, kChecked, store(d, d.skins, read_skin)},
+       {"nodes", kArray, kChecked,
+        [&](const JsonElement& element) {
+          const int index = static_cast<int>(d.nodes.size());
+          Node node = read_node(element, index, d);
+          d.charge.add(sizeof(node) + heap_bytes(node) + kCheckBytesPerNode);
+          d.nodes.push_back(std::move(node));
+        }},
+       {"scenes", kArray, kChecked, store(d, d.scenes, read_scene)},
+       {"scene", kWhole, kChecked,
+        [&](const JsonElement& element) { d.scene = element.as_index(); }}},
+      budget, cancel);
+  return violation.empty() && !has_asset ? "asset is missing" : violation;
 }
 
 }  // namespace
 
 Document read_document(const ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel) {
   const Container container = read_container(file);
-  FilteredJson json = filter_json(file, container.json, budget, cancel);
-  check_version(file.path(), json);
-  check_required_extensions(file.path(), json.extensions_required);
-  if (!json.violation.empty()) refuse(file.path(), json.violation);
+  Document d(file.path(), budget);
+  ModelReader model(file.path(), budget);
+  const std::string violation = read_structure(file, container.json, d, model, budget, cancel);
+  model.parse(d);
+  check_version(d.path, d.model->asset);
+  check_required_extensions(d.path, d.model->extensionsRequired);
+  if (!violation.empty()) refuse(d.path, violation);
+  place_bin_chunk(container, d);
 
-  Document document;
-  document.path = file.path();
-  document.buffers = std::move(json.buffers);
-  place_bin_chunk(container, document.buffers);
-  for (const auto* names : {&json.extensions_used, &json.extensions_required})
+  for (const auto* names : {&d.model->extensionsUsed, &d.model->extensionsRequired})
     for (const std::string& name : *names)
-      document.quantized = document.quantized || name == "KHR_mesh_quantization";
-  for (const std::string& name : json.extensions_used)
-    if (may_matter(name))
-      document.warn("the optional extension " + printable(name) + " is ignored");
-  parse_structure(json, budget, cancel, document);
-  return document;
+      d.quantized = d.quantized || name == "KHR_mesh_quantization";
+  for (const std::string& name : d.model->extensionsUsed)
+    if (may_change_geometry(name))
+      d.warn("the optional extension " + printable(name) + " is ignored");
+#ifdef __GLIBC__
+  // Many small blocks were freed; the allocator would retain their pages.
+  malloc_trim(0);
+#endif
+  return d;
 }
 
 }  // namespace voxdag::gltf

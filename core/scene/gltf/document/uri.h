@@ -5,8 +5,8 @@
 
 namespace voxdag::gltf {
 
-// The path of the file that `uri` names, relative to the folder of the scene file. Throws
-// Error{kInvalidInput} naming `where` for an absolute path, another scheme, or a broken escape.
+// The path of the file that `uri` names relative to the folder of the scene file. Throws
+// Error{kInvalidInput} naming `where` for an absolute path, a scheme, or a broken escape.
 std::string resolve_uri(const std::string& scene_path, const std::string& uri,
                         const std::string& where);
 

@@ -5,12 +5,14 @@
 #include <limits>
 #include <type_traits>
 
+#include "core/scene/gltf/messages.h"
+
 namespace voxdag::gltf {
 namespace {
 
 constexpr uint64_t kSparseWindow = 1024;
 
-// Layout of the elements in a window of bytes.
+// How elements lie in a window of bytes.
 struct Layout {
   int component_type;
   int components;
@@ -53,7 +55,7 @@ void decode(const std::byte* bytes, const Layout& layout, size_t count, To* out)
   }
 }
 
-// Reads `count` elements from `offset` of a view on, window by window.
+// Reads `count` elements, the first at `offset` of the view, window by window.
 template <class To>
 void read_elements(const BufferView& view, BufferReader& buffers, const Layout& layout,
                    size_t element, uint64_t offset, size_t count, To* out) {
@@ -136,18 +138,22 @@ void AccessorReader::read_sparse_indices(uint64_t first, size_t count) {
 
 void AccessorReader::check_sparse_indices() {
   const std::string where = document_.name_accessor(index_) + ": its sparse index ";
-  uint64_t least = 0;
+  const uint64_t windows = (accessor_.sparse.count + kSparseWindow - 1) / kSparseWindow;
+  directory_charge_ = MemoryCharge(buffers_.budget(), windows * sizeof(uint32_t),
+                                   document_.path + ": " + document_.name_accessor(index_));
+  sparse_directory_.reserve(static_cast<size_t>(windows));
+  uint64_t next = 0;  // the smallest index that may follow
   for (uint64_t k = 0; k < accessor_.sparse.count; k += kSparseWindow) {
     read_sparse_indices(k,
                         static_cast<size_t>(std::min(kSparseWindow, accessor_.sparse.count - k)));
     sparse_directory_.push_back(sparse_indices_.front());
     for (uint32_t index : sparse_indices_) {
-      if (index < least)
+      if (index < next)
         refuse(document_.path, where + std::to_string(index) + " does not increase strictly");
       if (index >= accessor_.count)
         refuse(document_.path, where + std::to_string(index) + " is not below the count of " +
                                    std::to_string(accessor_.count));
-      least = uint64_t{index} + 1;
+      next = uint64_t{index} + 1;
     }
   }
 }

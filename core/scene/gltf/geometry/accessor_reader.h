@@ -1,6 +1,6 @@
 // Elements of one accessor, decoded by windows: interleaved or packed, integers normalized or not,
-// sparse replacements applied. Holds nothing of the accessor's data but, if it is sparse, one index
-// in a thousand to find the replacements of a range by.
+// sparse replacements applied. Of a sparse accessor, every 1024th index is in memory, to find the
+// replacements of a range. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,16 +15,17 @@ namespace voxdag::gltf {
 
 class AccessorReader {
  public:
-  // Throws Error{kInvalidInput} if sparse indices do not increase strictly or are out of range.
-  // Both references must outlive the reader.
+  // Throws Error{kInvalidInput} if sparse indices do not increase strictly or are out of range,
+  // Error{kOutOfMemory} if there are too many for the budget of `buffers`. Both references must
+  // outlive the reader.
   AccessorReader(const Document& document, BufferReader& buffers, int accessor);
 
   uint64_t count() const { return accessor_.count; }
 
-  // Elements [first, first + count), components() numbers each. Normalized integers c become c/max,
-  // not below -1, in doubles.
+  // Reads elements [first, first + count), as many numbers each as the accessor has components. A
+  // normalized integer c becomes max(c / the largest of its type, -1).
   void read(uint64_t first, size_t count, double* out);
-  // The same for what holds unsigned integers.
+  // Reads elements [first, first + count) of an accessor of unsigned integers.
   void read(uint64_t first, size_t count, uint32_t* out);
 
  private:
@@ -32,7 +33,7 @@ class AccessorReader {
   void read_any(uint64_t first, size_t count, T* out);
   template <class T>
   void replace_sparse(uint64_t first, size_t count, T* out);
-  // Sparse indices [first, first + count), into sparse_indices_.
+  // Reads sparse indices [first, first + count) into sparse_indices_.
   void read_sparse_indices(uint64_t first, size_t count);
   void check_sparse_indices();
 
@@ -40,8 +41,9 @@ class AccessorReader {
   BufferReader& buffers_;
   const Accessor& accessor_;
   const int index_;
-  std::vector<uint32_t> sparse_indices_;    // a window of them
-  std::vector<uint32_t> sparse_directory_;  // every kSparseWindow-th
+  std::vector<uint32_t> sparse_indices_;    // a window of the sparse indices
+  std::vector<uint32_t> sparse_directory_;  // every kSparseWindow-th sparse index
+  MemoryCharge directory_charge_;
 };
 
 }  // namespace voxdag::gltf

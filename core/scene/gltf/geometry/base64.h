@@ -7,12 +7,12 @@
 
 namespace voxdag::gltf {
 
-// Bytes that `character_count` characters stand for, the last of which are `tail` (up to two, for
-// the padding); padding may be left out.
+// The number of bytes that `character_count` characters encode. `tail` is the last two of them, or
+// all if there are fewer; padding may be absent.
 uint64_t base64_bytes(uint64_t character_count, std::span<const std::byte> tail);
 
-// Decodes whole or final groups; `out` has room for three bytes per group of four characters.
-// Returns false for a character outside the alphabet.
+// Decodes groups of four characters, the last of which may be shorter; `out` has space for three
+// bytes per group. Returns false for a character outside the alphabet.
 bool decode_base64(std::span<const std::byte> characters, std::byte* out);
 
 }  // namespace voxdag::gltf

@@ -6,26 +6,28 @@
 #include "core/base/error.h"
 #include "core/scene/gltf/document/uri.h"
 #include "core/scene/gltf/geometry/base64.h"
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
 
 constexpr size_t kMaxOpenFiles = 16;
+constexpr uint64_t kMapNodeBytes = 48;
 // A window that begins inside a group of three bytes and ends inside another.
 constexpr size_t kMaxGroups = BufferReader::kWindowBytes / 3 + 2;
 
 // Base64 characters [begin, begin + out.size()) of a buffer.
-void read_characters(const ReadableFile& scene_file, const Buffer& buffer, uint64_t begin,
+void read_characters(const ReadableFile& scene_file, const BufferSource& buffer, uint64_t begin,
                      std::span<std::byte> out) {
-  if (buffer.source == Buffer::Source::kBase64)
-    return scene_file.read_at(buffer.text.begin + begin, out);
+  if (buffer.kind == BufferSource::Kind::kBase64)
+    return scene_file.read_at(buffer.range.begin + begin, out);
   const auto from = buffer.characters.begin() + static_cast<ptrdiff_t>(begin);
   std::transform(from, from + static_cast<ptrdiff_t>(out.size()), out.begin(),
                  [](char c) { return static_cast<std::byte>(c); });
 }
 
-uint64_t character_count(const Buffer& buffer) {
-  return buffer.source == Buffer::Source::kBase64 ? buffer.text.size : buffer.characters.size();
+uint64_t character_count(const BufferSource& buffer) {
+  return buffer.kind == BufferSource::Kind::kBase64 ? buffer.range.size : buffer.characters.size();
 }
 
 }  // namespace
@@ -36,37 +38,38 @@ BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
       scene_file_(scene_file),
       document_(document),
       budget_(budget),
-      window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()) {
+      window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()),
+      external_files_charge_(budget, "the list of external files of " + scene_file.path()) {
   for (size_t i = 0; i < document.buffers.size(); ++i)
     if (document.buffers[i].is_read) check_length(static_cast<int>(i));
 }
 
 std::span<const std::byte> BufferReader::window(int index, uint64_t offset, size_t size) {
-  const Buffer& buffer = document_.buffers[static_cast<size_t>(index)];
-  if (buffer.source == Buffer::Source::kBase64 || buffer.source == Buffer::Source::kMemory)
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
+  if (buffer.kind == BufferSource::Kind::kBase64 || buffer.kind == BufferSource::Kind::kMemory)
     return decode_base64(index, offset, size);
   const std::span<std::byte> bytes(window_.data(), size);
-  if (buffer.source == Buffer::Source::kFile)
-    scene_file_.read_at(buffer.text.begin + offset, bytes);
+  if (buffer.kind == BufferSource::Kind::kBinChunk)
+    scene_file_.read_at(buffer.range.begin + offset, bytes);
   else
     external(index).read_at(offset, bytes);
   return bytes;
 }
 
 void BufferReader::check_length(int index) {
-  const Buffer& buffer = document_.buffers[static_cast<size_t>(index)];
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
   uint64_t there = 0;
-  switch (buffer.source) {
-    case Buffer::Source::kNone:
+  switch (buffer.kind) {
+    case BufferSource::Kind::kNone:
       return;
-    case Buffer::Source::kFile:
-      there = buffer.text.size;
+    case BufferSource::Kind::kBinChunk:
+      there = buffer.range.size;
       break;
-    case Buffer::Source::kExternal:
+    case BufferSource::Kind::kExternal:
       there = external(index).size();
       break;
-    case Buffer::Source::kBase64:
-    case Buffer::Source::kMemory: {
+    case BufferSource::Kind::kBase64:
+    case BufferSource::Kind::kMemory: {
       std::array<std::byte, 2> tail{};
       const uint64_t characters = character_count(buffer);
       const size_t n = static_cast<size_t>(std::min<uint64_t>(2, characters));
@@ -95,15 +98,16 @@ const ReadableFile& BufferReader::external(int index) {
     throw Error(e.code(), where + ": " + e.message());
   }
   const FileIdentity identity = open_.back().file->identity();
-  SourceFile& known = external_files_.try_emplace(index, SourceFile{path, identity}).first->second;
-  if (known.identity != identity) known.identity = {};
+  const auto [known, is_new] = external_files_.try_emplace(index, SourceFile{path, identity});
+  if (is_new) external_files_charge_.add(sizeof(*known) + kMapNodeBytes + path.size());
+  if (known->second.identity != identity) known->second.identity = {};
   return *open_.back().file;
 }
 
 std::span<const std::byte> BufferReader::decode_base64(int index, uint64_t offset, size_t size) {
   if (characters_.size() == 0)
     characters_ = PageBuffer<std::byte>(budget_, 4 * kMaxGroups, "base64 of " + document_.path);
-  const Buffer& buffer = document_.buffers[static_cast<size_t>(index)];
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
   const uint64_t first_group = offset / 3;
   const uint64_t group_count = (offset + size + 2) / 3 - first_group;
   const uint64_t begin = 4 * first_group;

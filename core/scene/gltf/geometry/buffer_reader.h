@@ -1,5 +1,5 @@
-// The bytes of a scene's buffers, read by windows wherever they lie: in the scene file, in an
-// external file, or as base64 characters. Not thread-safe.
+// The bytes of the buffers of a scene, read by windows: from the scene file, from an external file,
+// or out of base64 characters. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +13,7 @@
 #include "core/base/page_buffer.h"
 #include "core/io/file_system.h"
 #include "core/scene/gltf/document/document.h"
+#include "core/scene/gltf/growing_charge.h"
 #include "core/scene/triangle_source.h"
 
 namespace voxdag::gltf {
@@ -21,8 +22,9 @@ class BufferReader {
  public:
   static constexpr size_t kWindowBytes = size_t{256} << 10;
 
-  // Checks that every buffer that is read has as many bytes as it claims, else
-  // Error{kInvalidInput}; Error{kNotFound} for an external file that is not there.
+  // Checks every buffer that is read: throws Error{kInvalidInput} if it has fewer bytes than it
+  // claims, Error{kNotFound} if an external file does not exist. The references must outlive the
+  // reader.
   BufferReader(FileSystem& files, const ReadableFile& scene_file, const Document& document,
                MemoryBudget& budget);
 
@@ -30,9 +32,12 @@ class BufferReader {
   // the next call.
   std::span<const std::byte> window(int buffer, uint64_t offset, size_t size);
 
-  // Files beside the scene file that were opened, by buffer. The identity is unknown of one that
-  // had changed when it was opened again.
+  // The external files that were opened, by buffer. The identity of a file that had changed when it
+  // was opened again is unknown.
   const std::map<int, SourceFile>& external_files() const { return external_files_; }
+
+  // What readers of the scene charge their own memory to.
+  MemoryBudget& budget() { return budget_; }
 
  private:
   void check_length(int buffer);
@@ -44,14 +49,14 @@ class BufferReader {
   const Document& document_;
   MemoryBudget& budget_;
   PageBuffer<std::byte> window_;
-  PageBuffer<std::byte> characters_;  // base64 of a window, once that is needed
-  // External files that are open, by buffer; few at a time, the oldest is closed.
+  PageBuffer<std::byte> characters_;  // base64 of a window; empty until a buffer needs it
   struct OpenFile {
     int buffer;
     std::unique_ptr<ReadableFile> file;
   };
-  std::vector<OpenFile> open_;
+  std::vector<OpenFile> open_;  // a few external files; the oldest is closed for another one
   std::map<int, SourceFile> external_files_;
+  GrowingCharge external_files_charge_;
 };
 
 }  // namespace voxdag::gltf

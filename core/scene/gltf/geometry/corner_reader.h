@@ -1,5 +1,6 @@
-// The vertex indices of a primitive's triangles, three each, out of triangle lists, strips and
-// fans, indexed or not. Winding is not kept: a voxel does not care.
+// The vertex indices of the triangles of a primitive, three each, out of triangle lists, strips and
+// fans, indexed or not. The winding of strips is not corrected: voxels do not depend on it. Not
+// thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@ class CornerReader {
  public:
   CornerReader(const Document& document, BufferReader& buffers, const Primitive& primitive);
 
-  // Those of triangles [first, first + count); may be beyond the vertices that are there.
+  // Reads the indices of triangles [first, first + count). They may be out of range.
   void read(uint64_t first, size_t count, uint32_t* corners);
 
  private:

@@ -1,5 +1,5 @@
 // The transforms of a node's instances (EXT_mesh_gpu_instancing), read by windows; a single
-// identity for a node without the extension.
+// identity for a node without the extension. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ class InstanceReader {
   InstanceReader(const Document& document, BufferReader& buffers, const Node& node);
 
   uint64_t count() const { return count_; }
-  // T * R * S of an instance, relative to the node. Cheap when asked for in order.
+  // T * R * S of an instance, relative to the node. Fast if called in the order of the instances.
   Transform at(uint64_t instance);
 
  private:

@@ -1,9 +1,13 @@
 #include "core/scene/gltf/geometry/joint_matrices.h"
 
 #include <array>
+#include <string>
 #include <unordered_map>
+#include <vector>
 
 #include "core/scene/gltf/geometry/accessor_reader.h"
+#include "core/scene/gltf/growing_charge.h"
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
@@ -12,11 +16,15 @@ namespace {
 // node is multiplied once.
 class GlobalTransforms {
  public:
-  explicit GlobalTransforms(const Document& document) : document_(document) {}
+  GlobalTransforms(const Document& document, MemoryBudget& budget, const std::string& what)
+      : document_(document), charge_(budget, what) {}
 
   const Transform& of(int node) {
-    std::vector<int> chain;  // from the node up, as far as nothing is known
-    for (int i = node; i >= 0 && !known_.contains(i); i = parent_of(i)) chain.push_back(i);
+    std::vector<int> chain;  // from the node up to an ancestor whose product is known
+    for (int i = node; i >= 0 && !known_.contains(i); i = parent_of(i)) {
+      charge_.add(kBytesPerNode);
+      chain.push_back(i);
+    }
     for (size_t k = chain.size(); k-- > 0;) {
       const int parent = parent_of(chain[k]);
       const Transform& local = document_.nodes[static_cast<size_t>(chain[k])].local;
@@ -26,20 +34,24 @@ class GlobalTransforms {
   }
 
  private:
+  // In the map, whose table of buckets is copied when it grows, and in the chain.
+  static constexpr uint64_t kBytesPerNode = sizeof(Transform) + 72;
+
   int parent_of(int node) const { return document_.nodes[static_cast<size_t>(node)].parent; }
 
   const Document& document_;
+  GrowingCharge charge_;
   std::unordered_map<int, Transform> known_;
 };
 
 }  // namespace
 
-std::vector<Transform> joint_matrices(const Document& document, BufferReader& buffers, int index) {
+PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buffers, int index) {
   const Skin& skin = document.skins[static_cast<size_t>(index)];
-  std::vector<Transform> matrices;
-  matrices.reserve(skin.joints.size());
-  GlobalTransforms globals(document);
-  for (int joint : skin.joints) matrices.push_back(globals.of(joint));
+  const std::string what = document.path + ": " + document.name_skin(index);
+  PageBuffer<Transform> matrices(buffers.budget(), skin.joints.size(), what);
+  GlobalTransforms globals(document, buffers.budget(), what);
+  for (size_t i = 0; i < matrices.size(); ++i) matrices[i] = globals.of(skin.joints[i]);
   if (skin.inverse_bind < 0) return matrices;
   AccessorReader reader(document, buffers, skin.inverse_bind);
   for (size_t i = 0; i < matrices.size(); ++i) {

@@ -1,11 +1,9 @@
 #include "core/scene/gltf/geometry/node_walk.h"
 
-#include "core/base/error.h"
-
 namespace voxdag::gltf {
 
 NodeWalk::NodeWalk(const Document& document, MemoryBudget& budget)
-    : document_(document), charge_(budget, 0, "the node hierarchy") {}
+    : document_(document), charge_(budget, "the node hierarchy of " + document.path) {}
 
 bool NodeWalk::next() {
   while (descend())
@@ -33,12 +31,8 @@ bool NodeWalk::descend() {
 
 void NodeWalk::enter(int node, const Transform& global) {
   path_.push_back({node, 0, global});
-  // Growing, a vector holds its old and its new half for a moment.
-  const uint64_t bytes = path_.capacity() * sizeof(Step) * 3 / 2;
-  if (bytes > charge_.bytes() && !charge_.try_resize(bytes))
-    throw Error(ErrorCode::kOutOfMemory, "out of memory: " + document_.path +
-                                             " has a hierarchy of over " +
-                                             std::to_string(path_.size()) + " nested nodes");
+  // A vector that grows has its old memory as well, half of the new.
+  charge_.grow_to(path_.capacity() * sizeof(Step) * 3 / 2);
 }
 
 }  // namespace voxdag::gltf

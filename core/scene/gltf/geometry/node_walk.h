@@ -1,10 +1,9 @@
 // The nodes of the scene that draw a mesh, parents before children, in the order of the file, with
-// their global transforms. Takes memory by the depth of the hierarchy and never recurses.
+// their global transforms. Its memory grows with the depth of the hierarchy; it never recurses.
 #pragma once
 
 #include <vector>
 
-#include "core/base/memory_budget.h"
 #include "core/scene/gltf/document/document.h"
 
 namespace voxdag::gltf {
@@ -13,7 +12,7 @@ class NodeWalk {
  public:
   NodeWalk(const Document& document, MemoryBudget& budget);
 
-  // Goes to the next node with a mesh; false when there is none.
+  // Moves to the next node with a mesh; false if there is none.
   bool next();
   int node() const { return path_.back().node; }
   const Transform& global() const { return path_.back().global; }
@@ -31,7 +30,7 @@ class NodeWalk {
 
   const Document& document_;
   std::vector<Step> path_;  // from a root to the current node
-  MemoryCharge charge_;
+  GrowingCharge charge_;
   size_t next_root_ = 0;
 };
 

@@ -12,7 +12,13 @@ constexpr size_t kInfluencesOfSet = 4;
 VertexSource::VertexSource(const Document& document, BufferReader& buffers,
                            const Primitive& primitive, std::span<const double> weights,
                            std::span<const Transform> joints)
-    : positions_(document, buffers, primitive.position), joints_(joints) {
+    : charge_(buffers.budget(),
+              sizeof(Target) * weights.size() + sizeof(Influences) * primitive.joint_sets.size(),
+              document.path + ": a primitive with its morph targets and joints"),
+      positions_(document, buffers, primitive.position),
+      joints_(joints) {
+  targets_.reserve(weights.size());
+  influences_.reserve(joints.empty() ? 0 : primitive.joint_sets.size());
   for (size_t t = 0; t < weights.size(); ++t)
     if (weights[t] != 0 && primitive.targets[t] >= 0)
       targets_.push_back({AccessorReader(document, buffers, primitive.targets[t]), weights[t]});

@@ -1,7 +1,7 @@
 // The vertex positions of one primitive as a node draws it: base positions, morphed by the weights,
-// skinned at rest.
+// skinned at rest. Not thread-safe.
 //
-//   morph   p = (p0 + w0 * d0) + w1 * d1 ...   targets of weight 0 are not looked at
+//   morph   p = (p0 + w0 * d0) + w1 * d1 ...   targets of weight 0 are not read
 //   skin    M = (w0 * M0 + w1 * M1) + ...      entry by entry; p' = M p
 #pragma once
 
@@ -16,15 +16,16 @@ namespace voxdag::gltf {
 
 class VertexSource {
  public:
-  // `weights` are the node's, else the mesh's; `joints` are empty for what has no skin. All
-  // arguments must outlive the source.
+  // `weights` are the node's, else the mesh's; `joints` are empty for a node without a skin. All
+  // arguments must outlive the source. Throws Error{kOutOfMemory} for more targets and joint sets
+  // than fit the budget of `buffers`.
   VertexSource(const Document& document, BufferReader& buffers, const Primitive& primitive,
                std::span<const double> weights, std::span<const Transform> joints);
 
   uint64_t count() const { return positions_.count(); }
 
-  // Positions of vertices [first, first + count), three doubles each. A vertex whose joints do not
-  // exist comes out as not a number, so that it is refused only if a triangle uses it.
+  // Reads the positions of vertices [first, first + count), three doubles each. A vertex whose
+  // joints do not exist becomes NaN, so that it is refused only if a triangle uses it.
   void read(uint64_t first, size_t count, double* out);
 
  private:
@@ -41,6 +42,7 @@ class VertexSource {
   void skin(uint64_t first, size_t count, double* positions);
   void blend(const uint32_t* joints, const double* weights, Transform& sum) const;
 
+  MemoryCharge charge_;  // for targets_ and influences_
   AccessorReader positions_;
   std::vector<Target> targets_;
   std::vector<Influences> influences_;

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "core/base/error.h"
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
@@ -13,7 +14,7 @@ constexpr uint32_t kJsonChunk = 0x4E4F534A;  // "JSON"
 constexpr uint32_t kBinChunk = 0x004E4942;   // "BIN"
 constexpr uint64_t kHeaderBytes = 12;
 constexpr uint64_t kChunkHeaderBytes = 8;
-constexpr uint64_t kLongestJson = uint64_t{1} << 30;
+constexpr uint64_t kMaxJsonBytes = uint64_t{1} << 30;
 
 uint32_t read_u32(const ReadableFile& file, uint64_t offset) {
   std::array<std::byte, 4> b;
@@ -78,7 +79,7 @@ Container read_container(const ReadableFile& file) {
   if (!is_glb && !may_be_json(file))
     refuse(file.path(), "is neither a GLB, which begins with \"glTF\", nor JSON");
   const Container container = is_glb ? read_glb(file) : Container{{0, file.size()}, false, {}};
-  if (container.json.size > kLongestJson)
+  if (container.json.size > kMaxJsonBytes)
     throw Error(ErrorCode::kLimit, file.path() + ": its JSON has " +
                                        std::to_string(container.json.size) +
                                        " bytes, the limit is 1 GiB");

@@ -1,9 +1,9 @@
 // The two containers of glTF 2.0: a GLB (a header, a JSON chunk, perhaps a BIN chunk), or the bare
-// JSON of a .gltf. Which of them a file is, its first bytes say.
+// JSON of a .gltf. The first bytes of a file tell which of them it is, not its name.
 #pragma once
 
 #include "core/io/file_system.h"
-#include "core/scene/gltf/document/document.h"
+#include "core/scene/gltf/json/file_range.h"
 
 namespace voxdag::gltf {
 

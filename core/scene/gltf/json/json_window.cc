@@ -2,30 +2,26 @@
 
 #include <algorithm>
 
-#include "core/base/error.h"
-
 namespace voxdag::gltf {
 namespace {
 
 constexpr size_t kWindowBytes = size_t{64} << 10;
-// As long as any name or path of a file need be.
-constexpr uint64_t kShownCharacters = 4096;
-// The parser keeps a string raw and decoded, in buffers that grow by doubling, and hands on a copy.
+// Enough for every name and every path of a file.
+constexpr uint64_t kMaxShownCharacters = 4096;
+// The parser stores a string raw and decoded, in buffers that grow by doubling, and passes a copy.
 constexpr uint64_t kCopies = 6;
-constexpr uint64_t kChargeStepBytes = 64 << 10;
 
-// ASCII that stands for itself within a string.
+// ASCII that JSON does not escape within a string.
 bool is_plain(char c) { return c >= ' ' && c <= '~'; }
 
 }  // namespace
 
-JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, bool cut_strings,
-                       MemoryBudget& budget, const CancelToken& cancel)
+JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, MemoryBudget& budget,
+                       const CancelToken& cancel)
     : file_(file),
       json_(json),
-      cut_strings_(cut_strings),
       cancel_(cancel),
-      charge_(budget, 0, "strings of the JSON"),
+      charge_(budget, "a string in the JSON of " + file.path()),
       window_begin_(json.begin),
       position_(json.begin) {
   advance();
@@ -41,9 +37,7 @@ void JsonWindow::advance() {
     track(c);
     current_ = c;
   } while (is_withheld());
-  if (!in_string_) return;
-  ++shown_;
-  charge_shown();
+  if (in_string_) charge_.grow_to(kCopies * ++shown_);
 }
 
 bool JsonWindow::next(char& c) {
@@ -65,10 +59,10 @@ void JsonWindow::track(char c) {
   if (in_string_) return track_in_string(c);
   if (c != '"') return;
   in_string_ = true;
-  escaped_ = after_backslash_ = in_escape_ = false;
+  after_backslash_ = in_escape_ = false;
   hex_digits_left_ = 0;
   shown_ = 0;
-  string_ = {position_, 0};
+  string_ = {.characters = {position_, 0}};
 }
 
 void JsonWindow::track_in_string(char c) {
@@ -79,25 +73,21 @@ void JsonWindow::track_in_string(char c) {
   } else if (hex_digits_left_ > 0) {
     --hex_digits_left_;
   } else if (c == '\\') {
-    after_backslash_ = escaped_ = true;
+    after_backslash_ = string_.is_escaped = true;
   } else {
     in_escape_ = false;
     in_string_ = c != '"';
   }
-  string_.size += in_string_;
+  string_.characters.size += in_string_;
 }
 
-// Neither an escape nor a character of several bytes is ever cut in two.
-bool JsonWindow::is_withheld() const {
-  return cut_strings_ && in_string_ && string_.size > kShownCharacters && !in_escape_ &&
-         is_plain(current_);
-}
-
-void JsonWindow::charge_shown() {
-  const uint64_t bytes = kCopies * shown_;
-  if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kChargeStepBytes)) return;
-  throw Error(ErrorCode::kOutOfMemory, "out of memory: a string in the JSON of " + file_.path() +
-                                           " has over " + std::to_string(shown_) + " characters");
+// Neither an escape nor a character of several bytes is withheld in part.
+bool JsonWindow::is_withheld() {
+  if (!in_string_ || string_.characters.size <= kMaxShownCharacters || in_escape_ ||
+      !is_plain(current_))
+    return false;
+  string_.is_clipped = true;
+  return true;
 }
 
 }  // namespace voxdag::gltf

@@ -1,12 +1,12 @@
 // Streams the triangles of one document in world space: node by node, primitive by primitive,
-// instance by instance. Vertices and indices stay in their windows while consecutive draws share
-// them, so a mesh used by many nodes is read once.
+// instance by instance. Vertices and indices stay in their windows while consecutive nodes or
+// instances draw the same primitive, so a mesh used by many nodes is read once. Not thread-safe.
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "core/base/page_buffer.h"
 #include "core/scene/gltf/batch.h"
 #include "core/scene/gltf/geometry/corner_reader.h"
 #include "core/scene/gltf/geometry/instance_reader.h"
@@ -15,17 +15,18 @@
 
 namespace voxdag::gltf {
 
-class TriangleStream {
+class TriangleReader {
  public:
-  TriangleStream(const Document& document, BufferReader& buffers, MemoryBudget& budget,
+  TriangleReader(const Document& document, BufferReader& buffers, MemoryBudget& budget,
                  bool skip_invalid, Batch& batch);
 
-  // Gives every triangle to the batch, but for those it jumps over. Throws Error{kInvalidInput}
-  // naming node, mesh and primitive for an invalid one, unless those are dropped.
+  // Adds every triangle to the batch, except those that the batch skips. Throws
+  // Error{kInvalidInput} naming node, mesh and primitive of an invalid triangle, unless
+  // `skip_invalid` drops it.
   void run();
 
  private:
-  // What the readers below are set up for.
+  // What the readers are set up for.
   struct Binding {
     int mesh = -1;
     size_t primitive = 0;
@@ -48,19 +49,18 @@ class TriangleStream {
   Batch& batch_;
 
   Binding binding_;
-  std::vector<Transform> joints_;
+  PageBuffer<Transform> joints_;  // of the skin in binding_; empty without one
   std::optional<VertexSource> vertices_;
   std::optional<CornerReader> corner_reader_;
   VertexCache cache_;
   uint64_t vertex_count_ = 0;
   uint64_t triangle_count_ = 0;
 
-  std::vector<uint32_t> corners_;  // of the window that begins at window_first_
+  std::vector<uint32_t> corners_;  // vertex indices from triangle window_first_ on
   uint64_t window_first_ = 0;
 
-  // For messages.
-  int node_ = -1;
-  uint64_t instance_ = 0;
+  int node_ = -1;          // being drawn, for messages
+  uint64_t instance_ = 0;  // being drawn, for messages
 };
 
 }  // namespace voxdag::gltf

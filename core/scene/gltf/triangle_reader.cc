@@ -1,6 +1,8 @@
-#include "core/scene/gltf/triangle_stream.h"
+#include "core/scene/gltf/triangle_reader.h"
 
 #include <algorithm>
+
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
@@ -23,7 +25,7 @@ bool is_finite(const double* point) {
 
 }  // namespace
 
-TriangleStream::TriangleStream(const Document& document, BufferReader& buffers,
+TriangleReader::TriangleReader(const Document& document, BufferReader& buffers,
                                MemoryBudget& budget, bool skip_invalid, Batch& batch)
     : document_(document),
       buffers_(buffers),
@@ -33,16 +35,16 @@ TriangleStream::TriangleStream(const Document& document, BufferReader& buffers,
       cache_(budget, largest_vertex_count(document)),
       corners_(3 * Batch::kTriangles) {}
 
-void TriangleStream::run() {
+void TriangleReader::run() {
   NodeWalk walk(document_, budget_);
   while (walk.next()) draw_node(walk);
 }
 
-void TriangleStream::draw_node(const NodeWalk& walk) {
+void TriangleReader::draw_node(const NodeWalk& walk) {
   node_ = walk.node();
   const Node& node = document_.nodes[static_cast<size_t>(node_)];
   const Mesh& mesh = document_.meshes[static_cast<size_t>(node.mesh)];
-  // A skin's joints place the vertices in the world already.
+  // The joints of a skin place its vertices in world space already.
   const Transform global = node.skin >= 0 ? Transform{} : walk.global();
   for (size_t p = 0; p < mesh.primitives.size(); ++p) {
     const uint64_t triangles = triangle_count(document_, mesh.primitives[p]);
@@ -58,27 +60,29 @@ void TriangleStream::draw_node(const NodeWalk& walk) {
   }
 }
 
-void TriangleStream::bind(const Node& node, size_t primitive_index) {
+void TriangleReader::bind(const Node& node, size_t primitive_index) {
   const Mesh& mesh = document_.meshes[static_cast<size_t>(node.mesh)];
   const std::vector<double>& weights = node.weights.empty() ? mesh.weights : node.weights;
-  const Binding wanted{node.mesh, primitive_index, weights.data(), node.skin};
-  if (wanted == binding_) return;
+  const Binding next{node.mesh, primitive_index, weights.data(), node.skin};
+  if (next == binding_) return;
   const Primitive& primitive = mesh.primitives[primitive_index];
-  if (node.skin < 0)
-    joints_.clear();
-  else if (node.skin != binding_.skin)
-    joints_ = joint_matrices(document_, buffers_, node.skin);
+  if (node.skin != binding_.skin) {
+    binding_ = {};
+    joints_ = {};
+    if (node.skin >= 0) joints_ = joint_matrices(document_, buffers_, node.skin);
+  }
   binding_ = {};
-  vertices_.emplace(document_, buffers_, primitive, weights, joints_);
+  vertices_.emplace(document_, buffers_, primitive, weights,
+                    std::span<const Transform>(joints_.data(), joints_.size()));
   corner_reader_.emplace(document_, buffers_, primitive);
   cache_.bind(*vertices_);
   vertex_count_ = vertices_->count();
   triangle_count_ = triangle_count(document_, primitive);
   window_first_ = kNoWindow;
-  binding_ = wanted;
+  binding_ = next;
 }
 
-void TriangleStream::draw_instance(const Transform& world, uint64_t first_triangle) {
+void TriangleReader::draw_instance(const Transform& world, uint64_t first_triangle) {
   batch_.check_canceled();
   for (uint64_t first = first_triangle; first < triangle_count_; first += Batch::kTriangles) {
     const auto count =
@@ -92,11 +96,11 @@ void TriangleStream::draw_instance(const Transform& world, uint64_t first_triang
   }
 }
 
-void TriangleStream::draw_window(const Transform& world, size_t count) {
+void TriangleReader::draw_window(const Transform& world, size_t count) {
   const uint32_t* corners = corners_.data();
   for (size_t i = 0; i < count; ++i, corners += 3) {
     if (place(corners, world, batch_.next())) {
-      batch_.keep();
+      batch_.add();
     } else {
       if (!skip_invalid_) report(corners, world);
       batch_.drop();
@@ -105,13 +109,13 @@ void TriangleStream::draw_window(const Transform& world, size_t count) {
 }
 
 // False for a corner out of range or a vertex that is not finite in world space.
-bool TriangleStream::place(const uint32_t* corners, const Transform& world, WorldTriangle& out) {
+bool TriangleReader::place(const uint32_t* corners, const Transform& world, WorldTriangle& out) {
   if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
   for (int k = 0; k < 3; ++k) apply(world, cache_.at(corners[k]), out.v[k]);
   return is_finite(out.v[0]) && is_finite(out.v[1]) && is_finite(out.v[2]);
 }
 
-void TriangleStream::report(const uint32_t* corners, const Transform& world) const {
+void TriangleReader::report(const uint32_t* corners, const Transform& world) const {
   const Node& node = document_.nodes[static_cast<size_t>(node_)];
   const Primitive& primitive =
       document_.meshes[static_cast<size_t>(binding_.mesh)].primitives[binding_.primitive];

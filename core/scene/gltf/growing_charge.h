@@ -1,0 +1,38 @@
+// A charge to the memory budget for data whose size is known only while it is read. It grows in
+// steps, so that small additions cost no call to the budget. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/memory_budget.h"
+
+namespace voxdag::gltf {
+
+class GrowingCharge {
+ public:
+  GrowingCharge() = default;
+  GrowingCharge(MemoryBudget& budget, std::string what)
+      : charge_(budget, 0, what), what_(std::move(what)) {}
+
+  // Charges `bytes` in all, unless as many are charged already. Throws Error{kOutOfMemory} if they
+  // do not fit the budget.
+  void grow_to(uint64_t bytes) {
+    if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
+    throw Error(ErrorCode::kOutOfMemory, "out of memory: " + what_ + " needs over " +
+                                             std::to_string(bytes) + " bytes of the budget");
+  }
+  // Charges `bytes` more than all calls of add() before.
+  void add(uint64_t bytes) { grow_to(added_ += bytes); }
+
+ private:
+  static constexpr uint64_t kStepBytes = 64 << 10;
+
+  MemoryCharge charge_;
+  std::string what_;
+  uint64_t added_ = 0;
+};
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,21 @@
+// Pieces of a scene file.
+#pragma once
+
+#include <cstdint>
+
+namespace voxdag::gltf {
+
+// Bytes [begin, begin + size).
+struct FileRange {
+  uint64_t begin = 0;
+  uint64_t size = 0;
+};
+
+// A string of the JSON where it lies in the scene file.
+struct RawString {
+  FileRange characters;     // between the quotes
+  bool is_escaped = false;  // has JSON escapes
+  bool is_clipped = false;  // the parser saw only its beginning
+};
+
+}  // namespace voxdag::gltf
