@@ -1,5 +1,5 @@
-// Hash-consing: look-ups of bricks and of nodes in tables of a given size, prefetched in batches as
-// the tile reducer does. All are found.
+// Speed of hash consing: lookups of bricks and nodes in tables of a given size, prefetched in
+// batches as in the tile reducer. Every lookup succeeds.
 #include <benchmark/benchmark.h>
 
 #include <random>
@@ -20,7 +20,7 @@ struct Setting {
   Memory memory{budget, pool};
 };
 
-// Numbers of entries, in no order, as many as make a few batches.
+// Entry numbers in random order, enough for 256 batches.
 std::vector<uint64_t> random_entries(uint64_t count) {
   std::mt19937_64 random(2);
   std::vector<uint64_t> out(256 * kBatch);
@@ -28,7 +28,7 @@ std::vector<uint64_t> random_entries(uint64_t count) {
   return out;
 }
 
-void look_bricks_up(benchmark::State& state) {
+void look_up_bricks(benchmark::State& state) {
   const uint64_t count = static_cast<uint64_t>(state.range(0));
   Setting setting;
   BrickTable table(setting.memory);
@@ -46,7 +46,7 @@ void look_bricks_up(benchmark::State& state) {
 }
 
 // Node `n` has the four children n, n + 1, n + 2, n + 3 of the level below.
-void look_nodes_up(benchmark::State& state) {
+void look_up_nodes(benchmark::State& state) {
   constexpr uint32_t kMask = 0x0f;
   constexpr int kChildren = 4;
   const uint64_t count = static_cast<uint64_t>(state.range(0));
@@ -79,8 +79,8 @@ void look_nodes_up(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * wanted.size()));
 }
 
-BENCHMARK(look_bricks_up)->Arg(10'000)->Arg(300'000)->Arg(10'000'000);
-BENCHMARK(look_nodes_up)->Arg(10'000)->Arg(300'000)->Arg(10'000'000);
+BENCHMARK(look_up_bricks)->Arg(10'000)->Arg(300'000)->Arg(10'000'000);
+BENCHMARK(look_up_nodes)->Arg(10'000)->Arg(300'000)->Arg(10'000'000);
 
 }  // namespace
 }  // namespace voxdag::cpu
