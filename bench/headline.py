@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Whole builds: the shipped program, default options, empty work folders.
+"""Whole builds: the release build of the program, default options, empty work folders.
 
 Each case is built several times, and medians are shown; cases that take more than a minute are
-built once. With --study the yardstick's build stage runs before every build, and the ratio is CPU
-seconds of the whole `voxdag build` (reading, artifacts, merge, final file) over CPU seconds of the
-study's build stage alone. `plot` draws the figures of --json.
+built once. `plot` draws the values of --json.
+
+With --study FOLDER, an optional external reference program (see study.py) runs before every build. The
+ratio is CPU seconds of the whole `voxdag build` (reading, artifacts, merge, final file) divided by CPU
+seconds of the reference's build in memory.
 """
 
 import argparse
@@ -31,17 +33,17 @@ def measure_case(case, options, study, folder):
     scene, resolution = case.split(":")
     levels = int(resolution).bit_length() - 1
     path = scene_path(scene, options, folder)
-    runs, reports, yardsticks = [], [], []
+    runs, reports, references = [], [], []
     while len(runs) < options.repeat and not (runs and runs[-1].wall_s > LONG_S):
-        if study and study.knows(scene):
-            yardsticks.append(study.build_stage(scene, path, levels))
+        if study and study.supports(scene):
+            references.append(study.build_stage(scene, path, levels))
         taken, report = measure.build(options.voxdag, path, resolution, options.scratch)
         runs.append(taken)
         reports.append(report)
-    return summary(case, runs, reports, yardsticks)
+    return summary(case, runs, reports, references)
 
 
-def summary(case, runs, reports, yardsticks):
+def summary(case, runs, reports, references):
     last = reports[-1]
     cpu_s = median([taken.cpu_s for taken in runs])
     wall_s = median([taken.wall_s for taken in runs])
@@ -73,12 +75,12 @@ def summary(case, runs, reports, yardsticks):
         "dag_nodes_per_cpu_s": last["dag_nodes"] / cpu_s,
         "stages_cpu_s": stages,
     }
-    if yardsticks:
-        figures["study_cpu_s"] = median([y["cpu_s"] for y in yardsticks])
-        figures["study_cpu_s_all"] = [y["cpu_s"] for y in yardsticks]
-        figures["study_wall_s"] = median([y["wall_s"] for y in yardsticks])
+    if references:
+        figures["study_cpu_s"] = median([r["cpu_s"] for r in references])
+        figures["study_cpu_s_all"] = [r["cpu_s"] for r in references]
+        figures["study_wall_s"] = median([r["wall_s"] for r in references])
         figures["ratio"] = cpu_s / figures["study_cpu_s"]
-        figures["same_work"] = same_work(yardsticks[-1], last)
+        figures["same_work"] = same_work(references[-1], last)
     return figures
 
 
@@ -126,9 +128,10 @@ def print_ratios(cases):
     cases = [case for case in cases if "ratio" in case]
     if not cases:
         return
-    print("\nBeside the study's build stage (CPU seconds, single thread, in memory):\n")
+    print("\nCompared with the external reference (one thread, in memory):\n")
     measure.print_table(
-        ["case", "build CPU s", "study CPU s", "ratio", "build wall s", "study wall s", "same work"],
+        ["case", "build CPU s", "reference CPU s", "ratio", "build wall s", "reference wall s",
+         "same work"],
         [[c["case"], f"{c['cpu_s']:.2f}", f"{c['study_cpu_s']:.2f}", f"{c['ratio']:.2f}",
           f"{c['wall_s']:.2f}", f"{c['study_wall_s']:.2f}", "yes" if c["same_work"] else "NO"]
          for c in cases])
@@ -148,15 +151,18 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     measure.add_common_options(parser)
     add_hairball_option(parser)
-    parser.add_argument("--study", type=Path, help="the study's folder; without it, no ratios")
+    parser.add_argument("--study", type=Path, metavar="FOLDER",
+                        help="sources of an external reference program to compare with")
     parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--case", action="append", metavar="SCENE:R", help="instead of the usual")
-    parser.add_argument("--short", action="store_true", help="what takes less than five minutes")
+    parser.add_argument("--case", action="append", metavar="SCENE:R",
+                        help="build this case instead of the default ones")
+    parser.add_argument("--short", action="store_true",
+                        help="only cases of less than five minutes in total")
     options = parser.parse_args()
 
     names = options.case or (SHORT_CASES if options.short else CASES)
     if not options.case and not can_make_hairball(options):
-        print("No hairball: its generator needs numpy, and to lie beside the scenes.\n")
+        print("No hairball: give --hairball, or numpy and its generator next to the scenes.\n")
         names = [name for name in names if not name.startswith(HAIRBALL)]
     facts = measure.machine()
     print(measure.machine_line(facts) + "\n", flush=True)

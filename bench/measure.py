@@ -1,4 +1,4 @@
-"""What the benchmarks share: running a command and knowing what it took, whole builds, tables.
+"""Shared by the benchmarks: running a command and measuring it, whole builds, tables.
 
 CPU time is user + system time of the whole process tree, wall time from start to exit, peak memory
 the largest resident set of any process of the tree.
@@ -21,7 +21,7 @@ MIB = 1 << 20
 
 @dataclass
 class Run:
-    """What one command took, and what it wrote to stdout; of a build also what its folder held."""
+    """Cost and standard output of one command; for a build also the peak disk use of its folder."""
 
     wall_s: float
     cpu_s: float
@@ -48,40 +48,40 @@ def run(command):
 
 
 class DiskWatch:
-    """The most bytes that a folder held while the watch was on, looked at every 20 ms."""
+    """The peak disk use of a folder, sampled every 20 ms."""
 
     def __init__(self, folder):
         self.folder = folder
         self.peak_bytes = 0
-        self.over = threading.Event()
+        self.stopped = threading.Event()
         self.thread = threading.Thread(target=self.watch)
 
-    def look(self):
+    def sample(self):
         total = 0
-        for folder, _, names in os.walk(self.folder):  # which passes over folders that go meanwhile
+        for folder, _, names in os.walk(self.folder):  # skips removed folders
             for name in names:
                 try:
                     total += os.stat(os.path.join(folder, name)).st_blocks * 512
                 except FileNotFoundError:
-                    pass  # gone since it was listed
+                    pass  # removed since it was listed
         self.peak_bytes = max(self.peak_bytes, total)
 
     def watch(self):
-        while not self.over.wait(0.02):
-            self.look()
+        while not self.stopped.wait(0.02):
+            self.sample()
 
     def __enter__(self):
         self.thread.start()
         return self
 
     def __exit__(self, *_):
-        self.over.set()
+        self.stopped.set()
         self.thread.join()
-        self.look()
+        self.sample()
 
 
 def build(voxdag, scene, resolution, scratch, *options):
-    """Builds into an empty folder that is removed again; returns (Run, the build's report)."""
+    """Builds into an empty temporary folder; returns (Run, the report of the build)."""
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         output = Path(folder) / "out.vdag"
         with DiskWatch(Path(folder)) as disk:
@@ -91,7 +91,7 @@ def build(voxdag, scene, resolution, scratch, *options):
 
 
 def machine():
-    """The machine and the moment, for the head of a report."""
+    """The machine and the time, for the header of a report."""
     model = next(
         (line.split(":", 1)[1].strip()
          for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name")),
@@ -146,7 +146,7 @@ def add_common_options(parser):
                         help="folder of .glb scenes")
     parser.add_argument("--scratch", type=Path, default=None,
                         help="folder for results and work folders (default: the system's)")
-    parser.add_argument("--json", type=Path, help="also write the figures here, as JSON")
+    parser.add_argument("--json", type=Path, help="also write the values to this JSON file")
 
 
 def write_json(path, figures):

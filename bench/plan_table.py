@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""What `plan` foretells against what `build` then takes, scene by scene.
+"""Estimates of `plan` compared with what builds take, scene by scene.
 
 Voxels should come within 25 %; disk at its peak, peak memory and the bytes of the DAG within a
-factor of 2. The disk's peak is watched while the build runs. Exits 1 if a figure is out of bounds.
+factor of 2. Peak disk use is sampled during the build. Exits 1 if an estimate is out of bounds.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from pathlib import Path
 import measure
 
 RESOLUTIONS = [1024, 4096, 8192]
-# What must hold for estimate / truth, whichever is larger on top.
+# Upper limits of estimate / truth and of truth / estimate.
 WITHIN = {"voxels": 1.25, "file_bytes": 2.0, "disk_bytes": 2.0, "memory_bytes": 2.0}
 SHOWN = ["voxels", "file_bytes", "disk_bytes", "memory_bytes", "dag_nodes", "cpu_s"]
 
@@ -47,7 +47,7 @@ def print_cases(cases):
         text = f"{measure.amount(likely)} / {measure.amount(truth)} = {likely / truth:.2f}"
         return text + (" !" if name in case["missed"] else "")
 
-    print("Estimate / truth, ! where it is out of bounds:\n")
+    print("Estimate / truth, ! if out of bounds:\n")
     measure.print_table(["case"] + SHOWN + ["plan's own CPU s"],
                         [[c["case"]] + [cell(c, name) for name in SHOWN] + [f"{c['plan_cpu_s']:.2f}"]
                          for c in cases])
@@ -57,9 +57,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     measure.add_common_options(parser)
     parser.add_argument("--scene", action="append", type=Path, metavar="FILE.glb",
-                        help="instead of all in --scenes")
+                        help="this scene instead of all in --scenes")
     parser.add_argument("--resolution", action="append", type=int, metavar="R",
-                        help=f"instead of {RESOLUTIONS}")
+                        help=f"this resolution instead of {RESOLUTIONS}")
     options = parser.parse_args()
 
     facts = measure.machine()

@@ -4,7 +4,7 @@
     tools/bench headline --json headline.json
     tools/bench plot headline.json headline.png
 
-Needs matplotlib (Debian: python3-matplotlib; PyPI: matplotlib), which nothing else here does.
+Needs matplotlib (Debian: python3-matplotlib; PyPI: matplotlib), which no other benchmark does.
 """
 
 import argparse
@@ -16,7 +16,7 @@ import measure
 PANELS = [
     ("CPU seconds of the whole build", lambda case: case["cpu_s"]),
     ("DAG nodes, millions", lambda case: case["dag_nodes"] / 1e6),
-    ("bytes of the file a million voxels", lambda case: case["bytes"] / (case["voxels"] / 1e6)),
+    ("bytes of the file per million voxels", lambda case: case["bytes"] / (case["voxels"] / 1e6)),
 ]
 
 
@@ -38,7 +38,7 @@ def draw(figures, output):
             if timed and panel is panels[0]:
                 panel.plot([case["resolution"] for case in timed],
                            [case["study_cpu_s"] for case in timed], "x--", color=f"C{number}",
-                           label=f"{scene}, the study's build stage")
+                           label=f"{scene}, external reference")
         panel.set_xscale("log", base=2)
         panel.set_yscale("log")
         panel.set_xticks(resolutions, [str(r) for r in resolutions], rotation=30)
@@ -54,8 +54,8 @@ def draw(figures, output):
 def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("figures", type=Path, help="what headline wrote with --json")
-    parser.add_argument("output", type=Path, help="the PNG")
+    parser.add_argument("figures", type=Path, help="the JSON file of headline --json")
+    parser.add_argument("output", type=Path, help="the PNG file to write")
     options = parser.parse_args()
     try:
         draw(json.loads(options.figures.read_text()), options.output)

@@ -1,4 +1,4 @@
-"""The scenes that benchmarks build: files of a folder, and a hairball that is made when asked for."""
+"""The scenes of the benchmarks: files of a folder, and a hairball that is generated on demand."""
 
 import importlib.util
 import json
@@ -13,14 +13,14 @@ HAIRBALL = "hairball"
 
 
 def can_make_hairball(options):
-    """Whether a file was given, or the generator beside the scenes is there, and numpy for it."""
+    """Whether --hairball was given, or its generator is next to the scenes and numpy is installed."""
     return bool(options.hairball) or (
         (options.scenes / "../tools/gen_hairball.py").exists()
         and importlib.util.find_spec("numpy") is not None)
 
 
 def hairball(options, folder):
-    """A million slivers: --hairball, or made in `folder` by the generator beside the scenes."""
+    """A million slivers: --hairball, or generated in `folder` by a script next to the scenes."""
     if options.hairball:
         return options.hairball
     path = folder / f"{HAIRBALL}.glb"
@@ -35,11 +35,11 @@ def scene_path(name, options, folder):
 
 def add_hairball_option(parser):
     parser.add_argument("--hairball", type=Path,
-                        help="hairball.glb, if it was made already")
+                        help="an existing hairball.glb")
 
 
 def glb_to_obj(glb, obj):
-    """The meshes of a .glb without transforms, as the study reads them."""
+    """The meshes of a .glb without transforms, as .obj."""
     data = glb.read_bytes()
     json_bytes, = struct.unpack_from("<I", data, 12)
     document = json.loads(data[20:20 + json_bytes])

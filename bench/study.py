@@ -1,7 +1,12 @@
-"""The yardstick: an in-memory speed study of the build stage, outside of this repository.
+"""An optional reference: an external program that builds a DAG in memory, given by --study FOLDER.
 
-It is one C++ program that reads an OBJ file and prints the CPU seconds of its build stage. It is
-compiled for the very machine it runs on (-march=native), which the shipped binary is not.
+The folder is not part of this repository; the benchmarks run without it. It contains C++ sources of one
+program, with main() in bench.cpp, that is called as `study MESH.obj LEVELS` and prints one line:
+
+    BUILD cpu SECONDS s (wall SECONDS) | voxels COUNT ... dag COUNT nodes
+
+It may contain meshes as NAME.obj.xz (see MESHES); other scenes are converted. It is compiled with
+-march=native, which the released binary is not.
 """
 
 import lzma
@@ -12,23 +17,23 @@ from pathlib import Path
 from measure import run
 from scenes import HAIRBALL, glb_to_obj
 
-# Scenes that the study has a copy of, by its name.
+# Scenes of which the folder has a mesh, with the name of the mesh.
 MESHES = {"sponza": "sponza", "dragon_100k": "dragon"}
 
-# The study's own cube and child order differ a little: its counts only tell that the work was alike.
+# The reference snaps vertices a little differently: its counts only show that the work was equal.
 VOXELS_WITHIN = 0.005
 NODES_WITHIN = 0.03
 
 
 class Study:
     def __init__(self, source, folder):
-        """Copies the study into `folder` and compiles it there."""
+        """Copies the sources into `folder` and compiles them there."""
         self.folder = Path(folder)
         self.source = Path(source)
         for path in self.source.iterdir():
             if path.suffix in (".h", ".cpp"):
                 shutil.copyfile(path, self.folder / path.name)
-        # One load asks for 32-byte alignment that its heap object does not have.
+        # The sources may use an aligned load on a heap object that is not 32-byte aligned.
         header = self.folder / "build.h"
         text = header.read_text().replace("_mm256_load_si256(", "_mm256_loadu_si256(")
         header.write_text(text)
@@ -36,11 +41,11 @@ class Study:
         run(["g++", "-std=c++20", "-O3", "-march=native", "-w", "-o", self.program,
              self.folder / "bench.cpp"])
 
-    def knows(self, scene):
+    def supports(self, scene):
         return scene in MESHES or scene == HAIRBALL
 
     def mesh_of(self, scene, scene_path):
-        """The scene as .obj: the study's own copy, or converted."""
+        """The scene as .obj: the mesh in the folder, or converted."""
         mesh = self.folder / f"{scene}.obj"
         if not mesh.exists():
             if scene in MESHES:
@@ -57,12 +62,12 @@ class Study:
         found = re.search(r"BUILD cpu ([\d.]+) s \(wall ([\d.]+)\) \| voxels ([\d.e+]+).*"
                           r"dag ([\d.e+]+) nodes", text)
         if not found:
-            raise SystemExit(f"the study's answer has no 'BUILD cpu': {text}")
+            raise SystemExit(f"expected a line 'BUILD cpu ...' from {self.program}: {text}")
         cpu_s, wall_s, voxels, dag_nodes = map(float, found.groups())
         return {"cpu_s": cpu_s, "wall_s": wall_s, "voxels": voxels, "dag_nodes": dag_nodes}
 
 
 def same_work(study, report):
-    """Whether the study's counts are as near to the build's as they must be."""
+    """Whether the counts of the reference are close enough to those of the build."""
     return (abs(study["voxels"] / report["voxels"] - 1) <= VOXELS_WITHIN
             and abs(study["dag_nodes"] / report["dag_nodes"] - 1) <= NODES_WITHIN)

@@ -23,10 +23,10 @@ void print(const BuildReport& r) {
               static_cast<long long>(r.grid.resolution()));
   std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.voxels).c_str(),
               count_text(r.svo_nodes).c_str(), count_text(r.dag_nodes).c_str());
-  std::printf("  %s subvolumes (%s split), artifacts %s, spilled %s, %u merge round%s\n",
+  std::printf("  %s subvolumes (%s split), artifacts %s, spilled %s, %u merge pass%s\n",
               count_text(r.subvolumes).c_str(), count_text(r.subvolumes_split).c_str(),
               size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge_rounds,
-              r.merge_rounds == 1 ? "" : "s");
+              r.merge_rounds == 1 ? "" : "es");
   std::printf(" ");
   for (const StageTime& stage : r.stages)
     std::printf(" %s %s%s", stage.name.c_str(), duration_text(stage.wall_s).c_str(),
@@ -61,12 +61,14 @@ void add_build_command(CLI::App& app, CommandContext& context) {
   const auto state = std::make_shared<BuildCommand>();
   state->options.declare(*command);
   state->options.declare_work_folder(*command);
-  command->add_option("-o,--output", state->run.output, "the .vdag file to make")->required();
+  command->add_option("-o,--output", state->run.output, "the .vdag file to write")->required();
   command->add_option("--cache", state->run.cache_folder,
-                      "folder of subvolumes shared between builds");
-  command->add_option("--cache-size", state->cache_size, "its limit (default 16GiB)");
-  command->add_flag("--keep-work", state->run.keep_work, "leave the temporary files");
-  command->add_flag("--restart", state->run.restart, "start over, whatever the work folder holds");
+                      "folder in which builds share subvolumes");
+  command->add_option("--cache-size", state->cache_size,
+                      "limit of the cache folder (default: 16GiB)");
+  command->add_flag("--keep-work", state->run.keep_work, "do not remove the work folder");
+  command->add_flag("--restart", state->run.restart,
+                    "start over instead of resuming the work folder");
   command->add_flag("--force", state->run.force, "build even if the estimate says it cannot fit");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
   command->callback([state, &context] { run(*state, context); });

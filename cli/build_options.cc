@@ -2,34 +2,27 @@
 
 #include <sstream>
 
+#include "cli/parse_list.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
 
 namespace voxdag::cli {
 namespace {
 
-constexpr uint64_t kLargestConfig = uint64_t{1} << 20;
-constexpr const char* kRunGroup = "Run (never changes the result)";
+constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
+constexpr const char* kRunGroup = "Run (never changes the bytes of the result)";
 
-std::array<double, 4> parse_bounds(const std::string& text) {
-  const auto numbers = parse_numbers<double, 4>(text, ',');
-  if (!numbers)
-    throw Error(ErrorCode::kInvalidInput,
-                "--bounds '" + text + "': expected four numbers X,Y,Z,EDGE");
-  return *numbers;
-}
-
-// Options from a TOML or INI file, for those that the command line does not give. CLI11 reads such
-// files for the program as a whole only, not for a command.
-void take_options_from(const std::string& path, CLI::App& command) {
-  std::istringstream text(read_small_file(system_files(), path, kLargestConfig));
+// Sets options that the command line does not give from a TOML or INI file. CLI11 reads such files
+// for the whole program only, not for one command.
+void read_config_file(const std::string& path, CLI::App& command) {
+  std::istringstream text(read_small_file(system_files(), path, kMaxConfigBytes));
   for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_config(text)) {
     CLI::Option* const option = command.get_option_no_throw("--" + item.fullname());
     if (!option || !option->get_configurable())
       throw Error(ErrorCode::kInvalidInput,
                   path + ": '" + item.fullname() + "' is not an option of " + command.get_name());
     if (option->count() > 0) continue;
-    // Should the command line give it later: the last one counts.
+    // If the command line gives the option later, that value wins.
     option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)->add_result(item.inputs);
   }
 }
@@ -43,7 +36,7 @@ void BuildOptions::declare(CLI::App& command) {
   command
       .add_option("-r,--resolution", g.resolution, "voxels per edge, a power of two, 4 to 1048576")
       ->required();
-  const char* geometry = "Geometry (decides the result's bytes)";
+  const char* geometry = "Geometry (decides the bytes of the result)";
   auto* bounds = command.add_option("--bounds", bounds_, "the cube: low corner X,Y,Z and its EDGE")
                      ->group(geometry);
   command
@@ -53,11 +46,11 @@ void BuildOptions::declare(CLI::App& command) {
       ->excludes(bounds);
   command.add_flag("--skip-invalid", g.skip_invalid, "drop and count invalid triangles")
       ->group(geometry);
-  command.add_option("--hash-bits", g.hash_bits, "bits of a node's hash that are kept, 4 to 64")
+  command.add_option("--hash-bits", g.hash_bits, "truncate node hashes to this many bits, 4 to 64")
       ->group(geometry);
   command
       .add_option_function<std::string>(
-          "--config", [&command](const std::string& path) { take_options_from(path, command); },
+          "--config", [&command](const std::string& path) { read_config_file(path, command); },
           "read options from a TOML or INI file")
       ->trigger_on_parse()
       ->configurable(false);
@@ -67,7 +60,7 @@ void BuildOptions::declare(CLI::App& command) {
       ->group(kRunGroup);
   command
       .add_option("--subvolume", r.subvolume_edge,
-                  "edge of a subvolume in voxels, a power of two (default: by the plan)")
+                  "edge of a subvolume in voxels, a power of two (default: chosen by the build)")
       ->group(kRunGroup);
   command.add_option("--backend", r.backend, "auto, cpu, cuda or parallel-host")->group(kRunGroup);
   command
@@ -84,7 +77,9 @@ void BuildOptions::declare_work_folder(CLI::App& command) {
 
 BuildSpec BuildOptions::spec() const {
   BuildSpec spec = spec_;
-  if (!bounds_.empty()) spec.geometry.bounds = parse_bounds(bounds_);
+  if (!bounds_.empty())
+    spec.geometry.bounds =
+        parse_list<double, 4>("--bounds", bounds_, ',', "four numbers X,Y,Z,EDGE");
   if (!memory_.empty()) {
     spec.run.memory_bytes = parse_size(memory_, "--memory");
     if (spec.run.memory_bytes == 0)

@@ -1,4 +1,4 @@
-// The options that `build`, `plan` and `submit` share: what to build, and within which limits.
+// The options that the commands `build`, `plan` and `submit` share.
 #pragma once
 
 #include <string>
@@ -8,14 +8,14 @@
 
 namespace voxdag::cli {
 
-// Options as typed; spec() checks and translates them.
+// Option values as text; spec() checks and converts them.
 class BuildOptions {
  public:
-  // Declares the scene, geometry and run options on a command.
+  // Adds the scene, geometry and run options to a command.
   void declare(CLI::App& command);
-  // And --work, for commands that build on this machine.
+  // Adds --work to a command that builds on this machine.
   void declare_work_folder(CLI::App& command);
-  // Throws Error{kInvalidInput} naming the option that is wrong.
+  // Throws Error{kInvalidInput} that names the invalid option.
   BuildSpec spec() const;
 
  private:

@@ -1,5 +1,5 @@
-// What every command of the command line shares. A command file has one function
-// `add_<name>_command(app, context)` that declares the command's options and what it runs; main.cc
+// The interface between main.cc and the commands. Each command file defines one function
+// `add_<name>_command(app, context)` that adds the command and its options to the parser; main.cc
 // calls them all and turns an Error into a message and an exit status.
 #pragma once
 
@@ -15,7 +15,7 @@ namespace voxdag::cli {
 struct CommandContext {
   FileSystem& files;
   CancelToken& cancel;  // set by Ctrl-C and SIGTERM
-  // Exit status of a command that ran but whose answer is "no" (diff: the files differ).
+  // Exit status of a command that succeeded; diff sets 1 if the files differ.
   int exit_status = 0;
 };
 
@@ -27,7 +27,7 @@ void add_verify_command(CLI::App& app, CommandContext& context);
 void add_diff_command(CLI::App& app, CommandContext& context);
 void add_generate_command(CLI::App& app, CommandContext& context);
 void add_render_command(CLI::App& app, CommandContext& context);
-// serve, token, and what serve starts.
+// Adds `serve`, `token`, and the hidden command that `serve` starts for each job.
 void add_serve_commands(CLI::App& app, CommandContext& context);
 void add_submit_command(CLI::App& app, CommandContext& context);
 void add_jobs_command(CLI::App& app, CommandContext& context);

@@ -29,7 +29,7 @@ void run(const DiffCommand& command, CommandContext& context) {
                                       {"only_b", report.only_b}};
     std::printf("%s\n", json.dump().c_str());
   } else if (report.same()) {
-    std::printf("the same %s voxels\n", count_text(a->voxels()).c_str());
+    std::printf("identical: %s voxels\n", count_text(a->voxels()).c_str());
   } else {
     std::printf("%s of %s voxels only in %s\n%s of %s voxels only in %s\n",
                 count_text(report.only_a).c_str(), count_text(a->voxels()).c_str(),
@@ -41,10 +41,11 @@ void run(const DiffCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_diff_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("diff", "voxels only in A, only in B; status 1 if any");
+  CLI::App* command =
+      app.add_subcommand("diff", "count the voxels only in A and only in B; exit status 1 if any");
   const auto state = std::make_shared<DiffCommand>();
   command->add_option("a", state->a, "a .vdag file")->required();
-  command->add_option("b", state->b, "another one on the same grid")->required();
+  command->add_option("b", state->b, "another .vdag file on the same grid")->required();
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
   command->callback([state, &context] { run(*state, context); });
 }

@@ -54,7 +54,7 @@ void run(GenerateCommand& command, CommandContext& context) {
 }
 
 std::string kinds_text() {
-  std::string text = "what to make:";
+  std::string text = "kind of scene:";
   for (const SceneKindInfo& info : scene_kinds())
     text += std::string("\n") + info.name + ": " + info.summary;
   return text;
@@ -63,19 +63,19 @@ std::string kinds_text() {
 }  // namespace
 
 void add_generate_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("generate", "make a scene from a seed");
+  CLI::App* command = app.add_subcommand("generate", "generate a scene from a seed");
   const auto state = std::make_shared<GenerateCommand>();
   command->add_option("kind", state->kind, kinds_text())->required();
-  command->add_option("output", state->output, "the .glb file to make")->required();
-  command->add_option("--seed", state->options.seed, "another seed, another scene")
+  command->add_option("output", state->output, "the .glb file to write")->required();
+  command->add_option("--seed", state->options.seed, "seed of the random numbers")
       ->capture_default_str();
   auto* triangles = command->add_option("--triangles", state->options.triangles,
-                                        "how many, about (not for menger)");
+                                        "approximate number of triangles (not for menger)");
   triangles->check(CLI::PositiveNumber);
-  command->add_option("--level", state->options.level, "menger: how often the cube is cut, 0 to 5")
+  command->add_option("--level", state->options.level, "menger: recursion depth, 0 to 5")
       ->capture_default_str();
   command->add_flag("--instances", state->options.instances,
-                    "city, spheres: repeated parts once, placed by EXT_mesh_gpu_instancing");
+                    "city, spheres: store repeated parts once, with EXT_mesh_gpu_instancing");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
   command->callback([state, &context] { run(*state, context); });
 }

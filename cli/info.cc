@@ -85,10 +85,10 @@ void run(const InfoCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_info_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("info", "counts and sizes of a DAG, per level");
+  CLI::App* command = app.add_subcommand("info", "print counts and sizes of a DAG, per level");
   const auto state = std::make_shared<InfoCommand>();
   command->add_option("file", state->path, "the .vdag file")->required();
-  command->add_flag("--digest", state->digest, "also the SHA-256 of the file");
+  command->add_flag("--digest", state->digest, "also print the SHA-256 of the file");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
   command->callback([state, &context] { run(*state, context); });
 }

@@ -12,7 +12,7 @@ namespace {
 
 CancelToken g_cancel;
 
-// The first signal asks to stop; a second one is taken at its word.
+// The first signal cancels the command, a second one terminates the process.
 void on_signal(int signal) {
   if (g_cancel.canceled()) _Exit(128 + signal);
   g_cancel.cancel();
@@ -33,8 +33,7 @@ int report(ErrorCode code, const char* message) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"voxdag: huge triangle scenes to one global sparse voxel DAG, out of core",
-               "voxdag"};
+  CLI::App app{"voxdag: builds sparse voxel DAGs of huge triangle scenes, out of core", "voxdag"};
   app.set_version_flag("--version", VOXDAG_VERSION);
   app.require_subcommand(1);
   CommandContext context{system_files(), g_cancel};
@@ -57,7 +56,7 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    // Help and version are "errors" of status 0; what the user mistyped is invalid input.
+    // CLI11 reports --help and --version as errors of status 0; any other is invalid input.
     return app.exit(error) == 0 ? 0 : exit_status(ErrorCode::kInvalidInput);
   } catch (const Error& error) {
     return report(error.code(), error.what());

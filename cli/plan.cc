@@ -15,9 +15,9 @@ struct PlanCommand {
 };
 
 template <class Text>
-void print_figure(const char* name, const EstimateRange& figure, const Text& text) {
-  std::printf("  %-16s %s   (%s to %s)\n", name, text(figure.likely).c_str(),
-              text(figure.low).c_str(), text(figure.high).c_str());
+void print_range(const char* name, const EstimateRange& range, const Text& text) {
+  std::printf("  %-16s %s   (%s to %s)\n", name, text(range.likely).c_str(),
+              text(range.low).c_str(), text(range.high).c_str());
 }
 
 void print(const Estimate& e) {
@@ -26,14 +26,14 @@ void print(const Estimate& e) {
   std::printf("%s triangles, %s occupied subvolumes; estimated from builds at %s^3 and below:\n",
               count_text(e.triangles).c_str(), count_text(e.subvolumes).c_str(),
               count_text(e.pilot_resolution).c_str());
-  print_figure("voxels", e.voxels, count);
-  print_figure("octree nodes", e.svo_nodes, count);
-  print_figure("DAG nodes", e.dag_nodes, count);
-  print_figure("global file", e.file_bytes, size);
-  print_figure("disk, at most", e.disk_bytes, size);
-  print_figure("memory, at most", e.memory_bytes, size);
-  print_figure("CPU time", e.cpu_s, duration_text);
-  print_figure("wall time", e.wall_s, duration_text);
+  print_range("voxels", e.voxels, count);
+  print_range("octree nodes", e.svo_nodes, count);
+  print_range("DAG nodes", e.dag_nodes, count);
+  print_range("global file", e.file_bytes, size);
+  print_range("disk, at most", e.disk_bytes, size);
+  print_range("memory, at most", e.memory_bytes, size);
+  print_range("CPU time", e.cpu_s, duration_text);
+  print_range("wall time", e.wall_s, duration_text);
   std::printf("  free: %s of disk; memory budget %s\n", size_text(e.free_disk).c_str(),
               size_text(e.free_memory).c_str());
 }
@@ -51,11 +51,12 @@ void run(const PlanCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_plan_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("plan", "estimate what a build would take");
+  CLI::App* command =
+      app.add_subcommand("plan", "estimate the size, memory, disk space and time of a build");
   const auto state = std::make_shared<PlanCommand>();
   state->options.declare(*command);
   state->options.declare_work_folder(*command);
-  command->add_flag("--json", state->json, "one JSON object on standard output");
+  command->add_flag("--json", state->json, "report as one JSON object on standard output");
   command->callback([state, &context] { run(*state, context); });
 }
 

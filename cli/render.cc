@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "cli/command.h"
+#include "cli/parse_list.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
 #include "core/base/text.h"
@@ -30,22 +31,13 @@ struct RenderCommand {
   bool json = false;
 };
 
-// Numbers with `separator` between them, all of `text`; `expected` says what they should be.
-template <class Number, size_t kCount>
-std::array<Number, kCount> parse_list(const std::string& text, char separator,
-                                      const std::string& expected) {
-  const auto numbers = parse_numbers<Number, kCount>(text, separator);
-  if (!numbers) throw Error(ErrorCode::kInvalidInput, "\"" + text + "\": expected " + expected);
-  return *numbers;
-}
-
-// From world space to voxel units.
+// The point that an option names in world space, in voxel units.
 query::Vec parse_point(const std::string& text, const std::string& option,
                        const voxdag_reader::File& file) {
-  const auto world = parse_list<double, 3>(text, ',', option + " X,Y,Z");
+  const auto world = parse_list<double, 3>(option, text, ',', "three numbers X,Y,Z");
   for (const double coordinate : world)
     if (!std::isfinite(coordinate))
-      throw Error(ErrorCode::kInvalidInput, option + " " + text + ": expected finite numbers");
+      throw Error(ErrorCode::kInvalidInput, option + " '" + text + "': expected finite numbers");
   const double scale = static_cast<double>(file.resolution()) / file.edge();
   query::Vec point;
   for (int axis = 0; axis < 3; ++axis)
@@ -57,11 +49,7 @@ query::Placement place_camera(const RenderCommand& command, const voxdag_reader:
                               const query::DagView& dag) {
   query::Placement placement{{{0, 0, 1}}, {{0, 0, 0}}};
   const double aspect = static_cast<double>(command.options.width) / command.options.height;
-  if (!dag.empty()) {
-    const query::RayCaster caster(dag);
-    placement = query::named_view(command.view, caster, dag, query::occupied_box(dag), aspect,
-                                  command.fov_degrees);
-  }
+  if (!dag.empty()) placement = query::named_view(command.view, dag, aspect, command.fov_degrees);
   if (!command.camera.empty()) {
     placement.eye = parse_point(command.camera, "--camera", file);
     placement.target = parse_point(command.target, "--target", file);
@@ -101,9 +89,10 @@ void report(const RenderCommand& command, const query::Placement& placement,
 }
 
 void run(RenderCommand& command, CommandContext& context) {
-  const auto [width, height] = parse_list<int, 2>(command.size, 'x', "--size WIDTHxHEIGHT");
+  const auto [width, height] = parse_list<int, 2>("--size", command.size, 'x', "WIDTHxHEIGHT");
   if (width < 1 || height < 1 || width > kMaxPictureEdge || height > kMaxPictureEdge)
-    throw Error(ErrorCode::kInvalidInput, "--size " + command.size + ": expected edges of 1 to " +
+    throw Error(ErrorCode::kInvalidInput, "--size '" + command.size +
+                                              "': expected a width and a height of 1 to " +
                                               std::to_string(kMaxPictureEdge) + " pixels");
   command.options.width = width;
   command.options.height = height;
@@ -122,25 +111,27 @@ void run(RenderCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_render_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("render", "draw a picture of a DAG");
+  CLI::App* command = app.add_subcommand("render", "render a picture of a DAG");
   const auto state = std::make_shared<RenderCommand>();
   state->options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   command->add_option("input", state->input, "the .vdag file")->required();
-  command->add_option("-o,--output", state->output, "the .png file to make")->required();
-  auto* view = command->add_option("--view", state->view, "from where to look")
+  command->add_option("-o,--output", state->output, "the .png file to write")->required();
+  auto* view = command->add_option("--view", state->view, "named view")
                    ->check(CLI::IsMember(query::view_names()))
                    ->capture_default_str();
-  auto* camera = command->add_option("--camera", state->camera, "X,Y,Z of the eye, in scene units");
-  auto* target = command->add_option("--target", state->target, "X,Y,Z that it looks at");
+  auto* camera =
+      command->add_option("--camera", state->camera, "X,Y,Z of the camera, in scene units");
+  auto* target =
+      command->add_option("--target", state->target, "X,Y,Z of the point that it looks at");
   camera->needs(target)->excludes(view);
   target->needs(camera);
-  command->add_option("--fov", state->fov_degrees, "field of view in degrees, top to bottom")
+  command->add_option("--fov", state->fov_degrees, "vertical field of view in degrees")
       ->check(CLI::Range(1.0, 170.0));
   command->add_option("--size", state->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-  command->add_option("--samples", state->options.samples, "rays a pixel: this, squared")
+  command->add_option("--samples", state->options.samples, "N: N * N samples per pixel")
       ->check(CLI::Range(1, 8))
       ->capture_default_str();
-  command->add_option("--threads", state->options.threads, "threads to use")
+  command->add_option("--threads", state->options.threads, "worker threads")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   command->add_flag("--json", state->json, "report as one JSON object on standard output");

@@ -37,9 +37,9 @@ void print(const JobStatus& status) {
 }
 
 void run(const StatusCommand& command, CommandContext& context) {
-  for (bool looked = false;; looked = true) {
-    // Between two looks the build may finish and tidy its folder away.
-    if (looked && !context.files.exists(WorkFolder::store_path(command.work_folder))) return;
+  for (bool first = true;; first = false) {
+    // A build that finishes between two queries removes its work folder.
+    if (!first && !context.files.exists(WorkFolder::store_path(command.work_folder))) return;
     const JobStatus status = read_job_status(context.files, command.work_folder);
     if (command.json)
       std::printf("%s\n", status_json(status).c_str());
@@ -55,12 +55,12 @@ void run(const StatusCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_status_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("status", "a build's state and progress");
+  CLI::App* command = app.add_subcommand("status", "print the state and progress of a build");
   const auto state = std::make_shared<StatusCommand>();
   command->add_option("work", state->work_folder, "the work folder, OUT.vdag.work by default")
       ->required();
-  command->add_flag("--json", state->json, "one JSON object on standard output");
-  command->add_flag("--watch", state->watch, "every second, until the build ends");
+  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+  command->add_flag("--watch", state->watch, "repeat every second until the build ends");
   command->callback([state, &context] { run(*state, context); });
 }
 

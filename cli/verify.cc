@@ -14,8 +14,6 @@
 #include "query/surface_sample.h"
 
 namespace voxdag::cli {
-
-using namespace voxdag::query;
 namespace {
 
 constexpr uint64_t kSceneMemory = uint64_t{64} << 20;  // windows of the scene's buffers
@@ -33,28 +31,29 @@ Grid grid_of(const voxdag_reader::File& file) {
   return Grid::given({origin[0], origin[1], origin[2]}, file.edge(), file.grid_levels());
 }
 
-SampleReport check_against(const VerifyCommand& command, const voxdag_reader::File& file,
-                           Progress& progress, CommandContext& context) {
+query::SampleReport check_against(const VerifyCommand& command, const voxdag_reader::File& file,
+                                  Progress& progress, CommandContext& context) {
   return_freed_memory_to_system();
   MemoryBudget budget(kSceneMemory);
   const auto scene =
       open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);
-  const auto boxes = sample_surface(*scene, grid_of(file), command.seed, progress, context.cancel);
-  return with_reader_errors([&] { return compare_with_sample(file, boxes); });
+  const auto boxes =
+      query::sample_surface(*scene, grid_of(file), command.seed, progress, context.cancel);
+  return with_reader_errors([&] { return query::compare_with_sample(file, boxes); });
 }
 
-void print(const voxdag_reader::File& file, const std::optional<SampleReport>& sample) {
-  std::printf("%s: right; %s voxels, %s octree nodes, %s DAG nodes\n", file.path().c_str(),
+void print(const voxdag_reader::File& file, const std::optional<query::SampleReport>& sample) {
+  std::printf("%s: valid; %s voxels, %s octree nodes, %s DAG nodes\n", file.path().c_str(),
               count_text(file.voxels()).c_str(), count_text(file.svo_nodes()).c_str(),
               count_text(file.dag_nodes()).c_str());
   if (sample)
-    std::printf("  as the scene says: %s voxels compared in %s boxes near its surface, %s set\n",
+    std::printf("  equal to the scene: %s voxels compared in %s boxes near its surface, %s set\n",
                 count_text(sample->voxels).c_str(), count_text(sample->boxes).c_str(),
                 count_text(sample->set).c_str());
 }
 
 std::string verify_json(const VerifyCommand& command, const voxdag_reader::File& file,
-                        const std::optional<SampleReport>& sample) {
+                        const std::optional<query::SampleReport>& sample) {
   nlohmann::ordered_json json{{"ok", true},
                               {"voxels", file.voxels()},
                               {"svo_nodes", file.svo_nodes()},
@@ -73,7 +72,7 @@ void run(const VerifyCommand& command, CommandContext& context) {
   const auto progress = make_progress_bar();
   MemoryBudget budget(~uint64_t{0});
   verify_global_file(*file, budget, *progress, context.cancel);
-  std::optional<SampleReport> sample;
+  std::optional<query::SampleReport> sample;
   if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
   if (command.json)
     std::printf("%s\n", verify_json(command, *file, sample).c_str());
@@ -88,11 +87,11 @@ void add_verify_command(CLI::App& app, CommandContext& context) {
   const auto state = std::make_shared<VerifyCommand>();
   command->add_option("file", state->path, "the .vdag file")->required();
   command->add_option("--against", state->scenes,
-                      "compare voxels near the surface of this scene, straight from its triangles");
-  command->add_option("--seed", state->seed, "of the sample that --against takes")
+                      "compare a sample of voxels with the triangles of this scene");
+  command->add_option("--seed", state->seed, "seed of the sample that --against compares")
       ->capture_default_str();
   command->add_flag("--skip-invalid", state->scene_options.skip_invalid,
-                    "as the build had it: drop invalid triangles of the scene");
+                    "drop invalid triangles of the scene, as the build did");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
   command->callback([state, &context] { run(*state, context); });
 }

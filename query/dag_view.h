@@ -1,9 +1,9 @@
-// The DAG as the renderer walks it: raw words of every level, as in the global file, and cells of
-// any size from the whole grid down to a voxel. What lies below a cell is its `content`:
-//     a node      its word offset in its level
-//     a brick     its 64-bit mask                  (size 4)
-//     half a brick  the 8 bits of its 2x2x2 voxels (size 2)
-//     a voxel     1                                (size 1)
+// A finished DAG as cells of any size, from the whole grid down to a voxel. It reads the words of
+// each level in place, as the global file holds them. What lies below a cell is its `content`:
+//     a node        its word offset in its level
+//     a brick       its 64-bit mask                  (edge 4)
+//     half a brick  the 8 bits of its 2x2x2 voxels   (edge 2)
+//     a voxel       1                                (edge 1)
 // Offsets come from a file that may be damaged: each is checked, a bad one is Error{kCorrupt}.
 // Immutable; any number of threads may read.
 #pragma once
@@ -14,12 +14,13 @@
 
 #include "core/base/popcount8.h"
 #include "core/format/global/voxdag_reader.h"
+#include "query/vec.h"
 
 namespace voxdag::query {
 
 class DagView {
  public:
-  // Words of levels 0 to L - 2; none at all for a scene without voxels.
+  // `levels` holds the words of levels 0 to L - 2, or nothing for a scene without voxels.
   explicit DagView(std::vector<std::span<const uint32_t>> levels, uint32_t grid_levels)
       : grid_levels_(grid_levels), levels_(std::move(levels)) {}
   explicit DagView(const voxdag_reader::File& file);
@@ -41,7 +42,7 @@ class DagView {
   };
   uint64_t root() const { return grid_levels_ == kBrickLevels ? brick(0) : 0; }
   Children children(uint32_t depth, uint64_t content) const;
-  // Of child `index`, which must be there; `depth` is the parent's.
+  // The content of child `index`, which must be occupied, of a parent at `depth`.
   uint64_t content(uint32_t depth, const Children& children, int index) const {
     if (depth + kBrickLevels < grid_levels_) {
       const uint32_t before = children.mask & ((1u << index) - 1);
@@ -51,9 +52,25 @@ class DagView {
     return depth + kBrickLevels == grid_levels_ ? children.bits_ >> (8 * index) & 255 : 1;
   }
 
+  struct Cell {
+    uint32_t depth = 0;  // below the root
+    double edge = 0;     // R / 2^depth voxels
+    Vec low;             // its low corner, in voxels
+  };
+  // Calls `visit` with each occupied cell at `depth` (0 to L), and on the way down
+  // `select` with each cell above: it returns the mask of the children to descend into. The DAG
+  // must not be empty.
+  template <class Select, class Visit>
+  void for_each_cell(uint32_t depth, const Select& select, const Visit& visit) const {
+    visit_below({0, static_cast<double>(resolution()), {}}, root(), depth, select, visit);
+  }
+
  private:
   static constexpr uint32_t kBrickLevels = 2;
 
+  template <class Select, class Visit>
+  void visit_below(const Cell& cell, uint64_t content, uint32_t depth, const Select& select,
+                   const Visit& visit) const;
   uint64_t brick(uint64_t offset) const;
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
 
@@ -79,6 +96,22 @@ inline DagView::Children DagView::children(uint32_t depth, uint64_t content) con
   c.bits_ = content;
   for (int i = 0; i < 8; ++i) c.mask |= (content >> (8 * i) & 255 ? 1u : 0u) << i;
   return c;
+}
+
+template <class Select, class Visit>
+void DagView::visit_below(const Cell& cell, uint64_t content, uint32_t depth, const Select& select,
+                          const Visit& visit) const {
+  if (cell.depth == depth) return visit(cell);
+  const uint32_t selected = select(cell);
+  if (selected == 0) return;
+  const Children c = children(cell.depth, content);
+  const double half = cell.edge / 2;
+  // Opposite corners first: a search for a bounding box can then skip most of the rest.
+  for (const int i : {0, 7, 3, 4, 5, 2, 1, 6}) {
+    if (!(selected & c.mask & 1u << i)) continue;
+    const Vec low = cell.low + Vec{{i & 4 ? half : 0, i & 2 ? half : 0, i & 1 ? half : 0}};
+    visit_below({cell.depth + 1, half, low}, this->content(cell.depth, c, i), depth, select, visit);
+  }
 }
 
 inline uint64_t DagView::brick(uint64_t offset) const {

@@ -5,14 +5,14 @@
 namespace voxdag::query {
 namespace {
 
-// Smaller components are as good as 0 and would only make infinities.
+// A smaller component of a direction counts as 0; its inverse could be infinite.
 constexpr double kMinComponent = 1e-18;
 
 struct Times {
   double t[3];
 };
 
-// One ray on its way down.
+// The descent of one ray.
 class Walk {
  public:
   Walk(const DagView& dag, const Ray& ray, const Cone& cone, double t_max)
@@ -41,7 +41,7 @@ class Walk {
   }
 
  private:
-  // When the ray crosses the planes `add` voxels above the corner.
+  // The ray parameters at the planes `add` voxels above the corner.
   Times planes(const int64_t (&corner)[3], int64_t add) const {
     Times times;
     for (int axis = 0; axis < 3; ++axis)
@@ -49,7 +49,7 @@ class Walk {
     return times;
   }
 
-  // The ray is at `t` in the (mirrored) cell with this low corner.
+  // Visits the mirrored cell with this low corner, which contains the ray at `t`.
   bool enter(uint32_t depth, const int64_t (&corner)[3], uint64_t content, double t, Hit& hit) {
     const int64_t size = dag_.resolution() >> depth;
     if (size == 1 || static_cast<double>(size) <= cone_.at(t)) {

@@ -1,13 +1,14 @@
 // Casts rays through the DAG.
 //
-// A ray walks the octree from the root, at each node through the children that it crosses, nearest
-// first. The parameters at which it crosses planes are computed from the planes' integer
-// coordinates, by one formula: cells on both sides of a plane agree on it to the last bit, so there
-// are no cracks, whatever the resolution. The ray is mirrored so that it runs upwards on every
-// axis.
+// A ray descends the octree from the root, at each node through the children that it crosses,
+// nearest first. The parameters at which it crosses planes are computed from the planes' integer
+// coordinates by one formula: cells on both sides of a plane agree to the last bit, so there are no
+// cracks at any resolution. The ray is mirrored so that its direction is positive on every axis.
 //
-// A ray widens into a cone: a cell that is no larger than the cone is there is solid if it is
-// occupied at all. That ends the walk where finer cells could not be seen.
+// A ray widens into a cone: an occupied cell that is no larger than the cone's width there is hit
+// as a whole. That ends the descent where finer cells could not be seen.
+//
+// Immutable; any number of threads may cast rays.
 #pragma once
 
 #include <cstdint>
@@ -25,16 +26,17 @@ struct Cone {
 
 struct Hit {
   double t = 0;
-  uint32_t depth = 0;    // of the cell below the root; its edge is R / 2^depth voxels
-  int64_t cell[3] = {};  // its position, in cells
-  int axis = -1;         // of the plane through which it was entered; -1: the ray began in it
+  uint32_t depth = 0;    // levels below the root; the edge of the cell is R / 2^depth voxels
+  int64_t cell[3] = {};  // position of the cell, in units of its edge
+  int axis = -1;  // normal axis of the face that the ray entered by; -1 if it began in the cell
 };
 
 class RayCaster {
  public:
   explicit RayCaster(const DagView& dag) : dag_(dag) {}
 
-  // The first occupied cell between t_min and t_max; false if there is none.
+  // Finds the first occupied cell between t_min and t_max; false if there is none. Throws
+  // Error{kCorrupt} for a damaged DAG.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) const;
 
  private:

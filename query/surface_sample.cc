@@ -27,20 +27,21 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// Keeps `size` items of a stream, each with a chance in proportion to its weight: those with the
-// smallest of keys that are exponential with the weight as rate (Efraimidis & Spirakis 2006).
+// Samples `size` items of a stream without replacement, with probability proportional to weight:
+// those with the smallest keys, which are exponentially distributed with the weight as rate
+// (Efraimidis & Spirakis 2006).
 class Reservoir {
  public:
   explicit Reservoir(size_t size) : size_(size) {}
   void offer(const FixedTriangle& triangle, double weight, Random& random) {
     if (!(weight > 0)) return;
     const double key = -std::log(random.unit()) / weight;
-    if (kept_.size() == size_ && key >= kept_.top().key) return;
-    if (kept_.size() == size_) kept_.pop();
-    kept_.push({key, triangle});
+    if (sampled_.size() == size_ && key >= sampled_.top().key) return;
+    if (sampled_.size() == size_) sampled_.pop();
+    sampled_.push({key, triangle});
   }
   void drain_to(std::vector<FixedTriangle>& out) {
-    for (; !kept_.empty(); kept_.pop()) out.push_back(kept_.top().triangle);
+    for (; !sampled_.empty(); sampled_.pop()) out.push_back(sampled_.top().triangle);
   }
 
  private:
@@ -50,7 +51,7 @@ class Reservoir {
     bool operator<(const Item& o) const { return key < o.key; }
   };
   const size_t size_;
-  std::priority_queue<Item> kept_;
+  std::priority_queue<Item> sampled_;
 };
 
 double area(const FixedTriangle& t) {
@@ -77,8 +78,8 @@ void for_each_snapped(TriangleSource& scene, const Grid& grid, Progress& progres
       const SnapResult result = snap_triangle(grid, world, triangle);
       if (result == SnapResult::kTooFar)
         throw Error(ErrorCode::kLimit,
-                    "a triangle of the scene reaches 2^40 units beyond the file's grid; no build "
-                    "takes it");
+                    "a triangle of the scene reaches 2^40 units beyond the file's grid; builds refuse "
+                    "such a scene");
       if (result == SnapResult::kInside) visit(triangle);
     }
   });
@@ -86,13 +87,13 @@ void for_each_snapped(TriangleSource& scene, const Grid& grid, Progress& progres
 
 std::vector<FixedTriangle> draw_triangles(TriangleSource& scene, const Grid& grid, Random& random,
                                           Progress& progress, const CancelToken& cancel) {
-  Reservoir alike(kSampleBoxes / 2), by_area(kSampleBoxes / 2);
+  Reservoir uniform(kSampleBoxes / 2), by_area(kSampleBoxes / 2);
   for_each_snapped(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
-    alike.offer(triangle, 1.0, random);
+    uniform.offer(triangle, 1.0, random);
     by_area.offer(triangle, area(triangle), random);
   });
   std::vector<FixedTriangle> drawn;
-  alike.drain_to(drawn);
+  uniform.drain_to(drawn);
   by_area.drain_to(drawn);
   return drawn;
 }
@@ -146,7 +147,7 @@ void mark(const FixedTriangle& t, SampleBox& box) {
 
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
                                       Progress& progress, const CancelToken& cancel) {
-  progress.begin_stage("sample the scene", 2 * scene.declared_triangles(), "triangles");
+  progress.begin_stage("sample", 2 * scene.declared_triangles(), "triangles");
   Random random(seed);
   std::vector<SampleBox> boxes;
   for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, progress, cancel)) {
@@ -185,8 +186,8 @@ SampleReport compare_with_sample(const voxdag_reader::File& file,
           if (wrong++ == 0)
             first_wrong = std::to_string(box.low[0] + x) + " " + std::to_string(box.low[1] + y) +
                           " " + std::to_string(box.low[2] + z) +
-                          (expected ? " is not set though a triangle touches it"
-                                    : " is set though no triangle touches it");
+                          (expected ? " is not set, but a triangle touches it"
+                                    : " is set, but no triangle touches it");
         }
   if (wrong > 0)
     throw Error(ErrorCode::kCorrupt, file.path() + ": " + std::to_string(wrong) + " of " +
@@ -194,8 +195,9 @@ SampleReport compare_with_sample(const voxdag_reader::File& file,
                                          " sampled voxels differ from the scene; voxel " +
                                          first_wrong);
   if (boxes.empty() && file.voxels() != 0)
-    throw Error(ErrorCode::kCorrupt, file.path() + ": it has " + std::to_string(file.voxels()) +
-                                         " voxels though the scene has no triangle in its grid");
+    throw Error(ErrorCode::kCorrupt, file.path() + ": the file has " +
+                                         std::to_string(file.voxels()) +
+                                         " voxels, but the scene has no triangle in its grid");
   return report;
 }
 

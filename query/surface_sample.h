@@ -1,7 +1,8 @@
-// A seeded sample of what a scene's triangles say of the voxels near its surface: small boxes of
-// voxels around random points of random triangles, half of them drawn alike, half by area (so that
-// neither a floor of two triangles nor a million leaves is missed). Two passes over the scene;
-// memory goes with the sample, not with the scene.
+// A seeded sample of the voxels near a scene's surface, computed from its triangles without the
+// code that builds DAGs. The sample is boxes of voxels around random points of random triangles:
+// half of the triangles are drawn uniformly, half by area, so that neither a floor of two triangles
+// nor a million leaves is missed. Takes two passes over the scene; memory depends on the sample
+// only.
 #pragma once
 
 #include <bitset>
@@ -25,17 +26,17 @@ struct SampleBox {
   std::bitset<kBoxEdge * kBoxEdge * kBoxEdge> set;  // bit (x * kBoxEdge + y) * kBoxEdge + z
 };
 
-// None if no triangle touches the grid.
+// Returns no boxes if no triangle touches the grid.
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
                                       Progress& progress, const CancelToken& cancel);
 
 struct SampleReport {
   uint64_t boxes = 0;
   uint64_t voxels = 0;  // compared
-  uint64_t set = 0;     // of them
+  uint64_t set = 0;     // of the compared voxels
 };
 
-// Throws Error{kCorrupt} if the file has any of these voxels otherwise, naming the first.
+// Throws Error{kCorrupt} that names the first voxel in which the file differs from the sample.
 SampleReport compare_with_sample(const voxdag_reader::File& file,
                                  const std::vector<SampleBox>& boxes);
 

@@ -1,4 +1,4 @@
-// Artifacts: a sub-DAG of a real backend written to a segment and read back, rows per second.
+// Speed of artifacts: writing a sub-DAG to a segment and reading it back, in rows per second.
 #include <benchmark/benchmark.h>
 #include <stdlib.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 constexpr uint32_t kLevels = 11;
 
-// Built once: random triangles of about 30 voxels, like those of a scan.
+// A sub-DAG of random triangles of about 30 voxels, as in a scan; built once.
 struct Sample {
   MemoryBudget budget{uint64_t{4} << 30};
   SubDag dag;

@@ -1,4 +1,4 @@
-// The speed of rasterization: tests of the octree's cubes, and drawing into a tile.
+// Speed of the rasterizer: overlap tests of octree cubes, and drawing into a tile.
 #include <benchmark/benchmark.h>
 
 #include <memory>
@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kTriangles = 1024;
 constexpr int kTileVoxels = 1 << kTileLog2;
 
-// Random triangles around a tile at the origin: `edge` voxels long, `width` wide.
+// Random triangles near a tile at the origin, `edge` voxels long and `width` voxels wide.
 std::vector<NarrowTriangle> triangles(int edge, int width) {
   std::mt19937_64 random(1);
   const auto between = [&](int low, int high) {
@@ -22,7 +22,7 @@ std::vector<NarrowTriangle> triangles(int edge, int width) {
     return static_cast<int32_t>((low * kUnitsPerVoxel + static_cast<int64_t>(random() % units)) |
                                 1);
   };
-  std::vector<NarrowTriangle> out(kTriangles + 1);  // kernels load one vertex too many
+  std::vector<NarrowTriangle> out(kTriangles + 1);  // kernels read one element beyond the end
   for (NarrowTriangle& t : out)
     for (auto& axis : t.v) {
       axis[0] = between(0, kTileVoxels);
@@ -35,7 +35,7 @@ std::vector<NarrowTriangle> triangles(int edge, int width) {
 }
 
 void draw(benchmark::State& state, const Kernels* k) {
-  if (!k) return state.SkipWithError("not on this machine");
+  if (!k) return state.SkipWithError("not supported by this CPU");
   const auto scene = triangles(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
   const auto tile = std::make_unique<TileBricks>();
   std::vector<uint8_t> existing(kTileBlocks / 8);
@@ -64,7 +64,7 @@ void draw(benchmark::State& state, const Kernels* k) {
 }
 
 void test_octants(benchmark::State& state, const Kernels* k) {
-  if (!k) return state.SkipWithError("not on this machine");
+  if (!k) return state.SkipWithError("not supported by this CPU");
   const auto scene = triangles(256, 64);
   const Box box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
   for (auto _ : state)
@@ -73,7 +73,7 @@ void test_octants(benchmark::State& state, const Kernels* k) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * kTriangles));
 }
 
-// Items are bricks. Length and width in voxels: a scan's triangles, a wall's, slivers.
+// Items are bricks. Arguments are length and width in voxels, as in a scan, a wall, and slivers.
 BENCHMARK_CAPTURE(draw, avx512, avx512_kernels())->Args({32, 32})->Args({512, 512})->Args({64, 1});
 BENCHMARK_CAPTURE(draw, avx2, avx2_kernels())->Args({32, 32})->Args({512, 512})->Args({64, 1});
 BENCHMARK_CAPTURE(draw, portable, &portable_kernels())

@@ -1,5 +1,5 @@
-// Hash-consing: lookups of bricks and of nodes in tables of a given size, prefetched in batches as
-// in the tile reducer. All are found.
+// Speed of hash consing: lookups of bricks and nodes in tables of a given size, prefetched in
+// batches as in the tile reducer. Every lookup succeeds.
 #include <benchmark/benchmark.h>
 
 #include <random>
@@ -20,7 +20,7 @@ struct Setting {
   Memory memory{budget, pool};
 };
 
-// Random numbers of entries, enough for 256 batches.
+// Entry numbers in random order, enough for 256 batches.
 std::vector<uint64_t> random_entries(uint64_t count) {
   std::mt19937_64 random(2);
   std::vector<uint64_t> out(256 * kBatch);

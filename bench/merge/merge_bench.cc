@@ -1,4 +1,4 @@
-// How fast one core merges: rows of all runs per CPU second, for the whole merge and for its steps.
+// Speed of the merge and of its steps: rows of all runs per CPU second.
 #include <benchmark/benchmark.h>
 #include <stdlib.h>
 
@@ -18,7 +18,7 @@ namespace {
 constexpr uint64_t kRows = 8'000'000;
 constexpr uint64_t kGiB = uint64_t{1} << 30;
 
-// The artifacts of each number of runs, made once, in a folder of their own.
+// The artifacts for each number of runs, generated once, in a temporary folder.
 class Fixtures {
  public:
   ~Fixtures() { std::filesystem::remove_all(folder_); }
@@ -48,7 +48,7 @@ Fixtures& fixtures() {
   return all;
 }
 
-// The whole merge, global file written. Arguments: runs, memory in MiB.
+// The whole merge, including the global file. Arguments: runs, memory in MiB.
 void BM_Merge(benchmark::State& state) {
   const SyntheticRuns& runs = fixtures().of(static_cast<size_t>(state.range(0)));
   MergeInputs inputs;
@@ -69,7 +69,7 @@ void BM_Merge(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * report.input_nodes));
   state.counters["passes"] = report.passes;
   state.counters["partitions"] = static_cast<double>(report.hash_partitions);
-  state.counters["unique"] =
+  state.counters["unique_share"] =
       static_cast<double>(report.dag_nodes) / static_cast<double>(report.input_nodes);
 }
 BENCHMARK(BM_Merge)
@@ -81,7 +81,7 @@ BENCHMARK(BM_Merge)
     ->Args({512, 40})
     ->Unit(benchmark::kMillisecond);
 
-// One level in memory; the parts of a merge without the files that it writes.
+// One level in memory: the steps of a merge without output files.
 class OneLevel {
  public:
   OneLevel(size_t runs, uint32_t levels_above_bricks)
@@ -112,13 +112,13 @@ class OneLevel {
   void load(HashPartition& partition) { partition.load(&*below_, {1, kGiB}, budget_, cancel_); }
   uint64_t rows() const { return total_; }
 
-  // Decodes all frames and does nothing with them.
+  // Decodes all frames and discards them.
   void decode() {
     Frame frame;
     for (const auto& run : runs_)
       for (size_t f = 0; f < run->frames().size(); ++f) run->read_frame(f, frame);
   }
-  // Merges the level into an output that discards it.
+  // Runs all steps, with an output that discards its data.
   void merge(bool bricks) {
     struct Nowhere : LevelOutput {
       bool in_words() const override { return true; }
@@ -153,7 +153,7 @@ class OneLevel {
   uint64_t total_ = 0;
 };
 
-// Arguments of all that follow: runs, levels above the bricks.
+// Arguments of the benchmarks below: runs, levels above the bricks.
 void BM_Decode(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
   for (auto _ : state) level.decode();
@@ -170,7 +170,7 @@ void BM_LoadPartition(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
 }
 
-// Merges a level without writing it.
+// Decoding, rewiring and merging, without output.
 void BM_MergeLevel(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
   for (auto _ : state) level.merge(state.range(1) == 0);

@@ -1,4 +1,4 @@
-// Artifacts for the merge's benchmarks, made up in a second: runs of random bricks and nodes in the
+// Synthetic artifacts for the benchmarks of the merge: runs of random bricks and nodes in the
 // total order, part of them common to many runs, as neighboring subvolumes share theirs.
 #pragma once
 
@@ -12,15 +12,15 @@
 
 namespace voxdag {
 
-// A block is a small DAG of its own; a run is made of blocks, and two runs that hold the same block
+// A block is a small DAG; a run consists of blocks, and two runs that contain the same block
 // have its nodes in common. Children are random within the block, as they are in hash order.
 class SyntheticRuns {
  public:
   static constexpr uint32_t kLevels = 5;  // of nodes, above the bricks
   static constexpr uint32_t kGridLevels = 14;
 
-  // `runs` artifacts of about `rows` rows in all, in one segment. Half of each run's blocks come
-  // from a pool that holds each about twice as often as a pool block is drawn.
+  // Writes `runs` artifacts of about `rows` rows in total to one segment. Half of each run's blocks
+  // come from a pool that holds each about twice as often as a pool block is drawn.
   SyntheticRuns(const std::string& folder, size_t runs, uint64_t rows) {
     segment_path_ = segment_path(folder, 0);
     SegmentWriter segment(system_files(), folder, 0, budget_);
@@ -113,7 +113,7 @@ class SyntheticRuns {
       writer.end_level();
       index_below = index;
     }
-    // One root a run, side by side.
+    // One root per run.
     const uint32_t top = kGridLevels - 2 - kLevels;
     const uint32_t x = static_cast<uint32_t>(run);
     const ArtifactRoot root{{top, {x >> 8, x >> 4 & 15, x & 15}}, 0, 1, 1, 1};

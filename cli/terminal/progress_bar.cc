@@ -11,7 +11,7 @@
 namespace voxdag::cli {
 namespace {
 
-constexpr double kMinPartToForesee = 0.01;  // a time left reckoned from less is a guess
+constexpr double kMinPartForEstimate = 0.01;  // too little is done for an estimate of the time left
 
 class ProgressBar : public Progress {
  public:
@@ -28,7 +28,7 @@ class ProgressBar : public Progress {
   void advance(uint64_t count) override {
     done_ += count;
     std::unique_lock lock(mutex_, std::try_to_lock);
-    if (!lock) return;  // somebody else is just showing it
+    if (!lock) return;  // another thread is just showing it
     const double now = wall_seconds();
     if (now - last_shown_s_ < line_.interval_s()) return;
     last_shown_s_ = now;
@@ -53,7 +53,7 @@ class ProgressBar : public Progress {
     const double elapsed = std::max(now - start_s_, 1e-9);
     const double part =
         total_ ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total_)) : 0;
-    const double left = part >= kMinPartToForesee ? elapsed / part - elapsed : 0;
+    const double left = part >= kMinPartForEstimate ? elapsed / part - elapsed : 0;
     const double rate = static_cast<double>(done) / elapsed;
     line_.show({stage_, unit_, done, total_, elapsed, rate, left}, ended);
   }

@@ -8,7 +8,7 @@
 
 namespace voxdag::cli {
 
-// `quiet` shows warnings only.
+// A quiet bar shows warnings only.
 std::unique_ptr<Progress> make_progress_bar(bool quiet = false);
 
 }  // namespace voxdag::cli

@@ -1,5 +1,5 @@
-// A stage's progress as one line on standard error: a bar that is drawn over on a terminal, a plain
-// line otherwise. Used by one thread at a time.
+// A stage's progress as one line on standard error: a bar that is redrawn on a terminal, a plain
+// line otherwise. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -18,24 +18,24 @@ struct StageView {
 
 class ProgressLine {
  public:
-  // `quiet` shows warnings only.
+  // A quiet line shows warnings and notes only.
   explicit ProgressLine(bool quiet = false);
-  // Ends a line that was cut short, so that what is said next stands on its own.
+  // Ends an open line, so that later output starts on its own line.
   ~ProgressLine();
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  // How often it is worth showing a stage that goes on.
+  // The interval at which a running stage should be shown.
   double interval_s() const;
   void show(const StageView& stage, bool ended);
   void warn(std::string_view message);
-  // A line of its own.
+  // Prints a line of text.
   void note(std::string_view text);
 
  private:
   const bool quiet_;
   const bool terminal_;
-  bool open_ = false;  // a line on the terminal waits to be drawn over
+  bool open_ = false;  // the line on the terminal will be redrawn
 };
 
 }  // namespace voxdag::cli

@@ -1,4 +1,4 @@
-// The box around what is set.
+// Where the occupied part of the grid lies, in voxels. The functions need a DAG that is not empty.
 #pragma once
 
 #include <vector>
@@ -14,15 +14,10 @@ struct Box {
   double diagonal() const { return length(high - low); }
 };
 
-// Exact to a 2048th of the grid, in voxels, the cells at its sides included. The view must not be
-// empty.
+// The box around the occupied cells of 1/2048 of the grid's edge.
 Box occupied_box(const DagView& dag);
 
-// The middles of the occupied cells of a 64th of the grid.
+// The centers of the occupied cells of 1/64 of the grid's edge.
 std::vector<Vec> occupied_points(const DagView& dag);
-
-// The points without those few of thousands that lie far from all others, such as a speck that the
-// scene's maker forgot.
-std::vector<Vec> without_strays(const std::vector<Vec>& points);
 
 }  // namespace voxdag::query

@@ -3,12 +3,12 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "query/render/sampling.h"
 
 namespace voxdag::query {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kMargin = 1.06;
+constexpr double kMargin = 1.06;  // free space around the points
 
 double half_tangent(double fov_degrees) { return std::tan(fov_degrees * kPi / 360); }
 
@@ -20,11 +20,14 @@ void picture_axes(const Vec& forward, Vec& right, Vec& up) {
   up = cross(right, forward);
 }
 
-// How far the points reach along `axis`.
+// How far the points reach along `axis`. The outermost 1/2000 of them are outliers, and ignored, if
+// they alone account for a tenth of the extent.
 double bound(const std::vector<Vec>& points, const Vec& axis) {
-  double reach = dot(points[0], axis);
-  for (const Vec& p : points) reach = std::max(reach, dot(p, axis));
-  return reach;
+  std::vector<double> along;
+  for (const Vec& p : points) along.push_back(dot(p, axis));
+  std::sort(along.begin(), along.end());
+  const double last = along.back(), inner = along[along.size() - 1 - along.size() / 2000];
+  return last - inner > 0.1 * (last - along.front()) ? inner : last;
 }
 
 }  // namespace
@@ -34,7 +37,7 @@ Camera::Camera(const Placement& p, int width, int height)
   if (!(p.fov_degrees > 0 && p.fov_degrees < 180))
     throw Error(ErrorCode::kInvalidInput, "the field of view must lie between 0 and 180 degrees");
   if (!(length(p.target - p.eye) > 0))
-    throw Error(ErrorCode::kInvalidInput, "the camera stands on its target");
+    throw Error(ErrorCode::kInvalidInput, "the camera must not be at its target");
   forward_ = normalized(p.target - p.eye);
   picture_axes(forward_, right_, up_);
   pixel_ = half_tangent(p.fov_degrees) / half_height_;
@@ -45,15 +48,15 @@ Ray Camera::ray(double x, double y) const {
   return {eye_, normalized(forward_ + offset)};
 }
 
-Placement see_whole(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
-                    double aspect) {
+Placement fit_camera(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
+                     double aspect) {
   const Vec back = normalized(toward_eye);
   Vec right, up;
   picture_axes(back * -1.0, right, up);
   const double tangent_up = half_tangent(fov_degrees) / kMargin;
-  // With the eye at e, point p is in the picture if |p.right - e.right| <= tangent (e.back -
-  // p.back), and likewise up: both sides of each are bounds on e, the tightest of which are met in
-  // the middle.
+  // With the eye at e, point p is in the picture if |p.right - e.right| <= tangent * (e.back -
+  // p.back), and likewise for up. Both sides of each are linear bounds on e, and e is centered
+  // between the tightest ones.
   double e[2] = {0, 0}, distance = bound(points, back) + 1;
   const Vec axes[2] = {right, up};
   const double tangents[2] = {tangent_up * aspect, tangent_up};

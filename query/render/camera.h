@@ -1,4 +1,4 @@
-// A pinhole camera in voxel units, and where to put one to see a thing whole.
+// A pinhole camera in voxel units, and where to put one to see a set of points. Immutable.
 #pragma once
 
 #include <vector>
@@ -18,7 +18,7 @@ class Camera {
   // Throws Error{kInvalidInput} if the eye is on the target or the field of view not in (0, 180).
   Camera(const Placement& placement, int width, int height);
 
-  // Through a point of the picture; (0, 0) is the upper left corner of the upper left pixel.
+  // The ray through a point of the picture, in pixels from its upper left corner.
   Ray ray(double x, double y) const;
   // The width of a pixel at distance 1.
   double pixel_spread() const { return pixel_; }
@@ -31,9 +31,10 @@ class Camera {
   double half_width_, half_height_;  // of the picture, in pixels
 };
 
-// Looks from `toward_eye` (need not be of length 1) with all of `points` in the picture's middle,
-// from no farther than it takes. At least one point.
-Placement see_whole(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
-                    double aspect);
+// Looks from the direction `toward_eye` (of any length), with all of `points` in the center of the
+// picture and as large as they fit; a few outliers among thousands may be outside. Needs at least
+// one point.
+Placement fit_camera(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
+                     double aspect);
 
 }  // namespace voxdag::query

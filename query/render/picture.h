@@ -11,7 +11,7 @@ namespace voxdag::query {
 
 struct Picture {
   int width = 0, height = 0;
-  std::vector<uint8_t> rgb;  // rows from the top, 3 bytes a pixel
+  std::vector<uint8_t> rgb;  // rows from the top, 3 bytes per pixel
 
   Picture(int w, int h)
       : width(w), height(h), rgb(3 * static_cast<size_t>(w) * static_cast<size_t>(h)) {}
@@ -22,7 +22,7 @@ struct Picture {
 
 // Throws Error{kOutOfMemory} if libpng runs out of memory.
 std::string encode_png(const Picture& picture);
-// Under `path`, whole or not at all.
+// Writes the PNG file atomically.
 void write_png(FileSystem& files, const std::string& path, const Picture& picture);
 
 }  // namespace voxdag::query

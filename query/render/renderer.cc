@@ -9,23 +9,25 @@
 #include <vector>
 
 #include "query/render/bounds.h"
-#include "query/render/film.h"
-#include "query/render/light_buffer.h"
+#include "query/render/g_buffer.h"
 #include "query/render/lighting.h"
 #include "query/render/surface.h"
 
 namespace voxdag::query {
 namespace {
 
-// `dither` in [0, 1) spreads what rounding would make steps of.
+constexpr Vec kTopColor{{0.46, 0.54, 0.65}}, kBottomColor{{0.86, 0.87, 0.88}};
+constexpr double kMaxHaze = 0.25;
+
+// `dither` in [0, 1) spreads the rounding error, so that gradients show no steps.
 uint8_t srgb_byte(double linear, double dither) {
   const double v = std::clamp(linear, 0.0, 1.0);
   const double s = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
   return static_cast<uint8_t>(std::min(255.0, 255 * s + dither));
 }
 
-// What the camera sees through a coarse grid of points.
-std::vector<Surface> first_look(const DagView& dag, const Camera& camera, int width, int height) {
+// What the camera sees through a coarse grid of points, nearest first.
+std::vector<Surface> probe_view(const DagView& dag, const Camera& camera, int width, int height) {
   constexpr int kColumns = 40, kRows = 24;
   std::vector<Surface> seen;
   Surface s;
@@ -34,96 +36,73 @@ std::vector<Surface> first_look(const DagView& dag, const Camera& camera, int wi
     if (find_surface(dag, camera.ray(x * width, y * height), camera.pixel_spread(), s))
       seen.push_back(s);
   }
+  std::sort(seen.begin(), seen.end(), [](const Surface& a, const Surface& b) { return a.t < b.t; });
   return seen;
 }
 
-// Adds up what the samples of a pixel find.
-class Gatherer {
- public:
-  Gatherer(const Lighting& lighting) : lighting_(lighting) {}
-
-  void add(const Surface& s, int sky_rays, Sampler& sampler) {
-    ++surfaces_;
-    t_ += s.t;
-    normal_ = normal_ + s.normal;
-    sky_ = sky_ + lighting_.skylight(s, sky_rays, sampler);
-    lamp_ += lighting_.lamplight(s, sampler);
+// The factor that gives the median light of the probed surfaces a middle tone, and their brightest
+// tenth one below white.
+double choose_exposure(const Lighting& lighting, const std::vector<Surface>& seen) {
+  constexpr int kSkyRays = 8;
+  if (seen.empty()) return 1;
+  std::vector<double> luminance;
+  for (const Surface& s : seen) {
+    const Sampler sampler(luminance.size());
+    const Vec light = lighting.reflected(s.normal, lighting.sky_light(s, kSkyRays, sampler),
+                                         lighting.sun_light(s, sampler));
+    luminance.push_back(1e-3 + dot(light, {{0.2126, 0.7152, 0.0722}}));
   }
-  void add_miss(const Ray& ray, Sampler& sampler) {
-    ++misses_;
-    floor_ += lighting_.floor_light(ray, sampler);
+  std::sort(luminance.begin(), luminance.end());
+  return std::min(0.42 / luminance[luminance.size() / 2],
+                  0.85 / luminance[luminance.size() * 9 / 10]);
+}
+
+// A filmic curve that compresses bright light: the ACES fit of Narkowicz 2015.
+Vec tone_map(const Vec& light) {
+  Vec out;
+  for (int i = 0; i < 3; ++i) {
+    const double x = light[i];
+    out[i] = std::min(1.0, x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14));
   }
+  return out;
+}
 
-  LightPixel pixel() const {
-    LightPixel p;
-    if (misses_ > 0) p.floor = static_cast<float>(floor_ / misses_);
-    if (surfaces_ == 0) return p;
-    p.coverage = static_cast<float>(surfaces_) / static_cast<float>(surfaces_ + misses_);
-    p.t = static_cast<float>(t_ / surfaces_);
-    p.lamp = static_cast<float>(lamp_ / surfaces_);
-    const double normal_length = std::max(length(normal_), 1e-9);
-    for (int i = 0; i < 3; ++i) {
-      p.normal[i] = static_cast<float>(normal_[i] / normal_length);
-      p.sky[i] = static_cast<float>(sky_[i] / surfaces_);
-    }
-    return p;
-  }
-
- private:
-  const Lighting& lighting_;
-  int surfaces_ = 0, misses_ = 0;
-  double t_ = 0, lamp_ = 0, floor_ = 0;
-  Vec normal_, sky_;
-};
-
-LightPixel gather_pixel(const DagView& dag, const Camera& camera, const Lighting& lighting,
-                        int samples, int x, int y) {
+// Takes samples * samples samples of a pixel.
+GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighting& lighting,
+                          int samples, int x, int y) {
   constexpr int kSkyRays = 4;
-  Gatherer gatherer(lighting);
+  Vec offset, normal, sky;
+  double sun = 0, floor = 0;
+  int surfaces = 0, misses = 0;
   for (int i = 0; i < samples * samples; ++i) {
-    Sampler sampler(x, y, i);
-    const Sampler::Pair within = sampler.pair();
+    const Sampler sampler(x, y, i);
+    const Sampler::Pair within = sampler.pair(0);
     const Ray ray =
         camera.ray(x + (i % samples + within.u) / samples, y + (i / samples + within.v) / samples);
     Surface s;
-    if (find_surface(dag, ray, camera.pixel_spread(), s))
-      gatherer.add(s, kSkyRays, sampler);
-    else
-      gatherer.add_miss(ray, sampler);
+    if (!find_surface(dag, ray, camera.pixel_spread(), s)) {
+      ++misses;
+      floor += lighting.floor_light(ray, sampler);
+      continue;
+    }
+    ++surfaces;
+    offset = offset + ray.direction * s.t;
+    normal = normal + s.normal;
+    sky = sky + lighting.sky_light(s, kSkyRays, sampler);
+    sun += lighting.sun_light(s, sampler);
   }
-  return gatherer.pixel();
+  GBufferPixel p;
+  if (misses > 0) p.floor = static_cast<float>(floor / misses);
+  if (surfaces == 0) return p;
+  p.coverage = static_cast<float>(surfaces) / static_cast<float>(surfaces + misses);
+  p.offset = offset * (1.0 / surfaces);
+  p.normal = normal * (1 / std::max(length(normal), 1e-9));
+  p.sky = sky * (1.0 / surfaces);
+  p.sun = static_cast<float>(sun / surfaces);
+  return p;
 }
 
-// The light on the surfaces of a first look, for choosing an exposure.
-std::vector<LightPixel> first_light(const Lighting& lighting, const std::vector<Surface>& seen) {
-  constexpr int kSkyRays = 8;
-  std::vector<LightPixel> light;
-  for (const Surface& s : seen) {
-    Sampler sampler(light.size());
-    Gatherer gatherer(lighting);
-    gatherer.add(s, kSkyRays, sampler);
-    light.push_back(gatherer.pixel());
-    light.back().lamp *= static_cast<float>(lighting.facing_lamp(s.start, s.normal));
-  }
-  return light;
-}
-
-void develop_row(const LightBuffer& light, const Camera& camera, const Lighting& lighting,
-                 const ToneMapper& film, int y, Picture& picture) {
-  constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
-  for (int x = 0; x < picture.width; ++x) {
-    LightPixel pixel = light.smoothed(camera, x, y);
-    if (pixel.coverage > 0)
-      pixel.lamp *= static_cast<float>(
-          lighting.facing_lamp(camera.ray(x + 0.5, y + 0.5).at(pixel.t),
-                               {{pixel.normal[0], pixel.normal[1], pixel.normal[2]}}));
-    const Vec color = film.color(pixel, y);
-    const double dither = (kBayer[y % 4][x % 4] + 0.5) / 16;
-    for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(color[c], dither);
-  }
-}
-
-// Runs work(0) to work(count - 1) on threads; the first exception stops all and is thrown.
+// Runs work(0) to work(count - 1) on threads; the first exception stops all and is rethrown.
 template <class Work>
 void for_each_row(int count, int threads, const Work& work) {
   std::atomic<int> next{0};
@@ -152,24 +131,41 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
   const int width = options.width, height = options.height;
   const Camera camera(placement, width, height);
   const Box box = dag.empty() ? Box{} : occupied_box(dag);
-  const std::vector<Surface> seen = first_look(dag, camera, width, height);
+  const std::vector<Surface> seen = probe_view(dag, camera, width, height);
   const Lighting lighting(dag, box, camera, seen);
-  const ToneMapper film(first_light(lighting, seen), box.diagonal(), height);
+  const double exposure = choose_exposure(lighting, seen);
+  const double haze_start = seen.empty() ? 0 : seen[0].t;
 
-  LightBuffer light(width, height);
+  GBuffer buffer(width, height);
   progress.begin_stage("render", static_cast<uint64_t>(height), "rows");
   for_each_row(height, options.threads, [&](int y) {
     for (int x = 0; x < width; ++x) {
       cancel.check();
-      light.at(x, y) = gather_pixel(dag, camera, lighting, options.samples, x, y);
+      buffer.at(x, y) = sample_pixel(dag, camera, lighting, options.samples, x, y);
     }
     progress.advance(1);
   });
   progress.end_stage();
 
   Picture picture(width, height);
-  for_each_row(height, options.threads,
-               [&](int y) { develop_row(light, camera, lighting, film, y, picture); });
+  const auto resolve_row = [&](int y) {
+    constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
+    const Vec background = mix(kTopColor, kBottomColor, (y + 0.5) / height);
+    for (int x = 0; x < width; ++x) {
+      const GBufferPixel p = buffer.smoothed(x, y, camera.pixel_spread());
+      Vec color = background * p.floor;
+      if (p.coverage > 0) {
+        const Vec lit = tone_map(lighting.reflected(p.normal, p.sky, p.sun) * exposure);
+        const double depth =
+            std::max(0.0, length(p.offset) - haze_start) / std::max(1.0, box.diagonal());
+        const Vec surface = mix(lit, background, kMaxHaze * (1 - std::exp(-depth * depth)));
+        color = mix(color, surface, p.coverage);
+      }
+      const double dither = (kBayer[y % 4][x % 4] + 0.5) / 16;
+      for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(color[c], dither);
+    }
+  };
+  for_each_row(height, options.threads, resolve_row);
   return picture;
 }
 

@@ -1,4 +1,4 @@
-// Renders a picture on several threads; the same pixels for any number of them.
+// Renders a picture of a DAG on several threads; the pixels do not depend on their number.
 #pragma once
 
 #include "core/base/cancel_token.h"
@@ -11,11 +11,12 @@ namespace voxdag::query {
 
 struct RenderOptions {
   int width = 1280, height = 720;
-  int samples = 2;  // along each side of a pixel
+  int samples = 2;  // per pixel, along each of its sides
   int threads = 1;
 };
 
-// Throws Error{kCorrupt} for a DAG that is damaged, Error{kCanceled}.
+// Shows a plain background if the DAG is empty. Throws Error{kCorrupt} for a damaged DAG, and
+// Error{kCanceled}.
 Picture render_picture(const DagView& dag, const Placement& placement, const RenderOptions& options,
                        Progress& progress, const CancelToken& cancel);
 

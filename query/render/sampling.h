@@ -1,4 +1,5 @@
-// Numbers that look random but are the same in every run: a picture does not depend on threads.
+// Low-discrepancy sample points that depend on nothing but the pixel: a picture is the same for any
+// number of threads.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +8,11 @@
 
 namespace voxdag::query {
 
-// Pairs of numbers in [0, 1) that cover the unit square evenly (the R2 sequence). The sequences of
-// neighboring pixels start far from one another, so that what noise is left is fine-grained.
+inline constexpr double kPi = 3.14159265358979323846;
+
+// Points in [0, 1)^2 that cover the square evenly (the R2 sequence). Each dimension of a sample
+// (its place in the pixel, its rays to the sky) shifts the sequence by a random amount. The
+// sequences of neighboring pixels start far apart, so that the noise that remains is fine.
 class Sampler {
  public:
   struct Pair {
@@ -16,24 +20,16 @@ class Sampler {
   };
 
   explicit Sampler(uint64_t seed) : start_{random(seed, 0), random(seed, 1)} {}
-  // Sample `sample` of a pixel.
   Sampler(int x, int y, int sample)
       : start_{x * 0.7548776662466927 + y * 0.5698402909980532,
                x * 0.4142135623730951 + y * 0.7320508075688772},
         sample_(sample) {}
 
-  // Member `i` of `count` pairs that this sample asks for together.
-  Pair pair(int i, int count) const {
+  // Point `i` of the `count` points that each sample of the pixel takes in this dimension.
+  Pair pair(uint64_t dimension, int i = 0, int count = 1) const {
     const double n = static_cast<double>(sample_) * count + i;
-    return {wrap(start_[0] + random(question_, 0) + 0.7548776662466927 * n),
-            wrap(start_[1] + random(question_, 1) + 0.5698402909980532 * n)};
-  }
-  // The pairs from here on have nothing to do with those before.
-  void next_question() { ++question_; }
-  Pair pair() {
-    const Pair p = pair(0, 1);
-    next_question();
-    return p;
+    return {wrap(start_[0] + random(dimension, 0) + 0.7548776662466927 * n),
+            wrap(start_[1] + random(dimension, 1) + 0.5698402909980532 * n)};
   }
 
  private:
@@ -47,18 +43,9 @@ class Sampler {
 
   double start_[2];
   int sample_ = 0;
-  uint64_t question_ = 0;
 };
 
-inline constexpr double kPi = 3.14159265358979323846;
-
-// Any direction as likely as any other.
-inline Vec uniform_direction(const Sampler::Pair& p) {
-  const double y = 2 * p.u - 1, angle = 2 * kPi * p.v, r = std::sqrt(1 - y * y);
-  return {{r * std::cos(angle), y, r * std::sin(angle)}};
-}
-
-// A direction about the unit vector `n`, more often near it, as a matt surface gathers light.
+// A cosine-distributed direction around the unit vector `n`.
 inline Vec cosine_direction(const Vec& n, const Sampler::Pair& p) {
   Vec a, b;
   basis_around(n, a, b);

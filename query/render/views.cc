@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "query/ray_caster.h"
+#include "query/render/bounds.h"
 #include "query/render/sampling.h"
 
 namespace voxdag::query {
@@ -10,128 +12,35 @@ namespace {
 
 constexpr double kFar = 1e30;
 constexpr double kOutsideFov = 32, kInsideFov = 62;
-constexpr double kEnclosureOfRooms = 0.1;
+constexpr double kMinEnclosureOfRooms = 0.1;
 
 struct NamedDirection {
   const char* name;
   Vec toward_eye;
 };
-// glTF's front looks along +z; "iso" stands to its right, above it.
+// The front of a glTF scene is +z, up is +y; "iso" is to the right of the front, and above.
 const NamedDirection kDirections[] = {
     {"iso", {{0.62, 0.55, 1}}}, {"front", {{0, 0, 1}}}, {"back", {{0, 0, -1}}},
     {"left", {{-1, 0, 0}}},     {"right", {{1, 0, 0}}}, {"top", {{0, 1, 0}}},
 };
 
-// A random occupied cell: its middle and its edge. At each level a child is chosen by how many
-// children it has, which comes close to choosing all cells alike.
-Vec random_cell(const DagView& dag, Sampler& sampler, double& size) {
-  const uint32_t depth = std::min(dag.grid_levels() - 1, 11u);
-  uint64_t content = dag.root();
-  Vec low;
-  size = static_cast<double>(dag.resolution());
-  for (uint32_t d = 0; d < depth; ++d) {
-    const DagView::Children children = dag.children(d, content);
-    int weights[8] = {}, sum = 0;
-    for (int i = 0; i < 8; ++i)
-      if (children.has(i))
-        sum += weights[i] = kPopcount8[dag.children(d + 1, dag.content(d, children, i)).mask];
-    auto left = static_cast<int>(sampler.pair().u * sum);
-    int index = 0;
-    while (left >= weights[index]) left -= weights[index++];
-    content = dag.content(d, children, index);
-    size /= 2;
-    low = low + Vec{{index & 4 ? size : 0, index & 2 ? size : 0, index & 1 ? size : 0}};
-  }
-  return low + Vec{{size / 2, size / 2, size / 2}};
-}
-
-// A glance through a camera: few rays, judged for how much there is to see.
-class Glance {
- public:
-  Glance(const RayCaster& caster, const Placement& placement) {
-    const Camera camera(placement, kColumns, kRows);
-    for (int y = 0; y < kRows; ++y)
-      for (int x = 0; x < kColumns; ++x) {
-        Hit hit;
-        const bool seen =
-            caster.cast(camera.ray(x + 0.5, y + 0.5), {0, camera.pixel_spread()}, 0, kFar, hit);
-        depth_[y][x] = seen ? std::max(hit.t, 1.0) : kFar;
-      }
-  }
-
-  // The share of rays at which what is seen is not one plane: little for a wall or a box.
-  double detail() const {
-    int breaks = 0;
-    for (int y = 0; y < kRows; ++y)
-      for (int x = 0; x < kColumns; ++x) {
-        if (x > 1) breaks += bends(depth_[y][x - 2], depth_[y][x - 1], depth_[y][x]);
-        if (y > 1) breaks += bends(depth_[y - 2][x], depth_[y - 1][x], depth_[y][x]);
-      }
-    return breaks / kRays;
-  }
-
-  // Higher for long views with much in them; lower for a wall before one's nose, or where one looks
-  // out of the scene. `near` is a distance that is too close.
-  double score(double near) const {
-    int close = 0, out = 0;
-    double sum = 0;
-    for (int y = 0; y < kRows; ++y)
-      for (int x = 0; x < kColumns; ++x) {
-        const double depth = depth_[y][x];
-        close += depth < near;
-        out += depth == kFar;
-        sum += depth == kFar ? 0 : depth;
-      }
-    const double free = 1 - close / kRays, within = 1 - out / kRays;
-    return detail() * std::sqrt(sum / kRays) * free * free * free * within;
-  }
-
- private:
-  static constexpr int kColumns = 24, kRows = 14;
-  static constexpr double kRays = kColumns * kRows;
-
-  // Whether three neighboring rays do not end on one plane, along which 1/depth is linear.
-  static bool bends(double a, double b, double c) {
-    return std::fabs(1 / a - 2 / b + 1 / c) * b > 0.03;
-  }
-
-  double depth_[kRows][kColumns];
-};
-
-}  // namespace
-const std::vector<std::string>& view_names() {
-  static const std::vector<std::string> names = {"auto", "iso",   "front", "back",
-                                                 "left", "right", "top",   "inside"};
-  return names;
-}
-
-Placement named_view(const std::string& name, const RayCaster& caster, const DagView& dag,
-                     const Box& box, double aspect, std::optional<double> fov_degrees) {
-  if (name == "auto") {
-    const bool room = enclosure(caster, dag, box) > kEnclosureOfRooms;
-    return named_view(room ? "inside" : "iso", caster, dag, box, aspect, fov_degrees);
-  }
-  if (name == "inside") return inside_view(caster, box, fov_degrees.value_or(kInsideFov));
-  for (const NamedDirection& d : kDirections)
-    if (name == d.name)
-      return see_whole(without_strays(occupied_points(dag)), d.toward_eye,
-                       fov_degrees.value_or(kOutsideFov), aspect);
-  std::string names;
-  for (const std::string& known : view_names()) names += (names.empty() ? "" : ", ") + known;
-  throw Error(ErrorCode::kInvalidInput, "no view is called \"" + name + "\": expected " + names);
-}
-
+// How far one sees from places on the surface, as a share of the scene's diagonal; a place from
+// which one can see out of the scene counts as 0. Near 0 for an object, or for caves; more for
+// rooms.
 double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
-  constexpr int kPlaces = 1000, kRays = 24;
-  Sampler sampler(1);
+  constexpr size_t kPlaces = 1000;
+  const std::vector<Vec> points = occupied_points(dag);
+  std::vector<Vec> directions;  // toward the 26 neighbors of a cell
+  for (int i = 0; i < 27; ++i)
+    if (i != 13) directions.push_back(normalized({{i / 9 - 1.0, i / 3 % 3 - 1.0, i % 3 - 1.0}}));
+  const double start = 3 * static_cast<double>(dag.resolution()) / 64;
   double sum = 0;
-  for (int i = 0; i < kPlaces; ++i) {
-    double size = 0, longest = 0;
-    const Vec place = random_cell(dag, sampler, size);
-    for (int j = 0; j < kRays; ++j) {
+  for (size_t i = 0; i < kPlaces; ++i) {
+    const Vec& place = points[i * points.size() / kPlaces];
+    double longest = 0;
+    for (const Vec& direction : directions) {
       Hit hit;
-      const Ray ray{place, uniform_direction(sampler.pair())};
-      const bool escaped = !caster.cast(ray, {size, 0}, 3 * size, box.diagonal(), hit);
+      const bool escaped = !caster.cast({place, direction}, {1, 0}, start, box.diagonal(), hit);
       longest = escaped ? 0 : std::max(longest, hit.t);
       if (escaped) break;
     }
@@ -140,14 +49,44 @@ double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
   return sum / (kPlaces * box.diagonal());
 }
 
+// How much there is to see, by a few rays: higher for long views with much detail, lower close to a
+// wall or where the camera looks out of the scene. A distance below `near` is too close.
+double score(const RayCaster& caster, const Placement& placement, double near) {
+  constexpr int kColumns = 24, kRows = 14;
+  constexpr double kRays = kColumns * kRows;
+  const Camera camera(placement, kColumns, kRows);
+  double depth[kRows][kColumns], sum = 0;
+  int close = 0, out = 0, breaks = 0;
+  // Along a plane 1 / depth is linear.
+  const auto bends = [](double a, double b, double c) {
+    return std::fabs(1 / a - 2 / b + 1 / c) * b > 0.03;
+  };
+  for (int y = 0; y < kRows; ++y)
+    for (int x = 0; x < kColumns; ++x) {
+      Hit hit;
+      const bool seen =
+          caster.cast(camera.ray(x + 0.5, y + 0.5), {0, camera.pixel_spread()}, 0, kFar, hit);
+      const double d = depth[y][x] = seen ? std::max(hit.t, 1.0) : kFar;
+      close += d < near;
+      out += !seen;
+      sum += seen ? d : 0;
+      if (x > 1) breaks += bends(depth[y][x - 2], depth[y][x - 1], d);
+      if (y > 1) breaks += bends(depth[y - 2][x], depth[y - 1][x], d);
+    }
+  const double free = 1 - close / kRays, within = 1 - out / kRays;
+  return breaks / kRays * std::sqrt(sum / kRays) * free * free * free * within;
+}
+
+// The best-scoring of some hundreds of random places in the lower half of the scene.
 Placement inside_view(const RayCaster& caster, const Box& box, double fov_degrees) {
-  constexpr int kPlaces = 400, kYaws = 8;
-  Sampler sampler(2);
+  constexpr uint64_t kPlaces = 400;
+  constexpr int kYaws = 8;
+  const Sampler sampler(2);
   const Vec extent = box.high - box.low;
   Placement best{box.center(), box.center() + Vec{{1, 0, 0}}, fov_degrees};
   double best_score = 0;
-  for (int i = 0; i < kPlaces; ++i) {
-    const Sampler::Pair across = sampler.pair(), up = sampler.pair();
+  for (uint64_t i = 0; i < kPlaces; ++i) {
+    const Sampler::Pair across = sampler.pair(2 * i), up = sampler.pair(2 * i + 1);
     const Vec eye =
         box.low + Vec{{extent[0] * (0.05 + 0.9 * across.u), extent[1] * (0.05 + 0.35 * up.u),
                        extent[2] * (0.05 + 0.9 * across.v)}};
@@ -155,13 +94,37 @@ Placement inside_view(const RayCaster& caster, const Box& box, double fov_degree
       const double angle = 2 * kPi * (yaw + up.v) / kYaws;
       const Vec forward{{std::cos(angle), 0.08, std::sin(angle)}};
       const Placement trial{eye, eye + forward * (0.25 * box.diagonal()), fov_degrees};
-      const double score = Glance(caster, trial).score(0.04 * box.diagonal());
-      if (score <= best_score) continue;
-      best_score = score;
+      const double trial_score = score(caster, trial, 0.04 * box.diagonal());
+      if (trial_score <= best_score) continue;
+      best_score = trial_score;
       best = trial;
     }
   }
   return best;
+}
+
+}  // namespace
+
+const std::vector<std::string>& view_names() {
+  static const std::vector<std::string> names = {"auto", "iso",   "front", "back",
+                                                 "left", "right", "top",   "inside"};
+  return names;
+}
+
+Placement named_view(const std::string& name, const DagView& dag, double aspect,
+                     std::optional<double> fov_degrees) {
+  const RayCaster caster(dag);
+  const Box box = occupied_box(dag);
+  const bool automatic = name == "auto";
+  if (name == "inside" || (automatic && enclosure(caster, dag, box) > kMinEnclosureOfRooms))
+    return inside_view(caster, box, fov_degrees.value_or(kInsideFov));
+  for (const NamedDirection& d : kDirections)
+    if ((automatic ? "iso" : name) == d.name)
+      return fit_camera(occupied_points(dag), d.toward_eye, fov_degrees.value_or(kOutsideFov),
+                        aspect);
+  std::string names;
+  for (const std::string& known : view_names()) names += (names.empty() ? "" : ", ") + known;
+  throw Error(ErrorCode::kInvalidInput, "unknown view \"" + name + "\": expected one of " + names);
 }
 
 }  // namespace voxdag::query

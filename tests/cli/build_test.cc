@@ -16,8 +16,8 @@ class BuildCommand : public CommandLine {
   }
 };
 
-// The names that scripts may rely on, and that they agree with the file.
-TEST_F(BuildCommand, ReportsAsPromised) {
+// The report has the documented names, and its values agree with the file.
+TEST_F(BuildCommand, ReportHasTheDocumentedNames) {
   const Json report = build();
   for (const char* name :
        {"output",       "sha256",       "resolution",     "bounds",      "hash_bits",
@@ -42,18 +42,18 @@ TEST_F(BuildCommand, ReportsAsPromised) {
   EXPECT_GT(report["voxels"], 10000);
 }
 
-// The same report lies beside the result, and the work folder is gone.
+// The report is also written next to the result, and the work folder is removed.
 TEST_F(BuildCommand, LeavesFileAndReportOnly) {
   const Json report = build();
   EXPECT_EQ(Json::parse(contents("m.vdag.report.json")), report);
   EXPECT_FALSE(exists("m.vdag.work"));
   EXPECT_FALSE(exists("m.vdag.partial"));
-  build({"--keep-work", "--work", "kept"}, "n.vdag");
-  EXPECT_TRUE(exists("kept"));
+  build({"--keep-work", "--work", "work"}, "n.vdag");
+  EXPECT_TRUE(exists("work"));
 }
 
-// Without --json: words on standard output, progress on standard error.
-TEST_F(BuildCommand, SpeaksPlainly) {
+// Without --json, a text report is on standard output and progress on standard error.
+TEST_F(BuildCommand, PrintsATextReport) {
   const Answer answer = run({"build", "m.glb", "-r", "64", "-o", "m.vdag"});
   EXPECT_EQ(answer.status, 0);
   for (const char* part : {"m.vdag", "sha256", "triangles", "voxels", "DAG nodes"})
@@ -62,7 +62,7 @@ TEST_F(BuildCommand, SpeaksPlainly) {
 }
 
 // Run options do not change the bytes; geometry options do.
-TEST_F(BuildCommand, OnlyGeometryOptionsShow) {
+TEST_F(BuildCommand, OnlyGeometryOptionsChangeTheBytes) {
   const std::string sha256 = build()["sha256"];
   const std::string bytes = contents("m.vdag");
   EXPECT_EQ(
@@ -79,7 +79,7 @@ TEST_F(BuildCommand, OnlyGeometryOptionsShow) {
   EXPECT_GT(part["dropped"]["outside"], 0);
 }
 
-// Options may come from a file; those of the command line win.
+// Options may come from a file; the command line takes precedence.
 TEST_F(BuildCommand, ReadsOptionsFromAFile) {
   put("options.toml", "resolution = 32\nhash-bits = 16\n");
   const Json report = run_json({"build", "m.glb", "-o", "m.vdag", "--config", "options.toml"});
@@ -94,7 +94,7 @@ TEST_F(BuildCommand, ReadsOptionsFromAFile) {
   expect_error(2, "resolutoin", {"build", "m.glb", "-o", "x.vdag", "--config", "wrong.toml"});
 }
 
-// Each wrong value is refused with the option or the limit named, and nothing is left behind.
+// An invalid value is an error that names the option or the limit, and leaves no file.
 TEST_F(BuildCommand, RefusesWrongOptions) {
   const struct {
     std::vector<std::string> options;
@@ -142,23 +142,23 @@ TEST_F(BuildCommand, RefusesWrongOptions) {
   }
 }
 
-// Scenes that are missing or no scenes, outputs that cannot be.
+// Missing or invalid scenes and outputs that cannot be written are errors.
 TEST_F(BuildCommand, RefusesWrongFiles) {
   expect_error(3, "none.glb", {"build", "none.glb", "-r", "64", "-o", "x.vdag"});
   expect_error(3, "none.glb", {"build", "m.glb", "none.glb", "-r", "64", "-o", "x.vdag"});
   put("text.glb", "this is not a scene");
   expect_error(2, "text.glb", {"build", "text.glb", "-r", "64", "-o", "x.vdag"});
-  put("cut.glb", contents("m.glb").substr(0, 5000));
-  expect_error(2, "cut.glb", {"build", "cut.glb", "-r", "64", "-o", "x.vdag"});
+  put("truncated.glb", contents("m.glb").substr(0, 5000));
+  expect_error(2, "truncated.glb", {"build", "truncated.glb", "-r", "64", "-o", "x.vdag"});
   EXPECT_FALSE(exists("x.vdag"));
   EXPECT_FALSE(exists("x.vdag.work"));
-  // A folder in the place of the output is refused before anything is built.
+  // A folder under the name of the output is an error before the build starts.
   ASSERT_EQ(mkdir(folder_.file("taken").c_str(), 0777), 0);
   expect_error(2, "taken", {"build", "m.glb", "-r", "64", "-o", "taken"});
   EXPECT_FALSE(exists("taken.work"));
 }
 
-// A work folder that holds somebody else's files is not touched.
+// A work folder with foreign files is not touched.
 TEST_F(BuildCommand, LeavesForeignWorkFoldersAlone) {
   ASSERT_EQ(mkdir(folder_.file("mine").c_str(), 0777), 0);
   put("mine/letter.txt", "dear");

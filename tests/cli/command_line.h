@@ -1,4 +1,4 @@
-// Runs the built program as a user does, and keeps what it said.
+// A test fixture that runs the built program and records its output.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -24,15 +24,15 @@ class CommandLine : public testing::Test {
  protected:
   // Runs `voxdag ARGS...` within folder_.
   Answer run(const std::vector<std::string>& args);
-  // The same without waiting; wait_for() gives the answer.
+  // Starts `voxdag ARGS...` without waiting; wait_for() returns its output.
   pid_t start(const std::vector<std::string>& args);
   Answer wait_for(pid_t pid);
-  // Runs, expects success, and parses what was printed. Messages must not be mixed into it.
+  // Runs, expects success, and parses standard output, which must be JSON without messages.
   Json run_json(std::vector<std::string> args);
-  // Runs, expects a failure of this status, and one message that has `part` in it.
+  // Runs, expects this exit status and one message that contains `part`.
   void expect_error(int status, const std::string& part, const std::vector<std::string>& args);
 
-  // Menger's sponge, 2112 triangles, as m.glb.
+  // Writes a Menger sponge of 2112 triangles to m.glb.
   void make_scene();
 
   bool exists(const std::string& name) const;

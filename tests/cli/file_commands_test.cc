@@ -32,7 +32,7 @@ TEST_F(FileCommands, InfoNamesAndCounts) {
   EXPECT_NE(plain.out.find("128"), std::string::npos);
 }
 
-// A right file passes, with and without its scene; any damage is status 4.
+// A valid file passes, with and without its scene; any damage is exit status 4.
 TEST_F(FileCommands, Verify) {
   EXPECT_EQ(run_json({"verify", "m.vdag"})["ok"], true);
   EXPECT_EQ(run_json({"verify", "m.vdag", "--against", "m.glb"})["ok"], true);
@@ -50,17 +50,17 @@ TEST_F(FileCommands, Verify) {
   expect_error(4, "short.vdag", {"verify", "short.vdag"});
 }
 
-// A file of another scene is not what the scene says.
+// A file of another scene differs from the sample.
 TEST_F(FileCommands, VerifyAgainstAnotherScene) {
   ASSERT_EQ(run({"generate", "menger", "other.glb", "--level", "1"}).status, 0);
   const Answer answer = run({"verify", "m.vdag", "--against", "other.glb"});
   EXPECT_EQ(answer.status, 4) << answer.err;
 }
 
-// Equal files are status 0, different ones 1, incomparable ones an error.
+// Equal files are exit status 0, different ones 1, files on different grids an error.
 TEST_F(FileCommands, Diff) {
-  run_json({"build", "m.glb", "-r", "128", "-o", "cut.vdag", "--hash-bits", "4"});
-  const Json same = run_json({"diff", "m.vdag", "cut.vdag"});
+  run_json({"build", "m.glb", "-r", "128", "-o", "truncated.vdag", "--hash-bits", "4"});
+  const Json same = run_json({"diff", "m.vdag", "truncated.vdag"});
   EXPECT_EQ(same["same"], true);
   EXPECT_EQ(same["only_a"], 0);
   EXPECT_EQ(same["only_b"], 0);
@@ -77,7 +77,7 @@ TEST_F(FileCommands, Diff) {
   expect_error(2, "", {"diff", "m.vdag", "a.vdag"});
 }
 
-// What is missing, or no file of ours, is told apart.
+// A missing file and a file of another format are different errors.
 TEST_F(FileCommands, WrongFiles) {
   put("text.vdag", std::string(10000, 'x'));
   for (const char* command : {"info", "verify"}) {
@@ -99,7 +99,7 @@ TEST_F(FileCommands, RenderMakesAPicture) {
   EXPECT_FALSE(exists("x.png"));
 }
 
-// The estimate has a range for everything, and builds nothing.
+// The estimate has a range for every value, and plan builds nothing.
 TEST_F(FileCommands, PlanNames) {
   const Json plan = run_json({"plan", "m.glb", "-r", "1024"});
   for (const char* name : {"voxels", "svo_nodes", "dag_nodes", "file_bytes", "disk_bytes",
@@ -115,7 +115,7 @@ TEST_F(FileCommands, PlanNames) {
   EXPECT_FALSE(exists("m.glb.work"));
 }
 
-// A kept work folder answers; one that is not there, or holds no job, is not found.
+// status reads a work folder; a folder that does not exist, or has no job, is not found.
 TEST_F(FileCommands, StatusNames) {
   run_json({"build", "m.glb", "-r", "128", "-o", "m.vdag", "--keep-work"});
   const Json status = run_json({"status", "m.vdag.work"});
@@ -126,7 +126,7 @@ TEST_F(FileCommands, StatusNames) {
   expect_error(3, "none.work", {"status", "none.work"});
 }
 
-// A seed makes the same bytes every time, another one others.
+// The same seed generates the same bytes, another seed different ones.
 TEST_F(FileCommands, GenerateIsSeeded) {
   const auto make = [&](const std::string& kind, const std::string& seed) {
     const Json json = run_json({"generate", kind, "g.glb", "--seed", seed, "--triangles", "500"});

@@ -1,4 +1,4 @@
-// What the program says about itself.
+// Tests of --help, --version and mistyped commands.
 #include "tests/cli/command_line.h"
 
 namespace command_line {
@@ -35,8 +35,7 @@ TEST_F(Help, Version) {
   EXPECT_EQ(answer.out.find_first_of("0123456789"), answer.out.find_first_not_of("voxdag "));
 }
 
-// No command, an unknown one, an unknown option, a missing one: invalid input, said on standard
-// error.
+// A missing or unknown command or option is invalid input, reported on standard error.
 TEST_F(Help, MistypedCommandsAreInvalidInput) {
   expect_error(2, "subcommand", {});
   expect_error(2, "", {"biuld"});

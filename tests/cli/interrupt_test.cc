@@ -1,4 +1,4 @@
-// Ctrl-C, and the same command again.
+// Tests that interrupt a build by a signal and then resume it.
 #include <signal.h>
 #include <time.h>
 
@@ -14,7 +14,7 @@ class Interrupt : public CommandLine {
   void SetUp() override {
     ASSERT_EQ(run({"generate", "soup", "s.glb", "--triangles", "3000"}).status, 0);
   }
-  // Runs the build until it has said something and a little longer, then sends a signal.
+  // Runs the build until its first message plus wait_ms, then sends a signal.
   Answer interrupt(int signal, int wait_ms) {
     put(".stderr", "");
     const pid_t pid = start(args_);
@@ -32,9 +32,9 @@ class Interrupt : public CommandLine {
 };
 
 // Either signal stops a build with status 130 and nothing under the final name; the same command
-// then ends with the bytes of a build that was never stopped. A build that was faster than its
-// signal says nothing, but of those that start anew at least one must have been caught.
-TEST_F(Interrupt, StopsAndGoesOn) {
+// then writes the bytes of an uninterrupted build. A build may finish before its signal arrives,
+// but at least one of them must be interrupted.
+TEST_F(Interrupt, StopsAndResumes) {
   std::vector<std::string> clean = args_;
   clean[5] = "clean.vdag";
   ASSERT_EQ(run(clean).status, 0);

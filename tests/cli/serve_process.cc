@@ -27,7 +27,7 @@ ServeProcess::ServeProcess(const std::string& folder, const std::vector<std::str
   std::vector<char*> argv;
   for (std::string& arg : args) argv.push_back(arg.data());
   argv.push_back(nullptr);
-  unlink(log_path_.c_str());  // what an earlier server said is not about this one
+  unlink(log_path_.c_str());  // removes the log of an earlier server
   pid_ = fork();
   if (pid_ == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);  // a test that is killed leaves no server behind

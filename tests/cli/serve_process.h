@@ -1,4 +1,4 @@
-// A `voxdag serve` of a test's own, on a free port of the loopback.
+// A `voxdag serve` process for one test, on a free port of the loopback interface.
 #pragma once
 
 #include <sys/types.h>
@@ -8,10 +8,10 @@
 
 namespace command_line {
 
-// Starts in the constructor, listening when it returns; stops in the destructor at the latest.
+// The server accepts connections when the constructor returns, and is stopped by the destructor.
 class ServeProcess {
  public:
-  // Keeps its data and its log in `folder`.
+  // Stores its data and its log in `folder`.
   explicit ServeProcess(const std::string& folder, const std::vector<std::string>& more = {},
                         const std::string& port = "0");
   ~ServeProcess();
@@ -19,7 +19,7 @@ class ServeProcess {
   ServeProcess& operator=(const ServeProcess&) = delete;
 
   const std::string& url() const { return url_; }  // "" if it did not start
-  // SIGTERM; its exit status.
+  // Sends SIGTERM and returns the exit status.
   int stop();
   std::string log() const;
 

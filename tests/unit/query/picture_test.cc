@@ -42,7 +42,7 @@ VoxelScene block() {
 
 const Placement kFromTheFront{{{8, 9, 24}}, {{8, 8, 8}}, 40};
 
-// Signature, then an IHDR chunk with the picture's size, 8 bits, red, green and blue; IEND last.
+// A PNG file is its signature, an IHDR chunk with the size and format (8 bits, RGB), and IEND last.
 TEST(Picture, IsAPngOfItsSize) {
   Picture picture(123, 45);
   picture.pixel(7, 9)[1] = 200;
@@ -76,7 +76,7 @@ TEST(Renderer, ThreadsDoNotChangeThePicture) {
   EXPECT_EQ(render(block(), kFromTheFront, 1).rgb, render(block(), kFromTheFront, 3).rgb);
 }
 
-// The block is seen in the middle of the picture, lit, before a background that it does not reach.
+// The block is seen in the center of the picture, lit, in front of the background.
 TEST(Renderer, ShowsTheBlockInTheMiddle) {
   const VoxelScene nothing(4, {});
   Picture with = render(block(), kFromTheFront, 2), without = render(nothing, kFromTheFront, 2);
@@ -91,10 +91,10 @@ TEST(Renderer, ShowsTheBlockInTheMiddle) {
   int pixels = 0;
   for (int y = 0; y < 30; ++y)
     for (int x = 0; x < 64; ++x) pixels += differs(x, y);
-  // A cube of edge 4 at distance 14: some 19 pixels wide.
+  // A cube of edge 4 at distance 14 is about 19 pixels wide.
   EXPECT_GT(pixels, 150);
   EXPECT_LT(pixels, 700);
-  // Neither black nor burnt out.
+  // Neither black nor overexposed.
   EXPECT_GT(with.pixel(32, 24)[0], 60);
   EXPECT_LT(with.pixel(32, 24)[0], 250);
 }
@@ -108,7 +108,7 @@ TEST(Renderer, StopsWhenCanceled) {
   EXPECT_THROW(render_picture(dag, kFromTheFront, {}, progress, cancel), Error);
 }
 
-// An error on any thread ends the work and reaches the caller.
+// An error on any thread stops the others and is rethrown to the caller.
 TEST(Renderer, ReportsDamage) {
   VoxelScene scene = block();
   scene.level_words(1).at(1) = 0x7fffffff;

@@ -37,8 +37,8 @@ TEST(RayCaster, HitsAVoxelOfABrick) {
   EXPECT_FALSE(caster.cast({{{-5, 1.5, 3.5}}, {{1, 0, 0}}}, {}, 0, kFar, hit));
 }
 
-// A ray that begins within a voxel hits it at once; one that begins behind it does not turn round;
-// one that may not go so far does not reach it.
+// A ray that begins within a voxel hits it at once; one that begins behind it misses it, and so
+// does one whose t_max is too small.
 TEST(RayCaster, KeepsToItsInterval) {
   const VoxelScene scene(3, {{4, 4, 4}});
   const DagView dag = scene.view();
@@ -73,7 +73,7 @@ double entry(const Ray& ray, const VoxelScene::Voxel& voxel) {
   return in <= out ? in : kFar;
 }
 
-// Against every voxel asked one by one, from within and from without, in all directions.
+// Compares with an intersection of every voxel, for rays from inside and outside in all directions.
 TEST(RayCaster, AgreesWithTryingEveryVoxel) {
   constexpr uint64_t kSeed = 20240601;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
@@ -102,8 +102,8 @@ TEST(RayCaster, AgreesWithTryingEveryVoxel) {
   EXPECT_GT(hits, 300);
 }
 
-// A wall one voxel thick in a grid of 131072^3 has no cracks: rays through edges and corners of
-// cells of all sizes, flat ones and steep ones, all end on it.
+// A wall one voxel thick in a grid of 131072^3 has no cracks: rays at all angles through edges and
+// corners of cells of all sizes end on it.
 TEST(RayCaster, SeesNoCracksAtHighResolution) {
   constexpr uint64_t kSeed = 7;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
@@ -136,7 +136,7 @@ TEST(RayCaster, SeesNoCracksAtHighResolution) {
   }
 }
 
-// Cells no larger than the cone count as a whole; with distance the cone takes in larger ones.
+// A cell no larger than the cone is hit as a whole; the cone grows with distance.
 TEST(RayCaster, EndsAtTheConesWidth) {
   const VoxelScene scene(6, {{63, 63, 63}});
   const DagView dag = scene.view();
@@ -152,7 +152,7 @@ TEST(RayCaster, EndsAtTheConesWidth) {
   EXPECT_EQ(hit.depth, 1u);
 }
 
-// A ray's way through a damaged file ends in an error, never beyond the words.
+// A damaged file is an error; no word outside a level is read.
 TEST(RayCaster, RefusesOffsetsOutsideALevel) {
   const Ray ray{{{-1, 0.5, 0.5}}, {{1, 0, 0}}};
   const auto code_of = [&](uint32_t level, size_t word, uint32_t value) {

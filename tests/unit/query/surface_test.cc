@@ -28,7 +28,7 @@ std::set<VoxelScene::Voxel> shell(const VoxelScene::Voxel& low, const VoxelScene
   return voxels;
 }
 
-// The normal of a wall is its own, on the side that is looked at, not the ray's or a cell's.
+// The normal of a wall is perpendicular to it and points to the side that is looked at.
 TEST(Surface, NormalOfAWall) {
   const VoxelScene scene = VoxelScene::wall(6, 30);
   const DagView dag = scene.view();
@@ -42,8 +42,8 @@ TEST(Surface, NormalOfAWall) {
   }
 }
 
-// Stairs of single voxels are a slope of 45 degrees, when a voxel is as small as a pixel; when it
-// is many pixels large, they are stairs.
+// Stairs of single voxels are shown as a slope of 45 degrees if a voxel is as small as a pixel, and
+// as stairs if it is many pixels large.
 TEST(Surface, StairsAreASlopeFromAfar) {
   std::set<VoxelScene::Voxel> voxels;
   for (int64_t x = 0; x < 32; ++x)
@@ -58,7 +58,7 @@ TEST(Surface, StairsAreASlopeFromAfar) {
   EXPECT_LT(degrees_between(s.normal, {{0, 1, 0}}), 0.1);
 }
 
-// A lone voxel has no plane: the face that was entered serves.
+// Too few cells to fit a plane: a lone voxel has the normal of the face that the ray entered.
 TEST(Surface, ALoneVoxelShowsItsFace) {
   const VoxelScene scene(4, {{7, 7, 7}});
   const DagView dag = scene.view();
@@ -67,7 +67,7 @@ TEST(Surface, ALoneVoxelShowsItsFace) {
   EXPECT_LT(degrees_between(s.normal, {{0, 1, 0}}), 0.1);
 }
 
-// Shared words, damaged or not, are walked once for the box: exact here, where cells are voxels.
+// The box is exact in a grid this small, where its cells are voxels.
 TEST(Bounds, AreTheOccupiedVoxels) {
   const VoxelScene scene(5, {{3, 9, 30}, {20, 10, 1}, {4, 4, 4}});
   const Box box = occupied_box(scene.view());
@@ -80,9 +80,10 @@ TEST(Bounds, AreTheOccupiedVoxels) {
   EXPECT_EQ(occupied_points(scene.view()).size(), 3u);
 }
 
-// A thing is looked at from outside; a furnished room in a house with outer walls from within.
+// The automatic view of an object is from outside, that of a furnished room with outer walls from
+// within.
 TEST(Views, RoomsAreSeenFromWithin) {
-  const VoxelScene thing(5, shell({8, 8, 8}, {23, 23, 23}));
+  const VoxelScene object(5, shell({8, 8, 8}, {23, 23, 23}));
   auto voxels = shell({0, 0, 0}, {63, 63, 63});
   for (const auto& v : shell({6, 6, 6}, {57, 57, 57})) voxels.insert(v);
   for (const auto& v : shell({20, 7, 20}, {40, 18, 40})) voxels.insert(v);
@@ -91,13 +92,13 @@ TEST(Views, RoomsAreSeenFromWithin) {
   const auto eye_is_within = [](const VoxelScene& scene) {
     const DagView dag = scene.view();
     const Box box = occupied_box(dag);
-    const Vec eye = named_view("auto", RayCaster(dag), dag, box, 1.5, {}).eye;
+    const Vec eye = named_view("auto", dag, 1.5, {}).eye;
     bool within = true;
     for (int axis = 0; axis < 3; ++axis)
       within = within && eye[axis] > box.low[axis] && eye[axis] < box.high[axis];
     return within;
   };
-  EXPECT_FALSE(eye_is_within(thing));
+  EXPECT_FALSE(eye_is_within(object));
   EXPECT_TRUE(eye_is_within(room));
 }
 

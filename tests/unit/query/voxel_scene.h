@@ -1,5 +1,4 @@
-// DAGs for tests of the renderer, without a file: from a set of voxels, or a wall in a grid of any
-// size by hand.
+// DAGs in memory for tests of query/: from a set of voxels, or a wall in a grid of any size.
 #pragma once
 
 #include <array>
@@ -10,7 +9,7 @@
 
 #include "query/dag_view.h"
 
-// An octree (no two nodes are shared) of the voxels for which `set` says so.
+// An octree, without shared nodes, of a set of voxels.
 class VoxelScene {
  public:
   using Voxel = std::array<int64_t, 3>;
@@ -20,8 +19,7 @@ class VoxelScene {
     if (!voxels.empty()) add(0, {voxels.begin(), voxels.end()});
   }
 
-  // The voxels with x == `plane`, all of them: one node a level, used by all four of its parent's
-  // children.
+  // All voxels with x == `plane`: one node per level, shared by the four children of its parent.
   static VoxelScene wall(uint32_t grid_levels, int64_t plane) {
     VoxelScene scene(grid_levels, {});
     for (uint32_t level = 0; level + 2 < grid_levels; ++level) {
@@ -44,7 +42,7 @@ class VoxelScene {
   }
 
  private:
-  // The word offset of the new node or brick; `voxels` are the ones in its cube.
+  // Returns the word offset of the new node or brick; `voxels` are those in its cube.
   uint32_t add(uint32_t level, const std::vector<Voxel>& voxels) {
     if (level + 2 == grid_levels_) return add_brick(voxels);
     const uint32_t shift = grid_levels_ - 1 - level;

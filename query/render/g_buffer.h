@@ -1,0 +1,45 @@
+// The G-buffer: what each pixel of a picture sees and the light there, before tone mapping, with a
+// filter that removes sampling noise.
+#pragma once
+
+#include <vector>
+
+#include "query/vec.h"
+
+namespace voxdag::query {
+
+struct Float3 {
+  float x = 0, y = 0, z = 0;
+  Float3() = default;
+  Float3(const Vec& v)
+      : x(static_cast<float>(v[0])), y(static_cast<float>(v[1])), z(static_cast<float>(v[2])) {}
+  operator Vec() const { return {{x, y, z}}; }
+};
+
+// Means over a pixel's samples: `floor` over those that met no surface, the rest over the others.
+struct GBufferPixel {
+  float coverage = 0;  // share of the samples that met a surface
+  Float3 offset;       // from the eye to the surface, in voxels
+  Float3 normal;       // unit vector
+  Float3 sky;          // red, green and blue light from the sky; 1 is an open sky
+  float sun = 0;       // share of the sun that is visible
+  float floor = 1;     // brightness of the floor; 1 without a shadow
+};
+
+struct GBuffer {
+  int width, height;
+  std::vector<GBufferPixel> pixels;  // rows from the top
+
+  GBuffer(int w, int h)
+      : width(w), height(h), pixels(static_cast<size_t>(w) * static_cast<size_t>(h)) {}
+  GBufferPixel& at(int x, int y) {
+    return pixels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
+  }
+
+  // The pixel with its sky light averaged over the neighbors on the same plane, or its floor light
+  // over the floor; sun and normal, which have finer detail, over fewer neighbors. `pixel_spread`
+  // is the width of a pixel at distance 1. Does not modify the buffer.
+  GBufferPixel smoothed(int x, int y, double pixel_spread);
+};
+
+}  // namespace voxdag::query
