@@ -194,6 +194,7 @@ class Build {
     start_or_resume(scene);
 
     std::vector<StoredSubvolume> leaves = store_->leaves();
+    report_subvolumes(leaves, scene.grid.levels, context_.progress);
     const size_t leaf_count = leaves.size();
     std::erase_if(leaves,
                   [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/base/error.h"
+#include "scheduler/job/job_progress.h"
 #include "scheduler/triangles/distribute.h"
 
 namespace voxdag {
@@ -92,6 +93,7 @@ class Worker {
         store_(store),
         files_(context.files),
         cancel_(context.cancel),
+        progress_(context.progress),
         share_(share_bytes, &budget),
         journal_(std::make_unique<CommitQueue>(
             store,
@@ -118,7 +120,7 @@ class Worker {
       if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
         bins_.drop(queued.bin);
         ++counts.cached;
-        journal_->built(copied, queued.kept);
+        record_built(copied, queued.kept);
         return {};
       }
     }
@@ -134,7 +136,7 @@ class Worker {
       built.artifact = artifact.finish({&root, 1});
       if (key) share(*key, built.artifact);
     }
-    journal_->built(built, queued.kept);
+    record_built(built, queued.kept);
     return {};
   }
   CommitQueue& journal() { return *journal_; }
@@ -143,6 +145,13 @@ class Worker {
   ExecutorCounts counts;
 
  private:
+  void record_built(const StoredSubvolume& built, std::optional<BinId> kept) {
+    journal_->built(built, kept);
+    SubvolumeStatus status = status_of(built, options_.grid_levels);
+    status.built = true;
+    progress_.subvolume_built(status);
+  }
+
   void share(const std::string& key, const ArtifactRef& artifact) {
     segment_.flush();
     if (!written_segment_)
@@ -175,7 +184,12 @@ class Worker {
       queued.back().subvolume.weight = subvolume.weight / 8;
     }
     const std::vector<SubvolumeId> ids = store_.record_split(subvolume, cubes);
-    for (size_t i = 0; i < ids.size(); ++i) queued[i].subvolume.id = ids[i];
+    std::vector<SubvolumeStatus> statuses;
+    for (size_t i = 0; i < ids.size(); ++i) {
+      queued[i].subvolume.id = ids[i];
+      statuses.push_back(status_of(queued[i].subvolume, options_.grid_levels));
+    }
+    progress_.subvolume_split(subvolume.id, statuses);
     if (whole.kept) {
       bins_.hold(*whole.kept, queued.size());
       bins_.release(*whole.kept);
@@ -189,6 +203,7 @@ class Worker {
   JobStore& store_;
   FileSystem& files_;
   const CancelToken& cancel_;
+  Progress& progress_;
   MemoryBudget share_;
   std::unique_ptr<CommitQueue> journal_;
   SegmentWriter& segment_;

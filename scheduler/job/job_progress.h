@@ -21,6 +21,13 @@ class JobProgress : public Progress {
   void set_total(uint64_t total) override;
   void end_stage() override;
   void warn(std::string_view message) override { shown_.warn(message); }
+  void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override {
+    shown_.set_subvolumes(resolution, all);
+  }
+  void subvolume_built(const SubvolumeStatus& built) override { shown_.subvolume_built(built); }
+  void subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) override {
+    shown_.subvolume_split(id, parts);
+  }
   void record_failure(const Error& error);
   // The store is about to close: only passes on from here.
   void detach();
@@ -36,5 +43,11 @@ class JobProgress : public Progress {
   ProgressSnapshot snapshot_;
   double last_recorded_s_ = 0;
 };
+
+// A subvolume as Progress reports it.
+SubvolumeStatus status_of(const StoredSubvolume& subvolume, uint32_t grid_levels);
+// Reports all subvolumes of a build.
+void report_subvolumes(std::span<const StoredSubvolume> all, uint32_t grid_levels,
+                       Progress& progress);
 
 }  // namespace voxdag
