@@ -159,6 +159,7 @@ class Build {
     if (counts.triangles == 0)
       context_.progress.warn("the scene has no triangles in the grid: the file will have no nodes");
     start_or_resume_job(scene);
+    report_subvolumes(jobs_->leaves(), scene.state.grid.levels, context_.progress);
     const std::vector<StoredSubvolume> planned = planned_leaves(*jobs_);
     report_.subvolumes_reused = jobs_->leaves().size() - planned.size();
     if (!planned.empty()) build_subvolumes_of(scene, planned);

@@ -1,6 +1,6 @@
 #include "server/assets.h"
 
-#include "server/api/digest.h"
+#include "core/format/checksum.h"
 
 namespace voxdag::server {
 namespace {

@@ -1,4 +1,4 @@
-// Files that are compiled into the program: the dashboard's and openapi.json (embed.cmake).
+// Files that are compiled into the program: the dashboard's and openapi.json (see embed.cmake).
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@ struct EmbeddedFile {
   const unsigned char* bytes;
   size_t size;
 };
-// Ends with a nameless one.
+// The last one has no name and no bytes.
 extern const EmbeddedFile kEmbeddedFiles[];
 
 struct Asset {
@@ -21,7 +21,7 @@ struct Asset {
   std::string type;  // for Content-Type
   std::string etag;
 };
-// No value for a name that is not there.
+// No value for an unknown name.
 std::optional<Asset> find_asset(std::string_view name);
 
 }  // namespace voxdag::server

@@ -12,31 +12,31 @@ namespace voxdag::server {
 
 struct JobLimits {
   unsigned max_concurrent = 1;
-  uint64_t memory_bytes = 0;  // of all running jobs together; 0: half of what the machine allows
-  unsigned threads = 0;       // of each job unless it says less; 0: all cores
-  uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // below it nothing is begun
+  uint64_t memory_bytes = 0;  // of all running jobs together; 0 for half of what the machine allows
+  unsigned threads = 0;       // of a job that does not say; 0 for all cores
+  uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // with less, no job starts
   int nice = 5;                                      // of the processes that build
-  unsigned attempts = 5;
-  double backoff_s = 15;  // before the second attempt; doubles each time
+  unsigned max_attempts = 5;
+  double backoff_s = 15;  // before the second attempt; doubles for each further one
   double max_backoff_s = 900;
-  double grace_s = 8;       // for a build to stop at a checkpoint
-  uint64_t queued = 20000;  // jobs that have not ended
-  double plan_s = 120;      // for a dry run
+  double stop_timeout_s = 8;    // for a build to stop at a checkpoint before it is killed
+  uint64_t max_queued = 20000;  // jobs that have not ended
+  double plan_timeout_s = 120;  // for a dry run
   unsigned max_concurrent_plans = 1;
 };
 
 struct TransferLimits {
-  uint64_t scene_bytes = uint64_t{64} << 30;
-  uint64_t body_bytes = 64 << 10;  // of JSON
-  size_t transfers = 64;           // uploads and downloads at a time
-  size_t event_streams = 256;
-  double requests_per_s = 200;  // of one address, with bursts of twice that; the loopback is exempt
+  uint64_t max_scene_bytes = uint64_t{64} << 30;
+  uint64_t max_body_bytes = 64 << 10;  // of JSON
+  size_t max_concurrent = 64;          // uploads and downloads
+  size_t max_event_streams = 256;
+  double max_requests_per_s = 200;  // per address, twice that in bursts; the loopback is exempt
 };
 
 struct Retention {
-  double finished_days = 30;  // ended jobs and their files
+  double finished_days = 30;  // for jobs that have ended, and their files
   uint64_t finished_jobs = 10000;
-  double upload_days = 2;  // parts of scenes that wait for the rest
+  double upload_days = 2;  // for unfinished uploads
 };
 
 struct ServerConfig {
@@ -44,16 +44,16 @@ struct ServerConfig {
   std::string data_folder;
   std::string token_file;                // "" for none: loopback only
   std::vector<std::string> scene_roots;  // absolute folders whose scenes jobs may name by path
-  std::vector<std::string> hosts;        // names that a Host header may have beside the loopback's
+  std::vector<std::string> hosts;        // names that a Host header may have besides the loopback's
   std::string program;                   // that runs jobs; "" for this one
   JobLimits jobs;
   TransferLimits transfers;
   Retention retention;
-  double drain_s = 10;  // for answers in flight when the service stops
+  double drain_timeout_s = 10;  // for requests in progress when the service stops
 };
 
-// Adds what a JSON file says. Throws Error{kInvalidInput} naming the file and the member that is
-// unknown or has a wrong value.
+// Applies a JSON file to `config`. Throws Error{kInvalidInput} naming the file and the member that
+// is unknown or has a wrong value.
 void read_config(FileSystem& files, const std::string& path, ServerConfig& config);
 // Throws Error{kInvalidInput} if the parts do not go together: no data folder, an address that is
 // not the loopback without tokens, a certificate without its key.

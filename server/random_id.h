@@ -1,11 +1,11 @@
-// Names that nobody can guess or meet twice.
+// Names that cannot be guessed and do not occur twice.
 #pragma once
 
 #include <string>
 
 namespace voxdag::server {
 
-// 16 hex digits from the system's source of randomness.
+// 16 hex digits (64 bits) from the system's random number generator.
 std::string random_id();
 
 }  // namespace voxdag::server

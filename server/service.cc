@@ -17,9 +17,9 @@
 namespace voxdag::server {
 namespace {
 
-constexpr std::chrono::minutes kHousekeepingEvery{10};
+constexpr std::chrono::minutes kCleanUpInterval{10};
 constexpr double kSecondsPerDay = 86400;
-constexpr size_t kLongestLogged = 200;
+constexpr size_t kMaxLoggedChars = 200;
 
 ServerConfig checked(ServerConfig config, FileSystem& files) {
   check_config(config);
@@ -27,7 +27,7 @@ ServerConfig checked(ServerConfig config, FileSystem& files) {
   return config;
 }
 
-std::unique_ptr<FileLock> take_folder(FileSystem& files, const std::string& folder) {
+std::unique_ptr<FileLock> lock_folder(FileSystem& files, const std::string& folder) {
   auto lock = files.try_lock(folder + "/lock");
   if (!lock)
     throw Error(ErrorCode::kInvalidInput, folder + ": another service uses this data folder");
@@ -42,7 +42,7 @@ class Service::Parts {
       : config_(checked(std::move(given), files)),
         files_(files),
         log_(std::move(log)),
-        lock_(take_folder(files, config_.data_folder)),
+        lock_(lock_folder(files, config_.data_folder)),
         gate_(config_, files),
         queue_(config_.data_folder + "/queue.db"),
         scenes_(files, config_.data_folder + "/scenes"),
@@ -72,14 +72,14 @@ class Service::Parts {
   }
 
   void run() {
-    // Builds wind down while answers in flight finish.
-    std::thread keeper([this] {
-      keep_house();
+    // Builds stop while requests in progress finish.
+    std::thread housekeeper([this] {
+      clean_up_periodically();
       dispatcher_.stop();
     });
-    http_.run(config_.drain_s);
+    http_.run(config_.drain_timeout_s);
     stop();
-    keeper.join();
+    housekeeper.join();
   }
 
   void stop() {
@@ -88,13 +88,13 @@ class Service::Parts {
       draining_ = true;
     }
     stop_wake_.notify_all();
-    queue_.announce();  // event streams wait for it
+    queue_.announce();  // wakes event streams
     http_.stop();
   }
 
  private:
-  // Until the service stops.
-  void keep_house() {
+  // Runs until the service stops.
+  void clean_up_periodically() {
     std::unique_lock lock(stop_mutex_);
     while (!draining_) {
       try {
@@ -103,7 +103,7 @@ class Service::Parts {
       } catch (const Error& error) {
         log_("cannot remove old uploads: " + error.message());
       }
-      stop_wake_.wait_for(lock, kHousekeepingEvery, [this] { return draining_.load(); });
+      stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });
     }
   }
 
@@ -113,21 +113,21 @@ class Service::Parts {
     try {
       response = router_.route(request, gate_);
     } catch (const Problem& problem) {
-      note(request, problem.status, start);
+      record(request, problem.status, start);
       throw;
     } catch (...) {
-      note(request, 500, start);
+      record(request, 500, start);
       throw;
     }
-    note(request, response.status, start);
+    record(request, response.status, start);
     return response;
   }
 
-  // A line for every change that was tried, and counters for everything.
-  void note(const Request& request, int status, double start) {
+  // Counts every request, and logs those that try to change something.
+  void record(const Request& request, int status, double start) {
     metrics_.count_request(status, wall_seconds() - start);
     if (request.method == "GET" || request.method == "HEAD") return;
-    log_("audit " + request.method + " " + request.target.path.substr(0, kLongestLogged) +
+    log_("audit " + request.method + " " + request.target.path.substr(0, kMaxLoggedChars) +
          " status=" + std::to_string(status) +
          " who=" + (request.caller.empty() ? "-" : request.caller) + " from=" + request.peer +
          " request=" + request.id);

@@ -1,4 +1,4 @@
-// The service as one object: everything that `voxdag serve` is, given a configuration.
+// The service as one object: what `voxdag serve` runs, given a configuration. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -16,15 +16,15 @@ class Service {
   // Writes a line of the log: what changed, by whom, and what went wrong.
   using Log = std::function<void(const std::string& line)>;
 
-  // Checks the configuration, takes the data folder (one service at a time), opens the stores,
-  // carries on with the jobs of the last service, and listens. Throws Error.
+  // Checks the configuration, locks the data folder (one service at a time), opens the stores,
+  // resumes the jobs of the last service, and listens. Throws Error.
   Service(ServerConfig config, FileSystem& files, Log log);
   ~Service();
 
   int port() const;
   // "http://127.0.0.1:8080"
   std::string url() const;
-  // Serves until stop(): then builds stop at a checkpoint, answers in flight finish, and it
+  // Serves until stop(). Then builds stop at a checkpoint, requests in progress finish, and it
   // returns.
   void run();
   // From any thread.

@@ -5,7 +5,7 @@
 
 #include "cli/terminal/progress_bar.h"
 #include "core/format/checksum.h"
-#include "server/api/digest.h"
+#include "server/http/digest_field.h"
 
 namespace voxdag::cli {
 namespace {

@@ -1,11 +1,25 @@
-// How long work tells the world how far it is. Stages follow one another; within a stage any
-// thread may advance. Implementations (a terminal's bar, plain lines, the service) are thread-safe.
+// How long work reports its progress. Stages follow one another; within a stage any thread may
+// advance. Implementations (a terminal's bar, plain lines, the service) are thread-safe.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 namespace voxdag {
+
+// A subvolume of a build, for those who show how far it is.
+struct SubvolumeStatus {
+  int64_t id = 0;
+  std::array<uint64_t, 3> corner{};  // the low one, in voxels of the grid
+  uint64_t edge = 0;                 // in voxels
+  bool built = false;
+  // What a built subvolume consists of.
+  uint64_t voxels = 0;
+  uint64_t nodes = 0;
+  uint64_t bytes = 0;
+};
 
 class Progress {
  public:
@@ -19,9 +33,18 @@ class Progress {
   virtual void end_stage() = 0;
   // A warning that a user should read, one sentence.
   virtual void warn(std::string_view message) = 0;
+
+  // All subvolumes of the build, those that an earlier run built included; they replace what was
+  // reported before.
+  virtual void set_subvolumes(uint64_t /*resolution*/, std::span<const SubvolumeStatus> /*all*/) {}
+  virtual void subvolume_built(const SubvolumeStatus& /*built*/) {}
+  // `parts` replace the subvolume `id`.
+  virtual void subvolume_split(int64_t /*id*/, std::span<const SubvolumeStatus> /*parts*/) {}
+  // What the build uses now: resident memory, and disk space of the work folder.
+  virtual void set_usage(uint64_t /*memory_bytes*/, uint64_t /*disk_bytes*/) {}
 };
 
-// Says nothing.
+// Ignores everything.
 class NoProgress : public Progress {
  public:
   void begin_stage(std::string_view, uint64_t, std::string_view) override {}

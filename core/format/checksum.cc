@@ -78,4 +78,10 @@ std::string Sha256::finish() {
   return hex_text({digest, size});
 }
 
+std::string sha256_hex(std::string_view text) {
+  Sha256 digest;
+  digest.add(std::as_bytes(std::span(text)));
+  return digest.finish();
+}
+
 }  // namespace voxdag

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace voxdag {
 
@@ -49,5 +50,7 @@ class Sha256 {
   struct Context;
   std::unique_ptr<Context> context_;
 };
+// The SHA-256 of a text: 64 lower-case hex digits.
+std::string sha256_hex(std::string_view text);
 
 }  // namespace voxdag

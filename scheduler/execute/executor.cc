@@ -8,8 +8,9 @@
 #include <thread>
 
 #include "core/base/error.h"
-#include "scheduler/memory_plan.h"
 #include "core/format/artifact/artifact_writer.h"
+#include "scheduler/job/job_progress.h"
+#include "scheduler/memory_plan.h"
 #include "scheduler/triangles/partition.h"
 
 namespace voxdag {
@@ -82,6 +83,7 @@ class Worker {
         jobs_(jobs),
         files_(context.files),
         cancel_(context.cancel),
+        progress_(context.progress),
         share_(share_bytes, &budget),
         commits_(std::make_unique<CommitQueue>(
             jobs,
@@ -106,7 +108,7 @@ class Worker {
       StoredSubvolume copied = subvolume;
       if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
         ++counts.cached;
-        commits_->add_built(copied, queued.bin);
+        record_built(copied, queued.bin);
         return {};
       }
     }
@@ -121,7 +123,7 @@ class Worker {
       built.artifact = artifact.finish({&root, 1});
       if (key) add_to_cache(*key, built.artifact);
     }
-    commits_->add_built(built, queued.bin);
+    record_built(built, queued.bin);
     return {};
   }
   std::unique_ptr<CommitQueue> release_commits() { return std::move(commits_); }
@@ -129,6 +131,13 @@ class Worker {
   ExecutorCounts counts;
 
  private:
+  void record_built(const StoredSubvolume& built, BinId bin) {
+    commits_->add_built(built, bin);
+    SubvolumeStatus status = status_of(built, options_.grid_levels);
+    status.built = true;
+    progress_.subvolume_built(status);
+  }
+
   void add_to_cache(const std::string& key, const ArtifactRef& artifact) {
     segment_.flush();
     if (!written_segment_)
@@ -164,7 +173,12 @@ class Worker {
       queued.back().subvolume.weight = subvolume.weight / 8;
     }
     const std::vector<SubvolumeId> ids = jobs_.record_split(subvolume, cubes);
-    for (size_t i = 0; i < ids.size(); ++i) queued[i].subvolume.id = ids[i];
+    std::vector<SubvolumeStatus> statuses;
+    for (size_t i = 0; i < ids.size(); ++i) {
+      queued[i].subvolume.id = ids[i];
+      statuses.push_back(status_of(queued[i].subvolume, options_.grid_levels));
+    }
+    progress_.subvolume_split(subvolume.id, statuses);
     triangles_.release(whole.bin);
     ++counts.split;
     return queued;
@@ -175,6 +189,7 @@ class Worker {
   JobStore& jobs_;
   FileSystem& files_;
   const CancelToken& cancel_;
+  Progress& progress_;
   MemoryBudget share_;
   std::unique_ptr<CommitQueue> commits_;
   SegmentWriter& segment_;

@@ -28,6 +28,7 @@ void JobProgress::write(ProgressSnapshot snapshot) {
   snapshot.updated_s = unix_seconds();
   snapshot.memory_bytes = resident_bytes();
   snapshot.disk_bytes = work_.bytes();
+  shown_.set_usage(snapshot.memory_bytes, snapshot.disk_bytes);
   try {
     store_->set_progress(snapshot);
   } catch (const Error&) {
@@ -71,6 +72,27 @@ void JobProgress::record_failure(const Error& error) {
 void JobProgress::detach() {
   std::lock_guard lock(store_mutex_);
   store_ = nullptr;
+}
+
+SubvolumeStatus status_of(const StoredSubvolume& subvolume, uint32_t grid_levels) {
+  SubvolumeStatus status;
+  status.id = subvolume.id;
+  status.edge = static_cast<uint64_t>(subvolume.cube.edge_voxels(grid_levels));
+  for (int a = 0; a < 3; ++a) status.corner[a] = subvolume.cube.position[a] * status.edge;
+  status.built = subvolume.state == SubvolumeState::kBuilt;
+  status.voxels = subvolume.summary.voxels;
+  status.nodes = subvolume.summary.dag_nodes;
+  status.bytes = subvolume.artifact.bytes;
+  return status;
+}
+
+void report_subvolumes(std::span<const StoredSubvolume> all, uint32_t grid_levels,
+                       Progress& progress) {
+  std::vector<SubvolumeStatus> statuses;
+  statuses.reserve(all.size());
+  for (const StoredSubvolume& subvolume : all)
+    statuses.push_back(status_of(subvolume, grid_levels));
+  progress.set_subvolumes(uint64_t{1} << grid_levels, statuses);
 }
 
 }  // namespace voxdag

@@ -24,6 +24,13 @@ class JobProgress : public Progress {
   void set_total(uint64_t total) override;
   void end_stage() override;
   void warn(std::string_view message) override { shown_.warn(message); }
+  void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override {
+    shown_.set_subvolumes(resolution, all);
+  }
+  void subvolume_built(const SubvolumeStatus& built) override { shown_.subvolume_built(built); }
+  void subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) override {
+    shown_.subvolume_split(id, parts);
+  }
   void record_failure(const Error& error);
   // From here on progress is only passed on: the store is about to close.
   void detach();
@@ -42,5 +49,11 @@ class JobProgress : public Progress {
   std::mutex store_mutex_;  // guards the store, locked without mutex_
   JobStore* store_;
 };
+
+// A subvolume as Progress reports it.
+SubvolumeStatus status_of(const StoredSubvolume& subvolume, uint32_t grid_levels);
+// Reports all subvolumes of a build.
+void report_subvolumes(std::span<const StoredSubvolume> all, uint32_t grid_levels,
+                       Progress& progress);
 
 }  // namespace voxdag

@@ -26,8 +26,8 @@ struct Context {
   Metrics& metrics;
   const std::atomic<bool>& draining;
 
-  ConcurrencyLimiter event_streams{config.transfers.event_streams};
-  ConcurrencyLimiter transfers{config.transfers.transfers};
+  ConcurrencyLimiter event_streams{config.transfers.max_event_streams};
+  ConcurrencyLimiter transfers{config.transfers.max_concurrent};
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans};
   // Held while a job begins to need a scene, or a scene goes or changes that none may need.
   std::mutex scene_use = {};

@@ -29,7 +29,7 @@ class TemporaryTask {
   FileSystem& files_;
 };
 
-Problem problem_of(const Report& failure) {
+Problem problem_of(const Failure& failure) {
   for (const ErrorCode code :
        {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kUnsupportedVersion,
         ErrorCode::kIo, ErrorCode::kNoSpace, ErrorCode::kOutOfMemory, ErrorCode::kDevice,
@@ -51,14 +51,15 @@ Response dry_run(Context& context, const JobRequest& request) {
   ChildProcess child(
       {{program, "run-job", place.folder.path}, place.folder.log(), context.config.jobs.nice});
   std::string estimate;
-  std::optional<Report> failure;
-  const double deadline = wall_seconds() + context.config.jobs.plan_s;
+  std::optional<Failure> failure;
+  const double deadline = wall_seconds() + context.config.jobs.plan_timeout_s;
   bool too_long = false;
   child.read_lines(
       [&](std::string_view line) {
-        const auto report = parse_report(line);
-        if (report && report->kind == Report::Kind::kResult) estimate = report->text;
-        if (report && report->kind == Report::Kind::kError) failure = report;
+        const auto message = decode(line);
+        if (!message) return;
+        if (const auto* result = std::get_if<Result>(&*message)) estimate = result->json;
+        if (const auto* reported = std::get_if<Failure>(&*message)) failure = *reported;
       },
       [&] { return too_long = too_long || context.draining || wall_seconds() > deadline; });
   child.wait();

@@ -76,7 +76,7 @@ void EventFeed::add_changes(std::string& text) {
     last_number_ = event.number;
   }
   const auto live = dispatcher_.live(id_);
-  text += event_text("job", job_json(*job, live.get(), 0, config_.jobs.attempts), last_number_);
+  text += event_text("job", job_json(*job, live.get(), 0, config_.jobs.max_attempts), last_number_);
   if (has_ended(job->state)) {
     text += event_text("end", "{\"state\":\"" + std::string(state_name(job->state)) + "\"}");
     ended_ = true;

@@ -1,8 +1,8 @@
 #include "server/api/file_answer.h"
 
-#include "server/api/digest.h"
 #include "server/api/problem.h"
 #include "server/http/byte_range.h"
+#include "server/http/digest_field.h"
 #include "server/random_id.h"
 
 namespace voxdag::server {

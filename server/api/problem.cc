@@ -2,37 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "server/request_error.h"
+
 namespace voxdag::server {
-namespace {
-
-const char* public_text(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kInvalidInput:
-      return "the request breaks a rule";
-    case ErrorCode::kNotFound:
-      return "what was asked for is not there";
-    case ErrorCode::kCorrupt:
-      return "stored data fail their checks; the service's log says which";
-    case ErrorCode::kUnsupportedVersion:
-      return "a format version that this service does not read";
-    case ErrorCode::kIo:
-      return "the system refused to read or write; the service's log says what";
-    case ErrorCode::kNoSpace:
-      return "the service's disk is full";
-    case ErrorCode::kOutOfMemory:
-      return "the service has not enough memory for this";
-    case ErrorCode::kDevice:
-      return "the GPU or its driver failed";
-    case ErrorCode::kCanceled:
-      return "stopped before it was done";
-    case ErrorCode::kLimit:
-      return "a limit is exceeded";
-  }
-  return "";
-}
-
-}  // namespace
-
 Problem problem(ErrorCode code, std::string detail) {
   return Problem(http_status(code), error_name(code), std::move(detail));
 }

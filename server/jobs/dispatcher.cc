@@ -7,36 +7,30 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "server/api/problem.h"
-#include "server/jobs/settlement.h"
+#include "server/jobs/job_outcome.h"
 
 namespace voxdag::server {
 namespace {
 
 constexpr const char* kPreview = "preview";
-constexpr double kPreview_s = 900;
-constexpr int kPreviewNicer = 5;  // than builds
-constexpr double kLongestSleep_s = 1;
-constexpr double kRetireEvery_s = 300;
+constexpr double kMaxPreview_s = 900;
+constexpr int kPreviewNice = 5;  // on top of the builds'
+constexpr double kMaxSleep_s = 1;
+constexpr double kNoTimeLimit_s = 1e9;
+constexpr double kRetireInterval_s = 300;
 constexpr double kSecondsPerDay = 86400;
-
-Problem wrong_state(const Job& job, const std::string& detail) {
-  Problem problem = conflict(detail);
-  problem.state = state_name(job.state);
-  return problem;
-}
 
 }  // namespace
 
 Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue,
-                       TaskResolver& tasks, Log log, OnSettled on_settled)
+                       TaskResolver& tasks, Log log, OnRunEnded on_run_ended)
     : config_(config),
       files_(files),
       queue_(queue),
       tasks_(tasks),
       log_(std::move(log)),
-      on_settled_(std::move(on_settled)),
-      // Still this program if another is put in its place under the same name.
+      on_run_ended_(std::move(on_run_ended)),
+      // Still this program after another was installed under the same name.
       program_(config.program.empty() ? "/proc/self/exe" : config.program) {
   files_.make_directories(config_.data_folder + "/jobs");
   for (const Job& job : queue_.recover()) log_("job " + job.id + " canceled");
@@ -50,8 +44,8 @@ JobFolder Dispatcher::folder(const std::string& id) const {
   return {config_.data_folder + "/jobs/" + id};
 }
 
-// Deleting a job takes its row away first, canceling one changes its state first: what a crash left
-// of the rest goes here.
+// Deleting a job removes its row first, and canceling one changes its state first. What a crash
+// then left of its files is removed here.
 void Dispatcher::clean_up_folders() {
   for (const DirectoryEntry& entry : files_.list(config_.data_folder + "/jobs")) {
     const auto job = queue_.find(entry.name);
@@ -90,7 +84,7 @@ void Dispatcher::dispatch() {
     } catch (const Error& error) {
       log_("cannot remove old jobs: " + error.message());
     }
-    queue_.wait_for_change(seen, kLongestSleep_s);
+    queue_.wait_for_change(seen, kMaxSleep_s);
   }
 }
 
@@ -128,8 +122,7 @@ bool Dispatcher::start_next_job() {
   if (running_jobs >= config_.jobs.max_concurrent) return false;
   const auto job = queue_.next(unix_seconds(), present);
   if (!job) return false;
-  const uint64_t asked = parse_job_request(job->request).spec.run.memory_bytes;
-  const uint64_t needed = asked ? asked : tasks_.memory_bytes() / config_.jobs.max_concurrent;
+  const uint64_t needed = tasks_.memory_of(parse_job_request(job->request));
   if (running_jobs > 0 && memory + needed > tasks_.memory_bytes()) return false;
   if (files_.free_space(config_.data_folder) < config_.jobs.min_free_disk_bytes) return false;
   const Job started = queue_.change(job->id, [](Job& j) {
@@ -141,8 +134,8 @@ bool Dispatcher::start_next_job() {
   });
   log_("job " + started.id + " running");
   try {
-    begin(started.id, std::make_shared<LiveJob>(started.id, needed),
-          [this, started](LiveJob& live) { run_job(started, live); });
+    start_worker(started.id, std::make_shared<LiveJob>(started.id, needed),
+                 [this, started](LiveJob& live) { run_job(started, live); });
   } catch (const Error&) {
     queue_.change(started.id, [](Job& j) {
       j.state = JobState::kQueued;
@@ -156,12 +149,12 @@ bool Dispatcher::start_next_job() {
 void Dispatcher::start_preview() {
   const auto job = queue_.next_without_preview({});
   if (!job) return;
-  begin(kPreview, std::make_shared<LiveJob>(job->id, 0),
-        [this, job = *job](LiveJob& live) { draw_preview(job, live); });
+  start_worker(kPreview, std::make_shared<LiveJob>(job->id, 0),
+               [this, job = *job](LiveJob& live) { draw_preview(job, live); });
 }
 
-void Dispatcher::begin(const std::string& key, std::shared_ptr<LiveJob> live,
-                       std::function<void(LiveJob&)> work) {
+void Dispatcher::start_worker(const std::string& key, std::shared_ptr<LiveJob> live,
+                              std::function<void(LiveJob&)> work) {
   workers_[key].live = live;
   const bool is_job = key != kPreview;
   if (is_job) {
@@ -193,67 +186,62 @@ void Dispatcher::begin(const std::string& key, std::shared_ptr<LiveJob> live,
 ChildProcess::End Dispatcher::run_child(const ChildProcess::Start& start, LiveJob& live,
                                         double max_s) {
   ChildProcess child(start);
-  bool asked = false;
+  bool stop_sent = false;
   const double started_s = wall_seconds();
   child.read_lines(
       [&](std::string_view line) {
-        const auto report = parse_report(line);
-        if (!report) return;
-        live.take(*report);
+        const auto message = decode(line);
+        if (!message) return;
+        live.apply(*message);
         queue_.announce();
       },
       [&] {
-        const double stop_s = live.stop_asked_s(), now = wall_seconds();
-        if (stop_s > 0 && !asked) child.ask_to_stop();
-        asked = stop_s > 0;
-        return (asked && now > stop_s + config_.jobs.grace_s) || now > started_s + max_s;
+        const double stop_s = live.stop_requested_s(), now = wall_seconds();
+        if (stop_s > 0 && !stop_sent) child.ask_to_stop();
+        stop_sent = stop_s > 0;
+        return (stop_sent && now > stop_s + config_.jobs.stop_timeout_s) || now > started_s + max_s;
       });
   return child.wait();
 }
 
 void Dispatcher::run_job(const Job& job, LiveJob& live) {
   const JobFolder place = folder(job.id);
-  Report failure;
-  failure.kind = Report::Kind::kError;
   ChildProcess::End end;
   try {
     files_.make_directories(place.path);
     write_task(files_, place.task(),
                tasks_.make(parse_job_request(job.request), Task::Kind::kBuild));
-    end = run_child({{program_, "run-job", place.path}, place.log(), config_.jobs.nice}, live, 1e9);
-  } catch (const Problem& problem) {
-    failure.code = problem.code;
-    failure.text = problem.detail;
-    live.take(failure);
+    end = run_child({{program_, "run-job", place.path}, place.log(), config_.jobs.nice}, live,
+                    kNoTimeLimit_s);
+  } catch (const RequestError& error) {
+    live.apply(Failure{error.code(), error.message()});
   } catch (const Error& error) {
     log_("job " + job.id + ": " + error.message());
-    failure.code = error_name(error.code());
-    failure.text = public_problem(error).detail;
-    live.take(failure);
+    live.apply(Failure{error_name(error.code()), public_text(error.code())});
   }
-  settle(job, live, end);
+  record_outcome(job, live, end);
 }
 
-void Dispatcher::settle(const Job& job, LiveJob& live, const ChildProcess::End& end) {
+void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end) {
   for (;;) {
     try {
       std::lock_guard lock(mutex_);
-      const Job settled = queue_.change(
-          job.id, [&](Job& j) { settle_job(j, live, end, config_.jobs, unix_seconds()); });
-      if (settled.state == JobState::kCanceled || settled.state == JobState::kSucceeded)
+      const Job after = queue_.change(
+          job.id, [&](Job& j) { apply_outcome(j, live, end, config_.jobs, unix_seconds()); });
+      if (after.state == JobState::kCanceled || after.state == JobState::kSucceeded)
         remove_tree(files_, folder(job.id).work());
-      log_("job " + job.id + " " + state_name(settled.state) +
-           (settled.error ? ": " + settled.error->code : ""));
-      on_settled_(settled);
+      log_("job " + job.id + " " + state_name(after.state) +
+           (after.error ? ": " + after.error->code : ""));
+      on_run_ended_(after);
       return;
-    } catch (const Problem&) {
+    } catch (const RequestError&) {
       return;  // it was deleted
     } catch (const Error& error) {
-      // The store cannot be written, for want of space perhaps. Until it can, or the service ends
-      // and the next one runs the job again, it counts as running.
-      log_("job " + job.id + " cannot be settled: " + error.message());
+      // The queue cannot be written, perhaps because the disk is full. The job counts as running
+      // until it can, or until the service ends and the next one runs the job again.
+      log_("job " + job.id + ": its outcome cannot be recorded: " + error.message());
     }
-    std::this_thread::sleep_for(std::chrono::duration<double>(kLongestSleep_s));
+    std::this_thread::sleep_for(std::chrono::duration<double>(kMaxSleep_s));
     std::lock_guard lock(mutex_);
     if (stops_) return;
   }
@@ -265,28 +253,32 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
     const ChildProcess::End end =
         run_child({{program_, "render", place.result(), "-o", place.preview(), "--size", "960x540",
                     "--samples", "1", "--threads", "1"},
-                   place.path + "/preview.log",
-                   config_.jobs.nice + kPreviewNicer},
-                  live, kPreview_s);
-    if (live.stop_asked_s() > 0) return;
+                   place.file("preview.log"),
+                   config_.jobs.nice + kPreviewNice},
+                  live, kMaxPreview_s);
+    if (live.stop_requested_s() > 0) return;
     const bool drawn = end.signal == 0 && end.exit_status == 0 && files_.exists(place.preview());
     queue_.change(job.id, [&](Job& j) { j.preview = drawn ? Preview::kReady : Preview::kFailed; });
-  } catch (const Problem&) {
-    // The job was deleted meanwhile.
+  } catch (const RequestError&) {
+    // The job was deleted while its preview was drawn.
   } catch (const Error& error) {
     log_("preview of job " + job.id + ": " + error.message());
-    std::this_thread::sleep_for(std::chrono::duration<double>(kLongestSleep_s));
+    std::this_thread::sleep_for(std::chrono::duration<double>(kMaxSleep_s));
   }
 }
 
 void Dispatcher::retire_old_jobs() {
-  if (last_retired_s_ > 0 && wall_seconds() < last_retired_s_ + kRetireEvery_s) return;
+  if (last_retired_s_ > 0 && wall_seconds() < last_retired_s_ + kRetireInterval_s) return;
   last_retired_s_ = wall_seconds();
   const Retention& rule = config_.retention;
   for (const std::string& id :
        queue_.expired(unix_seconds() - rule.finished_days * kSecondsPerDay, rule.finished_jobs)) {
-    remove(id);
-    log_("job " + id + " removed by the retention rule");
+    try {
+      remove(id);
+      log_("job " + id + " removed by the retention rule");
+    } catch (const RequestError&) {
+      // A client has deleted it or tried it again.
+    }
   }
 }
 
@@ -296,7 +288,7 @@ Job Dispatcher::cancel(const std::string& id) {
   const bool runs = worker != workers_.end() && !worker->second.done;
   const Job job = queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kFailed || j.state == JobState::kSucceeded)
-      throw wrong_state(j, "the job has ended");
+      throw state_conflict(j, "the job has ended");
     if (j.state == JobState::kCanceling || j.state == JobState::kCanceled) return;
     j.state = runs ? JobState::kCanceling : JobState::kCanceled;
     if (!runs) j.finished_s = unix_seconds();
@@ -310,7 +302,7 @@ Job Dispatcher::suspend(const std::string& id) {
   std::lock_guard lock(mutex_);
   const Job job = queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kCanceling || has_ended(j.state))
-      throw wrong_state(j, "expected a job that is queued or running");
+      throw state_conflict(j, "expected a job that is queued or running");
     j.state = JobState::kSuspended;
   });
   const auto worker = workers_.find(id);
@@ -321,7 +313,7 @@ Job Dispatcher::suspend(const std::string& id) {
 Job Dispatcher::resume(const std::string& id) {
   return queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kQueued || j.state == JobState::kRunning) return;
-    if (j.state != JobState::kSuspended) throw wrong_state(j, "expected a suspended job");
+    if (j.state != JobState::kSuspended) throw state_conflict(j, "expected a suspended job");
     j.state = JobState::kQueued;
     j.front = j.attempts > 0;
     j.not_before_s = 0;
@@ -332,7 +324,7 @@ Job Dispatcher::retry(const std::string& id) {
   return queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kQueued || j.state == JobState::kRunning) return;
     if (j.state != JobState::kFailed && j.state != JobState::kCanceled)
-      throw wrong_state(j, "expected a job that failed or was canceled");
+      throw state_conflict(j, "expected a job that failed or was canceled");
     j.state = JobState::kQueued;
     j.attempts = 0;
     j.front = false;

@@ -1,11 +1,10 @@
-// Takes jobs from the queue and runs each in a process of its own, as many as slots, memory and
-// disk allow; and everything that stops, continues or cleans up after them.
+// Runs the queue's jobs, each in a process of its own, as many as their number, memory and disk
+// allow, and stops, resumes and cleans up after them. Thread-safe.
 //
-// Why processes: the memory promise of a build is one of a process, a scene that crashes a build
-// takes nothing else along, and a build can be stopped, killed and reniced without touching the
-// threads that answer. A process dies with the service; started again with the same task it goes on
-// where its work folder is. So whatever happens to either, the queue's state and the folders are
-// enough to carry on.
+// Why processes: a build's memory limit holds for a process, a scene that crashes a build harms
+// nothing else, and a build can be stopped, killed and reniced without touching the threads that
+// answer requests. A process dies with the service; started again with the same task it resumes
+// from its work folder. The queue and the folders are therefore enough to continue after any crash.
 #pragma once
 
 #include <functional>
@@ -28,27 +27,27 @@ class Dispatcher {
  public:
   using Log = std::function<void(const std::string& line)>;
 
-  // Told of every job whose process has ended, as it is then.
-  using OnSettled = std::function<void(const Job&)>;
+  // Called whenever a job's process has ended, with the job as it is then.
+  using OnRunEnded = std::function<void(const Job&)>;
 
-  // Brings the queue and the folders in order after whatever ended the last service, then begins.
+  // Repairs what a crash of the last service left in the queue and the folders, then starts jobs.
   Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue, TaskResolver& tasks,
-             Log log, OnSettled on_settled);
-  // As stop().
+             Log log, OnRunEnded on_run_ended);
+  // Calls stop().
   ~Dispatcher();
 
-  // Stops every build at a checkpoint and waits for it, for at most a grace. They stay in the
-  // queue.
+  // Stops every build at a checkpoint and waits for it, for at most JobLimits::stop_timeout_s. The
+  // jobs stay in the queue.
   void stop();
 
-  // Each throws Problem (404, 409).
+  // Each throws RequestError: kNotFound, or kConflict for a job in another state.
   Job cancel(const std::string& id);
   Job suspend(const std::string& id);
   Job resume(const std::string& id);
   Job retry(const std::string& id);
   void remove(const std::string& id);
 
-  // Null unless its process runs.
+  // Null unless the job's process runs.
   std::shared_ptr<LiveJob> live(const std::string& id) const;
   size_t running() const;
   JobFolder folder(const std::string& id) const;
@@ -66,18 +65,19 @@ class Dispatcher {
   // The thread that starts jobs.
   void dispatch();
   void start_ready_jobs();
-  // False if there is none, or no slot, memory or disk for it.
+  // False if no job is ready, or if the limits leave no place, memory or disk for it.
   bool start_next_job();
   void start_preview();
-  void begin(const std::string& key, std::shared_ptr<LiveJob> live,
-             std::function<void(LiveJob&)> work);
+  void start_worker(const std::string& key, std::shared_ptr<LiveJob> live,
+                    std::function<void(LiveJob&)> work);
   void join_finished();
 
-  // What the threads of `workers_` do.
+  // These run on the threads of `workers_`.
   void run_job(const Job& job, LiveJob& live);
-  void settle(const Job& job, LiveJob& live, const ChildProcess::End& end);
+  void record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end);
   void draw_preview(const Job& job, LiveJob& live);
-  // Until its end; asks it to stop when `live` is to, and kills it after `max_s` or a grace.
+  // Runs a process to its end. Asks it to stop when `live` is to stop, and kills it after `max_s`,
+  // or JobLimits::stop_timeout_s after that request.
   ChildProcess::End run_child(const ChildProcess::Start& start, LiveJob& live, double max_s);
 
   const ServerConfig& config_;
@@ -85,16 +85,17 @@ class Dispatcher {
   JobQueue& queue_;
   TaskResolver& tasks_;
   const Log log_;
-  const OnSettled on_settled_;
+  const OnRunEnded on_run_ended_;
   const std::string program_;
 
-  mutable std::mutex
-      mutex_;  // guards all below; held while a job's state and process change together
-  std::map<std::string, Worker> workers_;  // by job; "preview" draws a picture
+  // Guards all below; held while a job's state and process change together.
+  mutable std::mutex mutex_;
+  std::map<std::string, Worker> workers_;  // by job; the one named "preview" draws a picture
   bool stops_ = false;
   double last_retired_s_ = 0;
 
-  mutable std::mutex live_mutex_;  // guards the next: who asks for progress waits for nothing else
+  // Guards live_ alone, so that requests for progress wait for nothing else.
+  mutable std::mutex live_mutex_;
   std::map<std::string, std::shared_ptr<LiveJob>> live_;  // by job
 
   std::thread thread_;

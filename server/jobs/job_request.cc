@@ -10,7 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
-#include "server/api/problem.h"
+#include "server/request_error.h"
 
 namespace voxdag::server {
 namespace {
@@ -18,26 +18,26 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr size_t kMaxScenes = 64;
-constexpr size_t kLongestText = 4096;
-constexpr size_t kLongestName = 200;
+constexpr size_t kMaxTextBytes = 4096;
+constexpr size_t kMaxNameCharacters = 200;
 constexpr int64_t kMinSubvolume = 64;
-constexpr int64_t kLargestResolution = int64_t{1} << 20;
-constexpr int64_t kHighestPriority = 100;
+constexpr int64_t kMaxResolution = int64_t{1} << 20;
+constexpr int64_t kMaxPriority = 100;
 
 [[noreturn]] void fail(const std::string& member, const std::string& expected) {
-  throw bad_request("'" + member + "': expected " + expected);
+  throw RequestError(RequestError::Kind::kInvalid, "'" + member + "': expected " + expected);
 }
 
 std::string text_of(const ordered_json& value, const std::string& member) {
   if (!value.is_string()) fail(member, "a text");
   const auto& text = value.get_ref<const std::string&>();
-  if (text.empty() || text.size() > kLongestText) fail(member, "1 to 4096 bytes");
+  if (text.empty() || text.size() > kMaxTextBytes) fail(member, "1 to 4096 bytes");
   for (const char c : text)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) fail(member, "no control characters");
   return text;
 }
 
-// UTF-8's continuation bytes count with what they continue.
+// Counts UTF-8 characters: every byte that is no continuation byte.
 size_t characters_of(const std::string& text) {
   return static_cast<size_t>(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xc0) != 0x80;
@@ -62,31 +62,29 @@ double number_of(const ordered_json& value, const std::string& member) {
   return value.get<double>();
 }
 
-// A whole number from `least` to `most`; 64.0 is one, too.
-int64_t whole_of(const ordered_json& value, const std::string& member, int64_t least,
-                 int64_t most) {
+// A whole number from `min` to `max`; 64.0 is one, too.
+int64_t whole_of(const ordered_json& value, const std::string& member, int64_t min, int64_t max) {
   constexpr double kExact = 0x1p53;
   const bool is_whole = value.is_number_unsigned() ? value.get<uint64_t>() <= INT64_MAX
                         : value.is_number_float()
                             ? std::abs(value.get<double>()) <= kExact &&
                                   value.get<double>() == std::floor(value.get<double>())
                             : value.is_number_integer();
-  if (!is_whole || value.get<int64_t>() < least || value.get<int64_t>() > most)
-    fail(member, "a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+  if (!is_whole || value.get<int64_t>() < min || value.get<int64_t>() > max)
+    fail(member, "a whole number from " + std::to_string(min) + " to " + std::to_string(max));
   return value.get<int64_t>();
 }
 
-uint64_t count_of(const ordered_json& value, const std::string& member, int64_t least,
-                  int64_t most) {
-  return static_cast<uint64_t>(whole_of(value, member, least, most));
+uint64_t count_of(const ordered_json& value, const std::string& member, int64_t min, int64_t max) {
+  return static_cast<uint64_t>(whole_of(value, member, min, max));
 }
 
 int priority_of(const ordered_json& value) {
-  return static_cast<int>(whole_of(value, "priority", -kHighestPriority, kHighestPriority));
+  return static_cast<int>(whole_of(value, "priority", -kMaxPriority, kMaxPriority));
 }
 
-uint64_t power_of_two(const ordered_json& value, const std::string& member, int64_t least) {
-  const uint64_t count = count_of(value, member, least, kLargestResolution);
+uint64_t power_of_two(const ordered_json& value, const std::string& member, int64_t min) {
+  const uint64_t count = count_of(value, member, min, kMaxResolution);
   if (!std::has_single_bit(count)) fail(member, "a power of two");
   return count;
 }
@@ -124,21 +122,21 @@ std::array<double, 4> bounds_of(const ordered_json& value) {
   return bounds;
 }
 
-using Takers = std::map<std::string, std::function<void(const ordered_json&)>>;
+using Readers = std::map<std::string, std::function<void(const ordered_json&)>>;
 
-void take_members(const ordered_json& object, const std::string& where, const Takers& takers) {
+void read_members(const ordered_json& object, const std::string& where, const Readers& readers) {
   if (!object.is_object()) fail(where, "an object");
   for (const auto& [name, value] : object.items()) {
-    const auto taker = takers.find(name);
-    if (taker == takers.end()) fail(name.substr(0, 64), "a member that docs/api.md names");
-    taker->second(value);
+    const auto reader = readers.find(name);
+    if (reader == readers.end()) fail(name.substr(0, 64), "a member that docs/api.md names");
+    reader->second(value);
   }
 }
 
-void take_options(const ordered_json& options, BuildSpec& spec) {
+void read_options(const ordered_json& options, BuildSpec& spec) {
   GeometryOptions& g = spec.geometry;
   RunOptions& r = spec.run;
-  take_members(
+  read_members(
       options, "options",
       {{"bounds", [&](const auto& v) { g.bounds = bounds_of(v); }},
        {"voxel_size", [&](const auto& v) { g.voxel_size = number_of(v, "voxel_size"); }},
@@ -159,7 +157,7 @@ void take_options(const ordered_json& options, BuildSpec& spec) {
        {"method", [&](const auto& v) {
           r.method = one_of(v, "method", {"consing", "pointers", "hashes"});
         }}});
-  if (g.bounds && g.voxel_size) fail("voxel_size", "no bounds beside it");
+  if (g.bounds && g.voxel_size) fail("voxel_size", "no bounds at the same time");
   if (g.voxel_size && *g.voxel_size <= 0) fail("voxel_size", "a number above 0");
 }
 
@@ -171,20 +169,21 @@ int parse_priority(std::string_view number) {
 
 JobRequest parse_job_request(std::string_view body) {
   const auto json = ordered_json::parse(body, nullptr, false);
-  if (json.is_discarded()) throw bad_request("the body is not JSON");
+  if (json.is_discarded()) throw RequestError(RequestError::Kind::kInvalid, "the body is not JSON");
   JobRequest request;
   uint64_t& resolution = request.spec.geometry.resolution;
-  take_members(
+  read_members(
       json, "the body",
       {{"scene", [&](const auto& v) { request.scenes = texts_of(v, "scene"); }},
        {"resolution", [&](const auto& v) { resolution = power_of_two(v, "resolution", 4); }},
        {"name",
         [&](const auto& v) {
           request.name = text_of(v, "name");
-          if (characters_of(request.name) > kLongestName) fail("name", "at most 200 characters");
+          if (characters_of(request.name) > kMaxNameCharacters)
+            fail("name", "at most 200 characters");
         }},
        {"priority", [&](const auto& v) { request.priority = priority_of(v); }},
-       {"options", [&](const auto& v) { take_options(v, request.spec); }}});
+       {"options", [&](const auto& v) { read_options(v, request.spec); }}});
   if (request.scenes.empty()) fail("scene", "a scene");
   if (resolution == 0) fail("resolution", "voxels per edge");
   request.text = ordered_json{{"scene", request.scenes},

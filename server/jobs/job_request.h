@@ -14,14 +14,13 @@ struct JobRequest {
   std::string name;
   int priority = 0;
   std::vector<std::string> scenes;  // names of uploads, or absolute paths
-  BuildSpec spec;                   // all of it but scenes, output and work folder
-  std::string text;                 // JSON of scene, resolution and options, as posted
+  BuildSpec spec;                   // without scenes, output and work folder
+  std::string text;                 // JSON of scene, resolution and options, as submitted
 };
 
-// Throws Problem (400) naming the member that is unknown, missing or has a wrong value, and (422)
-// for limits of the format.
+// Throws RequestError{kInvalid} naming the member that is unknown, missing or has a wrong value.
 JobRequest parse_job_request(std::string_view body);
-// Of a JSON number. Throws Problem (400).
+// A priority as a JSON number. Throws RequestError{kInvalid}.
 int parse_priority(std::string_view number);
 
 }  // namespace voxdag::server

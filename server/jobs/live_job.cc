@@ -15,38 +15,35 @@ constexpr size_t kMaxStages = 64;
 LiveJob::LiveJob(std::string id, uint64_t memory_bytes)
     : id_(std::move(id)), memory_bytes_(memory_bytes), start_s_(wall_seconds()) {}
 
-bool LiveJob::take(const Report& report) {
+void LiveJob::apply(const Message& message) {
   std::lock_guard lock(mutex_);
   ++version_;
   const double now = wall_seconds();
-  switch (report.kind) {
-    case Report::Kind::kStage:
-      if (stages_.size() == kMaxStages) stages_.erase(stages_.begin());
-      stages_.push_back({report.text, report.unit, 0, report.total, now, 0, false});
-      return true;
-    case Report::Kind::kAdvance:
-    case Report::Kind::kEnd:
-      if (stages_.empty()) return false;
-      stages_.back().wall_s = now - stages_.back().start_s;
-      stages_.back().ended = report.kind == Report::Kind::kEnd;
-      if (stages_.back().ended) return true;
-      stages_.back().done = report.done;
-      stages_.back().total = report.total;
-      return false;
-    case Report::Kind::kBuilt:
-      built_ = report;
-      return false;
-    case Report::Kind::kWarning:
-      if (warnings_.size() < kMaxWarnings) warnings_.push_back(report.text);
-      return true;
-    case Report::Kind::kError:
-      failure_ = report;
-      return false;
-    case Report::Kind::kResult:
-      result_ = report.text;
-      return false;
+  if (const auto* begun = std::get_if<StageBegun>(&message)) {
+    if (stages_.size() == kMaxStages) stages_.erase(stages_.begin());
+    stages_.push_back({begun->stage, begun->unit, 0, begun->total, now, 0, false});
+  } else if (const auto* advanced = std::get_if<StageAdvanced>(&message)) {
+    if (stages_.empty()) return;
+    Stage& stage = stages_.back();
+    stage.wall_s = now - stage.start_s;
+    stage.ended = false;
+    stage.done = advanced->done;
+    stage.total = advanced->total;
+  } else if (std::holds_alternative<StageEnded>(message)) {
+    if (stages_.empty()) return;
+    stages_.back().wall_s = now - stages_.back().start_s;
+    stages_.back().ended = true;
+  } else if (const auto* subvolumes = std::get_if<SubvolumeTotals>(&message)) {
+    subvolumes_ = *subvolumes;
+  } else if (const auto* usage = std::get_if<Usage>(&message)) {
+    usage_ = *usage;
+  } else if (const auto* warning = std::get_if<Warning>(&message)) {
+    if (warnings_.size() < kMaxWarnings) warnings_.push_back(warning->text);
+  } else if (const auto* failure = std::get_if<Failure>(&message)) {
+    failure_ = *failure;
+  } else if (const auto* result = std::get_if<Result>(&message)) {
+    result_ = result->json;
   }
-  return false;
 }
 
 std::string LiveJob::progress_json() const {
@@ -81,12 +78,12 @@ std::string LiveJob::make_progress() const {
       {"eta_s", rate > 0 && !now.ended ? left / rate : 0.0},
       {"elapsed_s", wall_seconds() - start_s_},
       {"stages", std::move(stages)},
-      {"subvolumes", {{"built", built_.done}, {"total", built_.total}}},
-      {"voxels", built_.voxels},
-      {"nodes", built_.nodes},
-      {"bytes", built_.bytes},
-      {"memory_bytes", built_.memory_bytes},
-      {"disk_bytes", built_.disk_bytes},
+      {"subvolumes", {{"built", subvolumes_.built}, {"total", subvolumes_.total}}},
+      {"voxels", subvolumes_.voxels},
+      {"nodes", subvolumes_.nodes},
+      {"bytes", subvolumes_.bytes},
+      {"memory_bytes", usage_.memory_bytes},
+      {"disk_bytes", usage_.disk_bytes},
   }
       .dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
@@ -101,7 +98,7 @@ std::vector<std::string> LiveJob::warnings() const {
   return warnings_;
 }
 
-std::optional<Report> LiveJob::failure() const {
+std::optional<Failure> LiveJob::failure() const {
   std::lock_guard lock(mutex_);
   return failure_;
 }
@@ -113,12 +110,12 @@ std::string LiveJob::result() const {
 
 void LiveJob::stop() {
   std::lock_guard lock(mutex_);
-  if (stop_asked_s_ == 0) stop_asked_s_ = wall_seconds();
+  if (stop_requested_s_ == 0) stop_requested_s_ = wall_seconds();
 }
 
-double LiveJob::stop_asked_s() const {
+double LiveJob::stop_requested_s() const {
   std::lock_guard lock(mutex_);
-  return stop_asked_s_;
+  return stop_requested_s_;
 }
 
 }  // namespace voxdag::server

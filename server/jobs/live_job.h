@@ -1,5 +1,5 @@
-// A job while its process runs: its progress, put together from what the process reports, and
-// whether it is to stop. Thread-safe.
+// A job while its process runs: its progress, put together from the process's messages, and whether
+// it is to stop. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/jobs/process/task.h"
+#include "server/jobs/process/messages.h"
 
 namespace voxdag::server {
 
@@ -19,20 +19,20 @@ class LiveJob {
   const std::string& id() const { return id_; }
   uint64_t memory_bytes() const { return memory_bytes_; }
 
-  // Returns true for what everybody who follows should be told at once (a stage, a warning).
-  bool take(const Report& report);
-  // PROGRESS of docs/api.md; the text is made once for each report.
+  void apply(const Message& message);
+  // PROGRESS of docs/api.md, "" before the first stage. The text is made once per version.
   std::string progress_json() const;
-  // Counts reports that changed the progress.
+  // Counts messages.
   uint64_t version() const;
   std::vector<std::string> warnings() const;
-  std::optional<Report> failure() const;
-  std::string result() const;  // "" if there is none
+  std::optional<Failure> failure() const;
+  // JSON, "" if there is none.
+  std::string result() const;
 
-  // Asks for an end, once or more often; the first asking counts. When that was (wall_seconds()),
-  // or 0.
+  // Asks for an end; only the first call counts.
   void stop();
-  double stop_asked_s() const;
+  // When stop() was called first (wall_seconds()), 0 if it was not.
+  double stop_requested_s() const;
 
  private:
   struct Stage {
@@ -48,14 +48,15 @@ class LiveJob {
   const double start_s_;
   mutable std::mutex mutex_;  // guards all below
   std::vector<Stage> stages_;
-  Report built_;
+  SubvolumeTotals subvolumes_;
+  Usage usage_;
   std::vector<std::string> warnings_;
-  std::optional<Report> failure_;
+  std::optional<Failure> failure_;
   std::string result_;
   uint64_t version_ = 1;
   mutable uint64_t json_version_ = 0;
   mutable std::string json_;
-  double stop_asked_s_ = 0;
+  double stop_requested_s_ = 0;
 };
 
 }  // namespace voxdag::server

@@ -4,8 +4,8 @@
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
-#include "server/api/problem.h"
 #include "server/jobs/process/confined_files.h"
+#include "server/request_error.h"
 
 namespace voxdag::server {
 namespace {
@@ -35,37 +35,46 @@ std::vector<std::string> TaskResolver::uploads_of(const JobRequest& request) {
   return uploads;
 }
 
-std::string TaskResolver::find_scene(const std::string& scene, std::vector<std::string>& readable) {
-  const Problem missing =
-      not_found("no scene '" + scene.substr(0, 128) +
-                "': expected an uploaded one, or a path below one of the scene roots");
+void TaskResolver::add_scene(const std::string& scene, Task& task) {
+  const RequestError missing(RequestError::Kind::kNotFound,
+                             "no scene '" + scene.substr(0, 128) +
+                                 "': expected an uploaded one, or a path below one of the scene "
+                                 "roots");
   if (is_path(scene)) {
     const std::string path = resolved_path(scene);
     const auto root = std::find_if(roots_.begin(), roots_.end(),
                                    [&](const std::string& r) { return lies_in(path, r); });
     if (root == roots_.end() || (!path.ends_with(".glb") && !path.ends_with(".gltf")))
       throw missing;
-    readable.push_back(*root);
-    return path;
+    task.readable.push_back(*root);
+    return;
   }
   const auto found = is_scene_name(scene) ? scenes_.find(scene) : std::nullopt;
   if (!found) throw missing;
-  if (!found->complete) throw conflict("the scene '" + scene + "' is still arriving");
-  readable.push_back(scenes_.path(scene));
-  return scenes_.path(scene);
+  if (!found->complete)
+    throw RequestError(RequestError::Kind::kConflict,
+                       "the scene '" + scene + "' is still being uploaded");
+  const std::string path = resolved_path(scenes_.path(scene));
+  if (path.empty()) throw missing;
+  task.uploads.emplace(scene, path);
+  task.readable.push_back(path);
+}
+
+uint64_t TaskResolver::memory_of(const JobRequest& request) const {
+  const uint64_t requested = request.spec.run.memory_bytes;
+  return requested ? requested : memory_bytes_ / config_.jobs.max_concurrent;
 }
 
 Task TaskResolver::make(const JobRequest& request, Task::Kind kind) {
   Task task;
   task.kind = kind;
-  task.text = request.text;
-  for (const std::string& scene : request.scenes)
-    task.scene_paths.push_back(find_scene(scene, task.readable));
-  const uint64_t asked = request.spec.run.memory_bytes;
-  if (asked > memory_bytes_)
-    throw problem(ErrorCode::kLimit, "'memory': a job of this service may have at most " +
-                                         std::to_string(memory_bytes_) + " bytes");
-  task.memory_bytes = asked ? asked : memory_bytes_ / config_.jobs.max_concurrent;
+  task.request = request.text;
+  for (const std::string& scene : request.scenes) add_scene(scene, task);
+  task.memory_bytes = memory_of(request);
+  if (task.memory_bytes > memory_bytes_)
+    throw RequestError(RequestError::Kind::kLimit,
+                       "'memory': a job of this service may have at most " +
+                           std::to_string(memory_bytes_) + " bytes");
   task.threads = config_.jobs.threads;
   return task;
 }

@@ -1,4 +1,4 @@
-// From what was asked for to what a process can do: scenes found, limits applied. Thread-safe.
+// From a request to the task of a process: scenes found, limits applied. Thread-safe.
 #pragma once
 
 #include <string>
@@ -13,21 +13,24 @@ namespace voxdag::server {
 
 class TaskResolver {
  public:
+  // Throws Error{kInvalidInput} for a scene root that is not there.
   TaskResolver(const ServerConfig& config, SceneStore& scenes);
 
-  // Throws Problem: 404 for a scene that is not there (or lies outside the configured roots: which
-  // of the two is not said), 409 for one that is still arriving, 422 (`limit`) for more memory than
-  // a job may have.
+  // Throws RequestError: kNotFound for a scene that does not exist or lies outside the configured
+  // roots (the message does not say which), kConflict for one that is still being uploaded, kLimit
+  // for more memory than a job may have.
   Task make(const JobRequest& request, Task::Kind kind);
-  // Those of its scenes that are uploads.
+  // The scenes of a request that are uploads.
   static std::vector<std::string> uploads_of(const JobRequest& request);
 
   // What all running jobs may have together.
   uint64_t memory_bytes() const { return memory_bytes_; }
+  // What one job may have: as much as it asks for, or its share.
+  uint64_t memory_of(const JobRequest& request) const;
 
  private:
-  // Adds what the scene may refer to; returns where it lies.
-  std::string find_scene(const std::string& scene, std::vector<std::string>& readable);
+  // Adds to the task what the scene needs.
+  void add_scene(const std::string& scene, Task& task);
 
   const ServerConfig& config_;
   SceneStore& scenes_;

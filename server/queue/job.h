@@ -1,4 +1,4 @@
-// A job as the queue keeps it.
+// A job as the queue stores it.
 #pragma once
 
 #include <array>
@@ -32,13 +32,13 @@ inline constexpr std::array<const char*, 7> kJobStateNames = {
 
 inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
 std::optional<JobState> parse_state(std::string_view name);
-// Nothing will happen to it by itself any more.
+// A job in such a state changes only if somebody asks for it.
 inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
 
 struct JobError {
   std::string code;  // docs/errors.md, or "internal"
   std::string message;
-  double at_s = 0;  // Unix time, like all times here; 0 for never
+  double at_s = 0;  // Unix time, like all times of jobs; 0 for never
   bool transient = false;
 };
 
@@ -53,17 +53,17 @@ struct Job {
   std::vector<std::string> scenes;  // uploads that it needs until it has ended
   std::string posted_by;
   int priority = 0;
-  bool front = false;  // was running already: before others of its priority
+  bool front = false;  // queued before others of its priority, since it was running already
   unsigned attempts = 0;
   double created_s = 0, started_s = 0, finished_s = 0, not_before_s = 0;
   std::optional<JobError> error;
   std::vector<std::string> warnings;
-  std::string result;    // JSON; "" until it succeeded
-  std::string progress;  // JSON; of the last attempt, "" before the first
+  std::string result;    // JSON; "" until the job succeeded
+  std::string progress;  // JSON of the last attempt, "" before the first
   Preview preview = Preview::kNone;
 };
 
-// One change of a job's state; `number` counts them over all jobs.
+// One change of a job's state; `number` counts the events of all jobs.
 struct JobEvent {
   int64_t number = 0;
   double at_s = 0;

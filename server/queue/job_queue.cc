@@ -4,7 +4,6 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "server/api/problem.h"
 #include "server/queue/job_rows.h"
 #include "server/random_id.h"
 
@@ -19,7 +18,7 @@ SqlDatabase open_writer(const std::string& path) {
   return database;
 }
 
-// No ids of callers are ever made into SQL; states are.
+// Only states become part of the text of SQL; what callers give is bound.
 std::string states_in(const std::vector<JobState>& states) {
   std::string list;
   for (const JobState state : states)
@@ -35,17 +34,23 @@ std::optional<Job> job_of_key(SqlDatabase& database, const IdempotencyKey& key) 
   auto known = database.prepare("SELECT job, request FROM idempotency WHERE key = ?");
   if (!known.bind(0, key.key).step()) return {};
   if (known.text(1) != key.request)
-    throw Problem(422, "idempotency_mismatch",
-                  "this Idempotency-Key came with another request before");
+    throw RequestError(RequestError::Kind::kKeyReused,
+                       "this Idempotency-Key came with another request before");
   return read_job(database, known.text(0));
 }
 
-Problem no_job(const std::string& id) {
-  return not_found("no job " + id.substr(0, 32) +
-                   ": expected the id of a job that was not deleted");
+RequestError no_job(const std::string& id) {
+  return {RequestError::Kind::kNotFound,
+          "no job " + id.substr(0, 32) + ": expected the id of a job that was not deleted"};
 }
 
 }  // namespace
+
+RequestError state_conflict(const Job& job, const std::string& message) {
+  RequestError error(RequestError::Kind::kConflict, message);
+  error.job_state = state_name(job.state);
+  return error;
+}
 
 std::optional<JobState> parse_state(std::string_view name) {
   for (size_t i = 0; i < kJobStateNames.size(); ++i)
@@ -56,7 +61,7 @@ std::optional<JobState> parse_state(std::string_view name) {
 JobQueue::JobQueue(const std::string& path)
     : writer_(open_writer(path)),
       reader_(path, SqlDatabase::Mode::kReadOnly),
-      find_(reader_.prepare("SELECT " + std::string(kJobColumns) + " FROM job WHERE id = ?")) {}
+      find_(reader_.prepare("SELECT " + job_columns() + " FROM job WHERE id = ?")) {}
 
 JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_open) {
   Added added;
@@ -66,7 +71,7 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
     if (auto known = job_of_key(writer_, key)) return {std::move(*known), true};
     if (static_cast<uint64_t>(writer_.integer("SELECT count(*) FROM job WHERE " + kOpen)) >=
         max_open)
-      throw busy("the queue is full", 60);
+      throw RequestError(RequestError::Kind::kQueueFull, "the queue is full");
     job.id = random_id();
     job.number = writer_.integer("SELECT coalesce(max(number), 0) + 1 FROM job");
     job.created_s = unix_seconds();
@@ -100,7 +105,7 @@ std::optional<Job> JobQueue::find_by_key(const IdempotencyKey& key) {
 
 std::vector<Job> JobQueue::query(const std::string& rest, const std::vector<int64_t>& numbers) {
   std::lock_guard lock(read_mutex_);
-  auto rows = reader_.prepare("SELECT " + std::string(kJobColumns) + " FROM job " + rest);
+  auto rows = reader_.prepare("SELECT " + job_columns() + " FROM job " + rest);
   for (size_t i = 0; i < numbers.size(); ++i) rows.bind(static_cast<int>(i), numbers[i]);
   std::vector<Job> jobs;
   while (rows.step()) jobs.push_back(job_of_row(rows));
@@ -174,11 +179,8 @@ void JobQueue::remove(const std::string& id) {
     SqlTransaction transaction(writer_);
     const auto job = read_job(writer_, id);
     if (!job) throw no_job(id);
-    if (!has_ended(job->state)) {
-      Problem problem = conflict("the job has not ended: cancel it first");
-      problem.state = state_name(job->state);
-      throw problem;
-    }
+    if (!has_ended(job->state))
+      throw state_conflict(*job, "the job has not ended: cancel it first");
     writer_.prepare("DELETE FROM job WHERE id = ?").bind(0, id).run();
     transaction.commit();
   }
@@ -186,7 +188,7 @@ void JobQueue::remove(const std::string& id) {
 }
 
 std::optional<Job> JobQueue::next(double now_s, const std::set<std::string>& except) {
-  // Those in `except` are few: at most the ones that are just stopping.
+  // `except` is small: at most the jobs that are just stopping.
   const auto jobs = query("WHERE " + states_in({JobState::kQueued}) + " AND not_before_s <= " +
                               std::to_string(now_s) + " ORDER BY " + kQueueOrder + " LIMIT ?",
                           {static_cast<int64_t>(except.size() + 1)});
@@ -220,13 +222,13 @@ std::vector<Job> JobQueue::recover() {
   return canceled;
 }
 
-std::vector<std::string> JobQueue::expired(double finished_before_s, uint64_t most) {
+std::vector<std::string> JobQueue::expired(double finished_before_s, uint64_t max_count) {
   std::lock_guard lock(read_mutex_);
   auto rows = reader_.prepare("SELECT id FROM job WHERE " + kEnded +
                               " AND (finished_s < ? OR number <= coalesce((SELECT number FROM job "
                               "WHERE " +
                               kEnded + " ORDER BY number DESC LIMIT 1 OFFSET ?), 0))");
-  rows.bind(0, finished_before_s).bind(1, static_cast<int64_t>(most));
+  rows.bind(0, finished_before_s).bind(1, static_cast<int64_t>(max_count));
   std::vector<std::string> ids;
   while (rows.step()) ids.push_back(rows.text(0));
   return ids;

@@ -1,8 +1,8 @@
 // The service's jobs, durable: one SQLite file (WAL, synchronous = FULL). What a call returns has
 // been committed. A SIGKILL between any two instructions leaves every job in a state that recover()
-// makes good.
+// repairs.
 //
-// Order of the queue: priority, then jobs that were running before, then order of posting.
+// Order of the queue: priority, then jobs that were running before, then the order of submission.
 // Thread-safe; readers never wait for a writer's sync.
 #pragma once
 
@@ -19,6 +19,7 @@
 
 #include "core/db/sqlite.h"
 #include "server/queue/job.h"
+#include "server/request_error.h"
 
 namespace voxdag::server {
 
@@ -35,53 +36,59 @@ struct IdempotencyKey {
 
 class JobQueue {
  public:
-  // Throws Error{kCorrupt}, {kInvalidInput} for a database that is not ours, {kUnsupportedVersion}.
+  // Throws Error{kCorrupt}, {kInvalidInput} for a database of another program,
+  // {kUnsupportedVersion}.
   explicit JobQueue(const std::string& path);
 
   struct Added {
     Job job;
     bool replayed = false;
   };
-  // Gives the job its id and number and queues it; or finds the one that has this key. Throws
-  // Problem: 422 if the key came with another request, 503 if `max_open` jobs have not ended.
+  // Queues the job under a new id and number, or finds the job that has this key. Throws
+  // RequestError: kKeyReused if the key came with another request, kQueueFull if `max_open` jobs
+  // have not ended.
   Added add(Job job, const IdempotencyKey& key, uint64_t max_open);
 
   std::optional<Job> find(const std::string& id);
   // Newest first.
   std::vector<Job> list(const JobFilter& filter);
   std::map<JobState, uint64_t> counts();
-  // Places in the queue from 1, by job number; as of the last change.
+  // Positions in the queue from 1, by job number, as of the last change.
   using Places = std::unordered_map<int64_t, uint64_t>;
   std::shared_ptr<const Places> places();
   // Whether a job that has not ended needs this upload.
   bool uses_scene(const std::string& name);
 
   // Applies `edit` to the job in one transaction and returns it. A change of state is recorded as
-  // an event. What `edit` throws leaves the job as it was. Throws Problem (404) if there is none.
+  // an event. What `edit` throws leaves the job as it was. Throws RequestError{kNotFound}
+  // if there is no such job.
   Job change(const std::string& id, const std::function<void(Job&)>& edit);
-  // Throws Problem unless the job has ended.
+  // Throws RequestError{kConflict} unless the job has ended, {kNotFound} if there is none.
   void remove(const std::string& id);
 
   // The first queued job that may start at `now_s` and is not in `except`.
   std::optional<Job> next(double now_s, const std::set<std::string>& except);
-  // One that succeeded and has no preview yet, and is not in `except`.
+  // A job that succeeded and has no preview yet, and is not in `except`.
   std::optional<Job> next_without_preview(const std::set<std::string>& except);
-  // Running jobs are queued again, at the front; canceling ones are canceled. Returns the latter.
+  // After a crash: running jobs are queued again, at the front; canceling ones are canceled.
+  // Returns those that were canceled.
   std::vector<Job> recover();
-  // Ended jobs that finished before `finished_before_s`, or are not among the newest `most`.
-  std::vector<std::string> expired(double finished_before_s, uint64_t most);
+  // Ended jobs that finished before `finished_before_s`, or are not among the newest
+  // `max_count`.
+  std::vector<std::string> expired(double finished_before_s, uint64_t max_count);
 
   std::vector<JobEvent> events_after(const std::string& id, int64_t number);
-  // The job that has this key, if one has. Throws Problem (422) if it came with another request.
+  // The job that has this key, if there is one. Throws RequestError{kKeyReused} if it came with
+  // another request.
   std::optional<Job> find_by_key(const IdempotencyKey& key);
 
-  // Counts all changes of all jobs, and announcements.
+  // Counts the changes of all jobs, and announcements.
   uint64_t version() const;
-  // Counts the changes alone.
+  // Counts the changes without the announcements.
   uint64_t changes() const;
   // Waits until version() differs from `seen`, or for `max_s` seconds.
   void wait_for_change(uint64_t seen, double max_s) const;
-  // As a change does, for what is not in the database (progress).
+  // Wakes waiting threads as a change does, for what is not in the database (progress).
   void announce();
 
  private:
@@ -105,5 +112,8 @@ class JobQueue {
   uint64_t changes_ = 1;
   uint64_t queue_version_ = 1;  // counts those that may move jobs in the queue
 };
+
+// The error for a request that does not fit the present state of a job.
+RequestError state_conflict(const Job& job, const std::string& message);
 
 }  // namespace voxdag::server

@@ -9,9 +9,9 @@
 namespace voxdag::server {
 namespace {
 
-// "vdsv": a service's queue, not a build's job store.
+// "vdsv": the queue of a service.
 constexpr int64_t kApplicationId = 0x76647376;
-constexpr int64_t kSchemaVersion = 1;
+constexpr int64_t kSchemaVersion = 2;
 
 constexpr const char* kSchema = R"sql(
 CREATE TABLE job (
@@ -57,27 +57,88 @@ CREATE TABLE idempotency (
 CREATE INDEX idempotency_by_job ON idempotency (job);
 )sql";
 
-std::string error_text(const std::optional<JobError>& error) {
-  if (!error) return "";
-  return nlohmann::json::array({error->code, error->message, error->at_s, error->transient})
-      .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+std::string dump(const nlohmann::json& json) {
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-std::optional<JobError> error_of(const std::string& text) {
-  if (text.empty()) return {};
+// Every column of a job's row with the member that it stores, in the order of the table.
+template <class AnyJob, class Use>
+void each_column(AnyJob& job, Use use) {
+  use("number", job.number);
+  use("id", job.id);
+  use("name", job.name);
+  use("state", job.state);
+  use("request", job.request);
+  use("scenes", job.scenes);
+  use("posted_by", job.posted_by);
+  use("priority", job.priority);
+  use("front", job.front);
+  use("attempts", job.attempts);
+  use("created_s", job.created_s);
+  use("started_s", job.started_s);
+  use("finished_s", job.finished_s);
+  use("not_before_s", job.not_before_s);
+  use("error", job.error);
+  use("warnings", job.warnings);
+  use("result", job.result);
+  use("progress", job.progress);
+  use("preview", job.preview);
+}
+
+// The members of a job as values of SQL, and below each the way back.
+
+template <class Value>
+void put(SqlStatement& row, int column, const Value& value) {
+  if constexpr (std::is_integral_v<Value> || std::is_enum_v<Value>)
+    row.bind(column, static_cast<int64_t>(value));
+  else
+    row.bind(column, value);
+}
+template <class Value>
+void get(const SqlStatement& row, int column, Value& value) {
+  if constexpr (std::is_integral_v<Value> || std::is_enum_v<Value>)
+    value = static_cast<Value>(row.integer(column));
+  else if constexpr (std::is_same_v<Value, double>)
+    value = row.real(column);
+  else
+    value = row.text(column);
+}
+
+void put(SqlStatement& row, int column, const std::vector<std::string>& list) {
+  row.bind(column, dump(list));
+}
+void get(const SqlStatement& row, int column, std::vector<std::string>& list) {
+  list = nlohmann::json::parse(row.text(column)).get<std::vector<std::string>>();
+}
+
+void put(SqlStatement& row, int column, const std::optional<JobError>& error) {
+  row.bind(column, !error ? ""
+                          : dump({{"code", error->code},
+                                  {"message", error->message},
+                                  {"at_s", error->at_s},
+                                  {"transient", error->transient}}));
+}
+void get(const SqlStatement& row, int column, std::optional<JobError>& error) {
+  error.reset();
+  const std::string text = row.text(column);
+  if (text.empty()) return;
   const auto json = nlohmann::json::parse(text);
-  return JobError{json.at(0), json.at(1), json.at(2), json.at(3)};
-}
-
-std::string list_text(const std::vector<std::string>& list) {
-  return nlohmann::json(list).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  error = JobError{json.at("code"), json.at("message"), json.at("at_s"), json.at("transient")};
 }
 
 }  // namespace
 
-const char* const kJobColumns =
-    "number, id, name, state, request, scenes, posted_by, priority, front, attempts, created_s, "
-    "started_s, finished_s, not_before_s, error, warnings, result, progress, preview";
+const std::string& job_columns() {
+  static const std::string list = [] {
+    std::string text;
+    const Job job;
+    each_column(job, [&](const char* name, const auto&) {
+      text += (text.empty() ? "" : ", ") + std::string(name);
+    });
+    return text;
+  }();
+  return list;
+}
 
 void prepare_schema(SqlDatabase& database, const std::string& path) {
   const int64_t application = database.integer("PRAGMA application_id");
@@ -102,26 +163,9 @@ void prepare_schema(SqlDatabase& database, const std::string& path) {
 
 Job job_of_row(const SqlStatement& row) {
   Job job;
-  job.number = row.integer(0);
-  job.id = row.text(1);
-  job.name = row.text(2);
-  job.state = static_cast<JobState>(row.integer(3));
-  job.request = row.text(4);
-  job.posted_by = row.text(6);
-  job.priority = static_cast<int>(row.integer(7));
-  job.front = row.integer(8) != 0;
-  job.attempts = static_cast<unsigned>(row.integer(9));
-  job.created_s = row.real(10);
-  job.started_s = row.real(11);
-  job.finished_s = row.real(12);
-  job.not_before_s = row.real(13);
-  job.result = row.text(16);
-  job.progress = row.text(17);
-  job.preview = static_cast<Preview>(row.integer(18));
   try {
-    job.scenes = nlohmann::json::parse(row.text(5)).get<std::vector<std::string>>();
-    job.error = error_of(row.text(14));
-    job.warnings = nlohmann::json::parse(row.text(15)).get<std::vector<std::string>>();
+    each_column(job,
+                [&, column = 0](const char*, auto& value) mutable { get(row, column++, value); });
   } catch (const nlohmann::json::exception&) {
     throw Error(ErrorCode::kCorrupt, "the row of job " + job.id + " is damaged");
   }
@@ -129,25 +173,22 @@ Job job_of_row(const SqlStatement& row) {
 }
 
 std::optional<Job> read_job(SqlDatabase& database, const std::string& id) {
-  auto row = database.prepare("SELECT " + std::string(kJobColumns) + " FROM job WHERE id = ?");
+  auto row = database.prepare("SELECT " + job_columns() + " FROM job WHERE id = ?");
   if (!row.bind(0, id).step()) return {};
   return job_of_row(row);
 }
 
 void write_job(SqlDatabase& database, const Job& job) {
-  // An upsert: replacing the row would take what refers to it along.
-  auto row = database.prepare(
-      "INSERT INTO job VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, "
-      "?16, ?17, ?18, ?19) ON CONFLICT (number) DO UPDATE SET name = ?3, state = ?4, priority = "
-      "?8, front = ?9, attempts = ?10, started_s = ?12, finished_s = ?13, not_before_s = ?14, "
-      "error = ?15, warnings = ?16, result = ?17, progress = ?18, preview = ?19");
-  row.bind(0, job.number).bind(1, job.id).bind(2, job.name);
-  row.bind(3, static_cast<int64_t>(job.state)).bind(4, job.request);
-  row.bind(5, list_text(job.scenes)).bind(6, job.posted_by);
-  row.bind(7, int64_t{job.priority}).bind(8, int64_t{job.front}).bind(9, int64_t{job.attempts});
-  row.bind(10, job.created_s).bind(11, job.started_s).bind(12, job.finished_s);
-  row.bind(13, job.not_before_s).bind(14, error_text(job.error)).bind(15, list_text(job.warnings));
-  row.bind(16, job.result).bind(17, job.progress).bind(18, static_cast<int64_t>(job.preview));
+  // An upsert: replacing the row would remove what refers to it.
+  std::string values, updates;
+  each_column(job, [&](const char* name, const auto&) {
+    values += values.empty() ? "?" : ", ?";
+    updates += (updates.empty() ? "" : ", ") + std::string(name) + " = excluded." + name;
+  });
+  auto row = database.prepare("INSERT INTO job (" + job_columns() + ") VALUES (" + values +
+                              ") ON CONFLICT (number) DO UPDATE SET " + updates);
+  each_column(
+      job, [&, column = 0](const char*, const auto& value) mutable { put(row, column++, value); });
   row.run();
   for (const std::string& scene : job.scenes)
     database.prepare("INSERT OR IGNORE INTO job_scene VALUES (?, ?)")

@@ -1,4 +1,4 @@
-// The queue's tables, and jobs as their rows.
+// The queue's tables, and jobs as their rows. Used by JobQueue alone, under its locks.
 #pragma once
 
 #include <optional>
@@ -9,16 +9,17 @@
 
 namespace voxdag::server {
 
-// Makes the tables of a new database, or checks that an old one is ours.
+// Makes the tables of a new database, or checks that an existing one is a queue of this version.
 void prepare_schema(SqlDatabase& database, const std::string& path);
 
-// In the order that job_of_row() reads them.
-extern const char* const kJobColumns;
+// The columns of the table `job`, in the order in which job_of_row() reads them.
+const std::string& job_columns();
+// Throws Error{kCorrupt} for a row that is damaged.
 Job job_of_row(const SqlStatement& row);
 
 std::optional<Job> read_job(SqlDatabase& database, const std::string& id);
 void write_job(SqlDatabase& database, const Job& job);
-// Records the state that the job is in as its newest.
+// Records the present state of the job as its newest event.
 void write_event(SqlDatabase& database, const Job& job);
 
 }  // namespace voxdag::server

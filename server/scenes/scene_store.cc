@@ -6,11 +6,11 @@
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kLongestName = 128;
+constexpr size_t kMaxNameBytes = 128;
 // "vdsc": the scenes of a service.
 constexpr int64_t kApplicationId = 0x76647363;
 
-// `total` is -1 while it is not known; `sha256` is "" until the upload is whole.
+// `total` is -1 while it is not known; `sha256` is "" until the upload is complete.
 constexpr const char* kSchema = R"sql(
 CREATE TABLE scene (
   name TEXT PRIMARY KEY, size INTEGER NOT NULL, sha256 TEXT NOT NULL, modified_s REAL NOT NULL
@@ -23,7 +23,7 @@ CREATE TABLE upload (
 
 double now_s() { return clock_seconds(CLOCK_REALTIME); }
 
-std::string made(FileSystem& files, const std::string& folder) {
+std::string make_folders(FileSystem& files, const std::string& folder) {
   files.make_directories(folder + "/files");
   files.make_directories(folder + "/parts");
   return folder;
@@ -53,23 +53,25 @@ bool is_scene_name(std::string_view name) {
   const auto is_alphanumeric = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
   };
-  if (name.empty() || name.size() > kLongestName || !is_alphanumeric(name[0])) return false;
+  if (name.empty() || name.size() > kMaxNameBytes || !is_alphanumeric(name[0])) return false;
   for (const char c : name)
     if (!is_alphanumeric(c) && c != '.' && c != '_' && c != '-') return false;
   return name.ends_with(".glb") || name.ends_with(".gltf");
 }
 
 SceneStore::SceneStore(FileSystem& files, const std::string& folder)
-    : files_(files), folder_(made(files, folder)), database_(open_database(folder + "/scenes.db")) {
-  struct Whole {
+    : files_(files),
+      folder_(make_folders(files, folder)),
+      database_(open_database(folder + "/scenes.db")) {
+  struct Finished {
     std::string name, sha256;
     uint64_t size;
   };
-  std::vector<Whole> whole;
+  std::vector<Finished> finished;
   auto rows = database_.prepare("SELECT name, sha256, offset FROM upload WHERE sha256 != ''");
-  while (rows.step()) whole.push_back({rows.text(0), rows.text(1), rows.word(2)});
+  while (rows.step()) finished.push_back({rows.text(0), rows.text(1), rows.word(2)});
   rows.reset();
-  for (const Whole& w : whole) finish_publishing(w.name, w.size, w.sha256);
+  for (const Finished& f : finished) finish_publishing(f.name, f.size, f.sha256);
 }
 
 std::optional<Scene> SceneStore::find(const std::string& name) {

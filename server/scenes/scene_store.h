@@ -1,11 +1,13 @@
-// Uploaded scenes: whole ones under files/NAME, those that are still arriving under parts/NAME, and
-// what is known of both in scenes.db.
+// Uploaded scenes: complete ones under files/NAME, unfinished uploads under parts/NAME, and the
+// records of both in scenes.db.
 //
-//   1. A scene is listed only when its bytes are whole, synced and of the digest that was promised.
-//   2. The offset of an upload counts synced bytes only: a power cut loses what came after, and the
-//      client is told so.
+//   1. A scene is complete only when all its bytes are synced and have the digest that the client
+//      named.
+//   2. The recorded offset of an upload counts synced bytes only: a power cut loses what came
+//   after,
+//      and the client continues from that offset.
 //   3. One request at a time writes to an upload.
-// Thread-safe. Names are checked by is_scene_name() before they come here.
+// Thread-safe. Callers check names with is_scene_name().
 #pragma once
 
 #include <mutex>
@@ -25,9 +27,9 @@ bool is_scene_name(std::string_view name);
 struct Scene {
   std::string name;
   bool complete = false;
-  std::optional<uint64_t> size;  // of the whole
-  uint64_t offset = 0;           // how much is here
-  std::string sha256;            // of complete ones
+  std::optional<uint64_t> size;  // of the complete scene, if known
+  uint64_t offset = 0;           // bytes received
+  std::string sha256;            // of complete scenes
   double modified_s = 0;
 };
 
@@ -42,13 +44,13 @@ class SceneStore {
   SceneStore(FileSystem& files, const std::string& folder);
 
   std::optional<Scene> find(const std::string& name);
-  // In the order of names, after `after`.
+  // The first scenes whose names follow `after`, in the order of names.
   std::vector<Scene> list(const std::string& after, size_t limit);
-  // Of a scene that is arriving.
+  // The state of an unfinished upload.
   std::optional<UploadState> upload(const std::string& name);
-  // Scene and upload. False if there is neither.
+  // Removes a scene and its upload. False if there is no complete scene.
   bool remove(const std::string& name);
-  // Uploads that nothing was added to since.
+  // Removes uploads that received nothing since `before_s` (Unix time).
   void remove_stale_uploads(double before_s);
   std::string path(const std::string& name) const { return folder_ + "/files/" + name; }
 
@@ -59,7 +61,7 @@ class SceneStore {
   bool lock_name(const std::string& name);
   void unlock_name(const std::string& name);
   void record(const std::string& name, const UploadState& state);
-  // Names the digest of a whole upload, then gives it its place.
+  // Records the digest of a finished upload, then renames it to its final path.
   void publish(const std::string& name, uint64_t size, const std::string& sha256);
   void finish_publishing(const std::string& name, uint64_t size, const std::string& sha256);
   void drop_upload(const std::string& name);

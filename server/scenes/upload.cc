@@ -3,19 +3,20 @@
 #include <algorithm>
 
 #include "core/base/error.h"
-#include "server/api/problem.h"
+#include "server/request_error.h"
 
 namespace voxdag::server {
 namespace {
 
 constexpr size_t kBufferBytes = 256 << 10;
-// What a power cut may cost a client.
-constexpr uint64_t kKeepEvery = uint64_t{64} << 20;
+// What a power cut may cost a client: the bytes that it sends again.
+constexpr uint64_t kCheckpointBytes = uint64_t{64} << 20;
 
-Problem wrong_offset(uint64_t expected) {
-  Problem problem = conflict("the part does not begin where the last one ended");
-  problem.headers.emplace("Upload-Offset", std::to_string(expected));
-  return problem;
+RequestError wrong_offset(uint64_t expected) {
+  RequestError error(RequestError::Kind::kConflict,
+                     "the part does not begin where the last one ended");
+  error.upload_offset = expected;
+  return error;
 }
 
 }  // namespace
@@ -26,8 +27,9 @@ Upload::Upload(SceneStore& store, std::string name, uint64_t first, std::optiona
       first_(first),
       total_(total),
       offset_(first),
-      kept_(first) {
-  if (!store_.lock_name(name_)) throw conflict("another request is uploading this scene");
+      recorded_(first) {
+  if (!store_.lock_name(name_))
+    throw RequestError(RequestError::Kind::kConflict, "another request is uploading this scene");
   try {
     const auto known = store_.upload(name_);
     if (first_ == 0) {
@@ -36,7 +38,8 @@ Upload::Upload(SceneStore& store, std::string name, uint64_t first, std::optiona
     } else {
       if (first_ != (known ? known->offset : 0)) throw wrong_offset(known ? known->offset : 0);
       if (known->total && total_ != known->total)
-        throw bad_request("Content-Range: the total is another than that of the first part");
+        throw RequestError(RequestError::Kind::kInvalid,
+                           "Content-Range: the total is another than that of the first part");
       file_ = store_.files_.open_write(store_.part_path(name_));
     }
   } catch (...) {
@@ -47,9 +50,9 @@ Upload::Upload(SceneStore& store, std::string name, uint64_t first, std::optiona
 
 Upload::~Upload() {
   try {
-    if (!done_) keep();
+    if (!done_) checkpoint();
   } catch (const Error&) {
-    // The record still names an offset that was kept before.
+    // The record still has an earlier offset, which is valid too.
   }
   file_.reset();
   store_.unlock_name(name_);
@@ -58,7 +61,7 @@ Upload::~Upload() {
 void Upload::write(std::string_view bytes) {
   buffer_ += bytes;
   if (buffer_.size() >= kBufferBytes) flush();
-  if (offset_ - kept_ >= kKeepEvery) keep();
+  if (offset_ - recorded_ >= kCheckpointBytes) checkpoint();
 }
 
 void Upload::flush() {
@@ -70,11 +73,11 @@ void Upload::flush() {
   buffer_.clear();
 }
 
-void Upload::keep() {
+void Upload::checkpoint() {
   flush();
   file_->sync();
   store_.record(name_, {offset_, total_});
-  kept_ = offset_;
+  recorded_ = offset_;
 }
 
 bool Upload::finish(const std::string& part_digest, const std::string& whole_digest, bool is_last) {
@@ -86,10 +89,11 @@ bool Upload::finish(const std::string& part_digest, const std::string& whole_dig
       store_.drop_upload(name_);
     else
       store_.record(name_, {first_, total_});
-    throw bad_request("the part's bytes have another SHA-256 than Content-Digest says");
+    throw RequestError(RequestError::Kind::kInvalid,
+                       "the part's bytes have another SHA-256 than Content-Digest says");
   }
   if (!is_last) {
-    keep();
+    checkpoint();
     done_ = true;
     return false;
   }
@@ -98,7 +102,8 @@ bool Upload::finish(const std::string& part_digest, const std::string& whole_dig
   if (!whole_digest.empty() && whole_digest != sha256_) {
     done_ = true;
     store_.drop_upload(name_);
-    throw bad_request("the scene's bytes have another SHA-256 than Repr-Digest says");
+    throw RequestError(RequestError::Kind::kInvalid,
+                       "the scene's bytes have another SHA-256 than Repr-Digest says");
   }
   return true;
 }

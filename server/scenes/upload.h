@@ -1,5 +1,5 @@
-// One request's part of an upload, written as it comes. Unless it is finished or dropped, what came
-// is kept, so that the client can go on from there.
+// One request's part of an upload, written as it arrives. What arrived is recorded unless its
+// digest was wrong, so that the client can continue from there. Used by one thread.
 #pragma once
 
 #include <memory>
@@ -15,8 +15,9 @@ namespace voxdag::server {
 class Upload {
  public:
   // `first` is where this part begins (0 starts over), `total` the whole's size if it is known.
-  // Throws Problem: 409 if another request is writing, or with Upload-Offset if the part does not
-  // begin where the last one ended; 400 if the total is another than before.
+  // Throws RequestError: kConflict if another request is writing, or (with upload_offset) if the
+  // part does not begin where the last one ended; kInvalid if the total differs from the first
+  // part's.
   Upload(SceneStore& store, std::string name, uint64_t first, std::optional<uint64_t> total);
   ~Upload();
   Upload(const Upload&) = delete;
@@ -24,17 +25,17 @@ class Upload {
   void write(std::string_view bytes);
   uint64_t offset() const { return offset_; }
 
-  // The part is here, of this digest ("" for any). True if the scene is whole now, and of
-  // `whole_digest` ("" for any): it then waits for publish(). Throws Problem (400) on a mismatch,
-  // and keeps nothing of the part, or of the whole.
+  // The part is complete; its digest must be `part_digest` ("" for any). Returns true if it was the
+  // last one: then the scene has `whole_digest` ("" for any) and waits for publish(). Throws
+  // RequestError{kInvalid} on a mismatch, and discards the part or the whole scene.
   bool finish(const std::string& part_digest, const std::string& whole_digest, bool is_last);
-  // Puts the whole scene in its place. Returns its SHA-256.
+  // Makes the scene complete, in place of an earlier one. Returns its SHA-256.
   std::string publish();
 
  private:
   void flush();
-  // Syncs and records what is here.
-  void keep();
+  // Syncs what was written and records the offset.
+  void checkpoint();
   std::string digest_of_whole();
 
   SceneStore& store_;
@@ -44,8 +45,8 @@ class Upload {
   std::unique_ptr<WritableFile> file_;
   std::string buffer_;
   uint64_t offset_;
-  uint64_t kept_;  // of the offset
-  Sha256 digest_;  // of this part
+  uint64_t recorded_;  // the offset in the store
+  Sha256 digest_;      // of this part
   std::string sha256_;
   bool done_ = false;
 };

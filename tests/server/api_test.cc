@@ -1,7 +1,8 @@
 #include <filesystem>
 
 #include "core/base/error.h"
-#include "server/api/digest.h"
+#include "core/format/checksum.h"
+#include "server/http/digest_field.h"
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {
@@ -215,6 +216,46 @@ TEST_F(Api, FailsWithTheReason) {
   EXPECT_NE(error["message"].get<std::string>().find("bad.glb"), std::string::npos) << error;
   EXPECT_EQ(error["message"].get<std::string>().find(folder_.path()), std::string::npos) << error;
   EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/" + id + "/dag"), 404, "not_found"), "");
+}
+
+// What clients see of failures names the scene as they did, and no folder of the service's machine.
+TEST_F(Api, NamesNoFolderOfItsMachine) {
+  start();
+  const auto expect_no_path = [&](const std::string& id) {
+    for (const char* part : {"", "/log", "/subvolumes"}) {
+      const std::string body = http_->get("/api/v1/jobs/" + id + part).body;
+      EXPECT_EQ(body.find(folder_.path()), std::string::npos) << body;
+    }
+    std::string events;
+    http_->stream(
+        "/api/v1/jobs/" + id + "/events", {{"Last-Event-ID", "0"}},
+        [](const ClientResponse& r) { return r.status == 200; },
+        [&](std::string_view piece) {
+          events += piece;
+          return true;
+        });
+    EXPECT_EQ(events.find(folder_.path()), std::string::npos) << events;
+  };
+  put_scene("gone.glb", scene_bytes());
+  std::filesystem::remove(config_.data_folder + "/scenes/files/gone.glb");
+  EXPECT_EQ(post("/api/v1/jobs", {{"scene", "gone.glb"}, {"resolution", 64}}).status, 404);
+
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 16384}});
+  const std::string work = config_.data_folder + "/jobs/" + id + "/work";
+  ASSERT_TRUE(until([&] { return std::filesystem::exists(work + "/job.db"); }));
+  post("/api/v1/jobs/" + id + "/suspend");
+  // The job's process may still be writing: wait until it has ended.
+  ASSERT_TRUE(until([&] {
+    return http_->get("/metrics").body.find("voxdag_running_processes 0") != std::string::npos;
+  }));
+  for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(work + "/job.db" + suffix);
+  write_file_atomically(system_files(), work + "/job.db", std::string(8192, 'x'));
+  post("/api/v1/jobs/" + id + "/resume");
+  ASSERT_TRUE(until([&] { return job(id)["state"] == "failed"; }));
+  EXPECT_NE(job(id)["error"]["message"].get<std::string>().find("job.db"), std::string::npos)
+      << job(id)["error"];
+  expect_no_path(id);
 }
 
 // Scenes by path: below a root, and nowhere else.

@@ -53,7 +53,7 @@ TEST_F(Hostile, AnUnreadBodyEndsTheConnection) {
 }
 
 TEST_F(Hostile, BodiesOverTheirLimitAreRefused) {
-  config_.transfers.scene_bytes = 1000;
+  config_.transfers.max_scene_bytes = 1000;
   start();
   EXPECT_EQ(not_problem(put_scene("a.glb", std::string(1001, 'x')), 413, "too_large"), "");
   const std::string chunk(600, 'x');

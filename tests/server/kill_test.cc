@@ -9,7 +9,7 @@
 #include <random>
 
 #include "core/base/clock.h"
-#include "server/api/digest.h"
+#include "core/format/checksum.h"
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {
@@ -74,7 +74,7 @@ class KilledService : public testing::Test {
     run("generate soup " + folder_.file("s.glb") + " --triangles 30000");
     write_file_atomically(
         system_files(), folder_.file("config.json"),
-        Json{{"data", folder_.file("data")},
+        Json{{"data_folder", folder_.file("data")},
              {"jobs", {{"min_free_disk", 0}, {"memory", "256MiB"}, {"threads", 1}, {"nice", 0}}}}
             .dump());
     scene_ = contents(folder_.file("s.glb"));
@@ -141,8 +141,8 @@ TEST_F(KilledService, FinishesEveryJobInTheEnd) {
   }
 }
 
-// SIGTERM: builds stop at a checkpoint, the exit is clean, and the next service goes on.
-TEST_F(KilledService, DrainsAndGoesOn) {
+// SIGTERM: builds stop at a checkpoint, the exit is clean, and the next service resumes them.
+TEST_F(KilledService, DrainsAndResumes) {
   prepare();
   post_jobs();
   const std::string id = jobs_.back().id;

@@ -37,7 +37,7 @@ Problem unauthorized(const std::string& detail) {
 
 AccessControl::AccessControl(const ServerConfig& config, FileSystem& files)
     : hosts_(config.hosts),
-      requests_(config.transfers.requests_per_s),
+      requests_(config.transfers.max_requests_per_s),
       wrong_tokens_(kWrongTokensPerSecond) {
   if (!config.token_file.empty()) tokens_ = Tokens::read(files, config.token_file);
   hosts_.insert(hosts_.end(), {"localhost", "127.0.0.1", "[::1]", config.http.address});

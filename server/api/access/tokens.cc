@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "core/base/error.h"
-#include "server/api/digest.h"
+#include "core/format/checksum.h"
 #include "server/random_id.h"
 
 namespace voxdag::server {

@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/format/checksum.h"
 #include "server/api/context.h"
-#include "server/api/digest.h"
 #include "server/api/dry_run.h"
 #include "server/api/job_json.h"
 #include "server/api/problem.h"
@@ -24,7 +24,7 @@ std::string describe(Context& context, const Job& job) {
     const auto found = places->find(job.number);
     if (found != places->end()) place = found->second;
   }
-  return job_json(job, live.get(), place, context.config.jobs.attempts);
+  return job_json(job, live.get(), place, context.config.jobs.max_attempts);
 }
 
 IdempotencyKey key_of(const Request& request, const JobRequest& job) {
@@ -50,7 +50,7 @@ Response post_job(Context& context, Call& call) {
   if (call.request.target.query.contains("dry_run") && dry != "true" && dry != "false")
     throw bad_request("'dry_run': expected true or false");
   const JobRequest request =
-      parse_job_request(read_json_body(call.request, context.config.transfers.body_bytes));
+      parse_job_request(read_json_body(call.request, context.config.transfers.max_body_bytes));
   const IdempotencyKey key = key_of(call.request, request);
   if (dry == "true") return dry_run(context, request);
   if (context.draining) throw busy("the service is stopping");
@@ -63,7 +63,7 @@ Response post_job(Context& context, Call& call) {
   job.scenes = TaskResolver::uploads_of(request);
   job.posted_by = call.caller.name;
   job.priority = request.priority;
-  const JobQueue::Added added = context.queue.add(job, key, context.config.jobs.queued);
+  const JobQueue::Added added = context.queue.add(job, key, context.config.jobs.max_queued);
   return accepted(context, added.job, added.replayed);
 }
 
@@ -109,7 +109,7 @@ Response list_jobs(Context& context, Call& call) {
 Response patch_job(Context& context, Call& call) {
   call.allow_query({});
   const auto body = nlohmann::json::parse(
-      read_json_body(call.request, context.config.transfers.body_bytes), nullptr, false);
+      read_json_body(call.request, context.config.transfers.max_body_bytes), nullptr, false);
   if (!body.is_object() || body.size() != 1 || !body.contains("priority"))
     throw bad_request("expected {\"priority\": N}");
   const int priority = parse_priority(body["priority"].dump());

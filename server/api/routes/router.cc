@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "server/api/problem.h"
+#include "server/api/request_problem.h"
 
 namespace voxdag::server {
 namespace {
@@ -64,7 +65,11 @@ Response Router::route(Request& request, AccessControl& gate) const {
     if (route.method == method) {
       call.caller = gate.admit(request, route.role);
       request.caller = call.caller.name;
-      return route.handler(call);
+      try {
+        return route.handler(call);
+      } catch (const RequestError& error) {
+        throw problem_of(error);
+      }
     }
     allowed += (allowed.empty() ? "" : ", ") + route.method;
     if (route.method == "GET") allowed += ", HEAD";

@@ -3,10 +3,10 @@
 
 #include "core/base/error.h"
 #include "server/api/context.h"
-#include "server/api/digest.h"
 #include "server/api/job_json.h"
 #include "server/api/problem.h"
 #include "server/api/routes/router.h"
+#include "server/http/digest_field.h"
 #include "server/scenes/upload.h"
 
 namespace voxdag::server {
@@ -75,7 +75,7 @@ Part part_of(const Request& request) {
 }
 
 void check_disk_space(Context& context, const Part& part) {
-  const uint64_t most = context.config.transfers.scene_bytes;
+  const uint64_t most = context.config.transfers.max_scene_bytes;
   const uint64_t size = part.total.value_or(0);
   if (size > most)
     throw Problem(413, "too_large", "a scene may have at most " + std::to_string(most) + " bytes");
@@ -85,7 +85,7 @@ void check_disk_space(Context& context, const Part& part) {
 }
 
 BodyEnd receive(Context& context, Call& call, const Part& part, Upload& upload) {
-  const uint64_t most = part.end.value_or(context.config.transfers.scene_bytes);
+  const uint64_t most = part.end.value_or(context.config.transfers.max_scene_bytes);
   uint64_t received = part.first;
   const BodyEnd end = call.request.read_body([&](std::string_view piece) {
     received += piece.size();

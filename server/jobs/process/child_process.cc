@@ -17,13 +17,13 @@ namespace voxdag::server {
 namespace {
 
 constexpr int kTick_ms = 100;
-constexpr size_t kLongestLine = 4 << 20;
+constexpr size_t kMaxLineBytes = 4 << 20;
 
-// In the child, between fork and exec: only what is async-signal-safe.
-[[noreturn]] void become(char* const* arguments, int output, const char* log_file, int nice,
-                         pid_t parent) {
+// Runs in the child, between fork and exec: only async-signal-safe calls are allowed.
+[[noreturn]] void run_program(char* const* arguments, int output, const char* log_file, int nice,
+                              pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(127);  // it died before the line above
+  if (getppid() != parent) _exit(127);  // the parent died before the line above
   setpgid(0, 0);                        // Ctrl-C on a terminal is for the service
   if (nice != 0) setpriority(PRIO_PROCESS, 0, nice);
   sigset_t none;
@@ -47,16 +47,16 @@ ChildProcess::ChildProcess(const Start& start) {
   arguments.push_back(nullptr);
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
-    throw Error(ErrorCode::kIo, "a pipe: " + std::string(std::strerror(errno)));
+    throw Error(ErrorCode::kIo, "pipe: " + std::string(std::strerror(errno)));
   const pid_t parent = getpid();
   pid_ = fork();
-  if (pid_ == 0) become(arguments.data(), ends[1], start.log_file.c_str(), start.nice, parent);
+  if (pid_ == 0) run_program(arguments.data(), ends[1], start.log_file.c_str(), start.nice, parent);
   const int reason = errno;
   close(ends[1]);
   output_ = ends[0];
   if (pid_ < 0) {
     close(output_);
-    throw Error(ErrorCode::kIo, "a process for the job: " + std::string(std::strerror(reason)));
+    throw Error(ErrorCode::kIo, "fork: " + std::string(std::strerror(reason)));
   }
 }
 
@@ -83,13 +83,16 @@ void ChildProcess::read_lines(const std::function<void(std::string_view)>& use,
     for (size_t end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1)
       use(std::string_view(text).substr(begin, end - begin));
     text.erase(0, begin);
-    if (text.size() > kLongestLine) text.clear();
+    if (text.size() > kMaxLineBytes) text.clear();
   }
 }
 
-void ChildProcess::signal(bool ask) {
+void ChildProcess::ask_to_stop() { send(SIGTERM); }
+void ChildProcess::kill() { send(SIGKILL); }
+
+void ChildProcess::send(int signal) {
   std::lock_guard lock(mutex_);
-  if (pid_ > 0) ::kill(pid_, ask ? SIGTERM : SIGKILL);
+  if (pid_ > 0) ::kill(pid_, signal);
 }
 
 ChildProcess::End ChildProcess::wait() {

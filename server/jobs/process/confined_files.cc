@@ -1,11 +1,24 @@
 #include "server/jobs/process/confined_files.h"
 
+#include <sys/stat.h>
+
+#include <algorithm>
 #include <cstdlib>
 #include <memory>
 
 #include "core/base/error.h"
 
 namespace voxdag::server {
+namespace {
+
+// A link that is changed between the check of a path and its opening must not let another file
+// through.
+bool is_same_file(const std::string& resolved, const FileIdentity& opened) {
+  struct stat found {};
+  return lstat(resolved.c_str(), &found) == 0 && found.st_ino == opened.inode;
+}
+
+}  // namespace
 
 std::string resolved_path(const std::string& path) {
   const std::unique_ptr<char, decltype(&std::free)> resolved(realpath(path.c_str(), nullptr),
@@ -21,17 +34,21 @@ ConfinedFiles::ConfinedFiles(FileSystem& files, const std::vector<std::string>& 
     : ForwardingFiles(files) {
   for (const std::string& place : readable) {
     std::string resolved = resolved_path(place);
-    if (resolved.empty()) continue;
-    if (place.ends_with('/') && resolved != "/") resolved += '/';
+    if (resolved.empty()) resolved = place;
+    if (place.ends_with('/') && !resolved.ends_with('/')) resolved += '/';
     readable_.push_back(resolved);
   }
 }
 
 std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) {
   const std::string resolved = resolved_path(path);
-  if (resolved.empty()) return ForwardingFiles::open_read(path);  // says what is missing
-  for (const std::string& place : readable_)
-    if (lies_in(resolved, place)) return ForwardingFiles::open_read(resolved);
+  if (resolved.empty()) return ForwardingFiles::open_read(path);  // reports what is missing
+  const bool is_readable = std::any_of(readable_.begin(), readable_.end(),
+                                       [&](const std::string& p) { return lies_in(resolved, p); });
+  if (is_readable) {
+    auto file = ForwardingFiles::open_read(path);
+    if (is_same_file(resolved, file->identity())) return file;
+  }
   throw Error(
       ErrorCode::kInvalidInput,
       path + " lies outside the scene's folder: expected a scene that needs no other files");

@@ -1,5 +1,5 @@
-// A file system that opens nothing but what it was given: a scene that somebody uploaded may name
-// any file as its buffers, by dots or through symbolic links. Everything else passes through.
+// A file system that reads only the files it was given: an uploaded scene may name any file as its
+// buffers, by dots or through symbolic links. Everything else passes through.
 #pragma once
 
 #include <string>
@@ -11,10 +11,12 @@ namespace voxdag::server {
 
 class ConfinedFiles : public ForwardingFiles {
  public:
-  // `readable`: files, or folders ending in '/' with all below them.
+  // `readable`: files, or folders ending in '/' with all below them. What does not exist yet must
+  // be named without symbolic links and dots.
   ConfinedFiles(FileSystem& files, const std::vector<std::string>& readable);
 
-  // Throws Error{kInvalidInput} for a file outside.
+  // Opens a file under the name given, which is the one that errors name. Throws
+  // Error{kInvalidInput} for a file outside.
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override;
 
  private:

@@ -1,4 +1,5 @@
-// Where a job's files lie: DATA/jobs/ID.
+// Where a job's files lie: DATA/jobs/ID. A job's process has this folder as its working directory
+// and uses the empty path, so that no message of its build names a folder of this machine.
 #pragma once
 
 #include <string>
@@ -8,18 +9,21 @@
 namespace voxdag::server {
 
 struct JobFolder {
-  std::string path;
+  std::string path;  // "" for the working directory
 
-  std::string task() const { return path + "/task.json"; }  // what the job's process is to do
-  std::string log() const { return path + "/log"; }
-  std::string result() const { return path + "/result.vdag"; }
+  std::string task() const { return file("task.json"); }  // what the job's process is to do
+  std::string log() const { return file("log"); }
+  std::string result() const { return file("result.vdag"); }
   std::string report() const { return result() + ".report.json"; }
-  std::string work() const { return path + "/work"; }
-  std::string subvolumes() const { return path + "/subvolumes.json"; }
-  std::string preview() const { return path + "/preview.png"; }
+  std::string work() const { return file("work"); }
+  std::string subvolumes() const { return file("subvolumes.json"); }
+  std::string preview() const { return file("preview.png"); }
+  std::string file(const std::string& name) const {
+    return path.empty() ? name : path + "/" + name;
+  }
 };
 
-// A folder and all that is in it; nothing happens if it is not there.
+// Removes a folder and all that is in it, if it exists.
 void remove_tree(FileSystem& files, const std::string& path);
 
 }  // namespace voxdag::server

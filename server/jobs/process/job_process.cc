@@ -1,9 +1,11 @@
 #include "server/jobs/process/job_process.h"
 
+#include <unistd.h>
+
+#include <filesystem>
 #include <fstream>
 #include <new>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <system_error>
 
 #include "core/base/error.h"
@@ -11,40 +13,58 @@
 #include "scheduler/job/work_folder.h"
 #include "scheduler/plan/estimate.h"
 #include "scheduler/run_build.h"
-#include "server/api/problem.h"
-#include "server/jobs/built_watch.h"
 #include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
 #include "server/jobs/process/job_folder.h"
 #include "server/jobs/process/progress_pipe.h"
 #include "server/jobs/process/task.h"
+#include "server/request_error.h"
 
 namespace voxdag::server {
 namespace {
 
 using nlohmann::ordered_json;
 
-constexpr uint64_t kLargestReport = uint64_t{4} << 20;
+constexpr uint64_t kMaxReportBytes = uint64_t{4} << 20;
+constexpr int kInternalExitStatus = 1;
 
-// Should memory run out, the system takes this process and not the service.
+// Should memory run out, the system's OOM killer takes this process and not the service.
 void raise_oom_score() { std::ofstream("/proc/self/oom_score_adj") << 500; }
 
-JobRequest request_of(const Task& task) {
-  try {
-    return parse_job_request(task.text);
-  } catch (const Problem& problem) {
-    throw Error(ErrorCode::kInvalidInput, problem.detail);
+void enter(const std::string& folder) {
+  if (chdir(folder.c_str()) != 0) throw Error(ErrorCode::kIo, "the job's folder cannot be entered");
+}
+
+// Makes the uploads of a task appear in the working directory under their public names.
+void link_uploads(const Task& task) {
+  for (const auto& [name, path] : task.uploads) {
+    std::error_code failure;
+    std::filesystem::remove(name, failure);
+    if (!failure) std::filesystem::create_symlink(path, name, failure);
+    if (failure)
+      throw Error(failure == std::errc::no_space_on_device ? ErrorCode::kNoSpace : ErrorCode::kIo,
+                  "symlink " + name + ": " + failure.message());
   }
 }
 
+// The scene's files, and what the build itself writes and reads again.
+ConfinedFiles confined(FileSystem& files, const Task& task, const JobFolder& folder) {
+  const std::string here = resolved_path(".") + "/";
+  std::vector<std::string> readable = task.readable;
+  readable.push_back(here + folder.work() + "/");
+  readable.push_back(here + folder.report());
+  for (const char* suffix : {"", ".partial"}) readable.push_back(here + folder.result() + suffix);
+  return ConfinedFiles(files, readable);
+}
+
 BuildSpec spec_of(const Task& task, const JobFolder& folder) {
-  BuildSpec spec = request_of(task).spec;
-  spec.geometry.scenes = task.scene_paths;
+  const JobRequest request = parse_job_request(task.request);
+  BuildSpec spec = request.spec;
+  spec.geometry.scenes = request.scenes;
   spec.run.output = folder.result();
   spec.run.work_folder = folder.work();
   if (spec.run.memory_bytes == 0) spec.run.memory_bytes = task.memory_bytes;
   if (spec.run.threads == 0) spec.run.threads = task.threads;
-  spec.run.keep_work = true;  // it is looked at once more
   return spec;
 }
 
@@ -59,71 +79,63 @@ ordered_json levels_of(const std::string& path) {
   return levels;
 }
 
-// The report of the build, without what does not concern clients.
-std::string result_of(FileSystem& files, const JobFolder& folder) {
-  const auto report = ordered_json::parse(read_small_file(files, folder.report(), kLargestReport));
+// The members of a build's report that concern clients, and the sizes of the levels.
+std::string result_json(const std::string& report_text, const std::string& output) {
+  const auto report = ordered_json::parse(report_text);
   ordered_json result;
   for (const char* name : {"sha256", "bytes", "voxels", "svo_nodes", "dag_nodes", "triangles",
                            "wall_s", "cpu_s", "peak_rss_bytes", "bounds"})
     result[name] = report.at(name);
-  result["levels"] = levels_of(folder.result());
+  result["levels"] = levels_of(output);
   return result.dump();
 }
 
-std::string build(FileSystem& files, const Task& task, const JobFolder& folder, ProgressPipe& pipe,
-                  const CancelToken& cancel) {
-  // The report is written last: where it is, only the tidying up was interrupted.
-  if (!files.exists(folder.report())) {
-    BuiltWatch watch(files, folder, request_of(task).spec.geometry.resolution, pipe);
-    run_build(spec_of(task, folder), {files, pipe, cancel});
-  }
-  std::string result = result_of(files, folder);
-  if (files.exists(folder.work())) WorkFolder(files, folder.work()).remove();
-  return result;
+// The report is written last: if it exists, only the removal of the work folder was interrupted.
+std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildContext& context) {
+  if (!context.files.exists(folder.report()))
+    return result_json(report_json(run_build(spec, context)), spec.run.output);
+  if (context.files.exists(folder.work())) WorkFolder(context.files, folder.work()).remove();
+  return result_json(read_small_file(context.files, folder.report(), kMaxReportBytes),
+                     spec.run.output);
 }
 
-std::string plan(FileSystem& files, const Task& task, const JobFolder& folder, ProgressPipe& pipe,
-                 const CancelToken& cancel) {
-  return estimate_json(plan_build(spec_of(task, folder), {files, pipe, cancel}));
-}
-
-std::vector<std::pair<std::string, std::string>> private_paths(const Task& task,
-                                                               const JobFolder& folder,
-                                                               const JobRequest& request) {
-  std::vector<std::pair<std::string, std::string>> paths;
-  for (size_t i = 0; i < task.scene_paths.size(); ++i)
-    paths.emplace_back(task.scene_paths[i], request.scenes[i]);
-  paths.emplace_back(folder.path + "/", "");
-  paths.emplace_back(folder.path, "the job's folder");
-  for (const std::string& place : task.readable) paths.emplace_back(place, "");
-  return paths;
+std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progress,
+                    const CancelToken& cancel) {
+  const Task task = read_task(files, folder.task());
+  link_uploads(task);
+  ConfinedFiles readable = confined(files, task, folder);
+  const BuildContext context{readable, progress, cancel};
+  const BuildSpec spec = spec_of(task, folder);
+  return task.kind == Task::Kind::kPlan ? estimate_json(plan_build(spec, context))
+                                        : build(spec, folder, context);
 }
 
 }  // namespace
 
 int run_job(FileSystem& files, const std::string& path, const CancelToken& cancel) {
   raise_oom_score();
-  ProgressPipe pipe;
-  const JobFolder folder{path};
+  const JobFolder folder;
+  ProgressPipe pipe(files, folder.subvolumes());
   const auto fail = [&](ErrorCode code, const std::string& message) {
     pipe.fail(error_name(code), message);
     return exit_status(code);
   };
   try {
-    const Task task = read_task(files, folder.task());
-    pipe.hide(private_paths(task, folder, request_of(task)));
-    std::vector<std::string> readable = task.readable;
-    readable.push_back(folder.path + "/");
-    ConfinedFiles confined(files, readable);
-    pipe.finish(task.kind == Task::Kind::kPlan ? plan(confined, task, folder, pipe, cancel)
-                                               : build(confined, task, folder, pipe, cancel));
+    enter(path);
+    pipe.finish(do_task(files, folder, pipe, cancel));
     return 0;
   } catch (const Error& error) {
     return fail(error.code(), error.message());
-  } catch (const std::system_error& error) {
-    return fail(ErrorCode::kOutOfMemory, "the system has no threads or memory left");
+  } catch (const RequestError& error) {
+    return fail(ErrorCode::kInvalidInput, error.message());
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
+  } catch (const std::system_error&) {
+    return fail(ErrorCode::kOutOfMemory, "the system has no threads or memory left");
+  } catch (const std::exception&) {
+    // Texts of libraries may name paths.
+    pipe.fail("internal", "a fault of the job's process");
+    return kInternalExitStatus;
   }
 }
 

@@ -1,6 +1,10 @@
 // The process that does one job: `voxdag run-job FOLDER`, started by the service alone. It reads
-// FOLDER/task.json, builds with run_build(), reports by lines on standard output (task.h), and logs
-// in plain words on standard error. Neither shows a path of this machine.
+// FOLDER/task.json, builds with run_build(), reports by messages on standard output (messages.h),
+// and logs in plain words on standard error.
+//
+// No message or log line names a folder of this machine. The process works in FOLDER and names its
+// files relative to that; an uploaded scene is opened by its public name, a symbolic link in
+// FOLDER; a scene below a scene root by the path that the client gave.
 #pragma once
 
 #include <string>
@@ -10,7 +14,8 @@
 
 namespace voxdag::server {
 
-// Returns the exit status. After a crash at any moment the same call goes on where it was.
+// Returns the exit status; changes the working directory. After a crash at any moment the same call
+// resumes the job.
 int run_job(FileSystem& files, const std::string& folder, const CancelToken& cancel);
 
 }  // namespace voxdag::server

@@ -2,32 +2,32 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <ctime>
 
 #include "core/base/clock.h"
+#include "core/base/error.h"
 
 namespace voxdag::server {
 namespace {
 
-constexpr double kInterval_s = 0.25;
+constexpr double kAdvanceInterval_s = 0.25;
+constexpr double kSubvolumesInterval_s = 1;
+// Writing subvolumes.json takes at most this part of one core.
+constexpr double kMaxSubvolumesShare = 0.01;
 
 void write_all(int file, const std::string& text) {
   for (size_t at = 0; at < text.size();) {
     const ssize_t wrote = ::write(file, text.data() + at, text.size() - at);
     if (wrote < 0 && errno == EINTR) continue;
-    if (wrote <= 0) return;  // nobody reads any more
+    if (wrote <= 0) return;  // nobody reads it
     at += static_cast<size_t>(wrote);
   }
 }
 
 }  // namespace
-
-void ProgressPipe::hide(std::vector<std::pair<std::string, std::string>> texts) {
-  std::lock_guard lock(mutex_);
-  hidden_ = std::move(texts);
-}
 
 void ProgressPipe::begin_stage(std::string_view stage, uint64_t total, std::string_view unit) {
   std::lock_guard lock(mutex_);
@@ -35,13 +35,8 @@ void ProgressPipe::begin_stage(std::string_view stage, uint64_t total, std::stri
   unit_ = unit;
   done_ = 0;
   total_ = total;
-  stage_start_s_ = last_sent_s_ = wall_seconds();
-  Report report;
-  report.kind = Report::Kind::kStage;
-  report.text = stage_;
-  report.unit = unit_;
-  report.total = total_;
-  send(report);
+  stage_start_s_ = last_advance_s_ = wall_seconds();
+  send(StageBegun{stage_, unit_, total_});
 }
 
 void ProgressPipe::advance(uint64_t count) {
@@ -59,9 +54,8 @@ void ProgressPipe::set_total(uint64_t total) {
 void ProgressPipe::end_stage() {
   std::lock_guard lock(mutex_);
   send_advance(true);
-  Report report;
-  report.kind = Report::Kind::kEnd;
-  send(report);
+  report_subvolumes(true);
+  send(StageEnded{});
   char took[32];
   std::snprintf(took, sizeof took, "%.2f s", wall_seconds() - stage_start_s_);
   log(stage_ + ": " + std::to_string(done_) + " " + unit_ + " in " + took);
@@ -69,50 +63,81 @@ void ProgressPipe::end_stage() {
 
 void ProgressPipe::warn(std::string_view message) {
   std::lock_guard lock(mutex_);
-  Report report;
-  report.kind = Report::Kind::kWarning;
-  report.text = hidden(std::string(message));
-  send(report);
-  log("warning: " + report.text);
+  send(Warning{std::string(message)});
+  log("warning: " + std::string(message));
 }
 
-void ProgressPipe::built(const Report& report) {
+void ProgressPipe::set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) {
   std::lock_guard lock(mutex_);
-  send(report);
+  subvolumes_.set(resolution, all);
+  subvolumes_changed_ = !all.empty();
+  report_subvolumes(true);
 }
 
-void ProgressPipe::fail(const std::string& code, const std::string& message) {
+void ProgressPipe::subvolume_built(const SubvolumeStatus& built) {
   std::lock_guard lock(mutex_);
-  Report report;
-  report.kind = Report::Kind::kError;
-  report.code = code;
-  report.text = hidden(message);
-  send(report);
-  log((code == "canceled" ? "stopped: " : "error: ") + report.text);
+  subvolumes_.built(built);
+  subvolumes_changed_ = true;
+  report_subvolumes(false);
 }
 
-void ProgressPipe::finish(const std::string& result) {
+void ProgressPipe::subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) {
   std::lock_guard lock(mutex_);
-  Report report;
-  report.kind = Report::Kind::kResult;
-  report.text = result;
-  send(report);
+  subvolumes_.split(id, parts);
+  subvolumes_changed_ = true;
+  report_subvolumes(false);
+}
+
+void ProgressPipe::set_usage(uint64_t memory_bytes, uint64_t disk_bytes) {
+  std::lock_guard lock(mutex_);
+  send(Usage{memory_bytes, disk_bytes});
+}
+
+void ProgressPipe::fail(const std::string& code, const std::string& text) {
+  std::lock_guard lock(mutex_);
+  report_subvolumes(true);
+  send(Failure{code, text});
+  log((code == "canceled" ? "stopped: " : "error: ") + text);
+}
+
+void ProgressPipe::finish(const std::string& result_json) {
+  std::lock_guard lock(mutex_);
+  send(Result{result_json});
   log("done");
 }
 
-void ProgressPipe::send(const Report& report) {
-  write_all(STDOUT_FILENO, report_line(report) + "\n");
+void ProgressPipe::send(const Message& message) {
+  write_all(STDOUT_FILENO, encode(message) + "\n");
 }
 
-void ProgressPipe::send_advance(bool at_once) {
-  const double now = wall_seconds();
-  if (!at_once && now - last_sent_s_ < kInterval_s) return;
-  last_sent_s_ = now;
-  Report report;
-  report.kind = Report::Kind::kAdvance;
-  report.done = done_;
-  report.total = total_;
-  send(report);
+void ProgressPipe::send_advance(bool now) {
+  const double time_s = wall_seconds();
+  if (!now && time_s - last_advance_s_ < kAdvanceInterval_s) return;
+  last_advance_s_ = time_s;
+  send(StageAdvanced{done_, total_});
+}
+
+void ProgressPipe::report_subvolumes(bool now) {
+  if (!subvolumes_changed_ || (!now && wall_seconds() < next_subvolumes_s_)) return;
+  subvolumes_changed_ = false;
+  send(subvolumes_.totals());
+  const double start_s = thread_cpu_seconds();
+  write_subvolumes();
+  const double pause_s = (thread_cpu_seconds() - start_s) / kMaxSubvolumesShare;
+  next_subvolumes_s_ = wall_seconds() + std::max(kSubvolumesInterval_s, pause_s);
+}
+
+void ProgressPipe::write_subvolumes() {
+  const std::string temporary = subvolumes_path_ + ".new";
+  try {
+    const std::string text = subvolumes_.json();
+    const auto file = files_.create(temporary);
+    file->write_at(0, std::as_bytes(std::span(text)));
+    file->close();
+    files_.rename(temporary, subvolumes_path_);
+  } catch (const Error&) {
+    // The next attempt may succeed.
+  }
 }
 
 void ProgressPipe::log(const std::string& text) {
@@ -122,14 +147,6 @@ void ProgressPipe::log(const std::string& text) {
   char stamp[32];
   strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%SZ ", &parts);
   write_all(STDERR_FILENO, stamp + text + "\n");
-}
-
-std::string ProgressPipe::hidden(std::string text) const {
-  for (const auto& [from, to] : hidden_)
-    for (size_t at = text.find(from); !from.empty() && at != std::string::npos;
-         at = text.find(from, at + to.size()))
-      text.replace(at, from.size(), to);
-  return text;
 }
 
 }  // namespace voxdag::server

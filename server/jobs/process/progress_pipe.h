@@ -1,44 +1,54 @@
-// The reporting side of a job's process: a build's progress as lines on standard output, at most a
-// few a second, and in plain words on standard error. Thread-safe.
+// How a job's process reports: messages on standard output, at most a few per second, plain words
+// on standard error, and the file subvolumes.json, about once per second. Thread-safe.
 #pragma once
 
 #include <mutex>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "core/base/progress.h"
-#include "server/jobs/process/task.h"
+#include "core/io/file_system.h"
+#include "server/jobs/process/messages.h"
+#include "server/jobs/process/subvolume_map.h"
 
 namespace voxdag::server {
 
 class ProgressPipe : public Progress {
  public:
-  // Texts that are to be replaced in all that is said.
-  void hide(std::vector<std::pair<std::string, std::string>> texts);
+  ProgressPipe(FileSystem& files, std::string subvolumes_path)
+      : files_(files), subvolumes_path_(std::move(subvolumes_path)) {}
 
   void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
   void advance(uint64_t count) override;
   void set_total(uint64_t total) override;
   void end_stage() override;
   void warn(std::string_view message) override;
+  void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override;
+  void subvolume_built(const SubvolumeStatus& built) override;
+  void subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) override;
+  void set_usage(uint64_t memory_bytes, uint64_t disk_bytes) override;
 
-  void built(const Report& report);
-  void fail(const std::string& code, const std::string& message);
-  void finish(const std::string& result);
+  void fail(const std::string& code, const std::string& text);
+  void finish(const std::string& result_json);
 
  private:
-  // Called with the mutex held.
-  void send(const Report& report);
-  void send_advance(bool at_once);
+  // Each is called with the mutex held; `now` sends even if the last message was just sent.
+  void send(const Message& message);
+  void send_advance(bool now);
+  void report_subvolumes(bool now);
   void log(const std::string& text);
-  std::string hidden(std::string text) const;
+  // Writes subvolumes.json, under its name at once. It is not synced, since it can be made again;
+  // failures are ignored, since they must not make a build fail.
+  void write_subvolumes();
 
+  FileSystem& files_;
+  const std::string subvolumes_path_;
   std::mutex mutex_;  // guards all below
-  std::vector<std::pair<std::string, std::string>> hidden_;
   std::string stage_, unit_;
   uint64_t done_ = 0, total_ = 0;
-  double stage_start_s_ = 0, last_sent_s_ = 0;
+  double stage_start_s_ = 0, last_advance_s_ = 0;
+  SubvolumeMap subvolumes_;
+  bool subvolumes_changed_ = false;
+  double next_subvolumes_s_ = 0;
 };
 
 }  // namespace voxdag::server

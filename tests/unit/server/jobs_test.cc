@@ -2,12 +2,14 @@
 
 #include <csignal>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
-#include "server/api/problem.h"
+#include "server/jobs/job_outcome.h"
 #include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
+#include "server/jobs/process/subvolume_map.h"
 #include "server/jobs/process/task.h"
-#include "server/jobs/settlement.h"
+#include "server/request_error.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag::server {
@@ -31,7 +33,7 @@ TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   EXPECT_EQ(request.spec.run.threads, 2u);
   EXPECT_EQ(request.spec.run.subvolume_edge, 512u);
   EXPECT_EQ(parse_job_request(request.text).spec.geometry.bounds, g.bounds)
-      << "what is kept can be read again";
+      << "the stored text can be read again";
 }
 
 TEST(JobRequestBody, IsRefusedByName) {
@@ -64,10 +66,10 @@ TEST(JobRequestBody, IsRefusedByName) {
     SCOPED_TRACE(body);
     try {
       parse_job_request(body);
-      ADD_FAILURE() << "was taken";
-    } catch (const Problem& problem) {
-      EXPECT_EQ(problem.status, 400);
-      EXPECT_NE(problem.detail.find(part), std::string::npos) << problem.detail;
+      ADD_FAILURE() << "was accepted";
+    } catch (const RequestError& error) {
+      EXPECT_EQ(error.kind(), RequestError::Kind::kInvalid);
+      EXPECT_NE(error.message().find(part), std::string::npos) << error.message();
     }
   }
 }
@@ -76,35 +78,124 @@ TEST(TaskFile, IsReadAsItWasWritten) {
   const TemporaryFolder folder;
   Task task;
   task.kind = Task::Kind::kPlan;
-  task.text = "{\"a\":1}";
-  task.scene_paths = {"/x/a.glb"};
+  task.request = "{\"a\":1}";
+  task.uploads = {{"a.glb", "/x/a.glb"}};
   task.readable = {"/x/"};
   task.memory_bytes = 123;
   task.threads = 3;
   write_task(system_files(), folder.file("task.json"), task);
   const Task back = read_task(system_files(), folder.file("task.json"));
   EXPECT_EQ(back.kind, task.kind);
-  EXPECT_EQ(back.text, task.text);
-  EXPECT_EQ(back.scene_paths, task.scene_paths);
+  EXPECT_EQ(back.request, task.request);
+  EXPECT_EQ(back.uploads, task.uploads);
   EXPECT_EQ(back.readable, task.readable);
   EXPECT_EQ(back.memory_bytes, 123u);
   EXPECT_EQ(back.threads, 3u);
 }
 
-// A process of ours is trusted no more than a file: its lines are checked.
-TEST(ReportLine, IsReadOrIgnored) {
-  Report report;
-  report.kind = Report::Kind::kWarning;
-  report.text = "a \"text\"\nof two lines \xff";
-  const auto back = parse_report(report_line(report));
-  ASSERT_TRUE(back);
-  EXPECT_EQ(back->kind, Report::Kind::kWarning);
-  EXPECT_EQ(back->text.substr(0, 8), "a \"text\"");
-  for (const char* line : {"", "hello", "[]", "[99,\"\",\"\",\"\",0,0,0,0,0,0,0]", "{\"a\":1}",
-                           "[0,1,2,3,4,5,6,7,8,9,10]"}) {
+template <class M>
+M sent(const M& message) {
+  const auto received = decode(encode(message));
+  if (received && std::holds_alternative<M>(*received)) return std::get<M>(*received);
+  ADD_FAILURE() << encode(message);
+  return {};
+}
+
+TEST(Messages, AreReadAsTheyWereWritten) {
+  const StageBegun begun = sent(StageBegun{"build", "subvolumes", 64});
+  EXPECT_EQ(begun.stage, "build");
+  EXPECT_EQ(begun.unit, "subvolumes");
+  EXPECT_EQ(begun.total, 64u);
+  const StageAdvanced advanced = sent(StageAdvanced{12, UINT64_MAX});
+  EXPECT_EQ(advanced.done, 12u);
+  EXPECT_EQ(advanced.total, UINT64_MAX);
+  sent(StageEnded{});
+  const SubvolumeTotals totals = sent(SubvolumeTotals{1, 2, 3, 4, 5});
+  EXPECT_EQ(totals.built, 1u);
+  EXPECT_EQ(totals.total, 2u);
+  EXPECT_EQ(totals.voxels, 3u);
+  EXPECT_EQ(totals.nodes, 4u);
+  EXPECT_EQ(totals.bytes, 5u);
+  const Usage usage = sent(Usage{6, 7});
+  EXPECT_EQ(usage.memory_bytes, 6u);
+  EXPECT_EQ(usage.disk_bytes, 7u);
+  EXPECT_EQ(sent(Warning{"a \"text\"\nof two lines"}).text, "a \"text\"\nof two lines");
+  EXPECT_EQ(sent(Warning{"no UTF-8: \xff"}).text.substr(0, 10), "no UTF-8: ");
+  const Failure failure = sent(Failure{"no_space", "full"});
+  EXPECT_EQ(failure.code, "no_space");
+  EXPECT_EQ(failure.text, "full");
+  EXPECT_EQ(sent(Result{"{\"a\":1}"}).json, "{\"a\":1}");
+}
+
+TEST(Messages, AreLinesOfNamedMembers) {
+  EXPECT_EQ(encode(StageAdvanced{12, 64}), R"({"done":12,"message":"stage_advanced","total":64})");
+  EXPECT_EQ(encode(Warning{"two\nlines"}), R"({"message":"warning","text":"two\nlines"})");
+}
+
+// A job's process is trusted no more than a file: its lines are checked.
+TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
+  for (const char* line :
+       {"", "hello", "[]", "null", "{", "{\"a\":1}", "[0,1,2,3,4,5,6,7,8,9,10]", R"({"message":1})",
+        R"({"message":"unknown"})", R"({"message":"warning"})", R"({"message":"warning","text":1})",
+        R"({"message":"stage_advanced","done":1})",
+        R"({"message":"stage_advanced","done":-1,"total":2})",
+        R"({"message":"stage_advanced","done":1.5,"total":2})",
+        R"({"message":"stage_begun","stage":"s","unit":"u","total":"3"})",
+        R"({"message":"failure","code":"io"})", R"({"message":"result","json":{}})"}) {
     SCOPED_TRACE(line);
-    EXPECT_FALSE(parse_report(line));
+    EXPECT_FALSE(decode(line));
   }
+}
+
+TEST(Progress, IsPutTogetherFromMessages) {
+  LiveJob live("id", 0);
+  EXPECT_EQ(live.progress_json(), "");
+  live.apply(StageAdvanced{1, 2});
+  EXPECT_EQ(live.progress_json(), "") << "no stage has begun";
+  live.apply(StageBegun{"build", "subvolumes", 4});
+  live.apply(SubvolumeTotals{1, 4, 100, 20, 300});
+  live.apply(Usage{5000, 6000});
+  live.apply(StageAdvanced{1, 5});
+  const auto progress = nlohmann::json::parse(live.progress_json());
+  EXPECT_EQ(progress["stage"], "build");
+  EXPECT_EQ(progress["done"], 1);
+  EXPECT_EQ(progress["total"], 5);
+  EXPECT_EQ(progress["subvolumes"], nlohmann::json({{"built", 1}, {"total", 4}}));
+  EXPECT_EQ(progress["voxels"], 100);
+  EXPECT_EQ(progress["nodes"], 20);
+  EXPECT_EQ(progress["bytes"], 300);
+  EXPECT_EQ(progress["memory_bytes"], 5000);
+  EXPECT_EQ(progress["disk_bytes"], 6000);
+}
+
+// Built subvolumes of an earlier run count from the start; a split replaces one by its parts.
+TEST(Subvolumes, AreCountedAndListed) {
+  SubvolumeMap map;
+  const SubvolumeStatus built{1, {0, 0, 0}, 512, true, 10, 5, 100};
+  const SubvolumeStatus planned{2, {512, 0, 0}, 512, false, 0, 0, 0};
+  map.set(1024, std::vector{built, planned});
+  EXPECT_EQ(map.totals().built, 1u);
+  EXPECT_EQ(map.totals().total, 2u);
+  map.built(built);
+  EXPECT_EQ(map.totals().voxels, 10u) << "counted once";
+  const SubvolumeStatus part{3, {512, 256, 0}, 256, false, 0, 0, 0};
+  const SubvolumeStatus other{4, {768, 0, 0}, 256, false, 0, 0, 0};
+  map.split(2, std::vector{part, other});
+  SubvolumeStatus done = part;
+  done.voxels = 7;
+  done.nodes = 3;
+  done.bytes = 50;
+  map.built(done);
+  EXPECT_EQ(map.totals().built, 2u);
+  EXPECT_EQ(map.totals().total, 3u);
+  EXPECT_EQ(map.totals().voxels, 17u);
+  EXPECT_EQ(map.totals().nodes, 8u);
+  EXPECT_EQ(map.totals().bytes, 150u);
+  EXPECT_EQ(map.json(), R"({"resolution":1024,"built":2,"total":3,)"
+                        R"("cubes":[[0,0,0,512,1],[512,256,0,256,1],[768,0,0,256,0]]})");
+  map.set(1024, std::vector{planned});
+  EXPECT_EQ(map.totals().built, 0u) << "a damaged one is planned again";
+  EXPECT_EQ(map.totals().bytes, 0u);
 }
 
 // Neither dots nor symbolic links lead out of what a scene may read.
@@ -122,85 +213,80 @@ TEST(ConfinedFilesTest, OpensNothingOutside) {
     SCOPED_TRACE(name);
     EXPECT_THROW(files.open_read(folder.file(name)), Error);
   }
+  std::filesystem::create_symlink(folder.file("in/a"), folder.file("public.glb"));
+  EXPECT_EQ(files.open_read(folder.file("public.glb"))->path(), folder.file("public.glb"))
+      << "errors name the link, not its target";
   ConfinedFiles one(system_files(), {folder.file("in/a")});
   EXPECT_EQ(one.open_read(folder.file("in/a"))->size(), 1u);
   EXPECT_THROW(one.open_read(folder.file("in/side/b")), Error);
 }
 
-class Settlement : public testing::Test {
+class JobOutcome : public testing::Test {
  protected:
-  Settlement() {
+  JobOutcome() {
     job_.state = JobState::kRunning;
     job_.attempts = 1;
   }
-  void fail(const char* code) {
-    Report report;
-    report.kind = Report::Kind::kError;
-    report.code = code;
-    live_.take(report);
-  }
-  void settle(ChildProcess::End end = {}) { settle_job(job_, live_, end, limits_, 1000); }
+  void fail(const char* code) { live_.apply(Failure{code, ""}); }
+  void apply(ChildProcess::End end = {}) { apply_outcome(job_, live_, end, limits_, 1000); }
 
   JobLimits limits_;
   Job job_;
   LiveJob live_{"id", 0};
 };
 
-TEST_F(Settlement, ARunWithAResultSucceeds) {
-  Report report;
-  report.kind = Report::Kind::kResult;
-  report.text = "{}";
-  live_.take(report);
-  settle();
+TEST_F(JobOutcome, ARunWithAResultSucceeds) {
+  live_.apply(Result{"{}"});
+  apply();
   EXPECT_EQ(job_.state, JobState::kSucceeded);
   EXPECT_EQ(job_.result, "{}");
   EXPECT_EQ(job_.finished_s, 1000);
 }
 
-TEST_F(Settlement, AFullDiskIsTriedAgainLaterAndLater) {
+TEST_F(JobOutcome, AFullDiskIsRetriedWithLongerPauses) {
   fail("no_space");
-  settle();
+  apply();
   EXPECT_EQ(job_.state, JobState::kQueued);
   EXPECT_EQ(job_.not_before_s, 1000 + limits_.backoff_s);
   job_.state = JobState::kRunning;
   job_.attempts = 3;
-  settle();
+  apply();
   EXPECT_EQ(job_.not_before_s, 1000 + 4 * limits_.backoff_s);
   job_.state = JobState::kRunning;
-  job_.attempts = limits_.attempts;
-  settle();
+  job_.attempts = limits_.max_attempts;
+  apply();
   EXPECT_EQ(job_.state, JobState::kFailed);
   EXPECT_TRUE(job_.error->transient);
 }
 
-TEST_F(Settlement, ABrokenSceneFailsAtOnce) {
+TEST_F(JobOutcome, ABrokenSceneFailsAtOnce) {
   fail("invalid_input");
-  settle();
+  apply();
   EXPECT_EQ(job_.state, JobState::kFailed);
   EXPECT_FALSE(job_.error->transient);
 }
 
-TEST_F(Settlement, ACrashIsNoSecret) {
-  settle({0, SIGSEGV});
+TEST_F(JobOutcome, ACrashIsReported) {
+  apply({0, SIGSEGV});
   EXPECT_EQ(job_.state, JobState::kFailed);
   EXPECT_EQ(job_.error->code, "internal");
   job_.state = JobState::kRunning;
-  settle({0, SIGKILL});
+  apply({0, SIGKILL});
   EXPECT_EQ(job_.error->code, "out_of_memory");
 }
 
-TEST_F(Settlement, WhatWasStoppedBecomesWhatWasAskedFor) {
+TEST_F(JobOutcome, AStoppedRunGetsTheStateThatWasAskedFor) {
   live_.stop();
   fail("canceled");
-  settle();
+  apply();
   EXPECT_EQ(job_.state, JobState::kQueued) << "the service stops";
   EXPECT_TRUE(job_.front);
   EXPECT_FALSE(job_.error);
   job_.state = JobState::kCanceling;
-  settle();
+  apply();
   EXPECT_EQ(job_.state, JobState::kCanceled);
   job_.state = JobState::kSuspended;
-  settle();
+  apply();
   EXPECT_EQ(job_.state, JobState::kSuspended);
 }
 

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include "core/base/clock.h"
-#include "server/api/problem.h"
 #include "server/queue/job_queue.h"
 #include "tests/unit/io/temporary_folder.h"
 
@@ -27,12 +26,12 @@ class Queue : public testing::Test {
     queue_.reset();
     queue_ = std::make_unique<JobQueue>(folder_.file("queue.db"));
   }
-  int status_of(const std::function<void()>& act) {
+  std::optional<RequestError::Kind> refusal(const std::function<void()>& act) {
     try {
       act();
-      return 0;
-    } catch (const Problem& problem) {
-      return problem.status;
+      return {};
+    } catch (const RequestError& error) {
+      return error.kind();
     }
   }
 
@@ -40,8 +39,8 @@ class Queue : public testing::Test {
   std::unique_ptr<JobQueue> queue_ = std::make_unique<JobQueue>(folder_.file("queue.db"));
 };
 
-// All of a job survives the end of the process.
-TEST_F(Queue, KeepsEverythingOfAJob) {
+// A job survives the end of the process completely.
+TEST_F(Queue, StoresEveryMemberOfAJob) {
   const std::string id = post(7).id;
   queue_->change(id, [](Job& j) {
     j.name = "a \"name\"\xff";
@@ -82,14 +81,14 @@ TEST_F(Queue, ServesByPriorityThenFrontThenOrder) {
   EXPECT_EQ(places->at(queue_->find(first)->number), 3u);
 }
 
-TEST_F(Queue, WaitsUntilAJobMayBeTriedAgain) {
+TEST_F(Queue, WaitsUntilAJobMayBeRetried) {
   const std::string id = post().id;
   queue_->change(id, [](Job& j) { j.not_before_s = 1000; });
   EXPECT_FALSE(queue_->next(999, {}));
   EXPECT_TRUE(queue_->next(1000, {}));
 }
 
-// After a crash of the service: what ran goes on first, what was to stop has stopped.
+// After a crash of the service: running jobs are first in the queue, canceling ones are canceled.
 TEST_F(Queue, RecoversWhatWasRunning) {
   const std::string waiting = post().id, running = post().id, stopping = post().id;
   set_state(running, JobState::kRunning);
@@ -109,26 +108,26 @@ TEST_F(Queue, AnswersARepetitionWithTheSameJob) {
   reopen();
   EXPECT_EQ(post(0, key).id, id);
   EXPECT_EQ(queue_->find_by_key(key)->id, id);
-  EXPECT_EQ(status_of([&] { post(0, {"key", "other"}); }), 422);
+  EXPECT_EQ(refusal([&] { post(0, {"key", "other"}); }), RequestError::Kind::kKeyReused);
   set_state(id, JobState::kCanceled);
   queue_->remove(id);
   EXPECT_NE(post(0, key).id, id) << "the key lives as long as its job";
 }
 
-TEST_F(Queue, RefusesMoreThanItMayHold) {
+TEST_F(Queue, RefusesJobsOverItsLimit) {
   Job job;
   job.request = "{}";
   queue_->add(job, {}, 1);
-  EXPECT_EQ(status_of([&] { queue_->add(job, {}, 1); }), 503);
+  EXPECT_EQ(refusal([&] { queue_->add(job, {}, 1); }), RequestError::Kind::kQueueFull);
 }
 
 TEST_F(Queue, RemovesOnlyWhatHasEnded) {
   const std::string id = post().id;
-  EXPECT_EQ(status_of([&] { queue_->remove(id); }), 409);
+  EXPECT_EQ(refusal([&] { queue_->remove(id); }), RequestError::Kind::kConflict);
   set_state(id, JobState::kFailed);
   queue_->remove(id);
   EXPECT_FALSE(queue_->find(id));
-  EXPECT_EQ(status_of([&] { queue_->remove(id); }), 404);
+  EXPECT_EQ(refusal([&] { queue_->remove(id); }), RequestError::Kind::kNotFound);
   EXPECT_TRUE(queue_->events_after(id, 0).empty()) << "its events go with it";
 }
 
@@ -147,15 +146,15 @@ TEST_F(Queue, RecordsEveryChangeOfState) {
 }
 
 // An edit that throws leaves nothing behind.
-TEST_F(Queue, ForgetsAChangeThatFails) {
+TEST_F(Queue, RollsBackAChangeThatFails) {
   const std::string id = post().id;
-  EXPECT_EQ(status_of([&] {
+  EXPECT_EQ(refusal([&] {
               queue_->change(id, [](Job& j) {
                 j.priority = 50;
-                throw conflict("no");
+                throw RequestError(RequestError::Kind::kConflict, "no");
               });
             }),
-            409);
+            RequestError::Kind::kConflict);
   EXPECT_EQ(queue_->find(id)->priority, 0);
 }
 
@@ -201,7 +200,7 @@ TEST_F(Queue, LetsEndedJobsExpire) {
   EXPECT_EQ(queue_->expired(1e12, 100).size(), 2u);
 }
 
-TEST_F(Queue, RefusesADatabaseOfSomebodyElse) {
+TEST_F(Queue, RefusesADatabaseOfAnotherProgram) {
   SqlDatabase(folder_.file("other.db"), SqlDatabase::Mode::kReadWrite)
       .execute("CREATE TABLE t (a)");
   EXPECT_THROW(JobQueue(folder_.file("other.db")), Error);

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "server/api/digest.h"
-#include "server/api/problem.h"
+#include "core/format/checksum.h"
+#include "server/request_error.h"
 #include "server/scenes/scene_store.h"
 #include "server/scenes/upload.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -15,13 +15,13 @@ class Scenes : public testing::Test {
     store_.reset();
     store_ = std::make_unique<SceneStore>(system_files(), folder_.path());
   }
-  Problem problem_of(const std::function<void()>& act) {
+  std::optional<RequestError> refusal(const std::function<void()>& act) {
     try {
       act();
-    } catch (const Problem& problem) {
-      return problem;
+      return {};
+    } catch (const RequestError& error) {
+      return error;
     }
-    return Problem(0, "", "");
   }
   std::string contents(const std::string& name) {
     return read_small_file(system_files(), store_->path(name), 1 << 20);
@@ -60,8 +60,8 @@ TEST_F(Scenes, ArriveInOneGo) {
   EXPECT_FALSE(store_->upload("a.glb"));
 }
 
-// What came before the connection broke is kept, over a restart of the service too.
-TEST_F(Scenes, GoOnWhereTheyBrokeOff) {
+// What arrived before the connection broke is not lost, even if the service restarts.
+TEST_F(Scenes, ContinueWhereTheyBrokeOff) {
   {
     Upload upload(*store_, "a.glb", 0, 10);
     upload.write("01234");
@@ -69,10 +69,12 @@ TEST_F(Scenes, GoOnWhereTheyBrokeOff) {
   reopen();
   ASSERT_EQ(store_->upload("a.glb")->offset, 5u);
   EXPECT_EQ(store_->upload("a.glb")->total, 10u);
-  const Problem wrong = problem_of([&] { Upload(*store_, "a.glb", 4, 10); });
-  EXPECT_EQ(wrong.status, 409);
-  EXPECT_EQ(header_value(wrong.headers, "Upload-Offset"), "5");
-  EXPECT_EQ(problem_of([&] { Upload(*store_, "a.glb", 5, 11); }).status, 400);
+  const auto wrong = refusal([&] { Upload(*store_, "a.glb", 4, 10); });
+  ASSERT_TRUE(wrong);
+  EXPECT_EQ(wrong->kind(), RequestError::Kind::kConflict);
+  EXPECT_EQ(wrong->upload_offset, 5u);
+  EXPECT_EQ(refusal([&] { Upload(*store_, "a.glb", 5, 11); })->kind(),
+            RequestError::Kind::kInvalid);
   Upload upload(*store_, "a.glb", 5, 10);
   upload.write("56789");
   EXPECT_TRUE(upload.finish(sha256_hex("56789"), sha256_hex("0123456789"), true));
@@ -88,7 +90,8 @@ TEST_F(Scenes, DropAPartOfTheWrongDigest) {
   {
     Upload upload(*store_, "a.glb", 5, 10);
     upload.write("x6789");
-    EXPECT_EQ(problem_of([&] { upload.finish(sha256_hex("56789"), "", true); }).status, 400);
+    EXPECT_EQ(refusal([&] { upload.finish(sha256_hex("56789"), "", true); })->kind(),
+              RequestError::Kind::kInvalid);
   }
   EXPECT_EQ(store_->upload("a.glb")->offset, 5u);
 }
@@ -97,18 +100,20 @@ TEST_F(Scenes, DropAWholeOfTheWrongDigest) {
   {
     Upload upload(*store_, "a.glb", 0, 5);
     upload.write("hello");
-    EXPECT_EQ(problem_of([&] { upload.finish("", sha256_hex("other"), true); }).status, 400);
+    EXPECT_EQ(refusal([&] { upload.finish("", sha256_hex("other"), true); })->kind(),
+              RequestError::Kind::kInvalid);
   }
   EXPECT_FALSE(store_->find("a.glb"));
 }
 
 TEST_F(Scenes, AreWrittenByOneRequestAtATime) {
   Upload upload(*store_, "a.glb", 0, 5);
-  EXPECT_EQ(problem_of([&] { Upload(*store_, "a.glb", 0, 5); }).status, 409);
-  EXPECT_EQ(problem_of([&] { Upload(*store_, "b.glb", 0, 5); }).status, 0);
+  EXPECT_EQ(refusal([&] { Upload(*store_, "a.glb", 0, 5); })->kind(),
+            RequestError::Kind::kConflict);
+  EXPECT_FALSE(refusal([&] { Upload(*store_, "b.glb", 0, 5); }));
 }
 
-// The old scene stays until the new one is whole.
+// The old scene stays until the new one is complete.
 TEST_F(Scenes, AreReplacedAtOnce) {
   {
     Upload upload(*store_, "a.glb", 0, 3);
@@ -141,7 +146,7 @@ TEST_F(Scenes, AreListedByNameAndRemoved) {
   EXPECT_FALSE(store_->find("a.glb"));
 }
 
-TEST_F(Scenes, ForgetUploadsThatNobodyGoesOnWith) {
+TEST_F(Scenes, DropStaleUploads) {
   { Upload(*store_, "a.glb", 0, 5).write("abc"); }
   store_->remove_stale_uploads(0);
   EXPECT_TRUE(store_->upload("a.glb"));

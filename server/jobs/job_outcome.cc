@@ -1,4 +1,4 @@
-#include "server/jobs/settlement.h"
+#include "server/jobs/job_outcome.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,13 +14,14 @@ JobError error_of(const LiveJob& live, const ChildProcess::End& end, double now_
     return {failure->code, failure->text, now_s, is_transient(failure->code)};
   if (end.signal == SIGKILL)
     return {"out_of_memory",
-            "the job's process was killed, by the system for want of memory perhaps", now_s, false};
+            "the job's process was killed, perhaps by the system because memory ran out", now_s,
+            false};
   if (end.signal != 0)
     return {"internal", "the job's process crashed (signal " + std::to_string(end.signal) + ")",
             now_s, false};
   return {"internal",
           "the job's process ended with status " + std::to_string(end.exit_status) +
-              " and said nothing",
+              " and reported neither a result nor a failure",
           now_s, false};
 }
 
@@ -36,11 +37,11 @@ double pause_s(const JobLimits& limits, unsigned attempts) {
 
 }  // namespace
 
-void settle_job(Job& job, const LiveJob& live, const ChildProcess::End& end,
-                const JobLimits& limits, double now_s) {
+void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
+                   const JobLimits& limits, double now_s) {
   job.warnings = live.warnings();
   job.progress = live.progress_json();
-  const bool asked = live.stop_asked_s() > 0;
+  const bool asked = live.stop_requested_s() > 0;
   if (const std::string result = live.result(); !result.empty()) {
     if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);
     job.result = result;
@@ -55,7 +56,7 @@ void settle_job(Job& job, const LiveJob& live, const ChildProcess::End& end,
   if (stopped || error.code == "canceled") {
     job.state = JobState::kQueued;
     job.front = true;
-  } else if (error.transient && job.attempts < limits.attempts) {
+  } else if (error.transient && job.attempts < limits.max_attempts) {
     job.state = JobState::kQueued;
     job.not_before_s = now_s + pause_s(limits, job.attempts);
   } else {

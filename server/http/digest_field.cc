@@ -1,13 +1,12 @@
-#include "server/api/digest.h"
+#include "server/http/digest_field.h"
 
 #include <openssl/evp.h>
 
 #include <array>
 
 #include "core/base/text.h"
-#include "core/format/checksum.h"
-#include "server/api/problem.h"
 #include "server/http/headers.h"
+#include "server/request_error.h"
 
 namespace voxdag::server {
 namespace {
@@ -16,12 +15,6 @@ constexpr size_t kDigestBytes = 32;
 constexpr size_t kBase64Chars = 44;
 
 }  // namespace
-
-std::string sha256_hex(std::string_view text) {
-  Sha256 sum;
-  sum.add(std::as_bytes(std::span(text)));
-  return sum.finish();
-}
 
 std::string digest_field(const std::string& sha256) {
   std::array<unsigned char, kDigestBytes> bytes{};
@@ -45,10 +38,12 @@ std::string parse_digest_field(const std::string& header) {
     if (entry.size() != kName.size() + kBase64Chars + 1 || !entry.ends_with("=:") ||
         EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(base64.data()),
                         kBase64Chars) != kDigestBytes + 1)
-      throw bad_request("a digest is broken: expected sha-256=:BASE64:");
+      throw RequestError(RequestError::Kind::kInvalid,
+                         "a digest is broken: expected sha-256=:BASE64:");
     return hex_text(std::span(bytes).first(kDigestBytes));
   }
-  throw bad_request("a digest has no sha-256: expected sha-256=:BASE64:");
+  throw RequestError(RequestError::Kind::kInvalid,
+                     "a digest has no sha-256: expected sha-256=:BASE64:");
 }
 
 }  // namespace voxdag::server

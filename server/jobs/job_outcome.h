@@ -8,12 +8,12 @@
 
 namespace voxdag::server {
 
-// Changes the job, which may meanwhile have been suspended, resumed or asked to be canceled:
+// Changes the job, which may have been suspended, resumed or asked to be canceled since it started:
 //   a result                      succeeded (canceled if that was asked for)
 //   stopped because we asked      as asked: canceled, suspended; queued again if the service stops
 //   no_space, io                  queued again after a pause, while there are attempts left
 //   anything else                 failed
-void settle_job(Job& job, const LiveJob& live, const ChildProcess::End& end,
-                const JobLimits& limits, double now_s);
+void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
+                   const JobLimits& limits, double now_s);
 
 }  // namespace voxdag::server

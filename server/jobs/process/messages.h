@@ -1,0 +1,58 @@
+// What a job's process reports to the service: one JSON object per line of its standard output,
+// with the name of the message as "message" and the members of its struct under their own names.
+//
+//   {"message":"stage_advanced","done":12,"total":64}
+//
+// The service trusts a job's process no more than a file: a line that is broken, incomplete or
+// unknown has no value.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+namespace voxdag::server {
+
+// "stage_begun": the first message of a stage; `total` counts `unit`s, 0 if unknown.
+struct StageBegun {
+  std::string stage, unit;
+  uint64_t total = 0;
+};
+// "stage_advanced"
+struct StageAdvanced {
+  uint64_t done = 0, total = 0;
+};
+// "stage_ended"
+struct StageEnded {};
+// "subvolumes": how many there are, how many are built, and what the built ones consist of.
+struct SubvolumeTotals {
+  uint64_t built = 0, total = 0;
+  uint64_t voxels = 0, nodes = 0, bytes = 0;
+};
+// "usage": resident memory, and disk space of the work folder.
+struct Usage {
+  uint64_t memory_bytes = 0, disk_bytes = 0;
+};
+// "warning"
+struct Warning {
+  std::string text;
+};
+// "failure": the last message of a job that failed; `code` as in docs/errors.md, or "internal".
+struct Failure {
+  std::string code, text;
+};
+// "result": the last message of a job that succeeded; `json` is one object.
+struct Result {
+  std::string json;
+};
+
+using Message = std::variant<StageBegun, StageAdvanced, StageEnded, SubvolumeTotals, Usage, Warning,
+                             Failure, Result>;
+
+// One line of JSON, without its end.
+std::string encode(const Message& message);
+std::optional<Message> decode(std::string_view line);
+
+}  // namespace voxdag::server

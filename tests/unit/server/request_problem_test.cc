@@ -1,0 +1,43 @@
+#include "server/api/request_problem.h"
+
+#include <gtest/gtest.h>
+
+namespace voxdag::server {
+namespace {
+
+// Statuses and codes are those of docs/errors.md and docs/api.md.
+TEST(RequestProblem, HasTheStatusAndCodeOfItsKind) {
+  using Kind = RequestError::Kind;
+  struct Row {
+    Kind kind;
+    int status;
+    const char* code;
+  };
+  for (const auto& [kind, status, code] :
+       {Row{Kind::kInvalid, 400, "invalid_input"}, Row{Kind::kNotFound, 404, "not_found"},
+        Row{Kind::kLimit, 422, "limit"}, Row{Kind::kConflict, 409, "conflict"},
+        Row{Kind::kKeyReused, 422, "idempotency_mismatch"}, Row{Kind::kQueueFull, 503, "busy"}}) {
+    SCOPED_TRACE(code);
+    const RequestError error(kind, "the reason");
+    const Problem problem = problem_of(error);
+    EXPECT_EQ(problem.status, status);
+    EXPECT_EQ(problem.code, code);
+    EXPECT_STREQ(error.code(), code);
+    EXPECT_EQ(problem.detail, "the reason");
+  }
+}
+
+TEST(RequestProblem, CarriesWhatAClientNeedsToContinue) {
+  RequestError conflict(RequestError::Kind::kConflict, "no");
+  EXPECT_TRUE(problem_of(conflict).headers.empty());
+  conflict.job_state = "running";
+  conflict.upload_offset = 5;
+  const Problem problem = problem_of(conflict);
+  EXPECT_EQ(problem.state, "running");
+  EXPECT_EQ(header_value(problem.headers, "Upload-Offset"), "5");
+  const Problem full = problem_of(RequestError(RequestError::Kind::kQueueFull, "full"));
+  EXPECT_EQ(header_value(full.headers, "Retry-After"), "60");
+}
+
+}  // namespace
+}  // namespace voxdag::server
