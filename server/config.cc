@@ -102,11 +102,11 @@ Members members_of(ServerConfig& c) {
       .add("transfers", c.transfers.transfers)
       .add("event_streams", c.transfers.event_streams)
       .add("requests_per_s", c.transfers.requests_per_s);
-  connections.add("connections", c.http.limits.connections)
-      .add("per_address", c.http.limits.per_address)
-      .add("header", c.http.limits.header_bytes)
-      .add("header_s", c.http.limits.header_s)
-      .add("idle_s", c.http.limits.idle_s)
+  connections.add("connections", c.http.limits.max_connections)
+      .add("per_address", c.http.limits.max_per_address)
+      .add("header", c.http.limits.max_header_bytes)
+      .add("header_s", c.http.limits.header_timeout_s)
+      .add("idle_s", c.http.limits.idle_timeout_s)
       .add("grace_s", c.http.limits.grace_s)
       .add("min_bytes_per_s", c.http.limits.min_bytes_per_s);
   retention.add("finished_days", c.retention.finished_days)
@@ -155,7 +155,7 @@ void check_config(const ServerConfig& config) {
              "FILE), or listen on 127.0.0.1");
   expect(config.jobs.max_concurrent >= 1 && config.jobs.attempts >= 1,
          "jobs.max_concurrent and jobs.attempts: expected at least 1");
-  expect(config.http.limits.connections >= 8 && config.http.limits.min_bytes_per_s > 0,
+  expect(config.http.limits.max_connections >= 8 && config.http.limits.min_bytes_per_s > 0,
          "connections.connections: expected at least 8, connections.min_bytes_per_s: more than 0");
   expect(config.jobs.memory_bytes == 0 ||
              config.jobs.memory_bytes / config.jobs.max_concurrent >= kMinMemory,

@@ -1,6 +1,6 @@
 #include "server/http/target.h"
 
-#include "server/api/problem.h"
+#include "server/http/problem.h"
 
 namespace voxdag::server {
 namespace {
@@ -12,7 +12,7 @@ int hex_digit(char c) {
   return -1;
 }
 
-std::string decode(std::string_view text, bool plus_is_blank) {
+std::string decode(std::string_view text, bool plus_is_space) {
   std::string out;
   out.reserve(text.size());
   for (size_t i = 0; i < text.size(); ++i) {
@@ -20,14 +20,14 @@ std::string decode(std::string_view text, bool plus_is_blank) {
     if (c == '%') {
       const int high = i + 2 < text.size() ? hex_digit(text[i + 1]) : -1;
       const int low = high >= 0 ? hex_digit(text[i + 2]) : -1;
-      if (low < 0) throw bad_request("the target has a broken percent escape");
+      if (low < 0) throw bad_request("the request target has a malformed percent escape");
       c = static_cast<char>(high * 16 + low);
       i += 2;
-    } else if (c == '+' && plus_is_blank) {
+    } else if (c == '+' && plus_is_space) {
       c = ' ';
     }
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-      throw bad_request("the target has a control character");
+      throw bad_request("the request target has a control character");
     out += c;
   }
   return out;
@@ -51,7 +51,7 @@ void parse_query(std::string_view text, std::map<std::string, std::string>& quer
         equals < pair.size() ? pair.substr(equals + 1) : std::string_view{};
     const auto [at, is_new] =
         query.emplace(decode(pair.substr(0, equals), true), decode(value, true));
-    if (!is_new) throw bad_request("a query parameter is given twice");
+    if (!is_new) throw bad_request("a query parameter is repeated");
   });
 }
 
@@ -69,7 +69,7 @@ std::string_view without_origin(std::string_view text) {
 
 Target parse_target(std::string_view text) {
   text = without_origin(text.substr(0, text.find('#')));
-  if (!text.starts_with('/')) throw bad_request("the target is no path: expected /…");
+  if (!text.starts_with('/')) throw bad_request("the request target is not a path: expected /...");
   Target target;
   const size_t mark = std::min(text.find('?'), text.size());
   target.path = text.substr(0, mark);

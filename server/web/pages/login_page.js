@@ -1,17 +1,17 @@
 // Asks for the bearer token.
 
-import {request, token} from "./api.js";
-import {field, h} from "./dom.js";
-import {problem_box} from "./parts.js";
+import {request, token} from "../lib/api.js";
+import {field, h} from "../lib/dom.js";
+import {problem_box} from "../views/parts.js";
 
-export function login_page(was_wrong, signed_in) {
+export function login_page(token_rejected, signed_in) {
   const input = h("input", {type: "password", autocomplete: "off", required: true, spellcheck: "false"});
-  const trouble = h("div", {role: "alert"},
-                    was_wrong && h("p", {class: "bad"}, "The service does not know this token."));
+  const error = h("div", {role: "alert"},
+                    token_rejected && h("p", {class: "bad"}, "The service does not know this token."));
   const form = h("form", {class: "card narrow stack"},
     h("h1", {}, "Sign in"),
-    h("p", {}, "This service answers only to those who have a token."),
-    field("Token", input, "Kept until this tab is closed."), trouble,
+    h("p", {}, "This service requires an access token."),
+    field("Token", input, "Stored until this tab is closed."), error,
     h("div", {class: "buttons"}, h("button", {class: "primary"}, "Sign in")));
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
@@ -20,7 +20,7 @@ export function login_page(was_wrong, signed_in) {
       await request("GET", "/api/v1/jobs?limit=1");
       signed_in();
     } catch (problem) {
-      if (problem.status !== 401) trouble.replaceChildren(problem_box(problem));
+      if (problem.status !== 401) error.replaceChildren(problem_box(problem));
     }
   });
   queueMicrotask(() => input.focus());

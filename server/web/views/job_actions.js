@@ -1,17 +1,17 @@
-// What may be done to a job in its state.
+// The actions that the state of a job allows.
 
-import {request, send_json, token} from "./api.js";
-import {clear, confirm_deed, h} from "./dom.js";
-import {has_ended, size_text, title_text} from "./format.js";
+import {request, send_json, token} from "../lib/api.js";
+import {clear, confirm_action, h} from "../lib/dom.js";
+import {has_ended, size_text, title_text} from "../lib/format.js";
 import {copy_button, problem_box} from "./parts.js";
 
-const kLargestInMemory = 2 ** 30;
+const kMaxInMemoryBytes = 2 ** 30;
 
 // `reload` is called after each action.
 export function actions(job, reload) {
-  const trouble = h("div", {role: "alert"});
-  const post = (verb) => async () => {
-    await send_json("POST", `${job.links.self}/${verb}`);
+  const error = h("div", {role: "alert"});
+  const post = (name) => async () => {
+    await send_json("POST", `${job.links.self}/${name}`);
     await reload();
   };
   const button = (text, action, kind = "") => {
@@ -19,12 +19,12 @@ export function actions(job, reload) {
     element.addEventListener("click", async () => {
       if (element.hasAttribute("aria-busy")) return;
       element.setAttribute("aria-busy", "true");  // a disabled button would lose the focus
-      clear(trouble);
+      clear(error);
       try {
         await action();
       } catch (problem) {
         if (problem.code === undefined) throw problem;
-        clear(trouble, problem_box(problem));
+        clear(error, problem_box(problem));
       } finally {
         element.removeAttribute("aria-busy");
       }
@@ -38,26 +38,26 @@ export function actions(job, reload) {
     may("failed", "canceled") && button("Retry", post("retry"), "primary"),
     may("queued", "running") && button("Suspend", post("suspend")),
     may("queued", "running", "suspended") && button("Cancel", async () => {
-      if (await confirm_deed("Cancel this job?", "What it has built so far is thrown away.", "Cancel the job"))
+      if (await confirm_action("Cancel this job?", "Its partial result will be deleted.", "Cancel the job"))
         await post("cancel")();
     }, "danger"),
     has_ended(job.state) && button("Delete", async () => {
-      const what = job.state === "succeeded" ? "Its result, report and log go with it." : "Its log goes with it.";
-      if (!await confirm_deed("Delete this job?", what, "Delete the job")) return;
+      const what = job.state === "succeeded" ? "Its result, report and log will be deleted." : "Its log will be deleted.";
+      if (!await confirm_action("Delete this job?", what, "Delete the job")) return;
       await send_json("DELETE", job.links.self);
       location.hash = "#/";
     }, "danger"),
-    may("succeeded") && h("a", {class: "button quiet", href: `#/new?like=${job.id}`}, "Another like this"),
+    may("succeeded") && h("a", {class: "button quiet", href: `#/new?like=${job.id}`}, "Copy to new job"),
   ];
-  return [h("div", {class: "buttons"}, buttons), trouble];
+  return [h("div", {class: "buttons"}, buttons), error];
 }
 
 function file_name(job) {
   return `${title_text(job).replace(/\.(glb|gltf)$/, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
 }
 
-// Without a token the browser's own download does it, which can be resumed. A link cannot carry a
-// token; then the bytes go to a file chosen here where the browser can do that, else over memory.
+// Without a token the browser downloads the link itself, which is resumable. A link cannot carry a
+// token: then the bytes are streamed to a file where the browser supports that, else held in memory.
 async function download(job) {
   const name = file_name(job);
   if (!token.get()) return click_link(job.links.dag, name);
@@ -68,7 +68,7 @@ async function download(job) {
     await response.body.pipeTo(await handle.createWritable());
     return;
   }
-  if (job.result.bytes > kLargestInMemory) throw {code: "too_large", detail:
+  if (job.result.bytes > kMaxInMemoryBytes) throw {code: "too_large", detail:
     `This browser cannot save ${size_text(job.result.bytes)} with a token: use the command under "Result".`};
   const url = URL.createObjectURL(await (await request("GET", job.links.dag)).blob());
   click_link(url, name);
@@ -82,7 +82,7 @@ function click_link(href, name) {
   link.remove();
 }
 
-// The same download in a terminal, which goes on after a broken connection.
+// The same download as a shell command, which resumes after a lost connection.
 export function download_command(job) {
   const text = `voxdag download ${job.id} -o ${file_name(job)} --server ${location.origin}` +
                (token.get() ? " --token-file FILE" : "");

@@ -1,11 +1,11 @@
-// The resolution and the options of a job: those of the command line.
+// The resolution and the options of a job, the same as on the command line.
 
-import {Problem} from "./api.js";
-import {field, h} from "./dom.js";
-import {grid_text} from "./format.js";
+import {Problem} from "../lib/api.js";
+import {field, h} from "../lib/dom.js";
+import {grid_text} from "../lib/format.js";
 
 const kMinLevel = 2, kMaxLevel = 20;
-const kUsualLevel = 11;
+const kDefaultLevel = 11;
 
 export class JobOptions {
   constructor(changed) {
@@ -15,10 +15,10 @@ export class JobOptions {
       options.map(([value, text]) => h("option", {value}, text)));
     const powers = (from, to) => Array.from({length: to - from + 1}, (_, i) => 2 ** (from + i));
     this.resolution = choice(...powers(kMinLevel, kMaxLevel).map((r) => [r, grid_text(r)]));
-    this.resolution.value = String(2 ** kUsualLevel);
-    this.resolution_field = field("Resolution", this.resolution, "Voxels along an edge of the cube.");
+    this.resolution.value = String(2 ** kDefaultLevel);
+    this.resolution_field = field("Resolution", this.resolution, "Voxels along each edge of the cube.");
 
-    this.cube = choice(["", "Around the scene"], ["bounds", "Given by corner and edge"], ["voxel_size", "Given by the voxel's size"]);
+    this.cube = choice(["", "Bounds of the scene"], ["bounds", "Corner and edge"], ["voxel_size", "Voxel size"]);
     this.bounds = ["X", "Y", "Z", "Edge"].map((name) => number({step: "any", "aria-label": `Bounds: ${name}`, placeholder: name}));
     this.voxel_size = number({step: "any", min: "0"});
     this.bounds_row = h("div", {class: "field", role: "group", "aria-label": "Bounds"},
@@ -27,19 +27,19 @@ export class JobOptions {
     this.skip_invalid = h("input", {type: "checkbox", id: "skip-invalid", ...watch});
     this.hash_bits = number({min: "4", max: "64", step: "1", placeholder: "64"});
     this.memory = h("input", {placeholder: "2GiB", autocomplete: "off", ...watch});
-    this.threads = number({min: "1", step: "1", placeholder: "as the service chooses"});
-    this.subvolume = choice(["", "By the plan"], ...powers(6, 14).map((edge) => [edge, grid_text(edge)]));
-    this.backend = choice(["", "Automatic"], ["cpu", "CPU"], ["cuda", "CUDA"], ["parallel-host", "GPU's pipeline on the CPU"]);
-    this.method = choice(["", "The backend's fastest"], ["consing", "Consing"], ["pointers", "Pointers"], ["hashes", "Hashes"]);
+    this.threads = number({min: "1", step: "1", placeholder: "default"});
+    this.subvolume = choice(["", "Automatic"], ...powers(6, 14).map((edge) => [edge, grid_text(edge)]));
+    this.backend = choice(["", "Automatic"], ["cpu", "CPU"], ["cuda", "CUDA"], ["parallel-host", "GPU pipeline on the CPU"]);
+    this.method = choice(["", "Automatic"], ["consing", "Consing"], ["pointers", "Pointers"], ["hashes", "Hashes"]);
     this.priority = number({min: "-100", max: "100", step: "1", placeholder: "0"});
     this.cube.addEventListener("change", () => this.show_cube());
     this.element = h("details", {class: "card"}, h("summary", {}, h("h2", {}, "Options")), h("div", {class: "options"},
-      h("fieldset", {}, h("legend", {}, "Geometry, decides the result"),
+      h("fieldset", {}, h("legend", {}, "Geometry: determines the result"),
         field("Cube", this.cube), this.bounds_row, this.size_row,
         h("div", {class: "check"}, this.skip_invalid, h("label", {for: "skip-invalid"}, "Skip invalid triangles")),
-        field("Bits of a node's hash", this.hash_bits)),
-      h("fieldset", {}, h("legend", {}, "Run, never changes the result"),
-        field("Memory", this.memory, "Such as 512MiB or 8GiB."), field("Threads", this.threads),
+        field("Hash bits", this.hash_bits)),
+      h("fieldset", {}, h("legend", {}, "Run: does not affect the result"),
+        field("Memory", this.memory, "For example 512MiB or 8GiB."), field("Threads", this.threads),
         field("Subvolumes", this.subvolume), field("Backend", this.backend), field("Method", this.method),
         field("Priority", this.priority, "Higher runs earlier; -100 to 100."))));
     this.show_cube();
@@ -54,9 +54,9 @@ export class JobOptions {
   values() {
     const options = {};
     if (this.cube.value === "bounds") options.bounds = this.bounds.map((input) => number_of(input, "The bounds"));
-    if (this.cube.value === "voxel_size") options.voxel_size = number_of(this.voxel_size, "The voxel's size");
+    if (this.cube.value === "voxel_size") options.voxel_size = number_of(this.voxel_size, "The voxel size");
     if (this.skip_invalid.checked) options.skip_invalid = true;
-    if (this.hash_bits.value) options.hash_bits = number_of(this.hash_bits, "The bits of a hash");
+    if (this.hash_bits.value) options.hash_bits = number_of(this.hash_bits, "The hash bits");
     if (this.memory.value.trim()) options.memory = this.memory.value.trim();
     if (this.threads.value) options.threads = number_of(this.threads, "The threads");
     if (this.subvolume.value) options.subvolume = Number(this.subvolume.value);
@@ -67,7 +67,7 @@ export class JobOptions {
             ...(Object.keys(options).length && {options})};
   }
 
-  // Takes over those of a job.
+  // Copies those of a job.
   set({resolution, priority, options = {}}) {
     this.resolution.value = String(resolution);
     if (priority) this.priority.value = String(priority);

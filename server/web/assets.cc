@@ -1,9 +1,11 @@
-#include "server/assets.h"
+#include "server/web/assets.h"
 
-#include "server/api/digest.h"
+#include "core/format/checksum.h"
 
 namespace voxdag::server {
 namespace {
+
+constexpr size_t kEtagDigits = 32;
 
 std::string type_of(std::string_view name) {
   const std::string_view suffix = name.substr(name.rfind('.') + 1);
@@ -14,15 +16,21 @@ std::string type_of(std::string_view name) {
   return "application/json";
 }
 
+std::string etag_of(std::string_view contents) {
+  Sha256 sha256;
+  sha256.add(std::as_bytes(std::span(contents)));
+  return '"' + sha256.finish().substr(0, kEtagDigits) + '"';
+}
+
 }  // namespace
 
-std::optional<Asset> find_asset(std::string_view name) {
+std::vector<Asset> embedded_assets() {
+  std::vector<Asset> assets;
   for (const EmbeddedFile* file = kEmbeddedFiles; file->bytes; ++file) {
-    if (name != file->name) continue;
     const std::string_view contents(reinterpret_cast<const char*>(file->bytes), file->size);
-    return Asset{contents, type_of(name), '"' + sha256_hex(contents).substr(0, 32) + '"'};
+    assets.push_back({file->name, contents, type_of(file->name), etag_of(contents)});
   }
-  return {};
+  return assets;
 }
 
 }  // namespace voxdag::server

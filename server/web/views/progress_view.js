@@ -1,12 +1,12 @@
-// The present stage in large, and the figures of the attempt.
+// The current stage of a job, and the numbers of the attempt.
 
-import {h, set_text} from "./dom.js";
-import {count_text, done_part, duration_text, has_ended, short_count, size_text, unit_text} from "./format.js";
+import {h, set_text} from "../lib/dom.js";
+import {count_text, done_fraction, duration_text, has_ended, short_count, size_text, unit_text} from "../lib/format.js";
 import {meter, update_job_meter} from "./parts.js";
 
 const kFigures = [
   ["elapsed", "Elapsed", (p) => duration_text(p.elapsed_s)],
-  ["voxels", "Voxels so far", (p) => short_count(p.voxels)],
+  ["voxels", "Voxels", (p) => short_count(p.voxels)],
   ["nodes", "Nodes", (p) => short_count(p.nodes)],
   ["bytes", "Artifacts", (p) => size_text(p.bytes)],
   ["memory", "Memory", (p) => size_text(p.memory_bytes)],
@@ -17,7 +17,7 @@ export class ProgressView {
   constructor() {
     this.stage = h("strong", {class: "stage-now"});
     this.percent = h("span", {class: "percent"});
-    this.bar = meter("progress of the present stage");
+    this.bar = meter("progress of the current stage");
     this.detail = h("p", {class: "detail"});
     this.values = {};
     const figures = kFigures.map(([key, name]) =>
@@ -32,16 +32,16 @@ export class ProgressView {
     this.element.hidden = job.state === "succeeded";
     update_job_meter(this.bar, job);
     set_text(this.stage, headline(job));
-    const part = done_part(p);
-    set_text(this.percent, part === null || job.state === "queued" ? "" : percent_text(part));
+    const fraction = done_fraction(p);
+    set_text(this.percent, fraction === null || job.state === "queued" ? "" : percent_text(fraction));
     set_text(this.detail, detail_text(job));
     this.figures.hidden = !p;
     if (p) for (const [key, , text] of kFigures) set_text(this.values[key], text(p));
   }
 }
 
-function percent_text(part) {
-  return part > 0 && part < 0.1 ? `${(Math.floor(1000 * part) / 10).toFixed(1)} %` : `${Math.floor(100 * part)} %`;
+function percent_text(fraction) {
+  return fraction > 0 && fraction < 0.1 ? `${(Math.floor(1000 * fraction) / 10).toFixed(1)} %` : `${Math.floor(100 * fraction)} %`;
 }
 
 function headline(job) {
@@ -62,6 +62,6 @@ function detail_text(job) {
   const far = p.total ? `${count_text(p.done)} of ${unit_text(count_text(p.total), p.unit)}`
                       : unit_text(count_text(p.done), p.unit);
   if (has_ended(job.state) || job.state !== "running") return far;
-  return [far, p.rate > 0 && `${short_count(p.rate)} ${p.unit} a second`,
+  return [far, p.rate > 0 && `${short_count(p.rate)} ${p.unit} per second`,
           p.eta_s > 0 && `${duration_text(p.eta_s)} left in this stage`].filter(Boolean).join(" · ");
 }

@@ -1,10 +1,10 @@
-// All jobs, newest first, by state, looked at again every other second while any is under way.
+// All jobs, newest first, filtered by state; refreshed every other second while any is active.
 
-import {get_json, poll} from "./api.js";
-import {announce, clear, h, set_text} from "./dom.js";
+import {get_json, poll} from "../lib/api.js";
+import {announce, clear, h, set_text} from "../lib/dom.js";
 import {ago_text, duration_text, grid_text, has_ended, scene_text, short_count, size_text, state_text,
-        time_text, title_text, unit_text} from "./format.js";
-import {meter, problem_box, state_badge, update_job_meter} from "./parts.js";
+        time_text, title_text, unit_text} from "../lib/format.js";
+import {meter, problem_box, state_badge, update_job_meter} from "../views/parts.js";
 
 const kStates = ["running", "queued", "suspended", "failed", "canceled", "succeeded"];
 const kPageSize = 50;
@@ -15,39 +15,39 @@ export function jobs_page(_, query, signal) {
   const state = kStates.includes(query.get("state")) ? query.get("state") : null;
   const cursor = query.get("cursor");
   const filters = h("div", {class: "filters"});
-  const trouble = h("div", {role: "alert"});
+  const error = h("div", {role: "alert"});
   const list = h("ul", {class: "jobs"});
   const empty = h("p", {class: "empty", hidden: true});
   const older = h("div", {class: "buttons end"});
   const rows = new Map();  // job id -> row
   let seen = false;
 
-  const look = async () => {
+  const update = async () => {
     const path = new URLSearchParams({limit: kPageSize});
     if (state) path.set("state", state === "running" ? "running,canceling" : state);
     if (cursor) path.set("cursor", cursor);
     const {jobs, counts, next_cursor} = await get_json(`/api/v1/jobs?${path}`, signal);
-    clear(trouble);
+    clear(error);
     show_filters(filters, counts, state);
     show_rows(list, rows, jobs);
     empty.hidden = jobs.length > 0;
-    if (!seen || !empty.hidden) clear(empty, nothing_text(state, cursor));
+    if (!seen || !empty.hidden) clear(empty, empty_text(state, cursor));
     seen = true;
     show_paging(older, state, cursor, next_cursor);
     return jobs.every((job) => has_ended(job.state)) ? kIdle_ms : kBusy_ms;
   };
-  poll(look, (problem) => clear(trouble, problem_box(problem)), signal);
+  poll(update, (problem) => clear(error, problem_box(problem)), signal);
 
   return {title: "Jobs", content: h("div", {class: "stack"},
     h("div", {class: "page-head"}, h("h1", {}, "Jobs"),
       h("a", {class: "button primary", href: "#/new"}, "New job")),
-    filters, trouble, list, empty, older)};
+    filters, error, list, empty, older)};
 }
 
-function nothing_text(state, cursor) {
+function empty_text(state, cursor) {
   if (cursor) return "No older jobs.";
-  if (state) return `No job is ${state} now.`;
-  return h("span", {}, "No jobs yet. ", h("a", {href: "#/new"}, "Post the first one."));
+  if (state) return `No ${state} jobs.`;
+  return h("span", {}, "No jobs yet. ", h("a", {href: "#/new"}, "Submit the first one."));
 }
 
 function show_filters(element, counts, chosen) {
@@ -68,7 +68,7 @@ function show_paging(element, state, cursor, next_cursor) {
         next_cursor && h("a", {class: "button", href: to(next_cursor)}, "Older jobs"));
 }
 
-// Keeps the rows of jobs that stay, so that focus and selection do too.
+// Reuses the rows of jobs that remain, to preserve focus and selection.
 function show_rows(list, rows, jobs) {
   const ids = new Set(jobs.map((job) => job.id));
   for (const [id, row] of rows) {
@@ -87,14 +87,14 @@ function show_rows(list, rows, jobs) {
 function job_row(job) {
   const badge = h("span", {class: "badge-place"});
   const bar = meter(`progress of ${title_text(job)}`);
-  const does = h("span", {class: "does"});
+  const activity = h("span", {class: "does"});
   const made = h("time", {class: "made"});
   const element = h("li", {},
     h("a", {class: "job-row", href: `#/jobs/${job.id}`},
       badge,
       h("div", {class: "what"}, h("strong", {}, title_text(job)),
         h("span", {class: "about"}, `${job.name ? `${scene_text(job)} · ` : ""}${grid_text(job.resolution)}`)),
-      h("div", {class: "how-far"}, bar.element, does), made));
+      h("div", {class: "how-far"}, bar.element, activity), made));
   let state = null;
   const update = (now) => {
     if (now.state !== state) {
@@ -103,7 +103,7 @@ function job_row(job) {
       state = now.state;
     }
     update_job_meter(bar, now);
-    set_text(does, does_text(now));
+    set_text(activity, activity_text(now));
     set_text(made, ago_text(now.created_at));
     made.setAttribute("datetime", now.created_at);
     made.title = time_text(now.created_at);
@@ -111,13 +111,13 @@ function job_row(job) {
   return {element, update};
 }
 
-// What a job is doing, in a line.
-function does_text(job) {
+// What a job is doing, in one line.
+function activity_text(job) {
   const p = job.progress;
   switch (job.state) {
     case "queued":
       if (job.not_before && Date.parse(job.not_before) > Date.now())
-        return `tries again ${ago_text(job.not_before)} after ${job.error?.code || "an error"}`;
+        return `retries ${ago_text(job.not_before)} after ${job.error?.code || "an error"}`;
       return job.position ? `number ${job.position} in the queue` : "waiting";
     case "succeeded":
       return `${size_text(job.result.bytes)} · ${short_count(job.result.voxels)} voxels · ` +

@@ -1,10 +1,10 @@
-// Which scene: one that is on the server, one to upload, or a file's path on the server.
+// Chooses a scene: an uploaded one, a new upload, or the path of a file on the server.
 
-import {get_json} from "./api.js";
-import {announce, clear, field, h, set_text} from "./dom.js";
-import {duration_text, size_text} from "./format.js";
+import {get_json} from "../lib/api.js";
+import {announce, clear, field, h, set_text} from "../lib/dom.js";
+import {duration_text, size_text} from "../lib/format.js";
 import {meter, problem_box} from "./parts.js";
-import {kSceneName, scene_name, upload} from "./upload.js";
+import {kSceneName, scene_name, upload} from "../lib/upload.js";
 
 const kPageSize = 200;
 
@@ -17,7 +17,7 @@ export class SceneChoice {
     this.path = h("input", {autocomplete: "off", spellcheck: "false", placeholder: "/srv/scenes/building.glb",
                             on: {change: changed}});
     this.file = h("input", {type: "file", accept: ".glb,.gltf", id: "scene-file", class: "unseen",
-                            on: {change: () => this.take(this.file.files[0])}});
+                            on: {change: () => this.start_upload(this.file.files[0])}});
     const drop = h("div", {class: "drop"}, this.file,
       h("label", {for: "scene-file", class: "button"}, "Upload a scene…"),
       h("span", {class: "hint"}, "or drop a .glb file here"));
@@ -26,15 +26,15 @@ export class SceneChoice {
     this.element = h("section", {class: "card stack", "aria-labelledby": "scene-title"},
       h("h2", {id: "scene-title"}, "Scene"), field("On the server", this.select), drop, this.upload_place,
       this.more = h("details", {}, h("summary", {}, "A path on the server"),
-        field("Absolute path", this.path, "Under one of the folders that the service was given for scenes.")));
+        field("Absolute path", this.path, "In one of the scene folders configured for the service.")));
   }
 
-  // A path, if one is typed, or the chosen scene, or "".
+  // The path if one is entered, else the chosen scene, else "".
   value() {
-    return this.path.value.trim() || this.kept || this.select.value;
+    return this.path.value.trim() || this.several || this.select.value;
   }
 
-  // Fills the list; `chosen` are the scenes of a job that this one shall be like.
+  // Fills the list and selects `chosen`, the scenes of a job.
   async load(chosen = null) {
     const scenes = [];
     for (let cursor = null, more = true; more; more = cursor !== null) {
@@ -45,13 +45,13 @@ export class SceneChoice {
     }
     const before = this.select.value;
     clear(this.select, h("option", {value: ""}, scenes.length ? "Choose one…" : "None yet"),
-      scenes.map((scene) => h("option", {value: scene.name}, `${scene.name} (${size_text(scene.size)})`)));
+      scenes.map((scene) => h("option", {value: scene.name}, `${scene.name} (${size_text(scene.size_bytes)})`)));
     this.select.value = before;
     if (chosen) this.choose(chosen);
   }
 
   choose(scenes) {
-    this.kept = scenes.length > 1 ? scenes : null;
+    this.several = scenes.length > 1 ? scenes : null;
     if (scenes.length === 1 && scenes[0].startsWith("/")) {
       this.path.value = scenes[0];
       this.more.open = true;
@@ -71,12 +71,12 @@ export class SceneChoice {
     element.addEventListener("dragleave", over(false));
     element.addEventListener("drop", (event) => {
       over(false)(event);
-      if (event.dataTransfer.files.length) this.take(event.dataTransfer.files[0]);
+      if (event.dataTransfer.files.length) this.start_upload(event.dataTransfer.files[0]);
     });
   }
 
-  // Uploads the file, with buttons to pause and go on.
-  take(file) {
+  // Uploads the file, with buttons to pause and resume.
+  start_upload(file) {
     if (!file) return;
     this.file.value = "";
     this.stop?.abort();
@@ -97,7 +97,7 @@ export class SceneChoice {
         await this.load([name]);
         this.changed();
       } catch (problem) {
-        if (!this.signal.aborted) view.halt(stop.signal.aborted ? null : problem);
+        if (!this.signal.aborted) view.stop(stop.signal.aborted ? null : problem);
       }
     };
     run();
@@ -105,22 +105,22 @@ export class SceneChoice {
 }
 
 class UploadView {
-  constructor(name, size, pause, go_on) {
+  constructor(name, size, pause, resume) {
     this.name = name;
     this.size = size;
     this.bar = meter(`upload of ${name}`);
     this.text = h("span", {class: "hint"});
-    this.trouble = h("div", {role: "alert"});
+    this.error = h("div", {role: "alert"});
     this.pause = h("button", {type: "button", class: "quiet small", on: {click: pause}}, "Pause");
-    this.resume = h("button", {type: "button", class: "small", on: {click: go_on}}, "Go on");
+    this.resume = h("button", {type: "button", class: "small", on: {click: resume}}, "Resume");
     this.element = h("div", {class: "upload"}, h("div", {class: "split"}, h("strong", {}, name), this.pause, this.resume),
-                     this.bar.element, this.text, this.trouble);
+                     this.bar.element, this.text, this.error);
   }
   begin() {
     this.pause.hidden = false;
     this.resume.hidden = true;
     this.begin_ms = null;
-    clear(this.trouble);
+    clear(this.error);
   }
   show(bytes) {
     this.begin_ms ??= performance.now();
@@ -134,13 +134,13 @@ class UploadView {
   end() {
     this.pause.hidden = this.resume.hidden = true;
     this.bar.update(1);
-    set_text(this.text, `${size_text(this.size)}, uploaded and chosen`);
+    set_text(this.text, `${size_text(this.size)}, uploaded and selected`);
     announce(`${this.name} is uploaded`);
   }
-  halt(problem) {
+  stop(problem) {
     this.pause.hidden = true;
     this.resume.hidden = false;
-    if (problem) clear(this.trouble, problem_box(problem, "The upload stopped; what arrived is kept."));
+    if (problem) clear(this.error, problem_box(problem, "The upload stopped; it can be resumed."));
     else set_text(this.text, `${this.text.textContent}, paused`);
   }
 }

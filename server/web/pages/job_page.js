@@ -1,20 +1,20 @@
-// One job: its events drive everything that is shown here.
+// The page of one job, updated by its events.
 
-import {get_json, sleep} from "./api.js";
-import {CubesView} from "./cubes_view.js";
-import {announce, clear, fact, h, set_text} from "./dom.js";
-import {follow} from "./events.js";
-import {ago_text, grid_text, has_ended, scene_text, state_text, time_text, title_text} from "./format.js";
-import {actions} from "./job_actions.js";
-import {LogView} from "./log_view.js";
-import {copy_button, problem_box, state_badge} from "./parts.js";
-import {ProgressView} from "./progress_view.js";
-import {RatePlot} from "./rate_plot.js";
-import {result_view} from "./result_view.js";
-import {Timeline} from "./timeline.js";
+import {get_json, sleep} from "../lib/api.js";
+import {CubesView} from "../views/cubes_view.js";
+import {announce, clear, fact, h, set_text} from "../lib/dom.js";
+import {follow} from "../lib/events.js";
+import {ago_text, grid_text, has_ended, scene_text, state_text, time_text, title_text} from "../lib/format.js";
+import {actions} from "../views/job_actions.js";
+import {LogView} from "../views/log_view.js";
+import {copy_button, problem_box, state_badge} from "../views/parts.js";
+import {ProgressView} from "../views/progress_view.js";
+import {RatePlot} from "../views/rate_plot.js";
+import {result_view} from "../views/result_view.js";
+import {Timeline} from "../views/timeline.js";
 
-const kPicturePause_ms = 1500;
-const kLongPause_ms = 30000;
+const kPreviewPause_ms = 1500;
+const kEndedPause_ms = 30000;
 
 export function job_page([id], _, signal) {
   const page = new JobPage(id, signal);
@@ -28,8 +28,8 @@ class JobPage {
     this.signal = signal;
     this.job = null;
     this.places = Object.fromEntries(
-      ["head", "actions", "trouble", "warnings", "result"].map((name) => [name, h("div", {class: name})]));
-    this.places.trouble.setAttribute("role", "alert");
+      ["head", "actions", "error", "warnings", "result"].map((name) => [name, h("div", {class: name})]));
+    this.places.error.setAttribute("role", "alert");
     this.link = h("span", {class: "link-state"});
     this.progress = new ProgressView();
     this.timeline = new Timeline();
@@ -40,86 +40,86 @@ class JobPage {
       h("p", {class: "loading"}, "Loading…"));
   }
 
-  // Follows the job until it has ended, and again when somebody starts it anew.
+  // Follows the job until it has ended, and again if it is retried.
   async run() {
     try {
-      this.take_job(await get_json(this.path, this.signal));
+      this.update_job(await get_json(this.path, this.signal));
       while (!this.signal.aborted) {
-        if (has_ended(this.job.state)) await this.until_asked();
+        if (has_ended(this.job.state)) await this.wait_while_ended();
         else await this.follow();
       }
     } catch (problem) {
       if (this.signal.aborted) return;
       if (problem.code === undefined) throw problem;
-      this.show_gone(problem);
+      this.show_failure(problem);
     }
   }
 
   async follow() {
     await follow(`${this.path}/events`, {
       signal: this.signal,
-      on_event: (name, data) => this.take_event(name, data),
-      on_status: (status, problem) => this.show_link(status, problem),
+      on_event: (name, data) => this.handle_event(name, data),
+      on_status: (status, problem) => this.show_connection(status, problem),
     });
     set_text(this.link, "");
   }
 
-  // Nothing comes by itself any more, but the picture of a job that has just succeeded.
-  async until_asked() {
+  // Waits before looking at an ended job again: for its preview, or in case it is retried.
+  async wait_while_ended() {
     const waking = new AbortController();
     this.wake = () => waking.abort();
     this.signal.addEventListener("abort", this.wake, {once: true});
-    const picture_to_come = this.job.state === "succeeded" && !this.job.preview;
-    await sleep(picture_to_come ? kPicturePause_ms : kLongPause_ms, waking.signal);
+    const preview_pending = this.job.state === "succeeded" && !this.job.preview;
+    await sleep(preview_pending ? kPreviewPause_ms : kEndedPause_ms, waking.signal);
     this.signal.removeEventListener("abort", this.wake);
     if (this.signal.aborted || (waking.signal.aborted && !has_ended(this.job.state))) return;
-    this.take_job(await get_json(this.path, this.signal));
+    this.update_job(await get_json(this.path, this.signal));
   }
 
-  take_event(name, data) {
-    if (name === "job") this.take_job(data);
-    if (name === "progress") this.take_progress(data);
+  handle_event(name, data) {
+    if (name === "job") this.update_job(data);
+    if (name === "progress") this.update_progress(data);
   }
 
-  take_job(job) {
+  update_job(job) {
     const first = this.job === null;
     const changed = first || this.job.state !== job.state;
     this.job = job;
-    if (first) this.lay_out();
+    if (first) this.build_layout();
     if (changed) {
       if (!first) announce(`The job is ${state_text(job.state)}.`);
       document.title = `${state_text(job.state)} · ${title_text(job)} · voxdag`;
     }
     this.show_head();
     if (changed) this.show_actions();
-    clear(this.places.trouble, trouble_box(job));
+    clear(this.places.error, error_box(job));
     clear(this.places.warnings, job.warnings.length > 0 && h("ul", {class: "notice"},
       job.warnings.map((text) => h("li", {}, text))));
     this.progress.show(job);
-    if (job.progress) this.take_progress(job.progress);
-    this.cubes.look(job);
-    this.log.live(!has_ended(job.state));
+    if (job.progress) this.update_progress(job.progress);
+    this.cubes.update(job);
+    this.log.set_live(!has_ended(job.state));
     if (job.state === "succeeded") result_view(this.places.result, job, this.signal);
     else clear(this.places.result);
   }
 
-  take_progress(progress) {
+  update_progress(progress) {
     this.job.progress = progress;
     this.progress.show(this.job);
     this.timeline.show(this.job);
     this.rate.add(this.job);
     this.rate_card.hidden = this.rate.empty && has_ended(this.job.state);
-    this.cubes.look(this.job);
+    this.cubes.update(this.job);
   }
 
   async reload() {
-    this.take_job(await get_json(this.path, this.signal));
+    this.update_job(await get_json(this.path, this.signal));
     this.wake?.();
   }
 
-  lay_out() {
+  build_layout() {
     clear(this.element, this.element.firstChild,
-      this.places.head, this.places.actions, this.places.trouble, this.places.warnings,
+      this.places.head, this.places.actions, this.places.error, this.places.warnings,
       this.progress.element, this.places.result,
       h("div", {class: "two"},
         h("div", {class: "stack"},
@@ -143,38 +143,38 @@ class JobPage {
     clear(this.about,
       fact("Id", h("code", {}, job.id), " ", copy_button(job.id, "the job's id")),
       fact("Scene", [job.scene].flat().join(", ")),
-      fact("Options", options || "as the plan chooses"),
+      fact("Options", options || "default"),
       fact("Priority", String(job.priority)),
       fact("Attempts", `${job.attempts} of ${job.max_attempts}`),
-      fact("Posted", ...when(job.created_at)),
+      fact("Created", ...when(job.created_at)),
       fact("Started", ...when(job.started_at)),
-      fact("Ended", ...when(job.finished_at)));
+      fact("Finished", ...when(job.finished_at)));
   }
 
-  // Buttons come and go with the state; whoever pressed one by keyboard stays among them.
+  // The buttons change with the state; keyboard focus stays among them.
   show_actions() {
     const had_focus = this.places.actions.contains(document.activeElement);
     clear(this.places.actions, actions(this.job, () => this.reload()));
     if (had_focus) this.places.actions.querySelector("button, a")?.focus();
   }
 
-  show_link(status, problem) {
+  show_connection(status, problem) {
     this.link.className = `link-state ${status}`;
     set_text(this.link, status === "live" ? "live" : `reconnecting: ${problem?.message || "the stream closed"}`);
   }
 
-  show_gone(problem) {
+  show_failure(problem) {
     clear(this.element, this.element.firstChild, problem_box(problem),
       h("div", {class: "buttons"}, h("a", {class: "button", href: "#/"}, "All jobs")));
   }
 }
 
-// The last error, while it says why the job stands where it stands.
-function trouble_box(job) {
+// The last error, unless the job has succeeded since.
+function error_box(job) {
   if (!job.error || job.state === "succeeded") return null;
   const problem = {code: job.error.code, detail: job.error.message};
   if (job.state === "failed") return problem_box(problem, "This job failed.");
   if (job.not_before && Date.parse(job.not_before) > Date.now())
-    return problem_box(problem, `An attempt failed; the next one begins ${ago_text(job.not_before)}.`);
+    return problem_box(problem, `An attempt failed; the next one starts ${ago_text(job.not_before)}.`);
   return job.state === "canceled" ? null : problem_box(problem, "An earlier attempt failed.");
 }

@@ -1,19 +1,19 @@
-// What a build would take, asked of the service while the form is filled in.
+// An estimate of the build, requested from the service while the user fills in the form.
 
-import {send_json, sleep} from "./api.js";
-import {clear, h, set_text} from "./dom.js";
-import {count_text, duration_text, range_text, short_count, size_text} from "./format.js";
+import {send_json, sleep} from "../lib/api.js";
+import {clear, h, set_text} from "../lib/dom.js";
+import {count_text, duration_text, range_text, short_count, size_text} from "../lib/format.js";
 import {problem_box} from "./parts.js";
 
-const kCalm_ms = 700;  // after the last change
-const kMaxTries = 5;  // while the service is busy with others' plans
+const kDebounce_ms = 700;  // after the last change
+const kMaxAttempts = 5;    // while the service is busy with other plans
 
 const kFigures = [
   ["voxels", "Voxels", short_count],
   ["dag_nodes", "DAG nodes", short_count],
   ["file_bytes", "File", size_text],
-  ["disk_bytes", "Disk, at most", size_text],
-  ["memory_bytes", "Memory, at most", size_text],
+  ["disk_bytes", "Disk (peak)", size_text],
+  ["memory_bytes", "Memory (peak)", size_text],
   ["cpu_s", "CPU time", duration_text],
   ["wall_s", "Wall time", duration_text],
 ];
@@ -24,30 +24,30 @@ export class EstimateView {
     this.status = h("p", {class: "hint", "aria-live": "polite"});
     this.table = h("div", {});
     this.element = h("section", {class: "card estimate", "aria-labelledby": "estimate-title"},
-      h("h2", {id: "estimate-title"}, "What it would take"), this.status, this.table);
-    this.look(null);
+      h("h2", {id: "estimate-title"}, "Estimate"), this.status, this.table);
+    this.update(null);
   }
 
-  // `body`: of the job; null while there is none to ask about.
-  async look(body) {
+  // `body`: of the job; null while the form is incomplete.
+  async update(body) {
     const question = JSON.stringify(body);
     if (question === this.question) return;
     this.question = question;
-    this.asking?.abort();
+    this.request_abort?.abort();
     this.table.classList.add("old");
     if (!body) {
       set_text(this.status, "Choose a scene to see the estimate.");
       clear(this.table);
       return;
     }
-    const asking = this.asking = new AbortController();
-    this.signal.addEventListener("abort", () => asking.abort(), {once: true, signal: asking.signal});
+    const request_abort = this.request_abort = new AbortController();
+    this.signal.addEventListener("abort", () => request_abort.abort(), {once: true, signal: request_abort.signal});
     set_text(this.status, "Estimating from small builds…");
     try {
-      await sleep(kCalm_ms, asking.signal);
-      if (!asking.signal.aborted) this.show(await this.ask(body, asking.signal));
+      await sleep(kDebounce_ms, request_abort.signal);
+      if (!request_abort.signal.aborted) this.show(await this.request(body, request_abort.signal));
     } catch (problem) {
-      if (asking.signal.aborted) return;
+      if (request_abort.signal.aborted) return;
       if (problem.code === undefined) throw problem;
       set_text(this.status, "");
       clear(this.table, problem_box(problem));
@@ -55,12 +55,12 @@ export class EstimateView {
     }
   }
 
-  async ask(body, signal) {
-    for (let tries = 1;; ++tries) {
+  async request(body, signal) {
+    for (let attempt = 1;; ++attempt) {
       try {
         return await send_json("POST", "/api/v1/jobs?dry_run=true", body, {signal});
       } catch (problem) {
-        if (signal.aborted || !problem.may_pass || tries === kMaxTries) throw problem;
+        if (signal.aborted || !problem.is_transient || attempt === kMaxAttempts) throw problem;
         await sleep(1000 * Math.max(1, problem.retry_after_s), signal);
       }
     }
@@ -72,7 +72,7 @@ export class EstimateView {
     this.table.classList.remove("old");
     clear(this.table, h("table", {},
       h("thead", {}, h("tr", {}, h("td", {}), h("th", {scope: "col", class: "number"}, "Likely"),
-        h("th", {scope: "col", class: "number"}, "Between"))),
+        h("th", {scope: "col", class: "number"}, "Range"))),
       h("tbody", {}, kFigures.filter(([key]) => estimate[key]).map(([key, name, text]) => {
         const {low, likely, high} = estimate[key];
         return h("tr", {}, h("th", {scope: "row"}, name), h("td", {class: "number likely"}, text(likely)),

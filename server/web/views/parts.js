@@ -1,7 +1,7 @@
-// Small parts that several pages show.
+// Small elements used by several pages.
 
-import {h, set_text} from "./dom.js";
-import {done_part, state_text} from "./format.js";
+import {h, set_text} from "../lib/dom.js";
+import {done_fraction, state_text} from "../lib/format.js";
 
 export function state_badge(state) {
   return h("span", {class: `state ${state}`}, state_text(state));
@@ -15,34 +15,34 @@ export function problem_box(problem, title = null) {
     h("p", {class: "code"}, problem.code, problem.status ? ` · HTTP ${problem.status}` : null));
 }
 
-// A bar that is also read out. update(part) takes 0 to 1, or null for "not known".
+// An accessible progress bar. update(fraction) takes 0 to 1, or null if it is unknown.
 export function meter(label) {
   const full = h("div", {class: "meter-full"});
   const element = h("div", {class: "meter", role: "progressbar", "aria-label": label,
                             "aria-valuemin": "0", "aria-valuemax": "100"}, full);
-  const update = (part) => {
-    element.classList.toggle("unknown", part === null);
-    full.style.width = part === null ? "" : `${(100 * part).toFixed(2)}%`;
-    if (part === null) element.removeAttribute("aria-valuenow");
-    else element.setAttribute("aria-valuenow", String(Math.floor(100 * part)));
+  const update = (fraction) => {
+    element.classList.toggle("unknown", fraction === null);
+    full.style.width = fraction === null ? "" : `${(100 * fraction).toFixed(2)}%`;
+    if (fraction === null) element.removeAttribute("aria-valuenow");
+    else element.setAttribute("aria-valuenow", String(Math.floor(100 * fraction)));
   };
   return {element, update};
 }
 
-// The meter of a job: its present stage while it runs, full when it succeeded.
+// Shows the current stage of a job, or a full bar once it succeeded.
 export function update_job_meter(bar, job) {
-  const part = job.state === "succeeded" ? 1 : done_part(job.progress);
+  const fraction = job.state === "succeeded" ? 1 : done_fraction(job.progress);
   const idle = ["queued", "suspended", "canceled", "failed"].includes(job.state);
-  bar.update(idle && part === null ? 0 : part);
+  bar.update(idle && fraction === null ? 0 : fraction);
   bar.element.dataset.state = job.state;
 }
 
-// A button that copies a text.
+// A button that copies `text` to the clipboard.
 export function copy_button(text, what) {
   const button = h("button", {type: "button", class: "quiet small", "aria-label": `Copy ${what}`}, "Copy");
   button.addEventListener("click", async () => {
     const copied = await copy(text);
-    set_text(button, copied ? "Copied" : "Select it and press Ctrl-C");
+    set_text(button, copied ? "Copied" : "Select and press Ctrl-C");
     setTimeout(() => set_text(button, "Copy"), 2000);
   });
   return button;
@@ -50,7 +50,7 @@ export function copy_button(text, what) {
 
 async function copy(text) {
   try {
-    await navigator.clipboard.writeText(text);  // not there on plain http
+    await navigator.clipboard.writeText(text);  // not available on plain http
     return true;
   } catch {
     return false;

@@ -1,12 +1,12 @@
-// Server-sent events read with fetch(), which can send the Authorization header; EventSource cannot.
-// Reconnects with Last-Event-ID after a growing pause, until the stream says `end`.
+// Server-sent events read with fetch(), because EventSource cannot send the Authorization header.
+// Reconnects with Last-Event-ID after growing pauses, until the event `end`.
 
 import {Problem, request, sleep} from "./api.js";
 
-const kSilence_ms = 45000;  // three missed keep-alives: the connection is dead
-const kLongestPause_ms = 30000;
+const kIdleTimeout_ms = 45000;  // three missed keep-alives
+const kMaxPause_ms = 30000;
 
-// Splits a stream's text into events {event, data, id}; `retry` is told of.
+// Parses the text of a stream into events {event, data, id}.
 export class EventParser {
   constructor(on_event, on_retry = () => {}) {
     this.on_event = on_event;
@@ -22,9 +22,9 @@ export class EventParser {
   feed(text) {
     const lines = (this.rest + text).split(/\r\n|\n|\r(?!$)/);
     this.rest = lines.pop();
-    lines.forEach((line) => this.take(line));
+    lines.forEach((line) => this.parse_line(line));
   }
-  take(line) {
+  parse_line(line) {
     if (line === "") {
       if (this.data.length) this.on_event({event: this.event, data: this.data.join("\n"), id: this.id});
       this.begin();
@@ -38,9 +38,9 @@ export class EventParser {
   }
 }
 
-// Calls on_event(name, parsed data) for every event; on_status("live" | "waiting", problem) when the
-// connection comes and goes. Returns when the stream has ended or `signal` aborts; throws Problem if
-// there is no use in trying again (404, 401, 403).
+// Calls on_event(name, parsed data) for every event, and on_status("live" | "waiting", problem) when
+// the connection opens and closes. Returns when the stream has ended or `signal` aborts; throws Problem
+// if a retry is useless (401, 403, 404).
 export async function follow(path, {on_event, on_status, signal}) {
   let last_id = null;
   let retry_ms = 3000;
@@ -63,36 +63,36 @@ export async function follow(path, {on_event, on_status, signal}) {
       });
     } catch (error) {
       if (signal.aborted) return;
-      problem = error instanceof Problem ? error : new Problem(0, "unreachable", "The connection broke.");
-      if (problem.status && !problem.may_pass) throw problem;
+      problem = error instanceof Problem ? error : new Problem(0, "unreachable", "The connection was lost.");
+      if (problem.status && !problem.is_transient) throw problem;
     }
     if (ended || signal.aborted) return;
     on_status("waiting", problem);
-    const pause_ms = Math.min(kLongestPause_ms, retry_ms * 2 ** failures++);
+    const pause_ms = Math.min(kMaxPause_ms, retry_ms * 2 ** failures++);
     const jitter = 0.75 + Math.random() / 2;
     await sleep(Math.max(pause_ms * jitter, 1000 * (problem?.retry_after_s || 0)), signal);
   }
 }
 
 async function read(path, headers, parser, signal, on_open) {
-  const link = new AbortController();
-  const hang_up = () => link.abort();
-  signal.addEventListener("abort", hang_up, {once: true});
-  let watchdog = setTimeout(hang_up, kSilence_ms);
+  const connection = new AbortController();
+  const close = () => connection.abort();
+  signal.addEventListener("abort", close, {once: true});
+  let watchdog = setTimeout(close, kIdleTimeout_ms);
   try {
-    const response = await request("GET", path, {headers, signal: link.signal});
+    const response = await request("GET", path, {headers, signal: connection.signal});
     on_open();
     const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
     for (;;) {
       const {done, value} = await reader.read();
       if (done) return;
       clearTimeout(watchdog);
-      watchdog = setTimeout(hang_up, kSilence_ms);
+      watchdog = setTimeout(close, kIdleTimeout_ms);
       parser.feed(value);
     }
   } finally {
     clearTimeout(watchdog);
-    signal.removeEventListener("abort", hang_up);
-    link.abort();
+    signal.removeEventListener("abort", close);
+    connection.abort();
   }
 }

@@ -1,10 +1,10 @@
-// Elements made in code. The page's policy forbids inline scripts and styles; and text that is set
-// this way is never taken for markup, whatever a job is called.
+// Creates elements in code. The content security policy forbids inline scripts and styles, and text
+// set this way is never parsed as markup.
 
 const kSvg = "http://www.w3.org/2000/svg";
 
-// h("a", {class: "x", href: "…", on: {click: f}}, "text", other): null and false children are left
-// out; attributes that are null, undefined or false too.
+// h("a", {class: "x", href: "…", on: {click: f}}, "text", other). Children and attributes that are
+// null, undefined or false are omitted.
 export function h(tag, attributes = {}, ...children) {
   return fill(document.createElement(tag), attributes, children);
 }
@@ -25,7 +25,7 @@ function fill(element, attributes, children) {
   return element;
 }
 
-// Sets the text only if it changed, so that selections and screen readers are left in peace.
+// Sets the text only if it changed, to preserve selections and not disturb screen readers.
 export function set_text(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
@@ -35,12 +35,12 @@ export function clear(element, ...children) {
   return element;
 }
 
-// Said aloud by screen readers, seen by nobody.
+// Announces a text to screen readers only.
 export function announce(text) {
   document.getElementById("announcer").textContent = text;
 }
 
-// A label above (or before) a control; `hint` is read out with it.
+// A labeled control; `hint` is its accessible description.
 export function field(label, control, hint = null) {
   const id = control.id || `f-${++field.count}`;
   control.id = id;
@@ -50,18 +50,18 @@ export function field(label, control, hint = null) {
 }
 field.count = 0;
 
-// A pair of a definition list.
+// An entry of a definition list.
 export function fact(name, ...value) {
   return h("div", {class: "fact"}, h("dt", {}, name), h("dd", {}, ...value));
 }
 
-// Asks in a modal dialog; resolves to true if the action is confirmed.
-export function confirm_deed(title, text, action) {
+// Asks in a modal dialog; resolves to true if the user confirms the action.
+export function confirm_action(title, text, action) {
   const dialog = h("dialog", {class: "ask", "aria-labelledby": "ask-title"},
     h("form", {method: "dialog"},
       h("h2", {id: "ask-title"}, title), h("p", {}, text),
       h("div", {class: "buttons end"},
-        h("button", {value: "no", class: "quiet"}, "Keep it"),
+        h("button", {value: "no", class: "quiet"}, "No"),
         h("button", {value: "yes", class: "danger"}, action))));
   document.body.append(dialog);
   dialog.showModal();

@@ -1,4 +1,4 @@
-// Requests to /api/v1. Every failure is a Problem, also one of the network.
+// Requests to /api/v1. Every failure is a Problem, including those of the network.
 
 const kTokenKey = "voxdag-token";
 
@@ -10,8 +10,8 @@ export class Problem extends Error {
     this.members = members;
     this.headers = headers;
   }
-  // Whether the same request may well succeed a little later.
-  get may_pass() {
+  // Whether the same request may succeed later.
+  get is_transient() {
     return this.code === "unreachable" || [408, 429, 502, 503, 504].includes(this.status);
   }
   // Seconds that the service asks to wait for.
@@ -20,18 +20,18 @@ export class Problem extends Error {
   }
 }
 
-// The bearer token is kept as long as this tab is.
+// The bearer token is stored until the tab is closed.
 export const token = {
   get: () => sessionStorage.getItem(kTokenKey) || "",
   set: (text) => sessionStorage.setItem(kTokenKey, text),
-  drop: () => sessionStorage.removeItem(kTokenKey),
+  remove: () => sessionStorage.removeItem(kTokenKey),
 };
 
 export function authorization() {
   return token.get() ? {Authorization: `Bearer ${token.get()}`} : {};
 }
 
-// The Response of a request that succeeded; throws Problem otherwise. A 401 shows the login, too.
+// Returns the Response of a successful request, else throws Problem. A 401 also shows the login page.
 export async function request(method, path, {headers = {}, body, signal} = {}) {
   let response;
   try {
@@ -67,13 +67,13 @@ export async function send_json(method, path, body, {headers = {}, signal} = {})
   return response.status === 204 ? null : response.json();
 }
 
-// A key for Idempotency-Key; crypto.randomUUID() is not there on plain http.
+// A value for Idempotency-Key. crypto.randomUUID() is not available on plain http.
 export function random_key() {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)),
                     (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-// Resolves after a while, or at once when `signal` aborts.
+// Resolves after `ms`, or immediately when `signal` aborts.
 export function sleep(ms, signal) {
   return new Promise((resolve) => {
     const done = () => {
@@ -87,17 +87,18 @@ export function sleep(ms, signal) {
   });
 }
 
-// Calls `look` again and again until `signal` aborts: after `look`'s answer in ms while the page is
-// in sight, at once when it comes into sight again. `failed(problem)` is told when `look` throws.
-export async function poll(look, failed, signal) {
+// Calls `update` repeatedly until `signal` aborts. `update` returns the pause in ms until the next
+// call; while the page is hidden, the next call waits until it is visible. on_failure(problem) is
+// called when `update` throws.
+export async function poll(update, on_failure, signal) {
   while (!signal.aborted) {
     let pause_ms = 5000;
     try {
-      pause_ms = await look();
+      pause_ms = await update();
     } catch (error) {
       if (signal.aborted) return;
       if (!(error instanceof Problem)) throw error;
-      failed(error);
+      on_failure(error);
       if (error.status === 401) return;
     }
     await pause(pause_ms, signal);
@@ -112,11 +113,11 @@ function pause(ms, signal) {
       listening.abort();
       resolve();
     };
-    const done_if_seen = () => {
+    const done_if_visible = () => {
       if (!document.hidden) done();
     };
-    const timer = setTimeout(done_if_seen, ms);
-    document.addEventListener("visibilitychange", done_if_seen, {signal: listening.signal});
+    const timer = setTimeout(done_if_visible, ms);
+    document.addEventListener("visibilitychange", done_if_visible, {signal: listening.signal});
     signal.addEventListener("abort", done, {signal: listening.signal});
     if (signal.aborted) done();
   });

@@ -1,17 +1,17 @@
-// The occupied subvolumes as small cubes seen from a corner of the grid. Those that wait are a faint
-// shell of glass; those that are built stand in it, solid, and bright for a moment after.
+// The occupied subvolumes as cubes in an isometric view. Pending cubes are translucent; built ones are
+// solid, and highlighted for a moment when they are finished.
 
-import {get_json} from "./api.js";
-import {h, set_text} from "./dom.js";
-import {count_text, has_ended} from "./format.js";
+import {get_json} from "../lib/api.js";
+import {h, set_text} from "../lib/dom.js";
+import {count_text, has_ended} from "../lib/format.js";
 
 const kWidth = 480, kHeight = 460;
 const kMargin = 10;
 const kCos = Math.cos(Math.PI / 6), kSin = 0.5;
 const kGlow_ms = 900;
-const kOutlineLimit_px = 5;  // smaller cubes show no outlines
-const kGlowLimit = 6000;     // more cubes than that do not glow: each frame draws them all
-const kSoonest_ms = 1000;    // between two looks
+const kMinOutline_px = 5;      // smaller cubes are drawn without outlines
+const kMaxGlowing = 6000;      // no highlights above this count: each frame draws all cubes
+const kMinInterval_ms = 1000;  // between two requests
 
 export class CubesView {
   constructor(path, signal) {
@@ -19,48 +19,47 @@ export class CubesView {
     this.signal = signal;
     this.cubes = [];
     this.turn = 0;  // quarter turns about the vertical axis
-    this.seen_built = -1;
-    this.next_look = 0;
+    this.next_fetch_ms = 0;
     this.canvas = h("canvas", {class: "cubes", role: "img"});
-    this.note = h("p", {class: "faint"}, "Shown once the subvolumes are planned.");
+    this.note = h("p", {class: "faint"}, "Shown when the subvolumes are planned.");
     this.turner = h("div", {class: "buttons"}, ...[[-1, "Turn left"], [1, "Turn right"]].map(([by, text]) =>
       h("button", {type: "button", class: "quiet small", on: {click: () => this.turn_by(by)}}, text)));
     this.element = h("div", {class: "cubes-view"}, this.canvas, h("div", {class: "split"}, this.note, this.turner));
-    this.show_emptiness(true);
+    this.set_empty(true);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
     scheme.addEventListener("change", () => this.draw(), {signal});
     new ResizeObserver(() => this.draw()).observe(this.canvas);
   }
 
-  // Fetches the cubes again if the job has built more of them; not more often than is of use.
-  async look(job) {
+  // Fetches the cubes if the job has built more of them, at a limited rate.
+  async update(job) {
     const {built, total} = job.progress?.subvolumes ?? {total: 0};
     const key = `${job.attempts} ${built} ${total} ${has_ended(job.state)}`;
-    if (!total || key === this.key || this.looking) return;
-    const wait_ms = this.next_look - performance.now();
+    if (!total || key === this.key || this.fetching) return;
+    const wait_ms = this.next_fetch_ms - performance.now();
     if (wait_ms > 0) {
-      this.again ??= setTimeout(() => {
-        this.again = null;
-        this.look(job);
+      this.timer ??= setTimeout(() => {
+        this.timer = null;
+        this.update(job);
       }, wait_ms);
       return;
     }
-    this.looking = true;
+    this.fetching = true;
     const begin = performance.now();
     try {
-      this.take(await get_json(this.path, this.signal));
+      this.show(await get_json(this.path, this.signal));
       this.key = key;
     } catch (problem) {
       if (this.signal.aborted) return;
-      if (problem.status === 404) this.key = key;  // not planned yet, or too early a failure
+      if (problem.status === 404) this.key = key;  // not planned yet, or the job failed before planning
     } finally {
-      this.looking = false;
+      this.fetching = false;
       const now = performance.now();
-      this.next_look = now + Math.max(kSoonest_ms, 10 * (now - begin));
+      this.next_fetch_ms = now + Math.max(kMinInterval_ms, 10 * (now - begin));
     }
   }
 
-  take({resolution, cubes, built, total}) {
+  show({resolution, cubes, built, total}) {
     const before = new Map(this.cubes.map((cube) => [cube.key, cube]));
     const now = performance.now();
     this.resolution = resolution;
@@ -70,7 +69,7 @@ export class CubesView {
       const lit_at = !is_built ? null : !old ? -Infinity : old.lit_at ?? now;
       return {key, x, y, z, edge, lit_at, faces: {}};
     });
-    this.show_emptiness(this.cubes.length === 0);
+    this.set_empty(this.cubes.length === 0);
     this.order();
     this.draw();
     const text = `${count_text(built)} of ${count_text(total)} occupied subvolumes are built`;
@@ -78,7 +77,7 @@ export class CubesView {
     this.canvas.setAttribute("aria-label", text);
   }
 
-  show_emptiness(empty) {
+  set_empty(empty) {
     this.canvas.hidden = this.turner.hidden = empty;
   }
 
@@ -88,22 +87,22 @@ export class CubesView {
     this.draw();
   }
 
-  // A cube's low corner after the turn; y is up.
+  // The low corner of a cube after the rotation; y is up.
   turned({x, y, z, edge}) {
     const far = (c) => this.resolution - edge - c;
     return [[x, y, z], [z, y, far(x)], [far(x), y, far(z)], [far(z), y, x]][this.turn];
   }
 
-  // From back to front. Cubes of an octree do not overlap, so the Morton order of their low corners
-  // does it for any mixture of sizes: no cube comes before one that lies lower on all axes.
+  // Sorts the cubes from back to front. Octree cubes do not overlap, so the Morton order of their low
+  // corners is correct for any mixture of sizes: no cube precedes one that is lower on all axes.
   order() {
-    const least = Math.min(...this.cubes.map((cube) => cube.edge));
+    const min_edge = Math.min(...this.cubes.map((cube) => cube.edge));
     for (const cube of this.cubes) {
       cube.at = this.turned(cube);
-      cube.rank = morton(...cube.at.map((c) => Math.floor(c / least)));
+      cube.rank = morton(...cube.at.map((c) => Math.floor(c / min_edge)));
     }
     this.cubes.sort((a, b) => a.rank - b.rank);
-    // Faces that look at another cube of the same size are not seen.
+    // Faces that touch another cube of the same size are hidden.
     const here = new Set(this.cubes.map((cube) => `${cube.at} ${cube.edge}`));
     for (const {at: [x, y, z], edge, faces} of this.cubes) {
       faces.top = !here.has(`${[x, y + edge, z]} ${edge}`);
@@ -125,8 +124,8 @@ export class CubesView {
     const size = (kHeight - 2 * kMargin) / 2 / this.resolution;  // pixels per voxel
     this.frame(pen, colors, size);
     for (const cube of this.cubes)
-      if (cube.lit_at === null) this.draw_waiting(pen, colors, size, cube);
-    const glows = this.cubes.length <= kGlowLimit && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+      if (cube.lit_at === null) this.draw_pending(pen, colors, size, cube);
+    const glows = this.cubes.length <= kMaxGlowing && !matchMedia("(prefers-reduced-motion: reduce)").matches;
     const now = performance.now();
     let glowing = false;
     for (const cube of this.cubes) {
@@ -150,7 +149,7 @@ export class CubesView {
             kMargin + (this.resolution + (x + z) * kSin - y) * size];
   }
 
-  // The three far edges and the outline of the whole grid's floor.
+  // The floor and the far edges of the grid.
   frame(pen, colors, size) {
     const r = this.resolution;
     const lines = [[[0, 0, 0], [r, 0, 0], [r, 0, r], [0, 0, r], [0, 0, 0]], [[0, 0, 0], [0, r, 0]],
@@ -164,7 +163,7 @@ export class CubesView {
     }
   }
 
-  // Calls paint(face) for each face that can be seen, its path begun.
+  // Calls paint(face) for each visible face, with its path set.
   each_face(pen, size, {at: [x, y, z], edge}, paint) {
     const p = (dx, dy, dz) => this.point(size, x + dx * edge, y + dy * edge, z + dz * edge);
     const paths = {
@@ -180,8 +179,8 @@ export class CubesView {
     }
   }
 
-  draw_waiting(pen, colors, size, cube) {
-    const outlined = cube.edge * size >= kOutlineLimit_px;
+  draw_pending(pen, colors, size, cube) {
+    const outlined = cube.edge * size >= kMinOutline_px;
     pen.lineWidth = 0.75;
     pen.strokeStyle = colors.wait_edge;
     pen.fillStyle = colors.wait;
@@ -204,12 +203,12 @@ export class CubesView {
         pen.fill();
         pen.globalAlpha = 1;
       }
-      if (cube.edge * size >= kOutlineLimit_px) pen.stroke();
+      if (cube.edge * size >= kMinOutline_px) pen.stroke();
     });
   }
 }
 
-// Up to 2^17 a coordinate: 51 bits, which a double holds exactly.
+// Coordinates have up to 17 bits: a double represents the 51 bits of the code exactly.
 function morton(x, y, z) {
   let code = 0;
   for (let bit = 2 ** 16; bit >= 1; bit /= 2) {

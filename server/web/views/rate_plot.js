@@ -1,20 +1,21 @@
-// Units a second over the time of each stage, as seen by this page since it was opened.
+// Plots the rate of each stage over time, from the updates this page has received.
 
-import {clear, h, set_text, svg} from "./dom.js";
-import {duration_text, short_count} from "./format.js";
+import {clear, h, set_text, svg} from "../lib/dom.js";
+import {duration_text, short_count} from "../lib/format.js";
 
 const kWidth = 520, kHeight = 170;
 const kLeft = 52, kRight = 8, kTop = 10, kBottom = 24;
-const kWindow_s = 2;       // a rate is taken over at least so long
-const kMaxSamples = 600;  // then every other one is dropped
+const kWindow_s = 2;      // minimum duration that a rate is averaged over
+const kMaxSamples = 600;  // above it every other sample is dropped
 
-const memory = new Map();  // job id -> series by stage: coming back to a job shows what was seen
+// Job id -> series by stage: shown again when the user returns to a job.
+const series_by_job = new Map();
 
 export class RatePlot {
   constructor(id) {
-    if (!memory.has(id)) memory.set(id, new Map());
-    this.series = memory.get(id);
-    this.chosen = null;  // a stage, or null for the present one
+    if (!series_by_job.has(id)) series_by_job.set(id, new Map());
+    this.series = series_by_job.get(id);
+    this.chosen = null;  // a stage, or null for the current one
     this.tabs = h("div", {class: "tabs", role: "group", "aria-label": "Stage"});
     this.note = h("p", {class: "faint"});
     this.picture = svg("svg", {viewBox: `0 0 ${kWidth} ${kHeight}`, class: "plot", role: "img"});
@@ -24,11 +25,11 @@ export class RatePlot {
 
   add(job) {
     const p = job.progress;
-    if (job.state === "running" && p.stage) this.take(p);
+    if (job.state === "running" && p.stage) this.record(p);
     this.draw();
   }
 
-  take(p) {
+  record(p) {
     let series = this.series.get(p.stage);
     const known = p.stages?.find((stage) => stage.name === p.stage);
     const time = known ? known.wall_s : p.elapsed_s;
@@ -40,24 +41,24 @@ export class RatePlot {
     if (time - from.time < 0.4) return;
     series.samples.push([time, (p.done - from.done) / (time - from.time)]);
     if (series.samples.length > kMaxSamples) series.samples = series.samples.filter((_, i) => i % 2 === 0);
-    this.present = p.stage;
+    this.current = p.stage;
   }
 
   draw() {
     const names = [...this.series.keys()].filter((name) => this.series.get(name).samples.length > 1);
     const name = names.includes(this.chosen) ? this.chosen
-               : names.includes(this.present) ? this.present : longest(this.series, names);
+               : names.includes(this.current) ? this.current : longest(this.series, names);
     this.show_tabs(names, name);
     this.picture.toggleAttribute("hidden", !name);
     this.empty = !name;
     if (!name) {
-      set_text(this.note, "Plotted while the job runs and this page is open.");
+      set_text(this.note, "Recorded while the job runs and this page is open.");
       return;
     }
     const {samples, unit} = this.series.get(name);
-    set_text(this.note, `${unit} a second, over the seconds of ${name}`);
+    set_text(this.note, `${unit} per second during ${name}`);
     this.picture.setAttribute("aria-label",
-      `Rate of ${name}: now ${short_count(samples.at(-1)[1])} ${unit} a second`);
+      `Rate of ${name}: now ${short_count(samples.at(-1)[1])} ${unit} per second`);
     clear(this.picture, plot(samples));
   }
 
@@ -81,7 +82,7 @@ function longest(series, names) {
   return names.reduce((best, name) => (best && size(best) >= size(name) ? best : name), null);
 }
 
-// Axes with few, round ticks; a line over a faint area.
+// Axes with few, round ticks; a line over a filled area.
 function plot(samples) {
   const begin = samples[0][0], end = Math.max(samples.at(-1)[0], begin + 1);
   const ticks = round_ticks(Math.max(...samples.map(([, rate]) => rate), 1e-9));
@@ -100,9 +101,9 @@ function plot(samples) {
   ];
 }
 
-// 0 and two to five round steps that reach `most`.
-function round_ticks(most) {
-  const power = 10 ** Math.floor(Math.log10(most));
-  const step = [0.25, 0.5, 1, 2, 5].map((factor) => factor * power).find((size) => most / size <= 4);
-  return Array.from({length: Math.ceil(most / step) + 1}, (_, i) => i * step);
+// 0 and two to five round steps that reach `max`.
+function round_ticks(max) {
+  const power = 10 ** Math.floor(Math.log10(max));
+  const step = [0.25, 0.5, 1, 2, 5].map((factor) => factor * power).find((size) => max / size <= 4);
+  return Array.from({length: Math.ceil(max / step) + 1}, (_, i) => i * step);
 }

@@ -1,19 +1,19 @@
-// The stages of an attempt, each as long as it took.
+// The stages of an attempt as bars in proportion to their duration.
 
-import {clear, h, set_text} from "./dom.js";
-import {duration_text, short_count, unit_text} from "./format.js";
+import {clear, h, set_text} from "../lib/dom.js";
+import {duration_text, short_count, unit_text} from "../lib/format.js";
 
 export class Timeline {
   constructor() {
     this.element = h("div", {}, this.list = h("ol", {class: "timeline"}),
-                     this.none = h("p", {class: "empty"}, "No stage has begun."));
+                     this.none = h("p", {class: "empty"}, "No stage has started."));
     this.rows = [];
   }
 
   show(job) {
     const stages = job.progress?.stages || [];
     this.none.hidden = stages.length > 0;
-    // A new attempt begins with fewer stages or others.
+    // A new attempt has fewer or other stages.
     if (stages.length < this.rows.length || this.rows.some((row, i) => row.name !== stages[i].name)) {
       clear(this.list);
       this.rows = [];
@@ -29,10 +29,10 @@ export class Timeline {
 
   add_row({name}) {
     const span = h("span", {class: "span"});
-    const far = h("span", {class: "far"});
+    const done = h("span", {class: "far"});
     const time = h("span", {class: "time"});
     const state = h("span", {class: "unseen"});
-    const element = h("li", {}, h("span", {class: "name"}, name, state), h("span", {class: "track"}, span), far, time);
+    const element = h("li", {}, h("span", {class: "name"}, name, state), h("span", {class: "track"}, span), done, time);
     this.list.append(element);
     const update = (stage, from, part, running) => {
       const now = !stage.ended && running;
@@ -40,9 +40,9 @@ export class Timeline {
       set_text(state, stage.ended ? ", ended" : now ? ", running" : ", stopped");
       span.style.left = `${(100 * from).toFixed(2)}%`;
       span.style.width = `${(100 * part).toFixed(2)}%`;
-      const done = short_count(stage.done);
-      set_text(far, stage.ended || !stage.total ? unit_text(done, stage.unit)
-                                                : `${done} of ${unit_text(short_count(stage.total), stage.unit)}`);
+      const count = short_count(stage.done);
+      set_text(done, stage.ended || !stage.total ? unit_text(count, stage.unit)
+                                                : `${count} of ${unit_text(short_count(stage.total), stage.unit)}`);
       set_text(time, duration_text(stage.wall_s));
     };
     return {name, update};

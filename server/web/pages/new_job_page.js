@@ -1,11 +1,11 @@
-// The form of a new job: a scene, a grid, options, and what building it would take.
+// The form for a new job: scene, grid, options, and an estimate of the build.
 
-import {get_json, random_key, send_json} from "./api.js";
-import {clear, field, h} from "./dom.js";
-import {EstimateView} from "./estimate_view.js";
-import {JobOptions} from "./job_options.js";
-import {problem_box} from "./parts.js";
-import {SceneChoice} from "./scene_choice.js";
+import {get_json, random_key, send_json} from "../lib/api.js";
+import {clear, field, h} from "../lib/dom.js";
+import {EstimateView} from "../views/estimate_view.js";
+import {JobOptions} from "../views/job_options.js";
+import {problem_box} from "../views/parts.js";
+import {SceneChoice} from "../views/scene_choice.js";
 
 export function new_job_page(_, query, signal) {
   const form = new NewJob(signal);
@@ -21,9 +21,9 @@ class NewJob {
     this.estimate = new EstimateView(signal);
     this.name = h("input", {maxlength: "200", autocomplete: "off",
                             on: {change: () => { this.key = random_key(); }}});
-    this.trouble = h("div", {role: "alert"});
-    this.key = random_key();  // one for what is filled in: pressing the button twice posts one job
-    this.submit = h("button", {class: "primary"}, "Post the job");
+    this.error = h("div", {role: "alert"});
+    this.key = random_key();  // one per state of the form: a double click creates one job
+    this.submit = h("button", {class: "primary"}, "Submit");
     this.element = h("form", {class: "stack", novalidate: true},
       h("p", {class: "crumb"}, h("a", {href: "#/"}, "Jobs")), h("h1", {}, "New job"),
       h("div", {class: "two form-two"},
@@ -31,17 +31,17 @@ class NewJob {
           this.scene.element,
           h("section", {class: "card stack", "aria-labelledby": "grid-title"},
             h("h2", {id: "grid-title"}, "Grid"), this.options.resolution_field,
-            field("Name of the job", this.name, "Optional, for people.")),
+            field("Name of the job", this.name, "Optional.")),
           this.options.element),
-        h("div", {class: "stack sticky"}, this.estimate.element, this.trouble,
+        h("div", {class: "stack sticky"}, this.estimate.element, this.error,
           h("div", {class: "buttons"}, this.submit))));
     this.element.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.post();
+      this.submit_job();
     });
   }
 
-  // `like`: the id of a job whose scene and options are taken over.
+  // `like`: the id of a job whose scene and options are copied.
   async begin(like) {
     try {
       const model = like ? await get_json(`/api/v1/jobs/${encodeURIComponent(like)}`, this.signal) : null;
@@ -51,11 +51,11 @@ class NewJob {
     } catch (problem) {
       if (this.signal.aborted) return;
       if (problem.code === undefined) throw problem;
-      clear(this.trouble, problem_box(problem));
+      clear(this.error, problem_box(problem));
     }
   }
 
-  // The request's body, or null while no scene is chosen. Throws Problem for a field that is wrong.
+  // The request body, or null while no scene is chosen. Throws Problem for an invalid field.
   body() {
     const scene = this.scene.value();
     if (!scene) return null;
@@ -64,25 +64,25 @@ class NewJob {
   }
 
   changed() {
-    clear(this.trouble);
+    clear(this.error);
     this.key = random_key();
     let question = null;
     try {
       const body = this.body();
       if (body) question = {scene: body.scene, resolution: body.resolution, options: body.options};
     } catch {
-      // Said when the job is posted, not while it is typed.
+      // Reported when the job is submitted, not while the user types.
     }
-    this.estimate.look(question);
+    this.estimate.update(question);
   }
 
-  async post() {
-    clear(this.trouble);
+  async submit_job() {
+    clear(this.error);
     this.submit.disabled = true;
     try {
       const body = this.body();
       if (!body) {
-        clear(this.trouble, h("p", {class: "bad"}, "Choose a scene, or upload one."));
+        clear(this.error, h("p", {class: "bad"}, "Choose a scene, or upload one."));
         return;
       }
       const job = await send_json("POST", "/api/v1/jobs", body,
@@ -91,7 +91,7 @@ class NewJob {
     } catch (problem) {
       if (this.signal.aborted) return;
       if (problem.code === undefined) throw problem;
-      clear(this.trouble, problem_box(problem));
+      clear(this.error, problem_box(problem));
     } finally {
       this.submit.disabled = false;
     }

@@ -1,15 +1,15 @@
-// The end of a job's log, looked at while it is open.
+// The end of the log of a job, refreshed while it is open.
 
-import {poll, request} from "./api.js";
-import {h, set_text} from "./dom.js";
+import {poll, request} from "../lib/api.js";
+import {h, set_text} from "../lib/dom.js";
 
-const kBytes = 32768;
+const kMaxBytes = 32768;
 const kLive_ms = 2500;
 const kIdle_ms = 20000;
 
 export class LogView {
   constructor(path, signal) {
-    this.path = `${path}?bytes=${kBytes}`;
+    this.path = `${path}?max_bytes=${kMaxBytes}`;
     this.signal = signal;
     this.is_live = false;
     this.text = h("pre", {class: "log", tabindex: "0", "aria-label": "The end of the log"});
@@ -17,8 +17,8 @@ export class LogView {
     this.element.addEventListener("toggle", () => this.element.open ? this.begin() : this.closing?.abort());
   }
 
-  live(is_live) {
-    if (this.is_live && !is_live && this.element.open) setTimeout(() => this.begin(), 500);  // its last lines
+  set_live(is_live) {
+    if (this.is_live && !is_live && this.element.open) setTimeout(() => this.begin(), 500);  // fetches the last lines
     this.is_live = is_live;
   }
 
@@ -35,7 +35,7 @@ export class LogView {
 
   show(text) {
     const at_end = this.text.scrollTop + this.text.clientHeight >= this.text.scrollHeight - 8;
-    set_text(this.text, text || "Nothing yet.");
+    set_text(this.text, text || "The log is empty.");
     if (at_end) this.text.scrollTop = this.text.scrollHeight;
   }
 }

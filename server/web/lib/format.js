@@ -1,4 +1,4 @@
-// Numbers, sizes and times as the command line writes them.
+// Numbers, sizes and times in the formats of the command line.
 
 const kThinSpace = "\u2009";
 
@@ -63,7 +63,7 @@ export function ago_text(time) {
   return seconds >= 0 ? `${text} ago` : `in ${text}`;
 }
 
-// "2026-11-21 07:00:00", in the reader's own time zone
+// "2026-11-21 07:00:00", in the local time zone
 export function time_text(time) {
   const date = new Date(time);
   const two = (n) => String(n).padStart(2, "0");
@@ -92,7 +92,7 @@ export function has_ended(state) {
   return ["canceled", "failed", "succeeded"].includes(state);
 }
 
-// Part of the present stage that is done, 0 to 1, or null while that is not known.
-export function done_part(progress) {
+// The completed fraction of the current stage, 0 to 1, or null while it is unknown.
+export function done_fraction(progress) {
   return progress && progress.total > 0 ? Math.min(1, progress.done / progress.total) : null;
 }

@@ -1,5 +1,5 @@
-// Uploads a scene in parts, each with its digest; what arrived is kept, so that a broken connection,
-// a pause or a closed page costs a part at most.
+// Uploads a scene in parts, each with its digest. The service stores complete parts, so that a lost
+// connection, a pause or a closed page loses one part at most.
 
 import {authorization, Problem, request, sleep} from "./api.js";
 
@@ -13,12 +13,12 @@ export function scene_name(file_name) {
   return file_name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "").replace(/-+\./g, ".");
 }
 
-// Resolves to the SCENE; on_progress(bytes here) is called often. Throws Problem, or AbortError when
-// `signal` aborts: the same call goes on from there later.
+// Resolves to the SCENE. Calls on_progress(bytes received) often. Throws Problem, or AbortError when
+// `signal` aborts; the same call resumes the upload later.
 export async function upload(file, name, on_progress, signal) {
   const path = `/api/v1/scenes/${name}`;
   if (file.size === 0) throw new Problem(0, "invalid_input", `${file.name} is empty.`);
-  let offset = await offset_known(path, file, name, signal);
+  let offset = await resume_offset(path, file, name, signal);
   let failures = 0;
   for (;;) {
     on_progress(offset);
@@ -36,10 +36,10 @@ export async function upload(file, name, on_progress, signal) {
       const expected = Number(problem.headers?.get("Upload-Offset") ?? NaN);
       if (problem.status === 409 && expected >= 0 && expected !== offset) {
         offset = expected;
-      } else if (problem.may_pass && ++failures <= kMaxFailures) {
+      } else if (problem.is_transient && ++failures <= kMaxFailures) {
         await sleep(Math.max(1000 * problem.retry_after_s, 500 * 2 ** failures), signal);
         if (signal.aborted) throw problem;
-        offset = await offset_known(path, file, name, signal).catch(() => offset);
+        offset = await resume_offset(path, file, name, signal).catch(() => offset);
       } else {
         throw problem;
       }
@@ -47,9 +47,9 @@ export async function upload(file, name, on_progress, signal) {
   }
 }
 
-// Where to go on: what is there of this very file, if this browser began to send it; else 0.
-async function offset_known(path, file, name, signal) {
-  if (localStorage.getItem(key_of(name)) !== print_of(file)) return 0;
+// The offset to resume at: bytes the service has of this file, if this browser sent them; else 0.
+async function resume_offset(path, file, name, signal) {
+  if (localStorage.getItem(key_of(name)) !== fingerprint_of(file)) return 0;
   try {
     const {headers} = await request("HEAD", path, {signal});
     const length = headers.get("Upload-Length");
@@ -62,7 +62,7 @@ async function offset_known(path, file, name, signal) {
   }
 }
 
-// XMLHttpRequest, because fetch() does not tell how much of a body has gone.
+// Uses XMLHttpRequest, because fetch() does not report the progress of an upload.
 async function put_part(path, file, offset, on_progress, signal) {
   const end = Math.min(file.size, offset + kPart_bytes);
   const part = await file.slice(offset, end).arrayBuffer();
@@ -70,13 +70,13 @@ async function put_part(path, file, offset, on_progress, signal) {
                    "Content-Range": `bytes ${offset}-${end - 1}/${file.size}`, ...await digest_header(part)};
   return new Promise((resolve, reject) => {
     const put = new XMLHttpRequest();
-    const hang_up = () => put.abort();
-    signal.addEventListener("abort", hang_up, {once: true});
+    const cancel = () => put.abort();
+    signal.addEventListener("abort", cancel, {once: true});
     put.open("PUT", path);
     for (const [name, value] of Object.entries(headers)) put.setRequestHeader(name, value);
     put.upload.addEventListener("progress", (event) => on_progress(offset + Math.min(event.loaded, end - offset)));
     put.addEventListener("loadend", () => {
-      signal.removeEventListener("abort", hang_up);
+      signal.removeEventListener("abort", cancel);
       if (put.status >= 200 && put.status < 300) resolve(parse(put.responseText));
       else reject(problem_of(put));
     });
@@ -84,7 +84,7 @@ async function put_part(path, file, offset, on_progress, signal) {
   });
 }
 
-// crypto.subtle is there on https and on this machine only; the service does without, too.
+// crypto.subtle is available on https and localhost only; the digest is optional.
 async function digest_header(part) {
   if (!crypto.subtle) return {};
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", part));
@@ -92,7 +92,7 @@ async function digest_header(part) {
 }
 
 function problem_of(put) {
-  if (put.status === 0) return new Problem(0, "unreachable", "The connection broke.");
+  if (put.status === 0) return new Problem(0, "unreachable", "The connection was lost.");
   if (put.status === 401) window.dispatchEvent(new Event("voxdag-login"));
   const members = parse(put.responseText);
   const headers = {get: (name) => put.getResponseHeader(name)};
@@ -108,6 +108,6 @@ function parse(text) {
 }
 
 const key_of = (name) => `voxdag-upload ${name}`;
-const print_of = (file) => `${file.name} ${file.size} ${file.lastModified}`;
-const remember = (name, file) => localStorage.setItem(key_of(name), print_of(file));
+const fingerprint_of = (file) => `${file.name} ${file.size} ${file.lastModified}`;
+const remember = (name, file) => localStorage.setItem(key_of(name), fingerprint_of(file));
 const forget = (name) => localStorage.removeItem(key_of(name));
