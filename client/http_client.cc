@@ -4,14 +4,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/base/error.h"
-
 namespace voxdag::client {
 namespace {
 
-constexpr uint64_t kUploadStep = 256 << 10;
+constexpr uint64_t kUploadPieceBytes = 256 << 10;
 
-// ASCII only, whatever the locale.
+// ASCII only, independent of the locale.
 std::string lower_case(std::string_view name) {
   std::string lower(name);
   for (char& c : lower)
@@ -41,15 +39,6 @@ void check_url(const std::string& url) {
               "server '" + url + "': expected http://HOST:PORT or https://HOST[:PORT]");
 }
 
-ErrorCode code_of(const std::string& name, int status) {
-  for (const ErrorCode code :
-       {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kCorrupt,
-        ErrorCode::kUnsupportedVersion, ErrorCode::kIo, ErrorCode::kNoSpace,
-        ErrorCode::kOutOfMemory, ErrorCode::kDevice, ErrorCode::kCanceled, ErrorCode::kLimit})
-    if (name == error_name(code)) return code;
-  return status >= 500 ? ErrorCode::kIo : ErrorCode::kInvalidInput;
-}
-
 }  // namespace
 
 std::string ClientResponse::header(std::string_view name) const {
@@ -60,7 +49,7 @@ std::string ClientResponse::header(std::string_view name) const {
 struct HttpClient::Impl {
   explicit Impl(const ClientOptions& options) : url(options.url), http(options.url) {
     if (!http.is_valid())
-      throw Error(ErrorCode::kInvalidInput, "server '" + url + "': the address cannot be used");
+      throw Error(ErrorCode::kInvalidInput, "server '" + url + "': cannot use this address");
     const auto timeout = std::chrono::microseconds(static_cast<int64_t>(options.timeout_s * 1e6));
     http.set_connection_timeout(timeout);
     http.set_read_timeout(timeout);
@@ -68,7 +57,7 @@ struct HttpClient::Impl {
     http.set_keep_alive(true);
     http.set_tcp_nodelay(true);
     http.set_decompress(false);
-    http.set_url_encode(false);  // paths come encoded
+    http.set_url_encode(false);  // callers pass encoded paths
     if (!options.token.empty()) http.set_bearer_token_auth(options.token.c_str());
     if (!options.ca_file.empty()) http.set_ca_cert_path(options.ca_file.c_str());
   }
@@ -111,11 +100,11 @@ ClientResponse HttpClient::send(const std::string& method, const std::string& pa
 
 ClientResponse HttpClient::upload(const std::string& path, uint64_t size, const Source& source,
                                   const HeaderMap& headers) {
-  // What a source throws must not pass through httplib.
+  // Exceptions of the source must not propagate through httplib.
   std::exception_ptr failure;
   const auto provider = [&](size_t offset, size_t length, httplib::DataSink& sink) {
     try {
-      const std::string piece = source(offset, std::min<uint64_t>(length, kUploadStep));
+      const std::string piece = source(offset, std::min<uint64_t>(length, kUploadPieceBytes));
       return sink.write(piece.data(), piece.size());
     } catch (...) {
       failure = std::current_exception();
@@ -131,14 +120,14 @@ ClientResponse HttpClient::upload(const std::string& path, uint64_t size, const 
 ClientResponse HttpClient::stream(const std::string& path, const HeaderMap& headers,
                                   const Begin& begin, const Sink& sink) {
   ClientResponse head;
-  std::string refusal;
-  bool hung_up = false;
+  std::string error_body;
+  bool closed = false;
   std::exception_ptr failure;
-  // What begin or sink throw must not pass through httplib.
+  // Exceptions of begin and sink must not propagate through httplib.
   const auto guarded = [&](const auto& step) {
     try {
       if (step()) return true;
-      hung_up = true;
+      closed = true;
     } catch (...) {
       failure = std::current_exception();
     }
@@ -153,20 +142,29 @@ ClientResponse HttpClient::stream(const std::string& path, const HeaderMap& head
       [&](const char* data, size_t size) {
         const std::string_view piece(data, size);
         if (head.status < 400) return guarded([&] { return sink(piece); });
-        refusal += piece;
-        return refusal.size() < (1 << 20);
+        error_body += piece;
+        return error_body.size() < (1 << 20);
       });
   if (failure) std::rethrow_exception(failure);
-  if (!hung_up) head = impl_->check(result);
-  if (!refusal.empty()) head.body = refusal;
+  if (!closed) head = impl_->check(result);
+  if (!error_body.empty()) head.body = error_body;
   return head;
+}
+
+ErrorCode error_code_of(const std::string& name, int http_status) {
+  for (const ErrorCode code :
+       {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kCorrupt,
+        ErrorCode::kUnsupportedVersion, ErrorCode::kIo, ErrorCode::kNoSpace,
+        ErrorCode::kOutOfMemory, ErrorCode::kDevice, ErrorCode::kCanceled, ErrorCode::kLimit})
+    if (name == error_name(code)) return code;
+  return http_status >= 500 ? ErrorCode::kIo : ErrorCode::kInvalidInput;
 }
 
 void throw_if_problem(const ClientResponse& response) {
   if (response.status < 400) return;
   const auto json = nlohmann::json::parse(response.body, nullptr, false);
   std::string code, detail = "the server answered with status " + std::to_string(response.status);
-  // What answers may be another server, or a proxy before ours.
+  // The answer may come from another server or a proxy.
   const auto text = [&](const char* name, const std::string& otherwise) {
     const auto found = json.find(name);
     return found != json.end() && found->is_string() ? found->get<std::string>() : otherwise;
@@ -174,10 +172,10 @@ void throw_if_problem(const ClientResponse& response) {
   if (json.is_object()) {
     code = text("code", "");
     detail = text("detail", detail);
-    if (code_of(code, response.status) == ErrorCode::kInvalidInput && code != "invalid_input")
+    if (error_code_of(code, response.status) == ErrorCode::kInvalidInput && code != "invalid_input")
       detail += " (" + code + ")";
   }
-  throw Error(code_of(code, response.status), detail);
+  throw Error(error_code_of(code, response.status), detail);
 }
 
 }  // namespace voxdag::client

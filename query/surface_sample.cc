@@ -77,9 +77,10 @@ void for_each_snapped(TriangleSource& scene, const Grid& grid, Progress& progres
       FixedTriangle triangle;
       const SnapResult result = snap_triangle(grid, world, triangle);
       if (result == SnapResult::kTooFar)
-        throw Error(ErrorCode::kLimit,
-                    "a triangle of the scene reaches 2^40 units beyond the file's grid; builds refuse "
-                    "such a scene");
+        throw Error(
+            ErrorCode::kLimit,
+            "a triangle of the scene reaches 2^40 units beyond the file's grid; builds refuse "
+            "such a scene");
       if (result == SnapResult::kInside) visit(triangle);
     }
   });

@@ -104,11 +104,11 @@ Members members_of(ServerConfig& c) {
       .add("max_concurrent", c.transfers.max_concurrent)
       .add("max_event_streams", c.transfers.max_event_streams)
       .add("max_requests_per_s", c.transfers.max_requests_per_s);
-  connections.add("max_connections", c.http.limits.connections)
-      .add("max_per_address", c.http.limits.per_address)
-      .add("max_header_size", c.http.limits.header_bytes)
-      .add("header_timeout_s", c.http.limits.header_s)
-      .add("idle_timeout_s", c.http.limits.idle_s)
+  connections.add("max_connections", c.http.limits.max_connections)
+      .add("max_per_address", c.http.limits.max_per_address)
+      .add("max_header_size", c.http.limits.max_header_bytes)
+      .add("header_timeout_s", c.http.limits.header_timeout_s)
+      .add("idle_timeout_s", c.http.limits.idle_timeout_s)
       .add("grace_s", c.http.limits.grace_s)
       .add("min_bytes_per_s", c.http.limits.min_bytes_per_s);
   retention.add("finished_days", c.retention.finished_days)
@@ -158,7 +158,7 @@ void check_config(const ServerConfig& config) {
   expect(config.jobs.max_concurrent >= 1 && config.jobs.max_attempts >= 1,
          "jobs.max_concurrent and jobs.max_attempts: expected at least 1");
   expect(
-      config.http.limits.connections >= 8 && config.http.limits.min_bytes_per_s > 0,
+      config.http.limits.max_connections >= 8 && config.http.limits.min_bytes_per_s > 0,
       "connections.max_connections: expected at least 8, connections.min_bytes_per_s: more than 0");
   expect(config.jobs.memory_bytes == 0 ||
              config.jobs.memory_bytes / config.jobs.max_concurrent >= kMinMemory,

@@ -23,23 +23,23 @@ const char* RequestError::code() const {
 const char* public_text(ErrorCode code) {
   switch (code) {
     case ErrorCode::kInvalidInput:
-      return "the request breaks a rule";
+      return "the request is invalid";
     case ErrorCode::kNotFound:
-      return "what was asked for is not there";
+      return "not found";
     case ErrorCode::kCorrupt:
-      return "stored data fail their checks; the service's log says which";
+      return "stored data are corrupt; the log of the service has the details";
     case ErrorCode::kUnsupportedVersion:
-      return "a format version that this service does not read";
+      return "this service does not read this format version";
     case ErrorCode::kIo:
-      return "the system refused to read or write; the service's log says what";
+      return "reading or writing a file failed; the log of the service has the details";
     case ErrorCode::kNoSpace:
-      return "the service's disk is full";
+      return "the disk of the service is full";
     case ErrorCode::kOutOfMemory:
-      return "the service has not enough memory for this";
+      return "the service does not have enough memory for this request";
     case ErrorCode::kDevice:
       return "the GPU or its driver failed";
     case ErrorCode::kCanceled:
-      return "stopped before it was done";
+      return "canceled";
     case ErrorCode::kLimit:
       return "a limit is exceeded";
   }

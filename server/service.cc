@@ -47,13 +47,9 @@ class Service::Parts {
         queue_(config_.data_folder + "/queue.db"),
         scenes_(files, config_.data_folder + "/scenes"),
         tasks_(config_, scenes_),
-        http_(
-            config_.http, [this](Request& request) { return answer(request); },
-            [this](const Request& request, const std::string& what) {
-              log_("request " + request.id + " " + request.method + " failed: " + what);
-            }),
+        http_(config_.http, [this](Request& request) { return answer(request); }),
         dispatcher_(config_, files, queue_, tasks_, log_,
-                    [this](const Job& job) { metrics_.count_settled(job); }),
+                    [this](const Job& job) { metrics_.count_run(job); }),
         context_{config_, files, queue_, scenes_, tasks_, dispatcher_, metrics_, draining_} {
     remove_tree(files_, config_.data_folder + "/plans");
     add_job_routes(router_, context_);
@@ -112,12 +108,11 @@ class Service::Parts {
     Response response;
     try {
       response = router_.route(request, gate_);
-    } catch (const Problem& problem) {
-      record(request, problem.status, start);
-      throw;
-    } catch (...) {
-      record(request, 500, start);
-      throw;
+    } catch (const std::exception& error) {
+      const Problem problem = public_problem(error);
+      if (problem.detail != error.what())  // clients do not see this text
+        log_("request " + request.id + " " + request.method + " failed: " + error.what());
+      response = problem_response(problem);
     }
     record(request, response.status, start);
     return response;

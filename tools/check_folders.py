@@ -27,7 +27,7 @@ PRODUCT_INCLUDES = CORE_INCLUDES | {
     "merge": CORE,
     "scheduler": CORE + ["merge"],
     "query": CORE,
-    "client": ["core/base", "core/io"],
+    "client": ["core/base", "core/io", "core/format"],  # core/format: SHA-256
     "server": CORE + ["scheduler", "query"],
     "cli": CORE + ["scheduler", "query", "client", "server"],
 }

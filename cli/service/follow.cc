@@ -7,9 +7,7 @@
 namespace voxdag::cli {
 namespace {
 
-constexpr double kPause_s = 0.5;
-
-// Shows what changed from one look at a job to the next.
+// Shows the changes between two states of a job.
 class JobView {
  public:
   void show(const Json& job) {
@@ -24,7 +22,7 @@ class JobView {
 
  private:
   void show_progress(const Json& job, const Json& progress) {
-    if (job.at("attempts") != attempt_) {  // it began anew
+    if (job.at("attempts") != attempt_) {
       attempt_ = job.at("attempts");
       ended_ = 0;
     }
@@ -51,30 +49,16 @@ class JobView {
   ProgressLine line_;
   std::string state_;
   Json attempt_;
-  size_t warnings_ = 0;  // that were shown
-  size_t ended_ = 0;     // stages whose end was shown
+  size_t warnings_ = 0;  // number shown so far
+  size_t ended_ = 0;     // stages shown as ended so far
   double shown_s_ = 0;
 };
 
-ErrorCode code_named(const std::string& name) {
-  for (int i = 0; i <= static_cast<int>(ErrorCode::kLimit); ++i)
-    if (name == error_name(static_cast<ErrorCode>(i))) return static_cast<ErrorCode>(i);
-  return ErrorCode::kIo;
-}
-
 }  // namespace
 
-Json follow_job(Server& server, const std::string& id) {
-  try {
-    for (JobView view;; server.pause(kPause_s)) {
-      Json job = server.job(id);
-      view.show(job);
-      if (has_ended(job)) return job;
-    }
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kCanceled) throw;
-    throw Error(ErrorCode::kCanceled, "no longer watching job " + id + ", which goes on");
-  }
+Json follow_job(ServiceClient& service, const std::string& id) {
+  JobView view;
+  return service.follow_job(id, [&](const Json& job) { view.show(job); });
 }
 
 void check_succeeded(const Json& job) {
@@ -83,7 +67,7 @@ void check_succeeded(const Json& job) {
   if (state == "canceled") throw Error(ErrorCode::kCanceled, "job " + id + " was canceled");
   if (!job.at("error").is_object()) throw Error(ErrorCode::kIo, "job " + id + " failed");
   const Json& error = job.at("error");
-  throw Error(code_named(error.at("code")),
+  throw Error(client::error_code_of(error.at("code"), 500),
               "job " + id + " failed: " + printable(error.at("message").get<std::string>()));
 }
 

@@ -1,15 +1,15 @@
-// Follows a job to its end, with its progress on standard error.
+// Follows a job of a server, with its progress on standard error.
 #pragma once
 
 #include <string>
 
-#include "cli/service/service_client.h"
+#include "cli/service/service_options.h"
 
 namespace voxdag::cli {
 
-// The JOB as it ended: succeeded, failed or canceled. A server that restarts meanwhile is waited
-// for. Ctrl-C is Error{kCanceled}; the job goes on.
-Json follow_job(Server& server, const std::string& id);
+// Returns the JOB once it has ended: succeeded, failed or canceled. Throws Error{kCanceled} on
+// Ctrl-C; the job itself continues.
+Json follow_job(ServiceClient& service, const std::string& id);
 
 // Throws the error of a job that failed or was canceled.
 void check_succeeded(const Json& job);

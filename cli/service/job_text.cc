@@ -25,11 +25,6 @@ std::string printable(std::string text) {
   return text;
 }
 
-bool has_ended(const Json& job) {
-  const std::string state = job.at("state");
-  return state == "succeeded" || state == "failed" || state == "canceled";
-}
-
 std::string job_title(const Json& job) {
   std::string title = job.at("name");
   if (!title.empty()) return printable(title);
@@ -46,7 +41,7 @@ std::string state_line(const Json& job) {
   if (job.at("position").is_number())
     line += ", number " + job.at("position").dump() + " in the queue";
   if (state == "queued" && !error_code(job).empty())
-    line += ", tries again after " + printable(error_code(job));
+    line += ", retry after " + printable(error_code(job));
   return line;
 }
 

@@ -2,13 +2,13 @@
 #include <memory>
 
 #include "cli/service/job_text.h"
-#include "cli/service/service_client.h"
+#include "cli/service/service_options.h"
 
 namespace voxdag::cli {
 namespace {
 
 struct JobsCommand {
-  ServerOptions server;
+  ServiceOptions service;
   std::string states;
   unsigned limit = 50;
   bool json = false;
@@ -20,20 +20,20 @@ void print(const Json& answer) {
     std::printf("%-16s  %-10s  %10s  %-28s  %s\n", job.at("id").get<std::string>().c_str(),
                 job.at("state").get<std::string>().c_str(), job.at("resolution").dump().c_str(),
                 progress_text(job).c_str(), job_title(job).c_str());
-  if (!answer.at("next_cursor").is_null()) std::printf("and older ones\n");
+  if (!answer.at("next_cursor").is_null()) std::printf("(more: raise --limit)\n");
 }
 
-void run(const JobsCommand& command, Server& server) {
+void run(const JobsCommand& command, ServiceClient& service) {
   std::string path = "/api/v1/jobs?limit=" + std::to_string(command.limit);
   if (!command.states.empty()) path += "&state=" + command.states;
-  const Json answer = server.get(path);
+  const Json answer = service.get(path);
   if (command.json)
     std::printf("%s\n", answer.dump().c_str());
   else
     print(answer);
 }
 
-// What may stand in a query as it is.
+// Accepts what needs no escape in a query.
 std::string check_states(const std::string& states) {
   const bool fine = states.find_first_not_of("abcdefghijklmnopqrstuvwxyz,") == std::string::npos;
   return fine ? "" : "expected states such as running,queued";
@@ -42,18 +42,19 @@ std::string check_states(const std::string& states) {
 }  // namespace
 
 void add_jobs_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("jobs", "the jobs of a server, newest first");
+  CLI::App* command = app.add_subcommand("jobs", "list the jobs of a server, newest first");
   const auto state = std::make_shared<JobsCommand>();
-  state->server.declare(*command);
+  state->service.declare(*command);
   command
-      ->add_option("--state", state->states,
-                   "only these, with commas: queued, running, suspended, canceling, canceled, "
-                   "failed, succeeded")
+      ->add_option(
+          "--state", state->states,
+          "only these states, comma-separated: queued, running, suspended, canceling, canceled, "
+          "failed, succeeded")
       ->check(check_states);
-  command->add_option("--limit", state->limit, "how many at most, 1 to 200 (default 50)");
+  command->add_option("--limit", state->limit, "maximum number of jobs, 1 to 200 (default 50)");
   command->add_flag("--json", state->json, "one JSON object on standard output");
   command->callback([state, &context] {
-    with_server(state->server, context, [&](Server& server) { run(*state, server); });
+    state->service.with_service(context, [&](ServiceClient& service) { run(*state, service); });
   });
 }
 

@@ -6,7 +6,8 @@
 #include "cli/build_options.h"
 #include "cli/service/follow.h"
 #include "cli/service/job_text.h"
-#include "cli/service/upload.h"
+#include "cli/terminal/progress_bar.h"
+#include "client/upload.h"
 #include "core/base/text.h"
 
 namespace voxdag::cli {
@@ -14,14 +15,14 @@ namespace {
 
 struct SubmitCommand {
   BuildOptions build;
-  ServerOptions server;
+  ServiceOptions service;
   std::string name;
   int priority = 0;
   bool wait = false;
   bool json = false;
 };
 
-// The options that were given, as the API takes them.
+// The options of the command line in the form of the API.
 Json options_json(const BuildSpec& spec) {
   const GeometryOptions& g = spec.geometry;
   const RunOptions& r = spec.run;
@@ -38,15 +39,18 @@ Json options_json(const BuildSpec& spec) {
   return options;
 }
 
-// A scene that is a file here is uploaded; any other is the server's.
-Json scenes_json(const std::vector<std::string>& scenes, Server& server) {
+// Uploads scenes that are local files; other names are scenes of the server.
+Json scenes_json(const std::vector<std::string>& scenes, FileSystem& files,
+                 ServiceClient& service) {
+  const auto progress = make_progress_bar();
   Json names = Json::array();
   for (const std::string& scene : scenes)
-    names.push_back(server.files().exists(scene) ? upload_scene(server, scene) : scene);
+    names.push_back(files.exists(scene) ? client::upload_scene(service, files, scene, *progress)
+                                        : scene);
   return names;
 }
 
-// So that an answer that was lost on its way does not make a second job.
+// For Idempotency-Key: a retry after a lost answer must not create a second job.
 std::string random_key() {
   unsigned char bytes[16];
   if (getrandom(bytes, sizeof bytes, 0) != sizeof bytes)
@@ -54,17 +58,17 @@ std::string random_key() {
   return hex_text(bytes);
 }
 
-void run(const SubmitCommand& command, Server& server) {
+void run(const SubmitCommand& command, FileSystem& files, ServiceClient& service) {
   const BuildSpec spec = command.build.spec();
-  Json body = {{"scene", scenes_json(spec.geometry.scenes, server)},
+  Json body = {{"scene", scenes_json(spec.geometry.scenes, files, service)},
                {"resolution", spec.geometry.resolution},
                {"options", options_json(spec)}};
   if (!command.name.empty()) body["name"] = command.name;
   if (command.priority != 0) body["priority"] = command.priority;
-  Json job = server.post("/api/v1/jobs", body, {{"Idempotency-Key", random_key()}});
+  Json job = service.post("/api/v1/jobs", body, {{"Idempotency-Key", random_key()}});
   if (!command.json) std::printf("%s\n", state_line(job).c_str());
   std::fflush(stdout);
-  if (command.wait) job = follow_job(server, job.at("id"));
+  if (command.wait) job = follow_job(service, job.at("id"));
   if (command.json) std::printf("%s\n", job.dump().c_str());
   if (!command.wait) return;
   check_succeeded(job);
@@ -77,13 +81,14 @@ void add_submit_command(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand("submit", "build a scene on a server");
   const auto state = std::make_shared<SubmitCommand>();
   state->build.declare(*command);
-  state->server.declare(*command);
-  command->add_option("--name", state->name, "what people shall call the job");
+  state->service.declare(*command);
+  command->add_option("--name", state->name, "name of the job, for people");
   command->add_option("--priority", state->priority, "-100 to 100; higher runs earlier");
-  command->add_flag("--wait", state->wait, "follow the job to its end, as watch does");
+  command->add_flag("--wait", state->wait, "follow the job until it ends, as watch does");
   command->add_flag("--json", state->json, "the job as one JSON object on standard output");
   command->callback([state, &context] {
-    with_server(state->server, context, [&](Server& server) { run(*state, server); });
+    state->service.with_service(
+        context, [&](ServiceClient& service) { run(*state, context.files, service); });
   });
 }
 

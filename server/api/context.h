@@ -1,4 +1,4 @@
-// What the handlers share: the service's parts, as references to what Service owns.
+// What the request handlers share: references to the parts of the service, which Service owns.
 #pragma once
 
 #include <atomic>
@@ -29,8 +29,9 @@ struct Context {
   ConcurrencyLimiter event_streams{config.transfers.max_event_streams};
   ConcurrencyLimiter transfers{config.transfers.max_concurrent};
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans};
-  // Held while a job begins to need a scene, or a scene goes or changes that none may need.
-  std::mutex scene_use = {};
+  // Held while a job that uses scenes is added, and while a scene that no job uses is replaced or
+  // removed: neither may happen between the other's check and its change.
+  std::mutex scene_mutex = {};
 };
 
 // Throws Problem (404) if there is none.

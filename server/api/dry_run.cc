@@ -10,7 +10,7 @@
 namespace voxdag::server {
 namespace {
 
-// Away with its files, whatever happened.
+// The folder of a plan, removed with it.
 class TemporaryTask {
  public:
   TemporaryTask(FileSystem& files, const std::string& path) : folder{path}, files_(files) {
@@ -20,7 +20,7 @@ class TemporaryTask {
     try {
       remove_tree(files_, folder.path);
     } catch (const Error&) {
-      // The next start of the service removes it.
+      // The service removes it at its next start.
     }
   }
   const JobFolder folder;
@@ -41,19 +41,21 @@ Problem problem_of(const Failure& failure) {
 }  // namespace
 
 Response dry_run(Context& context, const JobRequest& request) {
-  const auto slot = context.plans.take();
-  if (!slot) throw busy("another plan is being made", 5);
+  const auto permit = context.plans.acquire();
+  if (!permit) throw busy("too many concurrent plans", 5);
   const Task task = context.tasks.make(request, Task::Kind::kPlan);
-  const TemporaryTask place(context.files, context.config.data_folder + "/plans/" + random_id());
-  write_task(context.files, place.folder.task(), task);
+  const TemporaryTask temporary(context.files,
+                                context.config.data_folder + "/plans/" + random_id());
+  write_task(context.files, temporary.folder.task(), task);
   const std::string program =
       context.config.program.empty() ? "/proc/self/exe" : context.config.program;
-  ChildProcess child(
-      {{program, "run-job", place.folder.path}, place.folder.log(), context.config.jobs.nice});
+  ChildProcess child({{program, "run-job", temporary.folder.path},
+                      temporary.folder.log(),
+                      context.config.jobs.nice});
   std::string estimate;
   std::optional<Failure> failure;
   const double deadline = wall_seconds() + context.config.jobs.plan_timeout_s;
-  bool too_long = false;
+  bool timed_out = false;
   child.read_lines(
       [&](std::string_view line) {
         const auto message = decode(line);
@@ -61,11 +63,11 @@ Response dry_run(Context& context, const JobRequest& request) {
         if (const auto* result = std::get_if<Result>(&*message)) estimate = result->json;
         if (const auto* reported = std::get_if<Failure>(&*message)) failure = *reported;
       },
-      [&] { return too_long = too_long || context.draining || wall_seconds() > deadline; });
+      [&] { return timed_out = timed_out || context.draining || wall_seconds() > deadline; });
   child.wait();
-  if (too_long) throw busy("the plan took too long", 60);
+  if (timed_out) throw busy("the plan exceeded its time limit", 60);
   if (failure) throw problem_of(*failure);
-  if (estimate.empty()) throw Problem(500, "internal", "the plan's process crashed");
+  if (estimate.empty()) throw Problem(500, "internal", "the process of the plan crashed");
   return json_response(200, estimate);
 }
 

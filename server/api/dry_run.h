@@ -1,4 +1,4 @@
-// The plan of a job that is not queued.
+// The estimate of a job without queuing it.
 #pragma once
 
 #include "server/api/context.h"
@@ -7,8 +7,8 @@
 
 namespace voxdag::server {
 
-// Runs it in a process of its own and waits for it. Throws Problem: what is wrong with the scene or
-// the request, 503 if too many are being made or it takes too long.
+// Runs the plan in a child process and answers with its estimate as JSON. Throws Problem: the error
+// of the scene or the request; 503 if too many plans run or this one takes too long.
 Response dry_run(Context& context, const JobRequest& request);
 
 }  // namespace voxdag::server

@@ -8,9 +8,9 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kProgressEvery_s = 0.5;
-constexpr double kKeepAlive_s = 15;
-constexpr double kLongestWait_s = 1;
+constexpr double kProgressInterval_s = 0.5;
+constexpr double kKeepAliveInterval_s = 15;
+constexpr double kMaxWait_s = 1;
 
 std::string event_text(const char* name, const std::string& data, int64_t id = -1) {
   std::string text = "event: " + std::string(name) + "\n";
@@ -52,15 +52,15 @@ std::optional<std::string> EventFeed::next() {
   if (!ended_) add_progress(text);
   started_ = true;
   const double now = wall_seconds();
-  if (text.empty() && now - last_sent_s_ > kKeepAlive_s) text = ": keep-alive\n\n";
+  if (text.empty() && now - last_sent_s_ > kKeepAliveInterval_s) text = ": keep-alive\n\n";
   if (!text.empty()) last_sent_s_ = now;
   return text;
 }
 
 void EventFeed::wait() {
-  // Progress that came too early for the last event is waited for no longer than it takes.
-  const double left_s = last_progress_s_ + kProgressEvery_s - wall_seconds();
-  queue_.wait_for_change(seen_version_, left_s > 0 ? left_s : kLongestWait_s);
+  // Wakes up in time for progress that came too soon after the last event.
+  const double left_s = last_progress_s_ + kProgressInterval_s - wall_seconds();
+  queue_.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWait_s);
 }
 
 void EventFeed::add_changes(std::string& text) {
@@ -69,10 +69,10 @@ void EventFeed::add_changes(std::string& text) {
     ended_ = true;
     return;
   }
-  // Without a number to go on from, the job as it is says all that its past events would.
-  const bool goes_on = last_number_ >= 0;
+  // A new stream begins with the job itself, which makes its past state changes redundant.
+  const bool resumed = last_number_ >= 0;
   for (const JobEvent& event : queue_.events_after(id_, last_number_)) {
-    if (goes_on) text += event_text("state", state_data(event), event.number);
+    if (resumed) text += event_text("state", state_data(event), event.number);
     last_number_ = event.number;
   }
   const auto live = dispatcher_.live(id_);
@@ -88,7 +88,7 @@ void EventFeed::add_progress(std::string& text) {
   if (!live) return;
   const uint64_t version = live->version();
   const double now = wall_seconds();
-  if (version == seen_progress_ || now - last_progress_s_ < kProgressEvery_s) return;
+  if (version == seen_progress_ || now - last_progress_s_ < kProgressInterval_s) return;
   const std::string progress = live->progress_json();
   if (progress.empty()) return;
   seen_progress_ = version;

@@ -1,4 +1,4 @@
-// One client's stream of a job's events (docs/api.md, "Following a job").
+// The event stream of one client for one job (docs/api.md, "Events of a job"). Used by one thread.
 #pragma once
 
 #include <atomic>
@@ -12,11 +12,11 @@ namespace voxdag::server {
 
 class EventFeed {
  public:
-  // Events after `last_seen` are sent again; none if it is not given.
+  // Sends the state changes after event `last_seen`; without it only the current state.
   EventFeed(JobQueue& queue, const Dispatcher& dispatcher, const ServerConfig& config,
             const std::atomic<bool>& draining, std::string id, std::optional<int64_t> last_seen);
 
-  // What is to be sent next, "" for nothing yet; no value when the stream is at its end. Waits up
+  // An EventSource: text to send, "" for nothing yet, no value at the end of the stream. Waits up
   // to about a second.
   std::optional<std::string> next();
 
@@ -30,7 +30,7 @@ class EventFeed {
   const ServerConfig& config_;
   const std::atomic<bool>& draining_;
   const std::string id_;
-  int64_t last_number_ = -1;  // of the newest event that was sent; -1 before the first
+  int64_t last_number_ = -1;  // of the newest event sent; -1 before the first
   bool started_ = false;
   bool ended_ = false;
   uint64_t seen_version_ = 0, seen_changes_ = 0, seen_progress_ = 0;

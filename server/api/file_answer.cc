@@ -8,13 +8,13 @@
 namespace voxdag::server {
 namespace {
 
-// Whether a list of entity tags has this one; weak ones count where `weakly`.
-bool has_tag(std::string_view list, std::string_view tag, bool weakly) {
-  if (weakly && trimmed(list) == "*") return true;
+// Whether the value of If-None-Match has this entity tag. The comparison is weak.
+bool has_tag(std::string_view list, std::string_view tag) {
+  if (trimmed(list) == "*") return true;
   while (!list.empty()) {
     const size_t comma = std::min(list.find(','), list.size());
     std::string_view entry = trimmed(list.substr(0, comma));
-    if (weakly && entry.starts_with("W/")) entry.remove_prefix(2);
+    if (entry.starts_with("W/")) entry.remove_prefix(2);
     if (entry == tag) return true;
     list.remove_prefix(std::min(comma + 1, list.size()));
   }
@@ -26,15 +26,15 @@ std::string content_range(const ByteRange& range, uint64_t size) {
          std::to_string(size);
 }
 
-RangeAnswer asked_ranges(const Request& request, const std::string& tag, uint64_t size) {
+RangeAnswer requested_ranges(const Request& request, const std::string& tag, uint64_t size) {
   const auto condition = request.headers.find("If-Range");
-  // A date cannot be compared with a digest: then the whole is sent, which is always right.
+  // An entity tag that differs, or a date, makes the answer the whole file.
   if (condition != request.headers.end() && trimmed(condition->second) != tag) return {};
   return parse_ranges(request.header("Range"), size);
 }
 
-void put_parts(Response& response, const FileAnswer& answer, const std::vector<ByteRange>& ranges,
-               uint64_t size) {
+void add_multipart(Response& response, const FileAnswer& answer,
+                   const std::vector<ByteRange>& ranges, uint64_t size) {
   const std::string boundary = random_id() + random_id();
   for (const ByteRange& range : ranges)
     response.pieces.push_back({"\r\n--" + boundary + "\r\nContent-Type: " + answer.type +
@@ -53,26 +53,26 @@ Response answer_with_file(const Request& request, FileAnswer answer) {
   response.headers.emplace("ETag", tag);
   response.headers.emplace("Accept-Ranges", "bytes");
   response.headers.emplace("Cache-Control", "private, no-cache");
-  if (has_tag(request.header("If-None-Match"), tag, true)) {
+  if (has_tag(request.header("If-None-Match"), tag)) {
     response.status = 304;
     return response;
   }
-  const RangeAnswer asked = asked_ranges(request, tag, size);
-  if (asked.kind == RangeAnswer::Kind::kUnsatisfiable) {
-    Problem problem(416, "range_not_satisfiable", "no range lies within the file");
+  const RangeAnswer requested = requested_ranges(request, tag, size);
+  if (requested.kind == RangeAnswer::Kind::kUnsatisfiable) {
+    Problem problem(416, "range_not_satisfiable", "no requested range lies within the file");
     problem.headers.emplace("Content-Range", "bytes */" + std::to_string(size));
     throw problem;
   }
   response.headers.emplace("Content-Disposition", "attachment; filename=\"" + answer.name + '"');
   response.headers.emplace("Repr-Digest", digest_field(answer.sha256));
-  if (asked.kind == RangeAnswer::Kind::kPart) {
+  if (requested.kind == RangeAnswer::Kind::kPart) {
     response.status = 206;
-    if (asked.ranges.size() == 1) {
-      response.headers.emplace("Content-Range", content_range(asked.ranges[0], size));
+    if (requested.ranges.size() == 1) {
+      response.headers.emplace("Content-Range", content_range(requested.ranges[0], size));
       response.headers.emplace("Content-Type", answer.type);
-      response.pieces.push_back({"", asked.ranges[0]});
+      response.pieces.push_back({"", requested.ranges[0]});
     } else {
-      put_parts(response, answer, asked.ranges, size);
+      add_multipart(response, answer, requested.ranges, size);
     }
   } else {
     response.headers.emplace("Content-Type", answer.type);

@@ -1,4 +1,4 @@
-// A large file as an answer: whole, in part or in parts (RFC 9110, sections 13 and 14).
+// Answers with a large file: whole, one range or several (RFC 9110, sections 13 and 14).
 #pragma once
 
 #include <memory>
@@ -12,11 +12,11 @@ namespace voxdag::server {
 struct FileAnswer {
   std::shared_ptr<ReadableFile> file;  // not empty
   std::string type;
-  std::string sha256;  // of the file, in hex: its ETag
-  std::string name;    // to save it under
+  std::string sha256;  // of the file in hex, used as its ETag
+  std::string name;    // file name for Content-Disposition
 };
 
-// 200, 206, or 304. Throws Problem (416).
+// Answers with 200, 206 or 304. Throws Problem (416).
 Response answer_with_file(const Request& request, FileAnswer answer);
 
 }  // namespace voxdag::server

@@ -29,7 +29,7 @@ std::string links(const std::string& self) {
   return text + ",\"preview\":\"" + self + "/preview.png\"}";
 }
 
-// Texts that are JSON already.
+// `json` is JSON text already.
 std::string or_null(const std::string& json) { return json.empty() ? "null" : json; }
 
 }  // namespace
@@ -46,10 +46,11 @@ std::string time_text(double unix_s) {
   return text;
 }
 
-std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsigned max_attempts) {
+std::string job_json(const Job& job, const LiveJob* live, uint64_t position,
+                     unsigned max_attempts) {
   const std::string progress = live ? live->progress_json() : "";
   const std::vector<std::string> warnings = live ? live->warnings() : job.warnings;
-  // The request is an object of the members scene, resolution and options.
+  // The request is an object with the members scene, resolution and options: drop its braces.
   const std::string request = job.request.substr(1, job.request.size() - 2);
   return "{\"id\":\"" + job.id + "\",\"name\":" + quoted(job.name) + ",\"state\":\"" +
          state_name(job.state) + "\"," + request + ",\"priority\":" + std::to_string(job.priority) +
@@ -59,7 +60,7 @@ std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsign
          ",\"started_at\":" + time_member(job.started_s) +
          ",\"finished_at\":" + time_member(job.finished_s) +
          ",\"not_before\":" + time_member(job.not_before_s) +
-         ",\"position\":" + (place == 0 ? "null" : std::to_string(place)) +
+         ",\"position\":" + (position == 0 ? "null" : std::to_string(position)) +
          ",\"progress\":" + or_null(progress.empty() ? job.progress : progress) +
          ",\"result\":" + or_null(job.result) + ",\"error\":" + error_member(job.error) +
          ",\"warnings\":" +

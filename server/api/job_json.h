@@ -1,4 +1,4 @@
-// A job as answers show it (JOB of docs/api.md).
+// A job in JSON (JOB of docs/api.md).
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace voxdag::server {
 // "2026-11-21T07:00:00.123Z"; "" for 0.
 std::string time_text(double unix_s);
 
-// `live` may be null; `place` is the job's in the queue, from 1, 0 if it has none.
-std::string job_json(const Job& job, const LiveJob* live, uint64_t place, unsigned max_attempts);
+// `live` may be null. `position` is the place in the queue from 1; 0 if the job is not queued.
+std::string job_json(const Job& job, const LiveJob* live, uint64_t position, unsigned max_attempts);
 
 }  // namespace voxdag::server

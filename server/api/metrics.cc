@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-void head(std::ostream& out, const std::string& name, const char* type, const char* help) {
+void write_header(std::ostream& out, const std::string& name, const char* type, const char* help) {
   out << "# HELP " << name << ' ' << help << "\n# TYPE " << name << ' ' << type << '\n';
 }
 
@@ -17,9 +17,9 @@ std::string short_text(double value) {
   return text;
 }
 
-void single(std::ostream& out, const std::string& name, const char* type, const char* help,
-            double value) {
-  head(out, name, type, help);
+void write_metric(std::ostream& out, const std::string& name, const char* type, const char* help,
+                  double value) {
+  write_header(out, name, type, help);
   out << name << ' ' << value << '\n';
 }
 
@@ -34,9 +34,9 @@ void Metrics::count_request(int status, double wall_s) {
   duration_sum_s_ += wall_s;
 }
 
-void Metrics::count_settled(const Job& job) {
+void Metrics::count_run(const Job& job) {
   std::lock_guard lock(mutex_);
-  ++settled_[state_name(job.state)];
+  ++runs_[state_name(job.state)];
   if (job.state != JobState::kSucceeded) return;
   const auto result = nlohmann::json::parse(job.result, nullptr, false);
   if (!result.is_object()) return;
@@ -47,45 +47,48 @@ void Metrics::count_settled(const Job& job) {
 }
 
 std::string Metrics::text(const std::map<JobState, uint64_t>& jobs,
-                          const std::vector<Gauge>& gauges) const {
+                          const std::vector<Sample>& samples) const {
   std::ostringstream out;
   out.precision(17);
-  head(out, "voxdag_jobs", "gauge", "Jobs that are kept, by state.");
+  write_header(out, "voxdag_jobs", "gauge", "Jobs by state.");
   for (size_t i = 0; i < kJobStateNames.size(); ++i) {
     const auto found = jobs.find(static_cast<JobState>(i));
     out << "voxdag_jobs{state=\"" << kJobStateNames[i] << "\"} "
         << (found == jobs.end() ? 0 : found->second) << '\n';
   }
-  for (const Gauge& gauge : gauges) single(out, gauge.name, "gauge", gauge.help, gauge.value);
+  for (const Sample& sample : samples) {
+    const bool counter = std::string_view(sample.name).ends_with("_total");
+    write_metric(out, sample.name, counter ? "counter" : "gauge", sample.help, sample.value);
+  }
   std::lock_guard lock(mutex_);
-  head(out, "voxdag_http_requests_total", "counter", "Requests answered, by status.");
+  write_header(out, "voxdag_http_requests_total", "counter", "Answered requests by status.");
   for (const auto& [status, count] : requests_)
     out << "voxdag_http_requests_total{status=\"" << status << "\"} " << count << '\n';
-  head(out, "voxdag_http_request_seconds", "histogram",
-       "Time from a request's header to its answer, bodies sent from disk aside.");
-  uint64_t sum = 0;
+  write_header(out, "voxdag_http_request_duration_seconds", "histogram",
+               "Time from the end of a request's header to its answer, without sending files.");
+  uint64_t total = 0;
   for (size_t i = 0; i <= kBounds_s.size(); ++i) {
-    sum += durations_[i];
-    out << "voxdag_http_request_seconds_bucket{le=\"";
-    out << (i < kBounds_s.size() ? short_text(kBounds_s[i]) : "+Inf") << "\"} " << sum << '\n';
+    total += durations_[i];
+    out << "voxdag_http_request_duration_seconds_bucket{le=\"";
+    out << (i < kBounds_s.size() ? short_text(kBounds_s[i]) : "+Inf") << "\"} " << total << '\n';
   }
-  out << "voxdag_http_request_seconds_sum " << duration_sum_s_
-      << "\nvoxdag_http_request_seconds_count " << sum << '\n';
-  head(out, "voxdag_job_runs_total", "counter",
-       "Runs of jobs that ended, by the state they left the job in.");
-  for (const auto& [state, count] : settled_)
+  out << "voxdag_http_request_duration_seconds_sum " << duration_sum_s_
+      << "\nvoxdag_http_request_duration_seconds_count " << total << '\n';
+  write_header(out, "voxdag_job_runs_total", "counter",
+               "Ended runs of jobs by the state they left the job in.");
+  for (const auto& [state, count] : runs_)
     out << "voxdag_job_runs_total{state=\"" << state << "\"} " << count << '\n';
   const auto counter = [&](const char* name, const char* help, double value) {
-    single(out, name, "counter", help, value);
+    write_metric(out, name, "counter", help, value);
   };
-  counter("voxdag_built_voxels_total", "Voxels of jobs that succeeded.",
-          static_cast<double>(voxels_));
-  counter("voxdag_built_bytes_total", "Bytes of their files.", static_cast<double>(result_bytes_));
-  counter("voxdag_build_wall_seconds_total", "Their wall time.", build_wall_s_);
-  counter("voxdag_build_cpu_seconds_total", "Their CPU time.", build_cpu_s_);
-  counter("voxdag_uploaded_bytes_total", "Bytes of scenes received.",
+  counter("voxdag_built_voxels_total", "Voxels of succeeded jobs.", static_cast<double>(voxels_));
+  counter("voxdag_built_bytes_total", "File bytes of succeeded jobs.",
+          static_cast<double>(result_bytes_));
+  counter("voxdag_build_wall_seconds_total", "Wall time of succeeded jobs.", build_wall_s_);
+  counter("voxdag_build_cpu_seconds_total", "CPU time of succeeded jobs.", build_cpu_s_);
+  counter("voxdag_uploaded_bytes_total", "Received bytes of scenes.",
           static_cast<double>(uploaded_bytes_.load()));
-  counter("voxdag_downloaded_bytes_total", "Bytes of results asked for.",
+  counter("voxdag_downloaded_bytes_total", "Requested bytes of results.",
           static_cast<double>(downloaded_bytes_.load()));
   return out.str();
 }

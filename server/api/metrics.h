@@ -1,4 +1,4 @@
-// Counters for /metrics, in Prometheus' text format. Thread-safe.
+// Counters for /metrics in the Prometheus text format. Thread-safe.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@
 
 namespace voxdag::server {
 
-// One measured now.
-struct Gauge {
+// A value measured when /metrics is read: a counter if its name ends with _total, else a gauge.
+struct Sample {
   const char* name;
   const char* help;
   double value;
@@ -25,12 +25,12 @@ class Metrics {
   void count_request(int status, double wall_s);
   void count_uploaded(uint64_t bytes) { uploaded_bytes_ += bytes; }
   void count_downloaded(uint64_t bytes) { downloaded_bytes_ += bytes; }
-  // A job's process has ended, and left it so.
-  void count_settled(const Job& job);
+  // Counts an ended run of a job by the state it left the job in.
+  void count_run(const Job& job);
 
-  // `jobs` by state.
+  // `jobs`: number of jobs by state.
   std::string text(const std::map<JobState, uint64_t>& jobs,
-                   const std::vector<Gauge>& gauges) const;
+                   const std::vector<Sample>& samples) const;
 
  private:
   static constexpr std::array<double, 8> kBounds_s = {0.001, 0.005, 0.01, 0.05, 0.1, 0.5, 1, 10};
@@ -39,7 +39,7 @@ class Metrics {
   std::map<int, uint64_t> requests_;
   std::array<uint64_t, kBounds_s.size() + 1> durations_{};
   double duration_sum_s_ = 0;
-  std::map<std::string, uint64_t> settled_;  // by state, or error code
+  std::map<std::string, uint64_t> runs_;  // by state
   uint64_t voxels_ = 0, result_bytes_ = 0;
   double build_wall_s_ = 0, build_cpu_s_ = 0;
   std::atomic<uint64_t> uploaded_bytes_{0}, downloaded_bytes_{0};

@@ -1,78 +1,46 @@
 #include "server/api/problem.h"
 
-#include <nlohmann/json.hpp>
+#include <new>
 
 #include "server/request_error.h"
 
 namespace voxdag::server {
-Problem problem(ErrorCode code, std::string detail) {
-  return Problem(http_status(code), error_name(code), std::move(detail));
-}
-Problem bad_request(std::string detail) {
-  return problem(ErrorCode::kInvalidInput, std::move(detail));
-}
-Problem not_found(std::string detail) { return problem(ErrorCode::kNotFound, std::move(detail)); }
-Problem conflict(std::string detail) { return Problem(409, "conflict", std::move(detail)); }
+namespace {
 
-Problem busy(std::string detail, int retry_after_s) {
-  Problem result(503, "busy", std::move(detail));
-  result.headers.emplace("Retry-After", std::to_string(retry_after_s));
+constexpr int kQueueFullRetry_s = 60;
+
+Problem problem_of(const RequestError& error) {
+  switch (error.kind()) {
+    case RequestError::Kind::kInvalid:
+      return bad_request(error.message());
+    case RequestError::Kind::kNotFound:
+      return not_found(error.message());
+    case RequestError::Kind::kLimit:
+      return problem(ErrorCode::kLimit, error.message());
+    case RequestError::Kind::kKeyReused:
+      return Problem(422, error.code(), error.message());
+    case RequestError::Kind::kQueueFull:
+      return busy(error.message(), kQueueFullRetry_s);
+    case RequestError::Kind::kConflict:
+      break;
+  }
+  Problem result = conflict(error.message());
+  result.state = error.job_state;
+  if (error.upload_offset)
+    result.headers.emplace("Upload-Offset", std::to_string(*error.upload_offset));
   return result;
 }
 
-Problem public_problem(const Error& error) {
-  return problem(error.code(), public_text(error.code()));
-}
+}  // namespace
 
-std::string problem_json(const Problem& problem) {
-  nlohmann::ordered_json json = {{"type", "about:blank"},
-                                 {"title", status_title(problem.status)},
-                                 {"status", problem.status},
-                                 {"code", problem.code},
-                                 {"detail", problem.detail}};
-  if (!problem.state.empty()) json["state"] = problem.state;
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
-
-const char* status_title(int status) {
-  switch (status) {
-    case 400:
-      return "Bad Request";
-    case 401:
-      return "Unauthorized";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 408:
-      return "Request Timeout";
-    case 409:
-      return "Conflict";
-    case 413:
-      return "Content Too Large";
-    case 414:
-      return "URI Too Long";
-    case 415:
-      return "Unsupported Media Type";
-    case 416:
-      return "Range Not Satisfiable";
-    case 422:
-      return "Unprocessable Content";
-    case 429:
-      return "Too Many Requests";
-    case 431:
-      return "Request Header Fields Too Large";
-    case 500:
-      return "Internal Server Error";
-    case 503:
-      return "Service Unavailable";
-    case 507:
-      return "Insufficient Storage";
-    default:
-      return "";
-  }
+Problem public_problem(const std::exception& error) {
+  if (const auto* problem = dynamic_cast<const Problem*>(&error)) return *problem;
+  if (const auto* refused = dynamic_cast<const RequestError*>(&error)) return problem_of(*refused);
+  if (const auto* known = dynamic_cast<const Error*>(&error))
+    return problem(known->code(), public_text(known->code()));
+  if (dynamic_cast<const std::bad_alloc*>(&error))
+    return busy(public_text(ErrorCode::kOutOfMemory));
+  return Problem(500, "internal", "internal error; the log of the service has the request id");
 }
 
 }  // namespace voxdag::server

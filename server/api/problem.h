@@ -1,41 +1,15 @@
-// What an answer says when a request fails: problem+json (RFC 9457), thrown through the handlers.
-// `detail` is seen by clients: it never holds paths of the server or texts of libraries.
+// Which problem a client sees for what a handler threw.
 #pragma once
 
 #include <exception>
-#include <string>
 
-#include "core/base/error.h"
-#include "server/http/headers.h"
+#include "server/http/problem.h"
 
 namespace voxdag::server {
 
-struct Problem : std::exception {
-  Problem(int http_status, std::string name, std::string text)
-      : status(http_status), code(std::move(name)), detail(std::move(text)) {}
-  const char* what() const noexcept override { return detail.c_str(); }
-
-  int status;
-  std::string code;
-  std::string detail;
-  std::string state;  // of the job that is in the wrong one; "" elsewhere
-  HeaderMap headers;  // that belong to the answer: Retry-After, Allow, Content-Range…
-};
-
-// Code and status by docs/errors.md.
-Problem problem(ErrorCode code, std::string detail);
-Problem bad_request(std::string detail);
-Problem not_found(std::string detail);
-Problem conflict(std::string detail);
-// 503 with Retry-After.
-Problem busy(std::string detail, int retry_after_s = 2);
-
-// An Error of the rooms below, as clients may see it: its code, and a text that gives nothing away.
-Problem public_problem(const Error& error);
-
-// The body.
-std::string problem_json(const Problem& problem);
-// "Not Found"; "" for a status that is not used here.
-const char* status_title(int status);
+// A Problem stays as it is, and a RequestError keeps its message. An Error keeps its code, with a
+// fixed text in place of its message, which may hold paths of the server. Anything else is `busy`
+// (no memory) or `internal`.
+Problem public_problem(const std::exception& error);
 
 }  // namespace voxdag::server

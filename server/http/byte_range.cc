@@ -11,7 +11,7 @@ namespace {
 
 constexpr size_t kMaxRanges = 16;
 
-// Digits only. A number over 64 bits counts as the largest: beyond the end of everything.
+// Digits only. A number over 64 bits saturates: it is beyond the end of any file.
 std::optional<uint64_t> parse_number(std::string_view text) {
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return {};
   uint64_t value = 0;
@@ -19,29 +19,29 @@ std::optional<uint64_t> parse_number(std::string_view text) {
   return parsed.ec == std::errc::result_out_of_range ? UINT64_MAX : value;
 }
 
-enum class Parsed { kRange, kOutside, kBroken };
+enum class Parsed { kRange, kOutside, kMalformed };
 
 // "5-9", "5-" or "-4".
 Parsed parse_range(std::string_view text, uint64_t size, ByteRange& range) {
   const size_t dash = text.find('-');
-  if (dash == std::string_view::npos) return Parsed::kBroken;
+  if (dash == std::string_view::npos) return Parsed::kMalformed;
   const std::string_view first = text.substr(0, dash), last = text.substr(dash + 1);
   if (first.empty()) {
     const auto suffix = parse_number(last);
-    if (!suffix) return Parsed::kBroken;
+    if (!suffix) return Parsed::kMalformed;
     range = {size - std::min(size, *suffix), size};
     return *suffix == 0 ? Parsed::kOutside : Parsed::kRange;
   }
   const auto begin = parse_number(first);
   const auto end = last.empty() ? UINT64_MAX : parse_number(last);
-  if (!begin || !end || *end < *begin) return Parsed::kBroken;
+  if (!begin || !end || *end < *begin) return Parsed::kMalformed;
   if (*begin >= size) return Parsed::kOutside;
   range = {*begin, std::min(size - 1, *end) + 1};
   return Parsed::kRange;
 }
 
-// Many small or overlapping ranges cost the server more than the client: such a request is no
-// resumed download.
+// Many small or overlapping ranges cost the server more than the client, and no download needs
+// them.
 bool is_reasonable(const std::vector<ByteRange>& ranges, uint64_t size) {
   uint64_t bytes = 0;
   for (const ByteRange& range : ranges) bytes += range.size();
@@ -57,7 +57,7 @@ RangeAnswer parse_ranges(std::string_view header, uint64_t size) {
     return {};
   header.remove_prefix(kUnit.size());
   RangeAnswer answer;
-  size_t asked = 0;
+  size_t requested = 0;
   for (bool more = true; more;) {
     const size_t comma = header.find(',');
     more = comma != std::string_view::npos;
@@ -66,10 +66,10 @@ RangeAnswer parse_ranges(std::string_view header, uint64_t size) {
     if (text.empty()) continue;
     ByteRange range;
     const Parsed parsed = parse_range(text, size, range);
-    if (parsed == Parsed::kBroken || ++asked > kMaxRanges) return {};
+    if (parsed == Parsed::kMalformed || ++requested > kMaxRanges) return {};
     if (parsed == Parsed::kRange) answer.ranges.push_back(range);
   }
-  if (asked == 0 || !is_reasonable(answer.ranges, size)) return {};
+  if (requested == 0 || !is_reasonable(answer.ranges, size)) return {};
   answer.kind =
       answer.ranges.empty() ? RangeAnswer::Kind::kUnsatisfiable : RangeAnswer::Kind::kPart;
   return answer;

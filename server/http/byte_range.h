@@ -1,4 +1,4 @@
-// The Range header (RFC 9110, section 14) for what has a known size.
+// Range and Content-Range headers (RFC 9110, section 14) for contents of a known size.
 #pragma once
 
 #include <cstdint>
@@ -17,20 +17,20 @@ struct ByteRange {
 
 struct RangeAnswer {
   enum class Kind {
-    kWhole,          // no range is asked for, or not in a way that is to be honored: 200
+    kWhole,          // 200: no range is requested, or the header is ignored
     kPart,           // 206
     kUnsatisfiable,  // 416
   };
   Kind kind = Kind::kWhole;
-  std::vector<ByteRange> ranges;  // of kPart, in the order asked for
+  std::vector<ByteRange> ranges;  // for kPart, in the order requested
 };
 
-// `size` > 0. A header that breaks the grammar, has another unit, or asks for more than 16 ranges,
-// or more bytes than there are, is answered with the whole. Ranges that
-// lie outside are dropped; if none is left it is unsatisfiable.
+// Resolves a Range header for contents of `size` > 0 bytes. A header that is malformed, has another
+// unit, or asks for more than 16 ranges or for more bytes in total than `size` is ignored. Ranges
+// outside the contents are dropped; if none is left, the header is unsatisfiable.
 RangeAnswer parse_ranges(std::string_view header, uint64_t size);
 
-// "bytes FIRST-LAST/TOTAL" of a request that sends a part. False if it is not that, or not
+// Parses the Content-Range of an upload, "bytes FIRST-LAST/TOTAL". False if it is malformed or not
 // FIRST <= LAST < TOTAL.
 bool parse_content_range(std::string_view header, ByteRange& range, uint64_t& total);
 

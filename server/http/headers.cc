@@ -5,7 +5,7 @@
 namespace voxdag::server {
 namespace {
 
-// ASCII only, whatever the locale.
+// ASCII only, independent of the locale.
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c; }
 
 }  // namespace

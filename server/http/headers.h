@@ -1,4 +1,4 @@
-// Header fields of a request or an answer. Names compare without regard to case.
+// Header fields of a request or an answer. Names compare case-insensitively (ASCII).
 #pragma once
 
 #include <map>
@@ -13,9 +13,9 @@ struct HeaderLess {
 };
 using HeaderMap = std::multimap<std::string, std::string, HeaderLess>;
 
-// The first field of the name, "" if there is none.
+// The value of the first field of this name, "" if there is none.
 std::string header_value(const HeaderMap& headers, std::string_view name);
-// Without the blanks and tabs around it.
+// `text` without leading and trailing spaces and tabs.
 std::string_view trimmed(std::string_view text);
 bool equal_ignoring_case(std::string_view a, std::string_view b);
 

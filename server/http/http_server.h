@@ -1,6 +1,5 @@
-// HTTP on one port: connections within their limits, requests parsed and answers written by
-// httplib, handlers called with messages of our own. A handler runs on its connection's thread;
-// many run at a time.
+// HTTP on one port: sockets, limits and threads are ours, httplib parses requests and writes
+// answers. The handler runs on the thread of its connection, so that many calls run concurrently.
 #pragma once
 
 #include <functional>
@@ -22,20 +21,18 @@ struct HttpOptions {
 
 class HttpServer {
  public:
-  // May throw Problem; an Error becomes the problem of its code, anything else is `internal`.
+  // May throw Problem; any other exception is answered as the problem `internal`.
   using Handler = std::function<Response(Request&)>;
-  // Told of faults that clients see as `internal` and the like, for the log.
-  using OnFault = std::function<void(const Request&, const std::string& what)>;
 
-  // Listens, but accepts nobody yet. Throws as Listener and TlsContext do.
-  HttpServer(const HttpOptions& options, Handler handler, OnFault on_fault);
+  // Listens, but accepts no connection yet. Throws as Listener and TlsContext do.
+  HttpServer(const HttpOptions& options, Handler handler);
   ~HttpServer();
 
   int port() const;
   size_t connections() const;
-  // Serves until stop(), then lets answers in flight finish for up to `drain_s`.
+  // Serves until stop(), then waits up to `drain_s` for answers in flight.
   void run(double drain_s);
-  // From any thread. Event streams must end by themselves.
+  // Callable from any thread. Event streams must end by themselves.
   void stop();
 
  private:

@@ -1,4 +1,4 @@
-// A request and its answer, as the service's handlers see them; httplib stays in its folder.
+// A request and its answer as handlers see them; httplib's types stay in server/http.
 #pragma once
 
 #include <cstdint>
@@ -16,46 +16,47 @@
 
 namespace voxdag::server {
 
-enum class BodyEnd { kWhole, kStopped, kBroken, kTooSlow };
+// How reading a body ended: complete, stopped by the sink, or cut off by the client.
+enum class BodyEnd { kComplete, kStopped, kBroken, kTooSlow };
 
 struct Request {
   std::string method;
   Target target;
   HeaderMap headers;
   std::string peer;    // the client's address
-  std::string id;      // of this request, in answer and log
-  std::string caller;  // whose token it has, once that is known
+  std::string id;      // X-Request-Id of the answer, also in the log
+  std::string caller;  // the name of its token, once access is granted
   std::optional<uint64_t> content_length;
-  bool has_body = false;  // a Content-Length above 0, or chunks of unknown number
+  bool has_body = false;  // a Content-Length above 0, or chunked
 
-  // Hands the body to `sink` piece by piece, until that returns false. Called at most once; an
-  // unread body costs the client its connection.
+  // Passes the body to `sink` in pieces, until that returns false. Called at most once; if the body
+  // is not read to its end, the connection is closed after the answer.
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
 
   std::string header(std::string_view name) const { return header_value(headers, name); }
 };
 
-// The next piece of a file's answer: a text, then a range of the file (which may be empty).
+// A piece of an answer from a file: a text, then a range of the file (may be empty).
 struct FilePiece {
   std::string text;
   ByteRange range;
 };
 
-// An endless answer. next() gives what is to be sent, "" for nothing yet, no value for the end; it
-// returns within about a second.
-using EventText = std::function<std::optional<std::string>()>;
+// The source of an event stream. A call returns what is to be sent next, "" for nothing yet, or no
+// value at the end; it takes at most about a second.
+using EventSource = std::function<std::optional<std::string>()>;
 
 struct Response {
   int status = 200;
   HeaderMap headers;
-  // One of the three, or none.
+  // At most one of body, file and next_event is set.
   std::string body;
   std::shared_ptr<ReadableFile> file;
-  std::vector<FilePiece> pieces;  // of `file`
-  EventText next_event;
-  // Held until the answer is sent: a slot of a limit.
-  std::shared_ptr<void> slot;
+  std::vector<FilePiece> pieces;  // what to send of `file`
+  EventSource next_event;
+  // A permit of a ConcurrencyLimiter, released when the answer is sent.
+  std::shared_ptr<void> permit;
 };
 
 }  // namespace voxdag::server

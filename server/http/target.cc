@@ -3,18 +3,18 @@
 #include <algorithm>
 
 #include "core/base/text.h"
-#include "server/api/problem.h"
+#include "server/http/problem.h"
 
 namespace voxdag::server {
 namespace {
 
-std::string decode(std::string text, bool plus_is_blank) {
-  if (plus_is_blank) std::ranges::replace(text, '+', ' ');
+std::string decode(std::string text, bool plus_is_space) {
+  if (plus_is_space) std::ranges::replace(text, '+', ' ');
   auto out = percent_decoded(text);
-  if (!out) throw bad_request("the target has a broken percent escape");
+  if (!out) throw bad_request("the request target has a malformed percent escape");
   for (const char c : *out)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-      throw bad_request("the target has a control character");
+      throw bad_request("the request target has a control character");
   return std::move(*out);
 }
 
@@ -36,7 +36,7 @@ void parse_query(std::string_view text, std::map<std::string, std::string>& quer
         equals < pair.size() ? pair.substr(equals + 1) : std::string_view{};
     const auto [at, is_new] = query.emplace(decode(std::string(pair.substr(0, equals)), true),
                                             decode(std::string(value), true));
-    if (!is_new) throw bad_request("a query parameter is given twice");
+    if (!is_new) throw bad_request("a query parameter is repeated");
   });
 }
 
@@ -54,7 +54,7 @@ std::string_view without_origin(std::string_view text) {
 
 Target parse_target(std::string_view text) {
   text = without_origin(text.substr(0, text.find('#')));
-  if (!text.starts_with('/')) throw bad_request("the target is no path: expected /…");
+  if (!text.starts_with('/')) throw bad_request("the request target is not a path: expected /...");
   Target target;
   const size_t mark = std::min(text.find('?'), text.size());
   target.path = text.substr(0, mark);

@@ -1,4 +1,4 @@
-// The target of a request, "/api/v1/jobs?limit=5", taken apart.
+// The parsed target of a request, such as "/api/v1/jobs?limit=5".
 #pragma once
 
 #include <map>
@@ -10,13 +10,13 @@ namespace voxdag::server {
 
 struct Target {
   std::string path;                          // as sent, without the query
-  std::vector<std::string> segments;         // percent-decoded; "/" has none
+  std::vector<std::string> segments;         // percent-decoded; empty for "/"
   std::map<std::string, std::string> query;  // percent-decoded
 };
 
-// Throws Problem (400) for broken escapes, control characters, a repeated query name or a target
-// that is no path. Dots are not resolved: "." and ".." are names like others, and nothing bears
-// them.
+// Throws Problem (400) for malformed escapes, control characters, a repeated query parameter or a
+// target that is not a path. "." and ".." are not resolved: they are ordinary names, which no route
+// has.
 Target parse_target(std::string_view text);
 
 }  // namespace voxdag::server

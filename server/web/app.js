@@ -1,16 +1,16 @@
-// The page's frame: which page the fragment names, the login, the menu.
+// The frame of all pages: routing by URL fragment, the login, the menu.
 
-import {get_json, Problem, request, token} from "./api.js";
-import {clear, h, set_text} from "./dom.js";
-import {job_page} from "./job_page.js";
-import {jobs_page} from "./jobs_page.js";
-import {login_page} from "./login_page.js";
-import {new_job_page} from "./new_job_page.js";
-import {problem_box} from "./parts.js";
+import {get_json, Problem, request, token} from "./lib/api.js";
+import {clear, h, set_text} from "./lib/dom.js";
+import {job_page} from "./pages/job_page.js";
+import {jobs_page} from "./pages/jobs_page.js";
+import {login_page} from "./pages/login_page.js";
+import {new_job_page} from "./pages/new_job_page.js";
+import {problem_box} from "./views/parts.js";
 
 const main = document.getElementById("main");
 const sign_out = document.getElementById("sign-out");
-let leaving = new AbortController();  // aborts what the page that is left still has under way
+let page_lifetime = new AbortController();  // aborts the requests of the page being left
 
 // A page is a function (params, query, signal) -> {title, content}.
 const kRoutes = [
@@ -20,9 +20,9 @@ const kRoutes = [
 ];
 
 function show(page) {
-  leaving.abort();
-  leaving = new AbortController();
-  const {title, content} = page(leaving.signal);
+  page_lifetime.abort();
+  page_lifetime = new AbortController();
+  const {title, content} = page(page_lifetime.signal);
   document.title = `${title} · voxdag`;
   clear(main, content);
   window.scrollTo(0, 0);
@@ -49,12 +49,12 @@ function route({focus = true} = {}) {
 
 window.addEventListener("hashchange", () => route());
 window.addEventListener("voxdag-login", () => {
-  const was_wrong = Boolean(token.get());
-  token.drop();
-  show(() => login_page(was_wrong, () => route()));
+  const token_rejected = Boolean(token.get());
+  token.remove();
+  show(() => login_page(token_rejected, () => route()));
 });
 sign_out.addEventListener("click", async () => {
-  token.drop();
+  token.remove();
   await request("GET", "/api/v1/jobs?limit=1").catch(() => {});
 });
 

@@ -38,7 +38,7 @@ class Client : public CommandLine {
     args.insert(args.end(), more.begin(), more.end());
     return run_json(args).at("id");
   }
-  // A job that is still at work whatever the machine, until it is canceled.
+  // A job that runs for minutes on any machine.
   std::string submit_long() {
     EXPECT_EQ(run({"generate", "soup", "long.glb", "--triangles", "50000"}).status, 0);
     return run_json({"submit", "long.glb", "-r", "32768", "--threads", "1"}).at("id");
@@ -49,8 +49,8 @@ class Client : public CommandLine {
       if (job.at("id") == id) return job.at("state");
     return "";
   }
-  // Canceling a job that runs takes it a moment.
-  void expect_state_in_the_end(const std::string& id, const std::string& expected) {
+  // A running job takes a moment to stop.
+  void expect_state_eventually(const std::string& id, const std::string& expected) {
     for (int i = 0; i < 1200 && state(id) != expected; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     EXPECT_EQ(state(id), expected);
@@ -70,8 +70,8 @@ class Client : public CommandLine {
   std::unique_ptr<ServeProcess> server_;
 };
 
-// From a local scene to a file that verifies: the bytes are those of a build on this machine.
-TEST_F(Client, BuildsAsTheCommandDoes) {
+// From a local scene to a verified file, with the bytes of a local build.
+TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
   const Json job = run_json({"submit", "m.glb", "-r", "128", "--hash-bits", "16", "--name",
                              "sponge", "--memory", "256MiB", "--wait"});
   EXPECT_EQ(job["state"], "succeeded");
@@ -79,7 +79,7 @@ TEST_F(Client, BuildsAsTheCommandDoes) {
   EXPECT_EQ(job["options"]["hash_bits"], 16);
   const std::string id = job["id"];
   const Json report = run_json({"download", id, "-o", "out/got.vdag"});
-  EXPECT_EQ(report["resumed_at"], 0);
+  EXPECT_EQ(report["resumed_bytes"], 0);
   EXPECT_EQ(report["sha256"], job["result"]["sha256"]);
   EXPECT_EQ(report["bytes"], contents("out/got.vdag").size());
   EXPECT_EQ(run({"verify", "out/got.vdag", "--against", "m.glb"}).status, 0);
@@ -92,15 +92,15 @@ TEST_F(Client, BuildsAsTheCommandDoes) {
   EXPECT_NE(listed.out.find(id), std::string::npos) << listed.out;
   EXPECT_EQ(run_json({"jobs", "--state", "failed,queued"})["jobs"].size(), 0u);
 
-  // Who comes late sees the stages that were, and the result.
+  // Watching an ended job shows its stages and the result.
   const Answer watched = run({"watch", id});
   EXPECT_EQ(watched.status, 0);
   EXPECT_NE(watched.err.find("\nbuild "), std::string::npos) << watched.err;
   EXPECT_NE(watched.out.find(report["sha256"].get<std::string>()), std::string::npos);
 }
 
-// The same file is sent once; of one that the server has a part of, the rest is sent.
-TEST_F(Client, UploadsWhatIsMissing) {
+// The same file is sent once; of a file that the server has in part, the rest is sent.
+TEST_F(Client, UploadsTheMissingPart) {
   const std::string scene = contents("m.glb");
   const Json job = run_json({"submit", "m.glb", "-r", "64"});
   const std::string name = job["scene"][0];
@@ -114,8 +114,8 @@ TEST_F(Client, UploadsWhatIsMissing) {
   const size_t half = scene.size() / 2;
   const auto part =
       http().upload("/api/v1/scenes/" + name, half,
-                    [&](uint64_t offset, uint64_t most) {
-                      return scene.substr(offset, std::min<uint64_t>(most, half - offset));
+                    [&](uint64_t offset, uint64_t max_bytes) {
+                      return scene.substr(offset, std::min<uint64_t>(max_bytes, half - offset));
                     },
                     {{"Content-Range",
                       "bytes 0-" + std::to_string(half - 1) + "/" + std::to_string(scene.size())}});
@@ -124,8 +124,8 @@ TEST_F(Client, UploadsWhatIsMissing) {
   EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), 2 * scene.size());
 }
 
-// A download goes on from what an earlier one left, and never passes off other bytes as the result.
-TEST_F(Client, DownloadsTheRest) {
+// A download resumes a partial file, and detects one with other bytes.
+TEST_F(Client, ResumesADownload) {
   const Json job = run_json({"submit", "m.glb", "-r", "128", "--wait"});
   const std::string id = job["id"], sha256 = job["result"]["sha256"];
   const std::string partial = "got.vdag." + sha256.substr(0, 12) + ".partial";
@@ -134,7 +134,7 @@ TEST_F(Client, DownloadsTheRest) {
 
   put(partial, whole.substr(0, whole.size() / 2));
   const Json report = run_json({"download", id, "-o", "got.vdag"});
-  EXPECT_EQ(report["resumed_at"], whole.size() / 2);
+  EXPECT_EQ(report["resumed_bytes"], whole.size() / 2);
   EXPECT_TRUE(contents("got.vdag") == whole);
   EXPECT_FALSE(exists(partial));
 
@@ -147,25 +147,25 @@ TEST_F(Client, DownloadsTheRest) {
   EXPECT_TRUE(contents("got.vdag") == whole);
 }
 
-// Jobs in the queue behind a long one can be suspended, canceled and gone on with.
+// Jobs in the queue behind a long one can be suspended, canceled and resumed.
 TEST_F(Client, SuspendsCancelsAndResumes) {
   const std::string first = submit_long();
-  const std::string kept = submit("64"), dropped = submit("32");
-  EXPECT_EQ(run({"suspend", kept}).status, 0);
-  EXPECT_EQ(state(kept), "suspended");
-  expect_error(3, "suspended", {"download", kept, "-o", "x.vdag"});
-  EXPECT_EQ(run({"cancel", dropped}).status, 0);
-  EXPECT_EQ(state(dropped), "canceled");
-  EXPECT_EQ(run({"watch", dropped}).status, 130);
-  EXPECT_EQ(run_json({"resume", kept})["state"], "queued");
-  EXPECT_EQ(run_json({"resume", dropped})["state"], "queued");
+  const std::string suspended = submit("64"), canceled = submit("32");
+  EXPECT_EQ(run({"suspend", suspended}).status, 0);
+  EXPECT_EQ(state(suspended), "suspended");
+  expect_error(3, "suspended", {"download", suspended, "-o", "x.vdag"});
+  EXPECT_EQ(run({"cancel", canceled}).status, 0);
+  EXPECT_EQ(state(canceled), "canceled");
+  EXPECT_EQ(run({"watch", canceled}).status, 130);
+  EXPECT_EQ(run_json({"resume", suspended})["state"], "queued");
+  EXPECT_EQ(run_json({"resume", canceled})["state"], "queued");
   EXPECT_EQ(run({"cancel", first}).status, 0);
-  expect_state_in_the_end(first, "canceled");
-  for (const std::string& id : {kept, dropped}) EXPECT_EQ(run({"watch", id}).status, 0);
+  expect_state_eventually(first, "canceled");
+  for (const std::string& id : {suspended, canceled}) EXPECT_EQ(run({"watch", id}).status, 0);
 }
 
-// A watcher does not mind that the server restarts; the job goes on too.
-TEST_F(Client, WatchesOverARestart) {
+// A watcher waits for a server that restarts; the job continues, too.
+TEST_F(Client, WatchesAcrossARestart) {
   const std::string first = submit_long(), id = submit("64");
   const std::string url = server_->url();
   const pid_t watcher = start({"watch", id, "--json"});
@@ -176,7 +176,7 @@ TEST_F(Client, WatchesOverARestart) {
   if (server_->url().empty()) {
     kill(watcher, SIGINT);
     wait_for(watcher);
-    GTEST_SKIP() << "somebody else took the port meanwhile: " << server_->log();
+    GTEST_SKIP() << "another process took the port: " << server_->log();
   }
   http().send("POST", "/api/v1/jobs/" + first + "/cancel", "");
   const Answer answer = wait_for(watcher);
@@ -184,8 +184,8 @@ TEST_F(Client, WatchesOverARestart) {
   EXPECT_EQ(Json::parse(answer.out)["state"], "succeeded");
 }
 
-// Errors come with the statuses of docs/errors.md.
-TEST_F(Client, SaysWhatIsWrong) {
+// Errors have the exit statuses of docs/errors.md.
+TEST_F(Client, ReportsErrors) {
   expect_error(3, "no ", {"watch", "0123456789abcdef"});
   expect_error(2, "16 hex digits", {"cancel", "../scenes"});
   expect_error(3, "none.glb", {"submit", "none.glb", "-r", "64"});
@@ -198,8 +198,8 @@ TEST_F(Client, SaysWhatIsWrong) {
   expect_error(2, "--server", {"jobs"});
 }
 
-// With tokens: none, one that may read, one that may submit.
-TEST_F(Client, CarriesAToken) {
+// With a token file: no token, one with the role read, one with the role submit.
+TEST_F(Client, SendsAToken) {
   std::string lines;
   for (const std::string role : {"read", "submit"}) {
     const Answer made = run({"token", "--role", role, "--name", "anna"});

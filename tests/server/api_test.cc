@@ -10,7 +10,7 @@ namespace {
 
 using Api = RunningService;
 
-// From upload to result, as a client does it, and the bytes are those of `voxdag build`.
+// From the upload to the result, with the bytes of `voxdag build`.
 TEST_F(Api, TurnsASceneIntoADag) {
   start();
   ASSERT_EQ(put_scene("m.glb", scene_bytes()).status, 201);
@@ -21,11 +21,11 @@ TEST_F(Api, TurnsASceneIntoADag) {
   EXPECT_EQ(done["progress"]["subvolumes"]["built"], done["progress"]["subvolumes"]["total"]);
   EXPECT_EQ(done["result"]["levels"].size(), 8u);
 
-  const std::string by_hand = folder_.file("by-hand.vdag");
+  const std::string local = folder_.file("local.vdag");
   const std::string command = std::string(VOXDAG_BINARY) + " build " + folder_.file("menger.glb") +
-                              " -r 512 -o " + by_hand + " >/dev/null 2>&1";
+                              " -r 512 -o " + local + " >/dev/null 2>&1";
   ASSERT_EQ(std::system(command.c_str()), 0);
-  const std::string expected = read_small_file(system_files(), by_hand, 1 << 30);
+  const std::string expected = read_small_file(system_files(), local, 1 << 30);
   const ClientResponse dag = http_->get("/api/v1/jobs/" + id + "/dag");
   EXPECT_EQ(dag.status, 200);
   EXPECT_TRUE(dag.body == expected) << "the bytes differ from those of voxdag build";
@@ -40,13 +40,13 @@ TEST_F(Api, TurnsASceneIntoADag) {
   EXPECT_EQ(cubes["built"], cubes["total"]);
   const std::string text = http_->get("/api/v1/jobs/" + id + "/log").body;
   EXPECT_NE(text.find("merge: "), std::string::npos) << text;
-  EXPECT_EQ(text.find(folder_.path()), std::string::npos) << "no path of this machine";
+  EXPECT_EQ(text.find(folder_.path()), std::string::npos) << "contains a path of this machine";
   EXPECT_EQ(http_->send("DELETE", "/api/v1/jobs/" + id, "").status, 204);
   EXPECT_EQ(http_->get("/api/v1/jobs/" + id).status, 404);
   EXPECT_FALSE(std::filesystem::exists(config_.data_folder + "/jobs/" + id));
 }
 
-TEST_F(Api, DrawsAPicture) {
+TEST_F(Api, RendersAPreview) {
   start();
   put_scene("m.glb", scene_bytes());
   const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 16}});
@@ -55,7 +55,7 @@ TEST_F(Api, DrawsAPicture) {
   EXPECT_TRUE(http_->get("/api/v1/jobs/" + id + "/preview.png").body.starts_with("\x89PNG"));
 }
 
-TEST_F(Api, ServesPartsOfTheFile) {
+TEST_F(Api, ServesRanges) {
   start();
   put_scene("m.glb", scene_bytes());
   const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 64}});
@@ -87,11 +87,11 @@ TEST_F(Api, ServesPartsOfTheFile) {
   EXPECT_TRUE(head.body.empty());
 }
 
-TEST_F(Api, GoesOnWithABrokenUpload) {
+TEST_F(Api, ResumesABrokenUpload) {
   start();
   const std::string bytes = scene_bytes(), path = "/api/v1/scenes/m.glb";
   const std::string size = std::to_string(bytes.size()), half = std::to_string(bytes.size() / 2);
-  // A connection that breaks off in the middle of the body.
+  // A connection that ends in the middle of the body.
   const int port = std::stoi(url().substr(url().rfind(':') + 1));
   raw_exchange(port, "PUT " + path + " HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + size +
                          "\r\n\r\n" + bytes.substr(0, bytes.size() / 2));
@@ -116,14 +116,14 @@ TEST_F(Api, GoesOnWithABrokenUpload) {
   EXPECT_EQ(Json::parse(done.body)["sha256"], sha256_hex(bytes));
 }
 
-TEST_F(Api, RefusesAWrongChecksum) {
+TEST_F(Api, RejectsAWrongChecksum) {
   start();
   const client::HeaderMap wrong = {{"Content-Digest", digest_field(sha256_hex("other"))}};
   EXPECT_EQ(not_problem(put_scene("m.glb", "hello", wrong), 400, "invalid_input"), "");
   EXPECT_EQ(http_->get("/api/v1/scenes/m.glb").status, 404);
 }
 
-TEST_F(Api, AnswersARepetitionOnce) {
+TEST_F(Api, IsIdempotentWithAKey) {
   start();
   put_scene("m.glb", scene_bytes());
   const Json body = {{"scene", "m.glb"}, {"resolution", 64}};
@@ -138,8 +138,8 @@ TEST_F(Api, AnswersARepetitionOnce) {
             "");
 }
 
-// Cancel, suspend, resume and retry, over a job that would take minutes.
-TEST_F(Api, SteersJobs) {
+// Cancel, suspend, resume and retry a job that would run for minutes.
+TEST_F(Api, ControlsJobs) {
   start();
   put_scene("m.glb", scene_bytes());
   const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 16384}});
@@ -149,11 +149,11 @@ TEST_F(Api, SteersJobs) {
   EXPECT_EQ(not_problem(http_->send("DELETE", "/api/v1/scenes/m.glb", ""), 409, "conflict"), "");
   EXPECT_EQ(post(path + "/suspend").status, 202);
   EXPECT_EQ(job(id)["state"], "suspended");
-  EXPECT_EQ(post(path + "/suspend").status, 202) << "it is so already";
+  EXPECT_EQ(post(path + "/suspend").status, 202) << "suspending a suspended job changes nothing";
   EXPECT_EQ(not_problem(post(path + "/retry"), 409, "conflict"), "");
   EXPECT_EQ(post(path + "/resume").status, 202);
   ASSERT_TRUE(until_state(id, "running"));
-  EXPECT_EQ(job(id)["attempts"], 1) << "resuming is no new attempt";
+  EXPECT_EQ(job(id)["attempts"], 1) << "resuming does not start a new attempt";
   EXPECT_EQ(post(path + "/cancel").status, 202);
   ASSERT_TRUE(until_state(id, "canceled"));
   EXPECT_EQ(not_problem(post(path + "/resume"), 409, "conflict"), "");
@@ -167,7 +167,7 @@ TEST_F(Api, SteersJobs) {
   EXPECT_EQ(list["counts"]["canceled"], 1);
 }
 
-TEST_F(Api, TellsWhatAJobWouldTake) {
+TEST_F(Api, EstimatesAJob) {
   start();
   put_scene("m.glb", scene_bytes());
   const ClientResponse plan =
@@ -180,7 +180,7 @@ TEST_F(Api, TellsWhatAJobWouldTake) {
             400);
 }
 
-// A stream begins with the job, tells every change, and ends with it; Last-Event-ID repeats.
+// A stream begins with the job and reports every change until it has ended; Last-Event-ID resumes.
 TEST_F(Api, StreamsEvents) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -206,7 +206,7 @@ TEST_F(Api, StreamsEvents) {
         << again;
 }
 
-TEST_F(Api, FailsWithTheReason) {
+TEST_F(Api, ReportsWhyAJobFailed) {
   start();
   put_scene("bad.glb", "no scene at all");
   const std::string id = post_job({{"scene", "bad.glb"}, {"resolution", 64}});
@@ -258,8 +258,8 @@ TEST_F(Api, NamesNoFolderOfItsMachine) {
   expect_no_path(id);
 }
 
-// Scenes by path: below a root, and nowhere else.
-TEST_F(Api, TakesScenesBelowItsRootsOnly) {
+// Scenes by path are accepted inside a scene root only.
+TEST_F(Api, AcceptsScenesInsideItsRootsOnly) {
   std::filesystem::create_directories(folder_.file("root/sub"));
   std::filesystem::create_directories(folder_.file("secret"));
   const std::string bytes = scene_bytes();
@@ -289,9 +289,19 @@ TEST_F(Api, DescribesItself) {
   EXPECT_EQ(http_->get("/readyz").status, 200);
   EXPECT_EQ(Json::parse(http_->get("/version").body)["api"], "v1");
   const std::string metrics = http_->get("/metrics").body;
-  for (const char* name : {"voxdag_jobs{state=\"queued\"} 0", "voxdag_http_request_seconds_count",
-                           "voxdag_free_disk_bytes"})
+  for (const char* name : {"voxdag_jobs{state=\"queued\"} 0",
+                           "voxdag_http_request_duration_seconds_count", "voxdag_free_disk_bytes"})
     EXPECT_NE(metrics.find(name), std::string::npos) << metrics;
+  for (const char* file :
+       {"/", "/app.js", "/pages/job_page.js", "/views/parts.js", "/lib/api.js"}) {
+    SCOPED_TRACE(file);
+    const ClientResponse asset = http_->get(file);
+    EXPECT_EQ(asset.status, 200);
+    EXPECT_EQ(asset.header("Content-Type"), std::string(file) == "/"
+                                                ? "text/html; charset=utf-8"
+                                                : "text/javascript; charset=utf-8");
+    EXPECT_EQ(http_->get(file, {{"If-None-Match", asset.header("ETag")}}).status, 304);
+  }
   const ClientResponse nothing = http_->get("/nothing/here");
   EXPECT_EQ(not_problem(nothing, 404, "not_found"), "");
   EXPECT_EQ(nothing.header("X-Content-Type-Options"), "nosniff");
@@ -300,14 +310,14 @@ TEST_F(Api, DescribesItself) {
   EXPECT_EQ(method.header("Allow"), "POST, GET, HEAD");
 }
 
-// A second service would start the same jobs.
-TEST_F(Api, HasItsDataFolderForItself) {
+// A second service on the same folder would start the same jobs.
+TEST_F(Api, LocksItsDataFolder) {
   start();
   EXPECT_THROW(Service(config_, system_files(), [](const std::string&) {}), Error);
 }
 
-// What changed, by whom.
-TEST_F(Api, KeepsAnAudit) {
+// Changes are logged with their author, reads are not.
+TEST_F(Api, WritesAnAuditLog) {
   start();
   put_scene("m.glb", "x");
   http_->get("/api/v1/scenes");

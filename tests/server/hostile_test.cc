@@ -19,8 +19,8 @@ class Hostile : public RunningService {
   }
 };
 
-// Requests that are no requests, or of which nobody can tell where they end.
-TEST_F(Hostile, BrokenRequestsAreRefused) {
+// Malformed requests, and requests whose end is ambiguous.
+TEST_F(Hostile, MalformedRequestsAreRejected) {
   start();
   EXPECT_EQ(status("hello\r\n\r\n"), 400);
   EXPECT_EQ(status("GET /healthz\r\n\r\n"), 400);
@@ -41,8 +41,8 @@ TEST_F(Hostile, BrokenRequestsAreRefused) {
   EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
 }
 
-// A body that was not read is not taken for the next request.
-TEST_F(Hostile, AnUnreadBodyEndsTheConnection) {
+// An unread body is not parsed as the next request.
+TEST_F(Hostile, AnUnreadBodyClosesTheConnection) {
   start();
   const std::string answer = raw_exchange(
       port(),
@@ -52,7 +52,7 @@ TEST_F(Hostile, AnUnreadBodyEndsTheConnection) {
   EXPECT_NE(answer.find("Connection: close"), std::string::npos) << answer;
 }
 
-TEST_F(Hostile, BodiesOverTheirLimitAreRefused) {
+TEST_F(Hostile, TooLargeBodiesAreRejected) {
   config_.transfers.max_scene_bytes = 1000;
   start();
   EXPECT_EQ(not_problem(put_scene("a.glb", std::string(1001, 'x')), 413, "too_large"), "");
@@ -68,8 +68,8 @@ TEST_F(Hostile, BodiesOverTheirLimitAreRefused) {
             "");
 }
 
-// httplib takes multipart bodies apart by itself, which nobody here asked for.
-TEST_F(Hostile, AFormIsABodyLikeOthers) {
+// httplib parses multipart bodies by itself unless that is disabled.
+TEST_F(Hostile, MultipartBodiesAreNotParsed) {
   start();
   const client::HeaderMap form = {{"Content-Type", "multipart/form-data; boundary=x"}};
   EXPECT_EQ(status("PUT /api/v1/scenes/a.glb HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n"
@@ -89,24 +89,24 @@ TEST_F(Hostile, NamesCannotLeaveTheFolder) {
   EXPECT_EQ(put_scene("../x.glb", "x").status, 404);
 }
 
-// Clients that drip a byte now and then hold neither threads nor places of those who ask and go.
-TEST_F(Hostile, SlowClientsKeepNobodyWaiting) {
-  config_.http.limits.connections = 40;
+// Clients that send their requests slowly block neither threads nor connections of others.
+TEST_F(Hostile, SlowClientsDoNotBlockOthers) {
+  config_.http.limits.max_connections = 40;
   start();
   std::vector<int> slow;
   for (int i = 0; i < 64; ++i) {
     slow.push_back(raw_connect(port()));
-    const std::string start_of_request = "GET /healthz HTTP/1.1\r\nX-Slow: ";
-    send(slow.back(), start_of_request.data(), start_of_request.size(), MSG_NOSIGNAL);
+    const std::string request_start = "GET /healthz HTTP/1.1\r\nX-Slow: ";
+    send(slow.back(), request_start.data(), request_start.size(), MSG_NOSIGNAL);
   }
   for (int i = 0; i < 20; ++i)
     EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
   for (const int socket : slow) close(socket);
 }
 
-// A header that takes too long costs its connection.
-TEST_F(Hostile, AHeaderHasItsTime) {
-  config_.http.limits.header_s = 0.2;
+// A header that takes too long closes its connection.
+TEST_F(Hostile, HeadersTimeOut) {
+  config_.http.limits.header_timeout_s = 0.2;
   start();
   const int socket = raw_connect(port());
   const std::string begin = "GET /healthz HTTP/1.1\r\n";
@@ -118,7 +118,7 @@ TEST_F(Hostile, AHeaderHasItsTime) {
   close(socket);
 }
 
-TEST_F(Hostile, TokensAreAskedFor) {
+TEST_F(Hostile, TokensAreRequired) {
   const NewToken reader = make_token("read", "r");
   write_file_atomically(system_files(), folder_.file("tokens"), reader.line + "\n");
   config_.token_file = folder_.file("tokens");
@@ -131,8 +131,8 @@ TEST_F(Hostile, TokensAreAskedFor) {
   EXPECT_EQ(client.send("DELETE", "/api/v1/scenes/a.glb", "").status, 403);
 }
 
-// Whatever bytes come, the service answers the next client.
-TEST_F(Hostile, NoiseDoesNoHarm) {
+// Random bytes never stop the service.
+TEST_F(Hostile, SurvivesRandomBytes) {
   start();
   const unsigned seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));

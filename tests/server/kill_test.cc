@@ -1,5 +1,5 @@
-// The service killed at random moments, as a power cut or the system would: every job succeeds in
-// the end, with the bytes of an undisturbed `voxdag build`.
+// Kills the service at random moments, as a power failure would: every job still succeeds, with the
+// bytes of `voxdag build`.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kMaxWait_s = 600;
 
-// How often to kill: a few times in the tests of every day.
+// How often to kill the service.
 int rounds() {
   const char* text = std::getenv("VOXDAG_CRASH_ROUNDS");
   return text ? std::atoi(text) : 4;
@@ -79,9 +79,9 @@ class KilledService : public testing::Test {
             .dump());
     scene_ = contents(folder_.file("s.glb"));
     start();
-    const ClientResponse put =
-        http_->upload("/api/v1/scenes/s.glb", scene_.size(),
-                      [&](uint64_t at, uint64_t most) { return scene_.substr(at, most); });
+    const ClientResponse put = http_->upload(
+        "/api/v1/scenes/s.glb", scene_.size(),
+        [&](uint64_t at, uint64_t max_bytes) { return scene_.substr(at, max_bytes); });
     ASSERT_EQ(put.status, 201) << put.body;
   }
   void post_jobs() {
@@ -107,7 +107,7 @@ class KilledService : public testing::Test {
   pid_t pid_ = -1;
 };
 
-TEST_F(KilledService, FinishesEveryJobInTheEnd) {
+TEST_F(KilledService, FinishesEveryJob) {
   prepare();
   post_jobs();
   const unsigned seed = std::random_device{}();
@@ -118,7 +118,7 @@ TEST_F(KilledService, FinishesEveryJobInTheEnd) {
     usleep(static_cast<useconds_t>(pause_us(random)));
     ASSERT_EQ(end(SIGKILL), -SIGKILL);
     start();
-    if (state(jobs_.back().id) == "succeeded") post_jobs();  // always some to interrupt
+    if (state(jobs_.back().id) == "succeeded") post_jobs();  // so that a job is always interrupted
   }
   std::map<int, std::string> expected;  // SHA-256 by resolution
   for (const auto& [id, resolution] : jobs_) {
@@ -128,20 +128,19 @@ TEST_F(KilledService, FinishesEveryJobInTheEnd) {
       usleep(20000);
     const Json job = Json::parse(http_->get("/api/v1/jobs/" + id).body);
     ASSERT_EQ(job["state"], "succeeded") << job.dump(2);
-    EXPECT_EQ(job["attempts"], 1) << "an end of the service is no failure of the job";
+    EXPECT_EQ(job["attempts"], 1) << "a killed service is not a failed attempt";
     std::string& sha256 = expected[resolution];
     if (sha256.empty()) {
-      const std::string by_hand = folder_.file("by-hand.vdag");
-      run("build " + folder_.file("s.glb") + " -r " + std::to_string(resolution) + " -o " +
-          by_hand);
-      sha256 = sha256_hex(contents(by_hand));
+      const std::string local = folder_.file("local.vdag");
+      run("build " + folder_.file("s.glb") + " -r " + std::to_string(resolution) + " -o " + local);
+      sha256 = sha256_hex(contents(local));
     }
     EXPECT_EQ(job["result"]["sha256"], sha256);
     EXPECT_EQ(sha256_hex(http_->get("/api/v1/jobs/" + id + "/dag").body), job["result"]["sha256"]);
   }
 }
 
-// SIGTERM: builds stop at a checkpoint, the exit is clean, and the next service resumes them.
+// After SIGTERM builds stop at a checkpoint and the exit is clean; the next service resumes them.
 TEST_F(KilledService, DrainsAndResumes) {
   prepare();
   post_jobs();

@@ -64,7 +64,8 @@ ClientResponse RunningService::put_scene(const std::string& name, const std::str
                                          const client::HeaderMap& headers) {
   return http_->upload(
       "/api/v1/scenes/" + name, bytes.size(),
-      [&](uint64_t offset, uint64_t most) { return bytes.substr(offset, most); }, headers);
+      [&](uint64_t offset, uint64_t max_bytes) { return bytes.substr(offset, max_bytes); },
+      headers);
 }
 
 ClientResponse RunningService::post(const std::string& path, const Json& body,
@@ -87,9 +88,9 @@ Json RunningService::job(const std::string& id) {
   return Json::parse(response.body);
 }
 
-bool RunningService::until(const std::function<bool()>& holds) {
+bool RunningService::until(const std::function<bool()>& condition) {
   const double deadline = wall_seconds() + kMaxWait_s;
-  while (!holds()) {
+  while (!condition()) {
     if (wall_seconds() > deadline) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

@@ -1,4 +1,4 @@
-// The service within the test, on a free port, with its jobs in real processes.
+// Runs the service within the test on a free port, with its jobs in real processes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -36,13 +36,13 @@ class RunningService : public testing::Test {
                            const client::HeaderMap& headers = {});
   ClientResponse post(const std::string& path, const Json& body = nullptr,
                       const client::HeaderMap& headers = {});
-  // Posts a job and expects it to be taken; returns its id.
+  // Posts a job and expects it to be accepted; returns its id.
   std::string post_job(const Json& body);
   Json job(const std::string& id);
-  // Asks until it holds, for up to ten minutes.
-  bool until(const std::function<bool()>& holds);
+  // Polls the condition for up to ten minutes; returns whether it became true.
+  bool until(const std::function<bool()>& condition);
   bool until_state(const std::string& id, const std::string& state);
-  // What is wrong with an answer that should be this problem; "" if nothing.
+  // Describes an answer that is not this problem; "" if it is.
   static std::string not_problem(const ClientResponse& response, int status,
                                  const std::string& code);
   std::string log();
@@ -58,7 +58,7 @@ class RunningService : public testing::Test {
   std::string log_;
 };
 
-// Sends bytes as they are and reads until the other side closes, or says nothing for a while.
+// Sends raw bytes and reads until the server closes the connection, or is silent for 30 s.
 std::string raw_exchange(int port, const std::string& bytes);
 // A connected socket.
 int raw_connect(int port);

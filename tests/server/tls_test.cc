@@ -9,8 +9,8 @@
 namespace voxdag::server {
 namespace {
 
-// A certificate for this machine, signed by itself, and its key. By address: a container may not
-// know the name localhost.
+// Writes a self-signed certificate for 127.0.0.1 and its key. A container may not resolve
+// localhost.
 void make_certificate(const std::string& certificate_file, const std::string& key_file) {
   EVP_PKEY* key = EVP_EC_gen("P-256");
   X509* certificate = X509_new();
@@ -47,8 +47,8 @@ class Tls : public RunningService {
   }
 };
 
-// Requests, bodies in both directions and event streams work as without TLS; a client that does not
-// know the certificate refuses, one that speaks plain HTTP is hung up on.
+// Requests, bodies in both directions and event streams work over TLS. A client that does not trust
+// the certificate refuses to connect; a plain HTTP request closes the connection.
 TEST_F(Tls, EncryptsEverything) {
   start();
   const std::string port = url().substr(url().rfind(':'));
@@ -72,7 +72,7 @@ TEST_F(Tls, EncryptsEverything) {
   EXPECT_THROW(plain.get("/healthz"), Error);
 }
 
-TEST_F(Tls, RefusesAKeyOfAnotherCertificate) {
+TEST_F(Tls, RejectsAKeyOfAnotherCertificate) {
   make_certificate(folder_.file("other.pem"), config_.http.key_file);
   EXPECT_THROW(start(), Error);
 }

@@ -45,7 +45,8 @@ const char* check_counts(const NodeLevelView& rows, uint64_t child_rows, uint32_
   if (highest >= child_rows) return "a child index is beyond the next level";
   uint64_t all_hashes = 0;
   for (const uint64_t hash : rows.hashes) all_hashes |= hash;
-  if (truncate_hash(all_hashes, hash_bits) != all_hashes) return "a hash has bits beyond the hash bits";
+  if (truncate_hash(all_hashes, hash_bits) != all_hashes)
+    return "a hash has bits beyond the hash bits";
   return nullptr;
 }
 

@@ -9,7 +9,7 @@
 namespace voxdag::server {
 namespace {
 
-// Guessing is hopeless at any rate; this keeps it out of the log.
+// Bounds the load of guessing; 256-bit tokens cannot be guessed at any rate.
 constexpr double kWrongTokensPerSecond = 5;
 
 std::string without_port(const std::string& host) {
@@ -19,7 +19,7 @@ std::string without_port(const std::string& host) {
   return host.substr(0, colon);
 }
 
-bool changes(const std::string& method) { return method != "GET" && method != "HEAD"; }
+bool is_write(const std::string& method) { return method != "GET" && method != "HEAD"; }
 
 Problem too_many(const std::string& detail) {
   Problem problem(429, "too_many_requests", detail);
@@ -43,8 +43,8 @@ AccessControl::AccessControl(const ServerConfig& config, FileSystem& files)
   hosts_.insert(hosts_.end(), {"localhost", "127.0.0.1", "[::1]", config.http.address});
 }
 
-// Without tokens the network is the wall, and a browser on this machine is a hole in it: any page
-// can send requests to the loopback, under a name of its own (DNS rebinding) or as another site's.
+// Without tokens, access is limited to the loopback, but a browser on this machine lets any page
+// send requests there: under a host name of its own (DNS rebinding) or as a cross-site request.
 void AccessControl::check_site(const Request& request) const {
   const auto is_ours = [&](const std::string& host) {
     return std::any_of(hosts_.begin(), hosts_.end(),
@@ -52,13 +52,14 @@ void AccessControl::check_site(const Request& request) const {
   };
   const std::string host = request.header("Host");
   if (!host.empty() && !is_ours(without_port(host)))
-    throw Problem(403, "forbidden", "the Host is none of this service's");
-  if (!changes(request.method)) return;
+    throw Problem(403, "forbidden", "the Host header does not name this service");
+  if (!is_write(request.method)) return;
   const std::string origin = request.header("Origin");
   const size_t scheme = origin.find("://");
   const bool foreign =
       !origin.empty() && (scheme == std::string::npos || origin.substr(scheme + 3) != host);
-  if (foreign) throw Problem(403, "forbidden", "the request comes from another site");
+  if (foreign)
+    throw Problem(403, "forbidden", "cross-site request: the Origin is not this service");
 }
 
 Caller AccessControl::identify(const Request& request) {
@@ -71,12 +72,12 @@ Caller AccessControl::identify(const Request& request) {
     if (caller) return *caller;
   }
   if (!wrong_tokens_.take(request.peer, wall_seconds())) throw too_many("too many wrong tokens");
-  throw unauthorized("the token is not known here");
+  throw unauthorized("unknown token");
 }
 
 Caller AccessControl::admit(const Request& request, Role needed) {
   if (!is_loopback(request.peer) && !requests_.take(request.peer, wall_seconds()))
-    throw too_many("more requests per second than one client may send");
+    throw too_many("the rate limit of this client is exceeded");
   if (!tokens_) {
     check_site(request);
     return {Role::kAdmin, "local"};
@@ -84,7 +85,8 @@ Caller AccessControl::admit(const Request& request, Role needed) {
   if (needed == Role::kNone) return {};
   const Caller caller = identify(request);
   if (caller.role == Role::kNone) throw unauthorized("expected Authorization: Bearer TOKEN");
-  if (caller.role < needed) throw Problem(403, "forbidden", "the token's role does not suffice");
+  if (caller.role < needed)
+    throw Problem(403, "forbidden", "the role of the token is not sufficient");
   return caller;
 }
 

@@ -1,4 +1,4 @@
-// Who comes in: the Host and Origin of a request, its rate, its token. Thread-safe.
+// Access control: checks the Host, Origin, rate and token of every request. Thread-safe.
 #pragma once
 
 #include <optional>
@@ -14,10 +14,10 @@ namespace voxdag::server {
 
 class AccessControl {
  public:
-  // Reads the token file, if there is one.
+  // Reads the token file if one is configured. Throws as Tokens::read does.
   AccessControl(const ServerConfig& config, FileSystem& files);
 
-  // Throws Problem unless the request may do what takes `needed`. Says who it is.
+  // Returns who sends the request. Throws Problem unless that caller has the role `needed`.
   Caller admit(const Request& request, Role needed);
 
  private:

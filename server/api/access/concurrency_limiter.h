@@ -1,4 +1,4 @@
-// A limit on how many of a thing there are at a time. Thread-safe.
+// Limits how many operations of a kind run concurrently. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -9,23 +9,23 @@ namespace voxdag::server {
 
 class ConcurrencyLimiter {
  public:
-  explicit ConcurrencyLimiter(size_t most)
-      : counter_(std::make_shared<std::atomic<size_t>>(0)), most_(most) {}
+  explicit ConcurrencyLimiter(size_t max)
+      : counter_(std::make_shared<std::atomic<size_t>>(0)), max_(max) {}
 
-  // Taken until the pointer goes; null if all are.
-  std::shared_ptr<void> take() {
-    if (counter_->fetch_add(1) >= most_) {
+  // A permit, released when the last copy of the pointer is destroyed; null if none is free.
+  std::shared_ptr<void> acquire() {
+    if (counter_->fetch_add(1) >= max_) {
       counter_->fetch_sub(1);
       return nullptr;
     }
     return std::shared_ptr<void>(counter_.get(),
                                  [counter = counter_](void*) { counter->fetch_sub(1); });
   }
-  size_t taken() const { return *counter_; }
+  size_t in_use() const { return *counter_; }
 
  private:
   std::shared_ptr<std::atomic<size_t>> counter_;
-  size_t most_;
+  size_t max_;
 };
 
 }  // namespace voxdag::server

@@ -6,8 +6,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kDepth_s = 2;
-// Beyond so many clients those whose buckets are full again, who lose nothing, are forgotten.
-constexpr size_t kManyClients = 10000;
+// Above this count, full buckets are dropped: a new bucket is full, too.
+constexpr size_t kMaxBuckets = 10000;
 
 }  // namespace
 
@@ -15,7 +15,7 @@ bool RateLimiter::take(const std::string& client, double now_s) {
   if (per_s_ <= 0) return true;
   std::lock_guard lock(mutex_);
   const double depth = std::max(1.0, per_s_ * kDepth_s);
-  if (buckets_.size() > kManyClients)
+  if (buckets_.size() > kMaxBuckets)
     std::erase_if(buckets_, [&](const auto& entry) {
       return entry.second.level + (now_s - entry.second.at_s) * per_s_ >= depth;
     });

@@ -1,5 +1,4 @@
-// How often each client may do a thing: a bucket of tokens per client, refilled steadily, as deep
-// as two seconds' worth. Thread-safe.
+// Rate limit per client: a token bucket that holds two seconds' worth. Thread-safe.
 #pragma once
 
 #include <map>
@@ -10,10 +9,10 @@ namespace voxdag::server {
 
 class RateLimiter {
  public:
-  // `per_s` of 0 limits nobody.
+  // A rate of 0 means no limit.
   explicit RateLimiter(double per_s) : per_s_(per_s) {}
 
-  // Takes one from the client's bucket; false if it is empty.
+  // Takes one token of the client's bucket; false if it is empty.
   bool take(const std::string& client, double now_s);
 
  private:

@@ -11,7 +11,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr uint64_t kLargestFile = uint64_t{1} << 20;
+constexpr uint64_t kMaxFileBytes = uint64_t{1} << 20;
 constexpr size_t kHashDigits = 64;
 
 bool is_name(const std::string& name) {
@@ -31,7 +31,7 @@ std::optional<Role> parse_role(std::string_view name) {
 }
 
 Tokens Tokens::read(FileSystem& files, const std::string& path) {
-  std::istringstream text(read_small_file(files, path, kLargestFile));
+  std::istringstream text(read_small_file(files, path, kMaxFileBytes));
   Tokens tokens;
   std::string line;
   for (int number = 1; std::getline(text, line); ++number) {
@@ -48,8 +48,9 @@ Tokens Tokens::read(FileSystem& files, const std::string& path) {
     tokens.entries_.push_back({{*parsed, name}, hash});
   }
   if (tokens.entries_.empty())
-    throw Error(ErrorCode::kInvalidInput,
-                path + " has no tokens: expected lines ROLE NAME SHA256 (voxdag token makes them)");
+    throw Error(
+        ErrorCode::kInvalidInput,
+        path + " has no tokens: expected lines ROLE NAME SHA256, as written by voxdag token");
   return tokens;
 }
 

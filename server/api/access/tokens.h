@@ -1,9 +1,9 @@
-// Bearer tokens and what each may do. The file holds hashes only:
+// Bearer tokens and their roles. The file holds hashes only:
 //
 //     # role name sha256(token)
 //     admin  anna  9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08
 //
-// Tokens are 256 random bits, so that a plain SHA-256 hides them.
+// Tokens have 256 random bits, so that an unsalted SHA-256 is enough.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@
 
 namespace voxdag::server {
 
-// Each may do what those before it may.
+// Each role includes the ones before it.
 enum class Role { kNone, kRead, kSubmit, kAdmin };
 
 // "read", "submit" or "admin"; no value for anything else.
@@ -28,10 +28,10 @@ struct Caller {
 
 class Tokens {
  public:
-  // Throws Error{kInvalidInput} naming the line that is wrong, or for a file without tokens.
+  // Throws Error{kInvalidInput} with the number of a malformed line, or for a file without tokens.
   static Tokens read(FileSystem& files, const std::string& path);
 
-  // Takes as long for one token as for another.
+  // Runs in constant time, whether the token is known or not.
   std::optional<Caller> find(std::string_view token) const;
 
  private:
@@ -42,12 +42,12 @@ class Tokens {
   std::vector<Entry> entries_;
 };
 
-// A new token, and the line that lets it in.
+// A new token and its line for the token file.
 struct NewToken {
   std::string token;
   std::string line;
 };
-// Throws Error{kInvalidInput} for a role or name that is none.
+// Throws Error{kInvalidInput} for an invalid role or name.
 NewToken make_token(const std::string& role, const std::string& name);
 
 }  // namespace voxdag::server

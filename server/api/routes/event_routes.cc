@@ -1,4 +1,4 @@
-// Following a job by server-sent events.
+// The server-sent events of a job.
 #include <charconv>
 
 #include "server/api/context.h"
@@ -25,15 +25,15 @@ Response follow(Context& context, Call& call) {
   Response response;
   response.headers.emplace("Content-Type", "text/event-stream");
   response.headers.emplace("Cache-Control", "no-store");
-  response.headers.emplace("X-Accel-Buffering", "no");  // a proxy must pass events on at once
+  response.headers.emplace("X-Accel-Buffering", "no");  // a proxy must not buffer events
   if (call.request.method == "HEAD") return response;
-  auto slot = context.event_streams.take();
-  if (!slot) throw busy("too many event streams at a time", 10);
+  auto permit = context.event_streams.acquire();
+  if (!permit) throw busy("too many event streams", 10);
   const auto feed =
       std::make_shared<EventFeed>(context.queue, context.dispatcher, context.config,
                                   context.draining, call.names[0], last_event_id(call.request));
   response.next_event = [feed] { return feed->next(); };
-  response.slot = std::move(slot);
+  response.permit = std::move(permit);
   return response;
 }
 

@@ -1,4 +1,4 @@
-// Jobs: posting, listing, looking, steering.
+// Jobs: submitting, listing, showing and controlling them.
 #include <charconv>
 #include <nlohmann/json.hpp>
 
@@ -14,31 +14,31 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxListed = 200;
-constexpr size_t kLongestKey = 255;
+constexpr size_t kMaxKeyChars = 255;
 
-std::string describe(Context& context, const Job& job) {
+std::string to_json(Context& context, const Job& job) {
   const auto live = context.dispatcher.live(job.id);
-  uint64_t place = 0;
+  uint64_t position = 0;
   if (job.state == JobState::kQueued) {
-    const auto places = context.queue.places();
-    const auto found = places->find(job.number);
-    if (found != places->end()) place = found->second;
+    const auto positions = context.queue.places();
+    const auto found = positions->find(job.number);
+    if (found != positions->end()) position = found->second;
   }
-  return job_json(job, live.get(), place, context.config.jobs.max_attempts);
+  return job_json(job, live.get(), position, context.config.jobs.max_attempts);
 }
 
 IdempotencyKey key_of(const Request& request, const JobRequest& job) {
   const auto given = request.headers.find("Idempotency-Key");
   if (given == request.headers.end()) return {};
   const std::string& key = given->second;
-  bool visible = !key.empty() && key.size() <= kLongestKey;
+  bool visible = !key.empty() && key.size() <= kMaxKeyChars;
   for (const char c : key) visible = visible && c > 0x20 && c < 0x7f;
   if (!visible) throw bad_request("Idempotency-Key: expected 1 to 255 visible ASCII characters");
   return {key, sha256_hex(job.text + '\n' + std::to_string(job.priority) + '\n' + job.name)};
 }
 
 Response accepted(Context& context, const Job& job, bool replayed) {
-  Response response = json_response(202, describe(context, job));
+  Response response = json_response(202, to_json(context, job));
   response.headers.emplace("Location", "/api/v1/jobs/" + job.id);
   if (replayed) response.headers.emplace("Idempotent-Replayed", "true");
   return response;
@@ -54,9 +54,9 @@ Response post_job(Context& context, Call& call) {
   const IdempotencyKey key = key_of(call.request, request);
   if (dry == "true") return dry_run(context, request);
   if (context.draining) throw busy("the service is stopping");
-  std::lock_guard lock(context.scene_use);
+  std::lock_guard lock(context.scene_mutex);
   if (const auto known = context.queue.find_by_key(key)) return accepted(context, *known, true);
-  context.tasks.make(request, Task::Kind::kBuild);  // says what cannot be done
+  context.tasks.make(request, Task::Kind::kBuild);  // throws if the request cannot be built
   Job job;
   job.name = request.name;
   job.request = request.text;
@@ -70,15 +70,15 @@ Response post_job(Context& context, Call& call) {
 JobFilter filter_of(const Call& call) {
   call.allow_query({"state", "limit", "cursor"});
   JobFilter filter;
-  filter.limit = call.query_count("limit", filter.limit, 1, kMaxListed);
+  filter.limit = call.query_integer("limit", filter.limit, 1, kMaxListed);
   filter.before =
-      static_cast<int64_t>(call.query_count("cursor", INT64_MAX, 1, uint64_t{INT64_MAX}));
+      static_cast<int64_t>(call.query_integer("cursor", INT64_MAX, 1, uint64_t{INT64_MAX}));
   if (!call.request.target.query.contains("state")) return filter;
   const std::string states = call.query("state");
   for (size_t begin = 0; begin <= states.size();) {
     const size_t end = std::min(states.find(',', begin), states.size());
     const auto state = parse_state(std::string_view(states).substr(begin, end - begin));
-    if (!state) throw bad_request("'state': expected states of jobs, with commas between them");
+    if (!state) throw bad_request("'state': expected a comma-separated list of job states");
     filter.states.push_back(*state);
     begin = end + 1;
   }
@@ -87,7 +87,7 @@ JobFilter filter_of(const Call& call) {
 
 Response list_jobs(Context& context, Call& call) {
   JobFilter filter = filter_of(call);
-  const size_t limit = filter.limit++;  // one more tells whether there are more
+  const size_t limit = filter.limit++;  // one more shows whether there is a next page
   std::vector<Job> jobs = context.queue.list(filter);
   std::string next = "null";
   if (jobs.size() > limit) {
@@ -95,7 +95,7 @@ Response list_jobs(Context& context, Call& call) {
     next = '"' + std::to_string(jobs.back().number) + '"';
   }
   std::string body = "{\"jobs\":[";
-  for (const Job& job : jobs) body += (&job == &jobs.front() ? "" : ",") + describe(context, job);
+  for (const Job& job : jobs) body += (&job == &jobs.front() ? "" : ",") + to_json(context, job);
   body += "],\"next_cursor\":" + next + ",\"counts\":{";
   const auto counts = context.queue.counts();
   for (size_t i = 0; i < kJobStateNames.size(); ++i) {
@@ -114,7 +114,7 @@ Response patch_job(Context& context, Call& call) {
     throw bad_request("expected {\"priority\": N}");
   const int priority = parse_priority(body["priority"].dump());
   const Job job = context.queue.change(call.names[0], [&](Job& j) { j.priority = priority; });
-  return json_response(200, describe(context, job));
+  return json_response(200, to_json(context, job));
 }
 
 using Action = Job (Dispatcher::*)(const std::string& id);
@@ -122,14 +122,14 @@ using Action = Job (Dispatcher::*)(const std::string& id);
 Response act(Context& context, Call& call, Action action) {
   call.allow_query({});
   expect_no_body(call.request);
-  return json_response(202, describe(context, (context.dispatcher.*action)(call.names[0])));
+  return json_response(202, to_json(context, (context.dispatcher.*action)(call.names[0])));
 }
 
 }  // namespace
 
 Job find_job(JobQueue& queue, const std::string& id) {
   auto job = queue.find(id);
-  if (!job) throw not_found("no such job: expected the id of one that was not deleted");
+  if (!job) throw not_found("no such job: expected the id of a job that was not deleted");
   return std::move(*job);
 }
 
@@ -140,7 +140,7 @@ void add_job_routes(Router& router, Context& context) {
              [&](Call& call) { return list_jobs(context, call); });
   router.add("GET", "/api/v1/jobs/{id}", Role::kRead, [&](Call& call) {
     call.allow_query({});
-    return json_response(200, describe(context, find_job(context.queue, call.names[0])));
+    return json_response(200, to_json(context, find_job(context.queue, call.names[0])));
   });
   router.add("PATCH", "/api/v1/jobs/{id}", Role::kAdmin,
              [&](Call& call) { return patch_job(context, call); });

@@ -1,4 +1,4 @@
-// What a job leaves: its file, report, picture, log and subvolumes.
+// The results of a job: its file, report, preview, log and subvolumes.
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
@@ -10,22 +10,34 @@
 namespace voxdag::server {
 namespace {
 
-constexpr uint64_t kLargestReport = uint64_t{4} << 20;
-constexpr uint64_t kStandardTail = 65536;
-constexpr uint64_t kLongestTail = uint64_t{1} << 20;
+constexpr uint64_t kMaxReportBytes = uint64_t{4} << 20;
+constexpr uint64_t kDefaultLogBytes = 65536;
+constexpr uint64_t kMaxLogBytes = uint64_t{1} << 20;
 
 Job finished_job(Context& context, Call& call) {
   call.allow_query({});
   Job job = find_job(context.queue, call.names[0]);
   if (job.state != JobState::kSucceeded) {
-    Problem problem = not_found("the job has no result: expected one that succeeded");
+    Problem problem = not_found("the job has no result: expected a succeeded job");
     problem.state = state_name(job.state);
     throw problem;
   }
   return job;
 }
 
-// From the job's name, or its first scene's, with nothing in it that a header or shell minds.
+std::string read_range(ReadableFile& file, const ByteRange& range) {
+  std::string bytes(range.size(), '\0');
+  file.read_at(range.begin, std::as_writable_bytes(std::span(bytes)));
+  return bytes;
+}
+
+std::string read_whole(FileSystem& files, const std::string& path) {
+  const auto file = files.open_read(path);
+  return read_range(*file, {0, file->size()});
+}
+
+// The name of the job or its first scene, reduced to characters that are safe in headers and
+// shells.
 std::string file_name(const Job& job) {
   const auto request = nlohmann::json::parse(job.request);
   std::string base = job.name;
@@ -42,8 +54,8 @@ std::string file_name(const Job& job) {
 
 Response get_dag(Context& context, Call& call) {
   const Job job = finished_job(context, call);
-  auto slot = context.transfers.take();
-  if (!slot) throw busy("too many transfers at a time", 5);
+  auto permit = context.transfers.acquire();
+  if (!permit) throw busy("too many transfers", 5);
   FileAnswer answer;
   answer.file = context.files.open_read(context.dispatcher.folder(job.id).result());
   answer.type = "application/octet-stream";
@@ -51,7 +63,7 @@ Response get_dag(Context& context, Call& call) {
   answer.name = file_name(job);
   Response response = answer_with_file(call.request, std::move(answer));
   if (response.file) {
-    response.slot = std::move(slot);
+    response.permit = std::move(permit);
     if (call.request.method == "GET")
       for (const FilePiece& piece : response.pieces)
         context.metrics.count_downloaded(piece.range.size());
@@ -62,7 +74,7 @@ Response get_dag(Context& context, Call& call) {
 Response get_report(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   auto report = nlohmann::ordered_json::parse(
-      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kLargestReport));
+      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kMaxReportBytes));
   report["output"] = file_name(job);
   return json_response(200, report.dump());
 }
@@ -71,20 +83,18 @@ Response get_preview(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   const std::string path = context.dispatcher.folder(job.id).preview();
   if (job.preview != Preview::kReady || !context.files.exists(path))
-    throw not_found(job.preview == Preview::kFailed ? "no picture could be drawn"
-                                                    : "the picture is not drawn yet");
-  const auto file = context.files.open_read(path);
+    throw not_found(job.preview == Preview::kFailed ? "the preview could not be rendered"
+                                                    : "the preview is not rendered yet");
   Response response;
   response.headers.emplace("Content-Type", "image/png");
   response.headers.emplace("Cache-Control", "private, max-age=3600");
-  response.body.resize(file->size());
-  file->read_at(0, std::as_writable_bytes(std::span(response.body)));
+  response.body = read_whole(context.files, path);
   return response;
 }
 
 Response get_log(Context& context, Call& call) {
-  call.allow_query({"bytes"});
-  const uint64_t most = call.query_count("bytes", kStandardTail, 1, kLongestTail);
+  call.allow_query({"max_bytes"});
+  const uint64_t max_bytes = call.query_integer("max_bytes", kDefaultLogBytes, 1, kMaxLogBytes);
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).log();
   Response response;
@@ -92,9 +102,8 @@ Response get_log(Context& context, Call& call) {
   response.headers.emplace("Cache-Control", "no-store");
   if (!context.files.exists(path)) return response;
   const auto file = context.files.open_read(path);
-  const uint64_t size = file->size(), begin = size - std::min(size, most);
-  response.body.resize(size - begin);
-  file->read_at(begin, std::as_writable_bytes(std::span(response.body)));
+  const uint64_t size = file->size(), begin = size - std::min(size, max_bytes);
+  response.body = read_range(*file, {begin, size});
   if (begin > 0) response.body.erase(0, response.body.find('\n') + 1);
   return response;
 }
@@ -103,12 +112,8 @@ Response get_subvolumes(Context& context, Call& call) {
   call.allow_query({});
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).subvolumes();
-  if (!context.files.exists(path)) throw not_found("the job's subvolumes are not planned yet");
-  const auto file = context.files.open_read(path);
-  Response response = json_response(200, "");
-  response.body.resize(file->size());
-  file->read_at(0, std::as_writable_bytes(std::span(response.body)));
-  return response;
+  if (!context.files.exists(path)) throw not_found("the subvolumes of the job are not planned yet");
+  return json_response(200, read_whole(context.files, path));
 }
 
 }  // namespace

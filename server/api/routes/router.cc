@@ -4,7 +4,6 @@
 #include <charconv>
 
 #include "server/api/problem.h"
-#include "server/api/request_problem.h"
 
 namespace voxdag::server {
 namespace {
@@ -31,24 +30,24 @@ std::string Call::query(const std::string& name) const {
   return found == request.target.query.end() ? "" : found->second;
 }
 
-uint64_t Call::query_count(const std::string& name, uint64_t standard, uint64_t least,
-                           uint64_t most) const {
+uint64_t Call::query_integer(const std::string& name, uint64_t default_value, uint64_t min,
+                             uint64_t max) const {
   const auto found = request.target.query.find(name);
-  if (found == request.target.query.end()) return standard;
+  if (found == request.target.query.end()) return default_value;
   const std::string& text = found->second;
   uint64_t count = 0;
   const auto parsed = std::from_chars(text.data(), text.data() + text.size(), count);
-  if (parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size() || count < least ||
-      count > most)
-    throw bad_request("'" + name + "': expected a whole number from " + std::to_string(least) +
-                      " to " + std::to_string(most));
+  if (parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size() || count < min ||
+      count > max)
+    throw bad_request("'" + name + "': expected an integer from " + std::to_string(min) + " to " +
+                      std::to_string(max));
   return count;
 }
 
 void Call::allow_query(const std::vector<std::string>& allowed) const {
   for (const auto& [name, value] : request.target.query)
     if (std::find(allowed.begin(), allowed.end(), name) == allowed.end())
-      throw bad_request("a query parameter is not known here");
+      throw bad_request("unknown query parameter");
 }
 
 void Router::add(const std::string& method, const std::string& pattern, Role role,
@@ -56,26 +55,22 @@ void Router::add(const std::string& method, const std::string& pattern, Role rol
   routes_.push_back({method, parse_target(pattern).segments, role, std::move(handler)});
 }
 
-Response Router::route(Request& request, AccessControl& gate) const {
+Response Router::route(Request& request, AccessControl& access) const {
   const std::string method = request.method == "HEAD" ? "GET" : request.method;
   std::string allowed;
   Call call{request, {}, {}};
   for (const Route& route : routes_) {
     if (!matches(route.pattern, request.target.segments, call.names)) continue;
     if (route.method == method) {
-      call.caller = gate.admit(request, route.role);
+      call.caller = access.admit(request, route.role);
       request.caller = call.caller.name;
-      try {
-        return route.handler(call);
-      } catch (const RequestError& error) {
-        throw problem_of(error);
-      }
+      return route.handler(call);
     }
     allowed += (allowed.empty() ? "" : ", ") + route.method;
     if (route.method == "GET") allowed += ", HEAD";
   }
-  gate.admit(request, Role::kNone);
-  if (allowed.empty()) throw not_found("nothing is here");
+  access.admit(request, Role::kNone);
+  if (allowed.empty()) throw not_found("no such resource");
   Problem problem(405, "method_not_allowed", "expected one of " + allowed);
   problem.headers.emplace("Allow", allowed);
   throw problem;
@@ -96,7 +91,7 @@ std::string read_json_body(Request& request, uint64_t max_bytes) {
                            "application/json"))
     throw Problem(415, "unsupported_media_type", "expected Content-Type: application/json");
   const Problem too_large(413, "too_large",
-                          "the body is over " + std::to_string(max_bytes) + " bytes");
+                          "the body is larger than " + std::to_string(max_bytes) + " bytes");
   if (request.content_length.value_or(0) > max_bytes) throw too_large;
   std::string body;
   const BodyEnd end = request.read_body([&](std::string_view piece) {
@@ -104,8 +99,8 @@ std::string read_json_body(Request& request, uint64_t max_bytes) {
     return body.size() <= max_bytes;
   });
   if (end == BodyEnd::kStopped) throw too_large;
-  if (end == BodyEnd::kTooSlow) throw Problem(408, "timeout", "the body came too slowly");
-  if (end == BodyEnd::kBroken) throw bad_request("the body broke off");
+  if (end == BodyEnd::kTooSlow) throw Problem(408, "timeout", "the body was sent too slowly");
+  if (end == BodyEnd::kBroken) throw bad_request("the connection ended within the body");
   return body;
 }
 

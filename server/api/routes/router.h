@@ -1,4 +1,4 @@
-// Which handler a request goes to, and what role that takes.
+// Routes requests to handlers and checks the role that each needs.
 #pragma once
 
 #include <functional>
@@ -11,18 +11,18 @@
 
 namespace voxdag::server {
 
-// A request that was let in.
+// A request to which access was granted.
 struct Call {
   Request& request;
   Caller caller;
-  std::vector<std::string> names;  // what stands for the {…} of the pattern
+  std::vector<std::string> names;  // values of the {...} segments of the pattern
 
-  // A query parameter; "" if it is not given.
+  // The value of a query parameter; "" if it is missing.
   std::string query(const std::string& name) const;
-  // A whole number in a query parameter. Throws Problem (400) unless it is in range.
-  uint64_t query_count(const std::string& name, uint64_t standard, uint64_t least,
-                       uint64_t most) const;
-  // Throws Problem (400) for a query parameter that is not among these.
+  // The integer in a query parameter. Throws Problem (400) unless it is from min to max.
+  uint64_t query_integer(const std::string& name, uint64_t default_value, uint64_t min,
+                         uint64_t max) const;
+  // Throws Problem (400) for a query parameter not in this list.
   void allow_query(const std::vector<std::string>& names) const;
 };
 
@@ -30,10 +30,10 @@ class Router {
  public:
   using Handler = std::function<Response(Call&)>;
 
-  // `pattern` like "/api/v1/jobs/{id}/dag". HEAD is answered where GET is.
+  // `pattern` is like "/api/v1/jobs/{id}/dag". A GET route answers HEAD, too.
   void add(const std::string& method, const std::string& pattern, Role role, Handler handler);
-  // Throws Problem: 404, 405 with Allow, what the gate throws, and what the handler throws.
-  Response route(Request& request, AccessControl& gate) const;
+  // Throws Problem: 404, 405 with Allow, and as `access` and the handler do.
+  Response route(Request& request, AccessControl& access) const;
 
  private:
   struct Route {
@@ -45,10 +45,9 @@ class Router {
   std::vector<Route> routes_;
 };
 
-// An answer of JSON.
 Response json_response(int status, std::string body);
-// The body of a request, at most so large. Throws Problem: 413, 415 unless it says that it is JSON,
-// 400 or 408 if it breaks off.
+// The body of a request. Throws Problem: 413 if it is larger than `max_bytes`, 415 if its content
+// type is not JSON, 400 or 408 if it ends early.
 std::string read_json_body(Request& request, uint64_t max_bytes);
 // Throws Problem (400) if there is a body.
 void expect_no_body(const Request& request);

@@ -1,4 +1,4 @@
-// Scenes: uploading, listing, removing.
+// Scenes: uploading, listing and removing them.
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
@@ -13,14 +13,14 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxListed = 200;
-constexpr size_t kStandardListed = 100;
+constexpr size_t kDefaultListed = 100;
 
 nlohmann::ordered_json scene_json(const Scene& scene) {
   nlohmann::ordered_json json = {
-      {"name", scene.name}, {"complete", scene.complete},
-      {"size", nullptr},    {"offset", scene.offset},
-      {"sha256", nullptr},  {"modified_at", time_text(scene.modified_s)}};
-  if (scene.size) json["size"] = *scene.size;
+      {"name", scene.name},    {"complete", scene.complete},
+      {"size_bytes", nullptr}, {"received_bytes", scene.offset},
+      {"sha256", nullptr},     {"modified_at", time_text(scene.modified_s)}};
+  if (scene.size) json["size_bytes"] = *scene.size;
   if (scene.complete) json["sha256"] = scene.sha256;
   return json;
 }
@@ -28,15 +28,15 @@ nlohmann::ordered_json scene_json(const Scene& scene) {
 std::string checked_name(const Call& call) {
   if (!is_scene_name(call.names[0]))
     throw bad_request(
-        "a scene's name: expected 1 to 128 of A-Z a-z 0-9 . _ -, beginning with a letter or digit "
-        "and ending with .glb or .gltf");
+        "scene name: expected 1 to 128 of A-Z a-z 0-9 . _ -, beginning with a letter or digit and "
+        "ending with .glb or .gltf");
   return call.names[0];
 }
 
-// SCENE, with what an upload that goes on needs to know.
+// SCENE, with the headers that a client needs to resume an upload.
 Response scene_response(Context& context, int status, const std::string& name) {
   const auto scene = context.scenes.find(name);
-  if (!scene) throw not_found("no scene of this name");
+  if (!scene) throw not_found("no such scene");
   Response response = json_response(status, scene_json(*scene).dump());
   const auto upload = context.scenes.upload(name);
   const uint64_t offset = upload ? upload->offset : scene->offset;
@@ -47,15 +47,16 @@ Response scene_response(Context& context, int status, const std::string& name) {
 }
 
 void check_unused(Context& context, const std::string& name) {
-  if (context.queue.uses_scene(name)) throw conflict("a job that has not ended uses this scene");
+  if (context.queue.uses_scene(name))
+    throw conflict("the scene is in use by a job that has not ended");
 }
 
-// Which bytes of the scene a request brings.
+// The bytes of the scene that a request carries.
 struct Part {
   uint64_t first = 0;
-  std::optional<uint64_t> end;    // if it says so
-  std::optional<uint64_t> total;  // of the whole
-  bool completes(uint64_t offset) const { return !total || offset == *total; }
+  std::optional<uint64_t> end;    // no value for a chunked body
+  std::optional<uint64_t> total;  // size of the scene, if known
+  bool is_last(uint64_t offset) const { return !total || offset == *total; }
 };
 
 Part part_of(const Request& request) {
@@ -70,36 +71,38 @@ Part part_of(const Request& request) {
   if (!parse_content_range(header, range, total))
     throw bad_request("Content-Range: expected bytes FIRST-LAST/TOTAL");
   if (request.content_length && *request.content_length != range.size())
-    throw bad_request("Content-Range and Content-Length do not agree");
+    throw bad_request("Content-Range and Content-Length do not match");
   return {range.begin, range.end, total};
 }
 
 void check_disk_space(Context& context, const Part& part) {
-  const uint64_t most = context.config.transfers.max_scene_bytes;
+  const uint64_t max_bytes = context.config.transfers.max_scene_bytes;
   const uint64_t size = part.total.value_or(0);
-  if (size > most)
-    throw Problem(413, "too_large", "a scene may have at most " + std::to_string(most) + " bytes");
+  if (size > max_bytes)
+    throw Problem(413, "too_large",
+                  "a scene may have at most " + std::to_string(max_bytes) + " bytes");
   const uint64_t free = context.files.free_space(context.config.data_folder);
   if (free < context.config.jobs.min_free_disk_bytes + (size - std::min(size, part.first)))
-    throw problem(ErrorCode::kNoSpace, "the service has no room for this scene");
+    throw problem(ErrorCode::kNoSpace,
+                  "the disk of the service has not enough free space for this scene");
 }
 
 BodyEnd receive(Context& context, Call& call, const Part& part, Upload& upload) {
-  const uint64_t most = part.end.value_or(context.config.transfers.max_scene_bytes);
+  const uint64_t end_offset = part.end.value_or(context.config.transfers.max_scene_bytes);
   uint64_t received = part.first;
   const BodyEnd end = call.request.read_body([&](std::string_view piece) {
     received += piece.size();
-    if (received > most) return false;
+    if (received > end_offset) return false;
     upload.write(piece);
     context.metrics.count_uploaded(piece.size());
     return true;
   });
-  if (end == BodyEnd::kWhole && part.end && received != *part.end)
-    throw bad_request("the body is shorter than Content-Range says");
+  if (end == BodyEnd::kComplete && part.end && received != *part.end)
+    throw bad_request("the body is shorter than its Content-Range");
   return end;
 }
 
-// "" if the header is not there.
+// The SHA-256 in a digest header; "" without the header.
 std::string digest_of(const Request& request, const char* name) {
   const auto found = request.headers.find(name);
   return found == request.headers.end() ? "" : parse_digest_field(found->second);
@@ -108,28 +111,28 @@ std::string digest_of(const Request& request, const char* name) {
 Response put_scene(Context& context, Call& call) {
   call.allow_query({});
   const std::string name = checked_name(call);
-  const auto slot = context.transfers.take();
-  if (!slot) throw busy("too many transfers at a time", 5);
+  const auto permit = context.transfers.acquire();
+  if (!permit) throw busy("too many transfers", 5);
   const Part part = part_of(call.request);
-  if (!call.request.has_body) throw bad_request("expected the scene's bytes as body");
+  if (!call.request.has_body) throw bad_request("expected the scene as body");
   check_disk_space(context, part);
   check_unused(context, name);
   const std::string part_digest = digest_of(call.request, "Content-Digest");
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
   Upload upload(context.scenes, name, part.first, part.total);
   switch (receive(context, call, part, upload)) {
-    case BodyEnd::kWhole:
+    case BodyEnd::kComplete:
       break;
     case BodyEnd::kStopped:
-      throw Problem(413, "too_large", "the body is longer than it may be");
+      throw Problem(413, "too_large", "the body is too large");
     case BodyEnd::kTooSlow:
-      throw Problem(408, "timeout", "the body came too slowly; what came is kept");
+      throw Problem(408, "timeout", "the body was sent too slowly; resume at Upload-Offset");
     case BodyEnd::kBroken:
-      throw bad_request("the body broke off; what came is kept");
+      throw bad_request("the connection ended within the body; resume at Upload-Offset");
   }
-  const bool last = part.completes(part.end.value_or(part.total.value_or(0)));
+  const bool last = part.is_last(part.end.value_or(part.total.value_or(0)));
   if (!upload.finish(part_digest, whole_digest, last)) return scene_response(context, 202, name);
-  std::lock_guard lock(context.scene_use);
+  std::lock_guard lock(context.scene_mutex);
   check_unused(context, name);
   const bool replaces = context.scenes.find(name).value_or(Scene{}).complete;
   upload.publish();
@@ -138,10 +141,10 @@ Response put_scene(Context& context, Call& call) {
 
 Response list_scenes(Context& context, Call& call) {
   call.allow_query({"limit", "cursor"});
-  const size_t limit = call.query_count("limit", kStandardListed, 1, kMaxListed);
+  const size_t limit = call.query_integer("limit", kDefaultListed, 1, kMaxListed);
   const std::string cursor = call.query("cursor");
   if (call.request.target.query.contains("cursor") && !is_scene_name(cursor))
-    throw bad_request("'cursor': expected a next_cursor");
+    throw bad_request("'cursor': expected the next_cursor of a page");
   auto scenes = context.scenes.list(cursor, limit + 1);
   nlohmann::ordered_json json = {{"scenes", nlohmann::ordered_json::array()},
                                  {"next_cursor", nullptr}};
@@ -157,9 +160,9 @@ Response delete_scene(Context& context, Call& call) {
   call.allow_query({});
   expect_no_body(call.request);
   const std::string name = checked_name(call);
-  std::lock_guard lock(context.scene_use);
+  std::lock_guard lock(context.scene_mutex);
   check_unused(context, name);
-  if (!context.scenes.remove(name)) throw not_found("no scene of this name");
+  if (!context.scenes.remove(name)) throw not_found("no such scene");
   Response response;
   response.status = 204;
   return response;

@@ -1,4 +1,4 @@
-// The service about itself, and the files that travel in it.
+// Health, readiness, version, metrics, and the embedded files.
 #include <unistd.h>
 
 #include "core/base/clock.h"
@@ -7,7 +7,7 @@
 #include "server/api/context.h"
 #include "server/api/problem.h"
 #include "server/api/routes/router.h"
-#include "server/assets.h"
+#include "server/web/assets.h"
 
 namespace voxdag::server {
 namespace {
@@ -16,23 +16,21 @@ constexpr const char* kPagePolicy =
     "default-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'";
 
-Response get_asset(Call& call, const std::string& name) {
-  const auto asset = find_asset(name);
-  if (!asset) throw not_found("nothing is here");
+Response get_asset(Call& call, const Asset& asset) {
   Response response;
-  response.headers.emplace("ETag", asset->etag);
+  response.headers.emplace("ETag", asset.etag);
   response.headers.emplace("Cache-Control", "no-cache");
   response.headers.emplace("Content-Security-Policy", kPagePolicy);
-  if (call.request.header("If-None-Match") == asset->etag) {
+  if (call.request.header("If-None-Match") == asset.etag) {
     response.status = 304;
     return response;
   }
-  response.headers.emplace("Content-Type", asset->type);
-  response.body = asset->contents;
+  response.headers.emplace("Content-Type", asset.type);
+  response.body = asset.contents;
   return response;
 }
 
-// Writes and removes a file: the least that a job needs of the disk.
+// Creates and removes a file.
 void check_writable(Context& context) {
   const std::string probe = context.config.data_folder + "/.ready-" + std::to_string(getpid());
   context.files.create(probe)->close();
@@ -44,36 +42,37 @@ Response get_ready(Context& context) {
   const std::string& data = context.config.data_folder;
   try {
     if (context.files.free_space(data) < context.config.jobs.min_free_disk_bytes)
-      throw busy("the disk has less free space than is held in reserve", 60);
+      throw busy("the disk has less free space than min_free_disk", 60);
     context.queue.counts();
     check_writable(context);
   } catch (const Error&) {
-    throw busy("the data folder cannot be written", 60);
+    throw busy("the data folder is not writable", 60);
   }
   return json_response(200, "{\"status\":\"ready\"}");
 }
 
 Response get_metrics(Context& context, double started_s) {
-  const std::vector<Gauge> gauges = {
-      {"voxdag_running_processes", "Processes that run jobs.",
+  const std::vector<Sample> samples = {
+      {"voxdag_job_processes", "Running job processes.",
        static_cast<double>(context.dispatcher.running())},
-      {"voxdag_event_streams", "Event streams that are open.",
-       static_cast<double>(context.event_streams.taken())},
-      {"voxdag_transfers", "Uploads and downloads in flight.",
-       static_cast<double>(context.transfers.taken())},
-      {"voxdag_free_disk_bytes", "Free where the data folder lies.",
+      {"voxdag_event_streams", "Open event streams.",
+       static_cast<double>(context.event_streams.in_use())},
+      {"voxdag_transfers", "Uploads and downloads in progress.",
+       static_cast<double>(context.transfers.in_use())},
+      {"voxdag_free_disk_bytes", "Free disk space for the data folder.",
        static_cast<double>(context.files.free_space(context.config.data_folder))},
-      {"voxdag_job_memory_bytes", "What running jobs may have together.",
+      {"voxdag_job_memory_limit_bytes", "Memory limit of all running jobs together.",
        static_cast<double>(context.tasks.memory_bytes())},
-      {"voxdag_resident_bytes", "Resident memory of the service, its jobs aside.",
+      {"voxdag_resident_memory_bytes", "Resident memory of the service without its jobs.",
        static_cast<double>(resident_bytes())},
-      {"voxdag_cpu_seconds", "CPU time of the service, its jobs aside.", process_cpu_seconds()},
-      {"voxdag_uptime_seconds", "Since the service began.", wall_seconds() - started_s},
+      {"voxdag_cpu_seconds_total", "CPU time of the service without its jobs.",
+       process_cpu_seconds()},
+      {"voxdag_uptime_seconds", "Time since the service started.", wall_seconds() - started_s},
   };
   Response response;
   response.headers.emplace("Content-Type", "text/plain; version=0.0.4; charset=utf-8");
   response.headers.emplace("Cache-Control", "no-store");
-  response.body = context.metrics.text(context.queue.counts(), gauges);
+  response.body = context.metrics.text(context.queue.counts(), samples);
   return response;
 }
 
@@ -88,9 +87,11 @@ void add_system_routes(Router& router, Context& context) {
   });
   router.add("GET", "/metrics", Role::kRead,
              [&, started_s = wall_seconds()](Call&) { return get_metrics(context, started_s); });
-  router.add("GET", "/", Role::kNone, [](Call& call) { return get_asset(call, "index.html"); });
-  router.add("GET", "/{file}", Role::kNone,
-             [](Call& call) { return get_asset(call, call.names[0]); });
+  for (const Asset& asset : embedded_assets()) {
+    const auto get = [asset](Call& call) { return get_asset(call, asset); };
+    router.add("GET", '/' + asset.name, Role::kNone, get);
+    if (asset.name == "index.html") router.add("GET", "/", Role::kNone, get);
+  }
 }
 
 }  // namespace voxdag::server

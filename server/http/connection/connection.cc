@@ -14,8 +14,8 @@ namespace {
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLinger_s = 1;
 constexpr size_t kLingerBytes = 1 << 20;
-// A pause between two writes that long was ours: the client's time starts anew.
-constexpr double kOwnPause_s = 0.2;
+// A longer pause between two writes was the handler's: the client's time starts again.
+constexpr double kHandlerPause_s = 0.2;
 
 }  // namespace
 
@@ -27,13 +27,11 @@ Connection::Connection(int socket, std::string address, const HttpLimits& limits
       buffer_(kBufferBytes),
       phase_start_s_(wall_seconds()) {}
 
-bool Connection::greet() {
+bool Connection::handshake() {
   for (;;) {
-    const ssize_t done = tls_.greet();
+    const ssize_t done = tls_.handshake();
     if (done == 1) return true;
-    const bool reads = done == TlsSession::kWantsRead;
-    if (!reads && done != TlsSession::kWantsWrite) return false;
-    if (!wait(reads ? POLLIN : POLLOUT, phase_start_s_ + limits_.header_s)) return false;
+    if (!wait_for_io(done, phase_start_s_ + limits_.header_timeout_s)) return false;
   }
 }
 
@@ -58,9 +56,9 @@ void Connection::begin_exchange() {
 double Connection::read_deadline() const {
   switch (phase_) {
     case Phase::kWaiting:
-      return phase_start_s_ + limits_.idle_s;
+      return phase_start_s_ + limits_.idle_timeout_s;
     case Phase::kHeader:
-      return phase_start_s_ + limits_.header_s;
+      return phase_start_s_ + limits_.header_timeout_s;
     case Phase::kExchange:
       break;
   }
@@ -68,18 +66,23 @@ double Connection::read_deadline() const {
          static_cast<double>(consumed_) / limits_.min_bytes_per_s;
 }
 
-bool Connection::wait(short events, double deadline_s) {
+bool Connection::wait_for_io(ssize_t outcome, double deadline_s) {
+  const bool reads = outcome == TlsSession::kNeedsRead;
+  if (!reads && outcome != TlsSession::kNeedsWrite) {
+    error_ = ErrorState::kBroken;
+    return false;
+  }
   for (;;) {
     const double left_s = deadline_s - wall_seconds();
     if (left_s <= 0) {
-      trouble_ = Trouble::kTooSlow;
+      error_ = ErrorState::kTooSlow;
       return false;
     }
-    pollfd waiting{socket_, events, 0};
+    pollfd waiting{socket_, static_cast<short>(reads ? POLLIN : POLLOUT), 0};
     const int ready = poll(&waiting, 1, static_cast<int>(std::min(left_s, 3600.0) * 1000) + 1);
     if (ready > 0) return true;
     if (ready < 0 && errno != EINTR) {
-      trouble_ = Trouble::kBroken;
+      error_ = ErrorState::kBroken;
       return false;
     }
   }
@@ -93,24 +96,19 @@ bool Connection::fill() {
       end_ = static_cast<size_t>(got);
       return true;
     }
-    const bool writes = got == TlsSession::kWantsWrite;
-    if (!writes && got != TlsSession::kWantsRead) {
-      trouble_ = Trouble::kBroken;
-      return false;
-    }
-    if (!wait(writes ? POLLOUT : POLLIN, read_deadline())) return false;
+    if (!wait_for_io(got, read_deadline())) return false;
   }
 }
 
 ssize_t Connection::read(char* data, size_t size) {
-  if (trouble_ != Trouble::kNone) return -1;
+  if (error_ != ErrorState::kNone) return -1;
   if (begin_ == end_ && !fill()) return -1;
   const size_t taken = std::min(size, end_ - begin_);
   std::memcpy(data, buffer_.data() + begin_, taken);
   begin_ += taken;
   consumed_ += taken;
-  if (phase_ == Phase::kHeader && consumed_ > limits_.header_bytes) {
-    trouble_ = Trouble::kHeaderTooLarge;
+  if (phase_ == Phase::kHeader && consumed_ > limits_.max_header_bytes) {
+    error_ = ErrorState::kHeaderTooLarge;
     return -1;
   }
   return static_cast<ssize_t>(taken);
@@ -118,40 +116,35 @@ ssize_t Connection::read(char* data, size_t size) {
 
 ssize_t Connection::write(const char* data, size_t size) {
   const double now = wall_seconds();
-  if (answer_start_s_ == 0 || now - last_write_s_ > kOwnPause_s) {
+  if (answer_start_s_ == 0 || now - last_write_s_ > kHandlerPause_s) {
     answer_start_s_ = now;
     written_ = 0;
   }
   size_t sent = 0;
   while (sent < size) {
-    if (trouble_ == Trouble::kBroken) return -1;
+    if (error_ == ErrorState::kBroken) return -1;
     const ssize_t wrote = tls_.write(socket_, data + sent, size - sent);
     if (wrote > 0) {
       sent += static_cast<size_t>(wrote);
       written_ += static_cast<size_t>(wrote);
       continue;
     }
-    const bool reads = wrote == TlsSession::kWantsRead;
-    if (!reads && wrote != TlsSession::kWantsWrite) {
-      trouble_ = Trouble::kBroken;
-      return -1;
-    }
     const double allowed_s =
         limits_.grace_s + static_cast<double>(written_) / limits_.min_bytes_per_s;
-    if (!wait(reads ? POLLIN : POLLOUT, answer_start_s_ + allowed_s)) return -1;
+    if (!wait_for_io(wrote, answer_start_s_ + allowed_s)) return -1;
   }
   last_write_s_ = wall_seconds();
   return static_cast<ssize_t>(size);
 }
 
-bool Connection::peer_gone() const {
+bool Connection::peer_disconnected() const {
   char byte;
   const ssize_t got = recv(socket_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
   return got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR);
 }
 
 void Connection::linger() {
-  tls_.say_goodbye();
+  tls_.shutdown();
   if (shutdown(socket_, SHUT_WR) != 0) return;
   const double deadline = wall_seconds() + kLinger_s;
   for (size_t bytes = 0; bytes < kLingerBytes;) {

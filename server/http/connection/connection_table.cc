@@ -13,30 +13,31 @@ bool is_loopback(const std::string& address) {
 bool ConnectionTable::admit(int socket, const std::string& address, Place& place) {
   std::lock_guard lock(mutex_);
   const auto same = by_address_.find(address);
-  if (same != by_address_.end() && same->second >= limits_.per_address && !is_loopback(address))
+  if (same != by_address_.end() && same->second >= limits_.max_per_address && !is_loopback(address))
     return false;
-  if (entries_.size() >= limits_.connections && !evict_one()) return false;
+  if (entries_.size() >= limits_.max_connections && !evict_one()) return false;
   place = entries_.insert(entries_.end(), Entry{socket, address, true, wall_seconds()});
   ++by_address_[address];
   return true;
 }
 
-// Its thread wakes up, finds the end of the stream, and removes the entry. Until then there is one
-// more than the limit.
+// The thread of the evicted connection wakes up at the end of its stream and removes the entry.
+// Until then the table holds one more than the limit.
 bool ConnectionTable::evict_one() {
   Entry* longest = nullptr;
   for (Entry& entry : entries_)
-    if (entry.waits && (!longest || entry.since_s < longest->since_s)) longest = &entry;
+    if (entry.waiting && (!longest || entry.waiting_since_s < longest->waiting_since_s))
+      longest = &entry;
   if (!longest) return false;
-  longest->waits = false;
+  longest->waiting = false;
   shutdown(longest->socket, SHUT_RDWR);
   return true;
 }
 
-void ConnectionTable::set_waiting(Place place, bool waits) {
+void ConnectionTable::set_waiting(Place place, bool waiting) {
   std::lock_guard lock(mutex_);
-  if (waits && !place->waits) place->since_s = wall_seconds();
-  place->waits = waits;
+  if (waiting && !place->waiting) place->waiting_since_s = wall_seconds();
+  place->waiting = waiting;
 }
 
 void ConnectionTable::remove(Place place) {
@@ -51,13 +52,13 @@ size_t ConnectionTable::size() const {
   return entries_.size();
 }
 
-void ConnectionTable::hang_up_waiting() {
+void ConnectionTable::close_waiting() {
   std::lock_guard lock(mutex_);
   for (const Entry& entry : entries_)
-    if (entry.waits) shutdown(entry.socket, SHUT_RD);
+    if (entry.waiting) shutdown(entry.socket, SHUT_RD);
 }
 
-void ConnectionTable::hang_up_all() {
+void ConnectionTable::close_all() {
   std::lock_guard lock(mutex_);
   for (const Entry& entry : entries_) shutdown(entry.socket, SHUT_RDWR);
 }

@@ -1,6 +1,6 @@
-// All connections at a time, within their limits. When the table is full, the connection that has
-// waited longest for its client (for a request or for the rest of its header) is hung up for the
-// new one; so clients that only hold places cannot keep others out. Thread-safe.
+// The open connections, within their limits. When the table is full, the connection that has waited
+// longest for its client (for a request or the rest of its header) is closed in favor of the new
+// one, so that idle clients cannot keep others out. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ class ConnectionTable {
   struct Entry {
     int socket;
     std::string address;
-    bool waits;      // for its client
-    double since_s;  // it does
+    bool waiting;  // for its client
+    double waiting_since_s;
   };
 
  public:
@@ -27,16 +27,16 @@ class ConnectionTable {
 
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}
 
-  // False if this connection is one too many: of its address, or while all others are at work.
+  // False if the address has too many connections, or the table is full and none is waiting.
   bool admit(int socket, const std::string& address, Place& place);
-  void set_waiting(Place place, bool waits);
-  // To be called before the socket is closed.
+  void set_waiting(Place place, bool waiting);
+  // Must be called before the socket is closed.
   void remove(Place place);
 
   size_t size() const;
-  // Hangs up those that wait, or all. What is being answered then breaks off.
-  void hang_up_waiting();
-  void hang_up_all();
+  void close_waiting();
+  // Aborts answers in flight, too.
+  void close_all();
 
  private:
   bool evict_one();

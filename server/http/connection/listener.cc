@@ -60,7 +60,7 @@ Listener::Listener(const std::string& address, int port) {
   const Addresses found = resolve(address, port);
   socket_ = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const int yes = 1;
-  // A port of connections that are just closing may be taken again, one that is in use not.
+  // Allows a port whose old connections are still closing, not one that is in use.
   setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   if (socket_ < 0 || bind(socket_, found->ai_addr, found->ai_addrlen) != 0 ||
       ::listen(socket_, kBacklog) != 0 || pipe2(wake_, O_CLOEXEC | O_NONBLOCK) != 0) {
@@ -78,7 +78,7 @@ Listener::~Listener() {
   close(wake_[1]);
 }
 
-void Listener::accept_all(const std::function<void(int, const std::string&)>& use) {
+void Listener::accept_all(const std::function<void(int, const std::string&)>& on_connection) {
   for (;;) {
     pollfd waiting[2] = {{socket_, POLLIN, 0}, {wake_[0], POLLIN, 0}};
     if (poll(waiting, 2, -1) < 0 && errno != EINTR) return;
@@ -88,14 +88,14 @@ void Listener::accept_all(const std::function<void(int, const std::string&)>& us
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     const int client = accept4(socket_, generic, &size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (client < 0) {
-      // Out of files or memory: the client waits in the backlog until there are some.
+      // Out of file descriptors or memory: the client waits in the backlog until there are some.
       if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM)
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
       continue;
     }
     const int yes = 1;
     setsockopt(client, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-    use(client, numeric(generic, size));
+    on_connection(client, numeric(generic, size));
   }
 }
 

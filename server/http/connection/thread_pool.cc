@@ -5,30 +5,30 @@ namespace voxdag::server {
 ThreadPool::~ThreadPool() {
   {
     std::lock_guard lock(mutex_);
-    ends_ = true;
+    stopping_ = true;
   }
   wake_.notify_all();
   for (std::thread& thread : threads_) thread.join();
 }
 
-void ThreadPool::run(std::function<void()> work) {
+void ThreadPool::run(std::function<void()> task) {
   std::lock_guard lock(mutex_);
-  if (idle_ <= waiting_.size()) threads_.emplace_back([this] { work_on(); });
-  waiting_.push_back(std::move(work));
+  if (idle_ <= tasks_.size()) threads_.emplace_back([this] { run_tasks(); });
+  tasks_.push_back(std::move(task));
   wake_.notify_one();
 }
 
-void ThreadPool::work_on() {
+void ThreadPool::run_tasks() {
   std::unique_lock lock(mutex_);
   for (;;) {
     ++idle_;
-    wake_.wait(lock, [&] { return ends_ || !waiting_.empty(); });
+    wake_.wait(lock, [&] { return stopping_ || !tasks_.empty(); });
     --idle_;
-    if (waiting_.empty()) return;
-    const std::function<void()> work = std::move(waiting_.front());
-    waiting_.pop_front();
+    if (tasks_.empty()) return;
+    const std::function<void()> task = std::move(tasks_.front());
+    tasks_.pop_front();
     lock.unlock();
-    work();
+    task();
     lock.lock();
   }
 }

@@ -1,5 +1,5 @@
-// Threads that come when there is work for them and stay for more. Work never waits for other work:
-// how much there is at a time is bounded by whoever hands it in.
+// A pool of threads that grows with the number of concurrent tasks: a task never waits for another
+// one to finish. The caller bounds how many run at a time. Thread-safe.
 #pragma once
 
 #include <condition_variable>
@@ -14,21 +14,21 @@ namespace voxdag::server {
 class ThreadPool {
  public:
   ThreadPool() = default;
-  // Waits for all work to end.
+  // Waits for all tasks to finish.
   ~ThreadPool();
 
-  // `work` must not throw. Throws std::system_error if there is no thread for it.
-  void run(std::function<void()> work);
+  // `task` must not throw. Throws std::system_error if no thread can be started for it.
+  void run(std::function<void()> task);
 
  private:
-  void work_on();
+  void run_tasks();
 
   std::mutex mutex_;  // guards all below
   std::condition_variable wake_;
-  std::deque<std::function<void()>> waiting_;
+  std::deque<std::function<void()>> tasks_;
   std::vector<std::thread> threads_;
   size_t idle_ = 0;
-  bool ends_ = false;
+  bool stopping_ = false;
 };
 
 }  // namespace voxdag::server

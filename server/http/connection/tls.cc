@@ -18,9 +18,9 @@ ssize_t TlsSession::outcome(int result) {
   if (result > 0) return result;
   switch (SSL_get_error(ssl_.get(), result)) {
     case SSL_ERROR_WANT_READ:
-      return kWantsRead;
+      return kNeedsRead;
     case SSL_ERROR_WANT_WRITE:
-      return kWantsWrite;
+      return kNeedsWrite;
     case SSL_ERROR_ZERO_RETURN:
       return 0;
     default:
@@ -28,7 +28,7 @@ ssize_t TlsSession::outcome(int result) {
   }
 }
 
-ssize_t TlsSession::greet() {
+ssize_t TlsSession::handshake() {
   if (!ssl_) return 1;
   ERR_clear_error();
   return outcome(SSL_accept(ssl_.get()));
@@ -43,7 +43,7 @@ ssize_t TlsSession::read(int socket, char* data, size_t size) {
     const ssize_t got = recv(socket, data, size, 0);
     if (got >= 0) return got;
     if (errno == EINTR) continue;
-    return errno == EAGAIN || errno == EWOULDBLOCK ? kWantsRead : kBroken;
+    return errno == EAGAIN || errno == EWOULDBLOCK ? kNeedsRead : kBroken;
   }
 }
 
@@ -56,11 +56,11 @@ ssize_t TlsSession::write(int socket, const char* data, size_t size) {
     const ssize_t sent = send(socket, data, size, MSG_NOSIGNAL);
     if (sent >= 0) return sent;
     if (errno == EINTR) continue;
-    return errno == EAGAIN || errno == EWOULDBLOCK ? kWantsWrite : kBroken;
+    return errno == EAGAIN || errno == EWOULDBLOCK ? kNeedsWrite : kBroken;
   }
 }
 
-void TlsSession::say_goodbye() {
+void TlsSession::shutdown() {
   if (!ssl_) return;
   ERR_clear_error();
   SSL_shutdown(ssl_.get());
@@ -72,7 +72,7 @@ TlsContext::TlsContext(const std::string& certificate_file, const std::string& k
     ERR_clear_error();
     throw Error(ErrorCode::kInvalidInput, what);
   };
-  if (!context_) fail("TLS: OpenSSL cannot be set up");
+  if (!context_) fail("TLS: cannot initialize OpenSSL");
   SSL_CTX_set_min_proto_version(context_.get(), TLS1_2_VERSION);
   SSL_CTX_set_options(context_.get(), SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION);
   SSL_CTX_set_mode(context_.get(),

@@ -1,4 +1,4 @@
-// TLS by certificate files, over sockets that do not block.
+// TLS with certificate files over non-blocking sockets.
 #pragma once
 
 #include <sys/types.h>
@@ -12,18 +12,20 @@ struct ssl_st;
 
 namespace voxdag::server {
 
-// One connection's; an empty one passes bytes as they are. What read() and write() return: bytes
-// moved, 0 at the end of the stream, or one of the below.
+// The TLS state of one connection; without one (default constructed), bytes pass unencrypted.
+// read() and write() return the number of bytes moved, 0 at the end of the stream, or one of the
+// negative constants. Used by one thread.
 class TlsSession {
  public:
-  static constexpr ssize_t kWantsRead = -1, kWantsWrite = -2, kBroken = -3;
+  static constexpr ssize_t kNeedsRead = -1, kNeedsWrite = -2, kBroken = -3;
 
   TlsSession() = default;
-  // 1 when done.
-  ssize_t greet();
+  // Returns 1 when the handshake is complete, else as read() does.
+  ssize_t handshake();
   ssize_t read(int socket, char* data, size_t size);
   ssize_t write(int socket, const char* data, size_t size);
-  void say_goodbye();
+  // Tells the client that nothing more will be sent.
+  void shutdown();
 
  private:
   friend class TlsContext;
@@ -38,7 +40,7 @@ class TlsSession {
 class TlsContext {
  public:
   // PEM files: the chain beginning with the server's certificate, and its key. Throws
-  // Error{kInvalidInput} if they cannot be read or do not belong together.
+  // Error{kInvalidInput} if they cannot be read or do not match.
   TlsContext(const std::string& certificate_file, const std::string& key_file);
   TlsSession session(int socket) const;
 

@@ -381,8 +381,7 @@ TEST(GltfMemory, HostileSkinIsCharged) {
     FAIL() << "9.6 MB of matrices fit 8 MiB";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kOutOfMemory);
-    EXPECT_NE(e.message().find("folder/scene: skin 0 needs"), std::string::npos)
-        << e.message();
+    EXPECT_NE(e.message().find("folder/scene: skin 0 needs"), std::string::npos) << e.message();
   }
 }
 

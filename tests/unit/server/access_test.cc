@@ -26,7 +26,7 @@ int status_of(const std::function<void()>& act) {
   }
 }
 
-TEST(TokenFile, LetsInWhoIsNamed) {
+TEST(TokenFile, AcceptsTheListedTokens) {
   const TemporaryFolder folder;
   const NewToken reader = make_token("read", "r"), admin = make_token("admin", "anna@x");
   write_file_atomically(system_files(), folder.file("t"),
@@ -42,7 +42,7 @@ TEST(TokenFile, LetsInWhoIsNamed) {
   EXPECT_NE(reader.token, admin.token);
 }
 
-TEST(TokenFile, IsRefusedWithItsLine) {
+TEST(TokenFile, RejectsMalformedLines) {
   const TemporaryFolder folder;
   for (const std::string& text : std::vector<std::string>{
            "", "# none\n", "root a " + sha256_hex("x"), "read a", "read a abc",
@@ -63,21 +63,21 @@ class AccessControlTest : public testing::Test {
     r.peer = peer;
     return r;
   }
-  int status(AccessControl& gate, const Request& r, Role role) {
-    return status_of([&] { gate.admit(r, role); });
+  int status(AccessControl& access, const Request& r, Role role) {
+    return status_of([&] { access.admit(r, role); });
   }
   ServerConfig config_;
   TemporaryFolder folder_;
 };
 
-// A page of another site, or one that calls this machine by its own name, is refused.
-TEST_F(AccessControlTest, WithoutTokensRefusesOtherSites) {
-  AccessControl gate(config_, system_files());
-  EXPECT_EQ(status(gate, request("GET", {{"Host", "localhost:8080"}}), Role::kAdmin), 0);
-  EXPECT_EQ(status(gate, request("GET", {{"Host", "[::1]:8080"}}), Role::kRead), 0);
-  EXPECT_EQ(status(gate, request("GET", {{"Host", "evil.example"}}), Role::kRead), 403);
+// Pages of other sites, also under a host name that resolves to this machine, are rejected.
+TEST_F(AccessControlTest, RejectsOtherSitesWithoutTokens) {
+  AccessControl access(config_, system_files());
+  EXPECT_EQ(status(access, request("GET", {{"Host", "localhost:8080"}}), Role::kAdmin), 0);
+  EXPECT_EQ(status(access, request("GET", {{"Host", "[::1]:8080"}}), Role::kRead), 0);
+  EXPECT_EQ(status(access, request("GET", {{"Host", "evil.example"}}), Role::kRead), 403);
   const auto post = [&](const char* origin) {
-    return status(gate, request("POST", {{"Host", "127.0.0.1:8080"}, {"Origin", origin}}),
+    return status(access, request("POST", {{"Host", "127.0.0.1:8080"}, {"Origin", origin}}),
                   Role::kSubmit);
   };
   EXPECT_EQ(post("http://127.0.0.1:8080"), 0);
@@ -86,16 +86,16 @@ TEST_F(AccessControlTest, WithoutTokensRefusesOtherSites) {
   EXPECT_EQ(post("null"), 403);
 }
 
-TEST_F(AccessControlTest, WithTokensRequiresASufficientRole) {
+TEST_F(AccessControlTest, RequiresATokenWithTheRole) {
   const NewToken reader = make_token("read", "r"), admin = make_token("admin", "a");
   write_file_atomically(system_files(), folder_.file("t"), reader.line + "\n" + admin.line);
   config_.token_file = folder_.file("t");
-  AccessControl gate(config_, system_files());
+  AccessControl access(config_, system_files());
   const auto with = [&](const std::string& header, Role role) {
-    return status(gate, request("GET", {{"Authorization", header}}), role);
+    return status(access, request("GET", {{"Authorization", header}}), role);
   };
-  EXPECT_EQ(status(gate, request("GET", {}), Role::kNone), 0);
-  EXPECT_EQ(status(gate, request("GET", {}), Role::kRead), 401);
+  EXPECT_EQ(status(access, request("GET", {}), Role::kNone), 0);
+  EXPECT_EQ(status(access, request("GET", {}), Role::kRead), 401);
   EXPECT_EQ(with("Bearer " + reader.token, Role::kRead), 0);
   EXPECT_EQ(with("bearer " + admin.token, Role::kSubmit), 0);
   EXPECT_EQ(with("Bearer " + reader.token, Role::kSubmit), 403);
@@ -103,7 +103,8 @@ TEST_F(AccessControlTest, WithTokensRequiresASufficientRole) {
   EXPECT_EQ(with("Bearer", Role::kRead), 401);
   for (int i = 0; i < 100; ++i) with("Bearer wrong", Role::kRead);
   EXPECT_EQ(with("Bearer wrong", Role::kRead), 429);
-  EXPECT_EQ(with("Bearer " + reader.token, Role::kRead), 0) << "others guess; this one knows";
+  EXPECT_EQ(with("Bearer " + reader.token, Role::kRead), 0)
+      << "a valid token is accepted while another client guesses";
 }
 
 TEST(RateLimiterTest, RefillsWithTime) {
@@ -117,16 +118,16 @@ TEST(RateLimiterTest, RefillsWithTime) {
   for (int i = 0; i < 1000; ++i) EXPECT_TRUE(unlimited.take("a", 0));
 }
 
-TEST(ConcurrencyLimiterTest, FreesASlotWhenItsHolderIsGone) {
-  ConcurrencyLimiter slots(1);
-  auto first = slots.take();
+TEST(ConcurrencyLimiterTest, ReleasesPermits) {
+  ConcurrencyLimiter limiter(1);
+  auto first = limiter.acquire();
   EXPECT_TRUE(first);
-  EXPECT_FALSE(slots.take());
+  EXPECT_FALSE(limiter.acquire());
   first.reset();
-  EXPECT_TRUE(slots.take());
+  EXPECT_TRUE(limiter.acquire());
 }
 
-TEST(DigestField, IsReadAndWritten) {
+TEST(DigestField, IsParsedAndFormatted) {
   const std::string sum = sha256_hex("hello");
   EXPECT_EQ(digest_field(sum), "sha-256=:LPJNul+wow4m6DsqxbninhsWHlwfp0JecwQzYpOLmCQ=:");
   EXPECT_EQ(parse_digest_field("md5=:abc=:, " + digest_field(sum)), sum);
@@ -138,8 +139,8 @@ TEST(DigestField, IsReadAndWritten) {
   }
 }
 
-// Whatever lies in configs/ for the service is loaded as it would be.
-TEST(Configs, AreLoaded) {
+// The examples in configs/ are valid.
+TEST(Configs, ExamplesAreValid) {
   const std::string folder = std::string(VOXDAG_SOURCE_DIR) + "/configs";
   ServerConfig config;
   read_config(system_files(), folder + "/server.json", config);
@@ -153,7 +154,7 @@ TEST(Configs, AreLoaded) {
   EXPECT_GE(jobs, 2);
 }
 
-TEST(Configs, AreRefusedByName) {
+TEST(Configs, ErrorsNameTheMember) {
   const TemporaryFolder folder;
   const std::pair<const char*, const char*> texts[] = {
       {"{", "JSON"},
@@ -178,8 +179,8 @@ TEST(Configs, AreRefusedByName) {
   }
 }
 
-// Nobody opens a port to the network by mistake.
-TEST(Configs, RefuseTheNetworkWithoutTokens) {
+// The service never listens on the network without access control.
+TEST(Configs, RejectTheNetworkWithoutTokens) {
   ServerConfig config;
   config.data_folder = "/tmp/x";
   EXPECT_NO_THROW(check_config(config));

@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "server/api/problem.h"
 #include "server/http/byte_range.h"
 #include "server/http/connection/connection_table.h"
 #include "server/http/headers.h"
+#include "server/http/problem.h"
 #include "server/http/target.h"
 
 namespace voxdag::server {
@@ -12,8 +12,8 @@ namespace {
 using Kind = RangeAnswer::Kind;
 using Ranges = std::vector<ByteRange>;
 
-// What lies within is served, cut at the end of the file.
-TEST(ByteRanges, AreCutToTheFile) {
+// Ranges are clipped to the end of the file.
+TEST(ByteRanges, AreClippedToTheFile) {
   EXPECT_EQ(parse_ranges("bytes=0-9", 100).ranges, (Ranges{{0, 10}}));
   EXPECT_EQ(parse_ranges("bytes=90-", 100).ranges, (Ranges{{90, 100}}));
   EXPECT_EQ(parse_ranges("bytes=-5", 100).ranges, (Ranges{{95, 100}}));
@@ -32,8 +32,8 @@ TEST(ByteRanges, OutsideTheFileAreUnsatisfiable) {
   }
 }
 
-// A header that is none, or asks for more than it is worth, is answered with the whole file.
-TEST(ByteRanges, ThatMakeNoSenseAreIgnored) {
+// A malformed or excessive header is ignored: the answer is the whole file.
+TEST(ByteRanges, MalformedOrExcessiveHeadersAreIgnored) {
   for (const char* header :
        {"", "bytes", "bytes=", "bytes=-", "bytes=5-4", "bytes=a-b", "bytes=1", "items=0-1",
         "bytes=0-1-2", "bytes=+0-1", "bytes=0-99,0-99", "bytes= - ",
@@ -43,7 +43,7 @@ TEST(ByteRanges, ThatMakeNoSenseAreIgnored) {
   }
 }
 
-TEST(ContentRange, SaysWhichPartComes) {
+TEST(ContentRange, IsParsed) {
   ByteRange range;
   uint64_t total = 0;
   ASSERT_TRUE(parse_content_range("bytes 5-9/20", range, total));
@@ -57,7 +57,7 @@ TEST(ContentRange, SaysWhichPartComes) {
   }
 }
 
-TEST(Target, IsTakenApart) {
+TEST(Target, IsParsed) {
   const Target target = parse_target("/api/v1/jobs/a%20b?limit=5&state=a%2Cb+c&empty");
   EXPECT_EQ(target.segments, (std::vector<std::string>{"api", "v1", "jobs", "a b"}));
   EXPECT_EQ(target.query.at("limit"), "5");
@@ -67,7 +67,7 @@ TEST(Target, IsTakenApart) {
   EXPECT_EQ(parse_target("http://host:80/x").segments, (std::vector<std::string>{"x"}));
 }
 
-// Dots and encoded slashes stay names: no path is ever made of several segments.
+// Dots and encoded slashes are parts of names; segments are never joined.
 TEST(Target, DoesNotResolveDots) {
   EXPECT_EQ(parse_target("/a/../b").segments, (std::vector<std::string>{"a", "..", "b"}));
   EXPECT_EQ(parse_target("/a/..%2f..%2fetc").segments,
@@ -75,14 +75,14 @@ TEST(Target, DoesNotResolveDots) {
   EXPECT_EQ(parse_target("//a").segments, (std::vector<std::string>{"", "a"}));
 }
 
-TEST(Target, RefusesWhatIsBroken) {
+TEST(Target, RejectsMalformedTargets) {
   for (const char* text : {"", "x", "*", "/%", "/%2", "/%zz", "/%00", "/a%0d%0ab", "/?a=1&a=2"}) {
     SCOPED_TRACE(text);
     EXPECT_THROW(parse_target(text), Problem);
   }
 }
 
-TEST(Headers, CompareWithoutRegardToCase) {
+TEST(Headers, CompareCaseInsensitively) {
   const HeaderMap headers = {{"Content-Type", "a"}};
   EXPECT_EQ(header_value(headers, "content-TYPE"), "a");
   EXPECT_EQ(header_value(headers, "content"), "");
@@ -90,21 +90,21 @@ TEST(Headers, CompareWithoutRegardToCase) {
   EXPECT_EQ(trimmed(" "), "");
 }
 
-// Clients that only hold places make room for those that come; clients at work stay.
-TEST(ConnectionTable, GivesThePlaceOfTheLongestWaiting) {
+// A full table closes the longest waiting connection for a new one, never one with a request.
+TEST(ConnectionTable, EvictsTheLongestWaiting) {
   HttpLimits limits;
-  limits.connections = 2;
-  limits.per_address = 2;
+  limits.max_connections = 2;
+  limits.max_per_address = 2;
   ConnectionTable table(limits);
   ConnectionTable::Place first, second, third;
   ASSERT_TRUE(table.admit(-1, "10.0.0.1", first));
   ASSERT_TRUE(table.admit(-1, "10.0.0.1", second));
-  EXPECT_FALSE(table.admit(-1, "10.0.0.1", third)) << "two of one address";
+  EXPECT_FALSE(table.admit(-1, "10.0.0.1", third)) << "the limit per address";
   table.set_waiting(first, false);
-  ASSERT_TRUE(table.admit(-1, "10.0.0.2", third)) << "the second waits";
+  ASSERT_TRUE(table.admit(-1, "10.0.0.2", third)) << "the second one waits and is evicted";
   table.remove(second);
   table.set_waiting(third, false);
-  EXPECT_FALSE(table.admit(-1, "10.0.0.3", second)) << "all are at work";
+  EXPECT_FALSE(table.admit(-1, "10.0.0.3", second)) << "all have requests";
   table.remove(first);
   table.remove(third);
   EXPECT_EQ(table.size(), 0u);

@@ -1,0 +1,32 @@
+// When to retry a request: after half a second, then with growing pauses, for five minutes in all.
+// Used by one thread.
+#pragma once
+
+#include "client/http_client.h"
+#include "core/base/cancel_token.h"
+
+namespace voxdag::client {
+
+class RetryPolicy {
+ public:
+  explicit RetryPolicy(const CancelToken& cancel) : cancel_(cancel) {}
+  // Waits before the next attempt, at least `min_wait_s`; false once the time for retries is used
+  // up. Throws Error{kCanceled}.
+  bool wait(double min_wait_s = 0);
+  // Starts over, after an attempt that made progress.
+  void reset() { waited_s_ = 0, pause_s_ = kFirstPause_s; }
+
+ private:
+  static constexpr double kFirstPause_s = 0.5;
+  const CancelToken& cancel_;
+  double waited_s_ = 0, pause_s_ = kFirstPause_s;
+};
+
+// Seconds to wait before a busy server (408, 429, 502 to 504) is asked again, 0 if it does not say;
+// -1 for any other status, which a retry would not change.
+double retry_after_s(const ClientResponse& response);
+
+// Throws Error{kCanceled} within about 50 ms of a cancellation.
+void sleep_for(double seconds, const CancelToken& cancel);
+
+}  // namespace voxdag::client

@@ -1,0 +1,73 @@
+#include "client/service_client.h"
+
+#include "client/retry_policy.h"
+#include "core/base/error.h"
+
+namespace voxdag::client {
+namespace {
+
+constexpr double kPollInterval_s = 0.5;
+
+}  // namespace
+
+ClientResponse ServiceClient::send_with_retries(const Request& request) {
+  for (RetryPolicy retry(cancel_);;) {
+    cancel_.check();
+    ClientResponse response;
+    try {
+      response = request(http_);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kIo || !has_answered_ || !retry.wait()) throw;
+      continue;
+    }
+    has_answered_ = true;
+    const double wait_s = retry_after_s(response);
+    if (wait_s >= 0 && retry.wait(wait_s)) continue;
+    throw_if_problem(response);
+    return response;
+  }
+}
+
+Json ServiceClient::get(const std::string& path) {
+  return Json::parse(send_with_retries([&](HttpClient& http) { return http.get(path); }).body);
+}
+
+Json ServiceClient::post(const std::string& path, const Json& body, const HeaderMap& headers) {
+  const std::string text = body.is_null() ? "" : body.dump();
+  return Json::parse(send_with_retries([&](HttpClient& http) {
+                       return http.send("POST", path, text, headers);
+                     }).body);
+}
+
+Json ServiceClient::job(const std::string& id) { return get(job_path(id)); }
+
+Json ServiceClient::post_action(const std::string& id, const std::string& action) {
+  return post(job_path(id) + "/" + action, nullptr);
+}
+
+Json ServiceClient::follow_job(const std::string& id,
+                               const std::function<void(const Json& job)>& on_job) {
+  try {
+    for (;; sleep_for(kPollInterval_s, cancel_)) {
+      Json state = job(id);
+      on_job(state);
+      if (has_ended(state)) return state;
+    }
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCanceled) throw;
+    throw Error(ErrorCode::kCanceled, "no longer watching job " + id + ", which continues");
+  }
+}
+
+std::string job_path(const std::string& id) {
+  if (id.size() != 16 || id.find_first_not_of("0123456789abcdef") != std::string::npos)
+    throw Error(ErrorCode::kInvalidInput, "job '" + id + "': expected an id of 16 hex digits");
+  return "/api/v1/jobs/" + id;
+}
+
+bool has_ended(const Json& job) {
+  const std::string state = job.at("state");
+  return state == "succeeded" || state == "failed" || state == "canceled";
+}
+
+}  // namespace voxdag::client

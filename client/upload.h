@@ -1,0 +1,19 @@
+// Uploads a scene, resumable and verified by its SHA-256.
+#pragma once
+
+#include <string>
+
+#include "client/service_client.h"
+#include "core/base/progress.h"
+#include "core/io/file_system.h"
+
+namespace voxdag::client {
+
+// Uploads a local .glb or .gltf file and returns its name on the server: the file's name with
+// twelve digits of its SHA-256 before the suffix, so that no other scene is replaced. What the
+// server has already, from this or an earlier call, is not sent again. Retries as RetryPolicy does;
+// every attempt that makes progress starts it over.
+std::string upload_scene(ServiceClient& service, FileSystem& files, const std::string& path,
+                         Progress& progress);
+
+}  // namespace voxdag::client

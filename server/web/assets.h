@@ -1,0 +1,27 @@
+// The files compiled into the program (embed.cmake): those of the dashboard and openapi.json.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace voxdag::server {
+
+struct EmbeddedFile {
+  const char* name;  // "app.js", "lib/api.js"
+  const unsigned char* bytes;
+  size_t size;
+};
+// The last entry has no bytes (nullptr). Defined in the generated embedded_files.cc.
+extern const EmbeddedFile kEmbeddedFiles[];
+
+struct Asset {
+  std::string name;  // its URL path without the leading slash
+  std::string_view contents;
+  std::string type;  // for Content-Type
+  std::string etag;  // quoted
+};
+std::vector<Asset> embedded_assets();
+
+}  // namespace voxdag::server

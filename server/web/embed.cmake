@@ -1,0 +1,28 @@
+# cmake -DOUTPUT=embedded_files.cc -DROOT=server -DFILES="web/app.js;web/lib/dom.js" -P embed.cmake
+# Writes a source file with the bytes of the files. Their names are the paths without the first
+# folder: "app.js", "lib/dom.js".
+set(arrays "")
+set(rows "")
+set(index 0)
+foreach(file IN LISTS FILES)
+  string(REGEX REPLACE "^[^/]*/" "" name ${file})
+  file(READ ${ROOT}/${file} hex HEX)
+  string(REGEX REPLACE "(..)" "0x\\1," bytes "${hex}")
+  string(APPEND arrays "const unsigned char kBytes${index}[] = {${bytes}0};\n")
+  string(APPEND rows "    {\"${name}\", kBytes${index}, sizeof kBytes${index} - 1},\n")
+  math(EXPR index "${index} + 1")
+endforeach()
+file(WRITE ${OUTPUT} "#include \"server/web/assets.h\"
+
+namespace voxdag::server {
+namespace {
+
+${arrays}
+}  // namespace
+
+const EmbeddedFile kEmbeddedFiles[] = {
+${rows}    {\"\", nullptr, 0},
+};
+
+}  // namespace voxdag::server
+")

@@ -1,0 +1,124 @@
+// Requests to /api/v1. Every failure is a Problem, including those of the network.
+
+const kTokenKey = "voxdag-token";
+
+export class Problem extends Error {
+  constructor(status, code, detail, members = {}, headers = null) {
+    super(detail);
+    this.status = status;
+    this.code = code;
+    this.members = members;
+    this.headers = headers;
+  }
+  // Whether the same request may succeed later.
+  get is_transient() {
+    return this.code === "unreachable" || [408, 429, 502, 503, 504].includes(this.status);
+  }
+  // Seconds that the service asks to wait for.
+  get retry_after_s() {
+    return Number(this.headers?.get("Retry-After")) || 0;
+  }
+}
+
+// The bearer token is stored until the tab is closed.
+export const token = {
+  get: () => sessionStorage.getItem(kTokenKey) || "",
+  set: (text) => sessionStorage.setItem(kTokenKey, text),
+  remove: () => sessionStorage.removeItem(kTokenKey),
+};
+
+export function authorization() {
+  return token.get() ? {Authorization: `Bearer ${token.get()}`} : {};
+}
+
+// Returns the Response of a successful request, else throws Problem. A 401 also shows the login page.
+export async function request(method, path, {headers = {}, body, signal} = {}) {
+  let response;
+  try {
+    response = await fetch(path, {method, body, signal, cache: "no-store",
+                                  headers: {...authorization(), ...headers}});
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Problem(0, "unreachable", "The service does not answer.");
+  }
+  if (response.ok) return response;
+  throw await problem_of(response);
+}
+
+async function problem_of(response) {
+  const members = await response.json().catch(() => ({}));
+  const problem = new Problem(response.status, members.code || `http_${response.status}`,
+                              members.detail || response.statusText, members, response.headers);
+  if (response.status === 401) window.dispatchEvent(new Event("voxdag-login"));
+  return problem;
+}
+
+export async function get_json(path, signal) {
+  return (await request("GET", path, {signal})).json();
+}
+
+export async function send_json(method, path, body, {headers = {}, signal} = {}) {
+  const options = {signal, headers};
+  if (body !== undefined) {
+    options.body = JSON.stringify(body);
+    options.headers = {"Content-Type": "application/json", ...headers};
+  }
+  const response = await request(method, path, options);
+  return response.status === 204 ? null : response.json();
+}
+
+// A value for Idempotency-Key. crypto.randomUUID() is not available on plain http.
+export function random_key() {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)),
+                    (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+// Resolves after `ms`, or immediately when `signal` aborts.
+export function sleep(ms, signal) {
+  return new Promise((resolve) => {
+    const done = () => {
+      clearTimeout(timer);
+      signal.removeEventListener("abort", done);
+      resolve();
+    };
+    const timer = setTimeout(done, ms);
+    signal.addEventListener("abort", done);
+    if (signal.aborted) done();
+  });
+}
+
+// Calls `update` repeatedly until `signal` aborts. `update` returns the pause in ms until the next
+// call; while the page is hidden, the next call waits until it is visible. on_failure(problem) is
+// called when `update` throws.
+export async function poll(update, on_failure, signal) {
+  while (!signal.aborted) {
+    let pause_ms = 5000;
+    try {
+      pause_ms = await update();
+    } catch (error) {
+      if (signal.aborted) return;
+      if (!(error instanceof Problem)) throw error;
+      on_failure(error);
+      if (error.status === 401) return;
+    }
+    await pause(pause_ms, signal);
+  }
+}
+
+function pause(ms, signal) {
+  return new Promise((resolve) => {
+    const listening = new AbortController();
+    const done = () => {
+      clearTimeout(timer);
+      listening.abort();
+      resolve();
+    };
+    const done_if_visible = () => {
+      if (!document.hidden) done();
+    };
+    const timer = setTimeout(done_if_visible, ms);
+    document.addEventListener("visibilitychange", done_if_visible, {signal: listening.signal});
+    signal.addEventListener("abort", done, {signal: listening.signal});
+    if (signal.aborted) done();
+  });
+}

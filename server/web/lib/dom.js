@@ -1,0 +1,72 @@
+// Creates elements in code. The content security policy forbids inline scripts and styles, and text
+// set this way is never parsed as markup.
+
+const kSvg = "http://www.w3.org/2000/svg";
+
+// h("a", {class: "x", href: "…", on: {click: f}}, "text", other). Children and attributes that are
+// null, undefined or false are omitted.
+export function h(tag, attributes = {}, ...children) {
+  return fill(document.createElement(tag), attributes, children);
+}
+
+export function svg(tag, attributes = {}, ...children) {
+  return fill(document.createElementNS(kSvg, tag), attributes, children);
+}
+
+function fill(element, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name === "on") {
+      for (const [event, listener] of Object.entries(value)) element.addEventListener(event, listener);
+    } else if (value !== null && value !== undefined && value !== false) {
+      element.setAttribute(name, value === true ? "" : value);
+    }
+  }
+  element.append(...children.flat().filter((child) => child !== null && child !== false && child !== undefined));
+  return element;
+}
+
+// Sets the text only if it changed, to preserve selections and not disturb screen readers.
+export function set_text(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+export function clear(element, ...children) {
+  element.replaceChildren(...children.flat().filter(Boolean));
+  return element;
+}
+
+// Announces a text to screen readers only.
+export function announce(text) {
+  document.getElementById("announcer").textContent = text;
+}
+
+// A labeled control; `hint` is its accessible description.
+export function field(label, control, hint = null) {
+  const id = control.id || `f-${++field.count}`;
+  control.id = id;
+  if (hint) control.setAttribute("aria-describedby", `${id}-hint`);
+  return h("div", {class: "field"}, h("label", {for: id}, label), control,
+           hint && h("p", {class: "hint", id: `${id}-hint`}, hint));
+}
+field.count = 0;
+
+// An entry of a definition list.
+export function fact(name, ...value) {
+  return h("div", {class: "fact"}, h("dt", {}, name), h("dd", {}, ...value));
+}
+
+// Asks in a modal dialog; resolves to true if the user confirms the action.
+export function confirm_action(title, text, action) {
+  const dialog = h("dialog", {class: "ask", "aria-labelledby": "ask-title"},
+    h("form", {method: "dialog"},
+      h("h2", {id: "ask-title"}, title), h("p", {}, text),
+      h("div", {class: "buttons end"},
+        h("button", {value: "no", class: "quiet"}, "No"),
+        h("button", {value: "yes", class: "danger"}, action))));
+  document.body.append(dialog);
+  dialog.showModal();
+  return new Promise((resolve) => dialog.addEventListener("close", () => {
+    dialog.remove();
+    resolve(dialog.returnValue === "yes");
+  }));
+}

@@ -1,0 +1,99 @@
+// The form for a new job: scene, grid, options, and an estimate of the build.
+
+import {get_json, random_key, send_json} from "../lib/api.js";
+import {clear, field, h} from "../lib/dom.js";
+import {EstimateView} from "../views/estimate_view.js";
+import {JobOptions} from "../views/job_options.js";
+import {problem_box} from "../views/parts.js";
+import {SceneChoice} from "../views/scene_choice.js";
+
+export function new_job_page(_, query, signal) {
+  const form = new NewJob(signal);
+  form.begin(query.get("like"));
+  return {title: "New job", content: form.element};
+}
+
+class NewJob {
+  constructor(signal) {
+    this.signal = signal;
+    this.scene = new SceneChoice(signal, () => this.changed());
+    this.options = new JobOptions(() => this.changed());
+    this.estimate = new EstimateView(signal);
+    this.name = h("input", {maxlength: "200", autocomplete: "off",
+                            on: {change: () => { this.key = random_key(); }}});
+    this.error = h("div", {role: "alert"});
+    this.key = random_key();  // one per state of the form: a double click creates one job
+    this.submit = h("button", {class: "primary"}, "Submit");
+    this.element = h("form", {class: "stack", novalidate: true},
+      h("p", {class: "crumb"}, h("a", {href: "#/"}, "Jobs")), h("h1", {}, "New job"),
+      h("div", {class: "two form-two"},
+        h("div", {class: "stack"},
+          this.scene.element,
+          h("section", {class: "card stack", "aria-labelledby": "grid-title"},
+            h("h2", {id: "grid-title"}, "Grid"), this.options.resolution_field,
+            field("Name of the job", this.name, "Optional.")),
+          this.options.element),
+        h("div", {class: "stack sticky"}, this.estimate.element, this.error,
+          h("div", {class: "buttons"}, this.submit))));
+    this.element.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.submit_job();
+    });
+  }
+
+  // `like`: the id of a job whose scene and options are copied.
+  async begin(like) {
+    try {
+      const model = like ? await get_json(`/api/v1/jobs/${encodeURIComponent(like)}`, this.signal) : null;
+      await this.scene.load(model ? [model.scene].flat() : null);
+      if (model) this.options.set(model);
+      this.changed();
+    } catch (problem) {
+      if (this.signal.aborted) return;
+      if (problem.code === undefined) throw problem;
+      clear(this.error, problem_box(problem));
+    }
+  }
+
+  // The request body, or null while no scene is chosen. Throws Problem for an invalid field.
+  body() {
+    const scene = this.scene.value();
+    if (!scene) return null;
+    const name = this.name.value.trim();
+    return {scene, ...(name && {name}), ...this.options.values()};
+  }
+
+  changed() {
+    clear(this.error);
+    this.key = random_key();
+    let question = null;
+    try {
+      const body = this.body();
+      if (body) question = {scene: body.scene, resolution: body.resolution, options: body.options};
+    } catch {
+      // Reported when the job is submitted, not while the user types.
+    }
+    this.estimate.update(question);
+  }
+
+  async submit_job() {
+    clear(this.error);
+    this.submit.disabled = true;
+    try {
+      const body = this.body();
+      if (!body) {
+        clear(this.error, h("p", {class: "bad"}, "Choose a scene, or upload one."));
+        return;
+      }
+      const job = await send_json("POST", "/api/v1/jobs", body,
+                                  {headers: {"Idempotency-Key": this.key}, signal: this.signal});
+      location.hash = `#/jobs/${job.id}`;
+    } catch (problem) {
+      if (this.signal.aborted) return;
+      if (problem.code === undefined) throw problem;
+      clear(this.error, problem_box(problem));
+    } finally {
+      this.submit.disabled = false;
+    }
+  }
+}

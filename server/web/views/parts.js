@@ -1,0 +1,58 @@
+// Small elements used by several pages.
+
+import {h, set_text} from "../lib/dom.js";
+import {done_fraction, state_text} from "../lib/format.js";
+
+export function state_badge(state) {
+  return h("span", {class: `state ${state}`}, state_text(state));
+}
+
+// A Problem, or a job's error, with its code.
+export function problem_box(problem, title = null) {
+  return h("div", {class: "problem"},
+    title && h("strong", {}, title),
+    h("p", {}, problem.detail || problem.message),
+    h("p", {class: "code"}, problem.code, problem.status ? ` · HTTP ${problem.status}` : null));
+}
+
+// An accessible progress bar. update(fraction) takes 0 to 1, or null if it is unknown.
+export function meter(label) {
+  const full = h("div", {class: "meter-full"});
+  const element = h("div", {class: "meter", role: "progressbar", "aria-label": label,
+                            "aria-valuemin": "0", "aria-valuemax": "100"}, full);
+  const update = (fraction) => {
+    element.classList.toggle("unknown", fraction === null);
+    full.style.width = fraction === null ? "" : `${(100 * fraction).toFixed(2)}%`;
+    if (fraction === null) element.removeAttribute("aria-valuenow");
+    else element.setAttribute("aria-valuenow", String(Math.floor(100 * fraction)));
+  };
+  return {element, update};
+}
+
+// Shows the current stage of a job, or a full bar once it succeeded.
+export function update_job_meter(bar, job) {
+  const fraction = job.state === "succeeded" ? 1 : done_fraction(job.progress);
+  const idle = ["queued", "suspended", "canceled", "failed"].includes(job.state);
+  bar.update(idle && fraction === null ? 0 : fraction);
+  bar.element.dataset.state = job.state;
+}
+
+// A button that copies `text` to the clipboard.
+export function copy_button(text, what) {
+  const button = h("button", {type: "button", class: "quiet small", "aria-label": `Copy ${what}`}, "Copy");
+  button.addEventListener("click", async () => {
+    const copied = await copy(text);
+    set_text(button, copied ? "Copied" : "Select and press Ctrl-C");
+    setTimeout(() => set_text(button, "Copy"), 2000);
+  });
+  return button;
+}
+
+async function copy(text) {
+  try {
+    await navigator.clipboard.writeText(text);  // not available on plain http
+    return true;
+  } catch {
+    return false;
+  }
+}

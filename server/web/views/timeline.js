@@ -1,0 +1,50 @@
+// The stages of an attempt as bars in proportion to their duration.
+
+import {clear, h, set_text} from "../lib/dom.js";
+import {duration_text, short_count, unit_text} from "../lib/format.js";
+
+export class Timeline {
+  constructor() {
+    this.element = h("div", {}, this.list = h("ol", {class: "timeline"}),
+                     this.none = h("p", {class: "empty"}, "No stage has started."));
+    this.rows = [];
+  }
+
+  show(job) {
+    const stages = job.progress?.stages || [];
+    this.none.hidden = stages.length > 0;
+    // A new attempt has fewer or other stages.
+    if (stages.length < this.rows.length || this.rows.some((row, i) => row.name !== stages[i].name)) {
+      clear(this.list);
+      this.rows = [];
+    }
+    const total_s = Math.max(1e-3, stages.reduce((sum, stage) => sum + stage.wall_s, 0));
+    let begin_s = 0;
+    stages.forEach((stage, i) => {
+      if (!this.rows[i]) this.rows.push(this.add_row(stage));
+      this.rows[i].update(stage, begin_s / total_s, stage.wall_s / total_s, job.state === "running");
+      begin_s += stage.wall_s;
+    });
+  }
+
+  add_row({name}) {
+    const span = h("span", {class: "span"});
+    const done = h("span", {class: "far"});
+    const time = h("span", {class: "time"});
+    const state = h("span", {class: "unseen"});
+    const element = h("li", {}, h("span", {class: "name"}, name, state), h("span", {class: "track"}, span), done, time);
+    this.list.append(element);
+    const update = (stage, from, part, running) => {
+      const now = !stage.ended && running;
+      element.className = stage.ended ? "ended" : now ? "now" : "stopped";
+      set_text(state, stage.ended ? ", ended" : now ? ", running" : ", stopped");
+      span.style.left = `${(100 * from).toFixed(2)}%`;
+      span.style.width = `${(100 * part).toFixed(2)}%`;
+      const count = short_count(stage.done);
+      set_text(done, stage.ended || !stage.total ? unit_text(count, stage.unit)
+                                                : `${count} of ${unit_text(short_count(stage.total), stage.unit)}`);
+      set_text(time, duration_text(stage.wall_s));
+    };
+    return {name, update};
+  }
+}
