@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/stage_clock.h"
+#include "scheduler/stage_clock.h"
 #include "core/geometry/grid.h"
 
 namespace voxdag {

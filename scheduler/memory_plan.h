@@ -36,7 +36,7 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/backend_memory.h"
-#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/segment_writer.h"
 
 namespace voxdag {
 

@@ -5,7 +5,7 @@
 #pragma once
 
 #include "core/base/memory_budget.h"
-#include "core/base/stage_clock.h"
+#include "scheduler/stage_clock.h"
 #include "core/format/global/global_writer.h"
 #include "scheduler/build_report.h"
 #include "scheduler/build_spec.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/memory_budget.h"
-#include "core/base/stage_clock.h"
+#include "scheduler/stage_clock.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/ingest/ingest_checkpoint.h"
 #include "scheduler/plan/top_tree.h"

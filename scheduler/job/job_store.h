@@ -22,7 +22,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/stage_clock.h"
+#include "scheduler/stage_clock.h"
 #include "core/dag/sub_dag.h"
 #include "core/db/sqlite.h"
 #include "core/format/artifact/artifact.h"
