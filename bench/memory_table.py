@@ -56,7 +56,7 @@ def measure_case(name, options, folder):
         "within_budget": peak <= budget_mib * MIB + SLACK_BYTES,
         "spill_bytes": small["spill_bytes"],
         "split": small["subvolumes"]["split"],
-        "merge_rounds": small["merge_rounds"],
+        "merge_passes": small["merge_passes"],
         "wall_s": small_run.wall_s,
         "large_wall_s": large_run.wall_s,
         "large_vm_hwm_bytes": large["peak_rss_bytes"],
@@ -72,7 +72,7 @@ def print_cases(cases):
         [[c["case"], f"{c['scene_bytes'] / MIB:.0f}", f"{c['budget_bytes'] / MIB:.0f}",
           f"{c['vm_hwm_bytes'] / MIB:.0f}", f"{c['max_rss_bytes'] / MIB:.0f}",
           "yes" if c["within_budget"] else "NO", f"{c['spill_bytes'] / MIB:.0f}", c["split"],
-          c["merge_rounds"], f"{c['wall_s']:.1f}", f"{c['large_vm_hwm_bytes'] / MIB:.0f}",
+          c["merge_passes"], f"{c['wall_s']:.1f}", f"{c['large_vm_hwm_bytes'] / MIB:.0f}",
           f"{c['large_wall_s']:.1f}", "yes" if c["same_bytes"] else "NO"] for c in cases])
 
 

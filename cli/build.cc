@@ -25,8 +25,8 @@ void print(const BuildReport& r) {
               count_text(r.svo_nodes).c_str(), count_text(r.dag_nodes).c_str());
   std::printf("  %s subvolumes (%s split), artifacts %s, spilled %s, %u merge pass%s\n",
               count_text(r.subvolumes).c_str(), count_text(r.subvolumes_split).c_str(),
-              size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge_rounds,
-              r.merge_rounds == 1 ? "" : "es");
+              size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge_passes,
+              r.merge_passes == 1 ? "" : "es");
   std::printf(" ");
   for (const StageTime& stage : r.stages)
     std::printf(" %s %s%s", stage.name.c_str(), duration_text(stage.wall_s).c_str(),

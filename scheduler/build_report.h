@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "scheduler/stage_clock.h"
 #include "core/geometry/grid.h"
+#include "scheduler/stage_clock.h"
 
 namespace voxdag {
 
@@ -29,8 +29,8 @@ struct BuildReport {
   uint64_t artifact_bytes = 0;
   uint64_t artifact_nodes = 0;
   uint64_t spill_bytes = 0;
-  uint32_t merge_rounds = 0;
-  uint64_t merge_ranges = 0;
+  uint32_t merge_passes = 0;
+  uint64_t merge_partitions = 0;
   uint64_t merge_streamed_groups = 0;
   uint64_t memory_bytes = 0;
   unsigned threads = 0;

@@ -78,8 +78,8 @@ bool MergeStage::is_published(BuildReport& report) {
   report.voxels = result->voxels;
   report.svo_nodes = result->svo_nodes;
   report.dag_nodes = result->dag_nodes;
-  report.merge_rounds = result->merge_rounds;
-  report.merge_ranges = result->merge_ranges;
+  report.merge_passes = result->merge_passes;
+  report.merge_partitions = result->merge_partitions;
   report.merge_streamed_groups = result->merge_streamed_groups;
   return true;
 }
@@ -101,8 +101,8 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
   report.voxels = merged.voxels;
   report.svo_nodes = merged.svo_nodes;
   report.dag_nodes = merged.dag_nodes;
-  report.merge_rounds = merged.passes;
-  report.merge_ranges = merged.hash_partitions;
+  report.merge_passes = merged.passes;
+  report.merge_partitions = merged.hash_partitions;
   report.merge_streamed_groups = merged.streamed_groups;
   report.spill_bytes += merged.scratch_bytes;
   if (report.voxels == 0 && report.triangles > 0)
@@ -116,7 +116,7 @@ void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
   const GlobalFileSummary file =
       out.seal(report.voxels, report.svo_nodes, report.threads, context_.cancel);
   store_.record_result({report.output, file.sha256, file.bytes, report.voxels, report.svo_nodes,
-                        report.dag_nodes, report.merge_rounds, report.merge_ranges,
+                        report.dag_nodes, report.merge_passes, report.merge_partitions,
                         report.merge_streamed_groups});
   out.publish();
   context_.progress.advance(1);

@@ -5,13 +5,13 @@
 #pragma once
 
 #include "core/base/memory_budget.h"
-#include "scheduler/stage_clock.h"
 #include "core/format/global/global_writer.h"
 #include "scheduler/build_report.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/execute/commit_queue.h"
 #include "scheduler/job/job_store.h"
 #include "scheduler/job/work_folder.h"
+#include "scheduler/stage_clock.h"
 
 namespace voxdag {
 

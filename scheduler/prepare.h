@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "core/base/memory_budget.h"
-#include "scheduler/stage_clock.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/ingest/ingest_checkpoint.h"
 #include "scheduler/plan/top_tree.h"
+#include "scheduler/stage_clock.h"
 #include "scheduler/triangles/triangle_store.h"
 
 namespace voxdag {

@@ -69,13 +69,13 @@ class Service::Parts {
 
   void run() {
     // Builds stop while requests in progress finish.
-    std::thread housekeeper([this] {
+    std::thread cleaner([this] {
       clean_up_periodically();
       dispatcher_.stop();
     });
     http_.run(config_.drain_timeout_s);
     stop();
-    housekeeper.join();
+    cleaner.join();
   }
 
   void stop() {

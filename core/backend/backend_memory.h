@@ -12,7 +12,7 @@
 namespace voxdag {
 
 struct BackendMemory {
-  // Pages that a backend retains for its next subvolume, uncharged, while they fit beside what is
+  // Pages that a backend retains for its next subvolume, uncharged, while they fit next to what is
   // charged. A budget of less than eight times kMinPageBytes can be exceeded by kMinPageBytes.
   static constexpr uint64_t kMinPageBytes = uint64_t{8} << 20;
   static constexpr uint64_t kMaxPageBytes = uint64_t{128} << 20;

@@ -26,7 +26,7 @@ const NamedDirection kDirections[] = {
 
 // How far one sees from places on the surface, as a share of the scene's diagonal; a place from
 // which one can see out of the scene counts as 0. Near 0 for an object, or for caves; more for
-// rooms.
+// interiors.
 double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
   constexpr size_t kPlaces = 1000;
   const std::vector<Vec> points = occupied_points(dag);

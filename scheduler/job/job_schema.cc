@@ -1,7 +1,5 @@
 #include "scheduler/job/job_schema.h"
 
-#include <iterator>
-
 #include "core/base/error.h"
 
 namespace voxdag {
@@ -10,10 +8,7 @@ namespace {
 // "vdag": marks a database as a job store.
 constexpr int64_t kApplicationId = 0x76646167;
 
-// Entry i migrates a store from version i to version i + 1; version 0 is an empty database. Entries
-// never change: a new version is a new entry.
-constexpr const char* kMigrations[] = {
-    R"sql(
+constexpr const char* kTables = R"sql(
 CREATE TABLE job (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   scene_sha256 TEXT NOT NULL,
@@ -44,9 +39,7 @@ CREATE TABLE progress (
   stage_started_s REAL NOT NULL, updated_s REAL NOT NULL,
   memory_bytes INTEGER NOT NULL, disk_bytes INTEGER NOT NULL, last_error TEXT NOT NULL
 );
-)sql",
-    // An unfinished merge, and the file that a finished one is about to publish.
-    R"sql(
+-- An unfinished merge, and the file that a finished one is about to publish.
 CREATE TABLE merge (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   level INTEGER NOT NULL,
@@ -56,20 +49,16 @@ CREATE TABLE result (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   output TEXT NOT NULL, sha256 TEXT NOT NULL, bytes INTEGER NOT NULL,
   voxels INTEGER NOT NULL, svo_nodes INTEGER NOT NULL, dag_nodes INTEGER NOT NULL,
-  merge_rounds INTEGER NOT NULL, merge_ranges INTEGER NOT NULL,
+  merge_passes INTEGER NOT NULL, merge_partitions INTEGER NOT NULL,
   merge_streamed_groups INTEGER NOT NULL
 );
-)sql",
-    // The progress of scan, ingest and partition; the triangles are in a file.
-    R"sql(
+-- The progress of scan, ingest and partition; the triangles are in a file.
 CREATE TABLE ingest (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   record BLOB NOT NULL,
   row_checksum INTEGER NOT NULL
 );
-)sql",
-};
-static_assert(std::size(kMigrations) == kSchemaVersion);
+)sql";
 
 bool is_empty(SqlDatabase& database) {
   return database.integer("PRAGMA application_id") == 0 &&
@@ -90,10 +79,11 @@ void check_schema(SqlDatabase& database, const std::string& path) {
   if (database.integer("PRAGMA application_id") != kApplicationId)
     throw Error(ErrorCode::kInvalidInput, path + " is not a job store of voxdag");
   const int64_t version = database.integer("PRAGMA user_version");
-  if (version < 1 || version > kSchemaVersion)
+  if (version != kSchemaVersion)
     throw Error(ErrorCode::kUnsupportedVersion,
                 path + " is a job store of version " + std::to_string(version) +
-                    ": expected version 1 to " + std::to_string(kSchemaVersion));
+                    ": expected version " + std::to_string(kSchemaVersion) +
+                    "; start over with --restart");
 }
 
 void prepare_schema(SqlDatabase& database, const std::string& path) {
@@ -101,11 +91,9 @@ void prepare_schema(SqlDatabase& database, const std::string& path) {
   if (!empty) check_schema(database, path);
   database.execute("PRAGMA journal_mode = WAL");
   database.execute("PRAGMA foreign_keys = ON");
-  if (!empty) check_sound(database, path);
-  const int64_t version = database.integer("PRAGMA user_version");
-  if (version == kSchemaVersion) return;
+  if (!empty) return check_sound(database, path);
   SqlTransaction transaction(database);
-  for (int64_t from = version; from < kSchemaVersion; ++from) database.execute(kMigrations[from]);
+  database.execute(kTables);
   database.execute("PRAGMA application_id = " + std::to_string(kApplicationId));
   database.execute("PRAGMA user_version = " + std::to_string(kSchemaVersion));
   transaction.commit();

@@ -1,4 +1,4 @@
-// The job store's tables, and the migrations from earlier versions.
+// The tables of the job store.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,13 @@
 
 namespace voxdag {
 
-inline constexpr int64_t kSchemaVersion = 3;
+inline constexpr int64_t kSchemaVersion = 4;
 
-// Creates the tables in an empty database, or migrates those of an earlier version, in one
-// transaction. Throws Error{kCorrupt} for a damaged database, Error{kInvalidInput} for one that
-// is not a job store, Error{kUnsupportedVersion} for one of a later version.
+// Creates the tables in an empty database, in one transaction. Throws Error{kCorrupt} for a damaged
+// database, Error{kInvalidInput} for one that is not a job store, Error{kUnsupportedVersion} for
+// one of another version.
 void prepare_schema(SqlDatabase& database, const std::string& path);
-// Checks a store that is only read: it may have any version up to this one. Throws likewise.
+// Checks a store that is only read. Throws likewise.
 void check_schema(SqlDatabase& database, const std::string& path);
 
 }  // namespace voxdag

@@ -109,8 +109,8 @@ void columns(Row& row, JobResult& result) {
   row("voxels", result.voxels);
   row("svo_nodes", result.svo_nodes);
   row("dag_nodes", result.dag_nodes);
-  row("merge_rounds", result.merge_rounds);
-  row("merge_ranges", result.merge_ranges);
+  row("merge_passes", result.merge_passes);
+  row("merge_partitions", result.merge_partitions);
   row("merge_streamed_groups", result.merge_streamed_groups);
 }
 

@@ -22,11 +22,11 @@
 #include <string>
 #include <vector>
 
-#include "scheduler/stage_clock.h"
 #include "core/dag/sub_dag.h"
 #include "core/db/sqlite.h"
 #include "core/format/artifact/artifact.h"
 #include "core/geometry/cube.h"
+#include "scheduler/stage_clock.h"
 
 namespace voxdag {
 
@@ -66,8 +66,8 @@ struct JobResult {
   uint64_t voxels = 0;
   uint64_t svo_nodes = 0;
   uint64_t dag_nodes = 0;
-  uint32_t merge_rounds = 0;
-  uint64_t merge_ranges = 0;
+  uint32_t merge_passes = 0;
+  uint64_t merge_partitions = 0;
   uint64_t merge_streamed_groups = 0;
 };
 
@@ -88,7 +88,7 @@ class JobStore {
  public:
   enum class Access { kBuild, kRead };
 
-  // Opens the store; for kBuild creates it, or migrates one of an earlier version. Throws
+  // Opens the store; for kBuild creates it. Throws
   // Error{kCorrupt} for a damaged one, Error{kInvalidInput} for another kind of database,
   // Error{kUnsupportedVersion}.
   JobStore(const std::string& path, Access access);

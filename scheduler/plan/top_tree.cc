@@ -24,7 +24,7 @@ ExpectedWork expected_work(const FixedTriangle& t) {
     e[1][a] = static_cast<double>(t.v[2][a] - t.v[0][a]) * kVoxel;
     extents += static_cast<double>(t.high(a) - t.low(a)) * kVoxel;
   }
-  double area = 0;  // of the three projections, summed: area * (|nx| + |ny| + |nz|)
+  double area = 0;  // of the three projections: area * (|nx| + |ny| + |nz|)
   for (int a = 0; a < 3; ++a) {
     const int b = (a + 1) % 3, c = (a + 2) % 3;
     area += 0.5 * std::abs(e[0][b] * e[1][c] - e[0][c] * e[1][b]);

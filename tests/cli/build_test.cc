@@ -20,11 +20,11 @@ class BuildCommand : public CommandLine {
 TEST_F(BuildCommand, ReportHasTheDocumentedNames) {
   const Json report = build();
   for (const char* name :
-       {"output",       "sha256",       "resolution",     "bounds",      "hash_bits",
-        "voxels",       "svo_nodes",    "dag_nodes",      "bytes",       "triangles",
-        "dropped",      "subvolumes",   "artifacts",      "spill_bytes", "merge_rounds",
-        "merge_ranges", "memory_bytes", "threads",        "backend",     "stages",
-        "wall_s",       "cpu_s",        "peak_rss_bytes", "voxels_per_s"})
+       {"output",           "sha256",       "resolution",     "bounds",      "hash_bits",
+        "voxels",           "svo_nodes",    "dag_nodes",      "bytes",       "triangles",
+        "dropped",          "subvolumes",   "artifacts",      "spill_bytes", "merge_passes",
+        "merge_partitions", "memory_bytes", "threads",        "backend",     "stages",
+        "wall_s",           "cpu_s",        "peak_rss_bytes", "voxels_per_s"})
     EXPECT_TRUE(report.contains(name)) << name;
   EXPECT_EQ(report["output"], "m.vdag");
   EXPECT_EQ(report["resolution"], 128);

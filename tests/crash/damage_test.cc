@@ -1,4 +1,4 @@
-// What a disk gives back changed is noticed, and healed or refused: never a wrong DAG.
+// Bytes that a disk returns changed are noticed, and repaired or refused: never a wrong DAG.
 #include <fstream>
 
 #include "core/base/error.h"

@@ -35,7 +35,7 @@ class FaultyWriter : public voxdag::ForwardingWriter {
   }
   void sync() override {
     files_.operate([&] {
-      // What is written beside the sync may be on the disk afterwards, or not.
+      // What is written during the sync may or may not be on the disk afterwards.
       std::string before = contents(path());
       ForwardingWriter::sync();
       std::lock_guard lock(files_.mutex_);

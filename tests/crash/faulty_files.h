@@ -1,4 +1,4 @@
-// A file system that fails when told to: after leveldb's fault_injection_test, a disk that forgets
+// A file system that fails on request: after leveldb's fault_injection_test, a disk that forgets
 // what was not synced, is full, or takes the process with it.
 //
 // Every call that changes the disk is an operation, numbered from 1 in the order in which they
@@ -50,7 +50,7 @@ class FaultyFiles : public voxdag::ForwardingFiles {
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
-  // Runs one operation, which is told its number, or what the plan has in its place; `half` is what
+  // Runs one operation, which gets its number, or what the plan has in its place; `half` is what
   // an operation does that the disk gives up on.
   template <class Operation, class Half>
   void operate(const Operation& operation, const Half& half);

@@ -104,7 +104,7 @@ class Maker {
   }
 
   // In a plane a + b = 256 k or a - b = 256 k for two axes a and b: it holds edges of voxels, and
-  // touches those beside it without entering them.
+  // touches the voxels next to it without entering them.
   Triangle diagonal() {
     const int64_t a = random_.between(0, 2), b = (a + random_.between(1, 2)) % 3;
     const int64_t sign = random_.coin() ? 1 : -1;

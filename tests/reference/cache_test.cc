@@ -64,7 +64,7 @@ TEST_F(CacheTest, ContentIsRelativeAndCanonical) {
   EXPECT_GT(report.subvolumes_cached, 0u);
 }
 
-// Another hash cut is other content; a damaged entry is a miss; a small limit evicts.
+// Other hash bits are other content; a damaged entry is a miss; a small limit evicts.
 TEST_F(CacheTest, MissesWhatItMust) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSoup, 6, {{0, 0, 0}, 256}, 60);
   auto spec = spec_for(scene, 256);

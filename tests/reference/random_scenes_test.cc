@@ -15,7 +15,7 @@ std::vector<oracle::SceneKind> exact_kinds() {
   return kinds;
 }
 
-// Every kind on grids from 4 to 128, one subvolume and many, hashes cut and whole.
+// Every kind on grids from 4 to 128, one subvolume and many, hashes truncated and whole.
 TEST_F(RandomScenes, EqualTheOracle) {
   for (const oracle::SceneKind kind : exact_kinds())
     for (int levels = 2; levels <= 7; ++levels) {

@@ -46,7 +46,7 @@ TEST_F(SharedScenes, Sponza4096) {
   EXPECT_EQ(fine.sha256, whole.sha256);
   EXPECT_GT(fine.subvolumes, 4000u);
   EXPECT_GT(fine.spill_bytes, 0u);
-  EXPECT_GT(fine.merge_rounds, 1u);
+  EXPECT_GT(fine.merge_passes, 1u);
   const BuildReport split = run_with(64 * kMebibyte, 4096, 1);
   EXPECT_EQ(split.sha256, whole.sha256);
   EXPECT_GT(split.subvolumes_split, 0u);
@@ -70,7 +70,7 @@ TEST_F(SharedScenes, Dragon8192) {
 
   const BuildReport rounds = run_with(64 * kMebibyte, 512, 2);
   EXPECT_EQ(rounds.sha256, whole.sha256);
-  EXPECT_GT(rounds.merge_rounds, 1u);
+  EXPECT_GT(rounds.merge_passes, 1u);
   EXPECT_GT(rounds.spill_bytes, 10 * kMebibyte);
 }
 

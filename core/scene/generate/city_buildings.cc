@@ -78,7 +78,7 @@ void add_crown(SceneBuilder& scene, const Tier& tier, Random& random) {
                                {half * 0.6875, half * 1.25, half * 0.6875}, turn);
 }
 
-// Adds plant rooms at odd angles, sometimes a mast.
+// Adds plant housings at odd angles, sometimes a mast.
 void add_flat_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double y = tier.top() + kSlabHeight;
   for (int i = random.between(1, 3); i > 0; --i) {

@@ -84,7 +84,7 @@ TEST_F(Voxelize, TinyWindowsChangeNothing) {
   EXPECT_GT(first.size(), 500u);
 }
 
-// The brick list under many small parts, with codes that come again and again.
+// The brick list under many small parts, with codes that repeat.
 TEST_F(Voxelize, BrickListMergesWhatComesAgain) {
   oracle::Random random(5);
   BrickList<HostSpace> list(space, 15);

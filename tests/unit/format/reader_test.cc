@@ -102,8 +102,8 @@ TEST_F(ReaderTest, EmptySceneHasNoVoxels) {
   file.verify_checksums();
 }
 
-// What is no global file is told apart: not there, not ours, too new, damaged.
-TEST_F(ReaderTest, ProblemsAreTold) {
+// Files that are no global file give different errors: missing, foreign, too new, damaged.
+TEST_F(ReaderTest, ProblemsAreReported) {
   using voxdag_reader::Problem;
   const auto problem = [&] {
     try {

@@ -200,7 +200,7 @@ TEST(GenerateSoup, HoldsDegeneratesAndSlivers) {
 
 // Terrain is one connected sheet: as many triangles as the largest square that fits, and tiles that
 // meet at equal heights.
-TEST(GenerateTerrain, IsASquareWithoutSeams) {
+TEST(GenerateTerrain, IsASquareWithoutGaps) {
   GenerateOptions options = small(SceneKind::kTerrain);
   options.triangles = 2 * 300 * 300 + 5;
   const auto triangles = glb::File(make(options).bytes).triangles();

@@ -143,25 +143,25 @@ TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
   }
 }
 
-// A store as version 1 left it, without the tables that came later, is migrated with all
-// its rows; a reader reads it as it is.
-TEST_F(JobStoreTest, MigratesAnEarlierVersion) {
+// A store of an earlier version is refused, for building and for reading, and is left as it is.
+TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
   {
     JobStore store(path(), JobStore::Access::kBuild);
     store.start(job_, plan(3));
-    store.record_built(std::vector{built(store.leaves()[1])});
   }
-  SqlDatabase(path(), SqlDatabase::Mode::kReadWrite)
-      .execute("DROP TABLE merge; DROP TABLE result; DROP TABLE ingest; PRAGMA user_version = 1");
+  const auto set_version = [&](const std::string& version) {
+    SqlDatabase(path(), SqlDatabase::Mode::kReadWrite).execute("PRAGMA user_version = " + version);
+  };
+  set_version("3");
+  for (const auto access : {JobStore::Access::kBuild, JobStore::Access::kRead}) try {
+      JobStore store(path(), access);
+      FAIL() << "opened a store of version 3";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kUnsupportedVersion);
+      EXPECT_NE(error.message().find("--restart"), std::string::npos) << error.message();
+    }
+  set_version("4");
   EXPECT_EQ(JobStore(path(), JobStore::Access::kRead).leaves().size(), 3u);
-  for (int opened = 1; opened <= 2; ++opened) {
-    JobStore store(path(), JobStore::Access::kBuild);
-    EXPECT_EQ(store.job(), job_);
-    EXPECT_EQ(store.leaves()[1].artifact, built(plan(3)[1]).artifact);
-    EXPECT_EQ(store.merge().has_value(), opened == 2);
-    store.save_merge(5, {});
-  }
-  EXPECT_EQ(SqlDatabase(path(), SqlDatabase::Mode::kReadOnly).integer("PRAGMA user_version"), 3);
 }
 
 // An unfinished merge and its result are remembered, replaced and forgotten; a new job has neither.

@@ -47,7 +47,7 @@ TEST(MemoryPlan, DividesWhatIsFreeBetweenWorkers) {
   }
 }
 
-// Within a worker's share, and what it retains beside it.
+// Within a worker's share, and what it retains next to it.
 TEST(MemoryPlan, DividesAWorkersShare) {
   EXPECT_EQ(WorkerMemory::key_bytes(64 * kMiB), 56 * kMiB);
   EXPECT_EQ(BackendMemory::page_bytes(10 * kMiB), 8 * kMiB);
@@ -65,12 +65,12 @@ TEST(MemoryPlan, DividesTheMergesBudget) {
   EXPECT_EQ(small.workers, 2u);
   EXPECT_EQ(small.worker_bytes, 8 * kMiB);
   EXPECT_EQ(small.resident_bytes, 64 * kMiB / 6);
-  EXPECT_EQ(small.slab_bytes, 26214402u);
+  EXPECT_EQ(small.partition_bytes, 26214402u);
   const MergeMemory large = MergeMemory::divide(12 * kGiB, 16);
   EXPECT_EQ(large.workers, 16u);
   EXPECT_EQ(large.worker_bytes, 192 * kMiB);
   EXPECT_EQ(large.resident_bytes, 2 * kGiB);
-  EXPECT_EQ(large.slab_bytes, 5 * kGiB - 5 * kGiB / 16);
+  EXPECT_EQ(large.partition_bytes, 5 * kGiB - 5 * kGiB / 16);
 }
 
 // What is taken at the same time never adds up to more than there is.
@@ -94,7 +94,7 @@ TEST(MemoryPlan, PartsFitTheWhole) {
                     4 * BackendMemory::plane_table_bytes(share, share),
                 share);
       const MergeMemory merge = MergeMemory::divide(budget, threads);
-      EXPECT_LE(merge.workers * merge.worker_bytes + 2 * merge.resident_bytes + merge.slab_bytes,
+      EXPECT_LE(merge.workers * merge.worker_bytes + 2 * merge.resident_bytes + merge.partition_bytes,
                 budget);
     }
   }

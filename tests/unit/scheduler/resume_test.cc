@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "core/base/error.h"
+#include "core/format/artifact/segment_writer.h"
 #include "scheduler/job/job_status.h"
 #include "scheduler/job/job_store.h"
 #include "scheduler/job/output_lock.h"

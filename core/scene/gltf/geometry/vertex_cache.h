@@ -1,6 +1,6 @@
 // Random access to the vertex positions of a primitive within a fixed amount of memory: blocks of
-// consecutive vertices, each kept in the one slot that its number maps to. A primitive that fits is
-// read once; of a larger one, meshes whose indices stay near each other still read it about once.
+// consecutive vertices, each cached in the one slot that its number maps to. A primitive that fits
+// is read once; so is, about, a larger one whose indices stay near each other.
 #pragma once
 
 #include <bit>
