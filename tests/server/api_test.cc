@@ -247,7 +247,7 @@ TEST_F(Api, NamesNoFolderOfItsMachine) {
   post("/api/v1/jobs/" + id + "/suspend");
   // The job's process may still be writing: wait until it has ended.
   ASSERT_TRUE(until([&] {
-    return http_->get("/metrics").body.find("voxdag_running_processes 0") != std::string::npos;
+    return http_->get("/metrics").body.find("voxdag_job_processes 0") != std::string::npos;
   }));
   for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(work + "/job.db" + suffix);
   write_file_atomically(system_files(), work + "/job.db", std::string(8192, 'x'));

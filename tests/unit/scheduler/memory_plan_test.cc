@@ -94,8 +94,9 @@ TEST(MemoryPlan, PartsFitTheWhole) {
                     4 * BackendMemory::plane_table_bytes(share, share),
                 share);
       const MergeMemory merge = MergeMemory::divide(budget, threads);
-      EXPECT_LE(merge.workers * merge.worker_bytes + 2 * merge.resident_bytes + merge.partition_bytes,
-                budget);
+      EXPECT_LE(
+          merge.workers * merge.worker_bytes + 2 * merge.resident_bytes + merge.partition_bytes,
+          budget);
     }
   }
 }

@@ -2,10 +2,7 @@
 
 #include <tiny_gltf.h>
 
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
-
+#include "core/base/process_limits.h"
 #include "core/scene/gltf/document/extensions.h"
 #include "core/scene/gltf/document/model_reader.h"
 #include "core/scene/gltf/document/read_elements.h"
@@ -108,10 +105,7 @@ Document read_document(const ReadableFile& file, MemoryBudget& budget, const Can
   for (const std::string& name : d.model->extensionsUsed)
     if (may_change_geometry(name))
       d.warn("the optional extension " + printable(name) + " is ignored");
-#ifdef __GLIBC__
-  // Many small blocks were freed; the allocator would retain their pages.
-  malloc_trim(0);
-#endif
+  trim_heap();  // the parse freed many small blocks
   return d;
 }
 

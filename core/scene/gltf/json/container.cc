@@ -63,11 +63,11 @@ Container read_glb(const ReadableFile& file) {
   return container;
 }
 
-// White space, an opening brace or a byte order mark.
+// White space, an opening brace or bracket, or a byte order mark.
 bool may_be_json(const ReadableFile& file) {
   std::array<std::byte, 1> first;
   file.read_at(0, first);
-  return std::string_view(" \t\r\n{\xef").find(static_cast<char>(first[0])) !=
+  return std::string_view(" \t\r\n{[\xef").find(static_cast<char>(first[0])) !=
          std::string_view::npos;
 }
 

@@ -1,12 +1,14 @@
-#include "server/api/request_problem.h"
+#include "server/api/problem.h"
 
 #include <gtest/gtest.h>
+
+#include "server/request_error.h"
 
 namespace voxdag::server {
 namespace {
 
 // Statuses and codes are those of docs/errors.md and docs/api.md.
-TEST(RequestProblem, HasTheStatusAndCodeOfItsKind) {
+TEST(PublicProblem, HasTheStatusAndCodeOfItsKind) {
   using Kind = RequestError::Kind;
   struct Row {
     Kind kind;
@@ -19,7 +21,7 @@ TEST(RequestProblem, HasTheStatusAndCodeOfItsKind) {
         Row{Kind::kKeyReused, 422, "idempotency_mismatch"}, Row{Kind::kQueueFull, 503, "busy"}}) {
     SCOPED_TRACE(code);
     const RequestError error(kind, "the reason");
-    const Problem problem = problem_of(error);
+    const Problem problem = public_problem(error);
     EXPECT_EQ(problem.status, status);
     EXPECT_EQ(problem.code, code);
     EXPECT_STREQ(error.code(), code);
@@ -27,15 +29,15 @@ TEST(RequestProblem, HasTheStatusAndCodeOfItsKind) {
   }
 }
 
-TEST(RequestProblem, CarriesWhatAClientNeedsToContinue) {
+TEST(PublicProblem, CarriesWhatAClientNeedsToContinue) {
   RequestError conflict(RequestError::Kind::kConflict, "no");
-  EXPECT_TRUE(problem_of(conflict).headers.empty());
+  EXPECT_TRUE(public_problem(conflict).headers.empty());
   conflict.job_state = "running";
   conflict.upload_offset = 5;
-  const Problem problem = problem_of(conflict);
+  const Problem problem = public_problem(conflict);
   EXPECT_EQ(problem.state, "running");
   EXPECT_EQ(header_value(problem.headers, "Upload-Offset"), "5");
-  const Problem full = problem_of(RequestError(RequestError::Kind::kQueueFull, "full"));
+  const Problem full = public_problem(RequestError(RequestError::Kind::kQueueFull, "full"));
   EXPECT_EQ(header_value(full.headers, "Retry-After"), "60");
 }
 
