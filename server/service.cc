@@ -52,11 +52,11 @@ class Service::Parts {
                     [this](const Job& job) { metrics_.count_run(job); }),
         context_{config_, files, queue_, scenes_, tasks_, dispatcher_, metrics_, draining_} {
     remove_tree(files_, config_.data_folder + "/plans");
-    add_job_routes(router_, context_);
-    add_result_routes(router_, context_);
-    add_event_routes(router_, context_);
-    add_scene_routes(router_, context_);
-    add_system_routes(router_, context_);
+    add_job_routes(router_);
+    add_result_routes(router_);
+    add_event_routes(router_);
+    add_scene_routes(router_);
+    add_system_routes(router_);
   }
 
   int port() const { return http_.port(); }
@@ -141,7 +141,7 @@ class Service::Parts {
   HttpServer http_;
   Dispatcher dispatcher_;
   Context context_;
-  Router router_;
+  Router router_{context_};
   std::mutex stop_mutex_;
   std::condition_variable stop_wake_;  // draining_ has become true
 };

@@ -92,17 +92,32 @@ ColumnNames column_names() {
   return names;
 }
 
-// Inserts the record's row into `table`, in place of one with the same key.
+// Runs a statement that names the columns and then, after `between`, has a parameter for each.
 template <class Record>
-void put_row(SqlDatabase& database, const std::string& table, Record record) {
+void write_row(SqlDatabase& database, const std::string& before, const char* between,
+               const std::string& after, Record record) {
   const ColumnNames names = column_names<Record>();
   std::string parameters = "?";
   for (int i = 1; i < names.count(); ++i) parameters += ", ?";
-  SqlStatement insert = database.prepare("INSERT OR REPLACE INTO " + table + " (" + names.text() +
-                                         ") VALUES (" + parameters + ")");
-  RowWriter writer(insert);
+  SqlStatement statement = database.prepare(before + " (" + names.text() + ") " + between + " (" +
+                                            parameters + ") " + after);
+  RowWriter writer(statement);
   columns(writer, record);
-  insert.run();
+  statement.run();
+}
+
+// Inserts the record's row into `table`, in place of one with the same key.
+template <class Record>
+void put_row(SqlDatabase& database, const std::string& table, Record record) {
+  write_row(database, "INSERT OR REPLACE INTO " + table, "VALUES", "", std::move(record));
+}
+
+// Changes the rows of `table` for which `condition` holds into the record's. Unlike put_row() it
+// does not remove rows that refer to them.
+template <class Record>
+void update_row(SqlDatabase& database, const std::string& table, const std::string& condition,
+                Record record) {
+  write_row(database, "UPDATE " + table + " SET", "=", "WHERE " + condition, std::move(record));
 }
 
 // The rows of `table`; `rest` may filter and order them.

@@ -37,11 +37,4 @@ struct Context {
 // Throws Problem (404) if there is none.
 Job find_job(JobQueue& queue, const std::string& id);
 
-class Router;
-void add_job_routes(Router& router, Context& context);
-void add_result_routes(Router& router, Context& context);
-void add_event_routes(Router& router, Context& context);
-void add_scene_routes(Router& router, Context& context);
-void add_system_routes(Router& router, Context& context);
-
 }  // namespace voxdag::server

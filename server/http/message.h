@@ -59,4 +59,13 @@ struct Response {
   std::shared_ptr<void> permit;
 };
 
+inline Response make_response(int status, const char* content_type, const char* cache_control,
+                              std::string body = "") {
+  Response response;
+  response.status = status;
+  response.headers = {{"Content-Type", content_type}, {"Cache-Control", cache_control}};
+  response.body = std::move(body);
+  return response;
+}
+
 }  // namespace voxdag::server

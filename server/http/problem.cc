@@ -30,12 +30,9 @@ std::string problem_json(const Problem& problem) {
 }
 
 Response problem_response(const Problem& problem) {
-  Response response;
-  response.status = problem.status;
-  response.headers = problem.headers;
-  response.headers.emplace("Content-Type", "application/problem+json");
-  response.headers.emplace("Cache-Control", "no-store");
-  response.body = problem_json(problem);
+  Response response =
+      make_response(problem.status, "application/problem+json", "no-store", problem_json(problem));
+  response.headers.insert(problem.headers.begin(), problem.headers.end());
   return response;
 }
 

@@ -147,7 +147,7 @@ bool Dispatcher::start_next_job() {
 }
 
 void Dispatcher::start_preview() {
-  const auto job = queue_.next_without_preview({});
+  const auto job = queue_.next_without_preview();
   if (!job) return;
   start_worker(kPreview, std::make_shared<LiveJob>(job->id, 0),
                [this, job = *job](LiveJob& live) { draw_preview(job, live); });

@@ -1,21 +1,169 @@
 #include "server/queue/job_queue.h"
 
 #include <chrono>
+#include <nlohmann/json.hpp>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "server/queue/job_rows.h"
+#include "core/db/row.h"
 #include "server/random_id.h"
 
 namespace voxdag::server {
 namespace {
 
+using nlohmann::json;
+
 constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 
+// "vdsv": the queue of a service.
+constexpr int64_t kApplicationId = 0x76647376;
+constexpr int64_t kSchemaVersion = 2;
+
+constexpr const char* kSchema = R"sql(
+CREATE TABLE job (
+  number INTEGER PRIMARY KEY,
+  id TEXT NOT NULL UNIQUE,
+  name TEXT NOT NULL,
+  state INTEGER NOT NULL CHECK (state BETWEEN 0 AND 6),
+  request TEXT NOT NULL,
+  scenes TEXT NOT NULL,
+  posted_by TEXT NOT NULL,
+  priority INTEGER NOT NULL,
+  front INTEGER NOT NULL,
+  attempts INTEGER NOT NULL,
+  created_s REAL NOT NULL, started_s REAL NOT NULL, finished_s REAL NOT NULL,
+  not_before_s REAL NOT NULL,
+  error TEXT NOT NULL,
+  warnings TEXT NOT NULL,
+  result TEXT NOT NULL,
+  progress TEXT NOT NULL,
+  preview INTEGER NOT NULL
+);
+CREATE INDEX job_by_place ON job (state, priority DESC, front DESC, number);
+CREATE TABLE job_scene (
+  job TEXT NOT NULL REFERENCES job (id) ON DELETE CASCADE,
+  scene TEXT NOT NULL,
+  PRIMARY KEY (job, scene)
+) WITHOUT ROWID;
+CREATE INDEX job_scene_by_scene ON job_scene (scene);
+CREATE TABLE job_event (
+  number INTEGER PRIMARY KEY AUTOINCREMENT,
+  job TEXT NOT NULL REFERENCES job (id) ON DELETE CASCADE,
+  at_s REAL NOT NULL,
+  state INTEGER NOT NULL,
+  attempt INTEGER NOT NULL,
+  error TEXT NOT NULL
+);
+CREATE INDEX job_event_by_job ON job_event (job, number);
+CREATE TABLE idempotency (
+  key TEXT PRIMARY KEY,
+  request TEXT NOT NULL,
+  job TEXT NOT NULL REFERENCES job (id) ON DELETE CASCADE
+);
+CREATE INDEX idempotency_by_job ON idempotency (job);
+)sql";
+
+std::string dump(const json& value) {
+  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+// Makes the tables of a new database, or checks that an existing one is a queue of this version.
 SqlDatabase open_writer(const std::string& path) {
   SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
-  prepare_schema(database, path);
+  const int64_t application = database.integer("PRAGMA application_id");
+  const int64_t version = database.integer("PRAGMA user_version");
+  const bool fresh = application == 0 && version == 0 &&
+                     database.integer("SELECT count(*) FROM sqlite_master") == 0;
+  if (!fresh && application != kApplicationId)
+    throw Error(ErrorCode::kInvalidInput, path + ": expected a queue of voxdag serve");
+  if (!fresh && version != kSchemaVersion)
+    throw Error(ErrorCode::kUnsupportedVersion, path + ": the queue's version is " +
+                                                    std::to_string(version) + ", expected " +
+                                                    std::to_string(kSchemaVersion));
+  database.execute("PRAGMA journal_mode = WAL");
+  database.execute("PRAGMA foreign_keys = ON");
+  if (!fresh) return database;
+  SqlTransaction transaction(database);
+  database.execute(kSchema);
+  database.execute("PRAGMA application_id = " + std::to_string(kApplicationId));
+  database.execute("PRAGMA user_version = " + std::to_string(kSchemaVersion));
+  transaction.commit();
   return database;
+}
+
+// A row of the table `job`: the members without a type of SQL are JSON.
+struct JobRow {
+  Job job;
+  std::string scenes, error, warnings;
+};
+
+template <class Row>
+void columns(Row& row, JobRow& r) {
+  Job& job = r.job;
+  row("number", job.number);
+  row("id", job.id);
+  row("name", job.name);
+  row("state", job.state);
+  row("request", job.request);
+  row("scenes", r.scenes);
+  row("posted_by", job.posted_by);
+  row("priority", job.priority);
+  row("front", job.front);
+  row("attempts", job.attempts);
+  row("created_s", job.created_s);
+  row("started_s", job.started_s);
+  row("finished_s", job.finished_s);
+  row("not_before_s", job.not_before_s);
+  row("error", r.error);
+  row("warnings", r.warnings);
+  row("result", job.result);
+  row("progress", job.progress);
+  row("preview", job.preview);
+}
+
+JobRow row_of(const Job& job) {
+  JobRow row{job, dump(job.scenes), "", dump(job.warnings)};
+  if (job.error)
+    row.error = dump({{"code", job.error->code},
+                      {"message", job.error->message},
+                      {"at_s", job.error->at_s},
+                      {"transient", job.error->transient}});
+  return row;
+}
+
+// The job that a statement of select_rows<JobRow>() stands at.
+Job read_job(const SqlStatement& statement) {
+  JobRow row = read_row<JobRow>(statement);
+  Job& job = row.job;
+  try {
+    json::parse(row.scenes).get_to(job.scenes);
+    json::parse(row.warnings).get_to(job.warnings);
+    if (row.error.empty()) return job;
+    const json error = json::parse(row.error);
+    job.error =
+        JobError{error.at("code"), error.at("message"), error.at("at_s"), error.at("transient")};
+    return job;
+  } catch (const json::exception&) {
+    throw Error(ErrorCode::kCorrupt, "the row of job " + job.id + " is damaged");
+  }
+}
+
+std::optional<Job> find_job(SqlDatabase& database, const std::string& id) {
+  auto rows = select_rows<JobRow>(database, "job", "WHERE id = ?");
+  if (!rows.bind(0, id).step()) return {};
+  return read_job(rows);
+}
+
+// Records the present state of the job as its newest event.
+void write_event(SqlDatabase& database, const Job& job) {
+  database
+      .prepare("INSERT INTO job_event (job, at_s, state, attempt, error) VALUES (?, ?, ?, ?, ?)")
+      .bind(0, job.id)
+      .bind(1, unix_seconds())
+      .bind(2, static_cast<int64_t>(job.state))
+      .bind(3, int64_t{job.attempts})
+      .bind(4, job.error ? job.error->code : std::string())
+      .run();
 }
 
 // Only states become part of the text of SQL; what callers give is bound.
@@ -36,7 +184,7 @@ std::optional<Job> job_of_key(SqlDatabase& database, const IdempotencyKey& key) 
   if (known.text(1) != key.request)
     throw RequestError(RequestError::Kind::kKeyReused,
                        "this Idempotency-Key came with another request before");
-  return read_job(database, known.text(0));
+  return find_job(database, known.text(0));
 }
 
 RequestError no_job(const std::string& id) {
@@ -61,7 +209,7 @@ std::optional<JobState> parse_state(std::string_view name) {
 JobQueue::JobQueue(const std::string& path)
     : writer_(open_writer(path)),
       reader_(path, SqlDatabase::Mode::kReadOnly),
-      find_(reader_.prepare("SELECT " + job_columns() + " FROM job WHERE id = ?")) {}
+      find_(select_rows<JobRow>(reader_, "job", "WHERE id = ?")) {}
 
 JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_open) {
   Added added;
@@ -75,7 +223,12 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
     job.id = random_id();
     job.number = writer_.integer("SELECT coalesce(max(number), 0) + 1 FROM job");
     job.created_s = unix_seconds();
-    write_job(writer_, job);
+    put_row(writer_, "job", row_of(job));
+    for (const std::string& scene : job.scenes)
+      writer_.prepare("INSERT OR IGNORE INTO job_scene VALUES (?, ?)")
+          .bind(0, job.id)
+          .bind(1, scene)
+          .run();
     write_event(writer_, job);
     if (!key.key.empty())
       writer_.prepare("INSERT INTO idempotency VALUES (?, ?, ?)")
@@ -93,7 +246,7 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
 std::optional<Job> JobQueue::find(const std::string& id) {
   std::lock_guard lock(read_mutex_);
   std::optional<Job> job;
-  if (find_.bind(0, id).step()) job = job_of_row(find_);
+  if (find_.bind(0, id).step()) job = read_job(find_);
   find_.reset();
   return job;
 }
@@ -105,10 +258,10 @@ std::optional<Job> JobQueue::find_by_key(const IdempotencyKey& key) {
 
 std::vector<Job> JobQueue::query(const std::string& rest, const std::vector<int64_t>& numbers) {
   std::lock_guard lock(read_mutex_);
-  auto rows = reader_.prepare("SELECT " + job_columns() + " FROM job " + rest);
+  auto rows = select_rows<JobRow>(reader_, "job", rest);
   for (size_t i = 0; i < numbers.size(); ++i) rows.bind(static_cast<int>(i), numbers[i]);
   std::vector<Job> jobs;
-  while (rows.step()) jobs.push_back(job_of_row(rows));
+  while (rows.step()) jobs.push_back(read_job(rows));
   return jobs;
 }
 
@@ -160,11 +313,11 @@ Job JobQueue::change(const std::string& id, const std::function<void(Job&)>& edi
   {
     std::lock_guard lock(write_mutex_);
     SqlTransaction transaction(writer_);
-    const auto found = read_job(writer_, id);
+    const auto found = find_job(writer_, id);
     if (!found) throw no_job(id);
     job = *found;
     edit(job);
-    write_job(writer_, job);
+    update_row(writer_, "job", "number = " + std::to_string(job.number), row_of(job));
     if (job.state != found->state) write_event(writer_, job);
     moves = job.state != found->state || job.priority != found->priority;
     transaction.commit();
@@ -177,7 +330,7 @@ void JobQueue::remove(const std::string& id) {
   {
     std::lock_guard lock(write_mutex_);
     SqlTransaction transaction(writer_);
-    const auto job = read_job(writer_, id);
+    const auto job = find_job(writer_, id);
     if (!job) throw no_job(id);
     if (!has_ended(job->state))
       throw state_conflict(*job, "the job has not ended: cancel it first");
@@ -197,13 +350,12 @@ std::optional<Job> JobQueue::next(double now_s, const std::set<std::string>& exc
   return {};
 }
 
-std::optional<Job> JobQueue::next_without_preview(const std::set<std::string>& except) {
+std::optional<Job> JobQueue::next_without_preview() {
   const auto jobs = query("WHERE " + states_in({JobState::kSucceeded}) +
-                              " AND preview = 0 ORDER BY number DESC LIMIT ?",
-                          {static_cast<int64_t>(except.size() + 1)});
-  for (const Job& job : jobs)
-    if (!except.contains(job.id)) return job;
-  return {};
+                              " AND preview = 0 ORDER BY number DESC LIMIT 1",
+                          {});
+  if (jobs.empty()) return {};
+  return jobs[0];
 }
 
 std::vector<Job> JobQueue::recover() {

@@ -68,8 +68,8 @@ class JobQueue {
 
   // The first queued job that may start at `now_s` and is not in `except`.
   std::optional<Job> next(double now_s, const std::set<std::string>& except);
-  // A job that succeeded and has no preview yet, and is not in `except`.
-  std::optional<Job> next_without_preview(const std::set<std::string>& except);
+  // A job that succeeded and has no preview yet.
+  std::optional<Job> next_without_preview();
   // After a crash: running jobs are queued again, at the front; canceling ones are canceled.
   // Returns those that were canceled.
   std::vector<Job> recover();

@@ -1,13 +1,116 @@
 // The server-sent events of a job.
 #include <charconv>
 
+#include "core/base/clock.h"
 #include "server/api/context.h"
-#include "server/api/event_feed.h"
+#include "server/api/job_json.h"
 #include "server/api/problem.h"
 #include "server/api/routes/router.h"
 
 namespace voxdag::server {
 namespace {
+
+constexpr double kProgressInterval_s = 0.5;
+constexpr double kKeepAliveInterval_s = 15;
+constexpr double kMaxWait_s = 1;
+
+std::string event_text(const char* name, const std::string& data, int64_t id = -1) {
+  std::string text = "event: " + std::string(name) + "\n";
+  if (id >= 0) text += "id: " + std::to_string(id) + "\n";
+  return text + "data: " + data + "\n\n";
+}
+
+std::string state_data(const JobEvent& event) {
+  return "{\"seq\":" + std::to_string(event.number) + ",\"at\":\"" + time_text(event.at_s) +
+         "\",\"state\":\"" + state_name(event.state) +
+         "\",\"attempt\":" + std::to_string(event.attempt) +
+         ",\"error\":" + (event.error.empty() ? "null" : '"' + event.error + '"') + "}";
+}
+
+// The event stream of one client for one job (docs/api.md, "Events of a job"). Used by one thread.
+class EventFeed {
+ public:
+  // Sends the state changes after event `last_seen`; without it only the current state.
+  EventFeed(Context& context, std::string id, std::optional<int64_t> last_seen)
+      : context_(context), id_(std::move(id)), last_number_(last_seen.value_or(-1)) {}
+
+  // An EventSource: text to send, "" for nothing yet, no value at the end of the stream. Waits up
+  // to about a second.
+  std::optional<std::string> next();
+
+ private:
+  void wait();
+  void add_changes(std::string& text);
+  void add_progress(std::string& text);
+
+  Context& context_;
+  const std::string id_;
+  int64_t last_number_ = -1;  // of the newest event sent; -1 before the first
+  bool started_ = false;
+  bool ended_ = false;
+  uint64_t seen_version_ = 0, seen_changes_ = 0, seen_progress_ = 0;
+  double last_sent_s_ = 0, last_progress_s_ = 0;
+};
+
+std::optional<std::string> EventFeed::next() {
+  if (ended_ || context_.draining) return {};
+  std::string text;
+  if (!started_)
+    text = "retry: 3000\n\n";
+  else
+    wait();
+  seen_version_ = context_.queue.version();
+  if (const uint64_t changes = context_.queue.changes(); !started_ || changes != seen_changes_) {
+    seen_changes_ = changes;
+    add_changes(text);
+  }
+  if (!ended_) add_progress(text);
+  started_ = true;
+  const double now = wall_seconds();
+  if (text.empty() && now - last_sent_s_ > kKeepAliveInterval_s) text = ": keep-alive\n\n";
+  if (!text.empty()) last_sent_s_ = now;
+  return text;
+}
+
+void EventFeed::wait() {
+  // Wakes up in time for progress that came too soon after the last event.
+  const double left_s = last_progress_s_ + kProgressInterval_s - wall_seconds();
+  context_.queue.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWait_s);
+}
+
+void EventFeed::add_changes(std::string& text) {
+  const auto job = context_.queue.find(id_);
+  if (!job) {
+    ended_ = true;
+    return;
+  }
+  // A new stream begins with the job itself, which makes its past state changes redundant.
+  const bool resumed = last_number_ >= 0;
+  for (const JobEvent& event : context_.queue.events_after(id_, last_number_)) {
+    if (resumed) text += event_text("state", state_data(event), event.number);
+    last_number_ = event.number;
+  }
+  const auto live = context_.dispatcher.live(id_);
+  text += event_text("job", job_json(*job, live.get(), 0, context_.config.jobs.max_attempts),
+                     last_number_);
+  if (has_ended(job->state)) {
+    text += event_text("end", "{\"state\":\"" + std::string(state_name(job->state)) + "\"}");
+    ended_ = true;
+  }
+}
+
+void EventFeed::add_progress(std::string& text) {
+  const auto live = context_.dispatcher.live(id_);
+  if (!live) return;
+  const uint64_t version = live->version();
+  const double now = wall_seconds();
+  if (version == seen_progress_ || now - last_progress_s_ < kProgressInterval_s) return;
+  const std::string progress = live->progress_json();
+  if (progress.empty()) return;
+  seen_progress_ = version;
+  last_progress_s_ = now;
+  text += event_text("progress", progress);
+}
 
 std::optional<int64_t> last_event_id(const Request& request) {
   const std::string text = request.header("Last-Event-ID");
@@ -22,16 +125,13 @@ std::optional<int64_t> last_event_id(const Request& request) {
 Response follow(Context& context, Call& call) {
   call.allow_query({});
   find_job(context.queue, call.names[0]);
-  Response response;
-  response.headers.emplace("Content-Type", "text/event-stream");
-  response.headers.emplace("Cache-Control", "no-store");
+  Response response = make_response(200, "text/event-stream", "no-store");
   response.headers.emplace("X-Accel-Buffering", "no");  // a proxy must not buffer events
   if (call.request.method == "HEAD") return response;
   auto permit = context.event_streams.acquire();
   if (!permit) throw busy("too many event streams", 10);
   const auto feed =
-      std::make_shared<EventFeed>(context.queue, context.dispatcher, context.config,
-                                  context.draining, call.names[0], last_event_id(call.request));
+      std::make_shared<EventFeed>(context, call.names[0], last_event_id(call.request));
   response.next_event = [feed] { return feed->next(); };
   response.permit = std::move(permit);
   return response;
@@ -39,9 +139,8 @@ Response follow(Context& context, Call& call) {
 
 }  // namespace
 
-void add_event_routes(Router& router, Context& context) {
-  router.add("GET", "/api/v1/jobs/{id}/events", Role::kRead,
-             [&](Call& call) { return follow(context, call); });
+void add_event_routes(Router& router) {
+  router.add("GET", "/api/v1/jobs/{id}/events", Role::kRead, follow);
 }
 
 }  // namespace voxdag::server

@@ -2,13 +2,15 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "server/api/context.h"
-#include "server/api/dry_run.h"
 #include "server/api/job_json.h"
 #include "server/api/problem.h"
 #include "server/api/routes/router.h"
+#include "server/jobs/process/child_process.h"
+#include "server/random_id.h"
 
 namespace voxdag::server {
 namespace {
@@ -42,6 +44,67 @@ Response accepted(Context& context, const Job& job, bool replayed) {
   response.headers.emplace("Location", "/api/v1/jobs/" + job.id);
   if (replayed) response.headers.emplace("Idempotent-Replayed", "true");
   return response;
+}
+
+// The folder of a plan, removed with it.
+class TemporaryTask {
+ public:
+  TemporaryTask(FileSystem& files, const std::string& path) : folder{path}, files_(files) {
+    files_.make_directories(path);
+  }
+  ~TemporaryTask() {
+    try {
+      remove_tree(files_, folder.path);
+    } catch (const Error&) {
+      // The service removes it at its next start.
+    }
+  }
+  const JobFolder folder;
+
+ private:
+  FileSystem& files_;
+};
+
+Problem problem_of(const Failure& failure) {
+  for (const ErrorCode code :
+       {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kUnsupportedVersion,
+        ErrorCode::kIo, ErrorCode::kNoSpace, ErrorCode::kOutOfMemory, ErrorCode::kDevice,
+        ErrorCode::kLimit, ErrorCode::kCorrupt})
+    if (failure.code == error_name(code)) return problem(code, failure.text);
+  return Problem(500, "internal", "the plan failed");
+}
+
+// The estimate of a job without queuing it: runs the plan in a child process. Throws Problem: the
+// error of the scene or the request; 503 if too many plans run or this one takes too long.
+Response dry_run(Context& context, const JobRequest& request) {
+  const auto permit = context.plans.acquire();
+  if (!permit) throw busy("too many concurrent plans", 5);
+  const Task task = context.tasks.make(request, Task::Kind::kPlan);
+  const TemporaryTask temporary(context.files,
+                                context.config.data_folder + "/plans/" + random_id());
+  write_task(context.files, temporary.folder.task(), task);
+  const std::string program =
+      context.config.program.empty() ? "/proc/self/exe" : context.config.program;
+  ChildProcess child({{program, "run-job", temporary.folder.path},
+                      temporary.folder.log(),
+                      context.config.jobs.nice});
+  std::string estimate;
+  std::optional<Failure> failure;
+  const double deadline = wall_seconds() + context.config.jobs.plan_timeout_s;
+  bool timed_out = false;
+  child.read_lines(
+      [&](std::string_view line) {
+        const auto message = decode(line);
+        if (!message) return;
+        if (const auto* result = std::get_if<Result>(&*message)) estimate = result->json;
+        if (const auto* reported = std::get_if<Failure>(&*message)) failure = *reported;
+      },
+      [&] { return timed_out = timed_out || context.draining || wall_seconds() > deadline; });
+  child.wait();
+  if (timed_out) throw busy("the plan exceeded its time limit", 60);
+  if (failure) throw problem_of(*failure);
+  if (estimate.empty()) throw Problem(500, "internal", "the process of the plan crashed");
+  return json_response(200, estimate);
 }
 
 Response post_job(Context& context, Call& call) {
@@ -117,12 +180,20 @@ Response patch_job(Context& context, Call& call) {
   return json_response(200, to_json(context, job));
 }
 
-using Action = Job (Dispatcher::*)(const std::string& id);
-
-Response act(Context& context, Call& call, Action action) {
+Response delete_job(Context& context, Call& call) {
   call.allow_query({});
   expect_no_body(call.request);
-  return json_response(202, to_json(context, (context.dispatcher.*action)(call.names[0])));
+  context.dispatcher.remove(call.names[0]);
+  return no_content();
+}
+
+// A handler that applies the action to a job.
+Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
+  return [action](Context& context, Call& call) {
+    call.allow_query({});
+    expect_no_body(call.request);
+    return json_response(202, to_json(context, (context.dispatcher.*action)(call.names[0])));
+  };
 }
 
 }  // namespace
@@ -133,32 +204,21 @@ Job find_job(JobQueue& queue, const std::string& id) {
   return std::move(*job);
 }
 
-void add_job_routes(Router& router, Context& context) {
-  router.add("POST", "/api/v1/jobs", Role::kSubmit,
-             [&](Call& call) { return post_job(context, call); });
-  router.add("GET", "/api/v1/jobs", Role::kRead,
-             [&](Call& call) { return list_jobs(context, call); });
-  router.add("GET", "/api/v1/jobs/{id}", Role::kRead, [&](Call& call) {
+void add_job_routes(Router& router) {
+  const std::string job = "/api/v1/jobs/{id}";
+  const auto get_job = [](Context& context, Call& call) {
     call.allow_query({});
     return json_response(200, to_json(context, find_job(context.queue, call.names[0])));
-  });
-  router.add("PATCH", "/api/v1/jobs/{id}", Role::kAdmin,
-             [&](Call& call) { return patch_job(context, call); });
-  router.add("DELETE", "/api/v1/jobs/{id}", Role::kAdmin, [&](Call& call) {
-    call.allow_query({});
-    expect_no_body(call.request);
-    context.dispatcher.remove(call.names[0]);
-    Response response;
-    response.status = 204;
-    return response;
-  });
-  const std::pair<const char*, Action> actions[] = {{"cancel", &Dispatcher::cancel},
-                                                    {"suspend", &Dispatcher::suspend},
-                                                    {"resume", &Dispatcher::resume},
-                                                    {"retry", &Dispatcher::retry}};
-  for (const auto& [name, action] : actions)
-    router.add("POST", std::string("/api/v1/jobs/{id}/") + name, Role::kSubmit,
-               [&context, action = action](Call& call) { return act(context, call, action); });
+  };
+  router.add("POST", "/api/v1/jobs", Role::kSubmit, post_job);
+  router.add("GET", "/api/v1/jobs", Role::kRead, list_jobs);
+  router.add("GET", job, Role::kRead, get_job);
+  router.add("PATCH", job, Role::kAdmin, patch_job);
+  router.add("DELETE", job, Role::kAdmin, delete_job);
+  router.add("POST", job + "/cancel", Role::kSubmit, act(&Dispatcher::cancel));
+  router.add("POST", job + "/suspend", Role::kSubmit, act(&Dispatcher::suspend));
+  router.add("POST", job + "/resume", Role::kSubmit, act(&Dispatcher::resume));
+  router.add("POST", job + "/retry", Role::kSubmit, act(&Dispatcher::retry));
 }
 
 }  // namespace voxdag::server

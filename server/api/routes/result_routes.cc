@@ -3,13 +3,15 @@
 
 #include "core/base/error.h"
 #include "server/api/context.h"
-#include "server/api/file_answer.h"
 #include "server/api/problem.h"
 #include "server/api/routes/router.h"
+#include "server/http/digest_field.h"
+#include "server/random_id.h"
 
 namespace voxdag::server {
 namespace {
 
+constexpr const char* kDagType = "application/octet-stream";
 constexpr uint64_t kMaxReportBytes = uint64_t{4} << 20;
 constexpr uint64_t kDefaultLogBytes = 65536;
 constexpr uint64_t kMaxLogBytes = uint64_t{1} << 20;
@@ -52,16 +54,87 @@ std::string file_name(const Job& job) {
          ".vdag";
 }
 
+// Whether the value of If-None-Match has this entity tag. The comparison is weak.
+bool has_tag(std::string_view list, std::string_view tag) {
+  if (trimmed(list) == "*") return true;
+  while (!list.empty()) {
+    const size_t comma = std::min(list.find(','), list.size());
+    std::string_view entry = trimmed(list.substr(0, comma));
+    if (entry.starts_with("W/")) entry.remove_prefix(2);
+    if (entry == tag) return true;
+    list.remove_prefix(std::min(comma + 1, list.size()));
+  }
+  return false;
+}
+
+std::string content_range(const ByteRange& range, uint64_t size) {
+  return "bytes " + std::to_string(range.begin) + "-" + std::to_string(range.end - 1) + "/" +
+         std::to_string(size);
+}
+
+RangeAnswer requested_ranges(const Request& request, const std::string& tag, uint64_t size) {
+  const auto condition = request.headers.find("If-Range");
+  // An entity tag that differs, or a date, makes the answer the whole file.
+  if (condition != request.headers.end() && trimmed(condition->second) != tag) return {};
+  return parse_ranges(request.header("Range"), size);
+}
+
+void add_multipart(Response& response, const std::vector<ByteRange>& ranges, uint64_t size) {
+  const std::string boundary = random_id() + random_id();
+  for (const ByteRange& range : ranges)
+    response.pieces.push_back({"\r\n--" + boundary + "\r\nContent-Type: " + kDagType +
+                                   "\r\nContent-Range: " + content_range(range, size) + "\r\n\r\n",
+                               range});
+  response.pieces.push_back({"\r\n--" + boundary + "--\r\n", {}});
+  response.headers.emplace("Content-Type", "multipart/byteranges; boundary=" + boundary);
+}
+
+// A large file, which must not be empty: whole, one range or several (RFC 9110, sections 13 and
+// 14), as 200, 206 or 304. Its SHA-256 in hex is its ETag. Throws Problem (416).
+Response answer_with_file(const Request& request, std::shared_ptr<ReadableFile> file,
+                          const std::string& sha256, const std::string& name) {
+  const uint64_t size = file->size();
+  const std::string tag = '"' + sha256 + '"';
+  Response response;
+  response.headers.emplace("ETag", tag);
+  response.headers.emplace("Accept-Ranges", "bytes");
+  response.headers.emplace("Cache-Control", "private, no-cache");
+  if (has_tag(request.header("If-None-Match"), tag)) {
+    response.status = 304;
+    return response;
+  }
+  const RangeAnswer requested = requested_ranges(request, tag, size);
+  if (requested.kind == RangeAnswer::Kind::kUnsatisfiable) {
+    Problem problem(416, "range_not_satisfiable", "no requested range lies within the file");
+    problem.headers.emplace("Content-Range", "bytes */" + std::to_string(size));
+    throw problem;
+  }
+  response.headers.emplace("Content-Disposition", "attachment; filename=\"" + name + '"');
+  response.headers.emplace("Repr-Digest", digest_field(sha256));
+  if (requested.kind == RangeAnswer::Kind::kPart) {
+    response.status = 206;
+    if (requested.ranges.size() == 1) {
+      response.headers.emplace("Content-Range", content_range(requested.ranges[0], size));
+      response.headers.emplace("Content-Type", kDagType);
+      response.pieces.push_back({"", requested.ranges[0]});
+    } else {
+      add_multipart(response, requested.ranges, size);
+    }
+  } else {
+    response.headers.emplace("Content-Type", kDagType);
+    response.pieces.push_back({"", {0, size}});
+  }
+  response.file = std::move(file);
+  return response;
+}
+
 Response get_dag(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   auto permit = context.transfers.acquire();
   if (!permit) throw busy("too many transfers", 5);
-  FileAnswer answer;
-  answer.file = context.files.open_read(context.dispatcher.folder(job.id).result());
-  answer.type = "application/octet-stream";
-  answer.sha256 = nlohmann::json::parse(job.result).at("sha256").get<std::string>();
-  answer.name = file_name(job);
-  Response response = answer_with_file(call.request, std::move(answer));
+  Response response = answer_with_file(
+      call.request, context.files.open_read(context.dispatcher.folder(job.id).result()),
+      nlohmann::json::parse(job.result).at("sha256"), file_name(job));
   if (response.file) {
     response.permit = std::move(permit);
     if (call.request.method == "GET")
@@ -85,11 +158,7 @@ Response get_preview(Context& context, Call& call) {
   if (job.preview != Preview::kReady || !context.files.exists(path))
     throw not_found(job.preview == Preview::kFailed ? "the preview could not be rendered"
                                                     : "the preview is not rendered yet");
-  Response response;
-  response.headers.emplace("Content-Type", "image/png");
-  response.headers.emplace("Cache-Control", "private, max-age=3600");
-  response.body = read_whole(context.files, path);
-  return response;
+  return make_response(200, "image/png", "private, max-age=3600", read_whole(context.files, path));
 }
 
 Response get_log(Context& context, Call& call) {
@@ -97,9 +166,7 @@ Response get_log(Context& context, Call& call) {
   const uint64_t max_bytes = call.query_integer("max_bytes", kDefaultLogBytes, 1, kMaxLogBytes);
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).log();
-  Response response;
-  response.headers.emplace("Content-Type", "text/plain; charset=utf-8");
-  response.headers.emplace("Cache-Control", "no-store");
+  Response response = make_response(200, "text/plain; charset=utf-8", "no-store");
   if (!context.files.exists(path)) return response;
   const auto file = context.files.open_read(path);
   const uint64_t size = file->size(), begin = size - std::min(size, max_bytes);
@@ -118,16 +185,13 @@ Response get_subvolumes(Context& context, Call& call) {
 
 }  // namespace
 
-void add_result_routes(Router& router, Context& context) {
-  using Get = Response (*)(Context&, Call&);
-  const std::pair<const char*, Get> routes[] = {{"dag", get_dag},
-                                                {"report", get_report},
-                                                {"preview.png", get_preview},
-                                                {"log", get_log},
-                                                {"subvolumes", get_subvolumes}};
-  for (const auto& [name, get] : routes)
-    router.add("GET", std::string("/api/v1/jobs/{id}/") + name, Role::kRead,
-               [&context, get = get](Call& call) { return get(context, call); });
+void add_result_routes(Router& router) {
+  const std::string job = "/api/v1/jobs/{id}/";
+  router.add("GET", job + "dag", Role::kRead, get_dag);
+  router.add("GET", job + "report", Role::kRead, get_report);
+  router.add("GET", job + "preview.png", Role::kRead, get_preview);
+  router.add("GET", job + "log", Role::kRead, get_log);
+  router.add("GET", job + "subvolumes", Role::kRead, get_subvolumes);
 }
 
 }  // namespace voxdag::server

@@ -64,7 +64,7 @@ Response Router::route(Request& request, AccessControl& access) const {
     if (route.method == method) {
       call.caller = access.admit(request, route.role);
       request.caller = call.caller.name;
-      return route.handler(call);
+      return route.handler(context_, call);
     }
     allowed += (allowed.empty() ? "" : ", ") + route.method;
     if (route.method == "GET") allowed += ", HEAD";
@@ -77,11 +77,12 @@ Response Router::route(Request& request, AccessControl& access) const {
 }
 
 Response json_response(int status, std::string body) {
+  return make_response(status, "application/json", "no-store", std::move(body));
+}
+
+Response no_content() {
   Response response;
-  response.status = status;
-  response.headers.emplace("Content-Type", "application/json");
-  response.headers.emplace("Cache-Control", "no-store");
-  response.body = std::move(body);
+  response.status = 204;
   return response;
 }
 

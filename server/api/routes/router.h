@@ -11,6 +11,8 @@
 
 namespace voxdag::server {
 
+struct Context;
+
 // A request to which access was granted.
 struct Call {
   Request& request;
@@ -28,7 +30,9 @@ struct Call {
 
 class Router {
  public:
-  using Handler = std::function<Response(Call&)>;
+  using Handler = std::function<Response(Context&, Call&)>;
+
+  explicit Router(Context& context) : context_(context) {}
 
   // `pattern` is like "/api/v1/jobs/{id}/dag". A GET route answers HEAD, too.
   void add(const std::string& method, const std::string& pattern, Role role, Handler handler);
@@ -42,10 +46,19 @@ class Router {
     Role role;
     Handler handler;
   };
+  Context& context_;
   std::vector<Route> routes_;
 };
 
+void add_job_routes(Router& router);
+void add_result_routes(Router& router);
+void add_event_routes(Router& router);
+void add_scene_routes(Router& router);
+void add_system_routes(Router& router);
+
 Response json_response(int status, std::string body);
+// 204
+Response no_content();
 // The body of a request. Throws Problem: 413 if it is larger than `max_bytes`, 415 if its content
 // type is not JSON, 400 or 408 if it ends early.
 std::string read_json_body(Request& request, uint64_t max_bytes);

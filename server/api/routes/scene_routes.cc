@@ -163,24 +163,20 @@ Response delete_scene(Context& context, Call& call) {
   std::lock_guard lock(context.scene_mutex);
   check_unused(context, name);
   if (!context.scenes.remove(name)) throw not_found("no such scene");
-  Response response;
-  response.status = 204;
-  return response;
+  return no_content();
 }
 
 }  // namespace
 
-void add_scene_routes(Router& router, Context& context) {
-  router.add("GET", "/api/v1/scenes", Role::kRead,
-             [&](Call& call) { return list_scenes(context, call); });
-  router.add("GET", "/api/v1/scenes/{name}", Role::kRead, [&](Call& call) {
+void add_scene_routes(Router& router) {
+  const auto get_scene = [](Context& context, Call& call) {
     call.allow_query({});
     return scene_response(context, 200, checked_name(call));
-  });
-  router.add("PUT", "/api/v1/scenes/{name}", Role::kSubmit,
-             [&](Call& call) { return put_scene(context, call); });
-  router.add("DELETE", "/api/v1/scenes/{name}", Role::kAdmin,
-             [&](Call& call) { return delete_scene(context, call); });
+  };
+  router.add("GET", "/api/v1/scenes", Role::kRead, list_scenes);
+  router.add("GET", "/api/v1/scenes/{name}", Role::kRead, get_scene);
+  router.add("PUT", "/api/v1/scenes/{name}", Role::kSubmit, put_scene);
+  router.add("DELETE", "/api/v1/scenes/{name}", Role::kAdmin, delete_scene);
 }
 
 }  // namespace voxdag::server

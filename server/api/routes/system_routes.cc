@@ -37,7 +37,7 @@ void check_writable(Context& context) {
   context.files.remove(probe);
 }
 
-Response get_ready(Context& context) {
+Response get_ready(Context& context, Call&) {
   if (context.draining) throw busy("the service is stopping");
   const std::string& data = context.config.data_folder;
   try {
@@ -69,26 +69,24 @@ Response get_metrics(Context& context, double started_s) {
        process_cpu_seconds()},
       {"voxdag_uptime_seconds", "Time since the service started.", wall_seconds() - started_s},
   };
-  Response response;
-  response.headers.emplace("Content-Type", "text/plain; version=0.0.4; charset=utf-8");
-  response.headers.emplace("Cache-Control", "no-store");
-  response.body = context.metrics.text(context.queue.counts(), samples);
-  return response;
+  return make_response(200, "text/plain; version=0.0.4; charset=utf-8", "no-store",
+                       context.metrics.text(context.queue.counts(), samples));
 }
 
 }  // namespace
 
-void add_system_routes(Router& router, Context& context) {
+void add_system_routes(Router& router) {
   router.add("GET", "/healthz", Role::kNone,
-             [](Call&) { return json_response(200, "{\"status\":\"ok\"}"); });
-  router.add("GET", "/readyz", Role::kNone, [&](Call&) { return get_ready(context); });
-  router.add("GET", "/version", Role::kNone, [](Call&) {
+             [](Context&, Call&) { return json_response(200, "{\"status\":\"ok\"}"); });
+  router.add("GET", "/readyz", Role::kNone, get_ready);
+  router.add("GET", "/version", Role::kNone, [](Context&, Call&) {
     return json_response(200, "{\"version\":\"" VOXDAG_VERSION "\",\"api\":\"v1\"}");
   });
-  router.add("GET", "/metrics", Role::kRead,
-             [&, started_s = wall_seconds()](Call&) { return get_metrics(context, started_s); });
+  router.add("GET", "/metrics", Role::kRead, [started_s = wall_seconds()](Context& context, Call&) {
+    return get_metrics(context, started_s);
+  });
   for (const Asset& asset : embedded_assets()) {
-    const auto get = [asset](Call& call) { return get_asset(call, asset); };
+    const auto get = [asset](Context&, Call& call) { return get_asset(call, asset); };
     router.add("GET", '/' + asset.name, Role::kNone, get);
     if (asset.name == "index.html") router.add("GET", "/", Role::kNone, get);
   }
