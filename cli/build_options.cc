@@ -2,7 +2,6 @@
 
 #include <sstream>
 
-#include "cli/parse_list.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
 

@@ -6,11 +6,26 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <array>
+#include <string>
 
 #include "core/base/cancel_token.h"
+#include "core/base/error.h"
+#include "core/base/text.h"
 #include "core/io/file_system.h"
 
 namespace voxdag::cli {
+
+// Exactly kCount numbers separated by `separator`, such as X,Y,Z or WIDTHxHEIGHT. Throws
+// Error{kInvalidInput} that names the option and says what was `expected`.
+template <class Number, size_t kCount>
+std::array<Number, kCount> parse_list(const std::string& option, const std::string& text,
+                                      char separator, const std::string& expected) {
+  const auto numbers = parse_numbers<Number, kCount>(text, separator);
+  if (!numbers)
+    throw Error(ErrorCode::kInvalidInput, option + " '" + text + "': expected " + expected);
+  return *numbers;
+}
 
 struct CommandContext {
   FileSystem& files;

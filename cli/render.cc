@@ -7,7 +7,6 @@
 #include <thread>
 
 #include "cli/command.h"
-#include "cli/parse_list.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
 #include "core/base/text.h"

@@ -8,10 +8,6 @@ namespace {
 // A smaller component of a direction counts as 0; its inverse could be infinite.
 constexpr double kMinComponent = 1e-18;
 
-struct Times {
-  double t[3];
-};
-
 // The descent of one ray.
 class Walk {
  public:
@@ -29,23 +25,23 @@ class Walk {
 
   bool run(double t_min, Hit& hit) {
     const int64_t whole[3] = {0, 0, 0};
-    const Times in = planes(whole, 0), out = planes(whole, dag_.resolution());
+    const Vec in = planes(whole, 0), out = planes(whole, dag_.resolution());
     double t = t_min;
     for (int axis = 0; axis < 3; ++axis)
-      if (in.t[axis] > t) {
-        t = in.t[axis];
+      if (in[axis] > t) {
+        t = in[axis];
         axis_ = axis;
       }
-    if (t > std::min({out.t[0], out.t[1], out.t[2], t_max_})) return false;
+    if (t > std::min({out[0], out[1], out[2], t_max_})) return false;
     return enter(0, whole, dag_.root(), t, hit);
   }
 
  private:
   // The ray parameters at the planes `add` voxels above the corner.
-  Times planes(const int64_t (&corner)[3], int64_t add) const {
-    Times times;
+  Vec planes(const int64_t (&corner)[3], int64_t add) const {
+    Vec times;
     for (int axis = 0; axis < 3; ++axis)
-      times.t[axis] = (static_cast<double>(corner[axis] + add) - origin_[axis]) * inverse_[axis];
+      times[axis] = (static_cast<double>(corner[axis] + add) - origin_[axis]) * inverse_[axis];
     return times;
   }
 
@@ -57,13 +53,13 @@ class Walk {
       return true;
     }
     const DagView::Children children = dag_.children(depth, content);
-    const Times middle = planes(corner, size / 2), out = planes(corner, size);
-    Times next = middle;
+    const Vec middle = planes(corner, size / 2), out = planes(corner, size);
+    Vec next = middle;
     int index = 0;
     for (int axis = 0; axis < 3; ++axis)
-      if (t >= middle.t[axis]) {
+      if (t >= middle[axis]) {
         index |= 4 >> axis;
-        next.t[axis] = out.t[axis];
+        next[axis] = out[axis];
       }
     for (;;) {
       if (children.has(index ^ mirror_)) {
@@ -74,13 +70,13 @@ class Walk {
         if (enter(depth + 1, low, dag_.content(depth, children, index ^ mirror_), t, hit))
           return true;
       }
-      const int axis = next.t[0] <= next.t[1] ? (next.t[0] <= next.t[2] ? 0 : 2)
-                                              : (next.t[1] <= next.t[2] ? 1 : 2);
-      t = next.t[axis];
+      const int axis =
+          next[0] <= next[1] ? (next[0] <= next[2] ? 0 : 2) : (next[1] <= next[2] ? 1 : 2);
+      t = next[axis];
       if (index & 4 >> axis || t > t_max_) return false;
       axis_ = axis;
       index |= 4 >> axis;
-      next.t[axis] = out.t[axis];
+      next[axis] = out[axis];
     }
   }
 

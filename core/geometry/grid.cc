@@ -18,9 +18,7 @@ void check_levels(uint32_t levels) {
 }
 
 Grid centered(const WorldBounds& bounds, double edge, uint32_t levels) {
-  Grid grid;
-  grid.levels = levels;
-  grid.edge = edge;
+  Grid grid{levels, {}, edge};
   for (int a = 0; a < 3; ++a) {
     const double middle = bounds.empty ? 0.0 : 0.5 * (bounds.low[a] + bounds.high[a]);
     grid.origin[a] = middle - 0.5 * edge;
@@ -59,11 +57,7 @@ Grid Grid::given(const std::array<double, 3>& origin, double edge, uint32_t leve
                       std::isfinite(origin[2]) && std::isfinite(edge);
   if (!finite || !(edge > 0))
     throw Error(ErrorCode::kInvalidInput, "bounds: expected finite X,Y,Z and an EDGE above 0");
-  Grid grid;
-  grid.levels = levels;
-  grid.origin = origin;
-  grid.edge = edge;
-  return grid;
+  return {levels, origin, edge};
 }
 
 Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels) {

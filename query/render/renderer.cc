@@ -1,13 +1,10 @@
 #include "query/render/renderer.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
-#include <thread>
 #include <vector>
 
+#include "core/base/parallel_for.h"
 #include "query/render/bounds.h"
 #include "query/render/g_buffer.h"
 #include "query/render/lighting.h"
@@ -102,28 +99,6 @@ GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighti
   return p;
 }
 
-// Runs work(0) to work(count - 1) on threads; the first exception stops all and is rethrown.
-template <class Work>
-void for_each_row(int count, int threads, const Work& work) {
-  std::atomic<int> next{0};
-  std::exception_ptr failure;
-  std::mutex mutex;
-  const auto run = [&] {
-    try {
-      for (int row; (row = next.fetch_add(1)) < count;) work(row);
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      if (!failure) failure = std::current_exception();
-      next = count;
-    }
-  };
-  std::vector<std::jthread> helpers;
-  for (int i = 1; i < threads; ++i) helpers.emplace_back(run);
-  run();
-  helpers.clear();
-  if (failure) std::rethrow_exception(failure);
-}
-
 }  // namespace
 
 Picture render_picture(const DagView& dag, const Placement& placement, const RenderOptions& options,
@@ -138,7 +113,11 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
 
   GBuffer buffer(width, height);
   progress.begin_stage("render", static_cast<uint64_t>(height), "rows");
-  for_each_row(height, options.threads, [&](int y) {
+  const auto for_each_row = [&](const auto& work) {
+    parallel_for(static_cast<unsigned>(options.threads), static_cast<size_t>(height),
+                 [&](unsigned, size_t row) { work(static_cast<int>(row)); });
+  };
+  for_each_row([&](int y) {
     for (int x = 0; x < width; ++x) {
       cancel.check();
       buffer.at(x, y) = sample_pixel(dag, camera, lighting, options.samples, x, y);
@@ -148,7 +127,7 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
   progress.end_stage();
 
   Picture picture(width, height);
-  const auto resolve_row = [&](int y) {
+  for_each_row([&](int y) {
     constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
     const Vec background = mix(kTopColor, kBottomColor, (y + 0.5) / height);
     for (int x = 0; x < width; ++x) {
@@ -164,8 +143,7 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
       const double dither = (kBayer[y % 4][x % 4] + 0.5) / 16;
       for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(color[c], dither);
     }
-  };
-  for_each_row(height, options.threads, resolve_row);
+  });
   return picture;
 }
 

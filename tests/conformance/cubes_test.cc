@@ -1,5 +1,6 @@
 // Subvolumes of every level, anywhere in grids of up to 2^20 voxels per edge.
 #include "tests/conformance/harness.h"
+#include "tests/oracle/check_sub_dag.h"
 
 namespace voxdag {
 namespace {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/dag/brick.h"
+#include "tests/oracle/check_sub_dag.h"
 
 namespace voxdag {
 namespace {

@@ -5,15 +5,6 @@
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
-namespace {
-
-uint64_t hash_of(uint32_t mask, int count, const uint64_t* child_hashes) {
-  uint64_t hash = node_hash_begin(mask);
-  for (int i = 0; i < count; ++i) hash = node_hash_add(hash, child_hashes[i]);
-  return node_hash_end(hash);
-}
-
-}  // namespace
 
 NodeRef TileReducer::reduce_bricks(TileBricks& tile, int size_log2) {
   if (size_log2 == kBrickLevels) {
@@ -111,7 +102,7 @@ void TileReducer::look_up(const Parents& parents, NodeTable& table, uint64_t* ha
   // The children of a node are at or behind its own position, so they are read before overwritten.
   for (int i = 0; i < count; ++i) {
     hashes[i] =
-        hash_of(parents.masks[i], popcount8(parents.masks[i]), &hashes[parents.first_child[i]]);
+        hash_node(parents.masks[i], popcount8(parents.masks[i]), &hashes[parents.first_child[i]]);
     table.prefetch_slot(hashes[i]);
   }
   if (count > 4)

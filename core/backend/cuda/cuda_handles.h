@@ -1,12 +1,28 @@
-// RAII owners of the CUDA runtime's handles.
+// Checked calls of the CUDA runtime, and RAII owners of its handles.
 #pragma once
 
 #include <cuda_runtime_api.h>
 
 #include <memory>
+#include <string>
 #include <type_traits>
 
+#include "core/backend/out_of_budget.h"
+#include "core/base/error.h"
+
 namespace voxdag::cuda {
+
+// Checks a call of the runtime: running out of device memory is OutOfBudget (the subvolume is
+// split), any other failure an Error{kDevice} that names the call and the place.
+// `call`: the runtime's or CUB's function; `where`: device and subvolume.
+inline void check_call(cudaError_t status, const char* call, const std::string& where) {
+  if (status == cudaSuccess) return;
+  cudaGetLastError();  // clears the error, which is reported here
+  if (status == cudaErrorMemoryAllocation) throw OutOfBudget{};
+  throw Error(ErrorCode::kDevice, std::string(call) + " failed on " + where + ": " +
+                                      cudaGetErrorString(status) + " (" + cudaGetErrorName(status) +
+                                      ")");
+}
 
 struct DestroyStream {
   void operator()(cudaStream_t stream) const { cudaStreamDestroy(stream); }

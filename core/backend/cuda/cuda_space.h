@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "core/backend/cuda/cuda_call.h"
 #include "core/backend/cuda/cuda_device.h"
 #include "core/backend/parallel/space.h"
 
@@ -142,7 +141,16 @@ class CudaSpace {
   // CUB's two phases: call(nullptr, bytes) returns the size of the temporary storage, call(storage,
   // bytes) does the work. The storage is retained for the next call.
   template <class Call>
-  void with_storage(const char* name, Call call);
+  void with_storage(const char* name, Call call) {
+    cancel_.check();
+    size_t bytes = 0;
+    check(call(nullptr, bytes), name);
+    if (bytes > storage_.size() || storage_.size() == 0) {
+      storage_ = {};
+      storage_ = Array<uint8_t>(*this, std::max<size_t>(bytes, 1));
+    }
+    check(call(storage_.data(), bytes), name);
+  }
 
   template <class T>
   T* answer() {

@@ -7,7 +7,7 @@
 #include <cub/device/device_select.cuh>
 #include <cuda/std/functional>
 
-#include "core/backend/cuda/with_storage.h"
+#include "core/backend/cuda/cuda_space.h"
 
 namespace voxdag::cuda {
 namespace {

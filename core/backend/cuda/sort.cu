@@ -1,7 +1,7 @@
 // Radix sorts on the device.
 #include <cub/device/device_radix_sort.cuh>
 
-#include "core/backend/cuda/with_storage.h"
+#include "core/backend/cuda/cuda_space.h"
 
 namespace voxdag::cuda {
 

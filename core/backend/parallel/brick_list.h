@@ -40,9 +40,8 @@ class BrickList {
     if (sorted_ || size_ == 0) return;
     Order<Space> order(space_, size_);
     order.sort_by(KeyAt{codes_.data()}, 0, code_bits_);
-    SpaceArray<Space, uint64_t> sorted_codes(space_, size_), sorted_masks(space_, size_);
-    space_.for_each(size_, Gather<uint64_t>{order.items(), codes_.data(), sorted_codes.data()});
-    space_.for_each(size_, Gather<uint64_t>{order.items(), masks_.data(), sorted_masks.data()});
+    const auto sorted_codes = gather<uint64_t>(space_, size_, order.items(), codes_.data());
+    const auto sorted_masks = gather<uint64_t>(space_, size_, order.items(), masks_.data());
     size_ = space_.merge_runs(sorted_codes.data(), sorted_masks.data(), size_, codes_.data(),
                               masks_.data());
     sorted_ = true;

@@ -7,18 +7,6 @@
 #include "core/base/page_buffer.h"
 
 namespace voxdag::parallel {
-namespace {
-
-// The items of part `part` of `parts`.
-struct Part {
-  uint32_t begin, end;
-  Part(uint32_t n, uint32_t parts, size_t part)
-      : begin(static_cast<uint32_t>(uint64_t{n} * part / parts)),
-        end(static_cast<uint32_t>(uint64_t{n} * (part + 1) / parts)) {}
-};
-
-}  // namespace
-
 void* HostSpace::allocate(uint64_t bytes) {
   try {
     return allocate_pages(bytes, "the parallel backend's buffers");
@@ -38,14 +26,12 @@ void HostSpace::scan(uint32_t* counts, uint32_t n) {
   cancel_.check();
   const uint32_t parts = part_count(n);
   std::vector<uint32_t> sums(parts + 1);
-  parallel_for(threads_, parts, [&](unsigned, size_t p) {
-    const Part part(n, parts, p);
-    sums[p] = std::accumulate(counts + part.begin, counts + part.end, uint32_t{0});
+  for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
+    sums[p] = std::accumulate(counts + begin, counts + end, uint32_t{0});
   });
   std::exclusive_scan(sums.begin(), sums.end(), sums.begin(), uint32_t{0});
-  parallel_for(threads_, parts, [&](unsigned, size_t p) {
-    const Part part(n, parts, p);
-    std::exclusive_scan(counts + part.begin, counts + part.end, counts + part.begin, sums[p]);
+  for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
+    std::exclusive_scan(counts + begin, counts + end, counts + begin, sums[p]);
   });
   counts[n] = sums[parts];
 }
@@ -54,15 +40,13 @@ uint32_t HostSpace::select(const uint8_t* flags, uint32_t n, uint32_t* out) {
   cancel_.check();
   const uint32_t parts = part_count(n);
   std::vector<uint32_t> starts(parts + 1);
-  parallel_for(threads_, parts, [&](unsigned, size_t p) {
-    const Part part(n, parts, p);
-    for (uint32_t i = part.begin; i < part.end; ++i) starts[p] += flags[i] != 0;
+  for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) starts[p] += flags[i] != 0;
   });
   std::exclusive_scan(starts.begin(), starts.end(), starts.begin(), uint32_t{0});
-  parallel_for(threads_, parts, [&](unsigned, size_t p) {
-    const Part part(n, parts, p);
+  for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
     uint32_t at = starts[p];
-    for (uint32_t i = part.begin; i < part.end; ++i)
+    for (uint32_t i = begin; i < end; ++i)
       if (flags[i]) out[at++] = i;
   });
   return starts[parts];
@@ -74,17 +58,15 @@ uint32_t HostSpace::merge_runs(const uint64_t* keys, const uint64_t* masks, uint
   const auto starts_run = [&](uint32_t i) { return i == 0 || keys[i] != keys[i - 1]; };
   const uint32_t parts = part_count(n);
   std::vector<uint32_t> starts(parts + 1);
-  parallel_for(threads_, parts, [&](unsigned, size_t p) {
-    const Part part(n, parts, p);
-    for (uint32_t i = part.begin; i < part.end; ++i) starts[p] += starts_run(i);
+  for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) starts[p] += starts_run(i);
   });
   std::exclusive_scan(starts.begin(), starts.end(), starts.begin(), uint32_t{0});
   // A part writes the runs that start in it, however far they reach.
-  parallel_for(threads_, parts, [&](unsigned, size_t p) {
-    const Part part(n, parts, p);
-    uint32_t at = starts[p], i = part.begin;
-    while (i < part.end && !starts_run(i)) ++i;
-    while (i < part.end) {
+  for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
+    uint32_t at = starts[p], i = begin;
+    while (i < end && !starts_run(i)) ++i;
+    while (i < end) {
       out_keys[at] = keys[i];
       uint64_t mask = masks[i];
       while (++i < n && !starts_run(i)) mask |= masks[i];
@@ -98,9 +80,8 @@ uint64_t HostSpace::count_bits(const uint64_t* masks, uint32_t n) {
   cancel_.check();
   const uint32_t parts = part_count(n);
   std::vector<uint64_t> sums(parts);
-  parallel_for(threads_, parts, [&](unsigned, size_t p) {
-    const Part part(n, parts, p);
-    for (uint32_t i = part.begin; i < part.end; ++i) sums[p] += std::popcount(masks[i]);
+  for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) sums[p] += std::popcount(masks[i]);
   });
   return std::accumulate(sums.begin(), sums.end(), uint64_t{0});
 }
@@ -120,18 +101,16 @@ void HostSpace::radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch,
     const uint64_t* from = keys.data();
     uint64_t* to = key_scratch.data();
     std::fill(places.begin(), places.end(), 0);
-    parallel_for(threads_, parts, [&](unsigned, size_t p) {
-      const Part part(n, parts, p);
+    for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
       uint32_t* counts = &places[p << kDigitBits];
-      for (uint32_t i = part.begin; i < part.end; ++i) ++counts[digit(from[i])];
+      for (uint32_t i = begin; i < end; ++i) ++counts[digit(from[i])];
     });
     uint32_t at = 0;
     for (uint32_t d = 0; d <= digit_mask; ++d)
       for (uint32_t p = 0; p < parts; ++p) at += std::exchange(places[p << kDigitBits | d], at);
-    parallel_for(threads_, parts, [&](unsigned, size_t p) {
-      const Part part(n, parts, p);
+    for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
       uint32_t* next = &places[p << kDigitBits];
-      for (uint32_t i = part.begin; i < part.end; ++i) {
+      for (uint32_t i = begin; i < end; ++i) {
         const uint32_t place = next[digit(from[i])]++;
         to[place] = from[i];
         if constexpr (kWithValues) value_scratch->data()[place] = values->data()[i];

@@ -108,6 +108,15 @@ class HostSpace {
                   Array<uint32_t>* value_scratch, uint32_t n, int begin_bit, int end_bit);
   // The number of parts to divide n items into where each part has its own counts.
   uint32_t part_count(uint32_t n) const;
+  // Calls body(part, begin, end) for the items of each part.
+  template <class Body>
+  void for_parts(uint32_t n, Body body) {
+    const uint32_t parts = part_count(n);
+    parallel_for(threads_, parts, [&](unsigned, size_t p) {
+      body(p, static_cast<uint32_t>(uint64_t{n} * p / parts),
+           static_cast<uint32_t>(uint64_t{n} * (p + 1) / parts));
+    });
+  }
 
   MemoryBudget& budget_;
   const CancelToken& cancel_;

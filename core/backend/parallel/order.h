@@ -30,6 +30,14 @@ struct Gather {
   VOXDAG_HD void operator()(uint32_t i) const { to[i] = from[items[i]]; }
 };
 
+// Elements items[0, count) of `from`.
+template <class T, class Space>
+SpaceArray<Space, T> gather(Space& space, uint32_t count, const uint32_t* items, const T* from) {
+  SpaceArray<Space, T> out(space, count);
+  space.for_each(count, Gather<T>{items, from, out.data()});
+  return out;
+}
+
 struct InvertOrder {
   const uint32_t* items;
   uint32_t* place_of;

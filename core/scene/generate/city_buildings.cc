@@ -58,10 +58,9 @@ void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
     return along_x ? Vec3{tier.x + l, y + up, tier.z + c} : Vec3{tier.x + c, y + up, tier.z - l};
   };
   Mesh& mesh = scene.mesh_for(6, 6);
-  const uint32_t first = mesh.vertices();
-  for (const Vec3& p : {at(-along, 0, across), at(along, 0, across), at(along, 0, -across),
-                        at(-along, 0, -across), at(-ridge, height, 0), at(ridge, height, 0)})
-    mesh.add_vertex(p);
+  const uint32_t first =
+      mesh.add_vertices({at(-along, 0, across), at(along, 0, across), at(along, 0, -across),
+                         at(-along, 0, -across), at(-ridge, height, 0), at(ridge, height, 0)});
   constexpr uint8_t kFaces[6][3] = {{0, 1, 5}, {0, 5, 4}, {1, 2, 5},
                                     {2, 3, 4}, {2, 4, 5}, {3, 0, 4}};
   for (const auto& f : kFaces) mesh.add_triangle(first + f[0], first + f[1], first + f[2]);

@@ -44,11 +44,12 @@ Mesh tree_mesh() {
   mesh.box({-0.03125, 0, -0.03125}, {0.03125, 0.3125, 0.03125}, false);
   for (const auto& [low, middle, high, radius] :
        {std::array{0.1875, 0.375, 0.75, 0.25}, std::array{0.46875, 0.5625, 1.0, 0.1875}}) {
-    const uint32_t first = mesh.vertices();
-    for (const Vec3& p :
-         {Vec3{radius, middle, 0}, Vec3{0, middle, radius}, Vec3{-radius, middle, 0},
-          Vec3{0, middle, -radius}, Vec3{0, low, 0}, Vec3{0, high, 0}})
-      mesh.add_vertex(p);
+    const uint32_t first = mesh.add_vertices({{radius, middle, 0},
+                                              {0, middle, radius},
+                                              {-radius, middle, 0},
+                                              {0, middle, -radius},
+                                              {0, low, 0},
+                                              {0, high, 0}});
     for (uint32_t side = 0; side < 4; ++side) {
       const uint32_t a = first + side, b = first + (side + 1) % 4;
       mesh.add_triangle(b, a, first + 5);

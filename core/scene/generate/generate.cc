@@ -9,11 +9,13 @@ namespace voxdag {
 namespace {
 
 constexpr SceneKindInfo kKinds[] = {
-    {SceneKind::kCity, "city", "streets, houses with rotated roofs, windows, trees", 400'000},
-    {SceneKind::kMenger, "menger", "Menger's sponge on the integer lattice", 0},
-    {SceneKind::kTerrain, "terrain", "a fractal heightfield", 1'000'000},
-    {SceneKind::kSoup, "soup", "random triangles, slivers and degenerate ones among them", 100'000},
-    {SceneKind::kSpheres, "spheres", "spheres of many sizes", 500'000},
+    {SceneKind::kCity, "city", "streets, houses with rotated roofs, windows, trees", 400'000,
+     make_city},
+    {SceneKind::kMenger, "menger", "Menger's sponge on the integer lattice", 0, make_menger},
+    {SceneKind::kTerrain, "terrain", "a fractal heightfield", 1'000'000, make_terrain},
+    {SceneKind::kSoup, "soup", "random triangles, slivers and degenerate ones among them", 100'000,
+     make_soup},
+    {SceneKind::kSpheres, "spheres", "spheres of many sizes", 500'000, make_spheres},
 };
 
 constexpr uint32_t kMaxMengerLevel = 5;
@@ -45,41 +47,9 @@ void check(const GenerateOptions& options) {
 
 void make(const GenerateOptions& options, BlockSink& sink) {
   SceneBuilder scene(sink, options.instances);
-  switch (options.kind) {
-    case SceneKind::kCity:
-      make_city(options, scene);
-      break;
-    case SceneKind::kMenger:
-      make_menger(options, scene);
-      break;
-    case SceneKind::kTerrain:
-      make_terrain(options, scene);
-      break;
-    case SceneKind::kSoup:
-      make_soup(options, scene);
-      break;
-    case SceneKind::kSpheres:
-      make_spheres(options, scene);
-      break;
-  }
+  scene_kind(options.kind).make(options, scene);
   scene.finish();
 }
-
-// The layout with progress and cancellation.
-class MeasuredLayout : public GlbLayout {
- public:
-  MeasuredLayout(Progress& progress, const CancelToken& cancel)
-      : progress_(progress), cancel_(cancel) {}
-  void mesh(const Mesh& mesh) override {
-    cancel_.check();
-    GlbLayout::mesh(mesh);
-    progress_.advance(mesh.triangles());
-  }
-
- private:
-  Progress& progress_;
-  const CancelToken& cancel_;
-};
 
 }  // namespace
 
@@ -105,7 +75,7 @@ GenerateReport generate_scene(FileSystem& files, const std::string& path,
   const SceneKindInfo& info = scene_kind(options.kind);
   if (options.triangles == 0) options.triangles = info.default_triangles;
 
-  MeasuredLayout layout(progress, cancel);
+  GlbLayout layout(progress, cancel);
   progress.begin_stage("count", options.triangles, "triangles");
   make(options, layout);
   progress.end_stage();

@@ -17,11 +17,15 @@ namespace voxdag {
 
 enum class SceneKind { kCity, kMenger, kTerrain, kSoup, kSpheres };
 
+class SceneBuilder;
+struct GenerateOptions;
+
 struct SceneKindInfo {
   SceneKind kind;
   const char* name;
   const char* summary;
   uint64_t default_triangles;  // 0 for the kind that is sized by its level
+  void (*make)(const GenerateOptions& options, SceneBuilder& scene);
 };
 std::span<const SceneKindInfo> scene_kinds();
 // Throws Error{kInvalidInput} listing the known names for another one.

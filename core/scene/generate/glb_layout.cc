@@ -45,8 +45,10 @@ json instancing_node(uint64_t part, uint64_t translations) {
 }  // namespace
 
 void GlbLayout::mesh(const Mesh& mesh) {
+  cancel_.check();
   add_geometry(Kind::kMesh, mesh);
   triangles_ += mesh.triangles();
+  progress_.advance(mesh.triangles());
 }
 
 void GlbLayout::part(const Mesh& mesh) {

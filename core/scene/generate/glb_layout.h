@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/cancel_token.h"
+#include "core/base/progress.h"
 #include "core/scene/generate/scene_builder.h"
 
 namespace voxdag {
@@ -20,6 +22,8 @@ inline constexpr uint64_t kMaxGlbBytes = UINT32_MAX;
 
 class GlbLayout : public BlockSink {
  public:
+  // `progress` is advanced by the triangles of meshes.
+  GlbLayout(Progress& progress, const CancelToken& cancel) : progress_(progress), cancel_(cancel) {}
   void mesh(const Mesh& mesh) override;
   void part(const Mesh& mesh) override;
   void instances(uint32_t part, std::span<const Float3> translations,
@@ -45,6 +49,8 @@ class GlbLayout : public BlockSink {
   void add_geometry(Kind kind, const Mesh& mesh);
   void add_bytes(uint64_t bytes);
 
+  Progress& progress_;
+  const CancelToken& cancel_;
   std::vector<Block> blocks_;
   std::vector<uint64_t> part_triangles_;
   uint64_t bin_bytes_ = 0;

@@ -32,14 +32,10 @@ Turn pythagorean_turn(uint32_t choice) {
   return {triple[swapped ? 0 : 1] / triple[2], triple[swapped ? 1 : 0] / triple[2]};
 }
 
-void Mesh::clear() {
-  positions.clear();
-  indices.clear();
-}
-
-uint32_t Mesh::add_vertex(const Vec3& p) {
-  positions.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
-  return vertices() - 1;
+uint32_t Mesh::add_vertices(std::initializer_list<Vec3> corners) {
+  const uint32_t first = vertices();
+  for (const Vec3& p : corners) add_vertex(p);
+  return first;
 }
 
 void Mesh::add_triangle(uint32_t a, uint32_t b, uint32_t c) {
@@ -47,14 +43,12 @@ void Mesh::add_triangle(uint32_t a, uint32_t b, uint32_t c) {
 }
 
 void Mesh::triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const uint32_t first = vertices();
-  for (const Vec3* p : {&a, &b, &c}) add_vertex(*p);
+  const uint32_t first = add_vertices({a, b, c});
   add_triangle(first, first + 1, first + 2);
 }
 
 void Mesh::quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-  const uint32_t first = vertices();
-  for (const Vec3* p : {&a, &b, &c, &d}) add_vertex(*p);
+  const uint32_t first = add_vertices({a, b, c, d});
   add_triangle(first, first + 1, first + 2);
   add_triangle(first, first + 2, first + 3);
 }
@@ -75,13 +69,12 @@ void Mesh::turned_box(const Vec3& base, const Vec3& half_and_height, const Turn&
 }
 
 void Mesh::pyramid(const Vec3& base, const Vec3& half_and_height, const Turn& turn) {
-  const uint32_t first = vertices();
   const Vec3& h = half_and_height;
-  add_vertex(turned(base, -h.x, 0, -h.z, turn));
-  add_vertex(turned(base, -h.x, 0, h.z, turn));
-  add_vertex(turned(base, h.x, 0, h.z, turn));
-  add_vertex(turned(base, h.x, 0, -h.z, turn));
-  add_vertex({base.x, base.y + h.y, base.z});
+  const uint32_t first = add_vertices({turned(base, -h.x, 0, -h.z, turn),
+                                       turned(base, -h.x, 0, h.z, turn),
+                                       turned(base, h.x, 0, h.z, turn),
+                                       turned(base, h.x, 0, -h.z, turn),
+                                       {base.x, base.y + h.y, base.z}});
   for (uint32_t side = 0; side < 4; ++side)
     add_triangle(first + side, first + (side + 1) % 4, first + 4);
 }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <vector>
 
 namespace voxdag {
@@ -17,6 +18,9 @@ inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b
 inline Vec3 operator*(const Vec3& a, double s) { return {a.x * s, a.y * s, a.z * s}; }
 
 using Float3 = std::array<float, 3>;
+inline Float3 rounded(const Vec3& v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
 
 // A rotation about the y axis whose cosine and sine are quotients of integers. They come from
 // Pythagorean triples, since sin() differs between machines.
@@ -34,10 +38,10 @@ struct Mesh {
 
   uint32_t vertices() const { return static_cast<uint32_t>(positions.size()); }
   uint32_t triangles() const { return static_cast<uint32_t>(indices.size() / 3); }
-  void clear();
 
-  // Returns the index of the new vertex.
-  uint32_t add_vertex(const Vec3& p);
+  void add_vertex(const Vec3& p) { positions.push_back(rounded(p)); }
+  // Returns the index of the first.
+  uint32_t add_vertices(std::initializer_list<Vec3> corners);
   void add_triangle(uint32_t a, uint32_t b, uint32_t c);
   // Adds a triangle with 3 new vertices.
   void triangle(const Vec3& a, const Vec3& b, const Vec3& c);

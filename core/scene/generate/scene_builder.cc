@@ -3,13 +3,6 @@
 #include <utility>
 
 namespace voxdag {
-namespace {
-
-Float3 rounded(const Vec3& v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
-
-}  // namespace
 
 Mesh& SceneBuilder::mesh_for(uint32_t vertices, uint32_t triangles) {
   if (mesh_.vertices() + vertices > Mesh::kMaxVertices ||
@@ -43,7 +36,8 @@ void SceneBuilder::place_triangles(const Mesh& part, const Vec3& translation, co
 
 void SceneBuilder::flush_mesh() {
   if (mesh_.triangles() > 0) sink_.mesh(mesh_);
-  mesh_.clear();
+  mesh_.positions.clear();
+  mesh_.indices.clear();
 }
 
 void SceneBuilder::flush_instances(uint32_t part) {

@@ -7,6 +7,7 @@
 #include "core/backend/parallel/dag/octree.h"
 #include "core/backend/parallel/host_space.h"
 #include "core/dag/brick.h"
+#include "tests/oracle/check_sub_dag.h"
 #include "tests/oracle/scenes.h"
 
 namespace voxdag::parallel {

@@ -1,3 +1,5 @@
+#include "tests/oracle/check_sub_dag.h"
+
 #include <gtest/gtest.h>
 
 #include <functional>

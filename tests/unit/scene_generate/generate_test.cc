@@ -272,7 +272,9 @@ TEST(GenerateLimit, CountingStopsAtTheLimit) {
   while (full.vertices() < Mesh::kMaxVertices) full.add_vertex({1, 2, 3});
   for (uint32_t i = 0; i < Mesh::kMaxTriangles; ++i) full.add_triangle(0, 1, 2);
   const uint64_t block_bytes = 12ull * Mesh::kMaxVertices + 6ull * Mesh::kMaxTriangles;
-  GlbLayout layout;
+  NoProgress progress;
+  const CancelToken never;
+  GlbLayout layout(progress, never);
   for (uint64_t i = 0; i < kMaxGlbBytes / block_bytes; ++i) layout.mesh(full);
   try {
     layout.mesh(full);

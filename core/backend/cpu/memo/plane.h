@@ -7,6 +7,7 @@
 
 #include "core/backend/cpu/triangle_set.h"
 #include "core/base/integers.h"
+#include "core/dag/brick.h"
 
 namespace voxdag::cpu {
 
@@ -46,5 +47,33 @@ std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
 
 // The plane of a triangle that is not degenerate.
 Plane plane_of(const NarrowTriangle& t);
+
+// The plane n.k + f crosses voxel k iff low <= n.k <= high.
+struct PlaneRange {
+  int64_t low, high;
+
+  PlaneRange(const int64_t (&n)[3], int64_t f, bool fractional) {
+    int64_t rising = 0, size = 0;
+    for (const int64_t x : n) {
+      rising += x > 0 ? x : 0;
+      size += x > 0 ? x : -x;
+    }
+    // Over a voxel's corners the value rises to n.k + f + rising, and falls below that by `size`.
+    low = -(f + rising);
+    high = low + size - (fractional ? 1 : 0);
+  }
+};
+
+// The voxels of a brick that the plane n.k + f crosses.
+inline uint64_t plane_brick(const int64_t (&n)[3], int64_t f, bool fractional) {
+  const PlaneRange crossed(n, f, fractional);
+  uint64_t mask = 0;
+  for (int voxel = 0; voxel < 64; ++voxel) {
+    int64_t value = 0;
+    for (int a = 0; a < 3; ++a) value += n[a] * brick_coordinate(voxel, a);
+    mask |= uint64_t{value >= crossed.low && value <= crossed.high} << voxel;
+  }
+  return mask;
+}
 
 }  // namespace voxdag::cpu

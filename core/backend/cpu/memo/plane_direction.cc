@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/backend/cpu/memo/plane_brick.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "core/backend/backend_memory.h"
-#include "core/backend/cpu/memo/plane_brick.h"
 
 namespace voxdag::cpu {
 namespace {

@@ -2,7 +2,6 @@
 // the integer tests of tile_triangle.h.
 #include <algorithm>
 
-#include "core/backend/cpu/raster/draw.h"
 #include "core/backend/cpu/raster/kernels.h"
 #include "core/dag/brick.h"
 

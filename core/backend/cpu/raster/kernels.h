@@ -48,6 +48,15 @@ const Kernels& portable_kernels();
 const Kernels* avx2_kernels();
 const Kernels* avx512_kernels();
 
+// The rasterizers: each sets exactly the voxels of the tile that the triangle touches.
+// Plain integer code, for narrow and wide triangles and for degenerate ones.
+template <class Coordinate>
+void draw_exactly(const TileTriangle<Coordinate>& triangle, TileBricks& tile);
+// Only for machines with AVX2 and BMI2.
+void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile);
+// Only for machines with AVX-512 F, BW, DQ, VL and VBMI as well.
+void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile);
+
 // Wide triangles have a portable implementation only.
 void draw_wide(const TileTriangle<int64_t>& triangle, TileBricks& tile);
 Octants test_octants_wide(const WideTriangle& triangle, const Box& cube, bool inside);

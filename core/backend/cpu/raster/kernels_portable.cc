@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/backend/cpu/raster/draw.h"
 #include "core/backend/cpu/raster/kernels.h"
 #include "core/backend/cpu/raster/octant_test.h"
 
@@ -90,6 +89,10 @@ constexpr Kernels kPortable = {"portable",    draw_exactly<int32_t>, test_octant
 }  // namespace
 
 const Kernels& portable_kernels() { return kPortable; }
+#ifndef __x86_64__
+const Kernels* avx2_kernels() { return nullptr; }
+const Kernels* avx512_kernels() { return nullptr; }
+#endif
 
 Octants test_octants_wide(const WideTriangle& triangle, const Box& cube, bool inside) {
   return OctantTest<PlainQuad, int64_t>(triangle, cube).run(inside);

@@ -53,7 +53,7 @@ NodeRef SubDagTables::add_node(int size_log2, const NodeRef (&children)[8]) {
   ++counts_.nodes;
   NodeTable& table = nodes(size_log2);
   table.reserve(1);
-  const uint64_t hash = hash_node(mask, hashes);
+  const uint64_t hash = hash_node(mask, count, hashes);
   return {hash, table.find_or_add(hash, mask, ids, count), true};
 }
 

@@ -158,9 +158,7 @@ Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
                                  const Survivors<Space>& parents, const uint64_t* octree_hashes,
                                  uint32_t hash_bits, DagLevel<Space>& level) {
   level.count = parents.count;
-  level.masks = SpaceArray<Space, uint8_t>(space, parents.count);
-  space.for_each(parents.count,
-                 Gather<uint8_t>{parents.nodes.data(), nodes.masks, level.masks.data()});
+  level.masks = gather<uint8_t>(space, parents.count, parents.nodes.data(), nodes.masks);
   SpaceArray<Space, uint32_t> offsets(space, parents.count + 1);
   space.for_each(parents.count, CountChildren{nodes, parents.nodes.data(), offsets.data()});
   space.scan(offsets.data(), parents.count);
@@ -229,9 +227,8 @@ std::optional<Dag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& 
                              survivors.nodes.data(), survivors.count, mismatch.data()});
   if (space.value(mismatch.data()) != 0) return std::nullopt;
   dag.bricks.count = survivors.count;
-  dag.bricks.masks = SpaceArray<Space, uint64_t>(space, survivors.count);
-  space.for_each(survivors.count, Gather<uint64_t>{survivors.nodes.data(), tree.brick_masks.data(),
-                                                   dag.bricks.masks.data()});
+  dag.bricks.masks =
+      gather<uint64_t>(space, survivors.count, survivors.nodes.data(), tree.brick_masks.data());
   return dag;
 }
 

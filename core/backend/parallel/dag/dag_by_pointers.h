@@ -163,10 +163,8 @@ Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same,
 
   Order<Space> by_hash(space, out.count);
   by_hash.sort_by(KeyAt{hashes.data()}, first_hash_bit(hash_bits), 64);
-  out.survivors = SpaceArray<Space, uint32_t>(space, out.count);
-  out.hashes = SpaceArray<Space, uint64_t>(space, out.count);
-  space.for_each(out.count, Gather<uint32_t>{by_hash.items(), firsts.data(), out.survivors.data()});
-  space.for_each(out.count, Gather<uint64_t>{by_hash.items(), hashes.data(), out.hashes.data()});
+  out.survivors = gather<uint32_t>(space, out.count, by_hash.items(), firsts.data());
+  out.hashes = gather<uint64_t>(space, out.count, by_hash.items(), hashes.data());
   const SpaceArray<Space, uint32_t> place_of_group = by_hash.places();
   out.index_of = SpaceArray<Space, uint32_t>(space, n);
   space.for_each(n, RewireThroughGroups{marked.data(), order.items(), place_of_group.data(),
@@ -212,8 +210,7 @@ DagLevel<Space> make_level(Space& space, const LinkedNodes& links, Reduced<Space
   const uint32_t* survivors = reduced.survivors.data();
   level.count = reduced.count;
   level.hashes = std::move(reduced.hashes);
-  level.masks = SpaceArray<Space, uint8_t>(space, level.count);
-  space.for_each(level.count, Gather<uint8_t>{survivors, links.nodes.masks, level.masks.data()});
+  level.masks = gather<uint8_t>(space, level.count, survivors, links.nodes.masks);
   SpaceArray<Space, uint32_t> offsets(space, level.count + 1);
   space.for_each(level.count, CountChildren{links.nodes, survivors, offsets.data()});
   space.scan(offsets.data(), level.count);
@@ -229,9 +226,8 @@ Dag<Space> make_dag_by_pointers(Space& space, const Octree<Space>& tree, uint32_
   Dag<Space> dag;
   Reduced<Space> reduced = reduce_bricks(space, tree, hash_bits);
   dag.bricks.count = reduced.count;
-  dag.bricks.masks = SpaceArray<Space, uint64_t>(space, reduced.count);
-  space.for_each(reduced.count, Gather<uint64_t>{reduced.survivors.data(), tree.brick_masks.data(),
-                                                 dag.bricks.masks.data()});
+  dag.bricks.masks =
+      gather<uint64_t>(space, reduced.count, reduced.survivors.data(), tree.brick_masks.data());
   const SpaceArray<Space, uint64_t> brick_hashes = std::move(reduced.hashes);
   const uint64_t* child_hashes = brick_hashes.data();
   for (const OctreeLevel<Space>& level : tree.levels) {

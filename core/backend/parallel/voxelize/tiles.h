@@ -112,8 +112,9 @@ void voxelize_by_tiles(Space& space, const SubvolumeTask& task, TriangleStream& 
   const int cube_levels = static_cast<int>(task.grid_levels - task.cube.level);
   const int depths = cube_levels - kCellLevels;
   SpaceArray<Space, FixedTriangle> triangles(space, stream.count());
-  const uint32_t count = TriangleUpload<Space>(space, stream)
-                             .read(triangles.data(), static_cast<uint32_t>(triangles.size()));
+  stream.rewind();
+  const uint32_t count =
+      upload_triangles(space, stream, triangles.data(), static_cast<uint32_t>(triangles.size()));
   CellPairs<Space> pairs(space);
   {
     const uint64_t bytes_each = static_cast<uint64_t>(depths) * PairExpansion<Space>::kBytesPerPair;

@@ -3,37 +3,26 @@
 // destination itself.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
 #include "core/backend/backend.h"
 
 namespace voxdag::parallel {
 
+// Copies up to `max_count` of the next triangles to `out`, in the space; returns their number, 0 at
+// the end of the stream.
 template <class Space>
-class TriangleUpload {
- public:
-  TriangleUpload(Space& space, TriangleStream& stream) : space_(space), stream_(stream) {
-    stream_.rewind();
+uint32_t upload_triangles(Space& space, TriangleStream& stream, FixedTriangle* out,
+                          uint32_t max_count) {
+  uint32_t count = 0;
+  while (count < max_count) {
+    const std::span<FixedTriangle> area = space.staging(out + count, max_count - count);
+    const size_t got = stream.read(area);
+    if (got == 0) break;
+    space.upload_staged(area.first(got), out + count);
+    count += static_cast<uint32_t>(got);
   }
-
-  // Copies up to `max_count` triangles to `out`, in the space; returns their number, 0 at the end
-  // of the stream.
-  uint32_t read(FixedTriangle* out, uint32_t max_count) {
-    uint32_t count = 0;
-    while (count < max_count) {
-      const std::span<FixedTriangle> area = space_.staging(out + count, max_count - count);
-      const size_t got = stream_.read(area);
-      if (got == 0) break;
-      space_.upload_staged(area.first(got), out + count);
-      count += static_cast<uint32_t>(got);
-    }
-    return count;
-  }
-
- private:
-  Space& space_;
-  TriangleStream& stream_;
-};
+  return count;
+}
 
 }  // namespace voxdag::parallel

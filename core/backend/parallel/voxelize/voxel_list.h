@@ -86,8 +86,8 @@ void voxelize_by_list(Space& space, const SubvolumeTask& task, TriangleStream& s
   PairExpansion<Space> pairs(space, task, cube_levels - kBrickLevels, true, window);
   VoxelList<Space> list(space, bricks, 3 * cube_levels, voxels);
   SpaceArray<Space, FixedTriangle> triangles(space, batch);
-  TriangleUpload<Space> upload(space, stream);
-  while (const uint32_t count = upload.read(triangles.data(), batch))
+  stream.rewind();
+  while (const uint32_t count = upload_triangles(space, stream, triangles.data(), batch))
     pairs.run(triangles.data(), 0, count, list);
   list.flush();
 }

@@ -9,6 +9,19 @@ namespace {
 
 constexpr size_t kMaxWarnings = 20;
 
+struct ComponentInfo {
+  const char* name;
+  int bytes;
+};
+
+ComponentInfo component_info(int component_type) {
+  static constexpr ComponentInfo kInfos[] = {
+      {"byte", 1},    {"unsigned byte", 1}, {"short", 2}, {"unsigned short", 2},
+      {"unknown", 0}, {"unsigned int", 4},  {"float", 4}};
+  return component_type >= kByte && component_type <= kFloat ? kInfos[component_type - kByte]
+                                                             : ComponentInfo{"unknown", 0};
+}
+
 template <class T>
 std::string name_of(const char* kind, const std::deque<T>& all, int index) {
   const size_t i = static_cast<size_t>(index);
@@ -32,40 +45,8 @@ std::string Document::name_accessor(int accessor) const {
   return name_of("accessor ", accessors, accessor);
 }
 
-int component_bytes(int component_type) {
-  switch (component_type) {
-    case kByte:
-    case kUnsignedByte:
-      return 1;
-    case kShort:
-    case kUnsignedShort:
-      return 2;
-    case kUnsignedInt:
-    case kFloat:
-      return 4;
-    default:
-      return 0;
-  }
-}
-
-const char* component_name(int component_type) {
-  switch (component_type) {
-    case kByte:
-      return "byte";
-    case kUnsignedByte:
-      return "unsigned byte";
-    case kShort:
-      return "short";
-    case kUnsignedShort:
-      return "unsigned short";
-    case kUnsignedInt:
-      return "unsigned int";
-    case kFloat:
-      return "float";
-    default:
-      return "unknown";
-  }
-}
+int component_bytes(int component_type) { return component_info(component_type).bytes; }
+const char* component_name(int component_type) { return component_info(component_type).name; }
 
 uint64_t triangle_count(const Document& document, const Primitive& primitive) {
   if (!primitive.makes_triangles()) return 0;

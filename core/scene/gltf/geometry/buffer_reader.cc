@@ -4,7 +4,7 @@
 #include <array>
 
 #include "core/base/error.h"
-#include "core/scene/gltf/document/uri.h"
+#include "core/base/text.h"
 #include "core/scene/gltf/geometry/base64.h"
 #include "core/scene/gltf/messages.h"
 
@@ -28,6 +28,28 @@ void read_characters(const ReadableFile& scene_file, const BufferSource& buffer,
 
 uint64_t character_count(const BufferSource& buffer) {
   return buffer.kind == BufferSource::Kind::kBase64 ? buffer.range.size : buffer.characters.size();
+}
+
+// A colon before the first slash: "http://...", "file:...", "C:\...".
+bool has_scheme(const std::string& uri) {
+  const size_t end = uri.find_first_of(":/");
+  return end != std::string::npos && uri[end] == ':';
+}
+
+[[noreturn]] void refuse_uri(const std::string& where, const char* what) {
+  throw Error(ErrorCode::kInvalidInput, where + ": its uri " + what);
+}
+
+// The path of the file that `uri`, percent-encoded (RFC 3986), names relative to the folder of the
+// scene file.
+std::string resolve_uri(const std::string& scene_path, const std::string& uri,
+                        const std::string& where) {
+  if (uri.empty()) refuse_uri(where, "is empty");
+  if (has_scheme(uri) || uri[0] == '/') refuse_uri(where, "is not a relative path");
+  const auto path = percent_decoded(uri);
+  if (!path) refuse_uri(where, "has a broken percent escape");
+  if (path->find('\0') != std::string::npos) refuse_uri(where, "has a zero byte");
+  return parent_directory(scene_path) + "/" + *path;
 }
 
 }  // namespace

@@ -9,10 +9,16 @@
 #include <span>
 #include <vector>
 
+#include "core/base/page_buffer.h"
 #include "core/scene/gltf/geometry/accessor_reader.h"
-#include "core/scene/gltf/geometry/joint_matrices.h"
 
 namespace voxdag::gltf {
+
+// The matrices of a skin's joints at rest: global transform of the joint times inverse bind matrix.
+// The transform of the skinned node itself is not used (glTF 2.0, section 3.7.3.3). Throws
+// Error{kInvalidInput} for an inverse bind matrix that is not affine, Error{kOutOfMemory} naming
+// the skin for more joints than fit the budget of `buffers`.
+PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buffers, int skin);
 
 class VertexSource {
  public:

@@ -1,6 +1,7 @@
 #include "core/scene/gltf/json/json_sections.h"
 
 #include <algorithm>
+#include <istream>
 #include <set>
 #include <utility>
 
@@ -200,7 +201,8 @@ std::string read_sections(const ReadableFile& file, FileRange json,
                           const CancelToken& cancel) {
   JsonWindow window(file, json, budget, cancel);
   SectionParser parser(file.path(), window, sections, budget);
-  Json::sax_parse(JsonIterator(window), JsonIterator(), &parser);
+  std::istream text(&window);
+  Json::sax_parse(text, &parser);
   return parser.violation();
 }
 

@@ -23,21 +23,16 @@ JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, MemoryBudget& b
       cancel_(cancel),
       charge_(budget, "a string in the JSON of " + file.path()),
       window_begin_(json.begin),
-      position_(json.begin) {
-  advance();
-}
+      position_(json.begin) {}
 
-void JsonWindow::advance() {
+JsonWindow::int_type JsonWindow::uflow() {
   char c;
   do {
-    if (!next(c)) {
-      ended_ = true;
-      return;
-    }
+    if (!next(c)) return traits_type::eof();
     track(c);
-    current_ = c;
-  } while (is_withheld());
+  } while (is_withheld(c));
   if (in_string_) charge_.grow_to(kCopies * ++shown_);
+  return traits_type::to_int_type(c);
 }
 
 bool JsonWindow::next(char& c) {
@@ -82,9 +77,8 @@ void JsonWindow::track_in_string(char c) {
 }
 
 // Neither an escape nor a character of several bytes is withheld in part.
-bool JsonWindow::is_withheld() {
-  if (!in_string_ || string_.characters.size <= kMaxShownCharacters || in_escape_ ||
-      !is_plain(current_))
+bool JsonWindow::is_withheld(char c) {
+  if (!in_string_ || string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c))
     return false;
   string_.is_clipped = true;
   return true;

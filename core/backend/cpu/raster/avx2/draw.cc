@@ -11,10 +11,6 @@
 //   3. These bounds become one bit per voxel of each brick.
 //
 // A triangle perpendicular to an axis is one layer of voxels: its columns are its voxels.
-#include "core/backend/cpu/raster/draw.h"
-
-#if defined(__AVX2__) && defined(__BMI2__)
-
 #include <immintrin.h>
 
 #include <type_traits>
@@ -22,6 +18,7 @@
 #include "core/backend/cpu/raster/avx2/draw_by_columns.h"
 #include "core/backend/cpu/raster/avx2/heights.h"
 #include "core/backend/cpu/raster/avx2/sides.h"
+#include "core/backend/cpu/raster/kernels.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -174,5 +171,3 @@ void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile) {
 }
 
 }  // namespace voxdag::cpu
-
-#endif

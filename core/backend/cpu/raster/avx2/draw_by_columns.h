@@ -10,11 +10,36 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/avx2/brick_columns.h"
-#include "core/backend/cpu/raster/draw.h"
+#include "core/backend/cpu/raster/avx2/column_set.h"
+#include "core/backend/cpu/raster/kernels.h"
 
 namespace voxdag::cpu {
 namespace {
+
+// The columns of bricks that a triangle may touch. `Edges`: the edges in the projection along D.
+template <int D, class Edges>
+struct Columns {
+  const TileTriangle<int32_t>& t;
+  int first[3], last[3];  // bricks of the triangle's box
+  Edges over;             // undefined if the triangle covers the tile
+  ColumnSet plain, edge;  // crossed by no edge, and perhaps by some
+
+  VOXDAG_INLINE explicit Columns(const TileTriangle<int32_t>& triangle) : t(triangle) {
+    for (int a = 0; a < 3; ++a) {
+      first[a] = t.first_voxel[a] / 4;
+      last[a] = t.last_voxel[a] / 4;
+    }
+    if (t.inside) {
+      for (int q = first[Q]; q <= last[Q]; ++q) plain.rows[q] = ColumnSet::bits(first[P], last[P]);
+      return;
+    }
+    over.set(t.edges[D], (D + 1) % 3 == Q);
+    over.find_columns(first[P], last[P], first[Q], last[Q], plain, edge);
+  }
+
+ private:
+  static constexpr int P = kP<D>, Q = kQ<D>;
+};
 
 // Draws a triangle perpendicular to D: one layer of voxels, which only the edges bound.
 template <int D, class EdgeColumns>

@@ -1,11 +1,8 @@
 #include "core/backend/cpu/raster/kernels.h"
 
-#if defined(__AVX2__) && defined(__BMI2__)
-
 #include <immintrin.h>
 
 #include "core/backend/cpu/raster/avx2/list_blocks.h"
-#include "core/backend/cpu/raster/draw.h"
 #include "core/backend/cpu/raster/octant_test.h"
 
 namespace voxdag::cpu {
@@ -96,13 +93,3 @@ const Kernels* avx2_kernels() {
 }
 
 }  // namespace voxdag::cpu
-
-#else
-
-namespace voxdag::cpu {
-
-const Kernels* avx2_kernels() { return nullptr; }
-
-}  // namespace voxdag::cpu
-
-#endif

@@ -1,13 +1,9 @@
 // The rasterizer for AVX-512: like avx2/draw.cc, but in every column of bricks all three edges are
 // tested, whether they cross it or not, which in vectors of this length costs less than branching.
-#include "core/backend/cpu/raster/draw.h"
-
-#if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && \
-    defined(__AVX512VL__) && defined(__AVX512VBMI__) && defined(__BMI2__)
-
 #include "core/backend/cpu/raster/avx2/draw_by_columns.h"
 #include "core/backend/cpu/raster/avx2/heights.h"
 #include "core/backend/cpu/raster/avx512/height_bounds.h"
+#include "core/backend/cpu/raster/kernels.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -95,5 +91,3 @@ void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile) {
 }
 
 }  // namespace voxdag::cpu
-
-#endif

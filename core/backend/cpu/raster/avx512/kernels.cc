@@ -1,12 +1,8 @@
 #include "core/backend/cpu/raster/kernels.h"
 
-#if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && \
-    defined(__AVX512VL__) && defined(__AVX512VBMI__) && defined(__BMI2__)
-
 #include <immintrin.h>
 
 #include "core/backend/cpu/raster/avx2/list_blocks.h"
-#include "core/backend/cpu/raster/draw.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -56,13 +52,3 @@ const Kernels* avx512_kernels() {
 }
 
 }  // namespace voxdag::cpu
-
-#else
-
-namespace voxdag::cpu {
-
-const Kernels* avx512_kernels() { return nullptr; }
-
-}  // namespace voxdag::cpu
-
-#endif

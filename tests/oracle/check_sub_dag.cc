@@ -1,4 +1,4 @@
-#include "core/dag/sub_dag.h"
+#include "tests/oracle/check_sub_dag.h"
 
 #include <string>
 
