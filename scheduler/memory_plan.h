@@ -5,7 +5,7 @@
 //   ------------  --------------------------------  ---------------------------  -------------
 //   scan, ingest  vertices of an indexed mesh       up to 1/4 of what is free    VertexCache
 //                 top tree                          up to 1/16                   TopTree
-//   ingest until  triangles; the rest is spilled    up to 1/3                    TriangleBins
+//   ingest until  triangles; the rest is spilled    up to 1/3                    TriangleStore
 //   built
 //   ingest        half-filled chunks of triangles   1 MiB                        nobody
 //   partition     half-filled chunks of triangles   1/8                          nobody
@@ -23,12 +23,12 @@
 //   merge         MergeMemory, of what is free
 //                   workers, together               1/4                          merge
 //                   positions of two levels         1/6 for each; then spilled   merge
-//                   slab                            the rest, less 1/16          merge
+//                   hash partition                  the rest, less 1/16          merge
 //
 // "What is free" is what the budget could still give when the part is taken. Uncharged are, besides
 // the parts above, lists that grow with the number of subvolumes and frames: the indexes of the
-// artifacts that one merge pass reads (56 bytes per frame, for which the slab leaves its 1/16) and
-// the chunk lists of spilled triangles where the share of the triangles is full.
+// artifacts that one merge pass reads (56 bytes per frame, for which the hash partition leaves its
+// 1/16) and the chunk lists of spilled triangles where the share of the triangles is full.
 #pragma once
 
 #include <algorithm>
@@ -60,7 +60,7 @@ struct WorkerMemory {
   // Every worker has a segment file open.
   static constexpr uint64_t kMaxWorkers = 256;
   // What a worker needs besides its share.
-  static constexpr uint64_t kBesideShareBytes = kSegmentWriterBytes + BackendMemory::kMinPageBytes;
+  static constexpr uint64_t kOutsideShareBytes = kSegmentWriterBytes + BackendMemory::kMinPageBytes;
 
   unsigned workers = 1;
   uint64_t share_bytes = 0;  // of each, for Backend::build()
@@ -68,11 +68,11 @@ struct WorkerMemory {
   // As many workers as are wanted, unless their shares would be too small for the smallest
   // subvolume.
   static constexpr WorkerMemory divide(uint64_t free_bytes, unsigned wanted) {
-    constexpr uint64_t kMinBytes = kSmallestBudget + kBesideShareBytes;
+    constexpr uint64_t kMinBytes = kSmallestBudget + kOutsideShareBytes;
     const uint64_t workers =
         std::clamp<uint64_t>(free_bytes / kMinBytes, 1, std::min<uint64_t>(wanted, kMaxWorkers));
     const uint64_t each = free_bytes / workers;
-    return {static_cast<unsigned>(workers), each - std::min(each, kBesideShareBytes)};
+    return {static_cast<unsigned>(workers), each - std::min(each, kOutsideShareBytes)};
   }
   // Of its share, what a worker may take for an artifact's key: the backend's pages stay.
   static constexpr uint64_t key_bytes(uint64_t share_bytes) { return share_bytes / 8 * 7; }

@@ -8,7 +8,8 @@
 //   2. Any number of streams read it.
 //   3. drop(): this run does not read it again. A store that no other run can read frees it.
 //   4. release(): what was made of it is durable. The last release() frees it.
-// Thread-safe, but for a bin being filled and read at a time.
+// Thread-safe, except that add_cube_bins() needs the store for itself and that a bin is not filled
+// and read at a time.
 #pragma once
 
 #include <cstddef>
