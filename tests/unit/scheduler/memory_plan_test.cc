@@ -86,7 +86,7 @@ TEST(MemoryPlan, PartsFitTheWhole) {
     for (const unsigned threads : kThreads) {
       const WorkerMemory memory = WorkerMemory::divide(free, threads);
       EXPECT_GE(memory.share_bytes, kSmallestBudget) << budget << " " << threads;
-      EXPECT_LE(memory.workers * (memory.share_bytes + WorkerMemory::kBesideShareBytes), free);
+      EXPECT_LE(memory.workers * (memory.share_bytes + WorkerMemory::kOutsideShareBytes), free);
       const uint64_t share = memory.share_bytes;
       EXPECT_LE(WorkerMemory::key_bytes(share) + BackendMemory::page_bytes(share),
                 share + BackendMemory::kMinPageBytes);
