@@ -249,6 +249,8 @@ TEST_F(Api, NamesNoFolderOfItsMachine) {
   ASSERT_TRUE(until([&] {
     return http_->get("/metrics").body.find("voxdag_job_processes 0") != std::string::npos;
   }));
+  // A build that had no plan yet has removed its folder.
+  std::filesystem::create_directories(work);
   for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(work + "/job.db" + suffix);
   write_file_atomically(system_files(), work + "/job.db", std::string(8192, 'x'));
   post("/api/v1/jobs/" + id + "/resume");
