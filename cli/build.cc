@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <memory>
 
 #include "cli/build_options.h"
 #include "cli/terminal/progress_bar.h"
@@ -57,8 +56,8 @@ void run(const BuildCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_build_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("build", "build the DAG of a scene");
-  const auto state = std::make_shared<BuildCommand>();
+  auto [command, state] =
+      add_command<BuildCommand>(app, context, "build", "build the DAG of a scene", run);
   state->options.declare(*command);
   state->options.declare_work_folder(*command);
   command->add_option("-o,--output", state->run.output, "the .vdag file to write")->required();
@@ -71,7 +70,6 @@ void add_build_command(CLI::App& app, CommandContext& context) {
                     "start over instead of resuming the work folder");
   command->add_flag("--force", state->run.force, "build even if the estimate says it cannot fit");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] { run(*state, context); });
 }
 
 }  // namespace voxdag::cli

@@ -7,7 +7,9 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <array>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "core/base/cancel_token.h"
 #include "core/base/error.h"
@@ -33,6 +35,17 @@ struct CommandContext {
   // Exit status of a command that succeeded; diff sets 1 if the files differ.
   int exit_status = 0;
 };
+
+// Adds a command whose options set the members of a `State`, which the command owns; after they are
+// parsed, `run` is called with the state and the context.
+template <class State, class Run>
+std::pair<CLI::App*, State*> add_command(CLI::App& app, CommandContext& context, const char* name,
+                                         const char* description, Run run) {
+  CLI::App* command = app.add_subcommand(name, description);
+  const auto state = std::make_shared<State>();
+  command->callback([state, run, &context] { run(*state, context); });
+  return {command, state.get()};
+}
 
 void add_build_command(CLI::App& app, CommandContext& context);
 void add_plan_command(CLI::App& app, CommandContext& context);

@@ -1,7 +1,6 @@
 #include "core/format/global/diff.h"
 
 #include <cstdio>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
@@ -41,13 +40,11 @@ void run(const DiffCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_diff_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command =
-      app.add_subcommand("diff", "count the voxels only in A and only in B; exit status 1 if any");
-  const auto state = std::make_shared<DiffCommand>();
+  auto [command, state] = add_command<DiffCommand>(
+      app, context, "diff", "count the voxels only in A and only in B; exit status 1 if any", run);
   command->add_option("a", state->a, "a .vdag file")->required();
   command->add_option("b", state->b, "another .vdag file on the same grid")->required();
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] { run(*state, context); });
 }
 
 }  // namespace voxdag::cli

@@ -1,7 +1,6 @@
 #include "core/scene/generate/generate.h"
 
 #include <cstdio>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
@@ -63,8 +62,8 @@ std::string kinds_text() {
 }  // namespace
 
 void add_generate_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("generate", "generate a scene from a seed");
-  const auto state = std::make_shared<GenerateCommand>();
+  auto [command, state] =
+      add_command<GenerateCommand>(app, context, "generate", "generate a scene from a seed", run);
   command->add_option("kind", state->kind, kinds_text())->required();
   command->add_option("output", state->output, "the .glb file to write")->required();
   command->add_option("--seed", state->options.seed, "seed of the random numbers")
@@ -77,7 +76,6 @@ void add_generate_command(CLI::App& app, CommandContext& context) {
   command->add_flag("--instances", state->options.instances,
                     "city, spheres: store repeated parts once, with EXT_mesh_gpu_instancing");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] { run(*state, context); });
 }
 
 }  // namespace voxdag::cli

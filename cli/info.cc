@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -85,12 +84,11 @@ void run(const InfoCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_info_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("info", "print counts and sizes of a DAG, per level");
-  const auto state = std::make_shared<InfoCommand>();
+  auto [command, state] = add_command<InfoCommand>(
+      app, context, "info", "print counts and sizes of a DAG, per level", run);
   command->add_option("file", state->path, "the .vdag file")->required();
   command->add_flag("--digest", state->digest, "also print the SHA-256 of the file");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] { run(*state, context); });
 }
 
 }  // namespace voxdag::cli

@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <memory>
 
 #include "cli/build_options.h"
 #include "cli/terminal/progress_bar.h"
@@ -51,13 +50,11 @@ void run(const PlanCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_plan_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command =
-      app.add_subcommand("plan", "estimate the size, memory, disk space and time of a build");
-  const auto state = std::make_shared<PlanCommand>();
+  auto [command, state] = add_command<PlanCommand>(
+      app, context, "plan", "estimate the size, memory, disk space and time of a build", run);
   state->options.declare(*command);
   state->options.declare_work_folder(*command);
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] { run(*state, context); });
 }
 
 }  // namespace voxdag::cli

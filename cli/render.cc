@@ -1,7 +1,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
@@ -110,8 +109,8 @@ void run(RenderCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_render_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("render", "render a picture of a DAG");
-  const auto state = std::make_shared<RenderCommand>();
+  auto [command, state] =
+      add_command<RenderCommand>(app, context, "render", "render a picture of a DAG", run);
   state->options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   command->add_option("input", state->input, "the .vdag file")->required();
   command->add_option("-o,--output", state->output, "the .png file to write")->required();
@@ -134,7 +133,6 @@ void add_render_command(CLI::App& app, CommandContext& context) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] { run(*state, context); });
 }
 
 }  // namespace voxdag::cli

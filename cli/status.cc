@@ -1,6 +1,5 @@
 #include <chrono>
 #include <cstdio>
-#include <memory>
 #include <thread>
 
 #include "cli/command.h"
@@ -55,13 +54,12 @@ void run(const StatusCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_status_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("status", "print the state and progress of a build");
-  const auto state = std::make_shared<StatusCommand>();
+  auto [command, state] = add_command<StatusCommand>(
+      app, context, "status", "print the state and progress of a build", run);
   command->add_option("work", state->work_folder, "the work folder, OUT.vdag.work by default")
       ->required();
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
   command->add_flag("--watch", state->watch, "repeat every second until the build ends");
-  command->callback([state, &context] { run(*state, context); });
 }
 
 }  // namespace voxdag::cli

@@ -1,7 +1,6 @@
 #include "core/format/global/verify.h"
 
 #include <cstdio>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
@@ -83,8 +82,8 @@ void run(const VerifyCommand& command, CommandContext& context) {
 }  // namespace
 
 void add_verify_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("verify", "check every invariant of a DAG");
-  const auto state = std::make_shared<VerifyCommand>();
+  auto [command, state] =
+      add_command<VerifyCommand>(app, context, "verify", "check every invariant of a DAG", run);
   command->add_option("file", state->path, "the .vdag file")->required();
   command->add_option("--against", state->scenes,
                       "compare a sample of voxels with the triangles of this scene");
@@ -93,7 +92,6 @@ void add_verify_command(CLI::App& app, CommandContext& context) {
   command->add_flag("--skip-invalid", state->scene_options.skip_invalid,
                     "drop invalid triangles of the scene, as the build did");
   command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] { run(*state, context); });
 }
 
 }  // namespace voxdag::cli

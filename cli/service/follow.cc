@@ -1,7 +1,7 @@
 #include "cli/service/follow.h"
 
 #include "cli/service/job_text.h"
-#include "cli/terminal/progress_line.h"
+#include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
 
 namespace voxdag::cli {

@@ -1,12 +1,47 @@
 // Progress on standard error: a bar with rate and ETA on a terminal, a plain line every few seconds
-// and at the end of each stage otherwise. Thread-safe.
+// and at the end of each stage otherwise. The bar is thread-safe.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <string_view>
 
 #include "core/base/progress.h"
 
 namespace voxdag::cli {
+
+struct StageView {
+  std::string_view name, unit;
+  uint64_t done = 0;
+  uint64_t total = 0;  // 0 if unknown
+  double elapsed_s = 0;
+  double rate = 0;   // units per second
+  double eta_s = 0;  // 0 if unknown
+};
+
+// A stage's progress as one line on standard error: a bar that is redrawn on a terminal, a plain
+// line otherwise. Not thread-safe.
+class ProgressLine {
+ public:
+  // A quiet line shows warnings and notes only.
+  explicit ProgressLine(bool quiet = false);
+  // Ends an open line, so that later output starts on its own line.
+  ~ProgressLine();
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  // The interval at which a running stage should be shown.
+  double interval_s() const;
+  void show(const StageView& stage, bool ended);
+  void warn(std::string_view message);
+  // Prints a line of text.
+  void note(std::string_view text);
+
+ private:
+  const bool quiet_;
+  const bool terminal_;
+  bool open_ = false;  // the line on the terminal will be redrawn
+};
 
 // A quiet bar shows warnings only.
 std::unique_ptr<Progress> make_progress_bar(bool quiet = false);

@@ -10,6 +10,16 @@
 
 namespace voxdag::parallel {
 
+// Flags the first of the sorted codes in each larger cube, that is with equal bits from `shift` on.
+struct MarkFirstOfCube {
+  const uint64_t* codes;
+  int shift;
+  uint8_t* flags;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    flags[i] = i == 0 || codes[i] >> shift != codes[i - 1] >> shift;
+  }
+};
+
 template <class Space>
 class BrickList {
  public:
@@ -54,13 +64,8 @@ class BrickList {
   static constexpr uint64_t kMinSize = 4096;
 
   void grow(uint64_t size) {
-    grow(codes_, size);
-    grow(masks_, size);
-  }
-  void grow(SpaceArray<Space, uint64_t>& buffer, uint64_t size) {
-    SpaceArray<Space, uint64_t> larger(space_, size);
-    space_.copy(buffer.data(), larger.data(), size_);
-    buffer = std::move(larger);
+    codes_.grow(space_, size, size_);
+    masks_.grow(space_, size, size_);
   }
 
   Space& space_;

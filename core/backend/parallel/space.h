@@ -69,6 +69,12 @@ class SpaceArray {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
   }
+  // Makes the size `size` and preserves the first `used` elements.
+  void grow(Space& space, uint64_t size, uint64_t used) {
+    SpaceArray larger(space, size);
+    space.copy(data_, larger.data_, used);
+    swap(larger);
+  }
 
  private:
   Space* space_ = nullptr;

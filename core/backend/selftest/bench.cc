@@ -47,6 +47,12 @@ void divide(Subvolume whole, const BenchOptions& options, std::vector<Subvolume>
 
 struct Totals {
   uint64_t voxels = 0, svo_nodes = 0, dag_nodes = 0, skipped = 0;
+  void add(const Totals& o) {
+    voxels += o.voxels;
+    svo_nodes += o.svo_nodes;
+    dag_nodes += o.dag_nodes;
+    skipped += o.skipped;
+  }
 };
 
 void build(Backend& backend, const Subvolume& subvolume, const BenchOptions& options,
@@ -57,13 +63,10 @@ void build(Backend& backend, const Subvolume& subvolume, const BenchOptions& opt
   NullSink sink;
   SubDagSummary summary;
   if (backend.build({options.grid_levels, subvolume.cube, 64}, stream, budget, never, sink,
-                    summary) == BuildOutcome::kNeedsSplit) {
+                    summary) == BuildOutcome::kNeedsSplit)
     ++sums.skipped;
-    return;
-  }
-  sums.voxels += summary.voxels;
-  sums.svo_nodes += summary.svo_nodes;
-  sums.dag_nodes += summary.dag_nodes;
+  else
+    sums.add({summary.voxels, summary.svo_nodes, summary.dag_nodes});
 }
 
 void measure(const Subject& subject, unsigned workers, const std::string& scene,
@@ -81,12 +84,7 @@ void measure(const Subject& subject, unsigned workers, const std::string& scene,
     const double seconds = wall_seconds() - start;
     if (repetition == 0 || seconds < best) best = seconds;
     sums = {};
-    for (const Totals& part : parts) {
-      sums.voxels += part.voxels;
-      sums.svo_nodes += part.svo_nodes;
-      sums.dag_nodes += part.dag_nodes;
-      sums.skipped += part.skipped;
-    }
+    for (const Totals& part : parts) sums.add(part);
   }
   std::printf("%-10s %-22s %7u %10zu %14llu %12llu %12llu %9.3f %10.1f", scene.c_str(),
               subject.name.c_str(), workers, subvolumes.size(),

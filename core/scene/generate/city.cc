@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "core/scene/generate/kinds.h"
+#include "core/scene/generate/scene_builder.h"
 
 namespace voxdag {
 namespace {

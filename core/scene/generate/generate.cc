@@ -3,7 +3,7 @@
 #include "core/base/error.h"
 #include "core/scene/generate/glb_layout.h"
 #include "core/scene/generate/glb_writer.h"
-#include "core/scene/generate/kinds.h"
+#include "core/scene/generate/scene_builder.h"
 
 namespace voxdag {
 namespace {

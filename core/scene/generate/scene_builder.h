@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/scene/generate/generate.h"
 #include "core/scene/generate/mesh.h"
 
 namespace voxdag {
@@ -52,5 +53,13 @@ class SceneBuilder {
   Mesh mesh_;
   std::vector<Part> parts_;
 };
+
+// The generators, one file each. A generator that runs again with the same options makes the same
+// calls: generate_scene() runs it twice.
+void make_city(const GenerateOptions& options, SceneBuilder& scene);
+void make_menger(const GenerateOptions& options, SceneBuilder& scene);
+void make_terrain(const GenerateOptions& options, SceneBuilder& scene);
+void make_soup(const GenerateOptions& options, SceneBuilder& scene);
+void make_spheres(const GenerateOptions& options, SceneBuilder& scene);
 
 }  // namespace voxdag

@@ -6,8 +6,8 @@
 //      79  in an axis-aligned plane
 //       1  as large as the cube
 //      80  degenerate: a point, a segment with a double corner, three corners in line
-#include "core/scene/generate/kinds.h"
 #include "core/scene/generate/random.h"
+#include "core/scene/generate/scene_builder.h"
 
 namespace voxdag {
 namespace {

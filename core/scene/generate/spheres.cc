@@ -2,8 +2,8 @@
 // to the sphere. Larger spheres are finer.
 #include <cmath>
 
-#include "core/scene/generate/kinds.h"
 #include "core/scene/generate/random.h"
+#include "core/scene/generate/scene_builder.h"
 
 namespace voxdag {
 namespace {

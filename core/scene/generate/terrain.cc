@@ -3,8 +3,8 @@
 // Each octave has half the wavelength of the one before, down to four cells of the field.
 #include <cmath>
 
-#include "core/scene/generate/kinds.h"
 #include "core/scene/generate/random.h"
+#include "core/scene/generate/scene_builder.h"
 
 namespace voxdag {
 namespace {

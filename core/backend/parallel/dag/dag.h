@@ -59,4 +59,20 @@ struct CountChildren {
   }
 };
 
+struct SameWord {
+  const uint64_t* words;
+  VOXDAG_HD bool operator()(uint32_t a, uint32_t b) const { return words[a] == words[b]; }
+};
+
+// 1 where a sorted item differs from the one before.
+template <class Same>
+struct MarkFirstOfEquals {
+  Same same;
+  const uint32_t* items;
+  uint32_t* marks;
+  VOXDAG_HD void operator()(uint32_t i) const {
+    marks[i] = i == 0 || !same(items[i - 1], items[i]);
+  }
+};
+
 }  // namespace voxdag::parallel

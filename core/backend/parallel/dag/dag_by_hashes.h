@@ -47,15 +47,6 @@ struct EmitCandidates {
   }
 };
 
-struct MarkFirstOfHash {
-  const uint64_t* candidate_hashes;
-  const uint32_t* items;
-  uint32_t* marks;
-  VOXDAG_HD void operator()(uint32_t i) const {
-    marks[i] = i == 0 || candidate_hashes[items[i - 1]] != candidate_hashes[items[i]];
-  }
-};
-
 // original index (item) -> sorted index (i) -> compact index (marked[i + 1] - 1): survivors are
 // copied, and the entries of all candidates in their parents' child lists are rewired.
 struct RemoveDuplicates {
@@ -173,7 +164,8 @@ Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
   Order<Space> order(space, n);
   order.sort_by(KeyAt{candidate_hashes.data()}, first_hash_bit(hash_bits), 64);
   SpaceArray<Space, uint32_t> marked(space, n + 1);
-  space.for_each(n, MarkFirstOfHash{candidate_hashes.data(), order.items(), marked.data()});
+  space.for_each(
+      n, MarkFirstOfEquals<SameWord>{{candidate_hashes.data()}, order.items(), marked.data()});
   space.scan(marked.data(), n);
   Survivors<Space> out;
   out.count = space.value(marked.data() + n);

@@ -62,11 +62,6 @@ struct MaskKey {
   VOXDAG_HD uint64_t operator()(uint32_t node) const { return masks[node]; }
 };
 
-struct SameBrick {
-  const uint64_t* masks;
-  VOXDAG_HD bool operator()(uint32_t a, uint32_t b) const { return masks[a] == masks[b]; }
-};
-
 struct SameNode {
   LinkedNodes links;
   VOXDAG_HD bool operator()(uint32_t a, uint32_t b) const {
@@ -76,17 +71,6 @@ struct SameNode {
     for (uint32_t rank = 0; rank < count; ++rank)
       if (links.child(a, rank) != links.child(b, rank)) return false;
     return true;
-  }
-};
-
-// 1 where a sorted item differs from the one before.
-template <class Same>
-struct MarkFirstOfEquals {
-  Same same;
-  const uint32_t* items;
-  uint32_t* marks;
-  VOXDAG_HD void operator()(uint32_t i) const {
-    marks[i] = i == 0 || !same(items[i - 1], items[i]);
   }
 };
 
@@ -177,7 +161,7 @@ Reduced<Space> reduce_bricks(Space& space, const Octree<Space>& tree, uint32_t h
   const uint64_t* masks = tree.brick_masks.data();
   Order<Space> order(space, tree.brick_count);
   order.sort_by(KeyAt{masks}, 0, 64);
-  return reduce_sorted(space, order, SameBrick{masks}, hash_bits,
+  return reduce_sorted(space, order, SameWord{masks}, hash_bits,
                        [&](const uint32_t* survivors, uint64_t* hashes) {
                          return HashSurvivorBrick{masks, hash_bits, survivors, hashes};
                        });

@@ -42,14 +42,6 @@ struct Octree {
   }
 };
 
-struct MarkFirstChild {
-  const uint64_t* codes;
-  uint8_t* flags;
-  VOXDAG_HD void operator()(uint32_t i) const {
-    flags[i] = i == 0 || codes[i] >> 3 != codes[i - 1] >> 3;
-  }
-};
-
 // Child mask and code of the node whose children begin at first_child[i].
 struct MakeParent {
   const uint64_t* codes;
@@ -81,7 +73,7 @@ Octree<Space> make_octree(Space& space, BrickList<Space>& bricks, uint32_t level
     OctreeLevel<Space> level;
     {
       SpaceArray<Space, uint8_t> flags(space, child_count);
-      space.for_each(child_count, MarkFirstChild{codes.data(), flags.data()});
+      space.for_each(child_count, MarkFirstOfCube{codes.data(), 3, flags.data()});
       level.count = space.select(flags.data(), child_count, first_child.data());
     }
     level.first_child = SpaceArray<Space, uint32_t>(space, level.count);

@@ -13,18 +13,9 @@
 #include "core/backend/parallel/brick_list.h"
 #include "core/backend/parallel/voxelize/pairs.h"
 #include "core/backend/parallel/voxelize/tile_kernel.h"
-#include "core/backend/parallel/voxelize/triangle_upload.h"
 #include "core/backend/parallel/voxelize/voxel_list.h"
 
 namespace voxdag::parallel {
-
-struct MarkFirstOfTile {
-  const uint64_t* codes;
-  uint8_t* flags;
-  VOXDAG_HD void operator()(uint32_t i) const {
-    flags[i] = i == 0 || codes[i] >> kTileCodeBits != codes[i - 1] >> kTileCodeBits;
-  }
-};
 
 // All (triangle, cell) pairs of a subvolume.
 template <class Space>
@@ -56,7 +47,7 @@ class CellPairs {
   SpaceArray<Space, uint32_t> tile_starts(uint32_t& tile_count) {
     SpaceArray<Space, uint8_t> flags(space_, size_);
     SpaceArray<Space, uint32_t> starts(space_, size_);
-    space_.for_each(size_, MarkFirstOfTile{codes_.data(), flags.data()});
+    space_.for_each(size_, MarkFirstOfCube{codes_.data(), kTileCodeBits, flags.data()});
     tile_count = space_.select(flags.data(), size_, starts.data());
     return starts;
   }
@@ -64,12 +55,8 @@ class CellPairs {
  private:
   void grow() {
     const uint64_t size = std::max<uint64_t>(2 * codes_.size(), 1 << 14);
-    SpaceArray<Space, uint64_t> codes(space_, size);
-    space_.copy(codes_.data(), codes.data(), size_);
-    codes_ = std::move(codes);
-    SpaceArray<Space, uint32_t> triangles(space_, size);
-    space_.copy(triangles_.data(), triangles.data(), size_);
-    triangles_ = std::move(triangles);
+    codes_.grow(space_, size, size_);
+    triangles_.grow(space_, size, size_);
   }
 
   Space& space_;

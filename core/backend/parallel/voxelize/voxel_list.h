@@ -10,7 +10,6 @@
 
 #include "core/backend/parallel/brick_list.h"
 #include "core/backend/parallel/voxelize/pairs.h"
-#include "core/backend/parallel/voxelize/triangle_upload.h"
 
 namespace voxdag::parallel {
 
@@ -70,6 +69,23 @@ template <class Space>
 uint32_t fitting_count(Space& space, uint64_t share, uint64_t bytes_each, uint64_t min_count) {
   return static_cast<uint32_t>(
       std::clamp(space.available() / share / bytes_each, min_count, 64 * Space::kWindow));
+}
+
+// Copies up to `max_count` of the next triangles to `out`, in the space; returns their number, 0 at
+// the end of the stream. They pass through a staging area of the host: on a GPU there are two, one
+// of which is filled while the other is copied; on the host it is the destination itself.
+template <class Space>
+uint32_t upload_triangles(Space& space, TriangleStream& stream, FixedTriangle* out,
+                          uint32_t max_count) {
+  uint32_t count = 0;
+  while (count < max_count) {
+    const std::span<FixedTriangle> area = space.staging(out + count, max_count - count);
+    const size_t got = stream.read(area);
+    if (got == 0) break;
+    space.upload_staged(area.first(got), out + count);
+    count += static_cast<uint32_t>(got);
+  }
+  return count;
 }
 
 // Fills `bricks` with all bricks that the triangles touch; reads the triangles in batches.

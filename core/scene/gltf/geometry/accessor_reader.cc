@@ -81,15 +81,8 @@ AccessorReader::AccessorReader(const Document& document, BufferReader& buffers, 
   if (accessor_.is_sparse) check_sparse_indices();
 }
 
-void AccessorReader::read(uint64_t first, size_t count, double* out) {
-  read_any(first, count, out);
-}
-void AccessorReader::read(uint64_t first, size_t count, uint32_t* out) {
-  read_any(first, count, out);
-}
-
 template <class T>
-void AccessorReader::read_any(uint64_t first, size_t count, T* out) {
+void AccessorReader::read(uint64_t first, size_t count, T* out) {
   const size_t element = static_cast<size_t>(element_bytes(accessor_));
   if (accessor_.view < 0) {
     std::fill_n(out, count * static_cast<size_t>(accessor_.components), T{0});
@@ -103,6 +96,8 @@ void AccessorReader::read_any(uint64_t first, size_t count, T* out) {
   }
   if (accessor_.is_sparse) replace_sparse(first, count, out);
 }
+template void AccessorReader::read(uint64_t first, size_t count, double* out);
+template void AccessorReader::read(uint64_t first, size_t count, uint32_t* out);
 
 template <class T>
 void AccessorReader::replace_sparse(uint64_t first, size_t count, T* out) {

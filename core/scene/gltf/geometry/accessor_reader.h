@@ -23,14 +23,12 @@ class AccessorReader {
   uint64_t count() const { return accessor_.count; }
 
   // Reads elements [first, first + count), as many numbers each as the accessor has components. A
-  // normalized integer c becomes max(c / the largest of its type, -1).
-  void read(uint64_t first, size_t count, double* out);
-  // Reads elements [first, first + count) of an accessor of unsigned integers.
-  void read(uint64_t first, size_t count, uint32_t* out);
+  // normalized integer c becomes max(c / the largest of its type, -1). T is double, or uint32_t for
+  // an accessor of unsigned integers.
+  template <class T>
+  void read(uint64_t first, size_t count, T* out);
 
  private:
-  template <class T>
-  void read_any(uint64_t first, size_t count, T* out);
   template <class T>
   void replace_sparse(uint64_t first, size_t count, T* out);
   // Reads sparse indices [first, first + count) into sparse_indices_.
