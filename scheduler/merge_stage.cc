@@ -1,12 +1,13 @@
 #include "scheduler/merge_stage.h"
 
 #include <algorithm>
+#include <map>
 #include <string>
 
 #include "core/base/error.h"
+#include "core/format/artifact/artifact_reader.h"
 #include "core/format/checksum.h"
 #include "merge/merge.h"
-#include "scheduler/execute/damage.h"
 
 namespace voxdag {
 namespace {
@@ -50,6 +51,45 @@ std::string sha256_of(FileSystem& files, const std::string& path, const CancelTo
     digest.add(piece);
   }
   return digest.finish();
+}
+
+struct DamagedSubvolume {
+  StoredSubvolume subvolume;
+  std::string what;  // what is wrong with its artifact
+};
+
+void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
+                const StoredSubvolume& subvolume) {
+  const ArtifactReader reader(std::move(segment), subvolume.artifact);
+  const auto roots = reader.roots();
+  if (roots.size() != 1 || !(roots[0].cube == subvolume.cube))
+    throw Error(ErrorCode::kCorrupt, "the artifact is that of another cube");
+  Frame frame;
+  for (const ArtifactLevel& l : reader.levels())
+    for (size_t i = 0; l.level < level && i < l.frames.size(); ++i)
+      reader.read_frame(l.level, i, frame);
+}
+
+// Reads the artifacts of all built subvolumes, the levels above `level` (of smaller number): the
+// others are not needed any more and may be gone.
+std::vector<DamagedSubvolume> find_damaged(std::span<const StoredSubvolume> subvolumes,
+                                           uint32_t level, const WorkFolder& work,
+                                           const CancelToken& cancel) {
+  std::vector<DamagedSubvolume> damaged;
+  std::map<uint32_t, std::shared_ptr<ReadableFile>> segments;
+  for (const StoredSubvolume& subvolume : subvolumes) {
+    if (subvolume.state != SubvolumeState::kBuilt || subvolume.summary.empty()) continue;
+    cancel.check();
+    try {
+      auto& segment = segments[subvolume.artifact.segment];
+      if (!segment) segment = work.open_segment(subvolume.artifact.segment);
+      read_above(level, segment, subvolume);
+    } catch (const Error& error) {
+      if (!error.is_corruption()) throw;
+      damaged.push_back({subvolume, error.message()});
+    }
+  }
+  return damaged;
 }
 
 }  // namespace
@@ -131,9 +171,8 @@ void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
 bool MergeStage::heal(const Error& error) {
   commits_.commit();
   const auto merge = store_.merge();
-  const auto damaged = find_damaged(
-      store_.leaves(), merge ? merge->level : UINT32_MAX,
-      [&](uint32_t id) { return work_.open_segment(id); }, context_.cancel);
+  const auto damaged =
+      find_damaged(store_.leaves(), merge ? merge->level : UINT32_MAX, work_, context_.cancel);
   size_t warnings = 0;
   for (const DamagedSubvolume& d : damaged) {
     if (++warnings <= kMaxWarnings)

@@ -3,13 +3,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
-#include "scheduler/disk_space.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/execute/executor.h"
 #include "scheduler/job/job_progress.h"
@@ -17,6 +17,7 @@
 #include "scheduler/job/work_folder.h"
 #include "scheduler/memory_plan.h"
 #include "scheduler/merge_stage.h"
+#include "scheduler/plan/estimate.h"
 #include "scheduler/prepare.h"
 
 namespace voxdag {
@@ -67,6 +68,22 @@ std::vector<StoredSubvolume> planned_leaves(JobStore& jobs) {
   std::erase_if(leaves,
                 [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });
   return leaves;
+}
+
+// What to do about a full disk, as the end of an error message. The artifacts of all subvolumes,
+// estimated from those that are built, and a global file of about the same size must fit.
+std::string full_disk_advice(std::span<const StoredSubvolume> leaves) {
+  double built = 0, planned = 0, bytes = 0;
+  for (const StoredSubvolume& subvolume : leaves) {
+    (subvolume.state == SubvolumeState::kBuilt ? built : planned) += subvolume.weight;
+    bytes += static_cast<double>(subvolume.artifact.bytes);
+  }
+  std::string needed;
+  if (built > 0) {
+    const double artifacts = bytes * (1 + planned / built);
+    needed = "about " + std::to_string(std::llround((2 * artifacts - bytes) / 1e6)) + " MB of ";
+  }
+  return "; the job is paused: free " + needed + "disk space and run the same command again";
 }
 
 // One build, stage by stage. What the work folder already has is not built again.
@@ -174,7 +191,8 @@ class Build {
         refuse_job("its scene has other contents (SHA-256 " + stored->scene_sha256.substr(0, 16) +
                    ", now " + scene.sha256().substr(0, 16) + ")");
     } else {
-      if (check_disk_space(spec_, scene, work_, budget_, context_)) clock_.finish("estimate");
+      if (check_disk_space(spec_, scene, work_.path(), budget_, context_))
+        clock_.finish("estimate");
       std::vector<StoredSubvolume> plan(scene.plan.size());
       for (size_t i = 0; i < plan.size(); ++i) {
         plan[i].cube = scene.plan[i].cube;

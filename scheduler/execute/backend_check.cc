@@ -1,9 +1,10 @@
-#include "scheduler/execute/backend_check.h"
+// difference_from_cpu() of choose_backend.h.
 
 #include <span>
 #include <vector>
 
 #include "core/backend/memory_stream.h"
+#include "scheduler/execute/choose_backend.h"
 
 namespace voxdag {
 namespace {

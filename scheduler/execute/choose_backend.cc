@@ -4,7 +4,6 @@
 #include <atomic>
 
 #include "core/base/error.h"
-#include "scheduler/execute/backend_check.h"
 
 namespace voxdag {
 namespace {

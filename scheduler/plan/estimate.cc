@@ -6,12 +6,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <optional>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "scheduler/job/work_folder.h"
 #include "scheduler/memory_plan.h"
-#include "scheduler/plan/pilot.h"
 
 namespace voxdag {
 namespace {
@@ -35,6 +36,11 @@ constexpr double kBuildOverPilotTime = 1.5;
 constexpr double kMemoryBytesPerNode = 34;
 constexpr double kBaseMemoryBytes = 24e6;
 
+// Below this resolution a build fits any disk that can hold its scene: no estimate is made.
+constexpr uint32_t kMinLevelsToEstimate = 12;
+// The pilot of this estimate is so much coarser than the build that it costs next to nothing.
+constexpr uint32_t kPilotLevelsBelow = 5;
+
 EstimateRange exactly(double value) { return {value, value, value}; }
 EstimateRange within(double value, double factor) {
   return {value / factor, value, value * factor};
@@ -44,6 +50,67 @@ EstimateRange operator+(const EstimateRange& a, const EstimateRange& b) {
 }
 EstimateRange operator*(double factor, const EstimateRange& a) {
   return {factor * a.low, factor * a.likely, factor * a.high};
+}
+
+// A pilot build: the whole scene as one subvolume on a coarser grid, counted and thrown away.
+struct PilotCounts {
+  uint32_t levels = 0;  // of the pilot's grid
+  double voxels = 0;
+  double svo_nodes = 0;
+  double dag_nodes = 0;
+  double file_bytes = 0;  // what its global file would take
+  double cpu_s = 0;
+};
+
+// The same triangles on a grid that is 2^shift times coarser; coordinates stay odd.
+class CoarserStream : public TriangleStream {
+ public:
+  CoarserStream(std::unique_ptr<TriangleStream> fine, uint32_t shift)
+      : fine_(std::move(fine)), shift_(shift) {}
+  uint64_t count() const override { return fine_->count(); }
+  void rewind() override { fine_->rewind(); }
+  size_t read(std::span<FixedTriangle> out) override {
+    const size_t n = fine_->read(out);
+    for (FixedTriangle& triangle : out.first(n))
+      for (auto& vertex : triangle.v)
+        for (int64_t& u : vertex) u = (u >> shift_) | 1;
+    return n;
+  }
+
+ private:
+  std::unique_ptr<TriangleStream> fine_;
+  const uint32_t shift_;
+};
+
+class CountingSink : public SubDagSink {
+ public:
+  void bricks(const BrickLevelView& level) override { words += 2 * level.masks.size(); }
+  void nodes(const NodeLevelView& level) override {
+    words += level.masks.size() + level.children.size();
+  }
+  uint64_t words = 0;
+};
+
+// Builds the scene's triangles, snapped to 2^grid_levels, on a grid of 2^pilot_levels. Nothing if
+// that does not fit the budget.
+std::optional<PilotCounts> build_pilot(const TriangleStore& triangles, uint32_t grid_levels,
+                                       uint32_t pilot_levels, Backend& backend,
+                                       MemoryBudget& budget, const CancelToken& cancel) {
+  const double start = thread_cpu_seconds();
+  CoarserStream stream(triangles.open(kSceneBin), grid_levels - pilot_levels);
+  CountingSink sink;
+  SubDagSummary summary;
+  if (backend.build({pilot_levels, Cube{}, 64}, stream, budget, cancel, sink, summary) ==
+      BuildOutcome::kNeedsSplit)
+    return std::nullopt;
+  PilotCounts counts;
+  counts.levels = pilot_levels;
+  counts.voxels = static_cast<double>(summary.voxels);
+  counts.svo_nodes = static_cast<double>(summary.svo_nodes);
+  counts.dag_nodes = static_cast<double>(summary.dag_nodes);
+  counts.file_bytes = 4.0 * static_cast<double>(sink.words);
+  counts.cpu_s = thread_cpu_seconds() - start;
+  return counts;
 }
 
 // Pilots at up to three resolutions, a doubling apart, coarsest first.
@@ -93,8 +160,9 @@ EstimateRange triangles_on_disk(const PreparedScene& scene) {
           std::max(spilled, scene.max_durable_bytes)};
 }
 
-}  // namespace
-
+// Estimates the build of a prepared scene (its triangles stay where they are). The pilots have at
+// most 2^pilot_levels voxels per edge: the finer, the better the estimate and the longer it takes.
+// They run on this thread within `budget`.
 Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsigned threads,
                         MemoryBudget& budget, const CancelToken& cancel) {
   Estimate estimate;
@@ -140,6 +208,8 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
   return estimate;
 }
 
+// An upper bound for the disk that a build of the scene needs, computed without pilots: several
+// times what it will need.
 double max_disk_bytes(const PreparedScene& scene) {
   // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
   // (expected_work()): over all levels twice its bricks, and one cube per level.
@@ -149,6 +219,43 @@ double max_disk_bytes(const PreparedScene& scene) {
   const double octree_nodes = 2 * bricks + scene.state.grid.levels * triangles;
   return kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
 }
+
+void check_disk(const char* what, const EstimateRange& bytes, const std::string& folder,
+                uint64_t free, Progress& progress) {
+  const auto gigabytes = [](double count) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2f GB", count / 1e9);
+    return std::string(text);
+  };
+  const double free_bytes = static_cast<double>(free);
+  const std::string need = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
+                           " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
+                           " has " + gigabytes(free_bytes) + " free";
+  if (bytes.low > free_bytes)
+    throw Error(ErrorCode::kNoSpace, need + ": free some, or build anyway with --force");
+  if (bytes.high > free_bytes) progress.warn(need);
+}
+
+// Throws Error{kNoSpace} with the estimate if not even its low end fits on the disk of the work
+// folder, or the file's on that of the output's folder; warns if the high end may not fit.
+void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
+                    const std::string& output_folder, Progress& progress) {
+  const uint64_t work_free = files.free_space(work_folder);
+  const uint64_t output_free = files.free_space(output_folder);
+  // Equal to the byte: taken for one disk, which must hold everything.
+  if (work_free == output_free) {
+    check_disk("the build", estimate.disk_bytes, work_folder, work_free, progress);
+    return;
+  }
+  const EstimateRange& all = estimate.disk_bytes;
+  const EstimateRange& file = estimate.file_bytes;
+  check_disk("the build's work folder",
+             {all.low - file.low, all.likely - file.likely, all.high - file.high}, work_folder,
+             work_free, progress);
+  check_disk("the global file", file, output_folder, output_free, progress);
+}
+
+}  // namespace
 
 Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   // A pilot of 2048^3 takes a second or two and holds for every resolution above.
@@ -176,41 +283,19 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   return estimate;
 }
 
-namespace {
-
-void check_disk(const char* what, const EstimateRange& bytes, const std::string& folder,
-                uint64_t free, Progress& progress) {
-  const auto gigabytes = [](double count) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.2f GB", count / 1e9);
-    return std::string(text);
-  };
-  const double free_bytes = static_cast<double>(free);
-  const std::string need = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
-                           " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
-                           " has " + gigabytes(free_bytes) + " free";
-  if (bytes.low > free_bytes)
-    throw Error(ErrorCode::kNoSpace, need + ": free some, or build anyway with --force");
-  if (bytes.high > free_bytes) progress.warn(need);
-}
-
-}  // namespace
-
-void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
-                    const std::string& output_folder, Progress& progress) {
-  const uint64_t work_free = files.free_space(work_folder);
-  const uint64_t output_free = files.free_space(output_folder);
-  // Equal to the byte: taken for one disk, which must hold everything.
-  if (work_free == output_free) {
-    check_disk("the build", estimate.disk_bytes, work_folder, work_free, progress);
-    return;
-  }
-  const EstimateRange& all = estimate.disk_bytes;
-  const EstimateRange& file = estimate.file_bytes;
-  check_disk("the build's work folder",
-             {all.low - file.low, all.likely - file.likely, all.high - file.high}, work_folder,
-             work_free, progress);
-  check_disk("the global file", file, output_folder, output_free, progress);
+bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene,
+                      const std::string& work_folder, MemoryBudget& budget,
+                      const BuildContext& context) {
+  const uint32_t levels = scene.state.grid.levels;
+  if (spec.run.force || levels < kMinLevelsToEstimate) return false;
+  const std::string output_folder = parent_directory(spec.run.output);
+  const uint64_t free_bytes =
+      std::min(context.files.free_space(work_folder), context.files.free_space(output_folder));
+  if (max_disk_bytes(scene) < static_cast<double>(free_bytes)) return false;
+  const Estimate estimate =
+      estimate_build(scene, levels - kPilotLevelsBelow, spec.run.threads, budget, context.cancel);
+  check_estimate(estimate, context.files, work_folder, output_folder, context.progress);
+  return true;
 }
 
 std::string estimate_json(const Estimate& e) {

@@ -35,23 +35,15 @@ struct Estimate {
   uint64_t free_memory = 0;  // the budget
 };
 
-// Estimates the build of a prepared scene (its triangles stay where they are). The pilots have at
-// most 2^pilot_levels voxels per edge: the finer, the better the estimate and the longer it takes.
-// They run on this thread within `budget`.
-Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsigned threads,
-                        MemoryBudget& budget, const CancelToken& cancel);
-
-// An upper bound for the disk that a build of the scene needs, computed without pilots: several
-// times what it will need.
-double max_disk_bytes(const PreparedScene& scene);
-
 // The whole of `voxdag plan`: reads the scene, plans, estimates, builds nothing.
 Estimate plan_build(const BuildSpec& spec, const BuildContext& context);
 
-// Throws Error{kNoSpace} with the estimate if not even its low end fits on the disk of the work
-// folder, or the file's on that of the output's folder; warns if the high end may not fit.
-void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
-                    const std::string& output_folder, Progress& progress);
+// Whether the disk has space for a build, before anything is built: throws Error{kNoSpace} if it
+// cannot fit, unless it is forced; warns if it may not. Returns whether that took an estimate,
+// which runs a pilot build.
+bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene,
+                      const std::string& work_folder, MemoryBudget& budget,
+                      const BuildContext& context);
 
 // One JSON object, names as in docs/cli.md.
 std::string estimate_json(const Estimate& estimate);

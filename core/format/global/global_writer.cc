@@ -10,7 +10,6 @@
 #include "core/dag/brick.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
-#include "core/format/global/block_checksums.h"
 #include "core/format/global/global_layout.h"
 
 namespace voxdag {
@@ -49,6 +48,44 @@ void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const 
     use(std::span<const std::byte>(chunk));
     begin += chunk.size();
   }
+}
+
+// Computes the checksums of the checksum blocks from the bytes of the file in order; see
+// global_layout.h.
+class BlockChecksums {
+ public:
+  BlockChecksums() = default;
+  // Continues after whole blocks with these checksums.
+  explicit BlockChecksums(std::span<const uint64_t> whole_blocks)
+      : checksums_(whole_blocks.begin(), whole_blocks.end()) {}
+
+  void add(std::span<const std::byte> bytes);
+  // The checksums of all blocks; that of the last one covers its bytes so far.
+  std::vector<uint64_t> values() const;
+
+ private:
+  std::vector<uint64_t> checksums_;  // of whole blocks
+  Checksum64 block_;                 // of the block after them
+  size_t filled_ = 0;                // bytes of that block
+};
+
+void BlockChecksums::add(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const auto part = bytes.first(std::min<size_t>(bytes.size(), kChecksumBlockBytes - filled_));
+    block_.add(part);
+    filled_ += part.size();
+    bytes = bytes.subspan(part.size());
+    if (filled_ < kChecksumBlockBytes) return;
+    checksums_.push_back(block_.value());
+    block_.reset();
+    filled_ = 0;
+  }
+}
+
+std::vector<uint64_t> BlockChecksums::values() const {
+  std::vector<uint64_t> all = checksums_;
+  if (filled_ > 0) all.push_back(block_.value());
+  return all;
 }
 
 uint64_t bytes_of(const GlobalLevel& level) { return sizeof(uint32_t) * level.words; }

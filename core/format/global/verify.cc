@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/host_device.h"
+#include "core/base/page_buffer.h"
 #include "core/base/popcount8.h"
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
-#include "core/format/global/node_index.h"
 
 namespace voxdag {
 
@@ -19,6 +20,69 @@ using namespace global_layout;
 namespace {
 
 constexpr uint64_t kNodesPerCheck = uint64_t{1} << 16;  // of the cancel token
+
+// Maps the word offset where a node of a level of the global file begins to its index in the level.
+// Takes 1.5 bits per word. Immutable after construction.
+class NodeIndex {
+ public:
+  static constexpr uint64_t kNone = ~uint64_t{0};
+
+  NodeIndex() = default;
+  // Walks the words of the level. Throws Error{kCorrupt} beginning with `where` unless every child
+  // mask is 1 to 255, the last node ends with the level, and there are as many nodes as the header
+  // says.
+  NodeIndex(const voxdag_reader::Level& level, bool bricks, MemoryBudget& budget,
+            const std::string& where);
+
+  // The index of the node that begins at `offset`; kNone if none does.
+  uint64_t find(uint64_t offset) const {
+    if (offset >= words_) return kNone;
+    if (bricks_) return offset % 2 == 0 ? offset / 2 : kNone;
+    const uint64_t bits = starts_[offset / 64], bit = uint64_t{1} << offset % 64;
+    return bits & bit
+               ? nodes_before_[offset / 64] + static_cast<uint64_t>(popcount64(bits & (bit - 1)))
+               : kNone;
+  }
+
+ private:
+  bool bricks_ = false;
+  uint64_t words_ = 0;
+  PageBuffer<uint64_t> starts_;        // one bit per word: a node begins here
+  PageBuffer<uint32_t> nodes_before_;  // for each 64 words
+};
+
+NodeIndex::NodeIndex(const voxdag_reader::Level& level, bool bricks, MemoryBudget& budget,
+                     const std::string& where)
+    : bricks_(bricks), words_(level.word_count) {
+  const auto miscounted = [&](uint64_t nodes) {
+    throw Error(ErrorCode::kCorrupt, where + ": its words hold " + std::to_string(nodes) +
+                                         " nodes, expected " + std::to_string(level.node_count));
+  };
+  if (bricks) {
+    if (words_ != 2 * level.node_count) miscounted(words_ / 2);
+    return;
+  }
+  starts_ = PageBuffer<uint64_t>(budget, words_ / 64 + 1, "an index of nodes");
+  nodes_before_ = PageBuffer<uint32_t>(budget, words_ / 64 + 1, "an index of nodes");
+  uint64_t nodes = 0, at = 0;
+  for (; at < words_; ++nodes) {
+    const uint32_t mask = level.words[at];
+    if (mask == 0 || mask > 255)
+      throw Error(ErrorCode::kCorrupt, where + ", word " + std::to_string(at) + ": child mask " +
+                                           std::to_string(mask) + ", expected 1 to 255");
+    starts_[at / 64] |= uint64_t{1} << at % 64;
+    at += 1 + uint64_t{kPopcount8[mask]};
+  }
+  if (at != words_)
+    throw Error(ErrorCode::kCorrupt, where + ": its last node ends at word " + std::to_string(at) +
+                                         ", the level at word " + std::to_string(words_));
+  if (nodes != level.node_count) miscounted(nodes);
+  uint32_t before = 0;
+  for (size_t i = 0; i < starts_.size(); ++i) {
+    nodes_before_[i] = before;
+    before += static_cast<uint32_t>(popcount64(starts_[i]));
+  }
+}
 
 class Verifier {
  public:

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "scheduler/execute/backend_check.h"
 
 namespace voxdag {
 namespace {
