@@ -102,7 +102,7 @@ void run(RenderCommand& command, CommandContext& context) {
   const query::Placement placement = place_camera(command, *file, dag);
   const query::Picture picture =
       query::render_picture(dag, placement, command.options, *progress, context.cancel);
-  query::write_png(context.files, command.output, picture);
+  write_file_atomically(context.files, command.output, query::encode_png(picture));
   report(command, placement, *file, wall_seconds() - start_s);
 }
 
