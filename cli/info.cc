@@ -81,14 +81,17 @@ void run(const InfoCommand& command, CommandContext& context) {
     print(*file, sha256);
 }
 
+void declare(Command& command, InfoCommand& state) {
+  command.option("file", state.path, "the .vdag file").required();
+  command.flag("--digest", state.digest, "also print the SHA-256 of the file");
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_info_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] = add_command<InfoCommand>(
-      app, context, "info", "print counts and sizes of a DAG, per level", run);
-  command->add_option("file", state->path, "the .vdag file")->required();
-  command->add_flag("--digest", state->digest, "also print the SHA-256 of the file");
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_info_command(CommandLine& line) {
+  add_command<InfoCommand>(line, "info", "print counts and sizes of a DAG, per level", declare,
+                           run);
 }
 
 }  // namespace voxdag::cli
