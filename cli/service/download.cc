@@ -1,4 +1,4 @@
-#include "client/download.h"
+#include "client/result_download.h"
 
 #include <cstdio>
 

@@ -6,7 +6,7 @@
 #include "cli/service/follow.h"
 #include "cli/service/job_text.h"
 #include "cli/terminal/progress_bar.h"
-#include "client/upload.h"
+#include "client/scene_upload.h"
 #include "core/base/text.h"
 
 namespace voxdag::cli {
