@@ -1,6 +1,5 @@
 // The commands cancel, suspend and resume: one action on one or more jobs.
 #include <cstdio>
-#include <functional>
 #include <memory>
 #include <vector>
 
@@ -10,18 +9,22 @@
 namespace voxdag::cli {
 namespace {
 
-// Performs the action and returns the JOB after it.
-using JobAction = std::function<Json(ServiceClient& service, const std::string& id)>;
-
 struct JobActionCommand {
   ServiceOptions service;
   std::vector<std::string> ids;
   bool json = false;
 };
 
-void add_job_action_command(CLI::App& app, CommandContext& context, const std::string& name,
-                            const std::string& description, const JobAction& action) {
-  CLI::App* command = app.add_subcommand(name, description);
+// `action` is a name of the API; "resume" retries a failed or canceled job.
+Json act(ServiceClient& service, const std::string& id, const std::string& action) {
+  if (action != "resume") return service.post_action(id, action);
+  const std::string state = service.job(id).at("state");
+  return service.post_action(id, state == "failed" || state == "canceled" ? "retry" : "resume");
+}
+
+void add_job_action_command(CLI::App& app, CommandContext& context, const std::string& action,
+                            const std::string& description) {
+  CLI::App* command = app.add_subcommand(action, description);
   const auto state = std::make_shared<JobActionCommand>();
   command->add_option("id", state->ids, "job id; several may be given")->required();
   state->service.declare(*command);
@@ -29,40 +32,27 @@ void add_job_action_command(CLI::App& app, CommandContext& context, const std::s
   command->callback([state, action, &context] {
     state->service.with_service(context, [&](ServiceClient& service) {
       for (const std::string& id : state->ids) {
-        const Json job = action(service, id);
+        const Json job = act(service, id, action);
         std::printf("%s\n", state->json ? job.dump().c_str() : state_line(job).c_str());
       }
     });
   });
 }
 
-// A failed or canceled job is retried, any other one resumed.
-Json resume(ServiceClient& service, const std::string& id) {
-  const std::string state = service.job(id).at("state");
-  return service.post_action(id, state == "failed" || state == "canceled" ? "retry" : "resume");
-}
-
 }  // namespace
 
 void add_cancel_command(CLI::App& app, CommandContext& context) {
   add_job_action_command(app, context, "cancel",
-                         "cancel jobs of a server and discard what they have built",
-                         [](ServiceClient& service, const std::string& id) {
-                           return service.post_action(id, "cancel");
-                         });
+                         "cancel jobs of a server and discard what they have built");
 }
 
 void add_suspend_command(CLI::App& app, CommandContext& context) {
-  add_job_action_command(app, context, "suspend", "suspend jobs of a server, to be resumed later",
-                         [](ServiceClient& service, const std::string& id) {
-                           return service.post_action(id, "suspend");
-                         });
+  add_job_action_command(app, context, "suspend", "suspend jobs of a server, to be resumed later");
 }
 
 void add_resume_command(CLI::App& app, CommandContext& context) {
   add_job_action_command(app, context, "resume",
-                         "resume suspended jobs of a server, or retry failed and canceled ones",
-                         resume);
+                         "resume suspended jobs of a server, or retry failed and canceled ones");
 }
 
 }  // namespace voxdag::cli
