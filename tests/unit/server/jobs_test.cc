@@ -7,8 +7,8 @@
 #include "server/jobs/job_outcome.h"
 #include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
+#include "server/jobs/process/job_task.h"
 #include "server/jobs/process/subvolume_map.h"
-#include "server/jobs/process/task.h"
 #include "server/request_error.h"
 #include "tests/unit/io/temporary_folder.h"
 
@@ -148,7 +148,7 @@ TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
 }
 
 TEST(Progress, IsPutTogetherFromMessages) {
-  LiveJob live("id", 0);
+  LiveJob live(0);
   EXPECT_EQ(live.progress_json(), "");
   live.apply(StageAdvanced{1, 2});
   EXPECT_EQ(live.progress_json(), "") << "no stage has begun";
@@ -232,7 +232,7 @@ class JobOutcome : public testing::Test {
 
   JobLimits limits_;
   Job job_;
-  LiveJob live_{"id", 0};
+  LiveJob live_{0};
 };
 
 TEST_F(JobOutcome, ARunWithAResultSucceeds) {
