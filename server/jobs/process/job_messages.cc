@@ -46,9 +46,10 @@ std::string encode(const Message& message) {
 std::optional<Message> decode(std::string_view text) {
   try {
     const auto line = nlohmann::json::parse(text);
-    auto message = message_of(line, std::make_index_sequence<kKinds>());
-    // Reading converts numbers that are negative or broken: they differ when they are written.
-    if (message && encode(*message) == json_text(line)) return message;
+    // The library would convert other numbers.
+    for (const auto& member : line)
+      if (member.is_number() && !member.is_number_unsigned()) return {};
+    return message_of(line, std::make_index_sequence<kKinds>());
   } catch (const nlohmann::json::exception&) {
     // A broken line is as good as none.
   }

@@ -147,6 +147,15 @@ TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
   }
 }
 
+// Nothing walks down a value of which no message knows.
+TEST(Messages, MayHaveADeepMember) {
+  constexpr size_t kDepth = 1'000'000;
+  const std::string deep = std::string(kDepth, '[') + std::string(kDepth, ']');
+  EXPECT_TRUE(decode(R"({"message":"stage_ended","x":)" + deep + "}"));
+  EXPECT_FALSE(decode(R"({"message":"warning","text":)" + deep + "}"));
+  EXPECT_FALSE(decode(deep));
+}
+
 TEST(Progress, IsPutTogetherFromMessages) {
   LiveJob live(0);
   EXPECT_EQ(live.progress_json(), "");
