@@ -152,11 +152,7 @@ ClientResponse HttpClient::stream(const std::string& path, const HeaderMap& head
 }
 
 ErrorCode error_code_of(const std::string& name, int http_status) {
-  for (const ErrorCode code :
-       {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kCorrupt,
-        ErrorCode::kUnsupportedVersion, ErrorCode::kIo, ErrorCode::kNoSpace,
-        ErrorCode::kOutOfMemory, ErrorCode::kDevice, ErrorCode::kCanceled, ErrorCode::kLimit})
-    if (name == error_name(code)) return code;
+  if (const auto code = error_code_named(name)) return *code;
   return http_status >= 500 ? ErrorCode::kIo : ErrorCode::kInvalidInput;
 }
 

@@ -1,5 +1,6 @@
 #include "server/config.h"
 
+#include <concepts>
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -36,27 +37,20 @@ void read_value(const json& value, const std::string& name, double& out) {
   out = value.get<double>();
 }
 
-template <class Integer>
-void read_integer(const json& value, const std::string& name, Integer& out) {
+// Sizes may have a unit.
+template <std::integral Integer>
+void read_value(const json& value, const std::string& name, Integer& out) {
+  if constexpr (std::is_same_v<Integer, uint64_t>) {
+    if (value.is_string()) {
+      out = parse_size(value.get<std::string>(), name);
+      return;
+    }
+  }
   const bool fits = value.is_number_integer() &&
                     (!value.is_number_unsigned() ? std::in_range<Integer>(value.get<int64_t>())
                                                  : std::in_range<Integer>(value.get<uint64_t>()));
   if (!fits) fail(name, "a whole number in range");
   out = value.get<Integer>();
-}
-void read_value(const json& value, const std::string& name, int& out) {
-  read_integer(value, name, out);
-}
-void read_value(const json& value, const std::string& name, unsigned& out) {
-  read_integer(value, name, out);
-}
-// Sizes may have a unit.
-void read_value(const json& value, const std::string& name, uint64_t& out) {
-  if (value.is_string()) {
-    out = parse_size(value.get<std::string>(), name);
-  } else {
-    read_integer(value, name, out);
-  }
 }
 
 // The members of one object, each with the function that reads it.

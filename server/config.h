@@ -45,7 +45,8 @@ struct ServerConfig {
   std::string token_file;                // "" for none: loopback only
   std::vector<std::string> scene_roots;  // absolute folders whose scenes jobs may name by path
   std::vector<std::string> hosts;        // names that a Host header may have besides the loopback's
-  std::string program;                   // that runs jobs; "" for this one
+  // Runs the jobs. This is this program, even after another was installed under the same name.
+  std::string program = "/proc/self/exe";
   JobLimits jobs;
   TransferLimits transfers;
   Retention retention;

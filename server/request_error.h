@@ -15,6 +15,7 @@ namespace voxdag::server {
 
 class RequestError : public std::exception {
  public:
+  // Tables of code() and server/api are in this order.
   enum class Kind {
     kInvalid,    // breaks a rule
     kNotFound,   // names a job or scene that is not there
@@ -23,6 +24,7 @@ class RequestError : public std::exception {
     kKeyReused,  // brings the idempotency key of another request
     kQueueFull,  // would be accepted later
   };
+  static constexpr size_t kKinds = static_cast<size_t>(Kind::kQueueFull) + 1;
 
   RequestError(Kind kind, std::string message) : kind_(kind), message_(std::move(message)) {}
   Kind kind() const { return kind_; }

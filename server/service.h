@@ -2,12 +2,16 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 
-#include "core/io/file_system.h"
-#include "server/config.h"
+#include "server/api/access/access_control.h"
+#include "server/api/context.h"
+#include "server/api/routes/router.h"
+#include "server/http/http_server.h"
 
 namespace voxdag::server {
 
@@ -19,9 +23,8 @@ class Service {
   // Checks the configuration, locks the data folder (one service at a time), opens the stores,
   // resumes the jobs of the last service, and listens. Throws Error.
   Service(ServerConfig config, FileSystem& files, Log log);
-  ~Service();
 
-  int port() const;
+  int port() const { return http_.port(); }
   // "http://127.0.0.1:8080"
   std::string url() const;
   // Serves until stop(). Then builds stop at a checkpoint, requests in progress finish, and it
@@ -31,8 +34,28 @@ class Service {
   void stop();
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  // Runs until the service stops.
+  void clean_up_periodically();
+  Response answer(Request& request);
+  // Counts every request, and logs those that try to change something.
+  void record(const Request& request, int status, double start_s);
+
+  const ServerConfig config_;
+  FileSystem& files_;
+  const Log log_;
+  const std::unique_ptr<FileLock> lock_;
+  std::atomic<bool> draining_{false};
+  Metrics metrics_;
+  AccessControl access_;
+  JobQueue queue_;
+  SceneStore scenes_;
+  TaskResolver tasks_;
+  HttpServer http_;
+  Dispatcher dispatcher_;
+  Context context_;
+  Router router_{context_};
+  std::mutex stop_mutex_;
+  std::condition_variable stop_wake_;  // draining_ has become true
 };
 
 }  // namespace voxdag::server

@@ -1,11 +1,10 @@
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <mutex>
 #include <thread>
 
 #include "cli/command.h"
-#include "core/base/clock.h"
+#include "core/base/text.h"
 #include "server/api/access/tokens.h"
 #include "server/jobs/process/job_process.h"
 #include "server/service.h"
@@ -27,12 +26,8 @@ struct TokenCommand {
 void log_line(const std::string& line) {
   static std::mutex mutex;
   std::lock_guard lock(mutex);
-  const time_t now = time(nullptr);
-  tm parts{};
-  gmtime_r(&now, &parts);
-  char stamp[32];
-  strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%SZ", &parts);
-  std::fprintf(stderr, "%s %s\n", stamp, line.c_str());
+  std::fprintf(stderr, "%s %s\n", utc_text(time(nullptr), "%Y-%m-%dT%H:%M:%SZ").c_str(),
+               line.c_str());
 }
 
 // The settings of the file, overridden by the options given.

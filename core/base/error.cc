@@ -33,6 +33,11 @@ const Row& row(ErrorCode code) {
 }  // namespace
 
 const char* error_name(ErrorCode code) { return row(code).name; }
+std::optional<ErrorCode> error_code_named(std::string_view name) {
+  for (const Row& r : kTable)
+    if (name == r.name) return r.code;
+  return {};
+}
 int exit_status(ErrorCode code) { return row(code).exit_status; }
 int http_status(ErrorCode code) { return row(code).http_status; }
 

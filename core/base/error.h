@@ -4,7 +4,9 @@
 #pragma once
 
 #include <exception>
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace voxdag {
 
@@ -42,6 +44,8 @@ class Error : public std::exception {
 
 // The stable name of a code, as JSON reports carry it: "invalid_input", "no_space", ...
 const char* error_name(ErrorCode code);
+// The code of this name, if there is one.
+std::optional<ErrorCode> error_code_named(std::string_view name);
 // Exit status of the command line for a code; never 0.
 int exit_status(ErrorCode code);
 // HTTP status of the service for a code.

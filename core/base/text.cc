@@ -74,6 +74,13 @@ std::string duration_text(double seconds) {
   return text;
 }
 
+std::string utc_text(time_t time, const char* format) {
+  tm parts{};
+  gmtime_r(&time, &parts);
+  char text[64];
+  return std::string(text, std::strftime(text, sizeof text, format, &parts));
+}
+
 std::string hex_text(std::span<const unsigned char> bytes) {
   constexpr char kDigits[] = "0123456789abcdef";
   std::string text;

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
+#include <ctime>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,6 +24,9 @@ std::string size_text(uint64_t bytes);
 std::string count_text(uint64_t count);
 // "1 m 04 s", "12.3 s"
 std::string duration_text(double seconds);
+
+// A Unix time in UTC, in a format of strftime().
+std::string utc_text(time_t time, const char* format);
 
 // Two lower-case hexadecimal digits per byte.
 std::string hex_text(std::span<const unsigned char> bytes);

@@ -1,14 +1,17 @@
 #include "server/api/job_json.h"
 
 #include <cmath>
-#include <ctime>
-#include <nlohmann/json.hpp>
+
+#include "core/base/text.h"
+#include "server/json_text.h"
 
 namespace voxdag::server {
 namespace {
 
-std::string quoted(const std::string& text) {
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+// A text as a JSON string, or a list of texts as an array.
+template <class T>
+std::string as_json(const T& value) {
+  return json_text(nlohmann::json(value));
 }
 
 std::string time_member(double unix_s) {
@@ -17,7 +20,7 @@ std::string time_member(double unix_s) {
 
 std::string error_member(const std::optional<JobError>& error) {
   if (!error) return "null";
-  return "{\"code\":" + quoted(error->code) + ",\"message\":" + quoted(error->message) +
+  return "{\"code\":" + as_json(error->code) + ",\"message\":" + as_json(error->message) +
          ",\"at\":" + time_member(error->at_s) +
          ",\"transient\":" + (error->transient ? "true" : "false") + "}";
 }
@@ -37,22 +40,17 @@ std::string or_null(const std::string& json) { return json.empty() ? "null" : js
 std::string time_text(double unix_s) {
   if (unix_s == 0) return "";
   const auto milliseconds = static_cast<int64_t>(std::floor(unix_s * 1000));
-  const time_t seconds = milliseconds / 1000;
-  tm parts{};
-  gmtime_r(&seconds, &parts);
-  char text[64];
-  const size_t size = strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
-  std::snprintf(text + size, sizeof text - size, ".%03dZ", static_cast<int>(milliseconds % 1000));
-  return text;
+  char fraction[8];
+  std::snprintf(fraction, sizeof fraction, ".%03dZ", static_cast<int>(milliseconds % 1000));
+  return utc_text(milliseconds / 1000, "%Y-%m-%dT%H:%M:%S") + fraction;
 }
 
 std::string job_json(const Job& job, const LiveJob* live, uint64_t position,
                      unsigned max_attempts) {
   const std::string progress = live ? live->progress_json() : "";
-  const std::vector<std::string> warnings = live ? live->warnings() : job.warnings;
   // The request is an object with the members scene, resolution and options: drop its braces.
   const std::string request = job.request.substr(1, job.request.size() - 2);
-  return "{\"id\":\"" + job.id + "\",\"name\":" + quoted(job.name) + ",\"state\":\"" +
+  return "{\"id\":\"" + job.id + "\",\"name\":" + as_json(job.name) + ",\"state\":\"" +
          state_name(job.state) + "\"," + request + ",\"priority\":" + std::to_string(job.priority) +
          ",\"attempts\":" + std::to_string(job.attempts) +
          ",\"max_attempts\":" + std::to_string(max_attempts) +
@@ -63,8 +61,7 @@ std::string job_json(const Job& job, const LiveJob* live, uint64_t position,
          ",\"position\":" + (position == 0 ? "null" : std::to_string(position)) +
          ",\"progress\":" + or_null(progress.empty() ? job.progress : progress) +
          ",\"result\":" + or_null(job.result) + ",\"error\":" + error_member(job.error) +
-         ",\"warnings\":" +
-         nlohmann::json(warnings).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
+         ",\"warnings\":" + as_json(live ? live->warnings() : job.warnings) +
          ",\"preview\":" + (job.preview == Preview::kReady ? "true" : "false") +
          ",\"links\":" + links("/api/v1/jobs/" + job.id) + "}";
 }

@@ -17,12 +17,6 @@ std::string short_text(double value) {
   return text;
 }
 
-void write_metric(std::ostream& out, const std::string& name, const char* type, const char* help,
-                  double value) {
-  write_header(out, name, type, help);
-  out << name << ' ' << value << '\n';
-}
-
 }  // namespace
 
 void Metrics::count_request(int status, double wall_s) {
@@ -47,7 +41,7 @@ void Metrics::count_run(const Job& job) {
 }
 
 std::string Metrics::text(const std::map<JobState, uint64_t>& jobs,
-                          const std::vector<Sample>& samples) const {
+                          std::vector<Sample> samples) const {
   std::ostringstream out;
   out.precision(17);
   write_header(out, "voxdag_jobs", "gauge", "Jobs by state.");
@@ -55,10 +49,6 @@ std::string Metrics::text(const std::map<JobState, uint64_t>& jobs,
     const auto found = jobs.find(static_cast<JobState>(i));
     out << "voxdag_jobs{state=\"" << kJobStateNames[i] << "\"} "
         << (found == jobs.end() ? 0 : found->second) << '\n';
-  }
-  for (const Sample& sample : samples) {
-    const bool counter = std::string_view(sample.name).ends_with("_total");
-    write_metric(out, sample.name, counter ? "counter" : "gauge", sample.help, sample.value);
   }
   std::lock_guard lock(mutex_);
   write_header(out, "voxdag_http_requests_total", "counter", "Answered requests by status.");
@@ -78,18 +68,19 @@ std::string Metrics::text(const std::map<JobState, uint64_t>& jobs,
                "Ended runs of jobs by the state they left the job in.");
   for (const auto& [state, count] : runs_)
     out << "voxdag_job_runs_total{state=\"" << state << "\"} " << count << '\n';
-  const auto counter = [&](const char* name, const char* help, double value) {
-    write_metric(out, name, "counter", help, value);
+  const auto add = [&](const char* name, const char* help, auto value) {
+    samples.push_back({name, help, static_cast<double>(value)});
   };
-  counter("voxdag_built_voxels_total", "Voxels of succeeded jobs.", static_cast<double>(voxels_));
-  counter("voxdag_built_bytes_total", "File bytes of succeeded jobs.",
-          static_cast<double>(result_bytes_));
-  counter("voxdag_build_wall_seconds_total", "Wall time of succeeded jobs.", build_wall_s_);
-  counter("voxdag_build_cpu_seconds_total", "CPU time of succeeded jobs.", build_cpu_s_);
-  counter("voxdag_uploaded_bytes_total", "Received bytes of scenes.",
-          static_cast<double>(uploaded_bytes_.load()));
-  counter("voxdag_downloaded_bytes_total", "Requested bytes of results.",
-          static_cast<double>(downloaded_bytes_.load()));
+  add("voxdag_built_voxels_total", "Voxels of succeeded jobs.", voxels_);
+  add("voxdag_built_bytes_total", "File bytes of succeeded jobs.", result_bytes_);
+  add("voxdag_build_wall_seconds_total", "Wall time of succeeded jobs.", build_wall_s_);
+  add("voxdag_build_cpu_seconds_total", "CPU time of succeeded jobs.", build_cpu_s_);
+  add("voxdag_uploaded_bytes_total", "Received bytes of scenes.", uploaded_bytes_.load());
+  add("voxdag_downloaded_bytes_total", "Requested bytes of results.", downloaded_bytes_.load());
+  for (const auto& [name, help, value] : samples) {
+    write_header(out, name, std::string_view(name).ends_with("_total") ? "counter" : "gauge", help);
+    out << name << ' ' << value << '\n';
+  }
   return out.str();
 }
 

@@ -29,8 +29,7 @@ class Metrics {
   void count_run(const Job& job);
 
   // `jobs`: number of jobs by state.
-  std::string text(const std::map<JobState, uint64_t>& jobs,
-                   const std::vector<Sample>& samples) const;
+  std::string text(const std::map<JobState, uint64_t>& jobs, std::vector<Sample> samples) const;
 
  private:
   static constexpr std::array<double, 8> kBounds_s = {0.001, 0.005, 0.01, 0.05, 0.1, 0.5, 1, 10};

@@ -29,9 +29,7 @@ Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& 
       queue_(queue),
       tasks_(tasks),
       log_(std::move(log)),
-      on_run_ended_(std::move(on_run_ended)),
-      // Still this program after another was installed under the same name.
-      program_(config.program.empty() ? "/proc/self/exe" : config.program) {
+      on_run_ended_(std::move(on_run_ended)) {
   files_.make_directories(config_.data_folder + "/jobs");
   for (const Job& job : queue_.recover()) log_("job " + job.id + " canceled");
   clean_up_folders();
@@ -134,7 +132,7 @@ bool Dispatcher::start_next_job() {
   });
   log_("job " + started.id + " running");
   try {
-    start_worker(started.id, std::make_shared<LiveJob>(started.id, needed),
+    start_worker(started.id, std::make_shared<LiveJob>(needed),
                  [this, started](LiveJob& live) { run_job(started, live); });
   } catch (const Error&) {
     queue_.change(started.id, [](Job& j) {
@@ -149,7 +147,7 @@ bool Dispatcher::start_next_job() {
 void Dispatcher::start_preview() {
   const auto job = queue_.next_without_preview();
   if (!job) return;
-  start_worker(kPreview, std::make_shared<LiveJob>(job->id, 0),
+  start_worker(kPreview, std::make_shared<LiveJob>(0),
                [this, job = *job](LiveJob& live) { draw_preview(job, live); });
 }
 
@@ -211,8 +209,8 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
     files_.make_directories(place.path);
     write_task(files_, place.task(),
                tasks_.make(parse_job_request(job.request), Task::Kind::kBuild));
-    end = run_child({{program_, "run-job", place.path}, place.log(), config_.jobs.nice}, live,
-                    kNoTimeLimit_s);
+    end = run_child({{config_.program, "run-job", place.path}, place.log(), config_.jobs.nice},
+                    live, kNoTimeLimit_s);
   } catch (const RequestError& error) {
     live.apply(Failure{error.code(), error.message()});
   } catch (const Error& error) {
@@ -251,8 +249,8 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
   const JobFolder place = folder(job.id);
   try {
     const ChildProcess::End end =
-        run_child({{program_, "render", place.result(), "-o", place.preview(), "--size", "960x540",
-                    "--samples", "1", "--threads", "1"},
+        run_child({{config_.program, "render", place.result(), "-o", place.preview(), "--size",
+                    "960x540", "--samples", "1", "--threads", "1"},
                    place.file("preview.log"),
                    config_.jobs.nice + kPreviewNice},
                   live, kMaxPreview_s);

@@ -86,7 +86,6 @@ class Dispatcher {
   TaskResolver& tasks_;
   const Log log_;
   const OnRunEnded on_run_ended_;
-  const std::string program_;
 
   // Guards all below; held while a job's state and process change together.
   mutable std::mutex mutex_;

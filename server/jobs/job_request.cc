@@ -5,11 +5,11 @@
 #include <cmath>
 #include <functional>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "server/json_text.h"
 #include "server/request_error.h"
 
 namespace voxdag::server {
@@ -186,10 +186,10 @@ JobRequest parse_job_request(std::string_view body) {
        {"options", [&](const auto& v) { read_options(v, request.spec); }}});
   if (request.scenes.empty()) fail("scene", "a scene");
   if (resolution == 0) fail("resolution", "voxels per edge");
-  request.text = ordered_json{{"scene", request.scenes},
-                              {"resolution", resolution},
-                              {"options", json.value("options", ordered_json::object())}}
-                     .dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+  request.text =
+      json_text(ordered_json{{"scene", request.scenes},
+                             {"resolution", resolution},
+                             {"options", json.value("options", ordered_json::object())}});
   return request;
 }
 

@@ -8,31 +8,31 @@
 #include <string>
 #include <vector>
 
-#include "server/jobs/process/messages.h"
+#include "core/base/clock.h"
+#include "server/jobs/process/job_messages.h"
 
 namespace voxdag::server {
 
 class LiveJob {
  public:
-  LiveJob(std::string id, uint64_t memory_bytes);
+  explicit LiveJob(uint64_t memory_bytes) : memory_bytes_(memory_bytes) {}
 
-  const std::string& id() const { return id_; }
   uint64_t memory_bytes() const { return memory_bytes_; }
 
   void apply(const Message& message);
   // PROGRESS of docs/api.md, "" before the first stage. The text is made once per version.
   std::string progress_json() const;
   // Counts messages.
-  uint64_t version() const;
-  std::vector<std::string> warnings() const;
-  std::optional<Failure> failure() const;
+  uint64_t version() const { return locked(version_); }
+  std::vector<std::string> warnings() const { return locked(warnings_); }
+  std::optional<Failure> failure() const { return locked(failure_); }
   // JSON, "" if there is none.
-  std::string result() const;
+  std::string result() const { return locked(result_); }
 
   // Asks for an end; only the first call counts.
   void stop();
   // When stop() was called first (wall_seconds()), 0 if it was not.
-  double stop_requested_s() const;
+  double stop_requested_s() const { return locked(stop_requested_s_); }
 
  private:
   struct Stage {
@@ -42,10 +42,14 @@ class LiveJob {
     bool ended = false;
   };
   std::string make_progress() const;
+  template <class T>
+  T locked(const T& value) const {
+    std::lock_guard lock(mutex_);
+    return value;
+  }
 
-  const std::string id_;
   const uint64_t memory_bytes_;
-  const double start_s_;
+  const double start_s_ = wall_seconds();
   mutable std::mutex mutex_;  // guards all below
   std::vector<Stage> stages_;
   SubvolumeTotals subvolumes_;

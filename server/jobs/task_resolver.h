@@ -6,7 +6,7 @@
 
 #include "server/config.h"
 #include "server/jobs/job_request.h"
-#include "server/jobs/process/task.h"
+#include "server/jobs/process/job_task.h"
 #include "server/scenes/scene_store.h"
 
 namespace voxdag::server {

@@ -1,14 +1,17 @@
 #include "server/queue/job_queue.h"
 
 #include <chrono>
-#include <nlohmann/json.hpp>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/db/row.h"
+#include "server/json_text.h"
 #include "server/random_id.h"
 
 namespace voxdag::server {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(JobError, code, message, at_s, transient)
+
 namespace {
 
 using nlohmann::json;
@@ -62,10 +65,6 @@ CREATE TABLE idempotency (
 );
 CREATE INDEX idempotency_by_job ON idempotency (job);
 )sql";
-
-std::string dump(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
 
 // Makes the tables of a new database, or checks that an existing one is a queue of this version.
 SqlDatabase open_writer(const std::string& path) {
@@ -122,13 +121,8 @@ void columns(Row& row, JobRow& r) {
 }
 
 JobRow row_of(const Job& job) {
-  JobRow row{job, dump(job.scenes), "", dump(job.warnings)};
-  if (job.error)
-    row.error = dump({{"code", job.error->code},
-                      {"message", job.error->message},
-                      {"at_s", job.error->at_s},
-                      {"transient", job.error->transient}});
-  return row;
+  return {job, json_text(json(job.scenes)), job.error ? json_text(json(*job.error)) : "",
+          json_text(json(job.warnings))};
 }
 
 // The job that a statement of select_rows<JobRow>() stands at.
@@ -138,10 +132,7 @@ Job read_job(const SqlStatement& statement) {
   try {
     json::parse(row.scenes).get_to(job.scenes);
     json::parse(row.warnings).get_to(job.warnings);
-    if (row.error.empty()) return job;
-    const json error = json::parse(row.error);
-    job.error =
-        JobError{error.at("code"), error.at("message"), error.at("at_s"), error.at("transient")};
+    if (!row.error.empty()) job.error = json::parse(row.error).get<JobError>();
     return job;
   } catch (const json::exception&) {
     throw Error(ErrorCode::kCorrupt, "the row of job " + job.id + " is damaged");

@@ -21,8 +21,6 @@ CREATE TABLE upload (
 );
 )sql";
 
-double now_s() { return clock_seconds(CLOCK_REALTIME); }
-
 std::string make_folders(FileSystem& files, const std::string& folder) {
   files.make_directories(folder + "/files");
   files.make_directories(folder + "/parts");
@@ -155,7 +153,7 @@ void SceneStore::record(const std::string& name, const UploadState& state) {
       .bind(0, name)
       .bind_word(1, state.offset)
       .bind(2, state.total ? static_cast<int64_t>(*state.total) : int64_t{-1})
-      .bind(3, now_s())
+      .bind(3, unix_seconds())
       .run();
   transaction.commit();
 }
@@ -183,7 +181,7 @@ void SceneStore::finish_publishing(const std::string& name, uint64_t size,
       .bind(0, name)
       .bind_word(1, size)
       .bind(2, sha256)
-      .bind(3, now_s())
+      .bind(3, unix_seconds())
       .run();
   database_.prepare("DELETE FROM upload WHERE name = ?").bind(0, name).run();
   transaction.commit();

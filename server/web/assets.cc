@@ -16,19 +16,14 @@ std::string type_of(std::string_view name) {
   return "application/json";
 }
 
-std::string etag_of(std::string_view contents) {
-  Sha256 sha256;
-  sha256.add(std::as_bytes(std::span(contents)));
-  return '"' + sha256.finish().substr(0, kEtagDigits) + '"';
-}
-
 }  // namespace
 
 std::vector<Asset> embedded_assets() {
   std::vector<Asset> assets;
   for (const EmbeddedFile* file = kEmbeddedFiles; file->bytes; ++file) {
     const std::string_view contents(reinterpret_cast<const char*>(file->bytes), file->size);
-    assets.push_back({file->name, contents, type_of(file->name), etag_of(contents)});
+    assets.push_back({file->name, contents, type_of(file->name),
+                      '"' + sha256_hex(contents).substr(0, kEtagDigits) + '"'});
   }
   return assets;
 }

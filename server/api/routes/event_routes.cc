@@ -1,10 +1,9 @@
 // The server-sent events of a job.
-#include <charconv>
-
 #include "core/base/clock.h"
+#include "core/base/text.h"
 #include "server/api/context.h"
 #include "server/api/job_json.h"
-#include "server/api/problem.h"
+#include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
 
 namespace voxdag::server {
@@ -113,17 +112,12 @@ void EventFeed::add_progress(std::string& text) {
 }
 
 std::optional<int64_t> last_event_id(const Request& request) {
-  const std::string text = request.header("Last-Event-ID");
-  int64_t number = 0;
-  const auto parsed = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (text.empty() || parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size() ||
-      number < 0)
-    return {};
-  return number;
+  const auto number = parse_numbers<int64_t, 1>(request.header("Last-Event-ID"), 0);
+  if (!number || (*number)[0] < 0) return {};
+  return (*number)[0];
 }
 
 Response follow(Context& context, Call& call) {
-  call.allow_query({});
   find_job(context.queue, call.names[0]);
   Response response = make_response(200, "text/event-stream", "no-store");
   response.headers.emplace("X-Accel-Buffering", "no");  // a proxy must not buffer events

@@ -7,7 +7,7 @@
 #include "core/format/checksum.h"
 #include "server/api/context.h"
 #include "server/api/job_json.h"
-#include "server/api/problem.h"
+#include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
 #include "server/jobs/process/child_process.h"
 #include "server/random_id.h"
@@ -66,11 +66,8 @@ class TemporaryTask {
 };
 
 Problem problem_of(const Failure& failure) {
-  for (const ErrorCode code :
-       {ErrorCode::kInvalidInput, ErrorCode::kNotFound, ErrorCode::kUnsupportedVersion,
-        ErrorCode::kIo, ErrorCode::kNoSpace, ErrorCode::kOutOfMemory, ErrorCode::kDevice,
-        ErrorCode::kLimit, ErrorCode::kCorrupt})
-    if (failure.code == error_name(code)) return problem(code, failure.text);
+  const auto code = error_code_named(failure.code);
+  if (code && *code != ErrorCode::kCanceled) return problem(*code, failure.text);
   return Problem(500, "internal", "the plan failed");
 }
 
@@ -83,9 +80,7 @@ Response dry_run(Context& context, const JobRequest& request) {
   const TemporaryTask temporary(context.files,
                                 context.config.data_folder + "/plans/" + random_id());
   write_task(context.files, temporary.folder.task(), task);
-  const std::string program =
-      context.config.program.empty() ? "/proc/self/exe" : context.config.program;
-  ChildProcess child({{program, "run-job", temporary.folder.path},
+  ChildProcess child({{context.config.program, "run-job", temporary.folder.path},
                       temporary.folder.log(),
                       context.config.jobs.nice});
   std::string estimate;
@@ -108,7 +103,6 @@ Response dry_run(Context& context, const JobRequest& request) {
 }
 
 Response post_job(Context& context, Call& call) {
-  call.allow_query({"dry_run"});
   const std::string dry = call.query("dry_run");
   if (call.request.target.query.contains("dry_run") && dry != "true" && dry != "false")
     throw bad_request("'dry_run': expected true or false");
@@ -131,7 +125,6 @@ Response post_job(Context& context, Call& call) {
 }
 
 JobFilter filter_of(const Call& call) {
-  call.allow_query({"state", "limit", "cursor"});
   JobFilter filter;
   filter.limit = call.query_integer("limit", filter.limit, 1, kMaxListed);
   filter.before =
@@ -169,8 +162,11 @@ Response list_jobs(Context& context, Call& call) {
   return json_response(200, body + "}}");
 }
 
+Response get_job(Context& context, Call& call) {
+  return json_response(200, to_json(context, find_job(context.queue, call.names[0])));
+}
+
 Response patch_job(Context& context, Call& call) {
-  call.allow_query({});
   const auto body = nlohmann::json::parse(
       read_json_body(call.request, context.config.transfers.max_body_bytes), nullptr, false);
   if (!body.is_object() || body.size() != 1 || !body.contains("priority"))
@@ -181,7 +177,6 @@ Response patch_job(Context& context, Call& call) {
 }
 
 Response delete_job(Context& context, Call& call) {
-  call.allow_query({});
   expect_no_body(call.request);
   context.dispatcher.remove(call.names[0]);
   return no_content();
@@ -190,7 +185,6 @@ Response delete_job(Context& context, Call& call) {
 // A handler that applies the action to a job.
 Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   return [action](Context& context, Call& call) {
-    call.allow_query({});
     expect_no_body(call.request);
     return json_response(202, to_json(context, (context.dispatcher.*action)(call.names[0])));
   };
@@ -206,12 +200,8 @@ Job find_job(JobQueue& queue, const std::string& id) {
 
 void add_job_routes(Router& router) {
   const std::string job = "/api/v1/jobs/{id}";
-  const auto get_job = [](Context& context, Call& call) {
-    call.allow_query({});
-    return json_response(200, to_json(context, find_job(context.queue, call.names[0])));
-  };
-  router.add("POST", "/api/v1/jobs", Role::kSubmit, post_job);
-  router.add("GET", "/api/v1/jobs", Role::kRead, list_jobs);
+  router.add("POST", "/api/v1/jobs", Role::kSubmit, post_job, {"dry_run"});
+  router.add("GET", "/api/v1/jobs", Role::kRead, list_jobs, {"state", "limit", "cursor"});
   router.add("GET", job, Role::kRead, get_job);
   router.add("PATCH", job, Role::kAdmin, patch_job);
   router.add("DELETE", job, Role::kAdmin, delete_job);

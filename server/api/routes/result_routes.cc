@@ -3,7 +3,7 @@
 
 #include "core/base/error.h"
 #include "server/api/context.h"
-#include "server/api/problem.h"
+#include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
 #include "server/http/digest_field.h"
 #include "server/random_id.h"
@@ -12,12 +12,12 @@ namespace voxdag::server {
 namespace {
 
 constexpr const char* kDagType = "application/octet-stream";
-constexpr uint64_t kMaxReportBytes = uint64_t{4} << 20;
+// Of what is sent at once: reports, previews and lists of subvolumes.
+constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
 constexpr uint64_t kDefaultLogBytes = 65536;
 constexpr uint64_t kMaxLogBytes = uint64_t{1} << 20;
 
 Job finished_job(Context& context, Call& call) {
-  call.allow_query({});
   Job job = find_job(context.queue, call.names[0]);
   if (job.state != JobState::kSucceeded) {
     Problem problem = not_found("the job has no result: expected a succeeded job");
@@ -25,17 +25,6 @@ Job finished_job(Context& context, Call& call) {
     throw problem;
   }
   return job;
-}
-
-std::string read_range(ReadableFile& file, const ByteRange& range) {
-  std::string bytes(range.size(), '\0');
-  file.read_at(range.begin, std::as_writable_bytes(std::span(bytes)));
-  return bytes;
-}
-
-std::string read_whole(FileSystem& files, const std::string& path) {
-  const auto file = files.open_read(path);
-  return read_range(*file, {0, file->size()});
 }
 
 // The name of the job or its first scene, reduced to characters that are safe in headers and
@@ -147,7 +136,7 @@ Response get_dag(Context& context, Call& call) {
 Response get_report(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   auto report = nlohmann::ordered_json::parse(
-      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kMaxReportBytes));
+      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kMaxFileBytes));
   report["output"] = file_name(job);
   return json_response(200, report.dump());
 }
@@ -158,11 +147,11 @@ Response get_preview(Context& context, Call& call) {
   if (job.preview != Preview::kReady || !context.files.exists(path))
     throw not_found(job.preview == Preview::kFailed ? "the preview could not be rendered"
                                                     : "the preview is not rendered yet");
-  return make_response(200, "image/png", "private, max-age=3600", read_whole(context.files, path));
+  return make_response(200, "image/png", "private, max-age=3600",
+                       read_small_file(context.files, path, kMaxFileBytes));
 }
 
 Response get_log(Context& context, Call& call) {
-  call.allow_query({"max_bytes"});
   const uint64_t max_bytes = call.query_integer("max_bytes", kDefaultLogBytes, 1, kMaxLogBytes);
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).log();
@@ -170,17 +159,17 @@ Response get_log(Context& context, Call& call) {
   if (!context.files.exists(path)) return response;
   const auto file = context.files.open_read(path);
   const uint64_t size = file->size(), begin = size - std::min(size, max_bytes);
-  response.body = read_range(*file, {begin, size});
+  response.body.resize(size - begin);
+  file->read_at(begin, std::as_writable_bytes(std::span(response.body)));
   if (begin > 0) response.body.erase(0, response.body.find('\n') + 1);
   return response;
 }
 
 Response get_subvolumes(Context& context, Call& call) {
-  call.allow_query({});
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).subvolumes();
   if (!context.files.exists(path)) throw not_found("the subvolumes of the job are not planned yet");
-  return json_response(200, read_whole(context.files, path));
+  return json_response(200, read_small_file(context.files, path, kMaxFileBytes));
 }
 
 }  // namespace
@@ -190,7 +179,7 @@ void add_result_routes(Router& router) {
   router.add("GET", job + "dag", Role::kRead, get_dag);
   router.add("GET", job + "report", Role::kRead, get_report);
   router.add("GET", job + "preview.png", Role::kRead, get_preview);
-  router.add("GET", job + "log", Role::kRead, get_log);
+  router.add("GET", job + "log", Role::kRead, get_log, {"max_bytes"});
   router.add("GET", job + "subvolumes", Role::kRead, get_subvolumes);
 }
 

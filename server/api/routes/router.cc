@@ -1,9 +1,9 @@
 #include "server/api/routes/router.h"
 
 #include <algorithm>
-#include <charconv>
 
-#include "server/api/problem.h"
+#include "core/base/text.h"
+#include "server/api/public_problem.h"
 
 namespace voxdag::server {
 namespace {
@@ -23,6 +23,13 @@ bool matches(const std::vector<std::string>& pattern, const std::vector<std::str
   return true;
 }
 
+void check_query(const Request& request, const QueryNames& allowed) {
+  if (allowed == kAnyQuery) return;
+  for (const auto& [name, value] : request.target.query)
+    if (std::find(allowed.begin(), allowed.end(), name) == allowed.end())
+      throw bad_request("unknown query parameter");
+}
+
 }  // namespace
 
 std::string Call::query(const std::string& name) const {
@@ -34,25 +41,16 @@ uint64_t Call::query_integer(const std::string& name, uint64_t default_value, ui
                              uint64_t max) const {
   const auto found = request.target.query.find(name);
   if (found == request.target.query.end()) return default_value;
-  const std::string& text = found->second;
-  uint64_t count = 0;
-  const auto parsed = std::from_chars(text.data(), text.data() + text.size(), count);
-  if (parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size() || count < min ||
-      count > max)
+  const auto number = parse_numbers<uint64_t, 1>(found->second, 0);
+  if (!number || (*number)[0] < min || (*number)[0] > max)
     throw bad_request("'" + name + "': expected an integer from " + std::to_string(min) + " to " +
                       std::to_string(max));
-  return count;
+  return (*number)[0];
 }
 
-void Call::allow_query(const std::vector<std::string>& allowed) const {
-  for (const auto& [name, value] : request.target.query)
-    if (std::find(allowed.begin(), allowed.end(), name) == allowed.end())
-      throw bad_request("unknown query parameter");
-}
-
-void Router::add(const std::string& method, const std::string& pattern, Role role,
-                 Handler handler) {
-  routes_.push_back({method, parse_target(pattern).segments, role, std::move(handler)});
+void Router::add(const std::string& method, const std::string& pattern, Role role, Handler handler,
+                 const QueryNames& query) {
+  routes_.push_back({method, parse_target(pattern).segments, role, std::move(handler), query});
 }
 
 Response Router::route(Request& request, AccessControl& access) const {
@@ -64,6 +62,7 @@ Response Router::route(Request& request, AccessControl& access) const {
     if (route.method == method) {
       call.caller = access.admit(request, route.role);
       request.caller = call.caller.name;
+      check_query(request, route.query);
       return route.handler(context_, call);
     }
     allowed += (allowed.empty() ? "" : ", ") + route.method;

@@ -24,9 +24,11 @@ struct Call {
   // The integer in a query parameter. Throws Problem (400) unless it is from min to max.
   uint64_t query_integer(const std::string& name, uint64_t default_value, uint64_t min,
                          uint64_t max) const;
-  // Throws Problem (400) for a query parameter not in this list.
-  void allow_query(const std::vector<std::string>& names) const;
 };
+
+// The query parameters that a route accepts. Any other is answered with 400.
+using QueryNames = std::vector<std::string>;
+inline const QueryNames kAnyQuery = {"*"};
 
 class Router {
  public:
@@ -35,7 +37,8 @@ class Router {
   explicit Router(Context& context) : context_(context) {}
 
   // `pattern` is like "/api/v1/jobs/{id}/dag". A GET route answers HEAD, too.
-  void add(const std::string& method, const std::string& pattern, Role role, Handler handler);
+  void add(const std::string& method, const std::string& pattern, Role role, Handler handler,
+           const QueryNames& query = {});
   // Throws Problem: 404, 405 with Allow, and as `access` and the handler do.
   Response route(Request& request, AccessControl& access) const;
 
@@ -45,6 +48,7 @@ class Router {
     std::vector<std::string> pattern;
     Role role;
     Handler handler;
+    QueryNames query;
   };
   Context& context_;
   std::vector<Route> routes_;

@@ -4,10 +4,10 @@
 #include "core/base/error.h"
 #include "server/api/context.h"
 #include "server/api/job_json.h"
-#include "server/api/problem.h"
+#include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
 #include "server/http/digest_field.h"
-#include "server/scenes/upload.h"
+#include "server/scenes/scene_upload.h"
 
 namespace voxdag::server {
 namespace {
@@ -109,7 +109,6 @@ std::string digest_of(const Request& request, const char* name) {
 }
 
 Response put_scene(Context& context, Call& call) {
-  call.allow_query({});
   const std::string name = checked_name(call);
   const auto permit = context.transfers.acquire();
   if (!permit) throw busy("too many transfers", 5);
@@ -140,7 +139,6 @@ Response put_scene(Context& context, Call& call) {
 }
 
 Response list_scenes(Context& context, Call& call) {
-  call.allow_query({"limit", "cursor"});
   const size_t limit = call.query_integer("limit", kDefaultListed, 1, kMaxListed);
   const std::string cursor = call.query("cursor");
   if (call.request.target.query.contains("cursor") && !is_scene_name(cursor))
@@ -156,8 +154,11 @@ Response list_scenes(Context& context, Call& call) {
   return json_response(200, json.dump());
 }
 
+Response get_scene(Context& context, Call& call) {
+  return scene_response(context, 200, checked_name(call));
+}
+
 Response delete_scene(Context& context, Call& call) {
-  call.allow_query({});
   expect_no_body(call.request);
   const std::string name = checked_name(call);
   std::lock_guard lock(context.scene_mutex);
@@ -169,11 +170,7 @@ Response delete_scene(Context& context, Call& call) {
 }  // namespace
 
 void add_scene_routes(Router& router) {
-  const auto get_scene = [](Context& context, Call& call) {
-    call.allow_query({});
-    return scene_response(context, 200, checked_name(call));
-  };
-  router.add("GET", "/api/v1/scenes", Role::kRead, list_scenes);
+  router.add("GET", "/api/v1/scenes", Role::kRead, list_scenes, {"limit", "cursor"});
   router.add("GET", "/api/v1/scenes/{name}", Role::kRead, get_scene);
   router.add("PUT", "/api/v1/scenes/{name}", Role::kSubmit, put_scene);
   router.add("DELETE", "/api/v1/scenes/{name}", Role::kAdmin, delete_scene);

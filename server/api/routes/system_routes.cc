@@ -5,7 +5,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "server/api/context.h"
-#include "server/api/problem.h"
+#include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
 #include "server/web/assets.h"
 
@@ -52,43 +52,45 @@ Response get_ready(Context& context, Call&) {
 }
 
 Response get_metrics(Context& context, double started_s) {
-  const std::vector<Sample> samples = {
-      {"voxdag_job_processes", "Running job processes.",
-       static_cast<double>(context.dispatcher.running())},
-      {"voxdag_event_streams", "Open event streams.",
-       static_cast<double>(context.event_streams.in_use())},
-      {"voxdag_transfers", "Uploads and downloads in progress.",
-       static_cast<double>(context.transfers.in_use())},
-      {"voxdag_free_disk_bytes", "Free disk space for the data folder.",
-       static_cast<double>(context.files.free_space(context.config.data_folder))},
-      {"voxdag_job_memory_limit_bytes", "Memory limit of all running jobs together.",
-       static_cast<double>(context.tasks.memory_bytes())},
-      {"voxdag_resident_memory_bytes", "Resident memory of the service without its jobs.",
-       static_cast<double>(resident_bytes())},
-      {"voxdag_cpu_seconds_total", "CPU time of the service without its jobs.",
-       process_cpu_seconds()},
-      {"voxdag_uptime_seconds", "Time since the service started.", wall_seconds() - started_s},
+  std::vector<Sample> samples;
+  const auto add = [&](const char* name, const char* help, auto value) {
+    samples.push_back({name, help, static_cast<double>(value)});
   };
+  add("voxdag_job_processes", "Running job processes.", context.dispatcher.running());
+  add("voxdag_event_streams", "Open event streams.", context.event_streams.in_use());
+  add("voxdag_transfers", "Uploads and downloads in progress.", context.transfers.in_use());
+  add("voxdag_free_disk_bytes", "Free disk space for the data folder.",
+      context.files.free_space(context.config.data_folder));
+  add("voxdag_job_memory_limit_bytes", "Memory limit of all running jobs together.",
+      context.tasks.memory_bytes());
+  add("voxdag_resident_memory_bytes", "Resident memory of the service without its jobs.",
+      resident_bytes());
+  add("voxdag_cpu_seconds_total", "CPU time of the service without its jobs.",
+      process_cpu_seconds());
+  add("voxdag_uptime_seconds", "Time since the service started.", wall_seconds() - started_s);
   return make_response(200, "text/plain; version=0.0.4; charset=utf-8", "no-store",
-                       context.metrics.text(context.queue.counts(), samples));
+                       context.metrics.text(context.queue.counts(), std::move(samples)));
 }
 
 }  // namespace
 
 void add_system_routes(Router& router) {
-  router.add("GET", "/healthz", Role::kNone,
-             [](Context&, Call&) { return json_response(200, "{\"status\":\"ok\"}"); });
-  router.add("GET", "/readyz", Role::kNone, get_ready);
-  router.add("GET", "/version", Role::kNone, [](Context&, Call&) {
+  const auto add = [&](const std::string& path, Role role, Router::Handler handler) {
+    router.add("GET", path, role, std::move(handler), kAnyQuery);
+  };
+  add("/healthz", Role::kNone,
+      [](Context&, Call&) { return json_response(200, "{\"status\":\"ok\"}"); });
+  add("/readyz", Role::kNone, get_ready);
+  add("/version", Role::kNone, [](Context&, Call&) {
     return json_response(200, "{\"version\":\"" VOXDAG_VERSION "\",\"api\":\"v1\"}");
   });
-  router.add("GET", "/metrics", Role::kRead, [started_s = wall_seconds()](Context& context, Call&) {
+  add("/metrics", Role::kRead, [started_s = wall_seconds()](Context& context, Call&) {
     return get_metrics(context, started_s);
   });
   for (const Asset& asset : embedded_assets()) {
     const auto get = [asset](Context&, Call& call) { return get_asset(call, asset); };
-    router.add("GET", '/' + asset.name, Role::kNone, get);
-    if (asset.name == "index.html") router.add("GET", "/", Role::kNone, get);
+    add('/' + asset.name, Role::kNone, get);
+    if (asset.name == "index.html") add("/", Role::kNone, get);
   }
 }
 

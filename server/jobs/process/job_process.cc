@@ -16,8 +16,8 @@
 #include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
 #include "server/jobs/process/job_folder.h"
+#include "server/jobs/process/job_task.h"
 #include "server/jobs/process/progress_pipe.h"
-#include "server/jobs/process/task.h"
 #include "server/request_error.h"
 
 namespace voxdag::server {

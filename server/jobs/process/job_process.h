@@ -1,6 +1,6 @@
 // The process that does one job: `voxdag run-job FOLDER`, started by the service alone. It reads
-// FOLDER/task.json, builds with run_build(), reports by messages on standard output (messages.h),
-// and logs in plain words on standard error.
+// FOLDER/task.json, builds with run_build(), reports by messages on standard output
+// (job_messages.h), and logs in plain words on standard error.
 //
 // No message or log line names a folder of this machine. The process works in FOLDER and names its
 // files relative to that; an uploaded scene is opened by its public name, a symbolic link in

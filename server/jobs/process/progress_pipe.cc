@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <ctime>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/text.h"
 
 namespace voxdag::server {
 namespace {
@@ -141,12 +141,7 @@ void ProgressPipe::write_subvolumes() {
 }
 
 void ProgressPipe::log(const std::string& text) {
-  const time_t now = time(nullptr);
-  tm parts{};
-  gmtime_r(&now, &parts);
-  char stamp[32];
-  strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%SZ ", &parts);
-  write_all(STDERR_FILENO, stamp + text + "\n");
+  write_all(STDERR_FILENO, utc_text(time(nullptr), "%Y-%m-%dT%H:%M:%SZ ") + text + "\n");
 }
 
 }  // namespace voxdag::server

@@ -7,7 +7,7 @@
 
 #include "core/base/progress.h"
 #include "core/io/file_system.h"
-#include "server/jobs/process/messages.h"
+#include "server/jobs/process/job_messages.h"
 #include "server/jobs/process/subvolume_map.h"
 
 namespace voxdag::server {

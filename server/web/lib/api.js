@@ -73,16 +73,22 @@ export function random_key() {
                     (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-// Resolves after `ms`, or immediately when `signal` aborts.
-export function sleep(ms, signal) {
+// Resolves after `ms`, or immediately when `signal` aborts; with `until_visible` not before the page
+// is visible.
+export function sleep(ms, signal, until_visible = false) {
   return new Promise((resolve) => {
+    const listening = new AbortController();
     const done = () => {
       clearTimeout(timer);
-      signal.removeEventListener("abort", done);
+      listening.abort();
       resolve();
     };
-    const timer = setTimeout(done, ms);
-    signal.addEventListener("abort", done);
+    const done_if_visible = () => {
+      if (!until_visible || !document.hidden) done();
+    };
+    const timer = setTimeout(done_if_visible, ms);
+    if (until_visible) document.addEventListener("visibilitychange", done_if_visible, {signal: listening.signal});
+    signal.addEventListener("abort", done, {signal: listening.signal});
     if (signal.aborted) done();
   });
 }
@@ -101,24 +107,6 @@ export async function poll(update, on_failure, signal) {
       on_failure(error);
       if (error.status === 401) return;
     }
-    await pause(pause_ms, signal);
+    await sleep(pause_ms, signal, true);
   }
-}
-
-function pause(ms, signal) {
-  return new Promise((resolve) => {
-    const listening = new AbortController();
-    const done = () => {
-      clearTimeout(timer);
-      listening.abort();
-      resolve();
-    };
-    const done_if_visible = () => {
-      if (!document.hidden) done();
-    };
-    const timer = setTimeout(done_if_visible, ms);
-    document.addEventListener("visibilitychange", done_if_visible, {signal: listening.signal});
-    signal.addEventListener("abort", done, {signal: listening.signal});
-    if (signal.aborted) done();
-  });
 }

@@ -4,7 +4,7 @@ import {get_json} from "../lib/api.js";
 import {announce, clear, field, h, set_text} from "../lib/dom.js";
 import {duration_text, size_text} from "../lib/format.js";
 import {meter, problem_box} from "./parts.js";
-import {kSceneName, scene_name, upload} from "../lib/upload.js";
+import {kSceneName, scene_name, upload} from "../lib/scene_upload.js";
 
 const kPageSize = 200;
 

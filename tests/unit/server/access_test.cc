@@ -7,7 +7,7 @@
 #include "server/api/access/concurrency_limiter.h"
 #include "server/api/access/rate_limiter.h"
 #include "server/api/access/tokens.h"
-#include "server/api/problem.h"
+#include "server/api/public_problem.h"
 #include "server/config.h"
 #include "server/http/digest_field.h"
 #include "server/jobs/job_request.h"

@@ -12,8 +12,8 @@
 #include <sstream>
 
 #include "server/jobs/process/job_folder.h"
-#include "server/jobs/process/messages.h"
-#include "server/jobs/process/task.h"
+#include "server/jobs/process/job_messages.h"
+#include "server/jobs/process/job_task.h"
 #include "tests/crash/faulty_files.h"
 #include "tests/unit/io/temporary_folder.h"
 

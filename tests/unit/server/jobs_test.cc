@@ -7,8 +7,8 @@
 #include "server/jobs/job_outcome.h"
 #include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
+#include "server/jobs/process/job_task.h"
 #include "server/jobs/process/subvolume_map.h"
-#include "server/jobs/process/task.h"
 #include "server/request_error.h"
 #include "tests/unit/io/temporary_folder.h"
 
@@ -147,8 +147,17 @@ TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
   }
 }
 
+// Nothing walks down a value of which no message knows.
+TEST(Messages, MayHaveADeepMember) {
+  constexpr size_t kDepth = 1'000'000;
+  const std::string deep = std::string(kDepth, '[') + std::string(kDepth, ']');
+  EXPECT_TRUE(decode(R"({"message":"stage_ended","x":)" + deep + "}"));
+  EXPECT_FALSE(decode(R"({"message":"warning","text":)" + deep + "}"));
+  EXPECT_FALSE(decode(deep));
+}
+
 TEST(Progress, IsPutTogetherFromMessages) {
-  LiveJob live("id", 0);
+  LiveJob live(0);
   EXPECT_EQ(live.progress_json(), "");
   live.apply(StageAdvanced{1, 2});
   EXPECT_EQ(live.progress_json(), "") << "no stage has begun";
@@ -232,7 +241,7 @@ class JobOutcome : public testing::Test {
 
   JobLimits limits_;
   Job job_;
-  LiveJob live_{"id", 0};
+  LiveJob live_{0};
 };
 
 TEST_F(JobOutcome, ARunWithAResultSucceeds) {

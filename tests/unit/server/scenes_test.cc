@@ -3,7 +3,7 @@
 #include "core/format/checksum.h"
 #include "server/request_error.h"
 #include "server/scenes/scene_store.h"
-#include "server/scenes/upload.h"
+#include "server/scenes/scene_upload.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag::server {

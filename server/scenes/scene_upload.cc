@@ -1,4 +1,4 @@
-#include "server/scenes/upload.h"
+#include "server/scenes/scene_upload.h"
 
 #include <algorithm>
 

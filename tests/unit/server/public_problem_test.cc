@@ -1,4 +1,4 @@
-#include "server/api/problem.h"
+#include "server/api/public_problem.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/api/problem.h"
+#include "server/api/public_problem.h"
 
 #include <new>
 
@@ -10,21 +10,11 @@ namespace {
 constexpr int kQueueFullRetry_s = 60;
 
 Problem problem_of(const RequestError& error) {
-  switch (error.kind()) {
-    case RequestError::Kind::kInvalid:
-      return bad_request(error.message());
-    case RequestError::Kind::kNotFound:
-      return not_found(error.message());
-    case RequestError::Kind::kLimit:
-      return problem(ErrorCode::kLimit, error.message());
-    case RequestError::Kind::kKeyReused:
-      return Problem(422, error.code(), error.message());
-    case RequestError::Kind::kQueueFull:
-      return busy(error.message(), kQueueFullRetry_s);
-    case RequestError::Kind::kConflict:
-      break;
-  }
-  Problem result = conflict(error.message());
+  static constexpr int kStatuses[] = {400, 404, 422, 409, 422, 503};
+  static_assert(std::size(kStatuses) == RequestError::kKinds);
+  Problem result(kStatuses[static_cast<size_t>(error.kind())], error.code(), error.message());
+  if (error.kind() == RequestError::Kind::kQueueFull)
+    result.headers.emplace("Retry-After", std::to_string(kQueueFullRetry_s));
   result.state = error.job_state;
   if (error.upload_offset)
     result.headers.emplace("Upload-Offset", std::to_string(*error.upload_offset));

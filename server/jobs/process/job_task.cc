@@ -1,0 +1,25 @@
+#include "server/jobs/process/job_task.h"
+
+#include "core/base/error.h"
+#include "server/json_text.h"
+
+namespace voxdag::server {
+
+NLOHMANN_JSON_SERIALIZE_ENUM(Task::Kind,
+                             {{Task::Kind::kBuild, "build"}, {Task::Kind::kPlan, "plan"}})
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Task, kind, request, uploads, readable, memory_bytes, threads)
+
+void write_task(FileSystem& files, const std::string& path, const Task& task) {
+  write_file_atomically(files, path, json_text(nlohmann::json(task)));
+}
+
+Task read_task(FileSystem& files, const std::string& path) {
+  constexpr uint64_t kMaxTaskBytes = uint64_t{4} << 20;
+  try {
+    return nlohmann::json::parse(read_small_file(files, path, kMaxTaskBytes)).get<Task>();
+  } catch (const nlohmann::json::exception&) {
+    throw Error(ErrorCode::kCorrupt, path + ": expected a task of voxdag serve");
+  }
+}
+
+}  // namespace voxdag::server
