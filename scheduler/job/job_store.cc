@@ -291,6 +291,11 @@ void JobStore::mark_built_in_memory(std::span<const StoredSubvolume> built) {
         SubvolumeState::kBuilt;
 }
 
+void JobStore::forget_built_in_memory() {
+  std::lock_guard lock(mutex_);
+  built_in_memory_.clear();
+}
+
 std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
                                                 std::span<const Cube> parts) {
   std::lock_guard lock(mutex_);

@@ -102,6 +102,8 @@ class JobStore {
   // Makes leaves() of this object return these subvolumes as built, although they become durable
   // only with record_built().
   void mark_built_in_memory(std::span<const StoredSubvolume> built);
+  // Makes leaves() return as planned again what is not recorded.
+  void forget_built_in_memory();
   // Returns the ids of the parts, in their order.
   std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
   // Plans a subvolume again whose artifact turned out to be damaged. The progress of ingest is

@@ -56,6 +56,19 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   EXPECT_EQ(store.stage_times()[0].cpu_s, 2.5);
 }
 
+// What is marked as built without a record is planned again when it is forgotten; records stay.
+TEST_F(JobStoreTest, ForgetsWhatIsBuiltInMemoryOnly) {
+  JobStore store(path(), JobStore::Access::kBuild);
+  store.start(job_, plan(2));
+  const auto planned = store.leaves();
+  store.record_built(std::vector{built(planned[0])});
+  store.mark_built_in_memory(std::vector{built(planned[1])});
+  EXPECT_EQ(store.leaves()[1].state, SubvolumeState::kBuilt);
+  store.forget_built_in_memory();
+  EXPECT_EQ(store.leaves()[0].state, SubvolumeState::kBuilt);
+  EXPECT_EQ(store.leaves()[1].state, SubvolumeState::kPlanned);
+}
+
 // A split subvolume is replaced by its parts; a lost one is planned again; both survive.
 TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   JobStore store(path(), JobStore::Access::kBuild);
