@@ -232,8 +232,7 @@ class Build {
     const BackendChoice backend = choose_backend(spec_.run, context_.progress);
     report_.backend = backend.name;
     ExecutorOptions options;
-    options.grid_levels = scene.state.grid.levels;
-    options.hash_bits = spec_.geometry.hash_bits;
+    options.shape = {.grid_levels = scene.state.grid.levels, .hash_bits = spec_.geometry.hash_bits};
     options.threads = std::min(spec_.run.threads, backend.max_workers);
     options.open_backend = backend.open;
     if (spec_.run.subvolume_edge)

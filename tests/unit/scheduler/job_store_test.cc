@@ -180,7 +180,9 @@ TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
 // An unfinished merge and its result are remembered, replaced and forgotten; a new job has neither.
 TEST_F(JobStoreTest, RemembersTheMerge) {
   const std::vector<std::byte> state = {std::byte{0}, std::byte{7}, std::byte{255}};
-  const JobResult result{"out", "sha", 1ull << 40, 2, 3, 4, 5, 6, 7};
+  JobResult result{"out", "sha", 1ull << 40, {}};
+  result.merge.voxels = 2;
+  result.merge.streamed_groups = 7;
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(1));
   EXPECT_FALSE(store.merge().has_value());
@@ -193,7 +195,7 @@ TEST_F(JobStoreTest, RemembersTheMerge) {
   EXPECT_EQ(store.merge()->state, state);
   ASSERT_TRUE(store.result().has_value());
   EXPECT_EQ(store.result()->bytes, result.bytes);
-  EXPECT_EQ(store.result()->merge_streamed_groups, 7u);
+  EXPECT_EQ(store.result()->merge.streamed_groups, 7u);
   store.forget_merge();
   EXPECT_FALSE(store.merge().has_value());
   EXPECT_FALSE(store.result().has_value());
