@@ -20,20 +20,21 @@ void print(const BuildReport& r) {
               r.sha256.c_str());
   std::printf("  %s triangles in a grid of %lld^3\n", count_text(r.triangles).c_str(),
               static_cast<long long>(r.grid.resolution()));
-  std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.voxels).c_str(),
-              count_text(r.svo_nodes).c_str(), count_text(r.dag_nodes).c_str());
+  std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.merge.voxels).c_str(),
+              count_text(r.merge.svo_nodes).c_str(), count_text(r.merge.dag_nodes).c_str());
   std::printf("  %s subvolumes (%s split), artifacts %s, spilled %s, %u merge pass%s\n",
               count_text(r.subvolumes).c_str(), count_text(r.subvolumes_split).c_str(),
-              size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge_passes,
-              r.merge_passes == 1 ? "" : "es");
+              size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge.passes,
+              r.merge.passes == 1 ? "" : "es");
   std::printf(" ");
   for (const StageTime& stage : r.stages)
     std::printf(" %s %s%s", stage.name.c_str(), duration_text(stage.wall_s).c_str(),
                 &stage == &r.stages.back() ? "\n" : ",");
-  std::printf("  %s wall, %s CPU, %s voxels/s, peak memory %s of %s\n",
-              duration_text(r.wall_s).c_str(), duration_text(r.cpu_s).c_str(),
-              count_text(static_cast<uint64_t>(static_cast<double>(r.voxels) / r.wall_s)).c_str(),
-              size_text(r.peak_rss_bytes).c_str(), size_text(r.memory_bytes).c_str());
+  std::printf(
+      "  %s wall, %s CPU, %s voxels/s, peak memory %s of %s\n", duration_text(r.wall_s).c_str(),
+      duration_text(r.cpu_s).c_str(),
+      count_text(static_cast<uint64_t>(static_cast<double>(r.merge.voxels) / r.wall_s)).c_str(),
+      size_text(r.peak_rss_bytes).c_str(), size_text(r.memory_bytes).c_str());
 }
 
 void run(const BuildCommand& command, CommandContext& context) {

@@ -134,7 +134,7 @@ class Preparation {
   }
 
   void ingest_and_plan() {
-    TopTree top(state_.grid.levels, state_.top_tree_depth, budget_);
+    TopTree top(state_.grid.levels, budget_, state_.top_tree_depth);
     checkpoint_.load_top_tree(state_, top);
     if (state_.stage == IngestStage::kIngest) {
       BinWriter writer(*prepared_.triangles, {kSceneBin}, MemoryPlan::kIngestBufferBytes);
@@ -173,7 +173,7 @@ std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube
   IngestState& state = scene.state;
   TriangleStore& triangles = *scene.triangles;
   if (state.stage < IngestStage::kReady) {
-    partition_scene(triangles, state.grid.levels, cubes, state.position, buffer_bytes, cancel,
+    partition_scene(triangles, state.grid.levels, cubes, buffer_bytes, cancel, state.position,
                     [&](uint64_t copied, BinWriter& writer) {
                       state.position = copied;
                       if (!checkpoint.is_due()) return;

@@ -156,13 +156,23 @@ class Build {
       } catch (const DamagedTriangles& damage) {
         if (read == kMaxReads) throw;
         context_.progress.warn(damage.message() + "; the scene is read again");
+        close_segments();
         checkpoint_.forget();
       } catch (const Error& error) {
         if (error.code() != ErrorCode::kNoSpace || !checkpoint_.is_optional()) throw;
         context_.progress.warn(error.message() + "; the scene is read again, into memory");
+        close_segments();
         checkpoint_.disable();
       }
     }
+  }
+
+  // Before subvolumes are queued again: what is not recorded by now is built again, and its
+  // segment is removed, so that nothing may record it later.
+  void close_segments() {
+    commit_best_effort();
+    commits_.clear();
+    jobs_->forget_built_in_memory();
   }
 
   // From the scene to artifacts of all subvolumes. The triangles are freed when it returns.
@@ -180,7 +190,7 @@ class Build {
     const std::vector<StoredSubvolume> planned = planned_leaves(*jobs_);
     report_.subvolumes_reused = jobs_->leaves().size() - planned.size();
     if (!planned.empty()) build_subvolumes_of(scene, planned);
-    report_.spill_bytes += scene.triangles->file_bytes();
+    if (scene.triangles) report_.spill_bytes += scene.triangles->file_bytes();
     report_artifacts();
   }
 
@@ -222,8 +232,7 @@ class Build {
     const BackendChoice backend = choose_backend(spec_.run, context_.progress);
     report_.backend = backend.name;
     ExecutorOptions options;
-    options.grid_levels = scene.state.grid.levels;
-    options.hash_bits = spec_.geometry.hash_bits;
+    options.shape = {.grid_levels = scene.state.grid.levels, .hash_bits = spec_.geometry.hash_bits};
     options.threads = std::min(spec_.run.threads, backend.max_workers);
     options.open_backend = backend.open;
     if (spec_.run.subvolume_edge)
@@ -236,6 +245,8 @@ class Build {
     const ExecutorCounts counts = build_subvolumes(options, std::move(queue), *scene.triangles,
                                                    *jobs_, commits_, budget_, context_);
     checkpoint_.finish();
+    report_.spill_bytes += scene.triangles->file_bytes();
+    scene.triangles.reset();  // Freeing a large file takes time, which belongs to this stage.
     report_.subvolumes_split += counts.split;
     report_.subvolumes_cached += counts.cached;
     report_.subvolumes_reused += counts.cached;

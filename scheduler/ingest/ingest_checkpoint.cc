@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <system_error>
 
+#include "core/base/background.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "scheduler/memory_plan.h"
@@ -135,7 +135,7 @@ void IngestCheckpoint::load_top_tree(const IngestState& state, TopTree& top) con
 
 bool IngestCheckpoint::is_due() {
   if (pending_.valid()) {
-    if (pending_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+    if (pending_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) return false;
     wait();
   }
   return record_ && wall_seconds() - last_save_s_ >= spec_.run.checkpoint_interval_s;
@@ -169,17 +169,12 @@ void IngestCheckpoint::save_in_background(IngestState& state, const TopTree* top
     state.top_tree_weight = top->total_weight();
   }
   state.triangles = store_->checkpoint();
-  const auto sync_and_commit = [this, state, file] {
+  pending_ = run_in_background([this, state, file] {
     file->sync();
     const Extent old = record_->state.top_tree;
     commit(state);
     if (old.bytes && old.offset != state.top_tree.offset) file->release(old);
-  };
-  try {
-    pending_ = std::async(std::launch::async, sync_and_commit);
-  } catch (const std::system_error&) {
-    sync_and_commit();  // The system has no thread left.
-  }
+  });
   // Tests need a checkpoint after every batch.
   if (spec_.run.checkpoint_interval_s == 0) wait();
 }

@@ -118,10 +118,10 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
   }
 }
 
-void WorkFolder::release(uint32_t segment, uint64_t offset, uint64_t bytes) {
-  std::unique_ptr<WritableFile>& file = released_[segment];
-  if (!file) file = files_.open_write(segment_path(path_, segment));
-  file->release(offset, bytes);
+void WorkFolder::release(const SegmentRange& range) {
+  std::unique_ptr<WritableFile>& file = released_[range.segment];
+  if (!file) file = files_.open_write(segment_path(path_, range.segment));
+  file->release(range.offset, range.bytes);
 }
 
 void WorkFolder::empty_scratch() {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/format/artifact/artifact.h"
 #include "core/io/file_system.h"
 
 namespace voxdag {
@@ -39,7 +40,7 @@ class WorkFolder {
   uint64_t bytes() const;
 
   // Frees the space of bytes of a segment that are no longer read. One call at a time.
-  void release(uint32_t segment, uint64_t offset, uint64_t bytes);
+  void release(const SegmentRange& range);
 
   // Removes the segments for which `is_named` is false: an interrupted build left them, and no row
   // of the store names them.
