@@ -1,9 +1,8 @@
-#include "client/result_download.h"
-
 #include <cstdio>
 
 #include "cli/service/service_options.h"
 #include "cli/terminal/progress_bar.h"
+#include "client/result_download.h"
 #include "core/base/text.h"
 
 namespace voxdag::cli {
