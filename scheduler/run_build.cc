@@ -18,7 +18,7 @@
 #include "scheduler/memory_plan.h"
 #include "scheduler/merge_stage.h"
 #include "scheduler/plan/estimate.h"
-#include "scheduler/prepare.h"
+#include "scheduler/scene_stages.h"
 
 namespace voxdag {
 namespace {

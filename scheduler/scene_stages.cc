@@ -1,4 +1,4 @@
-#include "scheduler/prepare.h"
+#include "scheduler/scene_stages.h"
 
 #include <algorithm>
 #include <chrono>
