@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "scheduler/job/build_locks.h"
 #include "scheduler/job/work_folder.h"
+#include "scheduler/plan/estimate.h"
 #include "scheduler/run_build.h"
 #include "tests/unit/base/error_of.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -85,6 +86,22 @@ TEST_F(Hardening, M5_WaitingCanBeCanceled) {
   const Error error = error_of([&] { run_build(spec(), context()); });
   user.join();
   EXPECT_EQ(error.code(), ErrorCode::kCanceled);
+}
+
+// A few bytes can describe billions of triangles: what neither memory nor disk can hold is refused
+// before it is read, by `plan` as well.
+TEST_F(Hardening, L8_TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
+  write_spheres(scene(), 700000);
+  BuildSpec tight = spec();
+  tight.run.memory_bytes = uint64_t{64} << 20;
+  files_.free_bytes = 1'000'000;
+  const Error error = error_of([&] { run_build(tight, context()); });
+  EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
+  EXPECT_NE(error.message().find("triangles, which take"), std::string::npos) << error.message();
+  EXPECT_FALSE(files_.bytes_written.contains(output() + ".work/triangles.vdspill"));
+  EXPECT_EQ(error_of([&] { plan_build(tight, context()); }).code(), ErrorCode::kNoSpace);
+  tight.run.memory_bytes = uint64_t{512} << 20;
+  EXPECT_NO_THROW(plan_build(tight, context()));
 }
 
 }  // namespace
