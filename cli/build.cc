@@ -54,23 +54,22 @@ void run(const BuildCommand& command, CommandContext& context) {
     print(report);
 }
 
+void declare(Command& command, BuildCommand& state) {
+  state.options.declare(command);
+  state.options.declare_work_folder(command);
+  command.option("-o,--output", state.run.output, "the .vdag file to write").required();
+  command.option("--cache", state.run.cache_folder, "folder in which builds share subvolumes");
+  command.option("--cache-size", state.cache_size, "limit of the cache folder (default: 16GiB)");
+  command.flag("--keep-work", state.run.keep_work, "do not remove the work folder");
+  command.flag("--restart", state.run.restart, "start over instead of resuming the work folder");
+  command.flag("--force", state.run.force, "build even if the estimate says it cannot fit");
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_build_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] =
-      add_command<BuildCommand>(app, context, "build", "build the DAG of a scene", run);
-  state->options.declare(*command);
-  state->options.declare_work_folder(*command);
-  command->add_option("-o,--output", state->run.output, "the .vdag file to write")->required();
-  command->add_option("--cache", state->run.cache_folder,
-                      "folder in which builds share subvolumes");
-  command->add_option("--cache-size", state->cache_size,
-                      "limit of the cache folder (default: 16GiB)");
-  command->add_flag("--keep-work", state->run.keep_work, "do not remove the work folder");
-  command->add_flag("--restart", state->run.restart,
-                    "start over instead of resuming the work folder");
-  command->add_flag("--force", state->run.force, "build even if the estimate says it cannot fit");
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_build_command(CommandLine& line) {
+  add_command<BuildCommand>(line, "build", "build the DAG of a scene", declare, run);
 }
 
 }  // namespace voxdag::cli

@@ -37,14 +37,17 @@ void run(const DiffCommand& command, CommandContext& context) {
   }
 }
 
+void declare(Command& command, DiffCommand& state) {
+  command.option("a", state.a, "a .vdag file").required();
+  command.option("b", state.b, "another .vdag file on the same grid").required();
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_diff_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] = add_command<DiffCommand>(
-      app, context, "diff", "count the voxels only in A and only in B; exit status 1 if any", run);
-  command->add_option("a", state->a, "a .vdag file")->required();
-  command->add_option("b", state->b, "another .vdag file on the same grid")->required();
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_diff_command(CommandLine& line) {
+  add_command<DiffCommand>(
+      line, "diff", "count the voxels only in A and only in B; exit status 1 if any", declare, run);
 }
 
 }  // namespace voxdag::cli

@@ -59,23 +59,24 @@ std::string kinds_text() {
   return text;
 }
 
+void declare(Command& command, GenerateCommand& state) {
+  command.option("kind", state.kind, kinds_text().c_str()).required();
+  command.option("output", state.output, "the .glb file to write").required();
+  command.option("--seed", state.options.seed, "seed of the random numbers").show_default();
+  command
+      .option("--triangles", state.options.triangles,
+              "approximate number of triangles (not for menger)")
+      .positive();
+  command.option("--level", state.options.level, "menger: recursion depth, 0 to 5").show_default();
+  command.flag("--instances", state.options.instances,
+               "city, spheres: store repeated parts once, with EXT_mesh_gpu_instancing");
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_generate_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] =
-      add_command<GenerateCommand>(app, context, "generate", "generate a scene from a seed", run);
-  command->add_option("kind", state->kind, kinds_text())->required();
-  command->add_option("output", state->output, "the .glb file to write")->required();
-  command->add_option("--seed", state->options.seed, "seed of the random numbers")
-      ->capture_default_str();
-  auto* triangles = command->add_option("--triangles", state->options.triangles,
-                                        "approximate number of triangles (not for menger)");
-  triangles->check(CLI::PositiveNumber);
-  command->add_option("--level", state->options.level, "menger: recursion depth, 0 to 5")
-      ->capture_default_str();
-  command->add_flag("--instances", state->options.instances,
-                    "city, spheres: store repeated parts once, with EXT_mesh_gpu_instancing");
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_generate_command(CommandLine& line) {
+  add_command<GenerateCommand>(line, "generate", "generate a scene from a seed", declare, run);
 }
 
 }  // namespace voxdag::cli

@@ -79,19 +79,20 @@ void run(const VerifyCommand& command, CommandContext& context) {
     print(*file, sample);
 }
 
+void declare(Command& command, VerifyCommand& state) {
+  command.option("file", state.path, "the .vdag file").required();
+  command.option("--against", state.scenes,
+                 "compare a sample of voxels with the triangles of this scene");
+  command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
+  command.flag("--skip-invalid", state.scene_options.skip_invalid,
+               "drop invalid triangles of the scene, as the build did");
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_verify_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] =
-      add_command<VerifyCommand>(app, context, "verify", "check every invariant of a DAG", run);
-  command->add_option("file", state->path, "the .vdag file")->required();
-  command->add_option("--against", state->scenes,
-                      "compare a sample of voxels with the triangles of this scene");
-  command->add_option("--seed", state->seed, "seed of the sample that --against compares")
-      ->capture_default_str();
-  command->add_flag("--skip-invalid", state->scene_options.skip_invalid,
-                    "drop invalid triangles of the scene, as the build did");
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_verify_command(CommandLine& line) {
+  add_command<VerifyCommand>(line, "verify", "check every invariant of a DAG", declare, run);
 }
 
 }  // namespace voxdag::cli

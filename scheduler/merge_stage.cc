@@ -38,19 +38,6 @@ class StoredCheckpoint : public Checkpoint {
   WorkFolder& work_;
 };
 
-std::string sha256_of(FileSystem& files, const std::string& path, const CancelToken& cancel) {
-  const auto file = files.open_read(path);
-  Sha256 digest;
-  std::vector<std::byte> buffer(size_t{1} << 20);
-  for (uint64_t at = 0; at < file->size(); at += buffer.size()) {
-    cancel.check();
-    const auto piece = std::span(buffer).first(std::min(buffer.size(), file->size() - at));
-    file->read_at(at, piece);
-    digest.add(piece);
-  }
-  return digest.finish();
-}
-
 struct DamagedSubvolume {
   StoredSubvolume subvolume;
   std::string what;  // what is wrong with its artifact
@@ -109,7 +96,7 @@ bool MergeStage::run(const RunOptions& options, BuildReport& report) {
 bool MergeStage::is_published(BuildReport& report) {
   const auto result = store_.result();
   if (!result || result->output != report.output || !context_.files.exists(report.output) ||
-      sha256_of(context_.files, report.output, context_.cancel) != result->sha256)
+      sha256_of_file(*context_.files.open_read(report.output), context_.cancel) != result->sha256)
     return false;
   report.sha256 = result->sha256;
   report.bytes = result->bytes;

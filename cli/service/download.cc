@@ -1,7 +1,6 @@
-#include "client/download.h"
+#include "client/result_download.h"
 
 #include <cstdio>
-#include <memory>
 
 #include "cli/service/service_options.h"
 #include "cli/terminal/progress_bar.h"
@@ -16,10 +15,10 @@ struct DownloadCommand {
   bool json = false;
 };
 
-void run(const DownloadCommand& command, FileSystem& files, ServiceClient& service) {
+void run(const DownloadCommand& command, ServiceClient& service, CommandContext& context) {
   const auto progress = make_progress_bar();
-  const client::DownloadResult result =
-      client::download_result(service, files, service.job(command.id), command.output, *progress);
+  const client::DownloadResult result = client::download_result(
+      service, context.files, service.job(command.id), command.output, *progress);
   if (command.json) {
     const Json report = {{"output", command.output},
                          {"bytes", result.bytes},
@@ -32,19 +31,18 @@ void run(const DownloadCommand& command, FileSystem& files, ServiceClient& servi
   }
 }
 
+void declare(Command& command, DownloadCommand& state) {
+  command.option("id", state.id, "job id").required();
+  command.option("-o,--output", state.output, "the .vdag file to write").required();
+  state.service.declare(command);
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_download_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("download", "download the result of a job of a server");
-  const auto state = std::make_shared<DownloadCommand>();
-  command->add_option("id", state->id, "job id")->required();
-  command->add_option("-o,--output", state->output, "the .vdag file to write")->required();
-  state->service.declare(*command);
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] {
-    state->service.with_service(
-        context, [&](ServiceClient& service) { run(*state, context.files, service); });
-  });
+void add_download_command(CommandLine& line) {
+  add_service_command<DownloadCommand>(line, "download", "download the result of a job of a server",
+                                       declare, run);
 }
 
 }  // namespace voxdag::cli

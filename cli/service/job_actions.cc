@@ -1,7 +1,5 @@
 // The commands cancel, suspend and resume: one action on one or more jobs.
 #include <cstdio>
-#include <functional>
-#include <memory>
 #include <vector>
 
 #include "cli/service/job_text.h"
@@ -10,59 +8,41 @@
 namespace voxdag::cli {
 namespace {
 
-// Performs the action and returns the JOB after it.
-using JobAction = std::function<Json(ServiceClient& service, const std::string& id)>;
-
 struct JobActionCommand {
   ServiceOptions service;
   std::vector<std::string> ids;
   bool json = false;
 };
 
-void add_job_action_command(CLI::App& app, CommandContext& context, const std::string& name,
-                            const std::string& description, const JobAction& action) {
-  CLI::App* command = app.add_subcommand(name, description);
-  const auto state = std::make_shared<JobActionCommand>();
-  command->add_option("id", state->ids, "job id; several may be given")->required();
-  state->service.declare(*command);
-  command->add_flag("--json", state->json, "each job as one JSON object on standard output");
-  command->callback([state, action, &context] {
-    state->service.with_service(context, [&](ServiceClient& service) {
-      for (const std::string& id : state->ids) {
-        const Json job = action(service, id);
-        std::printf("%s\n", state->json ? job.dump().c_str() : state_line(job).c_str());
-      }
-    });
-  });
+void declare(Command& command, JobActionCommand& state) {
+  command.option("id", state.ids, "job id; several may be given").required();
+  state.service.declare(command);
+  command.json_flag(state.json, "each job as one JSON object on standard output");
 }
 
-// A failed or canceled job is retried, any other one resumed.
-Json resume(ServiceClient& service, const std::string& id) {
-  const std::string state = service.job(id).at("state");
-  return service.post_action(id, state == "failed" || state == "canceled" ? "retry" : "resume");
+// Performs `action` on each job; "resume" retries those that have failed or were canceled.
+void run(const JobActionCommand& command, ServiceClient& service, const std::string& action) {
+  for (const std::string& id : command.ids) {
+    const std::string state = action == "resume" ? service.job(id).at("state") : "";
+    const bool ended = state == "failed" || state == "canceled";
+    const Json job = service.post_action(id, ended ? "retry" : action);
+    std::printf("%s\n", command.json ? job.dump().c_str() : state_line(job).c_str());
+  }
 }
 
 }  // namespace
 
-void add_cancel_command(CLI::App& app, CommandContext& context) {
-  add_job_action_command(app, context, "cancel",
-                         "cancel jobs of a server and discard what they have built",
-                         [](ServiceClient& service, const std::string& id) {
-                           return service.post_action(id, "cancel");
-                         });
-}
-
-void add_suspend_command(CLI::App& app, CommandContext& context) {
-  add_job_action_command(app, context, "suspend", "suspend jobs of a server, to be resumed later",
-                         [](ServiceClient& service, const std::string& id) {
-                           return service.post_action(id, "suspend");
-                         });
-}
-
-void add_resume_command(CLI::App& app, CommandContext& context) {
-  add_job_action_command(app, context, "resume",
-                         "resume suspended jobs of a server, or retry failed and canceled ones",
-                         resume);
+void add_job_action_commands(CommandLine& line) {
+  const auto add = [&](const char* action, const char* description) {
+    add_service_command<JobActionCommand>(
+        line, action, description, declare,
+        [action](const JobActionCommand& command, ServiceClient& service, CommandContext&) {
+          run(command, service, action);
+        });
+  };
+  add("cancel", "cancel jobs of a server and discard what they have built");
+  add("suspend", "suspend jobs of a server, to be resumed later");
+  add("resume", "resume suspended jobs of a server, or retry failed and canceled ones");
 }
 
 }  // namespace voxdag::cli

@@ -5,6 +5,7 @@
 #include "core/base/error.h"
 
 namespace voxdag::query {
+
 std::string encode_png(const Picture& picture) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
@@ -17,10 +18,6 @@ std::string encode_png(const Picture& picture) {
     throw Error(ErrorCode::kOutOfMemory, std::string("writing PNG: ") + image.message);
   png.resize(size);
   return png;
-}
-
-void write_png(FileSystem& files, const std::string& path, const Picture& picture) {
-  write_file_atomically(files, path, encode_png(picture));
 }
 
 }  // namespace voxdag::query

@@ -1,11 +1,9 @@
-// A picture of 8-bit sRGB pixels, and its PNG file.
+// A picture of 8-bit sRGB pixels.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
-
-#include "core/io/file_system.h"
 
 namespace voxdag::query {
 
@@ -20,9 +18,7 @@ struct Picture {
   }
 };
 
-// Throws Error{kOutOfMemory} if libpng runs out of memory.
+// The bytes of its PNG file. Throws Error{kOutOfMemory} if libpng runs out of memory.
 std::string encode_png(const Picture& picture);
-// Writes the PNG file atomically.
-void write_png(FileSystem& files, const std::string& path, const Picture& picture);
 
 }  // namespace voxdag::query

@@ -1,7 +1,6 @@
-#include "client/download.h"
+#include "client/result_download.h"
 
 #include <memory>
-#include <vector>
 
 #include "client/retry_policy.h"
 #include "core/base/error.h"
@@ -10,7 +9,6 @@
 namespace voxdag::client {
 namespace {
 
-constexpr size_t kPieceBytes = 1 << 20;
 constexpr size_t kDigitsInName = 12;
 
 class Download {
@@ -100,18 +98,7 @@ class Download {
   }
 
   void verify() {
-    const auto file = files_.open_read(partial_);
-    Sha256 sha256;
-    std::vector<std::byte> bytes(kPieceBytes);
-    for (uint64_t at = 0; at < size_;) {
-      service_.cancel().check();
-      const std::span piece(bytes.data(),
-                            static_cast<size_t>(std::min<uint64_t>(kPieceBytes, size_ - at)));
-      file->read_at(at, piece);
-      sha256.add(piece);
-      at += piece.size();
-    }
-    if (sha256.finish() == sha256_) return;
+    if (sha256_of_file(*files_.open_read(partial_), service_.cancel()) == sha256_) return;
     files_.remove(partial_);
     throw_corrupt("expected SHA-256 " + sha256_ + "; the partial file was removed");
   }

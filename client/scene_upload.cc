@@ -1,6 +1,4 @@
-#include "client/upload.h"
-
-#include <openssl/evp.h>
+#include "client/scene_upload.h"
 
 #include <charconv>
 #include <memory>
@@ -33,21 +31,13 @@ std::string name_on_server(const std::string& path, const std::string& sha256) {
   return stem + "-" + sha256.substr(0, kDigitsInName) + suffix;
 }
 
-// "sha-256=:BASE64:" (RFC 9530) of a digest in hex.
-std::string digest_field(const std::string& sha256) {
-  unsigned char bytes[32], base64[45];
-  for (size_t i = 0; i < sizeof bytes; ++i)
-    bytes[i] = static_cast<unsigned char>(std::stoi(sha256.substr(2 * i, 2), nullptr, 16));
-  EVP_EncodeBlock(base64, bytes, sizeof bytes);
-  return "sha-256=:" + std::string(reinterpret_cast<char*>(base64)) + ":";
-}
-
 class Upload {
  public:
   Upload(ServiceClient& service, FileSystem& files, const std::string& path, Progress& progress)
       : service_(service), progress_(progress), file_(files.open_read(path)), size_(file_->size()) {
     if (size_ == 0) throw Error(ErrorCode::kInvalidInput, "scene " + path + ": the file is empty");
-    sha256_ = digest();
+    progress.begin_stage("checksum", size_, "bytes");
+    sha256_ = sha256_of_file(*file_, service.cancel(), &progress);
     name_ = name_on_server(path, sha256_);
   }
 
@@ -71,19 +61,6 @@ class Upload {
     file_->read_at(offset, std::as_writable_bytes(std::span(bytes)));
     file_failed_ = false;
     return bytes;
-  }
-
-  std::string digest() {
-    Sha256 sha256;
-    progress_.begin_stage("checksum", size_, "bytes");
-    for (uint64_t at = 0; at < size_;) {
-      service_.cancel().check();
-      const std::string bytes = read_piece(at, size_ - at);
-      sha256.add(std::as_bytes(std::span(bytes)));
-      at += bytes.size();
-      progress_.advance(bytes.size());
-    }
-    return sha256.finish();
   }
 
   // Whether the server has the complete file. Sets offset_ to how many bytes it has.
