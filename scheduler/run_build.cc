@@ -12,13 +12,13 @@
 #include "core/base/process_limits.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/execute/executor.h"
+#include "scheduler/job/build_locks.h"
 #include "scheduler/job/job_progress.h"
-#include "scheduler/job/output_lock.h"
 #include "scheduler/job/work_folder.h"
 #include "scheduler/memory_plan.h"
 #include "scheduler/merge_stage.h"
 #include "scheduler/plan/estimate.h"
-#include "scheduler/prepare.h"
+#include "scheduler/scene_stages.h"
 
 namespace voxdag {
 namespace {
@@ -92,9 +92,10 @@ class Build {
   Build(const BuildSpec& spec, const BuildContext& context)
       : spec_(checked(spec)),
         budget_(spec_.run.memory_bytes),
-        output_lock_(context.files, spec_.run.output),
-        work_(context.files,
-              spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder),
+        output_lock_(context, spec_.run.output, spec_.run.lock_wait_s),
+        work_(context,
+              spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder,
+              spec_.run.lock_wait_s),
         jobs_(open_job_store(context.files, work_, spec_.run.restart)),
         progress_(context.progress, *jobs_, work_),
         context_{context.files, progress_, context.cancel},

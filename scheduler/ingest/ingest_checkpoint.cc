@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "core/base/background.h"
 #include "core/base/clock.h"
@@ -101,6 +102,24 @@ bool IngestCheckpoint::is_worthwhile(const TriangleSource& scene) const {
   return !fits_in_memory(spec_, triangles) ||
          kFreePerCopy * copies_bytes(spec_, triangles) <=
              static_cast<double>(context_.files.free_space(work_.path()));
+}
+
+void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
+  // Within bounds that are given, there may be none of them.
+  if (spec_.run.force || spec_.geometry.bounds) return;
+  const double bytes = static_cast<double>(scene.declared_triangles()) *
+                       static_cast<double>(triangle_record_bytes(is_wide(spec_)));
+  const double memory =
+      static_cast<double>(MemoryPlan::divide(spec_.run.memory_bytes).triangle_bytes);
+  const double free = static_cast<double>(context_.files.free_space(work_.path()));
+  if (bytes - memory > free)
+    throw Error(ErrorCode::kNoSpace,
+                "the scene has " + std::to_string(scene.declared_triangles()) +
+                    " triangles, which take " + std::to_string(std::llround(bytes / 1e6)) +
+                    " MB until they are built: memory has space for " +
+                    std::to_string(std::llround(memory / 1e6)) + " MB of them, " + work_.path() +
+                    " for " + std::to_string(std::llround(free / 1e6)) +
+                    " MB: free some, or build anyway with --force");
 }
 
 void IngestCheckpoint::enable(const TriangleSource& scene, int64_t opened_ns) {

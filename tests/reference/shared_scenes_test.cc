@@ -84,7 +84,7 @@ TEST_F(SharedScenes, HashBits) {
     spec_.geometry.hash_bits = hash_bits;
     const BuildReport cut = run_with(256 * kMebibyte, 512, 1);
     EXPECT_NE(cut.sha256, full.sha256);
-    EXPECT_EQ(cut.dag_nodes, full.dag_nodes);
+    EXPECT_EQ(cut.merge.dag_nodes, full.merge.dag_nodes);
     voxdag::MemoryBudget budget(1024 * kMebibyte);
     voxdag::CancelToken never;
     const auto difference = voxdag::diff_global_files(

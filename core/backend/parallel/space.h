@@ -32,7 +32,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "core/backend/out_of_budget.h"
+#include "core/backend/backend_memory.h"
 #include "core/base/memory_budget.h"
 
 namespace voxdag::parallel {

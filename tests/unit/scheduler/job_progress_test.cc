@@ -53,7 +53,9 @@ class BlockingProgress : public NoProgress {
 // began to wait: else the row could go back in time for good, at the end of a stage.
 TEST(JobProgressTest, WritesTheNewestSnapshot) {
   const TemporaryFolder folder;
-  WorkFolder work(system_files(), folder.path() + "/work");
+  CancelToken cancel;
+  NoProgress quiet;
+  WorkFolder work({system_files(), quiet, cancel}, folder.path() + "/work", 0);
   JobStore store(work.store_path(), JobStore::Access::kBuild);
   BlockingProgress shown;
   JobProgress progress(shown, store, work);

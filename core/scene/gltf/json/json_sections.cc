@@ -70,11 +70,8 @@ class SectionParser : public nlohmann::json_sax<Json> {
   }
 
   bool parse_error(size_t position, const std::string&, const Json::exception& e) override {
-    // The parser's message begins with "[json.exception...] ".
-    std::string reason = e.what();
-    reason.erase(0, reason.find("] ") + 2);
     refuse(path_, "its JSON is broken at character " + std::to_string(position) + ": " +
-                      reason.substr(0, kMaxReasonBytes));
+                      printable(without_prefix(e.what()), kMaxReasonBytes));
   }
 
  private:

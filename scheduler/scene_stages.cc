@@ -1,4 +1,4 @@
-#include "scheduler/prepare.h"
+#include "scheduler/scene_stages.h"
 
 #include <algorithm>
 #include <chrono>
@@ -59,7 +59,7 @@ BuildSpec checked(const BuildSpec& spec) {
     refuse("subvolume edge " + std::to_string(edge) + ": expected a power of two from 64 voxels");
   check_backend(r);
   BuildSpec out = spec;
-  if (!r.threads) out.run.threads = std::max(1u, std::thread::hardware_concurrency());
+  if (!r.threads) out.run.threads = default_threads();
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();
   return out;
 }
@@ -98,6 +98,7 @@ class Preparation {
       enable_checkpoints(opened_ns);
     }
     state_.declared_triangles = scene_->declared_triangles();
+    if (state_.position == 0) checkpoint_.check_disk_space(*scene_);
     for (const std::string& warning : scene_->warnings()) context_.progress.warn(warning);
   }
 

@@ -1,4 +1,5 @@
-// From a scene to subvolumes that are ready to be built. `build` and `plan` share the first half.
+// The first stages of a build: scan and ingest read the scene, partition divides its triangles among
+// the subvolumes. `plan` runs them up to the partition; merge_stage.h has the last ones.
 #pragma once
 
 #include <cstdint>
