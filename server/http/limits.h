@@ -13,7 +13,7 @@ struct HttpLimits {
   size_t max_header_bytes = 32768;  // request line and header fields together
   double header_timeout_s = 10;     // from a request's first byte to the end of its header
   double idle_timeout_s = 30;       // between requests
-  double grace_s = 20;              // of a body or an answer before the minimum rate applies
+  double grace_s = 20;              // how far a client may fall behind the minimum rate
   double min_bytes_per_s = 1024;    // of a body or an answer
   size_t max_requests = 10000;      // on one connection
 };

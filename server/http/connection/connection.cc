@@ -14,9 +14,7 @@ namespace {
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLinger_s = 1;
 constexpr size_t kLingerBytes = 1 << 20;
-// A client that moves bytes this many times faster than the minimum rate is not closed in favor of
-// another one.
-constexpr double kSteadyRates = 8;
+constexpr double kSteadyRates = 8;  // times the minimum rate
 
 }  // namespace
 
@@ -52,7 +50,7 @@ void Connection::begin_exchange() {
   table_.set_working(place_);
 }
 
-double Connection::allowed_s(const Pace& pace) const {
+double Connection::max_wait_s() const {
   switch (phase_) {
     case Phase::kWaiting:
       return limits_.idle_timeout_s;
@@ -61,7 +59,14 @@ double Connection::allowed_s(const Pace& pace) const {
     case Phase::kExchange:
       break;
   }
-  return limits_.grace_s + static_cast<double>(pace.bytes) / limits_.min_bytes_per_s;
+  return limits_.grace_s;
+}
+
+void Connection::count(uint64_t bytes, Pace& pace) const {
+  if (phase_ != Phase::kExchange) return;  // no bytes earn time there
+  const double earned_s = static_cast<double>(bytes) / limits_.min_bytes_per_s;
+  pace.behind_minimum_s = std::max(0.0, pace.behind_minimum_s - earned_s);
+  pace.behind_steady_s = std::max(0.0, pace.behind_steady_s - earned_s / kSteadyRates);
 }
 
 bool Connection::wait_for_io(ssize_t outcome, Pace& pace) {
@@ -71,11 +76,8 @@ bool Connection::wait_for_io(ssize_t outcome, Pace& pace) {
     return false;
   }
   const double start = wall_seconds();
-  const double deadline = start + allowed_s(pace) - pace.waited_s;
-  const double credit_s = phase_ == Phase::kExchange ? static_cast<double>(pace.bytes) /
-                                                           (kSteadyRates * limits_.min_bytes_per_s)
-                                                     : 0;
-  table_.set_waiting(place_, start - pace.waited_s + credit_s, phase_ != Phase::kExchange);
+  const double deadline = start + max_wait_s() - pace.behind_minimum_s;
+  table_.set_waiting(place_, start - pace.behind_steady_s, phase_ != Phase::kExchange);
   bool ready = false, broken = false;
   double now = start;
   for (; !ready && !broken && now < deadline; now = wall_seconds()) {
@@ -86,7 +88,8 @@ bool Connection::wait_for_io(ssize_t outcome, Pace& pace) {
     broken = count < 0 && errno != EINTR;
   }
   table_.set_working(place_);
-  pace.waited_s += now - start;
+  pace.behind_minimum_s += now - start;
+  pace.behind_steady_s += now - start;
   if (!ready) error_ = broken ? ErrorState::kBroken : ErrorState::kTooSlow;
   return ready;
 }
@@ -109,7 +112,7 @@ std::string_view Connection::read(uint64_t max_bytes) {
   const size_t size = std::min<uint64_t>(max_bytes, end_ - begin_);
   const std::string_view bytes(buffer_.data() + begin_, size);
   begin_ += size;
-  reading_.bytes += size;
+  count(size, reading_);
   return bytes;
 }
 
@@ -123,7 +126,7 @@ bool Connection::read_line(std::string& text, size_t max_bytes) {
     if (size > max_bytes - std::min(max_bytes, text.size())) return false;
     text += bytes.substr(0, size);
     begin_ += size;
-    reading_.bytes += size;
+    count(size, reading_);
   }
   return true;
 }
@@ -134,7 +137,7 @@ bool Connection::write(std::string_view bytes) {
     const ssize_t wrote = tls_.write(socket_, bytes.data(), bytes.size());
     if (wrote > 0) {
       bytes.remove_prefix(static_cast<size_t>(wrote));
-      writing_.bytes += static_cast<size_t>(wrote);
+      count(static_cast<size_t>(wrote), writing_);
     } else if (!wait_for_io(wrote, writing_)) {
       return false;
     }

@@ -2,10 +2,10 @@
 // allows. Used by one thread.
 //
 // Phases: waiting (idle_timeout_s for the next request), header (header_timeout_s for all of it),
-// exchange (grace_s + bytes / min_bytes_per_s for the body, and the same for the answer). Only the
-// time in which the connection waits for its client counts. A client that exceeds it puts the
-// connection into an error state, and reads fail from then on. While it waits, the table knows so
-// and may close the connection in favor of another one.
+// exchange (the body and the answer each at min_bytes_per_s, at no time more than grace_s behind).
+// Only the time in which the connection waits for its client counts. A client that exceeds it puts
+// the connection into an error state, and reads fail from then on. While it waits, the table knows
+// so and may close the connection in favor of another one.
 #pragma once
 
 #include <cstdint>
@@ -50,17 +50,19 @@ class Connection {
 
  private:
   enum class Phase { kWaiting, kHeader, kExchange };
-  // How long the client was waited for in a phase, and what it moved.
+  // How much longer the client was waited for in this phase than its bytes take at a rate: the
+  // minimum, and a multiple that is fast enough not to be closed in favor of others.
   struct Pace {
-    double waited_s = 0;
-    uint64_t bytes = 0;
+    double behind_minimum_s = 0;
+    double behind_steady_s = 0;
   };
 
   bool fill();
   // Waits until the socket is ready for what a call on tls_ needs (its `outcome`). False, with the
   // error state set, if the outcome is an error or the client exceeds its time.
   bool wait_for_io(ssize_t outcome, Pace& pace);
-  double allowed_s(const Pace& pace) const;
+  double max_wait_s() const;
+  void count(uint64_t bytes, Pace& pace) const;
 
   const int socket_;
   const HttpLimits& limits_;
@@ -71,7 +73,7 @@ class Connection {
   ErrorState error_ = ErrorState::kNone;
   std::vector<char> buffer_;
   size_t begin_ = 0, end_ = 0;  // the bytes of the buffer that are not yet read
-  Pace reading_, writing_;      // in this phase
+  Pace reading_, writing_;
 };
 
 }  // namespace voxdag::server

@@ -8,6 +8,12 @@
 #include "core/base/clock.h"
 
 namespace voxdag::server {
+namespace {
+
+// A client within a body or an answer that is waited for only this long is on its way.
+constexpr double kMinExchangeWait_s = 1;
+
+}  // namespace
 
 bool is_loopback(const std::string& address) {
   return address.starts_with("127.") || address == "::1" || address.starts_with("::ffff:127.");
@@ -40,12 +46,16 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
 // The thread of the evicted connection wakes up at the end of its stream and removes the entry.
 // Until then the table holds one more than the limit.
 bool ConnectionTable::evict_one() {
+  const double now = wall_seconds();
   Entry* longest = nullptr;
-  for (Entry& entry : entries_)
-    if (entry.waiting && !entry.evicted &&
-        (!longest || entry.waiting_since_s < longest->waiting_since_s))
+  for (Entry& entry : entries_) {
+    const bool may_be_closed =
+        entry.waiting && !entry.evicted &&
+        (entry.between_requests || now - entry.waiting_since_s >= kMinExchangeWait_s);
+    if (may_be_closed && (!longest || entry.waiting_since_s < longest->waiting_since_s))
       longest = &entry;
-  if (!longest || longest->waiting_since_s > wall_seconds()) return false;
+  }
+  if (!longest) return false;
   longest->evicted = true;
   shutdown(longest->socket, SHUT_RDWR);
   return true;

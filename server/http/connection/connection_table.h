@@ -31,8 +31,7 @@ class ConnectionTable {
 
   // False if the client has too many connections, or the table is full and none is waiting.
   bool admit(int socket, const std::string& address, Place& place);
-  // The connection waits for its client since then (in wall_seconds()); what lies in the future is
-  // a client ahead of its time, which is not closed.
+  // The connection waits for its client since then (in wall_seconds()).
   void set_waiting(Place place, double since_s, bool between_requests);
   void set_working(Place place);
   // Must be called before the socket is closed.

@@ -6,6 +6,7 @@
 
 #include <string>
 
+#include "core/base/clock.h"
 #include "server/http/exchange.h"
 #include "server/http/problem.h"
 
@@ -230,7 +231,7 @@ TEST(Hardening, M2_LinesOfChunksAreBounded) {
     trailers += "X: " + std::string(1000, 'x') + "\r\n";
   }
   for (const std::string& body : {endless, "4;" + endless, "1\r\na" + endless, "0\r\nX: " + endless,
-                                 extensions + "0\r\n\r\n", "0\r\n" + trailers + "\r\n"}) {
+                                  extensions + "0\r\n\r\n", "0\r\n" + trailers + "\r\n"}) {
     SCOPED_TRACE(body.substr(0, 20));
     Client client(chunked(body));
     ASSERT_EQ(client.next_request(), 200);
@@ -246,8 +247,9 @@ TEST(Hardening, M2_LinesOfChunksAreBounded) {
 }
 
 TEST(Hardening, M2_HeadersAreBounded) {
-  for (const std::string& bytes : {"GET /" + std::string(40000, 'x'),
-                                  "GET / HTTP/1.1\r\nX: " + std::string(40000, 'x') + "\r\n\r\n"}) {
+  for (const std::string& bytes :
+       {"GET /" + std::string(40000, 'x'),
+        "GET / HTTP/1.1\r\nX: " + std::string(40000, 'x') + "\r\n\r\n"}) {
     Client client(bytes);
     EXPECT_EQ(client.next_request(), 431);
   }
@@ -262,6 +264,16 @@ TEST(Exchange, TimesOut) {
   EXPECT_EQ(body.connection().error_state(), ErrorState::kTooSlow);
   Client idle("", true);
   EXPECT_EQ(idle.next_request(), 0);
+}
+
+// A client that was fast for a while may not be silent for longer than another one.
+TEST(Hardening, M4_PastBytesDoNotExcuseSilence) {
+  Client client(put("Content-Length: 1000000\r\n", std::string(100000, 'x')), true);
+  ASSERT_EQ(client.next_request(), 200);
+  const double start = wall_seconds();
+  EXPECT_EQ(client.read_body(), BodyEnd::kTooSlow);
+  EXPECT_EQ(client.body().size(), 100000u);
+  EXPECT_LT(wall_seconds() - start, 20);
 }
 
 // An answer without content has no length; that to HEAD has the length of the content it omits.
