@@ -100,6 +100,8 @@ bool Exchange::answer(Response response, bool last) {
 }
 
 bool Exchange::send_pieces(ReadableFile& file, const std::vector<FilePiece>& pieces) {
+  // The API limits how many such answers a client may ask for at a time.
+  connection_.allow_large_send_buffer();
   std::string buffer;
   for (const FilePiece& piece : pieces) {
     if (!connection_.write(piece.text)) return false;

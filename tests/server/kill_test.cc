@@ -144,7 +144,7 @@ TEST_F(KilledService, FinishesEveryJob) {
       sha256 = sha256_hex(contents(local));
     }
     EXPECT_EQ(job["result"]["sha256"], sha256);
-    EXPECT_EQ(sha256_hex(http_->get("/api/v1/jobs/" + id + "/dag").body), job["result"]["sha256"]);
+    EXPECT_EQ(job["result"]["sha256"], sha256_hex(http_->get("/api/v1/jobs/" + id + "/dag").body));
   }
 }
 

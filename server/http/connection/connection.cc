@@ -145,6 +145,13 @@ bool Connection::write(std::string_view bytes) {
   return true;
 }
 
+void Connection::allow_large_send_buffer() {
+#ifdef SO_BUF_LOCK  // Linux 5.16
+  const int none = 0;
+  setsockopt(socket_, SOL_SOCKET, SO_BUF_LOCK, &none, sizeof none);
+#endif
+}
+
 bool Connection::peer_disconnected() const {
   char byte;
   const ssize_t got = recv(socket_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);

@@ -34,6 +34,9 @@ class Connection {
 
   enum class ErrorState { kNone, kBroken, kTooSlow };
   ErrorState error_state() const { return error_; }
+  // Lets the kernel choose the size of the send buffer, which is small otherwise: for long answers
+  // over long distances.
+  void allow_large_send_buffer();
   // Whether the client has closed the connection. Consumes no bytes.
   bool peer_disconnected() const;
   // Closes the sending side and discards what the client still sends for up to a second, so that

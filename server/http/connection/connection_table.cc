@@ -11,7 +11,7 @@ namespace voxdag::server {
 namespace {
 
 // A client within a body or an answer that is waited for only this long is on its way.
-constexpr double kMinExchangeWait_s = 1;
+constexpr double kMinExchangeWait_s = 0.25;
 
 }  // namespace
 
