@@ -1,6 +1,7 @@
 #include "core/base/process_limits.h"
 
 #include <malloc.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -123,6 +124,11 @@ unsigned default_threads() {
 
 uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }
 uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
+
+uint64_t max_open_files() {
+  rlimit limit{};
+  return getrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur : UINT64_MAX;
+}
 
 void return_freed_memory_to_system() {
 #ifdef __GLIBC__

@@ -23,6 +23,8 @@ uint64_t cgroup_cpus(const std::string& membership, const std::string& mount);
 uint64_t peak_resident_bytes();
 // Resident set of this process now (VmRSS), in bytes.
 uint64_t resident_bytes();
+// How many files and sockets this process may have open (RLIMIT_NOFILE).
+uint64_t max_open_files();
 
 // Tells the C library to return freed memory to the system at once instead of retaining it, so that
 // resident memory follows what a MemoryBudget has charged. Process-wide; repeated calls are

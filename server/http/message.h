@@ -1,4 +1,4 @@
-// A request and its answer as handlers see them; httplib's types stay in server/http.
+// A request and its answer as handlers see them.
 #pragma once
 
 #include <cstdint>
