@@ -1,6 +1,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <new>
 #include <system_error>
 
@@ -8,6 +9,9 @@
 
 namespace voxdag::cli {
 namespace {
+
+// Of an exception that no part of voxdag should throw (docs/errors.md); EX_SOFTWARE of sysexits.h.
+constexpr int kDefectStatus = 70;
 
 CancelToken g_cancel;
 
@@ -48,6 +52,9 @@ int run(int argc, char** argv) {
     return report(ErrorCode::kOutOfMemory, error.what());
   } catch (const std::bad_alloc&) {
     return report(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "voxdag: error: a defect of voxdag: %s\n", error.what());
+    return kDefectStatus;
   }
 }
 
