@@ -3,8 +3,10 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <limits>
 #include <optional>
 #include <sstream>
+#include <type_traits>
 
 namespace voxdag::cli {
 namespace {
@@ -26,13 +28,29 @@ void read_config_file(const std::string& path, CLI::App& command) {
   }
 }
 
+// "", or what is expected in place of `text`, which CLI11 would convert to something else (-4 to
+// 2^64 - 4) or refuse without saying why.
+template <class T>
+std::string integer_problem(const std::string& text) {
+  if (parse_numbers<T, 1>(text, ',')) return "";
+  using Limits = std::numeric_limits<T>;
+  return "'" + text + "': expected a whole number from " + std::to_string(Limits::min()) + " to " +
+         std::to_string(Limits::max());
+}
+
 }  // namespace
 
 Option Option::required() { return Option(option_->required()); }
 Option Option::group(const char* heading) { return Option(option_->group(heading)); }
 Option Option::environment(const char* variable) { return Option(option_->envname(variable)); }
 Option Option::show_default() { return Option(option_->capture_default_str()); }
-Option Option::positive() { return Option(option_->check(CLI::PositiveNumber)); }
+Option Option::positive() {
+  const auto problem = [](const std::string& text) {
+    const bool positive = text.find_first_of("123456789") != std::string::npos;
+    return positive ? "" : "'" + text + "': expected a number above 0";
+  };
+  return Option(option_->check(problem, "POSITIVE"));
+}
 Option Option::range(int low, int high) { return Option(option_->check(CLI::Range(low, high))); }
 Option Option::range(double low, double high) {
   return Option(option_->check(CLI::Range(low, high)));
@@ -48,7 +66,9 @@ Option Option::needs(Option other) { return Option(option_->needs(other.option_)
 
 template <class T>
 Option Command::option(const char* names, T& value, const char* description) {
-  return Option(app_->add_option(names, value, description));
+  CLI::Option* const option = app_->add_option(names, value, description);
+  if constexpr (std::is_integral_v<T>) option->check(integer_problem<T>);
+  return Option(option);
 }
 template Option Command::option(const char*, int&, const char*);
 template Option Command::option(const char*, unsigned&, const char*);
@@ -95,8 +115,9 @@ int CommandLine::run(int argc, char** argv) {
   try {
     app_->parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    // CLI11 reports --help and --version as errors of status 0; any other is invalid input.
-    return app_->exit(error) == 0 ? 0 : exit_status(ErrorCode::kInvalidInput);
+    // CLI11 reports --help and --version as errors of status 0.
+    if (error.get_exit_code() == 0) return app_->exit(error);
+    throw Error(ErrorCode::kInvalidInput, error.what());
   }
   return context_.exit_status;
 }

@@ -118,6 +118,7 @@ void add_generate_command(CommandLine& line);
 void add_render_command(CommandLine& line);
 // Adds `serve`, `token`, and the hidden command that `serve` starts for each job.
 void add_serve_commands(CommandLine& line);
+void add_health_command(CommandLine& line);
 void add_submit_command(CommandLine& line);
 void add_jobs_command(CommandLine& line);
 void add_watch_command(CommandLine& line);

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
 
@@ -21,12 +21,11 @@ void run(const DiffCommand& command, CommandContext& context) {
   const DiffReport report = diff_global_files(*a, *b, budget, context.cancel);
   context.exit_status = report.same() ? 0 : 1;
   if (command.json) {
-    const nlohmann::ordered_json json{{"same", report.same()},
+    print_json(nlohmann::ordered_json{{"same", report.same()},
                                       {"voxels_a", a->voxels()},
                                       {"voxels_b", b->voxels()},
                                       {"only_a", report.only_a},
-                                      {"only_b", report.only_b}};
-    std::printf("%s\n", json.dump().c_str());
+                                      {"only_b", report.only_b}});
   } else if (report.same()) {
     std::printf("identical: %s voxels\n", count_text(a->voxels()).c_str());
   } else {

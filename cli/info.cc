@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "core/base/text.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
@@ -19,7 +19,7 @@ uint64_t level_bytes(const voxdag_reader::Level& level) {
   return level.word_count * sizeof(uint32_t);
 }
 
-std::string info_json(const voxdag_reader::File& file, const std::string& sha256) {
+nlohmann::ordered_json info_json(const voxdag_reader::File& file, const std::string& sha256) {
   nlohmann::ordered_json levels = nlohmann::ordered_json::array();
   for (uint32_t l = 0; l <= file.brick_level(); ++l)
     levels.push_back(
@@ -35,7 +35,7 @@ std::string info_json(const voxdag_reader::File& file, const std::string& sha256
       {"bytes", file.file_bytes()},
       {"levels", levels}};
   if (!sha256.empty()) json["sha256"] = sha256;
-  return json.dump();
+  return json;
 }
 
 void print(const voxdag_reader::File& file, const std::string& sha256) {
@@ -61,7 +61,7 @@ void run(const InfoCommand& command, CommandContext& context) {
   const std::string sha256 =
       command.digest ? sha256_of_file(*context.files.open_read(command.path), context.cancel) : "";
   if (command.json)
-    std::printf("%s\n", info_json(*file, sha256).c_str());
+    print_json(info_json(*file, sha256));
   else
     print(*file, sha256);
 }

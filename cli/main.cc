@@ -1,6 +1,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <new>
 #include <system_error>
 
@@ -8,6 +9,9 @@
 
 namespace voxdag::cli {
 namespace {
+
+// Of an exception that no part of voxdag should throw (docs/errors.md); EX_SOFTWARE of sysexits.h.
+constexpr int kDefectStatus = 70;
 
 CancelToken g_cancel;
 
@@ -37,8 +41,8 @@ int run(int argc, char** argv) {
   for (const auto add_command :
        {add_build_command, add_plan_command, add_status_command, add_info_command,
         add_verify_command, add_diff_command, add_generate_command, add_render_command,
-        add_serve_commands, add_submit_command, add_jobs_command, add_watch_command,
-        add_job_action_commands, add_download_command})
+        add_serve_commands, add_health_command, add_submit_command, add_jobs_command,
+        add_watch_command, add_job_action_commands, add_download_command})
     add_command(line);
   try {
     return line.run(argc, argv);
@@ -48,6 +52,9 @@ int run(int argc, char** argv) {
     return report(ErrorCode::kOutOfMemory, error.what());
   } catch (const std::bad_alloc&) {
     return report(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "voxdag: error: a defect of voxdag: %s\n", error.what());
+    return kDefectStatus;
   }
 }
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <thread>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
 #include "core/base/text.h"
@@ -20,7 +20,7 @@ constexpr int kMaxPictureEdge = 16384;
 
 struct RenderCommand {
   std::string input;
-  std::string output;
+  OutputFile output;
   std::string view = "auto";
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
@@ -68,19 +68,17 @@ void report(const RenderCommand& command, const query::Placement& placement,
             const voxdag_reader::File& file, double wall_s) {
   const auto eye = world_point(placement.eye, file), target = world_point(placement.target, file);
   if (command.json) {
-    const nlohmann::ordered_json json = {
-        {"output", command.output},
+    return print_json(nlohmann::ordered_json{
+        {"output", command.output.path},
         {"width", command.options.width},
         {"height", command.options.height},
         {"camera", eye},
         {"target", target},
         {"fov", placement.fov_degrees},
         {"wall_s", wall_s},
-    };
-    std::printf("%s\n", json.dump().c_str());
-    return;
+    });
   }
-  std::printf("%s: %d x %d, %s\n", command.output.c_str(), command.options.width,
+  std::printf("%s: %d x %d, %s\n", command.output.path.c_str(), command.options.width,
               command.options.height, duration_text(wall_s).c_str());
   std::printf("  --camera %.6g,%.6g,%.6g --target %.6g,%.6g,%.6g --fov %.4g\n", eye[0], eye[1],
               eye[2], target[0], target[1], target[2], placement.fov_degrees);
@@ -94,6 +92,7 @@ void run(RenderCommand& command, CommandContext& context) {
                                               std::to_string(kMaxPictureEdge) + " pixels");
   command.options.width = width;
   command.options.height = height;
+  command.output.check(context.files, command.input, query::is_rendered_png);
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
@@ -102,14 +101,14 @@ void run(RenderCommand& command, CommandContext& context) {
   const query::Placement placement = place_camera(command, *file, dag);
   const query::Picture picture =
       query::render_picture(dag, placement, command.options, *progress, context.cancel);
-  write_file_atomically(context.files, command.output, query::encode_png(picture));
+  write_file_atomically(context.files, command.output.path, query::encode_png(picture));
   report(command, placement, *file, wall_seconds() - start_s);
 }
 
 void declare(Command& command, RenderCommand& state) {
   state.options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   command.option("input", state.input, "the .vdag file").required();
-  command.option("-o,--output", state.output, "the .png file to write").required();
+  command.option("-o,--output", state.output.path, "the .png file to write").required();
   const Option view =
       command.option("--view", state.view, "named view").one_of(query::view_names()).show_default();
   Option camera = command.option("--camera", state.camera, "X,Y,Z of the camera, in scene units");
@@ -124,6 +123,7 @@ void declare(Command& command, RenderCommand& state) {
   command.option("--threads", state.options.threads, "worker threads")
       .range(1, 1024)
       .show_default();
+  state.output.declare_force(command);
   command.json_flag(state.json);
 }
 

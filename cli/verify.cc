@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
@@ -51,8 +51,8 @@ void print(const voxdag_reader::File& file, const std::optional<query::SampleRep
                 count_text(sample->set).c_str());
 }
 
-std::string verify_json(const VerifyCommand& command, const voxdag_reader::File& file,
-                        const std::optional<query::SampleReport>& sample) {
+nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_reader::File& file,
+                                   const std::optional<query::SampleReport>& sample) {
   nlohmann::ordered_json json{{"ok", true},
                               {"voxels", file.voxels()},
                               {"svo_nodes", file.svo_nodes()},
@@ -63,7 +63,7 @@ std::string verify_json(const VerifyCommand& command, const voxdag_reader::File&
                        {"boxes", sample->boxes},
                        {"voxels", sample->voxels},
                        {"set", sample->set}};
-  return json.dump();
+  return json;
 }
 
 void run(const VerifyCommand& command, CommandContext& context) {
@@ -74,7 +74,7 @@ void run(const VerifyCommand& command, CommandContext& context) {
   std::optional<query::SampleReport> sample;
   if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
   if (command.json)
-    std::printf("%s\n", verify_json(command, *file, sample).c_str());
+    print_json(verify_json(command, *file, sample));
   else
     print(*file, sample);
 }

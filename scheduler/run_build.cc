@@ -10,6 +10,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/io/overwrite.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/execute/executor.h"
 #include "scheduler/job/build_locks.h"
@@ -29,18 +30,24 @@ constexpr int64_t kWorkFormatVersion = 3;
 constexpr int kMaxReads = 3;
 // How often the merge is run before artifacts may not be damaged again.
 constexpr int kMaxMerges = 3;
+constexpr const char* kReportSuffix = ".report.json";
 
-// Refuses now an output that could not be written once all is built.
-void check_output(FileSystem& files, const std::string& output) {
+bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
+
+// Refuses now an output that could not be written once all is built, and one whose writing would
+// destroy a scene or a file that is not ours.
+void check_output(FileSystem& files, const std::string& output,
+                  const std::vector<std::string>& scenes) {
   if (output.empty())
     throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
   if (output.ends_with('/'))
     throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a file, not a folder");
-  if (files.exists(output) && files.open_read(output)->size() > 0 && !is_global_file(files, output))
-    throw Error(ErrorCode::kInvalidInput,
-                output +
-                    " exists and is no global file of voxdag: expected a free name or that of an "
-                    "earlier result (-o)");
+  const std::string partial = output + ".partial", report = output + kReportSuffix;
+  for (const std::string& path : {output, partial, report}) refuse_input(files, path, scenes);
+  refuse_foreign_file(files, output, is_global_file, " (-o)");
+  refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
+  refuse_foreign_file(files, report, is_report, " (-o)");
+  refuse_foreign_file(files, report + ".partial", is_report, " (-o)");
   files.make_directories(parent_directory(output));
   const std::string probe = output + ".probe-" + std::to_string(getpid());
   files.create(probe)->close();
@@ -142,7 +149,7 @@ class Build {
     report_.wall_s = wall_seconds() - start_s;
     report_.cpu_s = process_cpu_seconds();
     report_.peak_rss_bytes = peak_resident_bytes();
-    write_file_atomically(context_.files, spec_.run.output + ".report.json",
+    write_file_atomically(context_.files, spec_.run.output + kReportSuffix,
                           report_json(report_) + "\n");
     if (!spec_.run.keep_work) remove_work();
     return report_;
@@ -341,7 +348,7 @@ class Build {
 }  // namespace
 
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
-  check_output(context.files, spec.run.output);
+  check_output(context.files, spec.run.output, spec.geometry.scenes);
   return_freed_memory_to_system();
   return Build(spec, context).run();
 }

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "cli/output.h"
 #include "cli/service/job_text.h"
 #include "cli/service/service_options.h"
 
@@ -26,7 +27,10 @@ void run(const JobActionCommand& command, ServiceClient& service, const std::str
     const std::string state = action == "resume" ? service.job(id).at("state") : "";
     const bool ended = state == "failed" || state == "canceled";
     const Json job = service.post_action(id, ended ? "retry" : action);
-    std::printf("%s\n", command.json ? job.dump().c_str() : state_line(job).c_str());
+    if (command.json)
+      print_json(job);
+    else
+      std::printf("%s\n", state_line(job).c_str());
   }
 }
 

@@ -1,5 +1,6 @@
 #include <cstdio>
 
+#include "cli/output.h"
 #include "cli/service/job_text.h"
 #include "cli/service/service_options.h"
 
@@ -27,7 +28,7 @@ void run(const JobsCommand& command, ServiceClient& service, CommandContext&) {
   if (!command.states.empty()) path += "&state=" + command.states;
   const Json answer = service.get(path);
   if (command.json)
-    std::printf("%s\n", answer.dump().c_str());
+    print_json(answer);
   else
     print(answer);
 }

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "cli/build_options.h"
+#include "cli/output.h"
 #include "cli/service/follow.h"
 #include "cli/service/job_text.h"
 #include "cli/terminal/progress_bar.h"
@@ -68,7 +69,7 @@ void run(const SubmitCommand& command, ServiceClient& service, CommandContext& c
   if (!command.json) std::printf("%s\n", state_line(job).c_str());
   std::fflush(stdout);
   if (command.wait) job = follow_job(service, job.at("id"));
-  if (command.json) std::printf("%s\n", job.dump().c_str());
+  if (command.json) print_json(job);
   if (!command.wait) return;
   check_succeeded(job);
   if (!command.json) print_result(job);

@@ -1,5 +1,6 @@
 #include <cstdio>
 
+#include "cli/output.h"
 #include "cli/service/follow.h"
 #include "cli/service/job_text.h"
 
@@ -14,7 +15,7 @@ struct WatchCommand {
 
 void run(const WatchCommand& command, ServiceClient& service, CommandContext&) {
   const Json job = follow_job(service, command.id);
-  if (command.json) std::printf("%s\n", job.dump().c_str());
+  if (command.json) print_json(job);
   check_succeeded(job);
   if (!command.json) print_result(job);
 }

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/io/file_system.h"
+
 namespace voxdag::query {
 
 struct Picture {
@@ -18,7 +20,10 @@ struct Picture {
   }
 };
 
-// The bytes of its PNG file. Throws Error{kOutOfMemory} if libpng runs out of memory.
+// The bytes of its PNG file, which names voxdag as its software. Throws Error{kOutOfMemory} if
+// libpng runs out of memory.
 std::string encode_png(const Picture& picture);
+// Whether the file is one of encode_png().
+bool is_rendered_png(const ReadableFile& file);
 
 }  // namespace voxdag::query

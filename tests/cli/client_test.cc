@@ -219,5 +219,22 @@ TEST_F(Client, SendsAToken) {
   EXPECT_EQ(answer.status, 0) << answer.err;
 }
 
+// The health of a service is the exit status; a service that is not there or is no voxdag is not
+// waited for.
+TEST_F(Client, Health) {
+  const Answer answer = run({"health"});
+  EXPECT_EQ(answer.status, 0) << answer.err;
+  EXPECT_EQ(answer.out, server_->url() + ": ready\n");
+  put("full.json", R"({"jobs": {"min_free_disk": "1000TiB"}})");
+  start_server({"--config", folder_.file("full.json")});
+  expect_error(6, "less free space", {"health"});
+  const std::string url = server_->url();
+  EXPECT_EQ(server_->stop(), 0);
+  server_.reset();
+  const auto start = std::chrono::steady_clock::now();
+  expect_error(6, url, {"health", "--server", url});
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
+}
+
 }  // namespace
 }  // namespace command_line

@@ -11,6 +11,7 @@
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
+#include "core/io/overwrite.h"
 
 namespace voxdag {
 
@@ -285,12 +286,15 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   return digest.finish();
 }
 
-bool is_global_file(FileSystem& files, const std::string& path) {
-  const auto file = files.open_read(path);
+bool is_global_file(const ReadableFile& file) {
   uint64_t magic = 0;
-  if (file->size() < sizeof magic) return false;
-  file->read_at(kMagicAt, std::as_writable_bytes(std::span(&magic, 1)));
+  if (file.size() < sizeof magic) return false;
+  file.read_at(kMagicAt, std::as_writable_bytes(std::span(&magic, 1)));
   return magic == kMagic;
+}
+
+bool is_partial_global_file(const ReadableFile& file) {
+  return is_global_file(file) || begins_with(file, std::string(kPageBytes, '\0'));
 }
 
 GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned threads,

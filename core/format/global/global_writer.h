@@ -47,8 +47,10 @@ struct GlobalFileProgress {
   std::vector<uint64_t> checksums;  // of their checksum blocks; the last one may be partial
 };
 
-// Whether the file at `path` begins with the magic of a global file.
-bool is_global_file(FileSystem& files, const std::string& path);
+// Whether the file begins with the magic of a global file.
+bool is_global_file(const ReadableFile& file);
+// Whether it may be one that is not complete: its first page is written last.
+bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {
  public:
