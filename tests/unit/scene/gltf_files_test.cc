@@ -6,7 +6,7 @@
 #include <random>
 
 #include "core/scene/gltf/document/read_document.h"
-#include "core/scene/gltf/geometry/base64.h"
+#include "core/scene/gltf/mesh_data/base64.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {

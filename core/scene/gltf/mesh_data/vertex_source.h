@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/base/page_buffer.h"
-#include "core/scene/gltf/geometry/accessor_reader.h"
+#include "core/scene/gltf/mesh_data/accessor_reader.h"
 
 namespace voxdag::gltf {
 

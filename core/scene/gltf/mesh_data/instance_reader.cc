@@ -1,4 +1,4 @@
-#include "core/scene/gltf/geometry/instance_reader.h"
+#include "core/scene/gltf/mesh_data/instance_reader.h"
 
 #include <algorithm>
 #include <array>

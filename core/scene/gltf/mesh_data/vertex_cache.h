@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/page_buffer.h"
-#include "core/scene/gltf/geometry/vertex_source.h"
+#include "core/scene/gltf/mesh_data/vertex_source.h"
 
 namespace voxdag::gltf {
 

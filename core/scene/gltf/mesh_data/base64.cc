@@ -1,4 +1,4 @@
-#include "core/scene/gltf/geometry/base64.h"
+#include "core/scene/gltf/mesh_data/base64.h"
 
 #include <array>
 #include <string_view>

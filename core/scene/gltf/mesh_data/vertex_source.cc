@@ -1,4 +1,4 @@
-#include "core/scene/gltf/geometry/vertex_source.h"
+#include "core/scene/gltf/mesh_data/vertex_source.h"
 
 #include <array>
 #include <limits>

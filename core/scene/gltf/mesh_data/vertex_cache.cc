@@ -1,4 +1,4 @@
-#include "core/scene/gltf/geometry/vertex_cache.h"
+#include "core/scene/gltf/mesh_data/vertex_cache.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "core/scene/gltf/geometry/corner_reader.h"
+#include "core/scene/gltf/mesh_data/corner_reader.h"
 
 #include <numeric>
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/scene/gltf/document/document.h"
-#include "core/scene/gltf/geometry/buffer_reader.h"
+#include "core/scene/gltf/mesh_data/buffer_reader.h"
 
 namespace voxdag::gltf {
 

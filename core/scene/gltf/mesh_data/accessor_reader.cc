@@ -1,4 +1,4 @@
-#include "core/scene/gltf/geometry/accessor_reader.h"
+#include "core/scene/gltf/mesh_data/accessor_reader.h"
 
 #include <algorithm>
 #include <cstring>

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/scene/gltf/geometry/accessor_reader.h"
+#include "core/scene/gltf/mesh_data/accessor_reader.h"
 
 namespace voxdag::gltf {
 

@@ -1,4 +1,4 @@
-#include "core/scene/gltf/geometry/node_walk.h"
+#include "core/scene/gltf/mesh_data/node_walk.h"
 
 namespace voxdag::gltf {
 

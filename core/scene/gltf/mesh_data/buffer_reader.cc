@@ -1,11 +1,11 @@
-#include "core/scene/gltf/geometry/buffer_reader.h"
+#include "core/scene/gltf/mesh_data/buffer_reader.h"
 
 #include <algorithm>
 #include <array>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
-#include "core/scene/gltf/geometry/base64.h"
+#include "core/scene/gltf/mesh_data/base64.h"
 #include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
