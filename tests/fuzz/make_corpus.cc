@@ -132,14 +132,13 @@ void add_global_files(const Corpus& corpus) {
 }
 
 void add_records(const Corpus& corpus) {
-  const auto without_checksum = [](const MergeState& state) {
-    const std::string bytes = text_of(encode_state(state));
-    return bytes.substr(0, bytes.size() - sizeof(uint64_t));
+  const auto without_checksum = [](const std::vector<std::byte>& bytes) {
+    return text_of(std::span(bytes).first(bytes.size() - sizeof(uint64_t)));
   };
   MergeState state;
   state.inputs_checksum = 7;
   state.intermediates = {{.segment = 1, .offset = 32, .bytes = 64}};
-  corpus.add("merge_state", "pass", without_checksum(state));
+  corpus.add("merge_state", "pass", without_checksum(encode_state(state)));
   FinalPassState& pass = state.final_pass.emplace();
   pass.level = 3;
   pass.output = "out.vdag";
@@ -148,13 +147,13 @@ void add_records(const Corpus& corpus) {
   pass.map_rows = {5};
   pass.placed = {{}};
   pass.roots = {{}};
-  corpus.add("merge_state", "final_pass", without_checksum(state));
+  corpus.add("merge_state", "final_pass", without_checksum(encode_state(state)));
 
   IngestRecord record;
   record.request = R"({"resolution":1024})";
   record.files = {{"scene.glb", {1, 2, 3, 4}}};
   record.state.digest = ContentDigest(grid_of(64));
-  corpus.add("ingest_record", "one_file", text_of(encode(record)));
+  corpus.add("ingest_record", "one_file", without_checksum(encode(record)));
 }
 
 void add_requests(const Corpus& corpus) {

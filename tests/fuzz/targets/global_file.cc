@@ -104,7 +104,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const voxdag_reader::File file(bytes.path());
     fuzz::require(file.first_damaged_block() == 0, "checksums that fit are found to fit");
     MemoryBudget budget(kBudgetBytes);
-    Progress progress;
+    NoProgress progress;
     bool is_sound = true;
     try {
       verify_global_file(file, budget, progress, CancelToken());
