@@ -169,8 +169,11 @@ TEST_F(Client, WatchesAcrossARestart) {
   const std::string first = submit_long(), id = submit("64");
   const std::string url = server_->url();
   const pid_t watcher = start({"watch", id, "--json"});
-  while (contents(".stderr").find("queued") == std::string::npos)
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (contents(".stderr").find("queued") == std::string::npos) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "the watcher says nothing";
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
   EXPECT_EQ(server_->stop(), 0);
   start_server({}, url.substr(url.rfind(':') + 1));
   if (server_->url().empty()) {

@@ -265,6 +265,12 @@ TEST(GltfRefusals, DuplicateMembers) {
   EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
 }
 
+// The same where the first value is a number and the second an object, which cannot be put into it.
+TEST(Hardening, MemberThatIsANumberAndThenAnObjectIsRefused) {
+  const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":{"a":1}}]})";
+  EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
+}
+
 // JSON nested deeper than any stack, in what is read and in what is not.
 TEST(GltfRefusals, DeeplyNestedJson) {
   const std::string deep = std::string(1000000, '[') + std::string(1000000, ']');

@@ -136,9 +136,11 @@ class SectionParser : public nlohmann::json_sax<Json> {
       return &parent.emplace_back(std::move(value));
     }
     charge(kBytesPerMember + key_.size());
-    const auto [member, is_new] = parent.emplace(key_, std::move(value));
-    if (!is_new) violate(element().path() + "." + printable(key_) + " is given twice");
-    return &*member;
+    if (parent.contains(key_))
+      violate(element().path() + "." + printable(key_) + " is given twice");
+    Json& member = parent[key_];
+    member = std::move(value);
+    return &member;
   }
   void charge(uint64_t bytes) { charge_.grow_to(element_bytes_ += bytes); }
 
