@@ -44,8 +44,9 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
 }
 
 // The thread of the evicted connection wakes up at the end of its stream and removes the entry.
-// Until then the table holds one more than the limit.
+// Until then the table holds one more than the limit; there may be a quarter more.
 bool ConnectionTable::evict_one() {
+  if (entries_.size() >= limits_.max_connections + limits_.max_connections / 4 + 1) return false;
   const double now = wall_seconds();
   Entry* longest = nullptr;
   for (Entry& entry : entries_) {

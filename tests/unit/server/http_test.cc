@@ -93,10 +93,14 @@ TEST(Headers, CompareCaseInsensitively) {
 // A full table closes the longest waiting connection for a new one, never one with a request.
 TEST(ConnectionTable, EvictsTheLongestWaiting) {
   HttpLimits limits;
-  limits.max_connections = 2;
+  limits.max_connections = 4;
   limits.max_per_client = 2;
   ConnectionTable table(limits);
-  ConnectionTable::Place first, second, third;
+  ConnectionTable::Place first, second, third, more;
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(table.admit(-1, "10.0.0.9", more));
+    table.set_working(more);
+  }
   ASSERT_TRUE(table.admit(-1, "10.0.0.1", first));
   ASSERT_TRUE(table.admit(-1, "10.0.0.1", second));
   EXPECT_FALSE(table.admit(-1, "10.0.0.1", third)) << "the limit per client";
@@ -107,16 +111,20 @@ TEST(ConnectionTable, EvictsTheLongestWaiting) {
   EXPECT_FALSE(table.admit(-1, "10.0.0.3", second)) << "all have requests";
   table.remove(first);
   table.remove(third);
-  EXPECT_EQ(table.size(), 0u);
+  EXPECT_EQ(table.size(), 2u);
 }
 
 // Connections whose client is waited for within a body or an answer are closed, too, unless it was
 // only a moment.
 TEST(Hardening, M4_SlowTransfersAreEvicted) {
   HttpLimits limits;
-  limits.max_connections = 2;
+  limits.max_connections = 4;
   ConnectionTable table(limits);
-  ConnectionTable::Place slow, fast, other;
+  ConnectionTable::Place slow, fast, other, more;
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", more));
+  table.set_working(more);
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", more));
+  table.set_working(more);
   ASSERT_TRUE(table.admit(-1, "10.0.0.1", slow));
   ASSERT_TRUE(table.admit(-1, "10.0.0.2", fast));
   table.set_waiting(slow, wall_seconds() - 2, false);
@@ -125,6 +133,17 @@ TEST(Hardening, M4_SlowTransfersAreEvicted) {
   table.remove(slow);
   table.set_working(other);
   EXPECT_FALSE(table.admit(-1, "10.0.0.3", slow)) << "only the fast one waits";
+}
+
+// New connections do not pile up while the threads of the evicted ones have no time to end.
+TEST(Hardening, M4_EvictedConnectionsAreBounded) {
+  HttpLimits limits;
+  limits.max_connections = 8;
+  ConnectionTable table(limits);
+  ConnectionTable::Place place;
+  size_t admitted = 0;
+  while (admitted < 100 && table.admit(-1, "10.0.0.1", place)) ++admitted;
+  EXPECT_EQ(admitted, 11u);
 }
 
 // The addresses of one /64 are one client, and so are the two spellings of an IPv4 address.
