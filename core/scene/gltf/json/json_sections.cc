@@ -15,13 +15,13 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr size_t kMaxReasonBytes = 300;
+constexpr size_t kMaxParserReasonBytes = 300;
 // Values nested deeper inside an element are skipped; glTF nests about eight deep.
 constexpr size_t kMaxNesting = 32;
 
 // Memory of a value: its place in a growing array or in a map, and its own allocations.
 constexpr uint64_t kBytesPerArrayElement = 3 * sizeof(Json);
-constexpr uint64_t kBytesPerMember = 112;
+constexpr uint64_t kBytesPerObjectMember = 112;
 constexpr uint64_t kBytesPerContainer = 64;
 
 // Receives the parser's events and makes a Json value of each element of a section.
@@ -74,7 +74,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
     std::string reason = e.what();
     reason.erase(0, reason.find("] ") + 2);
     refuse(path_, "its JSON is broken at character " + std::to_string(position) + ": " +
-                      reason.substr(0, kMaxReasonBytes));
+                      reason.substr(0, kMaxParserReasonBytes));
   }
 
  private:
@@ -138,7 +138,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
       charge(kBytesPerArrayElement);
       return &parent.emplace_back(std::move(value));
     }
-    charge(kBytesPerMember + key_.size());
+    charge(kBytesPerObjectMember + key_.size());
     const auto [member, is_new] = parent.emplace(key_, std::move(value));
     if (!is_new) violate(element().path() + "." + printable(key_) + " is given twice");
     return &*member;
