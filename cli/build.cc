@@ -69,7 +69,7 @@ void declare(Command& command, BuildCommand& state) {
 }  // namespace
 
 void add_build_command(CommandLine& line) {
-  add_command<BuildCommand>(line, "build", "build the DAG of a scene", declare, run);
+  add_command<BuildCommand>(line, "build", "build the DAG of a scene");
 }
 
 }  // namespace voxdag::cli

@@ -97,15 +97,15 @@ class CommandLine {
   std::unique_ptr<CLI::App> app_;
 };
 
-// Adds a command whose options set the members of a `State`: declare(command, state) adds them, and
-// run(state, context) is called after they are parsed.
-template <class State, class Declare, class Run>
-void add_command(CommandLine& line, const char* name, const char* description, Declare declare,
-                 Run run) {
+// Adds a command whose options set the members of a `State`. Two functions next to it are called:
+// declare(command, state) adds the options, and run(state, context) runs after they are parsed.
+template <class State>
+State& add_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);
   const auto state = std::make_shared<State>();
   declare(command, *state);
-  command.on_run([state, run, &line] { run(*state, line.context()); });
+  command.on_run([state, &line] { run(*state, line.context()); });
+  return *state;
 }
 
 void add_build_command(CommandLine& line);

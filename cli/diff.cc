@@ -45,8 +45,8 @@ void declare(Command& command, DiffCommand& state) {
 }  // namespace
 
 void add_diff_command(CommandLine& line) {
-  add_command<DiffCommand>(
-      line, "diff", "count the voxels only in A and only in B; exit status 1 if any", declare, run);
+  add_command<DiffCommand>(line, "diff",
+                           "count the voxels only in A and only in B; exit status 1 if any");
 }
 
 }  // namespace voxdag::cli

@@ -72,7 +72,7 @@ void declare(Command& command, GenerateCommand& state) {
 }  // namespace
 
 void add_generate_command(CommandLine& line) {
-  add_command<GenerateCommand>(line, "generate", "generate a scene from a seed", declare, run);
+  add_command<GenerateCommand>(line, "generate", "generate a scene from a seed");
 }
 
 }  // namespace voxdag::cli

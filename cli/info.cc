@@ -75,8 +75,7 @@ void declare(Command& command, InfoCommand& state) {
 }  // namespace
 
 void add_info_command(CommandLine& line) {
-  add_command<InfoCommand>(line, "info", "print counts and sizes of a DAG, per level", declare,
-                           run);
+  add_command<InfoCommand>(line, "info", "print counts and sizes of a DAG, per level");
 }
 
 }  // namespace voxdag::cli

@@ -56,8 +56,8 @@ void declare(Command& command, PlanCommand& state) {
 }  // namespace
 
 void add_plan_command(CommandLine& line) {
-  add_command<PlanCommand>(
-      line, "plan", "estimate the size, memory, disk space and time of a build", declare, run);
+  add_command<PlanCommand>(line, "plan",
+                           "estimate the size, memory, disk space and time of a build");
 }
 
 }  // namespace voxdag::cli

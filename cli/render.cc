@@ -25,7 +25,7 @@ struct RenderCommand {
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
   std::string size = "1280x720";
-  query::RenderOptions options;
+  query::RenderOptions options{.threads = 0};  // all cores
   bool json = false;
 };
 
@@ -90,6 +90,8 @@ void run(RenderCommand& command, CommandContext& context) {
     throw Error(ErrorCode::kInvalidInput, "--size '" + command.size +
                                               "': expected a width and a height of 1 to " +
                                               std::to_string(kMaxPictureEdge) + " pixels");
+  if (command.options.threads == 0)
+    command.options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   command.options.width = width;
   command.options.height = height;
   command.output.check(context.files, command.input, query::is_rendered_png);
@@ -106,7 +108,6 @@ void run(RenderCommand& command, CommandContext& context) {
 }
 
 void declare(Command& command, RenderCommand& state) {
-  state.options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   command.option("input", state.input, "the .vdag file").required();
   command.option("-o,--output", state.output.path, "the .png file to write").required();
   const Option view =
@@ -120,9 +121,8 @@ void declare(Command& command, RenderCommand& state) {
   command.option("--samples", state.options.samples, "N: N * N samples per pixel")
       .range(1, 8)
       .show_default();
-  command.option("--threads", state.options.threads, "worker threads")
-      .range(1, 1024)
-      .show_default();
+  command.option("--threads", state.options.threads, "worker threads (default: all cores)")
+      .range(1, 1024);
   state.output.declare_force(command);
   command.json_flag(state.json);
 }
@@ -130,7 +130,7 @@ void declare(Command& command, RenderCommand& state) {
 }  // namespace
 
 void add_render_command(CommandLine& line) {
-  add_command<RenderCommand>(line, "render", "render a picture of a DAG", declare, run);
+  add_command<RenderCommand>(line, "render", "render a picture of a DAG");
 }
 
 }  // namespace voxdag::cli

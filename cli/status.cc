@@ -60,8 +60,7 @@ void declare(Command& command, StatusCommand& state) {
 }  // namespace
 
 void add_status_command(CommandLine& line) {
-  add_command<StatusCommand>(line, "status", "print the state and progress of a build", declare,
-                             run);
+  add_command<StatusCommand>(line, "status", "print the state and progress of a build");
 }
 
 }  // namespace voxdag::cli

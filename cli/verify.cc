@@ -92,7 +92,7 @@ void declare(Command& command, VerifyCommand& state) {
 }  // namespace
 
 void add_verify_command(CommandLine& line) {
-  add_command<VerifyCommand>(line, "verify", "check every invariant of a DAG", declare, run);
+  add_command<VerifyCommand>(line, "verify", "check every invariant of a DAG");
 }
 
 }  // namespace voxdag::cli

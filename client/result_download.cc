@@ -9,7 +9,7 @@
 namespace voxdag::client {
 namespace {
 
-constexpr size_t kDigitsInName = 12;
+constexpr size_t kDigitsInPartialName = 12;
 
 class Download {
  public:
@@ -22,7 +22,7 @@ class Download {
         output_(output),
         sha256_(job.at("result").at("sha256")),
         size_(job.at("result").at("bytes")),
-        partial_(output + "." + sha256_.substr(0, kDigitsInName) + ".partial") {}
+        partial_(output + "." + sha256_.substr(0, kDigitsInPartialName) + ".partial") {}
 
   DownloadResult run() {
     files_.make_directories(parent_directory(output_));

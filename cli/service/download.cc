@@ -44,8 +44,8 @@ void declare(Command& command, DownloadCommand& state) {
 }  // namespace
 
 void add_download_command(CommandLine& line) {
-  add_service_command<DownloadCommand>(line, "download", "download the result of a job of a server",
-                                       declare, run);
+  add_service_command<DownloadCommand>(line, "download",
+                                       "download the result of a job of a server");
 }
 
 }  // namespace voxdag::cli

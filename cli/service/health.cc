@@ -37,8 +37,7 @@ void run(const HealthCommand& command, CommandContext&) {
 }  // namespace
 
 void add_health_command(CommandLine& line) {
-  add_command<HealthCommand>(line, "health", "ask a service whether it can accept jobs", declare,
-                             run);
+  add_command<HealthCommand>(line, "health", "ask a service whether it can accept jobs");
 }
 
 }  // namespace voxdag::cli

@@ -10,6 +10,7 @@ namespace voxdag::cli {
 namespace {
 
 struct JobActionCommand {
+  std::string action;  // "cancel", "suspend" or "resume"
   ServiceOptions service;
   std::vector<std::string> ids;
   bool json = false;
@@ -21,12 +22,12 @@ void declare(Command& command, JobActionCommand& state) {
   command.json_flag(state.json, "each job as one JSON object on standard output");
 }
 
-// Performs `action` on each job; "resume" retries those that have failed or were canceled.
-void run(const JobActionCommand& command, ServiceClient& service, const std::string& action) {
+// Performs the action on each job; "resume" retries those that have failed or were canceled.
+void run(const JobActionCommand& command, ServiceClient& service, CommandContext&) {
   for (const std::string& id : command.ids) {
-    const std::string state = action == "resume" ? service.job(id).at("state") : "";
+    const std::string state = command.action == "resume" ? service.job(id).at("state") : "";
     const bool ended = state == "failed" || state == "canceled";
-    const Json job = service.post_action(id, ended ? "retry" : action);
+    const Json job = service.post_action(id, ended ? "retry" : command.action);
     if (command.json)
       print_json(job);
     else
@@ -38,11 +39,7 @@ void run(const JobActionCommand& command, ServiceClient& service, const std::str
 
 void add_job_action_commands(CommandLine& line) {
   const auto add = [&](const char* action, const char* description) {
-    add_service_command<JobActionCommand>(
-        line, action, description, declare,
-        [action](const JobActionCommand& command, ServiceClient& service, CommandContext&) {
-          run(command, service, action);
-        });
+    add_service_command<JobActionCommand>(line, action, description).action = action;
   };
   add("cancel", "cancel jobs of a server and discard what they have built");
   add("suspend", "suspend jobs of a server, to be resumed later");

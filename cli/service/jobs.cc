@@ -54,8 +54,7 @@ void declare(Command& command, JobsCommand& state) {
 }  // namespace
 
 void add_jobs_command(CommandLine& line) {
-  add_service_command<JobsCommand>(line, "jobs", "list the jobs of a server, newest first", declare,
-                                   run);
+  add_service_command<JobsCommand>(line, "jobs", "list the jobs of a server, newest first");
 }
 
 }  // namespace voxdag::cli

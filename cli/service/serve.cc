@@ -60,7 +60,12 @@ void serve(const ServeCommand& command, const Command& line, CommandContext& con
   log_line("stopped");
 }
 
-void make_token(const TokenCommand& command) {
+void declare(Command& command, TokenCommand& state) {
+  command.option("--role", state.role, "read, submit or admin").required();
+  command.option("--name", state.name, "name of its owner, for the log").required();
+}
+
+void run(const TokenCommand& command, CommandContext&) {
   const server::NewToken made = server::make_token(command.role, command.name);
   std::fprintf(stderr, "The token (shown only once): %s\n", made.token.c_str());
   std::printf("%s\n", made.line.c_str());
@@ -95,13 +100,7 @@ void add_serve_commands(CommandLine& line) {
                  "folder whose scenes jobs may name by path; may be repeated");
   command.on_run([state, command, &line] { serve(*state, command, line.context()); });
 
-  add_command<TokenCommand>(
-      line, "token", "create a bearer token for the service",
-      [](Command& token, TokenCommand& made) {
-        token.option("--role", made.role, "read, submit or admin").required();
-        token.option("--name", made.name, "name of its owner, for the log").required();
-      },
-      [](const TokenCommand& made, CommandContext&) { make_token(made); });
+  add_command<TokenCommand>(line, "token", "create a bearer token for the service");
   add_run_job_command(line);
 }
 

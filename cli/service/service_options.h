@@ -28,14 +28,16 @@ class ServiceOptions {
 
 // Adds a command whose State has a member `service` of these options: run(state, client, context)
 // is called with a client of the server.
-template <class State, class Declare, class Run>
-void add_service_command(CommandLine& line, const char* name, const char* description,
-                         Declare declare, Run run) {
-  add_command<State>(line, name, description, declare,
-                     [run](State& state, CommandContext& context) {
-                       state.service.with_service(
-                           context, [&](ServiceClient& service) { run(state, service, context); });
-                     });
+template <class State>
+State& add_service_command(CommandLine& line, const char* name, const char* description) {
+  Command command = line.add(name, description);
+  const auto state = std::make_shared<State>();
+  declare(command, *state);
+  command.on_run([state, &line] {
+    state->service.with_service(
+        line.context(), [&](ServiceClient& service) { run(*state, service, line.context()); });
+  });
+  return *state;
 }
 
 }  // namespace voxdag::cli

@@ -87,7 +87,7 @@ void declare(Command& command, SubmitCommand& state) {
 }  // namespace
 
 void add_submit_command(CommandLine& line) {
-  add_service_command<SubmitCommand>(line, "submit", "build a scene on a server", declare, run);
+  add_service_command<SubmitCommand>(line, "submit", "build a scene on a server");
 }
 
 }  // namespace voxdag::cli

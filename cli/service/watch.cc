@@ -29,8 +29,7 @@ void declare(Command& command, WatchCommand& state) {
 }  // namespace
 
 void add_watch_command(CommandLine& line) {
-  add_service_command<WatchCommand>(line, "watch", "follow a job of a server until it ends",
-                                    declare, run);
+  add_service_command<WatchCommand>(line, "watch", "follow a job of a server until it ends");
 }
 
 }  // namespace voxdag::cli

@@ -5,7 +5,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr double kFar = 1e30;
+constexpr double kSkyDistance = 1e30;
 constexpr Vec kAlbedo{{0.74, 0.70, 0.64}};
 constexpr Vec kSunlight{{3.6, 3.2, 2.6}};
 constexpr Vec kZenith{{0.62, 0.78, 1.00}}, kHorizon{{0.95, 0.98, 1.02}};
@@ -59,7 +59,7 @@ Vec Lighting::sky_light(const Surface& s, int rays, const Sampler& sampler) cons
 bool Lighting::sees(const Surface& s, const Vec& sun) const {
   Hit hit;
   return dot(s.normal, sun) > 0 &&
-         !caster_.cast({s.start, sun}, {s.size, kSunWidening}, 0, kFar, hit);
+         !caster_.cast({s.start, sun}, {s.size, kSunWidening}, 0, kSkyDistance, hit);
 }
 
 double Lighting::sun_light(const Surface& s, const Sampler& sampler) const {
@@ -96,7 +96,7 @@ double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
 void Lighting::place_sun(const std::vector<Surface>& seen, const Vec& back) {
   constexpr int kTurns = 16, kHeights = 3;
   constexpr double kLitTarget = 0.35;
-  double best = kFar;
+  double best = kSkyDistance;
   for (int i = 0; i < (has_floor_ ? 1 : kTurns * kHeights); ++i) {
     const double turn = std::atan2(back[2], back[0]) + 0.9 - 2 * kPi * (i % kTurns) / kTurns;
     const double height = 0.65 + 0.25 * (i / kTurns);

@@ -13,7 +13,9 @@ constexpr unsigned kWorkersPerDevice = 4;
 // A CUDA context alone has some hundred MiB resident that are charged to no budget.
 constexpr uint64_t kMinMemoryForGpu = uint64_t{2} << 30;
 
-[[noreturn]] void refuse(const std::string& what) { throw Error(ErrorCode::kInvalidInput, what); }
+[[noreturn]] void refuse_backend(const std::string& what) {
+  throw Error(ErrorCode::kInvalidInput, what);
+}
 
 Method method_of(const RunOptions& options) {
   if (options.method == "pointers") return Method::kPointers;
@@ -52,12 +54,12 @@ void check_backend(const RunOptions& options) {
   const std::string& method = options.method;
   const bool parallel = backend == "parallel-host" || backend == "cuda";
   if (!parallel && backend != "auto" && backend != "cpu")
-    refuse("backend '" + backend + "': expected auto, cpu, cuda or parallel-host");
+    refuse_backend("backend '" + backend + "': expected auto, cpu, cuda or parallel-host");
   if (!parallel && !method.empty() && method != "consing")
-    refuse("method '" + method + "': backend " + backend +
-           " has consing only; expected --backend parallel-host or cuda");
+    refuse_backend("method '" + method + "': backend " + backend +
+                   " has consing only; expected --backend parallel-host or cuda");
   if (parallel && !method.empty() && method != "pointers" && method != "hashes")
-    refuse("method '" + method + "': backend " + backend + " has pointers and hashes");
+    refuse_backend("method '" + method + "': backend " + backend + " has pointers and hashes");
   if (backend == "cuda" && !cuda_device_available())
     throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
 }

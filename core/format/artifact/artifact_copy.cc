@@ -14,7 +14,7 @@ constexpr uint64_t kEntryMagic = 0x0a48434147414456;  // "VDAGACH\n"
 constexpr size_t kFooterBytes = 48;
 constexpr uint64_t kChunkBytes = uint64_t{256} << 10;
 
-[[noreturn]] void corrupt(const std::string& where, const std::string& what) {
+[[noreturn]] void corrupt_copy(const std::string& where, const std::string& what) {
   throw Error(ErrorCode::kCorrupt, where + ": " + what);
 }
 
@@ -22,11 +22,12 @@ constexpr uint64_t kChunkBytes = uint64_t{256} << 10;
 ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref) {
   if (ref.bytes > file.size() || ref.offset > file.size() - ref.bytes ||
       ref.index_offset < ref.offset || ref.index_offset - ref.offset > ref.bytes)
-    corrupt(file.path(), "the file ends before its artifact does");
+    corrupt_copy(file.path(), "the file ends before its artifact does");
   std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
   file.read_at(ref.index_offset, bytes);
   ArtifactIndex index = decode_index(bytes, ref, file.path());
-  if (index.roots.size() != 1) corrupt(file.path(), "the artifact is not that of one subvolume");
+  if (index.roots.size() != 1)
+    corrupt_copy(file.path(), "the artifact is not that of one subvolume");
   return index;
 }
 
@@ -36,7 +37,7 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
                           uint32_t grid_levels, SegmentWriter& to) {
   ArtifactIndex index = read_single_index(from, ref);
   if (index.shape.grid_levels - index.roots[0].cube.level != grid_levels - cube.level)
-    corrupt(from.path(), "the artifact is that of a cube of another size");
+    corrupt_copy(from.path(), "the artifact is that of a cube of another size");
   index.shape.grid_levels = grid_levels;
   index.roots[0].cube = cube;
   const uint64_t first = to.size();
@@ -46,7 +47,8 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
     for (const FrameInfo& frame : index.levels[i].frames) {
       bytes.resize(frame.bytes);
       from.read_at(frame.offset, bytes);
-      if (checksum64(bytes) != frame.checksum) corrupt(from.path(), "a frame fails its checksum");
+      if (checksum64(bytes) != frame.checksum)
+        corrupt_copy(from.path(), "a frame fails its checksum");
       to.append(bytes);
     }
   }
@@ -82,20 +84,21 @@ uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std
 CacheEntry read_cache_entry(FileSystem& files, const std::string& path) {
   CacheEntry entry;
   entry.file = files.open_read(path);
-  if (entry.file->size() < kSegmentHeaderBytes + kFooterBytes) corrupt(path, "it is too short");
+  if (entry.file->size() < kSegmentHeaderBytes + kFooterBytes)
+    corrupt_copy(path, "it is too short");
   std::byte header[kSegmentHeaderBytes];
   entry.file->read_at(0, header);
   check_segment_header(header, 0, path);
   std::byte footer[kFooterBytes];
   entry.file->read_at(entry.file->size() - kFooterBytes, footer);
   ByteSource source(footer);
-  if (source.get<uint64_t>() != kEntryMagic) corrupt(path, "it is not a cache entry");
+  if (source.get<uint64_t>() != kEntryMagic) corrupt_copy(path, "it is not a cache entry");
   entry.ref.offset = source.get<uint64_t>();
   entry.ref.bytes = source.get<uint64_t>();
   entry.ref.index_offset = source.get<uint64_t>();
   entry.ref.checksum = source.get<uint64_t>();
   if (source.get<uint64_t>() != checksum64(std::span(footer).first(kFooterBytes - 8)))
-    corrupt(path, "its footer fails its checksum");
+    corrupt_copy(path, "its footer fails its checksum");
   const ArtifactIndex index = read_single_index(*entry.file, entry.ref);
   entry.root = index.roots[0];
   for (const ArtifactLevel& level : index.levels) entry.dag_nodes += level.rows;

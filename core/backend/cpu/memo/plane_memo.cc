@@ -8,8 +8,8 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr int64_t kSmallNormal = 64;  // sum of magnitudes
-constexpr uint64_t kMinSlots = 1024;  // slots; a power of two
+constexpr int64_t kSmallNormal = 64;       // sum of magnitudes
+constexpr uint64_t kMinPlaneSlots = 1024;  // slots; a power of two
 constexpr uint64_t kSpareSlots = 64;  // more than are used before the next reserve_small_nodes()
 constexpr uint32_t kMaxPlanes = 1 << 20;
 
@@ -161,7 +161,7 @@ NodeRef PlaneMemo::make_small_node(const Plane& plane, int64_t f, int size_log2)
 
 void PlaneMemo::reserve_small_nodes() {
   if ((small_count_ + kSpareSlots) * 2 <= small_slots_) return;
-  const uint64_t slots = small_slots_ == 0 ? kMinSlots : 2 * small_slots_;
+  const uint64_t slots = small_slots_ == 0 ? kMinPlaneSlots : 2 * small_slots_;
   if (small_slots_ != 0 && !affordable(slots * sizeof(SmallNode))) {
     std::fill(small_nodes_.begin(), small_nodes_.end(), SmallNode{});
     small_count_ = 0;

@@ -15,13 +15,13 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr size_t kMaxReasonBytes = 300;
+constexpr size_t kMaxParserReasonBytes = 300;
 // Values nested deeper inside an element are skipped; glTF nests about eight deep.
 constexpr size_t kMaxNesting = 32;
 
 // Memory of a value: its place in a growing array or in a map, and its own allocations.
 constexpr uint64_t kBytesPerArrayElement = 3 * sizeof(Json);
-constexpr uint64_t kBytesPerMember = 112;
+constexpr uint64_t kBytesPerObjectMember = 112;
 constexpr uint64_t kBytesPerContainer = 64;
 
 // Receives the parser's events and makes a Json value of each element of a section.
@@ -71,7 +71,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
 
   bool parse_error(size_t position, const std::string&, const Json::exception& e) override {
     refuse(path_, "its JSON is broken at character " + std::to_string(position) + ": " +
-                      printable(without_prefix(e.what()), kMaxReasonBytes));
+                      printable(without_prefix(e.what()), kMaxParserReasonBytes));
   }
 
  private:
@@ -135,7 +135,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
       charge(kBytesPerArrayElement);
       return &parent.emplace_back(std::move(value));
     }
-    charge(kBytesPerMember + key_.size());
+    charge(kBytesPerObjectMember + key_.size());
     if (parent.contains(key_))
       violate(element().path() + "." + printable(key_) + " is given twice");
     Json& member = parent[key_];
