@@ -1,5 +1,7 @@
 #include "server/api/access/access_control.h"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
 
 #include "core/base/clock.h"
@@ -62,6 +64,16 @@ void AccessControl::check_site(const Request& request) const {
     throw Problem(403, "forbidden", "cross-site request: the Origin is not this service");
 }
 
+// Each /64 of IPv6 is one client, because all of its 2^64 addresses are at one customer's disposal.
+std::string AccessControl::client_of(const std::string& address) {
+  in6_addr parsed{};
+  if (inet_pton(AF_INET6, address.c_str(), &parsed) != 1 || IN6_IS_ADDR_V4MAPPED(&parsed))
+    return address;
+  std::fill(std::begin(parsed.s6_addr) + 8, std::end(parsed.s6_addr), uint8_t{0});
+  char text[INET6_ADDRSTRLEN];
+  return std::string(inet_ntop(AF_INET6, &parsed, text, sizeof text)) + "/64";
+}
+
 Caller AccessControl::identify(const Request& request) {
   const std::string header = request.header("Authorization");
   constexpr std::string_view kScheme = "bearer ";
@@ -71,19 +83,21 @@ Caller AccessControl::identify(const Request& request) {
     const auto caller = tokens_->find(trimmed(std::string_view(header).substr(kScheme.size())));
     if (caller) return *caller;
   }
-  if (!wrong_tokens_.take(request.peer, wall_seconds())) throw too_many("too many wrong tokens");
+  if (!wrong_tokens_.take(client_of(request.peer), wall_seconds()))
+    throw too_many("too many wrong tokens");
   throw unauthorized("unknown token");
 }
 
 Caller AccessControl::admit(const Request& request, Role needed) {
-  if (!is_loopback(request.peer) && !requests_.take(request.peer, wall_seconds()))
+  if (!is_loopback(request.peer) && !requests_.take(client_of(request.peer), wall_seconds()))
     throw too_many("the rate limit of this client is exceeded");
   if (!tokens_) {
     check_site(request);
-    return {Role::kAdmin, "local"};
+    return {Role::kAdmin, "local", client_of(request.peer)};
   }
   if (needed == Role::kNone) return {};
-  const Caller caller = identify(request);
+  Caller caller = identify(request);
+  caller.client = "token " + caller.name;
   if (caller.role == Role::kNone) throw unauthorized("expected Authorization: Bearer TOKEN");
   if (caller.role < needed)
     throw Problem(403, "forbidden", "the role of the token is not sufficient");
