@@ -111,6 +111,7 @@ void Service::clean_up_periodically() {
     steps_.run("remove old uploads", [this] {
       scenes_.remove_stale_uploads(unix_seconds() - config_.retention.upload_days * kSecondsPerDay);
     });
+    steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
     steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });
     stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });
   }

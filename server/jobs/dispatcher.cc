@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <set>
 
 #include "core/base/clock.h"
@@ -20,7 +21,8 @@ constexpr int kPreviewNice = 5;  // on top of the builds'
 constexpr double kMaxSleep_s = 1;
 constexpr double kNoTimeLimit_s = 1e9;
 constexpr double kRetireInterval_s = 300;
-constexpr size_t kMaxRetiredAtOnce = 100;  // so that jobs can start in between
+constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
+constexpr size_t kMaxRetiredAtOnce = 100;   // so that jobs can start in between
 constexpr double kSecondsPerDay = 86400;
 // A clock that is further from where it was expected may be wrong; so long no job is deleted for
 // its age.
@@ -29,6 +31,12 @@ constexpr double kClockDoubt_s = kSecondsPerDay;
 
 bool is_job_id(const std::string& name) {
   return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+// The job whose deletion has begun in this folder; "" for none.
+std::string marked_job(const DirectoryEntry& entry) {
+  const std::string id = entry.name.substr(0, entry.name.find('.'));
+  return entry.is_directory && is_job_id(id) && entry.name == id + kDeleted ? id : "";
 }
 
 void sleep_s(double seconds) {
@@ -50,6 +58,7 @@ Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& 
   files_.make_directories(config_.data_folder + "/jobs");
   if (config_.adopt) adopt_jobs();
   recovered_ = steps_.run("recover the jobs", [this] { recover(); });
+  steps_.run("clean up the folders of jobs", [this] { clean_up_folders(); });
   thread_ = std::thread([this] {
     while (!steps_.run("dispatch jobs", [this] { dispatch(); }) && !stopping())
       sleep_s(kMaxSleep_s);
@@ -73,11 +82,35 @@ void Dispatcher::recover() {
     if (!worker.done) running.insert(key);
   for (const Job& job : queue_.recover(running, config_.jobs.max_attempts))
     log_("job " + job.id + " " + state_name(job.state));
-  if (!workers_.empty()) return;
+}
+
+// Files that no deletion has marked stay, even if there is no job for them: the queue may be an old
+// one.
+void Dispatcher::clean_up_folders() {
   std::string foreign;
-  for (const DirectoryEntry& entry : files_.list(config_.data_folder + "/jobs"))
-    steps_.run("clean up jobs/" + entry.name, [&] { clean_up_folder(entry, foreign); });
+  for (const DirectoryEntry& entry : files_.list(config_.data_folder + "/jobs")) {
+    if (!marked_job(entry).empty()) continue;
+    steps_.run("clean up jobs/" + entry.name, [&] {
+      const auto job = queue_.find(entry.name);
+      if (!job)
+        foreign += " jobs/" + entry.name;
+      else if (has_ended(job->state) && job->state != JobState::kFailed)
+        remove_tree(files_, folder(entry.name).work());
+    });
+  }
   if (!foreign.empty()) log_("left alone, since it belongs to no job of the queue:" + foreign);
+}
+
+void Dispatcher::finish_deletions() {
+  std::lock_guard lock(mutex_);
+  if (wall_seconds() < next_deletions_s_) return;
+  const auto entries = files_.list(config_.data_folder + "/jobs");
+  next_deletions_s_ = HUGE_VAL;
+  for (const DirectoryEntry& entry : entries) {
+    const std::string id = marked_job(entry);
+    if (!id.empty() && !steps_.run("delete job " + id, [&] { remove_files(id); }))
+      next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+  }
 }
 
 void Dispatcher::adopt_jobs() {
@@ -103,20 +136,6 @@ void Dispatcher::adopt_jobs() {
   }
 }
 
-// Finishes deletions that a crash interrupted. Files that no deletion has marked stay, even if
-// there is no job for them: the queue may be an old one.
-void Dispatcher::clean_up_folder(const DirectoryEntry& entry, std::string& foreign) {
-  const bool marked = entry.name.ends_with(kDeleted);
-  const std::string id = entry.name.substr(0, entry.name.find('.'));
-  const auto job = is_job_id(id) ? queue_.find(id) : std::nullopt;
-  if (marked && entry.is_directory && is_job_id(id))
-    remove_files(id);
-  else if (!job)
-    foreign += " jobs/" + entry.name;
-  else if (has_ended(job->state) && job->state != JobState::kFailed)
-    remove_tree(files_, folder(id).work());
-}
-
 void Dispatcher::stop() {
   {
     std::lock_guard lock(mutex_);
@@ -140,6 +159,7 @@ void Dispatcher::dispatch() {
       recovered_ = true;
       start_ready_jobs();
     });
+    steps_.run("finish deletions", [this] { finish_deletions(); });
     steps_.run("remove old jobs", [this] { retire_old_jobs(); });
     queue_.wait_for_change(seen, kMaxSleep_s);
   }
@@ -435,7 +455,12 @@ Job Dispatcher::retry(const std::string& id) {
 void Dispatcher::remove(const std::string& id) {
   std::lock_guard lock(mutex_);
   queue_.check_removable(id);
-  remove_files(id);
+  try {
+    remove_files(id);
+  } catch (...) {
+    next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+    throw;
+  }
 }
 
 // The marked folder stays until the row is gone, so that a crash in between loses neither.

@@ -67,9 +67,11 @@ class Dispatcher {
   // Makes records of the job folders that the queue does not know: jobs with a result have
   // succeeded, others are suspended.
   void adopt_jobs();
-  // Brings jobs and folders into order that a crash, or a disk that was full, left behind.
+  // Puts jobs in order that a crash, or a queue that could not be written, left behind.
   void recover();
-  void clean_up_folder(const DirectoryEntry& entry, std::string& foreign);
+  void clean_up_folders();
+  // Finishes deletions that a crash or a full disk interrupted.
+  void finish_deletions();
   void remove_files(const std::string& id);
   void retire_old_jobs();
   // The time from which on ended jobs are not too old.
@@ -107,6 +109,7 @@ class Dispatcher {
   std::map<std::string, Worker> workers_;  // by job; the one named "preview" draws a picture
   bool stops_ = false;
   bool recovered_ = false;
+  double next_deletions_s_ = 0;
 
   // Guards live_ alone, so that requests for progress wait for nothing else.
   mutable std::mutex live_mutex_;

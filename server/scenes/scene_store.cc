@@ -107,15 +107,14 @@ SceneStore::SceneStore(FileSystem& files, const std::string& folder, bool adopt)
   if (adopt) adopt_scenes();
 }
 
-// A removal marks the file first.
 void SceneStore::finish_removals() {
   for (const DirectoryEntry& entry : files_.list(folder_ + "/files")) {
     if (!entry.name.ends_with(kDeleted)) continue;
     const std::string name = entry.name.substr(0, entry.name.size() - strlen(kDeleted));
     try {
       if (is_scene_name(name)) remove(name);
-    } catch (const Error&) {
-      // The next start, or the next DELETE, may succeed.
+    } catch (const std::exception&) {
+      // It is tried again.
     }
   }
 }

@@ -52,6 +52,8 @@ class SceneStore {
   // Removes a scene and its upload, the files first, so that a full disk can be emptied. False if
   // there is neither. Throws RequestError{kConflict} if the scene is being uploaded.
   bool remove(const std::string& name);
+  // Finishes removals that a crash or a full disk interrupted.
+  void finish_removals();
   // Removes uploads that received nothing since `before_s` (Unix time).
   void remove_stale_uploads(double before_s);
   std::string path(const std::string& name) const { return folder_ + "/files/" + name; }
@@ -83,7 +85,6 @@ class SceneStore {
   void finish_publishing(const std::string& name, uint64_t size, const std::string& sha256);
   void drop_upload(const std::string& name);
   void put_scene(const std::string& name, uint64_t size, const std::string& sha256);
-  void finish_removals();
   void adopt_scenes();
 
   FileSystem& files_;
