@@ -6,9 +6,10 @@
 # On a CUDA base (12 or later), which lets a build that finds nvcc use it:
 #     docker build --build-arg BUILD_BASE=nvidia/cuda:12.6.3-devel-ubuntu24.04 \
 #                  --build-arg RUN_BASE=nvidia/cuda:12.6.3-base-ubuntu24.04 -t voxdag:cuda .
-# Both bases must be the same distribution.
-ARG BUILD_BASE=debian:bookworm-slim
-ARG RUN_BASE=debian:bookworm-slim
+# Both bases must be the same distribution. `tools/check-image` builds and tries this file without a
+# registry, on a base made by debootstrap.
+ARG BUILD_BASE=debian:bookworm-slim@sha256:3783cc01769c7b2b1b83a5c5ad96c815348e28ed7da68e2e3687004faa906251
+ARG RUN_BASE=debian:bookworm-slim@sha256:3783cc01769c7b2b1b83a5c5ad96c815348e28ed7da68e2e3687004faa906251
 
 FROM ${BUILD_BASE} AS build
 SHELL ["/bin/bash", "-euo", "pipefail", "-c"]
@@ -23,14 +24,21 @@ RUN cmake --preset cpu -DVOXDAG_TESTS=OFF -DVOXDAG_BENCH=OFF \
       | xargs dpkg-query -S | cut -d : -f 1 | sort -u > /out/packages
 
 FROM ${RUN_BASE}
-# The packages are those of the libraries the program was linked with: exactly as new as them.
+ARG VERSION=0.1.0
+LABEL org.opencontainers.image.title="voxdag" \
+      org.opencontainers.image.description="Builds sparse voxel DAGs of scenes that are larger than memory" \
+      org.opencontainers.image.version="${VERSION}" \
+      org.opencontainers.image.licenses="Apache-2.0"
+COPY --from=build /out/packages /usr/share/voxdag/packages
+# The packages are those of the libraries the program was linked with: exactly as new as them. The
+# client commands verify certificates, which takes the authorities'.
 # hadolint ignore=DL3008
-RUN --mount=type=bind,from=build,source=/out,target=/out \
-    apt-get update \
-    && xargs -a /out/packages apt-get install -y --no-install-recommends \
+RUN apt-get update \
+    && xargs -a /usr/share/voxdag/packages apt-get install -y --no-install-recommends ca-certificates \
     && rm -rf /var/lib/apt/lists/* \
     && useradd --create-home --uid 10001 voxdag \
-    && install -d -o voxdag /data
+    && install -d -m 1777 /data
+COPY --from=build /src/LICENSE /usr/share/doc/voxdag/LICENSE
 COPY --from=build /out/voxdag /usr/local/bin/voxdag
 USER 10001
 WORKDIR /data

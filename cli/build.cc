@@ -20,20 +20,21 @@ void print(const BuildReport& r) {
               r.sha256.c_str());
   std::printf("  %s triangles in a grid of %lld^3\n", count_text(r.triangles).c_str(),
               static_cast<long long>(r.grid.resolution()));
-  std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.voxels).c_str(),
-              count_text(r.svo_nodes).c_str(), count_text(r.dag_nodes).c_str());
+  std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.merge.voxels).c_str(),
+              count_text(r.merge.svo_nodes).c_str(), count_text(r.merge.dag_nodes).c_str());
   std::printf("  %s subvolumes (%s split), artifacts %s, spilled %s, %u merge pass%s\n",
               count_text(r.subvolumes).c_str(), count_text(r.subvolumes_split).c_str(),
-              size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge_passes,
-              r.merge_passes == 1 ? "" : "es");
+              size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge.passes,
+              r.merge.passes == 1 ? "" : "es");
   std::printf(" ");
   for (const StageTime& stage : r.stages)
     std::printf(" %s %s%s", stage.name.c_str(), duration_text(stage.wall_s).c_str(),
                 &stage == &r.stages.back() ? "\n" : ",");
-  std::printf("  %s wall, %s CPU, %s voxels/s, peak memory %s of %s\n",
-              duration_text(r.wall_s).c_str(), duration_text(r.cpu_s).c_str(),
-              count_text(static_cast<uint64_t>(static_cast<double>(r.voxels) / r.wall_s)).c_str(),
-              size_text(r.peak_rss_bytes).c_str(), size_text(r.memory_bytes).c_str());
+  std::printf(
+      "  %s wall, %s CPU, %s voxels/s, peak memory %s of %s\n", duration_text(r.wall_s).c_str(),
+      duration_text(r.cpu_s).c_str(),
+      count_text(static_cast<uint64_t>(static_cast<double>(r.merge.voxels) / r.wall_s)).c_str(),
+      size_text(r.peak_rss_bytes).c_str(), size_text(r.memory_bytes).c_str());
 }
 
 void run(const BuildCommand& command, CommandContext& context) {
@@ -53,23 +54,22 @@ void run(const BuildCommand& command, CommandContext& context) {
     print(report);
 }
 
+void declare(Command& command, BuildCommand& state) {
+  state.options.declare(command);
+  state.options.declare_work_folder(command);
+  command.option("-o,--output", state.run.output, "the .vdag file to write").required();
+  command.option("--cache", state.run.cache_folder, "folder in which builds share subvolumes");
+  command.option("--cache-size", state.cache_size, "limit of the cache folder (default: 16GiB)");
+  command.flag("--keep-work", state.run.keep_work, "do not remove the work folder");
+  command.flag("--restart", state.run.restart, "start over instead of resuming the work folder");
+  command.flag("--force", state.run.force, "build even if the estimate says it cannot fit");
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_build_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] =
-      add_command<BuildCommand>(app, context, "build", "build the DAG of a scene", run);
-  state->options.declare(*command);
-  state->options.declare_work_folder(*command);
-  command->add_option("-o,--output", state->run.output, "the .vdag file to write")->required();
-  command->add_option("--cache", state->run.cache_folder,
-                      "folder in which builds share subvolumes");
-  command->add_option("--cache-size", state->cache_size,
-                      "limit of the cache folder (default: 16GiB)");
-  command->add_flag("--keep-work", state->run.keep_work, "do not remove the work folder");
-  command->add_flag("--restart", state->run.restart,
-                    "start over instead of resuming the work folder");
-  command->add_flag("--force", state->run.force, "build even if the estimate says it cannot fit");
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_build_command(CommandLine& line) {
+  add_command<BuildCommand>(line, "build", "build the DAG of a scene", declare, run);
 }
 
 }  // namespace voxdag::cli

@@ -12,9 +12,9 @@ namespace voxdag::cli {
 class BuildOptions {
  public:
   // Adds the scene, geometry and run options to a command.
-  void declare(CLI::App& command);
+  void declare(Command& command);
   // Adds --work to a command that builds on this machine.
-  void declare_work_folder(CLI::App& command);
+  void declare_work_folder(Command& command);
   // Throws Error{kInvalidInput} that names the invalid option.
   BuildSpec spec() const;
 

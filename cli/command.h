@@ -1,20 +1,24 @@
-// The interface between main.cc and the commands. Each command file defines one function
-// `add_<name>_command(app, context)` that adds the command and its options to the parser; main.cc
-// calls them all and turns an Error into a message and an exit status.
+// The commands and their options. Each command file defines one function `add_<name>_command(line)`
+// that adds the command to the command line; main.cc calls them all and turns an Error into a
+// message and an exit status. CLI11, which takes seconds to compile, is included in command.cc
+// only.
 #pragma once
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <array>
+#include <functional>
 #include <memory>
 #include <string>
-#include <utility>
+#include <vector>
 
 #include "core/base/cancel_token.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "core/io/file_system.h"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
 
 namespace voxdag::cli {
 
@@ -29,6 +33,48 @@ std::array<Number, kCount> parse_list(const std::string& option, const std::stri
   return *numbers;
 }
 
+// An option of a command; a handle, each function of which returns the option again.
+class Option {
+ public:
+  explicit Option(CLI::Option* option) : option_(option) {}
+  Option required();
+  Option group(const char* heading);
+  Option environment(const char* variable);  // gives the value if the command line does not
+  Option show_default();
+  Option positive();
+  Option range(int low, int high);
+  Option range(double low, double high);
+  Option one_of(const std::vector<std::string>& values);
+  // `problem` returns "" for a valid value, else what was expected.
+  Option check(std::string (*problem)(const std::string& value));
+  Option excludes(Option other);
+  Option needs(Option other);
+
+ private:
+  CLI::Option* option_;
+};
+
+// A command; a handle. Values are set when the command line is parsed.
+class Command {
+ public:
+  explicit Command(CLI::App* app) : app_(app) {}
+  // A positional argument if `names` has no dashes. T is a number, a string, an optional double, or
+  // a vector of strings.
+  template <class T>
+  Option option(const char* names, T& value, const char* description);
+  Option flag(const char* names, bool& value, const char* description);
+  void json_flag(bool& value,
+                 const char* description = "report as one JSON object on standard output");
+  // Adds --config, a TOML or INI file of options that the command line does not give.
+  void config_option();
+  bool given(const char* option) const;
+  void hide();  // from the help
+  void on_run(std::function<void()> run);
+
+ private:
+  CLI::App* app_;
+};
+
 struct CommandContext {
   FileSystem& files;
   CancelToken& cancel;  // set by Ctrl-C and SIGTERM
@@ -36,33 +82,48 @@ struct CommandContext {
   int exit_status = 0;
 };
 
-// Adds a command whose options set the members of a `State`, which the command owns; after they are
-// parsed, `run` is called with the state and the context.
-template <class State, class Run>
-std::pair<CLI::App*, State*> add_command(CLI::App& app, CommandContext& context, const char* name,
-                                         const char* description, Run run) {
-  CLI::App* command = app.add_subcommand(name, description);
+class CommandLine {
+ public:
+  explicit CommandLine(CommandContext& context);
+  ~CommandLine();
+  Command add(const char* name, const char* description);
+  // Parses the arguments and runs the command, whose exceptions come through. Returns the exit
+  // status.
+  int run(int argc, char** argv);
+  CommandContext& context() { return context_; }
+
+ private:
+  CommandContext& context_;
+  std::unique_ptr<CLI::App> app_;
+};
+
+// Adds a command whose options set the members of a `State`: declare(command, state) adds them, and
+// run(state, context) is called after they are parsed.
+template <class State, class Declare, class Run>
+void add_command(CommandLine& line, const char* name, const char* description, Declare declare,
+                 Run run) {
+  Command command = line.add(name, description);
   const auto state = std::make_shared<State>();
-  command->callback([state, run, &context] { run(*state, context); });
-  return {command, state.get()};
+  declare(command, *state);
+  command.on_run([state, run, &line] { run(*state, line.context()); });
 }
 
-void add_build_command(CLI::App& app, CommandContext& context);
-void add_plan_command(CLI::App& app, CommandContext& context);
-void add_status_command(CLI::App& app, CommandContext& context);
-void add_info_command(CLI::App& app, CommandContext& context);
-void add_verify_command(CLI::App& app, CommandContext& context);
-void add_diff_command(CLI::App& app, CommandContext& context);
-void add_generate_command(CLI::App& app, CommandContext& context);
-void add_render_command(CLI::App& app, CommandContext& context);
+void add_build_command(CommandLine& line);
+void add_plan_command(CommandLine& line);
+void add_status_command(CommandLine& line);
+void add_info_command(CommandLine& line);
+void add_verify_command(CommandLine& line);
+void add_diff_command(CommandLine& line);
+void add_generate_command(CommandLine& line);
+void add_render_command(CommandLine& line);
 // Adds `serve`, `token`, and the hidden command that `serve` starts for each job.
-void add_serve_commands(CLI::App& app, CommandContext& context);
-void add_submit_command(CLI::App& app, CommandContext& context);
-void add_jobs_command(CLI::App& app, CommandContext& context);
-void add_watch_command(CLI::App& app, CommandContext& context);
-void add_cancel_command(CLI::App& app, CommandContext& context);
-void add_suspend_command(CLI::App& app, CommandContext& context);
-void add_resume_command(CLI::App& app, CommandContext& context);
-void add_download_command(CLI::App& app, CommandContext& context);
+void add_serve_commands(CommandLine& line);
+void add_health_command(CommandLine& line);
+void add_submit_command(CommandLine& line);
+void add_jobs_command(CommandLine& line);
+void add_watch_command(CommandLine& line);
+// Adds `cancel`, `suspend` and `resume`.
+void add_job_action_commands(CommandLine& line);
+void add_download_command(CommandLine& line);
 
 }  // namespace voxdag::cli

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
 
@@ -21,12 +21,11 @@ void run(const DiffCommand& command, CommandContext& context) {
   const DiffReport report = diff_global_files(*a, *b, budget, context.cancel);
   context.exit_status = report.same() ? 0 : 1;
   if (command.json) {
-    const nlohmann::ordered_json json{{"same", report.same()},
+    print_json(nlohmann::ordered_json{{"same", report.same()},
                                       {"voxels_a", a->voxels()},
                                       {"voxels_b", b->voxels()},
                                       {"only_a", report.only_a},
-                                      {"only_b", report.only_b}};
-    std::printf("%s\n", json.dump().c_str());
+                                      {"only_b", report.only_b}});
   } else if (report.same()) {
     std::printf("identical: %s voxels\n", count_text(a->voxels()).c_str());
   } else {
@@ -37,14 +36,17 @@ void run(const DiffCommand& command, CommandContext& context) {
   }
 }
 
+void declare(Command& command, DiffCommand& state) {
+  command.option("a", state.a, "a .vdag file").required();
+  command.option("b", state.b, "another .vdag file on the same grid").required();
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_diff_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] = add_command<DiffCommand>(
-      app, context, "diff", "count the voxels only in A and only in B; exit status 1 if any", run);
-  command->add_option("a", state->a, "a .vdag file")->required();
-  command->add_option("b", state->b, "another .vdag file on the same grid")->required();
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_diff_command(CommandLine& line) {
+  add_command<DiffCommand>(
+      line, "diff", "count the voxels only in A and only in B; exit status 1 if any", declare, run);
 }
 
 }  // namespace voxdag::cli

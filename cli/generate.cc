@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
 #include "core/base/text.h"
@@ -13,13 +13,13 @@ namespace {
 
 struct GenerateCommand {
   std::string kind;
-  std::string output;
+  OutputFile output;
   GenerateOptions options;
   bool json = false;
 };
 
 void print(const GenerateCommand& command, const GenerateReport& r, double wall_s) {
-  std::printf("%s: %s, %s triangles, %s", command.output.c_str(), command.kind.c_str(),
+  std::printf("%s: %s, %s triangles, %s", command.output.path.c_str(), command.kind.c_str(),
               count_text(r.triangles).c_str(), size_text(r.bytes).c_str());
   if (r.instances > 0)
     std::printf(" (%s triangles stored, %s instances)", count_text(r.stored_triangles).c_str(),
@@ -28,28 +28,23 @@ void print(const GenerateCommand& command, const GenerateReport& r, double wall_
               duration_text(wall_s).c_str());
 }
 
-void print_json(const GenerateCommand& command, const GenerateReport& r, double wall_s) {
-  const nlohmann::ordered_json report = {
-      {"kind", command.kind},
-      {"seed", command.options.seed},
-      {"output", command.output},
-      {"triangles", r.triangles},
-      {"stored_triangles", r.stored_triangles},
-      {"instances", r.instances},
-      {"bytes", r.bytes},
-      {"wall_s", wall_s},
-  };
-  std::printf("%s\n", report.dump().c_str());
-}
-
 void run(GenerateCommand& command, CommandContext& context) {
   command.options.kind = scene_kind(command.kind).kind;
+  command.output.check(context.files, "", is_generated_scene);
   const auto progress = make_progress_bar();
   const double start_s = wall_seconds();
-  const GenerateReport report =
-      generate_scene(context.files, command.output, command.options, *progress, context.cancel);
+  const GenerateReport report = generate_scene(context.files, command.output.path, command.options,
+                                               *progress, context.cancel);
   const double wall_s = wall_seconds() - start_s;
-  command.json ? print_json(command, report, wall_s) : print(command, report, wall_s);
+  if (!command.json) return print(command, report, wall_s);
+  print_json(nlohmann::ordered_json{{"kind", command.kind},
+                                    {"seed", command.options.seed},
+                                    {"output", command.output.path},
+                                    {"triangles", report.triangles},
+                                    {"stored_triangles", report.stored_triangles},
+                                    {"instances", report.instances},
+                                    {"bytes", report.bytes},
+                                    {"wall_s", wall_s}});
 }
 
 std::string kinds_text() {
@@ -59,23 +54,25 @@ std::string kinds_text() {
   return text;
 }
 
+void declare(Command& command, GenerateCommand& state) {
+  command.option("kind", state.kind, kinds_text().c_str()).required();
+  command.option("output", state.output.path, "the .glb file to write").required();
+  command.option("--seed", state.options.seed, "seed of the random numbers").show_default();
+  command
+      .option("--triangles", state.options.triangles,
+              "approximate number of triangles (not for menger)")
+      .positive();
+  command.option("--level", state.options.level, "menger: recursion depth, 0 to 5").show_default();
+  command.flag("--instances", state.options.instances,
+               "city, spheres: store repeated parts once, with EXT_mesh_gpu_instancing");
+  state.output.declare_force(command);
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_generate_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] =
-      add_command<GenerateCommand>(app, context, "generate", "generate a scene from a seed", run);
-  command->add_option("kind", state->kind, kinds_text())->required();
-  command->add_option("output", state->output, "the .glb file to write")->required();
-  command->add_option("--seed", state->options.seed, "seed of the random numbers")
-      ->capture_default_str();
-  auto* triangles = command->add_option("--triangles", state->options.triangles,
-                                        "approximate number of triangles (not for menger)");
-  triangles->check(CLI::PositiveNumber);
-  command->add_option("--level", state->options.level, "menger: recursion depth, 0 to 5")
-      ->capture_default_str();
-  command->add_flag("--instances", state->options.instances,
-                    "city, spheres: store repeated parts once, with EXT_mesh_gpu_instancing");
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_generate_command(CommandLine& line) {
+  add_command<GenerateCommand>(line, "generate", "generate a scene from a seed", declare, run);
 }
 
 }  // namespace voxdag::cli

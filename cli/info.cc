@@ -1,8 +1,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <vector>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "core/base/text.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
@@ -16,25 +15,11 @@ struct InfoCommand {
   bool json = false;
 };
 
-std::string file_digest(FileSystem& files, const std::string& path, const CancelToken& cancel) {
-  const auto file = files.open_read(path);
-  std::vector<std::byte> buffer(size_t{1} << 20);
-  Sha256 digest;
-  for (uint64_t at = 0; at < file->size(); at += buffer.size()) {
-    cancel.check();
-    const auto piece =
-        std::span(buffer).first(std::min<uint64_t>(buffer.size(), file->size() - at));
-    file->read_at(at, piece);
-    digest.add(piece);
-  }
-  return digest.finish();
-}
-
 uint64_t level_bytes(const voxdag_reader::Level& level) {
   return level.word_count * sizeof(uint32_t);
 }
 
-std::string info_json(const voxdag_reader::File& file, const std::string& sha256) {
+nlohmann::ordered_json info_json(const voxdag_reader::File& file, const std::string& sha256) {
   nlohmann::ordered_json levels = nlohmann::ordered_json::array();
   for (uint32_t l = 0; l <= file.brick_level(); ++l)
     levels.push_back(
@@ -50,7 +35,7 @@ std::string info_json(const voxdag_reader::File& file, const std::string& sha256
       {"bytes", file.file_bytes()},
       {"levels", levels}};
   if (!sha256.empty()) json["sha256"] = sha256;
-  return json.dump();
+  return json;
 }
 
 void print(const voxdag_reader::File& file, const std::string& sha256) {
@@ -74,21 +59,24 @@ void print(const voxdag_reader::File& file, const std::string& sha256) {
 void run(const InfoCommand& command, CommandContext& context) {
   const auto file = open_global_file(command.path);
   const std::string sha256 =
-      command.digest ? file_digest(context.files, command.path, context.cancel) : "";
+      command.digest ? sha256_of_file(*context.files.open_read(command.path), context.cancel) : "";
   if (command.json)
-    std::printf("%s\n", info_json(*file, sha256).c_str());
+    print_json(info_json(*file, sha256));
   else
     print(*file, sha256);
 }
 
+void declare(Command& command, InfoCommand& state) {
+  command.option("file", state.path, "the .vdag file").required();
+  command.flag("--digest", state.digest, "also print the SHA-256 of the file");
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_info_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] = add_command<InfoCommand>(
-      app, context, "info", "print counts and sizes of a DAG, per level", run);
-  command->add_option("file", state->path, "the .vdag file")->required();
-  command->add_flag("--digest", state->digest, "also print the SHA-256 of the file");
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_info_command(CommandLine& line) {
+  add_command<InfoCommand>(line, "info", "print counts and sizes of a DAG, per level", declare,
+                           run);
 }
 
 }  // namespace voxdag::cli

@@ -1,14 +1,17 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <new>
 #include <system_error>
 
 #include "cli/command.h"
-#include "core/base/error.h"
 
 namespace voxdag::cli {
 namespace {
+
+// Of an exception that no part of voxdag should throw (docs/errors.md); EX_SOFTWARE of sysexits.h.
+constexpr int kDefectStatus = 70;
 
 CancelToken g_cancel;
 
@@ -33,39 +36,26 @@ int report(ErrorCode code, const char* message) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"voxdag: builds sparse voxel DAGs of huge triangle scenes, out of core", "voxdag"};
-  app.set_version_flag("--version", VOXDAG_VERSION);
-  app.require_subcommand(1);
   CommandContext context{system_files(), g_cancel};
-  add_build_command(app, context);
-  add_plan_command(app, context);
-  add_status_command(app, context);
-  add_info_command(app, context);
-  add_verify_command(app, context);
-  add_diff_command(app, context);
-  add_generate_command(app, context);
-  add_render_command(app, context);
-  add_serve_commands(app, context);
-  add_submit_command(app, context);
-  add_jobs_command(app, context);
-  add_watch_command(app, context);
-  add_cancel_command(app, context);
-  add_suspend_command(app, context);
-  add_resume_command(app, context);
-  add_download_command(app, context);
+  CommandLine line(context);
+  for (const auto add_command :
+       {add_build_command, add_plan_command, add_status_command, add_info_command,
+        add_verify_command, add_diff_command, add_generate_command, add_render_command,
+        add_serve_commands, add_health_command, add_submit_command, add_jobs_command,
+        add_watch_command, add_job_action_commands, add_download_command})
+    add_command(line);
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    // CLI11 reports --help and --version as errors of status 0; any other is invalid input.
-    return app.exit(error) == 0 ? 0 : exit_status(ErrorCode::kInvalidInput);
+    return line.run(argc, argv);
   } catch (const Error& error) {
     return report(error.code(), error.what());
   } catch (const std::system_error& error) {
     return report(ErrorCode::kOutOfMemory, error.what());
   } catch (const std::bad_alloc&) {
     return report(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "voxdag: error: a defect of voxdag: %s\n", error.what());
+    return kDefectStatus;
   }
-  return context.exit_status;
 }
 
 }  // namespace

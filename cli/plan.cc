@@ -47,14 +47,17 @@ void run(const PlanCommand& command, CommandContext& context) {
     print(estimate);
 }
 
+void declare(Command& command, PlanCommand& state) {
+  state.options.declare(command);
+  state.options.declare_work_folder(command);
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_plan_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] = add_command<PlanCommand>(
-      app, context, "plan", "estimate the size, memory, disk space and time of a build", run);
-  state->options.declare(*command);
-  state->options.declare_work_folder(*command);
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_plan_command(CommandLine& line) {
+  add_command<PlanCommand>(
+      line, "plan", "estimate the size, memory, disk space and time of a build", declare, run);
 }
 
 }  // namespace voxdag::cli

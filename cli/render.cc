@@ -5,7 +5,7 @@
 #include <optional>
 #include <thread>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
 #include "core/base/text.h"
@@ -20,7 +20,7 @@ constexpr int kMaxPictureEdge = 16384;
 
 struct RenderCommand {
   std::string input;
-  std::string output;
+  OutputFile output;
   std::string view = "auto";
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
@@ -68,19 +68,17 @@ void report(const RenderCommand& command, const query::Placement& placement,
             const voxdag_reader::File& file, double wall_s) {
   const auto eye = world_point(placement.eye, file), target = world_point(placement.target, file);
   if (command.json) {
-    const nlohmann::ordered_json json = {
-        {"output", command.output},
+    return print_json(nlohmann::ordered_json{
+        {"output", command.output.path},
         {"width", command.options.width},
         {"height", command.options.height},
         {"camera", eye},
         {"target", target},
         {"fov", placement.fov_degrees},
         {"wall_s", wall_s},
-    };
-    std::printf("%s\n", json.dump().c_str());
-    return;
+    });
   }
-  std::printf("%s: %d x %d, %s\n", command.output.c_str(), command.options.width,
+  std::printf("%s: %d x %d, %s\n", command.output.path.c_str(), command.options.width,
               command.options.height, duration_text(wall_s).c_str());
   std::printf("  --camera %.6g,%.6g,%.6g --target %.6g,%.6g,%.6g --fov %.4g\n", eye[0], eye[1],
               eye[2], target[0], target[1], target[2], placement.fov_degrees);
@@ -94,6 +92,7 @@ void run(RenderCommand& command, CommandContext& context) {
                                               std::to_string(kMaxPictureEdge) + " pixels");
   command.options.width = width;
   command.options.height = height;
+  command.output.check(context.files, command.input, query::is_rendered_png);
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
@@ -102,37 +101,36 @@ void run(RenderCommand& command, CommandContext& context) {
   const query::Placement placement = place_camera(command, *file, dag);
   const query::Picture picture =
       query::render_picture(dag, placement, command.options, *progress, context.cancel);
-  query::write_png(context.files, command.output, picture);
+  write_file_atomically(context.files, command.output.path, query::encode_png(picture));
   report(command, placement, *file, wall_seconds() - start_s);
+}
+
+void declare(Command& command, RenderCommand& state) {
+  state.options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  command.option("input", state.input, "the .vdag file").required();
+  command.option("-o,--output", state.output.path, "the .png file to write").required();
+  const Option view =
+      command.option("--view", state.view, "named view").one_of(query::view_names()).show_default();
+  Option camera = command.option("--camera", state.camera, "X,Y,Z of the camera, in scene units");
+  Option target = command.option("--target", state.target, "X,Y,Z of the point that it looks at");
+  camera.needs(target).excludes(view);
+  target.needs(camera);
+  command.option("--fov", state.fov_degrees, "vertical field of view in degrees").range(1.0, 170.0);
+  command.option("--size", state.size, "WIDTHxHEIGHT in pixels").show_default();
+  command.option("--samples", state.options.samples, "N: N * N samples per pixel")
+      .range(1, 8)
+      .show_default();
+  command.option("--threads", state.options.threads, "worker threads")
+      .range(1, 1024)
+      .show_default();
+  state.output.declare_force(command);
+  command.json_flag(state.json);
 }
 
 }  // namespace
 
-void add_render_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] =
-      add_command<RenderCommand>(app, context, "render", "render a picture of a DAG", run);
-  state->options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  command->add_option("input", state->input, "the .vdag file")->required();
-  command->add_option("-o,--output", state->output, "the .png file to write")->required();
-  auto* view = command->add_option("--view", state->view, "named view")
-                   ->check(CLI::IsMember(query::view_names()))
-                   ->capture_default_str();
-  auto* camera =
-      command->add_option("--camera", state->camera, "X,Y,Z of the camera, in scene units");
-  auto* target =
-      command->add_option("--target", state->target, "X,Y,Z of the point that it looks at");
-  camera->needs(target)->excludes(view);
-  target->needs(camera);
-  command->add_option("--fov", state->fov_degrees, "vertical field of view in degrees")
-      ->check(CLI::Range(1.0, 170.0));
-  command->add_option("--size", state->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-  command->add_option("--samples", state->options.samples, "N: N * N samples per pixel")
-      ->check(CLI::Range(1, 8))
-      ->capture_default_str();
-  command->add_option("--threads", state->options.threads, "worker threads")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_render_command(CommandLine& line) {
+  add_command<RenderCommand>(line, "render", "render a picture of a DAG", declare, run);
 }
 
 }  // namespace voxdag::cli

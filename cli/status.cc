@@ -51,15 +51,17 @@ void run(const StatusCommand& command, CommandContext& context) {
   }
 }
 
+void declare(Command& command, StatusCommand& state) {
+  command.option("work", state.work_folder, "the work folder, OUT.vdag.work by default").required();
+  command.json_flag(state.json);
+  command.flag("--watch", state.watch, "repeat every second until the build ends");
+}
+
 }  // namespace
 
-void add_status_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] = add_command<StatusCommand>(
-      app, context, "status", "print the state and progress of a build", run);
-  command->add_option("work", state->work_folder, "the work folder, OUT.vdag.work by default")
-      ->required();
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->add_flag("--watch", state->watch, "repeat every second until the build ends");
+void add_status_command(CommandLine& line) {
+  add_command<StatusCommand>(line, "status", "print the state and progress of a build", declare,
+                             run);
 }
 
 }  // namespace voxdag::cli

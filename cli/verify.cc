@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
@@ -51,8 +51,8 @@ void print(const voxdag_reader::File& file, const std::optional<query::SampleRep
                 count_text(sample->set).c_str());
 }
 
-std::string verify_json(const VerifyCommand& command, const voxdag_reader::File& file,
-                        const std::optional<query::SampleReport>& sample) {
+nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_reader::File& file,
+                                   const std::optional<query::SampleReport>& sample) {
   nlohmann::ordered_json json{{"ok", true},
                               {"voxels", file.voxels()},
                               {"svo_nodes", file.svo_nodes()},
@@ -63,7 +63,7 @@ std::string verify_json(const VerifyCommand& command, const voxdag_reader::File&
                        {"boxes", sample->boxes},
                        {"voxels", sample->voxels},
                        {"set", sample->set}};
-  return json.dump();
+  return json;
 }
 
 void run(const VerifyCommand& command, CommandContext& context) {
@@ -74,24 +74,25 @@ void run(const VerifyCommand& command, CommandContext& context) {
   std::optional<query::SampleReport> sample;
   if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
   if (command.json)
-    std::printf("%s\n", verify_json(command, *file, sample).c_str());
+    print_json(verify_json(command, *file, sample));
   else
     print(*file, sample);
 }
 
+void declare(Command& command, VerifyCommand& state) {
+  command.option("file", state.path, "the .vdag file").required();
+  command.option("--against", state.scenes,
+                 "compare a sample of voxels with the triangles of this scene");
+  command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
+  command.flag("--skip-invalid", state.scene_options.skip_invalid,
+               "drop invalid triangles of the scene, as the build did");
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_verify_command(CLI::App& app, CommandContext& context) {
-  auto [command, state] =
-      add_command<VerifyCommand>(app, context, "verify", "check every invariant of a DAG", run);
-  command->add_option("file", state->path, "the .vdag file")->required();
-  command->add_option("--against", state->scenes,
-                      "compare a sample of voxels with the triangles of this scene");
-  command->add_option("--seed", state->seed, "seed of the sample that --against compares")
-      ->capture_default_str();
-  command->add_flag("--skip-invalid", state->scene_options.skip_invalid,
-                    "drop invalid triangles of the scene, as the build did");
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
+void add_verify_command(CommandLine& line) {
+  add_command<VerifyCommand>(line, "verify", "check every invariant of a DAG", declare, run);
 }
 
 }  // namespace voxdag::cli

@@ -8,6 +8,15 @@ namespace {
 
 constexpr double kPollInterval_s = 0.5;
 
+std::string text_of(const Json& body) {
+  try {
+    return body.dump();
+  } catch (const Json::type_error&) {
+    throw Error(ErrorCode::kInvalidInput,
+                "a name or path is not UTF-8, which JSON cannot carry: expected UTF-8");
+  }
+}
+
 }  // namespace
 
 ClientResponse ServiceClient::send_with_retries(const Request& request) {
@@ -33,7 +42,7 @@ Json ServiceClient::get(const std::string& path) {
 }
 
 Json ServiceClient::post(const std::string& path, const Json& body, const HeaderMap& headers) {
-  const std::string text = body.is_null() ? "" : body.dump();
+  const std::string text = body.is_null() ? "" : text_of(body);
   return Json::parse(send_with_retries([&](HttpClient& http) {
                        return http.send("POST", path, text, headers);
                      }).body);

@@ -55,10 +55,10 @@ class Merger {
     std::vector<ArtifactRef> merged;
     size_t begin = 0;
     for (const size_t end : ends) {
-      ArtifactWriter writer(segment.writer(), inputs_.grid_levels, inputs_.hash_bits);
+      ArtifactWriter writer(segment.writer(), inputs_.shape);
       ArtifactOutput output(writer);
       const ArtifactSet group = pending_.open(begin, end, context_.budget);
-      const PassTask task{inputs_.grid_levels, inputs_.hash_bits, false, group.readers()};
+      const PassTask task{inputs_.shape, false, group.readers()};
       merged.push_back(writer.finish(run_merge_pass(context_, task, output, {}, {})));
       begin = end;
       if (begin < pending_.size() && recovery_.due())
@@ -80,7 +80,7 @@ class Merger {
     const auto after_level = [&](const PassProgress& done) {
       if (recovery_.due()) recovery_.save_level(done, artifacts.readers(), out);
     };
-    const PassTask task{inputs_.grid_levels, inputs_.hash_bits, true, artifacts.readers()};
+    const PassTask task{inputs_.shape, true, artifacts.readers()};
     for (const ArtifactRoot& root :
          run_merge_pass(context_, task, output, std::move(progress), after_level)) {
       context_.report.voxels += root.voxels;

@@ -30,6 +30,7 @@
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
+#include "core/dag/sub_dag.h"
 #include "core/format/artifact/artifact.h"
 #include "core/format/global/global_writer.h"
 #include "core/geometry/grid.h"
@@ -38,8 +39,7 @@
 namespace voxdag {
 
 struct MergeInputs {
-  uint32_t grid_levels = 2;
-  uint32_t hash_bits = 64;
+  DagShape shape;
   // The artifacts of the subvolumes, in any order; none for an empty scene. Their cubes are
   // disjoint.
   std::vector<ArtifactRef> artifacts;
@@ -70,7 +70,7 @@ class Checkpoint {
   // Discards the state.
   virtual void forget() = 0;
   // These bytes of the segment of an input are never read again: their space may be freed.
-  virtual void release(uint32_t segment, uint64_t offset, uint64_t bytes) = 0;
+  virtual void release(const SegmentRange& range) = 0;
 };
 
 struct MergeReport {

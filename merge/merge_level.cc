@@ -88,7 +88,7 @@ class PartitionMerge {
     const auto merge_bucket = [&](unsigned worker, size_t bucket) {
       try {
         context_.cancel.check();
-        const BucketSize size = size_of(bucket);
+        const RowCount size = size_of(bucket);
         if (fits(size))
           sort(sorters_[worker], bucket);
         else
@@ -105,39 +105,31 @@ class PartitionMerge {
   }
 
  private:
-  struct BucketSize {
-    uint64_t rows = 0;
-    uint64_t words = 0;
-  };
-
-  BucketSize size_of(size_t bucket) const {
-    BucketSize size;
+  RowCount size_of(size_t bucket) const {
+    RowCount size;
     for (size_t s = 0; s < partition_.slices().size(); ++s) {
       const RowOffset begin = partition_.bucket_begin(bucket, s);
       const RowOffset end = partition_.bucket_begin(bucket + 1, s);
-      size.rows += end.row - begin.row;
-      size.words += end.word - begin.word;
+      size.add({end.row - begin.row, end.word - begin.word});
     }
     return size;
   }
 
   // Whether a worker can sort a bucket of this size.
-  bool fits(const BucketSize& size) const {
+  bool fits(const RowCount& size) const {
     return size.rows <= BucketSorter::kMaxRows &&
-           BucketSorter::bytes_for(size.rows, size.words) <= context_.plan.worker_bytes;
+           BucketSorter::bytes_for(size) <= context_.plan.worker_bytes;
   }
 
   // One for each worker, large enough for every bucket that fits.
   void make_sorters() {
-    BucketSize max;
+    RowCount max;
     for (size_t bucket = 0; bucket < partition_.bucket_count(); ++bucket) {
-      const BucketSize size = size_of(bucket);
-      if (!fits(size)) continue;
-      max.rows = std::max(max.rows, size.rows);
-      max.words = std::max(max.words, size.words);
+      const RowCount size = size_of(bucket);
+      if (fits(size)) max.raise_to(size);
     }
     for (unsigned worker = 0; worker < context_.plan.workers; ++worker)
-      sorters_.emplace_back(context_.budget, task_.bricks, max.rows, max.words);
+      sorters_.emplace_back(context_.budget, task_.bricks, max);
   }
 
   void sort(BucketSorter& sorter, size_t bucket) {
@@ -212,7 +204,8 @@ class PartitionMerge {
 uint64_t bucket_rows(const MergeContext& context, size_t runs) {
   const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * runs);
   // Half of what the memory of a worker can hold, since buckets differ in size.
-  return std::min(rows, context.plan.worker_bytes / (2 * BucketSorter::bytes_for(1, kMaxRowWords)));
+  return std::min(rows,
+                  context.plan.worker_bytes / (2 * BucketSorter::bytes_for({1, kMaxRowWords})));
 }
 
 LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,

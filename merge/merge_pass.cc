@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "core/base/error.h"
-#include "core/dag/brick.h"
 #include "merge/merge_level.h"
 
 namespace voxdag {
@@ -19,7 +18,7 @@ class Pass {
   std::vector<ArtifactRoot> run(const std::function<void(const PassProgress&)>& after_level) {
     const uint32_t highest = task_.is_final ? 0 : highest_root();
     reserve_memory();
-    uint32_t level = done_.level.value_or(task_.grid_levels - kBrickLevels + 1);
+    uint32_t level = done_.level.value_or(task_.shape.brick_level() + 1);
     while (level-- > highest) {
       merge_all_runs(level);
       if (after_level) after_level(done_);
@@ -33,7 +32,7 @@ class Pass {
 
  private:
   uint32_t highest_root() const {
-    uint32_t highest = task_.grid_levels;
+    uint32_t highest = task_.shape.grid_levels;
     for (const ArtifactReader& artifact : task_.artifacts)
       for (const ArtifactRoot& root : artifact.roots())
         highest = std::min(highest, root.cube.level);
@@ -44,7 +43,7 @@ class Pass {
     std::vector<ArtifactRun> artifact_runs;
     for (const ArtifactReader& artifact : task_.artifacts)
       artifact_runs.emplace_back(artifact, level);
-    const TopTreeRun top(task_.hash_bits,
+    const TopTreeRun top(task_.shape.hash_bits,
                          task_.is_final ? std::move(done_.placed) : std::vector<PlacedNode>());
     context_.progress.expect_more(top.rows());
     std::vector<const LevelRun*> runs;
@@ -57,13 +56,13 @@ class Pass {
     output_.begin_level(level);
     const LevelExtent extent =
         merge_level(context_, {.level = level,
-                               .bricks = level + kBrickLevels == task_.grid_levels,
+                               .bricks = level == task_.shape.brick_level(),
                                .runs = runs,
                                .child_maps = done_.maps ? &*done_.maps : nullptr,
                                .maps = maps,
                                .output = output_,
                                .memory = memory_});
-    output_.end_level(extent.nodes, extent.positions);
+    output_.end_level(extent);
     if (task_.is_final) context_.report.dag_nodes += extent.nodes;
     place(level, top, maps);
     done_.maps = std::move(maps);
@@ -74,19 +73,18 @@ class Pass {
 
   // Reserves memory for the largest level from the start if the budget allows it.
   void reserve_memory() {
-    std::vector<uint64_t> rows(task_.grid_levels), words(task_.grid_levels);
+    std::vector<RowCount> levels(task_.shape.grid_levels);
     for (const ArtifactReader& artifact : task_.artifacts)
-      for (const ArtifactLevel& level : artifact.levels()) {
-        rows[level.level] += level.rows;
-        words[level.level] += std::max(level.children, kBrickWords * level.rows);
-      }
-    const uint64_t max_rows = std::ranges::max(rows), max_words = std::ranges::max(words);
-    const bool resident = max_rows * sizeof(uint32_t) <= context_.plan.resident_bytes;
-    const uint64_t bytes = HashPartition::bytes_for(max_rows, max_words, false);
+      for (const ArtifactLevel& level : artifact.levels())
+        levels[level.level].add({level.rows, std::max(level.children, kBrickWords * level.rows)});
+    RowCount max;
+    for (const RowCount& level : levels) max.raise_to(level);
+    const bool resident = max.rows * sizeof(uint32_t) <= context_.plan.resident_bytes;
+    const uint64_t bytes = HashPartition::bytes_for(max, false);
     if (resident && bytes <= kMaxPartitionBytes &&
         bytes + bytes_besides_partition() + context_.plan.resident_bytes <=
             context_.budget.available())
-      memory_.reserve(max_rows, max_words, false, context_.budget);
+      memory_.reserve(max, false, context_.budget);
   }
 
   // What a level may take besides its partition.

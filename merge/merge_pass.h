@@ -14,8 +14,7 @@
 namespace voxdag {
 
 struct PassTask {
-  uint32_t grid_levels = 2;
-  uint32_t hash_bits = 64;
+  DagShape shape;
   // In the final pass the top tree is added and the last level is the root; in earlier passes it is
   // that of the highest subvolume.
   bool is_final = false;

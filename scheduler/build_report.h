@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/geometry/grid.h"
+#include "merge/merge.h"
 #include "scheduler/stage_clock.h"
 
 namespace voxdag {
@@ -16,9 +17,7 @@ struct BuildReport {
   Grid grid;
   uint32_t hash_bits = 64;
   uint64_t bytes = 0;
-  uint64_t voxels = 0;
-  uint64_t svo_nodes = 0;
-  uint64_t dag_nodes = 0;
+  MergeReport merge;
   uint64_t triangles = 0;  // that may touch the grid
   uint64_t dropped_outside = 0;
   uint64_t dropped_invalid = 0;
@@ -29,9 +28,6 @@ struct BuildReport {
   uint64_t artifact_bytes = 0;
   uint64_t artifact_nodes = 0;
   uint64_t spill_bytes = 0;
-  uint32_t merge_passes = 0;
-  uint64_t merge_partitions = 0;
-  uint64_t merge_streamed_groups = 0;
   uint64_t memory_bytes = 0;
   unsigned threads = 0;
   std::string backend;  // that built what was not reused

@@ -33,7 +33,7 @@ struct RunOptions {
   std::string output;            // the global file
   std::string work_folder;       // "" for output + ".work"
   uint64_t memory_bytes = 0;     // 0 for half of what RAM and cgroup allow
-  unsigned threads = 0;          // 0 for all cores
+  unsigned threads = 0;          // 0 for all that the process may use
   uint64_t subvolume_edge = 0;   // voxels, a power of two; 0 for a choice by the plan
   std::string backend = "auto";  // auto, cpu, cuda or parallel-host
   std::string method;            // "" for the backend's own, consing, pointers or hashes
@@ -43,6 +43,8 @@ struct RunOptions {
   double checkpoint_interval_s = 2;
   // Triangles of a scene whose ingest, then about two CPU seconds, is worth checkpoints.
   uint64_t durable_min_triangles = uint64_t{4} << 20;
+  // How long a build waits for the locks of another one, which may be dying.
+  double lock_wait_s = 30;
   bool keep_work = false;
   bool restart = false;  // start over, whatever the work folder holds
   bool force = false;    // build though the estimate says that it cannot fit

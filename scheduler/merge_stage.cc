@@ -30,28 +30,13 @@ class StoredCheckpoint : public Checkpoint {
     store_.save_merge(level, state);
   }
   void forget() override { store_.forget_merge(); }
-  void release(uint32_t segment, uint64_t offset, uint64_t bytes) override {
-    work_.release(segment, offset, bytes);
-  }
+  void release(const SegmentRange& range) override { work_.release(range); }
 
  private:
   JobStore& store_;
   CommitQueues& commits_;
   WorkFolder& work_;
 };
-
-std::string sha256_of(FileSystem& files, const std::string& path, const CancelToken& cancel) {
-  const auto file = files.open_read(path);
-  Sha256 digest;
-  std::vector<std::byte> buffer(size_t{1} << 20);
-  for (uint64_t at = 0; at < file->size(); at += buffer.size()) {
-    cancel.check();
-    const auto piece = std::span(buffer).first(std::min(buffer.size(), file->size() - at));
-    file->read_at(at, piece);
-    digest.add(piece);
-  }
-  return digest.finish();
-}
 
 struct DamagedSubvolume {
   StoredSubvolume subvolume;
@@ -111,23 +96,17 @@ bool MergeStage::run(const RunOptions& options, BuildReport& report) {
 bool MergeStage::is_published(BuildReport& report) {
   const auto result = store_.result();
   if (!result || result->output != report.output || !context_.files.exists(report.output) ||
-      sha256_of(context_.files, report.output, context_.cancel) != result->sha256)
+      sha256_of_file(*context_.files.open_read(report.output), context_.cancel) != result->sha256)
     return false;
   report.sha256 = result->sha256;
   report.bytes = result->bytes;
-  report.voxels = result->voxels;
-  report.svo_nodes = result->svo_nodes;
-  report.dag_nodes = result->dag_nodes;
-  report.merge_passes = result->merge_passes;
-  report.merge_partitions = result->merge_partitions;
-  report.merge_streamed_groups = result->merge_streamed_groups;
+  report.merge = result->merge;
   return true;
 }
 
 void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildReport& report) {
   MergeInputs inputs;
-  inputs.grid_levels = report.grid.levels;
-  inputs.hash_bits = report.hash_bits;
+  inputs.shape = {.grid_levels = report.grid.levels, .hash_bits = report.hash_bits};
   for (const StoredSubvolume& subvolume : store_.leaves())
     if (!subvolume.summary.empty()) inputs.artifacts.push_back(subvolume.artifact);
   const MemoryCharge list(budget_, inputs.artifacts.size() * sizeof(ArtifactRef),
@@ -136,16 +115,10 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
   inputs.scratch_folder = work_.scratch_path();
   inputs.checkpoint_interval_s = options.checkpoint_interval_s;
   StoredCheckpoint checkpoint(store_, commits_, work_);
-  const MergeReport merged = merge_sub_dags(inputs, context_.files, out, budget_, report.threads,
-                                            context_.progress, context_.cancel, &checkpoint);
-  report.voxels = merged.voxels;
-  report.svo_nodes = merged.svo_nodes;
-  report.dag_nodes = merged.dag_nodes;
-  report.merge_passes = merged.passes;
-  report.merge_partitions = merged.hash_partitions;
-  report.merge_streamed_groups = merged.streamed_groups;
-  report.spill_bytes += merged.scratch_bytes;
-  if (report.voxels == 0 && report.triangles > 0)
+  report.merge = merge_sub_dags(inputs, context_.files, out, budget_, report.threads,
+                                context_.progress, context_.cancel, &checkpoint);
+  report.spill_bytes += report.merge.scratch_bytes;
+  if (report.merge.voxels == 0 && report.triangles > 0)
     context_.progress.warn("none of the " + std::to_string(report.triangles) +
                            " triangles near the grid touches it: the file will have no nodes");
   clock_.finish("merge");
@@ -154,10 +127,9 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
 void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
   context_.progress.begin_stage("write", 1, "files");
   const GlobalFileSummary file =
-      out.seal(report.voxels, report.svo_nodes, report.threads, context_.cancel);
-  store_.record_result({report.output, file.sha256, file.bytes, report.voxels, report.svo_nodes,
-                        report.dag_nodes, report.merge_passes, report.merge_partitions,
-                        report.merge_streamed_groups});
+      out.seal({.voxels = report.merge.voxels, .svo_nodes = report.merge.svo_nodes}, report.threads,
+               context_.cancel);
+  store_.record_result({report.output, file.sha256, file.bytes, report.merge});
   out.publish();
   context_.progress.advance(1);
   context_.progress.end_stage();

@@ -10,15 +10,16 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/io/overwrite.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/execute/executor.h"
+#include "scheduler/job/build_locks.h"
 #include "scheduler/job/job_progress.h"
-#include "scheduler/job/output_lock.h"
 #include "scheduler/job/work_folder.h"
 #include "scheduler/memory_plan.h"
 #include "scheduler/merge_stage.h"
 #include "scheduler/plan/estimate.h"
-#include "scheduler/prepare.h"
+#include "scheduler/scene_stages.h"
 
 namespace voxdag {
 namespace {
@@ -29,18 +30,24 @@ constexpr int64_t kWorkFormatVersion = 3;
 constexpr int kMaxReads = 3;
 // How often the merge is run before artifacts may not be damaged again.
 constexpr int kMaxMerges = 3;
+constexpr const char* kReportSuffix = ".report.json";
 
-// Refuses now an output that could not be written once all is built.
-void check_output(FileSystem& files, const std::string& output) {
+bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
+
+// Refuses now an output that could not be written once all is built, and one whose writing would
+// destroy a scene or a file that is not ours.
+void check_output(FileSystem& files, const std::string& output,
+                  const std::vector<std::string>& scenes) {
   if (output.empty())
     throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
   if (output.ends_with('/'))
     throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a file, not a folder");
-  if (files.exists(output) && files.open_read(output)->size() > 0 && !is_global_file(files, output))
-    throw Error(ErrorCode::kInvalidInput,
-                output +
-                    " exists and is no global file of voxdag: expected a free name or that of an "
-                    "earlier result (-o)");
+  const std::string partial = output + ".partial", report = output + kReportSuffix;
+  for (const std::string& path : {output, partial, report}) refuse_input(files, path, scenes);
+  refuse_foreign_file(files, output, is_global_file, " (-o)");
+  refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
+  refuse_foreign_file(files, report, is_report, " (-o)");
+  refuse_foreign_file(files, report + ".partial", is_report, " (-o)");
   files.make_directories(parent_directory(output));
   const std::string probe = output + ".probe-" + std::to_string(getpid());
   files.create(probe)->close();
@@ -92,9 +99,10 @@ class Build {
   Build(const BuildSpec& spec, const BuildContext& context)
       : spec_(checked(spec)),
         budget_(spec_.run.memory_bytes),
-        output_lock_(context.files, spec_.run.output),
-        work_(context.files,
-              spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder),
+        output_lock_(context, spec_.run.output, spec_.run.lock_wait_s),
+        work_(context,
+              spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder,
+              spec_.run.lock_wait_s),
         jobs_(open_job_store(context.files, work_, spec_.run.restart)),
         progress_(context.progress, *jobs_, work_),
         context_{context.files, progress_, context.cancel},
@@ -141,7 +149,7 @@ class Build {
     report_.wall_s = wall_seconds() - start_s;
     report_.cpu_s = process_cpu_seconds();
     report_.peak_rss_bytes = peak_resident_bytes();
-    write_file_atomically(context_.files, spec_.run.output + ".report.json",
+    write_file_atomically(context_.files, spec_.run.output + kReportSuffix,
                           report_json(report_) + "\n");
     if (!spec_.run.keep_work) remove_work();
     return report_;
@@ -156,13 +164,23 @@ class Build {
       } catch (const DamagedTriangles& damage) {
         if (read == kMaxReads) throw;
         context_.progress.warn(damage.message() + "; the scene is read again");
+        close_segments();
         checkpoint_.forget();
       } catch (const Error& error) {
         if (error.code() != ErrorCode::kNoSpace || !checkpoint_.is_optional()) throw;
         context_.progress.warn(error.message() + "; the scene is read again, into memory");
+        close_segments();
         checkpoint_.disable();
       }
     }
+  }
+
+  // Before subvolumes are queued again: what is not recorded by now is built again, and its
+  // segment is removed, so that nothing may record it later.
+  void close_segments() {
+    commit_best_effort();
+    commits_.clear();
+    jobs_->forget_built_in_memory();
   }
 
   // From the scene to artifacts of all subvolumes. The triangles are freed when it returns.
@@ -180,7 +198,7 @@ class Build {
     const std::vector<StoredSubvolume> planned = planned_leaves(*jobs_);
     report_.subvolumes_reused = jobs_->leaves().size() - planned.size();
     if (!planned.empty()) build_subvolumes_of(scene, planned);
-    report_.spill_bytes += scene.triangles->file_bytes();
+    if (scene.triangles) report_.spill_bytes += scene.triangles->file_bytes();
     report_artifacts();
   }
 
@@ -222,8 +240,7 @@ class Build {
     const BackendChoice backend = choose_backend(spec_.run, context_.progress);
     report_.backend = backend.name;
     ExecutorOptions options;
-    options.grid_levels = scene.state.grid.levels;
-    options.hash_bits = spec_.geometry.hash_bits;
+    options.shape = {.grid_levels = scene.state.grid.levels, .hash_bits = spec_.geometry.hash_bits};
     options.threads = std::min(spec_.run.threads, backend.max_workers);
     options.open_backend = backend.open;
     if (spec_.run.subvolume_edge)
@@ -236,6 +253,8 @@ class Build {
     const ExecutorCounts counts = build_subvolumes(options, std::move(queue), *scene.triangles,
                                                    *jobs_, commits_, budget_, context_);
     checkpoint_.finish();
+    report_.spill_bytes += scene.triangles->file_bytes();
+    scene.triangles.reset();  // Freeing a large file takes time, which belongs to this stage.
     report_.subvolumes_split += counts.split;
     report_.subvolumes_cached += counts.cached;
     report_.subvolumes_reused += counts.cached;
@@ -329,7 +348,7 @@ class Build {
 }  // namespace
 
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
-  check_output(context.files, spec.run.output);
+  check_output(context.files, spec.run.output, spec.geometry.scenes);
   return_freed_memory_to_system();
   return Build(spec, context).run();
 }

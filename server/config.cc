@@ -101,7 +101,7 @@ Members members_of(ServerConfig& c) {
       .add("max_event_streams_per_client", c.transfers.max_event_streams_per_client)
       .add("max_requests_per_s", c.transfers.max_requests_per_s);
   connections.add("max_connections", c.http.limits.max_connections)
-      .add("max_per_address", c.http.limits.max_per_address)
+      .add("max_per_client", c.http.limits.max_per_client)
       .add("max_header_size", c.http.limits.max_header_bytes)
       .add("header_timeout_s", c.http.limits.header_timeout_s)
       .add("idle_timeout_s", c.http.limits.idle_timeout_s)

@@ -18,9 +18,17 @@ constexpr std::chrono::minutes kCleanUpInterval{10};
 constexpr double kSecondsPerDay = 86400;
 constexpr size_t kMaxLoggedChars = 200;
 
-ServerConfig checked(ServerConfig config, FileSystem& files) {
+ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
   check_config(config);
   files.make_directories(config.data_folder);
+  // Clients must not use up the files that jobs, transfers and stores need.
+  const uint64_t sockets = max_open_files() / 2;
+  if (config.http.limits.max_connections > sockets) {
+    log("connections are limited to " + std::to_string(sockets) + ", not " +
+        std::to_string(config.http.limits.max_connections) +
+        ", because the process may have few open files (ulimit -n, LimitNOFILE)");
+    config.http.limits.max_connections = sockets;
+  }
   return config;
 }
 
@@ -43,7 +51,7 @@ void remove_plans(FileSystem& files, const ServerConfig& config) {
 }  // namespace
 
 Service::Service(ServerConfig config, FileSystem& files, Log log)
-    : config_(checked(std::move(config), files)),
+    : config_(checked(std::move(config), files, log)),
       files_(files),
       log_(log),
       steps_(log, config_.before_step),

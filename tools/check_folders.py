@@ -48,7 +48,7 @@ THIRD_PARTY = {
     "zstd.h": ["core/format"],
     "tiny_gltf.h": ["core/scene", "tests"],
     "sqlite3.h": ["core/db"],
-    "httplib.h": ["server", "client"],
+    "httplib.h": ["client"],
     "png.h": ["query"],
 }
 # Folders that build with a C++20 compiler (and CUDA) alone.

@@ -57,7 +57,7 @@ class Folder {
 ArtifactRef write(const std::string& folder) {
   Sample& made = sample();
   SegmentWriter segment(system_files(), folder, 0, made.budget);
-  ArtifactWriter artifact(segment, kLevels, 64);
+  ArtifactWriter artifact(segment, {.grid_levels = kLevels});
   artifact.bricks({made.dag.brick_masks});
   for (const SubDag::Nodes& level : made.dag.levels) artifact.nodes(level.view());
   const ArtifactRoot root{Cube{}, 0, made.summary.root_hash, made.summary.voxels,

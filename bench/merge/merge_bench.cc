@@ -52,12 +52,12 @@ Fixtures& fixtures() {
 void BM_Merge(benchmark::State& state) {
   const SyntheticRuns& runs = fixtures().of(static_cast<size_t>(state.range(0)));
   MergeInputs inputs;
-  inputs.grid_levels = SyntheticRuns::kGridLevels;
+  inputs.shape.grid_levels = SyntheticRuns::kGridLevels;
   inputs.artifacts = runs.refs();
   inputs.open_segment = [&](uint32_t) { return runs.open(); };
   inputs.scratch_folder = fixtures().folder() + "/scratch";
   Grid grid;
-  grid.levels = inputs.grid_levels;
+  grid.levels = inputs.shape.grid_levels;
   MergeReport report;
   for (auto _ : state) {
     MemoryBudget budget(static_cast<uint64_t>(state.range(1)) << 20);
@@ -86,8 +86,10 @@ class OneLevel {
  public:
   OneLevel(size_t runs, uint32_t levels_above_bricks)
       : source_(fixtures().of(runs)),
-        survey_(survey_artifacts(source_.refs(), open(), SyntheticRuns::kGridLevels, 64)),
-        artifacts_(survey_.in_morton_order, open(), SyntheticRuns::kGridLevels, 64, budget_) {
+        survey_(
+            survey_artifacts(source_.refs(), open(), {.grid_levels = SyntheticRuns::kGridLevels})),
+        artifacts_(survey_.in_morton_order, open(), {.grid_levels = SyntheticRuns::kGridLevels},
+                   budget_) {
     const uint32_t level = SyntheticRuns::kGridLevels - 2 - levels_above_bricks;
     std::vector<uint64_t> rows, rows_below;
     for (const ArtifactReader& artifact : artifacts_.readers()) {
@@ -125,7 +127,7 @@ class OneLevel {
       void begin_level(uint32_t) override {}
       void add(const MergedRows&) override {}
       void write(uint64_t, const MergedRows&) override {}
-      void end_level(uint64_t, uint64_t) override {}
+      void end_level(const LevelExtent&) override {}
     } nowhere;
     MergeReport report;
     NoProgress silent;

@@ -83,7 +83,7 @@ class SyntheticRuns {
   }
 
   void write(SegmentWriter& segment, const Levels& levels, size_t run) {
-    ArtifactWriter writer(segment, kGridLevels, 64);
+    ArtifactWriter writer(segment, {.grid_levels = kGridLevels});
     std::vector<uint32_t> index_below, index;
     for (size_t l = 0; l < levels.size(); ++l) {
       std::vector<uint32_t> order(levels[l].size());

@@ -1,50 +1,51 @@
-#include "client/download.h"
-
 #include <cstdio>
-#include <memory>
 
+#include "cli/output.h"
 #include "cli/service/service_options.h"
 #include "cli/terminal/progress_bar.h"
+#include "client/result_download.h"
 #include "core/base/text.h"
+#include "core/format/global/global_writer.h"
 
 namespace voxdag::cli {
 namespace {
 
 struct DownloadCommand {
   ServiceOptions service;
-  std::string id, output;
+  std::string id;
+  OutputFile output;
   bool json = false;
 };
 
-void run(const DownloadCommand& command, FileSystem& files, ServiceClient& service) {
+void run(const DownloadCommand& command, ServiceClient& service, CommandContext& context) {
+  command.output.check(context.files, command.output.path, "", is_global_file);
   const auto progress = make_progress_bar();
-  const client::DownloadResult result =
-      client::download_result(service, files, service.job(command.id), command.output, *progress);
+  const client::DownloadResult result = client::download_result(
+      service, context.files, service.job(command.id), command.output.path, *progress);
   if (command.json) {
-    const Json report = {{"output", command.output},
-                         {"bytes", result.bytes},
-                         {"resumed_bytes", result.resumed_bytes},
-                         {"sha256", result.sha256}};
-    std::printf("%s\n", report.dump().c_str());
+    print_json(Json{{"output", command.output.path},
+                    {"bytes", result.bytes},
+                    {"resumed_bytes", result.resumed_bytes},
+                    {"sha256", result.sha256}});
   } else {
-    std::printf("%s: %s, sha256 %s\n", command.output.c_str(), size_text(result.bytes).c_str(),
+    std::printf("%s: %s, sha256 %s\n", command.output.path.c_str(), size_text(result.bytes).c_str(),
                 result.sha256.c_str());
   }
 }
 
+void declare(Command& command, DownloadCommand& state) {
+  command.option("id", state.id, "job id").required();
+  command.option("-o,--output", state.output.path, "the .vdag file to write").required();
+  state.service.declare(command);
+  state.output.declare_force(command);
+  command.json_flag(state.json);
+}
+
 }  // namespace
 
-void add_download_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("download", "download the result of a job of a server");
-  const auto state = std::make_shared<DownloadCommand>();
-  command->add_option("id", state->id, "job id")->required();
-  command->add_option("-o,--output", state->output, "the .vdag file to write")->required();
-  state->service.declare(*command);
-  command->add_flag("--json", state->json, "report as one JSON object on standard output");
-  command->callback([state, &context] {
-    state->service.with_service(
-        context, [&](ServiceClient& service) { run(*state, context.files, service); });
-  });
+void add_download_command(CommandLine& line) {
+  add_service_command<DownloadCommand>(line, "download", "download the result of a job of a server",
+                                       declare, run);
 }
 
 }  // namespace voxdag::cli

@@ -1,6 +1,6 @@
 #include <cstdio>
-#include <memory>
 
+#include "cli/output.h"
 #include "cli/service/job_text.h"
 #include "cli/service/service_options.h"
 
@@ -23,12 +23,12 @@ void print(const Json& answer) {
   if (!answer.at("next_cursor").is_null()) std::printf("(more: raise --limit)\n");
 }
 
-void run(const JobsCommand& command, ServiceClient& service) {
+void run(const JobsCommand& command, ServiceClient& service, CommandContext&) {
   std::string path = "/api/v1/jobs?limit=" + std::to_string(command.limit);
   if (!command.states.empty()) path += "&state=" + command.states;
   const Json answer = service.get(path);
   if (command.json)
-    std::printf("%s\n", answer.dump().c_str());
+    print_json(answer);
   else
     print(answer);
 }
@@ -39,23 +39,23 @@ std::string check_states(const std::string& states) {
   return fine ? "" : "expected states such as running,queued";
 }
 
-}  // namespace
-
-void add_jobs_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("jobs", "list the jobs of a server, newest first");
-  const auto state = std::make_shared<JobsCommand>();
-  state->service.declare(*command);
+void declare(Command& command, JobsCommand& state) {
+  state.service.declare(command);
   command
-      ->add_option(
-          "--state", state->states,
+      .option(
+          "--state", state.states,
           "only these states, comma-separated: queued, running, suspended, canceling, canceled, "
           "failed, succeeded")
-      ->check(check_states);
-  command->add_option("--limit", state->limit, "maximum number of jobs, 1 to 200 (default 50)");
-  command->add_flag("--json", state->json, "one JSON object on standard output");
-  command->callback([state, &context] {
-    state->service.with_service(context, [&](ServiceClient& service) { run(*state, service); });
-  });
+      .check(check_states);
+  command.option("--limit", state.limit, "maximum number of jobs, 1 to 200 (default 50)");
+  command.json_flag(state.json, "one JSON object on standard output");
+}
+
+}  // namespace
+
+void add_jobs_command(CommandLine& line) {
+  add_service_command<JobsCommand>(line, "jobs", "list the jobs of a server, newest first", declare,
+                                   run);
 }
 
 }  // namespace voxdag::cli

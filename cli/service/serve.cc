@@ -33,10 +33,10 @@ void log_line(const std::string& line) {
 }
 
 // The settings of the file, overridden by the options given.
-server::ServerConfig settings(const ServeCommand& command, const CLI::App& app, FileSystem& files) {
+server::ServerConfig settings(const ServeCommand& command, const Command& line, FileSystem& files) {
   server::ServerConfig config;
   if (!command.config_file.empty()) server::read_config(files, command.config_file, config);
-  const auto given = [&](const char* option) { return app.count(option) > 0; };
+  const auto given = [&](const char* option) { return line.given(option); };
   if (given("--listen")) config.http.address = command.options.http.address;
   if (given("--port")) config.http.port = command.options.http.port;
   if (given("--data")) config.data_folder = command.options.data_folder;
@@ -48,9 +48,9 @@ server::ServerConfig settings(const ServeCommand& command, const CLI::App& app, 
   return config;
 }
 
-void serve(const ServeCommand& command, const CLI::App& app, CommandContext& context) {
+void serve(const ServeCommand& command, const Command& line, CommandContext& context) {
   umask(0077);  // scenes and results are for clients with a token, not for all users of the machine
-  server::Service service(settings(command, app, context.files), context.files, log_line);
+  server::Service service(settings(command, line, context.files), context.files, log_line);
   log_line("listening on " + service.url());
   // A signal handler may only set the token, so a thread watches it.
   std::thread watcher([&] {
@@ -78,45 +78,45 @@ void make_token(const TokenCommand& command) {
   std::printf("%s\n", made.line.c_str());
 }
 
-void add_run_job_command(CLI::App& app, CommandContext& context) {
-  // Started by the service only, so hidden from the help.
-  CLI::App* command = app.add_subcommand("run-job", "run one job of the service")->group("");
+// Adds the command that the service starts for each job.
+void add_run_job_command(CommandLine& line) {
+  Command command = line.add("run-job", "run one job of the service");
+  command.hide();
   const auto folder = std::make_shared<std::string>();
-  command->add_option("folder", *folder, "folder of the job")->required();
-  command->callback([folder, &context] {
+  command.option("folder", *folder, "folder of the job").required();
+  command.on_run([folder, &context = line.context()] {
     context.exit_status = server::run_job(context.files, *folder, context.cancel);
   });
 }
 
 }  // namespace
 
-void add_serve_commands(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("serve", "run the build service (HTTP API and dashboard)");
+void add_serve_commands(CommandLine& line) {
+  Command command = line.add("serve", "run the build service (HTTP API and dashboard)");
   const auto state = std::make_shared<ServeCommand>();
   server::ServerConfig& options = state->options;
-  command->add_option("--listen", options.http.address,
-                      "address to listen on (default: 127.0.0.1)");
-  command->add_option("--port", options.http.port,
-                      "port to listen on, 0 for any free one (default: 8080)");
-  command->add_option("--data", options.data_folder, "data folder: queue, scenes and results");
-  command->add_option("--config", state->config_file, "settings in JSON (docs/operating.md)");
-  command->add_option("--tokens", options.token_file, "file of hashed bearer tokens");
-  command->add_option("--certificate", options.http.certificate_file,
-                      "TLS: certificate chain, PEM");
-  command->add_option("--key", options.http.key_file, "TLS: its key, PEM");
-  command->add_option("--scenes", options.scene_roots,
-                      "folder whose scenes jobs may name by path; may be repeated");
-  command->add_flag("--adopt", options.adopt,
-                    "make new records of jobs and scenes whose records are lost");
-  command->callback([state, command, &context] { serve(*state, *command, context); });
+  command.option("--listen", options.http.address, "address to listen on (default: 127.0.0.1)");
+  command.option("--port", options.http.port,
+                 "port to listen on, 0 for any free one (default: 8080)");
+  command.option("--data", options.data_folder, "data folder: queue, scenes and results");
+  command.option("--config", state->config_file, "settings in JSON (docs/operating.md)");
+  command.option("--tokens", options.token_file, "file of hashed bearer tokens");
+  command.option("--certificate", options.http.certificate_file, "TLS: certificate chain, PEM");
+  command.option("--key", options.http.key_file, "TLS: its key, PEM");
+  command.option("--scenes", options.scene_roots,
+                 "folder whose scenes jobs may name by path; may be repeated");
+  command.flag("--adopt", options.adopt,
+               "make new records of jobs and scenes whose records are lost");
+  command.on_run([state, command, &line] { serve(*state, command, line.context()); });
 
-  CLI::App* token = app.add_subcommand("token", "create a bearer token for the service");
-  const auto made = std::make_shared<TokenCommand>();
-  token->add_option("--role", made->role, "read, submit or admin")->required();
-  token->add_option("--name", made->name, "name of its owner, for the log")->required();
-  token->callback([made] { make_token(*made); });
-
-  add_run_job_command(app, context);
+  add_command<TokenCommand>(
+      line, "token", "create a bearer token for the service",
+      [](Command& token, TokenCommand& made) {
+        token.option("--role", made.role, "read, submit or admin").required();
+        token.option("--name", made.name, "name of its owner, for the log").required();
+      },
+      [](const TokenCommand& made, CommandContext&) { make_token(made); });
+  add_run_job_command(line);
 }
 
 }  // namespace voxdag::cli

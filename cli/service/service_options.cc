@@ -17,17 +17,17 @@ std::string trimmed(const std::string& text) {
 
 }  // namespace
 
-void ServiceOptions::declare(CLI::App& command) {
+void ServiceOptions::declare(Command& command) {
   const char* group = "Server";
-  command.add_option("--server", url_, "http://HOST:PORT of a `voxdag serve`")
-      ->envname("VOXDAG_SERVER")
-      ->required()
-      ->group(group);
-  command.add_option("--token-file", token_file_, "file with the bearer token, if one is needed")
-      ->envname("VOXDAG_TOKEN_FILE")
-      ->group(group);
-  command.add_option("--ca-file", ca_file_, "certificates to trust instead of the system's")
-      ->group(group);
+  command.option("--server", url_, "http://HOST:PORT of a `voxdag serve`")
+      .environment("VOXDAG_SERVER")
+      .required()
+      .group(group);
+  command.option("--token-file", token_file_, "file with the bearer token, if one is needed")
+      .environment("VOXDAG_TOKEN_FILE")
+      .group(group);
+  command.option("--ca-file", ca_file_, "certificates to trust instead of the system's")
+      .group(group);
 }
 
 client::ClientOptions ServiceOptions::client_options(FileSystem& files) const {

@@ -1,13 +1,13 @@
 #include <sys/random.h>
 
 #include <cstdio>
-#include <memory>
 
 #include "cli/build_options.h"
+#include "cli/output.h"
 #include "cli/service/follow.h"
 #include "cli/service/job_text.h"
 #include "cli/terminal/progress_bar.h"
-#include "client/upload.h"
+#include "client/scene_upload.h"
 #include "core/base/text.h"
 
 namespace voxdag::cli {
@@ -58,9 +58,9 @@ std::string random_key() {
   return hex_text(bytes);
 }
 
-void run(const SubmitCommand& command, FileSystem& files, ServiceClient& service) {
+void run(const SubmitCommand& command, ServiceClient& service, CommandContext& context) {
   const BuildSpec spec = command.build.spec();
-  Json body = {{"scene", scenes_json(spec.geometry.scenes, files, service)},
+  Json body = {{"scene", scenes_json(spec.geometry.scenes, context.files, service)},
                {"resolution", spec.geometry.resolution},
                {"options", options_json(spec)}};
   if (!command.name.empty()) body["name"] = command.name;
@@ -69,27 +69,25 @@ void run(const SubmitCommand& command, FileSystem& files, ServiceClient& service
   if (!command.json) std::printf("%s\n", state_line(job).c_str());
   std::fflush(stdout);
   if (command.wait) job = follow_job(service, job.at("id"));
-  if (command.json) std::printf("%s\n", job.dump().c_str());
+  if (command.json) print_json(job);
   if (!command.wait) return;
   check_succeeded(job);
   if (!command.json) print_result(job);
 }
 
+void declare(Command& command, SubmitCommand& state) {
+  state.build.declare(command);
+  state.service.declare(command);
+  command.option("--name", state.name, "name of the job, for people");
+  command.option("--priority", state.priority, "-100 to 100; higher runs earlier");
+  command.flag("--wait", state.wait, "follow the job until it ends, as watch does");
+  command.json_flag(state.json, "the job as one JSON object on standard output");
+}
+
 }  // namespace
 
-void add_submit_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("submit", "build a scene on a server");
-  const auto state = std::make_shared<SubmitCommand>();
-  state->build.declare(*command);
-  state->service.declare(*command);
-  command->add_option("--name", state->name, "name of the job, for people");
-  command->add_option("--priority", state->priority, "-100 to 100; higher runs earlier");
-  command->add_flag("--wait", state->wait, "follow the job until it ends, as watch does");
-  command->add_flag("--json", state->json, "the job as one JSON object on standard output");
-  command->callback([state, &context] {
-    state->service.with_service(
-        context, [&](ServiceClient& service) { run(*state, context.files, service); });
-  });
+void add_submit_command(CommandLine& line) {
+  add_service_command<SubmitCommand>(line, "submit", "build a scene on a server", declare, run);
 }
 
 }  // namespace voxdag::cli

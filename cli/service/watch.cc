@@ -1,6 +1,6 @@
 #include <cstdio>
-#include <memory>
 
+#include "cli/output.h"
 #include "cli/service/follow.h"
 #include "cli/service/job_text.h"
 
@@ -13,24 +13,24 @@ struct WatchCommand {
   bool json = false;
 };
 
-void run(const WatchCommand& command, ServiceClient& service) {
+void run(const WatchCommand& command, ServiceClient& service, CommandContext&) {
   const Json job = follow_job(service, command.id);
-  if (command.json) std::printf("%s\n", job.dump().c_str());
+  if (command.json) print_json(job);
   check_succeeded(job);
   if (!command.json) print_result(job);
 }
 
+void declare(Command& command, WatchCommand& state) {
+  command.option("id", state.id, "job id").required();
+  state.service.declare(command);
+  command.json_flag(state.json, "the job as one JSON object on standard output");
+}
+
 }  // namespace
 
-void add_watch_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("watch", "follow a job of a server until it ends");
-  const auto state = std::make_shared<WatchCommand>();
-  command->add_option("id", state->id, "job id")->required();
-  state->service.declare(*command);
-  command->add_flag("--json", state->json, "the job as one JSON object on standard output");
-  command->callback([state, &context] {
-    state->service.with_service(context, [&](ServiceClient& service) { run(*state, service); });
-  });
+void add_watch_command(CommandLine& line) {
+  add_service_command<WatchCommand>(line, "watch", "follow a job of a server until it ends",
+                                    declare, run);
 }
 
 }  // namespace voxdag::cli

@@ -11,6 +11,10 @@
 
 namespace voxdag {
 
+// The budget, or the device's memory, cannot hold the subvolume. Thrown and caught within a
+// backend; Backend::build() then returns BuildOutcome::kNeedsSplit.
+struct OutOfBudget {};
+
 struct BackendMemory {
   // Pages that a backend retains for its next subvolume, uncharged, while they fit next to what is
   // charged. A budget of less than eight times kMinPageBytes can be exceeded by kMinPageBytes.

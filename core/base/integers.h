@@ -1,5 +1,4 @@
-// 128-bit integers, which g++, clang and nvcc have, and the one operation on them that the node
-// hash needs.
+// 128-bit integers, which g++, clang and nvcc have, and functions that mix the bits of a number.
 #pragma once
 
 #include <cstdint>
@@ -15,6 +14,13 @@ __extension__ typedef unsigned __int128 uint128;
 VOXDAG_HD inline uint64_t fold_multiply(uint64_t a, uint64_t b) {
   const uint128 product = static_cast<uint128>(a) * b;
   return static_cast<uint64_t>(product) ^ static_cast<uint64_t>(product >> 64);
+}
+
+// A bijective mix of all bits: the output function of splitmix64, the generator of random numbers.
+VOXDAG_HD inline uint64_t mix_bits(uint64_t x) {
+  x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ x >> 27) * 0x94d049bb133111ebull;
+  return x ^ x >> 31;
 }
 
 }  // namespace voxdag

@@ -33,7 +33,7 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
   try {
     for (unsigned worker = 1; worker < workers && worker < count; ++worker)
       threads.emplace_back(work, worker);
-  } catch (const std::system_error&) {
+  } catch (const std::exception&) {
     // The system has no more threads: those that were started, and this one, do all the work.
   }
   work(0);

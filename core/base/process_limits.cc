@@ -1,6 +1,7 @@
 #include "core/base/process_limits.h"
 
 #include <malloc.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <iterator>
 #include <sstream>
 #include <string>
+#include <thread>
 
 namespace voxdag {
 namespace {
@@ -19,15 +21,56 @@ uint64_t number_in(const std::string& path) {
 }
 
 // The lowest limit from the group at `path` up to the root of the hierarchy.
-uint64_t min_up_from(const std::string& root, std::string path, const std::string& file) {
+template <class LimitOf>
+uint64_t min_up_from(const std::string& root, std::string path, const LimitOf& limit_of) {
   uint64_t lowest = UINT64_MAX;
   for (;;) {
-    lowest = std::min(lowest, number_in(root + path + "/" + file));
+    lowest = std::min(lowest, limit_of(root + path + "/"));
     const size_t slash = path.find_last_of('/');
     if (path.empty() || slash == std::string::npos) return lowest;
     path.resize(slash);
   }
 }
+
+// The lowest limit of all groups that `membership` names and of those above them; limit_of2() and
+// limit_of1() read that of a group's folder in version 2 and 1. A line of `membership` is
+// "<id>:<controllers>:<path>"; version 2 has no controllers there.
+template <class LimitOf2, class LimitOf1>
+uint64_t min_of_groups(const std::string& membership, const std::string& mount,
+                       const std::string& controller, const LimitOf2& limit_of2,
+                       const LimitOf1& limit_of1) {
+  uint64_t lowest = UINT64_MAX;
+  std::istringstream lines(membership);
+  std::string line;
+  while (std::getline(lines, line)) {
+    const size_t first = line.find(':'), second = line.find(':', first + 1);
+    if (first == std::string::npos || second == std::string::npos) continue;
+    const std::string controllers = line.substr(first + 1, second - first - 1);
+    const std::string path = line.substr(second + 1);
+    if (controllers.empty()) {
+      for (const char* root : {"", "/unified"})
+        lowest = std::min(lowest, min_up_from(mount + root, path, limit_of2));
+    } else if (("," + controllers + ",").find("," + controller + ",") != std::string::npos) {
+      // Mounted by its own name, or by those of all that it is mounted with.
+      for (const std::string& name : {controller, controllers})
+        lowest = std::min(lowest, min_up_from(mount + "/" + name, path, limit_of1));
+    }
+  }
+  return lowest;
+}
+
+// CPUs of a quota in microseconds per period, rounded up.
+uint64_t cpus(uint64_t quota, uint64_t period) {
+  if (quota >= INT64_MAX || period == 0 || period >= INT64_MAX) return UINT64_MAX;
+  return std::max<uint64_t>(1, (quota + period - 1) / period);
+}
+
+std::string own_membership() {
+  std::ifstream file("/proc/self/cgroup");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+constexpr const char* kCgroupMount = "/sys/fs/cgroup";
 
 // A size in the kernel's status of this process; 0 where it is absent.
 uint64_t status_bytes(const std::string& name) {
@@ -45,36 +88,47 @@ uint64_t status_bytes(const std::string& name) {
 
 }  // namespace
 
-// A line is "<id>:<controllers>:<path>"; version 2 has no controllers there.
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount) {
-  uint64_t lowest = UINT64_MAX;
-  std::istringstream lines(membership);
-  std::string line;
-  while (std::getline(lines, line)) {
-    const size_t first = line.find(':'), second = line.find(':', first + 1);
-    if (first == std::string::npos || second == std::string::npos) continue;
-    const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";
-    const std::string path = line.substr(second + 1);
-    if (controllers == ",,") {
-      for (const char* root : {"", "/unified"})
-        lowest = std::min(lowest, min_up_from(mount + root, path, "memory.max"));
-    } else if (controllers.find(",memory,") != std::string::npos) {
-      lowest = std::min(lowest, min_up_from(mount + "/memory", path, "memory.limit_in_bytes"));
-    }
-  }
-  return lowest;
+  return min_of_groups(
+      membership, mount, "memory",
+      [](const std::string& folder) { return number_in(folder + "memory.max"); },
+      [](const std::string& folder) { return number_in(folder + "memory.limit_in_bytes"); });
+}
+
+uint64_t cgroup_cpus(const std::string& membership, const std::string& mount) {
+  return min_of_groups(
+      membership, mount, "cpu",
+      [](const std::string& folder) {
+        std::ifstream file(folder + "cpu.max");
+        uint64_t quota = 0, period = 0;
+        return file >> quota >> period ? cpus(quota, period) : UINT64_MAX;
+      },
+      [](const std::string& folder) {
+        // A quota of -1 is none; read as an unsigned number it is above all limits.
+        return cpus(number_in(folder + "cpu.cfs_quota_us"),
+                    number_in(folder + "cpu.cfs_period_us"));
+      });
 }
 
 uint64_t default_memory() {
   const uint64_t ram = static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) *
                        static_cast<uint64_t>(sysconf(_SC_PAGE_SIZE));
-  std::ifstream file("/proc/self/cgroup");
-  const std::string membership{std::istreambuf_iterator<char>(file), {}};
-  return std::max(kMinMemory, std::min(ram, cgroup_memory(membership, "/sys/fs/cgroup")) / 2);
+  return std::max(kMinMemory, std::min(ram, cgroup_memory(own_membership(), kCgroupMount)) / 2);
+}
+
+unsigned default_threads() {
+  const unsigned cpus = std::max(1u, std::thread::hardware_concurrency());
+  return static_cast<unsigned>(
+      std::min<uint64_t>(cpus, cgroup_cpus(own_membership(), kCgroupMount)));
 }
 
 uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }
 uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
+
+uint64_t max_open_files() {
+  rlimit limit{};
+  return getrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur : UINT64_MAX;
+}
 
 void return_freed_memory_to_system() {
 #ifdef __GLIBC__

@@ -1,5 +1,5 @@
-// How much memory the machine lets a build have, how much this process holds, and the allocator
-// settings without which it would hold more than it was charged. Thread-safe.
+// How much memory and how many CPUs the machine lets a build have, how much this process holds, and
+// the allocator settings without which it would hold more than it was charged. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,16 @@ uint64_t default_memory();
 // The lowest limit of the cgroups that `membership` (the text of /proc/self/cgroup) names and of
 // their ancestors, of version 2 or 1, mounted under `mount`; UINT64_MAX if there is none.
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount);
+// The CPUs that this process may use: those of its affinity mask, or fewer if a cgroup has a quota.
+unsigned default_threads();
+// The lowest quota of the cgroups as above, in CPUs and rounded up; UINT64_MAX if there is none.
+uint64_t cgroup_cpus(const std::string& membership, const std::string& mount);
 // Largest resident set of this process so far (VmHWM), in bytes.
 uint64_t peak_resident_bytes();
 // Resident set of this process now (VmRSS), in bytes.
 uint64_t resident_bytes();
+// How many files and sockets this process may have open (RLIMIT_NOFILE).
+uint64_t max_open_files();
 
 // Tells the C library to return freed memory to the system at once instead of retaining it, so that
 // resident memory follows what a MemoryBudget has charged. Process-wide; repeated calls are

@@ -10,6 +10,16 @@
 
 namespace voxdag {
 
+// What all parts of one DAG have in common. Written with names where the numbers are set:
+// `{.grid_levels = 11, .hash_bits = 64}`.
+struct DagShape {
+  uint32_t grid_levels = 2;  // L; bricks are level L-2
+  uint32_t hash_bits = 64;   // 4 to 64
+
+  uint32_t brick_level() const { return grid_levels - kBrickLevels; }
+  bool operator==(const DagShape&) const = default;
+};
+
 // Where a sub-DAG stands in the grid's octree, and how its nodes are hashed. One struct, so that
 // callers name these numbers (`{.cube_level = 2, .grid_levels = 11, .hash_bits = 64}`) instead of
 // passing neighboring integers that could be swapped.

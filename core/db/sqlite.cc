@@ -1,16 +1,27 @@
 #include "core/db/sqlite.h"
 
 #include <sqlite3.h>
+#include <sys/statvfs.h>
 
 #include <cerrno>
 
 #include "core/base/error.h"
+#include "core/io/file_system.h"
 
 namespace voxdag {
 namespace {
 
-[[noreturn]] void fail(sqlite3* database, int result) {
+// Whether the file system of the file at `path` can make no file any more.
+bool has_no_inodes(const std::string& path) {
+  struct statvfs s {};
+  return statvfs(parent_directory(path).c_str(), &s) == 0 && s.f_files > 0 && s.f_favail == 0;
+}
+
+[[noreturn]] void fail(sqlite3* database, int result, std::string path = "") {
   ErrorCode code = ErrorCode::kIo;
+  std::string message = database ? sqlite3_errmsg(database) : sqlite3_errstr(result);
+  if (const char* name = database ? sqlite3_db_filename(database, "main") : nullptr; name && *name)
+    path = name;
   switch (result & 0xff) {
     case SQLITE_FULL:
       code = ErrorCode::kNoSpace;
@@ -29,9 +40,12 @@ namespace {
   }
   const int reason = database ? sqlite3_system_errno(database) : 0;
   if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT)) code = ErrorCode::kNoSpace;
-  const char* path = database ? sqlite3_db_filename(database, "main") : nullptr;
-  throw Error(code, std::string("database ") + (path ? path : "") + ": " +
-                        (database ? sqlite3_errmsg(database) : sqlite3_errstr(result)));
+  // SQLite tries again without creating the file, and then reports that it is not there.
+  if ((result & 0xff) == SQLITE_CANTOPEN && has_no_inodes(path)) {
+    code = ErrorCode::kNoSpace;
+    message += ": the file system has no inodes left";
+  }
+  throw Error(code, "database " + path + ": " + message);
 }
 
 }  // namespace
@@ -122,7 +136,7 @@ SqlDatabase::SqlDatabase(const std::string& path, Mode mode, int busy_ms) {
       mode == Mode::kReadOnly ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
   const int result = sqlite3_open_v2(path.c_str(), &database, flags, nullptr);
   handle_.reset(database);
-  if (result != SQLITE_OK) fail(database, result);
+  if (result != SQLITE_OK) fail(database, result, path);
   sqlite3_busy_timeout(database, busy_ms);
 }
 

@@ -3,7 +3,9 @@
 #include <openssl/evp.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <new>
+#include <vector>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
@@ -82,6 +84,28 @@ std::string sha256_hex(std::string_view text) {
   Sha256 digest;
   digest.add(std::as_bytes(std::span(text)));
   return digest.finish();
+}
+
+std::string sha256_of_file(const ReadableFile& file, const CancelToken& cancel,
+                           Progress* progress) {
+  Sha256 digest;
+  std::vector<std::byte> buffer(size_t{1} << 20);
+  for (uint64_t at = 0; at < file.size(); at += buffer.size()) {
+    cancel.check();
+    const auto piece = std::span(buffer).first(std::min(buffer.size(), file.size() - at));
+    file.read_at(at, piece);
+    digest.add(piece);
+    if (progress) progress->advance(piece.size());
+  }
+  return digest.finish();
+}
+
+std::string digest_field(const std::string& sha256) {
+  unsigned char bytes[32], base64[45];
+  for (size_t i = 0; i < sizeof bytes; ++i)
+    bytes[i] = static_cast<unsigned char>(std::stoi(sha256.substr(2 * i, 2), nullptr, 16));
+  EVP_EncodeBlock(base64, bytes, sizeof bytes);
+  return "sha-256=:" + std::string(reinterpret_cast<char*>(base64)) + ":";
 }
 
 }  // namespace voxdag

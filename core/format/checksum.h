@@ -9,6 +9,10 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/cancel_token.h"
+#include "core/base/progress.h"
+#include "core/io/file_system.h"
+
 namespace voxdag {
 
 // XXH64 with seed 0.
@@ -52,5 +56,11 @@ class Sha256 {
 };
 // The SHA-256 of a text: 64 lower-case hex digits.
 std::string sha256_hex(std::string_view text);
+// The SHA-256 of a file, read once from its begin to its end; `progress` is advanced by its bytes.
+std::string sha256_of_file(const ReadableFile& file, const CancelToken& cancel,
+                           Progress* progress = nullptr);
+// "sha-256=:BASE64:" of a SHA-256 in hex, as the header fields Content-Digest and Repr-Digest carry
+// it (RFC 9530).
+std::string digest_field(const std::string& sha256);
 
 }  // namespace voxdag

@@ -39,10 +39,6 @@ struct Cube {
   VOXDAG_HD int64_t edge_voxels(uint32_t grid_levels) const {
     return int64_t{1} << (grid_levels - level);
   }
-  VOXDAG_HD bool operator==(const Cube& o) const {
-    return level == o.level && position[0] == o.position[0] && position[1] == o.position[1] &&
-           position[2] == o.position[2];
-  }
   // By level, then x, y and z: an order for containers, without meaning in the octree.
   std::strong_ordering operator<=>(const Cube&) const = default;
 };

@@ -22,6 +22,10 @@ Grid centered(const WorldBounds& bounds, double edge, uint32_t levels) {
   for (int a = 0; a < 3; ++a) {
     const double middle = bounds.empty ? 0.0 : 0.5 * (bounds.low[a] + bounds.high[a]);
     grid.origin[a] = middle - 0.5 * edge;
+    if (!std::isfinite(grid.origin[a]) || !std::isfinite(edge))
+      throw Error(ErrorCode::kLimit,
+                  "the grid around the scene is out of the range of doubles: expected coordinates "
+                  "below 1e307");
   }
   return grid;
 }

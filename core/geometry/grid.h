@@ -35,7 +35,8 @@ struct Grid {
   int64_t resolution() const { return int64_t{1} << levels; }
 
   // The default cube around a scene. A scene without extent, or without triangles, gets edge 1.
-  // Throws Error{kInvalidInput} for levels outside [2, 20].
+  // Throws Error{kInvalidInput} for levels outside [2, 20], Error{kLimit} if the grid is not
+  // finite.
   static Grid around(const WorldBounds& bounds, uint32_t levels);
   // A cube given by its low corner and its edge, finite and edge > 0.
   static Grid given(const std::array<double, 3>& origin, double edge, uint32_t levels);

@@ -99,7 +99,7 @@ void MergeRecovery::save_in_pass(PassSegment& segment, std::vector<ArtifactRef> 
 
 void MergeRecovery::save_pass(const PassSegment& segment, std::vector<ArtifactRef> merged,
                               std::span<const SurveyedArtifact> before) {
-  std::vector<MergedBytes> rows;
+  std::vector<SegmentRange> rows;
   for (const SurveyedArtifact& artifact : before)
     if (const ArtifactRef& ref = artifact.ref; !is_pass_segment(ref.segment))
       rows.push_back({ref.segment, ref.offset, ref.index_offset - ref.offset});
@@ -125,9 +125,9 @@ void MergeRecovery::save_level(const PassProgress& progress,
               newly_merged(readers, *progress.level));
 }
 
-std::vector<MergedBytes> MergeRecovery::newly_merged(std::span<const ArtifactReader> readers,
-                                                     uint32_t level) {
-  std::vector<MergedBytes> merged;
+std::vector<SegmentRange> MergeRecovery::newly_merged(std::span<const ArtifactReader> readers,
+                                                      uint32_t level) {
+  std::vector<SegmentRange> merged;
   merged_ends_.resize(readers.size());
   for (size_t i = 0; i < readers.size(); ++i) {
     const ArtifactRef& ref = pending_.artifacts()[i].ref;

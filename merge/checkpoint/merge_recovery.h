@@ -20,7 +20,7 @@ class MergeRecovery {
   MergeRecovery(const MergeInputs& inputs, const MergeContext& context, PendingArtifacts& pending,
                 Checkpoint* checkpoint)
       : context_(context),
-        grid_levels_(inputs.grid_levels),
+        grid_levels_(inputs.shape.grid_levels),
         pending_(pending),
         saver_(checkpoint, inputs.checkpoint_interval_s) {}
 
@@ -49,7 +49,7 @@ class MergeRecovery {
   // The intermediates among the pending artifacts from `begin` on.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
   // Frames of the inputs from the bricks up to `level`, without those that were returned before.
-  std::vector<MergedBytes> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
+  std::vector<SegmentRange> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
 
   const MergeContext& context_;
   const uint32_t grid_levels_;

@@ -93,9 +93,7 @@ void code_state(Code& code, MergeState& state) {
   code(state.next_scratch_id);
   code_fields(code, state.report);
   code_all(code, state.intermediates);
-  uint8_t in_final_pass = state.final_pass.has_value();
-  code(in_final_pass);
-  if (!in_final_pass) return;
+  if (!code.flag(state.final_pass.has_value())) return;
   if (!state.final_pass) state.final_pass.emplace();
   code_fields(code, *state.final_pass);
 }
@@ -110,6 +108,10 @@ class Put {
   template <class T>
   void resize(const std::vector<T>& items) {
     out_.put(uint64_t{items.size()});
+  }
+  bool flag(bool value) {
+    out_.put(uint8_t{value});
+    return value;
   }
   void text(const std::string& text) {
     out_.put(uint64_t{text.size()});
@@ -132,6 +134,11 @@ class Get {
   void resize(std::vector<T>& items) {
     items.resize(count(8));
   }
+  bool flag(bool) {
+    const uint8_t value = in_.get<uint8_t>();
+    if (value > 1) fail();
+    return value == 1;
+  }
   void text(std::string& text) {
     text.resize(count(1));
     const auto bytes = in_.take(text.size());
@@ -142,9 +149,10 @@ class Get {
   size_t count(size_t min_bytes) {
     const uint64_t n = in_.get<uint64_t>();
     if (n <= in_.left() / min_bytes) return n;
-    in_.take(in_.left() + 1);  // makes ok() false
+    fail();
     return 0;
   }
+  void fail() { in_.take(in_.left() + 1); }  // makes ok() false
 
   ByteSource& in_;
 };

@@ -34,7 +34,7 @@ bool StateSaver::due() {
 
 void StateSaver::save(uint32_t level, MergeState state,
                       std::vector<std::shared_ptr<ScratchPath>> named, std::function<void()> sync,
-                      std::vector<MergedBytes> merged) {
+                      std::vector<SegmentRange> merged) {
   wait();
   saved_s_ = process_cpu_seconds();
   // If saving fails, either state may be the durable one, so the files of both are retained.
@@ -45,8 +45,8 @@ void StateSaver::save(uint32_t level, MergeState state,
     sync();
     checkpoint_->save(level, encode_state(std::move(state)));
     named_.erase(named_.begin(), named_.begin() + before);
-    for (const auto& [segment, offset, bytes] : merged)
-      if (!finishing_) checkpoint_->release(segment, offset, bytes);
+    for (const SegmentRange& range : merged)
+      if (!finishing_) checkpoint_->release(range);
   });
   // An interval of 0, for tests, saves a state after every level.
   if (interval_s_ == 0) wait();

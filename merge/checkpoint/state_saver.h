@@ -17,13 +17,6 @@
 
 namespace voxdag {
 
-// Bytes of the segment of an input that the merge reads no more.
-struct MergedBytes {
-  uint32_t segment = 0;
-  uint64_t offset = 0;
-  uint64_t bytes = 0;
-};
-
 class StateSaver {
  public:
   // Without a checkpoint nothing is loaded, due or saved.
@@ -48,7 +41,7 @@ class StateSaver {
   // Saves a state in the background. `named` are the scratch files that it names, which `sync`
   // makes durable; the files of the state before are removed then, and `merged` is released.
   void save(uint32_t level, MergeState state, std::vector<std::shared_ptr<ScratchPath>> named,
-            std::function<void()> sync, std::vector<MergedBytes> merged);
+            std::function<void()> sync, std::vector<SegmentRange> merged);
   // Waits for the save in progress, and throws what it threw.
   void wait();
   // The same at the end of the merge. Bytes that are not released yet stay, since their files are

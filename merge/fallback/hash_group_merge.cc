@@ -54,9 +54,7 @@ class GroupFile {
   size_t frames_that_fit(const LevelRun& run, size_t begin, size_t limit) const {
     size_t end = begin + 1;
     while (end < limit &&
-           HashPartition::bytes_for(run.rows_before(end + 1) - run.rows_before(begin),
-                                    run.words_before(end + 1) - run.words_before(begin),
-                                    false) <= bytes_ / 2)
+           HashPartition::bytes_for(run.count({begin, end + 1}), false) <= bytes_ / 2)
       ++end;
     return end;
   }

@@ -18,9 +18,7 @@ class OrderedRowWriter {
  public:
   // The first row goes to `first_position`.
   OrderedRowWriter(LevelOutput& output, bool bricks, uint64_t first_position, MemoryBudget& budget)
-      : output_(output),
-        buffer_(budget, bricks, kBufferRows, uint64_t{kBufferRows} * kMaxRowWords),
-        flushed_(first_position) {}
+      : output_(output), buffer_(budget, bricks, kBuffered), flushed_(first_position) {}
 
   // Returns the position of the row in the merged level.
   uint64_t add(const RowKey& row) {
@@ -33,12 +31,10 @@ class OrderedRowWriter {
   uint64_t nodes() const { return nodes_; }
   // The position of the next new row.
   uint64_t end_position() const { return flushed_ + buffered_positions(); }
-  static uint64_t bytes() {
-    return MergedRows::bytes_for(kBufferRows, uint64_t{kBufferRows} * kMaxRowWords);
-  }
+  static uint64_t bytes() { return MergedRows::bytes_for(kBuffered); }
 
  private:
-  static constexpr uint32_t kBufferRows = 1024;
+  static constexpr RowCount kBuffered{1024, 1024 * kMaxRowWords};
 
   void push(const RowKey& row);
   uint64_t buffered_positions() const {

@@ -6,16 +6,6 @@
 namespace voxdag {
 namespace {
 
-struct Extent {
-  uint64_t rows = 0;
-  uint64_t words = 0;
-};
-
-Extent extent_of(const LevelRun& run, const FrameSpan& frames) {
-  return {run.rows_before(frames.end) - run.rows_before(frames.begin),
-          run.words_before(frames.end) - run.words_before(frames.begin)};
-}
-
 // The fewest bits for which buckets of evenly spread hashes have `bucket_rows` rows, and for which
 // the table of bucket begins takes at most a byte or two per row.
 unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_t bucket_rows,
@@ -29,9 +19,9 @@ unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_
 
 }  // namespace
 
-uint64_t HashPartition::bytes_for(uint64_t rows, uint64_t words, bool with_positions) {
+uint64_t HashPartition::bytes_for(const RowCount& count, bool with_positions) {
   // Hash, mask, bucket begins (see choose_bucket_bits); words, and a bit for each during rewiring.
-  return rows * (8 + 1 + 4 + (with_positions ? 4 : 0)) + words * 4 + words / 8;
+  return count.rows * (8 + 1 + 4 + (with_positions ? 4 : 0)) + count.words * 4 + count.words / 8;
 }
 
 std::vector<RunSlice> HashPartition::slices_within(std::span<const LevelRun* const> runs,
@@ -49,13 +39,9 @@ std::optional<HashInterval> HashPartition::widest_interval(std::span<const Level
                                                            bool with_positions) {
   bytes = std::min(bytes, kMaxPartitionBytes);
   const auto fits = [&](uint64_t last) {
-    Extent total;
-    for (const LevelRun* run : runs) {
-      const Extent extent = extent_of(*run, run->frames_within({first, last}));
-      total.rows += extent.rows;
-      total.words += extent.words;
-    }
-    return bytes_for(total.rows, total.words, with_positions) <= bytes;
+    RowCount total;
+    for (const LevelRun* run : runs) total.add(run->count(run->frames_within({first, last})));
+    return bytes_for(total, with_positions) <= bytes;
   };
   if (fits(~uint64_t{0})) return HashInterval{first, ~uint64_t{0}};
   if (!fits(first)) return std::nullopt;
@@ -71,28 +57,24 @@ HashPartition::HashPartition(std::span<const LevelRun* const> runs, std::vector<
                              const HashInterval& interval, uint64_t bucket_rows,
                              bool with_positions, PartitionMemory& memory, MemoryBudget& budget)
     : runs_(runs), slices_(std::move(slices)), interval_(interval), memory_(memory) {
-  uint64_t rows = 0, words = 0;
+  RowCount total;
   for (RunSlice& slice : slices_) {
     const LevelRun& run = *runs_[slice.run];
-    const Extent extent = extent_of(run, slice.frames);
     slice.first_row = run.rows_before(slice.frames.begin);
-    slice.rows = extent.rows;
-    slice.words = extent.words;
-    slice.row_base = rows;
-    slice.word_base = words;
-    rows += extent.rows;
-    words += extent.words;
+    slice.size = run.count(slice.frames);
+    slice.row_base = total.rows;
+    slice.word_base = total.words;
+    total.add(slice.size);
   }
-  bucket_bits_ = choose_bucket_bits(interval_, rows, bucket_rows, slices_.size());
+  bucket_bits_ = choose_bucket_bits(interval_, total.rows, bucket_rows, slices_.size());
   bucket_count_ = (interval_.last >> bucket_bits_) - (interval_.first >> bucket_bits_) + 1;
-  memory_.reserve(rows, words, with_positions, budget);
+  memory_.reserve(total, with_positions, budget);
   bucket_begins_ = PageBuffer<RowOffset>(budget, (bucket_count_ + 1) * slices_.size(),
                                          "the buckets of a hash partition");
 }
 
-void PartitionMemory::reserve(uint64_t rows, uint64_t words, bool with_positions,
-                              MemoryBudget& budget) {
-  words += kMaxRowWords;
+void PartitionMemory::reserve(const RowCount& count, bool with_positions, MemoryBudget& budget) {
+  const uint64_t rows = count.rows, words = count.words + kMaxRowWords;
   if (rows <= hashes_.size() && words <= words_.size() &&
       (!with_positions || rows <= positions_.size()))
     return;

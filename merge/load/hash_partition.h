@@ -29,7 +29,7 @@ struct RunSlice {
   size_t run = 0;
   FrameSpan frames;
   uint64_t first_row = 0;  // of the run
-  uint64_t rows = 0, words = 0;
+  RowCount size{};
   uint64_t row_base = 0, word_base = 0;
 };
 
@@ -43,8 +43,8 @@ struct RowOffset {
 // as long to zero new pages as it takes to read rows into them.
 class PartitionMemory {
  public:
-  // Makes space for `rows` rows of `words` words in all; what was in the columns is lost.
-  void reserve(uint64_t rows, uint64_t words, bool with_positions, MemoryBudget& budget);
+  // Makes space for so many rows; what was in the columns is lost.
+  void reserve(const RowCount& count, bool with_positions, MemoryBudget& budget);
   void release() { *this = {}; }
   uint64_t bytes() const;
 
@@ -70,7 +70,7 @@ inline constexpr uint64_t kMaxPartitionBytes = uint64_t{8} << 30;
 class HashPartition {
  public:
   // `with_positions`: the partition also has a position for each of its rows.
-  static uint64_t bytes_for(uint64_t rows, uint64_t words, bool with_positions);
+  static uint64_t bytes_for(const RowCount& count, bool with_positions);
   // The widest interval that begins with hash `first` and whose partition takes at most `bytes`;
   // none if not even the rows of that one hash fit.
   static std::optional<HashInterval> widest_interval(std::span<const LevelRun* const> runs,

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "core/dag/brick.h"
-
 namespace voxdag {
 
 FrameSpan LevelRun::frames_within(const HashInterval& interval) const {
@@ -17,9 +15,7 @@ FrameSpan LevelRun::frames_within(const HashInterval& interval) const {
 }
 
 ArtifactRun::ArtifactRun(const ArtifactReader& artifact, uint32_t level)
-    : LevelRun(level + kBrickLevels == artifact.grid_levels(), false),
-      artifact_(artifact),
-      level_(level) {
+    : LevelRun(level == artifact.shape().brick_level(), false), artifact_(artifact), level_(level) {
   if (const ArtifactLevel* rows = artifact.level(level))
     set_frames(rows->frames, rows->rows, rows->children);
 }

@@ -43,6 +43,10 @@ class LevelRun {
     if (bricks_) return kBrickWords * rows_before(index);
     return index < frames_.size() ? frames_[index].first_child : children_;
   }
+  RowCount count(const FrameSpan& frames) const {
+    return {rows_before(frames.end) - rows_before(frames.begin),
+            words_before(frames.end) - words_before(frames.begin)};
+  }
   // The frames that may hold rows of the interval, found by their first hashes.
   FrameSpan frames_within(const HashInterval& interval) const;
 

@@ -148,14 +148,14 @@ class HashPartition::Loader {
 
   // For a map that is larger than the memory of a worker: loads one window of it at a time.
   void replace_by_windows(Worker& worker, const RunSlice& slice, const CancelToken& cancel) {
-    worker.replaced.assign(slice.words, false);
+    worker.replaced.assign(slice.size.words, false);
     uint32_t* const words = partition_.memory_.words_.data() + slice.word_base;
     const uint64_t map_rows = maps_->rows(slice.run);
     for (uint64_t first = 0; first < map_rows; first += worker.window.size()) {
       cancel.check();
       const uint64_t rows = std::min<uint64_t>(worker.window.size(), map_rows - first);
       maps_->load(slice.run, first, {worker.window.data(), rows});
-      for (uint64_t i = 0; i < slice.words; ++i) {
+      for (uint64_t i = 0; i < slice.size.words; ++i) {
         if (worker.replaced[i] || words[i] < first || words[i] - first >= rows) continue;
         words[i] = worker.window[words[i] - first];
         worker.replaced[i] = true;

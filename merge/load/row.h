@@ -16,6 +16,7 @@
 // then copied without a branch on its number of words, which would be as good as random.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "core/base/popcount8.h"
@@ -29,6 +30,21 @@ inline constexpr uint32_t kMaxRowWords = 8;
 
 // Words of a row by its mask.
 inline constexpr auto& kRowWords = kPopcount8;
+
+// How many rows, and how many words they have in all.
+struct RowCount {
+  uint64_t rows = 0;
+  uint64_t words = 0;
+
+  void add(const RowCount& more) {
+    rows += more.rows;
+    words += more.words;
+  }
+  void raise_to(const RowCount& other) {
+    rows = std::max(rows, other.rows);
+    words = std::max(words, other.words);
+  }
+};
 
 struct RowKey {
   uint64_t hash = 0;

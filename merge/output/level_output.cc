@@ -9,8 +9,6 @@ void ArtifactOutput::begin_level(uint32_t level) {
   artifact_.begin_level(level);
 }
 
-void ArtifactOutput::end_level(uint64_t, uint64_t) { artifact_.end_level(); }
-
 void ArtifactOutput::add(const MergedRows& rows) {
   if (rows.bricks())
     write_bricks(rows);

@@ -43,7 +43,7 @@ class LevelOutput {
   // Gets the same rows once more, the first one at `position`, in any order and by several threads
   // at once: the part of the work that needs no order.
   virtual void write(uint64_t position, const MergedRows& rows) = 0;
-  virtual void end_level(uint64_t nodes, uint64_t positions) = 0;
+  virtual void end_level(const LevelExtent& level) = 0;
 };
 
 class GlobalOutput : public LevelOutput {
@@ -55,7 +55,9 @@ class GlobalOutput : public LevelOutput {
   void write(uint64_t position, const MergedRows& rows) override {
     file_.write_words(position, rows.words());
   }
-  void end_level(uint64_t nodes, uint64_t positions) override { file_.end_level(nodes, positions); }
+  void end_level(const LevelExtent& level) override {
+    file_.end_level({.nodes = level.nodes, .words = level.positions});
+  }
 
  private:
   GlobalFileWriter& file_;
@@ -68,7 +70,7 @@ class ArtifactOutput : public LevelOutput {
   void begin_level(uint32_t level) override;
   void add(const MergedRows& rows) override;
   void write(uint64_t, const MergedRows&) override {}
-  void end_level(uint64_t nodes, uint64_t positions) override;
+  void end_level(const LevelExtent&) override { artifact_.end_level(); }
 
  private:
   void write_bricks(const MergedRows& rows);

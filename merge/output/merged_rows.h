@@ -15,12 +15,12 @@ namespace voxdag {
 // low half followed by its high half.
 class MergedRows {
  public:
-  // Has space for `rows` rows of `row_words` words in all.
-  MergedRows(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t row_words)
+  // Has space for up to `max` rows.
+  MergedRows(MemoryBudget& budget, bool bricks, const RowCount& max)
       : bricks_(bricks),
-        words_(budget, row_words + (bricks ? 0 : rows) + kMaxRowWords, "the merge's output"),
-        hashes_(budget, rows, "the merge's output") {}
-  static uint64_t bytes_for(uint64_t rows, uint64_t row_words) { return 12 * rows + 4 * row_words; }
+        words_(budget, max.words + (bricks ? 0 : max.rows) + kMaxRowWords, "the merge's output"),
+        hashes_(budget, max.rows, "the merge's output") {}
+  static uint64_t bytes_for(const RowCount& max) { return 12 * max.rows + 4 * max.words; }
 
   void clear() { word_count_ = row_count_ = 0; }
   // The row must fit.

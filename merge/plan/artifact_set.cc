@@ -16,8 +16,7 @@ namespace {
 // Opens artifacts, each segment file once.
 class Opener {
  public:
-  Opener(const OpenSegment& open, uint32_t grid_levels, uint32_t hash_bits)
-      : open_(open), grid_levels_(grid_levels), hash_bits_(hash_bits) {}
+  Opener(const OpenSegment& open, const DagShape& shape) : open_(open), shape_(shape) {}
 
   ArtifactReader open(const ArtifactRef& ref) {
     std::shared_ptr<ReadableFile>& file = files_[ref.segment];
@@ -29,11 +28,12 @@ class Opener {
 
  private:
   void check(const ArtifactReader& reader, const std::string& where) const {
-    if (reader.grid_levels() != grid_levels_ || reader.hash_bits() != hash_bits_)
+    if (reader.shape() != shape_)
       throw Error(ErrorCode::kCorrupt,
-                  where + "made for " + std::to_string(reader.grid_levels()) + " grid levels and " +
-                      std::to_string(reader.hash_bits()) + " hash bits, expected " +
-                      std::to_string(grid_levels_) + " and " + std::to_string(hash_bits_));
+                  where + "made for " + std::to_string(reader.shape().grid_levels) +
+                      " grid levels and " + std::to_string(reader.shape().hash_bits) +
+                      " hash bits, expected " + std::to_string(shape_.grid_levels) + " and " +
+                      std::to_string(shape_.hash_bits));
     if (reader.roots().empty()) throw Error(ErrorCode::kCorrupt, where + "has no root");
     for (const ArtifactRoot& root : reader.roots()) {
       const ArtifactLevel* const level = reader.level(root.cube.level);
@@ -44,8 +44,7 @@ class Opener {
   }
 
   const OpenSegment& open_;
-  const uint32_t grid_levels_;
-  const uint32_t hash_bits_;
+  const DagShape shape_;
   std::map<uint32_t, std::shared_ptr<ReadableFile>> files_;
 };
 
@@ -81,9 +80,7 @@ uint64_t min_partition_bytes(const ArtifactReader& reader) {
     const ArtifactRun run(reader, level.level);
     for (size_t begin = 0; begin < level.frames.size(); ++begin) {
       const size_t end = std::min(begin + 2, level.frames.size());
-      const uint64_t rows = run.rows_before(end) - run.rows_before(begin);
-      const uint64_t words = run.words_before(end) - run.words_before(begin);
-      max = std::max(max, HashPartition::bytes_for(rows, words, true));
+      max = std::max(max, HashPartition::bytes_for(run.count({begin, end}), true));
     }
   }
   return max;
@@ -102,8 +99,8 @@ uint64_t morton_code_of(const Cube& cube) {
 }  // namespace
 
 ArtifactSet::ArtifactSet(std::span<const SurveyedArtifact> artifacts, const OpenSegment& open,
-                         uint32_t grid_levels, uint32_t hash_bits, MemoryBudget& budget) {
-  Opener opener(open, grid_levels, hash_bits);
+                         const DagShape& shape, MemoryBudget& budget) {
+  Opener opener(open, shape);
   uint64_t bytes = 0;
   for (const SurveyedArtifact& artifact : artifacts) {
     readers_.push_back(opener.open(artifact.ref));
@@ -113,8 +110,8 @@ ArtifactSet::ArtifactSet(std::span<const SurveyedArtifact> artifacts, const Open
 }
 
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
-                                uint32_t grid_levels, uint32_t hash_bits) {
-  Opener opener(open, grid_levels, hash_bits);
+                                const DagShape& shape) {
+  Opener opener(open, shape);
   ArtifactSurvey survey;
   std::vector<std::pair<uint64_t, SurveyedArtifact>> by_code;
   for (const ArtifactRef& ref : refs) {

@@ -39,7 +39,7 @@ class ArtifactSet {
   // Error{kCorrupt} for an artifact of another grid or of other hash bits, or whose roots are
   // missing.
   ArtifactSet(std::span<const SurveyedArtifact> artifacts, const OpenSegment& open,
-              uint32_t grid_levels, uint32_t hash_bits, MemoryBudget& budget);
+              const DagShape& shape, MemoryBudget& budget);
 
   std::span<const ArtifactReader> readers() const { return readers_; }
 
@@ -50,6 +50,6 @@ class ArtifactSet {
 
 // Reads the indexes of all artifacts, one after the other.
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
-                                uint32_t grid_levels, uint32_t hash_bits);
+                                const DagShape& shape);
 
 }  // namespace voxdag

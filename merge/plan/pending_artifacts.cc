@@ -12,7 +12,7 @@ PendingArtifacts::PendingArtifacts(const MergeInputs& inputs)
         return is_pass_segment(id) ? segments_.at(id)->open() : inputs_.open_segment(id);
       }) {
   survey(inputs.artifacts);
-  std::vector<uint64_t> words{inputs.grid_levels, inputs.hash_bits};
+  std::vector<uint64_t> words{inputs.shape.grid_levels, inputs.shape.hash_bits};
   for (const SurveyedArtifact& artifact : artifacts_) words.push_back(artifact.content_checksum);
   inputs_checksum_ = checksum64(std::as_bytes(std::span(words)));
 }
@@ -37,8 +37,7 @@ std::vector<size_t> PendingArtifacts::group_ends(uint64_t partition_bytes) const
 }
 
 ArtifactSet PendingArtifacts::open(size_t begin, size_t end, MemoryBudget& budget) const {
-  return ArtifactSet({artifacts_.data() + begin, end - begin}, open_, inputs_.grid_levels,
-                     inputs_.hash_bits, budget);
+  return ArtifactSet({artifacts_.data() + begin, end - begin}, open_, inputs_.shape, budget);
 }
 
 PassSegment& PendingArtifacts::add_segment(std::unique_ptr<PassSegment> segment) {
@@ -80,7 +79,7 @@ void PendingArtifacts::reset() {
 }
 
 void PendingArtifacts::survey(std::span<const ArtifactRef> refs) {
-  ArtifactSurvey found = survey_artifacts(refs, open_, inputs_.grid_levels, inputs_.hash_bits);
+  ArtifactSurvey found = survey_artifacts(refs, open_, inputs_.shape);
   artifacts_ = std::move(found.in_morton_order);
   rows_ = found.rows;
 }

@@ -31,14 +31,14 @@ void prefetch_rows(const HashPartition& partition, size_t bucket, size_t slice) 
 
 }  // namespace
 
-BucketSorter::BucketSorter(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t words)
-    : entries_(budget, rows, "a bucket of the merge"),
-      positions_(budget, rows, "a bucket of the merge"),
-      digit_ends_(budget, 2 * rows + 2, "a bucket of the merge"),
-      unique_(budget, bricks, rows, words) {}
+BucketSorter::BucketSorter(MemoryBudget& budget, bool bricks, const RowCount& max)
+    : entries_(budget, max.rows, "a bucket of the merge"),
+      positions_(budget, max.rows, "a bucket of the merge"),
+      digit_ends_(budget, 2 * max.rows + 2, "a bucket of the merge"),
+      unique_(budget, bricks, max) {}
 
-uint64_t BucketSorter::bytes_for(uint64_t rows, uint64_t words) {
-  return rows * (sizeof(Entry) + 4 + 8) + MergedRows::bytes_for(rows, words);
+uint64_t BucketSorter::bytes_for(const RowCount& max) {
+  return max.rows * (sizeof(Entry) + 4 + 8) + MergedRows::bytes_for(max);
 }
 
 void BucketSorter::sort(const HashPartition& partition, size_t bucket, bool in_words) {

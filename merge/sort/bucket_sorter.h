@@ -22,9 +22,9 @@ class BucketSorter {
   // Rows of a bucket: the limit for sort().
   static constexpr uint64_t kMaxRows = uint64_t{1} << 20;
 
-  // For buckets of up to `rows` rows with `words` words in all.
-  BucketSorter(MemoryBudget& budget, bool bricks, uint64_t rows, uint64_t words);
-  static uint64_t bytes_for(uint64_t rows, uint64_t words);
+  // For buckets of up to `max` rows.
+  BucketSorter(MemoryBudget& budget, bool bricks, const RowCount& max);
+  static uint64_t bytes_for(const RowCount& max);
 
   // Positions count words if `in_words`, else rows.
   void sort(const HashPartition& partition, size_t bucket, bool in_words);

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "query/ray_caster.h"
-#include "query/render/bounds.h"
 #include "query/render/camera.h"
 #include "query/render/sampling.h"
 #include "query/render/surface.h"
+#include "query/render/views.h"
 
 namespace voxdag::query {
 

@@ -2,9 +2,21 @@
 
 #include <png.h>
 
+#include <span>
+#include <string_view>
+
 #include "core/base/error.h"
 
 namespace voxdag::query {
+namespace {
+
+// The length of a PNG's signature and IHDR chunk.
+constexpr size_t kHeadBytes = 33;
+// A tEXt chunk: length, type, keyword and text, CRC.
+constexpr std::string_view kSoftware{"\0\0\0\x0ftEXtSoftware\0voxdag\x59\x60\x14\x49", 27};
+
+}  // namespace
+
 std::string encode_png(const Picture& picture) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
@@ -16,11 +28,14 @@ std::string encode_png(const Picture& picture) {
   if (!png_image_write_to_memory(&image, png.data(), &size, 0, picture.rgb.data(), 0, nullptr))
     throw Error(ErrorCode::kOutOfMemory, std::string("writing PNG: ") + image.message);
   png.resize(size);
-  return png;
+  return png.insert(kHeadBytes, kSoftware);
 }
 
-void write_png(FileSystem& files, const std::string& path, const Picture& picture) {
-  write_file_atomically(files, path, encode_png(picture));
+bool is_rendered_png(const ReadableFile& file) {
+  if (file.size() < kHeadBytes + kSoftware.size()) return false;
+  std::string chunk(kSoftware.size(), '\0');
+  file.read_at(kHeadBytes, std::as_writable_bytes(std::span(chunk)));
+  return chunk == kSoftware;
 }
 
 }  // namespace voxdag::query

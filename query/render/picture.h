@@ -1,4 +1,4 @@
-// A picture of 8-bit sRGB pixels, and its PNG file.
+// A picture of 8-bit sRGB pixels.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,10 @@ struct Picture {
   }
 };
 
-// Throws Error{kOutOfMemory} if libpng runs out of memory.
+// The bytes of its PNG file, which names voxdag as its software. Throws Error{kOutOfMemory} if
+// libpng runs out of memory.
 std::string encode_png(const Picture& picture);
-// Writes the PNG file atomically.
-void write_png(FileSystem& files, const std::string& path, const Picture& picture);
+// Whether the file is one of encode_png().
+bool is_rendered_png(const ReadableFile& file);
 
 }  // namespace voxdag::query

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/base/parallel_for.h"
-#include "query/render/bounds.h"
 #include "query/render/g_buffer.h"
 #include "query/render/lighting.h"
 #include "query/render/surface.h"

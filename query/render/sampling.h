@@ -2,8 +2,7 @@
 // number of threads.
 #pragma once
 
-#include <cstdint>
-
+#include "core/base/integers.h"
 #include "query/vec.h"
 
 namespace voxdag::query {
@@ -35,10 +34,8 @@ class Sampler {
  private:
   static double wrap(double x) { return x - std::floor(x); }
   static double random(uint64_t which, uint64_t axis) {
-    uint64_t x = (2 * which + axis + 1) * 0x9e3779b97f4a7c15ull;
-    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9ull;
-    x = (x ^ x >> 27) * 0x94d049bb133111ebull;
-    return static_cast<double>((x ^ x >> 31) >> 11) * 0x1p-53;
+    return static_cast<double>(mix_bits((2 * which + axis + 1) * 0x9e3779b97f4a7c15ull) >> 11) *
+           0x1p-53;
   }
 
   double start_[2];

@@ -4,7 +4,6 @@
 
 #include "core/base/error.h"
 #include "query/ray_caster.h"
-#include "query/render/bounds.h"
 #include "query/render/sampling.h"
 
 namespace voxdag::query {
@@ -105,6 +104,33 @@ Placement inside_view(const RayCaster& caster, const Box& box, double fov_degree
 
 }  // namespace
 
+Box occupied_box(const DagView& dag) {
+  Box box{{{1e30, 1e30, 1e30}}, {}};
+  const auto reaches_out = [&](const DagView::Cell& cell) {
+    for (int axis = 0; axis < 3; ++axis)
+      if (cell.low[axis] < box.low[axis] || cell.low[axis] + cell.edge > box.high[axis])
+        return 0xffu;
+    return 0u;
+  };
+  dag.for_each_cell(std::min(dag.grid_levels(), 11u), reaches_out, [&](const DagView::Cell& cell) {
+    for (int axis = 0; axis < 3; ++axis) {
+      box.low[axis] = std::min(box.low[axis], cell.low[axis]);
+      box.high[axis] = std::max(box.high[axis], cell.low[axis] + cell.edge);
+    }
+  });
+  return box;
+}
+
+std::vector<Vec> occupied_points(const DagView& dag) {
+  std::vector<Vec> points;
+  const auto everywhere = [](const DagView::Cell&) { return 0xffu; };
+  dag.for_each_cell(std::min(dag.grid_levels(), 6u), everywhere, [&](const DagView::Cell& cell) {
+    const double half = cell.edge / 2;
+    points.push_back(cell.low + Vec{{half, half, half}});
+  });
+  return points;
+}
+
 const std::vector<std::string>& view_names() {
   static const std::vector<std::string> names = {"auto", "iso",   "front", "back",
                                                  "left", "right", "top",   "inside"};
@@ -122,9 +148,7 @@ Placement named_view(const std::string& name, const DagView& dag, double aspect,
     if ((automatic ? "iso" : name) == d.name)
       return fit_camera(occupied_points(dag), d.toward_eye, fov_degrees.value_or(kOutsideFov),
                         aspect);
-  std::string names;
-  for (const std::string& known : view_names()) names += (names.empty() ? "" : ", ") + known;
-  throw Error(ErrorCode::kInvalidInput, "unknown view \"" + name + "\": expected one of " + names);
+  throw Error(ErrorCode::kInvalidInput, "view '" + name + "': expected one of view_names()");
 }
 
 }  // namespace voxdag::query

@@ -1,4 +1,5 @@
-// Camera placements for users who do not give one.
+// Camera placements for users who do not give one, and where the occupied part of the grid lies.
+// All functions of a DAG need one that is not empty.
 #pragma once
 
 #include <optional>
@@ -10,14 +11,25 @@
 
 namespace voxdag::query {
 
+struct Box {
+  Vec low, high;  // in voxels
+  Vec center() const { return mix(low, high, 0.5); }
+  double diagonal() const { return length(high - low); }
+};
+
+// The box around the occupied cells of 1/2048 of the grid's edge.
+Box occupied_box(const DagView& dag);
+// The centers of the occupied cells of 1/64 of the grid's edge.
+std::vector<Vec> occupied_points(const DagView& dag);
+
 // "auto", "iso", "front", "back", "left", "right", "top", "inside".
 const std::vector<std::string>& view_names();
 
-// The placement of a named view of a DAG that is not empty. "inside" is a place within the scene
-// with a long view, walls around and a floor below; "auto" is "inside" for a scene most of which
-// cannot be seen from outside, and "iso" for any other. `aspect` is the picture's width divided by
-// its height; without `fov_degrees`, the view decides on the field of view. Throws
-// Error{kInvalidInput} listing the names for an unknown one.
+// The placement of a named view. "inside" is a place within the scene with a long view, walls
+// around and a floor below; "auto" is "inside" for a scene most of which cannot be seen from
+// outside, and "iso" for any other. `aspect` is the picture's width divided by its height; without
+// `fov_degrees`, the view decides on the field of view. Throws Error{kInvalidInput} for another
+// name.
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees);
 

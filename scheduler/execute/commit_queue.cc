@@ -2,9 +2,9 @@
 
 #include <chrono>
 #include <exception>
-#include <system_error>
 #include <utility>
 
+#include "core/base/background.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
 
@@ -33,7 +33,7 @@ bool CommitQueue::is_due() const {
   if (segment_->size() - group_offset_ >= group_bytes_) return true;
   if (wall_seconds() - group_begun_s_ < interval_s_) return false;
   return !pending_.valid() ||
-         pending_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+         pending_.wait_for(std::chrono::seconds(0)) != std::future_status::timeout;
 }
 
 void CommitQueue::commit_in_background() {
@@ -44,11 +44,7 @@ void CommitQueue::commit_in_background() {
   pending_group_ = std::exchange(next_group_, {});
   try {
     segment_->flush();
-    try {
-      pending_ = std::async(std::launch::async, [this] { commit_pending(); });
-    } catch (const std::system_error&) {
-      commit_pending();  // The system has no thread left.
-    }
+    pending_ = run_in_background([this] { commit_pending(); });
   } catch (...) {
     recover();
     throw;

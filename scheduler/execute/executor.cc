@@ -97,22 +97,22 @@ class Worker {
   std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
     cancel_.check();
     const StoredSubvolume& subvolume = queued.subvolume;
-    const int64_t edge = subvolume.cube.edge_voxels(options_.grid_levels);
+    const int64_t edge = subvolume.cube.edge_voxels(options_.shape.grid_levels);
     if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
-    const SubvolumeTask task{options_.grid_levels, subvolume.cube, options_.hash_bits};
+    const SubvolumeTask task{options_.shape.grid_levels, subvolume.cube, options_.shape.hash_bits};
     const auto triangles = triangles_.open(queued.bin);
     std::optional<std::string> key;
     if (options_.cache) {
       MemoryBudget key_share(WorkerMemory::key_bytes(share_.limit()), &share_);
       key = ArtifactCache::key(task, *triangles, key_share);
       StoredSubvolume copied = subvolume;
-      if (key && options_.cache->find(*key, options_.grid_levels, copied, segment_)) {
+      if (key && options_.cache->find(*key, options_.shape.grid_levels, copied, segment_)) {
         ++counts.cached;
         record_built(copied, queued.bin);
         return {};
       }
     }
-    ArtifactWriter artifact(segment_, options_.grid_levels, options_.hash_bits);
+    ArtifactWriter artifact(segment_, options_.shape);
     StoredSubvolume built = subvolume;
     if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
         BuildOutcome::kNeedsSplit)
@@ -133,7 +133,7 @@ class Worker {
  private:
   void record_built(const StoredSubvolume& built, BinId bin) {
     commits_->add_built(built, bin);
-    SubvolumeStatus status = status_of(built, options_.grid_levels);
+    SubvolumeStatus status = status_of(built, options_.shape.grid_levels);
     status.built = true;
     progress_.subvolume_built(status);
   }
@@ -147,7 +147,7 @@ class Worker {
 
   std::vector<QueuedSubvolume> split(const QueuedSubvolume& whole) {
     const StoredSubvolume& subvolume = whole.subvolume;
-    if (subvolume.cube.edge_voxels(options_.grid_levels) <= kSmallestEdge)
+    if (subvolume.cube.edge_voxels(options_.shape.grid_levels) <= kSmallestEdge)
       throw Error(ErrorCode::kOutOfMemory,
                   "a subvolume of " + std::to_string(kSmallestEdge) +
                       " voxels per edge does not fit a worker's share of " +
@@ -158,7 +158,7 @@ class Worker {
       parts[c] = subvolume.cube.child(c);
       part_bins[c] = triangles_.add_part(whole.bin);
     }
-    const CubeTree tree(options_.grid_levels, subvolume.cube, parts);
+    const CubeTree tree(options_.shape.grid_levels, subvolume.cube, parts);
     partition(triangles_, whole.bin, tree, part_bins, MemoryPlan::kSplitBufferBytes, cancel_);
     std::vector<QueuedSubvolume> queued;
     std::vector<Cube> cubes;
@@ -176,7 +176,7 @@ class Worker {
     std::vector<SubvolumeStatus> statuses;
     for (size_t i = 0; i < ids.size(); ++i) {
       queued[i].subvolume.id = ids[i];
-      statuses.push_back(status_of(queued[i].subvolume, options_.grid_levels));
+      statuses.push_back(status_of(queued[i].subvolume, options_.shape.grid_levels));
     }
     progress_.subvolume_split(subvolume.id, statuses);
     triangles_.release(whole.bin);

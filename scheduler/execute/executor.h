@@ -25,8 +25,7 @@ struct QueuedSubvolume {
 };
 
 struct ExecutorOptions {
-  uint32_t grid_levels = 2;
-  uint32_t hash_bits = 64;
+  DagShape shape;
   unsigned threads = 1;
   // Subvolumes with longer edges are split before they are tried.
   int64_t longest_edge = INT64_MAX;

@@ -65,6 +65,13 @@ std::string ContentDigest::hex() const {
   return hex_text(digest);
 }
 
+// libcrypto takes the number of bytes that wait for a whole block for granted.
+bool ContentDigest::is_sound() const {
+  SHA256_CTX context;
+  std::memcpy(&context, state_.data(), sizeof context);
+  return context.num < SHA256_CBLOCK;
+}
+
 void ContentDigest::add_bytes(std::span<const std::byte> bytes) {
   SHA256_CTX context;
   std::memcpy(&context, state_.data(), sizeof context);

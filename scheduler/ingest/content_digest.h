@@ -19,6 +19,8 @@ class ContentDigest {
   void add(std::span<const FixedTriangle> triangles);
   // 64 lower-case hex digits of what was added so far.
   std::string hex() const;
+  // Whether the state, if it was read from a file, is one that add() can continue.
+  bool is_sound() const;
 
  private:
   void add_bytes(std::span<const std::byte> bytes);

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <system_error>
+#include <cmath>
 
+#include "core/base/background.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "scheduler/memory_plan.h"
@@ -103,6 +104,24 @@ bool IngestCheckpoint::is_worthwhile(const TriangleSource& scene) const {
              static_cast<double>(context_.files.free_space(work_.path()));
 }
 
+void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
+  // Within bounds that are given, there may be none of them.
+  if (spec_.run.force || spec_.geometry.bounds) return;
+  const double bytes = static_cast<double>(scene.declared_triangles()) *
+                       static_cast<double>(triangle_record_bytes(is_wide(spec_)));
+  const double memory =
+      static_cast<double>(MemoryPlan::divide(spec_.run.memory_bytes).triangle_bytes);
+  const double free = static_cast<double>(context_.files.free_space(work_.path()));
+  if (bytes - memory > free)
+    throw Error(ErrorCode::kNoSpace,
+                "the scene has " + std::to_string(scene.declared_triangles()) +
+                    " triangles, which take " + std::to_string(std::llround(bytes / 1e6)) +
+                    " MB until they are built: memory has space for " +
+                    std::to_string(std::llround(memory / 1e6)) + " MB of them, " + work_.path() +
+                    " for " + std::to_string(std::llround(free / 1e6)) +
+                    " MB: free some, or build anyway with --force");
+}
+
 void IngestCheckpoint::enable(const TriangleSource& scene, int64_t opened_ns) {
   forget();
   std::vector<SourceFile> files = scene.files();
@@ -135,7 +154,7 @@ void IngestCheckpoint::load_top_tree(const IngestState& state, TopTree& top) con
 
 bool IngestCheckpoint::is_due() {
   if (pending_.valid()) {
-    if (pending_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+    if (pending_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) return false;
     wait();
   }
   return record_ && wall_seconds() - last_save_s_ >= spec_.run.checkpoint_interval_s;
@@ -169,17 +188,12 @@ void IngestCheckpoint::save_in_background(IngestState& state, const TopTree* top
     state.top_tree_weight = top->total_weight();
   }
   state.triangles = store_->checkpoint();
-  const auto sync_and_commit = [this, state, file] {
+  pending_ = run_in_background([this, state, file] {
     file->sync();
     const Extent old = record_->state.top_tree;
     commit(state);
     if (old.bytes && old.offset != state.top_tree.offset) file->release(old);
-  };
-  try {
-    pending_ = std::async(std::launch::async, sync_and_commit);
-  } catch (const std::system_error&) {
-    sync_and_commit();  // The system has no thread left.
-  }
+  });
   // Tests need a checkpoint after every batch.
   if (spec_.run.checkpoint_interval_s == 0) wait();
 }

@@ -35,6 +35,9 @@ class IngestCheckpoint {
   std::optional<IngestState> resume();
   // Whether the scene is large enough for checkpoints, and the disk has space for its triangles.
   bool is_worthwhile(const TriangleSource& scene) const;
+  // Throws Error{kNoSpace} if the scene's triangles fit neither memory nor disk, unless forced: it
+  // may have billions of them in a few bytes.
+  void check_disk_space(const TriangleSource& scene) const;
   // Enables checkpoints for a scene that was opened at that Unix time, and forgets those of others.
   // Does not enable them if a change of a file since then might not show in its times.
   void enable(const TriangleSource& scene, int64_t opened_ns);

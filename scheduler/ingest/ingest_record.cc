@@ -5,12 +5,13 @@
 
 #include "core/base/error.h"
 #include "core/format/bytes.h"
+#include "core/format/checksum.h"
 
 namespace voxdag {
 namespace {
 
 // Increased with every change of what follows it.
-constexpr uint64_t kRecordVersion = 3;
+constexpr uint64_t kRecordVersion = 4;
 
 template <class Plain>
 void put(ByteSink& out, const Plain& value) {
@@ -48,15 +49,23 @@ std::vector<std::byte> encode(const IngestRecord& record) {
     put(out, file.path);
     put(out, file.identity);
   }
+  out.put(checksum64(bytes));
   return bytes;
 }
 
 IngestRecord decode_ingest_record(std::span<const std::byte> bytes) {
-  ByteSource in(bytes);
+  const auto corrupt = [](const char* what) {
+    return Error(ErrorCode::kCorrupt, std::string("job store: the ingest record ") + what);
+  };
+  if (bytes.size() < sizeof(uint64_t)) throw corrupt("ends too early");
+  ByteSource in(bytes.first(bytes.size() - sizeof(uint64_t)));
   if (const auto version = in.get<uint64_t>(); version != kRecordVersion)
     throw Error(ErrorCode::kUnsupportedVersion, "job store: the ingest record has version " +
                                                     std::to_string(version) + ": expected " +
                                                     std::to_string(kRecordVersion));
+  if (ByteSource(bytes.last(sizeof(uint64_t))).get<uint64_t>() !=
+      checksum64(bytes.first(bytes.size() - sizeof(uint64_t))))
+    throw corrupt("fails its checksum");
   IngestRecord record;
   record.request = get_text(in);
   record.state = get<IngestState>(in);
@@ -64,7 +73,8 @@ IngestRecord decode_ingest_record(std::span<const std::byte> bytes) {
     const std::string path = get_text(in);
     record.files.push_back({path, get<FileIdentity>(in)});
   }
-  if (!in.ok()) throw Error(ErrorCode::kCorrupt, "job store: the ingest record ends too early");
+  if (!in.ok()) throw corrupt("ends too early");
+  if (!record.state.digest.is_sound()) throw corrupt("has a digest in an impossible state");
   return record;
 }
 

@@ -17,14 +17,19 @@ void JobProgress::update(bool at_once, const Change& change) {
   const double now = wall_seconds();
   if (!at_once && now - last_written_s_ < kWriteInterval_s) return;
   last_written_s_ = now;
-  const ProgressSnapshot snapshot = snapshot_;
   lock.unlock();
-  write(snapshot);
+  write();
 }
 
-void JobProgress::write(ProgressSnapshot snapshot) {
+// Reads the snapshot only in its turn, so that an older one never replaces a newer one.
+void JobProgress::write() {
   std::lock_guard lock(store_mutex_);
   if (!store_) return;
+  ProgressSnapshot snapshot;
+  {
+    std::lock_guard snapshot_lock(mutex_);
+    snapshot = snapshot_;
+  }
   snapshot.updated_s = unix_seconds();
   snapshot.memory_bytes = resident_bytes();
   snapshot.disk_bytes = work_.bytes();

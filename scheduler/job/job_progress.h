@@ -39,14 +39,14 @@ class JobProgress : public Progress {
   // Changes the snapshot, and writes it if that is due or `at_once`.
   template <class Change>
   void update(bool at_once, const Change& change);
-  void write(ProgressSnapshot snapshot);
+  void write();
 
   Progress& shown_;
   const WorkFolder& work_;
   std::mutex mutex_;  // guards the next two
   ProgressSnapshot snapshot_;
   double last_written_s_ = 0;
-  std::mutex store_mutex_;  // guards the store, locked without mutex_
+  std::mutex store_mutex_;  // guards the store; locked before mutex_, never after it
   JobStore* store_;
 };
 

@@ -201,12 +201,12 @@ void columns(Row& row, JobResult& result) {
   row("output", result.output);
   row("sha256", result.sha256);
   row("bytes", result.bytes);
-  row("voxels", result.voxels);
-  row("svo_nodes", result.svo_nodes);
-  row("dag_nodes", result.dag_nodes);
-  row("merge_passes", result.merge_passes);
-  row("merge_partitions", result.merge_partitions);
-  row("merge_streamed_groups", result.merge_streamed_groups);
+  row("voxels", result.merge.voxels);
+  row("svo_nodes", result.merge.svo_nodes);
+  row("dag_nodes", result.merge.dag_nodes);
+  row("merge_passes", result.merge.passes);
+  row("merge_partitions", result.merge.hash_partitions);
+  row("merge_streamed_groups", result.merge.streamed_groups);
 }
 
 template <class Row>
@@ -289,6 +289,11 @@ void JobStore::mark_built_in_memory(std::span<const StoredSubvolume> built) {
   for (const StoredSubvolume& subvolume : built)
     built_in_memory_.insert_or_assign(subvolume.id, subvolume).first->second.state =
         SubvolumeState::kBuilt;
+}
+
+void JobStore::forget_built_in_memory() {
+  std::lock_guard lock(mutex_);
+  built_in_memory_.clear();
 }
 
 std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,

@@ -26,6 +26,7 @@
 #include "core/db/sqlite.h"
 #include "core/format/artifact/artifact.h"
 #include "core/geometry/cube.h"
+#include "merge/merge.h"
 #include "scheduler/stage_clock.h"
 
 namespace voxdag {
@@ -63,12 +64,7 @@ struct JobResult {
   std::string output;
   std::string sha256;
   uint64_t bytes = 0;
-  uint64_t voxels = 0;
-  uint64_t svo_nodes = 0;
-  uint64_t dag_nodes = 0;
-  uint32_t merge_passes = 0;
-  uint64_t merge_partitions = 0;
-  uint64_t merge_streamed_groups = 0;
+  MergeReport merge;  // without input_nodes and scratch_bytes
 };
 
 // The progress of a build as other processes see it.
@@ -102,6 +98,8 @@ class JobStore {
   // Makes leaves() of this object return these subvolumes as built, although they become durable
   // only with record_built().
   void mark_built_in_memory(std::span<const StoredSubvolume> built);
+  // Makes leaves() return as planned again what is not recorded.
+  void forget_built_in_memory();
   // Returns the ids of the parts, in their order.
   std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
   // Plans a subvolume again whose artifact turned out to be damaged. The progress of ingest is

@@ -4,23 +4,19 @@
 
 #include <algorithm>
 #include <charconv>
-#include <chrono>
 #include <optional>
 #include <string_view>
-#include <thread>
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/format/artifact/segment_writer.h"
+#include "scheduler/job/build_locks.h"
 
 namespace voxdag {
 namespace {
 
 constexpr std::string_view kLockName = "lock";
 constexpr std::string_view kScratchName = "merge";
-// `voxdag status` locks the folder for an instant.
-constexpr int kLockRetries = 10;
-constexpr auto kLockPause = std::chrono::milliseconds(20);
 // Threads that remove files, which takes half a second per GB of a file that is cached.
 constexpr unsigned kRemovers = 4;
 
@@ -49,21 +45,26 @@ bool is_ours(const DirectoryEntry& entry) {
 
 }  // namespace
 
-WorkFolder::WorkFolder(FileSystem& files, std::string path)
-    : files_(files), path_(std::move(path)) {
-  files_.make_directories(path_);
-  check_is_ours();
+WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max_wait_s)
+    : files_(context.files), path_(std::move(path)) {
   const std::string lock_path = path_ + "/" + std::string(kLockName);
-  was_there_ = files_.exists(lock_path);
-  lock_ = files_.try_lock(lock_path);
-  for (int i = 0; !lock_ && i < kLockRetries; ++i) {
-    std::this_thread::sleep_for(kLockPause);
-    lock_ = files_.try_lock(lock_path);
-  }
+  // A build that ends removes the folder, so it may have to be made again.
+  const auto try_lock = [&]() -> std::unique_ptr<FileLock> {
+    files_.make_directories(path_);
+    check_is_ours();
+    was_there_ = files_.exists(lock_path);
+    try {
+      return files_.try_lock(lock_path);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kNotFound) throw;
+      return nullptr;
+    }
+  };
+  lock_ = wait_for_lock(try_lock, "the work folder " + path_, max_wait_s, context);
   if (!lock_)
-    throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " is in use by " +
-                                              read_small_file(files_, lock_path, 1 << 12) +
-                                              ": expected to be the only build there");
+    throw Error(ErrorCode::kIo, "the work folder " + path_ + " is in use by " +
+                                    read_small_file(files_, lock_path, 1 << 12) +
+                                    ": expected to be the only build there");
   char host[256] = "";
   gethostname(host, sizeof host - 1);
   const std::string holder = "process " + std::to_string(getpid()) + " on " + host;
@@ -118,10 +119,10 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
   }
 }
 
-void WorkFolder::release(uint32_t segment, uint64_t offset, uint64_t bytes) {
-  std::unique_ptr<WritableFile>& file = released_[segment];
-  if (!file) file = files_.open_write(segment_path(path_, segment));
-  file->release(offset, bytes);
+void WorkFolder::release(const SegmentRange& range) {
+  std::unique_ptr<WritableFile>& file = released_[range.segment];
+  if (!file) file = files_.open_write(segment_path(path_, range.segment));
+  file->release(range.offset, range.bytes);
 }
 
 void WorkFolder::empty_scratch() {

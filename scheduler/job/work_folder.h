@@ -10,16 +10,17 @@
 #include <string>
 #include <vector>
 
+#include "core/format/artifact/artifact.h"
 #include "core/io/file_system.h"
+#include "scheduler/build_spec.h"
 
 namespace voxdag {
 
 class WorkFolder {
  public:
-  // Makes the folder and locks it, waiting a moment for `voxdag status`. Throws
-  // Error{kInvalidInput} if another process has locked it (saying which) or if it has files that
-  // are not voxdag's.
-  WorkFolder(FileSystem& files, std::string path);
+  // Makes the folder and locks it. Throws Error{kIo} if another process still has it locked after
+  // `max_wait_s` (saying which), Error{kInvalidInput} if it has files that are not voxdag's.
+  WorkFolder(const BuildContext& context, std::string path, double max_wait_s);
 
   const std::string& path() const { return path_; }
   // Whether an earlier build used the folder.
@@ -39,7 +40,7 @@ class WorkFolder {
   uint64_t bytes() const;
 
   // Frees the space of bytes of a segment that are no longer read. One call at a time.
-  void release(uint32_t segment, uint64_t offset, uint64_t bytes);
+  void release(const SegmentRange& range);
 
   // Removes the segments for which `is_named` is false: an interrupted build left them, and no row
   // of the store names them.

@@ -269,7 +269,7 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   if (folder.empty())
     folder =
         std::string(temporary ? temporary : "/tmp") + "/voxdag-plan-" + std::to_string(getpid());
-  WorkFolder work(context.files, folder);
+  WorkFolder work(context, folder, full.run.lock_wait_s);
   // Removes spilled triangles; a job in the given work folder stays as it is.
   struct Cleanup {
     WorkFolder& work;

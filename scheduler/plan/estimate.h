@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "scheduler/build_spec.h"
-#include "scheduler/prepare.h"
+#include "scheduler/scene_stages.h"
 
 namespace voxdag {
 

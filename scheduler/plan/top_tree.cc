@@ -40,7 +40,7 @@ uint32_t TopTree::depth_within(uint32_t grid_levels, uint64_t bytes) {
   return depth;
 }
 
-TopTree::TopTree(uint32_t grid_levels, uint32_t depth, MemoryBudget& budget)
+TopTree::TopTree(uint32_t grid_levels, MemoryBudget& budget, uint32_t depth)
     : grid_levels_(grid_levels),
       depth_(depth),
       cells_(budget, size_t{1} << (3 * depth), "the top tree's counters") {}

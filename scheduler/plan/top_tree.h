@@ -35,7 +35,7 @@ class TopTree {
 
   // Cells of `depth`, at most kMaxDepth and at least the smallest subvolume in size; the counters
   // are charged to `budget`.
-  TopTree(uint32_t grid_levels, uint32_t depth, MemoryBudget& budget);
+  TopTree(uint32_t grid_levels, MemoryBudget& budget, uint32_t depth);
   // The deepest tree whose counters take at most `bytes`.
   static uint32_t depth_within(uint32_t grid_levels, uint64_t bytes);
 

@@ -23,6 +23,7 @@ void DurableStore::add_cube_bins(std::span<const Cube> cubes) {
 }
 
 void DurableStore::set_cubes(std::span<const Cube> cubes, const Extent& extent) {
+  std::lock_guard lock(mutex_);
   cubes_ = extent;
   for (const Cube& cube : cubes) {
     cube_bins_.push_back({cube, static_cast<BinId>(bins_.size())});

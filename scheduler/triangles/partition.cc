@@ -65,7 +65,7 @@ void partition(TriangleStore& store, BinId from, const CubeTree& tree,
 }
 
 void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const Cube> cubes,
-                     uint64_t first, size_t buffer_bytes, const CancelToken& cancel,
+                     size_t buffer_bytes, const CancelToken& cancel, uint64_t first,
                      const AfterPartitionBatch& after_batch) {
   if (store.cube_bins().empty()) store.add_cube_bins(cubes);
   std::vector<Cube> leaves;

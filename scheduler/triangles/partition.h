@@ -73,7 +73,7 @@ using AfterPartitionBatch = std::function<void(uint64_t copied, BinWriter& write
 // Copies the scene's triangles, from number `first` on, into the store's cube bins, created for
 // `cubes` if there are none yet. The scene's bin is dropped.
 void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const Cube> cubes,
-                     uint64_t first, size_t buffer_bytes, const CancelToken& cancel,
+                     size_t buffer_bytes, const CancelToken& cancel, uint64_t first,
                      const AfterPartitionBatch& after_batch);
 
 // For each of `cubes` a bin with its triangles, in the same order: that of the cube, or else a part

@@ -16,15 +16,6 @@ constexpr size_t kBase64Chars = 44;
 
 }  // namespace
 
-std::string digest_field(const std::string& sha256) {
-  std::array<unsigned char, kDigestBytes> bytes{};
-  for (size_t i = 0; i < kDigestBytes; ++i)
-    bytes[i] = static_cast<unsigned char>(std::stoi(sha256.substr(2 * i, 2), nullptr, 16));
-  std::array<unsigned char, kBase64Chars + 1> text{};
-  EVP_EncodeBlock(text.data(), bytes.data(), kDigestBytes);
-  return "sha-256=:" + std::string(reinterpret_cast<char*>(text.data()), kBase64Chars) + ":";
-}
-
 std::string parse_digest_field(const std::string& header) {
   constexpr std::string_view kName = "sha-256=:";
   std::string_view rest = header;

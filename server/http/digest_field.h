@@ -3,10 +3,11 @@
 
 #include <string>
 
+#include "core/format/checksum.h"
+
 namespace voxdag::server {
 
-// "sha-256=:BASE64:" of a digest in hex.
-std::string digest_field(const std::string& sha256);
+using voxdag::digest_field;
 // The SHA-256 of a Content-Digest or Repr-Digest header in hex. Throws RequestError{kInvalid} for a
 // header that is broken or has other algorithms only: a check that a client asks for is not
 // skipped.

@@ -1,9 +1,11 @@
 #include "server/http/http_server.h"
 
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <optional>
 #include <thread>
 
 #include "core/base/clock.h"
@@ -29,15 +31,9 @@ void send_busy(int socket) {
       send(socket, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-// The exchange of this thread's connection: httplib passes only its own request and answer to the
-// handlers.
-thread_local Exchange* t_exchange = nullptr;
-
 }  // namespace
 
-// Of httplib's server only process_request() is used. Sockets, threads and timeouts are ours,
-// because with httplib's a few slow clients can occupy all threads.
-class HttpServer::Engine : private httplib::Server {
+class HttpServer::Engine {
  public:
   Engine(const HttpOptions& options, HttpServer::Handler handler)
       : limits_(options.limits),
@@ -45,10 +41,6 @@ class HttpServer::Engine : private httplib::Server {
         listener_(options.address, options.port),
         table_(limits_) {
     if (!options.certificate_file.empty()) tls_.emplace(options.certificate_file, options.key_file);
-    svr_sock_ = 0;  // any valid number: httplib aborts answers without one
-    set_keep_alive_timeout(static_cast<time_t>(limits_.idle_timeout_s));
-    set_keep_alive_max_count(limits_.max_requests);
-    register_handlers();
   }
 
   int port() const { return listener_.port(); }
@@ -66,97 +58,59 @@ class HttpServer::Engine : private httplib::Server {
       table_.close_waiting();
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
-    svr_sock_ = INVALID_SOCKET;
     table_.close_all();
     threads_.reset();
   }
 
  private:
-  void register_handlers() {
-    // Exchange::begin() sets every path to "/": routing is the handler's.
-    const Handler plain = [this](const auto&, auto& out) { answer(out, nullptr); };
-    const HandlerWithContentReader with_body = [this](const auto&, auto& out, const auto& reader) {
-      answer(out, &reader);
-    };
-    Get("/", plain);
-    Options("/", plain);
-    Delete("/", plain);
-    Post("/", with_body);
-    Put("/", with_body);
-    Patch("/", with_body);
-    Delete("/", with_body);
-    // httplib also knows methods that no route of ours has: TRACE, CONNECT, ...
-    set_pre_routing_handler([this](const auto& raw, auto& out) {
-      if (std::string_view("GET HEAD POST PUT PATCH DELETE OPTIONS").find(raw.method) !=
-          std::string_view::npos)
-        return HandlerResponse::Unhandled;
-      answer(out, nullptr);
-      return HandlerResponse::Handled;
-    });
-    set_error_handler([](const httplib::Request&, httplib::Response& out) {
-      if (out.body.empty() && !out.content_provider_) t_exchange->answer_error(out);
-    });
-  }
-
-  void accept(int socket, const std::string& address) {
+  // An exception (no memory, no thread) costs this connection only.
+  void accept(int socket, const std::string& address) try {
     ConnectionTable::Place place;
     if (draining_ || !table_.admit(socket, address, place)) {
       send_busy(socket);
       close(socket);
       return;
     }
+    const auto end = [this, socket, place] {
+      table_.remove(place);
+      close(socket);
+    };
     try {
-      threads_->run([this, socket, address, place] {
+      threads_->run([this, socket, address, place, end] {
         try {
           serve(socket, address, place);
         } catch (const std::exception&) {
-          // Out of memory: only this connection is lost.
         }
-        table_.remove(place);
-        close(socket);
+        end();
       });
-    } catch (const std::system_error&) {
-      table_.remove(place);
-      close(socket);
+    } catch (const std::exception&) {
+      end();
     }
+  } catch (const std::exception&) {
+    close(socket);
   }
 
   void serve(int socket, const std::string& address, ConnectionTable::Place place) {
-    Connection connection(socket, address, limits_, tls_ ? tls_->session(socket) : TlsSession{});
+    Connection connection(socket, limits_, tls_ ? tls_->session(socket) : TlsSession{}, table_,
+                          place);
     if (!connection.handshake()) return;
-    for (size_t served = 1; served <= limits_.max_requests && !draining_; ++served) {
-      table_.set_waiting(place, true);
+    for (size_t served = 1; !draining_; ++served) {
       if (!connection.wait_for_request()) return;
       Exchange exchange(connection, address);
-      t_exchange = &exchange;
-      bool closed = false;
-      const bool ok = process_request(connection, served == limits_.max_requests || draining_,
-                                      closed, [&](httplib::Request& raw) {
-                                        table_.set_waiting(place, false);
-                                        exchange.begin(raw);
-                                      });
-      t_exchange = nullptr;
-      if (connection.error_state() == Connection::ErrorState::kBroken) return;
-      if (!ok || closed || !exchange.is_complete()) {
-        exchange.send_error();
-        break;
-      }
+      Response response = respond(exchange);
+      if (!exchange.answer(std::move(response), served == limits_.max_requests || draining_)) break;
     }
     connection.linger();
   }
 
-  void answer(httplib::Response& out, const httplib::ContentReader* reader) {
-    Exchange& exchange = *t_exchange;
-    Response response;
+  Response respond(Exchange& exchange) {
     try {
-      exchange.check(reader);
-      response = handler_(exchange.request());
+      return handler_(exchange.read_request(limits_.max_header_bytes));
     } catch (const Problem& problem) {
-      response = problem_response(problem);
+      return problem_response(problem);
     } catch (const std::exception&) {
-      response = problem_response(Problem(500, "internal", "internal error"));
+      return problem_response(Problem(500, "internal", "internal error"));
     }
-    exchange.answer(std::move(response), out, draining_);
   }
 
   const HttpLimits limits_;

@@ -1,5 +1,5 @@
-// HTTP on one port: sockets, limits and threads are ours, httplib parses requests and writes
-// answers. The handler runs on the thread of its connection, so that many calls run concurrently.
+// HTTP/1.1 on one port (docs/decisions/sockets.md). The handler runs on the thread of its
+// connection, so that many calls run concurrently.
 #pragma once
 
 #include <functional>

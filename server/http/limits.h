@@ -9,11 +9,11 @@ namespace voxdag::server {
 
 struct HttpLimits {
   size_t max_connections = 512;     // beyond it the longest waiting one is closed for a new one
-  size_t max_per_address = 256;     // connections of one client; the loopback (a proxy) is exempt
+  size_t max_per_client = 256;      // the loopback (a proxy) is exempt
   size_t max_header_bytes = 32768;  // request line and header fields together
   double header_timeout_s = 10;     // from a request's first byte to the end of its header
   double idle_timeout_s = 30;       // between requests
-  double grace_s = 20;              // of a body or an answer before the minimum rate applies
+  double grace_s = 20;              // how far a client may fall behind the minimum rate
   double min_bytes_per_s = 1024;    // of a body or an answer
   size_t max_requests = 10000;      // on one connection
 };

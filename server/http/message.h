@@ -1,4 +1,4 @@
-// A request and its answer as handlers see them; httplib's types stay in server/http.
+// A request and its answer as handlers see them.
 #pragma once
 
 #include <cstdint>
@@ -33,6 +33,9 @@ struct Request {
   // is not read to its end, the connection is closed after the answer.
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
+
+  // Whether the client has closed the connection; for handlers that take long.
+  std::function<bool()> client_has_left;
 
   std::string header(std::string_view name) const { return header_value(headers, name); }
 };

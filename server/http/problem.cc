@@ -38,6 +38,12 @@ Response problem_response(const Problem& problem) {
 
 const char* status_title(int status) {
   static constexpr std::pair<int, const char*> kTitles[] = {
+      {200, "OK"},
+      {201, "Created"},
+      {202, "Accepted"},
+      {204, "No Content"},
+      {206, "Partial Content"},
+      {304, "Not Modified"},
       {400, "Bad Request"},
       {401, "Unauthorized"},
       {403, "Forbidden"},

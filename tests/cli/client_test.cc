@@ -169,8 +169,11 @@ TEST_F(Client, WatchesAcrossARestart) {
   const std::string first = submit_long(), id = submit("64");
   const std::string url = server_->url();
   const pid_t watcher = start({"watch", id, "--json"});
-  while (contents(".stderr").find("queued") == std::string::npos)
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (contents(".stderr").find("queued") == std::string::npos) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "the watcher says nothing";
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
   EXPECT_EQ(server_->stop(), 0);
   start_server({}, url.substr(url.rfind(':') + 1));
   if (server_->url().empty()) {
@@ -217,6 +220,23 @@ TEST_F(Client, SendsAToken) {
   expect_error(2, "forbidden", {"submit", "/m.glb", "-r", "64", "--token-file", "read"});
   const Answer answer = run({"submit", "m.glb", "-r", "64", "--token-file", "submit", "--wait"});
   EXPECT_EQ(answer.status, 0) << answer.err;
+}
+
+// The health of a service is the exit status; a service that is not there or is no voxdag is not
+// waited for.
+TEST_F(Client, Health) {
+  const Answer answer = run({"health"});
+  EXPECT_EQ(answer.status, 0) << answer.err;
+  EXPECT_EQ(answer.out, server_->url() + ": ready\n");
+  put("full.json", R"({"jobs": {"min_free_disk": "1000TiB"}})");
+  start_server({"--config", folder_.file("full.json")});
+  expect_error(6, "less free space", {"health"});
+  const std::string url = server_->url();
+  EXPECT_EQ(server_->stop(), 0);
+  server_.reset();
+  const auto start = std::chrono::steady_clock::now();
+  expect_error(6, url, {"health", "--server", url});
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ TEST_F(RandomScenes, GivenCubeInsideTheScene) {
   auto spec = spec_for(all, 128);
   spec.run.subvolume_edge = 64;
   const auto report = expect_right(all, 128, spec);
-  EXPECT_GT(report.voxels, 0u);
+  EXPECT_GT(report.merge.voxels, 0u);
   EXPECT_GT(report.dropped_outside, 0u);
   EXPECT_EQ(report.dropped_outside + report.triangles, all.size());
 }
@@ -98,7 +98,7 @@ TEST_F(RandomScenes, EmptyScenes) {
   const Triangles none, outside = {{{{-999, -999, -999}, {-999, -1, -1}, {-1, -999, -999}}}};
   for (const Triangles& scene : {none, outside}) {
     const auto report = expect_right(scene, 64, spec_for(scene, 64));
-    EXPECT_EQ(report.dag_nodes, 0u);
+    EXPECT_EQ(report.merge.dag_nodes, 0u);
     EXPECT_EQ(report.dropped_outside, scene.size());
   }
 }

@@ -113,9 +113,9 @@ voxdag::BuildReport Reference::run(voxdag::BuildSpec spec) {
   const auto report = voxdag::run_build(spec, {voxdag::system_files(), progress, never});
   EXPECT_FALSE(std::filesystem::exists(spec.run.output + ".work")) << "the work folder was left";
   const voxdag_reader::File file(spec.run.output);
-  EXPECT_EQ(report.voxels, file.voxels());
-  EXPECT_EQ(report.svo_nodes, file.svo_nodes());
-  EXPECT_EQ(report.dag_nodes, file.dag_nodes());
+  EXPECT_EQ(report.merge.voxels, file.voxels());
+  EXPECT_EQ(report.merge.svo_nodes, file.svo_nodes());
+  EXPECT_EQ(report.merge.dag_nodes, file.dag_nodes());
   EXPECT_EQ(report.bytes, file.file_bytes());
   return report;
 }

@@ -102,9 +102,9 @@ TEST_F(RunOptionsTest, HashBitsChangeTheOrderOnly) {
     spec.run.threads = 1;
     const auto cut = run(spec);
     EXPECT_NE(cut.sha256, full.sha256);
-    EXPECT_EQ(cut.voxels, full.voxels);
-    EXPECT_EQ(cut.svo_nodes, full.svo_nodes);
-    EXPECT_EQ(cut.dag_nodes, full.dag_nodes);
+    EXPECT_EQ(cut.merge.voxels, full.merge.voxels);
+    EXPECT_EQ(cut.merge.svo_nodes, full.merge.svo_nodes);
+    EXPECT_EQ(cut.merge.dag_nodes, full.merge.dag_nodes);
     for (const uint64_t edge : {64, 128}) {
       spec.run.subvolume_edge = edge;
       spec.run.threads = 2;

@@ -36,9 +36,9 @@ class SharedScenes : public Reference {
 TEST_F(SharedScenes, Sponza4096) {
   USE_SHARED_SCENE("sponza.glb", 4096);
   const BuildReport whole = run_with(8192 * kMebibyte, 4096, 1);
-  EXPECT_EQ(whole.voxels, 159880556u);
-  EXPECT_EQ(whole.svo_nodes, 12800213u);
-  EXPECT_EQ(whole.dag_nodes, 502482u);
+  EXPECT_EQ(whole.merge.voxels, 159880556u);
+  EXPECT_EQ(whole.merge.svo_nodes, 12800213u);
+  EXPECT_EQ(whole.merge.dag_nodes, 502482u);
   EXPECT_EQ(whole.subvolumes, 1u);
   EXPECT_EQ(whole.spill_bytes, 0u);
 
@@ -46,7 +46,7 @@ TEST_F(SharedScenes, Sponza4096) {
   EXPECT_EQ(fine.sha256, whole.sha256);
   EXPECT_GT(fine.subvolumes, 4000u);
   EXPECT_GT(fine.spill_bytes, 0u);
-  EXPECT_GT(fine.merge_passes, 1u);
+  EXPECT_GT(fine.merge.passes, 1u);
   const BuildReport split = run_with(64 * kMebibyte, 4096, 1);
   EXPECT_EQ(split.sha256, whole.sha256);
   EXPECT_GT(split.subvolumes_split, 0u);
@@ -59,9 +59,9 @@ TEST_F(SharedScenes, Sponza4096) {
 TEST_F(SharedScenes, Dragon8192) {
   USE_SHARED_SCENE("dragon_100k.glb", 8192);
   const BuildReport whole = run_with(8192 * kMebibyte, 8192, 2);
-  EXPECT_EQ(whole.voxels, 172785494u);
-  EXPECT_EQ(whole.svo_nodes, 14381671u);
-  EXPECT_EQ(whole.dag_nodes, 2616127u);
+  EXPECT_EQ(whole.merge.voxels, 172785494u);
+  EXPECT_EQ(whole.merge.svo_nodes, 14381671u);
+  EXPECT_EQ(whole.merge.dag_nodes, 2616127u);
   EXPECT_EQ(whole.subvolumes_split, 0u);
 
   const BuildReport split = run_with(64 * kMebibyte, 8192, 1);
@@ -70,7 +70,7 @@ TEST_F(SharedScenes, Dragon8192) {
 
   const BuildReport rounds = run_with(64 * kMebibyte, 512, 2);
   EXPECT_EQ(rounds.sha256, whole.sha256);
-  EXPECT_GT(rounds.merge_passes, 1u);
+  EXPECT_GT(rounds.merge.passes, 1u);
   EXPECT_GT(rounds.spill_bytes, 10 * kMebibyte);
 }
 
@@ -84,7 +84,7 @@ TEST_F(SharedScenes, HashBits) {
     spec_.geometry.hash_bits = hash_bits;
     const BuildReport cut = run_with(256 * kMebibyte, 512, 1);
     EXPECT_NE(cut.sha256, full.sha256);
-    EXPECT_EQ(cut.dag_nodes, full.dag_nodes);
+    EXPECT_EQ(cut.merge.dag_nodes, full.merge.dag_nodes);
     voxdag::MemoryBudget budget(1024 * kMebibyte);
     voxdag::CancelToken never;
     const auto difference = voxdag::diff_global_files(

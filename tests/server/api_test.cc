@@ -72,7 +72,8 @@ TEST_F(Api, ServesRanges) {
   part = get({{"Range", "bytes=100-"}, {"If-Range", tag}});
   EXPECT_EQ(part.body, whole.body.substr(100));
   EXPECT_EQ(get({{"Range", "bytes=100-"}, {"If-Range", "\"other\""}}).status, 200);
-  EXPECT_EQ(get({{"If-None-Match", tag}}).status, 304);
+  // cpp-httplib 0.11 takes the rest of the connection for the content of a 304.
+  EXPECT_EQ(get({{"If-None-Match", tag}, {"Connection", "close"}}).status, 304);
   part = get({{"Range", "bytes=0-3,8-11"}});
   EXPECT_EQ(part.status, 206);
   EXPECT_TRUE(part.header("Content-Type").starts_with("multipart/byteranges; boundary="));
@@ -302,7 +303,9 @@ TEST_F(Api, DescribesItself) {
     EXPECT_EQ(asset.header("Content-Type"), std::string(file) == "/"
                                                 ? "text/html; charset=utf-8"
                                                 : "text/javascript; charset=utf-8");
-    EXPECT_EQ(http_->get(file, {{"If-None-Match", asset.header("ETag")}}).status, 304);
+    const client::HeaderMap known = {{"If-None-Match", asset.header("ETag")},
+                                     {"Connection", "close"}};
+    EXPECT_EQ(http_->get(file, known).status, 304);
   }
   const ClientResponse nothing = http_->get("/nothing/here");
   EXPECT_EQ(not_problem(nothing, 404, "not_found"), "");

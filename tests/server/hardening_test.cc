@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/db/sqlite.h"
 #include "core/format/checksum.h"
@@ -275,6 +276,34 @@ TEST_F(Hardening, M6_LimitsOfOneClient) {
   EXPECT_EQ(not_problem(put_scene("m.glb", "x"), 503, "busy"), "");
   close(socket);
   EXPECT_TRUE(until([&] { return put_scene("m.glb", "x").status == 201; }));
+}
+
+// A plan ends with the connection of the client that wants it.
+TEST_F(Hardening, M6_APlanEndsWithItsClient) {
+  // In place of the program: a plan that takes longer than this test.
+  write_file_atomically(system_files(), folder_.file("slow"), "#!/bin/sh\nexec sleep 600\n");
+  std::filesystem::permissions(folder_.file("slow"), std::filesystem::perms::owner_all);
+  config_.program = folder_.file("slow");
+  config_.jobs.max_concurrent_plans = 1;
+  start();
+  put_scene("m.glb", "x");
+  const std::string body = R"({"scene":"m.glb","resolution":64})";
+  const int socket = raw_connect(port());
+  const std::string request =
+      "POST /api/v1/jobs?dry_run=true HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+      "application/json\r\nContent-Length: " +
+      std::to_string(body.size()) + "\r\n\r\n" + body;
+  ASSERT_EQ(send(socket, request.data(), request.size(), MSG_NOSIGNAL),
+            static_cast<ssize_t>(request.size()));
+  const auto plans = [&] {
+    return std::distance(std::filesystem::directory_iterator(data("plans")), {});
+  };
+  ASSERT_TRUE(until([&] { return std::filesystem::exists(data("plans")) && plans() == 1; }));
+  close(socket);
+  const double start_s = wall_seconds();
+  EXPECT_TRUE(until([&] { return plans() == 0; }));
+  EXPECT_LT(wall_seconds() - start_s, config_.jobs.plan_timeout_s / 2);
+  EXPECT_EQ(log().find("failed to"), std::string::npos) << log();
 }
 
 // Neither the answer nor its place in the queue shows what the JSON of a request makes of the

@@ -68,7 +68,7 @@ TEST_F(Hostile, TooLargeBodiesAreRejected) {
             "");
 }
 
-// httplib parses multipart bodies by itself unless that is disabled.
+// The type of a scene's bytes is not looked at.
 TEST_F(Hostile, MultipartBodiesAreNotParsed) {
   start();
   const client::HeaderMap form = {{"Content-Type", "multipart/form-data; boundary=x"}};

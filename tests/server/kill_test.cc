@@ -2,6 +2,8 @@
 // bytes of `voxdag build`.
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -35,6 +37,10 @@ class KilledService : public testing::Test {
     if (pid_ == 0) {
       const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
       dup2(file, 2);
+      if (max_files_ > 0) {
+        const rlimit limit{max_files_, max_files_};
+        setrlimit(RLIMIT_NOFILE, &limit);
+      }
       execl(VOXDAG_BINARY, VOXDAG_BINARY, "serve", "--port", "0", "--config",
             folder_.file("config.json").c_str(), nullptr);
       _exit(127);
@@ -46,8 +52,8 @@ class KilledService : public testing::Test {
       const size_t at = text.find(kMark), end = text.find('\n', at);
       if (at != std::string::npos && end != std::string::npos) {
         const size_t begin = at + kMark.size();
-        http_ = std::make_unique<HttpClient>(
-            ClientOptions{text.substr(begin, end - begin), "", "", 300});
+        url_ = text.substr(begin, end - begin);
+        http_ = std::make_unique<HttpClient>(ClientOptions{url_, "", "", 300});
         return;
       }
       ASSERT_LT(wall_seconds(), deadline) << text;
@@ -103,8 +109,10 @@ class KilledService : public testing::Test {
   TemporaryFolder folder_;
   std::string scene_;
   std::vector<Posted> jobs_;
+  std::string url_;
   std::unique_ptr<HttpClient> http_;
   pid_t pid_ = -1;
+  rlim_t max_files_ = 0;  // of the service; 0 for as many as the test has
 };
 
 TEST_F(KilledService, FinishesEveryJob) {
@@ -136,7 +144,7 @@ TEST_F(KilledService, FinishesEveryJob) {
       sha256 = sha256_hex(contents(local));
     }
     EXPECT_EQ(job["result"]["sha256"], sha256);
-    EXPECT_EQ(sha256_hex(http_->get("/api/v1/jobs/" + id + "/dag").body), job["result"]["sha256"]);
+    EXPECT_EQ(job["result"]["sha256"], sha256_hex(http_->get("/api/v1/jobs/" + id + "/dag").body));
   }
 }
 
@@ -154,6 +162,33 @@ TEST_F(KilledService, DrainsAndResumes) {
     usleep(20000);
   EXPECT_EQ(state(id), "succeeded");
   EXPECT_EQ(end(SIGTERM), 0);
+}
+
+// Idle clients do not use up the files that a service may open.
+TEST_F(KilledService, L8_FewOpenFilesLeaveConnections) {
+  max_files_ = 64;
+  prepare();
+  EXPECT_NE(contents(folder_.file("log")).find("connections are limited to 32"), std::string::npos);
+  const int port = std::stoi(url_.substr(url_.rfind(':') + 1));
+  std::vector<int> slow;
+  for (int i = 0; i < 100; ++i) {
+    slow.push_back(raw_connect(port));
+    const std::string begin = "GET /healthz HTTP/1.1\r\nHost: localhost\r\nX: ";
+    send(slow.back(), begin.data(), begin.size(), MSG_NOSIGNAL);
+  }
+  const double start = wall_seconds();
+  for (int i = 0; i < 10; ++i)
+    EXPECT_TRUE(raw_exchange(port, "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                    .starts_with("HTTP/1.1 200"));
+  EXPECT_LT(wall_seconds() - start, 5) << "it does not wait for their time-outs";
+  post_jobs();
+  const double deadline = start + kMaxWait_s;
+  for (const Posted& job : jobs_) {
+    while (state(job.id) != "succeeded" && state(job.id) != "failed" && wall_seconds() < deadline)
+      usleep(20000);
+    EXPECT_EQ(state(job.id), "succeeded");
+  }
+  for (const int socket : slow) close(socket);
 }
 
 }  // namespace

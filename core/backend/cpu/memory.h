@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/backend/out_of_budget.h"
+#include "core/backend/backend_memory.h"
 #include "core/base/memory_budget.h"
 
 namespace voxdag::cpu {

@@ -7,7 +7,7 @@
 #include <string>
 #include <type_traits>
 
-#include "core/backend/out_of_budget.h"
+#include "core/backend/backend_memory.h"
 #include "core/base/error.h"
 
 namespace voxdag::cuda {

@@ -96,10 +96,10 @@ class CudaSpace {
   uint32_t merge_runs(const uint64_t* keys, const uint64_t* masks, uint32_t n, uint64_t* out_keys,
                       uint64_t* out_masks);
   uint64_t count_bits(const uint64_t* masks, uint32_t n);
-  void sort_keys(Array<uint64_t>& keys, Array<uint64_t>& scratch, uint32_t n, int begin_bit,
-                 int end_bit);
+  void sort_keys(Array<uint64_t>& keys, Array<uint64_t>& scratch, uint32_t n,
+                 parallel::BitRange bits);
   void sort_pairs(Array<uint64_t>& keys, Array<uint64_t>& key_scratch, Array<uint32_t>& values,
-                  Array<uint32_t>& value_scratch, uint32_t n, int begin_bit, int end_bit);
+                  Array<uint32_t>& value_scratch, uint32_t n, parallel::BitRange bits);
 
   template <class T>
   void copy(const T* from, T* to, uint64_t n) {

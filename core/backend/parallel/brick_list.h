@@ -49,7 +49,7 @@ class BrickList {
   void merge() {
     if (sorted_ || size_ == 0) return;
     Order<Space> order(space_, size_);
-    order.sort_by(KeyAt{codes_.data()}, 0, code_bits_);
+    order.sort_by(KeyAt{codes_.data()}, {.begin = 0, .end = code_bits_});
     const auto sorted_codes = gather<uint64_t>(space_, size_, order.items(), codes_.data());
     const auto sorted_masks = gather<uint64_t>(space_, size_, order.items(), masks_.data());
     size_ = space_.merge_runs(sorted_codes.data(), sorted_masks.data(), size_, codes_.data(),

@@ -90,13 +90,13 @@ uint64_t HostSpace::count_bits(const uint64_t* masks, uint32_t n) {
 template <bool kWithValues>
 void HostSpace::radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch,
                            Array<uint32_t>* values, Array<uint32_t>* value_scratch, uint32_t n,
-                           int begin_bit, int end_bit) {
+                           BitRange bits) {
   constexpr int kDigitBits = 8;
   const uint32_t parts = part_count(n);
   std::vector<uint32_t> places(parts << kDigitBits);
-  for (int bit = begin_bit; bit < end_bit; bit += kDigitBits) {
+  for (int bit = bits.begin; bit < bits.end; bit += kDigitBits) {
     cancel_.check();
-    const uint32_t digit_mask = (1u << std::min(kDigitBits, end_bit - bit)) - 1;
+    const uint32_t digit_mask = (1u << std::min(kDigitBits, bits.end - bit)) - 1;
     const auto digit = [&](uint64_t key) { return static_cast<uint32_t>(key >> bit) & digit_mask; };
     const uint64_t* from = keys.data();
     uint64_t* to = key_scratch.data();
@@ -122,14 +122,14 @@ void HostSpace::radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch,
 }
 
 void HostSpace::sort_keys(Array<uint64_t>& keys, Array<uint64_t>& scratch, uint32_t n,
-                          int begin_bit, int end_bit) {
-  radix_sort<false>(keys, scratch, nullptr, nullptr, n, begin_bit, end_bit);
+                          BitRange bits) {
+  radix_sort<false>(keys, scratch, nullptr, nullptr, n, bits);
 }
 
 void HostSpace::sort_pairs(Array<uint64_t>& keys, Array<uint64_t>& key_scratch,
                            Array<uint32_t>& values, Array<uint32_t>& value_scratch, uint32_t n,
-                           int begin_bit, int end_bit) {
-  radix_sort<true>(keys, key_scratch, &values, &value_scratch, n, begin_bit, end_bit);
+                           BitRange bits) {
+  radix_sort<true>(keys, key_scratch, &values, &value_scratch, n, bits);
 }
 
 }  // namespace voxdag::parallel

@@ -66,10 +66,9 @@ class HostSpace {
   uint32_t merge_runs(const uint64_t* keys, const uint64_t* masks, uint32_t n, uint64_t* out_keys,
                       uint64_t* out_masks);
   uint64_t count_bits(const uint64_t* masks, uint32_t n);
-  void sort_keys(Array<uint64_t>& keys, Array<uint64_t>& scratch, uint32_t n, int begin_bit,
-                 int end_bit);
+  void sort_keys(Array<uint64_t>& keys, Array<uint64_t>& scratch, uint32_t n, BitRange bits);
   void sort_pairs(Array<uint64_t>& keys, Array<uint64_t>& key_scratch, Array<uint32_t>& values,
-                  Array<uint32_t>& value_scratch, uint32_t n, int begin_bit, int end_bit);
+                  Array<uint32_t>& value_scratch, uint32_t n, BitRange bits);
 
   template <class T>
   void copy(const T* from, T* to, uint64_t n) {
@@ -105,7 +104,7 @@ class HostSpace {
   }
   template <bool kWithValues>
   void radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch, Array<uint32_t>* values,
-                  Array<uint32_t>* value_scratch, uint32_t n, int begin_bit, int end_bit);
+                  Array<uint32_t>* value_scratch, uint32_t n, BitRange bits);
   // The number of parts to divide n items into where each part has its own counts.
   uint32_t part_count(uint32_t n) const;
   // Calls body(part, begin, end) for the items of each part.

@@ -55,13 +55,13 @@ class Order {
   uint32_t count() const { return count_; }
   const uint32_t* items() const { return items_.data(); }
 
-  // Sorts stably by bits [begin_bit, end_bit) of key(item), a host+device functor.
+  // Sorts stably by some bits of key(item), a host+device functor.
   template <class Key>
-  void sort_by(Key key, int begin_bit, int end_bit) {
+  void sort_by(Key key, BitRange bits) {
     SpaceArray<Space, uint64_t> key_scratch(space_, count_);
     SpaceArray<Space, uint32_t> item_scratch(space_, count_);
     space_.for_each(count_, KeysInOrder<Key>{key, items_.data(), keys_.data()});
-    space_.sort_pairs(keys_, key_scratch, items_, item_scratch, count_, begin_bit, end_bit);
+    space_.sort_pairs(keys_, key_scratch, items_, item_scratch, count_, bits);
   }
 
   // The inverse permutation: the position of each item.

@@ -32,10 +32,16 @@
 #include <cstdint>
 #include <utility>
 
-#include "core/backend/out_of_budget.h"
+#include "core/backend/backend_memory.h"
 #include "core/base/memory_budget.h"
 
 namespace voxdag::parallel {
+
+// Bits [begin, end) of a key; bit 0 is the lowest.
+struct BitRange {
+  int begin = 0;
+  int end = 64;
+};
 
 // Elements of one array: positions are 32-bit.
 inline constexpr uint64_t kMaxElements = uint64_t{1} << 31;

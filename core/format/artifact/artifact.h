@@ -34,6 +34,13 @@ struct ArtifactRef {
   bool operator==(const ArtifactRef&) const = default;
 };
 
+// Bytes of a segment.
+struct SegmentRange {
+  uint32_t segment = 0;
+  uint64_t offset = 0;
+  uint64_t bytes = 0;
+};
+
 // The root of one subvolume: row `index` of level cube.level of the artifact.
 struct ArtifactRoot {
   Cube cube;

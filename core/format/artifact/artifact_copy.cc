@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/base/error.h"
-#include "core/dag/brick.h"
 #include "core/format/artifact/artifact_index.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
@@ -36,14 +35,14 @@ ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
                           uint32_t grid_levels, SegmentWriter& to) {
   ArtifactIndex index = read_single_index(from, ref);
-  if (index.grid_levels - index.roots[0].cube.level != grid_levels - cube.level)
+  if (index.shape.grid_levels - index.roots[0].cube.level != grid_levels - cube.level)
     corrupt(from.path(), "the artifact is that of a cube of another size");
-  index.grid_levels = grid_levels;
+  index.shape.grid_levels = grid_levels;
   index.roots[0].cube = cube;
   const uint64_t first = to.size();
   std::vector<std::byte> bytes;
   for (size_t i = 0; i < index.levels.size(); ++i) {
-    index.levels[i].level = grid_levels - kBrickLevels - static_cast<uint32_t>(i);
+    index.levels[i].level = index.shape.brick_level() - static_cast<uint32_t>(i);
     for (const FrameInfo& frame : index.levels[i].frames) {
       bytes.resize(frame.bytes);
       from.read_at(frame.offset, bytes);

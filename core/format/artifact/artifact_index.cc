@@ -1,7 +1,6 @@
 #include "core/format/artifact/artifact_index.h"
 
 #include "core/base/error.h"
-#include "core/dag/brick.h"
 #include "core/dag/node_hash.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
@@ -45,14 +44,14 @@ ArtifactRoot get_root(ByteSource& source, const std::string& where) {
 }
 
 void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std::string& where) {
-  const uint32_t level = root.cube.level, brick_level = index.grid_levels - kBrickLevels;
+  const uint32_t level = root.cube.level, brick_level = index.shape.brick_level();
   const bool has_level = level <= brick_level && brick_level - level < index.levels.size();
   if (!has_level || root.index >= index.levels[brick_level - level].rows)
     corrupt(where, "a root is not in the artifact's levels");
   for (const uint32_t p : root.cube.position)
     if (p >> level != 0) corrupt(where, "a root's cube is outside the grid");
   if (root.voxels == 0 || root.svo_nodes == 0) corrupt(where, "a root is empty");
-  if (truncate_hash(root.hash, index.hash_bits) != root.hash)
+  if (truncate_hash(root.hash, index.shape.hash_bits) != root.hash)
     corrupt(where, "a root's hash has bits beyond the hash bits");
 }
 
@@ -105,8 +104,8 @@ std::vector<std::byte> encode_index(const ArtifactIndex& index) {
     throw Error(ErrorCode::kLimit, "an artifact holds at most 2^32-1 roots and frames");
   sink.put(kIndexMagic);
   sink.put(kSegmentVersion);
-  sink.put(index.grid_levels);
-  sink.put(index.hash_bits);
+  sink.put(index.shape.grid_levels);
+  sink.put(index.shape.hash_bits);
   sink.put(static_cast<uint32_t>(index.roots.size()));
   sink.put(static_cast<uint32_t>(index.levels.size()));
   sink.put(static_cast<uint32_t>(frames));
@@ -137,17 +136,17 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
   if (source.get<uint64_t>() != kIndexMagic) corrupt(where, "no index begins here");
   check_version(source.get<uint32_t>(), where);
   ArtifactIndex index;
-  index.grid_levels = source.get<uint32_t>();
-  index.hash_bits = source.get<uint32_t>();
+  index.shape.grid_levels = source.get<uint32_t>();
+  index.shape.hash_bits = source.get<uint32_t>();
   const uint64_t roots = source.get<uint32_t>();
   const uint64_t levels = source.get<uint32_t>();
   const uint64_t frames = source.get<uint32_t>();
   const uint64_t frame_bytes = source.get<uint64_t>();
-  if (index.grid_levels < kMinGridLevels || index.grid_levels > kMaxGridLevels)
-    corrupt(where, "a grid of 2^" + std::to_string(index.grid_levels) + " voxels per edge");
-  if (index.hash_bits < 4 || index.hash_bits > 64)
-    corrupt(where, std::to_string(index.hash_bits) + " hash bits, expected 4 to 64");
-  if (levels > index.grid_levels - kBrickLevels + 1)
+  if (index.shape.grid_levels < kMinGridLevels || index.shape.grid_levels > kMaxGridLevels)
+    corrupt(where, "a grid of 2^" + std::to_string(index.shape.grid_levels) + " voxels per edge");
+  if (index.shape.hash_bits < 4 || index.shape.hash_bits > 64)
+    corrupt(where, std::to_string(index.shape.hash_bits) + " hash bits, expected 4 to 64");
+  if (levels > index.shape.brick_level() + 1)
     corrupt(where, std::to_string(levels) + " levels are too many for the grid");
   // So everything allocated below is bounded by the size of `bytes`.
   if (bytes.size() !=
@@ -165,7 +164,7 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
     frame_counts.push_back(source.get<uint32_t>());
     level.rows = source.get<uint64_t>();
     level.children = source.get<uint64_t>();
-    if (level.level != index.grid_levels - kBrickLevels - i)
+    if (level.level != index.shape.brick_level() - i)
       corrupt(where, "levels do not follow one another");
     frames_of_levels += frame_counts.back();
     index.levels.push_back(std::move(level));

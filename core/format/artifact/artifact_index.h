@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/dag/sub_dag.h"
 #include "core/format/artifact/artifact.h"
 
 namespace voxdag {
@@ -19,8 +20,7 @@ inline constexpr uint64_t kIndexMagic = 0x0a58444947414456;    // "VDAGIDX\n"
 inline constexpr size_t kSegmentHeaderBytes = 32;
 
 struct ArtifactIndex {
-  uint32_t grid_levels = 0;
-  uint32_t hash_bits = 64;
+  DagShape shape;
   std::vector<ArtifactRoot> roots;
   std::vector<ArtifactLevel> levels;  // from L-2 upwards
 };

@@ -3,7 +3,6 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "core/dag/brick.h"
 #include "core/format/artifact/artifact_index.h"
 #include "core/format/artifact/frame_codec.h"
 #include "core/format/artifact/row_order.h"
@@ -39,14 +38,13 @@ ArtifactReader::ArtifactReader(std::shared_ptr<ReadableFile> segment, const Arti
   file_->read_at(0, header);
   check_segment_header(header, ref.segment, file_->path());
   ArtifactIndex index = decode_index(read_index(*file_, ref, where), ref, where);
-  grid_levels_ = index.grid_levels;
-  hash_bits_ = index.hash_bits;
+  shape_ = index.shape;
   roots_ = std::move(index.roots);
   levels_ = std::move(index.levels);
 }
 
 const ArtifactLevel* ArtifactReader::level(uint32_t level) const {
-  const uint32_t brick_level = grid_levels_ - kBrickLevels;
+  const uint32_t brick_level = shape_.brick_level();
   if (level > brick_level || brick_level - level >= levels_.size()) return nullptr;
   return &levels_[brick_level - level];
 }
@@ -57,7 +55,7 @@ void ArtifactReader::damaged(uint32_t level, size_t frame, const std::string& wh
 }
 
 void ArtifactReader::read_frame(uint32_t level, size_t index, Frame& out) const {
-  const size_t place = grid_levels_ - kBrickLevels - level;
+  const size_t place = shape_.brick_level() - level;
   const std::vector<FrameInfo>& frames = levels_[place].frames;
   const FrameInfo& info = frames[index];
   out.stored.resize(info.bytes);
@@ -65,13 +63,13 @@ void ArtifactReader::read_frame(uint32_t level, size_t index, Frame& out) const 
   if (checksum64(out.stored) != info.checksum) damaged(level, index, "it fails its checksum");
 
   const bool bricks = place == 0;
-  const char* wrong = bricks ? decode_brick_frame(out.stored, info.rows, hash_bits_, out)
+  const char* wrong = bricks ? decode_brick_frame(out.stored, info.rows, shape_.hash_bits, out)
                              : decode_node_frame(out.stored, info.rows, info.children, out);
   LastRow last;
   if (!wrong)
     wrong = bricks ? check_brick_order(out.hashes, out.brick_masks, last)
                    : check_node_order({level, out.hashes, out.masks, out.children},
-                                      levels_[place - 1].rows, hash_bits_, last);
+                                      levels_[place - 1].rows, shape_.hash_bits, last);
   if (wrong) damaged(level, index, wrong);
   if (out.hashes.front() != info.first_hash) damaged(level, index, "not the frame of its index");
   if (index + 1 < frames.size() && last.hash > frames[index + 1].first_hash)

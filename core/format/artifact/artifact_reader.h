@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/dag/sub_dag.h"
 #include "core/format/artifact/artifact.h"
 #include "core/io/file_system.h"
 
@@ -19,8 +20,7 @@ class ArtifactReader {
   // Error{kUnsupportedVersion}.
   ArtifactReader(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref);
 
-  uint32_t grid_levels() const { return grid_levels_; }
-  uint32_t hash_bits() const { return hash_bits_; }
+  const DagShape& shape() const { return shape_; }
   std::span<const ArtifactRoot> roots() const { return roots_; }
   // From the bricks upwards: level L-2 first.
   std::span<const ArtifactLevel> levels() const { return levels_; }
@@ -34,8 +34,7 @@ class ArtifactReader {
   [[noreturn]] void damaged(uint32_t level, size_t frame, const std::string& what) const;
 
   std::shared_ptr<ReadableFile> file_;
-  uint32_t grid_levels_ = 0;
-  uint32_t hash_bits_ = 64;
+  DagShape shape_;
   std::vector<ArtifactRoot> roots_;
   std::vector<ArtifactLevel> levels_;
 };

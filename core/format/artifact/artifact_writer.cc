@@ -5,7 +5,6 @@
 
 #include "core/base/error.h"
 #include "core/base/popcount8.h"
-#include "core/dag/brick.h"
 #include "core/dag/node_hash.h"
 #include "core/format/artifact/artifact_index.h"
 #include "core/format/artifact/frame_codec.h"
@@ -26,14 +25,12 @@ struct ArtifactWriter::State {
   std::vector<uint8_t> masks;
   std::vector<uint32_t> children;
 
-  State(SegmentWriter& s, uint32_t grid_levels, uint32_t hash_bits)
-      : segment(s), offset(s.size()), index{grid_levels, hash_bits, {}, {}} {
+  State(SegmentWriter& s, const DagShape& shape)
+      : segment(s), offset(s.size()), index{shape, {}, {}} {
     values.reserve(kFrameRows);
     masks.reserve(kFrameRows);
     children.reserve(8 * kFrameRows);
   }
-
-  uint32_t brick_level() const { return index.grid_levels - kBrickLevels; }
 
   [[noreturn]] void broken(const std::string& what) const {
     const std::string level =
@@ -71,14 +68,15 @@ struct ArtifactWriter::State {
 void ArtifactWriter::State::add_brick_frame(std::span<const uint64_t> rows) {
   uint64_t hashes[kFrameRows];
   for (size_t i = 0; i < rows.size(); ++i)
-    hashes[i] = truncate_hash(hash_brick(rows[i]), index.hash_bits);
+    hashes[i] = truncate_hash(hash_brick(rows[i]), index.shape.hash_bits);
   if (const char* wrong = check_brick_order(std::span(hashes, rows.size()), rows, last))
     broken(wrong);
   add_frame(segment.encoder_->encode_bricks(rows), hashes[0], rows.size(), 0);
 }
 
 void ArtifactWriter::State::add_node_frame(const NodeLevelView& rows) {
-  if (const char* wrong = check_node_order(rows, child_rows, index.hash_bits, last)) broken(wrong);
+  if (const char* wrong = check_node_order(rows, child_rows, index.shape.hash_bits, last))
+    broken(wrong);
   add_frame(segment.encoder_->encode_nodes(rows), rows.hashes[0], rows.masks.size(),
             rows.children.size());
 }
@@ -94,14 +92,14 @@ void ArtifactWriter::State::add_pending_frame() {
   children.clear();
 }
 
-ArtifactWriter::ArtifactWriter(SegmentWriter& segment, uint32_t grid_levels, uint32_t hash_bits)
-    : state_(std::make_unique<State>(segment, grid_levels, hash_bits)) {}
+ArtifactWriter::ArtifactWriter(SegmentWriter& segment, const DagShape& shape)
+    : state_(std::make_unique<State>(segment, shape)) {}
 
 ArtifactWriter::~ArtifactWriter() = default;
 
 void ArtifactWriter::begin_level(uint32_t level) {
   State& s = *state_;
-  if (s.level_open || level + s.index.levels.size() != s.brick_level())
+  if (s.level_open || level + s.index.levels.size() != s.index.shape.brick_level())
     s.broken("level " + std::to_string(level) + " does not follow");
   s.child_rows = s.index.levels.empty() ? 0 : s.index.levels.back().rows;
   s.last = {};
@@ -158,7 +156,7 @@ void ArtifactWriter::end_level() {
 }
 
 void ArtifactWriter::bricks(const BrickLevelView& level) {
-  begin_level(state_->brick_level());
+  begin_level(state_->index.shape.brick_level());
   append_bricks(level.masks);
   end_level();
 }

@@ -16,7 +16,7 @@ class ArtifactWriter : public SubDagSink {
  public:
   // A segment has at most one ArtifactWriter at a time. One that is destroyed without finish()
   // leaves bytes in the segment that nothing refers to.
-  ArtifactWriter(SegmentWriter& segment, uint32_t grid_levels, uint32_t hash_bits);
+  ArtifactWriter(SegmentWriter& segment, const DagShape& shape);
   ~ArtifactWriter() override;
 
   void begin_level(uint32_t level);

@@ -11,6 +11,7 @@
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
+#include "core/io/overwrite.h"
 
 namespace voxdag {
 
@@ -113,7 +114,7 @@ struct GlobalFileWriter::State {
   void create_file() {
     if (!file) file = files.create(partial_path);
   }
-  HeaderPage header(uint64_t voxels, uint64_t svo_nodes, std::span<const std::byte> table) const;
+  HeaderPage header(const VoxelCounts& counts, std::span<const std::byte> table) const;
   std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
                      unsigned threads, const CancelToken& cancel) const;
   [[noreturn]] void damaged(uint64_t at) const {
@@ -193,8 +194,9 @@ void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> wor
   s.file->write_at(s.end + sizeof(uint32_t) * first, std::as_bytes(words));
 }
 
-void GlobalFileWriter::end_level(uint64_t nodes, uint64_t words) {
+void GlobalFileWriter::end_level(const GlobalLevel& level) {
   State& s = *state_;
+  const auto [nodes, words] = level;
   if (words > kMaxLevelWords)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
                                        " has " + std::to_string(words) +
@@ -204,7 +206,7 @@ void GlobalFileWriter::end_level(uint64_t nodes, uint64_t words) {
                                          " has " + std::to_string(nodes) + " nodes in " +
                                          std::to_string(words) + " words, of which " +
                                          std::to_string(s.checksummed_words) + " were checksummed");
-  s.levels.push_back({nodes, words});
+  s.levels.push_back(level);
   const uint64_t level_end = s.end + bytes_of(s.levels.back());
   s.end = round_up_to_page(level_end);
   const std::byte zeros[kPageBytes] = {};
@@ -214,7 +216,7 @@ void GlobalFileWriter::end_level(uint64_t nodes, uint64_t words) {
   s.level_open = false;
 }
 
-HeaderPage GlobalFileWriter::State::header(uint64_t voxels, uint64_t svo_nodes,
+HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
                                            std::span<const std::byte> table) const {
   HeaderPage header;
   header.put(kMagicAt, kMagic);
@@ -227,8 +229,8 @@ HeaderPage GlobalFileWriter::State::header(uint64_t voxels, uint64_t svo_nodes,
   for (size_t axis = 0; axis < 3; ++axis)
     header.put(kOriginAt + axis * sizeof(double), grid.origin[axis]);
   header.put(kEdgeAt, grid.edge);
-  header.put(kVoxelsAt, voxels);
-  header.put(kSvoNodesAt, svo_nodes);
+  header.put(kVoxelsAt, counts.voxels);
+  header.put(kSvoNodesAt, counts.svo_nodes);
   uint64_t dag_nodes = 0, offset = kPageBytes;
   for (size_t i = 0; i < levels.size(); ++i) {
     const size_t entry = kLevelsAt + (brick_level() - i) * kLevelEntryBytes;
@@ -284,15 +286,18 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   return digest.finish();
 }
 
-bool is_global_file(FileSystem& files, const std::string& path) {
-  const auto file = files.open_read(path);
+bool is_global_file(const ReadableFile& file) {
   uint64_t magic = 0;
-  if (file->size() < sizeof magic) return false;
-  file->read_at(kMagicAt, std::as_writable_bytes(std::span(&magic, 1)));
+  if (file.size() < sizeof magic) return false;
+  file.read_at(kMagicAt, std::as_writable_bytes(std::span(&magic, 1)));
   return magic == kMagic;
 }
 
-GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes, unsigned threads,
+bool is_partial_global_file(const ReadableFile& file) {
+  return is_global_file(file) || begins_with(file, std::string(kPageBytes, '\0'));
+}
+
+GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned threads,
                                          const CancelToken& cancel) {
   State& s = *state_;
   if (s.level_open || !s.complete())
@@ -302,7 +307,7 @@ GlobalFileSummary GlobalFileWriter::seal(uint64_t voxels, uint64_t svo_nodes, un
   const std::vector<uint64_t> checksums = s.block_checksums.values();
   const auto table = std::as_bytes(std::span(checksums));
   s.file->write_at(s.end, table);
-  const HeaderPage header = s.header(voxels, svo_nodes, table);
+  const HeaderPage header = s.header(counts, table);
   s.file->write_at(0, header.bytes());
   // The file is read while the disk writes it.
   std::future<void> synced = run_in_background([&s] { s.file->sync(); });

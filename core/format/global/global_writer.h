@@ -29,6 +29,12 @@ struct GlobalFileSummary {
   std::string sha256;  // 64 lower-case hex digits
 };
 
+// What the octree has that the levels do not show.
+struct VoxelCounts {
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;
+};
+
 // The size of a level that was written.
 struct GlobalLevel {
   uint64_t nodes = 0;
@@ -41,8 +47,10 @@ struct GlobalFileProgress {
   std::vector<uint64_t> checksums;  // of their checksum blocks; the last one may be partial
 };
 
-// Whether the file at `path` begins with the magic of a global file.
-bool is_global_file(FileSystem& files, const std::string& path);
+// Whether the file begins with the magic of a global file.
+bool is_global_file(const ReadableFile& file);
+// Whether it may be one that is not complete: its first page is written last.
+bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {
  public:
@@ -73,15 +81,15 @@ class GlobalFileWriter {
   void write_words(uint64_t first, std::span<const uint32_t> words);
   // Ends the level once all its words were written and added to the checksums. Throws Error{kLimit}
   // naming the level if it has over 2^32 words.
-  void end_level(uint64_t nodes, uint64_t words);
+  void end_level(const GlobalLevel& level);
 
   // Writes checksums and header, syncs the file, and reads it to verify and digest it.
-  GlobalFileSummary seal(uint64_t voxels, uint64_t svo_nodes, unsigned threads = 1,
+  GlobalFileSummary seal(const VoxelCounts& counts, unsigned threads = 1,
                          const CancelToken& cancel = CancelToken());
   // Renames the sealed file to its final name and syncs the folder.
   void publish();
-  GlobalFileSummary finish(uint64_t voxels, uint64_t svo_nodes) {
-    const GlobalFileSummary summary = seal(voxels, svo_nodes);
+  GlobalFileSummary finish(const VoxelCounts& counts) {
+    const GlobalFileSummary summary = seal(counts);
     publish();
     return summary;
   }

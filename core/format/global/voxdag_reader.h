@@ -131,8 +131,9 @@ class Bytes {
   uint64_t size() const { return size_; }
 
  private:
+  // Does not wait for the writer of a pipe; for a regular file O_NONBLOCK means nothing.
   static int open_file(const std::string& path) {
-    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd >= 0) return fd;
     const Problem problem = errno == ENOENT || errno == ENOTDIR ? Problem::kNotFound : Problem::kIo;
     throw Error(problem, "open " + path + ": " + strerror(errno));

@@ -1,5 +1,7 @@
 #include "core/scene/generate/generate.h"
 
+#include <algorithm>
+
 #include "core/base/error.h"
 #include "core/scene/generate/glb_layout.h"
 #include "core/scene/generate/glb_writer.h"
@@ -18,6 +20,7 @@ constexpr SceneKindInfo kKinds[] = {
     {SceneKind::kSpheres, "spheres", "spheres of many sizes", 500'000, make_spheres},
 };
 
+constexpr const char* kGenerator = "voxdag generate ";
 constexpr uint32_t kMaxMengerLevel = 5;
 // Bytes of a triangle of terrain, the kind that stores triangles most compactly.
 constexpr uint64_t kMinBytesPerTriangle = 12;
@@ -81,12 +84,20 @@ GenerateReport generate_scene(FileSystem& files, const std::string& path,
   progress.end_stage();
 
   progress.begin_stage("write", layout.stored_triangles(), "triangles");
-  const std::string generator = std::string("voxdag generate ") + info.name;
+  const std::string generator = std::string(kGenerator) + info.name;
   GlbWriter writer(files, path, layout.json_text(generator), layout.bin_bytes(), progress, cancel);
   make(options, writer);
   const uint64_t bytes = writer.finish();
   progress.end_stage();
   return {layout.triangles(), layout.stored_triangles(), layout.instance_count(), bytes};
+}
+
+bool is_generated_scene(const ReadableFile& file) {
+  // The description of the largest scenes takes a few megabytes.
+  constexpr uint64_t kMaxDescriptionBytes = 16 << 20;
+  std::string start(std::min(file.size(), kMaxDescriptionBytes), '\0');
+  file.read_at(0, std::as_writable_bytes(std::span(start)));
+  return start.starts_with("glTF") && start.find(kGenerator) != std::string::npos;
 }
 
 }  // namespace voxdag

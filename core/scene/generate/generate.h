@@ -58,4 +58,7 @@ GenerateReport generate_scene(FileSystem& files, const std::string& path,
                               const GenerateOptions& options, Progress& progress,
                               const CancelToken& cancel);
 
+// Whether the file is a scene that generate_scene() wrote, or a part of one from its begin on.
+bool is_generated_scene(const ReadableFile& file);
+
 }  // namespace voxdag

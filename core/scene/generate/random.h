@@ -13,13 +13,6 @@
 
 namespace voxdag {
 
-// One step of splitmix64's output function: a bijective mix of all bits.
-inline uint64_t mix_bits(uint64_t x) {
-  x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ x >> 27) * 0x94d049bb133111ebull;
-  return x ^ x >> 31;
-}
-
 class Random {
  public:
   Random(uint64_t seed, std::initializer_list<uint64_t> coordinates) : state_(mix_bits(seed)) {

@@ -6,9 +6,18 @@ namespace voxdag::gltf {
 
 std::string printable(std::string_view text, size_t max_bytes) {
   std::string shown(text.substr(0, max_bytes));
-  for (char& c : shown)
-    if (static_cast<unsigned char>(c) < 0x20 || c == '"' || c == 0x7f) c = '?';
+  for (size_t i = 0; i < shown.size(); ++i) {
+    const auto byte = [&](size_t at) { return static_cast<unsigned char>(shown[at]); };
+    const bool is_c1 = i > 0 && byte(i - 1) == 0xc2 && byte(i) >= 0x80 && byte(i) < 0xa0;
+    if (is_c1) shown[i - 1] = '?';
+    if (is_c1 || byte(i) < 0x20 || shown[i] == '"' || byte(i) == 0x7f) shown[i] = '?';
+  }
   return text.size() > max_bytes ? shown + "..." : shown;
+}
+
+std::string without_prefix(std::string message) {
+  if (message.starts_with("[json.exception")) message.erase(0, message.find("] ") + 2);
+  return message;
 }
 
 std::string numbered(int index, const std::string& name) {

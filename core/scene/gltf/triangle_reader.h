@@ -12,10 +12,10 @@
 #include "core/base/cancel_token.h"
 #include "core/base/page_buffer.h"
 #include "core/geometry/grid.h"
-#include "core/scene/gltf/geometry/corner_reader.h"
-#include "core/scene/gltf/geometry/instance_reader.h"
-#include "core/scene/gltf/geometry/node_walk.h"
-#include "core/scene/gltf/geometry/vertex_cache.h"
+#include "core/scene/gltf/mesh_data/corner_reader.h"
+#include "core/scene/gltf/mesh_data/instance_reader.h"
+#include "core/scene/gltf/mesh_data/node_walk.h"
+#include "core/scene/gltf/mesh_data/vertex_cache.h"
 
 namespace voxdag::gltf {
 

@@ -1,7 +1,5 @@
 #include "server/api/access/access_control.h"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
 
 #include "core/base/clock.h"
@@ -62,16 +60,6 @@ void AccessControl::check_site(const Request& request) const {
       !origin.empty() && (scheme == std::string::npos || origin.substr(scheme + 3) != host);
   if (foreign)
     throw Problem(403, "forbidden", "cross-site request: the Origin is not this service");
-}
-
-// Each /64 of IPv6 is one client, because all of its 2^64 addresses are at one customer's disposal.
-std::string AccessControl::client_of(const std::string& address) {
-  in6_addr parsed{};
-  if (inet_pton(AF_INET6, address.c_str(), &parsed) != 1 || IN6_IS_ADDR_V4MAPPED(&parsed))
-    return address;
-  std::fill(std::begin(parsed.s6_addr) + 8, std::end(parsed.s6_addr), uint8_t{0});
-  char text[INET6_ADDRSTRLEN];
-  return std::string(inet_ntop(AF_INET6, &parsed, text, sizeof text)) + "/64";
 }
 
 Caller AccessControl::identify(const Request& request) {

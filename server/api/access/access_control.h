@@ -19,8 +19,6 @@ class AccessControl {
 
   // Returns who sends the request. Throws Problem unless that caller has the role `needed`.
   Caller admit(const Request& request, Role needed);
-  // What counts as one client of those without a token.
-  static std::string client_of(const std::string& address);
 
  private:
   void check_site(const Request& request) const;

@@ -87,7 +87,10 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
   std::string estimate;
   std::optional<Failure> failure;
   const double deadline = wall_seconds() + context.config.jobs.plan_timeout_s;
-  bool timed_out = false;
+  const auto is_in_vain = [&] {
+    return context.draining || wall_seconds() > deadline || call.request.client_has_left();
+  };
+  bool killed = false;
   child.read_lines(
       [&](std::string_view line) {
         const auto message = decode(line);
@@ -95,9 +98,9 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
         if (const auto* result = std::get_if<Result>(&*message)) estimate = result->json;
         if (const auto* reported = std::get_if<Failure>(&*message)) failure = *reported;
       },
-      [&] { return timed_out = timed_out || context.draining || wall_seconds() > deadline; });
+      [&] { return killed = killed || is_in_vain(); });
   child.wait();
-  if (timed_out) throw busy("the plan exceeded its time limit", 60);
+  if (killed) throw busy("the plan exceeded its time limit", 60);
   if (failure) throw problem_of(*failure);
   if (estimate.empty()) throw Problem(500, "internal", "the process of the plan crashed");
   return json_response(200, estimate);

@@ -4,7 +4,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <cstring>
+#include <cerrno>
 
 #include "core/base/clock.h"
 
@@ -14,81 +14,88 @@ namespace {
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLinger_s = 1;
 constexpr size_t kLingerBytes = 1 << 20;
-// A longer pause between two writes was the handler's: the client's time starts again.
-constexpr double kHandlerPause_s = 0.2;
+constexpr double kSteadyRates = 8;  // times the minimum rate
 
 }  // namespace
 
-Connection::Connection(int socket, std::string address, const HttpLimits& limits, TlsSession tls)
+Connection::Connection(int socket, const HttpLimits& limits, TlsSession tls, ConnectionTable& table,
+                       ConnectionTable::Place place)
     : socket_(socket),
-      address_(std::move(address)),
       limits_(limits),
       tls_(std::move(tls)),
-      buffer_(kBufferBytes),
-      phase_start_s_(wall_seconds()) {}
+      table_(table),
+      place_(place),
+      buffer_(kBufferBytes) {}
 
 bool Connection::handshake() {
   for (;;) {
     const ssize_t done = tls_.handshake();
     if (done == 1) return true;
-    if (!wait_for_io(done, phase_start_s_ + limits_.header_timeout_s)) return false;
+    if (!wait_for_io(done, reading_)) return false;
   }
 }
 
 bool Connection::wait_for_request() {
   phase_ = Phase::kWaiting;
-  phase_start_s_ = wall_seconds();
+  reading_ = {};
   if (begin_ == end_ && !fill()) return false;
   phase_ = Phase::kHeader;
-  phase_start_s_ = wall_seconds();
-  consumed_ = 0;
+  reading_ = {};
   return true;
 }
 
 void Connection::begin_exchange() {
   phase_ = Phase::kExchange;
-  phase_start_s_ = wall_seconds();
-  consumed_ = 0;
-  written_ = 0;
-  answer_start_s_ = 0;
+  reading_ = writing_ = {};
+  table_.set_working(place_);
 }
 
-double Connection::read_deadline() const {
+double Connection::max_wait_s() const {
   switch (phase_) {
     case Phase::kWaiting:
-      return phase_start_s_ + limits_.idle_timeout_s;
+      return limits_.idle_timeout_s;
     case Phase::kHeader:
-      return phase_start_s_ + limits_.header_timeout_s;
+      return limits_.header_timeout_s;
     case Phase::kExchange:
       break;
   }
-  return phase_start_s_ + limits_.grace_s +
-         static_cast<double>(consumed_) / limits_.min_bytes_per_s;
+  return limits_.grace_s;
 }
 
-bool Connection::wait_for_io(ssize_t outcome, double deadline_s) {
+void Connection::count(uint64_t bytes, Pace& pace) const {
+  if (phase_ != Phase::kExchange) return;  // no bytes earn time there
+  const double earned_s = static_cast<double>(bytes) / limits_.min_bytes_per_s;
+  pace.behind_minimum_s = std::max(0.0, pace.behind_minimum_s - earned_s);
+  pace.behind_steady_s = std::max(0.0, pace.behind_steady_s - earned_s / kSteadyRates);
+}
+
+bool Connection::wait_for_io(ssize_t outcome, Pace& pace) {
   const bool reads = outcome == TlsSession::kNeedsRead;
   if (!reads && outcome != TlsSession::kNeedsWrite) {
     error_ = ErrorState::kBroken;
     return false;
   }
-  for (;;) {
-    const double left_s = deadline_s - wall_seconds();
-    if (left_s <= 0) {
-      error_ = ErrorState::kTooSlow;
-      return false;
-    }
+  const double start = wall_seconds();
+  const double deadline = start + max_wait_s() - pace.behind_minimum_s;
+  table_.set_waiting(place_, start - pace.behind_steady_s, phase_ != Phase::kExchange);
+  bool ready = false, broken = false;
+  double now = start;
+  for (; !ready && !broken && now < deadline; now = wall_seconds()) {
     pollfd waiting{socket_, static_cast<short>(reads ? POLLIN : POLLOUT), 0};
-    const int ready = poll(&waiting, 1, static_cast<int>(std::min(left_s, 3600.0) * 1000) + 1);
-    if (ready > 0) return true;
-    if (ready < 0 && errno != EINTR) {
-      error_ = ErrorState::kBroken;
-      return false;
-    }
+    const int wait_ms = static_cast<int>(std::min(deadline - now, 3600.0) * 1000) + 1;
+    const int count = poll(&waiting, 1, wait_ms);
+    ready = count > 0;
+    broken = count < 0 && errno != EINTR;
   }
+  table_.set_working(place_);
+  pace.behind_minimum_s += now - start;
+  pace.behind_steady_s += now - start;
+  if (!ready) error_ = broken ? ErrorState::kBroken : ErrorState::kTooSlow;
+  return ready;
 }
 
 bool Connection::fill() {
+  if (error_ != ErrorState::kNone) return false;
   for (;;) {
     const ssize_t got = tls_.read(socket_, buffer_.data(), buffer_.size());
     if (got > 0) {
@@ -96,45 +103,53 @@ bool Connection::fill() {
       end_ = static_cast<size_t>(got);
       return true;
     }
-    if (!wait_for_io(got, read_deadline())) return false;
+    if (!wait_for_io(got, reading_)) return false;
   }
 }
 
-ssize_t Connection::read(char* data, size_t size) {
-  if (error_ != ErrorState::kNone) return -1;
-  if (begin_ == end_ && !fill()) return -1;
-  const size_t taken = std::min(size, end_ - begin_);
-  std::memcpy(data, buffer_.data() + begin_, taken);
-  begin_ += taken;
-  consumed_ += taken;
-  if (phase_ == Phase::kHeader && consumed_ > limits_.max_header_bytes) {
-    error_ = ErrorState::kHeaderTooLarge;
-    return -1;
-  }
-  return static_cast<ssize_t>(taken);
+std::string_view Connection::read(uint64_t max_bytes) {
+  if (begin_ == end_ && !fill()) return {};
+  const size_t size = std::min<uint64_t>(max_bytes, end_ - begin_);
+  const std::string_view bytes(buffer_.data() + begin_, size);
+  begin_ += size;
+  count(size, reading_);
+  return bytes;
 }
 
-ssize_t Connection::write(const char* data, size_t size) {
-  const double now = wall_seconds();
-  if (answer_start_s_ == 0 || now - last_write_s_ > kHandlerPause_s) {
-    answer_start_s_ = now;
-    written_ = 0;
+bool Connection::read_line(std::string& text, size_t max_bytes) {
+  for (bool ended = false; !ended;) {
+    if (begin_ == end_ && !fill()) return false;
+    const std::string_view bytes(buffer_.data() + begin_, end_ - begin_);
+    const size_t line_feed = bytes.find('\n');
+    ended = line_feed != std::string_view::npos;
+    const size_t size = ended ? line_feed + 1 : bytes.size();
+    if (size > max_bytes - std::min(max_bytes, text.size())) return false;
+    text += bytes.substr(0, size);
+    begin_ += size;
+    count(size, reading_);
   }
-  size_t sent = 0;
-  while (sent < size) {
-    if (error_ == ErrorState::kBroken) return -1;
-    const ssize_t wrote = tls_.write(socket_, data + sent, size - sent);
+  return true;
+}
+
+bool Connection::write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    if (error_ == ErrorState::kBroken) return false;
+    const ssize_t wrote = tls_.write(socket_, bytes.data(), bytes.size());
     if (wrote > 0) {
-      sent += static_cast<size_t>(wrote);
-      written_ += static_cast<size_t>(wrote);
-      continue;
+      bytes.remove_prefix(static_cast<size_t>(wrote));
+      count(static_cast<size_t>(wrote), writing_);
+    } else if (!wait_for_io(wrote, writing_)) {
+      return false;
     }
-    const double allowed_s =
-        limits_.grace_s + static_cast<double>(written_) / limits_.min_bytes_per_s;
-    if (!wait_for_io(wrote, answer_start_s_ + allowed_s)) return -1;
   }
-  last_write_s_ = wall_seconds();
-  return static_cast<ssize_t>(size);
+  return true;
+}
+
+void Connection::allow_large_send_buffer() {
+#ifdef SO_BUF_LOCK  // Linux 5.16
+  const int none = 0;
+  setsockopt(socket_, SOL_SOCKET, SO_BUF_LOCK, &none, sizeof none);
+#endif
 }
 
 bool Connection::peer_disconnected() const {
@@ -144,8 +159,10 @@ bool Connection::peer_disconnected() const {
 }
 
 void Connection::linger() {
+  if (error_ == ErrorState::kBroken) return;
   tls_.shutdown();
   if (shutdown(socket_, SHUT_WR) != 0) return;
+  table_.set_waiting(place_, 0, true);  // the first to be closed
   const double deadline = wall_seconds() + kLinger_s;
   for (size_t bytes = 0; bytes < kLingerBytes;) {
     pollfd waiting{socket_, POLLIN, 0};
@@ -155,16 +172,6 @@ void Connection::linger() {
     if (got <= 0) return;
     bytes += static_cast<size_t>(got);
   }
-}
-
-void Connection::get_remote_ip_and_port(std::string& ip, int& port) const {
-  ip = address_;
-  port = 0;
-}
-
-void Connection::get_local_ip_and_port(std::string& ip, int& port) const {
-  ip.clear();
-  port = 0;
 }
 
 }  // namespace voxdag::server

@@ -1,74 +1,82 @@
-// One client's connection as httplib reads and writes it: a plain or TLS socket on which no call
-// blocks for longer than the phase allows. Used by one thread.
+// One client's connection: a plain or TLS socket on which no call blocks for longer than the phase
+// allows. Used by one thread.
 //
-// Phases: waiting (idle_timeout_s for the next request), header (header_timeout_s and
-// max_header_bytes for all of it), exchange (grace_s + bytes / min_bytes_per_s for the body, and
-// the same for the answer). A client that exceeds them puts the connection into an error state, and
-// reads fail from then on.
+// Phases: waiting (idle_timeout_s for the next request), header (header_timeout_s for all of it),
+// exchange (the body and the answer each at min_bytes_per_s, at no time more than grace_s behind).
+// Only the time in which the connection waits for its client counts. A client that exceeds it puts
+// the connection into an error state, and reads fail from then on. While it waits, the table knows
+// so and may close the connection in favor of another one.
 #pragma once
 
-#include <httplib.h>
-
-#include <memory>
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "server/http/connection/connection_table.h"
 #include "server/http/connection/tls.h"
 #include "server/http/limits.h"
 
 namespace voxdag::server {
 
-class Connection : public httplib::Stream {
+class Connection {
  public:
-  // Owns neither the socket, which must be non-blocking, nor the limits.
-  Connection(int socket, std::string address, const HttpLimits& limits, TlsSession tls);
+  // Owns none of its parts. The socket must be non-blocking; `place` is its own in the table.
+  Connection(int socket, const HttpLimits& limits, TlsSession tls, ConnectionTable& table,
+             ConnectionTable::Place place);
 
   // The TLS handshake; false if it fails.
   bool handshake();
   // Waits for the first byte of a request; false if none comes.
   bool wait_for_request();
+  // Ends the header's phase.
   void begin_exchange();
-  // Bytes of the request body read so far.
-  uint64_t body_bytes() const { return consumed_; }
 
-  enum class ErrorState { kNone, kBroken, kTooSlow, kHeaderTooLarge };
+  enum class ErrorState { kNone, kBroken, kTooSlow };
   ErrorState error_state() const { return error_; }
+  // Lets the kernel choose the size of the send buffer, which is small otherwise: for long answers
+  // over long distances.
+  void allow_large_send_buffer();
   // Whether the client has closed the connection. Consumes no bytes.
   bool peer_disconnected() const;
   // Closes the sending side and discards what the client still sends for up to a second, so that
   // the last answer is not lost to a reset.
   void linger();
 
-  bool is_readable() const override { return error_ == ErrorState::kNone; }
-  bool is_writable() const override { return error_ == ErrorState::kNone; }
-  ssize_t read(char* data, size_t size) override;
-  ssize_t write(const char* data, size_t size) override;
-  void get_remote_ip_and_port(std::string& ip, int& port) const override;
-  void get_local_ip_and_port(std::string& ip, int& port) const override;
-  // httplib only checks that the number is in the range of select(), which is not used here.
-  socket_t socket() const override { return 0; }
+  // The next bytes, at least one unless in an error state; valid until the next call.
+  std::string_view read(uint64_t max_bytes);
+  // Appends the bytes up to and including the next LF. False if `text` would become longer than
+  // `max_bytes`, or in an error state.
+  bool read_line(std::string& text, size_t max_bytes);
+  // Sends all of it; false if that fails.
+  bool write(std::string_view bytes);
 
  private:
   enum class Phase { kWaiting, kHeader, kExchange };
+  // How much longer the client was waited for in this phase than its bytes take at a rate: the
+  // minimum, and a multiple that is fast enough not to be closed in favor of others.
+  struct Pace {
+    double behind_minimum_s = 0;
+    double behind_steady_s = 0;
+  };
 
   bool fill();
-  double read_deadline() const;
   // Waits until the socket is ready for what a call on tls_ needs (its `outcome`). False, with the
-  // error state set, if the outcome is an error or the deadline passes.
-  bool wait_for_io(ssize_t outcome, double deadline_s);
+  // error state set, if the outcome is an error or the client exceeds its time.
+  bool wait_for_io(ssize_t outcome, Pace& pace);
+  double max_wait_s() const;
+  void count(uint64_t bytes, Pace& pace) const;
 
   const int socket_;
-  const std::string address_;
   const HttpLimits& limits_;
   TlsSession tls_;
+  ConnectionTable& table_;
+  const ConnectionTable::Place place_;
   Phase phase_ = Phase::kHeader;
   ErrorState error_ = ErrorState::kNone;
   std::vector<char> buffer_;
   size_t begin_ = 0, end_ = 0;  // the bytes of the buffer that are not yet read
-  double phase_start_s_ = 0;
-  uint64_t consumed_ = 0;  // in this phase
-  double answer_start_s_ = 0, last_write_s_ = 0;
-  uint64_t written_ = 0;
+  Pace reading_, writing_;
 };
 
 }  // namespace voxdag::server

@@ -1,49 +1,82 @@
 #include "server/http/connection/connection_table.h"
 
+#include <arpa/inet.h>
 #include <sys/socket.h>
+
+#include <algorithm>
 
 #include "core/base/clock.h"
 
 namespace voxdag::server {
+namespace {
+
+// A client within a body or an answer that is waited for only this long is on its way.
+constexpr double kMinExchangeWait_s = 0.25;
+
+}  // namespace
 
 bool is_loopback(const std::string& address) {
   return address.starts_with("127.") || address == "::1" || address.starts_with("::ffff:127.");
 }
 
+std::string client_of(const std::string& address) {
+  in6_addr parsed{};
+  // A link-local address has its interface behind a percent sign.
+  if (inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &parsed) != 1)
+    return address;
+  char text[INET6_ADDRSTRLEN];
+  if (IN6_IS_ADDR_V4MAPPED(&parsed))
+    return inet_ntop(AF_INET, parsed.s6_addr + 12, text, sizeof text);
+  std::fill(parsed.s6_addr + 8, parsed.s6_addr + 16, uint8_t{0});
+  return std::string(inet_ntop(AF_INET6, &parsed, text, sizeof text)) + "/64";
+}
+
 bool ConnectionTable::admit(int socket, const std::string& address, Place& place) {
+  const std::string client = client_of(address);
   std::lock_guard lock(mutex_);
-  const auto same = by_address_.find(address);
-  if (same != by_address_.end() && same->second >= limits_.max_per_address && !is_loopback(address))
+  const auto same = by_client_.find(client);
+  if (same != by_client_.end() && same->second >= limits_.max_per_client && !is_loopback(address))
     return false;
   if (entries_.size() >= limits_.max_connections && !evict_one()) return false;
-  place = entries_.insert(entries_.end(), Entry{socket, address, true, wall_seconds()});
-  ++by_address_[address];
+  place = entries_.insert(entries_.end(), Entry{socket, client, true, true, wall_seconds(), false});
+  ++by_client_[client];
   return true;
 }
 
 // The thread of the evicted connection wakes up at the end of its stream and removes the entry.
 // Until then the table holds one more than the limit.
 bool ConnectionTable::evict_one() {
+  const double now = wall_seconds();
   Entry* longest = nullptr;
-  for (Entry& entry : entries_)
-    if (entry.waiting && (!longest || entry.waiting_since_s < longest->waiting_since_s))
+  for (Entry& entry : entries_) {
+    const bool may_be_closed =
+        entry.waiting && !entry.evicted &&
+        (entry.between_requests || now - entry.waiting_since_s >= kMinExchangeWait_s);
+    if (may_be_closed && (!longest || entry.waiting_since_s < longest->waiting_since_s))
       longest = &entry;
+  }
   if (!longest) return false;
-  longest->waiting = false;
+  longest->evicted = true;
   shutdown(longest->socket, SHUT_RDWR);
   return true;
 }
 
-void ConnectionTable::set_waiting(Place place, bool waiting) {
+void ConnectionTable::set_waiting(Place place, double since_s, bool between_requests) {
   std::lock_guard lock(mutex_);
-  if (waiting && !place->waiting) place->waiting_since_s = wall_seconds();
-  place->waiting = waiting;
+  place->waiting = true;
+  place->between_requests = between_requests;
+  place->waiting_since_s = since_s;
+}
+
+void ConnectionTable::set_working(Place place) {
+  std::lock_guard lock(mutex_);
+  place->waiting = false;
 }
 
 void ConnectionTable::remove(Place place) {
   std::lock_guard lock(mutex_);
-  const auto count = by_address_.find(place->address);
-  if (--count->second == 0) by_address_.erase(count);
+  const auto count = by_client_.find(place->client);
+  if (--count->second == 0) by_client_.erase(count);
   entries_.erase(place);
 }
 
@@ -55,7 +88,7 @@ size_t ConnectionTable::size() const {
 void ConnectionTable::close_waiting() {
   std::lock_guard lock(mutex_);
   for (const Entry& entry : entries_)
-    if (entry.waiting) shutdown(entry.socket, SHUT_RD);
+    if (entry.waiting && entry.between_requests) shutdown(entry.socket, SHUT_RD);
 }
 
 void ConnectionTable::close_all() {

@@ -1,6 +1,6 @@
 // The open connections, within their limits. When the table is full, the connection that has waited
-// longest for its client (for a request or the rest of its header) is closed in favor of the new
-// one, so that idle clients cannot keep others out. Thread-safe.
+// longest for its client is closed in favor of the new one, so that clients which do nothing, or
+// little, cannot keep others out. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,11 @@ class ConnectionTable {
  private:
   struct Entry {
     int socket;
-    std::string address;
-    bool waiting;  // for its client
+    std::string client;
+    bool waiting;           // for its client
+    bool between_requests;  // waits for a request or the rest of its header
     double waiting_since_s;
+    bool evicted;
   };
 
  public:
@@ -27,13 +29,16 @@ class ConnectionTable {
 
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}
 
-  // False if the address has too many connections, or the table is full and none is waiting.
+  // False if the client has too many connections, or the table is full and none is waiting.
   bool admit(int socket, const std::string& address, Place& place);
-  void set_waiting(Place place, bool waiting);
+  // The connection waits for its client since then (in wall_seconds()).
+  void set_waiting(Place place, double since_s, bool between_requests);
+  void set_working(Place place);
   // Must be called before the socket is closed.
   void remove(Place place);
 
   size_t size() const;
+  // Closes the connections that wait for a request.
   void close_waiting();
   // Aborts answers in flight, too.
   void close_all();
@@ -44,10 +49,13 @@ class ConnectionTable {
   const HttpLimits& limits_;
   mutable std::mutex mutex_;  // guards all below
   std::list<Entry> entries_;
-  std::map<std::string, size_t> by_address_;
+  std::map<std::string, size_t> by_client_;
 };
 
 // 127.0.0.0/8 and ::1.
 bool is_loopback(const std::string& address);
+// What counts as one client: an IPv4 address, or the /64 of an IPv6 address, because each of its
+// 2^64 addresses is at one customer's disposal.
+std::string client_of(const std::string& address);
 
 }  // namespace voxdag::server

@@ -20,6 +20,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr int kBacklog = 512;
+// Of the kernel's memory for answers that a client does not read. It doubles this for its own data.
+constexpr int kSendBufferBytes = 128 << 10;
 
 struct FreeAddresses {
   void operator()(addrinfo* list) const { freeaddrinfo(list); }
@@ -95,6 +97,7 @@ void Listener::accept_all(const std::function<void(int, const std::string&)>& on
     }
     const int yes = 1;
     setsockopt(client, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    setsockopt(client, SOL_SOCKET, SO_SNDBUF, &kSendBufferBytes, sizeof kSendBufferBytes);
     on_connection(client, numeric(generic, size));
   }
 }

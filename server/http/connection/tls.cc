@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 
 #include "core/base/error.h"
 
@@ -73,6 +74,8 @@ TlsContext::TlsContext(const std::string& certificate_file, const std::string& k
     throw Error(ErrorCode::kInvalidInput, what);
   };
   if (!context_) fail("TLS: cannot initialize OpenSSL");
+  // OpenSSL's writes would end the process when a client has closed its connection.
+  std::signal(SIGPIPE, SIG_IGN);
   SSL_CTX_set_min_proto_version(context_.get(), TLS1_2_VERSION);
   SSL_CTX_set_options(context_.get(), SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION);
   SSL_CTX_set_mode(context_.get(),

@@ -40,7 +40,7 @@ class TlsSession {
 class TlsContext {
  public:
   // PEM files: the chain beginning with the server's certificate, and its key. Throws
-  // Error{kInvalidInput} if they cannot be read or do not match.
+  // Error{kInvalidInput} if they cannot be read or do not match. The process ignores SIGPIPE then.
   TlsContext(const std::string& certificate_file, const std::string& key_file);
   TlsSession session(int socket) const;
 

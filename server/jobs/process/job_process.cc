@@ -93,7 +93,8 @@ std::string result_json(const std::string& report_text, const std::string& outpu
 std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildContext& context) {
   if (!context.files.exists(folder.report()))
     return result_json(report_json(run_build(spec, context)), spec.run.output);
-  if (context.files.exists(folder.work())) WorkFolder(context.files, folder.work()).remove();
+  if (context.files.exists(folder.work()))
+    WorkFolder(context, folder.work(), spec.run.lock_wait_s).remove();
   return finished_result(context.files, folder);
 }
 

@@ -116,8 +116,8 @@ TEST_P(HostSpaceTest, SortsAreStableByTheBitsGiven) {
       auto v = filled(order);
       SpaceArray<HostSpace, uint64_t> key_scratch(space, n);
       SpaceArray<HostSpace, uint32_t> value_scratch(space, n);
-      space.sort_pairs(k, key_scratch, v, value_scratch, n, begin, end);
-      space.sort_keys(only_keys, key_scratch, n, begin, end);
+      space.sort_pairs(k, key_scratch, v, value_scratch, n, {.begin = begin, .end = end});
+      space.sort_keys(only_keys, key_scratch, n, {.begin = begin, .end = end});
       std::stable_sort(order.begin(), order.end(),
                        [&](uint32_t a, uint32_t b) { return part(keys[a]) < part(keys[b]); });
       for (uint32_t i = 0; i < n; ++i) {

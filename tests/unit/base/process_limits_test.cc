@@ -10,7 +10,7 @@
 namespace voxdag {
 namespace {
 
-class CgroupMemoryTest : public testing::Test {
+class CgroupTest : public testing::Test {
  protected:
   void write(const std::string& path, const std::string& text) {
     const std::string full = mount() + "/" + path;
@@ -23,7 +23,7 @@ class CgroupMemoryTest : public testing::Test {
 };
 
 // Version 2: the lowest limit of the process's group and of all above it; siblings do not count.
-TEST_F(CgroupMemoryTest, WalksUpInVersion2) {
+TEST_F(CgroupTest, WalksUpInVersion2) {
   write("slice/box/memory.max", "max\n");
   write("slice/memory.max", "3000000000\n");
   write("slice/other/memory.max", "1000\n");
@@ -37,8 +37,27 @@ TEST_F(CgroupMemoryTest, WalksUpInVersion2) {
   EXPECT_EQ(cgroup_memory("0::/not/there\n", mount()), 500000000u);
 }
 
+// A quota is rounded up to whole CPUs; the lowest one on the way up counts.
+TEST_F(CgroupTest, CpuQuotas) {
+  write("slice/box/cpu.max", "max 100000\n");
+  EXPECT_EQ(cgroup_cpus("0::/slice/box\n", mount()), UINT64_MAX);
+  write("slice/cpu.max", "250000 100000\n");
+  EXPECT_EQ(cgroup_cpus("0::/slice/box\n", mount()), 3u);
+  write("slice/box/cpu.max", "1000 100000\n");
+  EXPECT_EQ(cgroup_cpus("0::/slice/box\n", mount()), 1u);
+  EXPECT_EQ(cgroup_cpus("", mount()), UINT64_MAX);
+  // Version 1, where two controllers may be mounted together.
+  write("cpu,cpuacct/pool/cpu.cfs_quota_us", "-1\n");
+  write("cpu,cpuacct/pool/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(cgroup_cpus("4:cpu,cpuacct:/pool\n", mount()), UINT64_MAX);
+  write("cpu,cpuacct/pool/cpu.cfs_quota_us", "400000\n");
+  EXPECT_EQ(cgroup_cpus("4:cpu,cpuacct:/pool\n", mount()), 4u);
+  EXPECT_EQ(cgroup_cpus("4:cpuset:/pool\n", mount()), UINT64_MAX);
+  EXPECT_GE(default_threads(), 1u);
+}
+
 // Version 1, alone or together with version 2, and what is no membership at all.
-TEST_F(CgroupMemoryTest, WalksUpInVersion1) {
+TEST_F(CgroupTest, WalksUpInVersion1) {
   write("memory/pool/job/memory.limit_in_bytes", "9223372036854771712\n");
   write("memory/pool/memory.limit_in_bytes", "700000000\n");
   const std::string membership = "9:name=systemd:/\n4:cpu,memory:/pool/job\n1:cpu:/x\n0::/\n";

@@ -34,8 +34,8 @@ TEST_F(ArtifactTest, SubDagComesBack) {
     const ArtifactRef ref = write_artifact(segment, dag, 10, hash_bits, {&root, 1});
     const ArtifactReader reader = open(ref);
     EXPECT_EQ(read_artifact(reader), dag);
-    EXPECT_EQ(reader.grid_levels(), 10u);
-    EXPECT_EQ(reader.hash_bits(), hash_bits);
+    EXPECT_EQ(reader.shape().grid_levels, 10u);
+    EXPECT_EQ(reader.shape().hash_bits, hash_bits);
     ASSERT_EQ(reader.roots().size(), 1u);
     EXPECT_EQ(reader.roots()[0].cube, root.cube);
     EXPECT_EQ(reader.roots()[0].hash, root.hash);
@@ -69,7 +69,7 @@ TEST_F(ArtifactTest, ChildIndicesOfFourBytesComeBack) {
   const uint64_t count = (uint64_t{1} << 24) + 10;
   MemoryBudget budget(uint64_t{1} << 30);
   SegmentWriter segment(system_files(), folder_.path(), 0, budget);
-  ArtifactWriter writer(segment, 10, 4);
+  ArtifactWriter writer(segment, {.grid_levels = 10, .hash_bits = 4});
   // With 4 bits all of these have hash 0 only if chosen so; the first `count` masks that do.
   writer.begin_level(8);
   std::vector<uint64_t> masks;
@@ -101,7 +101,7 @@ TEST_F(ArtifactTest, PiecesMakeTheSameArtifactAsAWhole) {
   SegmentWriter segment(system_files(), folder_.path(), 0, budget_);
   const ArtifactRef whole = write_artifact(segment, dag, 9, 64);
   SegmentWriter other(system_files(), folder_.path(), 1, budget_);
-  ArtifactWriter writer(other, 9, 64);
+  ArtifactWriter writer(other, {.grid_levels = 9});
   writer.begin_level(7);
   oracle::Random random(5);
   for (size_t at = 0; at < dag.brick_masks.size();) {
@@ -135,7 +135,7 @@ TEST_F(ArtifactTest, ManyArtifactsShareASegment) {
   std::vector<ArtifactRef> refs;
   for (uint64_t i = 0; i < 20; ++i) {
     refs.push_back(write_artifact(segment, random_rows(i, 100 * i + 1, 8, 2, 64), 8, 64));
-    ArtifactWriter abandoned(segment, 8, 64);
+    ArtifactWriter abandoned(segment, {.grid_levels = 8});
     abandoned.bricks({random_rows(i, 5000, 8, 0, 64).brick_masks});
   }
   for (uint64_t i = 0; i < 20; ++i)

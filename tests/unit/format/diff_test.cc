@@ -77,16 +77,16 @@ TEST_F(DiffTest, CountsBeyond32BitsInAMoment) {
     writer.begin_level(18);
     writer.checksum_words(words);
     writer.write_words(0, words);
-    writer.end_level(1, 2);
+    writer.end_level({1, 2});
     const uint32_t node[9] = {255};
     for (uint32_t level = 18; level-- > 0;) {
       writer.begin_level(level);
       writer.checksum_words(node);
       writer.write_words(0, node);
-      writer.end_level(1, 9);
+      writer.end_level({1, 9});
     }
     const uint64_t bricks = uint64_t{1} << 54;
-    writer.finish(bricks * static_cast<uint64_t>(popcount64(brick)), (8 * bricks - 1) / 7);
+    writer.finish({bricks * static_cast<uint64_t>(popcount64(brick)), (8 * bricks - 1) / 7});
   };
   write_solid(a_, ~uint64_t{0});
   write_solid(b_, 1);

@@ -94,9 +94,9 @@ TEST_F(GlobalWriterTest, OrderAndThreadsDoNotShow) {
                                words.subspan(7 * p, std::min<size_t>(7, words.size() - 7 * p)));
       });
     for (std::thread& thread : threads) thread.join();
-    writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), words.size());
+    writer.end_level({i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), words.size()});
   }
-  EXPECT_EQ(writer.finish(dag.voxels, dag.svo_nodes).sha256, expected.sha256);
+  EXPECT_EQ(writer.finish({dag.voxels, dag.svo_nodes}).sha256, expected.sha256);
   EXPECT_EQ(read_bytes(path_), bytes);
 }
 
@@ -121,7 +121,7 @@ TEST_F(GlobalWriterTest, UnfinishedFilesVanish) {
 // The header is written last, all is on the disk before the file gets its name, and the name too.
 TEST_F(GlobalWriterTest, IsDurableBeforeItIsNamed) {
   WatchedFiles files;
-  GlobalFileWriter(files, path_, grid_of(16), 64).finish(0, 0);
+  GlobalFileWriter(files, path_, grid_of(16), 64).finish({0, 0});
   const std::vector<std::string> expected = {"create " + path_ + ".partial",
                                              "write 4096 0",
                                              "write 0 4096",
@@ -143,9 +143,9 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
       writer.begin_level(static_cast<uint32_t>(2 - i));
       writer.checksum_words(levels[i]);
       writer.write_words(0, levels[i]);
-      writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
+      writer.end_level({i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size()});
     }
-    writer.finish(dag.voxels, dag.svo_nodes);
+    writer.finish({dag.voxels, dag.svo_nodes});
   };
   WatchedFiles clean;
   build(clean);
@@ -178,7 +178,7 @@ TEST_F(GlobalWriterTest, ResumesAfterAnyLevel) {
     writer.begin_level(static_cast<uint32_t>(5 - i));
     writer.checksum_words(levels[i]);
     writer.write_words(0, levels[i]);
-    writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
+    writer.end_level({i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size()});
   };
   for (size_t done = 1; done <= levels.size(); ++done) {
     SCOPED_TRACE(done);
@@ -193,7 +193,7 @@ TEST_F(GlobalWriterTest, ResumesAfterAnyLevel) {
     GlobalFileWriter writer(system_files(), path_, grid_of(128), 64);
     writer.resume(saved);
     for (size_t i = done; i < levels.size(); ++i) write_level(writer, i);
-    EXPECT_EQ(writer.finish(dag.voxels, dag.svo_nodes).sha256, expected);
+    EXPECT_EQ(writer.finish({dag.voxels, dag.svo_nodes}).sha256, expected);
   }
 }
 
@@ -208,7 +208,7 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
       writer.begin_level(static_cast<uint32_t>(3 - i));
       writer.checksum_words(levels[i]);
       writer.write_words(0, levels[i]);
-      writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
+      writer.end_level({i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size()});
     }
   };
   uint64_t at = kPageBytes;
@@ -219,7 +219,7 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
     ByteString bytes = read_bytes(partial);
     bytes[at + 4 * (levels[i].size() / 2)] ^= 16;
     write_bytes(partial, bytes);
-    const Error error = error_of([&] { writer.seal(dag.voxels, dag.svo_nodes); });
+    const Error error = error_of([&] { writer.seal({dag.voxels, dag.svo_nodes}); });
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
     EXPECT_THAT(error.message(), HasSubstr("is not what was written"));
     at += (4 * levels[i].size() + kPageBytes - 1) / kPageBytes * kPageBytes;
@@ -248,8 +248,9 @@ TEST_F(GlobalWriterTest, LevelsOverTheLimitAreRefused) {
   const Error on_write = error_of([&] { writer.write_words(kMaxLevelWords - 1, words); });
   EXPECT_EQ(on_write.code(), ErrorCode::kLimit);
   EXPECT_THAT(on_write.message(), HasSubstr("level 2"));
-  const Error on_end =
-      error_of([&] { writer.end_level(kMaxLevelWords / 2 + 1, kMaxLevelWords + 2); });
+  const Error on_end = error_of([&] {
+    writer.end_level({kMaxLevelWords / 2 + 1, kMaxLevelWords + 2});
+  });
   EXPECT_EQ(on_end.code(), ErrorCode::kLimit);
   EXPECT_THAT(on_end.message(), HasSubstr("level 2"));
 }
@@ -260,12 +261,12 @@ TEST_F(GlobalWriterTest, LevelsOutOfTurnAreRefused) {
   EXPECT_THROW(writer.begin_level(1), Error);
   writer.begin_level(2);
   EXPECT_THROW(writer.begin_level(1), Error);
-  EXPECT_THROW(writer.end_level(0, 0), Error);
+  EXPECT_THROW(writer.end_level({0, 0}), Error);
   const uint32_t brick[2] = {1, 0};
   writer.checksum_words(brick);
   writer.write_words(0, brick);
-  writer.end_level(1, 2);
-  EXPECT_THROW(writer.finish(1, 3), Error);
+  writer.end_level({1, 2});
+  EXPECT_THROW(writer.finish({1, 3}), Error);
 }
 
 }  // namespace

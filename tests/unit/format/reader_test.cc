@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "core/format/global/voxdag_reader.h"
 #include "tests/unit/format/test_files.h"
@@ -100,6 +101,18 @@ TEST_F(ReaderTest, EmptySceneHasNoVoxels) {
   file.walk(collector);
   EXPECT_EQ(collector.nodes, 0u);
   file.verify_checksums();
+}
+
+// A pipe that nobody writes to is refused at once.
+TEST_F(ReaderTest, Hardening_L5_APipeIsRefused) {
+  const std::string pipe = folder_.file("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  try {
+    voxdag_reader::File file(pipe);
+    FAIL() << "a pipe is no global file";
+  } catch (const voxdag_reader::Error& error) {
+    EXPECT_NE(std::string(error.what()).find("is not a regular file"), std::string::npos);
+  }
 }
 
 // Files that are no global file give different errors: missing, foreign, too new, damaged.

@@ -62,7 +62,7 @@ inline SubDag random_rows(uint64_t seed, size_t count, uint32_t grid_levels, uin
 
 inline ArtifactRef write_artifact(SegmentWriter& segment, const SubDag& dag, uint32_t grid_levels,
                                   uint32_t hash_bits, std::span<const ArtifactRoot> roots = {}) {
-  ArtifactWriter writer(segment, grid_levels, hash_bits);
+  ArtifactWriter writer(segment, {.grid_levels = grid_levels, .hash_bits = hash_bits});
   writer.bricks({dag.brick_masks});
   for (const SubDag::Nodes& nodes : dag.levels) writer.nodes(nodes.view());
   const ArtifactRef ref = writer.finish(roots);
@@ -74,7 +74,7 @@ inline SubDag read_artifact(const ArtifactReader& reader) {
   SubDag dag;
   Frame frame;
   for (const ArtifactLevel& level : reader.levels()) {
-    const bool bricks = level.level + 2 == reader.grid_levels();
+    const bool bricks = level.level == reader.shape().brick_level();
     if (!bricks) dag.levels.emplace_back().level = level.level;
     for (size_t i = 0; i < level.frames.size(); ++i) {
       reader.read_frame(level.level, i, frame);

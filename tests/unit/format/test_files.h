@@ -95,9 +95,9 @@ inline GlobalFileSummary write_global(const std::string& path, const oracle::Dag
     writer.begin_level(level);
     writer.checksum_words(levels[i]);
     writer.write_words(0, levels[i]);
-    writer.end_level(i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size());
+    writer.end_level({i == 0 ? dag.bricks.size() : dag.levels[i - 1].size(), levels[i].size()});
   }
-  return writer.finish(dag.voxels, dag.svo_nodes);
+  return writer.finish({dag.voxels, dag.svo_nodes});
 }
 
 inline GlobalFileSummary write_global(const std::string& path, const oracle::Voxels& voxels,

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "tests/unit/base/error_of.h"
 
 namespace voxdag {
 namespace {
@@ -125,6 +126,18 @@ TEST(Grid, OfAVoxelSize) {
   EXPECT_EQ(Grid::with_voxel_size(WorldBounds{}, 2, 2).edge, 8.0);
   for (const double size : {0.0, -1.0, kInfinity, kNan})
     expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, size, 4); });
+}
+
+// A grid whose origin or edge is not a finite number cannot be stored: it is refused, where it used
+// to give a file that no command opens.
+TEST(Hardening, M7_AGridOutOfTheRangeOfDoublesIsRefused) {
+  WorldBounds far;
+  far.add({1.5e308, 0, 0});
+  far.add({1.5e308, 1, 1});
+  EXPECT_EQ(error_of([&] { Grid::around(far, 6); }).code(), ErrorCode::kLimit);
+  EXPECT_EQ(error_of([&] { Grid::with_voxel_size(far, 1, 6); }).code(), ErrorCode::kLimit);
+  EXPECT_EQ(error_of([] { Grid::with_voxel_size({}, 1e308, 10); }).code(), ErrorCode::kLimit);
+  EXPECT_TRUE(std::isfinite(Grid::with_voxel_size({}, 1e304, 10).origin[0]));
 }
 
 // Four to 2^20 voxels per edge, powers of two only.

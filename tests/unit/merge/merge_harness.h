@@ -126,7 +126,7 @@ class MergeHarness {
     }
   }
   void add(const oracle::Dag& dag, const Cube& cube) {
-    ArtifactWriter writer(*segment_, grid_levels_, hash_bits_);
+    ArtifactWriter writer(*segment_, {.grid_levels = grid_levels_, .hash_bits = hash_bits_});
     oracle::send(oracle::as_sub_dag(dag, grid_levels_), writer);
     const ArtifactRoot root{cube, 0, dag.root_hash, dag.voxels, dag.svo_nodes};
     artifacts_.push_back(writer.finish({&root, 1}));
@@ -135,8 +135,7 @@ class MergeHarness {
 
   Merged merge(const MergeOptions& options = {}) {
     MergeInputs inputs;
-    inputs.grid_levels = grid_levels_;
-    inputs.hash_bits = hash_bits_;
+    inputs.shape = {.grid_levels = grid_levels_, .hash_bits = hash_bits_};
     inputs.artifacts = artifacts_;
     inputs.open_segment = [this](uint32_t id) -> std::shared_ptr<ReadableFile> {
       return system_files().open_read(segment_path(folder_.path(), id));
@@ -154,7 +153,7 @@ class MergeHarness {
     EXPECT_EQ(budget.used(), 0u);
     EXPECT_TRUE(options.checkpoint || std::filesystem::is_empty(scratch_folder()))
         << "scratch files were left behind";
-    merged.file = out.finish(merged.report.voxels, merged.report.svo_nodes);
+    merged.file = out.finish({merged.report.voxels, merged.report.svo_nodes});
     return merged;
   }
 
@@ -167,7 +166,7 @@ class MergeHarness {
       out.begin_level(level--);
       out.checksum_words(words);
       out.write_words(0, words);
-      out.end_level(nodes, words.size());
+      out.end_level({nodes, words.size()});
       below = std::move(offsets);
       offsets.clear();
       words.clear();
@@ -186,7 +185,7 @@ class MergeHarness {
       }
       end_level(nodes.size());
     }
-    return out.finish(dag.voxels, dag.svo_nodes);
+    return out.finish({dag.voxels, dag.svo_nodes});
   }
 
   // The merged file is that of the voxels' DAG, and so are the counts.

@@ -41,12 +41,12 @@ class DyingCheckpoint : public Checkpoint {
     ++forgotten;
   }
   // Overwrites the released bytes with zeros if it knows the segment.
-  void release(uint32_t, uint64_t offset, uint64_t bytes) override {
+  void release(const SegmentRange& range) override {
     if (segment_.empty()) return;
     std::fstream file(segment_, std::ios::in | std::ios::out | std::ios::binary);
-    file.seekp(static_cast<std::streamoff>(offset));
-    file << std::string(bytes, '\0');
-    released += bytes;
+    file.seekp(static_cast<std::streamoff>(range.offset));
+    file << std::string(range.bytes, '\0');
+    released += range.bytes;
   }
 
   std::optional<std::vector<std::byte>> state;

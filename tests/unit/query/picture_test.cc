@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "core/base/error.h"
+#include "core/io/file_system.h"
 #include "query/render/renderer.h"
 #include "tests/unit/query/voxel_scene.h"
 
@@ -63,7 +64,7 @@ TEST(Picture, IsWrittenWhole) {
   std::filesystem::create_directories(folder);
   const std::string path = folder / "p.png";
   const Picture picture(20, 10);
-  write_png(system_files(), path, picture);
+  voxdag::write_file_atomically(system_files(), path, encode_png(picture));
   std::ifstream in(path, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(in), {}};
   EXPECT_EQ(bytes, encode_png(picture));

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "query/render/bounds.h"
 #include "query/render/views.h"
 #include "tests/unit/query/voxel_scene.h"
 

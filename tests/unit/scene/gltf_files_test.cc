@@ -6,7 +6,7 @@
 #include <random>
 
 #include "core/scene/gltf/document/read_document.h"
-#include "core/scene/gltf/geometry/base64.h"
+#include "core/scene/gltf/mesh_data/base64.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {
@@ -332,7 +332,7 @@ std::string repeated(const std::string& text, size_t count) {
 
 // Every array whose length a file chooses is charged: JSON of a few megabytes took many times its
 // size in memory, unnoticed by the budget.
-TEST(GltfMemory, HostileArraysAreCharged) {
+TEST(Hardening, M3_ArraysAreCharged) {
   const std::pair<const char*, const char*> arrays[] = {
       {"buffers", R"({"byteLength":1})"},
       {"extensionsUsed", R"("a")"},
@@ -353,7 +353,7 @@ TEST(GltfMemory, HostileArraysAreCharged) {
 }
 
 // One element with a large array is charged while it is read.
-TEST(GltfMemory, HostileElementsAreCharged) {
+TEST(Hardening, M3_ElementsAreCharged) {
   for (const char* section : {R"("nodes":[{"children":[)", R"("scenes":[{"nodes":[)",
                               R"("skins":[{"joints":[)", R"("meshes":[{"primitives":[)"}) {
     const std::string json =
@@ -366,7 +366,7 @@ TEST(GltfMemory, HostileElementsAreCharged) {
 }
 
 // The matrices of a skin with hundreds of thousands of joints were not charged.
-TEST(GltfMemory, HostileSkinIsCharged) {
+TEST(Hardening, M3_JointMatricesAreCharged) {
   SceneBuilder scene = one_triangle();
   Json& attributes = scene.root["meshes"][0]["primitives"][0]["attributes"];
   attributes["JOINTS_0"] = scene.add_accessor<uint8_t>("VEC4", kU8, std::vector<uint8_t>(12, 0));

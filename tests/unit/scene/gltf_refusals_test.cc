@@ -168,6 +168,46 @@ std::string test_name(const testing::TestParamInfo<Refusal>& info) {
 
 INSTANTIATE_TEST_SUITE_P(All, GltfRefusal, testing::ValuesIn(kRefusals), test_name);
 
+// What a scene contains cannot steer a terminal or forge a line of a log, wherever an error shows
+// it.
+TEST(Hardening, L2_ControlCharactersOfASceneAreNotShown) {
+  const std::string hostile =
+      "A\n2026-11-21T00:00:00Z done\x1b[31m\x1b]0;title\x07\xc2\x9b"
+      "2J\x7f";
+  const std::pair<const char*, Json> places[] = {
+      {"/meshes/0/primitives/0/attributes", {{"POSITION", 0}, {hostile, "text"}}},
+      {"/meshes/0/primitives/0",
+       {{"attributes", {{"POSITION", 0}}}, {hostile, 1}, {"mode", hostile}}},
+      {"/nodes/0", {{"name", hostile}, {"mesh", 7}}},
+      {"/accessors/0/type", hostile},
+      {"/asset/version", hostile},
+      {"/extensionsRequired", {hostile}},
+      {"/buffers/0/uri", hostile}};
+  for (const auto& [pointer, value] : places) {
+    SCOPED_TRACE(pointer);
+    SceneBuilder scene = valid_scene();
+    scene.root[Json::json_pointer(pointer)] = value;
+    const std::string message = error_of_file(scene.glb()).message();
+    EXPECT_TRUE(std::ranges::none_of(message, [](unsigned char c) {
+      return c < 0x20 || c == 0x7f;
+    })) << message;
+    EXPECT_EQ(message.find("\xc2\x9b"), std::string::npos) << message;
+  }
+}
+
+// Garbage is not called broken JSON, and no message names a class of the JSON library.
+TEST(Hardening, L8_GarbageIsNotCalledJson) {
+  for (const char* text : {"\xef\x01\x02\x03", "\xef\xbb\xbf garbage", "\xef", "{broken", "[1,",
+                           "\xef\xbb\xbf{\"a\":}"}) {
+    const std::string message = error_of_file(text).message();
+    const bool is_json = std::string(text).find_first_of("{[ ") != std::string::npos;
+    EXPECT_NE(message.find(is_json ? "its JSON is broken" : "is neither a GLB"), std::string::npos)
+        << message;
+    EXPECT_EQ(message.find("json.exception"), std::string::npos) << message;
+    EXPECT_EQ(message.find("BOM"), std::string::npos) << message;
+  }
+}
+
 // Two parents need two edits at once.
 TEST(GltfRefusals, TwoParents) {
   SceneBuilder scene = valid_scene();
@@ -222,6 +262,12 @@ TEST(GltfRefusals, NoAsset) {
 // A member given twice could mean either; it is refused.
 TEST(GltfRefusals, DuplicateMembers) {
   const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":1}]})";
+  EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
+}
+
+// The same where the first value is a number and the second an object, which cannot be put into it.
+TEST(Hardening, MemberThatIsANumberAndThenAnObjectIsRefused) {
+  const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":{"a":1}}]})";
   EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
 }
 

@@ -106,7 +106,7 @@ class CommitQueueTest : public testing::Test {
   void build_one(CommitQueue& queue, BinId bin) {
     StoredSubvolume built = planned_[next_++];
     const SubDag rows = random_rows(next_, 500, kLevels, 2, kBits);
-    ArtifactWriter writer(queue.segment(), kLevels, kBits);
+    ArtifactWriter writer(queue.segment(), {.grid_levels = kLevels, .hash_bits = kBits});
     writer.bricks({rows.brick_masks});
     for (const SubDag::Nodes& nodes : rows.levels) writer.nodes(nodes.view());
     built.artifact = writer.finish({});

@@ -65,7 +65,7 @@ class IngestTest : public testing::TestWithParam<unsigned> {
   TemporaryFolder folder_;
   MemoryBudget budget_{uint64_t{64} << 20};
   MemoryStore triangles_{system_files(), folder_.file("spill"), true, budget_};
-  TopTree top_{10, 4, budget_};
+  TopTree top_{10, budget_, 4};
   NoProgress progress_;
   CancelToken cancel_;
 };

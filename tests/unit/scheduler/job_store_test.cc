@@ -56,6 +56,19 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   EXPECT_EQ(store.stage_times()[0].cpu_s, 2.5);
 }
 
+// What is marked as built without a record is planned again when it is forgotten; records stay.
+TEST_F(JobStoreTest, ForgetsWhatIsBuiltInMemoryOnly) {
+  JobStore store(path(), JobStore::Access::kBuild);
+  store.start(job_, plan(2));
+  const auto planned = store.leaves();
+  store.record_built(std::vector{built(planned[0])});
+  store.mark_built_in_memory(std::vector{built(planned[1])});
+  EXPECT_EQ(store.leaves()[1].state, SubvolumeState::kBuilt);
+  store.forget_built_in_memory();
+  EXPECT_EQ(store.leaves()[0].state, SubvolumeState::kBuilt);
+  EXPECT_EQ(store.leaves()[1].state, SubvolumeState::kPlanned);
+}
+
 // A split subvolume is replaced by its parts; a lost one is planned again; both survive.
 TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   JobStore store(path(), JobStore::Access::kBuild);
@@ -167,7 +180,9 @@ TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
 // An unfinished merge and its result are remembered, replaced and forgotten; a new job has neither.
 TEST_F(JobStoreTest, RemembersTheMerge) {
   const std::vector<std::byte> state = {std::byte{0}, std::byte{7}, std::byte{255}};
-  const JobResult result{"out", "sha", 1ull << 40, 2, 3, 4, 5, 6, 7};
+  JobResult result{"out", "sha", 1ull << 40, {}};
+  result.merge.voxels = 2;
+  result.merge.streamed_groups = 7;
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(1));
   EXPECT_FALSE(store.merge().has_value());
@@ -180,7 +195,7 @@ TEST_F(JobStoreTest, RemembersTheMerge) {
   EXPECT_EQ(store.merge()->state, state);
   ASSERT_TRUE(store.result().has_value());
   EXPECT_EQ(store.result()->bytes, result.bytes);
-  EXPECT_EQ(store.result()->merge_streamed_groups, 7u);
+  EXPECT_EQ(store.result()->merge.streamed_groups, 7u);
   store.forget_merge();
   EXPECT_FALSE(store.merge().has_value());
   EXPECT_FALSE(store.result().has_value());

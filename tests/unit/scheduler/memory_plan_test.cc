@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/scene/gltf/geometry/vertex_cache.h"
+#include "core/scene/gltf/mesh_data/vertex_cache.h"
 #include "merge/plan/merge_memory.h"
 
 namespace voxdag {

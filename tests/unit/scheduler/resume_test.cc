@@ -8,9 +8,9 @@
 
 #include "core/base/error.h"
 #include "core/format/artifact/segment_writer.h"
+#include "scheduler/job/build_locks.h"
 #include "scheduler/job/job_status.h"
 #include "scheduler/job/job_store.h"
-#include "scheduler/job/output_lock.h"
 #include "scheduler/job/work_folder.h"
 #include "scheduler/run_build.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -133,12 +133,16 @@ TEST_F(ResumeTest, RebuildsDamagedArtifacts) {
 // others are not touched.
 TEST_F(ResumeTest, OwnsItsFolderAlone) {
   {
-    WorkFolder first(system_files(), work());
+    CancelToken cancel;
+    NoProgress progress;
+    WorkFolder first({system_files(), progress, cancel}, work(), 0);
+    BuildSpec second = spec();
+    second.run.lock_wait_s = 0.1;
     try {
-      build(spec());
+      build(second);
       FAIL() << "two builds in one folder";
     } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+      EXPECT_EQ(error.code(), ErrorCode::kIo);
       EXPECT_NE(error.message().find("process " + std::to_string(getpid())), std::string::npos)
           << error.what();
     }
@@ -180,8 +184,12 @@ TEST_F(ResumeTest, OwnsItsOutputAlone) {
   first.run.work_folder = folder_.path() + "/first";
   build_until(first, "build", 5);
   {
-    const OutputLock held(system_files(), output());
-    EXPECT_EQ(code_of(spec()), ErrorCode::kInvalidInput);
+    CancelToken cancel;
+    NoProgress progress;
+    const OutputLock held({system_files(), progress, cancel}, output(), 0);
+    BuildSpec second = spec();
+    second.run.lock_wait_s = 0.1;
+    EXPECT_EQ(code_of(second), ErrorCode::kIo);
     EXPECT_FALSE(std::filesystem::exists(work()));
   }
   EXPECT_FALSE(std::filesystem::exists(output() + ".partial"));

@@ -46,7 +46,7 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   MemoryBudget budget(uint64_t{1} << 30);
   for (const int64_t size : {int64_t{600}, int64_t{40000}, int64_t{900000}}) {
     std::mt19937_64 random(static_cast<uint64_t>(size));
-    TopTree top(kLevels, TopTree::depth_within(kLevels, 1 << 20), budget);
+    TopTree top(kLevels, budget, TopTree::depth_within(kLevels, 1 << 20));
     std::vector<FixedTriangle> triangles;
     for (int i = 0; i < 60; ++i) triangles.push_back(triangle_near(random, size));
     for (const FixedTriangle& t : triangles) add(top, t);
@@ -114,7 +114,7 @@ TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
   for (const int64_t size : {int64_t{3000}, int64_t{30000}, int64_t{120000}, int64_t{900000}})
     for (int i = 0; i < 100; ++i) {
       MemoryBudget budget(uint64_t{1} << 30);
-      TopTree top(kLevels, kDepth, budget);
+      TopTree top(kLevels, budget, kDepth);
       const FixedTriangle t = triangle_near(random, size);
       add(top, t);
       const int64_t units = (int64_t{kUnitsPerVoxel} << kLevels) >> kDepth;
@@ -138,7 +138,7 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(3);
   const uint32_t depth = TopTree::depth_within(kLevels, 1 << 20);
-  TopTree top(kLevels, depth, budget);
+  TopTree top(kLevels, budget, depth);
   for (int i = 0; i < 2000; ++i) add(top, triangle_near(random, 5000));
   const double most = top.total_weight() / 100;
   const auto plan = top.subvolumes_by_weight(most);
@@ -172,8 +172,8 @@ TEST(TopTree, ContinuesFromTheCellsOfAnother) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(4);
   const uint32_t depth = TopTree::depth_within(kLevels, 1 << 20);
-  TopTree whole(kLevels, depth, budget), first(kLevels, depth, budget),
-      rest(kLevels, depth, budget);
+  TopTree whole(kLevels, budget, depth), first(kLevels, budget, depth),
+      rest(kLevels, budget, depth);
   for (int i = 0; i < 2000; ++i) {
     const FixedTriangle triangle = triangle_near(random, 5000);
     if (i == 700) std::ranges::copy(first.cells(), rest.fill(first.total_weight()).begin());

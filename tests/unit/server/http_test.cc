@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "core/base/clock.h"
 #include "server/http/byte_range.h"
 #include "server/http/connection/connection_table.h"
 #include "server/http/headers.h"
@@ -23,7 +24,6 @@ TEST(ByteRanges, AreClippedToTheFile) {
   EXPECT_EQ(parse_ranges("bytes=0-0, 200-300", 100).ranges, (Ranges{{0, 1}}));
 }
 
-// Debian's httplib 0.11.4 reads beyond the end for these.
 TEST(ByteRanges, OutsideTheFileAreUnsatisfiable) {
   for (const char* header : {"bytes=100-", "bytes=100-200", "bytes=-0", "bytes=200-300,400-",
                              "bytes=18446744073709551615-", "bytes=99999999999999999999999-"}) {
@@ -94,20 +94,54 @@ TEST(Headers, CompareCaseInsensitively) {
 TEST(ConnectionTable, EvictsTheLongestWaiting) {
   HttpLimits limits;
   limits.max_connections = 2;
-  limits.max_per_address = 2;
+  limits.max_per_client = 2;
   ConnectionTable table(limits);
   ConnectionTable::Place first, second, third;
   ASSERT_TRUE(table.admit(-1, "10.0.0.1", first));
   ASSERT_TRUE(table.admit(-1, "10.0.0.1", second));
-  EXPECT_FALSE(table.admit(-1, "10.0.0.1", third)) << "the limit per address";
-  table.set_waiting(first, false);
+  EXPECT_FALSE(table.admit(-1, "10.0.0.1", third)) << "the limit per client";
+  table.set_working(first);
   ASSERT_TRUE(table.admit(-1, "10.0.0.2", third)) << "the second one waits and is evicted";
   table.remove(second);
-  table.set_waiting(third, false);
+  table.set_working(third);
   EXPECT_FALSE(table.admit(-1, "10.0.0.3", second)) << "all have requests";
   table.remove(first);
   table.remove(third);
   EXPECT_EQ(table.size(), 0u);
+}
+
+// Connections whose client is waited for within a body or an answer are closed, too, unless it was
+// only a moment.
+TEST(Hardening, M4_SlowTransfersAreEvicted) {
+  HttpLimits limits;
+  limits.max_connections = 2;
+  ConnectionTable table(limits);
+  ConnectionTable::Place slow, fast, other;
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", slow));
+  ASSERT_TRUE(table.admit(-1, "10.0.0.2", fast));
+  table.set_waiting(slow, wall_seconds() - 2, false);
+  table.set_waiting(fast, wall_seconds(), false);
+  EXPECT_TRUE(table.admit(-1, "10.0.0.3", other));
+  table.remove(slow);
+  table.set_working(other);
+  EXPECT_FALSE(table.admit(-1, "10.0.0.3", slow)) << "only the fast one waits";
+}
+
+// The addresses of one /64 are one client, and so are the two spellings of an IPv4 address.
+TEST(Hardening, M4_AnIpv6NetworkIsOneClient) {
+  EXPECT_EQ(client_of("10.0.0.1"), "10.0.0.1");
+  EXPECT_EQ(client_of("::ffff:10.0.0.1"), "10.0.0.1");
+  EXPECT_EQ(client_of("2001:db8:1:2:3:4:5:6"), client_of("2001:db8:1:2:ffff::1"));
+  EXPECT_NE(client_of("2001:db8:1:2::1"), client_of("2001:db8:1:3::1"));
+  EXPECT_EQ(client_of("fe80::1%eth0"), "fe80::/64");
+  HttpLimits limits;
+  limits.max_per_client = 2;
+  ConnectionTable table(limits);
+  ConnectionTable::Place place;
+  EXPECT_TRUE(table.admit(-1, "2001:db8::1", place));
+  EXPECT_TRUE(table.admit(-1, "2001:db8::2", place));
+  EXPECT_FALSE(table.admit(-1, "2001:db8::3", place));
+  EXPECT_TRUE(table.admit(-1, "2001:db8:0:1::3", place));
 }
 
 }  // namespace

@@ -162,7 +162,7 @@ Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
   offsets = {};
 
   Order<Space> order(space, n);
-  order.sort_by(KeyAt{candidate_hashes.data()}, first_hash_bit(hash_bits), 64);
+  order.sort_by(KeyAt{candidate_hashes.data()}, {.begin = first_hash_bit(hash_bits), .end = 64});
   SpaceArray<Space, uint32_t> marked(space, n + 1);
   space.for_each(
       n, MarkFirstOfEquals<SameWord>{{candidate_hashes.data()}, order.items(), marked.data()});

@@ -146,7 +146,7 @@ Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same,
   space.for_each(out.count, hash(firsts.data(), hashes.data()));
 
   Order<Space> by_hash(space, out.count);
-  by_hash.sort_by(KeyAt{hashes.data()}, first_hash_bit(hash_bits), 64);
+  by_hash.sort_by(KeyAt{hashes.data()}, {.begin = first_hash_bit(hash_bits), .end = 64});
   out.survivors = gather<uint32_t>(space, out.count, by_hash.items(), firsts.data());
   out.hashes = gather<uint64_t>(space, out.count, by_hash.items(), hashes.data());
   const SpaceArray<Space, uint32_t> place_of_group = by_hash.places();
@@ -160,7 +160,7 @@ template <class Space>
 Reduced<Space> reduce_bricks(Space& space, const Octree<Space>& tree, uint32_t hash_bits) {
   const uint64_t* masks = tree.brick_masks.data();
   Order<Space> order(space, tree.brick_count);
-  order.sort_by(KeyAt{masks}, 0, 64);
+  order.sort_by(KeyAt{masks}, {.begin = 0, .end = 64});
   return reduce_sorted(space, order, SameWord{masks}, hash_bits,
                        [&](const uint32_t* survivors, uint64_t* hashes) {
                          return HashSurvivorBrick{masks, hash_bits, survivors, hashes};
@@ -177,10 +177,11 @@ Reduced<Space> reduce_nodes(Space& space, uint32_t node_count, const LinkedNodes
   const uint32_t slots = std::min(8u, 64u / static_cast<uint32_t>(bits));
   for (uint32_t end = 8; end > 0;) {
     const uint32_t first = end > slots ? end - slots : 0;
-    order.sort_by(PointerKey{links, first, end, bits}, 0, bits * static_cast<int>(end - first));
+    order.sort_by(PointerKey{links, first, end, bits},
+                  {.begin = 0, .end = bits * static_cast<int>(end - first)});
     end = first;
   }
-  order.sort_by(MaskKey{links.nodes.masks}, 0, 8);
+  order.sort_by(MaskKey{links.nodes.masks}, {.begin = 0, .end = 8});
   return reduce_sorted(space, order, SameNode{links}, hash_bits,
                        [&](const uint32_t* survivors, uint64_t* hashes) {
                          return HashSurvivorNode{links, child_hashes, hash_bits, survivors, hashes};

@@ -40,8 +40,8 @@ class CellPairs {
     if (size_ == 0 || code_bits == kTileCodeBits) return;
     SpaceArray<Space, uint64_t> code_scratch(space_, codes_.size());
     SpaceArray<Space, uint32_t> triangle_scratch(space_, codes_.size());
-    space_.sort_pairs(codes_, code_scratch, triangles_, triangle_scratch, size_, kTileCodeBits,
-                      code_bits);
+    space_.sort_pairs(codes_, code_scratch, triangles_, triangle_scratch, size_,
+                      {.begin = kTileCodeBits, .end = code_bits});
   }
   // The first pair of each tile.
   SpaceArray<Space, uint32_t> tile_starts(uint32_t& tile_count) {

@@ -43,7 +43,7 @@ class VoxelList {
   // Sorts the voxels and packs them into bricks.
   void flush() {
     if (size_ == 0) return;
-    space_.sort_keys(codes_, scratch_, size_, 0, code_bits_);
+    space_.sort_keys(codes_, scratch_, size_, {.begin = 0, .end = code_bits_});
     space_.for_each(size_, SplitVoxelCode{codes_.data(), bits_.data()});
     const uint32_t packed =
         space_.merge_runs(codes_.data(), bits_.data(), size_, scratch_.data(), packed_.data());

@@ -122,7 +122,7 @@ void ModelReader::parse(Document& document) {
     throw Error(ErrorCode::kOutOfMemory,
                 "out of memory: the system has none left for the materials of " + document.path);
   } catch (const std::exception& e) {
-    errors = e.what();
+    errors = without_prefix(e.what());
   }
   if (!is_loaded) {
     model_->materials.clear();

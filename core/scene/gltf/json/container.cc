@@ -1,6 +1,7 @@
 #include "core/scene/gltf/json/container.h"
 
-#include <array>
+#include <algorithm>
+#include <span>
 #include <string_view>
 
 #include "core/base/error.h"
@@ -63,12 +64,15 @@ Container read_glb(const ReadableFile& file) {
   return container;
 }
 
-// White space, an opening brace or bracket, or a byte order mark.
+// White space, an opening brace or bracket, or a byte order mark and then one of these.
 bool may_be_json(const ReadableFile& file) {
-  std::array<std::byte, 1> first;
-  file.read_at(0, first);
-  return std::string_view(" \t\r\n{[\xef").find(static_cast<char>(first[0])) !=
-         std::string_view::npos;
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  char text[4] = {};
+  const size_t size = std::min<uint64_t>(sizeof text, file.size());
+  file.read_at(0, std::as_writable_bytes(std::span(text).first(size)));
+  std::string_view begin(text, size);
+  if (begin.starts_with(kMark)) begin.remove_prefix(kMark.size());
+  return begin.find_first_of(" \t\r\n{[") == 0;
 }
 
 }  // namespace

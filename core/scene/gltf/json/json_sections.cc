@@ -70,11 +70,8 @@ class SectionParser : public nlohmann::json_sax<Json> {
   }
 
   bool parse_error(size_t position, const std::string&, const Json::exception& e) override {
-    // The parser's message begins with "[json.exception...] ".
-    std::string reason = e.what();
-    reason.erase(0, reason.find("] ") + 2);
     refuse(path_, "its JSON is broken at character " + std::to_string(position) + ": " +
-                      reason.substr(0, kMaxReasonBytes));
+                      printable(without_prefix(e.what()), kMaxReasonBytes));
   }
 
  private:
@@ -139,9 +136,11 @@ class SectionParser : public nlohmann::json_sax<Json> {
       return &parent.emplace_back(std::move(value));
     }
     charge(kBytesPerMember + key_.size());
-    const auto [member, is_new] = parent.emplace(key_, std::move(value));
-    if (!is_new) violate(element().path() + "." + printable(key_) + " is given twice");
-    return &*member;
+    if (parent.contains(key_))
+      violate(element().path() + "." + printable(key_) + " is given twice");
+    Json& member = parent[key_];
+    member = std::move(value);
+    return &member;
   }
   void charge(uint64_t bytes) { charge_.grow_to(element_bytes_ += bytes); }
 

@@ -1,0 +1,36 @@
+#include "cli/output.h"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "core/io/overwrite.h"
+
+namespace voxdag::cli {
+namespace {
+
+template <class Json>
+void print_line(const Json& json) {
+  std::printf("%s\n", json.dump(-1, ' ', false, Json::error_handler_t::replace).c_str());
+}
+
+}  // namespace
+
+void print_json(const nlohmann::ordered_json& json) { print_line(json); }
+void print_json(const nlohmann::json& json) { print_line(json); }
+
+void OutputFile::declare_force(Command& command) {
+  command.flag("--force", force, "replace a file that this command has not written");
+}
+
+void OutputFile::check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const {
+  check(files, path, input, is_own);
+  check(files, path + ".partial", input, is_own);
+}
+
+void OutputFile::check(FileSystem& files, const std::string& name, const std::string& input,
+                       const IsOwnFile& is_own) const {
+  refuse_input(files, name, std::span(&input, 1));
+  if (!force) refuse_foreign_file(files, name, is_own, " (--force replaces it)");
+}
+
+}  // namespace voxdag::cli

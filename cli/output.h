@@ -1,0 +1,33 @@
+// What commands write: JSON on standard output, and files.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "cli/command.h"
+
+namespace voxdag::cli {
+
+// Prints one line. Bytes that are not UTF-8, as a path may have, are printed as U+FFFD.
+void print_json(const nlohmann::ordered_json& json);
+void print_json(const nlohmann::json& json);
+
+// Whether voxdag wrote the file with a command of this kind.
+using IsOwnFile = std::function<bool(const ReadableFile& file)>;
+
+// A file to write, and the option --force.
+struct OutputFile {
+  std::string path;
+  bool force = false;
+  void declare_force(Command& command);
+  // Throws Error{kInvalidInput} if writing would destroy something: the `input` whatever the
+  // options, another file that is not `is_own` without --force. Checks path + ".partial" as well,
+  // under which write_file_atomically() writes.
+  void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
+  // The same for one name.
+  void check(FileSystem& files, const std::string& name, const std::string& input,
+             const IsOwnFile& is_own) const;
+};
+
+}  // namespace voxdag::cli

@@ -1,0 +1,145 @@
+#include "client/scene_upload.h"
+
+#include <charconv>
+#include <memory>
+#include <optional>
+
+#include "client/retry_policy.h"
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+
+namespace voxdag::client {
+namespace {
+
+constexpr size_t kPieceBytes = 1 << 20;
+constexpr uint64_t kFirstPartBytes = 64 << 10;
+constexpr uint64_t kPartBytes = 64 << 20;
+constexpr size_t kDigitsInName = 12;
+constexpr size_t kMaxStemChars = 100;
+
+// "/a/My hall.glb" -> "My-hall-3f2a91c05b77.glb", a name that the API accepts.
+std::string name_on_server(const std::string& path, const std::string& sha256) {
+  std::string stem = path.substr(path.rfind('/') + 1);
+  const size_t dot = stem.rfind('.');
+  const std::string suffix = dot == std::string::npos ? "" : stem.substr(dot);
+  if (suffix != ".glb" && suffix != ".gltf")
+    throw Error(ErrorCode::kInvalidInput, "scene " + path + ": expected a .glb or .gltf file");
+  stem.resize(std::min(dot, kMaxStemChars));
+  for (char& c : stem)
+    if (!isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_') c = '-';
+  if (stem.empty() || !isalnum(static_cast<unsigned char>(stem[0]))) stem.insert(0, "scene");
+  return stem + "-" + sha256.substr(0, kDigitsInName) + suffix;
+}
+
+class Upload {
+ public:
+  Upload(ServiceClient& service, FileSystem& files, const std::string& path, Progress& progress)
+      : service_(service), progress_(progress), file_(files.open_read(path)), size_(file_->size()) {
+    if (size_ == 0) throw Error(ErrorCode::kInvalidInput, "scene " + path + ": the file is empty");
+    progress.begin_stage("checksum", size_, "bytes");
+    sha256_ = sha256_of_file(*file_, service.cancel(), &progress);
+    name_ = name_on_server(path, sha256_);
+  }
+
+  std::string run() {
+    uint64_t max_offset = 0;
+    for (RetryPolicy retry(service_.cancel()); !is_complete();) {
+      if (offset_ > max_offset) retry.reset();
+      max_offset = std::max(max_offset, offset_);
+      if (send_rest()) break;
+      if (!retry.wait(wait_s_)) throw Error(ErrorCode::kIo, failure_);
+    }
+    return name_;
+  }
+
+ private:
+  std::string path_on_server() const { return "/api/v1/scenes/" + name_; }
+
+  std::string read_piece(uint64_t offset, uint64_t max_bytes) {
+    std::string bytes(static_cast<size_t>(std::min<uint64_t>(max_bytes, kPieceBytes)), '\0');
+    file_failed_ = true;
+    file_->read_at(offset, std::as_writable_bytes(std::span(bytes)));
+    file_failed_ = false;
+    return bytes;
+  }
+
+  // Whether the server has the complete file. Sets offset_ to how many bytes it has.
+  bool is_complete() {
+    offset_ = 0;
+    try {
+      const ClientResponse answer =
+          service_.send_with_retries([&](HttpClient& http) { return http.get(path_on_server()); });
+      const Json scene = Json::parse(answer.body);
+      if (scene.at("complete").get<bool>() && scene.at("sha256") == sha256_) return true;
+      const std::string text = answer.header("Upload-Offset");
+      uint64_t offset = 0;
+      const auto parsed = std::from_chars(text.data(), text.data() + text.size(), offset);
+      if (parsed.ec == std::errc{} && offset < size_) offset_ = offset;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kNotFound) throw;
+    }
+    return false;
+  }
+
+  // Sends the missing bytes in parts, so that a crash of the server loses one part at most. The
+  // first part is small: a server that rejects the scene can answer it, while it would close the
+  // connection within a large one. False if a retry is needed, for the reason in failure_.
+  bool send_rest() {
+    progress_.begin_stage("upload", size_ - offset_, "bytes");
+    for (uint64_t part_bytes = kFirstPartBytes; offset_ < size_; part_bytes = kPartBytes) {
+      const uint64_t end = std::min(size_, offset_ + part_bytes);
+      const auto answer = send_part(end);
+      if (!answer) return false;
+      wait_s_ = retry_after_s(*answer);
+      if (answer->status == 409 || wait_s_ >= 0) {
+        failure_ = "scene " + name_ + ": the server answered " + std::to_string(answer->status);
+        return false;
+      }
+      throw_if_problem(*answer);
+      offset_ = end;
+    }
+    progress_.end_stage();
+    return true;
+  }
+
+  // No value if the connection broke.
+  std::optional<ClientResponse> send_part(uint64_t end) {
+    const uint64_t first = offset_;
+    HeaderMap headers{{"Content-Range", "bytes " + std::to_string(first) + "-" +
+                                            std::to_string(end - 1) + "/" + std::to_string(size_)}};
+    if (end == size_) headers.emplace("Repr-Digest", digest_field(sha256_));
+    const auto source = [&](uint64_t offset, uint64_t max_bytes) {
+      service_.cancel().check();
+      std::string bytes = read_piece(first + offset, max_bytes);
+      progress_.advance(bytes.size());
+      return bytes;
+    };
+    try {
+      return service_.http().upload(path_on_server(), end - first, source, headers);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kIo || file_failed_) throw;
+      failure_ = error.message();
+      wait_s_ = 0;
+      return std::nullopt;
+    }
+  }
+
+  ServiceClient& service_;
+  Progress& progress_;
+  const std::unique_ptr<ReadableFile> file_;
+  const uint64_t size_;
+  std::string sha256_, name_;
+  uint64_t offset_ = 0;       // bytes that the server has
+  bool file_failed_ = false;  // the last error is of the local file, not of the connection
+  std::string failure_;       // of the last attempt
+  double wait_s_ = 0;         // requested by a busy server
+};
+
+}  // namespace
+
+std::string upload_scene(ServiceClient& service, FileSystem& files, const std::string& path,
+                         Progress& progress) {
+  return Upload(service, files, path, progress).run();
+}
+
+}  // namespace voxdag::client

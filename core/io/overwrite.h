@@ -1,0 +1,26 @@
+// Which files may be overwritten: never what is read at the same time, and a file that the program
+// did not make itself only if the user insists.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "core/io/file_system.h"
+
+namespace voxdag {
+
+// Throws Error{kInvalidInput} if `path` is the same file as one of `inputs`.
+void refuse_input(FileSystem& files, const std::string& path, std::span<const std::string> inputs);
+
+// Throws Error{kInvalidInput} if `path` is no regular file, or neither empty nor `is_own`, which
+// looks whether the program made it. `otherwise` ends the message.
+void refuse_foreign_file(FileSystem& files, const std::string& path,
+                         const std::function<bool(const ReadableFile& file)>& is_own,
+                         const std::string& otherwise = "");
+
+// Whether the file begins with `bytes`, or with a part of them where it ends early.
+bool begins_with(const ReadableFile& file, std::string_view bytes);
+
+}  // namespace voxdag

@@ -1,0 +1,145 @@
+#include "core/scene/gltf/mesh_data/buffer_reader.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+#include "core/scene/gltf/mesh_data/base64.h"
+#include "core/scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+constexpr size_t kMaxOpenFiles = 16;
+constexpr uint64_t kMapNodeBytes = 48;
+// A window that begins inside a group of three bytes and ends inside another.
+constexpr size_t kMaxGroups = BufferReader::kWindowBytes / 3 + 2;
+
+// Base64 characters [begin, begin + out.size()) of a buffer.
+void read_characters(const ReadableFile& scene_file, const BufferSource& buffer, uint64_t begin,
+                     std::span<std::byte> out) {
+  if (buffer.kind == BufferSource::Kind::kBase64)
+    return scene_file.read_at(buffer.range.begin + begin, out);
+  const auto from = buffer.characters.begin() + static_cast<ptrdiff_t>(begin);
+  std::transform(from, from + static_cast<ptrdiff_t>(out.size()), out.begin(),
+                 [](char c) { return static_cast<std::byte>(c); });
+}
+
+uint64_t character_count(const BufferSource& buffer) {
+  return buffer.kind == BufferSource::Kind::kBase64 ? buffer.range.size : buffer.characters.size();
+}
+
+// A colon before the first slash: "http://...", "file:...", "C:\...".
+bool has_scheme(const std::string& uri) {
+  const size_t end = uri.find_first_of(":/");
+  return end != std::string::npos && uri[end] == ':';
+}
+
+[[noreturn]] void refuse_uri(const std::string& where, const char* what) {
+  throw Error(ErrorCode::kInvalidInput, where + ": its uri " + what);
+}
+
+// The path of the file that `uri`, percent-encoded (RFC 3986), names relative to the folder of the
+// scene file.
+std::string resolve_uri(const std::string& scene_path, const std::string& uri,
+                        const std::string& where) {
+  if (uri.empty()) refuse_uri(where, "is empty");
+  if (has_scheme(uri) || uri[0] == '/') refuse_uri(where, "is not a relative path");
+  const auto path = percent_decoded(uri);
+  if (!path) refuse_uri(where, "has a broken percent escape");
+  if (path->find('\0') != std::string::npos) refuse_uri(where, "has a zero byte");
+  return parent_directory(scene_path) + "/" + *path;
+}
+
+}  // namespace
+
+BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
+                           const Document& document, MemoryBudget& budget)
+    : files_(files),
+      scene_file_(scene_file),
+      document_(document),
+      budget_(budget),
+      window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()),
+      external_files_charge_(budget, "the list of external files of " + scene_file.path()) {
+  for (size_t i = 0; i < document.buffers.size(); ++i)
+    if (document.buffers[i].is_read) check_length(static_cast<int>(i));
+}
+
+std::span<const std::byte> BufferReader::window(int index, uint64_t offset, size_t size) {
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
+  if (buffer.kind == BufferSource::Kind::kBase64 || buffer.kind == BufferSource::Kind::kMemory)
+    return decode_base64(index, offset, size);
+  const std::span<std::byte> bytes(window_.data(), size);
+  if (buffer.kind == BufferSource::Kind::kBinChunk)
+    scene_file_.read_at(buffer.range.begin + offset, bytes);
+  else
+    external(index).read_at(offset, bytes);
+  return bytes;
+}
+
+void BufferReader::check_length(int index) {
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
+  uint64_t there = 0;
+  switch (buffer.kind) {
+    case BufferSource::Kind::kNone:
+      return;
+    case BufferSource::Kind::kBinChunk:
+      there = buffer.range.size;
+      break;
+    case BufferSource::Kind::kExternal:
+      there = external(index).size();
+      break;
+    case BufferSource::Kind::kBase64:
+    case BufferSource::Kind::kMemory: {
+      std::array<std::byte, 2> tail{};
+      const uint64_t characters = character_count(buffer);
+      const size_t n = static_cast<size_t>(std::min<uint64_t>(2, characters));
+      read_characters(scene_file_, buffer, characters - n, std::span(tail).first(n));
+      there = base64_bytes(characters, std::span(tail).first(n));
+      break;
+    }
+  }
+  if (there < buffer.byte_length)
+    refuse(document_.path, "buffer " + std::to_string(index) + " claims " +
+                               std::to_string(buffer.byte_length) + " bytes, " +
+                               std::to_string(there) + " are there" +
+                               (buffer.uri.empty() ? "" : " in " + printable(buffer.uri)));
+}
+
+const ReadableFile& BufferReader::external(int index) {
+  const auto found = std::ranges::find(open_, index, &OpenFile::buffer);
+  if (found != open_.end()) return *found->file;
+  const std::string where = document_.path + ": buffer " + std::to_string(index);
+  const std::string& uri = document_.buffers[static_cast<size_t>(index)].uri;
+  const std::string path = resolve_uri(document_.path, uri, where);
+  if (open_.size() == kMaxOpenFiles) open_.erase(open_.begin());
+  try {
+    open_.push_back({index, files_.open_read(path)});
+  } catch (const Error& e) {
+    throw Error(e.code(), where + ": " + e.message());
+  }
+  const FileIdentity identity = open_.back().file->identity();
+  const auto [known, is_new] = external_files_.try_emplace(index, SourceFile{path, identity});
+  if (is_new) external_files_charge_.add(sizeof(*known) + kMapNodeBytes + path.size());
+  if (known->second.identity != identity) known->second.identity = {};
+  return *open_.back().file;
+}
+
+std::span<const std::byte> BufferReader::decode_base64(int index, uint64_t offset, size_t size) {
+  if (characters_.size() == 0)
+    characters_ = PageBuffer<std::byte>(budget_, 4 * kMaxGroups, "base64 of " + document_.path);
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
+  const uint64_t first_group = offset / 3;
+  const uint64_t group_count = (offset + size + 2) / 3 - first_group;
+  const uint64_t begin = 4 * first_group;
+  const uint64_t end = std::min(begin + 4 * group_count, character_count(buffer));
+  const std::span<std::byte> characters(characters_.data(), static_cast<size_t>(end - begin));
+  read_characters(scene_file_, buffer, begin, characters);
+  if (!gltf::decode_base64(characters, window_.data()))
+    refuse(document_.path,
+           "buffer " + std::to_string(index) + ": a character of its data: URI is not base64");
+  return {window_.data() + offset % 3, size};
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,47 @@
+// Random access to the vertex positions of a primitive within a fixed amount of memory: blocks of
+// consecutive vertices, each cached in the one slot that its number maps to. A primitive that fits
+// is read once; so is, about, a larger one whose indices stay near each other.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/page_buffer.h"
+#include "core/scene/gltf/mesh_data/vertex_source.h"
+
+namespace voxdag::gltf {
+
+class VertexCache {
+ public:
+  // The cache takes at most one part in so many of what the budget has free.
+  static constexpr uint64_t kShareOfFree = 4;
+
+  // Room for `vertices`, or for as many as fit that share.
+  VertexCache(MemoryBudget& budget, uint64_t vertices);
+
+  // Forgets everything and serves `source` from now on, which must outlive its use.
+  void bind(VertexSource& source);
+
+  // Three doubles, valid until the next call; `vertex` must be below the source's count.
+  const double* at(uint64_t vertex) {
+    const uint64_t block = vertex / kBlockVertices;
+    const size_t slot = static_cast<size_t>(block) & slot_mask_;
+    if (block_in_slot_[slot] != block) load(block, slot);
+    return &positions_[3 * (slot * kBlockVertices + static_cast<size_t>(vertex % kBlockVertices))];
+  }
+
+ private:
+  static constexpr uint64_t kBlockVertices = 1024;
+  static constexpr uint64_t kNoBlock = ~uint64_t{0};
+
+  void load(uint64_t block, size_t slot);
+
+  PageBuffer<double> positions_;
+  std::vector<uint64_t> block_in_slot_;
+  size_t slot_mask_ = 0;
+  size_t slots_used_ = 0;  // by the source, counted from the first
+  VertexSource* source_ = nullptr;
+};
+
+}  // namespace voxdag::gltf

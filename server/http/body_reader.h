@@ -1,0 +1,36 @@
+// Reads the body of a request from its connection. Memory is bounded whatever the client sends:
+// pieces are passed on as they arrive, and the lines between chunks have a limit. Used by one
+// thread.
+#pragma once
+
+#include "server/http/connection/connection.h"
+#include "server/http/message.h"
+#include "server/http/request_head.h"
+
+namespace voxdag::server {
+
+class BodyReader {
+ public:
+  BodyReader(Connection& connection, const RequestHead& head);
+
+  // As Request::read_body. A malformed chunk is BodyEnd::kBroken.
+  BodyEnd read(const Request::Sink& sink);
+  // Whether the body was read to its end, so that another request may follow.
+  bool is_complete() const { return complete_; }
+
+ private:
+  BodyEnd read_chunks(const Request::Sink& sink);
+  BodyEnd pass(uint64_t bytes, const Request::Sink& sink);
+  // Reads a line without its CRLF; false if it is too long or the connection fails.
+  bool read_line(std::string& line);
+  BodyEnd failure() const;
+
+  Connection& connection_;
+  const uint64_t length_;
+  const bool chunked_;
+  const bool expects_continue_;
+  bool complete_;
+  size_t extra_bytes_ = 0;  // chunk extensions and trailers so far, which are ignored
+};
+
+}  // namespace voxdag::server

@@ -1,0 +1,135 @@
+// Defects that an attack on the program found; each test is named for the entry of the report.
+#include <filesystem>
+
+#include "tests/cli/command_line.h"
+#include "tests/cli/serve_process.h"
+
+namespace command_line {
+namespace {
+
+class Hardening : public CommandLine {
+ protected:
+  void SetUp() override { make_scene(); }
+  void build() { run_json({"build", "m.glb", "-r", "64", "-o", "m.vdag"}); }
+  // Runs a command that would overwrite `name`, which it must refuse and leave as it is.
+  void expect_refused(const std::string& name, const std::vector<std::string>& args) {
+    SCOPED_TRACE(name);
+    const std::string before = contents(name);
+    expect_error(2, name, args);
+    EXPECT_TRUE(contents(name) == before);
+  }
+};
+
+constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, for a byte that is not UTF-8
+
+// A path is bytes; in JSON those that are not UTF-8 are replaced, and the file has the exact name.
+TEST_F(Hardening, L3_PathsNeedNotBeUtf8) {
+  build();
+  const auto expect_output = [&](std::vector<std::string> args, const std::string& suffix) {
+    SCOPED_TRACE(suffix);
+    EXPECT_EQ(run_json(std::move(args)).at("output"), "p" + std::string(kReplacement) + suffix);
+    EXPECT_TRUE(exists("p\xff" + suffix));
+  };
+  expect_output({"generate", "menger", "p\xff.glb", "--level", "1"}, ".glb");
+  expect_output({"render", "m.vdag", "-o", "p\xff.png", "--size", "32x32"}, ".png");
+  expect_output({"build", "m.glb", "-r", "64", "-o", "p\xff.vdag"}, ".vdag");
+  run_json({"info", "p\xff.vdag"});
+  run_json({"verify", "p\xff.vdag"});
+  run_json({"diff", "p\xff.vdag", "m.vdag"});
+}
+
+// In a request there is no replacement for such bytes: they are invalid input, not an invalid
+// answer.
+TEST_F(Hardening, L3_ClientsRefuseNamesThatAreNotUtf8) {
+  std::filesystem::create_directory(folder_.file("server"));
+  ServeProcess server(folder_.file("server"));
+  const auto client = [&](std::vector<std::string> args) {
+    args.insert(args.end(), {"--server", server.url()});
+    return args;
+  };
+  expect_error(2, "UTF-8", client({"submit", "m.glb", "-r", "64", "--name", "\xff"}));
+  expect_error(2, "UTF-8", client({"submit", "/none\xff.glb", "-r", "64"}));
+  const std::string id = run_json(client({"submit", "m.glb", "-r", "64", "--wait"})).at("id");
+  const Json report = run_json(client({"download", id, "-o", "d\xff.vdag"}));
+  EXPECT_EQ(report.at("output"), "d" + std::string(kReplacement) + ".vdag");
+  EXPECT_TRUE(exists("d\xff.vdag"));
+  // L6: download replaces results only.
+  put("notes.txt", "mine");
+  expect_refused("notes.txt", client({"download", id, "-o", "notes.txt"}));
+  run_json(client({"download", id, "-o", "notes.txt", "--force"}));
+  run_json(client({"download", id, "-o", "notes.txt"}));
+  EXPECT_EQ(server.stop(), 0);
+}
+
+// Only what the same command has made is replaced, unless --force is given; never the input.
+TEST_F(Hardening, L6_ForeignFilesAreNotOverwritten) {
+  build();
+  const std::vector<std::string> render = {"render", "m.vdag", "--size", "32x32", "-o"};
+  const std::vector<std::string> generate = {"generate", "menger", "--level", "1"};
+  for (std::vector<std::string> args : {render, generate}) {
+    SCOPED_TRACE(args[0]);
+    // Neither text, nor a picture and a scene of another program, nor a file cut short.
+    for (const char* bytes : {"mine", "\x89PNG\r\n\x1a\n", "glTF", "g"}) {
+      put("mine", bytes);
+      args.push_back("mine");
+      expect_refused("mine", args);
+      args.back() = "other";
+      std::filesystem::rename(folder_.file("mine"), folder_.file("other.partial"));
+      expect_refused("other.partial", args);
+      std::filesystem::remove(folder_.file("other.partial"));
+      args.pop_back();
+    }
+    put("mine", "mine");
+    args.push_back("mine");
+    args.push_back("--force");
+    run_json(args);
+    args.pop_back();
+    run_json(args);
+    args.back() = folder_.path();
+    expect_error(2, "not a regular file", args);
+  }
+  expect_refused("m.vdag", {"render", "m.vdag", "-o", "m.vdag", "--force"});
+  std::filesystem::create_hard_link(folder_.file("m.vdag"), folder_.file("same.partial"));
+  expect_refused("same.partial", {"render", "m.vdag", "-o", "same", "--force"});
+}
+
+// The files next to the result are as safe as the result.
+TEST_F(Hardening, L6_ABuildRefusesToOverwriteItsNeighbors) {
+  for (const char* name : {"q", "q.partial", "q.report.json", "q.report.json.partial"}) {
+    put(name, "mine");
+    expect_refused(name, {"build", "m.glb", "-r", "64", "-o", "q"});
+    std::filesystem::remove(folder_.file(name));
+  }
+  std::filesystem::copy_file(folder_.file("m.glb"), folder_.file("s.partial"));
+  expect_refused("s.partial", {"build", "s.partial", "-r", "64", "-o", "s"});
+  run_json({"build", "m.glb", "-r", "64", "-o", "q"});
+  run_json({"build", "m.glb", "-r", "128", "-o", "q"});
+}
+
+// Numbers mean what is written, and an error is one line that says what was expected.
+TEST_F(Hardening, L8_NumbersAndMessages) {
+  const std::vector<std::string> build = {"build", "m.glb", "-o", "m.vdag", "-r"};
+  for (const char* number : {"-4", "abc", "64x", "", "99999999999999999999", "6.4"}) {
+    SCOPED_TRACE(number);
+    std::vector<std::string> args = build;
+    args.push_back(number);
+    expect_error(2, "--resolution: '" + std::string(number) + "': expected a whole number", args);
+  }
+  expect_error(2, "--threads: '-1'",
+               {"build", "m.glb", "-o", "m.vdag", "-r", "64", "--threads", "-1"});
+  expect_error(2, "above 0", {"generate", "city", "c.glb", "--triangles", "0"});
+  for (const std::vector<std::string>& args : {std::vector<std::string>{},
+                                               {"biuld"},
+                                               {"info"},
+                                               {"info", "x", "--frob"},
+                                               {"serve", "--port", "x"}}) {
+    const Answer answer = run(args);
+    EXPECT_EQ(answer.status, 2);
+    EXPECT_EQ(answer.err.find("voxdag: error: "), 0u) << answer.err;
+    EXPECT_EQ(answer.err.find('\n'), answer.err.size() - 1) << answer.err;
+    EXPECT_EQ(answer.err.find("Run with"), std::string::npos) << answer.err;
+  }
+}
+
+}  // namespace
+}  // namespace command_line

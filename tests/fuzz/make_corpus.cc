@@ -1,0 +1,197 @@
+// Writes the first inputs of the fuzz targets below a folder:
+//
+//     fuzz_make_corpus tests/fuzz/corpus
+//
+// Run it again when a format gets a new version. What the fuzzers found in addition is committed
+// beside these, under names that are hashes.
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include "core/format/artifact/artifact_index.h"
+#include "core/format/artifact/frame_codec.h"
+#include "core/format/global/global_layout.h"
+#include "merge/checkpoint/merge_state.h"
+#include "scheduler/ingest/ingest_record.h"
+#include "tests/unit/format/test_artifacts.h"
+#include "tests/unit/format/test_files.h"
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+std::string text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+class Corpus {
+ public:
+  explicit Corpus(std::filesystem::path root) : root_(std::move(root)) {}
+  void add(const std::string& target, const std::string& name, const std::string& bytes) const {
+    std::filesystem::create_directories(root_ / target);
+    write_bytes((root_ / target / name).string(), bytes);
+  }
+
+ private:
+  const std::filesystem::path root_;
+};
+
+// Every kind of geometry that voxdag reads, in one small scene.
+SceneBuilder rich_scene() {
+  SceneBuilder scene = one_triangle();
+  const int joints = scene.add_accessor<uint8_t>("VEC4", kU8, std::vector<uint8_t>(12, 0));
+  const int weights = scene.add_accessor<float>("VEC4", kF32, std::vector<float>(12, 0.25f));
+  Json& primitive = scene.root["meshes"][0]["primitives"][0];
+  primitive["attributes"]["JOINTS_0"] = joints;
+  primitive["attributes"]["WEIGHTS_0"] = weights;
+  primitive["targets"] =
+      Json::array({{{"POSITION", scene.add_positions(std::vector<float>(9, 1))}}});
+  Json strip = primitive;
+  strip["mode"] = 5;
+  scene.root["meshes"][0]["primitives"].push_back(strip);
+  scene.root["meshes"][0]["weights"] = {0.5};
+  scene.root["accessors"][0]["sparse"] = {
+      {"count", 1},
+      {"indices", {{"bufferView", scene.add_view<uint8_t>({2})}, {"componentType", kU8}}},
+      {"values", {{"bufferView", scene.add_view<float>({0, 1, 0})}}}};
+  scene.add("skins", {{"joints", {0, 1}}});
+  scene.add_root({{"mesh", 0}, {"skin", 0}});
+  const int translations = scene.add_positions({0, 0, 1, 0, 0, 2});
+  scene.add_root(
+      {{"mesh", 0},
+       {"scale", {1, 2, 3}},
+       {"extensions",
+        {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", translations}}}}}}}});
+  scene.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0.5, 0, 1}}}}}};
+  scene.root["images"] = {{{"uri", "data:image/png;base64,AAAA"}}};
+  scene.root["textures"] = {{{"source", 0}}};
+  return scene;
+}
+
+void add_scenes(const Corpus& corpus) {
+  const SceneBuilder rich = rich_scene();
+  corpus.add("gltf_document", "triangle.glb", one_triangle().glb());
+  corpus.add("gltf_document", "rich.glb", rich.glb());
+  corpus.add("gltf_document", "rich.gltf",
+             rich.gltf("data:application/octet-stream;base64," + base64(rich.bin)));
+  corpus.add("gltf_document", "empty.gltf", R"({"asset":{"version":"2.0"}})");
+}
+
+// The index without its file, and the frames with the prefix that the target expects.
+void add_artifacts(const Corpus& corpus) {
+  TemporaryFolder folder;
+  constexpr uint32_t kGridLevels = 6, kHashBits = 64;
+  MemoryBudget budget(uint64_t{64} << 20);
+  SegmentWriter segment(system_files(), folder.path(), 1, budget);
+  const SubDag dag = random_rows(1, 24, kGridLevels, 2, kHashBits);
+  ArtifactRoot root;
+  root.cube.level = kGridLevels - 4;
+  root.hash = dag.levels.back().hashes[0];
+  root.voxels = root.svo_nodes = 1;
+  const ArtifactRef ref = write_artifact(segment, dag, kGridLevels, kHashBits, std::span(&root, 1));
+  const std::string file = read_bytes(segment_path(folder.path(), 1));
+  corpus.add("artifact_index", "two_levels", file.substr(ref.index_offset));
+
+  const auto prefix = [](bool bricks, size_t rows, size_t children) {
+    const size_t r = rows - 1, c = children - rows;
+    std::string bytes(5, '\0');
+    bytes[0] = static_cast<char>((bricks ? 1 : 0) | (kHashBits - 4) << 1);
+    bytes[1] = static_cast<char>(r);
+    bytes[2] = static_cast<char>(r >> 8);
+    bytes[3] = static_cast<char>(c);
+    bytes[4] = static_cast<char>(c >> 8);
+    return bytes;
+  };
+  for (const size_t rows : {size_t{24}, size_t{600}}) {
+    const SubDag level = random_rows(2, rows, kGridLevels, 1, kHashBits);
+    const NodeLevelView nodes = level.levels[0].view();
+    FrameEncoder encoder;
+    const std::string name = std::to_string(rows);
+    corpus.add("artifact_frame", "bricks_" + name,
+               prefix(true, level.brick_masks.size(), level.brick_masks.size()) +
+                   text_of(encoder.encode_bricks(level.brick_masks)));
+    corpus.add("artifact_frame", "nodes_" + name,
+               prefix(false, nodes.masks.size(), nodes.children.size()) +
+                   text_of(encoder.encode_nodes(nodes)));
+  }
+}
+
+// The used part of the header page and the levels, without the checksum table.
+void add_global_files(const Corpus& corpus) {
+  TemporaryFolder folder;
+  for (const int edge : {4, 16, 64}) {
+    const std::string path = folder.path() + "/" + std::to_string(edge) + ".vdag";
+    write_global(path, random_voxels(1, edge));
+    const std::string file = read_bytes(path);
+    uint64_t table_at = 0;
+    std::memcpy(&table_at, file.data() + global_layout::kTableOffsetAt, sizeof table_at);
+    const size_t page = global_layout::kPageBytes;
+    corpus.add("global_file", std::to_string(edge),
+               file.substr(0, global_layout::kAttributesAt) + file.substr(page, table_at - page));
+  }
+}
+
+void add_records(const Corpus& corpus) {
+  const auto without_checksum = [](const std::vector<std::byte>& bytes) {
+    return text_of(std::span(bytes).first(bytes.size() - sizeof(uint64_t)));
+  };
+  MergeState state;
+  state.inputs_checksum = 7;
+  state.intermediates = {{.segment = 1, .offset = 32, .bytes = 64}};
+  corpus.add("merge_state", "pass", without_checksum(encode_state(state)));
+  FinalPassState& pass = state.final_pass.emplace();
+  pass.level = 3;
+  pass.output = "out.vdag";
+  pass.file.levels = {{4, 20}};
+  pass.file.checksums = {1, 2};
+  pass.map_rows = {5};
+  pass.placed = {{}};
+  pass.roots = {{}};
+  corpus.add("merge_state", "final_pass", without_checksum(encode_state(state)));
+
+  IngestRecord record;
+  record.request = R"({"resolution":1024})";
+  record.files = {{"scene.glb", {1, 2, 3, 4}}};
+  record.state.digest = ContentDigest(grid_of(64));
+  corpus.add("ingest_record", "one_file", without_checksum(encode(record)));
+}
+
+void add_requests(const Corpus& corpus) {
+  corpus.add(
+      "job_request", "all_options",
+      R"({"scene":["a.glb","b.glb"],"resolution":1024,"name":"all","priority":-3,"options":{)"
+      R"("bounds":[0,0,0,1.5],"skip_invalid":true,"hash_bits":64,"memory":"2GiB","threads":2,)"
+      R"("subvolume":256,"backend":"cpu","method":"consing"}})");
+  corpus.add("job_request", "one_scene", R"({"scene":"a.glb","resolution":4})");
+  corpus.add("job_request", "voxel_size",
+             R"({"scene":"a.glb","resolution":64,"options":{"voxel_size":0.5,"memory":1e9}})");
+  const std::string host = "Host: localhost\r\n";
+  corpus.add("http_request", "get", "GET /api/v1/jobs?limit=2 HTTP/1.1\r\n" + host + "\r\n");
+  corpus.add("http_request", "pipelined",
+             "GET / HTTP/1.1\r\n" + host + "\r\nHEAD /a%20b HTTP/1.1\r\n" + host +
+                 "Range: bytes=0-1\r\nConnection: close\r\n\r\n");
+  corpus.add("http_request", "post",
+             "POST /x HTTP/1.1\r\n" + host + "Content-Length: 5\r\n\r\nhello");
+  corpus.add("http_request", "chunked",
+             "PUT /x HTTP/1.1\r\n" + host +
+                 "Transfer-Encoding: chunked\r\n\r\n5;a=b\r\nhello\r\n0\r\nTrailer: 1\r\n\r\n");
+  corpus.add("http_request", "expect",
+             "PUT /x HTTP/1.1\r\n" + host + "Expect: 100-continue\r\nContent-Length: 2\r\n\r\nab");
+}
+
+}  // namespace
+}  // namespace voxdag::test
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: %s FOLDER\n", argv[0]);
+    return 2;
+  }
+  const voxdag::test::Corpus corpus(argv[1]);
+  voxdag::test::add_scenes(corpus);
+  voxdag::test::add_artifacts(corpus);
+  voxdag::test::add_global_files(corpus);
+  voxdag::test::add_records(corpus);
+  voxdag::test::add_requests(corpus);
+  return 0;
+}

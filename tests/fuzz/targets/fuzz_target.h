@@ -1,0 +1,27 @@
+// What the fuzz targets share. A target is one function: it passes the bytes to a decoder and
+// aborts where a property does not hold. Errors that the decoder documents are outcomes like any
+// other; every other exception ends the process, which is a finding.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
+
+namespace voxdag::fuzz {
+
+// Ends the process with a message unless `holds`.
+inline void require(bool holds, const char* property) {
+  if (holds) return;
+  std::fprintf(stderr, "fuzz target: this does not hold: %s\n", property);
+  std::abort();
+}
+
+inline std::span<const std::byte> bytes_of(const uint8_t* data, size_t size) {
+  return std::as_bytes(std::span(data, size));
+}
+
+}  // namespace voxdag::fuzz

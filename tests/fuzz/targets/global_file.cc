@@ -1,0 +1,125 @@
+// Global files: the reader, lookups, rays and the verifier. The input is the used part of the
+// header page and the levels; sizes, checksums and the checksum table are made to fit, so that a
+// mutation reaches what is behind them.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/verify.h"
+#include "core/format/global/voxdag_reader.h"
+#include "query/ray_caster.h"
+#include "tests/fuzz/targets/fuzz_target.h"
+
+namespace voxdag {
+namespace {
+
+namespace layout = global_layout;
+constexpr uint64_t kMaxVisits = 4096;
+constexpr uint64_t kBudgetBytes = uint64_t{16} << 20;
+
+void put(std::vector<std::byte>& file, size_t at, uint64_t value) {
+  std::memcpy(file.data() + at, &value, sizeof value);
+}
+
+std::vector<std::byte> make_file(std::span<const std::byte> input) {
+  const auto head = input.first(std::min(input.size(), layout::kAttributesAt));
+  const auto levels = input.subspan(head.size());
+  std::vector<std::byte> file(layout::kPageBytes + layout::round_up_to_page(levels.size()));
+  std::ranges::copy(head, file.begin());
+  std::ranges::copy(levels, file.begin() + layout::kPageBytes);
+  const size_t table_at = file.size();
+  std::vector<uint64_t> table;
+  for (size_t at = layout::kPageBytes; at < table_at; at += layout::kChecksumBlockBytes)
+    table.push_back(checksum64(
+        std::span(file).subspan(at, std::min<size_t>(layout::kChecksumBlockBytes, table_at - at))));
+  const auto table_bytes = std::as_bytes(std::span(table));
+  file.insert(file.end(), table_bytes.begin(), table_bytes.end());
+  put(file, layout::kFileBytesAt, file.size());
+  put(file, layout::kTableOffsetAt, table_at);
+  put(file, layout::kTableCountAt, table.size());
+  put(file, layout::kTableChecksumAt, checksum64(table_bytes));
+  put(file, layout::kHeaderChecksumAt,
+      checksum64(std::span(file).first(layout::kHeaderChecksumAt)));
+  return file;
+}
+
+// A file without a name, for a reader that opens paths.
+class NamelessFile {
+ public:
+  explicit NamelessFile(std::span<const std::byte> bytes) : fd_(memfd_create("fuzz", MFD_CLOEXEC)) {
+    fuzz::require(
+        fd_ >= 0 && ::write(fd_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
+        "a file can be made in memory");
+  }
+  NamelessFile(const NamelessFile&) = delete;
+  ~NamelessFile() { ::close(fd_); }
+  std::string path() const { return "/proc/self/fd/" + std::to_string(fd_); }
+
+ private:
+  const int fd_;
+};
+
+// Visits a part of the octree.
+struct BoundedVisitor {
+  uint64_t left = kMaxVisits;
+  bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) { return left > 0 && --left > 0; }
+  void brick(int64_t, int64_t, int64_t, uint64_t, uint64_t) {}
+};
+
+void read_all(const voxdag_reader::File& file) {
+  BoundedVisitor visitor;
+  file.walk(visitor);
+  const int64_t last = file.resolution() - 1;
+  for (const int64_t at : {int64_t{0}, last / 3, last}) (void)file.voxel(at, last - at, at / 2);
+}
+
+void cast_rays(const voxdag_reader::File& file) {
+  const query::DagView view(file);
+  if (view.empty()) return;
+  const double edge = static_cast<double>(file.resolution());
+  for (const query::Vec toward :
+       {query::Vec{{1, 0.3, 0.2}}, query::Vec{{0, 0, -1}}, query::Vec{{-0.5, 1, 1}}}) {
+    const query::Vec direction = query::normalized(toward);
+    const query::Ray ray{query::Vec{{edge / 2, edge / 2, edge / 2}} + direction * (-2 * edge),
+                         direction};
+    query::Hit hit;
+    query::RayCaster(view).cast(ray, {edge / 512, 0}, 0, 4 * edge, hit);
+  }
+}
+
+}  // namespace
+}  // namespace voxdag
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace voxdag;
+  const NamelessFile bytes(make_file(fuzz::bytes_of(data, size)));
+  try {
+    const voxdag_reader::File file(bytes.path());
+    fuzz::require(file.first_damaged_block() == 0, "checksums that fit are found to fit");
+    MemoryBudget budget(kBudgetBytes);
+    NoProgress progress;
+    bool is_sound = true;
+    try {
+      verify_global_file(file, budget, progress, CancelToken());
+    } catch (const Error&) {
+      is_sound = false;
+    }
+    try {
+      read_all(file);
+      cast_rays(file);
+    } catch (const std::exception&) {
+      fuzz::require(!is_sound, "a file that verifies can be read");
+      throw;
+    }
+  } catch (const voxdag_reader::Error&) {
+  } catch (const Error&) {
+  }
+  return 0;
+}

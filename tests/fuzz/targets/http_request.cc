@@ -1,0 +1,89 @@
+// Bytes that a client sends to the service's port, through a real connection: the service answers
+// with HTTP or closes the connection, and goes on serving.
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <string>
+#include <thread>
+
+#include "server/http/http_server.h"
+#include "tests/fuzz/targets/fuzz_target.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr int kAnswerTimeout_ms = 20000;
+
+// Answers every request with its target and what it could read of the body.
+Response echo(Request& request) {
+  std::string body = request.method + " " + request.target.path + "\n";
+  if (request.read_body)
+    request.read_body([&](std::string_view piece) {
+      body += piece;
+      return body.size() < 65536;
+    });
+  return make_response(200, "text/plain", "no-store", body);
+}
+
+class EchoServer {
+ public:
+  EchoServer() : server_(options(), echo), thread_([this] { server_.run(0); }) {}
+  ~EchoServer() {
+    server_.stop();
+    thread_.join();
+  }
+  int port() const { return server_.port(); }
+
+ private:
+  static HttpOptions options() {
+    HttpOptions options;
+    options.port = 0;
+    options.limits.max_header_bytes = 4096;
+    return options;
+  }
+
+  HttpServer server_;
+  std::thread thread_;
+};
+
+std::string exchange(int port, const uint8_t* data, size_t size) {
+  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<uint16_t>(port));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  fuzz::require(fd >= 0 && ::connect(fd, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0,
+                "the service accepts connections");
+  // The service may refuse the rest of what is sent to it.
+  for (size_t sent = 0; sent < size;) {
+    const ssize_t n = ::send(fd, data + sent, size - sent, MSG_NOSIGNAL);
+    if (n <= 0) break;
+    sent += static_cast<size_t>(n);
+  }
+  ::shutdown(fd, SHUT_WR);
+  std::string answer;
+  for (char buffer[4096];;) {
+    pollfd waiting{fd, POLLIN, 0};
+    fuzz::require(::poll(&waiting, 1, kAnswerTimeout_ms) == 1,
+                  "the service ends an exchange with a client that sends no more");
+    const ssize_t n = ::recv(fd, buffer, sizeof buffer, 0);
+    if (n <= 0) break;
+    answer.append(buffer, static_cast<size_t>(n));
+  }
+  ::close(fd);
+  return answer;
+}
+
+}  // namespace
+}  // namespace voxdag::server
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace voxdag;
+  static server::EchoServer service;
+  const std::string answer = server::exchange(service.port(), data, size);
+  fuzz::require(answer.empty() || answer.starts_with("HTTP/1.1 "), "an answer is HTTP/1.1");
+  return 0;
+}

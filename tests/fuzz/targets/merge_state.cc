@@ -1,0 +1,25 @@
+// The durable state of a merge, whose checksum is made to fit: a decoded state is encoded to the
+// same bytes.
+#include "merge/checkpoint/merge_state.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/format/bytes.h"
+#include "core/format/checksum.h"
+#include "tests/fuzz/targets/fuzz_target.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace voxdag;
+  const auto input = fuzz::bytes_of(data, size);
+  std::vector<std::byte> bytes(input.begin(), input.end());
+  ByteSink(bytes).put(checksum64(input));
+  try {
+    fuzz::require(std::ranges::equal(encode_state(decode_state(bytes)), bytes),
+                  "a state that was decoded is encoded to the same bytes");
+  } catch (const Error& error) {
+    fuzz::require(error.code() == ErrorCode::kCorrupt, "a bad state is an error of kind corrupt");
+  }
+  return 0;
+}

@@ -1,0 +1,284 @@
+#!/usr/bin/env python3
+"""Many clients use one service for a long time, and the service is killed now and then.
+
+    tests/long/soak.py [--voxdag build/cpu/voxdag] [--minutes 60] [--clients 20] [--kill-every 5]
+
+Each client repeats, chosen by its seed: upload a scene, submit a job, follow its events, download and
+compare the result, cancel, suspend and resume, retry, delete. Every KILL-EVERY minutes the service is
+killed (SIGKILL) and started again at once on the same data. What must hold:
+
+  - a result has the SHA-256 that a build without a service gives, and so have its bytes;
+  - a job that was acknowledged is never lost, and none fails;
+  - memory and file descriptors of the service do not grow from the first quarter to the last.
+
+Prints a line per minute; exit status 1 if anything does not hold.
+"""
+
+import argparse
+import hashlib
+import http.client
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+REQUEST_TIMEOUT_S = 60
+JOB_TIMEOUT_S = 600
+SCENES = {"menger": ["menger"], "city": ["city"], "terrain": ["terrain"]}
+RESOLUTIONS = [256, 512, 1024]
+ENDED = ("succeeded", "failed", "canceled")
+
+
+class Failure(Exception):
+    """Something that must hold does not."""
+
+
+class Service:
+    """The service on one port and one data folder, over any number of kills."""
+
+    def __init__(self, voxdag, folder):
+        self.voxdag, self.folder = voxdag, folder
+        self.port = 0
+        self.log_path = folder / "service.log"
+        self.stopping = False
+        self.start()
+
+    def start(self):
+        begin = self.log_path.stat().st_size if self.log_path.exists() else 0
+        with open(self.log_path, "a", encoding="utf-8") as log:
+            self.process = subprocess.Popen(
+                [self.voxdag, "serve", "--port", str(self.port), "--data", self.folder / "data"],
+                stderr=log)
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            text = self.log_path.read_text(encoding="utf-8")[begin:]
+            if found := re.search(r"listening on http://[^:]+:(\d+)", text):
+                self.port = int(found[1])
+                return
+            if self.process.poll() is not None:
+                raise Failure(f"the service ended with {self.process.returncode}: {text[-500:]}")
+            time.sleep(0.02)
+        raise Failure("the service does not start within 60 s")
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.start()
+
+    def usage(self):
+        """Resident KiB and open file descriptors."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return (int(re.search(r"VmRSS:\s+(\d+)", status)[1]),
+                len(os.listdir(f"/proc/{self.process.pid}/fd")))
+
+
+class Client(threading.Thread):
+    """One user. Requests that a kill breaks are repeated, as the API's documentation says."""
+
+    def __init__(self, service, number, expected, scenes, until, counts):
+        super().__init__(daemon=True)
+        self.service, self.number, self.expected, self.scenes = service, number, expected, scenes
+        self.until, self.counts = until, counts
+        self.random = random.Random(number)
+        self.failure = None
+
+    def run(self):
+        try:
+            while time.monotonic() < self.until:
+                self.one_job()
+        except Exception as failure:  # pylint: disable=broad-except
+            self.failure = f"client {self.number}: {type(failure).__name__}: {failure}"
+
+    def count(self, what):
+        with self.counts["lock"]:
+            self.counts[what] = self.counts.get(what, 0) + 1
+
+    def request(self, method, path, body=None, headers=None):
+        """The status and bytes of the answer; repeats what got no answer, and what was too busy."""
+        deadline = time.monotonic() + JOB_TIMEOUT_S
+        while True:
+            try:
+                connection = http.client.HTTPConnection("127.0.0.1", self.service.port,
+                                                        timeout=REQUEST_TIMEOUT_S)
+                try:
+                    connection.request(method, path, body, headers or {})
+                    answer = connection.getresponse()
+                    data = answer.read()
+                finally:
+                    connection.close()
+                if answer.status not in (429, 503):
+                    return answer.status, data
+            except (OSError, http.client.HTTPException):
+                self.count("repeated requests")
+            if time.monotonic() > deadline:
+                raise Failure(f"{method} {path}: no answer for {JOB_TIMEOUT_S} s")
+            time.sleep(0.2)
+
+    def job(self, job_id):
+        status, data = self.request("GET", f"/api/v1/jobs/{job_id}")
+        if status != 200:
+            raise Failure(f"job {job_id} is lost: {status} {data[:200]}")
+        return json.loads(data)
+
+    def wait(self, job_id, states):
+        deadline = time.monotonic() + JOB_TIMEOUT_S
+        while time.monotonic() < deadline:
+            job = self.job(job_id)
+            if job["state"] in states:
+                return job
+            if job["state"] == "failed":
+                raise Failure(f"job {job_id} failed: {job['error']}")
+            time.sleep(0.1)
+        raise Failure(f"job {job_id} is {job['state']} after {JOB_TIMEOUT_S} s")
+
+    def follow(self, job_id):
+        """Reads the event stream until it ends or breaks."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.service.port,
+                                                timeout=REQUEST_TIMEOUT_S)
+        try:
+            connection.request("GET", f"/api/v1/jobs/{job_id}/events")
+            answer = connection.getresponse()
+            while answer.read(4096):
+                pass
+        except (OSError, http.client.HTTPException):
+            self.count("broken streams")
+        finally:
+            connection.close()
+
+    def one_job(self):
+        name, resolution = self.random.choice(sorted(self.scenes)), self.random.choice(RESOLUTIONS)
+        scene = f"{name}-{self.random.randrange(4)}.glb"
+        status, data = self.request("PUT", f"/api/v1/scenes/{scene}", self.scenes[name])
+        if status not in (200, 201, 409):
+            raise Failure(f"upload: {status} {data[:200]}")
+        if self.request("HEAD", f"/api/v1/scenes/{scene}")[0] == 404:
+            return
+        key = f"{self.number}-{self.random.getrandbits(64):x}"
+        body = json.dumps({"scene": scene, "resolution": resolution, "name": key})
+        status, data = self.request("POST", "/api/v1/jobs", body, {
+            "Content-Type": "application/json", "Idempotency-Key": key})
+        if status == 404 or status == 409:
+            return
+        if status != 202:
+            raise Failure(f"submit: {status} {data[:200]}")
+        job_id = json.loads(data)["id"]
+        self.count("jobs")
+        plan = self.random.random()
+        if plan < 0.15:
+            self.request("POST", f"/api/v1/jobs/{job_id}/cancel")
+            job = self.wait(job_id, ENDED)
+            if job["state"] == "canceled" and plan < 0.07:
+                self.request("POST", f"/api/v1/jobs/{job_id}/retry")
+            elif job["state"] == "canceled":
+                self.count("canceled")
+                return self.remove(job_id)
+        elif plan < 0.3:
+            self.request("POST", f"/api/v1/jobs/{job_id}/suspend")
+            self.wait(job_id, ("suspended",) + ENDED)
+            self.request("POST", f"/api/v1/jobs/{job_id}/resume")
+        elif plan < 0.6:
+            self.follow(job_id)
+        job = self.wait(job_id, ("succeeded",))
+        status, dag = self.request("GET", f"/api/v1/jobs/{job_id}/dag")
+        expected = self.expected[name, resolution]
+        if status != 200 or hashlib.sha256(dag).hexdigest() != expected:
+            raise Failure(f"job {job_id}: the downloaded bytes are not those of a local build")
+        if job["result"]["sha256"] != expected:
+            raise Failure(f"job {job_id}: another SHA-256 than that of a local build")
+        self.count("verified")
+        return self.remove(job_id)
+
+    def remove(self, job_id):
+        status, data = self.request("DELETE", f"/api/v1/jobs/{job_id}")
+        if status not in (204, 404):
+            raise Failure(f"delete {job_id}: {status} {data[:200]}")
+        return None
+
+
+def prepare(voxdag, folder):
+    """The scenes' bytes, and the SHA-256 of each at each resolution."""
+    scenes, expected = {}, {}
+    for name, arguments in SCENES.items():
+        path = folder / f"{name}.glb"
+        subprocess.run([voxdag, "generate", *arguments, path], check=True, capture_output=True)
+        scenes[name] = path.read_bytes()
+        for resolution in RESOLUTIONS:
+            built = subprocess.run([voxdag, "build", path, "-r", str(resolution), "-o",
+                                    folder / "out.vdag", "--json"],
+                                   check=True, capture_output=True, text=True)
+            expected[name, resolution] = json.loads(built.stdout)["sha256"]
+    return scenes, expected
+
+
+def grew(samples, slack):
+    """Whether the median of the last quarter is more than `slack` times that of the first."""
+    quarter = max(1, len(samples) // 4)
+    first, last = sorted(samples[:quarter]), sorted(samples[-quarter:])
+    return last[len(last) // 2] > slack * first[len(first) // 2]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--voxdag", default="build/cpu/voxdag", type=Path)
+    parser.add_argument("--minutes", default=60, type=float)
+    parser.add_argument("--clients", default=20, type=int)
+    parser.add_argument("--kill-every", default=5, type=float)
+    arguments = parser.parse_args()
+    voxdag = arguments.voxdag.resolve()
+    with tempfile.TemporaryDirectory(prefix="voxdag-soak-") as name:
+        return soak(voxdag, Path(name), arguments)
+
+
+def soak(voxdag, folder, arguments):
+    scenes, expected = prepare(voxdag, folder)
+    service = Service(voxdag, folder)
+    begin = time.monotonic()
+    counts = {"lock": threading.Lock()}
+    clients = [Client(service, number, expected, scenes, begin + 60 * arguments.minutes, counts)
+               for number in range(arguments.clients)]
+    for client in clients:
+        client.start()
+    memory, files, kills = [], [], 0
+    next_kill, next_line = begin + 60 * arguments.kill_every, begin
+    while any(client.is_alive() for client in clients):
+        now = time.monotonic()
+        if service.process.poll() is not None:
+            raise Failure(f"the service ended by itself with {service.process.returncode}")
+        if now >= next_line:
+            next_line += 60
+            rss_kib, descriptors = service.usage()
+            if now - begin > 60:  # Clients have connected.
+                memory.append(rss_kib)
+                files.append(descriptors)
+            shown = {k: v for k, v in sorted(counts.items()) if k != "lock"}
+            print(f"{(now - begin) / 60:5.0f} min  {rss_kib / 1024:6.1f} MiB  {descriptors:4} files  "
+                  f"{kills} kills  {shown}", flush=True)
+        if now >= next_kill:
+            next_kill += 60 * arguments.kill_every
+            service.kill()
+            kills += 1
+        time.sleep(0.1)
+    failures = [client.failure for client in clients if client.failure]
+    if memory and grew(memory, 1.5):
+        failures.append(f"resident memory grows: {memory} KiB")
+    if files and grew(files, 1.5):
+        failures.append(f"open files grow: {files}")
+    service.process.send_signal(signal.SIGTERM)
+    if service.process.wait(timeout=60) != 0:
+        failures.append(f"SIGTERM: exit status {service.process.returncode}")
+    shown = {k: v for k, v in sorted(counts.items()) if k != "lock"}
+    print(f"{kills} kills, {shown}")
+    for failure in failures:
+        print("FAILED ", failure)
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
