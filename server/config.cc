@@ -96,7 +96,9 @@ Members members_of(ServerConfig& c) {
   transfers.add("max_scene_size", c.transfers.max_scene_bytes)
       .add("max_body_size", c.transfers.max_body_bytes)
       .add("max_concurrent", c.transfers.max_concurrent)
+      .add("max_per_client", c.transfers.max_per_client)
       .add("max_event_streams", c.transfers.max_event_streams)
+      .add("max_event_streams_per_client", c.transfers.max_event_streams_per_client)
       .add("max_requests_per_s", c.transfers.max_requests_per_s);
   connections.add("max_connections", c.http.limits.max_connections)
       .add("max_per_client", c.http.limits.max_per_client)

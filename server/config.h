@@ -7,6 +7,7 @@
 
 #include "core/io/file_system.h"
 #include "server/http/http_server.h"
+#include "server/steps.h"
 
 namespace voxdag::server {
 
@@ -28,8 +29,10 @@ struct JobLimits {
 struct TransferLimits {
   uint64_t max_scene_bytes = uint64_t{64} << 30;
   uint64_t max_body_bytes = 64 << 10;  // of JSON
-  size_t max_concurrent = 64;          // uploads and downloads
+  size_t max_concurrent = 64;          // uploads, and as many downloads
+  size_t max_per_client = 16;          // of each
   size_t max_event_streams = 256;
+  size_t max_event_streams_per_client = 64;
   double max_requests_per_s = 200;  // per address, twice that in bursts; the loopback is exempt
 };
 
@@ -50,6 +53,8 @@ struct ServerConfig {
   JobLimits jobs;
   TransferLimits transfers;
   Retention retention;
+  bool adopt = false;           // takes up jobs and scenes whose records are lost
+  StepHook before_step;         // for tests
   double drain_timeout_s = 10;  // for requests in progress when the service stops
 };
 

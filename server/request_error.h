@@ -1,7 +1,7 @@
 // Why queue, scenes and jobs refuse a request. They throw a RequestError for what its client can
 // set right, and an Error for everything else; server/api turns both into answers. The message of a
 // RequestError is written for clients and holds no path of the server; that of an Error may, and is
-// replaced by public_text().
+// replaced by public_error().
 #pragma once
 
 #include <cstdint>
@@ -41,7 +41,12 @@ class RequestError : public std::exception {
   std::string message_;
 };
 
-// The text for clients in place of an Error's message.
-const char* public_text(ErrorCode code);
+// What clients see of an exception: a RequestError keeps its message, an Error its code. The code
+// of anything else is "internal".
+struct PublicError {
+  std::string code;
+  std::string text;
+};
+PublicError public_error(const std::exception& error);
 
 }  // namespace voxdag::server

@@ -1,12 +1,15 @@
 #include "server/service.h"
 
 #include <chrono>
+#include <exception>
 #include <thread>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "server/api/public_problem.h"
+#include "server/data_folder.h"
+#include "server/http/connection/listener.h"
 
 namespace voxdag::server {
 namespace {
@@ -15,7 +18,7 @@ constexpr std::chrono::minutes kCleanUpInterval{10};
 constexpr double kSecondsPerDay = 86400;
 constexpr size_t kMaxLoggedChars = 200;
 
-ServerConfig checked(ServerConfig config, FileSystem& files, const Service::Log& log) {
+ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
   check_config(config);
   files.make_directories(config.data_folder);
   // Clients must not use up the files that jobs, transfers and stores need.
@@ -36,22 +39,38 @@ std::unique_ptr<FileLock> lock_folder(FileSystem& files, const std::string& fold
   return lock;
 }
 
+// A plan's folder is all that a service that crashed during a dry run leaves behind.
+void remove_plans(FileSystem& files, const ServerConfig& config) {
+  const std::string folder = config.data_folder + "/plans";
+  if (!files.exists(folder)) return;
+  for (const DirectoryEntry& entry : files.list(folder))
+    if (entry.is_directory && files.exists(folder + "/" + entry.name + "/task.json"))
+      remove_tree(files, folder + "/" + entry.name);
+}
+
 }  // namespace
 
 Service::Service(ServerConfig config, FileSystem& files, Log log)
     : config_(checked(std::move(config), files, log)),
       files_(files),
-      log_(std::move(log)),
+      log_(log),
+      steps_(log, config_.before_step),
       lock_(lock_folder(files, config_.data_folder)),
+      disk_(files, config_.data_folder, config_.jobs.min_free_disk_bytes),
       access_(config_, files),
-      queue_(config_.data_folder + "/queue.db"),
-      scenes_(files, config_.data_folder + "/scenes"),
+      queue_(config_.data_folder + "/queue.db",
+             config_.adopt || !has_entries(files, config_.data_folder + "/jobs")),
+      scenes_(files, config_.data_folder + "/scenes", config_.adopt),
       tasks_(config_, scenes_),
       http_(config_.http, [this](Request& request) { return answer(request); }),
-      dispatcher_(config_, files, queue_, tasks_, log_,
+      dispatcher_(config_, files, queue_, tasks_, disk_, log_,
                   [this](const Job& job) { metrics_.count_run(job); }),
-      context_{config_, files, queue_, scenes_, tasks_, dispatcher_, metrics_, draining_} {
-  remove_tree(files_, config_.data_folder + "/plans");
+      context_{config_, files, queue_, scenes_, tasks_, disk_, dispatcher_, metrics_, draining_} {
+  if (!config_.token_file.empty() && config_.http.certificate_file.empty() &&
+      !is_loopback_name(config_.http.address))
+    log_("warning: tokens travel in plain text: " + url() +
+         " is open to the network without TLS. Use --certificate and --key, or a reverse proxy");
+  steps_.run("remove the folders of old plans", [this] { remove_plans(files_, config_); });
   add_job_routes(router_);
   add_result_routes(router_);
   add_event_routes(router_);
@@ -73,9 +92,15 @@ void Service::run() {
     clean_up_periodically();
     dispatcher_.stop();
   });
-  http_.run(config_.drain_timeout_s);
+  std::exception_ptr failure;
+  try {
+    http_.run(config_.drain_timeout_s);
+  } catch (...) {
+    failure = std::current_exception();
+  }
   stop();
   cleaner.join();
+  if (failure) std::rethrow_exception(failure);
 }
 
 void Service::stop() {
@@ -91,25 +116,40 @@ void Service::stop() {
 void Service::clean_up_periodically() {
   std::unique_lock lock(stop_mutex_);
   while (!draining_) {
-    try {
+    steps_.run("remove old uploads", [this] {
       scenes_.remove_stale_uploads(unix_seconds() - config_.retention.upload_days * kSecondsPerDay);
-    } catch (const Error& error) {
-      log_("cannot remove old uploads: " + error.message());
-    }
+    });
+    steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
+    steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });
     stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });
   }
+}
+
+// A disk that is full to the last byte has no room for the record of a deletion either.
+Response Service::routed(Request& request) {
+  if (config_.before_step) config_.before_step("answer " + request.method);
+  try {
+    return router_.route(request, access_);
+  } catch (const Error& error) {
+    const bool frees_space = request.method == "DELETE" || request.target.path.ends_with("/cancel");
+    if (error.code() != ErrorCode::kNoSpace || !frees_space || !disk_.drop_ballast()) throw;
+  }
+  return router_.route(request, access_);
 }
 
 Response Service::answer(Request& request) {
   const double start_s = wall_seconds();
   Response response;
   try {
-    response = router_.route(request, access_);
+    response = routed(request);
   } catch (const std::exception& error) {
     const Problem problem = public_problem(error);
     if (problem.detail != error.what())  // clients do not see this text
       log_("request " + request.id + " " + request.method + " failed: " + error.what());
     response = problem_response(problem);
+  } catch (...) {
+    log_("request " + request.id + " " + request.method + " failed: an unknown exception");
+    response = problem_response(public_problem(std::exception()));
   }
   record(request, response.status, start_s);
   return response;

@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <condition_variable>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -17,11 +16,9 @@ namespace voxdag::server {
 
 class Service {
  public:
-  // Writes a line of the log: what changed, by whom, and what went wrong.
-  using Log = std::function<void(const std::string& line)>;
-
-  // Checks the configuration, locks the data folder (one service at a time), opens the stores,
-  // resumes the jobs of the last service, and listens. Throws Error.
+  // `log` gets what changed, by whom, and what went wrong. Checks the configuration, locks the data
+  // folder (one service at a time), opens the stores, resumes the jobs of the last service, and
+  // listens. Throws Error.
   Service(ServerConfig config, FileSystem& files, Log log);
 
   int port() const { return http_.port(); }
@@ -37,13 +34,16 @@ class Service {
   // Runs until the service stops.
   void clean_up_periodically();
   Response answer(Request& request);
+  Response routed(Request& request);
   // Counts every request, and logs those that try to change something.
   void record(const Request& request, int status, double start_s);
 
   const ServerConfig config_;
   FileSystem& files_;
   const Log log_;
+  Steps steps_;
   const std::unique_ptr<FileLock> lock_;
+  DiskSpace disk_;
   std::atomic<bool> draining_{false};
   Metrics metrics_;
   AccessControl access_;

@@ -1,3 +1,5 @@
+#include <sys/stat.h>
+
 #include <cstdio>
 #include <memory>
 #include <mutex>
@@ -41,11 +43,13 @@ server::ServerConfig settings(const ServeCommand& command, const Command& line, 
   if (given("--tokens")) config.token_file = command.options.token_file;
   if (given("--certificate")) config.http.certificate_file = command.options.http.certificate_file;
   if (given("--key")) config.http.key_file = command.options.http.key_file;
+  config.adopt = command.options.adopt;
   if (given("--scenes")) config.scene_roots = command.options.scene_roots;
   return config;
 }
 
 void serve(const ServeCommand& command, const Command& line, CommandContext& context) {
+  umask(0077);  // scenes and results are for clients with a token, not for all users of the machine
   server::Service service(settings(command, line, context.files), context.files, log_line);
   log_line("listening on " + service.url());
   // A signal handler may only set the token, so a thread watches it.
@@ -54,9 +58,17 @@ void serve(const ServeCommand& command, const Command& line, CommandContext& con
     log_line("stopping: waiting for builds to reach a checkpoint and answers to finish");
     service.stop();
   });
-  service.run();
-  context.cancel.cancel();  // ends the watcher, however the service ended
-  watcher.join();
+  const auto end_watcher = [&] {
+    context.cancel.cancel();
+    watcher.join();
+  };
+  try {
+    service.run();
+  } catch (...) {
+    end_watcher();
+    throw;
+  }
+  end_watcher();
   log_line("stopped");
 }
 
@@ -98,6 +110,8 @@ void add_serve_commands(CommandLine& line) {
   command.option("--key", options.http.key_file, "TLS: its key, PEM");
   command.option("--scenes", options.scene_roots,
                  "folder whose scenes jobs may name by path; may be repeated");
+  command.flag("--adopt", options.adopt,
+               "make new records of jobs and scenes whose records are lost");
   command.on_run([state, command, &line] { serve(*state, command, line.context()); });
 
   add_command<TokenCommand>(line, "token", "create a bearer token for the service");

@@ -9,6 +9,7 @@
 #include "server/api/access/concurrency_limiter.h"
 #include "server/api/metrics.h"
 #include "server/config.h"
+#include "server/disk_space.h"
 #include "server/jobs/dispatcher.h"
 #include "server/jobs/task_resolver.h"
 #include "server/queue/job_queue.h"
@@ -22,13 +23,16 @@ struct Context {
   JobQueue& queue;
   SceneStore& scenes;
   TaskResolver& tasks;
+  DiskSpace& disk;
   Dispatcher& dispatcher;
   Metrics& metrics;
   const std::atomic<bool>& draining;
 
-  ConcurrencyLimiter event_streams{config.transfers.max_event_streams};
-  ConcurrencyLimiter transfers{config.transfers.max_concurrent};
-  ConcurrencyLimiter plans{config.jobs.max_concurrent_plans};
+  ConcurrencyLimiter event_streams{config.transfers.max_event_streams,
+                                   config.transfers.max_event_streams_per_client};
+  ConcurrencyLimiter uploads{config.transfers.max_concurrent, config.transfers.max_per_client};
+  ConcurrencyLimiter downloads{config.transfers.max_concurrent, config.transfers.max_per_client};
+  ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
   // Held while a job that uses scenes is added, and while a scene that no job uses is replaced or
   // removed: neither may happen between the other's check and its change.
   std::mutex scene_mutex = {};

@@ -26,11 +26,10 @@ Problem problem_of(const RequestError& error) {
 Problem public_problem(const std::exception& error) {
   if (const auto* problem = dynamic_cast<const Problem*>(&error)) return *problem;
   if (const auto* refused = dynamic_cast<const RequestError*>(&error)) return problem_of(*refused);
-  if (const auto* known = dynamic_cast<const Error*>(&error))
-    return problem(known->code(), public_text(known->code()));
-  if (dynamic_cast<const std::bad_alloc*>(&error))
-    return busy(public_text(ErrorCode::kOutOfMemory));
-  return Problem(500, "internal", "internal error; the log of the service has the request id");
+  const auto& [code, text] = public_error(error);
+  if (const auto* known = dynamic_cast<const Error*>(&error)) return problem(known->code(), text);
+  if (dynamic_cast<const std::bad_alloc*>(&error)) return busy(text);
+  return Problem(500, code, text);
 }
 
 }  // namespace voxdag::server

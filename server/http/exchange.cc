@@ -49,6 +49,7 @@ Request& Exchange::read_request(size_t max_header_bytes) {
   request_.content_length = head_.content_length;
   request_.has_body = !body_->is_complete();
   request_.read_body = [this](const Request::Sink& sink) { return body_->read(sink); };
+  request_.client_has_left = [this] { return connection_.peer_disconnected(); };
   if (request_.headers.contains("Content-Encoding"))
     throw Problem(415, "unsupported_media_type", "expected a body without Content-Encoding");
   return request_;

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <set>
-#include <system_error>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "server/data_folder.h"
 #include "server/jobs/job_outcome.h"
+#include "server/jobs/process/job_process.h"
+#include "server/jobs/process/job_task.h"
 
 namespace voxdag::server {
 namespace {
@@ -18,22 +21,48 @@ constexpr int kPreviewNice = 5;  // on top of the builds'
 constexpr double kMaxSleep_s = 1;
 constexpr double kNoTimeLimit_s = 1e9;
 constexpr double kRetireInterval_s = 300;
+constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
+constexpr size_t kMaxRetiredAtOnce = 100;   // so that jobs can start in between
 constexpr double kSecondsPerDay = 86400;
+// A clock that is further from where it was expected may be wrong; so long no job is deleted for
+// its age.
+constexpr double kMaxClockStep_s = 3600;
+constexpr double kClockDoubt_s = kSecondsPerDay;
+
+bool is_job_id(const std::string& name) {
+  return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+// The job whose deletion has begun in this folder; "" for none.
+std::string marked_job(const DirectoryEntry& entry) {
+  const std::string id = entry.name.substr(0, entry.name.find('.'));
+  return entry.is_directory && is_job_id(id) && entry.name == id + kDeleted ? id : "";
+}
+
+void sleep_s(double seconds) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
 
 }  // namespace
 
 Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue,
-                       TaskResolver& tasks, Log log, OnRunEnded on_run_ended)
+                       TaskResolver& tasks, DiskSpace& disk, Log log, OnRunEnded on_run_ended)
     : config_(config),
       files_(files),
       queue_(queue),
       tasks_(tasks),
-      log_(std::move(log)),
-      on_run_ended_(std::move(on_run_ended)) {
+      disk_(disk),
+      log_(log),
+      on_run_ended_(std::move(on_run_ended)),
+      steps_(log, config.before_step) {
   files_.make_directories(config_.data_folder + "/jobs");
-  for (const Job& job : queue_.recover()) log_("job " + job.id + " canceled");
-  clean_up_folders();
-  thread_ = std::thread([this] { dispatch(); });
+  if (config_.adopt) adopt_jobs();
+  recovered_ = steps_.run("recover the jobs", [this] { recover(); });
+  steps_.run("clean up the folders of jobs", [this] { clean_up_folders(); });
+  thread_ = std::thread([this] {
+    while (!steps_.run("dispatch jobs", [this] { dispatch(); }) && !stopping())
+      sleep_s(kMaxSleep_s);
+  });
 }
 
 Dispatcher::~Dispatcher() { stop(); }
@@ -42,15 +71,68 @@ JobFolder Dispatcher::folder(const std::string& id) const {
   return {config_.data_folder + "/jobs/" + id};
 }
 
-// Deleting a job removes its row first, and canceling one changes its state first. What a crash
-// then left of its files is removed here.
+bool Dispatcher::stopping() {
+  std::lock_guard lock(mutex_);
+  return stops_;
+}
+
+void Dispatcher::recover() {
+  std::set<std::string> running;
+  for (const auto& [key, worker] : workers_)
+    if (!worker.done) running.insert(key);
+  for (const Job& job : queue_.recover(running, config_.jobs.max_attempts))
+    log_("job " + job.id + " " + state_name(job.state));
+}
+
+// Files that no deletion has marked stay, even if there is no job for them: the queue may be an old
+// one.
 void Dispatcher::clean_up_folders() {
+  std::string foreign;
   for (const DirectoryEntry& entry : files_.list(config_.data_folder + "/jobs")) {
-    const auto job = queue_.find(entry.name);
-    if (!job)
-      remove_tree(files_, folder(entry.name).path);
-    else if (has_ended(job->state) && job->state != JobState::kFailed)
-      remove_tree(files_, folder(entry.name).work());
+    if (!marked_job(entry).empty()) continue;
+    steps_.run("clean up jobs/" + entry.name, [&] {
+      const auto job = queue_.find(entry.name);
+      if (!job)
+        foreign += " jobs/" + entry.name;
+      else if (has_ended(job->state) && job->state != JobState::kFailed)
+        remove_tree(files_, folder(entry.name).work());
+    });
+  }
+  if (!foreign.empty()) log_("left alone, since it belongs to no job of the queue:" + foreign);
+}
+
+void Dispatcher::finish_deletions() {
+  std::lock_guard lock(mutex_);
+  if (wall_seconds() < next_deletions_s_) return;
+  const auto entries = files_.list(config_.data_folder + "/jobs");
+  next_deletions_s_ = HUGE_VAL;
+  for (const DirectoryEntry& entry : entries) {
+    const std::string id = marked_job(entry);
+    if (!id.empty() && !steps_.run("delete job " + id, [&] { remove_files(id); }))
+      next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+  }
+}
+
+void Dispatcher::adopt_jobs() {
+  for (const DirectoryEntry& entry : files_.list(config_.data_folder + "/jobs")) {
+    if (!entry.is_directory || !is_job_id(entry.name) || queue_.find(entry.name)) continue;
+    steps_.run("adopt job " + entry.name, [&] {
+      const JobFolder place = folder(entry.name);
+      const JobRequest request = parse_job_request(read_task(files_, place.task()).request);
+      Job job;
+      job.id = entry.name;
+      job.request = request.text;
+      job.scenes = TaskResolver::uploads_of(request);
+      job.posted_by = "adopted";
+      job.state = JobState::kSuspended;
+      if (files_.exists(place.report())) {
+        job.result = finished_result(files_, place);
+        job.state = JobState::kSucceeded;
+        job.finished_s = unix_seconds();
+      }
+      queue_.add(job, {}, UINT64_MAX);
+      log_("job " + job.id + " adopted: " + state_name(job.state));
+    });
   }
 }
 
@@ -69,37 +151,31 @@ void Dispatcher::stop() {
 void Dispatcher::dispatch() {
   for (;;) {
     const uint64_t seen = queue_.version();
-    join_finished();
-    try {
+    steps_.run("end the threads of jobs", [this] { join_finished(); });
+    if (stopping()) return;
+    steps_.run("start jobs", [this] {
       std::lock_guard lock(mutex_);
-      if (stops_) return;
+      if (!recovered_) recover();
+      recovered_ = true;
       start_ready_jobs();
-    } catch (const Error& error) {
-      log_("cannot start jobs: " + error.message());
-    }
-    try {
-      retire_old_jobs();
-    } catch (const Error& error) {
-      log_("cannot remove old jobs: " + error.message());
-    }
+    });
+    steps_.run("finish deletions", [this] { finish_deletions(); });
+    steps_.run("remove old jobs", [this] { retire_old_jobs(); });
     queue_.wait_for_change(seen, kMaxSleep_s);
   }
 }
 
 void Dispatcher::join_finished() {
-  std::vector<std::thread> finished;
+  std::map<std::string, Worker> finished;
   {
     std::lock_guard lock(mutex_);
     for (auto worker = workers_.begin(); worker != workers_.end();) {
-      if (worker->second.done) {
-        finished.push_back(std::move(worker->second.thread));
-        worker = workers_.erase(worker);
-      } else {
-        ++worker;
-      }
+      const auto next = std::next(worker);
+      if (worker->second.done) finished.insert(workers_.extract(worker));
+      worker = next;
     }
   }
-  for (std::thread& thread : finished) thread.join();
+  for (auto& [key, worker] : finished) worker.thread.join();
 }
 
 void Dispatcher::start_ready_jobs() {
@@ -118,11 +194,23 @@ bool Dispatcher::start_next_job() {
     running_jobs += key != kPreview;
   }
   if (running_jobs >= config_.jobs.max_concurrent) return false;
-  const auto job = queue_.next(unix_seconds(), present);
+  const auto job = queue_.next(unix_seconds(), config_.jobs.max_backoff_s, present);
   if (!job) return false;
-  const uint64_t needed = tasks_.memory_of(parse_job_request(job->request));
+  uint64_t needed = 0;
+  try {
+    needed = tasks_.memory_of(parse_job_request(job->request));
+  } catch (const RequestError& error) {
+    // Another version of this program wrote it, or it is damaged.
+    log_("job " + job->id + " failed: " + error.message());
+    queue_.change(job->id, [&](Job& j) {
+      j.state = JobState::kFailed;
+      j.finished_s = unix_seconds();
+      j.error = JobError{error.code(), error.message(), j.finished_s, false};
+    });
+    return true;
+  }
   if (running_jobs > 0 && memory + needed > tasks_.memory_bytes()) return false;
-  if (files_.free_space(config_.data_folder) < config_.jobs.min_free_disk_bytes) return false;
+  if (disk_.available() == 0) return false;
   const Job started = queue_.change(job->id, [](Job& j) {
     if (!j.front) ++j.attempts;
     j.front = false;
@@ -130,14 +218,16 @@ bool Dispatcher::start_next_job() {
     if (j.started_s == 0) j.started_s = unix_seconds();
     j.not_before_s = 0;
   });
-  log_("job " + started.id + " running");
   try {
+    log_("job " + started.id + " running");
     start_worker(started.id, std::make_shared<LiveJob>(needed),
                  [this, started](LiveJob& live) { run_job(started, live); });
-  } catch (const Error&) {
-    queue_.change(started.id, [](Job& j) {
-      j.state = JobState::kQueued;
-      j.front = true;
+  } catch (...) {
+    recovered_ = steps_.run("queue job " + started.id + " again", [&] {
+      queue_.change(started.id, [](Job& j) {
+        j.state = JobState::kQueued;
+        j.front = true;
+      });
     });
     throw;
   }
@@ -153,31 +243,32 @@ void Dispatcher::start_preview() {
 
 void Dispatcher::start_worker(const std::string& key, std::shared_ptr<LiveJob> live,
                               std::function<void(LiveJob&)> work) {
-  workers_[key].live = live;
   const bool is_job = key != kPreview;
-  if (is_job) {
+  const auto forget_live = [this, key] {
     std::lock_guard lock(live_mutex_);
-    live_[key] = live;
-  }
-  const auto run = [this, key, is_job, live, work = std::move(work)] {
-    work(*live);
+    live_.erase(key);
+  };
+  const auto run = [this, key, live, forget_live, work = std::move(work)] {
+    const bool ended = steps_.run("run " + key, [&] { work(*live); });
     {
       std::lock_guard lock(mutex_);
       workers_.at(key).done = true;
+      recovered_ = recovered_ && ended;
     }
-    if (is_job) {
-      std::lock_guard lock(live_mutex_);
-      live_.erase(key);
-    }
+    forget_live();
     queue_.announce();
   };
   try {
+    workers_[key].live = live;
+    if (is_job) {
+      std::lock_guard lock(live_mutex_);
+      live_[key] = live;
+    }
     workers_.at(key).thread = std::thread(run);
-  } catch (const std::system_error&) {
-    std::lock_guard lock(live_mutex_);
-    live_.erase(key);
+  } catch (...) {
+    forget_live();
     workers_.erase(key);
-    throw Error(ErrorCode::kOutOfMemory, "no thread for " + key);
+    throw;
   }
 }
 
@@ -211,72 +302,96 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
                tasks_.make(parse_job_request(job.request), Task::Kind::kBuild));
     end = run_child({{config_.program, "run-job", place.path}, place.log(), config_.jobs.nice},
                     live, kNoTimeLimit_s);
-  } catch (const RequestError& error) {
-    live.apply(Failure{error.code(), error.message()});
-  } catch (const Error& error) {
-    log_("job " + job.id + ": " + error.message());
-    live.apply(Failure{error_name(error.code()), public_text(error.code())});
+  } catch (const std::exception& error) {
+    log_("job " + job.id + ": " + error.what());
+    const PublicError seen = public_error(error);
+    live.apply(Failure{seen.code, seen.text});
   }
   record_outcome(job, live, end);
 }
 
 void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end) {
-  for (;;) {
-    try {
-      std::lock_guard lock(mutex_);
-      const Job after = queue_.change(
-          job.id, [&](Job& j) { apply_outcome(j, live, end, config_.jobs, unix_seconds()); });
-      if (after.state == JobState::kCanceled || after.state == JobState::kSucceeded)
-        remove_tree(files_, folder(job.id).work());
-      log_("job " + job.id + " " + state_name(after.state) +
-           (after.error ? ": " + after.error->code : ""));
-      on_run_ended_(after);
-      return;
-    } catch (const RequestError&) {
-      return;  // it was deleted
-    } catch (const Error& error) {
-      // The queue cannot be written, perhaps because the disk is full. The job counts as running
-      // until it can, or until the service ends and the next one runs the job again.
-      log_("job " + job.id + ": its outcome cannot be recorded: " + error.message());
-    }
-    std::this_thread::sleep_for(std::chrono::duration<double>(kMaxSleep_s));
+  // While the queue cannot be written, perhaps because the disk is full, the job counts as running:
+  // until it can, or until the service ends and the next one runs the job again.
+  std::optional<Job> after;
+  while (!steps_.run("record how job " + job.id + " ended", [&] {
     std::lock_guard lock(mutex_);
-    if (stops_) return;
+    if (!queue_.find(job.id)) return;  // it was deleted
+    after = queue_.change(
+        job.id, [&](Job& j) { apply_outcome(j, live, end, config_.jobs, unix_seconds()); });
+  })) {
+    sleep_s(kMaxSleep_s);
+    if (stopping()) return;
   }
+  if (!after) return;
+  log_("job " + job.id + " " + state_name(after->state) +
+       (after->error ? ": " + after->error->code : ""));
+  steps_.run("remove the work folder of job " + job.id, [&] {
+    std::lock_guard lock(mutex_);
+    if (after->state == JobState::kCanceled || after->state == JobState::kSucceeded)
+      remove_tree(files_, folder(job.id).work());
+  });
+  on_run_ended_(*after);
 }
 
 void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
   const JobFolder place = folder(job.id);
-  try {
+  bool drawn = false;
+  steps_.run("draw a preview", [&] {
     const ChildProcess::End end =
         run_child({{config_.program, "render", place.result(), "-o", place.preview(), "--size",
                     "960x540", "--samples", "1", "--threads", "1"},
                    place.file("preview.log"),
                    config_.jobs.nice + kPreviewNice},
                   live, kMaxPreview_s);
-    if (live.stop_requested_s() > 0) return;
-    const bool drawn = end.signal == 0 && end.exit_status == 0 && files_.exists(place.preview());
-    queue_.change(job.id, [&](Job& j) { j.preview = drawn ? Preview::kReady : Preview::kFailed; });
-  } catch (const RequestError&) {
-    // The job was deleted while its preview was drawn.
-  } catch (const Error& error) {
-    log_("preview of job " + job.id + ": " + error.message());
-    std::this_thread::sleep_for(std::chrono::duration<double>(kMaxSleep_s));
+    drawn = end.signal == 0 && end.exit_status == 0 && files_.exists(place.preview());
+  });
+  if (live.stop_requested_s() > 0) return;
+  const bool recorded = steps_.run("record a preview", [&] {
+    if (queue_.find(job.id))
+      queue_.change(job.id,
+                    [&](Job& j) { j.preview = drawn ? Preview::kReady : Preview::kFailed; });
+  });
+  if (!recorded) sleep_s(kMaxSleep_s);
+}
+
+// A clock that is wrong for a while must not cost all results.
+double Dispatcher::oldest_retained_s(double now_s) {
+  const double clock_s = unix_seconds(), last_event_s = queue_.last_event_s();
+  const bool jumped = last_clock_s_ > 0
+                          ? clock_s - last_clock_s_ > now_s - last_pass_s_ + kMaxClockStep_s
+                          : last_event_s > 0 && clock_s - last_event_s > kSecondsPerDay;
+  last_clock_s_ = clock_s;
+  last_pass_s_ = now_s;
+  if (jumped) {
+    age_removal_from_s_ = now_s + kClockDoubt_s;
+    log_(
+        "the clock is far ahead of when the service last saw it: for a day no job is deleted for "
+        "its age");
   }
+  if (now_s < age_removal_from_s_) return 0;
+  return clock_s - config_.retention.finished_days * kSecondsPerDay;
 }
 
 void Dispatcher::retire_old_jobs() {
-  if (last_retired_s_ > 0 && wall_seconds() < last_retired_s_ + kRetireInterval_s) return;
-  last_retired_s_ = wall_seconds();
-  const Retention& rule = config_.retention;
-  for (const std::string& id :
-       queue_.expired(unix_seconds() - rule.finished_days * kSecondsPerDay, rule.finished_jobs)) {
-    try {
-      remove(id);
-      log_("job " + id + " removed by the retention rule");
-    } catch (const RequestError&) {
-      // A client has deleted it or tried it again.
+  const double now_s = wall_seconds();
+  if (now_s < next_retirement_s_) return;
+  const double oldest_s = oldest_retained_s(now_s);
+  next_retirement_s_ = now_s + kRetireInterval_s;
+  size_t removed = 0;
+  for (const std::string& id : queue_.expired(oldest_s, config_.retention.finished_jobs)) {
+    if (removed == kMaxRetiredAtOnce) {
+      next_retirement_s_ = now_s;
+      break;
     }
+    removed += steps_.run("remove old job " + id, [&] {
+      try {
+        remove(id);
+        log_("job " + id + " removed by the retention rule");
+      } catch (const RequestError&) {
+        // A client has deleted it or tried it again.
+      }
+    });
   }
 }
 
@@ -292,7 +407,9 @@ Job Dispatcher::cancel(const std::string& id) {
     if (!runs) j.finished_s = unix_seconds();
   });
   if (runs && job.state == JobState::kCanceling) worker->second.live->stop();
-  if (job.state == JobState::kCanceled) remove_tree(files_, folder(id).work());
+  if (job.state == JobState::kCanceled)
+    steps_.run("remove the work folder of job " + id,
+               [&] { remove_tree(files_, folder(id).work()); });
   return job;
 }
 
@@ -310,30 +427,61 @@ Job Dispatcher::suspend(const std::string& id) {
 
 Job Dispatcher::resume(const std::string& id) {
   return queue_.change(id, [&](Job& j) {
-    if (j.state == JobState::kQueued || j.state == JobState::kRunning) return;
-    if (j.state != JobState::kSuspended) throw state_conflict(j, "expected a suspended job");
+    if (j.state == JobState::kRunning) return;
+    if (j.state != JobState::kQueued && j.state != JobState::kSuspended)
+      throw state_conflict(j, "expected a suspended job");
+    if (j.state == JobState::kSuspended) j.front = j.attempts > 0;
     j.state = JobState::kQueued;
-    j.front = j.attempts > 0;
     j.not_before_s = 0;
   });
 }
 
 Job Dispatcher::retry(const std::string& id) {
+  std::lock_guard lock(mutex_);  // no deletion has begun
   return queue_.change(id, [&](Job& j) {
-    if (j.state == JobState::kQueued || j.state == JobState::kRunning) return;
-    if (j.state != JobState::kFailed && j.state != JobState::kCanceled)
+    if (j.state == JobState::kRunning) return;
+    if (j.state != JobState::kQueued && j.state != JobState::kFailed &&
+        j.state != JobState::kCanceled)
       throw state_conflict(j, "expected a job that failed or was canceled");
+    j.not_before_s = 0;
+    if (j.state == JobState::kQueued) return;
     j.state = JobState::kQueued;
-    j.attempts = 0;
+    j.attempts = j.interruptions = 0;
     j.front = false;
-    j.not_before_s = j.started_s = j.finished_s = 0;
+    j.started_s = j.finished_s = 0;
   });
 }
 
 void Dispatcher::remove(const std::string& id) {
   std::lock_guard lock(mutex_);
-  queue_.remove(id);
-  remove_tree(files_, folder(id).path);
+  queue_.check_removable(id);
+  try {
+    remove_files(id);
+  } catch (...) {
+    next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+    throw;
+  }
+}
+
+// The marked folder stays until the row is gone, so that a crash in between loses neither.
+void Dispatcher::remove_files(const std::string& id) {
+  const std::string path = folder(id).path, marked = path + kDeleted;
+  if (queue_.find(id)) queue_.check_removable(id);
+  if (files_.exists(path)) {
+    remove_tree(files_, marked);
+    files_.rename(path, marked);
+    files_.sync_directory(parent_directory(path));
+  }
+  if (files_.exists(marked))
+    for (const DirectoryEntry& entry : files_.list(marked)) {
+      const std::string inner = marked + "/" + entry.name;
+      if (entry.is_directory)
+        remove_tree(files_, inner);
+      else
+        files_.remove(inner);
+    }
+  if (queue_.find(id)) queue_.remove(id);
+  remove_tree(files_, marked);
 }
 
 std::shared_ptr<LiveJob> Dispatcher::live(const std::string& id) const {

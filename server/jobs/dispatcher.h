@@ -5,6 +5,9 @@
 // nothing else, and a build can be stopped, killed and reniced without touching the threads that
 // answer requests. A process dies with the service; started again with the same task it resumes
 // from its work folder. The queue and the folders are therefore enough to continue after any crash.
+//
+// What fails in a thread here ends neither the thread nor the service (Steps): a job that cannot be
+// handled fails, a folder that cannot be is left alone, and all else continues.
 #pragma once
 
 #include <functional>
@@ -15,24 +18,24 @@
 #include <thread>
 
 #include "server/config.h"
+#include "server/disk_space.h"
 #include "server/jobs/live_job.h"
 #include "server/jobs/process/child_process.h"
 #include "server/jobs/process/job_folder.h"
 #include "server/jobs/task_resolver.h"
 #include "server/queue/job_queue.h"
+#include "server/steps.h"
 
 namespace voxdag::server {
 
 class Dispatcher {
  public:
-  using Log = std::function<void(const std::string& line)>;
-
   // Called whenever a job's process has ended, with the job as it is then.
   using OnRunEnded = std::function<void(const Job&)>;
 
   // Repairs what a crash of the last service left in the queue and the folders, then starts jobs.
   Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue, TaskResolver& tasks,
-             Log log, OnRunEnded on_run_ended);
+             DiskSpace& disk, Log log, OnRunEnded on_run_ended);
   // Calls stop().
   ~Dispatcher();
 
@@ -45,6 +48,7 @@ class Dispatcher {
   Job suspend(const std::string& id);
   Job resume(const std::string& id);
   Job retry(const std::string& id);
+  // Deletes the files first, so that a full disk can be emptied.
   void remove(const std::string& id);
 
   // Null unless the job's process runs.
@@ -59,8 +63,19 @@ class Dispatcher {
     bool done = false;
   };
 
+  bool stopping();
+  // Makes records of the job folders that the queue does not know: jobs with a result have
+  // succeeded, others are suspended.
+  void adopt_jobs();
+  // Puts jobs in order that a crash, or a queue that could not be written, left behind.
+  void recover();
   void clean_up_folders();
+  // Finishes deletions that a crash or a full disk interrupted.
+  void finish_deletions();
+  void remove_files(const std::string& id);
   void retire_old_jobs();
+  // The time from which on ended jobs are not too old.
+  double oldest_retained_s(double now_s);
 
   // The thread that starts jobs.
   void dispatch();
@@ -84,19 +99,27 @@ class Dispatcher {
   FileSystem& files_;
   JobQueue& queue_;
   TaskResolver& tasks_;
+  DiskSpace& disk_;
   const Log log_;
   const OnRunEnded on_run_ended_;
+  Steps steps_;
 
   // Guards all below; held while a job's state and process change together.
   mutable std::mutex mutex_;
   std::map<std::string, Worker> workers_;  // by job; the one named "preview" draws a picture
   bool stops_ = false;
-  double last_retired_s_ = 0;
+  bool recovered_ = false;
+  double next_deletions_s_ = 0;
 
   // Guards live_ alone, so that requests for progress wait for nothing else.
   mutable std::mutex live_mutex_;
   std::map<std::string, std::shared_ptr<LiveJob>> live_;  // by job
 
+  // Used by the thread that starts jobs alone.
+  double next_retirement_s_ = 0;   // like the next two in wall_seconds()
+  double age_removal_from_s_ = 0;  // no job is deleted for its age before
+  double last_pass_s_ = 0;         // when the clock was last looked at,
+  double last_clock_s_ = 0;        // and what it showed
   std::thread thread_;
 };
 

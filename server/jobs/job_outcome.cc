@@ -39,6 +39,7 @@ double pause_s(const JobLimits& limits, unsigned attempts) {
 
 void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
                    const JobLimits& limits, double now_s) {
+  job.interruptions = 0;
   job.warnings = live.warnings();
   job.progress = live.progress_json();
   const bool asked = live.stop_requested_s() > 0;

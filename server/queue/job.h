@@ -55,6 +55,7 @@ struct Job {
   int priority = 0;
   bool front = false;  // queued before others of its priority, since it was running already
   unsigned attempts = 0;
+  unsigned interruptions = 0;  // runs in a row that ended because the service did
   double created_s = 0, started_s = 0, finished_s = 0, not_before_s = 0;
   std::optional<JobError> error;
   std::vector<std::string> warnings;

@@ -20,7 +20,9 @@ constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 
 // "vdsv": the queue of a service.
 constexpr int64_t kApplicationId = 0x76647376;
-constexpr int64_t kSchemaVersion = 2;
+constexpr int64_t kSchemaVersion = 3;
+// An interrupted run is no attempt of its job until there were so many in a row.
+constexpr unsigned kFreeInterruptions = 5;
 
 constexpr const char* kSchema = R"sql(
 CREATE TABLE job (
@@ -34,6 +36,7 @@ CREATE TABLE job (
   priority INTEGER NOT NULL,
   front INTEGER NOT NULL,
   attempts INTEGER NOT NULL,
+  interruptions INTEGER NOT NULL DEFAULT 0,
   created_s REAL NOT NULL, started_s REAL NOT NULL, finished_s REAL NOT NULL,
   not_before_s REAL NOT NULL,
   error TEXT NOT NULL,
@@ -66,8 +69,9 @@ CREATE TABLE idempotency (
 CREATE INDEX idempotency_by_job ON idempotency (job);
 )sql";
 
-// Makes the tables of a new database, or checks that an existing one is a queue of this version.
-SqlDatabase open_writer(const std::string& path) {
+// Makes the tables of a new database, or checks that an existing one is a queue of this version or
+// the last, and brings it to this one.
+SqlDatabase open_writer(const std::string& path, bool may_create) {
   SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
   const int64_t application = database.integer("PRAGMA application_id");
   const int64_t version = database.integer("PRAGMA user_version");
@@ -75,15 +79,22 @@ SqlDatabase open_writer(const std::string& path) {
                      database.integer("SELECT count(*) FROM sqlite_master") == 0;
   if (!fresh && application != kApplicationId)
     throw Error(ErrorCode::kInvalidInput, path + ": expected a queue of voxdag serve");
-  if (!fresh && version != kSchemaVersion)
+  if (fresh && !may_create)
+    throw Error(ErrorCode::kInvalidInput,
+                path +
+                    ": there is no queue, but there are folders of jobs: expected their queue. "
+                    "Restore it from a backup, or start once with --adopt, which makes a new queue "
+                    "of the jobs that are found");
+  if (!fresh && version != kSchemaVersion && version != kSchemaVersion - 1)
     throw Error(ErrorCode::kUnsupportedVersion, path + ": the queue's version is " +
                                                     std::to_string(version) + ", expected " +
                                                     std::to_string(kSchemaVersion));
   database.execute("PRAGMA journal_mode = WAL");
   database.execute("PRAGMA foreign_keys = ON");
-  if (!fresh) return database;
+  if (!fresh && version == kSchemaVersion) return database;
   SqlTransaction transaction(database);
-  database.execute(kSchema);
+  database.execute(fresh ? kSchema
+                         : "ALTER TABLE job ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0");
   database.execute("PRAGMA application_id = " + std::to_string(kApplicationId));
   database.execute("PRAGMA user_version = " + std::to_string(kSchemaVersion));
   transaction.commit();
@@ -109,6 +120,7 @@ void columns(Row& row, JobRow& r) {
   row("priority", job.priority);
   row("front", job.front);
   row("attempts", job.attempts);
+  row("interruptions", job.interruptions);
   row("created_s", job.created_s);
   row("started_s", job.started_s);
   row("finished_s", job.finished_s);
@@ -125,18 +137,37 @@ JobRow row_of(const Job& job) {
           json_text(json(job.warnings))};
 }
 
-// The job that a statement of select_rows<JobRow>() stands at.
+constexpr const char* kNoRequest = R"({"scene":[],"resolution":0,"options":{}})";
+
+// The job that a statement of select_rows<JobRow>() stands at. What is damaged in the row is left
+// out, so that the job can be listed and deleted, and the service works with the others.
 Job read_job(const SqlStatement& statement) {
   JobRow row = read_row<JobRow>(statement);
   Job& job = row.job;
-  try {
-    json::parse(row.scenes).get_to(job.scenes);
-    json::parse(row.warnings).get_to(job.warnings);
-    if (!row.error.empty()) job.error = json::parse(row.error).get<JobError>();
-    return job;
-  } catch (const json::exception&) {
-    throw Error(ErrorCode::kCorrupt, "the row of job " + job.id + " is damaged");
-  }
+  bool damaged = false;
+  const auto read = [&](const std::string& text, auto& value) {
+    try {
+      json::parse(text).get_to(value);
+    } catch (const json::exception&) {
+      damaged = true;
+    }
+  };
+  const auto check = [&](bool right, auto& value, auto instead) {
+    if (right) return;
+    value = instead;
+    damaged = true;
+  };
+  const auto is_json = [](const std::string& text) { return text.empty() || json::accept(text); };
+  read(row.scenes, job.scenes);
+  read(row.warnings, job.warnings);
+  if (!row.error.empty()) read(row.error, job.error.emplace());
+  check(static_cast<size_t>(job.state) < kJobStateNames.size(), job.state, JobState::kFailed);
+  check(job.request.starts_with('{') && is_json(job.request), job.request, kNoRequest);
+  check(is_json(job.progress), job.progress, "");
+  check(is_json(job.result), job.result, "");
+  if (job.error && job.error->code.empty()) job.error.reset();
+  if (damaged) job.warnings.push_back("the record of this job is damaged");
+  return std::move(job);
 }
 
 std::optional<Job> find_job(SqlDatabase& database, const std::string& id) {
@@ -183,6 +214,11 @@ RequestError no_job(const std::string& id) {
           "no job " + id.substr(0, 32) + ": expected the id of a job that was not deleted"};
 }
 
+void expect_ended(const std::optional<Job>& job, const std::string& id) {
+  if (!job) throw no_job(id);
+  if (!has_ended(job->state)) throw state_conflict(*job, "the job has not ended: cancel it first");
+}
+
 }  // namespace
 
 RequestError state_conflict(const Job& job, const std::string& message) {
@@ -197,12 +233,14 @@ std::optional<JobState> parse_state(std::string_view name) {
   return {};
 }
 
-JobQueue::JobQueue(const std::string& path)
-    : writer_(open_writer(path)),
+JobQueue::JobQueue(const std::string& path, bool may_create)
+    : writer_(open_writer(path, may_create)),
+      file_(path),
       reader_(path, SqlDatabase::Mode::kReadOnly),
       find_(select_rows<JobRow>(reader_, "job", "WHERE id = ?")) {}
 
 JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_open) {
+  check_file();
   Added added;
   {
     std::lock_guard lock(write_mutex_);
@@ -211,9 +249,9 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
     if (static_cast<uint64_t>(writer_.integer("SELECT count(*) FROM job WHERE " + kOpen)) >=
         max_open)
       throw RequestError(RequestError::Kind::kQueueFull, "the queue is full");
-    job.id = random_id();
+    if (job.id.empty()) job.id = random_id();
     job.number = writer_.integer("SELECT coalesce(max(number), 0) + 1 FROM job");
-    job.created_s = unix_seconds();
+    if (job.created_s == 0) job.created_s = unix_seconds();
     put_row(writer_, "job", row_of(job));
     for (const std::string& scene : job.scenes)
       writer_.prepare("INSERT OR IGNORE INTO job_scene VALUES (?, ?)")
@@ -237,6 +275,7 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
 std::optional<Job> JobQueue::find(const std::string& id) {
   std::lock_guard lock(read_mutex_);
   std::optional<Job> job;
+  find_.reset();  // the last call may have thrown
   if (find_.bind(0, id).step()) job = read_job(find_);
   find_.reset();
   return job;
@@ -317,25 +356,27 @@ Job JobQueue::change(const std::string& id, const std::function<void(Job&)>& edi
   return job;
 }
 
+void JobQueue::check_removable(const std::string& id) { expect_ended(find(id), id); }
+
 void JobQueue::remove(const std::string& id) {
   {
     std::lock_guard lock(write_mutex_);
     SqlTransaction transaction(writer_);
-    const auto job = find_job(writer_, id);
-    if (!job) throw no_job(id);
-    if (!has_ended(job->state))
-      throw state_conflict(*job, "the job has not ended: cancel it first");
+    expect_ended(find_job(writer_, id), id);
     writer_.prepare("DELETE FROM job WHERE id = ?").bind(0, id).run();
     transaction.commit();
   }
   announce_change(true);
 }
 
-std::optional<Job> JobQueue::next(double now_s, const std::set<std::string>& except) {
+std::optional<Job> JobQueue::next(double now_s, double max_wait_s,
+                                  const std::set<std::string>& except) {
   // `except` is small: at most the jobs that are just stopping.
-  const auto jobs = query("WHERE " + states_in({JobState::kQueued}) + " AND not_before_s <= " +
-                              std::to_string(now_s) + " ORDER BY " + kQueueOrder + " LIMIT ?",
-                          {static_cast<int64_t>(except.size() + 1)});
+  const auto jobs =
+      query("WHERE " + states_in({JobState::kQueued}) +
+                " AND (not_before_s <= " + std::to_string(now_s) + " OR not_before_s > " +
+                std::to_string(now_s + max_wait_s) + ") ORDER BY " + kQueueOrder + " LIMIT ?",
+            {static_cast<int64_t>(except.size() + 1)});
   for (const Job& job : jobs)
     if (!except.contains(job.id)) return job;
   return {};
@@ -349,20 +390,28 @@ std::optional<Job> JobQueue::next_without_preview() {
   return jobs[0];
 }
 
-std::vector<Job> JobQueue::recover() {
-  std::vector<Job> canceled;
+std::vector<Job> JobQueue::recover(const std::set<std::string>& running, unsigned max_attempts) {
+  std::vector<Job> ended;
   for (const Job& found :
        query("WHERE " + states_in({JobState::kRunning, JobState::kCanceling}) + " ORDER BY number",
              {})) {
-    const Job job = change(found.id, [](Job& j) {
-      const bool stops = j.state == JobState::kCanceling;
-      j.state = stops ? JobState::kCanceled : JobState::kQueued;
-      j.front = !stops;
-      if (stops) j.finished_s = unix_seconds();
+    if (running.contains(found.id)) continue;
+    const Job job = change(found.id, [&](Job& j) {
+      const bool cancels = j.state == JobState::kCanceling;
+      const bool is_suspect = !cancels && ++j.interruptions > kFreeInterruptions;
+      const bool fails = is_suspect && j.attempts >= max_attempts;
+      j.state = cancels ? JobState::kCanceled : fails ? JobState::kFailed : JobState::kQueued;
+      j.front = j.state == JobState::kQueued && !is_suspect;
+      if (has_ended(j.state)) j.finished_s = unix_seconds();
+      if (fails)
+        j.error = JobError{"internal",
+                           "the service ended " + std::to_string(j.interruptions) +
+                               " times while this job ran, perhaps because of it",
+                           unix_seconds(), false};
     });
-    if (job.state == JobState::kCanceled) canceled.push_back(job);
+    if (has_ended(job.state)) ended.push_back(job);
   }
-  return canceled;
+  return ended;
 }
 
 std::vector<std::string> JobQueue::expired(double finished_before_s, uint64_t max_count) {
@@ -375,6 +424,12 @@ std::vector<std::string> JobQueue::expired(double finished_before_s, uint64_t ma
   std::vector<std::string> ids;
   while (rows.step()) ids.push_back(rows.text(0));
   return ids;
+}
+
+double JobQueue::last_event_s() {
+  std::lock_guard lock(read_mutex_);
+  auto rows = reader_.prepare("SELECT at_s FROM job_event ORDER BY number DESC LIMIT 1");
+  return rows.step() ? rows.real(0) : 0;
 }
 
 std::vector<JobEvent> JobQueue::events_after(const std::string& id, int64_t number) {

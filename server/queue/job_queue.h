@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/db/sqlite.h"
+#include "server/data_folder.h"
 #include "server/queue/job.h"
 #include "server/request_error.h"
 
@@ -36,15 +37,17 @@ struct IdempotencyKey {
 
 class JobQueue {
  public:
-  // Throws Error{kCorrupt}, {kInvalidInput} for a database of another program,
-  // {kUnsupportedVersion}.
-  explicit JobQueue(const std::string& path);
+  // Throws Error{kCorrupt}, {kInvalidInput} for a database of another program, or if there is none
+  // and none may be made, {kUnsupportedVersion}.
+  explicit JobQueue(const std::string& path, bool may_create = true);
+  // Throws Error{kIo} if the database was removed or replaced.
+  void check_file() const { file_.check(); }
 
   struct Added {
     Job job;
     bool replayed = false;
   };
-  // Queues the job under a new id and number, or finds the job that has this key. Throws
+  // Queues the job under its id, or a new one, or finds the job that has this key. Throws
   // RequestError: kKeyReused if the key came with another request, kQueueFull if `max_open` jobs
   // have not ended.
   Added add(Job job, const IdempotencyKey& key, uint64_t max_open);
@@ -64,19 +67,26 @@ class JobQueue {
   // if there is no such job.
   Job change(const std::string& id, const std::function<void(Job&)>& edit);
   // Throws RequestError{kConflict} unless the job has ended, {kNotFound} if there is none.
+  void check_removable(const std::string& id);
+  // Throws as check_removable().
   void remove(const std::string& id);
 
-  // The first queued job that may start at `now_s` and is not in `except`.
-  std::optional<Job> next(double now_s, const std::set<std::string>& except);
+  // The first queued job that may start at `now_s` and is not in `except`. A job that would have to
+  // wait for more than `max_wait_s` may start: the clock was set back.
+  std::optional<Job> next(double now_s, double max_wait_s, const std::set<std::string>& except);
   // A job that succeeded and has no preview yet.
   std::optional<Job> next_without_preview();
-  // After a crash: running jobs are queued again, at the front; canceling ones are canceled.
-  // Returns those that were canceled.
-  std::vector<Job> recover();
+  // After a crash: jobs that are running or canceling, but not among `running`, are queued again,
+  // at the front, or canceled. A job that was interrupted often is not first any more, each of its
+  // further runs is an attempt, and after `max_attempts` of them it has failed: it may be what
+  // ended the service. Returns the jobs that have ended.
+  std::vector<Job> recover(const std::set<std::string>& running, unsigned max_attempts);
   // Ended jobs that finished before `finished_before_s`, or are not among the newest
   // `max_count`.
   std::vector<std::string> expired(double finished_before_s, uint64_t max_count);
 
+  // When the last change of a state was recorded; 0 for never.
+  double last_event_s();
   std::vector<JobEvent> events_after(const std::string& id, int64_t number);
   // The job that has this key, if there is one. Throws RequestError{kKeyReused} if it came with
   // another request.
@@ -98,6 +108,7 @@ class JobQueue {
 
   std::mutex write_mutex_;  // guards the next
   SqlDatabase writer_;
+  const NamedFile file_;
   std::mutex read_mutex_;  // guards the next
   SqlDatabase reader_;
   SqlStatement find_;

@@ -1,7 +1,12 @@
 #include "server/scenes/scene_store.h"
 
+#include <algorithm>
+#include <cstring>
+
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "server/request_error.h"
 
 namespace voxdag::server {
 namespace {
@@ -27,11 +32,17 @@ std::string make_folders(FileSystem& files, const std::string& folder) {
   return folder;
 }
 
-SqlDatabase open_database(const std::string& path) {
+SqlDatabase open_database(const std::string& path, bool may_create) {
   SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
   const bool fresh = database.integer("SELECT count(*) FROM sqlite_master") == 0;
   if (!fresh && database.integer("PRAGMA application_id") != kApplicationId)
     throw Error(ErrorCode::kInvalidInput, path + ": expected the scenes of voxdag serve");
+  if (fresh && !may_create)
+    throw Error(ErrorCode::kInvalidInput,
+                path +
+                    ": there are scenes without records: expected the database of these "
+                    "scenes. Restore it from a backup, or start once with --adopt, which makes new "
+                    "records of the scenes that are found");
   database.execute("PRAGMA journal_mode = WAL");
   if (!fresh) return database;
   SqlTransaction transaction(database);
@@ -57,10 +68,26 @@ bool is_scene_name(std::string_view name) {
   return name.ends_with(".glb") || name.ends_with(".gltf");
 }
 
-SceneStore::SceneStore(FileSystem& files, const std::string& folder)
+std::string file_sha256(FileSystem& files, const std::string& path, uint64_t size) {
+  constexpr uint64_t kPieceBytes = 256 << 10;
+  const auto file = files.open_read(path);
+  Sha256 digest;
+  std::vector<std::byte> piece;
+  for (uint64_t at = 0; at < size; at += piece.size()) {
+    piece.resize(std::min(kPieceBytes, size - at));
+    file->read_at(at, piece);
+    digest.add(piece);
+  }
+  return digest.finish();
+}
+
+SceneStore::SceneStore(FileSystem& files, const std::string& folder, bool adopt)
     : files_(files),
       folder_(make_folders(files, folder)),
-      database_(open_database(folder + "/scenes.db")) {
+      database_(
+          open_database(folder + "/scenes.db", adopt || (!has_entries(files, folder + "/files") &&
+                                                         !has_entries(files, folder + "/parts")))),
+      file_(folder + "/scenes.db") {
   struct Finished {
     std::string name, sha256;
     uint64_t size;
@@ -69,7 +96,33 @@ SceneStore::SceneStore(FileSystem& files, const std::string& folder)
   auto rows = database_.prepare("SELECT name, sha256, offset FROM upload WHERE sha256 != ''");
   while (rows.step()) finished.push_back({rows.text(0), rows.text(1), rows.word(2)});
   rows.reset();
-  for (const Finished& f : finished) finish_publishing(f.name, f.size, f.sha256);
+  for (const Finished& f : finished) {
+    try {
+      finish_publishing(f.name, f.size, f.sha256);
+    } catch (const Error&) {
+      drop_upload(f.name);  // the client uploads it again
+    }
+  }
+  finish_removals();
+  if (adopt) adopt_scenes();
+}
+
+void SceneStore::finish_removals() {
+  for (const DirectoryEntry& entry : files_.list(folder_ + "/files")) {
+    if (!entry.name.ends_with(kDeleted)) continue;
+    const std::string name = entry.name.substr(0, entry.name.size() - strlen(kDeleted));
+    try {
+      if (is_scene_name(name)) remove(name);
+    } catch (const std::exception&) {
+      // It is tried again.
+    }
+  }
+}
+
+void SceneStore::adopt_scenes() {
+  for (const DirectoryEntry& entry : files_.list(folder_ + "/files"))
+    if (!entry.is_directory && is_scene_name(entry.name) && !find(entry.name))
+      put_scene(entry.name, entry.bytes, file_sha256(files_, path(entry.name), entry.bytes));
 }
 
 std::optional<Scene> SceneStore::find(const std::string& name) {
@@ -109,16 +162,22 @@ std::optional<UploadState> SceneStore::upload(const std::string& name) {
 }
 
 bool SceneStore::remove(const std::string& name) {
+  const NameLock lock(*this, name);
+  const std::string marked = path(name) + kDeleted;
+  const bool found = find(name).has_value();
+  if (files_.exists(path(name))) {
+    files_.rename(path(name), marked);
+    files_.create(marked)->close();  // frees its space
+  }
   drop_upload(name);
   {
-    std::lock_guard lock(mutex_);
+    std::lock_guard database_lock(mutex_);
     SqlTransaction transaction(database_);
     database_.prepare("DELETE FROM scene WHERE name = ?").bind(0, name).run();
     transaction.commit();
   }
-  if (!files_.exists(path(name))) return false;
-  files_.remove(path(name));
-  return true;
+  if (files_.exists(marked)) files_.remove(marked);
+  return found;
 }
 
 void SceneStore::remove_stale_uploads(double before_s) {
@@ -130,20 +189,25 @@ void SceneStore::remove_stale_uploads(double before_s) {
     while (rows.step()) names.push_back(rows.text(0));
   }
   for (const std::string& name : names) {
-    if (!lock_name(name)) continue;
-    drop_upload(name);
-    unlock_name(name);
+    try {
+      const NameLock lock(*this, name);
+      drop_upload(name);
+    } catch (const RequestError&) {
+      // It is being uploaded.
+    }
   }
 }
 
-bool SceneStore::lock_name(const std::string& name) {
-  std::lock_guard lock(mutex_);
-  return busy_.insert(name).second;
+SceneStore::NameLock::NameLock(SceneStore& store, const std::string& name)
+    : store_(store), name_(name) {
+  std::lock_guard lock(store_.mutex_);
+  if (!store_.busy_.insert(name_).second)
+    throw RequestError(RequestError::Kind::kConflict, "another request is uploading this scene");
 }
 
-void SceneStore::unlock_name(const std::string& name) {
-  std::lock_guard lock(mutex_);
-  busy_.erase(name);
+SceneStore::NameLock::~NameLock() {
+  std::lock_guard lock(store_.mutex_);
+  store_.busy_.erase(name_);
 }
 
 void SceneStore::record(const std::string& name, const UploadState& state) {
@@ -173,9 +237,18 @@ void SceneStore::publish(const std::string& name, uint64_t size, const std::stri
 void SceneStore::finish_publishing(const std::string& name, uint64_t size,
                                    const std::string& sha256) {
   if (files_.exists(part_path(name))) {
+    if (files_.open_read(part_path(name))->size() != size)
+      throw Error(ErrorCode::kCorrupt, part_path(name) + ": expected " + std::to_string(size) +
+                                           " bytes; the file was changed during the upload");
     files_.rename(part_path(name), path(name));
     files_.sync_directory(folder_ + "/files");
+  } else if (!files_.exists(path(name)) || file_sha256(files_, path(name), size) != sha256) {
+    throw Error(ErrorCode::kCorrupt, part_path(name) + ": the file was removed during the upload");
   }
+  put_scene(name, size, sha256);
+}
+
+void SceneStore::put_scene(const std::string& name, uint64_t size, const std::string& sha256) {
   SqlTransaction transaction(database_);
   database_.prepare("INSERT OR REPLACE INTO scene VALUES (?, ?, ?, ?)")
       .bind(0, name)
@@ -187,14 +260,14 @@ void SceneStore::finish_publishing(const std::string& name, uint64_t size,
   transaction.commit();
 }
 
+// The file goes first, so that a full disk can be emptied: a record without its file is an upload
+// that starts over.
 void SceneStore::drop_upload(const std::string& name) {
-  {
-    std::lock_guard lock(mutex_);
-    SqlTransaction transaction(database_);
-    database_.prepare("DELETE FROM upload WHERE name = ?").bind(0, name).run();
-    transaction.commit();
-  }
   if (files_.exists(part_path(name))) files_.remove(part_path(name));
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.prepare("DELETE FROM upload WHERE name = ?").bind(0, name).run();
+  transaction.commit();
 }
 
 }  // namespace voxdag::server

@@ -4,8 +4,7 @@
 //   1. A scene is complete only when all its bytes are synced and have the digest that the client
 //      named.
 //   2. The recorded offset of an upload counts synced bytes only: a power cut loses what came
-//   after,
-//      and the client continues from that offset.
+//      after, and the client continues from that offset.
 //   3. One request at a time writes to an upload.
 // Thread-safe. Callers check names with is_scene_name().
 #pragma once
@@ -18,6 +17,7 @@
 
 #include "core/db/sqlite.h"
 #include "core/io/file_system.h"
+#include "server/data_folder.h"
 
 namespace voxdag::server {
 
@@ -40,37 +40,62 @@ struct UploadState {
 
 class SceneStore {
  public:
-  // Finishes what a crash interrupted.
-  SceneStore(FileSystem& files, const std::string& folder);
+  // Finishes what a crash interrupted. Throws Error{kInvalidInput} if there are scenes but no
+  // records of them, unless it may adopt them: then they get new ones.
+  SceneStore(FileSystem& files, const std::string& folder, bool adopt = false);
 
   std::optional<Scene> find(const std::string& name);
   // The first scenes whose names follow `after`, in the order of names.
   std::vector<Scene> list(const std::string& after, size_t limit);
   // The state of an unfinished upload.
   std::optional<UploadState> upload(const std::string& name);
-  // Removes a scene and its upload. False if there is no complete scene.
+  // Removes a scene and its upload, the files first, so that a full disk can be emptied. False if
+  // there is neither. Throws RequestError{kConflict} if the scene is being uploaded.
   bool remove(const std::string& name);
+  // Finishes removals that a crash or a full disk interrupted.
+  void finish_removals();
   // Removes uploads that received nothing since `before_s` (Unix time).
   void remove_stale_uploads(double before_s);
   std::string path(const std::string& name) const { return folder_ + "/files/" + name; }
+  // Throws Error{kIo} if the database was removed or replaced.
+  void check_file() const { file_.check(); }
 
  private:
-  friend class Upload;
+  friend class SceneUpload;
+
+  // Lets one request at a time write to a name.
+  class NameLock {
+   public:
+    // Throws RequestError{kConflict} if another one has it.
+    NameLock(SceneStore& store, const std::string& name);
+    ~NameLock();
+    NameLock(const NameLock&) = delete;
+
+   private:
+    SceneStore& store_;
+    const std::string name_;
+  };
 
   std::string part_path(const std::string& name) const { return folder_ + "/parts/" + name; }
-  bool lock_name(const std::string& name);
-  void unlock_name(const std::string& name);
   void record(const std::string& name, const UploadState& state);
   // Records the digest of a finished upload, then renames it to its final path.
   void publish(const std::string& name, uint64_t size, const std::string& sha256);
+  // The rest of publish(), which a crash may have interrupted. Throws Error{kCorrupt} if the bytes
+  // are gone.
   void finish_publishing(const std::string& name, uint64_t size, const std::string& sha256);
   void drop_upload(const std::string& name);
+  void put_scene(const std::string& name, uint64_t size, const std::string& sha256);
+  void adopt_scenes();
 
   FileSystem& files_;
   const std::string folder_;
   std::mutex mutex_;  // guards all below
   SqlDatabase database_;
+  const NamedFile file_;
   std::set<std::string> busy_;  // names that a request writes to
 };
+
+// The SHA-256 of the first `size` bytes of a file.
+std::string file_sha256(FileSystem& files, const std::string& path, uint64_t size);
 
 }  // namespace voxdag::server

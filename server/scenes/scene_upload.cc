@@ -1,7 +1,5 @@
 #include "server/scenes/scene_upload.h"
 
-#include <algorithm>
-
 #include "core/base/error.h"
 #include "server/request_error.h"
 
@@ -21,50 +19,54 @@ RequestError wrong_offset(uint64_t expected) {
 
 }  // namespace
 
-Upload::Upload(SceneStore& store, std::string name, uint64_t first, std::optional<uint64_t> total)
+SceneUpload::SceneUpload(SceneStore& store, std::string name, uint64_t first,
+                         std::optional<uint64_t> total)
     : store_(store),
       name_(std::move(name)),
+      lock_(store, name_),
       first_(first),
       total_(total),
       offset_(first),
       recorded_(first) {
-  if (!store_.lock_name(name_))
-    throw RequestError(RequestError::Kind::kConflict, "another request is uploading this scene");
-  try {
-    const auto known = store_.upload(name_);
-    if (first_ == 0) {
-      store_.record(name_, {0, total_});
-      file_ = store_.files_.create(store_.part_path(name_));
-    } else {
-      if (first_ != (known ? known->offset : 0)) throw wrong_offset(known ? known->offset : 0);
-      if (known->total && total_ != known->total)
-        throw RequestError(RequestError::Kind::kInvalid,
-                           "Content-Range: the total is another than that of the first part");
-      file_ = store_.files_.open_write(store_.part_path(name_));
-    }
-  } catch (...) {
-    store_.unlock_name(name_);
-    throw;
+  const std::string path = store_.part_path(name_);
+  if (first_ == 0) {
+    store_.record(name_, {0, total_});
+    file_ = store_.files_.create(path);
+    store_.files_.sync_directory(parent_directory(path));
+    return;
   }
+  const auto known = store_.upload(name_);
+  if (first_ != (known ? known->offset : 0)) throw wrong_offset(known ? known->offset : 0);
+  if (!has_part()) {
+    store_.drop_upload(name_);
+    throw wrong_offset(0);
+  }
+  if (known->total && total_ != known->total)
+    throw RequestError(RequestError::Kind::kInvalid,
+                       "Content-Range: the total is another than that of the first part");
+  file_ = store_.files_.open_write(path);
 }
 
-Upload::~Upload() {
+SceneUpload::~SceneUpload() {
   try {
-    if (!done_) checkpoint();
-  } catch (const Error&) {
+    if (!done_ && file_) checkpoint();
+  } catch (const std::exception&) {
     // The record still has an earlier offset, which is valid too.
   }
-  file_.reset();
-  store_.unlock_name(name_);
 }
 
-void Upload::write(std::string_view bytes) {
+bool SceneUpload::has_part() const {
+  const std::string path = store_.part_path(name_);
+  return store_.files_.exists(path) && store_.files_.open_read(path)->size() >= first_;
+}
+
+void SceneUpload::write(std::string_view bytes) {
   buffer_ += bytes;
   if (buffer_.size() >= kBufferBytes) flush();
   if (offset_ - recorded_ >= kCheckpointBytes) checkpoint();
 }
 
-void Upload::flush() {
+void SceneUpload::flush() {
   if (buffer_.empty()) return;
   const auto bytes = std::as_bytes(std::span(buffer_));
   file_->write_at(offset_, bytes);
@@ -73,14 +75,15 @@ void Upload::flush() {
   buffer_.clear();
 }
 
-void Upload::checkpoint() {
+void SceneUpload::checkpoint() {
   flush();
   file_->sync();
   store_.record(name_, {offset_, total_});
   recorded_ = offset_;
 }
 
-bool Upload::finish(const std::string& part_digest, const std::string& whole_digest, bool is_last) {
+bool SceneUpload::finish(const std::string& part_digest, const std::string& whole_digest,
+                         bool is_last) {
   flush();
   const std::string part = digest_.finish();
   if (!part_digest.empty() && part_digest != part) {
@@ -98,7 +101,7 @@ bool Upload::finish(const std::string& part_digest, const std::string& whole_dig
     return false;
   }
   file_->sync();
-  sha256_ = first_ == 0 ? part : digest_of_whole();
+  sha256_ = first_ == 0 ? part : file_sha256(store_.files_, store_.part_path(name_), offset_);
   if (!whole_digest.empty() && whole_digest != sha256_) {
     done_ = true;
     store_.drop_upload(name_);
@@ -108,23 +111,16 @@ bool Upload::finish(const std::string& part_digest, const std::string& whole_dig
   return true;
 }
 
-std::string Upload::publish() {
+std::string SceneUpload::publish() {
   file_->close();
-  store_.publish(name_, offset_, sha256_);
   done_ = true;
-  return sha256_;
-}
-
-std::string Upload::digest_of_whole() {
-  const auto file = store_.files_.open_read(store_.part_path(name_));
-  Sha256 digest;
-  std::string piece;
-  for (uint64_t at = 0; at < offset_; at += piece.size()) {
-    piece.resize(std::min<uint64_t>(kBufferBytes, offset_ - at));
-    file->read_at(at, std::as_writable_bytes(std::span(piece)));
-    digest.add(std::as_bytes(std::span(piece)));
+  try {
+    store_.publish(name_, offset_, sha256_);
+  } catch (const Error& error) {
+    if (error.is_corruption()) store_.drop_upload(name_);
+    throw;
   }
-  return digest.finish();
+  return sha256_;
 }
 
 }  // namespace voxdag::server

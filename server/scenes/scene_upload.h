@@ -12,15 +12,15 @@
 
 namespace voxdag::server {
 
-class Upload {
+class SceneUpload {
  public:
   // `first` is where this part begins (0 starts over), `total` the whole's size if it is known.
   // Throws RequestError: kConflict if another request is writing, or (with upload_offset) if the
   // part does not begin where the last one ended; kInvalid if the total differs from the first
   // part's.
-  Upload(SceneStore& store, std::string name, uint64_t first, std::optional<uint64_t> total);
-  ~Upload();
-  Upload(const Upload&) = delete;
+  SceneUpload(SceneStore& store, std::string name, uint64_t first, std::optional<uint64_t> total);
+  ~SceneUpload();
+  SceneUpload(const SceneUpload&) = delete;
 
   void write(std::string_view bytes);
   uint64_t offset() const { return offset_; }
@@ -36,10 +36,12 @@ class Upload {
   void flush();
   // Syncs what was written and records the offset.
   void checkpoint();
-  std::string digest_of_whole();
+  // Whether the file has the bytes that are recorded: it may have been lost.
+  bool has_part() const;
 
   SceneStore& store_;
   const std::string name_;
+  const SceneStore::NameLock lock_;
   const uint64_t first_;
   std::optional<uint64_t> total_;
   std::unique_ptr<WritableFile> file_;

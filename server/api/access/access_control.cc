@@ -71,19 +71,21 @@ Caller AccessControl::identify(const Request& request) {
     const auto caller = tokens_->find(trimmed(std::string_view(header).substr(kScheme.size())));
     if (caller) return *caller;
   }
-  if (!wrong_tokens_.take(request.peer, wall_seconds())) throw too_many("too many wrong tokens");
+  if (!wrong_tokens_.take(client_of(request.peer), wall_seconds()))
+    throw too_many("too many wrong tokens");
   throw unauthorized("unknown token");
 }
 
 Caller AccessControl::admit(const Request& request, Role needed) {
-  if (!is_loopback(request.peer) && !requests_.take(request.peer, wall_seconds()))
+  if (!is_loopback(request.peer) && !requests_.take(client_of(request.peer), wall_seconds()))
     throw too_many("the rate limit of this client is exceeded");
   if (!tokens_) {
     check_site(request);
-    return {Role::kAdmin, "local"};
+    return {Role::kAdmin, "local", client_of(request.peer)};
   }
   if (needed == Role::kNone) return {};
-  const Caller caller = identify(request);
+  Caller caller = identify(request);
+  caller.client = "token " + caller.name;
   if (caller.role == Role::kNone) throw unauthorized("expected Authorization: Bearer TOKEN");
   if (caller.role < needed)
     throw Problem(403, "forbidden", "the role of the token is not sufficient");

@@ -1,31 +1,52 @@
-// Limits how many operations of a kind run concurrently. Thread-safe.
+// Limits how many operations of a kind run concurrently, in all and for one client, so that no
+// client can keep all others out. Thread-safe.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <string>
 
 namespace voxdag::server {
 
 class ConcurrencyLimiter {
  public:
-  explicit ConcurrencyLimiter(size_t max)
-      : counter_(std::make_shared<std::atomic<size_t>>(0)), max_(max) {}
+  ConcurrencyLimiter(size_t max, size_t max_per_client)
+      : state_(std::make_shared<State>()), max_(max), max_per_client_(max_per_client) {}
 
   // A permit, released when the last copy of the pointer is destroyed; null if none is free.
-  std::shared_ptr<void> acquire() {
-    if (counter_->fetch_add(1) >= max_) {
-      counter_->fetch_sub(1);
-      return nullptr;
+  std::shared_ptr<void> acquire(const std::string& client) {
+    {
+      std::lock_guard lock(state_->mutex);
+      if (state_->in_use >= max_ || state_->by_client[client] >= max_per_client_) return nullptr;
+      ++state_->by_client[client];
+      ++state_->in_use;
     }
-    return std::shared_ptr<void>(counter_.get(),
-                                 [counter = counter_](void*) { counter->fetch_sub(1); });
+    return std::shared_ptr<void>(state_.get(),
+                                 [state = state_, client](void*) { state->release(client); });
   }
-  size_t in_use() const { return *counter_; }
+  size_t in_use() const {
+    std::lock_guard lock(state_->mutex);
+    return state_->in_use;
+  }
 
  private:
-  std::shared_ptr<std::atomic<size_t>> counter_;
-  size_t max_;
+  struct State {
+    void release(const std::string& client) {
+      std::lock_guard lock(mutex);
+      --in_use;
+      const auto found = by_client.find(client);
+      if (--found->second == 0) by_client.erase(found);
+    }
+
+    std::mutex mutex;  // guards the next
+    size_t in_use = 0;
+    std::map<std::string, size_t> by_client;
+  };
+
+  std::shared_ptr<State> state_;
+  size_t max_, max_per_client_;
 };
 
 }  // namespace voxdag::server

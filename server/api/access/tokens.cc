@@ -45,7 +45,7 @@ Tokens Tokens::read(FileSystem& files, const std::string& path) {
       throw Error(ErrorCode::kInvalidInput,
                   path + ":" + std::to_string(number) +
                       ": expected ROLE NAME SHA256, the role read, submit or admin");
-    tokens.entries_.push_back({{*parsed, name}, hash});
+    tokens.entries_.push_back({{*parsed, name, ""}, hash});
   }
   if (tokens.entries_.empty())
     throw Error(

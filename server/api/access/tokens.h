@@ -23,7 +23,8 @@ std::optional<Role> parse_role(std::string_view name);
 
 struct Caller {
   Role role = Role::kNone;
-  std::string name;  // for the audit log
+  std::string name;    // for the audit log
+  std::string client;  // shares limits: the name of a token, else an address
 };
 
 class Tokens {

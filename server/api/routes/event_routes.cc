@@ -122,8 +122,8 @@ Response follow(Context& context, Call& call) {
   Response response = make_response(200, "text/event-stream", "no-store");
   response.headers.emplace("X-Accel-Buffering", "no");  // a proxy must not buffer events
   if (call.request.method == "HEAD") return response;
-  auto permit = context.event_streams.acquire();
-  if (!permit) throw busy("too many event streams", 10);
+  auto permit = context.event_streams.acquire(call.caller.client);
+  if (!permit) throw busy("too many event streams, of this client or of all", 10);
   const auto feed =
       std::make_shared<EventFeed>(context, call.names[0], last_event_id(call.request));
   response.next_event = [feed] { return feed->next(); };

@@ -9,6 +9,7 @@
 #include "server/api/job_json.h"
 #include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
+#include "server/data_folder.h"
 #include "server/jobs/process/child_process.h"
 #include "server/random_id.h"
 
@@ -55,7 +56,7 @@ class TemporaryTask {
   ~TemporaryTask() {
     try {
       remove_tree(files_, folder.path);
-    } catch (const Error&) {
+    } catch (const std::exception&) {
       // The service removes it at its next start.
     }
   }
@@ -73,8 +74,8 @@ Problem problem_of(const Failure& failure) {
 
 // The estimate of a job without queuing it: runs the plan in a child process. Throws Problem: the
 // error of the scene or the request; 503 if too many plans run or this one takes too long.
-Response dry_run(Context& context, const JobRequest& request) {
-  const auto permit = context.plans.acquire();
+Response dry_run(Context& context, Call& call, const JobRequest& request) {
+  const auto permit = context.plans.acquire(call.caller.client);
   if (!permit) throw busy("too many concurrent plans", 5);
   const Task task = context.tasks.make(request, Task::Kind::kPlan);
   const TemporaryTask temporary(context.files,
@@ -86,7 +87,10 @@ Response dry_run(Context& context, const JobRequest& request) {
   std::string estimate;
   std::optional<Failure> failure;
   const double deadline = wall_seconds() + context.config.jobs.plan_timeout_s;
-  bool timed_out = false;
+  const auto is_in_vain = [&] {
+    return context.draining || wall_seconds() > deadline || call.request.client_has_left();
+  };
+  bool killed = false;
   child.read_lines(
       [&](std::string_view line) {
         const auto message = decode(line);
@@ -94,9 +98,9 @@ Response dry_run(Context& context, const JobRequest& request) {
         if (const auto* result = std::get_if<Result>(&*message)) estimate = result->json;
         if (const auto* reported = std::get_if<Failure>(&*message)) failure = *reported;
       },
-      [&] { return timed_out = timed_out || context.draining || wall_seconds() > deadline; });
+      [&] { return killed = killed || is_in_vain(); });
   child.wait();
-  if (timed_out) throw busy("the plan exceeded its time limit", 60);
+  if (killed) throw busy("the plan exceeded its time limit", 60);
   if (failure) throw problem_of(*failure);
   if (estimate.empty()) throw Problem(500, "internal", "the process of the plan crashed");
   return json_response(200, estimate);
@@ -109,7 +113,7 @@ Response post_job(Context& context, Call& call) {
   const JobRequest request =
       parse_job_request(read_json_body(call.request, context.config.transfers.max_body_bytes));
   const IdempotencyKey key = key_of(call.request, request);
-  if (dry == "true") return dry_run(context, request);
+  if (dry == "true") return dry_run(context, call, request);
   if (context.draining) throw busy("the service is stopping");
   std::lock_guard lock(context.scene_mutex);
   if (const auto known = context.queue.find_by_key(key)) return accepted(context, *known, true);
@@ -171,7 +175,9 @@ Response patch_job(Context& context, Call& call) {
       read_json_body(call.request, context.config.transfers.max_body_bytes), nullptr, false);
   if (!body.is_object() || body.size() != 1 || !body.contains("priority"))
     throw bad_request("expected {\"priority\": N}");
-  const int priority = parse_priority(body["priority"].dump());
+  const auto& value = body["priority"];
+  if (!value.is_number()) throw bad_request("'priority': expected a number");
+  const int priority = parse_priority(value.dump());
   const Job job = context.queue.change(call.names[0], [&](Job& j) { j.priority = priority; });
   return json_response(200, to_json(context, job));
 }

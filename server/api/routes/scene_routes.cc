@@ -75,24 +75,24 @@ Part part_of(const Request& request) {
   return {range.begin, range.end, total};
 }
 
-void check_disk_space(Context& context, const Part& part) {
+// The bytes that are still to come, as far as the client has announced them.
+uint64_t announced_bytes(Context& context, const Part& part) {
   const uint64_t max_bytes = context.config.transfers.max_scene_bytes;
   const uint64_t size = part.total.value_or(0);
   if (size > max_bytes)
     throw Problem(413, "too_large",
                   "a scene may have at most " + std::to_string(max_bytes) + " bytes");
-  const uint64_t free = context.files.free_space(context.config.data_folder);
-  if (free < context.config.jobs.min_free_disk_bytes + (size - std::min(size, part.first)))
-    throw problem(ErrorCode::kNoSpace,
-                  "the disk of the service has not enough free space for this scene");
+  return size - std::min(size, part.first);
 }
 
-BodyEnd receive(Context& context, Call& call, const Part& part, Upload& upload) {
+BodyEnd receive(Context& context, Call& call, const Part& part, DiskSpace::Reservation& space,
+                SceneUpload& upload) {
   const uint64_t end_offset = part.end.value_or(context.config.transfers.max_scene_bytes);
   uint64_t received = part.first;
   const BodyEnd end = call.request.read_body([&](std::string_view piece) {
     received += piece.size();
     if (received > end_offset) return false;
+    space.use(piece.size());
     upload.write(piece);
     context.metrics.count_uploaded(piece.size());
     return true;
@@ -110,16 +110,16 @@ std::string digest_of(const Request& request, const char* name) {
 
 Response put_scene(Context& context, Call& call) {
   const std::string name = checked_name(call);
-  const auto permit = context.transfers.acquire();
-  if (!permit) throw busy("too many transfers", 5);
+  const auto permit = context.uploads.acquire(call.caller.client);
+  if (!permit) throw busy("too many uploads, of this client or of all", 5);
   const Part part = part_of(call.request);
   if (!call.request.has_body) throw bad_request("expected the scene as body");
-  check_disk_space(context, part);
+  DiskSpace::Reservation space(context.disk, announced_bytes(context, part));
   check_unused(context, name);
   const std::string part_digest = digest_of(call.request, "Content-Digest");
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
-  Upload upload(context.scenes, name, part.first, part.total);
-  switch (receive(context, call, part, upload)) {
+  SceneUpload upload(context.scenes, name, part.first, part.total);
+  switch (receive(context, call, part, space, upload)) {
     case BodyEnd::kComplete:
       break;
     case BodyEnd::kStopped:

@@ -39,10 +39,10 @@ void check_writable(Context& context) {
 
 Response get_ready(Context& context, Call&) {
   if (context.draining) throw busy("the service is stopping");
-  const std::string& data = context.config.data_folder;
   try {
-    if (context.files.free_space(data) < context.config.jobs.min_free_disk_bytes)
-      throw busy("the disk has less free space than min_free_disk", 60);
+    if (context.disk.is_low()) throw busy("the disk has less free space than min_free_disk", 60);
+    context.queue.check_file();
+    context.scenes.check_file();
     context.queue.counts();
     check_writable(context);
   } catch (const Error&) {
@@ -58,9 +58,9 @@ Response get_metrics(Context& context, double started_s) {
   };
   add("voxdag_job_processes", "Running job processes.", context.dispatcher.running());
   add("voxdag_event_streams", "Open event streams.", context.event_streams.in_use());
-  add("voxdag_transfers", "Uploads and downloads in progress.", context.transfers.in_use());
-  add("voxdag_free_disk_bytes", "Free disk space for the data folder.",
-      context.files.free_space(context.config.data_folder));
+  add("voxdag_transfers", "Uploads and downloads in progress.",
+      context.uploads.in_use() + context.downloads.in_use());
+  add("voxdag_free_disk_bytes", "Free disk space for the data folder.", context.disk.free());
   add("voxdag_job_memory_limit_bytes", "Memory limit of all running jobs together.",
       context.tasks.memory_bytes());
   add("voxdag_resident_memory_bytes", "Resident memory of the service without its jobs.",

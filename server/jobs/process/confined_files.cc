@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 
 #include "core/base/error.h"
@@ -41,8 +42,10 @@ ConfinedFiles::ConfinedFiles(FileSystem& files, const std::vector<std::string>& 
 }
 
 std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) {
-  const std::string resolved = resolved_path(path);
-  if (resolved.empty()) return ForwardingFiles::open_read(path);  // reports what is missing
+  // Whether something lies outside shows in no way: what is missing there is as good as forbidden.
+  std::string resolved = resolved_path(path);
+  std::error_code failure;
+  if (resolved.empty()) resolved = std::filesystem::weakly_canonical(path, failure);
   const bool is_readable = std::any_of(readable_.begin(), readable_.end(),
                                        [&](const std::string& p) { return lies_in(resolved, p); });
   if (is_readable) {

@@ -4,8 +4,6 @@
 
 #include <string>
 
-#include "core/io/file_system.h"
-
 namespace voxdag::server {
 
 struct JobFolder {
@@ -22,8 +20,5 @@ struct JobFolder {
     return path.empty() ? name : path + "/" + name;
   }
 };
-
-// Removes a folder and all that is in it, if it exists.
-void remove_tree(FileSystem& files, const std::string& path);
 
 }  // namespace voxdag::server

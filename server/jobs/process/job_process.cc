@@ -15,7 +15,6 @@
 #include "scheduler/run_build.h"
 #include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
-#include "server/jobs/process/job_folder.h"
 #include "server/jobs/process/job_task.h"
 #include "server/jobs/process/progress_pipe.h"
 #include "server/request_error.h"
@@ -96,8 +95,7 @@ std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildCon
     return result_json(report_json(run_build(spec, context)), spec.run.output);
   if (context.files.exists(folder.work()))
     WorkFolder(context, folder.work(), spec.run.lock_wait_s).remove();
-  return result_json(read_small_file(context.files, folder.report(), kMaxReportBytes),
-                     spec.run.output);
+  return finished_result(context.files, folder);
 }
 
 std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progress,
@@ -112,6 +110,10 @@ std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progre
 }
 
 }  // namespace
+
+std::string finished_result(FileSystem& files, const JobFolder& folder) {
+  return result_json(read_small_file(files, folder.report(), kMaxReportBytes), folder.result());
+}
 
 int run_job(FileSystem& files, const std::string& path, const CancelToken& cancel) {
   raise_oom_score();

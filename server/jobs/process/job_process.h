@@ -11,8 +11,12 @@
 
 #include "core/base/cancel_token.h"
 #include "core/io/file_system.h"
+#include "server/jobs/process/job_folder.h"
 
 namespace voxdag::server {
+
+// RESULT of docs/api.md for a job whose build has finished. Throws Error.
+std::string finished_result(FileSystem& files, const JobFolder& folder);
 
 // Returns the exit status; changes the working directory. After a crash at any moment the same call
 // resumes the job.

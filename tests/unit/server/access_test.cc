@@ -119,12 +119,39 @@ TEST(RateLimiterTest, RefillsWithTime) {
 }
 
 TEST(ConcurrencyLimiterTest, ReleasesPermits) {
-  ConcurrencyLimiter limiter(1);
-  auto first = limiter.acquire();
+  ConcurrencyLimiter limiter(1, 1);
+  auto first = limiter.acquire("a");
   EXPECT_TRUE(first);
-  EXPECT_FALSE(limiter.acquire());
+  EXPECT_FALSE(limiter.acquire("b"));
   first.reset();
-  EXPECT_TRUE(limiter.acquire());
+  EXPECT_EQ(limiter.in_use(), 0u);
+  EXPECT_TRUE(limiter.acquire("b"));
+}
+
+// One client cannot take all permits.
+TEST(Hardening, M6_EachClientHasALimitOfItsOwn) {
+  ConcurrencyLimiter limiter(3, 2);
+  const auto first = limiter.acquire("a");
+  auto second = limiter.acquire("a");
+  EXPECT_TRUE(first && second);
+  EXPECT_FALSE(limiter.acquire("a"));
+  EXPECT_TRUE(limiter.acquire("b"));
+  second.reset();
+  EXPECT_TRUE(limiter.acquire("a"));
+}
+
+// A client is a token or an address, and all addresses of a /64 are one.
+TEST_F(AccessControlTest, HardeningM6_ClientsAreTokensOrNetworks) {
+  const NewToken reader = make_token("read", "r");
+  write_file_atomically(system_files(), folder_.file("t"), reader.line);
+  config_.token_file = folder_.file("t");
+  config_.transfers.max_requests_per_s = 1;
+  AccessControl access(config_, system_files());
+  const HeaderMap token = {{"Authorization", "Bearer " + reader.token}};
+  EXPECT_EQ(access.admit(request("GET", token), Role::kRead).client, "token r");
+  EXPECT_EQ(status(access, request("GET", token, "2001:db8::1"), Role::kRead), 0);
+  EXPECT_EQ(status(access, request("GET", token, "2001:db8::2"), Role::kRead), 0);
+  EXPECT_EQ(status(access, request("GET", token, "2001:db8::3"), Role::kRead), 429);
 }
 
 TEST(DigestField, IsParsedAndFormatted) {

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "server/data_folder.h"
 #include "server/jobs/process/job_folder.h"
 #include "server/jobs/process/job_messages.h"
 #include "server/jobs/process/job_task.h"

@@ -230,6 +230,34 @@ TEST(ConfinedFilesTest, OpensNothingOutside) {
   EXPECT_THROW(one.open_read(folder.file("in/side/b")), Error);
 }
 
+// Whether a file exists outside shows in no way, and neither does a path of the machine.
+TEST(ConfinedFilesTest, HardeningL1_DoesNotTellWhatIsOutside) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder.file("in"));
+  write_file_atomically(system_files(), folder.file("secret"), "x");
+  write_file_atomically(system_files(), folder.file("in/a"), "x");
+  ConfinedFiles files(system_files(), {folder.file("in/a")});
+  const auto failure = [&](const std::string& path) {
+    try {
+      files.open_read(folder.file(path));
+      return std::string("opened");
+    } catch (const Error& error) {
+      std::string text = error_name(error.code()) + (": " + error.message());
+      const size_t at = text.find(folder.file(path));
+      return at == std::string::npos ? text : text.replace(at, folder.file(path).size(), "PATH");
+    }
+  };
+  const std::string outside = failure("in/../secret");
+  EXPECT_NE(outside.find("lies outside"), std::string::npos) << outside;
+  for (const char* path : {"secret", "in/../missing", "missing", "in/b", "no/folder/x", "in/a/x"}) {
+    SCOPED_TRACE(path);
+    EXPECT_EQ(failure(path), outside);
+  }
+  EXPECT_EQ(failure("in/a"), "opened");
+  std::filesystem::remove(folder.file("in/a"));
+  EXPECT_NE(failure("in/a").find("not_found"), std::string::npos);
+}
+
 class JobOutcome : public testing::Test {
  protected:
   JobOutcome() {
@@ -297,6 +325,14 @@ TEST_F(JobOutcome, AStoppedRunGetsTheStateThatWasAskedFor) {
   job_.state = JobState::kSuspended;
   apply();
   EXPECT_EQ(job_.state, JobState::kSuspended);
+}
+
+// A run that ended by itself, in whatever way, shows that the job does not end the service.
+TEST_F(JobOutcome, ForgetsInterruptions) {
+  job_.interruptions = 4;
+  fail("no_space");
+  apply();
+  EXPECT_EQ(job_.interruptions, 0u);
 }
 
 }  // namespace

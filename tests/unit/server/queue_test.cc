@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "core/base/clock.h"
 #include "server/queue/job_queue.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -72,10 +74,10 @@ TEST_F(Queue, StoresEveryMemberOfAJob) {
 TEST_F(Queue, ServesByPriorityThenFrontThenOrder) {
   const std::string first = post().id, second = post().id, urgent = post(5).id;
   queue_->change(second, [](Job& j) { j.front = true; });
-  EXPECT_EQ(queue_->next(1e12, {})->id, urgent);
-  EXPECT_EQ(queue_->next(1e12, {urgent})->id, second);
-  EXPECT_EQ(queue_->next(1e12, {urgent, second})->id, first);
-  EXPECT_FALSE(queue_->next(1e12, {urgent, second, first}));
+  EXPECT_EQ(queue_->next(1e12, 900, {})->id, urgent);
+  EXPECT_EQ(queue_->next(1e12, 900, {urgent})->id, second);
+  EXPECT_EQ(queue_->next(1e12, 900, {urgent, second})->id, first);
+  EXPECT_FALSE(queue_->next(1e12, 900, {urgent, second, first}));
   const auto places = queue_->places();
   EXPECT_EQ(places->at(queue_->find(urgent)->number), 1u);
   EXPECT_EQ(places->at(queue_->find(first)->number), 3u);
@@ -84,8 +86,8 @@ TEST_F(Queue, ServesByPriorityThenFrontThenOrder) {
 TEST_F(Queue, WaitsUntilAJobMayBeRetried) {
   const std::string id = post().id;
   queue_->change(id, [](Job& j) { j.not_before_s = 1000; });
-  EXPECT_FALSE(queue_->next(999, {}));
-  EXPECT_TRUE(queue_->next(1000, {}));
+  EXPECT_FALSE(queue_->next(999, 900, {}));
+  EXPECT_TRUE(queue_->next(1000, 900, {}));
 }
 
 // After a crash of the service: running jobs are first in the queue, canceling ones are canceled.
@@ -94,11 +96,11 @@ TEST_F(Queue, RecoversWhatWasRunning) {
   set_state(running, JobState::kRunning);
   set_state(stopping, JobState::kCanceling);
   reopen();
-  const auto canceled = queue_->recover();
+  const auto canceled = queue_->recover({}, 5);
   ASSERT_EQ(canceled.size(), 1u);
   EXPECT_EQ(canceled[0].id, stopping);
   EXPECT_EQ(queue_->find(stopping)->state, JobState::kCanceled);
-  EXPECT_EQ(queue_->next(1e12, {})->id, running);
+  EXPECT_EQ(queue_->next(1e12, 900, {})->id, running);
   EXPECT_EQ(queue_->find(waiting)->state, JobState::kQueued);
 }
 
@@ -198,6 +200,100 @@ TEST_F(Queue, LetsEndedJobsExpire) {
   EXPECT_EQ(queue_->expired(0, 1), (std::vector<std::string>{old}));
   EXPECT_TRUE(queue_->expired(0, 2).empty());
   EXPECT_EQ(queue_->expired(1e12, 100).size(), 2u);
+}
+
+// A clock that was set back does not make a job wait for as long.
+TEST_F(Queue, HardeningL8_DoesNotWaitForAClockThatWasSetBack) {
+  const std::string id = post().id;
+  queue_->change(id, [](Job& j) { j.not_before_s = 1e6 + 900; });
+  EXPECT_FALSE(queue_->next(1e6, 900, {}));
+  EXPECT_TRUE(queue_->next(1e6 - 1, 900, {}));
+}
+
+// A job that takes the machine down with it is not tried for ever, and soon not first either.
+TEST_F(Queue, HardeningL8_InterruptedRunsCountInTheEnd) {
+  const std::string id = post().id, other = post().id;
+  int runs = 0;
+  for (; queue_->find(id)->state != JobState::kFailed && runs < 100; ++runs) {
+    queue_->change(id, [](Job& j) {
+      if (!j.front) ++j.attempts;
+      j.front = false;
+      j.state = JobState::kRunning;
+    });
+    reopen();
+    queue_->recover({}, 5);
+    const Job job = *queue_->find(id);
+    EXPECT_EQ(job.front, runs < 5) << runs;
+    EXPECT_EQ(job.attempts, runs < 6 ? 1u : static_cast<unsigned>(runs) - 4) << runs;
+  }
+  EXPECT_EQ(runs, 10);
+  EXPECT_EQ(queue_->find(id)->error->code, "internal");
+  EXPECT_FALSE(queue_->find(id)->error->transient);
+  EXPECT_EQ(queue_->next(1e12, 900, {})->id, other);
+}
+
+TEST_F(Queue, RecoversNothingThatRuns) {
+  const std::string id = post().id;
+  set_state(id, JobState::kRunning);
+  EXPECT_TRUE(queue_->recover({id}, 5).empty());
+  EXPECT_EQ(queue_->find(id)->state, JobState::kRunning);
+}
+
+// A damaged row can be read, listed and deleted, and hides no other one.
+TEST_F(Queue, HardeningH1_ReadsADamagedRow) {
+  const std::string id = post().id, other = post().id;
+  const auto damage = [&](const std::string& set) {
+    SqlDatabase(folder_.file("queue.db"), SqlDatabase::Mode::kReadWrite)
+        .execute("PRAGMA ignore_check_constraints = 1; UPDATE job SET " + set + " WHERE id = '" +
+                 id + "'");
+  };
+  for (const char* column : {"scenes", "request", "error", "warnings", "result", "progress"}) {
+    SCOPED_TRACE(column);
+    damage(std::string(column) + " = '{\"broken'");
+    EXPECT_EQ(queue_->list({}).size(), 2u);
+    const auto job = queue_->find(id);
+    ASSERT_TRUE(job);
+    EXPECT_FALSE(job->warnings.empty());
+    EXPECT_TRUE(job->request.starts_with('{') && job->request.ends_with('}')) << job->request;
+    EXPECT_EQ(job->result + job->progress, "");
+    EXPECT_TRUE(queue_->find(other));
+  }
+  damage("state = 77");
+  EXPECT_EQ(queue_->find(id)->state, JobState::kFailed);
+  queue_->remove(id);
+  EXPECT_FALSE(queue_->find(id));
+}
+
+// A queue that is removed or replaced under the service is noticed before a job is lost in it.
+TEST_F(Queue, HardeningL8_NoticesThatItsFileIsGone) {
+  post();
+  queue_->check_file();
+  std::filesystem::rename(folder_.file("queue.db"), folder_.file("away.db"));
+  EXPECT_THROW(queue_->check_file(), Error);
+  EXPECT_THROW(post(), Error);
+  std::filesystem::copy_file(folder_.file("away.db"), folder_.file("queue.db"));
+  EXPECT_THROW(queue_->check_file(), Error) << "another file";
+}
+
+// The queue of the last version is brought to this one.
+TEST_F(Queue, ReadsTheLastVersion) {
+  const std::string id = post().id;
+  queue_.reset();
+  SqlDatabase(folder_.file("queue.db"), SqlDatabase::Mode::kReadWrite)
+      .execute("ALTER TABLE job DROP COLUMN interruptions; PRAGMA user_version = 2");
+  reopen();
+  EXPECT_EQ(queue_->find(id)->interruptions, 0u);
+  set_state(id, JobState::kRunning);
+  reopen();
+  queue_->recover({}, 5);
+  EXPECT_EQ(queue_->find(id)->interruptions, 1u);
+}
+
+TEST_F(Queue, HardeningH2_MakesNoNewQueueWhereThereWasOne) {
+  EXPECT_THROW(JobQueue(folder_.file("new.db"), false), Error);
+  EXPECT_THROW(JobQueue(folder_.file("new.db"), false), Error) << "the first try left none";
+  JobQueue(folder_.file("new.db"), true);
+  JobQueue(folder_.file("new.db"), false);
 }
 
 TEST_F(Queue, RefusesADatabaseOfAnotherProgram) {

@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
+#include "core/db/sqlite.h"
 #include "core/format/checksum.h"
+#include "server/data_folder.h"
 #include "server/request_error.h"
 #include "server/scenes/scene_store.h"
 #include "server/scenes/scene_upload.h"
@@ -44,7 +48,7 @@ TEST(SceneName, IsAPlainFileName) {
 
 TEST_F(Scenes, ArriveInOneGo) {
   {
-    Upload upload(*store_, "a.glb", 0, 5);
+    SceneUpload upload(*store_, "a.glb", 0, 5);
     upload.write("hel");
     upload.write("lo");
     EXPECT_FALSE(store_->find("a.glb")->complete);
@@ -63,19 +67,19 @@ TEST_F(Scenes, ArriveInOneGo) {
 // What arrived before the connection broke is not lost, even if the service restarts.
 TEST_F(Scenes, ContinueWhereTheyBrokeOff) {
   {
-    Upload upload(*store_, "a.glb", 0, 10);
+    SceneUpload upload(*store_, "a.glb", 0, 10);
     upload.write("01234");
   }
   reopen();
   ASSERT_EQ(store_->upload("a.glb")->offset, 5u);
   EXPECT_EQ(store_->upload("a.glb")->total, 10u);
-  const auto wrong = refusal([&] { Upload(*store_, "a.glb", 4, 10); });
+  const auto wrong = refusal([&] { SceneUpload(*store_, "a.glb", 4, 10); });
   ASSERT_TRUE(wrong);
   EXPECT_EQ(wrong->kind(), RequestError::Kind::kConflict);
   EXPECT_EQ(wrong->upload_offset, 5u);
-  EXPECT_EQ(refusal([&] { Upload(*store_, "a.glb", 5, 11); })->kind(),
+  EXPECT_EQ(refusal([&] { SceneUpload(*store_, "a.glb", 5, 11); })->kind(),
             RequestError::Kind::kInvalid);
-  Upload upload(*store_, "a.glb", 5, 10);
+  SceneUpload upload(*store_, "a.glb", 5, 10);
   upload.write("56789");
   EXPECT_TRUE(upload.finish(sha256_hex("56789"), sha256_hex("0123456789"), true));
   EXPECT_EQ(upload.publish(), sha256_hex("0123456789"));
@@ -83,12 +87,12 @@ TEST_F(Scenes, ContinueWhereTheyBrokeOff) {
 
 TEST_F(Scenes, DropAPartOfTheWrongDigest) {
   {
-    Upload upload(*store_, "a.glb", 0, 10);
+    SceneUpload upload(*store_, "a.glb", 0, 10);
     upload.write("01234");
     EXPECT_FALSE(upload.finish("", "", false));
   }
   {
-    Upload upload(*store_, "a.glb", 5, 10);
+    SceneUpload upload(*store_, "a.glb", 5, 10);
     upload.write("x6789");
     EXPECT_EQ(refusal([&] { upload.finish(sha256_hex("56789"), "", true); })->kind(),
               RequestError::Kind::kInvalid);
@@ -98,7 +102,7 @@ TEST_F(Scenes, DropAPartOfTheWrongDigest) {
 
 TEST_F(Scenes, DropAWholeOfTheWrongDigest) {
   {
-    Upload upload(*store_, "a.glb", 0, 5);
+    SceneUpload upload(*store_, "a.glb", 0, 5);
     upload.write("hello");
     EXPECT_EQ(refusal([&] { upload.finish("", sha256_hex("other"), true); })->kind(),
               RequestError::Kind::kInvalid);
@@ -107,21 +111,21 @@ TEST_F(Scenes, DropAWholeOfTheWrongDigest) {
 }
 
 TEST_F(Scenes, AreWrittenByOneRequestAtATime) {
-  Upload upload(*store_, "a.glb", 0, 5);
-  EXPECT_EQ(refusal([&] { Upload(*store_, "a.glb", 0, 5); })->kind(),
+  SceneUpload upload(*store_, "a.glb", 0, 5);
+  EXPECT_EQ(refusal([&] { SceneUpload(*store_, "a.glb", 0, 5); })->kind(),
             RequestError::Kind::kConflict);
-  EXPECT_FALSE(refusal([&] { Upload(*store_, "b.glb", 0, 5); }));
+  EXPECT_FALSE(refusal([&] { SceneUpload(*store_, "b.glb", 0, 5); }));
 }
 
 // The old scene stays until the new one is complete.
 TEST_F(Scenes, AreReplacedAtOnce) {
   {
-    Upload upload(*store_, "a.glb", 0, 3);
+    SceneUpload upload(*store_, "a.glb", 0, 3);
     upload.write("old");
     upload.finish("", "", true);
     upload.publish();
   }
-  Upload upload(*store_, "a.glb", 0, 3);
+  SceneUpload upload(*store_, "a.glb", 0, 3);
   upload.write("new");
   EXPECT_EQ(contents("a.glb"), "old");
   EXPECT_TRUE(store_->find("a.glb")->complete);
@@ -132,7 +136,7 @@ TEST_F(Scenes, AreReplacedAtOnce) {
 
 TEST_F(Scenes, AreListedByNameAndRemoved) {
   for (const char* name : {"b.glb", "a.glb", "c.glb"}) {
-    Upload upload(*store_, name, 0, 1);
+    SceneUpload upload(*store_, name, 0, 1);
     upload.write("x");
     upload.finish("", "", true);
     upload.publish();
@@ -146,8 +150,115 @@ TEST_F(Scenes, AreListedByNameAndRemoved) {
   EXPECT_FALSE(store_->find("a.glb"));
 }
 
+// Neither the bytes that arrive nor the record of them may disappear under a request.
+TEST_F(Scenes, HardeningH3_AreNotRemovedWhileTheyArrive) {
+  SceneUpload upload(*store_, "a.glb", 0, 5);
+  upload.write("hel");
+  EXPECT_EQ(refusal([&] { store_->remove("a.glb"); })->kind(), RequestError::Kind::kConflict);
+  upload.write("lo");
+  EXPECT_TRUE(upload.finish("", "", true));
+  upload.publish();
+  EXPECT_EQ(contents("a.glb"), "hello");
+}
+
+TEST_F(Scenes, HardeningH3_AreNotCompleteWithoutTheirBytes) {
+  const std::string part = folder_.file("parts/a.glb");
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 5);
+    upload.write("hello");
+    EXPECT_TRUE(upload.finish("", "", true));
+    system_files().remove(part);
+    EXPECT_THROW(upload.publish(), Error);
+  }
+  EXPECT_FALSE(store_->find("a.glb"));
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 5);
+    upload.write("hello");
+    EXPECT_TRUE(upload.finish("", "", true));
+    write_file_atomically(system_files(), part, "he");
+    EXPECT_THROW(upload.publish(), Error);
+  }
+  EXPECT_FALSE(store_->find("a.glb"));
+  // A crash after the digest was recorded.
+  for (const char* left : {"", "hello", "hallo"}) {
+    SCOPED_TRACE(left);
+    { SceneUpload(*store_, "a.glb", 0, 5).write("hello"); }
+    system_files().remove(part);
+    if (*left) write_file_atomically(system_files(), store_->path("a.glb"), left);
+    SqlDatabase(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite)
+        .execute("UPDATE upload SET sha256 = '" + sha256_hex("hello") + "'");
+    reopen();
+    EXPECT_EQ(store_->find("a.glb").has_value(), std::string_view(left) == "hello");
+    store_->remove("a.glb");
+    if (*left && system_files().exists(store_->path("a.glb")))
+      system_files().remove(store_->path("a.glb"));
+  }
+}
+
+// The file of an upload that was lost, or is shorter than what is recorded, is sent again.
+TEST_F(Scenes, HardeningH4_StartOverIfTheirBytesAreLost) {
+  const std::string part = folder_.file("parts/a.glb");
+  for (const char* left : {"", "0123"}) {
+    SCOPED_TRACE(left);
+    { SceneUpload(*store_, "a.glb", 0, 10).write("01234"); }
+    system_files().remove(part);
+    if (*left) write_file_atomically(system_files(), part, left);
+    const auto lost = refusal([&] { SceneUpload(*store_, "a.glb", 5, 10); });
+    ASSERT_TRUE(lost);
+    EXPECT_EQ(lost->kind(), RequestError::Kind::kConflict);
+    EXPECT_EQ(lost->upload_offset, 0u);
+    EXPECT_FALSE(store_->upload("a.glb"));
+  }
+  SceneUpload upload(*store_, "a.glb", 0, 2);
+  upload.write("ok");
+  EXPECT_TRUE(upload.finish("", "", true));
+  upload.publish();
+  EXPECT_EQ(contents("a.glb"), "ok");
+}
+
+// A database that is gone costs no scene, and files that no upload made are left alone.
+TEST_F(Scenes, HardeningH2_StayWithoutTheirDatabase) {
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 5);
+    upload.write("hello");
+    upload.finish("", "", true);
+    upload.publish();
+  }
+  store_.reset();
+  for (const char* suffix : {"", "-wal", "-shm"})
+    std::filesystem::remove(folder_.file("scenes.db") + suffix);
+  write_file_atomically(system_files(), folder_.file("files/README"), "x");
+  write_file_atomically(system_files(), folder_.file("parts/b.glb"), "x");
+  for (int i = 0; i < 2; ++i)
+    EXPECT_THROW(SceneStore(system_files(), folder_.path()), Error) << "and made no database";
+  store_ = std::make_unique<SceneStore>(system_files(), folder_.path(), true);
+  const auto scene = store_->find("a.glb");
+  ASSERT_TRUE(scene && scene->complete);
+  EXPECT_EQ(scene->sha256, sha256_hex("hello"));
+  EXPECT_EQ(scene->size, 5u);
+  EXPECT_EQ(store_->list("", 10).size(), 1u);
+  reopen();
+  store_->remove_stale_uploads(1e12);
+  EXPECT_TRUE(system_files().exists(folder_.file("files/README")));
+  EXPECT_TRUE(system_files().exists(folder_.file("parts/b.glb")));
+}
+
+// A crash in the middle of a removal: the next start finishes it.
+TEST_F(Scenes, AreRemovedInTheEnd) {
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 5);
+    upload.write("hello");
+    upload.finish("", "", true);
+    upload.publish();
+  }
+  system_files().rename(store_->path("a.glb"), store_->path("a.glb") + kDeleted);
+  reopen();
+  EXPECT_FALSE(store_->find("a.glb"));
+  EXPECT_FALSE(has_entries(system_files(), folder_.file("files")));
+}
+
 TEST_F(Scenes, DropStaleUploads) {
-  { Upload(*store_, "a.glb", 0, 5).write("abc"); }
+  { SceneUpload(*store_, "a.glb", 0, 5).write("abc"); }
   store_->remove_stale_uploads(0);
   EXPECT_TRUE(store_->upload("a.glb"));
   store_->remove_stale_uploads(1e12);
