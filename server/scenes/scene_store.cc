@@ -13,10 +13,10 @@ namespace {
 
 constexpr size_t kMaxNameBytes = 128;
 // "vdsc": the scenes of a service.
-constexpr int64_t kApplicationId = 0x76647363;
+constexpr int64_t kSceneApplicationId = 0x76647363;
 
 // `total` is -1 while it is not known; `sha256` is "" until the upload is complete.
-constexpr const char* kSchema = R"sql(
+constexpr const char* kSceneSchema = R"sql(
 CREATE TABLE scene (
   name TEXT PRIMARY KEY, size INTEGER NOT NULL, sha256 TEXT NOT NULL, modified_s REAL NOT NULL
 );
@@ -35,7 +35,7 @@ std::string make_folders(FileSystem& files, const std::string& folder) {
 SqlDatabase open_database(const std::string& path, bool may_create) {
   SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
   const bool fresh = database.integer("SELECT count(*) FROM sqlite_master") == 0;
-  if (!fresh && database.integer("PRAGMA application_id") != kApplicationId)
+  if (!fresh && database.integer("PRAGMA application_id") != kSceneApplicationId)
     throw Error(ErrorCode::kInvalidInput, path + ": expected the scenes of voxdag serve");
   if (fresh && !may_create)
     throw Error(ErrorCode::kInvalidInput,
@@ -46,8 +46,8 @@ SqlDatabase open_database(const std::string& path, bool may_create) {
   database.execute("PRAGMA journal_mode = WAL");
   if (!fresh) return database;
   SqlTransaction transaction(database);
-  database.execute(kSchema);
-  database.execute("PRAGMA application_id = " + std::to_string(kApplicationId));
+  database.execute(kSceneSchema);
+  database.execute("PRAGMA application_id = " + std::to_string(kSceneApplicationId));
   transaction.commit();
   return database;
 }

@@ -12,7 +12,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kMaxListed = 200;
+constexpr size_t kMaxListedScenes = 200;
 constexpr size_t kDefaultListed = 100;
 
 nlohmann::ordered_json scene_json(const Scene& scene) {
@@ -139,7 +139,7 @@ Response put_scene(Context& context, Call& call) {
 }
 
 Response list_scenes(Context& context, Call& call) {
-  const size_t limit = call.query_integer("limit", kDefaultListed, 1, kMaxListed);
+  const size_t limit = call.query_integer("limit", kDefaultListed, 1, kMaxListedScenes);
   const std::string cursor = call.query("cursor");
   if (call.request.target.query.contains("cursor") && !is_scene_name(cursor))
     throw bad_request("'cursor': expected the next_cursor of a page");
