@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <chrono>
 
 #include "core/base/clock.h"
 
@@ -12,6 +13,7 @@ namespace {
 
 // A client within a body or an answer that is waited for only this long is on its way.
 constexpr double kMinExchangeWait_s = 0.25;
+constexpr std::chrono::seconds kMaxEvictionWait{1};
 
 }  // namespace
 
@@ -33,20 +35,23 @@ std::string client_of(const std::string& address) {
 
 bool ConnectionTable::admit(int socket, const std::string& address, Place& place) {
   const std::string client = client_of(address);
-  std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
   const auto same = by_client_.find(client);
   if (same != by_client_.end() && same->second >= limits_.max_per_client && !is_loopback(address))
     return false;
-  if (entries_.size() >= limits_.max_connections && !evict_one()) return false;
+  // Evicted connections are still here until their threads have had time to end.
+  const size_t max_entries = limits_.max_connections + limits_.max_connections / 4 + 1;
+  if (!removed_.wait_for(lock, kMaxEvictionWait, [&] { return entries_.size() < max_entries; }) ||
+      (entries_.size() >= limits_.max_connections && !evict_one()))
+    return false;
   place = entries_.insert(entries_.end(), Entry{socket, client, true, true, wall_seconds(), false});
   ++by_client_[client];
   return true;
 }
 
 // The thread of the evicted connection wakes up at the end of its stream and removes the entry.
-// Until then the table holds one more than the limit; there may be a quarter more.
+// Until then the table holds one more than the limit.
 bool ConnectionTable::evict_one() {
-  if (entries_.size() >= limits_.max_connections + limits_.max_connections / 4 + 1) return false;
   const double now = wall_seconds();
   Entry* longest = nullptr;
   for (Entry& entry : entries_) {
@@ -79,6 +84,7 @@ void ConnectionTable::remove(Place place) {
   const auto count = by_client_.find(place->client);
   if (--count->second == 0) by_client_.erase(count);
   entries_.erase(place);
+  removed_.notify_all();
 }
 
 size_t ConnectionTable::size() const {

@@ -3,6 +3,7 @@
 // little, cannot keep others out. Thread-safe.
 #pragma once
 
+#include <condition_variable>
 #include <cstdint>
 #include <list>
 #include <map>
@@ -29,7 +30,8 @@ class ConnectionTable {
 
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}
 
-  // False if the client has too many connections, or the table is full and none is waiting.
+  // False if the client has too many connections, or the table is full and none is waiting. Takes
+  // up to a second while many evicted connections have yet to end. One thread calls it.
   bool admit(int socket, const std::string& address, Place& place);
   // The connection waits for its client since then (in wall_seconds()).
   void set_waiting(Place place, double since_s, bool between_requests);
@@ -48,6 +50,7 @@ class ConnectionTable {
 
   const HttpLimits& limits_;
   mutable std::mutex mutex_;  // guards all below
+  std::condition_variable removed_;
   std::list<Entry> entries_;
   std::map<std::string, size_t> by_client_;
 };
