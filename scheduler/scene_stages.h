@@ -1,5 +1,5 @@
-// The first stages of a build: scan and ingest read the scene, partition divides its triangles among
-// the subvolumes. `plan` runs them up to the partition; merge_stage.h has the last ones.
+// The first stages of a build: scan and ingest read the scene, partition divides its triangles
+// among the subvolumes. `plan` runs them up to the partition; merge_stage.h has the last ones.
 #pragma once
 
 #include <cstdint>

@@ -3,7 +3,7 @@
 //     fuzz_make_corpus tests/fuzz/corpus
 //
 // Run it again when a format gets a new version. What the fuzzers found in addition is committed
-// beside these, under names that are hashes.
+// next to these, under names that are hashes.
 #include <cstdio>
 #include <cstring>
 #include <filesystem>

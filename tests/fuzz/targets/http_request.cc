@@ -1,5 +1,5 @@
 // Bytes that a client sends to the service's port, through a real connection: the service answers
-// with HTTP or closes the connection, and goes on serving.
+// with HTTP or closes the connection, and continues to serve.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
