@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <map>
 #include <random>
 
@@ -190,6 +191,25 @@ TEST_F(KilledService, L8_FewOpenFilesLeaveConnections) {
     usleep(20000);
   EXPECT_EQ(state(id), "succeeded");
   for (const int socket : slow) close(socket);
+}
+
+// Nothing of the data folder can be read by other users of the machine, whatever their umask is.
+TEST_F(KilledService, HardeningL7_DataIsForTheServiceAlone) {
+  prepare();
+  const ClientResponse posted =
+      http_->send("POST", "/api/v1/jobs", Json{{"scene", "s.glb"}, {"resolution", 64}}.dump());
+  ASSERT_EQ(posted.status, 202) << posted.body;
+  const std::string id = Json::parse(posted.body)["id"];
+  const double deadline = wall_seconds() + kMaxWait_s;
+  while (state(id) != "succeeded" && wall_seconds() < deadline) usleep(20000);
+  namespace fs = std::filesystem;
+  constexpr fs::perms kOfOthers = fs::perms::group_all | fs::perms::others_all;
+  int files = 0;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_.file("data"))) {
+    EXPECT_EQ(entry.status().permissions() & kOfOthers, fs::perms::none) << entry.path();
+    files += entry.is_regular_file();
+  }
+  EXPECT_GT(files, 5);
 }
 
 }  // namespace
