@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kDagType = "application/octet-stream";
 // Of what is sent at once: reports, previews and lists of subvolumes.
-constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxResultBytes = uint64_t{1} << 30;
 constexpr uint64_t kDefaultLogBytes = 65536;
 constexpr uint64_t kMaxLogBytes = uint64_t{1} << 20;
 
@@ -136,7 +136,7 @@ Response get_dag(Context& context, Call& call) {
 Response get_report(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   auto report = nlohmann::ordered_json::parse(
-      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kMaxFileBytes));
+      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kMaxResultBytes));
   report["output"] = file_name(job);
   return json_response(200, report.dump());
 }
@@ -148,7 +148,7 @@ Response get_preview(Context& context, Call& call) {
     throw not_found(job.preview == Preview::kFailed ? "the preview could not be rendered"
                                                     : "the preview is not rendered yet");
   return make_response(200, "image/png", "private, max-age=3600",
-                       read_small_file(context.files, path, kMaxFileBytes));
+                       read_small_file(context.files, path, kMaxResultBytes));
 }
 
 Response get_log(Context& context, Call& call) {
@@ -169,7 +169,7 @@ Response get_subvolumes(Context& context, Call& call) {
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).subvolumes();
   if (!context.files.exists(path)) throw not_found("the subvolumes of the job are not planned yet");
-  return json_response(200, read_small_file(context.files, path, kMaxFileBytes));
+  return json_response(200, read_small_file(context.files, path, kMaxResultBytes));
 }
 
 }  // namespace
