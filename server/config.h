@@ -53,9 +53,9 @@ struct ServerConfig {
   JobLimits jobs;
   TransferLimits transfers;
   Retention retention;
-  bool adopt = false;           // takes up jobs and scenes whose records are lost
-  StepHook before_step;         // for tests
-  double drain_timeout_s = 10;  // for requests in progress when the service stops
+  bool adopt = false;          // takes up jobs and scenes whose records are lost
+  StepHook before_step;        // for tests
+  double drain_timeout_s = 5;  // for requests in progress when the service stops
 };
 
 // Applies a JSON file to `config`. Throws Error{kInvalidInput} naming the file and the member that

@@ -15,7 +15,7 @@ uint64_t inode_of(const std::string& path) {
 
 }  // namespace
 
-void remove_tree(FileSystem& files, const std::string& path) {
+void remove_entries(FileSystem& files, const std::string& path) {
   if (!files.exists(path)) return;
   for (const DirectoryEntry& entry : files.list(path)) {
     const std::string inner = path + "/" + entry.name;
@@ -24,7 +24,11 @@ void remove_tree(FileSystem& files, const std::string& path) {
     else
       files.remove(inner);
   }
-  files.remove_directory(path);
+}
+
+void remove_tree(FileSystem& files, const std::string& path) {
+  remove_entries(files, path);
+  if (files.exists(path)) files.remove_directory(path);
 }
 
 bool has_entries(FileSystem& files, const std::string& path) {

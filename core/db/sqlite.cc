@@ -172,4 +172,19 @@ void SqlTransaction::commit() {
   open_ = false;
 }
 
+bool is_new(SqlDatabase& database) {
+  return database.integer("PRAGMA application_id") == 0 &&
+         database.integer("PRAGMA user_version") == 0 &&
+         database.integer("SELECT count(*) FROM sqlite_master") == 0;
+}
+
+void change_schema(SqlDatabase& database, const std::string& sql, int64_t application_id,
+                   int64_t version) {
+  SqlTransaction transaction(database);
+  database.execute(sql);
+  database.execute("PRAGMA application_id = " + std::to_string(application_id));
+  database.execute("PRAGMA user_version = " + std::to_string(version));
+  transaction.commit();
+}
+
 }  // namespace voxdag

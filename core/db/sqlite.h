@@ -71,6 +71,9 @@ class SqlDatabase {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
+// Whether a database has no tables and belongs to no program.
+bool is_new(SqlDatabase& database);
+
 // What is committed with kLater may be lost in a power cut until the next commit with kNow.
 enum class Durable { kNow, kLater };
 
@@ -85,5 +88,10 @@ class SqlTransaction {
   SqlDatabase& database_;
   bool open_ = true;
 };
+
+// Runs `sql`, which makes or changes tables, and marks the database as one of this kind
+// (PRAGMA application_id) and version of its schema (PRAGMA user_version), all or nothing.
+void change_schema(SqlDatabase& database, const std::string& sql, int64_t application_id,
+                   int64_t version);
 
 }  // namespace voxdag

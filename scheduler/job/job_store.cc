@@ -64,12 +64,6 @@ CREATE TABLE ingest (
 );
 )sql";
 
-bool is_empty(SqlDatabase& database) {
-  return database.integer("PRAGMA application_id") == 0 &&
-         database.integer("PRAGMA user_version") == 0 &&
-         database.integer("SELECT count(*) FROM sqlite_master") == 0;
-}
-
 void check_sound(SqlDatabase& database, const std::string& path) {
   auto check = database.prepare("PRAGMA integrity_check(1)");
   if (!check.step() || check.text(0) != "ok")
@@ -91,16 +85,12 @@ void check_schema(SqlDatabase& database, const std::string& path) {
 
 // Creates the tables in an empty database, in one transaction; else checks them.
 void prepare_schema(SqlDatabase& database, const std::string& path) {
-  const bool empty = is_empty(database);
+  const bool empty = is_new(database);
   if (!empty) check_schema(database, path);
   database.execute("PRAGMA journal_mode = WAL");
   database.execute("PRAGMA foreign_keys = ON");
   if (!empty) return check_sound(database, path);
-  SqlTransaction transaction(database);
-  database.execute(kTables);
-  database.execute("PRAGMA application_id = " + std::to_string(kApplicationId));
-  database.execute("PRAGMA user_version = " + std::to_string(kSchemaVersion));
-  transaction.commit();
+  change_schema(database, kTables, kApplicationId, kSchemaVersion);
 }
 
 // SQLite does not check its pages: what decides the result is checked row by row.

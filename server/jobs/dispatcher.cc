@@ -7,9 +7,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "server/data_folder.h"
 #include "server/jobs/job_outcome.h"
-#include "server/jobs/process/job_process.h"
 #include "server/jobs/process/job_task.h"
 
 namespace voxdag::server {
@@ -21,23 +19,12 @@ constexpr int kPreviewNice = 5;  // on top of the builds'
 constexpr double kMaxSleep_s = 1;
 constexpr double kNoTimeLimit_s = 1e9;
 constexpr double kRetireInterval_s = 300;
-constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
-constexpr size_t kMaxRetiredAtOnce = 100;   // so that jobs can start in between
+constexpr size_t kMaxRetiredAtOnce = 100;  // so that jobs can start in between
 constexpr double kSecondsPerDay = 86400;
 // A clock that is further from where it was expected may be wrong; so long no job is deleted for
 // its age.
 constexpr double kMaxClockStep_s = 3600;
 constexpr double kClockDoubt_s = kSecondsPerDay;
-
-bool is_job_id(const std::string& name) {
-  return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
-}
-
-// The job whose deletion has begun in this folder; "" for none.
-std::string marked_job(const DirectoryEntry& entry) {
-  const std::string id = entry.name.substr(0, entry.name.find('.'));
-  return entry.is_directory && is_job_id(id) && entry.name == id + kDeleted ? id : "";
-}
 
 void sleep_s(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
@@ -54,11 +41,11 @@ Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& 
       disk_(disk),
       log_(log),
       on_run_ended_(std::move(on_run_ended)),
-      steps_(log, config.before_step) {
-  files_.make_directories(config_.data_folder + "/jobs");
-  if (config_.adopt) adopt_jobs();
+      steps_(log, config.before_step),
+      folders_(config.data_folder + "/jobs", files, queue, steps_, log) {
+  if (config_.adopt) folders_.adopt();
   recovered_ = steps_.run("recover the jobs", [this] { recover(); });
-  steps_.run("clean up the folders of jobs", [this] { clean_up_folders(); });
+  steps_.run("clean up the folders of jobs", [this] { folders_.clean_up(); });
   thread_ = std::thread([this] {
     while (!steps_.run("dispatch jobs", [this] { dispatch(); }) && !stopping())
       sleep_s(kMaxSleep_s);
@@ -67,9 +54,7 @@ Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& 
 
 Dispatcher::~Dispatcher() { stop(); }
 
-JobFolder Dispatcher::folder(const std::string& id) const {
-  return {config_.data_folder + "/jobs/" + id};
-}
+JobFolder Dispatcher::folder(const std::string& id) const { return folders_.of(id); }
 
 bool Dispatcher::stopping() {
   std::lock_guard lock(mutex_);
@@ -82,58 +67,6 @@ void Dispatcher::recover() {
     if (!worker.done) running.insert(key);
   for (const Job& job : queue_.recover(running, config_.jobs.max_attempts))
     log_("job " + job.id + " " + state_name(job.state));
-}
-
-// Files that no deletion has marked stay, even if there is no job for them: the queue may be an old
-// one.
-void Dispatcher::clean_up_folders() {
-  std::string foreign;
-  for (const DirectoryEntry& entry : files_.list(config_.data_folder + "/jobs")) {
-    if (!marked_job(entry).empty()) continue;
-    steps_.run("clean up jobs/" + entry.name, [&] {
-      const auto job = queue_.find(entry.name);
-      if (!job)
-        foreign += " jobs/" + entry.name;
-      else if (has_ended(job->state) && job->state != JobState::kFailed)
-        remove_tree(files_, folder(entry.name).work());
-    });
-  }
-  if (!foreign.empty()) log_("left alone, since it belongs to no job of the queue:" + foreign);
-}
-
-void Dispatcher::finish_deletions() {
-  std::lock_guard lock(mutex_);
-  if (wall_seconds() < next_deletions_s_) return;
-  const auto entries = files_.list(config_.data_folder + "/jobs");
-  next_deletions_s_ = HUGE_VAL;
-  for (const DirectoryEntry& entry : entries) {
-    const std::string id = marked_job(entry);
-    if (!id.empty() && !steps_.run("delete job " + id, [&] { remove_files(id); }))
-      next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
-  }
-}
-
-void Dispatcher::adopt_jobs() {
-  for (const DirectoryEntry& entry : files_.list(config_.data_folder + "/jobs")) {
-    if (!entry.is_directory || !is_job_id(entry.name) || queue_.find(entry.name)) continue;
-    steps_.run("adopt job " + entry.name, [&] {
-      const JobFolder place = folder(entry.name);
-      const JobRequest request = parse_job_request(read_task(files_, place.task()).request);
-      Job job;
-      job.id = entry.name;
-      job.request = request.text;
-      job.scenes = TaskResolver::uploads_of(request);
-      job.posted_by = "adopted";
-      job.state = JobState::kSuspended;
-      if (files_.exists(place.report())) {
-        job.result = finished_result(files_, place);
-        job.state = JobState::kSucceeded;
-        job.finished_s = unix_seconds();
-      }
-      queue_.add(job, {}, UINT64_MAX);
-      log_("job " + job.id + " adopted: " + state_name(job.state));
-    });
-  }
 }
 
 void Dispatcher::stop() {
@@ -159,7 +92,10 @@ void Dispatcher::dispatch() {
       recovered_ = true;
       start_ready_jobs();
     });
-    steps_.run("finish deletions", [this] { finish_deletions(); });
+    steps_.run("finish deletions", [this] {
+      std::lock_guard lock(mutex_);
+      folders_.finish_deletions();
+    });
     steps_.run("remove old jobs", [this] { retire_old_jobs(); });
     queue_.wait_for_change(seen, kMaxSleep_s);
   }
@@ -329,7 +265,7 @@ void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProces
   steps_.run("remove the work folder of job " + job.id, [&] {
     std::lock_guard lock(mutex_);
     if (after->state == JobState::kCanceled || after->state == JobState::kSucceeded)
-      remove_tree(files_, folder(job.id).work());
+      folders_.remove_work(job.id);
   });
   on_run_ended_(*after);
 }
@@ -408,8 +344,7 @@ Job Dispatcher::cancel(const std::string& id) {
   });
   if (runs && job.state == JobState::kCanceling) worker->second.live->stop();
   if (job.state == JobState::kCanceled)
-    steps_.run("remove the work folder of job " + id,
-               [&] { remove_tree(files_, folder(id).work()); });
+    steps_.run("remove the work folder of job " + id, [&] { folders_.remove_work(id); });
   return job;
 }
 
@@ -455,33 +390,7 @@ Job Dispatcher::retry(const std::string& id) {
 void Dispatcher::remove(const std::string& id) {
   std::lock_guard lock(mutex_);
   queue_.check_removable(id);
-  try {
-    remove_files(id);
-  } catch (...) {
-    next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
-    throw;
-  }
-}
-
-// The marked folder stays until the row is gone, so that a crash in between loses neither.
-void Dispatcher::remove_files(const std::string& id) {
-  const std::string path = folder(id).path, marked = path + kDeleted;
-  if (queue_.find(id)) queue_.check_removable(id);
-  if (files_.exists(path)) {
-    remove_tree(files_, marked);
-    files_.rename(path, marked);
-    files_.sync_directory(parent_directory(path));
-  }
-  if (files_.exists(marked))
-    for (const DirectoryEntry& entry : files_.list(marked)) {
-      const std::string inner = marked + "/" + entry.name;
-      if (entry.is_directory)
-        remove_tree(files_, inner);
-      else
-        files_.remove(inner);
-    }
-  if (queue_.find(id)) queue_.remove(id);
-  remove_tree(files_, marked);
+  folders_.remove(id);
 }
 
 std::shared_ptr<LiveJob> Dispatcher::live(const std::string& id) const {

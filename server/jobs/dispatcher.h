@@ -19,9 +19,9 @@
 
 #include "server/config.h"
 #include "server/disk_space.h"
+#include "server/jobs/job_folders.h"
 #include "server/jobs/live_job.h"
 #include "server/jobs/process/child_process.h"
-#include "server/jobs/process/job_folder.h"
 #include "server/jobs/task_resolver.h"
 #include "server/queue/job_queue.h"
 #include "server/steps.h"
@@ -64,15 +64,8 @@ class Dispatcher {
   };
 
   bool stopping();
-  // Makes records of the job folders that the queue does not know: jobs with a result have
-  // succeeded, others are suspended.
-  void adopt_jobs();
   // Puts jobs in order that a crash, or a queue that could not be written, left behind.
   void recover();
-  void clean_up_folders();
-  // Finishes deletions that a crash or a full disk interrupted.
-  void finish_deletions();
-  void remove_files(const std::string& id);
   void retire_old_jobs();
   // The time from which on ended jobs are not too old.
   double oldest_retained_s(double now_s);
@@ -106,10 +99,10 @@ class Dispatcher {
 
   // Guards all below; held while a job's state and process change together.
   mutable std::mutex mutex_;
+  JobFolders folders_;
   std::map<std::string, Worker> workers_;  // by job; the one named "preview" draws a picture
   bool stops_ = false;
   bool recovered_ = false;
-  double next_deletions_s_ = 0;
 
   // Guards live_ alone, so that requests for progress wait for nothing else.
   mutable std::mutex live_mutex_;

@@ -73,11 +73,9 @@ CREATE INDEX idempotency_by_job ON idempotency (job);
 // the last, and brings it to this one.
 SqlDatabase open_writer(const std::string& path, bool may_create) {
   SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
-  const int64_t application = database.integer("PRAGMA application_id");
+  const bool fresh = is_new(database);
   const int64_t version = database.integer("PRAGMA user_version");
-  const bool fresh = application == 0 && version == 0 &&
-                     database.integer("SELECT count(*) FROM sqlite_master") == 0;
-  if (!fresh && application != kApplicationId)
+  if (!fresh && database.integer("PRAGMA application_id") != kApplicationId)
     throw Error(ErrorCode::kInvalidInput, path + ": expected a queue of voxdag serve");
   if (fresh && !may_create)
     throw Error(ErrorCode::kInvalidInput,
@@ -91,13 +89,11 @@ SqlDatabase open_writer(const std::string& path, bool may_create) {
                                                     std::to_string(kSchemaVersion));
   database.execute("PRAGMA journal_mode = WAL");
   database.execute("PRAGMA foreign_keys = ON");
-  if (!fresh && version == kSchemaVersion) return database;
-  SqlTransaction transaction(database);
-  database.execute(fresh ? kSchema
-                         : "ALTER TABLE job ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0");
-  database.execute("PRAGMA application_id = " + std::to_string(kApplicationId));
-  database.execute("PRAGMA user_version = " + std::to_string(kSchemaVersion));
-  transaction.commit();
+  if (version != kSchemaVersion)
+    change_schema(
+        database,
+        fresh ? kSchema : "ALTER TABLE job ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0",
+        kApplicationId, kSchemaVersion);
   return database;
 }
 

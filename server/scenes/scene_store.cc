@@ -14,6 +14,7 @@ namespace {
 constexpr size_t kMaxNameBytes = 128;
 // "vdsc": the scenes of a service.
 constexpr int64_t kSceneApplicationId = 0x76647363;
+constexpr int64_t kSceneSchemaVersion = 0;
 
 // `total` is -1 while it is not known; `sha256` is "" until the upload is complete.
 constexpr const char* kSceneSchema = R"sql(
@@ -34,7 +35,7 @@ std::string make_folders(FileSystem& files, const std::string& folder) {
 
 SqlDatabase open_database(const std::string& path, bool may_create) {
   SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
-  const bool fresh = database.integer("SELECT count(*) FROM sqlite_master") == 0;
+  const bool fresh = is_new(database);
   if (!fresh && database.integer("PRAGMA application_id") != kSceneApplicationId)
     throw Error(ErrorCode::kInvalidInput, path + ": expected the scenes of voxdag serve");
   if (fresh && !may_create)
@@ -44,11 +45,7 @@ SqlDatabase open_database(const std::string& path, bool may_create) {
                     "scenes. Restore it from a backup, or start once with --adopt, which makes new "
                     "records of the scenes that are found");
   database.execute("PRAGMA journal_mode = WAL");
-  if (!fresh) return database;
-  SqlTransaction transaction(database);
-  database.execute(kSceneSchema);
-  database.execute("PRAGMA application_id = " + std::to_string(kSceneApplicationId));
-  transaction.commit();
+  if (fresh) change_schema(database, kSceneSchema, kSceneApplicationId, kSceneSchemaVersion);
   return database;
 }
 

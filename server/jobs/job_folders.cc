@@ -1,0 +1,106 @@
+#include "server/jobs/job_folders.h"
+
+#include <cmath>
+
+#include "core/base/clock.h"
+#include "server/data_folder.h"
+#include "server/jobs/process/job_process.h"
+#include "server/jobs/process/job_task.h"
+#include "server/jobs/task_resolver.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
+
+bool is_job_id(const std::string& name) {
+  return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+// The job whose deletion has begun in this folder; "" for none.
+std::string marked_job(const DirectoryEntry& entry) {
+  const std::string id = entry.name.substr(0, entry.name.find('.'));
+  return entry.is_directory && is_job_id(id) && entry.name == id + kDeleted ? id : "";
+}
+
+}  // namespace
+
+JobFolders::JobFolders(const std::string& path, FileSystem& files, JobQueue& queue, Steps& steps,
+                       Log log)
+    : path_(path), files_(files), queue_(queue), steps_(steps), log_(std::move(log)) {
+  files_.make_directories(path_);
+}
+
+void JobFolders::adopt() {
+  for (const DirectoryEntry& entry : files_.list(path_)) {
+    if (!entry.is_directory || !is_job_id(entry.name) || queue_.find(entry.name)) continue;
+    steps_.run("adopt job " + entry.name, [&] {
+      const JobFolder place = of(entry.name);
+      const JobRequest request = parse_job_request(read_task(files_, place.task()).request);
+      Job job;
+      job.id = entry.name;
+      job.request = request.text;
+      job.scenes = TaskResolver::uploads_of(request);
+      job.posted_by = "adopted";
+      job.state = JobState::kSuspended;
+      if (files_.exists(place.report())) {
+        job.result = finished_result(files_, place);
+        job.state = JobState::kSucceeded;
+        job.finished_s = unix_seconds();
+      }
+      queue_.add(job, {}, UINT64_MAX);
+      log_("job " + job.id + " adopted: " + state_name(job.state));
+    });
+  }
+}
+
+void JobFolders::clean_up() {
+  std::string foreign;
+  for (const DirectoryEntry& entry : files_.list(path_)) {
+    if (!marked_job(entry).empty()) continue;
+    steps_.run("clean up jobs/" + entry.name, [&] {
+      const auto job = queue_.find(entry.name);
+      if (!job)
+        foreign += " jobs/" + entry.name;
+      else if (has_ended(job->state) && job->state != JobState::kFailed)
+        remove_work(entry.name);
+    });
+  }
+  if (!foreign.empty()) log_("left alone, since it belongs to no job of the queue:" + foreign);
+}
+
+void JobFolders::remove_work(const std::string& id) { remove_tree(files_, of(id).work()); }
+
+void JobFolders::remove(const std::string& id) {
+  try {
+    try_to_remove(id);
+  } catch (...) {
+    next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+    throw;
+  }
+}
+
+void JobFolders::finish_deletions() {
+  if (wall_seconds() < next_deletions_s_) return;
+  const auto entries = files_.list(path_);
+  next_deletions_s_ = HUGE_VAL;
+  for (const DirectoryEntry& entry : entries) {
+    const std::string id = marked_job(entry);
+    if (!id.empty()) steps_.run("delete job " + id, [&] { remove(id); });
+  }
+}
+
+void JobFolders::try_to_remove(const std::string& id) {
+  const std::string path = of(id).path, marked = path + kDeleted;
+  if (queue_.find(id)) queue_.check_removable(id);
+  if (files_.exists(path)) {
+    remove_tree(files_, marked);
+    files_.rename(path, marked);
+    files_.sync_directory(path_);
+  }
+  remove_entries(files_, marked);
+  if (queue_.find(id)) queue_.remove(id);
+  remove_tree(files_, marked);
+}
+
+}  // namespace voxdag::server
