@@ -47,7 +47,13 @@ void run(const BuildCommand& command, CommandContext& context) {
   spec.run.restart = command.run.restart;
   spec.run.force = command.run.force;
   const auto progress = make_progress_bar();
-  const BuildReport report = run_build(spec, {context.files, *progress, context.cancel});
+  const BuildReport report = [&] {
+    try {
+      return run_build(spec, {context.files, *progress, context.cancel});
+    } catch (const DoesNotFit& error) {
+      throw Error(error.code(), error.message() + " (--force builds anyway)");
+    }
+  }();
   if (command.json)
     std::printf("%s\n", report_json(report).c_str());
   else

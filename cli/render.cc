@@ -3,11 +3,11 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "cli/output.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
+#include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
 #include "query/render/renderer.h"
@@ -90,8 +90,7 @@ void run(RenderCommand& command, CommandContext& context) {
     throw Error(ErrorCode::kInvalidInput, "--size '" + command.size +
                                               "': expected a width and a height of 1 to " +
                                               std::to_string(kMaxPictureEdge) + " pixels");
-  if (command.options.threads == 0)
-    command.options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  if (command.options.threads == 0) command.options.threads = static_cast<int>(default_threads());
   command.options.width = width;
   command.options.height = height;
   command.output.check(context.files, command.input, query::is_rendered_png);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/cancel_token.h"
+#include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
@@ -53,6 +54,11 @@ struct RunOptions {
 struct BuildSpec {
   GeometryOptions geometry;
   RunOptions run;
+};
+
+// Refuses a build whose estimate says that it cannot fit; RunOptions::force builds it anyway.
+struct DoesNotFit : Error {
+  explicit DoesNotFit(std::string message) : Error(ErrorCode::kNoSpace, std::move(message)) {}
 };
 
 // The outside world of a build.

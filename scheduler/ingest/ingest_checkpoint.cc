@@ -113,13 +113,12 @@ void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
       static_cast<double>(MemoryPlan::divide(spec_.run.memory_bytes).triangle_bytes);
   const double free = static_cast<double>(context_.files.free_space(work_.path()));
   if (bytes - memory > free)
-    throw Error(ErrorCode::kNoSpace,
-                "the scene has " + std::to_string(scene.declared_triangles()) +
-                    " triangles, which take " + std::to_string(std::llround(bytes / 1e6)) +
-                    " MB until they are built: memory has space for " +
-                    std::to_string(std::llround(memory / 1e6)) + " MB of them, " + work_.path() +
-                    " for " + std::to_string(std::llround(free / 1e6)) +
-                    " MB: free some, or build anyway with --force");
+    throw DoesNotFit("the scene has " + std::to_string(scene.declared_triangles()) +
+                     " triangles, which take " + std::to_string(std::llround(bytes / 1e6)) +
+                     " MB until they are built: memory has space for " +
+                     std::to_string(std::llround(memory / 1e6)) + " MB of them, " + work_.path() +
+                     " for " + std::to_string(std::llround(free / 1e6)) +
+                     " MB: expected more free space");
 }
 
 void IngestCheckpoint::enable(const TriangleSource& scene, int64_t opened_ns) {

@@ -231,8 +231,7 @@ void check_disk(const char* what, const EstimateRange& bytes, const std::string&
   const std::string need = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
                            " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
                            " has " + gigabytes(free_bytes) + " free";
-  if (bytes.low > free_bytes)
-    throw Error(ErrorCode::kNoSpace, need + ": free some, or build anyway with --force");
+  if (bytes.low > free_bytes) throw DoesNotFit(need + ": expected more free space");
   if (bytes.high > free_bytes) progress.warn(need);
 }
 
@@ -255,6 +254,19 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
   check_disk("the global file", file, output_folder, output_free, progress);
 }
 
+// A name for the work folder of a plan, where this process may write: in $TMPDIR, /tmp or the
+// current folder.
+std::string temporary_folder() {
+  const char* chosen = std::getenv("TMPDIR");
+  std::string parent = ".";
+  for (const std::string candidate : {chosen ? chosen : "", "/tmp"})
+    if (!candidate.empty() && access(candidate.c_str(), W_OK | X_OK) == 0) {
+      parent = candidate;
+      break;
+    }
+  return parent + "/voxdag-plan-" + std::to_string(getpid());
+}
+
 }  // namespace
 
 Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
@@ -264,11 +276,8 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   return_freed_memory_to_system();
   MemoryBudget budget(full.run.memory_bytes);
   StageClock clock;
-  const char* temporary = std::getenv("TMPDIR");
-  std::string folder = full.run.work_folder;
-  if (folder.empty())
-    folder =
-        std::string(temporary ? temporary : "/tmp") + "/voxdag-plan-" + std::to_string(getpid());
+  const std::string folder =
+      full.run.work_folder.empty() ? temporary_folder() : full.run.work_folder;
   WorkFolder work(context, folder, full.run.lock_wait_s);
   // Removes spilled triangles; a job in the given work folder stays as it is.
   struct Cleanup {

@@ -131,5 +131,47 @@ TEST_F(Hardening, L8_NumbersAndMessages) {
   }
 }
 
+// Only the command that has the option --force names it. The scene is a triangle, 1000 times
+// 2^32 - 1 times at the same place: more than disks hold.
+TEST_F(Hardening, L8_OnlyBuildNamesForce) {
+  Json nodes = Json::array(), roots = Json::array();
+  for (int i = 0; i < 1000; ++i) {
+    nodes.push_back(
+        {{"mesh", 0},
+         {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", 1}}}}}}}});
+    roots.push_back(i);
+  }
+  put("many.gltf", R"({"asset":{"version":"2.0"},"extensionsUsed":["EXT_mesh_gpu_instancing"],
+    "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,)" +
+                       std::string("AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA") + R"("}],
+    "bufferViews":[{"buffer":0,"byteLength":36}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+                 {"componentType":5126,"count":4294967295,"type":"VEC3"}],
+    "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+    "scene":0,"scenes":[{"nodes":)" +
+                       roots.dump() + R"(}],"nodes":)" + nodes.dump() + "}");
+  const std::vector<std::string> scene = {"many.gltf", "-r", "64", "--memory", "64MiB"};
+  const auto with = [&](std::vector<std::string> args) {
+    args.insert(args.begin() + 1, scene.begin(), scene.end());
+    return args;
+  };
+  expect_error(7, "expected more free space (--force builds anyway)",
+               with({"build", "-o", "many.vdag"}));
+  const Answer plan = run(with({"plan"}));
+  EXPECT_EQ(plan.status, 7);
+  EXPECT_EQ(plan.err.find("--force"), std::string::npos) << plan.err;
+}
+
+// A plan keeps what it spills where it may write, wherever TMPDIR points.
+TEST_F(Hardening, PlanNeedsNoTmpdir) {
+  for (const char* folder : {"/proc/none", ""}) {
+    SCOPED_TRACE(folder);
+    setenv("TMPDIR", folder, 1);
+    const Answer plan = run({"plan", "m.glb", "-r", "256"});
+    unsetenv("TMPDIR");
+    EXPECT_EQ(plan.status, 0) << plan.err;
+  }
+}
+
 }  // namespace
 }  // namespace command_line

@@ -98,6 +98,7 @@ TEST_F(Hardening, L8_TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
   const Error error = error_of([&] { run_build(tight, context()); });
   EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
   EXPECT_NE(error.message().find("triangles, which take"), std::string::npos) << error.message();
+  EXPECT_EQ(error.message().find("--force"), std::string::npos) << error.message();
   EXPECT_FALSE(files_.bytes_written.contains(output() + ".work/triangles.vdspill"));
   EXPECT_EQ(error_of([&] { plan_build(tight, context()); }).code(), ErrorCode::kNoSpace);
   tight.run.memory_bytes = uint64_t{512} << 20;
