@@ -7,41 +7,13 @@
 #include <iterator>
 #include <random>
 
-#include "tests/unit/scene/scene_files.h"
+#include "tests/fuzz/scene/rich_scene.h"
 
 namespace voxdag::test {
 namespace {
 
 // A mutation may turn a count of instances into a large one; that is no reason to draw them all.
 constexpr uint64_t kMaxTriangles = 200000;
-
-SceneBuilder everything() {
-  SceneBuilder scene = one_triangle();
-  const int joints = scene.add_accessor<uint8_t>("VEC4", kU8, std::vector<uint8_t>(12, 0));
-  const int weights = scene.add_accessor<float>("VEC4", kF32, std::vector<float>(12, 0.25f));
-  const int target = scene.add_positions(std::vector<float>(9, 1));
-  scene.root["accessors"][0]["sparse"] = {
-      {"count", 1},
-      {"indices", {{"bufferView", scene.add_view<uint8_t>({2})}, {"componentType", kU8}}},
-      {"values", {{"bufferView", scene.add_view<float>({0, 1, 0})}}}};
-  Json& primitive = scene.root["meshes"][0]["primitives"][0];
-  primitive["attributes"]["JOINTS_0"] = joints;
-  primitive["attributes"]["WEIGHTS_0"] = weights;
-  primitive["targets"] = Json::array({{{"POSITION", target}}});
-  scene.root["meshes"][0]["weights"] = {0.5};
-  scene.add("skins", {{"joints", {0, 1}}});
-  scene.add_root({{"mesh", 0}, {"skin", 0}});
-  const int translations = scene.add_positions({0, 0, 1, 0, 0, 2});
-  scene.add_root(
-      {{"mesh", 0},
-       {"scale", {1, 2, 3}},
-       {"extensions",
-        {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", translations}}}}}}}});
-  Json strip = primitive;
-  strip["mode"] = 5;
-  scene.root["meshes"][0]["primitives"].push_back(strip);
-  return scene;
-}
 
 // Changes one to eight bytes: to anything, to a digit, to another byte of the file; or cuts it.
 std::string mutate(std::string file, std::mt19937& random) {
@@ -97,7 +69,7 @@ void run(const std::string& original, int count, uint32_t seed, Outcomes& outcom
 }
 
 TEST(FuzzScene, MutatedGlb) {
-  const std::string file = everything().glb();
+  const std::string file = rich_scene().glb();
   ASSERT_FALSE(triangles_of_file(file).empty());
   Outcomes outcomes;
   run(file, 2000, 1, outcomes);
@@ -106,7 +78,7 @@ TEST(FuzzScene, MutatedGlb) {
 }
 
 TEST(FuzzScene, MutatedGltfWithDataUri) {
-  const SceneBuilder scene = everything();
+  const SceneBuilder scene = rich_scene();
   const std::string file = scene.gltf("data:application/octet-stream;base64," + base64(scene.bin));
   ASSERT_FALSE(triangles_of_file(file).empty());
   Outcomes outcomes;
@@ -133,7 +105,7 @@ TEST(FuzzScene, MutatedNumbers) {
                                        INT64_MAX,
                                        UINT64_MAX};
   std::mt19937 random(3);
-  SceneBuilder scene = everything();
+  SceneBuilder scene = rich_scene();
   const std::string bin = scene.bin;
   const std::string text = scene.root.dump();
   Outcomes outcomes;

@@ -8,6 +8,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <span>
+#include <vector>
+
+#include "core/format/bytes.h"
+#include "core/format/checksum.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
@@ -22,6 +26,13 @@ inline void require(bool holds, const char* property) {
 
 inline std::span<const std::byte> bytes_of(const uint8_t* data, size_t size) {
   return std::as_bytes(std::span(data, size));
+}
+
+// The bytes followed by the checksum that the decoders of records expect.
+inline std::vector<std::byte> with_checksum(std::span<const std::byte> bytes) {
+  std::vector<std::byte> record(bytes.begin(), bytes.end());
+  ByteSink(record).put(checksum64(bytes));
+  return record;
 }
 
 }  // namespace voxdag::fuzz

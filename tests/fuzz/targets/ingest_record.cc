@@ -2,18 +2,12 @@
 // decoded can be decoded again from its encoding, and its digest can be continued.
 #include "scheduler/ingest/ingest_record.h"
 
-#include <vector>
-
 #include "core/base/error.h"
-#include "core/format/bytes.h"
-#include "core/format/checksum.h"
 #include "tests/fuzz/targets/fuzz_target.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxdag;
-  const auto input = fuzz::bytes_of(data, size);
-  std::vector<std::byte> bytes(input.begin(), input.end());
-  ByteSink(bytes).put(checksum64(input));
+  const auto bytes = fuzz::with_checksum(fuzz::bytes_of(data, size));
   try {
     IngestRecord record = decode_ingest_record(bytes);
     const IngestRecord again = decode_ingest_record(encode(record));

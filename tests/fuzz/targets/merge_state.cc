@@ -3,18 +3,13 @@
 #include "merge/checkpoint/merge_state.h"
 
 #include <algorithm>
-#include <vector>
 
 #include "core/base/error.h"
-#include "core/format/bytes.h"
-#include "core/format/checksum.h"
 #include "tests/fuzz/targets/fuzz_target.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxdag;
-  const auto input = fuzz::bytes_of(data, size);
-  std::vector<std::byte> bytes(input.begin(), input.end());
-  ByteSink(bytes).put(checksum64(input));
+  const auto bytes = fuzz::with_checksum(fuzz::bytes_of(data, size));
   try {
     fuzz::require(std::ranges::equal(encode_state(decode_state(bytes)), bytes),
                   "a state that was decoded is encoded to the same bytes");
