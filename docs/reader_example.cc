@@ -11,10 +11,10 @@ namespace {
 struct HighestVoxel {
   explicit HighestVoxel(const voxdag_reader::File& file) : dag(file) {}
 
-  bool node(uint32_t level, int64_t, int64_t y, int64_t, uint32_t) {
+  bool node(uint32_t level, int64_t, int64_t y, int64_t, uint64_t) {
     return y + (dag.resolution() >> level) - 1 > highest;
   }
-  void brick(int64_t, int64_t y, int64_t, uint64_t mask, uint32_t) {
+  void brick(int64_t, int64_t y, int64_t, uint64_t mask, uint64_t) {
     for (int64_t dy = 3; dy >= 0 && y + dy > highest; --dy)
       for (int64_t i = 0; i < 16; ++i)
         if (mask >> voxdag_reader::File::brick_bit(i / 4, dy, i % 4) & 1) {

@@ -11,16 +11,20 @@
 namespace voxdag {
 namespace {
 
+// Rows of an artifact are counted in 32 bits.
+constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
+
 // Merges in passes while not all artifacts fit at once, then into the global file.
 class Merger {
  public:
-  Merger(const MergeInputs& inputs, const MergeContext& context, Checkpoint* checkpoint)
+  Merger(const MergeInputs& inputs, const MergeContext& context, const GlobalFileWriter& out,
+         Checkpoint* checkpoint)
       : inputs_(inputs),
         context_(context),
         // Passes before the final one also have the writer of a segment in memory.
         pass_bytes_(context.plan.partition_bytes -
                     std::min(context.plan.partition_bytes, kSegmentWriterBytes)),
-        pending_(inputs),
+        pending_(inputs, out.narrow_words()),
         recovery_(inputs, context, pending_, checkpoint) {}
 
   void run(GlobalFileWriter& out) {
@@ -45,7 +49,7 @@ class Merger {
 
   // Merges groups of neighboring artifacts into one artifact each.
   void run_pass() {
-    const std::vector<size_t> ends = pending_.group_ends(pass_bytes_);
+    const std::vector<size_t> ends = pending_.group_ends(pass_bytes_, kMaxArtifactRows);
     if (ends.size() == pending_.size())
       throw Error(ErrorCode::kOutOfMemory,
                   "out of memory: merging any two neighboring subvolumes takes more than " +
@@ -116,7 +120,7 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
   MergeProgress rows_merged(progress);
   const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
                              rows_merged, cancel, report};
-  Merger(inputs, context, checkpoint).run(out);
+  Merger(inputs, context, out, checkpoint).run(out);
   report.scratch_bytes += scratch.bytes_written();
   return report;
 }

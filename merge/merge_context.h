@@ -47,7 +47,7 @@ struct MergeContext {
 
 struct LevelTask {
   uint32_t level = 0;
-  bool bricks = false;
+  RowFormat format;
   std::span<const LevelRun* const> runs;
   const PositionMaps* child_maps = nullptr;  // of the level below, run for run; null for bricks
   PositionMaps& maps;                        // filled

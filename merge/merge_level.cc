@@ -69,7 +69,7 @@ class SliceCursor {
   RowKey row() const {
     return {partition_.hashes()[row_], partition_.masks()[row_], partition_.words() + word_};
   }
-  void advance() { word_ += kRowWords[partition_.masks()[row_++]]; }
+  void advance() { word_ += partition_.format().words(partition_.masks()[row_++]); }
 
  private:
   const HashPartition& partition_;
@@ -129,7 +129,7 @@ class PartitionMerge {
       if (fits(size)) max.raise_to(size);
     }
     for (unsigned worker = 0; worker < context_.plan.workers; ++worker)
-      sorters_.emplace_back(context_.budget, task_.bricks, max);
+      sorters_.emplace_back(context_.budget, task_.format, max);
   }
 
   void sort(BucketSorter& sorter, size_t bucket) {
@@ -143,8 +143,11 @@ class PartitionMerge {
     for (size_t s = 0; s < partition_.slices().size(); ++s) {
       const uint32_t rows =
           partition_.bucket_begin(bucket + 1, s).row - partition_.bucket_begin(bucket, s).row;
-      uint32_t* const to = positions_of(bucket, s);
-      for (uint32_t i = 0; i < rows; ++i) to[i] = static_cast<uint32_t>(*position) + from[i];
+      uint32_t* to = positions_of(bucket, s);
+      if (task_.maps.wide())
+        for (uint32_t i = 0; i < rows; ++i) to = put_position(to, *position + from[i], true);
+      else
+        for (uint32_t i = 0; i < rows; ++i) to[i] = static_cast<uint32_t>(*position) + from[i];
       from += rows;
     }
   }
@@ -152,7 +155,7 @@ class PartitionMerge {
   void merge_by_rows(size_t bucket) {
     const auto position = sequencer_.wait_for_turn(bucket);
     if (!position) return;
-    OrderedRowWriter out(task_.output, task_.bricks, *position, context_.budget);
+    OrderedRowWriter out(task_.output, task_.format, *position, context_.budget);
     std::vector<SliceCursor> cursors;
     std::vector<uint32_t*> to;
     for (size_t s = 0; s < partition_.slices().size(); ++s) {
@@ -160,8 +163,8 @@ class PartitionMerge {
       to.push_back(positions_of(bucket, s));
     }
     uint64_t rows = 0;
-    merge_cursors(std::span(cursors), [&](size_t s, const RowKey& row) {
-      *to[s]++ = static_cast<uint32_t>(out.add(row));
+    merge_cursors(task_.format, std::span(cursors), [&](size_t s, const RowKey& row) {
+      to[s] = put_position(to[s], out.add(row), task_.maps.wide());
       if (++rows % kFrameRows == 0) context_.cancel.check();
     });
     out.flush();
@@ -178,9 +181,10 @@ class PartitionMerge {
   // Where the positions of the rows of a slice in a bucket are stored.
   uint32_t* positions_of(size_t bucket, size_t s) {
     const RunSlice& slice = partition_.slices()[s];
-    const uint32_t row = partition_.bucket_begin(bucket, s).row;
-    return task_.maps.resident() ? task_.maps.values(slice.run) + slice.first_row + row
-                                 : partition_.positions() + slice.row_base + row;
+    const uint64_t row = partition_.bucket_begin(bucket, s).row;
+    const uint32_t words = task_.maps.position_words();
+    return task_.maps.resident() ? task_.maps.words(slice.run) + words * (slice.first_row + row)
+                                 : partition_.positions() + words * (slice.row_base + row);
   }
 
   void store_positions() {
@@ -189,7 +193,7 @@ class PartitionMerge {
       const uint32_t begin = partition_.bucket_begin(0, s).row;
       const uint32_t end = partition_.bucket_begin(partition_.bucket_count(), s).row;
       task_.maps.store(slice.run, slice.first_row + begin,
-                       {partition_.positions() + slice.row_base + begin, end - begin});
+                       {positions_of(0, s), (end - begin) * task_.maps.position_words()});
     }
   }
 
@@ -201,18 +205,23 @@ class PartitionMerge {
   LevelExtent extent_;  // changed in turn
 };
 
-uint64_t bucket_rows(const MergeContext& context, size_t runs) {
-  const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * runs);
+uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {
+  const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * task.runs.size());
   // Half of what the memory of a worker can hold, since buckets differ in size.
-  return std::min(rows,
-                  context.plan.worker_bytes / (2 * BucketSorter::bytes_for({1, kMaxRowWords})));
+  const uint64_t row_bytes = BucketSorter::bytes_for({1, task.format.max_words()});
+  return std::min(rows, context.plan.worker_bytes / (2 * row_bytes));
+}
+
+// The words of a position that a partition holds until the partition is merged.
+uint32_t held_position_words(const LevelTask& task) {
+  return task.maps.resident() ? 0 : task.maps.position_words();
 }
 
 LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,
                             const HashInterval& interval, uint64_t first_position) {
   HashPartition partition(task.runs, HashPartition::slices_within(task.runs, interval), interval,
-                          bucket_rows(context, task.runs.size()), !task.maps.resident(),
-                          task.memory, context.budget);
+                          bucket_rows(context, task), held_position_words(task), task.memory,
+                          context.budget);
   partition.load(task.child_maps, {context.plan.workers, context.plan.worker_bytes}, context.budget,
                  context.cancel);
   return PartitionMerge(context, task, partition, first_position).run();
@@ -245,8 +254,8 @@ LevelExtent merge_level(const MergeContext& context, const LevelTask& task) {
   LevelExtent extent;
   HashInterval done{0, 0};
   for (uint64_t first = 0;; first = done.last + 1) {
-    const auto interval =
-        HashPartition::widest_interval(task.runs, first, partition_bytes, !task.maps.resident());
+    const auto interval = HashPartition::widest_interval(task.runs, first, partition_bytes,
+                                                         held_position_words(task));
     LevelExtent part;
     if (interval) {
       done = *interval;

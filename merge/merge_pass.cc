@@ -40,23 +40,30 @@ class Pass {
   }
 
   void merge_all_runs(uint32_t level) {
+    const RowFormat format{level == task_.shape.brick_level(), done_.wide};
     std::vector<ArtifactRun> artifact_runs;
     for (const ArtifactReader& artifact : task_.artifacts)
-      artifact_runs.emplace_back(artifact, level);
+      artifact_runs.emplace_back(artifact, level, format.wide);
     const TopTreeRun top(task_.shape.hash_bits,
-                         task_.is_final ? std::move(done_.placed) : std::vector<PlacedNode>());
+                         task_.is_final ? std::move(done_.placed) : std::vector<PlacedNode>(),
+                         format.wide);
     context_.progress.expect_more(top.rows());
     std::vector<const LevelRun*> runs;
     std::vector<uint64_t> rows;
     for (const ArtifactRun& run : artifact_runs) runs.push_back(&run);
     runs.push_back(&top);
-    for (const LevelRun* run : runs) rows.push_back(run->rows());
+    RowCount total;
+    for (const LevelRun* run : runs) {
+      rows.push_back(run->rows());
+      total.add(run->count({0, run->frames().size()}));
+    }
 
-    PositionMaps maps(rows, context_.plan.resident_bytes, context_.scratch, context_.budget);
+    PositionMaps maps(rows, output_.is_wide(max_positions(total)), context_.plan.resident_bytes,
+                      context_.scratch, context_.budget);
     output_.begin_level(level);
     const LevelExtent extent =
         merge_level(context_, {.level = level,
-                               .bricks = level == task_.shape.brick_level(),
+                               .format = format,
                                .runs = runs,
                                .child_maps = done_.maps ? &*done_.maps : nullptr,
                                .maps = maps,
@@ -66,9 +73,15 @@ class Pass {
     if (task_.is_final) context_.report.dag_nodes += extent.nodes;
     place(level, top, maps);
     done_.maps = std::move(maps);
+    done_.wide = output_.is_wide(extent.positions);
     done_.level = level;
     if (context_.budget.available() < memory_.bytes() / 4 + bytes_besides_partition())
       memory_.release();
+  }
+
+  // The most positions that rows can take: as if none of them were equal.
+  uint64_t max_positions(const RowCount& rows) const {
+    return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }
 
   // Reserves memory for the largest level from the start if the budget allows it.
@@ -79,12 +92,13 @@ class Pass {
         levels[level.level].add({level.rows, std::max(level.children, kBrickWords * level.rows)});
     RowCount max;
     for (const RowCount& level : levels) max.raise_to(level);
+    if (output_.is_wide(max_positions(max))) return;
     const bool resident = max.rows * sizeof(uint32_t) <= context_.plan.resident_bytes;
-    const uint64_t bytes = HashPartition::bytes_for(max, false);
+    const uint64_t bytes = HashPartition::bytes_for(max, 0);
     if (resident && bytes <= kMaxPartitionBytes &&
         bytes + bytes_besides_partition() + context_.plan.resident_bytes <=
             context_.budget.available())
-      memory_.reserve(max, false, context_.budget);
+      memory_.reserve(max, 0, context_.budget);
   }
 
   // What a level may take besides its partition.
@@ -101,8 +115,10 @@ class Pass {
     for (size_t run = 0; run < task_.artifacts.size(); ++run)
       for (ArtifactRoot root : task_.artifacts[run].roots()) {
         if (root.cube.level != level) continue;
-        root.index = maps.at(run, root.index);
-        done_.placed.push_back({root.cube, root.hash, root.index});
+        const uint64_t position = maps.at(run, root.index);
+        done_.placed.push_back({root.cube, root.hash, position});
+        // Nobody asks for the index of a root in the global file.
+        root.index = static_cast<uint32_t>(position);
         done_.roots.push_back(root);
       }
   }

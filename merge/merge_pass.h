@@ -25,6 +25,7 @@ struct PassTask {
 struct PassProgress {
   std::optional<uint32_t> level;     // merged last; none before the bricks
   std::optional<PositionMaps> maps;  // of that level
+  bool wide = false;                 // whether children in that level are wide
   std::vector<PlacedNode> placed;    // on that level
   // Of subvolumes on that level and below, `index` being their position in the output.
   std::vector<ArtifactRoot> roots;

@@ -20,8 +20,13 @@ namespace voxdag::query {
 
 class DagView {
  public:
-  // `levels` holds the words of levels 0 to L - 2, or nothing for a scene without voxels.
-  explicit DagView(std::vector<std::span<const uint32_t>> levels, uint32_t grid_levels)
+  // The words of a level, and whether pointers into it take two words, low half first.
+  struct Level {
+    std::span<const uint32_t> words;
+    bool wide = false;
+  };
+  // Levels 0 to L - 2, or nothing for a scene without voxels.
+  explicit DagView(std::vector<Level> levels, uint32_t grid_levels)
       : grid_levels_(grid_levels), levels_(std::move(levels)) {}
   explicit DagView(const voxdag_reader::File& file);
 
@@ -37,7 +42,7 @@ class DagView {
 
    private:
     friend class DagView;
-    const uint32_t* offsets_ = nullptr;
+    voxdag_reader::Node node_;
     uint64_t bits_ = 0;
   };
   uint64_t root() const { return grid_levels_ == kBrickLevels ? brick(0) : 0; }
@@ -46,7 +51,7 @@ class DagView {
   uint64_t content(uint32_t depth, const Children& children, int index) const {
     if (depth + kBrickLevels < grid_levels_) {
       const uint32_t before = children.mask & ((1u << index) - 1);
-      const uint32_t offset = children.offsets_[kPopcount8[before]];
+      const uint64_t offset = children.node_.child(kPopcount8[before]);
       return depth + kBrickLevels + 1 == grid_levels_ ? brick(offset) : offset;
     }
     return depth + kBrickLevels == grid_levels_ ? children.bits_ >> (8 * index) & 255 : 1;
@@ -75,17 +80,19 @@ class DagView {
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
 
   uint32_t grid_levels_;
-  std::vector<std::span<const uint32_t>> levels_;
+  std::vector<Level> levels_;
 };
 
 inline DagView::Children DagView::children(uint32_t depth, uint64_t content) const {
   Children c;
   if (depth + kBrickLevels < grid_levels_) {
-    const std::span<const uint32_t> words = levels_[depth];
+    const std::span<const uint32_t> words = levels_[depth].words;
+    const bool wide = levels_[depth + 1].wide;
     if (content >= words.size()) corrupt(depth, content);
     c.mask = words[content];
-    c.offsets_ = words.data() + content + 1;
-    if (c.mask == 0 || c.mask > 255 || kPopcount8[c.mask] >= words.size() - content)
+    c.node_ = {c.mask, words.data() + content + 1, wide};
+    if (c.mask == 0 || c.mask > 255 ||
+        uint64_t{kPopcount8[c.mask]} << wide >= words.size() - content)
       corrupt(depth, content);
     return c;
   }
@@ -115,7 +122,7 @@ void DagView::visit_below(const Cell& cell, uint64_t content, uint32_t depth, co
 }
 
 inline uint64_t DagView::brick(uint64_t offset) const {
-  const std::span<const uint32_t> words = levels_[grid_levels_ - kBrickLevels];
+  const std::span<const uint32_t> words = levels_[grid_levels_ - kBrickLevels].words;
   const uint32_t level = grid_levels_ - kBrickLevels;
   if (words.size() < 2 || offset > words.size() - 2) corrupt(level, offset);
   const uint64_t mask = words[offset] | static_cast<uint64_t>(words[offset + 1]) << 32;

@@ -86,29 +86,29 @@ class OneLevel {
  public:
   OneLevel(size_t runs, uint32_t levels_above_bricks)
       : source_(fixtures().of(runs)),
-        survey_(
-            survey_artifacts(source_.refs(), open(), {.grid_levels = SyntheticRuns::kGridLevels})),
+        survey_(survey_artifacts(source_.refs(), open(),
+                                 {.grid_levels = SyntheticRuns::kGridLevels}, false)),
         artifacts_(survey_.in_morton_order, open(), {.grid_levels = SyntheticRuns::kGridLevels},
                    budget_) {
     const uint32_t level = SyntheticRuns::kGridLevels - 2 - levels_above_bricks;
     std::vector<uint64_t> rows, rows_below;
     for (const ArtifactReader& artifact : artifacts_.readers()) {
-      runs_.push_back(std::make_unique<ArtifactRun>(artifact, level));
+      runs_.push_back(std::make_unique<ArtifactRun>(artifact, level, false));
       pointers_.push_back(runs_.back().get());
       rows.push_back(runs_.back()->rows());
       rows_below.push_back(levels_above_bricks ? artifact.level(level + 1)->rows : 0);
       total_ += rows.back();
     }
-    maps_.emplace(rows, kGiB, scratch_, budget_);
-    below_.emplace(rows_below, kGiB, scratch_, budget_);
+    maps_.emplace(rows, false, kGiB, scratch_, budget_);
+    below_.emplace(rows_below, false, kGiB, scratch_, budget_);
     for (size_t run = 0; run < runs; ++run)
       for (uint64_t row = 0; row < rows_below[run]; ++row)
-        below_->values(run)[row] = static_cast<uint32_t>(7 * row);
+        below_->words(run)[row] = static_cast<uint32_t>(7 * row);
   }
 
   HashPartition partition() {
     HashPartition made(pointers_, HashPartition::slices_within(pointers_, {}), {},
-                       std::max<uint64_t>(8192, 8 * pointers_.size()), false, memory_, budget_);
+                       std::max<uint64_t>(8192, 8 * pointers_.size()), 0, memory_, budget_);
     return made;
   }
   void load(HashPartition& partition) { partition.load(&*below_, {1, kGiB}, budget_, cancel_); }
@@ -124,6 +124,7 @@ class OneLevel {
   void merge(bool bricks) {
     struct Nowhere : LevelOutput {
       bool in_words() const override { return true; }
+      bool is_wide(uint64_t) const override { return false; }
       void begin_level(uint32_t) override {}
       void add(const MergedRows&) override {}
       void write(uint64_t, const MergedRows&) override {}
@@ -134,7 +135,7 @@ class OneLevel {
     MergeProgress progress(silent);
     const MergeContext context{scratch_, budget_, MergeMemory::divide(budget_.available(), 1),
                                progress, cancel_, report};
-    merge_level(context, {1, bricks, pointers_, &*below_, *maps_, nowhere, memory_});
+    merge_level(context, {1, {.bricks = bricks}, pointers_, &*below_, *maps_, nowhere, memory_});
   }
 
  private:

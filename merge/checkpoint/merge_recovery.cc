@@ -60,12 +60,15 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
   saver_.add_named(file->path());
   uint64_t map_rows = 0;
   for (const uint64_t rows : state.map_rows) map_rows += rows;
-  if (state.map_rows.size() != pending_.size() + 1 || map_rows != state.map.words)
+  if (state.map_rows.size() != pending_.size() + 1 ||
+      (state.map.words != map_rows && state.map.words != 2 * map_rows) ||
+      state.narrow_words != out.narrow_words() || state.file.levels.empty())
     throw Error(ErrorCode::kCorrupt, "the saved position maps are not those of the subvolumes");
   PassProgress progress;
   progress.level = state.level;
   progress.maps.emplace(state.map_rows, std::move(file), context_.plan.resident_bytes,
                         context_.budget);
+  progress.wide = out.is_wide(state.file.levels.back().words);
   progress.placed = state.placed;
   progress.roots = state.roots;
   out.resume(state.file);
@@ -112,8 +115,8 @@ void MergeRecovery::save_level(const PassProgress& progress,
   const auto map = progress.maps->file(context_.scratch);
   MergeState state = make_state(intermediates_from(0));
   state.final_pass =
-      FinalPassState{*progress.level, out.path(),      out.progress(), progress.maps->rows(),
-                     map->state(),    progress.placed, progress.roots};
+      FinalPassState{*progress.level,       out.path(),   out.narrow_words(), out.progress(),
+                     progress.maps->rows(), map->state(), progress.placed,    progress.roots};
   auto named = pending_.segment_paths();
   named.push_back(map->path());
   const auto sync = [&out, map, &scratch = context_.scratch] {

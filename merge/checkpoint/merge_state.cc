@@ -10,7 +10,7 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMagic = 0x0a4752454d474456;  // "VDGMERG\n"
-constexpr uint32_t kVersion = 2;
+constexpr uint32_t kVersion = 3;
 
 // The fields are described once for both directions: `code(field)` puts or gets one.
 template <class Code, class T>
@@ -77,6 +77,7 @@ template <class Code>
 void code_fields(Code& code, FinalPassState& pass) {
   code(pass.level);
   code.text(pass.output);
+  code(pass.narrow_words);
   code_all(code, pass.file.levels);
   code_all(code, pass.file.checksums);
   code_all(code, pass.map_rows);

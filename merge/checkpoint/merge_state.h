@@ -23,7 +23,8 @@ namespace voxdag {
 // How far the final pass is; see PassProgress.
 struct FinalPassState {
   uint32_t level = 0;
-  std::string output;  // path of the global file
+  std::string output;         // path of the global file
+  uint64_t narrow_words = 0;  // GlobalFileWriter::narrow_words()
   GlobalFileProgress file;
   std::vector<uint64_t> map_rows;
   ScratchFileState map;

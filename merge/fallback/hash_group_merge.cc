@@ -53,15 +53,14 @@ class GroupFile {
 
   size_t frames_that_fit(const LevelRun& run, size_t begin, size_t limit) const {
     size_t end = begin + 1;
-    while (end < limit &&
-           HashPartition::bytes_for(run.count({begin, end + 1}), false) <= bytes_ / 2)
+    while (end < limit && HashPartition::bytes_for(run.count({begin, end + 1}), 0) <= bytes_ / 2)
       ++end;
     return end;
   }
 
   void add_frames(GroupRun& group_run, const FrameSpan& frames) {
     HashPartition part(task_.runs, {{.run = group_run.run, .frames = frames}}, {hash_, hash_},
-                       kFrameRows, false, task_.memory, context_.budget);
+                       kFrameRows, 0, task_.memory, context_.budget);
     part.load(task_.child_maps, {context_.plan.workers, context_.plan.worker_bytes},
               context_.budget, context_.cancel);
     const RowOffset begin = part.bucket_begin(0, 0);
@@ -74,7 +73,7 @@ class GroupFile {
       const uint8_t mask = part.masks()[row];
       if (buffered_ + kMaxEncodedWords > kBufferWords) flush();
       buffer_[buffered_++] = mask;
-      for (uint32_t i = 0; i < kRowWords[mask]; ++i) buffer_[buffered_++] = *words++;
+      for (uint32_t i = task_.format.words(mask); i > 0; --i) buffer_[buffered_++] = *words++;
     }
   }
 
@@ -98,10 +97,11 @@ class GroupFile {
 // Walks the rows of one run through a buffer and stores their positions.
 class GroupCursor {
  public:
-  GroupCursor(const ScratchFile& file, const GroupRun& run, uint64_t hash, PositionMaps& maps,
-              std::span<uint32_t> rows, std::span<uint32_t> positions)
+  GroupCursor(const ScratchFile& file, const GroupRun& run, const RowFormat& format, uint64_t hash,
+              PositionMaps& maps, std::span<uint32_t> rows, std::span<uint32_t> positions)
       : file_(file),
         run_(run),
+        format_(format),
         maps_(maps),
         hash_(hash),
         buffer_(rows),
@@ -114,17 +114,18 @@ class GroupCursor {
   bool at_end() const { return rows_left_ == 0; }
   RowKey row() const { return {hash_, static_cast<uint8_t>(buffer_[at_]), &buffer_[at_ + 1]}; }
   void advance() {
-    at_ += 1 + kRowWords[buffer_[at_] & 0xff];
+    at_ += 1 + format_.words(static_cast<uint8_t>(buffer_[at_]));
     if (--rows_left_ > 0 && filled_ - at_ < kMaxEncodedWords) refill();
   }
   // Sets the position of the current row.
-  void set_position(uint32_t position) {
-    positions_[pending_++] = position;
+  void set_position(uint64_t position) {
+    put_position(&positions_[pending_], position, maps_.wide());
+    pending_ += maps_.position_words();
     if (pending_ == positions_.size()) flush();
   }
   void flush() {
     maps_.store(run_.run, run_.first_row + stored_, positions_.first(pending_));
-    stored_ += pending_;
+    stored_ += pending_ / maps_.position_words();
     pending_ = 0;
   }
 
@@ -141,15 +142,16 @@ class GroupCursor {
 
   const ScratchFile& file_;
   const GroupRun& run_;
+  const RowFormat format_;
   PositionMaps& maps_;
   const uint64_t hash_;
   std::span<uint32_t> buffer_;     // encoded rows
-  std::span<uint32_t> positions_;  // the first `pending_` are not stored yet
+  std::span<uint32_t> positions_;  // of an even number; the first `pending_` are not stored yet
   uint64_t next_word_;             // the first word of the file that is not read yet
   uint64_t rows_left_;
   size_t at_ = 0, filled_ = 0;  // in buffer_
-  uint64_t stored_ = 0;
-  size_t pending_ = 0;
+  uint64_t stored_ = 0;         // rows
+  size_t pending_ = 0;          // words
 };
 
 }  // namespace
@@ -161,19 +163,21 @@ LevelExtent merge_hash_group(const MergeContext& context, const LevelTask& task,
   task.memory.release();
   const auto runs = group.runs();
 
-  OrderedRowWriter out(task.output, task.bricks, first_position, context.budget);
-  const size_t each = std::clamp<uint64_t>(bytes / 2 / sizeof(uint32_t) / runs.size(), 64, 16384);
+  OrderedRowWriter out(task.output, task.format, first_position, context.budget);
+  // A multiple of 8, so that a quarter holds whole positions.
+  const size_t each =
+      std::clamp<uint64_t>(bytes / 2 / sizeof(uint32_t) / runs.size(), 128, 16384) / 8 * 8;
   PageBuffer<uint32_t> buffers(context.budget, each * runs.size() + kMaxRowWords,
                                "a group of equal hashes");
   std::vector<GroupCursor> cursors;
   for (size_t i = 0; i < runs.size(); ++i) {
     const std::span<uint32_t> mine(buffers.data() + i * each, each);
-    cursors.emplace_back(group.file(), runs[i], hash, task.maps, mine.subspan(each / 4),
-                         mine.first(each / 4));
+    cursors.emplace_back(group.file(), runs[i], task.format, hash, task.maps,
+                         mine.subspan(each / 4), mine.first(each / 4));
   }
   uint64_t rows = 0;
-  merge_cursors(std::span(cursors), [&](size_t cursor, const RowKey& row) {
-    cursors[cursor].set_position(static_cast<uint32_t>(out.add(row)));
+  merge_cursors(task.format, std::span(cursors), [&](size_t cursor, const RowKey& row) {
+    cursors[cursor].set_position(out.add(row));
     if (++rows % kFrameRows != 0) return;
     context.cancel.check();
     context.progress.advance(kFrameRows);

@@ -7,7 +7,7 @@ void OrderedRowWriter::push(const RowKey& row) {
   last_position_ = end_position();
   buffer_.push(row.hash, row.mask, row.words);
   ++nodes_;
-  std::copy_n(row.words, kRowWords[row.mask], last_words_);
+  std::copy_n(row.words, format_.words(row.mask), last_words_);
   last_ = {row.hash, row.mask, last_words_};
   any_ = true;
 }

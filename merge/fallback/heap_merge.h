@@ -17,12 +17,16 @@ namespace voxdag {
 class OrderedRowWriter {
  public:
   // The first row goes to `first_position`.
-  OrderedRowWriter(LevelOutput& output, bool bricks, uint64_t first_position, MemoryBudget& budget)
-      : output_(output), buffer_(budget, bricks, kBuffered), flushed_(first_position) {}
+  OrderedRowWriter(LevelOutput& output, const RowFormat& format, uint64_t first_position,
+                   MemoryBudget& budget)
+      : output_(output),
+        format_(format),
+        buffer_(budget, format, kBuffered),
+        flushed_(first_position) {}
 
   // Returns the position of the row in the merged level.
   uint64_t add(const RowKey& row) {
-    if (!any_ || compare_rows(last_, row) != 0) push(row);
+    if (!any_ || compare_rows(format_, last_, row) != 0) push(row);
     return last_position_;
   }
   // Writes the rows that are still in the buffer.
@@ -42,6 +46,7 @@ class OrderedRowWriter {
   }
 
   LevelOutput& output_;
+  const RowFormat format_;
   MergedRows buffer_;
   uint64_t flushed_;  // the position after all rows that were written
   uint64_t nodes_ = 0;
@@ -54,12 +59,12 @@ class OrderedRowWriter {
 // Calls visit(cursor index, row) for all rows of all cursors in the total order. A Cursor has
 // `bool at_end() const`, `RowKey row() const` (valid until it moves) and `void advance()`.
 template <class Cursor, class Visit>
-void merge_cursors(std::span<Cursor> cursors, Visit&& visit) {
+void merge_cursors(const RowFormat& format, std::span<Cursor> cursors, Visit&& visit) {
   std::vector<size_t> heap;
   for (size_t i = 0; i < cursors.size(); ++i)
     if (!cursors[i].at_end()) heap.push_back(i);
   const auto later = [&](size_t a, size_t b) {
-    return compare_rows(cursors[a].row(), cursors[b].row()) > 0;
+    return compare_rows(format, cursors[a].row(), cursors[b].row()) > 0;
   };
   std::ranges::make_heap(heap, later);
   while (!heap.empty()) {

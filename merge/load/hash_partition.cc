@@ -19,9 +19,9 @@ unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_
 
 }  // namespace
 
-uint64_t HashPartition::bytes_for(const RowCount& count, bool with_positions) {
+uint64_t HashPartition::bytes_for(const RowCount& count, uint32_t position_words) {
   // Hash, mask, bucket begins (see choose_bucket_bits); words, and a bit for each during rewiring.
-  return count.rows * (8 + 1 + 4 + (with_positions ? 4 : 0)) + count.words * 4 + count.words / 8;
+  return count.rows * (8 + 1 + 4 + 4 * position_words) + count.words * 4 + count.words / 8;
 }
 
 std::vector<RunSlice> HashPartition::slices_within(std::span<const LevelRun* const> runs,
@@ -36,12 +36,12 @@ std::vector<RunSlice> HashPartition::slices_within(std::span<const LevelRun* con
 
 std::optional<HashInterval> HashPartition::widest_interval(std::span<const LevelRun* const> runs,
                                                            uint64_t first, uint64_t bytes,
-                                                           bool with_positions) {
+                                                           uint32_t position_words) {
   bytes = std::min(bytes, kMaxPartitionBytes);
   const auto fits = [&](uint64_t last) {
     RowCount total;
     for (const LevelRun* run : runs) total.add(run->count(run->frames_within({first, last})));
-    return bytes_for(total, with_positions) <= bytes;
+    return bytes_for(total, position_words) <= bytes;
   };
   if (fits(~uint64_t{0})) return HashInterval{first, ~uint64_t{0}};
   if (!fits(first)) return std::nullopt;
@@ -55,7 +55,7 @@ std::optional<HashInterval> HashPartition::widest_interval(std::span<const Level
 
 HashPartition::HashPartition(std::span<const LevelRun* const> runs, std::vector<RunSlice> slices,
                              const HashInterval& interval, uint64_t bucket_rows,
-                             bool with_positions, PartitionMemory& memory, MemoryBudget& budget)
+                             uint32_t position_words, PartitionMemory& memory, MemoryBudget& budget)
     : runs_(runs), slices_(std::move(slices)), interval_(interval), memory_(memory) {
   RowCount total;
   for (RunSlice& slice : slices_) {
@@ -68,22 +68,24 @@ HashPartition::HashPartition(std::span<const LevelRun* const> runs, std::vector<
   }
   bucket_bits_ = choose_bucket_bits(interval_, total.rows, bucket_rows, slices_.size());
   bucket_count_ = (interval_.last >> bucket_bits_) - (interval_.first >> bucket_bits_) + 1;
-  memory_.reserve(total, with_positions, budget);
+  memory_.reserve(total, position_words, budget);
   bucket_begins_ = PageBuffer<RowOffset>(budget, (bucket_count_ + 1) * slices_.size(),
                                          "the buckets of a hash partition");
 }
 
-void PartitionMemory::reserve(const RowCount& count, bool with_positions, MemoryBudget& budget) {
+void PartitionMemory::reserve(const RowCount& count, uint32_t position_words,
+                              MemoryBudget& budget) {
   const uint64_t rows = count.rows, words = count.words + kMaxRowWords;
   if (rows <= hashes_.size() && words <= words_.size() &&
-      (!with_positions || rows <= positions_.size()))
+      position_words * rows <= positions_.size())
     return;
   release();  // all columns, so that the peak is what one partition takes
   hashes_ = PageBuffer<uint64_t>(budget, rows, "a hash partition of the merge");
   masks_ = PageBuffer<uint8_t>(budget, rows, "a hash partition of the merge");
   words_ = PageBuffer<uint32_t>(budget, words, "a hash partition of the merge");
-  if (with_positions)
-    positions_ = PageBuffer<uint32_t>(budget, rows, "a hash partition of the merge");
+  if (position_words > 0)
+    positions_ =
+        PageBuffer<uint32_t>(budget, position_words * rows, "a hash partition of the merge");
 }
 
 uint64_t PartitionMemory::bytes() const {

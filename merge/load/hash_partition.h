@@ -43,8 +43,9 @@ struct RowOffset {
 // as long to zero new pages as it takes to read rows into them.
 class PartitionMemory {
  public:
-  // Makes space for so many rows; what was in the columns is lost.
-  void reserve(const RowCount& count, bool with_positions, MemoryBudget& budget);
+  // Makes space for so many rows, each with `position_words` words of a position; what was in the
+  // columns is lost.
+  void reserve(const RowCount& count, uint32_t position_words, MemoryBudget& budget);
   void release() { *this = {}; }
   uint64_t bytes() const;
 
@@ -69,13 +70,13 @@ inline constexpr uint64_t kMaxPartitionBytes = uint64_t{8} << 30;
 
 class HashPartition {
  public:
-  // `with_positions`: the partition also has a position for each of its rows.
-  static uint64_t bytes_for(const RowCount& count, bool with_positions);
+  // The partition also has `position_words` words, none to two, for the position of each row.
+  static uint64_t bytes_for(const RowCount& count, uint32_t position_words);
   // The widest interval that begins with hash `first` and whose partition takes at most `bytes`;
   // none if not even the rows of that one hash fit.
   static std::optional<HashInterval> widest_interval(std::span<const LevelRun* const> runs,
                                                      uint64_t first, uint64_t bytes,
-                                                     bool with_positions);
+                                                     uint32_t position_words);
   // One slice for each run that has frames within the interval; the constructor sets their bases.
   static std::vector<RunSlice> slices_within(std::span<const LevelRun* const> runs,
                                              const HashInterval& interval);
@@ -83,7 +84,7 @@ class HashPartition {
   // Buckets get about `bucket_rows` rows if hashes are spread evenly. `memory` is used by one
   // partition at a time.
   HashPartition(std::span<const LevelRun* const> runs, std::vector<RunSlice> slices,
-                const HashInterval& interval, uint64_t bucket_rows, bool with_positions,
+                const HashInterval& interval, uint64_t bucket_rows, uint32_t position_words,
                 PartitionMemory& memory, MemoryBudget& budget);
 
   // Reads the rows and replaces their children by positions. `child_maps` may be null if no run
@@ -91,6 +92,8 @@ class HashPartition {
   void load(const PositionMaps* child_maps, const PartitionWorkers& workers, MemoryBudget& budget,
             const CancelToken& cancel);
 
+  // The same for all runs.
+  const RowFormat& format() const { return runs_[0]->format(); }
   std::span<const RunSlice> slices() const { return slices_; }
   size_t bucket_count() const { return bucket_count_; }
   unsigned bucket_bits() const { return bucket_bits_; }

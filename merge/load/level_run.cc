@@ -14,8 +14,10 @@ FrameSpan LevelRun::frames_within(const HashInterval& interval) const {
           static_cast<size_t>(std::max(reaching, end) - frames_.begin())};
 }
 
-ArtifactRun::ArtifactRun(const ArtifactReader& artifact, uint32_t level)
-    : LevelRun(level == artifact.shape().brick_level(), false), artifact_(artifact), level_(level) {
+ArtifactRun::ArtifactRun(const ArtifactReader& artifact, uint32_t level, bool wide)
+    : LevelRun({level == artifact.shape().brick_level(), wide}, false),
+      artifact_(artifact),
+      level_(level) {
   if (const ArtifactLevel* rows = artifact.level(level))
     set_frames(rows->frames, rows->rows, rows->children);
 }

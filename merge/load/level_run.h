@@ -25,12 +25,14 @@ struct FrameSpan {
 class LevelRun {
  public:
   virtual ~LevelRun() = default;
-  // Decodes a frame. Several threads may call it at once, each with its own `out`.
+  // Decodes a frame. Several threads may call it at once, each with its own `out`. Children are
+  // indices, or words of positions if they are rewired().
   virtual void read_frame(size_t index, Frame& out) const = 0;
 
   std::span<const FrameInfo> frames() const { return frames_; }
   uint64_t rows() const { return rows_; }
-  bool bricks() const { return bricks_; }
+  const RowFormat& format() const { return format_; }
+  bool bricks() const { return format_.bricks; }
   // Whether children are positions already, not indices into the run's own level below.
   bool rewired() const { return rewired_; }
 
@@ -40,8 +42,8 @@ class LevelRun {
   }
   // Words of those rows.
   uint64_t words_before(size_t index) const {
-    if (bricks_) return kBrickWords * rows_before(index);
-    return index < frames_.size() ? frames_[index].first_child : children_;
+    if (format_.bricks) return kBrickWords * rows_before(index);
+    return (index < frames_.size() ? frames_[index].first_child : children_) << format_.wide;
   }
   RowCount count(const FrameSpan& frames) const {
     return {rows_before(frames.end) - rows_before(frames.begin),
@@ -51,7 +53,7 @@ class LevelRun {
   FrameSpan frames_within(const HashInterval& interval) const;
 
  protected:
-  LevelRun(bool bricks, bool rewired) : bricks_(bricks), rewired_(rewired) {}
+  LevelRun(const RowFormat& format, bool rewired) : format_(format), rewired_(rewired) {}
   void set_frames(std::span<const FrameInfo> frames, uint64_t rows, uint64_t children) {
     frames_ = frames;
     rows_ = rows;
@@ -59,7 +61,7 @@ class LevelRun {
   }
 
  private:
-  const bool bricks_;
+  const RowFormat format_;
   const bool rewired_;
   std::span<const FrameInfo> frames_;
   uint64_t rows_ = 0;
@@ -69,7 +71,8 @@ class LevelRun {
 // A level of an artifact; without rows if the artifact does not reach up to that level.
 class ArtifactRun : public LevelRun {
  public:
-  ArtifactRun(const ArtifactReader& artifact, uint32_t level);
+  // `wide`: positions in the merged level below take two words.
+  ArtifactRun(const ArtifactReader& artifact, uint32_t level, bool wide);
   void read_frame(size_t index, Frame& out) const override {
     artifact_.read_frame(level_, index, out);
   }

@@ -13,8 +13,16 @@ namespace {
 // cache of the thread.
 constexpr size_t kFramesPerItem = 16;
 
-void replace_all(std::span<const uint32_t> children, const uint32_t* map, uint32_t* out) {
-  for (size_t i = 0; i < children.size(); ++i) out[i] = map[children[i]];
+// Writes the positions that the map has for the children. The map may be wide though its level, and
+// so the words of its parents, turned out not to be.
+void replace_all(std::span<const uint32_t> children, const uint32_t* map, bool wide_map, bool wide,
+                 uint32_t* out) {
+  if (!wide_map) {
+    for (size_t i = 0; i < children.size(); ++i) out[i] = map[children[i]];
+    return;
+  }
+  for (const uint32_t child : children)
+    out = put_position(out, get_position(map + 2 * uint64_t{child}, true), wide);
 }
 
 }  // namespace
@@ -27,16 +35,18 @@ class HashPartition::Loader {
         maps_(maps),
         spilled_(maps && !maps->resident()),
         workers_(workers.count) {
-    uint64_t window_rows = 0;
     if (spilled_) {
       const uint64_t window_bytes =
           std::max(workers.bytes_each, kFrameMemoryBytes) - kFrameMemoryBytes;
-      window_rows =
-          std::clamp<uint64_t>(window_bytes / sizeof(uint32_t), 1024, maps->max_rows() + 1024);
+      window_rows_ =
+          std::clamp<uint64_t>(window_bytes / (sizeof(uint32_t) * maps->position_words()), 1024,
+                               maps->max_rows() + 1024);
     }
     for (Worker& worker : workers_) {
       worker.charge = MemoryCharge(budget, kFrameMemoryBytes, "a frame of the merge");
-      worker.window = PageBuffer<uint32_t>(budget, window_rows, "a window of a position map");
+      if (spilled_)
+        worker.window = PageBuffer<uint32_t>(budget, window_rows_ * maps->position_words(),
+                                             "a window of a position map");
     }
   }
 
@@ -60,13 +70,11 @@ class HashPartition::Loader {
     const RunSlice& slice = partition_.slices_[slice_index];
     const LevelRun& run = *partition_.runs_[slice.run];
     const bool rewire = !run.bricks() && !run.rewired();
-    const bool by_windows = rewire && spilled_ && maps_->rows(slice.run) > worker.window.size();
+    const bool by_windows = rewire && spilled_ && maps_->rows(slice.run) > window_rows_;
     const uint32_t* map = nullptr;
-    if (rewire && !spilled_) map = maps_->values(slice.run);
-    if (rewire && spilled_ && !by_windows) {
-      maps_->load(slice.run, 0, {worker.window.data(), maps_->rows(slice.run)});
-      map = worker.window.data();
-    }
+    if (rewire && !spilled_) map = maps_->words(slice.run);
+    if (rewire && spilled_ && !by_windows)
+      map = load_window(worker, slice, 0, maps_->rows(slice.run));
     for (size_t f = frames.begin; f < frames.end; ++f) {
       cancel.check();
       run.read_frame(f, worker.frame);
@@ -81,7 +89,7 @@ class HashPartition::Loader {
     MemoryCharge charge;
     Frame frame;
     PageBuffer<uint32_t> window;
-    std::vector<bool> replaced;  // for each word of a slice; see HashPartition::bytes_for()
+    std::vector<bool> replaced;  // for each child of a slice; see HashPartition::bytes_for()
   };
 
   // Copies a frame into the columns; without a map its children stay as they are.
@@ -102,9 +110,18 @@ class HashPartition::Loader {
     }
     std::copy(frame.masks.begin(), frame.masks.end(), partition_.memory_.masks_.data() + row);
     if (map)
-      replace_all(frame.children, map, out);
-    else
+      replace_all(frame.children, map, maps_->wide(), run.format().wide, out);
+    else if (run.rewired() || !run.format().wide)
       std::copy(frame.children.begin(), frame.children.end(), out);
+    else
+      for (const uint32_t child : frame.children) out = put_position(out, child, true);
+  }
+
+  // Loads the positions of so many rows of the slice's run.
+  const uint32_t* load_window(Worker& worker, const RunSlice& slice, uint64_t first,
+                              uint64_t rows) const {
+    maps_->load(slice.run, first, {worker.window.data(), rows * maps_->position_words()});
+    return worker.window.data();
   }
 
   // The number of bucket begins, that of bucket_count() included, at or before this hash.
@@ -132,7 +149,7 @@ class HashPartition::Loader {
     for (size_t i = 0; i < frame.rows && next < end; ++i) {
       while (next < end && reached(next, frame.hashes[i])) mark();
       ++here.row;
-      here.word += kRowWords[masks[i]];
+      here.word += run.format().words(masks[i]);
     }
     if (next == end) return;
     here.row = static_cast<uint32_t>(run.rows_before(f + 1) - slice.first_row);
@@ -148,16 +165,21 @@ class HashPartition::Loader {
 
   // For a map that is larger than the memory of a worker: loads one window of it at a time.
   void replace_by_windows(Worker& worker, const RunSlice& slice, const CancelToken& cancel) {
-    worker.replaced.assign(slice.size.words, false);
+    const bool wide = partition_.format().wide;
+    const uint64_t children = slice.size.words >> wide;
+    worker.replaced.assign(children, false);
     uint32_t* const words = partition_.memory_.words_.data() + slice.word_base;
     const uint64_t map_rows = maps_->rows(slice.run);
-    for (uint64_t first = 0; first < map_rows; first += worker.window.size()) {
+    for (uint64_t first = 0; first < map_rows; first += window_rows_) {
       cancel.check();
-      const uint64_t rows = std::min<uint64_t>(worker.window.size(), map_rows - first);
-      maps_->load(slice.run, first, {worker.window.data(), rows});
-      for (uint64_t i = 0; i < slice.size.words; ++i) {
-        if (worker.replaced[i] || words[i] < first || words[i] - first >= rows) continue;
-        words[i] = worker.window[words[i] - first];
+      const uint64_t rows = std::min(window_rows_, map_rows - first);
+      const uint32_t* const window = load_window(worker, slice, first, rows);
+      for (uint64_t i = 0; i < children; ++i) {
+        uint32_t* const child = words + (i << wide);
+        const uint64_t row = get_position(child, wide);
+        if (worker.replaced[i] || row < first || row - first >= rows) continue;
+        const uint32_t* const position = window + (row - first) * maps_->position_words();
+        put_position(child, get_position(position, maps_->wide()), wide);
         worker.replaced[i] = true;
       }
     }
@@ -166,6 +188,7 @@ class HashPartition::Loader {
   HashPartition& partition_;
   const PositionMaps* const maps_;
   const bool spilled_;
+  uint64_t window_rows_ = 0;  // positions that a window holds
   std::vector<Worker> workers_;
 };
 

@@ -2,32 +2,42 @@
 
 #include <algorithm>
 
-namespace voxdag {
+#include "merge/load/row.h"
 
-PositionMaps::PositionMaps(std::span<const uint64_t> rows, uint64_t resident_bytes,
+namespace voxdag {
+namespace {
+
+// Where the map of each run begins, and the end of the last, in rows.
+std::vector<uint64_t> begins_of(std::span<const uint64_t> rows) {
+  std::vector<uint64_t> begins{0};
+  for (const uint64_t count : rows) begins.push_back(begins.back() + count);
+  return begins;
+}
+
+}  // namespace
+
+PositionMaps::PositionMaps(std::span<const uint64_t> rows, bool wide, uint64_t resident_bytes,
                            ScratchFolder& scratch, MemoryBudget& budget)
-    : first_{0} {
-  for (const uint64_t count : rows) first_.push_back(first_.back() + count);
-  if (total_rows() * sizeof(uint32_t) <= resident_bytes)
-    values_ = PageBuffer<uint32_t>(budget, total_rows(), "the merge's position maps");
+    : first_(begins_of(rows)), wide_(wide) {
+  if (total_words() * sizeof(uint32_t) <= resident_bytes)
+    words_ = PageBuffer<uint32_t>(budget, total_words(), "the merge's position maps");
   else
     file_ = std::make_shared<ScratchFile>(scratch);
 }
 
 PositionMaps::PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<ScratchFile> file,
                            uint64_t resident_bytes, MemoryBudget& budget)
-    : first_{0}, file_(std::move(file)) {
-  for (const uint64_t count : rows) first_.push_back(first_.back() + count);
-  if (total_rows() * sizeof(uint32_t) > resident_bytes) return;
-  values_ = PageBuffer<uint32_t>(budget, total_rows(), "the merge's position maps");
-  file_->read(0, {values_.data(), values_.size()});
+    : first_(begins_of(rows)), wide_(file->state().words > first_.back()), file_(std::move(file)) {
+  if (total_words() * sizeof(uint32_t) > resident_bytes) return;
+  words_ = PageBuffer<uint32_t>(budget, total_words(), "the merge's position maps");
+  file_->read(0, {words_.data(), words_.size()});
   file_.reset();
 }
 
 std::shared_ptr<ScratchFile> PositionMaps::file(ScratchFolder& scratch) const {
   if (file_) return file_;
   auto copy = std::make_shared<ScratchFile>(scratch);
-  copy->write(0, {values_.data(), values_.size()});
+  copy->write(0, {words_.data(), words_.size()});
   return copy;
 }
 
@@ -43,24 +53,24 @@ uint64_t PositionMaps::max_rows() const {
   return max;
 }
 
-void PositionMaps::store(size_t run, uint64_t first, std::span<const uint32_t> positions) {
+void PositionMaps::store(size_t run, uint64_t first, std::span<const uint32_t> words) {
   if (resident())
-    std::copy(positions.begin(), positions.end(), values(run) + first);
+    std::ranges::copy(words, this->words(run) + (first << wide_));
   else
-    file_->write(first_[run] + first, positions);
+    file_->write(first_word(run) + (first << wide_), words);
 }
 
-void PositionMaps::load(size_t run, uint64_t first, std::span<uint32_t> positions) const {
+void PositionMaps::load(size_t run, uint64_t first, std::span<uint32_t> words) const {
   if (resident())
-    std::copy_n(values(run) + first, positions.size(), positions.begin());
+    std::copy_n(this->words(run) + (first << wide_), words.size(), words.begin());
   else
-    file_->read(first_[run] + first, positions);
+    file_->read(first_word(run) + (first << wide_), words);
 }
 
-uint32_t PositionMaps::at(size_t run, uint64_t row) const {
-  uint32_t position = 0;
-  load(run, row, {&position, 1});
-  return position;
+uint64_t PositionMaps::at(size_t run, uint64_t row) const {
+  uint32_t words[2] = {};
+  load(run, row, std::span(words).first(position_words()));
+  return get_position(words, wide_);
 }
 
 }  // namespace voxdag

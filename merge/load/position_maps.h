@@ -1,9 +1,10 @@
 // The positions of a level's rows in the merged level: one map, row -> position, for every run.
 //
-// Positions are what parents refer to. They fit in 32 bits and increase with the row, so a run
-// whose children are replaced by their positions stays in the total order. The maps of all runs are
-// stored one after the other: in memory if they fit a limit, otherwise in a scratch file, from
-// which one run's map, or a part of it, is loaded at a time.
+// Positions are what parents refer to. They increase with the row, so a run whose children are
+// replaced by their positions stays in the total order. A position is one word, or two in wide
+// maps (put_position()). The maps of all runs are stored one after the other: in memory if they fit
+// a limit, otherwise in a scratch file, from which one run's map, or a part of it, is loaded at a
+// time.
 //
 // Different rows may be stored by several threads at once; loads come after the last store.
 #pragma once
@@ -22,35 +23,40 @@ namespace voxdag {
 class PositionMaps {
  public:
   // One map for each entry of `rows`; in memory if all of them take at most `resident_bytes`.
-  PositionMaps(std::span<const uint64_t> rows, uint64_t resident_bytes, ScratchFolder& scratch,
-               MemoryBudget& budget);
-  // The maps that an earlier merge left in `file`.
+  PositionMaps(std::span<const uint64_t> rows, bool wide, uint64_t resident_bytes,
+               ScratchFolder& scratch, MemoryBudget& budget);
+  // The maps that an earlier merge left in `file`, of one or two words per row.
   PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<ScratchFile> file,
                uint64_t resident_bytes, MemoryBudget& budget);
 
   // Whether the maps are in memory.
   bool resident() const { return file_ == nullptr; }
+  bool wide() const { return wide_; }
+  // Words of a position.
+  uint32_t position_words() const { return wide_ ? 2 : 1; }
   uint64_t rows(size_t run) const { return first_[run + 1] - first_[run]; }
   std::vector<uint64_t> rows() const;
   // Rows of the longest map.
   uint64_t max_rows() const;
-  // A whole map; only if resident.
-  uint32_t* values(size_t run) { return values_.data() + first_[run]; }
-  const uint32_t* values(size_t run) const { return values_.data() + first_[run]; }
+  // The words of a whole map; only if resident.
+  uint32_t* words(size_t run) { return words_.data() + first_word(run); }
+  const uint32_t* words(size_t run) const { return words_.data() + first_word(run); }
 
-  // Positions of rows [first, first + positions.size()) of a run.
-  void store(size_t run, uint64_t first, std::span<const uint32_t> positions);
-  void load(size_t run, uint64_t first, std::span<uint32_t> positions) const;
-  uint32_t at(size_t run, uint64_t row) const;
+  // The words of the positions of rows from `first` on.
+  void store(size_t run, uint64_t first, std::span<const uint32_t> words);
+  void load(size_t run, uint64_t first, std::span<uint32_t> words) const;
+  uint64_t at(size_t run, uint64_t row) const;
 
   // A file that holds all maps: the one they are in, or a copy.
   std::shared_ptr<ScratchFile> file(ScratchFolder& scratch) const;
 
  private:
-  uint64_t total_rows() const { return first_.back(); }
+  uint64_t first_word(size_t run) const { return first_[run] << wide_; }
+  uint64_t total_words() const { return first_.back() << wide_; }
 
-  std::vector<uint64_t> first_;  // where the map of each run begins, and the end of the last
-  PageBuffer<uint32_t> values_;
+  std::vector<uint64_t> first_;  // the row at which each run's map begins, and the end of the last
+  bool wide_;
+  PageBuffer<uint32_t> words_;
   std::shared_ptr<ScratchFile> file_;
 };
 

@@ -8,9 +8,9 @@
 //   position        where a row lies in the merged level: a word offset in the global file,
 //                   an index in an artifact
 //
-// A node's words are its children. A brick is held as a node of mask 3 whose two words are the high
-// and the low half of its voxel mask, so that one order, (hash, mask, words lexicographically), is
-// the total order of both.
+// A node's words are its children, one word each, or in a wide level two, the high half first. A
+// brick is held as a node of mask 3 whose two words are the high and the low half of its voxel
+// mask. So one order, (hash, mask, words lexicographically), is the total order of all of them.
 //
 // Wherever the words of a row lie, kMaxRowWords words can be read from the first one on: a row is
 // then copied without a branch on its number of words, which would be as good as random.
@@ -26,10 +26,26 @@ namespace voxdag {
 
 inline constexpr uint8_t kBrickRowMask = 3;
 inline constexpr uint32_t kBrickWords = 2;
-inline constexpr uint32_t kMaxRowWords = 8;
+inline constexpr uint32_t kMaxRowWords = 16;
 
-// Words of a row by its mask.
-inline constexpr auto& kRowWords = kPopcount8;
+// How the rows of a level are held.
+struct RowFormat {
+  bool bricks = false;
+  bool wide = false;  // children take two words
+
+  uint32_t words(uint8_t mask) const { return uint32_t{kPopcount8[mask]} << wide; }
+  uint32_t max_words() const { return uint32_t{8} << wide; }
+};
+
+// Appends a position as a child refers to it. Returns the end.
+inline uint32_t* put_position(uint32_t* to, uint64_t position, bool wide) {
+  if (wide) *to++ = static_cast<uint32_t>(position >> 32);
+  *to++ = static_cast<uint32_t>(position);
+  return to;
+}
+inline uint64_t get_position(const uint32_t* from, bool wide) {
+  return wide ? uint64_t{from[0]} << 32 | from[1] : from[0];
+}
 
 // How many rows, and how many words they have in all.
 struct RowCount {
@@ -53,8 +69,10 @@ struct RowKey {
 };
 
 // Negative, 0 or positive as `a` is before, equal to or after `b` in the total order.
-inline int compare_rows(const RowKey& a, const RowKey& b) {
-  return compare_nodes(a.hash, a.mask, a.words, b.hash, b.mask, b.words);
+inline int compare_rows(const RowFormat& format, const RowKey& a, const RowKey& b) {
+  if (a.hash != b.hash) return a.hash < b.hash ? -1 : 1;
+  if (a.mask != b.mask) return a.mask < b.mask ? -1 : 1;
+  return compare_children(a.words, b.words, static_cast<int>(format.words(a.mask)));
 }
 
 }  // namespace voxdag

@@ -21,12 +21,14 @@ std::string describe(const Cube& cube) {
 
 }  // namespace
 
-TopTreeRun::TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children)
-    : LevelRun(false, true) {
+TopTreeRun::TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children, bool wide)
+    : LevelRun({.bricks = false, .wide = wide}, true) {
   std::ranges::sort(children, {}, morton_of);
   add_parents(children, hash_bits);
   std::ranges::sort(nodes_, [](const Node& a, const Node& b) {
-    return compare_nodes(a.hash, a.mask, a.children, b.hash, b.mask, b.children) < 0;
+    if (a.hash != b.hash) return a.hash < b.hash;
+    if (a.mask != b.mask) return a.mask < b.mask;
+    return std::ranges::lexicographical_compare(a.child_span(), b.child_span());
   });
   divide_into_frames();
 }
@@ -65,8 +67,8 @@ void TopTreeRun::divide_into_frames() {
       infos_.push_back(frame);
     }
     ++infos_.back().rows;
-    infos_.back().children += kRowWords[nodes_[row].mask];
-    children += kRowWords[nodes_[row].mask];
+    infos_.back().children += kPopcount8[nodes_[row].mask];
+    children += kPopcount8[nodes_[row].mask];
   }
   set_frames(infos_, nodes_.size(), children);
 }
@@ -80,7 +82,10 @@ void TopTreeRun::read_frame(size_t index, Frame& out) const {
   for (auto node = first; node != first + out.rows; ++node) {
     out.hashes.push_back(node->hash);
     out.masks.push_back(node->mask);
-    out.children.insert(out.children.end(), node->children, node->children + kRowWords[node->mask]);
+    uint32_t words[kMaxRowWords];
+    uint32_t* end = words;
+    for (const uint64_t child : node->child_span()) end = put_position(end, child, format().wide);
+    out.children.insert(out.children.end(), words, end);
   }
 }
 

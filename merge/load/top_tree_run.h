@@ -14,14 +14,15 @@ namespace voxdag {
 struct PlacedNode {
   Cube cube;
   uint64_t hash = 0;  // truncated
-  uint32_t position = 0;
+  uint64_t position = 0;
 };
 
 class TopTreeRun : public LevelRun {
  public:
-  // Makes the parents of `children`, which are all top nodes and roots of the level below. Throws
-  // Error{kCorrupt} for two children with the same cube: their subvolumes overlap.
-  TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children);
+  // Makes the parents of `children`, which are all top nodes and roots of the level below; `wide`:
+  // their positions take two words. Throws Error{kCorrupt} for two children with the same cube:
+  // their subvolumes overlap.
+  TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children, bool wide);
   void read_frame(size_t index, Frame& out) const override;
 
   const Cube& cube(size_t row) const { return nodes_[row].cube; }
@@ -32,7 +33,8 @@ class TopTreeRun : public LevelRun {
     Cube cube;
     uint64_t hash = 0;
     uint8_t mask = 0;
-    uint32_t children[8] = {};
+    uint64_t children[8] = {};  // positions
+    std::span<const uint64_t> child_span() const { return {children, kPopcount8[mask]}; }
   };
 
   void add_parents(const std::vector<PlacedNode>& children, uint32_t hash_bits);

@@ -33,7 +33,7 @@ void ArtifactOutput::write_nodes(const MergedRows& rows) {
     children_.clear();
     for (size_t i = row; i < rows.row_count() && masks_.size() < kFrameRows; ++i) {
       masks_.push_back(static_cast<uint8_t>(*word++));
-      const uint32_t* const end = word + kRowWords[masks_.back()];
+      const uint32_t* const end = word + kPopcount8[masks_.back()];
       children_.insert(children_.end(), word, end);
       word = end;
     }

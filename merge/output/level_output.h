@@ -13,21 +13,20 @@
 
 namespace voxdag {
 
-// Positions of a level are below this: they are stored in 32 bits.
-inline constexpr uint64_t kPositionLimit = uint64_t{1} << 32;
-
 // The size of a merged level, or of a part of it.
 struct LevelExtent {
   uint64_t nodes = 0;
   uint64_t positions = 0;
 
-  // Throws Error{kLimit} naming the level if positions would not fit in 32 bits.
+  // Throws Error{kLimit} naming the level if the file's format cannot hold so many positions.
   void add(const LevelExtent& part, uint32_t level, bool in_words) {
     nodes += part.nodes;
     positions += part.positions;
-    if (positions > kPositionLimit)
-      throw Error(ErrorCode::kLimit, "level " + std::to_string(level) + " of the merged DAG has " +
-                                         "over 2^32 " + (in_words ? "words" : "nodes") +
+    const int bits = in_words ? 40 : 32;
+    if (positions >> bits > 0 && positions != uint64_t{1} << bits)
+      throw Error(ErrorCode::kLimit, "level " + std::to_string(level) +
+                                         " of the merged DAG has over 2^" + std::to_string(bits) +
+                                         (in_words ? " words" : " nodes") +
                                          ", the limit of a level");
   }
 };
@@ -37,6 +36,8 @@ class LevelOutput {
   virtual ~LevelOutput() = default;
   // Whether positions count words; otherwise they count rows.
   virtual bool in_words() const = 0;
+  // Whether the children of parents of a level with so many positions are wide.
+  virtual bool is_wide(uint64_t positions) const = 0;
   virtual void begin_level(uint32_t level) = 0;
   // Gets all rows of the level in order, by one thread at a time.
   virtual void add(const MergedRows& rows) = 0;
@@ -50,6 +51,7 @@ class GlobalOutput : public LevelOutput {
  public:
   explicit GlobalOutput(GlobalFileWriter& file) : file_(file) {}
   bool in_words() const override { return true; }
+  bool is_wide(uint64_t positions) const override { return file_.is_wide(positions); }
   void begin_level(uint32_t level) override { file_.begin_level(level); }
   void add(const MergedRows& rows) override { file_.checksum_words(rows.words()); }
   void write(uint64_t position, const MergedRows& rows) override {
@@ -67,6 +69,7 @@ class ArtifactOutput : public LevelOutput {
  public:
   explicit ArtifactOutput(ArtifactWriter& artifact) : artifact_(artifact) {}
   bool in_words() const override { return false; }
+  bool is_wide(uint64_t) const override { return false; }
   void begin_level(uint32_t level) override;
   void add(const MergedRows& rows) override;
   void write(uint64_t, const MergedRows&) override {}

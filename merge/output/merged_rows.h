@@ -12,13 +12,14 @@
 namespace voxdag {
 
 // Rows are encoded as in the global file: a node is its mask followed by its children, a brick its
-// low half followed by its high half.
+// low half followed by its high half; so are the two halves of a wide child.
 class MergedRows {
  public:
   // Has space for up to `max` rows.
-  MergedRows(MemoryBudget& budget, bool bricks, const RowCount& max)
-      : bricks_(bricks),
-        words_(budget, max.words + (bricks ? 0 : max.rows) + kMaxRowWords, "the merge's output"),
+  MergedRows(MemoryBudget& budget, const RowFormat& format, const RowCount& max)
+      : format_(format),
+        words_(budget, max.words + (format.bricks ? 0 : max.rows) + kMaxRowWords,
+               "the merge's output"),
         hashes_(budget, max.rows, "the merge's output") {}
   static uint64_t bytes_for(const RowCount& max) { return 12 * max.rows + 4 * max.words; }
 
@@ -27,18 +28,25 @@ class MergedRows {
   void push(uint64_t hash, uint8_t mask, const uint32_t* row_words) {
     hashes_[row_count_++] = hash;
     uint32_t* out = words_.data() + word_count_;
-    if (bricks_) {
+    if (format_.bricks) {
       out[0] = row_words[1];
       out[1] = row_words[0];
       word_count_ += kBrickWords;
       return;
     }
-    out[0] = mask;
-    std::memcpy(out + 1, row_words, kMaxRowWords * sizeof(uint32_t));
-    word_count_ += 1 + kRowWords[mask];
+    *out++ = mask;
+    word_count_ += 1 + format_.words(mask);
+    if (!format_.wide) {
+      std::memcpy(out, row_words, kMaxRowWords / 2 * sizeof(uint32_t));
+      return;
+    }
+    for (uint32_t i = 0; i < format_.words(mask); i += 2) {
+      out[i] = row_words[i + 1];
+      out[i + 1] = row_words[i];
+    }
   }
 
-  bool bricks() const { return bricks_; }
+  bool bricks() const { return format_.bricks; }
   bool full() const { return row_count_ == hashes_.size(); }
   uint64_t row_count() const { return row_count_; }
   uint64_t word_count() const { return word_count_; }
@@ -46,7 +54,7 @@ class MergedRows {
   std::span<const uint64_t> hashes() const { return {hashes_.data(), row_count_}; }
 
  private:
-  bool bricks_;
+  RowFormat format_;
   PageBuffer<uint32_t> words_;
   PageBuffer<uint64_t> hashes_;
   uint64_t word_count_ = 0;

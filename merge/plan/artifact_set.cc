@@ -74,13 +74,13 @@ uint64_t content_checksum(const ArtifactReader& reader) {
 }
 
 // What a hash partition needs to hold any two neighboring frames.
-uint64_t min_partition_bytes(const ArtifactReader& reader) {
+uint64_t min_partition_bytes(const ArtifactReader& reader, bool wide) {
   uint64_t max = 0;
   for (const ArtifactLevel& level : reader.levels()) {
-    const ArtifactRun run(reader, level.level);
+    const ArtifactRun run(reader, level.level, wide);
     for (size_t begin = 0; begin < level.frames.size(); ++begin) {
       const size_t end = std::min(begin + 2, level.frames.size());
-      max = std::max(max, HashPartition::bytes_for(run.count({begin, end}), true));
+      max = std::max(max, HashPartition::bytes_for(run.count({begin, end}), wide ? 2 : 1));
     }
   }
   return max;
@@ -110,18 +110,19 @@ ArtifactSet::ArtifactSet(std::span<const SurveyedArtifact> artifacts, const Open
 }
 
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
-                                const DagShape& shape) {
+                                const DagShape& shape, bool wide) {
   Opener opener(open, shape);
   ArtifactSurvey survey;
   std::vector<std::pair<uint64_t, SurveyedArtifact>> by_code;
   for (const ArtifactRef& ref : refs) {
     const ArtifactReader reader = opener.open(ref);
-    survey.rows += row_count(reader);
     SurveyedArtifact found{
         ref,
-        std::max(kMinRunBytes, index_bytes(reader) + min_partition_bytes(reader)),
+        std::max(kMinRunBytes, index_bytes(reader) + min_partition_bytes(reader, wide)),
+        row_count(reader),
         content_checksum(reader),
         {}};
+    survey.rows += found.rows;
     for (const ArtifactRoot& root : reader.roots()) found.cubes.push_back(root.cube);
     by_code.emplace_back(morton_code_of(found.cubes[0]), std::move(found));
   }

@@ -21,6 +21,7 @@ struct SurveyedArtifact {
   // The least memory that it takes in a merge pass: its index, and a hash partition that holds any
   // two neighboring frames of it.
   uint64_t min_bytes = 0;
+  uint64_t rows = 0;  // of all levels
   // Checksum of its roots and of the counts of its levels, independent of its place in a file.
   uint64_t content_checksum = 0;
   std::vector<Cube> cubes;  // of its roots
@@ -48,8 +49,8 @@ class ArtifactSet {
   MemoryCharge charge_;
 };
 
-// Reads the indexes of all artifacts, one after the other.
+// Reads the indexes of all artifacts, one after the other. `wide`: the merged levels may be wide.
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
-                                const DagShape& shape);
+                                const DagShape& shape, bool wide);
 
 }  // namespace voxdag

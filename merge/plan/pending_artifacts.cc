@@ -7,8 +7,8 @@
 
 namespace voxdag {
 
-PendingArtifacts::PendingArtifacts(const MergeInputs& inputs)
-    : inputs_(inputs), open_([this](uint32_t id) {
+PendingArtifacts::PendingArtifacts(const MergeInputs& inputs, uint64_t narrow_words)
+    : inputs_(inputs), narrow_words_(narrow_words), open_([this](uint32_t id) {
         return is_pass_segment(id) ? segments_.at(id)->open() : inputs_.open_segment(id);
       }) {
   survey(inputs.artifacts);
@@ -22,14 +22,17 @@ bool PendingArtifacts::has_inputs() const {
       artifacts_, [](const SurveyedArtifact& a) { return !is_pass_segment(a.ref.segment); });
 }
 
-std::vector<size_t> PendingArtifacts::group_ends(uint64_t partition_bytes) const {
+std::vector<size_t> PendingArtifacts::group_ends(uint64_t partition_bytes,
+                                                 uint64_t max_rows) const {
   std::vector<size_t> ends;
-  uint64_t bytes = 0;
+  uint64_t bytes = 0, rows = 0;
   for (size_t i = 0; i < artifacts_.size(); ++i) {
     bytes += artifacts_[i].min_bytes;
-    if (i > 0 && bytes > partition_bytes) {
+    rows += artifacts_[i].rows;
+    if (i > 0 && (bytes > partition_bytes || rows > max_rows)) {
       ends.push_back(i);
       bytes = artifacts_[i].min_bytes;
+      rows = artifacts_[i].rows;
     }
   }
   ends.push_back(artifacts_.size());
@@ -79,7 +82,9 @@ void PendingArtifacts::reset() {
 }
 
 void PendingArtifacts::survey(std::span<const ArtifactRef> refs) {
-  ArtifactSurvey found = survey_artifacts(refs, open_, inputs_.shape);
+  // A row has at most nine words.
+  ArtifactSurvey found = survey_artifacts(refs, open_, inputs_.shape, false);
+  if (found.rows > narrow_words_ / 9) found = survey_artifacts(refs, open_, inputs_.shape, true);
   artifacts_ = std::move(found.in_morton_order);
   rows_ = found.rows;
 }

@@ -16,8 +16,9 @@ namespace voxdag {
 
 class PendingArtifacts {
  public:
-  // All inputs. Throws Error{kCorrupt} as survey_artifacts() does.
-  explicit PendingArtifacts(const MergeInputs& inputs);
+  // All inputs; a level of the output may have `narrow_words` before it is wide. Throws
+  // Error{kCorrupt} as survey_artifacts() does.
+  PendingArtifacts(const MergeInputs& inputs, uint64_t narrow_words);
   PendingArtifacts(const PendingArtifacts&) = delete;
   PendingArtifacts& operator=(const PendingArtifacts&) = delete;
 
@@ -30,10 +31,10 @@ class PendingArtifacts {
   // Identifies the inputs by their content.
   uint64_t inputs_checksum() const { return inputs_checksum_; }
   // Where to end consecutive groups of artifacts so that each can be merged within
-  // `partition_bytes`; a group has at least one artifact.
-  std::vector<size_t> group_ends(uint64_t partition_bytes) const;
+  // `partition_bytes` and has at most `max_rows`; a group has at least one artifact.
+  std::vector<size_t> group_ends(uint64_t partition_bytes, uint64_t max_rows) const;
   bool fit_at_once(uint64_t partition_bytes) const {
-    return size() < 2 || group_ends(partition_bytes).size() == 1;
+    return size() < 2 || group_ends(partition_bytes, UINT64_MAX).size() == 1;
   }
   ArtifactSet open(size_t begin, size_t end, MemoryBudget& budget) const;
 
@@ -54,6 +55,7 @@ class PendingArtifacts {
   void survey(std::span<const ArtifactRef> refs);
 
   const MergeInputs& inputs_;
+  const uint64_t narrow_words_;
   const OpenSegment open_;
   std::map<uint32_t, std::unique_ptr<PassSegment>> segments_;
   std::vector<SurveyedArtifact> artifacts_;

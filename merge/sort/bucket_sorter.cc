@@ -31,11 +31,12 @@ void prefetch_rows(const HashPartition& partition, size_t bucket, size_t slice) 
 
 }  // namespace
 
-BucketSorter::BucketSorter(MemoryBudget& budget, bool bricks, const RowCount& max)
-    : entries_(budget, max.rows, "a bucket of the merge"),
+BucketSorter::BucketSorter(MemoryBudget& budget, const RowFormat& format, const RowCount& max)
+    : format_(format),
+      entries_(budget, max.rows, "a bucket of the merge"),
       positions_(budget, max.rows, "a bucket of the merge"),
       digit_ends_(budget, 2 * max.rows + 2, "a bucket of the merge"),
-      unique_(budget, bricks, max) {}
+      unique_(budget, format, max) {}
 
 uint64_t BucketSorter::bytes_for(const RowCount& max) {
   return max.rows * (sizeof(Entry) + 4 + 8) + MergedRows::bytes_for(max);
@@ -82,7 +83,7 @@ void BucketSorter::distribute(const HashPartition& partition, size_t bucket) {
     uint32_t word = static_cast<uint32_t>(slices[s].word_base + begin.word);
     for (uint32_t i = begin.row; i < end.row; ++i) {
       entries_[ends[digit(hashes[i])]++] = {hashes[i], row++ | uint32_t{masks[i]} << 24, word};
-      word += kRowWords[masks[i]];
+      word += format_.words(masks[i]);
     }
   }
   sort_digits(digit_mask + 1);
@@ -111,7 +112,7 @@ bool BucketSorter::same_row(const Entry& a, const Entry& b) const {
   if (a.mask() != b.mask()) return false;
   const uint32_t* const x = words_ + a.word;
   const uint32_t* const y = words_ + b.word;
-  for (uint32_t i = 0; i < kRowWords[a.mask()]; ++i)
+  for (uint32_t i = 0; i < format_.words(a.mask()); ++i)
     if (x[i] != y[i]) return false;
   return true;
 }
@@ -128,8 +129,9 @@ void BucketSorter::emit_unique(bool in_words) {
     for (end = begin + 1; end < row_count_ && entries[end].hash == first.hash; ++end)
       all_same = all_same && same_row(first, entries[end]);
     if (!all_same)
-      std::sort(entries + begin, entries + end,
-                [&](const Entry& x, const Entry& y) { return compare_rows(key(x), key(y)) < 0; });
+      std::sort(entries + begin, entries + end, [&](const Entry& x, const Entry& y) {
+        return compare_rows(format_, key(x), key(y)) < 0;
+      });
     uint32_t position = 0;
     for (size_t i = begin; i < end; ++i) {
       if (i == begin || (!all_same && !same_row(entries[i - 1], entries[i]))) {

@@ -23,7 +23,7 @@ class BucketSorter {
   static constexpr uint64_t kMaxRows = uint64_t{1} << 20;
 
   // For buckets of up to `max` rows.
-  BucketSorter(MemoryBudget& budget, bool bricks, const RowCount& max);
+  BucketSorter(MemoryBudget& budget, const RowFormat& format, const RowCount& max);
   static uint64_t bytes_for(const RowCount& max);
 
   // Positions count words if `in_words`, else rows.
@@ -53,6 +53,7 @@ class BucketSorter {
   void emit_unique(bool in_words);
   bool same_row(const Entry& a, const Entry& b) const;
 
+  const RowFormat format_;
   PageBuffer<Entry> entries_;
   PageBuffer<uint32_t> positions_;
   PageBuffer<uint32_t> digit_ends_;

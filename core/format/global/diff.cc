@@ -15,8 +15,7 @@
 namespace voxdag {
 namespace {
 
-// No node begins at the last possible word, since the smallest has two words.
-constexpr uint32_t kAbsent = ~uint32_t{0};
+constexpr uint64_t kAbsent = ~uint64_t{0};
 
 // The pairs of nodes of one level that were compared, with their results. Open addressing, at most
 // 3/4 full.
@@ -24,11 +23,11 @@ class PairTable {
  public:
   explicit PairTable(MemoryBudget& budget) : budget_(&budget) { grow(64); }
 
-  const DiffReport* find(uint32_t a, uint32_t b) const {
+  const DiffReport* find(uint64_t a, uint64_t b) const {
     const Entry& entry = entries_[find_entry(a, b)];
     return entry.taken() ? &entry.report : nullptr;
   }
-  void insert(uint32_t a, uint32_t b, const DiffReport& report) {
+  void insert(uint64_t a, uint64_t b, const DiffReport& report) {
     if (4 * (count_ + 1) > 3 * entries_.size()) grow(2 * entries_.size());
     entries_[find_entry(a, b)] = {a + 1, b + 1, report};
     ++count_;
@@ -37,15 +36,15 @@ class PairTable {
  private:
   // Offsets are stored plus one, so that absent is 0 and zeroed pages are free entries.
   struct Entry {
-    uint32_t a1 = 0, b1 = 0;
+    uint64_t a1 = 0, b1 = 0;
     DiffReport report;
     bool taken() const { return a1 != 0 || b1 != 0; }
   };
 
   // Index of the entry that has the pair, or of the free one where it belongs.
-  size_t find_entry(uint32_t a, uint32_t b) const {
-    const uint32_t a1 = a + 1, b1 = b + 1;
-    size_t at = hash_brick(static_cast<uint64_t>(a1) << 32 | b1) & (entries_.size() - 1);
+  size_t find_entry(uint64_t a, uint64_t b) const {
+    const uint64_t a1 = a + 1, b1 = b + 1;
+    size_t at = hash_brick(hash_brick(a1) ^ b1) & (entries_.size() - 1);
     while (entries_[at].taken() && (entries_[at].a1 != a1 || entries_[at].b1 != b1))
       at = (at + 1) & (entries_.size() - 1);
     return at;
@@ -72,7 +71,7 @@ class Differ {
   DiffReport run() { return compare(0, a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0); }
 
  private:
-  DiffReport compare(uint32_t level, uint32_t a, uint32_t b) {
+  DiffReport compare(uint32_t level, uint64_t a, uint64_t b) {
     if (a == kAbsent && b == kAbsent) return {};
     if (level == a_.brick_level()) return compare_bricks(a, b);
     if (const DiffReport* known = compared_[level].find(a, b)) return *known;
@@ -88,17 +87,17 @@ class Differ {
     return total;
   }
 
-  DiffReport compare_bricks(uint32_t a, uint32_t b) const {
+  DiffReport compare_bricks(uint64_t a, uint64_t b) const {
     const uint64_t mask_a = a == kAbsent ? 0 : a_.brick(a), mask_b = b == kAbsent ? 0 : b_.brick(b);
     return {static_cast<uint64_t>(popcount64(mask_a & ~mask_b)),
             static_cast<uint64_t>(popcount64(mask_b & ~mask_a))};
   }
 
   static voxdag_reader::Node node(const voxdag_reader::File& file, uint32_t level,
-                                  uint32_t offset) {
+                                  uint64_t offset) {
     return offset == kAbsent ? voxdag_reader::Node() : file.node(level, offset);
   }
-  static uint32_t child(const voxdag_reader::Node& node, int index) {
+  static uint64_t child(const voxdag_reader::Node& node, int index) {
     return node.child_mask >> index & 1 ? voxdag_reader::File::child(node, index) : kAbsent;
   }
 
@@ -111,7 +110,7 @@ class Differ {
 bool same_words(const voxdag_reader::File& a, const voxdag_reader::File& b) {
   for (uint32_t l = 0; l <= a.brick_level(); ++l) {
     const voxdag_reader::Level &in_a = a.level(l), &in_b = b.level(l);
-    if (in_a.word_count != in_b.word_count ||
+    if (in_a.word_count != in_b.word_count || in_a.pointer_bits != in_b.pointer_bits ||
         !std::equal(in_a.words, in_a.words + in_a.word_count, in_b.words))
       return false;
   }

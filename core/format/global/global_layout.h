@@ -14,10 +14,17 @@ namespace voxdag::global_layout {
 
 inline constexpr uint64_t kMagic = 0x0a1a0a4741445689;  // 0x89 "VDAG" LF 0x1a LF
 inline constexpr uint32_t kVersion = 1;
+inline constexpr uint32_t kVersionWithFeatures = 2;
+inline constexpr uint64_t kWideLevels = 1;  // a feature bit
 inline constexpr uint32_t kNodeOrderByHash = 1;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr uint64_t kChecksumBlockBytes = uint64_t{1} << 16;
-inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 32;
+inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 40;
+// Pointers into a level of more words are 64 bits wide, others 32. Tests choose fewer words.
+#ifndef VOXDAG_NARROW_LEVEL_WORDS
+#define VOXDAG_NARROW_LEVEL_WORDS (uint64_t{1} << 32)
+#endif
+inline constexpr uint64_t kNarrowLevelWords = VOXDAG_NARROW_LEVEL_WORDS;
 
 // Offsets in the header page.
 inline constexpr size_t kMagicAt = 0;
@@ -38,12 +45,13 @@ inline constexpr size_t kTableCountAt = 104;
 inline constexpr size_t kTableChecksumAt = 112;
 inline constexpr size_t kAttributeCountAt = 120;  // reserved: 0, as are the attributes
 inline constexpr size_t kLevelsAt = 128;          // entry l is level l
-inline constexpr size_t kLevelEntryBytes = 32;    // offset, nodes, words, 0
+inline constexpr size_t kLevelEntryBytes = 32;    // offset, nodes, words, pointer bits
 inline constexpr size_t kMaxLevels = 32;          // capacity of the table; 19 are used at most
 inline constexpr size_t kAttributesAt = kLevelsAt + kMaxLevels * kLevelEntryBytes;
 inline constexpr size_t kAttributeEntryBytes = 64;
 inline constexpr size_t kMaxAttributes = 16;
-inline constexpr size_t kReservedAt = kAttributesAt + kMaxAttributes * kAttributeEntryBytes;
+inline constexpr size_t kFeaturesAt = kAttributesAt + kMaxAttributes * kAttributeEntryBytes;
+inline constexpr size_t kReservedAt = kFeaturesAt + sizeof(uint64_t);
 inline constexpr size_t kHeaderChecksumAt = kPageBytes - sizeof(uint64_t);
 static_assert(kReservedAt <= kHeaderChecksumAt);
 

@@ -99,6 +99,7 @@ struct GlobalFileWriter::State {
   const std::string partial_path;
   const Grid grid;
   const uint32_t hash_bits;
+  const uint64_t narrow_words;
   std::unique_ptr<WritableFile> file;  // none before the first level or the header
   std::vector<GlobalLevel> levels;     // complete ones, from the bricks upwards
   BlockChecksums block_checksums;      // of them and of the open one
@@ -124,8 +125,9 @@ struct GlobalFileWriter::State {
 };
 
 GlobalFileWriter::GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid,
-                                   uint32_t hash_bits)
-    : state_(new State{files, path, path + ".partial", grid, hash_bits, nullptr, {}, {}}) {}
+                                   uint32_t hash_bits, uint64_t narrow_words)
+    : state_(new State{files, path, path + ".partial", grid, hash_bits, narrow_words, {}, {}, {}}) {
+}
 
 GlobalFileWriter::~GlobalFileWriter() {
   if (state_->retained || !state_->file) return;
@@ -138,6 +140,7 @@ GlobalFileWriter::~GlobalFileWriter() {
 }
 
 const std::string& GlobalFileWriter::path() const { return state_->path; }
+uint64_t GlobalFileWriter::narrow_words() const { return state_->narrow_words; }
 
 GlobalFileProgress GlobalFileWriter::progress() const {
   return {state_->levels, state_->block_checksums.values()};
@@ -190,7 +193,7 @@ void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> wor
   State& s = *state_;
   if (first > kMaxLevelWords || words.size() > kMaxLevelWords - first)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
-                                       " is over the format's limit of 2^32 words per level");
+                                       " is over the format's limit of 2^40 words per level");
   s.file->write_at(s.end + sizeof(uint32_t) * first, std::as_bytes(words));
 }
 
@@ -200,7 +203,7 @@ void GlobalFileWriter::end_level(const GlobalLevel& level) {
   if (words > kMaxLevelWords)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
                                        " has " + std::to_string(words) +
-                                       " words, the format's limit is 2^32 a level");
+                                       " words, the format's limit is 2^40 a level");
   if (!s.level_open || nodes == 0 || words < 2 * nodes || words != s.checksummed_words)
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(s.current_level()) +
                                          " has " + std::to_string(nodes) + " nodes in " +
@@ -218,9 +221,12 @@ void GlobalFileWriter::end_level(const GlobalLevel& level) {
 
 HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
                                            std::span<const std::byte> table) const {
+  const auto is_wide = [&](const GlobalLevel& level) { return level.words > narrow_words; };
+  const bool has_wide_levels = std::ranges::any_of(levels, is_wide);
   HeaderPage header;
   header.put(kMagicAt, kMagic);
-  header.put(kVersionAt, kVersion);
+  header.put(kVersionAt, has_wide_levels ? kVersionWithFeatures : kVersion);
+  if (has_wide_levels) header.put(kFeaturesAt, kWideLevels);
   header.put(kHeaderBytesAt, static_cast<uint32_t>(kPageBytes));
   header.put(kGridLevelsAt, grid.levels);
   header.put(kHashBitsAt, hash_bits);
@@ -238,6 +244,7 @@ HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
     offset += round_up_to_page(bytes_of(levels[i]));
     header.put(entry + 8, levels[i].nodes);
     header.put(entry + 16, levels[i].words);
+    if (has_wide_levels) header.put(entry + 24, uint64_t{is_wide(levels[i]) ? 64u : 32u});
     dag_nodes += levels[i].nodes;
   }
   header.put(kDagNodesAt, dag_nodes);

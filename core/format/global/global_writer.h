@@ -4,7 +4,8 @@
 // Levels are stored in the order in which the merge finishes them, from the bricks up to the root.
 // Within a level everything is addressed in 32-bit words from the level's start: a brick is two
 // words (low half of the mask first), a node is its child mask followed by the word offsets of its
-// children in the next level. Nothing in the file varies with time, place or machine.
+// children in the next level, one word each, or two (low half first) if that level is wide. Nothing
+// in the file varies with time, place or machine.
 //
 // Checksums are computed from the words that the merge passes in, never from a file, and the sealed
 // file is read and compared: bytes that a disk returns wrong are Error{kCorrupt}.
@@ -19,6 +20,7 @@
 #include <vector>
 
 #include "core/base/cancel_token.h"
+#include "core/format/global/global_layout.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 
@@ -54,13 +56,16 @@ bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {
  public:
-  // Writes to "<path>.partial", from the first level on, until publish(). Throws Error.
-  GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid,
-                   uint32_t hash_bits);
+  // Writes to "<path>.partial", from the first level on, until publish(). Levels of over
+  // `narrow_words` words are wide: pointers into them have 64 bits. Throws Error.
+  GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid, uint32_t hash_bits,
+                   uint64_t narrow_words = global_layout::kNarrowLevelWords);
   // Without publish(): removes the partial file, unless sync() made it resumable.
   ~GlobalFileWriter();
 
   const std::string& path() const;
+  uint64_t narrow_words() const;
+  bool is_wide(uint64_t level_words) const { return level_words > narrow_words(); }
   // Continues after an earlier writer that wrote to the same path and synced. Throws
   // Error{kNotFound} or Error{kCorrupt} if the partial file is missing or too short, or if its last
   // checksum block, which is read here, is damaged; seal() checks the other blocks.
@@ -80,7 +85,7 @@ class GlobalFileWriter {
   // in any order and by several threads at once.
   void write_words(uint64_t first, std::span<const uint32_t> words);
   // Ends the level once all its words were written and added to the checksums. Throws Error{kLimit}
-  // naming the level if it has over 2^32 words.
+  // naming the level if it has over 2^40 words.
   void end_level(const GlobalLevel& level);
 
   // Writes checksums and header, syncs the file, and reads it to verify and digest it.

@@ -22,16 +22,16 @@ namespace {
 constexpr uint64_t kNodesPerCheck = uint64_t{1} << 16;  // of the cancel token
 
 // Maps the word offset where a node of a level of the global file begins to its index in the level.
-// Takes 1.5 bits per word. Immutable after construction.
+// Takes 2 bits per word. Immutable after construction.
 class NodeIndex {
  public:
   static constexpr uint64_t kNone = ~uint64_t{0};
 
   NodeIndex() = default;
-  // Walks the words of the level. Throws Error{kCorrupt} beginning with `where` unless every child
-  // mask is 1 to 255, the last node ends with the level, and there are as many nodes as the header
-  // says.
-  NodeIndex(const voxdag_reader::Level& level, bool bricks, MemoryBudget& budget,
+  // Walks the words of the level, whose children are `wide` or not. Throws Error{kCorrupt}
+  // beginning with `where` unless every child mask is 1 to 255, the last node ends with the level,
+  // and there are as many nodes as the header says.
+  NodeIndex(const voxdag_reader::Level& level, bool bricks, bool wide, MemoryBudget& budget,
             const std::string& where);
 
   // The index of the node that begins at `offset`; kNone if none does.
@@ -48,11 +48,11 @@ class NodeIndex {
   bool bricks_ = false;
   uint64_t words_ = 0;
   PageBuffer<uint64_t> starts_;        // one bit per word: a node begins here
-  PageBuffer<uint32_t> nodes_before_;  // for each 64 words
+  PageBuffer<uint64_t> nodes_before_;  // for each 64 words
 };
 
-NodeIndex::NodeIndex(const voxdag_reader::Level& level, bool bricks, MemoryBudget& budget,
-                     const std::string& where)
+NodeIndex::NodeIndex(const voxdag_reader::Level& level, bool bricks, bool wide,
+                     MemoryBudget& budget, const std::string& where)
     : bricks_(bricks), words_(level.word_count) {
   const auto miscounted = [&](uint64_t nodes) {
     throw Error(ErrorCode::kCorrupt, where + ": its words hold " + std::to_string(nodes) +
@@ -63,7 +63,7 @@ NodeIndex::NodeIndex(const voxdag_reader::Level& level, bool bricks, MemoryBudge
     return;
   }
   starts_ = PageBuffer<uint64_t>(budget, words_ / 64 + 1, "an index of nodes");
-  nodes_before_ = PageBuffer<uint32_t>(budget, words_ / 64 + 1, "an index of nodes");
+  nodes_before_ = PageBuffer<uint64_t>(budget, words_ / 64 + 1, "an index of nodes");
   uint64_t nodes = 0, at = 0;
   for (; at < words_; ++nodes) {
     const uint32_t mask = level.words[at];
@@ -71,17 +71,27 @@ NodeIndex::NodeIndex(const voxdag_reader::Level& level, bool bricks, MemoryBudge
       throw Error(ErrorCode::kCorrupt, where + ", word " + std::to_string(at) + ": child mask " +
                                            std::to_string(mask) + ", expected 1 to 255");
     starts_[at / 64] |= uint64_t{1} << at % 64;
-    at += 1 + uint64_t{kPopcount8[mask]};
+    at += 1 + (uint64_t{kPopcount8[mask]} << wide);
   }
   if (at != words_)
     throw Error(ErrorCode::kCorrupt, where + ": its last node ends at word " + std::to_string(at) +
                                          ", the level at word " + std::to_string(words_));
   if (nodes != level.node_count) miscounted(nodes);
-  uint32_t before = 0;
+  uint64_t before = 0;
   for (size_t i = 0; i < starts_.size(); ++i) {
     nodes_before_[i] = before;
-    before += static_cast<uint32_t>(popcount64(starts_[i]));
+    before += static_cast<uint64_t>(popcount64(starts_[i]));
   }
+}
+
+// Whether `b` is after `a` in the total order.
+bool follows(uint64_t hash_a, const voxdag_reader::Node& a, uint64_t hash_b,
+             const voxdag_reader::Node& b) {
+  if (hash_a != hash_b) return hash_a < hash_b;
+  if (a.child_mask != b.child_mask) return a.child_mask < b.child_mask;
+  for (int c = 0; c < kPopcount8[a.child_mask]; ++c)
+    if (a.child(c) != b.child(c)) return a.child(c) < b.child(c);
+  return false;
 }
 
 class Verifier {
@@ -132,6 +142,7 @@ class Verifier {
   void check_zeros(uint64_t begin, uint64_t end, const std::string& what) const;
   void check_bricks();
   void check_nodes(uint32_t level);
+  bool wide_children(uint32_t level) const { return file_.level(level + 1).pointer_bits == 64; }
   void check_all_used(uint32_t level) const;
   void check_counts() const;
 
@@ -161,9 +172,12 @@ void Verifier::check_header() const {
   for (size_t level = 0; level < kMaxLevels; ++level) {
     const size_t entry = kLevelsAt + level * kLevelEntryBytes;
     const bool there = level <= file_.brick_level();
-    check_zeros(there ? entry + 24 : entry, entry + kLevelEntryBytes, "a reserved field");
+    const size_t last = file_.version() == kVersion ? entry + 24 : entry + 28;
+    check_zeros(there ? last : entry, entry + kLevelEntryBytes, "a reserved field");
   }
-  check_zeros(kAttributesAt, kHeaderChecksumAt, "reserved");
+  const bool has_features = file_.version() != kVersion;
+  check_zeros(kAttributesAt, kFeaturesAt, "reserved");
+  check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "reserved");
 }
 
 void Verifier::check_blocks() {
@@ -196,12 +210,12 @@ void Verifier::check_padding() const {
 void Verifier::check_bricks() {
   const uint32_t level = file_.brick_level();
   const voxdag_reader::Level& bricks = file_.level(level);
-  indexes_[level] = NodeIndex(bricks, true, budget_, where(level));
+  indexes_[level] = NodeIndex(bricks, true, false, budget_, where(level));
   hashes_ = PageBuffer<uint64_t>(budget_, bricks.node_count, "hashes of a level");
   uint64_t last_mask = 0;
   for (uint64_t i = 0; i < bricks.node_count; ++i) {
     advance(i, bricks.node_count);
-    const uint64_t mask = file_.brick(static_cast<uint32_t>(2 * i));
+    const uint64_t mask = file_.brick(2 * i);
     const uint64_t hash = truncate_hash(hash_brick(mask), file_.hash_bits());
     if (mask == 0) broken(where(level, 2 * i), "the brick is empty");
     if (i > 0 && (hash < hashes_[i - 1] || (hash == hashes_[i - 1] && mask <= last_mask)))
@@ -214,31 +228,31 @@ void Verifier::check_bricks() {
 void Verifier::check_nodes(uint32_t level) {
   const voxdag_reader::Level& nodes = file_.level(level);
   const NodeIndex& below = indexes_[level + 1];
-  indexes_[level] = NodeIndex(nodes, false, budget_, where(level));
+  const bool wide = wide_children(level);
+  indexes_[level] = NodeIndex(nodes, false, wide, budget_, where(level));
   PageBuffer<uint64_t> hashes(budget_, nodes.node_count, "hashes of a level");
   used_ = PageBuffer<uint8_t>(budget_, hashes_.size(), "parents of a level");
-  const uint32_t* previous = nullptr;
-  const uint32_t* word = nodes.words;
+  voxdag_reader::Node previous;
+  uint64_t at = 0;
   for (uint64_t i = 0; i < nodes.node_count; ++i) {
     advance(i, nodes.node_count);
-    const uint64_t at = static_cast<uint64_t>(word - nodes.words);
-    const int children = kPopcount8[*word];
+    const voxdag_reader::Node node{nodes.words[at], nodes.words + at + 1, wide};
+    const int children = kPopcount8[node.child_mask];
     uint64_t child_hashes[8];
     for (int c = 0; c < children; ++c) {
-      const uint64_t child = below.find(word[1 + c]);
+      const uint64_t child = below.find(node.child(c));
       if (child == NodeIndex::kNone)
-        broken(where(level, at + 1 + c), "a child at word " + std::to_string(word[1 + c]) +
-                                             ", where no node of level " +
-                                             std::to_string(level + 1) + " begins");
+        broken(where(level, at + 1 + (static_cast<uint64_t>(c) << wide)),
+               "a child at word " + std::to_string(node.child(c)) + ", where no node of level " +
+                   std::to_string(level + 1) + " begins");
       child_hashes[c] = hashes_[child];
       used_[child] = 1;
     }
-    hashes[i] = truncate_hash(hash_node(*word, child_hashes), file_.hash_bits());
-    if (previous &&
-        compare_nodes(hashes[i - 1], *previous, previous + 1, hashes[i], *word, word + 1) >= 0)
+    hashes[i] = truncate_hash(hash_node(node.child_mask, child_hashes), file_.hash_bits());
+    if (i > 0 && !follows(hashes[i - 1], previous, hashes[i], node))
       broken(where(level, at), "the node does not follow the one before it in the total order");
-    previous = word;
-    word += 1 + children;
+    previous = node;
+    at += 1 + (static_cast<uint64_t>(children) << wide);
   }
   check_all_used(level + 1);
   hashes_ = std::move(hashes);
@@ -258,19 +272,21 @@ void Verifier::check_counts() const {
     const NodeIndex& below = indexes_[level + 1];
     PageBuffer<uint64_t> child_times(budget_, file_.level(level + 1).node_count,
                                      "counts of a level");
+    const bool wide = wide_children(level);
     const uint32_t* word = file_.level(level).words;
     for (uint64_t i = 0; i < times.size(); ++i) {
       svo_nodes += times[i];
-      const int children = kPopcount8[*word++];
-      for (int c = 0; c < children; ++c) child_times[below.find(*word++)] += times[i];
+      const voxdag_reader::Node node{*word, word + 1, wide};
+      const int children = kPopcount8[node.child_mask];
+      for (int c = 0; c < children; ++c) child_times[below.find(node.child(c))] += times[i];
+      word += 1 + (static_cast<uint64_t>(children) << wide);
     }
     times = std::move(child_times);
     cancel_.check();
   }
   for (uint64_t i = 0; i < times.size(); ++i) {
     svo_nodes += times[i];
-    voxels +=
-        times[i] * static_cast<uint64_t>(popcount64(file_.brick(static_cast<uint32_t>(2 * i))));
+    voxels += times[i] * static_cast<uint64_t>(popcount64(file_.brick(2 * i)));
   }
   if (voxels != file_.voxels())
     broken(file_.path() + ": header",

@@ -10,7 +10,8 @@
 // brick_level() = log2(R) - 2. Within a level everything is addressed by word offsets:
 //     brick:  [mask, low 32 bits] [mask, high 32 bits]     bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0
 //     node:   [child mask, 8 bits] [offset of each child in the next level, in child order]
-// with child index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
+// An offset is one word, or two, low half first, where the next level's pointer_bits are 64. Child
+// index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
 //
 // Opening checks the header, and that the levels and the checksum table lie within the file. Nodes
 // and bricks are checked when they are read: a bad offset in a damaged file is an Error, and no
@@ -56,12 +57,20 @@ struct Level {
   uint64_t word_count = 0;
   uint64_t node_count = 0;   // nodes, or bricks on brick_level()
   uint64_t file_offset = 0;  // of the first word, in bytes
+  // Of the offsets in the level above that point into this one: 32, or 64 in a large level.
+  uint32_t pointer_bits = 32;
 };
 
 // A node of a level above the bricks. The children belong to the File.
 struct Node {
   uint32_t child_mask = 0;
-  const uint32_t* children = nullptr;  // word offsets in the next level, in child order
+  const uint32_t* children = nullptr;  // word offsets in the next level, in child order,
+  bool wide = false;                   // one word each, or two, low half first
+
+  // Word offset of the n-th child that the node has, in child order.
+  uint64_t child(int n) const {
+    return wide ? children[2 * n] | static_cast<uint64_t>(children[2 * n + 1]) << 32 : children[n];
+  }
 };
 
 // The XXH64 of `size` bytes, with seed 0.
@@ -178,6 +187,8 @@ class File {
   uint32_t grid_levels() const { return grid_levels_; }
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
   uint32_t brick_level() const { return grid_levels_ - 2; }
+  // Of the format: 1, or 2 if the file has a feature that version 1 has not, wide levels.
+  uint32_t version() const { return version_; }
   // The bits of the node hash by which the nodes of a level are ordered, 4 to 64.
   uint32_t hash_bits() const { return hash_bits_; }
   // Set voxels, nodes of the octree that the DAG represents, and nodes of the DAG; bricks count as
@@ -194,25 +205,26 @@ class File {
 
   // The mask of the 64 voxels of the brick at word `offset` of level brick_level(). Throws Error if
   // the offset lies outside the level.
-  uint64_t brick(uint32_t offset) const {
+  uint64_t brick(uint64_t offset) const {
     const Level& bricks = levels_[brick_level()];
     if (bricks.word_count < 2 || offset > bricks.word_count - 2) outside(brick_level(), offset);
-    return bricks.words[offset] | static_cast<uint64_t>(bricks.words[offset + uint64_t{1}]) << 32;
+    return bricks.words[offset] | static_cast<uint64_t>(bricks.words[offset + 1]) << 32;
   }
   // The node at word `offset` of level `l`, which is above the bricks. Throws Error if no node can
   // begin there.
-  Node node(uint32_t l, uint32_t offset) const {
+  Node node(uint32_t l, uint64_t offset) const {
     const Level& nodes = levels_[l];
     if (offset >= nodes.word_count) outside(l, offset);
     const uint32_t mask = nodes.words[offset];
+    const bool wide = levels_[l + 1].pointer_bits == 64;
     if (mask == 0 || mask > 255 ||
-        static_cast<uint64_t>(count_bits(mask)) >= nodes.word_count - offset)
+        static_cast<uint64_t>(count_bits(mask)) << wide >= nodes.word_count - offset)
       outside(l, offset);
-    return {mask, nodes.words + offset + 1};
+    return {mask, nodes.words + offset + 1, wide};
   }
   // Word offset of child `index` (0 to 7) in the next level; the child mask must have it.
-  static uint32_t child(const Node& node, int index) {
-    return node.children[count_bits(node.child_mask & ((1u << index) - 1))];
+  static uint64_t child(const Node& node, int index) {
+    return node.child(count_bits(node.child_mask & ((1u << index) - 1)));
   }
   // The bit of a voxel in the mask of its brick; only the two low bits of each coordinate count.
   static int brick_bit(int64_t x, int64_t y, int64_t z) {
@@ -224,7 +236,7 @@ class File {
   bool voxel(int64_t x, int64_t y, int64_t z) const {
     const int64_t r = resolution();
     if (empty() || x < 0 || y < 0 || z < 0 || x >= r || y >= r || z >= r) return false;
-    uint32_t offset = 0;
+    uint64_t offset = 0;
     for (uint32_t l = 0; l < brick_level(); ++l) {
       const int shift = static_cast<int>(grid_levels_ - 1 - l);
       const int index =
@@ -267,6 +279,7 @@ class File {
  private:
   static constexpr uint64_t kPageBytes = 4096, kChecksumBlockBytes = 65536;
   static constexpr uint32_t kMaxBrickLevel = 18;
+  static constexpr uint64_t kWideLevels = 1;  // a feature bit
 
   template <class T>
   static T get(const unsigned char* at) {
@@ -284,7 +297,7 @@ class File {
   [[noreturn]] void corrupt(const std::string& what) const {
     throw Error(Problem::kCorrupt, path_ + ": " + what);
   }
-  [[noreturn]] void outside(uint32_t l, uint32_t offset) const {
+  [[noreturn]] void outside(uint32_t l, uint64_t offset) const {
     corrupt("level " + std::to_string(l) + ", word " + std::to_string(offset) +
             ": no node lies here");
   }
@@ -293,17 +306,17 @@ class File {
   }
 
   template <class Visitor>
-  void walk_from(Visitor& visitor, uint32_t l, uint32_t offset, int64_t x, int64_t y,
+  void walk_from(Visitor& visitor, uint32_t l, uint64_t offset, int64_t x, int64_t y,
                  int64_t z) const {
     if (l == brick_level()) return static_cast<void>(visitor.brick(x, y, z, brick(offset), offset));
     const Node n = node(l, offset);
     if (!visitor.node(l, x, y, z, offset)) return;
     const int64_t half = resolution() >> (l + 1);
-    const uint32_t* next = n.children;
+    int next = 0;
     for (int index = 0; index < 8; ++index)
       if (n.child_mask >> index & 1)
-        walk_from(visitor, l + 1, *next++, x + (index >> 2 & 1) * half, y + (index >> 1 & 1) * half,
-                  z + (index & 1) * half);
+        walk_from(visitor, l + 1, n.child(next++), x + (index >> 2 & 1) * half,
+                  y + (index >> 1 & 1) * half, z + (index & 1) * half);
   }
 
   void read_header() {
@@ -312,12 +325,16 @@ class File {
     if (bytes_.size() < sizeof(kMagic) || std::memcmp(page, kMagic, sizeof(kMagic)) != 0)
       corrupt("not a voxdag file");
     if (bytes_.size() < kPageBytes) corrupt("the file ends within its header");
-    const uint32_t version = get<uint32_t>(page + 8);
-    if (version != 1)
+    version_ = get<uint32_t>(page + 8);
+    if (version_ != 1 && version_ != 2)
       throw Error(Problem::kUnsupportedVersion,
-                  path_ + ": format version " + std::to_string(version) + ", expected 1");
+                  path_ + ": format version " + std::to_string(version_) + ", expected 1 or 2");
     expect(xxh64(page, kPageBytes - 8) == get<uint64_t>(page + kPageBytes - 8),
            "its checksum is wrong");
+    const uint64_t features = version_ == 1 ? 0 : get<uint64_t>(page + 2176);
+    if (features & ~kWideLevels)
+      throw Error(Problem::kUnsupportedVersion,
+                  path_ + ": feature bits " + std::to_string(features) + ", expected none but 1");
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
     expect(
@@ -356,7 +373,11 @@ class File {
         continue;
       }
       expect(level.file_offset == end, "a level does not follow the one below it");
-      expect(level.word_count <= uint64_t{1} << 32, "a level has over 2^32 words");
+      if (version_ != 1) level.pointer_bits = get<uint32_t>(entry + 24);
+      expect(level.pointer_bits == 32 || level.pointer_bits == 64,
+             "expected pointers of 32 or 64 bits");
+      expect(level.word_count <= uint64_t{1} << (level.pointer_bits == 32 ? 32 : 40),
+             "a level has more words than pointers into it can count, or over 2^40");
       expect(4 * level.word_count <= bytes_.size() - end, "a level ends beyond the file");
       expect(level.node_count > 0 && level.node_count <= level.word_count / 2,
              "a level has more nodes than its words hold");
@@ -384,7 +405,7 @@ class File {
   const Bytes bytes_;
   double origin_[3] = {};
   double edge_ = 0;
-  uint32_t grid_levels_ = 0, hash_bits_ = 0;
+  uint32_t version_ = 0, grid_levels_ = 0, hash_bits_ = 0;
   uint64_t voxels_ = 0, svo_nodes_ = 0, dag_nodes_ = 0, table_offset_ = 0;
   Level levels_[kMaxBrickLevel + 1];
 };

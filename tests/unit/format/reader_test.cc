@@ -19,11 +19,11 @@ class ReaderTest : public testing::Test {
 // Sets the voxels of a walk, and counts what it visits.
 struct Collector {
   explicit Collector(int edge) : voxels(edge) {}
-  bool node(uint32_t, int64_t, int64_t, int64_t, uint32_t) {
+  bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) {
     ++nodes;
     return true;
   }
-  void brick(int64_t x, int64_t y, int64_t z, uint64_t mask, uint32_t) {
+  void brick(int64_t x, int64_t y, int64_t z, uint64_t mask, uint64_t) {
     ++nodes;
     for (int i = 0; i < 64; ++i)
       if (mask >> i & 1)
@@ -76,10 +76,10 @@ TEST_F(ReaderTest, WalksArePruned) {
   voxels.set(15, 15, 15);
   write_global(path_, voxels);
   struct {
-    bool node(uint32_t level, int64_t x, int64_t, int64_t, uint32_t) {
+    bool node(uint32_t level, int64_t x, int64_t, int64_t, uint64_t) {
       return level == 0 || x >= 8;
     }
-    void brick(int64_t x, int64_t y, int64_t z, uint64_t mask, uint32_t) {
+    void brick(int64_t x, int64_t y, int64_t z, uint64_t mask, uint64_t) {
       ++bricks;
       EXPECT_EQ(x, 12);
       EXPECT_EQ(y, 12);

@@ -284,8 +284,8 @@ TEST_F(VerifyTest, MutatedFilesNeverCrash) {
       }
       verify(path_);
       struct {
-        bool node(uint32_t, int64_t, int64_t, int64_t, uint32_t) { return true; }
-        void brick(int64_t, int64_t, int64_t, uint64_t mask, uint32_t) {
+        bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) { return true; }
+        void brick(int64_t, int64_t, int64_t, uint64_t mask, uint64_t) {
           voxels += static_cast<uint64_t>(popcount64(mask));
         }
         uint64_t voxels = 0;

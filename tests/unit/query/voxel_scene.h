@@ -36,8 +36,9 @@ class VoxelScene {
 
   std::vector<uint32_t>& level_words(uint32_t level) { return words_[level]; }
   voxdag::query::DagView view() const {
-    std::vector<std::span<const uint32_t>> levels(words_.begin(), words_.end());
-    if (words_.back().empty()) levels.clear();
+    std::vector<voxdag::query::DagView::Level> levels;
+    if (!words_.back().empty())
+      for (const std::vector<uint32_t>& words : words_) levels.push_back({words});
     return voxdag::query::DagView(std::move(levels), grid_levels_);
   }
 
