@@ -82,17 +82,20 @@ TEST_F(MergeErrors, CanceledMergesStop) {
   merge_fails(ErrorCode::kCanceled, {.cancel = &cancel});
 }
 
-// Positions are 32 bits wide: the level that would need more is named.
-TEST(LevelExtentTest, ALevelOver2To32IsALimitError) {
-  LevelExtent extent;
-  extent.add({1, kPositionLimit}, 9, true);
-  try {
-    extent.add({1, 2}, 9, true);
-    FAIL() << "expected an Error";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kLimit);
-    EXPECT_THAT(error.message(), testing::HasSubstr("level 9"));
-    EXPECT_THAT(error.message(), testing::HasSubstr("2^32 words"));
+// A level that its format cannot count is named.
+TEST(LevelExtentTest, ALevelOverTheLimitIsALimitError) {
+  for (const auto& [in_words, limit, text] : {std::tuple{true, uint64_t{1} << 40, "2^40 words"},
+                                              {false, uint64_t{1} << 32, "2^32 nodes"}}) {
+    LevelExtent extent;
+    extent.add({1, limit}, 9, in_words);
+    try {
+      extent.add({1, 2}, 9, in_words);
+      FAIL() << "expected an Error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kLimit);
+      EXPECT_THAT(error.message(), testing::HasSubstr("level 9"));
+      EXPECT_THAT(error.message(), testing::HasSubstr(text));
+    }
   }
 }
 

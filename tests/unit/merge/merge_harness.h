@@ -105,13 +105,19 @@ inline std::vector<Cube> mixed_cubes(uint64_t seed, uint32_t deepest) {
 
 class MergeHarness {
  public:
-  MergeHarness(uint32_t grid_levels, uint32_t hash_bits)
-      : grid_levels_(grid_levels), hash_bits_(hash_bits), budget_(uint64_t{1} << 30) {
+  // Levels of over `narrow_words` words are wide.
+  MergeHarness(uint32_t grid_levels, uint32_t hash_bits,
+               uint64_t narrow_words = global_layout::kNarrowLevelWords)
+      : grid_levels_(grid_levels),
+        hash_bits_(hash_bits),
+        narrow_words_(narrow_words),
+        budget_(uint64_t{1} << 30) {
     grid_.levels = grid_levels;
     segment_ = std::make_unique<SegmentWriter>(system_files(), folder_.path(), 7, budget_);
   }
 
   const TemporaryFolder& folder() const { return folder_; }
+  std::string merged_file() const { return folder_.file("merged.vdag"); }
   std::string segment() const { return segment_path(folder_.path(), 7); }
   std::string scratch_folder() const { return folder_.file("scratch"); }
   std::vector<ArtifactRef>& artifacts() { return artifacts_; }
@@ -143,7 +149,7 @@ class MergeHarness {
     inputs.scratch_folder = scratch_folder();
     inputs.checkpoint_interval_s = options.checkpoint_interval_s;
     MemoryBudget budget(options.budget_bytes);
-    GlobalFileWriter out(system_files(), folder_.file("merged.vdag"), grid_, hash_bits_);
+    GlobalFileWriter out(system_files(), merged_file(), grid_, hash_bits_, narrow_words_);
     NoProgress silent;
     CancelToken never;
     Merged merged;
@@ -159,8 +165,10 @@ class MergeHarness {
 
   // The file of a DAG as it should be.
   GlobalFileSummary expected(const oracle::Dag& dag) {
-    GlobalFileWriter out(system_files(), folder_.file("expected.vdag"), grid_, hash_bits_);
+    GlobalFileWriter out(system_files(), folder_.file("expected.vdag"), grid_, hash_bits_,
+                         narrow_words_);
     std::vector<uint32_t> below, offsets, words;
+    bool wide = false;  // children of the level
     uint32_t level = grid_levels_ - 2;
     const auto end_level = [&](size_t nodes) {
       out.begin_level(level--);
@@ -168,6 +176,7 @@ class MergeHarness {
       out.write_words(0, words);
       out.end_level({nodes, words.size()});
       below = std::move(offsets);
+      wide = words.size() > narrow_words_;
       offsets.clear();
       words.clear();
     };
@@ -181,7 +190,10 @@ class MergeHarness {
       for (const oracle::Node& node : nodes) {
         offsets.push_back(static_cast<uint32_t>(words.size()));
         words.push_back(node.mask);
-        for (const uint32_t child : node.children) words.push_back(below[child]);
+        for (const uint32_t child : node.children) {
+          words.push_back(below[child]);
+          if (wide) words.push_back(0);
+        }
       }
       end_level(nodes.size());
     }
@@ -199,6 +211,7 @@ class MergeHarness {
 
  private:
   const uint32_t grid_levels_, hash_bits_;
+  const uint64_t narrow_words_;
   TemporaryFolder folder_;
   MemoryBudget budget_;
   Grid grid_;
