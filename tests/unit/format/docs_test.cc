@@ -84,6 +84,7 @@ TEST(FormatDocTest, HeaderTableIsTheLayout) {
                                                 {"attribute sections", kAttributeCountAt},
                                                 {"levels", kLevelsAt},
                                                 {"attribute table", kAttributesAt},
+                                                {"feature bits", kFeaturesAt},
                                                 {"", kReservedAt},
                                                 {"header checksum", kHeaderChecksumAt}};
   std::map<std::string, size_t> found;

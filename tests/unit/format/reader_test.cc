@@ -134,7 +134,7 @@ TEST_F(ReaderTest, ProblemsAreReported) {
   EXPECT_EQ(problem(), Problem::kCorrupt);
   write_global(path_, random_voxels(1, 16));
   ByteString bytes = read_bytes(path_);
-  bytes[8] = 2;
+  bytes[8] = 3;
   write_bytes(path_, bytes);
   EXPECT_EQ(problem(), Problem::kUnsupportedVersion);
   EXPECT_THROW(File(folder_.path()), voxdag_reader::Error);

@@ -54,7 +54,7 @@ class WideLevels : public testing::TestWithParam<uint64_t> {
 };
 
 TEST_P(WideLevels, HashPartitionsAndSpilledMaps) {
-  merge(noise_voxels(1, 256), equal_cubes(1), 64, {11, 14});
+  merge(noise_voxels(1, 256), equal_cubes(1), 64, {15, 18});
 }
 
 TEST_P(WideLevels, SeveralPasses) { merge(noise_voxels(2, 256), equal_cubes(3), 64, {24, 16}); }
