@@ -7,6 +7,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/base/text.h"
 #include "server/api/public_problem.h"
 #include "server/data_folder.h"
 #include "server/http/connection/listener.h"
@@ -48,6 +49,16 @@ void remove_plans(FileSystem& files, const ServerConfig& config) {
       remove_tree(files, folder + "/" + entry.name);
 }
 
+// A target as the log shows it: no byte of it controls a terminal.
+std::string shown(const std::string& path) {
+  std::string text;
+  for (const char c : path.substr(0, kMaxLoggedChars)) {
+    const auto byte = static_cast<unsigned char>(c);
+    text += byte > ' ' && byte < 0x7f ? std::string(1, c) : "%" + hex_text({&byte, 1});
+  }
+  return text;
+}
+
 }  // namespace
 
 Service::Service(ServerConfig config, FileSystem& files, Log log)
@@ -62,7 +73,9 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
              config_.adopt || !has_entries(files, config_.data_folder + "/jobs")),
       scenes_(files, config_.data_folder + "/scenes", config_.adopt),
       tasks_(config_, scenes_),
-      http_(config_.http, [this](Request& request) { return answer(request); }),
+      http_(
+          config_.http, [this](Request& request) { return answer(request); },
+          [this](int status) { metrics_.count_request(status, 0); }),
       dispatcher_(config_, files, queue_, tasks_, disk_, log_,
                   [this](const Job& job) { metrics_.count_run(job); }),
       context_{config_, files, queue_, scenes_, tasks_, disk_, dispatcher_, metrics_, draining_} {
@@ -158,10 +171,9 @@ Response Service::answer(Request& request) {
 void Service::record(const Request& request, int status, double start_s) {
   metrics_.count_request(status, wall_seconds() - start_s);
   if (request.method == "GET" || request.method == "HEAD") return;
-  log_("audit " + request.method + " " + request.target.path.substr(0, kMaxLoggedChars) +
-       " status=" + std::to_string(status) +
-       " who=" + (request.caller.empty() ? "-" : request.caller) + " from=" + request.peer +
-       " request=" + request.id);
+  log_("audit " + request.method + " " + shown(request.target.path) + " status=" +
+       std::to_string(status) + " who=" + (request.caller.empty() ? "-" : request.caller) +
+       " from=" + request.peer + " request=" + request.id);
 }
 
 }  // namespace voxdag::server

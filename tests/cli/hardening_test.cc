@@ -1,4 +1,5 @@
 // Defects that an attack on the program found; each test is named for the entry of the report.
+#include <cstdlib>
 #include <filesystem>
 
 #include "tests/cli/command_line.h"
@@ -170,6 +171,20 @@ TEST_F(Hardening, PlanNeedsNoTmpdir) {
     const Answer plan = run({"plan", "m.glb", "-r", "256"});
     unsetenv("TMPDIR");
     EXPECT_EQ(plan.status, 0) << plan.err;
+  }
+}
+
+// What cannot be written to the standard output is an error, not an empty file and a success.
+TEST_F(Hardening, OutputThatCannotBeWrittenIsAnError) {
+  build();
+  for (const char* command :
+       {"info m.vdag --json", "--version", "verify m.vdag", "token --role read --name me"}) {
+    SCOPED_TRACE(command);
+    const std::string line =
+        "cd " + folder_.path() + " && " VOXDAG_BINARY " " + command + " > /dev/full 2> errors";
+    const int status = std::system(line.c_str());
+    EXPECT_NE(status, 0);
+    EXPECT_NE(contents("errors").find("standard output"), std::string::npos);
   }
 }
 
