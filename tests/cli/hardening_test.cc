@@ -1,4 +1,6 @@
 // Defects that an attack on the program found; each test is named for the entry of the report.
+#include <sys/stat.h>
+
 #include <cstdlib>
 #include <filesystem>
 
@@ -105,6 +107,30 @@ TEST_F(Hardening, L6_ABuildRefusesToOverwriteItsNeighbors) {
   expect_refused("s.partial", {"build", "s.partial", "-r", "64", "-o", "s"});
   run_json({"build", "m.glb", "-r", "64", "-o", "q"});
   run_json({"build", "m.glb", "-r", "128", "-o", "q"});
+}
+
+// What is no file is invalid input, whichever command reads it.
+TEST_F(Hardening, N9_InputsThatAreNoFilesHaveOneStatus) {
+  build();
+  ASSERT_EQ(mkfifo(folder_.file("pipe").c_str(), 0600), 0);
+  std::filesystem::create_directory(folder_.file("folder"));
+  for (const std::string name : {"pipe", "folder"})
+    for (const std::vector<std::string>& args :
+         std::vector<std::vector<std::string>>{{"build", name, "-r", "64", "-o", "x.vdag"},
+                                               {"info", name},
+                                               {"verify", name},
+                                               {"diff", "m.vdag", name},
+                                               {"render", name, "-o", "x.png"}}) {
+      SCOPED_TRACE(args[0]);
+      expect_error(2, name + " is not a regular file", args);
+    }
+}
+
+// A folder that is missing is noticed before the work is done.
+TEST_F(Hardening, N9_AMissingOutputFolderIsNoticedFirst) {
+  build();
+  expect_error(3, "there is no folder none", {"generate", "menger", "none/x.glb", "--level", "1"});
+  expect_error(3, "there is no folder none", {"render", "m.vdag", "-o", "none/x.png"});
 }
 
 // Numbers mean what is written, and an error is one line that says what was expected.
