@@ -108,6 +108,45 @@ TEST_F(JobHardening, R2_AMarkedFolderTakesNoOtherAlong) {
   EXPECT_EQ(delete_job(waiting).status, 204);
 }
 
+// The scene is not emptied under the process that reads it.
+TEST_F(JobHardening, R12_ASceneIsNotDeletedDuringADryRun) {
+  use_program("until test -e " + folder_.file("go") + R"(; do sleep 0.1; done
+echo '{"json":"{\"triangles\":1}","message":"result"}')");
+  start();
+  put_scene("m.glb", scene_bytes());
+  const auto plans = [&] {
+    return std::distance(std::filesystem::directory_iterator(data("plans")), {});
+  };
+  std::thread plan([this] {
+    HttpClient client(ClientOptions{url(), "", "", 300});
+    const Json body = {{"scene", "m.glb"}, {"resolution", 64}};
+    const ClientResponse answer = client.send("POST", "/api/v1/jobs?dry_run=true", body.dump(),
+                                              {{"Content-Type", "application/json"}});
+    EXPECT_EQ(answer.status, 200) << answer.body;
+  });
+  EXPECT_TRUE(until([&] { return std::filesystem::exists(data("plans")) && plans() == 1; }));
+  EXPECT_EQ(not_problem(http_->send("DELETE", "/api/v1/scenes/m.glb", ""), 409, "conflict"), "");
+  EXPECT_EQ(put_scene("m.glb", scene_bytes()).status, 200) << "it may be replaced";
+  write_file_atomically(system_files(), folder_.file("go"), "");
+  plan.join();
+  EXPECT_EQ(http_->send("DELETE", "/api/v1/scenes/m.glb", "").status, 204);
+}
+
+// A retry is refused for what a new job would be refused for.
+TEST_F(JobHardening, R13_AJobWithoutItsSceneIsNotTriedAgain) {
+  use_program("exec sleep 600");
+  start();
+  const std::string id = posted_job();
+  EXPECT_EQ(act(id, "cancel").status, 202);
+  EXPECT_TRUE(until_state(id, "canceled"));
+  EXPECT_EQ(http_->send("DELETE", "/api/v1/scenes/m.glb", "").status, 204);
+  EXPECT_EQ(not_problem(act(id, "retry"), 404, "not_found"), "");
+  EXPECT_EQ(job(id)["state"], "canceled");
+  put_scene("m.glb", scene_bytes());
+  EXPECT_EQ(act(id, "retry").status, 202);
+  EXPECT_EQ(not_problem(http_->send("DELETE", "/api/v1/scenes/m.glb", ""), 409, "conflict"), "");
+}
+
 // Once the outcome of a run is recorded, nothing of that run ends what a client asks for.
 TEST_F(JobHardening, R4_ASuspendedJobIsCanceledWhileItsThreadEnds) {
   use_program("exec sleep 600");
