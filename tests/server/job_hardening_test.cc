@@ -147,6 +147,23 @@ TEST_F(JobHardening, R13_AJobWithoutItsSceneIsNotTriedAgain) {
   EXPECT_EQ(not_problem(http_->send("DELETE", "/api/v1/scenes/m.glb", ""), 409, "conflict"), "");
 }
 
+// One damaged record leaves the list of all jobs valid.
+TEST_F(JobHardening, AListWithADamagedRequestIsJson) {
+  use_program("exec sleep 600");
+  start();
+  const std::string id = posted_job();
+  EXPECT_EQ(act(id, "cancel").status, 202);
+  EXPECT_TRUE(until_state(id, "canceled"));
+  for (const char* request : {"{}", "{\"scene\":[\"m.glb\"]} ", "[]", "{"}) {
+    edit_queue("UPDATE job SET request = '" + std::string(request) + "'");
+    const ClientResponse list = http_->get("/api/v1/jobs");
+    const Json body = Json::parse(list.body, nullptr, false);
+    ASSERT_TRUE(body.is_object()) << list.body;
+    EXPECT_EQ(body["jobs"][0]["id"], id);
+    EXPECT_EQ(body["jobs"][0]["resolution"], 0);
+  }
+}
+
 // Once the outcome of a run is recorded, nothing of that run ends what a client asks for.
 TEST_F(JobHardening, R4_ASuspendedJobIsCanceledWhileItsThreadEnds) {
   use_program("exec sleep 600");
