@@ -11,7 +11,7 @@ namespace {
 class JobHardening : public RunningService {
  protected:
   ~JobHardening() override {
-    let_go();
+    release();
     stop();  // before what the hook uses is gone
   }
 
@@ -36,7 +36,7 @@ class JobHardening : public RunningService {
     return http_->send("DELETE", "/api/v1/jobs/" + id, "");
   }
 
-  // The first step of this name waits until let_go().
+  // The first step of this name waits until release().
   void hold_step(const std::string& beginning) {
     config_.before_step = [this, beginning](const std::string& step) {
       std::unique_lock lock(mutex_);
@@ -50,7 +50,7 @@ class JobHardening : public RunningService {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return held_; });
   }
-  void let_go() {
+  void release() {
     std::lock_guard lock(mutex_);
     free_ = true;
     changed_.notify_all();
@@ -176,7 +176,7 @@ TEST_F(JobHardening, R4_ASuspendedJobIsCanceledWhileItsThreadEnds) {
   const ClientResponse answer = act(id, "cancel");
   EXPECT_EQ(Json::parse(answer.body)["state"], "canceled") << answer.body;
   EXPECT_EQ(delete_job(id).status, 204);
-  let_go();
+  release();
 }
 
 TEST_F(JobHardening, R4_AJobThatWaitsForAnotherAttemptIsCanceledToo) {
@@ -189,7 +189,7 @@ TEST_F(JobHardening, R4_AJobThatWaitsForAnotherAttemptIsCanceledToo) {
   const ClientResponse answer = act(id, "cancel");
   EXPECT_EQ(Json::parse(answer.body)["state"], "canceled") << answer.body;
   EXPECT_EQ(delete_job(id).status, 204);
-  let_go();
+  release();
 }
 
 }  // namespace
