@@ -19,7 +19,8 @@ constexpr int kPreviewNice = 5;  // on top of the builds'
 constexpr double kMaxSleep_s = 1;
 constexpr double kNoTimeLimit_s = 1e9;
 constexpr double kRetireInterval_s = 300;
-constexpr size_t kMaxRetiredAtOnce = 100;  // so that jobs can start in between
+constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
+constexpr size_t kMaxRetiredAtOnce = 100;   // so that jobs can start in between
 constexpr double kSecondsPerDay = 86400;
 // A clock that is further from where it was expected may be wrong; so long no job is deleted for
 // its age.
@@ -31,6 +32,21 @@ void sleep_s(double seconds) {
 }
 
 }  // namespace
+
+Dispatcher::FilesLock::FilesLock(Dispatcher& dispatcher, const std::string& id)
+    : dispatcher_(dispatcher), id_(id) {
+  std::unique_lock lock(dispatcher_.mutex_);
+  dispatcher_.files_unlocked_.wait(lock, [&] { return dispatcher_.locked_.insert(id_).second; });
+}
+
+Dispatcher::FilesLock::~FilesLock() {
+  {
+    std::lock_guard lock(dispatcher_.mutex_);
+    dispatcher_.locked_.erase(id_);
+  }
+  dispatcher_.files_unlocked_.notify_all();
+  dispatcher_.queue_.announce();
+}
 
 Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue,
                        TaskResolver& tasks, DiskSpace& disk, Log log, OnRunEnded on_run_ended)
@@ -64,7 +80,7 @@ bool Dispatcher::stopping() {
 void Dispatcher::recover() {
   std::set<std::string> running;
   for (const auto& [key, worker] : workers_)
-    if (!worker.done) running.insert(key);
+    if (worker.runs()) running.insert(key);
   for (const Job& job : queue_.recover(running, config_.jobs.max_attempts))
     log_("job " + job.id + " " + state_name(job.state));
 }
@@ -92,10 +108,7 @@ void Dispatcher::dispatch() {
       recovered_ = true;
       start_ready_jobs();
     });
-    steps_.run("finish deletions", [this] {
-      std::lock_guard lock(mutex_);
-      folders_.finish_deletions();
-    });
+    steps_.run("finish deletions", [this] { finish_deletions(); });
     steps_.run("remove old jobs", [this] { retire_old_jobs(); });
     queue_.wait_for_change(seen, kMaxSleep_s);
   }
@@ -123,7 +136,7 @@ void Dispatcher::start_ready_jobs() {
 bool Dispatcher::start_next_job() {
   uint64_t memory = 0;
   size_t running_jobs = 0;
-  std::set<std::string> present;
+  std::set<std::string> present = locked_;
   for (const auto& [key, worker] : workers_) {
     present.insert(key);
     memory += worker.live->memory_bytes();
@@ -255,6 +268,7 @@ void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProces
     if (!queue_.find(job.id)) return;  // it was deleted
     after = queue_.change(
         job.id, [&](Job& j) { apply_outcome(j, live, end, config_.jobs, unix_seconds()); });
+    workers_.at(job.id).recorded = true;
   })) {
     sleep_s(kMaxSleep_s);
     if (stopping()) return;
@@ -262,11 +276,7 @@ void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProces
   if (!after) return;
   log_("job " + job.id + " " + state_name(after->state) +
        (after->error ? ": " + after->error->code : ""));
-  steps_.run("remove the work folder of job " + job.id, [&] {
-    std::lock_guard lock(mutex_);
-    if (after->state == JobState::kCanceled || after->state == JobState::kSucceeded)
-      folders_.remove_work(job.id);
-  });
+  remove_work(job.id);
   on_run_ended_(*after);
 }
 
@@ -289,6 +299,15 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
                     [&](Job& j) { j.preview = drawn ? Preview::kReady : Preview::kFailed; });
   });
   if (!recorded) sleep_s(kMaxSleep_s);
+}
+
+void Dispatcher::remove_work(const std::string& id) {
+  steps_.run("remove the work folder of job " + id, [&] {
+    const FilesLock lock(*this, id);
+    const auto job = queue_.find(id);
+    if (job && (job->state == JobState::kCanceled || job->state == JobState::kSucceeded))
+      folders_.remove_work(id);
+  });
 }
 
 // A clock that is wrong for a while must not cost all results.
@@ -332,19 +351,21 @@ void Dispatcher::retire_old_jobs() {
 }
 
 Job Dispatcher::cancel(const std::string& id) {
-  std::lock_guard lock(mutex_);
-  const auto worker = workers_.find(id);
-  const bool runs = worker != workers_.end() && !worker->second.done;
-  const Job job = queue_.change(id, [&](Job& j) {
-    if (j.state == JobState::kFailed || j.state == JobState::kSucceeded)
-      throw state_conflict(j, "the job has ended");
-    if (j.state == JobState::kCanceling || j.state == JobState::kCanceled) return;
-    j.state = runs ? JobState::kCanceling : JobState::kCanceled;
-    if (!runs) j.finished_s = unix_seconds();
-  });
-  if (runs && job.state == JobState::kCanceling) worker->second.live->stop();
-  if (job.state == JobState::kCanceled)
-    steps_.run("remove the work folder of job " + id, [&] { folders_.remove_work(id); });
+  Job job;
+  {
+    std::lock_guard lock(mutex_);
+    const auto worker = workers_.find(id);
+    const bool runs = worker != workers_.end() && worker->second.runs();
+    job = queue_.change(id, [&](Job& j) {
+      if (j.state == JobState::kFailed || j.state == JobState::kSucceeded)
+        throw state_conflict(j, "the job has ended");
+      if (j.state == JobState::kCanceling || j.state == JobState::kCanceled) return;
+      j.state = runs ? JobState::kCanceling : JobState::kCanceled;
+      if (!runs) j.finished_s = unix_seconds();
+    });
+    if (runs && job.state == JobState::kCanceling) worker->second.live->stop();
+  }
+  if (job.state == JobState::kCanceled) remove_work(id);
   return job;
 }
 
@@ -372,7 +393,7 @@ Job Dispatcher::resume(const std::string& id) {
 }
 
 Job Dispatcher::retry(const std::string& id) {
-  std::lock_guard lock(mutex_);  // no deletion has begun
+  std::lock_guard lock(mutex_);  // no deletion begins
   return queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kRunning) return;
     if (j.state != JobState::kQueued && j.state != JobState::kFailed &&
@@ -380,6 +401,8 @@ Job Dispatcher::retry(const std::string& id) {
       throw state_conflict(j, "expected a job that failed or was canceled");
     j.not_before_s = 0;
     if (j.state == JobState::kQueued) return;
+    if (folders_.is_marked(id))
+      throw state_conflict(j, "the deletion of this job has begun: delete it again to end that");
     j.state = JobState::kQueued;
     j.attempts = j.interruptions = 0;
     j.front = false;
@@ -388,9 +411,39 @@ Job Dispatcher::retry(const std::string& id) {
 }
 
 void Dispatcher::remove(const std::string& id) {
-  std::lock_guard lock(mutex_);
-  queue_.check_removable(id);
-  folders_.remove(id);
+  const FilesLock files_lock(*this, id);
+  {
+    std::lock_guard lock(mutex_);  // no retry
+    queue_.check_removable(id);
+    folders_.mark(id);
+  }
+  try {
+    folders_.remove_marked(id);
+  } catch (...) {
+    std::lock_guard lock(mutex_);
+    next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+    throw;
+  }
+}
+
+void Dispatcher::finish_deletions() {
+  {
+    std::lock_guard lock(mutex_);
+    if (wall_seconds() < next_deletions_s_) return;
+    next_deletions_s_ = HUGE_VAL;
+  }
+  for (const std::string& id : folders_.marked()) {
+    {
+      std::lock_guard lock(mutex_);
+      if (locked_.contains(id)) continue;  // a client deletes it just now
+    }
+    const bool finished = steps_.run("delete job " + id, [&] {
+      const FilesLock lock(*this, id);
+      folders_.finish_deletion(id);
+    });
+    std::lock_guard lock(mutex_);
+    if (!finished) next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+  }
 }
 
 std::shared_ptr<LiveJob> Dispatcher::live(const std::string& id) const {

@@ -163,6 +163,7 @@ Response delete_scene(Context& context, Call& call) {
   const std::string name = checked_name(call);
   std::lock_guard lock(context.scene_mutex);
   check_unused(context, name);
+  if (context.planned_scenes.contains(name)) throw conflict("the scene is in use by a dry run");
   if (!context.scenes.remove(name)) throw not_found("no such scene");
   return no_content();
 }
