@@ -1,5 +1,6 @@
 #include "server/service.h"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <thread>
@@ -71,7 +72,8 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
       access_(config_, files),
       queue_(config_.data_folder + "/queue.db",
              config_.adopt || !has_entries(files, config_.data_folder + "/jobs")),
-      scenes_(files, config_.data_folder + "/scenes", config_.adopt),
+      scenes_(files, config_.data_folder + "/scenes", log_, config_.adopt),
+      clock_(std::max(queue_.last_event_s(), scenes_.last_change_s())),
       tasks_(config_, scenes_),
       http_(
           config_.http, [this](Request& request) { return answer(request); },
@@ -129,13 +131,21 @@ void Service::stop() {
 void Service::clean_up_periodically() {
   std::unique_lock lock(stop_mutex_);
   while (!draining_) {
-    steps_.run("remove old uploads", [this] {
-      scenes_.remove_stale_uploads(unix_seconds() - config_.retention.upload_days * kSecondsPerDay);
-    });
+    steps_.run("remove old uploads", [this] { remove_old_uploads(); });
     steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
     steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });
     stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });
   }
+}
+
+void Service::remove_old_uploads() {
+  const double clock_s = unix_seconds(), now_s = wall_seconds();
+  if (clock_.has_jumped(clock_s, now_s))
+    log_(
+        "the clock is far ahead of when the service last saw it: for a day no upload is deleted "
+        "for its age");
+  if (!clock_.is_in_doubt(now_s))
+    scenes_.remove_stale_uploads(clock_s - config_.retention.upload_days * kSecondsPerDay);
 }
 
 // A disk that is full to the last byte has no room for the record of a deletion either.

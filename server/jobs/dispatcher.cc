@@ -159,7 +159,7 @@ bool Dispatcher::start_next_job() {
     return true;
   }
   if (running_jobs > 0 && memory + needed > tasks_.memory_bytes()) return false;
-  if (disk_.available() == 0) return false;
+  if (disk_.is_low()) return false;
   const Job started = queue_.change(job->id, [](Job& j) {
     if (!j.front) ++j.attempts;
     j.front = false;
