@@ -22,10 +22,6 @@ constexpr double kRetireInterval_s = 300;
 constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
 constexpr size_t kMaxRetiredAtOnce = 100;   // so that jobs can start in between
 constexpr double kSecondsPerDay = 86400;
-// A clock that is further from where it was expected may be wrong; so long no job is deleted for
-// its age.
-constexpr double kMaxClockStep_s = 3600;
-constexpr double kClockDoubt_s = kSecondsPerDay;
 
 void sleep_s(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
@@ -58,6 +54,7 @@ Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& 
       log_(log),
       on_run_ended_(std::move(on_run_ended)),
       steps_(log, config.before_step),
+      clock_(queue.last_event_s()),
       folders_(config.data_folder + "/jobs", files, queue, steps_, log) {
   if (config_.adopt) folders_.adopt();
   recovered_ = steps_.run("recover the jobs", [this] { recover(); });
@@ -312,19 +309,12 @@ void Dispatcher::remove_work(const std::string& id) {
 
 // A clock that is wrong for a while must not cost all results.
 double Dispatcher::oldest_retained_s(double now_s) {
-  const double clock_s = unix_seconds(), last_event_s = queue_.last_event_s();
-  const bool jumped = last_clock_s_ > 0
-                          ? clock_s - last_clock_s_ > now_s - last_pass_s_ + kMaxClockStep_s
-                          : last_event_s > 0 && clock_s - last_event_s > kSecondsPerDay;
-  last_clock_s_ = clock_s;
-  last_pass_s_ = now_s;
-  if (jumped) {
-    age_removal_from_s_ = now_s + kClockDoubt_s;
+  const double clock_s = unix_seconds();
+  if (clock_.has_jumped(clock_s, now_s))
     log_(
         "the clock is far ahead of when the service last saw it: for a day no job is deleted for "
         "its age");
-  }
-  if (now_s < age_removal_from_s_) return 0;
+  if (clock_.is_in_doubt(now_s)) return 0;
   return clock_s - config_.retention.finished_days * kSecondsPerDay;
 }
 

@@ -19,6 +19,7 @@
 #include <string>
 #include <thread>
 
+#include "server/clock_guard.h"
 #include "server/config.h"
 #include "server/disk_space.h"
 #include "server/jobs/job_folders.h"
@@ -118,6 +119,7 @@ class Dispatcher {
   const Log log_;
   const OnRunEnded on_run_ended_;
   Steps steps_;
+  ClockGuard clock_;  // used by the thread that starts jobs
 
   // Guards all below; held while a job's state and process change together, and not while files
   // are removed.
@@ -135,10 +137,7 @@ class Dispatcher {
   std::map<std::string, std::shared_ptr<LiveJob>> live_;  // by job
 
   // Used by the thread that starts jobs alone.
-  double next_retirement_s_ = 0;   // like the next two in wall_seconds()
-  double age_removal_from_s_ = 0;  // no job is deleted for its age before
-  double last_pass_s_ = 0;         // when the clock was last looked at,
-  double last_clock_s_ = 0;        // and what it showed
+  double next_retirement_s_ = 0;  // in wall_seconds()
   std::thread thread_;
 };
 

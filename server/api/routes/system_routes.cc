@@ -33,7 +33,7 @@ Response get_asset(Call& call, const Asset& asset) {
   return response;
 }
 
-// Whether the data folder can be written, tried at most once a second. Thread-safe.
+// Whether the data folder can be written, tried at most once per second. Thread-safe.
 class WriteProbe {
  public:
   // Creates and removes a file.
