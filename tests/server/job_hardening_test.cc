@@ -120,8 +120,7 @@ echo '{"json":"{\"triangles\":1}","message":"result"}')");
   std::thread plan([this] {
     HttpClient client(ClientOptions{url(), "", "", 300});
     const Json body = {{"scene", "m.glb"}, {"resolution", 64}};
-    const ClientResponse answer = client.send("POST", "/api/v1/jobs?dry_run=true", body.dump(),
-                                              {{"Content-Type", "application/json"}});
+    const ClientResponse answer = client.send("POST", "/api/v1/jobs?dry_run=true", body.dump());
     EXPECT_EQ(answer.status, 200) << answer.body;
   });
   EXPECT_TRUE(until([&] { return std::filesystem::exists(data("plans")) && plans() == 1; }));
