@@ -43,7 +43,7 @@ COPY --from=build /out/voxdag /usr/local/bin/voxdag
 USER 10001
 WORKDIR /data
 EXPOSE 8080
-HEALTHCHECK --interval=30s --timeout=5s CMD ["voxdag", "health"]
+HEALTHCHECK --interval=30s --timeout=10s CMD ["voxdag", "health"]
 ENTRYPOINT ["voxdag"]
 # The network is behind that address, so tokens are needed: docs/operating.md.
 CMD ["serve", "--listen", "0.0.0.0", "--data", "/data", "--tokens", "/tokens"]

@@ -1,3 +1,4 @@
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -35,6 +36,15 @@ int report(ErrorCode code, const char* message) {
   return exit_status(code);
 }
 
+// What was printed may still be in a buffer: if it cannot be written, the command has failed.
+void check_output() {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return;
+  throw Error(
+      errno == ENOSPC ? ErrorCode::kNoSpace : ErrorCode::kIo,
+      "write to the standard output: " + std::generic_category().message(errno ? errno : EIO));
+}
+
 int run(int argc, char** argv) {
   CommandContext context{system_files(), g_cancel};
   CommandLine line(context);
@@ -45,7 +55,9 @@ int run(int argc, char** argv) {
         add_watch_command, add_job_action_commands, add_download_command})
     add_command(line);
   try {
-    return line.run(argc, argv);
+    const int status = line.run(argc, argv);
+    check_output();
+    return status;
   } catch (const Error& error) {
     return report(error.code(), error.what());
   } catch (const std::system_error& error) {

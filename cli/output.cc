@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "core/base/error.h"
 #include "core/io/overwrite.h"
 
 namespace voxdag::cli {
@@ -25,11 +26,15 @@ void OutputFile::declare_force(Command& command) {
 void OutputFile::check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const {
   check(files, path, input, is_own);
   check(files, path + ".partial", input, is_own);
+  const std::string folder = parent_directory(path);
+  if (!files.exists(folder))
+    throw Error(ErrorCode::kNotFound,
+                path + ": there is no folder " + folder + ": expected an existing one");
 }
 
 void OutputFile::check(FileSystem& files, const std::string& name, const std::string& input,
                        const IsOwnFile& is_own) const {
-  refuse_input(files, name, std::span(&input, 1));
+  refuse_inputs(files, std::span(&name, 1), std::span(&input, 1));
   if (!force) refuse_foreign_file(files, name, is_own, " (--force replaces it)");
 }
 

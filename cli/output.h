@@ -23,7 +23,7 @@ struct OutputFile {
   void declare_force(Command& command);
   // Throws Error{kInvalidInput} if writing would destroy something: the `input` whatever the
   // options, another file that is not `is_own` without --force. Checks path + ".partial" as well,
-  // under which write_file_atomically() writes.
+  // under which write_file_atomically() writes, and that the folder is there.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
   // The same for one name.
   void check(FileSystem& files, const std::string& name, const std::string& input,

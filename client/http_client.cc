@@ -94,7 +94,8 @@ ClientResponse HttpClient::send(const std::string& method, const std::string& pa
   request.path = path;
   request.headers = to_httplib(headers);
   request.body = body;
-  if (!body.empty()) request.set_header("Content-Type", "application/json");
+  if (!body.empty() && !request.has_header("Content-Type"))
+    request.set_header("Content-Type", "application/json");
   return impl_->check(impl_->http.send(request));
 }
 

@@ -74,7 +74,7 @@ class Upload {
       const std::string text = answer.header("Upload-Offset");
       uint64_t offset = 0;
       const auto parsed = std::from_chars(text.data(), text.data() + text.size(), offset);
-      if (parsed.ec == std::errc{} && offset < size_) offset_ = offset;
+      if (parsed.ec == std::errc{} && offset <= size_) offset_ = offset;
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kNotFound) throw;
     }
@@ -83,10 +83,12 @@ class Upload {
 
   // Sends the missing bytes in parts, so that a crash of the server loses one part at most. The
   // first part is small: a server that rejects the scene can answer it, while it would close the
-  // connection within a large one. False if a retry is needed, for the reason in failure_.
+  // connection within a large one. If no bytes are missing, an empty part finishes the upload.
+  // False if a retry is needed, for the reason in failure_.
   bool send_rest() {
     progress_.begin_stage("upload", size_ - offset_, "bytes");
-    for (uint64_t part_bytes = kFirstPartBytes; offset_ < size_; part_bytes = kPartBytes) {
+    uint64_t part_bytes = kFirstPartBytes;
+    do {
       const uint64_t end = std::min(size_, offset_ + part_bytes);
       const auto answer = send_part(end);
       if (!answer) return false;
@@ -97,7 +99,8 @@ class Upload {
       }
       throw_if_problem(*answer);
       offset_ = end;
-    }
+      part_bytes = kPartBytes;
+    } while (offset_ < size_);
     progress_.end_stage();
     return true;
   }
@@ -105,8 +108,9 @@ class Upload {
   // No value if the connection broke.
   std::optional<ClientResponse> send_part(uint64_t end) {
     const uint64_t first = offset_;
-    HeaderMap headers{{"Content-Range", "bytes " + std::to_string(first) + "-" +
-                                            std::to_string(end - 1) + "/" + std::to_string(size_)}};
+    const std::string range =
+        first == end ? "*" : std::to_string(first) + "-" + std::to_string(end - 1);
+    HeaderMap headers{{"Content-Range", "bytes " + range + "/" + std::to_string(size_)}};
     if (end == size_) headers.emplace("Repr-Digest", digest_field(sha256_));
     const auto source = [&](uint64_t offset, uint64_t max_bytes) {
       service_.cancel().check();

@@ -1,9 +1,8 @@
 #include "scheduler/run_build.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <optional>
 #include <set>
 
@@ -34,24 +33,36 @@ constexpr const char* kReportSuffix = ".report.json";
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
 
-// Refuses now an output that could not be written once all is built, and one whose writing would
-// destroy a scene or a file that is not ours.
-void check_output(FileSystem& files, const std::string& output,
-                  const std::vector<std::string>& scenes) {
+std::string work_folder_of(const RunOptions& options) {
+  return options.work_folder.empty() ? options.output + ".work" : options.work_folder;
+}
+
+// Refuses now an output that could not be written once all is built, and folders and files whose
+// writing would destroy a scene or a file that is not ours.
+void check_places(const BuildSpec& spec, const BuildContext& context) {
+  FileSystem& files = context.files;
+  const std::string& output = spec.run.output;
+  const std::string work = work_folder_of(spec.run);
   if (output.empty())
     throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
   if (output.ends_with('/'))
     throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a file, not a folder");
+  const auto resolved = [](const std::string& path) {
+    return std::filesystem::weakly_canonical(path + "/.");
+  };
+  if (!spec.run.cache_folder.empty() && resolved(spec.run.cache_folder) == resolved(work))
+    throw Error(ErrorCode::kInvalidInput,
+                work + " is both the cache (--cache) and the work folder: expected two folders");
   const std::string partial = output + ".partial", report = output + kReportSuffix;
-  for (const std::string& path : {output, partial, report}) refuse_input(files, path, scenes);
+  const std::string outputs[] = {output, partial, report, report + ".partial",
+                                 OutputLock::path_of(output)};
+  refuse_own_files(spec, work, outputs, context);
   refuse_foreign_file(files, output, is_global_file, " (-o)");
   refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
   refuse_foreign_file(files, report, is_report, " (-o)");
   refuse_foreign_file(files, report + ".partial", is_report, " (-o)");
   files.make_directories(parent_directory(output));
-  const std::string probe = output + ".probe-" + std::to_string(getpid());
-  files.create(probe)->close();
-  files.remove(probe);
+  if (!spec.run.cache_folder.empty()) files.make_directories(spec.run.cache_folder);
 }
 
 // Opens the work folder's job store. With `restart`, one that cannot be read is replaced; so is one
@@ -97,12 +108,10 @@ std::string full_disk_advice(std::span<const StoredSubvolume> leaves) {
 class Build {
  public:
   Build(const BuildSpec& spec, const BuildContext& context)
-      : spec_(checked(spec)),
+      : spec_(spec),
         budget_(spec_.run.memory_bytes),
         output_lock_(context, spec_.run.output, spec_.run.lock_wait_s),
-        work_(context,
-              spec_.run.work_folder.empty() ? spec_.run.output + ".work" : spec_.run.work_folder,
-              spec_.run.lock_wait_s),
+        work_(context, work_folder_of(spec_.run), spec_.run.lock_wait_s),
         jobs_(open_job_store(context.files, work_, spec_.run.restart)),
         progress_(context.progress, *jobs_, work_),
         context_{context.files, progress_, context.cancel},
@@ -203,8 +212,7 @@ class Build {
   }
 
   void start_or_resume_job(const PreparedScene& scene) {
-    const auto stored = jobs_->job();
-    if (stored && !start_over_) {
+    if (const auto stored = start_over_ ? std::nullopt : jobs_->job()) {
       if (stored->scene_sha256 != scene.sha256())
         refuse_job("its scene has other contents (SHA-256 " + stored->scene_sha256.substr(0, 16) +
                    ", now " + scene.sha256().substr(0, 16) + ")");
@@ -348,9 +356,10 @@ class Build {
 }  // namespace
 
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
-  check_output(context.files, spec.run.output, spec.geometry.scenes);
+  const BuildSpec full = checked(spec);
+  check_places(full, context);
   return_freed_memory_to_system();
-  return Build(spec, context).run();
+  return Build(full, context).run();
 }
 
 }  // namespace voxdag

@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/io/overwrite.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/ingest/ingest.h"
 #include "scheduler/memory_plan.h"
@@ -57,11 +58,33 @@ BuildSpec checked(const BuildSpec& spec) {
   const uint64_t edge = r.subvolume_edge;
   if (edge && ((edge & (edge - 1)) || edge < static_cast<uint64_t>(kSmallestEdge)))
     refuse("subvolume edge " + std::to_string(edge) + ": expected a power of two from 64 voxels");
+  choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that makes no grid
   check_backend(r);
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();
   return out;
+}
+
+void refuse_own_files(const BuildSpec& spec, const std::string& work_folder,
+                      std::span<const std::string> outputs, const BuildContext& context) {
+  FileSystem& files = context.files;
+  std::vector<std::string> own = WorkFolder::files_in(files, work_folder);
+  const bool is_first = !own.empty() && !files.exists(WorkFolder::store_path(work_folder));
+  own.insert(own.end(), outputs.begin(), outputs.end());
+  refuse_inputs(files, own, spec.geometry.scenes);
+  // Anything may begin with zeros, as an unfinished output does.
+  const bool is_unknown = std::ranges::any_of(outputs, [&](const std::string& path) {
+    const auto file = open_if_there(files, path);
+    return file && begins_with(*file, std::string_view("\0", 1));
+  });
+  if (!is_first && !is_unknown) return;
+  MemoryBudget budget(spec.run.memory_bytes);
+  const auto scene =
+      open_scene(files, spec.geometry.scenes, {spec.geometry.skip_invalid}, budget, context.cancel);
+  std::vector<std::string> inputs;
+  for (const SourceFile& file : scene->files()) inputs.push_back(file.path);
+  refuse_inputs(files, own, inputs);
 }
 
 namespace {

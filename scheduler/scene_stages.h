@@ -21,6 +21,12 @@ namespace voxdag {
 // Error{kDevice} for a backend whose device is missing.
 BuildSpec checked(const BuildSpec& spec);
 
+// Throws Error{kInvalidInput} if the scene reads one of `outputs` or a file of the work folder,
+// which the build would overwrite or remove. Files that only the scene names, as its buffers, are
+// looked up where no earlier build can have done so.
+void refuse_own_files(const BuildSpec& spec, const std::string& work_folder,
+                      std::span<const std::string> outputs, const BuildContext& context);
+
 // A scene after ingest: its triangles, and the subvolumes they are to be partitioned to.
 struct PreparedScene {
   IngestState state;

@@ -1,5 +1,6 @@
-// The free space on the data folder's disk: part of it stays free, and uploads reserve what they
-// have announced, so that no two of them count on the same bytes. Thread-safe.
+// The free space on the data folder's disk: part of it stays free, and uploads reserve a few
+// megabytes ahead of what they write, so that no two of them count on the same bytes, and none that
+// sends slowly keeps the others out. Thread-safe.
 //
 // A ballast file lies there for a disk that other programs fill to the last byte: without it the
 // databases could not even record that something was deleted.
@@ -21,24 +22,22 @@ class DiskSpace {
 
   uint64_t free() const { return files_.free_space(folder_); }
   bool is_low() const { return free() < min_free_bytes_; }
-  // What may still be used: neither to stay free nor reserved.
-  uint64_t available() const;
-
   // The disk space of one upload, for as long as this exists. Used by one thread.
   class Reservation {
    public:
-    // Throws Error{kNoSpace} if so much is not available.
-    Reservation(DiskSpace& disk, uint64_t bytes);
+    // `announced` bytes are to come, 0 if that is not known. Throws Error{kNoSpace} if they do not
+    // fit now; others may still take the space before they come.
+    Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;
-    // Call before writing so many bytes. Reserves more if more is written than was announced, and
-    // throws Error{kNoSpace} if the disk is filling up in spite of the reservations.
+    // Call before writing so many bytes. Reserves more when they are used up; throws
+    // Error{kNoSpace} if the disk is full by then.
     void use(uint64_t bytes);
 
    private:
     DiskSpace& disk_;
-    uint64_t left_ = 0;
-    uint64_t unchecked_ = 0;  // written since the disk was looked at
+    uint64_t left_;          // reserved, not yet written
+    uint64_t not_reserved_;  // of what was announced
   };
 
   // Removes the ballast; false if there is none.
@@ -47,13 +46,15 @@ class DiskSpace {
   void restore_ballast();
 
  private:
-  void reserve(uint64_t bytes);
+  // Throws Error{kNoSpace} if the larger of both is not free; reserves `bytes`.
+  void reserve(uint64_t bytes, uint64_t expected);
 
   FileSystem& files_;
   const std::string folder_;
   const uint64_t min_free_bytes_;
-  mutable std::mutex mutex_;  // guards the next
+  std::mutex mutex_;  // guards the next
   uint64_t reserved_bytes_ = 0;
+  std::mutex ballast_mutex_;  // guards the ballast
 };
 
 }  // namespace voxdag::server

@@ -1,5 +1,6 @@
 #include "server/service.h"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <thread>
@@ -7,6 +8,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/base/text.h"
 #include "server/api/public_problem.h"
 #include "server/data_folder.h"
 #include "server/http/connection/listener.h"
@@ -48,6 +50,16 @@ void remove_plans(FileSystem& files, const ServerConfig& config) {
       remove_tree(files, folder + "/" + entry.name);
 }
 
+// A target as the log shows it: no byte of it controls a terminal.
+std::string shown(const std::string& path) {
+  std::string text;
+  for (const char c : path.substr(0, kMaxLoggedChars)) {
+    const auto byte = static_cast<unsigned char>(c);
+    text += byte > ' ' && byte < 0x7f ? std::string(1, c) : "%" + hex_text({&byte, 1});
+  }
+  return text;
+}
+
 }  // namespace
 
 Service::Service(ServerConfig config, FileSystem& files, Log log)
@@ -60,9 +72,12 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
       access_(config_, files),
       queue_(config_.data_folder + "/queue.db",
              config_.adopt || !has_entries(files, config_.data_folder + "/jobs")),
-      scenes_(files, config_.data_folder + "/scenes", config_.adopt),
+      scenes_(files, config_.data_folder + "/scenes", log_, config_.adopt),
+      clock_(std::max(queue_.last_event_s(), scenes_.last_change_s())),
       tasks_(config_, scenes_),
-      http_(config_.http, [this](Request& request) { return answer(request); }),
+      http_(
+          config_.http, [this](Request& request) { return answer(request); },
+          [this](int status) { metrics_.count_request(status, 0); }),
       dispatcher_(config_, files, queue_, tasks_, disk_, log_,
                   [this](const Job& job) { metrics_.count_run(job); }),
       context_{config_, files, queue_, scenes_, tasks_, disk_, dispatcher_, metrics_, draining_} {
@@ -116,13 +131,21 @@ void Service::stop() {
 void Service::clean_up_periodically() {
   std::unique_lock lock(stop_mutex_);
   while (!draining_) {
-    steps_.run("remove old uploads", [this] {
-      scenes_.remove_stale_uploads(unix_seconds() - config_.retention.upload_days * kSecondsPerDay);
-    });
+    steps_.run("remove old uploads", [this] { remove_old_uploads(); });
     steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
     steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });
     stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });
   }
+}
+
+void Service::remove_old_uploads() {
+  const double clock_s = unix_seconds(), now_s = wall_seconds();
+  if (clock_.has_jumped(clock_s, now_s))
+    log_(
+        "the clock is far ahead of when the service last saw it: for a day no upload is deleted "
+        "for its age");
+  if (!clock_.is_in_doubt(now_s))
+    scenes_.remove_stale_uploads(clock_s - config_.retention.upload_days * kSecondsPerDay);
 }
 
 // A disk that is full to the last byte has no room for the record of a deletion either.
@@ -158,10 +181,9 @@ Response Service::answer(Request& request) {
 void Service::record(const Request& request, int status, double start_s) {
   metrics_.count_request(status, wall_seconds() - start_s);
   if (request.method == "GET" || request.method == "HEAD") return;
-  log_("audit " + request.method + " " + request.target.path.substr(0, kMaxLoggedChars) +
-       " status=" + std::to_string(status) +
-       " who=" + (request.caller.empty() ? "-" : request.caller) + " from=" + request.peer +
-       " request=" + request.id);
+  log_("audit " + request.method + " " + shown(request.target.path) + " status=" +
+       std::to_string(status) + " who=" + (request.caller.empty() ? "-" : request.caller) +
+       " from=" + request.peer + " request=" + request.id);
 }
 
 }  // namespace voxdag::server

@@ -10,6 +10,7 @@
 #include "server/api/access/access_control.h"
 #include "server/api/context.h"
 #include "server/api/routes/router.h"
+#include "server/clock_guard.h"
 #include "server/http/http_server.h"
 
 namespace voxdag::server {
@@ -33,6 +34,7 @@ class Service {
  private:
   // Runs until the service stops.
   void clean_up_periodically();
+  void remove_old_uploads();
   Response answer(Request& request);
   Response routed(Request& request);
   // Counts every request, and logs those that try to change something.
@@ -49,6 +51,7 @@ class Service {
   AccessControl access_;
   JobQueue queue_;
   SceneStore scenes_;
+  ClockGuard clock_;  // of the retention of uploads
   TaskResolver tasks_;
   HttpServer http_;
   Dispatcher dispatcher_;

@@ -59,6 +59,7 @@ struct DirectoryEntry {
   uint64_t bytes = 0;
   uint64_t disk_bytes = 0;  // what it takes up: less than `bytes` where space was released
   double modified_s = 0;    // Unix time
+  bool is_special = false;  // neither a file nor a directory: a link, a pipe, a device
 };
 
 // An exclusive lock, released when this is destroyed or the process ends, however it ends.
@@ -71,14 +72,16 @@ class FileSystem {
  public:
   virtual ~FileSystem() = default;
   virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
-  // An empty file under `path`; one that was there is emptied.
+  // An empty file under `path`; one that was there is emptied. Like open_write() and try_lock(), it
+  // refuses a symbolic link and a file with other hard links as Error{kInvalidInput}.
   virtual std::unique_ptr<WritableFile> create(const std::string& path) = 0;
   // The file under `path` with its contents, or an empty one if there is none.
   virtual std::unique_ptr<WritableFile> open_write(const std::string& path) = 0;
   virtual bool exists(const std::string& path) = 0;
   virtual void rename(const std::string& from, const std::string& to) = 0;
   virtual void remove(const std::string& path) = 0;
-  // Makes the directory and those above it that are missing.
+  // Makes the directory and those above it that are missing. A file in the place of one is
+  // Error{kInvalidInput}.
   virtual void make_directories(const std::string& path) = 0;
   // Removes an empty directory.
   virtual void remove_directory(const std::string& path) = 0;
@@ -89,6 +92,9 @@ class FileSystem {
   virtual void sync_directory(const std::string& path) = 0;
   // Locks the file at `path`, made if it is not there; nullptr if another holder has it.
   virtual std::unique_ptr<FileLock> try_lock(const std::string& path) = 0;
+  // Whether a holder has the lock of the file at `path`, which need only be readable. A try_lock()
+  // at the same instant may fail.
+  virtual bool is_locked(const std::string& path) = 0;
   // Bytes that an unprivileged user may still write to the disk of `path`.
   virtual uint64_t free_space(const std::string& path) = 0;
 };

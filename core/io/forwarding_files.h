@@ -35,6 +35,7 @@ class ForwardingFiles : public FileSystem {
   std::unique_ptr<FileLock> try_lock(const std::string& path) override {
     return files_.try_lock(path);
   }
+  bool is_locked(const std::string& path) override { return files_.is_locked(path); }
   uint64_t free_space(const std::string& path) override { return files_.free_space(path); }
 
  private:

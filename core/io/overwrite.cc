@@ -1,27 +1,41 @@
 #include "core/io/overwrite.h"
 
 #include <algorithm>
+#include <vector>
 
 #include "core/base/error.h"
 
 namespace voxdag {
 
-void refuse_input(FileSystem& files, const std::string& path, std::span<const std::string> inputs) {
-  if (!files.exists(path)) return;
-  const FileIdentity identity = files.open_read(path)->identity();
+std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string& path) {
+  if (!files.exists(path)) return nullptr;
+  try {
+    return files.open_read(path);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound) throw;
+    return nullptr;
+  }
+}
+
+void refuse_inputs(FileSystem& files, std::span<const std::string> paths,
+                   std::span<const std::string> inputs) {
+  std::vector<FileIdentity> read;
   for (const std::string& input : inputs)
-    if (files.exists(input) && files.open_read(input)->identity() == identity)
+    if (const auto file = open_if_there(files, input)) read.push_back(file->identity());
+  for (const std::string& path : paths) {
+    const auto file = open_if_there(files, path);
+    if (file && std::ranges::find(read, file->identity()) != read.end())
       throw Error(ErrorCode::kInvalidInput, path +
                                                 " is read and would be overwritten: expected "
                                                 "another output");
+  }
 }
 
 void refuse_foreign_file(FileSystem& files, const std::string& path,
                          const std::function<bool(const ReadableFile& file)>& is_own,
                          const std::string& otherwise) {
-  if (!files.exists(path)) return;
-  const auto file = files.open_read(path);
-  if (file->size() > 0 && !is_own(*file))
+  const auto file = open_if_there(files, path);
+  if (file && file->size() > 0 && !is_own(*file))
     throw Error(ErrorCode::kInvalidInput,
                 path +
                     " exists and was not written by this command: expected a free name or that "

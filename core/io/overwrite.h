@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,8 +12,13 @@
 
 namespace voxdag {
 
-// Throws Error{kInvalidInput} if `path` is the same file as one of `inputs`.
-void refuse_input(FileSystem& files, const std::string& path, std::span<const std::string> inputs);
+// Null if there is no file of that name: another process may just have removed it.
+std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string& path);
+
+// Throws Error{kInvalidInput} if one of `paths`, which need not exist, is the same file as one of
+// `inputs`.
+void refuse_inputs(FileSystem& files, std::span<const std::string> paths,
+                   std::span<const std::string> inputs);
 
 // Throws Error{kInvalidInput} if `path` is no regular file, or neither empty nor `is_own`, which
 // looks whether the program made it. `otherwise` ends the message.

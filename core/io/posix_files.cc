@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/io/file_system.h"
@@ -21,6 +22,10 @@ namespace {
   throw Error(code, std::string(call) + " " + path + ": " + strerror(reason));
 }
 
+[[noreturn]] void not_a_folder(const std::string& path) {
+  throw Error(ErrorCode::kInvalidInput, path + " is a file: expected a folder");
+}
+
 // A file descriptor that closes itself.
 class Descriptor {
  public:
@@ -29,10 +34,10 @@ class Descriptor {
   Descriptor& operator=(const Descriptor&) = delete;
   ~Descriptor() { release(); }
   int get() const { return fd_; }
+  int take() { return std::exchange(fd_, -1); }
   // Returns errno of close(), or 0.
   int release() {
-    const int fd = fd_;
-    fd_ = -1;
+    const int fd = take();
     return fd >= 0 && ::close(fd) != 0 ? errno : 0;
   }
 
@@ -45,6 +50,23 @@ int open_retrying(const std::string& path, int flags) {
   do fd = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
   while (fd < 0 && errno == EINTR);
   return fd;
+}
+
+// Opens, or makes, a file that is about to be changed. A link of that name could lead to any file.
+int open_to_change(const char* call, const std::string& path) {
+  const auto refuse = [&](const char* what) {
+    throw Error(ErrorCode::kInvalidInput,
+                path + " is " + what + ": expected a regular file of one name, or a free name");
+  };
+  const int fd = open_retrying(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK);
+  if (fd < 0 && errno == ELOOP) refuse("a symbolic link");
+  if (fd < 0) fail(call, path, errno);
+  Descriptor opened(fd);
+  struct stat s {};
+  if (fstat(fd, &s) != 0) fail("stat", path, errno);
+  if (S_ISREG(s.st_mode) && s.st_nlink > 1) refuse("a file of several names (hard links)");
+  if (!S_ISREG(s.st_mode) && !S_ISCHR(s.st_mode)) refuse("not a regular file");
+  return opened.take();
 }
 
 class PosixReadableFile : public ReadableFile {
@@ -64,6 +86,7 @@ class PosixReadableFile : public ReadableFile {
   const std::string& path() const override { return path_; }
   uint64_t size() const override { return identity_.bytes; }
   FileIdentity identity() const override { return identity_; }
+  int descriptor() const { return fd_.get(); }
   void read_at(uint64_t offset, std::span<std::byte> out) const override {
     while (!out.empty()) {
       const ssize_t n = pread(fd_.get(), out.data(), out.size(), static_cast<off_t>(offset));
@@ -85,9 +108,14 @@ class PosixReadableFile : public ReadableFile {
 
 class PosixWritableFile : public WritableFile {
  public:
-  PosixWritableFile(const std::string& path, int flags)
-      : path_(path), fd_(open_retrying(path, O_RDWR | O_CREAT | flags)) {
-    if (fd_.get() < 0) fail("create", path, errno);
+  enum class Contents { kKeep, kEmpty };
+
+  PosixWritableFile(const std::string& path, Contents contents)
+      : path_(path), fd_(open_to_change("create", path)) {
+    struct stat s {};
+    if (fstat(fd_.get(), &s) != 0) fail("stat", path, errno);
+    if (contents == Contents::kEmpty && s.st_size > 0 && ftruncate(fd_.get(), 0) != 0)
+      fail("empty", path, errno);
   }
   const std::string& path() const override { return path_; }
   void write_at(uint64_t offset, std::span<const std::byte> data) override {
@@ -134,10 +162,10 @@ class PosixFileSystem : public FileSystem {
     return std::make_unique<PosixReadableFile>(path);
   }
   std::unique_ptr<WritableFile> create(const std::string& path) override {
-    return std::make_unique<PosixWritableFile>(path, O_TRUNC);
+    return std::make_unique<PosixWritableFile>(path, PosixWritableFile::Contents::kEmpty);
   }
   std::unique_ptr<WritableFile> open_write(const std::string& path) override {
-    return std::make_unique<PosixWritableFile>(path, 0);
+    return std::make_unique<PosixWritableFile>(path, PosixWritableFile::Contents::kKeep);
   }
   bool exists(const std::string& path) override {
     struct stat s {};
@@ -152,7 +180,12 @@ class PosixFileSystem : public FileSystem {
     if (unlink(path.c_str()) != 0) fail("remove", path, errno);
   }
   void make_directories(const std::string& path) override {
-    if (path.empty() || exists(path)) return;
+    if (path.empty()) return;
+    struct stat s {};
+    if (stat(path.c_str(), &s) == 0) {
+      if (S_ISDIR(s.st_mode)) return;
+      not_a_folder(path);
+    }
     const std::string parent = parent_directory(path);
     if (parent != path) make_directories(parent);
     if (mkdir(path.c_str(), 0777) != 0 && errno != EEXIST) fail("make directory", path, errno);
@@ -163,6 +196,7 @@ class PosixFileSystem : public FileSystem {
   }
   std::vector<DirectoryEntry> list(const std::string& path) override {
     DIR* directory = opendir(path.c_str());
+    if (!directory && errno == ENOTDIR && exists(path)) not_a_folder(path);
     if (!directory) fail("list", path, errno);
     std::vector<DirectoryEntry> entries;
     while (const dirent* e = readdir(directory)) {
@@ -173,7 +207,8 @@ class PosixFileSystem : public FileSystem {
       entries.push_back(
           {name, S_ISDIR(s.st_mode), static_cast<uint64_t>(s.st_size),
            512 * static_cast<uint64_t>(s.st_blocks),
-           static_cast<double>(s.st_mtim.tv_sec) + 1e-9 * static_cast<double>(s.st_mtim.tv_nsec)});
+           static_cast<double>(s.st_mtim.tv_sec) + 1e-9 * static_cast<double>(s.st_mtim.tv_nsec),
+           !S_ISDIR(s.st_mode) && !S_ISREG(s.st_mode)});
     }
     closedir(directory);
     return entries;
@@ -187,8 +222,7 @@ class PosixFileSystem : public FileSystem {
     if (fsync(fd.get()) != 0) fail("sync", path, errno);
   }
   std::unique_ptr<FileLock> try_lock(const std::string& path) override {
-    const int fd = open_retrying(path, O_RDWR | O_CREAT);
-    if (fd < 0) fail("open", path, errno);
+    const int fd = open_to_change("open", path);
     auto lock = std::make_unique<PosixFileLock>(fd);
     if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
       if (errno != EWOULDBLOCK) fail("lock", path, errno);
@@ -200,6 +234,12 @@ class PosixFileSystem : public FileSystem {
     const bool same = fstat(fd, &held) == 0 && stat(path.c_str(), &named) == 0 &&
                       held.st_ino == named.st_ino && held.st_dev == named.st_dev;
     return same ? std::move(lock) : try_lock(path);
+  }
+  bool is_locked(const std::string& path) override {
+    const PosixReadableFile file(path);
+    if (flock(file.descriptor(), LOCK_SH | LOCK_NB) == 0) return false;
+    if (errno != EWOULDBLOCK) fail("lock", path, errno);
+    return true;
   }
   uint64_t free_space(const std::string& path) override {
     struct statvfs s {};

@@ -37,7 +37,7 @@ std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<File
 
 OutputLock::OutputLock(const BuildContext& context, const std::string& output, double max_wait_s)
     : files_(context.files),
-      path_(output + ".partial"),
+      path_(path_of(output)),
       lock_(wait_for_lock([&] { return files_.try_lock(path_); }, output, max_wait_s, context)) {
   if (!lock_)
     throw Error(ErrorCode::kIo, output +
@@ -47,7 +47,8 @@ OutputLock::OutputLock(const BuildContext& context, const std::string& output, d
 
 OutputLock::~OutputLock() {
   try {
-    if (files_.exists(path_) && files_.open_read(path_)->size() == 0) files_.remove(path_);
+    // A file of that name that is not empty is somebody else's.
+    if (files_.open_read(path_)->size() == 0) files_.remove(path_);
   } catch (const Error&) {
     // An empty file is left, which the next build there locks again.
   }

@@ -1,6 +1,8 @@
-// The locks that keep two builds apart: one is on the output's partial file, one on the work folder
-// (work_folder.h). A process that was killed holds its locks until the system has taken it apart,
-// which takes seconds when it has mapped or written much: who finds a lock waits for it.
+// The locks that keep two builds apart: one is on a file next to the output, one on the work folder
+// (work_folder.h). Only its holder removes a lock's file: whoever waits for the lock then makes a
+// new one. A file that is renamed, as the partial output is, could not be a lock: its name would be
+// free while it is still held. A process that was killed holds its locks until the system has taken
+// it apart, which takes seconds when it has mapped or written much: who finds a lock waits for it.
 #pragma once
 
 #include <functional>
@@ -20,9 +22,11 @@ std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<File
 
 class OutputLock {
  public:
+  // The file that is locked: empty, and there while a build writes the output.
+  static std::string path_of(const std::string& output) { return output + ".lock"; }
   // Throws Error{kIo} if another build still writes there after `max_wait_s`.
   OutputLock(const BuildContext& context, const std::string& output, double max_wait_s);
-  // Removes the partial file if nothing was written to it.
+  // Removes the file.
   ~OutputLock();
   OutputLock(const OutputLock&) = delete;
   OutputLock& operator=(const OutputLock&) = delete;

@@ -10,14 +10,17 @@ namespace {
 // "vdag": marks a database as a job store.
 constexpr int64_t kApplicationId = 0x76646167;
 
-constexpr int64_t kSchemaVersion = 4;
+constexpr int64_t kSchemaVersion = 5;
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE job (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   scene_sha256 TEXT NOT NULL,
   geometry TEXT NOT NULL,
-  format_version INTEGER NOT NULL
+  format_version INTEGER NOT NULL,
+  -- Their ids are 1, 2, ...
+  subvolumes INTEGER NOT NULL,
+  row_checksum INTEGER NOT NULL
 );
 CREATE TABLE subvolume (
   id INTEGER PRIMARY KEY,
@@ -47,14 +50,16 @@ CREATE TABLE progress (
 CREATE TABLE merge (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   level INTEGER NOT NULL,
-  state BLOB NOT NULL
+  state BLOB NOT NULL,
+  row_checksum INTEGER NOT NULL
 );
 CREATE TABLE result (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   output TEXT NOT NULL, sha256 TEXT NOT NULL, bytes INTEGER NOT NULL,
   voxels INTEGER NOT NULL, svo_nodes INTEGER NOT NULL, dag_nodes INTEGER NOT NULL,
   merge_passes INTEGER NOT NULL, merge_partitions INTEGER NOT NULL,
-  merge_streamed_groups INTEGER NOT NULL
+  merge_streamed_groups INTEGER NOT NULL,
+  row_checksum INTEGER NOT NULL
 );
 -- The progress of scan, ingest and partition; the triangles are in a file.
 CREATE TABLE ingest (
@@ -64,11 +69,13 @@ CREATE TABLE ingest (
 );
 )sql";
 
-void check_sound(SqlDatabase& database, const std::string& path) {
+void check_sound(SqlDatabase& database) {
   auto check = database.prepare("PRAGMA integrity_check(1)");
-  if (!check.step() || check.text(0) != "ok")
-    throw Error(ErrorCode::kCorrupt,
-                path + " is damaged (" + check.text(0) + "): start over with --restart");
+  std::string found = check.step() ? check.text(0) : "no answer";
+  if (found == "ok") return;
+  // A heading may come first.
+  if (found.starts_with("***")) found.erase(0, found.find('\n') + 1);
+  throw Error(ErrorCode::kCorrupt, "it is damaged (" + found + ")");
 }
 
 // Throws Error{kInvalidInput} or Error{kUnsupportedVersion}.
@@ -79,8 +86,7 @@ void check_schema(SqlDatabase& database, const std::string& path) {
   if (version != kSchemaVersion)
     throw Error(ErrorCode::kUnsupportedVersion,
                 path + " is a job store of version " + std::to_string(version) +
-                    ": expected version " + std::to_string(kSchemaVersion) +
-                    "; start over with --restart");
+                    ": expected version " + std::to_string(kSchemaVersion));
 }
 
 // Creates the tables in an empty database, in one transaction; else checks them.
@@ -89,35 +95,48 @@ void prepare_schema(SqlDatabase& database, const std::string& path) {
   if (!empty) check_schema(database, path);
   database.execute("PRAGMA journal_mode = WAL");
   database.execute("PRAGMA foreign_keys = ON");
-  if (!empty) return check_sound(database, path);
+  if (!empty) return check_sound(database);
   change_schema(database, kTables, kApplicationId, kSchemaVersion);
 }
 
-// SQLite does not check its pages: what decides the result is checked row by row.
-uint64_t row_checksum(const StoredSubvolume& s) {
-  const ArtifactRef& a = s.artifact;
-  const uint64_t words[] = {static_cast<uint64_t>(s.id),
-                            s.cube.level,
-                            s.cube.position[0],
-                            s.cube.position[1],
-                            s.cube.position[2],
-                            static_cast<uint64_t>(s.state),
-                            a.segment,
-                            a.offset,
-                            a.bytes,
-                            a.index_offset,
-                            a.checksum,
-                            s.summary.voxels,
-                            s.summary.svo_nodes,
-                            s.summary.dag_nodes,
-                            s.summary.root_hash};
-  return checksum64(std::as_bytes(std::span(words)));
-}
+// SQLite does not check its pages: every row that decides the result has a checksum, and the job's
+// row the number of subvolumes. What another row says that is missing is done again.
+template <class Record>
+struct Sealed {
+  Record record;
+  uint64_t checksum = 0;
+};
+
+// The bytes of the columns, each with its length, in order.
+class RowDigest {
+ public:
+  void fixed(const char*, int64_t) {}
+  template <class Value>
+  void operator()(const char*, const Value& value) {
+    const auto word = static_cast<int64_t>(value);
+    add(&word, sizeof word);
+  }
+  void operator()(const char*, const double& value) { add(&value, sizeof value); }
+  void operator()(const char*, const std::string& text) { add(text.data(), text.size()); }
+  void operator()(const char*, const std::vector<std::byte>& blob) {
+    add(blob.data(), blob.size());
+  }
+  void operator()(const char*, const std::optional<int64_t>& value) {
+    add(value ? &*value : nullptr, value ? sizeof *value : 0);
+  }
+  uint64_t value() const { return checksum64(std::as_bytes(std::span(bytes_))); }
+
+ private:
+  void add(const void* data, uint64_t size) {
+    bytes_.append(reinterpret_cast<const char*>(&size), sizeof size);
+    bytes_.append(static_cast<const char*>(data), size);
+  }
+  std::string bytes_;
+};
 
 struct SubvolumeRow {
   StoredSubvolume subvolume;
   std::optional<SubvolumeId> parent;
-  uint64_t checksum = 0;
 };
 
 template <class Row>
@@ -140,33 +159,22 @@ void columns(Row& row, SubvolumeRow& r) {
   row("svo_nodes", s.summary.svo_nodes);
   row("dag_nodes", s.summary.dag_nodes);
   row("root_hash", s.summary.root_hash);
-  row("row_checksum", r.checksum);
 }
 
 struct IngestRow {
   std::vector<std::byte> record;
-  uint64_t checksum = 0;
 };
 
 template <class Row>
 void columns(Row& row, IngestRow& r) {
   row.fixed("id", 1);
   row("record", r.record);
-  row("row_checksum", r.checksum);
 }
 
-void write_subvolume(SqlDatabase& database, const StoredSubvolume& s,
-                     std::optional<SubvolumeId> parent) {
-  put_row(database, "subvolume", SubvolumeRow{s, parent, row_checksum(s)});
-}
-
-StoredSubvolume verified(const SubvolumeRow& row) {
-  if (row.checksum != row_checksum(row.subvolume))
-    throw Error(ErrorCode::kCorrupt, "job store: the row of subvolume " +
-                                         std::to_string(row.subvolume.id) +
-                                         " fails its checksum: start over with --restart");
-  return row.subvolume;
-}
+struct JobRow {
+  JobIdentity job;
+  int64_t subvolumes = 0;
+};
 
 }  // namespace
 
@@ -220,18 +228,78 @@ void columns(Row& row, ProgressSnapshot& progress) {
   row("last_error", progress.last_error);
 }
 
+namespace {
+
+template <class Row>
+void columns(Row& row, JobRow& r) {
+  columns(row, r.job);
+  row("subvolumes", r.subvolumes);
+}
+
+template <class Row, class Record>
+void columns(Row& row, Sealed<Record>& sealed) {
+  columns(row, sealed.record);
+  row("row_checksum", sealed.checksum);
+}
+
+template <class Record>
+uint64_t checksum_of(Record& record) {
+  RowDigest digest;
+  columns(digest, record);
+  return digest.value();
+}
+
+template <class Record>
+void put_sealed(SqlDatabase& database, const std::string& table, Record record) {
+  const uint64_t checksum = checksum_of(record);
+  put_row(database, table, Sealed<Record>{std::move(record), checksum});
+}
+
+// Throws Error{kCorrupt} naming `what` if the row is not as it was written.
+template <class Record>
+Record unsealed(Sealed<Record> sealed, const std::string& what) {
+  if (sealed.checksum != checksum_of(sealed.record))
+    throw Error(ErrorCode::kCorrupt,
+                "job store: the row of " + what + " fails its checksum: start over with --restart");
+  return std::move(sealed.record);
+}
+
+template <class Record>
+std::optional<Record> find_sealed(SqlDatabase& database, const std::string& table,
+                                  const std::string& what) {
+  auto row = find_row<Sealed<Record>>(database, table);
+  if (!row) return std::nullopt;
+  return unsealed(std::move(*row), what);
+}
+
+void write_subvolume(SqlDatabase& database, const StoredSubvolume& s,
+                     std::optional<SubvolumeId> parent) {
+  put_sealed(database, "subvolume", SubvolumeRow{s, parent});
+}
+
+}  // namespace
+
 JobStore::JobStore(const std::string& path, Access access)
     : database_(path, access == Access::kBuild ? SqlDatabase::Mode::kReadWrite
                                                : SqlDatabase::Mode::kReadOnly) {
-  if (access == Access::kBuild)
-    prepare_schema(database_, path);
-  else
-    check_schema(database_, path);
+  try {
+    if (access == Access::kBuild)
+      prepare_schema(database_, path);
+    else
+      check_schema(database_, path);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion)
+      throw;
+    throw Error(error.code(),
+                "job store " + path + ": " + error.message() + "; start over with --restart");
+  }
 }
 
 std::optional<JobIdentity> JobStore::job() {
   std::lock_guard lock(mutex_);
-  return find_row<JobIdentity>(database_, "job");
+  auto row = find_sealed<JobRow>(database_, "job", "the job");
+  if (!row) return std::nullopt;
+  return std::move(row->job);
 }
 
 void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> plan) {
@@ -240,7 +308,7 @@ void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> pl
   database_.execute("UPDATE subvolume SET parent = NULL; DELETE FROM subvolume;");
   database_.execute(
       "DELETE FROM job; DELETE FROM progress; DELETE FROM merge; DELETE FROM result;");
-  put_row(database_, "job", job);
+  put_sealed(database_, "job", JobRow{job, static_cast<int64_t>(plan.size())});
   SubvolumeId next = 1;
   for (StoredSubvolume subvolume : plan) {
     subvolume.id = next++;
@@ -252,14 +320,25 @@ void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> pl
 
 std::vector<StoredSubvolume> JobStore::leaves() {
   std::lock_guard lock(mutex_);
-  auto rows = select_rows<SubvolumeRow>(database_, "subvolume", "ORDER BY id");
+  // Both statements see the same state of the database, since the first one stays open.
+  auto jobs = select_rows<Sealed<JobRow>>(database_, "job");
+  if (!jobs.step()) return {};
+  const JobRow job = unsealed(read_row<Sealed<JobRow>>(jobs), "the job");
+  auto rows = select_rows<Sealed<SubvolumeRow>>(database_, "subvolume", "ORDER BY id");
   std::vector<StoredSubvolume> leaves;
+  int64_t count = 0;
   while (rows.step()) {
-    const StoredSubvolume subvolume = verified(read_row<SubvolumeRow>(rows));
+    auto row = read_row<Sealed<SubvolumeRow>>(rows);
+    const std::string name = "subvolume " + std::to_string(row.record.subvolume.id);
+    const StoredSubvolume subvolume = unsealed(std::move(row), name).subvolume;
+    if (subvolume.id != ++count) break;
     if (subvolume.state == SubvolumeState::kSplit) continue;
     const auto built = built_in_memory_.find(subvolume.id);
     leaves.push_back(built == built_in_memory_.end() ? subvolume : built->second);
   }
+  if (count != job.subvolumes)
+    throw Error(ErrorCode::kCorrupt,
+                "job store: rows of subvolumes are missing: start over with --restart");
   return leaves;
 }
 
@@ -293,7 +372,11 @@ std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
   StoredSubvolume split = whole;
   split.state = SubvolumeState::kSplit;
   update_row(split);
-  SubvolumeId next = database_.integer("SELECT max(id) FROM subvolume") + 1;
+  auto job = find_sealed<JobRow>(database_, "job", "the job");
+  if (!job) throw Error(ErrorCode::kCorrupt, "job store: the row of the job is missing");
+  SubvolumeId next = job->subvolumes + 1;
+  job->subvolumes += static_cast<int64_t>(parts.size());
+  put_sealed(database_, "job", *job);
   std::vector<SubvolumeId> ids;
   for (const Cube& cube : parts) {
     StoredSubvolume part;
@@ -329,17 +412,15 @@ void JobStore::update_row(const StoredSubvolume& subvolume) {
 
 std::optional<std::vector<std::byte>> JobStore::ingest() {
   std::lock_guard lock(mutex_);
-  auto row = find_row<IngestRow>(database_, "ingest");
+  auto row = find_sealed<IngestRow>(database_, "ingest", "what was ingested");
   if (!row) return std::nullopt;
-  if (checksum64(row->record) != row->checksum)
-    throw Error(ErrorCode::kCorrupt, "job store: the row of what was ingested fails its checksum");
   return std::move(row->record);
 }
 
 void JobStore::save_ingest(std::span<const std::byte> record) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
-  put_row(database_, "ingest", IngestRow{{record.begin(), record.end()}, checksum64(record)});
+  put_sealed(database_, "ingest", IngestRow{{record.begin(), record.end()}});
   transaction.commit();
 }
 
@@ -353,13 +434,13 @@ void JobStore::forget_ingest() {
 
 std::optional<StoredMerge> JobStore::merge() {
   std::lock_guard lock(mutex_);
-  return find_row<StoredMerge>(database_, "merge");
+  return find_sealed<StoredMerge>(database_, "merge", "the merge");
 }
 
 void JobStore::save_merge(uint32_t level, std::span<const std::byte> state) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
-  put_row(database_, "merge", StoredMerge{level, {state.begin(), state.end()}});
+  put_sealed(database_, "merge", StoredMerge{level, {state.begin(), state.end()}});
   transaction.commit();
 }
 
@@ -373,13 +454,13 @@ void JobStore::forget_merge() {
 void JobStore::record_result(const JobResult& result) {
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
-  put_row(database_, "result", result);
+  put_sealed(database_, "result", result);
   transaction.commit();
 }
 
 std::optional<JobResult> JobStore::result() {
   std::lock_guard lock(mutex_);
-  return find_row<JobResult>(database_, "result");
+  return find_sealed<JobResult>(database_, "result", "the result");
 }
 
 void JobStore::add_stage_time(const StageTime& time) {

@@ -6,7 +6,9 @@
 //   1. A row names an artifact only after the artifact's bytes were synced.
 //   2. Subvolumes form a forest: a split one has its eight parts (those with triangles) as
 //      children; the leaves are what is built.
-//   3. Every subvolume's row carries a checksum; one that fails it is Error{kCorrupt}.
+//   3. Every row that decides the result carries a checksum; one that fails it is Error{kCorrupt}.
+//      Subvolumes are numbered from 1, and the job's row has their number: so is one that is
+//      missing.
 //   4. All rows of one call are committed together or not at all.
 // Thread-safe. One process writes, which the work folder's lock ensures; readers (`voxdag status`)
 // may open the same file at any time. Only the writer's leaves() include what is built but not yet

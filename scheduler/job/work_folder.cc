@@ -32,10 +32,12 @@ std::optional<uint32_t> segment_id(std::string_view name) {
 }
 
 bool is_scratch(const DirectoryEntry& entry) {
-  return !entry.is_directory && (segment_id(entry.name) || entry.name.starts_with("merge-"));
+  return !entry.is_directory && !entry.is_special &&
+         (segment_id(entry.name) || entry.name.starts_with("merge-"));
 }
 
 bool is_ours(const DirectoryEntry& entry) {
+  if (entry.is_special) return false;
   const std::string_view name = entry.name;
   if (entry.is_directory) return name == kScratchName;
   return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
@@ -87,8 +89,23 @@ void WorkFolder::check_is_ours() const {
 
 std::string WorkFolder::holder(FileSystem& files, const std::string& folder) {
   const std::string lock_path = folder + "/" + std::string(kLockName);
-  if (!files.exists(lock_path) || files.try_lock(lock_path)) return "";
+  if (!files.exists(lock_path) || !files.is_locked(lock_path)) return "";
   return read_small_file(files, lock_path, 1 << 12);
+}
+
+std::vector<std::string> WorkFolder::files_in(FileSystem& files, const std::string& folder) {
+  std::vector<std::string> paths;
+  const std::string scratch = folder + "/" + std::string(kScratchName);
+  try {
+    for (const std::string& from : {folder, scratch})
+      for (const DirectoryEntry& entry : files.list(from))
+        if (from == scratch ? is_scratch(entry) : is_ours(entry) && !entry.is_directory)
+          paths.push_back(from + "/" + entry.name);
+  } catch (const Error& error) {
+    // A build that ends removes the folder.
+    if (error.code() != ErrorCode::kNotFound) throw;
+  }
+  return paths;
 }
 
 std::shared_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {

@@ -29,6 +29,8 @@ class WorkFolder {
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
   // The process that has locked the folder: "process 17 on box"; "" if none has.
   static std::string holder(FileSystem& files, const std::string& folder);
+  // The files in a folder that have names of ours: a build there may remove or change them.
+  static std::vector<std::string> files_in(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
   // Triangles that outlive a run.
   std::string durable_path() const { return path_ + "/triangles.vddurable"; }

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <functional>
 #include <mutex>
+#include <set>
 #include <string>
 
 #include "server/api/access/concurrency_limiter.h"
@@ -33,9 +34,12 @@ struct Context {
   ConcurrencyLimiter uploads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter downloads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
-  // Held while a job that uses scenes is added, and while a scene that no job uses is replaced or
-  // removed: neither may happen between the other's check and its change.
+  // Held while a job that uses scenes is added or tried again, and while a scene that no job uses
+  // is replaced or removed: neither may happen between the other's check and its change.
   std::mutex scene_mutex = {};
+  // Uploads that dry runs read, guarded by scene_mutex. They may be replaced, which leaves the old
+  // file to those that read it, but not removed.
+  std::multiset<std::string> planned_scenes = {};
 };
 
 // Throws Problem (404) if there is none.

@@ -32,6 +32,18 @@ std::string links(const std::string& self) {
   return text + ",\"preview\":\"" + self + "/preview.png\"}";
 }
 
+// The members of a stored request, whatever else a damaged record has.
+std::string request_members(const std::string& request) {
+  using nlohmann::ordered_json;
+  const auto stored = ordered_json::parse(request, nullptr, false);
+  ordered_json members = {
+      {"scene", ordered_json::array()}, {"resolution", 0}, {"options", ordered_json::object()}};
+  for (const auto& [name, value] : members.items())
+    if (stored.contains(name)) value = stored[name];
+  const std::string text = json_text(members);
+  return text.substr(1, text.size() - 2);
+}
+
 // `json` is JSON text already.
 std::string or_null(const std::string& json) { return json.empty() ? "null" : json; }
 
@@ -48,10 +60,9 @@ std::string time_text(double unix_s) {
 std::string job_json(const Job& job, const LiveJob* live, uint64_t position,
                      unsigned max_attempts) {
   const std::string progress = live ? live->progress_json() : "";
-  // The request is an object with the members scene, resolution and options: drop its braces.
-  const std::string request = job.request.substr(1, job.request.size() - 2);
   return "{\"id\":\"" + job.id + "\",\"name\":" + as_json(job.name) + ",\"state\":\"" +
-         state_name(job.state) + "\"," + request + ",\"priority\":" + std::to_string(job.priority) +
+         state_name(job.state) + "\"," + request_members(job.request) +
+         ",\"priority\":" + std::to_string(job.priority) +
          ",\"attempts\":" + std::to_string(job.attempts) +
          ",\"max_attempts\":" + std::to_string(max_attempts) +
          ",\"created_at\":" + time_member(job.created_s) +

@@ -17,6 +17,8 @@ std::optional<uint64_t> chunk_size(std::string_view line) {
   if (error != std::errc{}) return {};
   const std::string_view rest = trimmed(line.substr(static_cast<size_t>(end - line.data())));
   if (!rest.empty() && !rest.starts_with(';')) return {};
+  for (const char c : rest)
+    if (static_cast<unsigned char>(c) < ' ' && c != '\t') return {};
   return size;
 }
 

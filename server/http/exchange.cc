@@ -63,7 +63,7 @@ std::string Exchange::read_head(size_t max_bytes) {
         throw Problem(408, "timeout", "the request was sent too slowly");
       throw Problem(431, "headers_too_large", "the header fields are too large");
     }
-    if (text.size() - line_begin > 2) continue;
+    if (std::string_view(text).substr(line_begin) != "\r\n") continue;
     if (line_begin > 0) return text;
     text.clear();  // empty lines before a request are ignored
   }

@@ -35,9 +35,10 @@ void send_busy(int socket) {
 
 class HttpServer::Engine {
  public:
-  Engine(const HttpOptions& options, HttpServer::Handler handler)
+  Engine(const HttpOptions& options, HttpServer::Handler handler, HttpServer::OnRefused on_refused)
       : limits_(options.limits),
         handler_(std::move(handler)),
+        on_refused_(std::move(on_refused)),
         listener_(options.address, options.port),
         table_(limits_) {
     if (!options.certificate_file.empty()) tls_.emplace(options.certificate_file, options.key_file);
@@ -104,9 +105,12 @@ class HttpServer::Engine {
   }
 
   Response respond(Exchange& exchange) {
+    Request* request = nullptr;
     try {
-      return handler_(exchange.read_request(limits_.max_header_bytes));
+      request = &exchange.read_request(limits_.max_header_bytes);
+      return handler_(*request);
     } catch (const Problem& problem) {
+      if (!request) on_refused_(problem.status);
       return problem_response(problem);
     } catch (const std::exception&) {
       return problem_response(Problem(500, "internal", "internal error"));
@@ -115,6 +119,7 @@ class HttpServer::Engine {
 
   const HttpLimits limits_;
   const HttpServer::Handler handler_;
+  const HttpServer::OnRefused on_refused_;
   Listener listener_;
   std::optional<TlsContext> tls_;
   ConnectionTable table_;
@@ -123,8 +128,8 @@ class HttpServer::Engine {
   std::unique_ptr<ThreadPool> threads_ = std::make_unique<ThreadPool>();
 };
 
-HttpServer::HttpServer(const HttpOptions& options, Handler handler)
-    : engine_(std::make_unique<Engine>(options, std::move(handler))) {}
+HttpServer::HttpServer(const HttpOptions& options, Handler handler, OnRefused on_refused)
+    : engine_(std::make_unique<Engine>(options, std::move(handler), std::move(on_refused))) {}
 HttpServer::~HttpServer() = default;
 int HttpServer::port() const { return engine_->port(); }
 size_t HttpServer::connections() const { return engine_->connections(); }

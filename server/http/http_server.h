@@ -23,9 +23,12 @@ class HttpServer {
  public:
   // May throw Problem; any other exception is answered as the problem `internal`.
   using Handler = std::function<Response(Request&)>;
+  // Called with the status of an answer to what is no request that a handler could get.
+  using OnRefused = std::function<void(int status)>;
 
   // Listens, but accepts no connection yet. Throws as Listener and TlsContext do.
-  HttpServer(const HttpOptions& options, Handler handler);
+  HttpServer(
+      const HttpOptions& options, Handler handler, OnRefused on_refused = [](int) {});
   ~HttpServer();
 
   int port() const;

@@ -25,7 +25,7 @@ struct Request {
   HeaderMap headers;
   std::string peer;    // the client's address
   std::string id;      // X-Request-Id of the answer, also in the log
-  std::string caller;  // the name of its token, once access is granted
+  std::string caller;  // the name of its token, once it is known
   std::optional<uint64_t> content_length;
   bool has_body = false;  // a Content-Length above 0, or chunked
 

@@ -59,6 +59,11 @@ void parse_field(std::string_view line, HeaderMap& headers) {
   headers.emplace(line.substr(0, colon), value);
 }
 
+// A request that has one of these twice may mean something else to whoever passed it on.
+constexpr const char* kSingleFields[] = {"Authorization", "Content-Encoding", "Content-Range",
+                                         "Content-Type",  "Idempotency-Key",  "If-Range",
+                                         "Last-Event-ID", "Origin",           "Range"};
+
 // Whether a field that is a list, such as Connection, has this element.
 bool lists(const HeaderMap& headers, std::string_view name, std::string_view element) {
   const auto [begin, end] = headers.equal_range(name);
@@ -99,6 +104,8 @@ RequestHead parse_request_head(std::string_view text) {
     parse_field(line, head.headers);
   const size_t hosts = head.headers.count("Host");
   if (hosts > 1 || (hosts == 0 && !head.is_http_1_0)) throw bad_request("expected one Host header");
+  for (const char* name : kSingleFields)
+    if (head.headers.count(name) > 1) throw bad_request(std::string(name) + ": expected it once");
   parse_framing(head);
   head.expects_continue = !head.is_http_1_0 && lists(head.headers, "Expect", "100-continue");
   head.keep_alive = !head.is_http_1_0 && !lists(head.headers, "Connection", "close");

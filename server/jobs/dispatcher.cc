@@ -19,18 +19,30 @@ constexpr int kPreviewNice = 5;  // on top of the builds'
 constexpr double kMaxSleep_s = 1;
 constexpr double kNoTimeLimit_s = 1e9;
 constexpr double kRetireInterval_s = 300;
-constexpr size_t kMaxRetiredAtOnce = 100;  // so that jobs can start in between
+constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
+constexpr size_t kMaxRetiredAtOnce = 100;   // so that jobs can start in between
 constexpr double kSecondsPerDay = 86400;
-// A clock that is further from where it was expected may be wrong; so long no job is deleted for
-// its age.
-constexpr double kMaxClockStep_s = 3600;
-constexpr double kClockDoubt_s = kSecondsPerDay;
 
 void sleep_s(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
 }
 
 }  // namespace
+
+Dispatcher::FilesLock::FilesLock(Dispatcher& dispatcher, const std::string& id)
+    : dispatcher_(dispatcher), id_(id) {
+  std::unique_lock lock(dispatcher_.mutex_);
+  dispatcher_.files_unlocked_.wait(lock, [&] { return dispatcher_.locked_.insert(id_).second; });
+}
+
+Dispatcher::FilesLock::~FilesLock() {
+  {
+    std::lock_guard lock(dispatcher_.mutex_);
+    dispatcher_.locked_.erase(id_);
+  }
+  dispatcher_.files_unlocked_.notify_all();
+  dispatcher_.queue_.announce();
+}
 
 Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue,
                        TaskResolver& tasks, DiskSpace& disk, Log log, OnRunEnded on_run_ended)
@@ -42,6 +54,7 @@ Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& 
       log_(log),
       on_run_ended_(std::move(on_run_ended)),
       steps_(log, config.before_step),
+      clock_(queue.last_event_s()),
       folders_(config.data_folder + "/jobs", files, queue, steps_, log) {
   if (config_.adopt) folders_.adopt();
   recovered_ = steps_.run("recover the jobs", [this] { recover(); });
@@ -64,7 +77,7 @@ bool Dispatcher::stopping() {
 void Dispatcher::recover() {
   std::set<std::string> running;
   for (const auto& [key, worker] : workers_)
-    if (!worker.done) running.insert(key);
+    if (worker.runs()) running.insert(key);
   for (const Job& job : queue_.recover(running, config_.jobs.max_attempts))
     log_("job " + job.id + " " + state_name(job.state));
 }
@@ -92,10 +105,7 @@ void Dispatcher::dispatch() {
       recovered_ = true;
       start_ready_jobs();
     });
-    steps_.run("finish deletions", [this] {
-      std::lock_guard lock(mutex_);
-      folders_.finish_deletions();
-    });
+    steps_.run("finish deletions", [this] { finish_deletions(); });
     steps_.run("remove old jobs", [this] { retire_old_jobs(); });
     queue_.wait_for_change(seen, kMaxSleep_s);
   }
@@ -123,7 +133,7 @@ void Dispatcher::start_ready_jobs() {
 bool Dispatcher::start_next_job() {
   uint64_t memory = 0;
   size_t running_jobs = 0;
-  std::set<std::string> present;
+  std::set<std::string> present = locked_;
   for (const auto& [key, worker] : workers_) {
     present.insert(key);
     memory += worker.live->memory_bytes();
@@ -146,7 +156,7 @@ bool Dispatcher::start_next_job() {
     return true;
   }
   if (running_jobs > 0 && memory + needed > tasks_.memory_bytes()) return false;
-  if (disk_.available() == 0) return false;
+  if (disk_.is_low()) return false;
   const Job started = queue_.change(job->id, [](Job& j) {
     if (!j.front) ++j.attempts;
     j.front = false;
@@ -255,6 +265,7 @@ void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProces
     if (!queue_.find(job.id)) return;  // it was deleted
     after = queue_.change(
         job.id, [&](Job& j) { apply_outcome(j, live, end, config_.jobs, unix_seconds()); });
+    workers_.at(job.id).recorded = true;
   })) {
     sleep_s(kMaxSleep_s);
     if (stopping()) return;
@@ -262,11 +273,7 @@ void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProces
   if (!after) return;
   log_("job " + job.id + " " + state_name(after->state) +
        (after->error ? ": " + after->error->code : ""));
-  steps_.run("remove the work folder of job " + job.id, [&] {
-    std::lock_guard lock(mutex_);
-    if (after->state == JobState::kCanceled || after->state == JobState::kSucceeded)
-      folders_.remove_work(job.id);
-  });
+  remove_work(job.id);
   on_run_ended_(*after);
 }
 
@@ -291,21 +298,23 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
   if (!recorded) sleep_s(kMaxSleep_s);
 }
 
+void Dispatcher::remove_work(const std::string& id) {
+  steps_.run("remove the work folder of job " + id, [&] {
+    const FilesLock lock(*this, id);
+    const auto job = queue_.find(id);
+    if (job && (job->state == JobState::kCanceled || job->state == JobState::kSucceeded))
+      folders_.remove_work(id);
+  });
+}
+
 // A clock that is wrong for a while must not cost all results.
 double Dispatcher::oldest_retained_s(double now_s) {
-  const double clock_s = unix_seconds(), last_event_s = queue_.last_event_s();
-  const bool jumped = last_clock_s_ > 0
-                          ? clock_s - last_clock_s_ > now_s - last_pass_s_ + kMaxClockStep_s
-                          : last_event_s > 0 && clock_s - last_event_s > kSecondsPerDay;
-  last_clock_s_ = clock_s;
-  last_pass_s_ = now_s;
-  if (jumped) {
-    age_removal_from_s_ = now_s + kClockDoubt_s;
+  const double clock_s = unix_seconds();
+  if (clock_.has_jumped(clock_s, now_s))
     log_(
         "the clock is far ahead of when the service last saw it: for a day no job is deleted for "
         "its age");
-  }
-  if (now_s < age_removal_from_s_) return 0;
+  if (clock_.is_in_doubt(now_s)) return 0;
   return clock_s - config_.retention.finished_days * kSecondsPerDay;
 }
 
@@ -332,19 +341,21 @@ void Dispatcher::retire_old_jobs() {
 }
 
 Job Dispatcher::cancel(const std::string& id) {
-  std::lock_guard lock(mutex_);
-  const auto worker = workers_.find(id);
-  const bool runs = worker != workers_.end() && !worker->second.done;
-  const Job job = queue_.change(id, [&](Job& j) {
-    if (j.state == JobState::kFailed || j.state == JobState::kSucceeded)
-      throw state_conflict(j, "the job has ended");
-    if (j.state == JobState::kCanceling || j.state == JobState::kCanceled) return;
-    j.state = runs ? JobState::kCanceling : JobState::kCanceled;
-    if (!runs) j.finished_s = unix_seconds();
-  });
-  if (runs && job.state == JobState::kCanceling) worker->second.live->stop();
-  if (job.state == JobState::kCanceled)
-    steps_.run("remove the work folder of job " + id, [&] { folders_.remove_work(id); });
+  Job job;
+  {
+    std::lock_guard lock(mutex_);
+    const auto worker = workers_.find(id);
+    const bool runs = worker != workers_.end() && worker->second.runs();
+    job = queue_.change(id, [&](Job& j) {
+      if (j.state == JobState::kFailed || j.state == JobState::kSucceeded)
+        throw state_conflict(j, "the job has ended");
+      if (j.state == JobState::kCanceling || j.state == JobState::kCanceled) return;
+      j.state = runs ? JobState::kCanceling : JobState::kCanceled;
+      if (!runs) j.finished_s = unix_seconds();
+    });
+    if (runs && job.state == JobState::kCanceling) worker->second.live->stop();
+  }
+  if (job.state == JobState::kCanceled) remove_work(id);
   return job;
 }
 
@@ -372,7 +383,7 @@ Job Dispatcher::resume(const std::string& id) {
 }
 
 Job Dispatcher::retry(const std::string& id) {
-  std::lock_guard lock(mutex_);  // no deletion has begun
+  std::lock_guard lock(mutex_);  // no deletion begins
   return queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kRunning) return;
     if (j.state != JobState::kQueued && j.state != JobState::kFailed &&
@@ -380,6 +391,8 @@ Job Dispatcher::retry(const std::string& id) {
       throw state_conflict(j, "expected a job that failed or was canceled");
     j.not_before_s = 0;
     if (j.state == JobState::kQueued) return;
+    if (folders_.is_marked(id))
+      throw state_conflict(j, "the deletion of this job has begun: delete it again to end that");
     j.state = JobState::kQueued;
     j.attempts = j.interruptions = 0;
     j.front = false;
@@ -388,9 +401,39 @@ Job Dispatcher::retry(const std::string& id) {
 }
 
 void Dispatcher::remove(const std::string& id) {
-  std::lock_guard lock(mutex_);
-  queue_.check_removable(id);
-  folders_.remove(id);
+  const FilesLock files_lock(*this, id);
+  {
+    std::lock_guard lock(mutex_);  // no retry
+    queue_.check_removable(id);
+    folders_.mark(id);
+  }
+  try {
+    folders_.remove_marked(id);
+  } catch (...) {
+    std::lock_guard lock(mutex_);
+    next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+    throw;
+  }
+}
+
+void Dispatcher::finish_deletions() {
+  {
+    std::lock_guard lock(mutex_);
+    if (wall_seconds() < next_deletions_s_) return;
+    next_deletions_s_ = HUGE_VAL;
+  }
+  for (const std::string& id : folders_.marked()) {
+    {
+      std::lock_guard lock(mutex_);
+      if (locked_.contains(id)) continue;  // a client deletes it just now
+    }
+    const bool finished = steps_.run("delete job " + id, [&] {
+      const FilesLock lock(*this, id);
+      folders_.finish_deletion(id);
+    });
+    std::lock_guard lock(mutex_);
+    if (!finished) next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+  }
 }
 
 std::shared_ptr<LiveJob> Dispatcher::live(const std::string& id) const {

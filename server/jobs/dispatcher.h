@@ -10,13 +10,16 @@
 // handled fails, a folder that cannot be is left alone, and all else continues.
 #pragma once
 
+#include <condition_variable>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 
+#include "server/clock_guard.h"
 #include "server/config.h"
 #include "server/disk_space.h"
 #include "server/jobs/job_folders.h"
@@ -48,7 +51,8 @@ class Dispatcher {
   Job suspend(const std::string& id);
   Job resume(const std::string& id);
   Job retry(const std::string& id);
-  // Deletes the files first, so that a full disk can be emptied.
+  // Deletes the files first, so that a full disk can be emptied. What is interrupted then is
+  // finished later; until then the job cannot be tried again.
   void remove(const std::string& id);
 
   // Null unless the job's process runs.
@@ -60,13 +64,32 @@ class Dispatcher {
   struct Worker {
     std::shared_ptr<LiveJob> live;
     std::thread thread;
+    bool recorded = false;  // what became of the job
     bool done = false;
+    // Whether it will still record what becomes of the job.
+    bool runs() const { return !recorded && !done; }
+  };
+  // Keeps the files of a job that has ended for one thread that removes them: other removals wait,
+  // and the job does not start if it is tried again.
+  class FilesLock {
+   public:
+    FilesLock(Dispatcher& dispatcher, const std::string& id);
+    ~FilesLock();
+    FilesLock(const FilesLock&) = delete;
+
+   private:
+    Dispatcher& dispatcher_;
+    const std::string id_;
   };
 
   bool stopping();
   // Puts jobs in order that a crash, or a queue that could not be written, left behind.
   void recover();
   void retire_old_jobs();
+  // Finishes deletions that a crash or an error has interrupted.
+  void finish_deletions();
+  // If the job needs its work folder no more.
+  void remove_work(const std::string& id);
   // The time from which on ended jobs are not too old.
   double oldest_retained_s(double now_s);
 
@@ -96,11 +119,16 @@ class Dispatcher {
   const Log log_;
   const OnRunEnded on_run_ended_;
   Steps steps_;
+  ClockGuard clock_;  // used by the thread that starts jobs
 
-  // Guards all below; held while a job's state and process change together.
+  // Guards all below; held while a job's state and process change together, and not while files
+  // are removed.
   mutable std::mutex mutex_;
   JobFolders folders_;
   std::map<std::string, Worker> workers_;  // by job; the one named "preview" draws a picture
+  std::set<std::string> locked_;           // jobs of which a FilesLock exists
+  std::condition_variable files_unlocked_;
+  double next_deletions_s_ = 0;  // in wall_seconds(); infinite if there is nothing to finish
   bool stops_ = false;
   bool recovered_ = false;
 
@@ -109,10 +137,7 @@ class Dispatcher {
   std::map<std::string, std::shared_ptr<LiveJob>> live_;  // by job
 
   // Used by the thread that starts jobs alone.
-  double next_retirement_s_ = 0;   // like the next two in wall_seconds()
-  double age_removal_from_s_ = 0;  // no job is deleted for its age before
-  double last_pass_s_ = 0;         // when the clock was last looked at,
-  double last_clock_s_ = 0;        // and what it showed
+  double next_retirement_s_ = 0;  // in wall_seconds()
   std::thread thread_;
 };
 

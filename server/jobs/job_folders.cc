@@ -1,17 +1,12 @@
 #include "server/jobs/job_folders.h"
 
-#include <cmath>
-
 #include "core/base/clock.h"
-#include "server/data_folder.h"
 #include "server/jobs/process/job_process.h"
 #include "server/jobs/process/job_task.h"
 #include "server/jobs/task_resolver.h"
 
 namespace voxdag::server {
 namespace {
-
-constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
 
 bool is_job_id(const std::string& name) {
   return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
@@ -71,36 +66,34 @@ void JobFolders::clean_up() {
 
 void JobFolders::remove_work(const std::string& id) { remove_tree(files_, of(id).work()); }
 
-void JobFolders::remove(const std::string& id) {
-  try {
-    try_to_remove(id);
-  } catch (...) {
-    next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
-    throw;
-  }
+void JobFolders::mark(const std::string& id) {
+  const std::string path = of(id).path;
+  if (!files_.exists(path)) return;
+  remove_tree(files_, path + kDeleted);
+  files_.rename(path, path + kDeleted);
 }
 
-void JobFolders::finish_deletions() {
-  if (wall_seconds() < next_deletions_s_) return;
-  const auto entries = files_.list(path_);
-  next_deletions_s_ = HUGE_VAL;
-  for (const DirectoryEntry& entry : entries) {
-    const std::string id = marked_job(entry);
-    if (!id.empty()) steps_.run("delete job " + id, [&] { remove(id); });
-  }
+std::vector<std::string> JobFolders::marked() const {
+  std::vector<std::string> ids;
+  for (const DirectoryEntry& entry : files_.list(path_))
+    if (const std::string id = marked_job(entry); !id.empty()) ids.push_back(id);
+  return ids;
 }
 
-void JobFolders::try_to_remove(const std::string& id) {
-  const std::string path = of(id).path, marked = path + kDeleted;
-  if (queue_.find(id)) queue_.check_removable(id);
-  if (files_.exists(path)) {
-    remove_tree(files_, marked);
-    files_.rename(path, marked);
-    files_.sync_directory(path_);
-  }
+void JobFolders::remove_marked(const std::string& id) {
+  const std::string marked = of(id).path + kDeleted;
+  files_.sync_directory(path_);
   remove_entries(files_, marked);
   if (queue_.find(id)) queue_.remove(id);
   remove_tree(files_, marked);
+  log_("job " + id + " deleted");
+}
+
+void JobFolders::finish_deletion(const std::string& id) {
+  const auto job = queue_.find(id);
+  if (!job || (has_ended(job->state) && !files_.exists(of(id).path))) return remove_marked(id);
+  remove_tree(files_, of(id).path + kDeleted);
+  log_("job " + id + ": what an interrupted deletion left was removed, the job stays");
 }
 
 }  // namespace voxdag::server

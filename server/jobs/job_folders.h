@@ -1,13 +1,16 @@
-// The folders of jobs, DATA/jobs/ID: which job each belongs to, and their deletion. Not
-// thread-safe, but for of().
+// The folders of jobs, DATA/jobs/ID: which job each belongs to, and their deletion. Thread-safe for
+// different jobs.
 //
-// A deletion renames the folder, then removes its files, the job's record and the renamed folder: a
-// crash in between loses neither, and a full disk can be emptied. Only what such a deletion has
-// marked is removed; a folder without a record stays, since the queue may be an old one.
+// A deletion marks the folder by renaming it, then removes its files, the job's record and the
+// renamed folder: a crash in between loses neither, and a full disk can be emptied. Only what such
+// a deletion has marked is removed; a folder without a record stays, since the queue may be an old
+// one.
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "server/data_folder.h"
 #include "server/jobs/process/job_folder.h"
 #include "server/queue/job_queue.h"
 #include "server/steps.h"
@@ -26,20 +29,24 @@ class JobFolders {
   // Removes the work folders of jobs that need them no more.
   void clean_up();
   void remove_work(const std::string& id);
-  // Deletes a job and its files. What a crash or a full disk interrupts is finished by
-  // finish_deletions().
-  void remove(const std::string& id);
-  void finish_deletions();
+  // Marks the folder of a job, if it has one: from now on the job is being deleted. Little work,
+  // but for what an earlier deletion left under that name.
+  void mark(const std::string& id);
+  bool is_marked(const std::string& id) const { return files_.exists(of(id).path + kDeleted); }
+  std::vector<std::string> marked() const;
+  // Removes what mark() has marked and the job's record. Throws RequestError{kConflict} if the job
+  // has not ended.
+  void remove_marked(const std::string& id);
+  // The same for a deletion that a crash or an error has interrupted. The job stays if it has not
+  // ended, or has another folder by now.
+  void finish_deletion(const std::string& id);
 
  private:
-  void try_to_remove(const std::string& id);
-
   const std::string path_;
   FileSystem& files_;
   JobQueue& queue_;
   Steps& steps_;
   const Log log_;
-  double next_deletions_s_ = 0;  // in wall_seconds(); infinite if no folder is marked
 };
 
 }  // namespace voxdag::server

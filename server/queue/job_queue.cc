@@ -412,10 +412,10 @@ std::vector<Job> JobQueue::recover(const std::set<std::string>& running, unsigne
 
 std::vector<std::string> JobQueue::expired(double finished_before_s, uint64_t max_count) {
   std::lock_guard lock(read_mutex_);
-  auto rows = reader_.prepare("SELECT id FROM job WHERE " + kEnded +
-                              " AND (finished_s < ? OR number <= coalesce((SELECT number FROM job "
-                              "WHERE " +
-                              kEnded + " ORDER BY number DESC LIMIT 1 OFFSET ?), 0))");
+  auto rows = reader_.prepare(
+      "SELECT id FROM (SELECT id, finished_s, row_number() OVER (PARTITION BY posted_by "
+      "ORDER BY finished_s DESC, number DESC) AS place FROM job WHERE " +
+      kEnded + ") WHERE finished_s < ? OR place > ? ORDER BY finished_s");
   rows.bind(0, finished_before_s).bind(1, static_cast<int64_t>(max_count));
   std::vector<std::string> ids;
   while (rows.step()) ids.push_back(rows.text(0));

@@ -81,8 +81,8 @@ class JobQueue {
   // further runs is an attempt, and after `max_attempts` of them it has failed: it may be what
   // ended the service. Returns the jobs that have ended.
   std::vector<Job> recover(const std::set<std::string>& running, unsigned max_attempts);
-  // Ended jobs that finished before `finished_before_s`, or are not among the newest
-  // `max_count`.
+  // Ended jobs that finished before `finished_before_s`, or are not among the `max_count` that
+  // finished last of those with the same poster: nobody's jobs make those of others expire.
   std::vector<std::string> expired(double finished_before_s, uint64_t max_count);
 
   // When the last change of a state was recorded; 0 for never.

@@ -65,12 +65,14 @@ bool is_scene_name(std::string_view name) {
   return name.ends_with(".glb") || name.ends_with(".gltf");
 }
 
-std::string file_sha256(FileSystem& files, const std::string& path, uint64_t size) {
+std::string file_sha256(FileSystem& files, const std::string& path, uint64_t size,
+                        const std::function<void()>& check) {
   constexpr uint64_t kPieceBytes = 256 << 10;
   const auto file = files.open_read(path);
   Sha256 digest;
   std::vector<std::byte> piece;
   for (uint64_t at = 0; at < size; at += piece.size()) {
+    check();
     piece.resize(std::min(kPieceBytes, size - at));
     file->read_at(at, piece);
     digest.add(piece);
@@ -78,13 +80,20 @@ std::string file_sha256(FileSystem& files, const std::string& path, uint64_t siz
   return digest.finish();
 }
 
-SceneStore::SceneStore(FileSystem& files, const std::string& folder, bool adopt)
+SceneStore::SceneStore(FileSystem& files, const std::string& folder, Log log, bool adopt)
     : files_(files),
       folder_(make_folders(files, folder)),
+      log_(std::move(log)),
       database_(
           open_database(folder + "/scenes.db", adopt || (!has_entries(files, folder + "/files") &&
                                                          !has_entries(files, folder + "/parts")))),
       file_(folder + "/scenes.db") {
+  finish_all_publishing();
+  finish_removals();
+  if (adopt) adopt_scenes();
+}
+
+void SceneStore::finish_all_publishing() {
   struct Finished {
     std::string name, sha256;
     uint64_t size;
@@ -96,30 +105,42 @@ SceneStore::SceneStore(FileSystem& files, const std::string& folder, bool adopt)
   for (const Finished& f : finished) {
     try {
       finish_publishing(f.name, f.size, f.sha256);
-    } catch (const Error&) {
-      drop_upload(f.name);  // the client uploads it again
+    } catch (const Error& error) {
+      log_("scene " + f.name + ": failed to finish its upload: " + error.message());
+      if (error.is_corruption()) drop_upload(f.name);  // the client uploads it again
     }
   }
-  finish_removals();
-  if (adopt) adopt_scenes();
 }
 
 void SceneStore::finish_removals() {
   for (const DirectoryEntry& entry : files_.list(folder_ + "/files")) {
-    if (!entry.name.ends_with(kDeleted)) continue;
+    if (entry.is_directory || !entry.name.ends_with(kDeleted)) continue;
     const std::string name = entry.name.substr(0, entry.name.size() - strlen(kDeleted));
+    if (!is_scene_name(name)) continue;
     try {
-      if (is_scene_name(name)) remove(name);
-    } catch (const std::exception&) {
-      // It is tried again.
+      const NameLock lock(*this, name);
+      drop_scene(name);
+      log_("scene " + name + ": finished a deletion that was interrupted");
+    } catch (const RequestError&) {
+      // It is being uploaded; it is tried again.
+    } catch (const std::exception& error) {
+      log_("scene " + name + ": failed to finish its deletion: " + error.what());
     }
   }
 }
 
 void SceneStore::adopt_scenes() {
-  for (const DirectoryEntry& entry : files_.list(folder_ + "/files"))
-    if (!entry.is_directory && is_scene_name(entry.name) && !find(entry.name))
-      put_scene(entry.name, entry.bytes, file_sha256(files_, path(entry.name), entry.bytes));
+  for (const DirectoryEntry& entry : files_.list(folder_ + "/files")) {
+    if (entry.is_directory || !is_scene_name(entry.name)) continue;
+    if (find(entry.name).value_or(Scene{}).complete) continue;
+    put_scene(entry.name, entry.bytes, file_sha256(files_, path(entry.name), entry.bytes));
+    log_("scene " + entry.name + " adopted");
+  }
+  for (const DirectoryEntry& entry : files_.list(folder_ + "/parts")) {
+    if (entry.is_directory || !is_scene_name(entry.name) || upload(entry.name)) continue;
+    record(entry.name, {});  // nobody knows how much of it was synced
+    log_("scene " + entry.name + ": adopted its unfinished upload, which starts over");
+  }
 }
 
 std::optional<Scene> SceneStore::find(const std::string& name) {
@@ -160,35 +181,53 @@ std::optional<UploadState> SceneStore::upload(const std::string& name) {
 
 bool SceneStore::remove(const std::string& name) {
   const NameLock lock(*this, name);
-  const std::string marked = path(name) + kDeleted;
+  check_file();
   const bool found = find(name).has_value();
   if (files_.exists(path(name))) {
-    files_.rename(path(name), marked);
-    files_.create(marked)->close();  // frees its space
+    files_.rename(path(name), marked_path(name));
+    files_.create(marked_path(name))->close();  // frees its space
   }
   drop_upload(name);
-  {
-    std::lock_guard database_lock(mutex_);
+  drop_scene(name);
+  return found;
+}
+
+void SceneStore::drop_scene(const std::string& name) {
+  check_file();
+  if (!files_.exists(path(name))) {
+    std::lock_guard lock(mutex_);
     SqlTransaction transaction(database_);
     database_.prepare("DELETE FROM scene WHERE name = ?").bind(0, name).run();
     transaction.commit();
   }
-  if (files_.exists(marked)) files_.remove(marked);
-  return found;
+  if (files_.exists(marked_path(name))) files_.remove(marked_path(name));
+}
+
+double SceneStore::last_change_s() {
+  std::lock_guard lock(mutex_);
+  auto row = database_.prepare(
+      "SELECT max(s) FROM (SELECT modified_s AS s FROM scene UNION ALL SELECT updated_s FROM "
+      "upload)");
+  return row.step() ? row.real(0) : 0;
 }
 
 void SceneStore::remove_stale_uploads(double before_s) {
-  std::vector<std::string> names;
-  {
+  const auto stale = [&](const std::string& pattern) {
     std::lock_guard lock(mutex_);
-    auto rows = database_.prepare("SELECT name FROM upload WHERE updated_s < ?");
-    rows.bind(0, before_s);
+    auto rows = database_.prepare("SELECT name FROM upload WHERE updated_s < ? AND name GLOB ?");
+    rows.bind(0, before_s).bind(1, pattern);
+    std::vector<std::string> names;
     while (rows.step()) names.push_back(rows.text(0));
-  }
-  for (const std::string& name : names) {
+    return names;
+  };
+  for (const std::string& name : stale("*")) {
     try {
       const NameLock lock(*this, name);
+      if (stale(name).empty()) continue;  // a part has just arrived
+      check_file();
       drop_upload(name);
+      log_("scene " + name +
+           ": removed its unfinished upload, to which nothing was added for long");
     } catch (const RequestError&) {
       // It is being uploaded.
     }
@@ -208,6 +247,7 @@ SceneStore::NameLock::~NameLock() {
 }
 
 void SceneStore::record(const std::string& name, const UploadState& state) {
+  check_file();
   std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
   database_.prepare("INSERT OR REPLACE INTO upload VALUES (?, ?, ?, '', ?)")
@@ -220,32 +260,51 @@ void SceneStore::record(const std::string& name, const UploadState& state) {
 }
 
 void SceneStore::publish(const std::string& name, uint64_t size, const std::string& sha256) {
-  std::lock_guard lock(mutex_);
-  SqlTransaction transaction(database_);
-  database_.prepare("UPDATE upload SET sha256 = ?, offset = ? WHERE name = ?")
-      .bind(0, sha256)
-      .bind_word(1, size)
-      .bind(2, name)
-      .run();
-  transaction.commit();
-  finish_publishing(name, size, sha256);
+  check_file();
+  check_part(name, size);
+  {
+    std::lock_guard lock(mutex_);
+    SqlTransaction transaction(database_);
+    database_.prepare("UPDATE upload SET sha256 = ?, offset = ? WHERE name = ?")
+        .bind(0, sha256)
+        .bind_word(1, size)
+        .bind(2, name)
+        .run();
+    transaction.commit();
+  }
+  // What a deletion that failed halfway left is not this scene.
+  if (files_.exists(marked_path(name))) files_.remove(marked_path(name));
+  move_into_place(name, size, sha256);
 }
 
 void SceneStore::finish_publishing(const std::string& name, uint64_t size,
                                    const std::string& sha256) {
-  if (files_.exists(part_path(name))) {
-    if (files_.open_read(part_path(name))->size() != size)
-      throw Error(ErrorCode::kCorrupt, part_path(name) + ": expected " + std::to_string(size) +
-                                           " bytes; the file was changed during the upload");
-    files_.rename(part_path(name), path(name));
-    files_.sync_directory(folder_ + "/files");
-  } else if (!files_.exists(path(name)) || file_sha256(files_, path(name), size) != sha256) {
-    throw Error(ErrorCode::kCorrupt, part_path(name) + ": the file was removed during the upload");
+  const bool moved = !files_.exists(part_path(name)) && files_.exists(path(name));
+  if (moved && file_sha256(files_, path(name), size) == sha256) {
+    put_scene(name, size, sha256);
+    return;
   }
+  check_part(name, size);
+  move_into_place(name, size, sha256);
+}
+
+void SceneStore::check_part(const std::string& name, uint64_t size) {
+  if (!files_.exists(part_path(name)))
+    throw Error(ErrorCode::kCorrupt, part_path(name) + ": the file was removed during the upload");
+  if (files_.open_read(part_path(name))->size() != size)
+    throw Error(ErrorCode::kCorrupt, part_path(name) + ": expected " + std::to_string(size) +
+                                         " bytes; the file was changed during the upload");
+}
+
+void SceneStore::move_into_place(const std::string& name, uint64_t size,
+                                 const std::string& sha256) {
+  files_.rename(part_path(name), path(name));
+  files_.sync_directory(folder_ + "/files");
   put_scene(name, size, sha256);
 }
 
 void SceneStore::put_scene(const std::string& name, uint64_t size, const std::string& sha256) {
+  std::lock_guard lock(mutex_);
   SqlTransaction transaction(database_);
   database_.prepare("INSERT OR REPLACE INTO scene VALUES (?, ?, ?, ?)")
       .bind(0, name)

@@ -6,9 +6,12 @@
 //   2. The recorded offset of an upload counts synced bytes only: a power cut loses what came
 //      after, and the client continues from that offset.
 //   3. One request at a time writes to an upload.
+//   4. What is marked as deleted is what is deleted, not what came in its place.
+//   5. Nothing is recorded in a database that is gone.
 // Thread-safe. Callers check names with is_scene_name().
 #pragma once
 
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -18,6 +21,7 @@
 #include "core/db/sqlite.h"
 #include "core/io/file_system.h"
 #include "server/data_folder.h"
+#include "server/steps.h"
 
 namespace voxdag::server {
 
@@ -41,8 +45,9 @@ struct UploadState {
 class SceneStore {
  public:
   // Finishes what a crash interrupted. Throws Error{kInvalidInput} if there are scenes but no
-  // records of them, unless it may adopt them: then they get new ones.
-  SceneStore(FileSystem& files, const std::string& folder, bool adopt = false);
+  // records of them, unless it may adopt them: then they get new ones, and unfinished uploads start
+  // over.
+  SceneStore(FileSystem& files, const std::string& folder, Log log, bool adopt = false);
 
   std::optional<Scene> find(const std::string& name);
   // The first scenes whose names follow `after`, in the order of names.
@@ -54,6 +59,8 @@ class SceneStore {
   bool remove(const std::string& name);
   // Finishes removals that a crash or a full disk interrupted.
   void finish_removals();
+  // When the newest of the records was made (Unix time); 0 without any.
+  double last_change_s();
   // Removes uploads that received nothing since `before_s` (Unix time).
   void remove_stale_uploads(double before_s);
   std::string path(const std::string& name) const { return folder_ + "/files/" + name; }
@@ -77,25 +84,33 @@ class SceneStore {
   };
 
   std::string part_path(const std::string& name) const { return folder_ + "/parts/" + name; }
+  std::string marked_path(const std::string& name) const { return path(name) + kDeleted; }
   void record(const std::string& name, const UploadState& state);
   // Records the digest of a finished upload, then renames it to its final path.
   void publish(const std::string& name, uint64_t size, const std::string& sha256);
-  // The rest of publish(), which a crash may have interrupted. Throws Error{kCorrupt} if the bytes
-  // are gone.
+  // The rest of publish(), which a crash interrupted. Throws Error{kCorrupt} if the bytes are gone.
   void finish_publishing(const std::string& name, uint64_t size, const std::string& sha256);
+  void check_part(const std::string& name, uint64_t size);
+  void move_into_place(const std::string& name, uint64_t size, const std::string& sha256);
   void drop_upload(const std::string& name);
+  // Removes what is marked as deleted, and the record of the scene unless another file has come.
+  void drop_scene(const std::string& name);
   void put_scene(const std::string& name, uint64_t size, const std::string& sha256);
+  void finish_all_publishing();
   void adopt_scenes();
 
   FileSystem& files_;
   const std::string folder_;
+  const Log log_;
   std::mutex mutex_;  // guards all below
   SqlDatabase database_;
   const NamedFile file_;
   std::set<std::string> busy_;  // names that a request writes to
 };
 
-// The SHA-256 of the first `size` bytes of a file.
-std::string file_sha256(FileSystem& files, const std::string& path, uint64_t size);
+// The SHA-256 of the first `size` bytes of a file. Calls `check` often, which may throw to stop it.
+std::string file_sha256(
+    FileSystem& files, const std::string& path, uint64_t size,
+    const std::function<void()>& check = [] {});
 
 }  // namespace voxdag::server

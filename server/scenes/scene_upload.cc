@@ -49,7 +49,12 @@ SceneUpload::SceneUpload(SceneStore& store, std::string name, uint64_t first,
 
 SceneUpload::~SceneUpload() {
   try {
-    if (!done_ && file_) checkpoint();
+    if (done_ || !file_) return;
+    flush();
+    if (offset_ > 0)
+      checkpoint();
+    else
+      store_.drop_upload(name_);
   } catch (const std::exception&) {
     // The record still has an earlier offset, which is valid too.
   }
@@ -83,7 +88,7 @@ void SceneUpload::checkpoint() {
 }
 
 bool SceneUpload::finish(const std::string& part_digest, const std::string& whole_digest,
-                         bool is_last) {
+                         bool is_last, const std::function<void()>& check) {
   flush();
   const std::string part = digest_.finish();
   if (!part_digest.empty() && part_digest != part) {
@@ -95,15 +100,12 @@ bool SceneUpload::finish(const std::string& part_digest, const std::string& whol
     throw RequestError(RequestError::Kind::kInvalid,
                        "the part's bytes have another SHA-256 than Content-Digest says");
   }
-  if (!is_last) {
-    checkpoint();
-    done_ = true;
-    return false;
-  }
-  file_->sync();
-  sha256_ = first_ == 0 ? part : file_sha256(store_.files_, store_.part_path(name_), offset_);
+  checkpoint();
+  done_ = true;
+  if (!is_last) return false;
+  sha256_ =
+      first_ == 0 ? part : file_sha256(store_.files_, store_.part_path(name_), offset_, check);
   if (!whole_digest.empty() && whole_digest != sha256_) {
-    done_ = true;
     store_.drop_upload(name_);
     throw RequestError(RequestError::Kind::kInvalid,
                        "the scene's bytes have another SHA-256 than Repr-Digest says");
@@ -113,7 +115,6 @@ bool SceneUpload::finish(const std::string& part_digest, const std::string& whol
 
 std::string SceneUpload::publish() {
   file_->close();
-  done_ = true;
   try {
     store_.publish(name_, offset_, sha256_);
   } catch (const Error& error) {

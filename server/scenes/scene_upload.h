@@ -1,7 +1,9 @@
 // One request's part of an upload, written as it arrives. What arrived is recorded unless its
-// digest was wrong, so that the client can continue from there. Used by one thread.
+// digest was wrong, so that the client can continue from there; an upload of which nothing arrived
+// leaves nothing. Used by one thread.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,8 +29,12 @@ class SceneUpload {
 
   // The part is complete; its digest must be `part_digest` ("" for any). Returns true if it was the
   // last one: then the scene has `whole_digest` ("" for any) and waits for publish(). Throws
-  // RequestError{kInvalid} on a mismatch, and discards the part or the whole scene.
-  bool finish(const std::string& part_digest, const std::string& whole_digest, bool is_last);
+  // RequestError{kInvalid} on a mismatch, and discards the part or the whole scene. Calls `check`
+  // often while it reads the scene; what that throws leaves an upload without missing bytes, which
+  // an empty part finishes later, as it does if publish() is not called.
+  bool finish(
+      const std::string& part_digest, const std::string& whole_digest, bool is_last,
+      const std::function<void()>& check = [] {});
   // Makes the scene complete, in place of an earlier one. Returns its SHA-256.
   std::string publish();
 

@@ -1,4 +1,7 @@
 // Defects that an attack on the program found; each test is named for the entry of the report.
+#include <sys/stat.h>
+
+#include <cstdlib>
 #include <filesystem>
 
 #include "tests/cli/command_line.h"
@@ -106,6 +109,30 @@ TEST_F(Hardening, L6_ABuildRefusesToOverwriteItsNeighbors) {
   run_json({"build", "m.glb", "-r", "128", "-o", "q"});
 }
 
+// What is no file is invalid input, whichever command reads it.
+TEST_F(Hardening, N9_InputsThatAreNoFilesHaveOneStatus) {
+  build();
+  ASSERT_EQ(mkfifo(folder_.file("pipe").c_str(), 0600), 0);
+  std::filesystem::create_directory(folder_.file("folder"));
+  for (const std::string name : {"pipe", "folder"})
+    for (const std::vector<std::string>& args :
+         std::vector<std::vector<std::string>>{{"build", name, "-r", "64", "-o", "x.vdag"},
+                                               {"info", name},
+                                               {"verify", name},
+                                               {"diff", "m.vdag", name},
+                                               {"render", name, "-o", "x.png"}}) {
+      SCOPED_TRACE(args[0]);
+      expect_error(2, name + " is not a regular file", args);
+    }
+}
+
+// A folder that is missing is noticed before the work is done.
+TEST_F(Hardening, N9_AMissingOutputFolderIsNoticedFirst) {
+  build();
+  expect_error(3, "there is no folder none", {"generate", "menger", "none/x.glb", "--level", "1"});
+  expect_error(3, "there is no folder none", {"render", "m.vdag", "-o", "none/x.png"});
+}
+
 // Numbers mean what is written, and an error is one line that says what was expected.
 TEST_F(Hardening, L8_NumbersAndMessages) {
   const std::vector<std::string> build = {"build", "m.glb", "-o", "m.vdag", "-r"};
@@ -170,6 +197,20 @@ TEST_F(Hardening, PlanNeedsNoTmpdir) {
     const Answer plan = run({"plan", "m.glb", "-r", "256"});
     unsetenv("TMPDIR");
     EXPECT_EQ(plan.status, 0) << plan.err;
+  }
+}
+
+// What cannot be written to the standard output is an error, not an empty file and a success.
+TEST_F(Hardening, OutputThatCannotBeWrittenIsAnError) {
+  build();
+  for (const char* command :
+       {"info m.vdag --json", "--version", "verify m.vdag", "token --role read --name me"}) {
+    SCOPED_TRACE(command);
+    const std::string line =
+        "cd " + folder_.path() + " && " VOXDAG_BINARY " " + command + " > /dev/full 2> errors";
+    const int status = std::system(line.c_str());
+    EXPECT_NE(status, 0);
+    EXPECT_NE(contents("errors").find("standard output"), std::string::npos);
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <random>
@@ -97,7 +98,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
       } catch (...) {
         _exit(1);
       }
-      _exit(0);
+      std::fflush(stdout);  // what an EXPECT of the child has reported
+      _exit(HasFailure() ? 1 : 0);
     }
     if (after.count() > 0) {
       std::this_thread::sleep_for(after);

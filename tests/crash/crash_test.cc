@@ -99,8 +99,8 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   const BuildReport whole = build(one, counting);
   ASSERT_GT(whole.artifact_bytes, uint64_t{4} << 20) << "fewer than four writes of a segment";
   std::filesystem::remove(output());
-  // Five operations come before the segment's first MiB; the fourth MiB fails.
-  FaultyFiles files({Fault::kNoSpace, 9});
+  // Three operations come before the segment's first MiB; the fourth MiB fails.
+  FaultyFiles files({Fault::kNoSpace, 7});
   EXPECT_THROW(build(one, files), voxdag::Error);
   const BuildReport report = build(one, voxdag::system_files());
   EXPECT_GT(report.subvolumes_reused, 0u);

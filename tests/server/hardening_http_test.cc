@@ -125,5 +125,43 @@ TEST_F(HardeningHttp, L8_TwoHostsAreRejected) {
           .starts_with("HTTP/1.1 400 "));
 }
 
+// Readiness is asked for by several at once, and by anybody.
+TEST_F(HardeningHttp, ReadinessDoesNotDependOnWhoElseAsks) {
+  config_.transfers.max_requests_per_s = 0;
+  start();
+  std::string requests;
+  for (int i = 0; i < 40; ++i) requests += "GET /readyz HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  requests += "GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+  std::vector<std::string> answers(6);
+  std::vector<std::thread> clients;
+  for (std::string& answer : answers)
+    clients.emplace_back([&, this] { answer = raw_exchange(port(), requests); });
+  for (std::thread& client : clients) client.join();
+  for (const std::string& answer : answers) {
+    EXPECT_EQ(answer.find("HTTP/1.1 503"), std::string::npos);
+    EXPECT_NE(answer.find("{\"status\":\"ready\"}"), std::string::npos);
+  }
+}
+
+// What is refused before it is a request is counted as well.
+TEST_F(HardeningHttp, MalformedRequestsAreCounted) {
+  start();
+  raw_exchange(port(), "hello\r\n\r\n");
+  EXPECT_NE(http_->get("/metrics").body.find("voxdag_http_requests_total{status=\"400\"} 1"),
+            std::string::npos);
+}
+
+// HEAD has no ranges.
+TEST_F(HardeningHttp, HeadIgnoresRanges) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 64}});
+  ASSERT_TRUE(until_state(id, "succeeded"));
+  EXPECT_TRUE(raw_exchange(port(), "HEAD /api/v1/jobs/" + id +
+                                       "/dag HTTP/1.1\r\nHost: localhost\r\nRange: bytes=0-3\r\n"
+                                       "Connection: close\r\n\r\n")
+                  .starts_with("HTTP/1.1 200"));
+}
+
 }  // namespace
 }  // namespace voxdag::server

@@ -292,7 +292,7 @@ TEST_F(Hardening, M6_APlanEndsWithItsClient) {
   const std::string request =
       "POST /api/v1/jobs?dry_run=true HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
       "application/json\r\nContent-Length: " +
-      std::to_string(body.size()) + "\r\n\r\n" + body;
+      std::to_string(body.size()) + "\r\n\r\n" + body + "G";  // the begin of another request
   ASSERT_EQ(send(socket, request.data(), request.size(), MSG_NOSIGNAL),
             static_cast<ssize_t>(request.size()));
   const auto plans = [&] {

@@ -35,6 +35,14 @@ TEST_F(Hostile, MalformedRequestsAreRejected) {
                    "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n"),
             400);
   EXPECT_EQ(status("GET /" + std::string(9000, 'a') + " HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
+  EXPECT_EQ(status("a\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 400);
+  EXPECT_EQ(status("\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
+  for (const std::string field : {"Authorization: Bearer a", "Content-Range: bytes 0-4/5",
+                                  "Idempotency-Key: a", "Range: bytes=0-1", "Origin: a"})
+    EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: localhost\r\n" + field + "\r\n" + field +
+                     "\r\n\r\n"),
+              400)
+        << field;
   std::string many = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n";
   for (int i = 0; i < 2000; ++i) many += "X-Filler: 0123456789012345678901234567890\r\n";
   EXPECT_EQ(status(many + "\r\n"), 431);
@@ -128,7 +136,10 @@ TEST_F(Hostile, TokensAreRequired) {
   EXPECT_EQ(http_->get("/metrics").status, 401);
   HttpClient client({url(), reader.token, "", 60});
   EXPECT_EQ(client.get("/api/v1/jobs").status, 200);
-  EXPECT_EQ(client.send("DELETE", "/api/v1/scenes/a.glb", "").status, 403);
+  EXPECT_EQ(client.send("DELETE", "/api/v1/scenes/a.glb\x9b", "").status, 403);
+  // The log names who was refused, and holds no byte that controls a terminal.
+  EXPECT_NE(log().find("audit DELETE /api/v1/scenes/a.glb%9b status=403 who=r"), std::string::npos)
+      << log();
 }
 
 // Random bytes never stop the service.

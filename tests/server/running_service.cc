@@ -30,7 +30,7 @@ RunningService::RunningService() {
 RunningService::~RunningService() { stop(); }
 
 void RunningService::start() {
-  service_ = std::make_unique<Service>(config_, system_files(), [this](const std::string& line) {
+  service_ = std::make_unique<Service>(config_, *files_, [this](const std::string& line) {
     std::lock_guard lock(log_mutex_);
     log_ += line + "\n";
   });

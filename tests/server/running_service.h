@@ -28,6 +28,8 @@ class RunningService : public testing::Test {
 
   void start();
   void stop();
+  // As SIGTERM does it, from any thread.
+  void begin_stop() { service_->stop(); }
   std::string url() const { return service_->url(); }
 
   // Menger's sponge, 36 096 triangles.
@@ -49,6 +51,7 @@ class RunningService : public testing::Test {
 
   TemporaryFolder folder_;
   ServerConfig config_;
+  FileSystem* files_ = &system_files();
   std::unique_ptr<HttpClient> http_;
 
  private:

@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/format/global/voxdag_reader.h"
+#include "core/io/file_system.h"
 
 namespace voxdag {
 
@@ -34,6 +35,7 @@ auto with_reader_errors(Use use) {
 }
 
 inline std::unique_ptr<voxdag_reader::File> open_global_file(const std::string& path) {
+  system_files().open_read(path);  // refuses a folder or a pipe as it does for every other input
   return with_reader_errors([&] { return std::make_unique<voxdag_reader::File>(path); });
 }
 

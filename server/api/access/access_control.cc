@@ -76,16 +76,18 @@ Caller AccessControl::identify(const Request& request) {
   throw unauthorized("unknown token");
 }
 
-Caller AccessControl::admit(const Request& request, Role needed) {
+Caller AccessControl::admit(Request& request, Role needed) {
   if (!is_loopback(request.peer) && !requests_.take(client_of(request.peer), wall_seconds()))
     throw too_many("the rate limit of this client is exceeded");
   if (!tokens_) {
     check_site(request);
-    return {Role::kAdmin, "local", client_of(request.peer)};
+    request.caller = "local";
+    return {Role::kAdmin, request.caller, client_of(request.peer)};
   }
   if (needed == Role::kNone) return {};
   Caller caller = identify(request);
   caller.client = "token " + caller.name;
+  request.caller = caller.name;
   if (caller.role == Role::kNone) throw unauthorized("expected Authorization: Bearer TOKEN");
   if (caller.role < needed)
     throw Problem(403, "forbidden", "the role of the token is not sufficient");

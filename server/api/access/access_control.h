@@ -17,8 +17,9 @@ class AccessControl {
   // Reads the token file if one is configured. Throws as Tokens::read does.
   AccessControl(const ServerConfig& config, FileSystem& files);
 
-  // Returns who sends the request. Throws Problem unless that caller has the role `needed`.
-  Caller admit(const Request& request, Role needed);
+  // Returns who sends the request, and sets its `caller` as soon as that is known. Throws Problem
+  // unless that caller has the role `needed`.
+  Caller admit(Request& request, Role needed);
 
  private:
   void check_site(const Request& request) const;

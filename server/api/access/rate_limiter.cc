@@ -8,6 +8,7 @@ namespace {
 constexpr double kDepth_s = 2;
 // Above this count, full buckets are dropped: a new bucket is full, too.
 constexpr size_t kMaxBuckets = 10000;
+constexpr double kSweepInterval_s = 1;
 
 }  // namespace
 
@@ -15,10 +16,12 @@ bool RateLimiter::take(const std::string& client, double now_s) {
   if (per_s_ <= 0) return true;
   std::lock_guard lock(mutex_);
   const double depth = std::max(1.0, per_s_ * kDepth_s);
-  if (buckets_.size() > kMaxBuckets)
+  if (buckets_.size() > kMaxBuckets && now_s >= next_sweep_s_) {
+    next_sweep_s_ = now_s + kSweepInterval_s;
     std::erase_if(buckets_, [&](const auto& entry) {
       return entry.second.level + (now_s - entry.second.at_s) * per_s_ >= depth;
     });
+  }
   Bucket& bucket = buckets_.try_emplace(client, Bucket{depth, now_s}).first->second;
   bucket.level = std::min(depth, bucket.level + (now_s - bucket.at_s) * per_s_);
   bucket.at_s = now_s;

@@ -22,8 +22,9 @@ class RateLimiter {
   };
 
   const double per_s_;
-  std::mutex mutex_;  // guards the map
+  std::mutex mutex_;  // guards the next
   std::map<std::string, Bucket> buckets_;
+  double next_sweep_s_ = 0;
 };
 
 }  // namespace voxdag::server

@@ -66,6 +66,28 @@ class TemporaryTask {
   FileSystem& files_;
 };
 
+// The task of a dry run. Its scenes are not removed while this exists.
+class Plan {
+ public:
+  Plan(Context& context, const JobRequest& request)
+      : context_(context), scenes_(TaskResolver::uploads_of(request)) {
+    std::lock_guard lock(context_.scene_mutex);
+    task = context_.tasks.make(request, Task::Kind::kPlan);
+    context_.planned_scenes.insert(scenes_.begin(), scenes_.end());
+  }
+  ~Plan() {
+    std::lock_guard lock(context_.scene_mutex);
+    for (const std::string& scene : scenes_)
+      context_.planned_scenes.erase(context_.planned_scenes.find(scene));
+  }
+  Plan(const Plan&) = delete;
+  Task task;
+
+ private:
+  Context& context_;
+  const std::vector<std::string> scenes_;
+};
+
 Problem problem_of(const Failure& failure) {
   const auto code = error_code_named(failure.code);
   if (code && *code != ErrorCode::kCanceled) return problem(*code, failure.text);
@@ -73,14 +95,15 @@ Problem problem_of(const Failure& failure) {
 }
 
 // The estimate of a job without queuing it: runs the plan in a child process. Throws Problem: the
-// error of the scene or the request; 503 if too many plans run or this one takes too long.
+// error of the scene or the request; 503 if too many plans run, the service stops, or this one
+// takes too long.
 Response dry_run(Context& context, Call& call, const JobRequest& request) {
   const auto permit = context.plans.acquire(call.caller.client);
   if (!permit) throw busy("too many concurrent plans", 5);
-  const Task task = context.tasks.make(request, Task::Kind::kPlan);
+  const Plan plan(context, request);
   const TemporaryTask temporary(context.files,
                                 context.config.data_folder + "/plans/" + random_id());
-  write_task(context.files, temporary.folder.task(), task);
+  write_task(context.files, temporary.folder.task(), plan.task);
   ChildProcess child({{context.config.program, "run-job", temporary.folder.path},
                       temporary.folder.log(),
                       context.config.jobs.nice});
@@ -100,6 +123,8 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
       },
       [&] { return killed = killed || is_in_vain(); });
   child.wait();
+  if (killed && context.draining) throw busy("the service is stopping");
+  if (killed && wall_seconds() <= deadline) throw bad_request("the client has left");
   if (killed) throw busy("the plan exceeded its time limit", 60);
   if (failure) throw problem_of(*failure);
   if (estimate.empty()) throw Problem(500, "internal", "the process of the plan crashed");
@@ -188,6 +213,16 @@ Response delete_job(Context& context, Call& call) {
   return no_content();
 }
 
+// A job whose scenes are gone is refused, as a new one is.
+Response retry_job(Context& context, Call& call) {
+  expect_no_body(call.request);
+  std::lock_guard lock(context.scene_mutex);
+  const Job job = find_job(context.queue, call.names[0]);
+  if (job.state == JobState::kFailed || job.state == JobState::kCanceled)
+    context.tasks.make(parse_job_request(job.request), Task::Kind::kBuild);
+  return json_response(202, to_json(context, context.dispatcher.retry(job.id)));
+}
+
 // A handler that applies the action to a job.
 Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   return [action](Context& context, Call& call) {
@@ -214,7 +249,7 @@ void add_job_routes(Router& router) {
   router.add("POST", job + "/cancel", Role::kSubmit, act(&Dispatcher::cancel));
   router.add("POST", job + "/suspend", Role::kSubmit, act(&Dispatcher::suspend));
   router.add("POST", job + "/resume", Role::kSubmit, act(&Dispatcher::resume));
-  router.add("POST", job + "/retry", Role::kSubmit, act(&Dispatcher::retry));
+  router.add("POST", job + "/retry", Role::kSubmit, retry_job);
 }
 
 }  // namespace voxdag::server

@@ -65,7 +65,8 @@ RangeAnswer requested_ranges(const Request& request, const std::string& tag, uin
   const auto condition = request.headers.find("If-Range");
   // An entity tag that differs, or a date, makes the answer the whole file.
   if (condition != request.headers.end() && trimmed(condition->second) != tag) return {};
-  return parse_ranges(request.header("Range"), size);
+  // Only GET has ranges (RFC 9110, 14.2).
+  return request.method == "GET" ? parse_ranges(request.header("Range"), size) : RangeAnswer{};
 }
 
 void add_multipart(Response& response, const std::vector<ByteRange>& ranges, uint64_t size) {

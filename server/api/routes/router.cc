@@ -61,7 +61,6 @@ Response Router::route(Request& request, AccessControl& access) const {
     if (!matches(route.pattern, request.target.segments, call.names)) continue;
     if (route.method == method) {
       call.caller = access.admit(request, route.role);
-      request.caller = call.caller.name;
       check_query(request, route.query);
       return route.handler(context_, call);
     }

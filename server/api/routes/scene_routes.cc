@@ -1,4 +1,5 @@
 // Scenes: uploading, listing and removing them.
+#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
@@ -59,12 +60,29 @@ struct Part {
   bool is_last(uint64_t offset) const { return !total || offset == *total; }
 };
 
+// N of "bytes */N", which finishes an upload that has all its bytes; no value for other headers.
+std::optional<uint64_t> total_of_empty_part(std::string_view header) {
+  constexpr std::string_view kBegin = "bytes */";
+  if (!header.starts_with(kBegin)) return {};
+  header.remove_prefix(kBegin.size());
+  uint64_t total = 0;
+  const auto [end, error] = std::from_chars(header.data(), header.data() + header.size(), total);
+  if (error != std::errc{} || end != header.data() + header.size() || total == 0)
+    throw bad_request("Content-Range: expected bytes */TOTAL, of a scene that is not empty");
+  return total;
+}
+
 Part part_of(const Request& request) {
   Part part;
   const std::string header = request.header("Content-Range");
   if (header.empty()) {
     part.end = part.total = request.content_length;
+    if (!request.has_body) throw bad_request("expected the scene as body");
     return part;
+  }
+  if (const auto whole = total_of_empty_part(header)) {
+    if (request.has_body) throw bad_request("Content-Range: bytes */TOTAL is of an empty body");
+    return {*whole, whole, whole};
   }
   ByteRange range;
   uint64_t total = 0;
@@ -72,6 +90,7 @@ Part part_of(const Request& request) {
     throw bad_request("Content-Range: expected bytes FIRST-LAST/TOTAL");
   if (request.content_length && *request.content_length != range.size())
     throw bad_request("Content-Range and Content-Length do not match");
+  if (!request.has_body) throw bad_request("expected the part of the scene as body");
   return {range.begin, range.end, total};
 }
 
@@ -108,17 +127,24 @@ std::string digest_of(const Request& request, const char* name) {
   return found == request.headers.end() ? "" : parse_digest_field(found->second);
 }
 
+// A service that stops takes no new parts, and reads no scene to its end.
+void check_running(const Context& context) {
+  if (context.draining) throw busy("the service is stopping; resume at Upload-Offset");
+}
+
 Response put_scene(Context& context, Call& call) {
+  check_running(context);
   const std::string name = checked_name(call);
   const auto permit = context.uploads.acquire(call.caller.client);
   if (!permit) throw busy("too many uploads, of this client or of all", 5);
   const Part part = part_of(call.request);
-  if (!call.request.has_body) throw bad_request("expected the scene as body");
-  DiskSpace::Reservation space(context.disk, announced_bytes(context, part));
+  const uint64_t announced = announced_bytes(context, part);
   check_unused(context, name);
   const std::string part_digest = digest_of(call.request, "Content-Digest");
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
   SceneUpload upload(context.scenes, name, part.first, part.total);
+  // Only now, because an upload that starts over has freed what it had.
+  DiskSpace::Reservation space(context.disk, announced);
   switch (receive(context, call, part, space, upload)) {
     case BodyEnd::kComplete:
       break;
@@ -130,7 +156,9 @@ Response put_scene(Context& context, Call& call) {
       throw bad_request("the connection ended within the body; resume at Upload-Offset");
   }
   const bool last = part.is_last(part.end.value_or(part.total.value_or(0)));
-  if (!upload.finish(part_digest, whole_digest, last)) return scene_response(context, 202, name);
+  const auto check = [&] { check_running(context); };
+  if (!upload.finish(part_digest, whole_digest, last, check))
+    return scene_response(context, 202, name);
   std::lock_guard lock(context.scene_mutex);
   check_unused(context, name);
   const bool replaces = context.scenes.find(name).value_or(Scene{}).complete;
@@ -163,6 +191,7 @@ Response delete_scene(Context& context, Call& call) {
   const std::string name = checked_name(call);
   std::lock_guard lock(context.scene_mutex);
   check_unused(context, name);
+  if (context.planned_scenes.contains(name)) throw conflict("the scene is in use by a dry run");
   if (!context.scenes.remove(name)) throw not_found("no such scene");
   return no_content();
 }

@@ -1,6 +1,9 @@
 // Health, readiness, version, metrics, and the embedded files.
 #include <unistd.h>
 
+#include <memory>
+#include <mutex>
+
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
@@ -30,21 +33,32 @@ Response get_asset(Call& call, const Asset& asset) {
   return response;
 }
 
-// Creates and removes a file.
-void check_writable(Context& context) {
-  const std::string probe = context.config.data_folder + "/.ready-" + std::to_string(getpid());
-  context.files.create(probe)->close();
-  context.files.remove(probe);
-}
+// Whether the data folder can be written, tried at most once per second. Thread-safe.
+class WriteProbe {
+ public:
+  // Creates and removes a file.
+  void check(Context& context) {
+    const std::lock_guard lock(mutex_);
+    if (wall_seconds() < valid_until_s_) return;
+    const std::string probe = context.config.data_folder + "/.ready-" + std::to_string(getpid());
+    context.files.create(probe)->close();
+    context.files.remove(probe);
+    valid_until_s_ = wall_seconds() + 1;
+  }
 
-Response get_ready(Context& context, Call&) {
+ private:
+  std::mutex mutex_;
+  double valid_until_s_ = 0;
+};
+
+Response get_ready(Context& context, WriteProbe& probe) {
   if (context.draining) throw busy("the service is stopping");
   try {
     if (context.disk.is_low()) throw busy("the disk has less free space than min_free_disk", 60);
     context.queue.check_file();
     context.scenes.check_file();
     context.queue.counts();
-    check_writable(context);
+    probe.check(context);
   } catch (const Error&) {
     throw busy("the data folder is not writable", 60);
   }
@@ -80,7 +94,9 @@ void add_system_routes(Router& router) {
   };
   add("/healthz", Role::kNone,
       [](Context&, Call&) { return json_response(200, "{\"status\":\"ok\"}"); });
-  add("/readyz", Role::kNone, get_ready);
+  add("/readyz", Role::kNone, [probe = std::make_shared<WriteProbe>()](Context& context, Call&) {
+    return get_ready(context, *probe);
+  });
   add("/version", Role::kNone, [](Context&, Call&) {
     return json_response(200, "{\"version\":\"" VOXDAG_VERSION "\",\"api\":\"v1\"}");
   });

@@ -152,10 +152,10 @@ void Connection::allow_large_send_buffer() {
 #endif
 }
 
+// Bytes that were not read yet, such as the last ones of a TLS session, may be before the end.
 bool Connection::peer_disconnected() const {
-  char byte;
-  const ssize_t got = recv(socket_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-  return got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR);
+  pollfd peer{socket_, POLLRDHUP, 0};
+  return poll(&peer, 1, 0) > 0;
 }
 
 void Connection::linger() {

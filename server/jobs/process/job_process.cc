@@ -51,8 +51,10 @@ ConfinedFiles confined(FileSystem& files, const Task& task, const JobFolder& fol
   const std::string here = resolved_path(".") + "/";
   std::vector<std::string> readable = task.readable;
   readable.push_back(here + folder.work() + "/");
-  readable.push_back(here + folder.report());
-  for (const char* suffix : {"", ".partial"}) readable.push_back(here + folder.result() + suffix);
+  for (const char* suffix : {"", ".partial", ".lock"}) {
+    readable.push_back(here + folder.result() + suffix);
+    readable.push_back(here + folder.report() + suffix);
+  }
   return ConfinedFiles(files, readable);
 }
 

@@ -55,7 +55,7 @@ async function resume_offset(path, file, name, signal) {
     const length = headers.get("Upload-Length");
     if (length !== null && Number(length) !== file.size) return 0;
     const offset = Number(headers.get("Upload-Offset"));
-    return offset > 0 && offset < file.size ? offset : 0;
+    return offset > 0 && offset <= file.size ? offset : 0;
   } catch (problem) {
     if (problem.status === 404) return 0;
     throw problem;
@@ -66,8 +66,9 @@ async function resume_offset(path, file, name, signal) {
 async function put_part(path, file, offset, on_progress, signal) {
   const end = Math.min(file.size, offset + kPart_bytes);
   const part = await file.slice(offset, end).arrayBuffer();
+  const range = end > offset ? `${offset}-${end - 1}` : "*";  // an empty part finishes what has all its bytes
   const headers = {...authorization(), "Content-Type": "application/octet-stream",
-                   "Content-Range": `bytes ${offset}-${end - 1}/${file.size}`, ...await digest_header(part)};
+                   "Content-Range": `bytes ${range}/${file.size}`, ...await digest_header(part)};
   return new Promise((resolve, reject) => {
     const put = new XMLHttpRequest();
     const cancel = () => put.abort();

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -120,6 +121,10 @@ TEST_F(PosixFiles, FilesAreNotFolders) {
   expect_error(ErrorCode::kNotFound, path_, [&] { files_.create(path_ + "/below"); });
   expect_error(ErrorCode::kInvalidInput, folder_.path(), [&] { files_.open_read(folder_.path()); });
   expect_error(ErrorCode::kIo, folder_.path(), [&] { files_.create(folder_.path()); });
+  for (const std::string& path : {path_, path_ + "/below"})
+    expect_error(ErrorCode::kInvalidInput, "expected a folder",
+                 [&] { files_.make_directories(path); });
+  expect_error(ErrorCode::kInvalidInput, "expected a folder", [&] { files_.list(path_); });
 }
 
 // A full disk has a code of its own. /dev/full is one that always is.
@@ -190,6 +195,40 @@ TEST_F(PosixFiles, LocksAreExclusive) {
   EXPECT_NE(files_.try_lock(path_), nullptr);
   EXPECT_TRUE(files_.exists(path_));
   expect_error(ErrorCode::kNotFound, "gone", [&] { files_.try_lock(folder_.file("gone/lock")); });
+}
+
+// Who may only read can see whether a file is locked.
+TEST_F(PosixFiles, LocksAreVisible) {
+  put(path_, "holder");
+  EXPECT_FALSE(files_.is_locked(path_));
+  const auto lock = files_.try_lock(path_);
+  std::filesystem::permissions(path_, std::filesystem::perms::owner_read);
+  EXPECT_TRUE(files_.is_locked(path_));
+}
+
+// A link, symbolic or hard, could lead to any file: what is to be changed is not opened through
+// one.
+TEST_F(PosixFiles, LinksAreNotChanged) {
+  const std::string link = folder_.file("link");
+  put(path_, "precious");
+  for (const bool hard : {false, true}) {
+    SCOPED_TRACE(hard ? "hard" : "symbolic");
+    if (hard)
+      std::filesystem::create_hard_link(path_, link);
+    else
+      std::filesystem::create_symlink(path_, link);
+    for (const std::function<void()>& change : std::initializer_list<std::function<void()>>{
+             [&] { files_.create(link); }, [&] { files_.open_write(link); },
+             [&] { files_.try_lock(link); }})
+      expect_error(ErrorCode::kInvalidInput, hard ? "several names" : "symbolic link", change);
+    EXPECT_EQ(read_small_file(files_, path_, 100), "precious");
+    std::filesystem::remove(link);
+  }
+  ASSERT_EQ(mkfifo(link.c_str(), 0600), 0);
+  expect_error(ErrorCode::kInvalidInput, "not a regular file", [&] { files_.try_lock(link); });
+  EXPECT_TRUE(std::ranges::any_of(files_.list(folder_.path()), [](const DirectoryEntry& entry) {
+    return entry.name == "link" && entry.is_special;
+  }));
 }
 
 // A process that dies leaves no lock behind.

@@ -365,6 +365,26 @@ TEST(Hardening, M3_ElementsAreCharged) {
   }
 }
 
+// The parser collects what stands between strings and numbers, and all digits of a number.
+TEST(Hardening, M3_WhatTheParserCollectsIsBounded) {
+  const std::string rest = R"("asset":{"version":"2.0"}})", blanks(4 << 20, ' ');
+  EXPECT_EQ(out_of_memory_message("{" + blanks + rest, uint64_t{2} << 20), "");
+  EXPECT_NE(out_of_memory_message(R"({"extras":[)" + repeated("[]", 1 << 20) + "]," + rest,
+                                  uint64_t{2} << 20)
+                .find("in the JSON of folder/scene needs over"),
+            std::string::npos);
+  const Error digits = error_of_file(R"({"extras":)" + std::string(1 << 20, '1') + "," + rest);
+  EXPECT_NE(digits.message().find("a number of over 1024 characters"), std::string::npos);
+}
+
+// Strings that are passed over take no memory.
+TEST(Hardening, M3_SkippedStringsAreNotCharged) {
+  SceneBuilder scene = one_triangle();
+  for (int i = 0; i < 1000; ++i) scene.root["extras"].push_back(std::string(4000, 'x'));
+  OpenScene open(scene.glb(), {}, uint64_t{2} << 20);
+  EXPECT_EQ(open.triangles().size(), 1u);
+}
+
 // The matrices of a skin with hundreds of thousands of joints were not charged.
 TEST(Hardening, M3_JointMatricesAreCharged) {
   SceneBuilder scene = one_triangle();

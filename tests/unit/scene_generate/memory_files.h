@@ -36,6 +36,7 @@ class MemoryFiles : public voxdag::FileSystem {
   std::vector<voxdag::DirectoryEntry> list(const std::string&) override { unexpected(); }
   void touch(const std::string&) override { unexpected(); }
   std::unique_ptr<voxdag::FileLock> try_lock(const std::string&) override { unexpected(); }
+  bool is_locked(const std::string&) override { unexpected(); }
   uint64_t free_space(const std::string&) override { unexpected(); }
 
  private:

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <functional>
 
 #include "core/base/error.h"
+#include "tests/unit/base/error_of.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag {
@@ -136,6 +138,7 @@ TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
     FAIL() << "opened a text file";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt) << error.what();
+    EXPECT_NE(error.message().find("--restart"), std::string::npos) << error.what();
   }
   std::remove(path().c_str());
   SqlDatabase(path(), SqlDatabase::Mode::kReadWrite).execute("CREATE TABLE t (a)");
@@ -173,7 +176,7 @@ TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
       EXPECT_EQ(error.code(), ErrorCode::kUnsupportedVersion);
       EXPECT_NE(error.message().find("--restart"), std::string::npos) << error.message();
     }
-  set_version("4");
+  set_version("5");
   EXPECT_EQ(JobStore(path(), JobStore::Access::kRead).leaves().size(), 3u);
 }
 
@@ -219,6 +222,48 @@ TEST_F(JobStoreTest, NoticesARowThatChanged) {
       EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
       EXPECT_NE(error.message().find("subvolume 2"), std::string::npos) << error.what();
     }
+  }
+}
+
+// So are the rows of the job, of the merge and of its result.
+TEST_F(JobStoreTest, NoticesAChangeInAnyRowThatDecides) {
+  struct Change {
+    const char* sql;
+    std::function<void(JobStore&)> read;
+  };
+  for (const Change& change :
+       {Change{"UPDATE job SET scene_sha256 = 'abd'", [](JobStore& s) { s.job(); }},
+        Change{"UPDATE job SET subvolumes = 1", [](JobStore& s) { s.leaves(); }},
+        Change{"UPDATE merge SET level = 4", [](JobStore& s) { s.merge(); }},
+        Change{"UPDATE result SET sha256 = 'sho'", [](JobStore& s) { s.result(); }}}) {
+    SCOPED_TRACE(change.sql);
+    JobStore store(path(), JobStore::Access::kBuild);
+    store.start(job_, plan(2));
+    store.save_merge(5, {});
+    store.record_result({"out", "sha", 1, {}});
+    EXPECT_NO_THROW(change.read(store));
+    SqlDatabase(path(), SqlDatabase::Mode::kReadWrite).execute(change.sql);
+    EXPECT_EQ(error_of([&] { change.read(store); }).code(), ErrorCode::kCorrupt);
+    store.start(job_, plan(2));
+    EXPECT_NO_THROW(change.read(store));
+  }
+}
+
+// Rows that are missing, first, middle, last or all of them, would make a file without their
+// voxels.
+TEST_F(JobStoreTest, NoticesMissingRows) {
+  for (const char* missing : {"id = 1", "id % 2 = 0", "id = 7", "id > 0"}) {
+    SCOPED_TRACE(missing);
+    JobStore store(path(), JobStore::Access::kBuild);
+    store.start(job_, plan(5));
+    const StoredSubvolume whole = store.leaves()[4];
+    store.record_split(whole, std::vector{whole.cube.child(0), whole.cube.child(5)});
+    EXPECT_EQ(store.leaves().size(), 6u);
+    SqlDatabase(path(), SqlDatabase::Mode::kReadWrite)
+        .execute("PRAGMA foreign_keys = OFF; DELETE FROM subvolume WHERE " + std::string(missing));
+    const Error error = error_of([&] { store.leaves(); });
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+    EXPECT_NE(error.message().find("--restart"), std::string::npos) << error.message();
   }
 }
 

@@ -226,11 +226,19 @@ TEST_F(ResumeTest, NeedsAFolderToWriteIn) {
 // A job of another program's version is refused with its number, unless the build is to start over.
 TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   const std::string expected = build(spec()).sha256;
-  for (const char* change : {"PRAGMA user_version = 77", "UPDATE job SET format_version = 77"}) {
-    SCOPED_TRACE(change);
+  for (const bool of_store : {true, false}) {
+    SCOPED_TRACE(of_store ? "version of the store" : "version of the job");
     std::filesystem::remove(output());
     build_until(spec(), "build", 5);
-    SqlDatabase(work() + "/job.db", SqlDatabase::Mode::kReadWrite).execute(change);
+    const std::string store = work() + "/job.db";
+    if (of_store) {
+      SqlDatabase(store, SqlDatabase::Mode::kReadWrite).execute("PRAGMA user_version = 77");
+    } else {
+      JobStore jobs(store, JobStore::Access::kBuild);
+      JobIdentity job = jobs.job().value();
+      job.format_version = 77;
+      jobs.start(job, {});
+    }
     try {
       build(spec());
       ADD_FAILURE() << "the build went through";

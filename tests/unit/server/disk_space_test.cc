@@ -34,27 +34,66 @@ uint64_t fill(SmallDisk& disk, DiskSpace::Reservation& space, uint64_t bytes) {
   return written;
 }
 
-// Uploads whose sum is too much are refused when they begin, and one of unknown size when the part
-// of the disk that stays free is reached.
-TEST(Hardening, M1_UploadsReserveWhatTheyAnnounce) {
+bool fits(DiskSpace& space, uint64_t announced) {
+  try {
+    DiskSpace::Reservation reservation(space, announced);
+    return true;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
+    return false;
+  }
+}
+
+// An upload that cannot fit is refused when it begins, one of unknown size when the part of the
+// disk that stays free is reached.
+TEST(Hardening, M1_UploadsLeaveThePartOfTheDiskThatStaysFree) {
   const TemporaryFolder folder;
   SmallDisk disk;
   DiskSpace space(disk, folder.path(), 30 * kMiB);
-  EXPECT_EQ(space.available(), 70 * kMiB);
+  EXPECT_TRUE(fits(space, 70 * kMiB));
+  EXPECT_FALSE(fits(space, 70 * kMiB + 1));
   {
-    DiskSpace::Reservation first(space, 40 * kMiB);
-    EXPECT_EQ(space.available(), 30 * kMiB);
-    EXPECT_THROW(DiskSpace::Reservation(space, 31 * kMiB), Error);
-    EXPECT_EQ(fill(disk, first, 10 * kMiB), 10 * kMiB);
-    EXPECT_EQ(space.available(), 30 * kMiB) << "written bytes are not reserved twice";
-    EXPECT_EQ(disk.free, 90 * kMiB);
+    DiskSpace::Reservation whole(space, 70 * kMiB);
+    EXPECT_EQ(fill(disk, whole, 70 * kMiB), 70 * kMiB) << "all that was announced fits";
+    EXPECT_EQ(disk.free, 30 * kMiB);
+    EXPECT_FALSE(fits(space, 1));
+    EXPECT_FALSE(space.is_low());
   }
-  EXPECT_EQ(space.available(), 60 * kMiB) << "what was not sent is free again";
+  disk.free = 90 * kMiB;
   DiskSpace::Reservation unknown(space, 0);
   const uint64_t written = fill(disk, unknown, 100 * kMiB);
   EXPECT_LE(written, 60 * kMiB);
   EXPECT_GT(written, 40 * kMiB);
   EXPECT_FALSE(space.is_low());
+}
+
+// Those who announce all of the disk and send little of it keep nobody out; what they do send next
+// has its place.
+TEST(Hardening, UploadsThatSendSlowlyKeepNobodyOut) {
+  const TemporaryFolder folder;
+  SmallDisk disk;
+  DiskSpace space(disk, folder.path(), 30 * kMiB);
+  DiskSpace::Reservation slow(space, 70 * kMiB);
+  EXPECT_EQ(fill(disk, slow, kMiB), kMiB);
+  EXPECT_TRUE(fits(space, 60 * kMiB));
+  DiskSpace::Reservation other(space, 62 * kMiB);
+  EXPECT_EQ(fill(disk, other, 62 * kMiB), 62 * kMiB);
+  EXPECT_EQ(fill(disk, slow, 7 * kMiB), 7 * kMiB) << "was reserved";
+  EXPECT_EQ(fill(disk, slow, kMiB), 0u);
+  EXPECT_EQ(disk.free, 30 * kMiB);
+}
+
+// As many bytes are reserved in the end as in the beginning.
+TEST(Hardening, UploadsGiveBackWhatTheyReserved) {
+  const TemporaryFolder folder;
+  SmallDisk disk;
+  DiskSpace space(disk, folder.path(), 30 * kMiB);
+  for (const uint64_t announced : {uint64_t{0}, kMiB, 20 * kMiB}) {
+    DiskSpace::Reservation broken(space, announced);
+    fill(disk, broken, 9 * kMiB);
+    disk.free = 100 * kMiB;
+  }
+  EXPECT_TRUE(fits(space, 70 * kMiB));
 }
 
 // Others write to the disk, too.
@@ -82,6 +121,32 @@ TEST(Hardening, M1_ABallastGivesRoomForDeletions) {
   space.restore_ballast();
   const DiskSpace next(disk, folder.path(), 0);
   EXPECT_FALSE(disk.exists(folder.file("ballast"))) << "the databases need room to open";
+}
+
+// A ballast that could be written in part only would be too small.
+TEST(Hardening, ABallastIsWholeOrAbsent) {
+  class FailingDisk : public SmallDisk {
+   public:
+    class File : public ForwardingWriter {
+     public:
+      using ForwardingWriter::ForwardingWriter;
+      void sync() override { throw Error(ErrorCode::kNoSpace, "the test's disk is full"); }
+    };
+    std::unique_ptr<WritableFile> create(const std::string& path) override {
+      auto file = SmallDisk::create(path);
+      if (fails) return std::make_unique<File>(std::move(file));
+      return file;
+    }
+    bool fails = true;
+  };
+  const TemporaryFolder folder;
+  FailingDisk disk;
+  DiskSpace space(disk, folder.path(), 0);
+  EXPECT_THROW(space.restore_ballast(), Error);
+  EXPECT_FALSE(disk.exists(folder.file("ballast")));
+  disk.fails = false;
+  space.restore_ballast();
+  EXPECT_TRUE(space.drop_ballast());
 }
 
 }  // namespace

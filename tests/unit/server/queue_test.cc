@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "core/base/clock.h"
@@ -200,6 +201,38 @@ TEST_F(Queue, LetsEndedJobsExpire) {
   EXPECT_EQ(queue_->expired(0, 1), (std::vector<std::string>{old}));
   EXPECT_TRUE(queue_->expired(0, 2).empty());
   EXPECT_EQ(queue_->expired(1e12, 100).size(), 2u);
+}
+
+// Whoever may post jobs must not be able to remove the results of others with them.
+TEST_F(Queue, HardeningR3_JobsExpireForThoseOfTheSamePosterOnly) {
+  const auto end = [&](const std::string& poster, JobState state, double finished_s) {
+    const std::string id = post().id;
+    queue_->change(id, [&](Job& j) {
+      j.posted_by = poster;
+      j.state = state;
+      j.finished_s = finished_s;
+    });
+    return id;
+  };
+  const std::string result = end("anna", JobState::kSucceeded, 100);
+  for (int i = 0; i < 5; ++i) end("bob", JobState::kCanceled, 200 + i);
+  const auto expired = queue_->expired(0, 2);
+  EXPECT_EQ(expired.size(), 3u);
+  EXPECT_EQ(std::count(expired.begin(), expired.end(), result), 0);
+}
+
+// A long job was posted before many short ones, and ends after them.
+TEST_F(Queue, HardeningR3_TheJobThatEndedLastStays) {
+  const std::string lengthy = post().id, quick = post().id;
+  const auto succeed = [&](const std::string& id, double finished_s) {
+    queue_->change(id, [&](Job& j) {
+      j.state = JobState::kSucceeded;
+      j.finished_s = finished_s;
+    });
+  };
+  succeed(quick, 100);
+  succeed(lengthy, 200);
+  EXPECT_EQ(queue_->expired(0, 1), (std::vector<std::string>{quick}));
 }
 
 // A clock that was set back does not make a job wait for as long.

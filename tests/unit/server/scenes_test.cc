@@ -4,6 +4,7 @@
 
 #include "core/db/sqlite.h"
 #include "core/format/checksum.h"
+#include "core/io/forwarding_files.h"
 #include "server/data_folder.h"
 #include "server/request_error.h"
 #include "server/scenes/scene_store.h"
@@ -13,11 +14,26 @@
 namespace voxdag::server {
 namespace {
 
+// Calls a function of the test before a file is removed.
+class RemovalHook : public ForwardingFiles {
+ public:
+  RemovalHook() : ForwardingFiles(system_files()) {}
+  void remove(const std::string& path) override {
+    if (before_removal) std::exchange(before_removal, nullptr)();
+    ForwardingFiles::remove(path);
+  }
+  std::function<void()> before_removal;
+};
+
 class Scenes : public testing::Test {
  protected:
   void reopen() {
     store_.reset();
-    store_ = std::make_unique<SceneStore>(system_files(), folder_.path());
+    store_ = make_store(false);
+  }
+  std::unique_ptr<SceneStore> make_store(bool adopt) {
+    return std::make_unique<SceneStore>(
+        files_, folder_.path(), [this](const std::string& line) { log_ += line + "\n"; }, adopt);
   }
   std::optional<RequestError> refusal(const std::function<void()>& act) {
     try {
@@ -27,12 +43,20 @@ class Scenes : public testing::Test {
       return error;
     }
   }
+  void put(const std::string& name, const std::string& bytes) {
+    SceneUpload upload(*store_, name, 0, bytes.size());
+    upload.write(bytes);
+    upload.finish("", "", true);
+    upload.publish();
+  }
   std::string contents(const std::string& name) {
     return read_small_file(system_files(), store_->path(name), 1 << 20);
   }
 
   TemporaryFolder folder_;
-  std::unique_ptr<SceneStore> store_ = std::make_unique<SceneStore>(system_files(), folder_.path());
+  RemovalHook files_;
+  std::string log_;
+  std::unique_ptr<SceneStore> store_ = make_store(false);
 };
 
 TEST(SceneName, IsAPlainFileName) {
@@ -119,12 +143,7 @@ TEST_F(Scenes, AreWrittenByOneRequestAtATime) {
 
 // The old scene stays until the new one is complete.
 TEST_F(Scenes, AreReplacedAtOnce) {
-  {
-    SceneUpload upload(*store_, "a.glb", 0, 3);
-    upload.write("old");
-    upload.finish("", "", true);
-    upload.publish();
-  }
+  put("a.glb", "old");
   SceneUpload upload(*store_, "a.glb", 0, 3);
   upload.write("new");
   EXPECT_EQ(contents("a.glb"), "old");
@@ -135,12 +154,7 @@ TEST_F(Scenes, AreReplacedAtOnce) {
 }
 
 TEST_F(Scenes, AreListedByNameAndRemoved) {
-  for (const char* name : {"b.glb", "a.glb", "c.glb"}) {
-    SceneUpload upload(*store_, name, 0, 1);
-    upload.write("x");
-    upload.finish("", "", true);
-    upload.publish();
-  }
+  for (const char* name : {"b.glb", "a.glb", "c.glb"}) put(name, "x");
   auto page = store_->list("", 2);
   ASSERT_EQ(page.size(), 2u);
   EXPECT_EQ(page[1].name, "b.glb");
@@ -218,43 +232,153 @@ TEST_F(Scenes, HardeningH4_StartOverIfTheirBytesAreLost) {
 
 // A database that is gone costs no scene, and files that no upload made are left alone.
 TEST_F(Scenes, HardeningH2_StayWithoutTheirDatabase) {
-  {
-    SceneUpload upload(*store_, "a.glb", 0, 5);
-    upload.write("hello");
-    upload.finish("", "", true);
-    upload.publish();
-  }
+  put("a.glb", "hello");
   store_.reset();
   for (const char* suffix : {"", "-wal", "-shm"})
     std::filesystem::remove(folder_.file("scenes.db") + suffix);
   write_file_atomically(system_files(), folder_.file("files/README"), "x");
-  write_file_atomically(system_files(), folder_.file("parts/b.glb"), "x");
-  for (int i = 0; i < 2; ++i)
-    EXPECT_THROW(SceneStore(system_files(), folder_.path()), Error) << "and made no database";
-  store_ = std::make_unique<SceneStore>(system_files(), folder_.path(), true);
+  for (const char* name : {"parts/b.glb", "parts/README"})
+    write_file_atomically(system_files(), folder_.file(name), "x");
+  for (int i = 0; i < 2; ++i) EXPECT_THROW(make_store(false), Error) << "and made no database";
+  store_ = make_store(true);
   const auto scene = store_->find("a.glb");
   ASSERT_TRUE(scene && scene->complete);
   EXPECT_EQ(scene->sha256, sha256_hex("hello"));
   EXPECT_EQ(scene->size, 5u);
-  EXPECT_EQ(store_->list("", 10).size(), 1u);
+  EXPECT_EQ(store_->list("", 10).size(), 2u);
+  EXPECT_NE(log_.find("a.glb adopted"), std::string::npos) << log_;
+  EXPECT_NE(log_.find("b.glb: adopted"), std::string::npos) << log_;
+  // A part of which nobody knows how much was synced: it can be sent again, or removed.
+  const auto part = store_->upload("b.glb");
+  ASSERT_TRUE(part);
+  EXPECT_EQ(part->offset, 0u);
   reopen();
   store_->remove_stale_uploads(1e12);
-  EXPECT_TRUE(system_files().exists(folder_.file("files/README")));
-  EXPECT_TRUE(system_files().exists(folder_.file("parts/b.glb")));
+  EXPECT_FALSE(store_->find("b.glb"));
+  EXPECT_FALSE(system_files().exists(folder_.file("parts/b.glb")));
+  for (const char* name : {"files/README", "parts/README"})
+    EXPECT_TRUE(system_files().exists(folder_.file(name))) << name;
 }
 
 // A crash in the middle of a removal: the next start finishes it.
 TEST_F(Scenes, AreRemovedInTheEnd) {
-  {
-    SceneUpload upload(*store_, "a.glb", 0, 5);
-    upload.write("hello");
-    upload.finish("", "", true);
-    upload.publish();
-  }
+  put("a.glb", "hello");
   system_files().rename(store_->path("a.glb"), store_->path("a.glb") + kDeleted);
   reopen();
   EXPECT_FALSE(store_->find("a.glb"));
   EXPECT_FALSE(has_entries(system_files(), folder_.file("files")));
+}
+
+// A deletion that failed halfway takes what it marked, not what was uploaded since.
+TEST_F(Scenes, AreNotRemovedByAnEarlierDeletion) {
+  put("a.glb", "old");
+  const std::string marked = store_->path("a.glb") + kDeleted;
+  {
+    SqlDatabase outside(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite);
+    const SqlTransaction locked(outside);
+    EXPECT_THROW(store_->remove("a.glb"), Error);
+  }
+  EXPECT_TRUE(system_files().exists(marked));
+  put("a.glb", "new");
+  EXPECT_FALSE(system_files().exists(marked));
+  for (const bool at_start : {false, true}) {
+    SCOPED_TRACE(at_start);
+    system_files().create(marked)->close();  // as if the mark had outlived the upload
+    at_start ? reopen() : store_->finish_removals();
+    EXPECT_FALSE(system_files().exists(marked));
+    ASSERT_TRUE(store_->find("a.glb"));
+    EXPECT_EQ(contents("a.glb"), "new");
+  }
+}
+
+// Nor does it take the upload in progress.
+TEST_F(Scenes, KeepAnUploadFromAnEarlierDeletion) {
+  put("a.glb", "old");
+  { SceneUpload(*store_, "a.glb", 0, 10).write("01234"); }
+  system_files().rename(store_->path("a.glb"), store_->path("a.glb") + kDeleted);
+  reopen();
+  EXPECT_EQ(store_->upload("a.glb")->offset, 5u);
+  EXPECT_FALSE(store_->find("a.glb")->complete);
+  EXPECT_NE(log_.find("scene a.glb: finished a deletion"), std::string::npos) << log_;
+}
+
+// What a start drops, or cannot finish, is in the log.
+TEST_F(Scenes, AreNotDroppedSilently) {
+  { SceneUpload(*store_, "a.glb", 0, 5).write("hello"); }
+  system_files().remove(folder_.file("parts/a.glb"));
+  SqlDatabase(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite)
+      .execute("UPDATE upload SET sha256 = 'x'");
+  reopen();
+  EXPECT_FALSE(store_->find("a.glb"));
+  EXPECT_NE(log_.find("scene a.glb: failed to finish its upload"), std::string::npos) << log_;
+}
+
+// All bytes are there, but the service stopped, or a job began to use the scene.
+TEST_F(Scenes, AreFinishedByAnEmptyPart) {
+  for (const std::optional<uint64_t> total : {std::optional<uint64_t>(5), {}}) {
+    for (const bool stopped : {false, true}) {
+      {
+        SceneUpload upload(*store_, "a.glb", 0, total);
+        upload.write("hel");
+        upload.finish("", "", false);
+      }
+      {
+        SceneUpload upload(*store_, "a.glb", 3, total);
+        upload.write("lo");
+        const auto check = [&] {
+          if (stopped) throw std::runtime_error("stopped");
+        };
+        if (stopped)
+          EXPECT_THROW(upload.finish("", "", true, check), std::runtime_error);
+        else
+          EXPECT_TRUE(upload.finish("", "", true, check));
+      }
+      reopen();
+      ASSERT_EQ(store_->upload("a.glb")->offset, 5u);
+      EXPECT_EQ(refusal([&] { SceneUpload(*store_, "a.glb", 6, 6); })->upload_offset, 5u);
+      SceneUpload upload(*store_, "a.glb", 5, 5);
+      EXPECT_TRUE(upload.finish("", sha256_hex("hello"), true));
+      upload.publish();
+      EXPECT_EQ(contents("a.glb"), "hello");
+    }
+  }
+}
+
+// Nothing is acknowledged that is recorded in a database without a name.
+TEST_F(Scenes, AreNotRecordedInADatabaseThatIsGone) {
+  put("b.glb", "old");
+  { SceneUpload(*store_, "old.glb", 0, 5).write("x"); }
+  SceneUpload upload(*store_, "a.glb", 0, 5);
+  upload.write("hello");
+  EXPECT_TRUE(upload.finish("", "", true));
+  for (const char* suffix : {"", "-wal", "-shm"})
+    std::filesystem::remove(folder_.file("scenes.db") + suffix);
+  EXPECT_THROW(upload.publish(), Error);
+  EXPECT_FALSE(system_files().exists(store_->path("a.glb")));
+  EXPECT_THROW(SceneUpload(*store_, "c.glb", 0, 5), Error);
+  EXPECT_THROW(store_->remove("b.glb"), Error);
+  EXPECT_THROW(store_->remove_stale_uploads(1e12), Error);
+  EXPECT_EQ(contents("b.glb"), "old");
+}
+
+// An upload of which nothing arrived leaves nothing.
+TEST_F(Scenes, LeaveNothingWithoutABeginning) {
+  { SceneUpload(*store_, "a.glb", 0, 5); }
+  EXPECT_FALSE(store_->find("a.glb"));
+  EXPECT_FALSE(system_files().exists(folder_.file("parts/a.glb")));
+}
+
+// A part that arrives while old uploads are removed.
+TEST_F(Scenes, AreNotStaleOnceTheyGoOn) {
+  for (const char* name : {"a.glb", "b.glb"}) SceneUpload(*store_, name, 0, 5).write("he");
+  SqlDatabase(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite)
+      .execute("UPDATE upload SET updated_s = 1000");
+  files_.before_removal = [&] { SceneUpload(*store_, "b.glb", 2, 5).write("ll"); };
+  store_->remove_stale_uploads(2000);
+  EXPECT_FALSE(store_->upload("a.glb"));
+  ASSERT_TRUE(store_->upload("b.glb"));
+  EXPECT_EQ(store_->upload("b.glb")->offset, 4u);
+  EXPECT_NE(log_.find("a.glb: removed its unfinished upload"), std::string::npos) << log_;
 }
 
 TEST_F(Scenes, DropStaleUploads) {

@@ -43,7 +43,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
   bool number_float(number_float_t v, const string_t&) override { return scalar(v); }
   bool string(string_t& v) override {
     if (open_.size() == 1 && key_ == "uri") uri_ = window_.last_string();
-    element_bytes_ += v.size() + sizeof(string_t);
+    if (skipped_depth_ == 0 && !skips_next_) element_bytes_ += v.size() + sizeof(string_t);
     return scalar(std::move(v));
   }
   bool binary(binary_t&) override { return true; }  // never occurs in a text
@@ -69,8 +69,8 @@ class SectionParser : public nlohmann::json_sax<Json> {
     return true;
   }
 
-  bool parse_error(size_t position, const std::string&, const Json::exception& e) override {
-    refuse(path_, "its JSON is broken at character " + std::to_string(position) + ": " +
+  bool parse_error(size_t, const std::string&, const Json::exception& e) override {
+    refuse(path_, "its JSON is broken at byte " + std::to_string(window_.position()) + ": " +
                       printable(without_prefix(e.what()), kMaxParserReasonBytes));
   }
 

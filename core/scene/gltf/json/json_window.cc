@@ -1,6 +1,10 @@
 #include "core/scene/gltf/json/json_window.h"
 
 #include <algorithm>
+#include <string>
+#include <string_view>
+
+#include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
@@ -10,9 +14,14 @@ constexpr size_t kWindowBytes = size_t{64} << 10;
 constexpr uint64_t kMaxShownCharacters = 4096;
 // The parser stores a string raw and decoded, in buffers that grow by doubling, and passes a copy.
 constexpr uint64_t kCopies = 6;
+constexpr uint64_t kMaxWordCharacters = 1024;  // of a number or literal
 
 // ASCII that JSON does not escape within a string.
 bool is_plain(char c) { return c >= ' ' && c <= '~'; }
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+bool is_punctuation(char c) {
+  return std::string_view("[]{},:\"").find(c) != std::string_view::npos;
+}
 
 }  // namespace
 
@@ -31,7 +40,7 @@ JsonWindow::int_type JsonWindow::uflow() {
     if (!next(c)) return traits_type::eof();
     track(c);
   } while (is_withheld(c));
-  if (in_string_) charge_.grow_to(kCopies * ++shown_);
+  charge_.grow_to(kCopies * ++collected_);
   return traits_type::to_int_type(c);
 }
 
@@ -52,12 +61,23 @@ bool JsonWindow::next(char& c) {
 // Follows where strings begin and end.
 void JsonWindow::track(char c) {
   if (in_string_) return track_in_string(c);
+  track_outside_strings(c);
   if (c != '"') return;
   in_string_ = true;
   after_backslash_ = in_escape_ = false;
   hex_digits_left_ = 0;
-  shown_ = 0;
+  collected_ = 0;
   string_ = {.characters = {position_, 0}};
+}
+
+void JsonWindow::track_outside_strings(char c) {
+  is_second_blank_ = is_blank(c) && is_blank(last_);
+  last_ = c;
+  word_ = is_blank(c) || is_punctuation(c) ? 0 : word_ + 1;
+  if (word_ == 1 && (c == '-' || (c >= '0' && c <= '9'))) collected_ = 0;
+  if (word_ > kMaxWordCharacters)
+    refuse(file_.path(), "its JSON has a number of over " + std::to_string(kMaxWordCharacters) +
+                             " characters at byte " + std::to_string(position_));
 }
 
 void JsonWindow::track_in_string(char c) {
@@ -78,8 +98,8 @@ void JsonWindow::track_in_string(char c) {
 
 // Neither an escape nor a character of several bytes is withheld in part.
 bool JsonWindow::is_withheld(char c) {
-  if (!in_string_ || string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c))
-    return false;
+  if (!in_string_) return is_second_blank_;
+  if (string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c)) return false;
   string_.is_clipped = true;
   return true;
 }

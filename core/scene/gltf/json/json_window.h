@@ -4,8 +4,9 @@
 // Strings can be long: a data: URI, of geometry or of an image, may be most of the file. The plain
 // characters of a string past the first few thousand are withheld from the parser, which would
 // collect them in memory. The place of the string in the file is recorded instead, so that a buffer
-// can be decoded from there by windows. The characters that the parser sees are charged to the
-// budget. Not thread-safe.
+// can be decoded from there by windows. Of several blanks between values the parser sees one, and a
+// number of more digits than any needs is refused. The characters that the parser collects are
+// charged to the budget. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -25,6 +26,8 @@ class JsonWindow : public std::streambuf {
   JsonWindow(const ReadableFile& file, FileRange json, MemoryBudget& budget,
              const CancelToken& cancel);
 
+  // The place in the file of the character that the parser sees next.
+  uint64_t position() const { return position_; }
   // The string that ended last.
   const RawString& last_string() const { return string_; }
 
@@ -33,6 +36,7 @@ class JsonWindow : public std::streambuf {
   int_type uflow() override;
   bool next(char& c);
   void track(char c);
+  void track_outside_strings(char c);
   void track_in_string(char c);
   bool is_withheld(char c);
 
@@ -48,7 +52,11 @@ class JsonWindow : public std::streambuf {
   bool after_backslash_ = false;
   int hex_digits_left_ = 0;  // of an escape \uXXXX
   bool in_escape_ = false;   // the last character is part of an escape
-  uint64_t shown_ = 0;       // characters of the string that were not withheld
+  bool is_second_blank_ = false;
+  char last_ = 0;           // the last character outside of strings
+  uint64_t word_ = 0;       // characters of the number or literal so far
+  uint64_t collected_ = 0;  // characters that the parser has, which begins again with each string
+                            // or number
   RawString string_;
 };
 
