@@ -78,7 +78,8 @@ void Dispatcher::recover() {
   std::set<std::string> running;
   for (const auto& [key, worker] : workers_)
     if (worker.runs()) running.insert(key);
-  for (const Job& job : queue_.recover(running, config_.jobs.max_attempts))
+  const auto pause = [this](unsigned attempt) { return pause_s(config_.jobs, attempt); };
+  for (const Job& job : queue_.recover(running, pause))
     log_("job " + job.id + " " + state_name(job.state));
 }
 
