@@ -85,6 +85,10 @@ void Command::json_flag(bool& value, const char* description) {
   flag("--json", value, description);
 }
 
+void Command::threads_option(unsigned& value) {
+  option("--threads", value, "worker threads (default: all cores)").range(1, 1024);
+}
+
 void Command::config_option() {
   app_->add_option_function<std::string>(
           "--config", [app = app_](const std::string& path) { read_config_file(path, *app); },

@@ -65,6 +65,8 @@ class Command {
   Option flag(const char* names, bool& value, const char* description);
   void json_flag(bool& value,
                  const char* description = "report as one JSON object on standard output");
+  // Adds --threads, 1 to 1024.
+  void threads_option(unsigned& value);
   // Adds --config, a TOML or INI file of options that the command line does not give.
   void config_option();
   bool given(const char* option) const;

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/output.h"
+#include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
 
@@ -12,13 +13,14 @@ namespace {
 
 struct DiffCommand {
   std::string a, b;
+  unsigned threads = default_threads();
   bool json = false;
 };
 
 void run(const DiffCommand& command, CommandContext& context) {
   const auto a = open_global_file(command.a), b = open_global_file(command.b);
   MemoryBudget budget(~uint64_t{0});
-  const DiffReport report = diff_global_files(*a, *b, budget, context.cancel);
+  const DiffReport report = diff_global_files(*a, *b, command.threads, budget, context.cancel);
   context.exit_status = report.same() ? 0 : 1;
   if (command.json) {
     print_json(nlohmann::ordered_json{{"same", report.same()},
@@ -39,6 +41,7 @@ void run(const DiffCommand& command, CommandContext& context) {
 void declare(Command& command, DiffCommand& state) {
   command.option("a", state.a, "a .vdag file").required();
   command.option("b", state.b, "another .vdag file on the same grid").required();
+  command.threads_option(state.threads);
   command.json_flag(state.json);
 }
 

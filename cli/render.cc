@@ -25,7 +25,7 @@ struct RenderCommand {
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
   std::string size = "1280x720";
-  query::RenderOptions options{.threads = 0};  // all cores
+  query::RenderOptions options{.threads = default_threads()};
   bool json = false;
 };
 
@@ -90,7 +90,6 @@ void run(RenderCommand& command, CommandContext& context) {
     throw Error(ErrorCode::kInvalidInput, "--size '" + command.size +
                                               "': expected a width and a height of 1 to " +
                                               std::to_string(kMaxPictureEdge) + " pixels");
-  if (command.options.threads == 0) command.options.threads = static_cast<int>(default_threads());
   command.options.width = width;
   command.options.height = height;
   command.output.check(context.files, command.input, query::is_rendered_png);
@@ -120,8 +119,7 @@ void declare(Command& command, RenderCommand& state) {
   command.option("--samples", state.options.samples, "N: N * N samples per pixel")
       .range(1, 8)
       .show_default();
-  command.option("--threads", state.options.threads, "worker threads (default: all cores)")
-      .range(1, 1024);
+  command.threads_option(state.options.threads);
   state.output.declare_force(command);
   command.json_flag(state.json);
 }

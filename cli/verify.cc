@@ -22,6 +22,7 @@ struct VerifyCommand {
   std::vector<std::string> scenes;
   SceneOptions scene_options;
   uint64_t seed = 1;
+  unsigned threads = default_threads();
   bool json = false;
 };
 
@@ -70,7 +71,7 @@ void run(const VerifyCommand& command, CommandContext& context) {
   const auto file = open_global_file(command.path);
   const auto progress = make_progress_bar();
   MemoryBudget budget(~uint64_t{0});
-  verify_global_file(*file, budget, *progress, context.cancel);
+  verify_global_file(*file, command.threads, budget, *progress, context.cancel);
   std::optional<query::SampleReport> sample;
   if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
   if (command.json)
@@ -86,6 +87,7 @@ void declare(Command& command, VerifyCommand& state) {
   command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
   command.flag("--skip-invalid", state.scene_options.skip_invalid,
                "drop invalid triangles of the scene, as the build did");
+  command.threads_option(state.threads);
   command.json_flag(state.json);
 }
 

@@ -1,14 +1,13 @@
 #include "merge/merge_level.h"
 
 #include <algorithm>
-#include <condition_variable>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
+#include "core/base/turns.h"
 #include "merge/fallback/hash_group_merge.h"
 #include "merge/fallback/heap_merge.h"
 #include "merge/sort/bucket_sorter.h"
@@ -20,41 +19,6 @@ namespace {
 constexpr uint64_t kBucketRows = 8192;
 // With many runs buckets are larger, so that the share of each run is worth a visit.
 constexpr uint64_t kMinBucketRowsPerRun = 16;
-
-// Assigns the positions of a level to its buckets, which several threads sort at once, in the order
-// of the buckets. Thread-safe.
-class Sequencer {
- public:
-  explicit Sequencer(uint64_t first_position) : position_(first_position) {}
-
-  // Waits for the turn of a bucket and returns its first position; none once close() was called.
-  std::optional<uint64_t> wait_for_turn(size_t bucket) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || bucket == turn_; });
-    if (closed_) return std::nullopt;
-    return position_;
-  }
-  // Ends the turn of the current bucket, which takes `positions`.
-  void end_turn(uint64_t positions) {
-    const std::lock_guard lock(mutex_);
-    position_ += positions;
-    ++turn_;
-    changed_.notify_all();
-  }
-  // Wakes all that wait, after an error: no bucket gets its turn any more.
-  void close() {
-    const std::lock_guard lock(mutex_);
-    closed_ = true;
-    changed_.notify_all();
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  uint64_t position_;
-  size_t turn_ = 0;
-  bool closed_ = false;
-};
 
 // Walks the rows of one slice within one bucket.
 class SliceCursor {
@@ -81,7 +45,7 @@ class PartitionMerge {
  public:
   PartitionMerge(const MergeContext& context, const LevelTask& task, HashPartition& partition,
                  uint64_t first_position)
-      : context_(context), task_(task), partition_(partition), sequencer_(first_position) {}
+      : context_(context), task_(task), partition_(partition), position_(first_position) {}
 
   LevelExtent run() {
     make_sorters();
@@ -95,7 +59,7 @@ class PartitionMerge {
           merge_by_rows(bucket);
         context_.progress.advance(size.rows);
       } catch (...) {
-        sequencer_.close();
+        turns_.fail(bucket);
         throw;
       }
     };
@@ -134,28 +98,27 @@ class PartitionMerge {
 
   void sort(BucketSorter& sorter, size_t bucket) {
     sorter.sort(partition_, bucket, task_.output.in_words());
-    const auto position = sequencer_.wait_for_turn(bucket);
-    if (!position) return;
+    if (!turns_.wait_for(bucket)) return;
+    const uint64_t position = position_;
     task_.output.add(sorter.unique());
     end_turn({sorter.unique().row_count(), sorter.extent()});
-    task_.output.write(*position, sorter.unique());
+    task_.output.write(position, sorter.unique());
     const uint32_t* from = sorter.positions().data();
     for (size_t s = 0; s < partition_.slices().size(); ++s) {
       const uint32_t rows =
           partition_.bucket_begin(bucket + 1, s).row - partition_.bucket_begin(bucket, s).row;
       uint32_t* to = positions_of(bucket, s);
       if (task_.maps.wide())
-        for (uint32_t i = 0; i < rows; ++i) to = put_position(to, *position + from[i], true);
+        for (uint32_t i = 0; i < rows; ++i) to = put_position(to, position + from[i], true);
       else
-        for (uint32_t i = 0; i < rows; ++i) to[i] = static_cast<uint32_t>(*position) + from[i];
+        for (uint32_t i = 0; i < rows; ++i) to[i] = static_cast<uint32_t>(position) + from[i];
       from += rows;
     }
   }
 
   void merge_by_rows(size_t bucket) {
-    const auto position = sequencer_.wait_for_turn(bucket);
-    if (!position) return;
-    OrderedRowWriter out(task_.output, task_.format, *position, context_.budget);
+    if (!turns_.wait_for(bucket)) return;
+    OrderedRowWriter out(task_.output, task_.format, position_, context_.budget);
     std::vector<SliceCursor> cursors;
     std::vector<uint32_t*> to;
     for (size_t s = 0; s < partition_.slices().size(); ++s) {
@@ -168,14 +131,15 @@ class PartitionMerge {
       if (++rows % kFrameRows == 0) context_.cancel.check();
     });
     out.flush();
-    end_turn({out.nodes(), out.end_position() - *position});
+    end_turn({out.nodes(), out.end_position() - position_});
   }
 
   // Called in the turn of the bucket that has this extent.
   void end_turn(const LevelExtent& bucket) {
     extent_.nodes += bucket.nodes;
     extent_.positions += bucket.positions;
-    sequencer_.end_turn(bucket.positions);
+    position_ += bucket.positions;
+    turns_.end();
   }
 
   // Where the positions of the rows of a slice in a bucket are stored.
@@ -200,7 +164,8 @@ class PartitionMerge {
   const MergeContext& context_;
   const LevelTask& task_;
   HashPartition& partition_;
-  Sequencer sequencer_;
+  Turns turns_;        // of the buckets
+  uint64_t position_;  // of the next bucket, changed in turn
   std::vector<BucketSorter> sorters_;
   LevelExtent extent_;  // changed in turn
 };

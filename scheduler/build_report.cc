@@ -8,7 +8,10 @@ std::string report_json(const BuildReport& report) {
   using nlohmann::ordered_json;
   ordered_json stages = ordered_json::array();
   for (const StageTime& stage : report.stages)
-    stages.push_back({{"name", stage.name}, {"wall_s", stage.wall_s}, {"cpu_s", stage.cpu_s}});
+    stages.push_back({{"name", stage.name},
+                      {"wall_s", stage.wall_s},
+                      {"cpu_s", stage.cpu_s},
+                      {"largest_thread_share", stage.largest_thread_share}});
   const ordered_json json = {
       {"output", report.output},
       {"sha256", report.sha256},

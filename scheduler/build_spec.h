@@ -9,6 +9,7 @@
 
 #include "core/base/cancel_token.h"
 #include "core/base/error.h"
+#include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
@@ -66,6 +67,13 @@ struct BuildContext {
   FileSystem& files;
   Progress& progress;
   const CancelToken& cancel;
+};
+
+// What a stage of a build works with.
+struct StageContext {
+  const BuildContext& build;
+  unsigned threads = 1;
+  MemoryBudget& budget;
 };
 
 }  // namespace voxdag

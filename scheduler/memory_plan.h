@@ -7,7 +7,7 @@
 //                 top tree                          up to 1/16                   TopTree
 //   ingest until  triangles; the rest is spilled    up to 1/3                    TriangleStore
 //   built
-//   ingest        half-filled chunks of triangles   1 MiB                        nobody
+//                 cursors and pieces of the scene   1/2 of what is free          each part
 //   partition     half-filled chunks of triangles   1/8                          nobody
 //   estimate      pilot build, one at a time        3/4 of what is free          Backend
 //   build         WorkerMemory, for every worker    what is free / workers
@@ -41,7 +41,9 @@
 namespace voxdag {
 
 struct MemoryPlan {
-  static constexpr uint64_t kIngestBufferBytes = uint64_t{1} << 20;
+  // Of a thread that reads the scene: windows, batches and a piece, its share of the vertices not
+  // counted.
+  static constexpr uint64_t kIngestWorkerBytes = uint64_t{4} << 20;
   static constexpr uint64_t kSplitBufferBytes = uint64_t{512} << 10;
 
   uint64_t top_tree_bytes = 0;          // counters of the top tree
@@ -50,6 +52,10 @@ struct MemoryPlan {
 
   static constexpr MemoryPlan divide(uint64_t budget_bytes) {
     return {budget_bytes / 16, budget_bytes / 3, budget_bytes / 8};
+  }
+  // How many threads can read the scene, `free_bytes` being free.
+  static constexpr uint64_t ingest_workers(uint64_t free_bytes) {
+    return std::max<uint64_t>(free_bytes / 2 / kIngestWorkerBytes, 1);
   }
   // The budget of a pilot build, `free_bytes` being free.
   static constexpr uint64_t pilot_bytes(uint64_t free_bytes) { return free_bytes * 3 / 4; }

@@ -24,7 +24,7 @@ namespace voxdag {
 namespace {
 
 // Version of artifacts, job store and digests of scenes; a job of another version is refused.
-constexpr int64_t kWorkFormatVersion = 3;
+constexpr int64_t kWorkFormatVersion = 4;
 // How often the scene is read before its stored triangles may not be damaged again.
 constexpr int kMaxReads = 3;
 // How often the merge is run before artifacts may not be damaged again.
@@ -58,7 +58,9 @@ void check_places(const BuildSpec& spec, const BuildContext& context) {
                                  OutputLock::path_of(output)};
   refuse_own_files(spec, work, outputs, context);
   refuse_foreign_file(files, output, is_global_file, " (-o)");
-  refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
+  // If a job is in the work folder, the file is ours even if its first bytes are damaged.
+  if (!files.exists(WorkFolder::store_path(work)))
+    refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
   refuse_foreign_file(files, report, is_report, " (-o)");
   refuse_foreign_file(files, report + ".partial", is_report, " (-o)");
   files.make_directories(parent_directory(output));
@@ -213,9 +215,9 @@ class Build {
 
   void start_or_resume_job(const PreparedScene& scene) {
     if (const auto stored = start_over_ ? std::nullopt : jobs_->job()) {
-      if (stored->scene_sha256 != scene.sha256())
-        refuse_job("its scene has other contents (SHA-256 " + stored->scene_sha256.substr(0, 16) +
-                   ", now " + scene.sha256().substr(0, 16) + ")");
+      if (stored->scene_digest != scene.digest())
+        refuse_job("its scene has other contents (digest " + stored->scene_digest.substr(0, 16) +
+                   ", now " + scene.digest().substr(0, 16) + ")");
     } else {
       if (check_disk_space(spec_, scene, work_.path(), budget_, context_))
         clock_.finish("estimate");
@@ -224,7 +226,7 @@ class Build {
         plan[i].cube = scene.plan[i].cube;
         plan[i].weight = scene.plan[i].weight;
       }
-      jobs_->start({scene.sha256(), geometry_json(spec_.geometry), kWorkFormatVersion}, plan);
+      jobs_->start({scene.digest(), geometry_json(spec_.geometry), kWorkFormatVersion}, plan);
       start_over_ = false;
     }
     std::set<uint32_t> named;
@@ -237,8 +239,8 @@ class Build {
   void build_subvolumes_of(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
     std::vector<Cube> cubes;
     for (const StoredSubvolume& subvolume : planned) cubes.push_back(subvolume.cube);
-    const std::vector<BinId> bins = partition_prepared(
-        scene, cubes, checkpoint_, memory_.partition_buffer_bytes, context_.cancel);
+    const std::vector<BinId> bins =
+        partition_prepared(scene, cubes, checkpoint_, {context_, spec_.run.threads, budget_});
     std::vector<QueuedSubvolume> queue;
     for (size_t i = 0; i < planned.size(); ++i) queue.push_back({planned[i], bins[i]});
     const MemoryCharge lists(budget_, queue.size() * (sizeof queue[0] + sizeof planned[0]),
@@ -339,7 +341,6 @@ class Build {
 
   const BuildSpec spec_;
   MemoryBudget budget_;
-  const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
   const OutputLock output_lock_;
   WorkFolder work_;
   std::optional<ArtifactCache> cache_;

@@ -140,7 +140,7 @@ class Preparation {
 
   void find_grid() {
     if (!spec_.geometry.bounds)
-      scan(*scene_, state_, context_, [&] {
+      scan(*scene_, state_, stage_context(), [&] {
         if (checkpoint_.is_due()) checkpoint_.save(state_);
       });
     state_.grid = choose_grid(spec_.geometry, state_.bounds);
@@ -161,11 +161,8 @@ class Preparation {
     TopTree top(state_.grid.levels, budget_, state_.top_tree_depth);
     checkpoint_.load_top_tree(state_, top);
     if (state_.stage == IngestStage::kIngest) {
-      BinWriter writer(*prepared_.triangles, {kSceneBin}, MemoryPlan::kIngestBufferBytes);
-      ingest(*scene_, spec_.run.threads, state_, writer, top, context_, [&] {
-        if (!checkpoint_.is_due()) return;
-        writer.flush();
-        checkpoint_.save_in_background(state_, &top);
+      ingest(*scene_, state_, *prepared_.triangles, top, stage_context(), [&] {
+        if (checkpoint_.is_due()) checkpoint_.save_in_background(state_, &top);
       });
       state_.stage = IngestStage::kPartition;
       state_.position = 0;
@@ -173,6 +170,8 @@ class Preparation {
     }
     prepared_.plan = choose_subvolumes(top, spec_.run);
   }
+
+  StageContext stage_context() const { return {context_, spec_.run.threads, budget_}; }
 
   const BuildSpec& spec_;
   MemoryBudget& budget_;
@@ -192,12 +191,12 @@ PreparedScene prepare_scene(const BuildSpec& spec, MemoryBudget& budget, StageCl
 }
 
 std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube> cubes,
-                                      IngestCheckpoint& checkpoint, size_t buffer_bytes,
-                                      const CancelToken& cancel) {
+                                      IngestCheckpoint& checkpoint, const StageContext& context) {
+  const size_t buffer_bytes = MemoryPlan::divide(context.budget.limit()).partition_buffer_bytes;
   IngestState& state = scene.state;
   TriangleStore& triangles = *scene.triangles;
   if (state.stage < IngestStage::kReady) {
-    partition_scene(triangles, state.grid.levels, cubes, buffer_bytes, cancel, state.position,
+    partition_scene(triangles, state.grid.levels, cubes, buffer_bytes, state.position, context,
                     [&](uint64_t copied, BinWriter& writer) {
                       state.position = copied;
                       if (!checkpoint.is_due()) return;
@@ -209,7 +208,8 @@ std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube
     checkpoint.save(state);
     triangles.release(kSceneBin);
   }
-  const auto bins = assign_bins(triangles, state.grid.levels, cubes, buffer_bytes, cancel);
+  const auto bins =
+      assign_bins(triangles, state.grid.levels, cubes, buffer_bytes, context.build.cancel);
   // Chunks of triangles are small blocks of the heap, which would keep them resident.
   trim_heap();
   return bins;

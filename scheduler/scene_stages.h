@@ -35,8 +35,8 @@ struct PreparedScene {
   std::vector<SubvolumePlan> plan;  // empty if an earlier run partitioned the triangles
   double max_durable_bytes = 0;     // of disk that the triangles take in a build
 
-  // SHA-256 of the grid and the snapped triangles: names the content.
-  std::string sha256() const { return state.digest.hex(); }
+  // Of the grid and the snapped triangles: names the content.
+  std::string digest() const { return state.digest.hex(); }
 };
 
 // Scans and ingests the scene of a checked spec and plans its subvolumes, resuming at the
@@ -46,10 +46,8 @@ PreparedScene prepare_scene(const BuildSpec& spec, MemoryBudget& budget, StageCl
                             const BuildContext& context, IngestCheckpoint& checkpoint);
 
 // Partitions the triangles to the subvolumes at `cubes`; returns the bin of each, in the same
-// order. Uses `buffer_bytes` for incomplete chunks. Throws DamagedTriangles if triangles are
-// missing.
+// order. Throws DamagedTriangles if triangles are missing.
 std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube> cubes,
-                                      IngestCheckpoint& checkpoint, size_t buffer_bytes,
-                                      const CancelToken& cancel);
+                                      IngestCheckpoint& checkpoint, const StageContext& context);
 
 }  // namespace voxdag

@@ -1,12 +1,14 @@
-// Measures the stages of a build, which follow one another. Not thread-safe.
+// Measures the stages of a build, which follow one another. Used by one thread.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/clock.h"
+#include "core/base/thread_times.h"
 
 namespace voxdag {
 
@@ -14,6 +16,8 @@ struct StageTime {
   std::string name;
   double wall_s = 0;
   double cpu_s = 0;  // of the whole process
+  // The largest part of cpu_s that one thread took, by ThreadTimes.
+  double largest_thread_share = 0;
 };
 
 class StageClock {
@@ -25,9 +29,15 @@ class StageClock {
   // Ends stage `name`, which began when the one before it ended.
   void finish(const std::string& name) {
     const double wall = wall_seconds(), cpu = process_cpu_seconds();
-    stages_.push_back({name, wall - wall_, cpu - cpu_});
+    const ThreadTimes::Seconds threads = ThreadTimes::now();
+    double largest = 0;
+    for (size_t i = 0; i < threads.size(); ++i)
+      largest = std::max(largest, threads[i] - threads_[i]);
+    const double share = cpu > cpu_ ? std::min(largest / (cpu - cpu_), 1.0) : 1.0;
+    stages_.push_back({name, wall - wall_, cpu - cpu_, share});
     wall_ = wall;
     cpu_ = cpu;
+    threads_ = threads;
     if (on_finish_) on_finish_(stages_.back());
   }
   const std::vector<StageTime>& stages() const { return stages_; }
@@ -37,6 +47,7 @@ class StageClock {
   std::vector<StageTime> stages_;
   double wall_ = wall_seconds();
   double cpu_ = process_cpu_seconds();
+  ThreadTimes::Seconds threads_ = ThreadTimes::now();
 };
 
 }  // namespace voxdag

@@ -2,7 +2,11 @@
 // is deleted for its age. Used by one thread.
 #pragma once
 
+#include "server/steps.h"
+
 namespace voxdag::server {
+
+inline constexpr double kSecondsPerDay = 86400;
 
 class ClockGuard {
  public:
@@ -14,6 +18,9 @@ class ClockGuard {
   bool has_jumped(double clock_s, double now_s);
   // Whether it did within the last day.
   bool is_in_doubt(double now_s) const { return now_s < doubt_until_s_; }
+  // The time (Unix) before which `what`, in the words of a log line, is too old after `days`; 0
+  // while the clock is in doubt, which is logged when it begins. Call it instead of has_jumped().
+  double oldest_s(double days, const char* what, const Log& log);
 
  private:
   double last_clock_s_;

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <string>
 
+#include "core/base/error.h"
 #include "core/io/file_system.h"
 
 namespace voxdag::server {
@@ -40,6 +41,17 @@ class DiskSpace {
     uint64_t not_reserved_;  // of what was announced
   };
 
+  // Calls `act`, which deletes or cancels something. If the disk has no space to record that, which
+  // it may have done in part, it is called again without the ballast.
+  template <class Act>
+  auto with_ballast(const Act& act) {
+    try {
+      return act();
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kNoSpace || !drop_ballast()) throw;
+    }
+    return act();
+  }
   // Removes the ballast; false if there is none.
   bool drop_ballast();
   // Puts the ballast there again if there is room for it.

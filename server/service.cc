@@ -17,7 +17,6 @@ namespace voxdag::server {
 namespace {
 
 constexpr std::chrono::minutes kCleanUpInterval{10};
-constexpr double kSecondsPerDay = 86400;
 constexpr size_t kMaxLoggedChars = 200;
 
 ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
@@ -129,42 +128,23 @@ void Service::stop() {
 }
 
 void Service::clean_up_periodically() {
-  std::unique_lock lock(stop_mutex_);
   while (!draining_) {
-    steps_.run("remove old uploads", [this] { remove_old_uploads(); });
+    steps_.run("remove old uploads", [this] {
+      scenes_.remove_stale_uploads(clock_.oldest_s(config_.retention.upload_days, "upload", log_));
+    });
     steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
     steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });
+    std::unique_lock lock(stop_mutex_);
     stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });
   }
-}
-
-void Service::remove_old_uploads() {
-  const double clock_s = unix_seconds(), now_s = wall_seconds();
-  if (clock_.has_jumped(clock_s, now_s))
-    log_(
-        "the clock is far ahead of when the service last saw it: for a day no upload is deleted "
-        "for its age");
-  if (!clock_.is_in_doubt(now_s))
-    scenes_.remove_stale_uploads(clock_s - config_.retention.upload_days * kSecondsPerDay);
-}
-
-// A disk that is full to the last byte has no room for the record of a deletion either.
-Response Service::routed(Request& request) {
-  if (config_.before_step) config_.before_step("answer " + request.method);
-  try {
-    return router_.route(request, access_);
-  } catch (const Error& error) {
-    const bool frees_space = request.method == "DELETE" || request.target.path.ends_with("/cancel");
-    if (error.code() != ErrorCode::kNoSpace || !frees_space || !disk_.drop_ballast()) throw;
-  }
-  return router_.route(request, access_);
 }
 
 Response Service::answer(Request& request) {
   const double start_s = wall_seconds();
   Response response;
   try {
-    response = routed(request);
+    if (config_.before_step) config_.before_step("answer " + request.method);
+    response = router_.route(request, access_);
   } catch (const std::exception& error) {
     const Problem problem = public_problem(error);
     if (problem.detail != error.what())  // clients do not see this text

@@ -34,9 +34,7 @@ class Service {
  private:
   // Runs until the service stops.
   void clean_up_periodically();
-  void remove_old_uploads();
   Response answer(Request& request);
-  Response routed(Request& request);
   // Counts every request, and logs those that try to change something.
   void record(const Request& request, int status, double start_s);
 

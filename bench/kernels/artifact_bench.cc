@@ -1,6 +1,5 @@
 // Speed of artifacts: writing a sub-DAG to a segment and reading it back, in rows per second.
 #include <benchmark/benchmark.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <random>
@@ -46,12 +45,8 @@ class Folder {
   const std::string& path() const { return path_; }
 
  private:
-  static std::string make() {
-    std::string name = std::filesystem::temp_directory_path() / "voxdag-bench-XXXXXX";
-    if (!mkdtemp(name.data())) throw Error(ErrorCode::kIo, "cannot make " + name);
-    return name;
-  }
-  const std::string path_ = make();
+  const std::string path_ =
+      make_temporary_folder(std::filesystem::temp_directory_path() / "voxdag-bench-");
 };
 
 ArtifactRef write(const std::string& folder) {

@@ -1,6 +1,5 @@
 // Speed of the merge and of its steps: rows of all runs per CPU second.
 #include <benchmark/benchmark.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <map>
@@ -34,12 +33,8 @@ class Fixtures {
   }
 
  private:
-  static std::string make_folder() {
-    std::string name = std::filesystem::temp_directory_path() / "voxdag-bench-XXXXXX";
-    if (!mkdtemp(name.data())) throw Error(ErrorCode::kIo, "cannot make " + name);
-    return name;
-  }
-  std::string folder_ = make_folder();
+  std::string folder_ =
+      make_temporary_folder(std::filesystem::temp_directory_path() / "voxdag-bench-");
   std::map<size_t, std::unique_ptr<SyntheticRuns>> made_;
 };
 

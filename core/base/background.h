@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/base/thread_times.h"
+
 namespace voxdag {
 
 // Starts `work` on a thread of its own. If the system has no thread left, the first call of get()
@@ -16,8 +18,14 @@ template <class Work>
 [[nodiscard]] std::future<void> run_in_background(Work&& work) {
   const auto shared = std::make_shared<std::decay_t<Work>>(std::forward<Work>(work));
   const auto call = [shared] { (*shared)(); };
+  const auto call_and_end = [shared] {
+    struct End {
+      ~End() { ThreadTimes::add_background(); }
+    } end;
+    (*shared)();
+  };
   try {
-    return std::async(std::launch::async, call);
+    return std::async(std::launch::async, call_and_end);
   } catch (const std::system_error&) {
     return std::async(std::launch::deferred, call);
   }

@@ -16,6 +16,11 @@ uint64_t checksum64(std::span<const std::byte> bytes) {
   return XXH64(bytes.data(), bytes.size(), 0);
 }
 
+Checksum128 checksum128(std::span<const std::byte> bytes) {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return {hash.low64, hash.high64};
+}
+
 struct Checksum64::State {
   XXH64_state_t* hash = XXH64_createState();
   ~State() { XXH64_freeState(hash); }

@@ -1,5 +1,6 @@
-// XXH64 to detect damage (simple enough that the header-only reader has its own), SHA-256 to
-// identify contents, and a checksum of words that can be computed in parts.
+// XXH64 to detect damage (simple enough that the header-only reader has its own), XXH3 to tell
+// large contents apart, SHA-256 to identify them, and a checksum of words that can be computed in
+// parts.
 #pragma once
 
 #include <cstddef>
@@ -17,6 +18,13 @@ namespace voxdag {
 
 // XXH64 with seed 0.
 uint64_t checksum64(std::span<const std::byte> bytes);
+
+// XXH3 of 128 bits, several times as fast: tells contents apart, but not against forgery.
+struct Checksum128 {
+  uint64_t low = 0, high = 0;
+  bool operator==(const Checksum128&) const = default;
+};
+Checksum128 checksum128(std::span<const std::byte> bytes);
 
 // A running XXH64.
 class Checksum64 {

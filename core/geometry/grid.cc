@@ -49,6 +49,15 @@ void WorldBounds::add(const double (&point)[3]) {
   empty = false;
 }
 
+void WorldBounds::add(const WorldBounds& other) {
+  if (other.empty) return;
+  for (int a = 0; a < 3; ++a) {
+    low[a] = empty ? other.low[a] : std::min(low[a], other.low[a]);
+    high[a] = empty ? other.high[a] : std::max(high[a], other.high[a]);
+  }
+  empty = false;
+}
+
 Grid Grid::around(const WorldBounds& bounds, uint32_t levels) {
   check_levels(levels);
   const double extent = largest_extent(bounds);

@@ -20,6 +20,7 @@ struct WorldBounds {
   bool empty = true;
 
   void add(const double (&point)[3]);
+  void add(const WorldBounds& other);
 };
 
 // Vertex positions in world space, double precision, [vertex][axis].

@@ -102,6 +102,10 @@ class FileSystem {
 // The file system of this machine.
 FileSystem& system_files();
 
+// Makes a folder that only this user may enter, under `prefix` and six characters that nobody can
+// foresee, and returns its path.
+std::string make_temporary_folder(const std::string& prefix);
+
 // The directory part of a path, "." if it has none.
 std::string parent_directory(const std::string& path);
 // The whole of a small file; one larger than `limit_bytes` is Error{kLimit}.

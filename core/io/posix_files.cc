@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
 
@@ -52,8 +53,10 @@ int open_retrying(const std::string& path, int flags) {
   return fd;
 }
 
+enum class Contents { kKeep, kEmpty };
+
 // Opens, or makes, a file that is about to be changed. A link of that name could lead to any file.
-int open_to_change(const char* call, const std::string& path) {
+int open_to_change(const char* call, const std::string& path, Contents contents) {
   const auto refuse = [&](const char* what) {
     throw Error(ErrorCode::kInvalidInput,
                 path + " is " + what + ": expected a regular file of one name, or a free name");
@@ -66,6 +69,8 @@ int open_to_change(const char* call, const std::string& path) {
   if (fstat(fd, &s) != 0) fail("stat", path, errno);
   if (S_ISREG(s.st_mode) && s.st_nlink > 1) refuse("a file of several names (hard links)");
   if (!S_ISREG(s.st_mode) && !S_ISCHR(s.st_mode)) refuse("not a regular file");
+  if (contents == Contents::kEmpty && s.st_size > 0 && ftruncate(fd, 0) != 0)
+    fail("empty", path, errno);
   return opened.take();
 }
 
@@ -108,15 +113,8 @@ class PosixReadableFile : public ReadableFile {
 
 class PosixWritableFile : public WritableFile {
  public:
-  enum class Contents { kKeep, kEmpty };
-
   PosixWritableFile(const std::string& path, Contents contents)
-      : path_(path), fd_(open_to_change("create", path)) {
-    struct stat s {};
-    if (fstat(fd_.get(), &s) != 0) fail("stat", path, errno);
-    if (contents == Contents::kEmpty && s.st_size > 0 && ftruncate(fd_.get(), 0) != 0)
-      fail("empty", path, errno);
-  }
+      : path_(path), fd_(open_to_change("create", path, contents)) {}
   const std::string& path() const override { return path_; }
   void write_at(uint64_t offset, std::span<const std::byte> data) override {
     while (!data.empty()) {
@@ -162,10 +160,10 @@ class PosixFileSystem : public FileSystem {
     return std::make_unique<PosixReadableFile>(path);
   }
   std::unique_ptr<WritableFile> create(const std::string& path) override {
-    return std::make_unique<PosixWritableFile>(path, PosixWritableFile::Contents::kEmpty);
+    return std::make_unique<PosixWritableFile>(path, Contents::kEmpty);
   }
   std::unique_ptr<WritableFile> open_write(const std::string& path) override {
-    return std::make_unique<PosixWritableFile>(path, PosixWritableFile::Contents::kKeep);
+    return std::make_unique<PosixWritableFile>(path, Contents::kKeep);
   }
   bool exists(const std::string& path) override {
     struct stat s {};
@@ -222,7 +220,7 @@ class PosixFileSystem : public FileSystem {
     if (fsync(fd.get()) != 0) fail("sync", path, errno);
   }
   std::unique_ptr<FileLock> try_lock(const std::string& path) override {
-    const int fd = open_to_change("open", path);
+    const int fd = open_to_change("open", path, Contents::kKeep);
     auto lock = std::make_unique<PosixFileLock>(fd);
     if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
       if (errno != EWOULDBLOCK) fail("lock", path, errno);
@@ -253,6 +251,12 @@ class PosixFileSystem : public FileSystem {
 FileSystem& system_files() {
   static PosixFileSystem files;
   return files;
+}
+
+std::string make_temporary_folder(const std::string& prefix) {
+  std::string path = prefix + "XXXXXX";
+  if (!mkdtemp(path.data())) fail("make directory", path, errno);
+  return path;
 }
 
 }  // namespace voxdag

@@ -1,5 +1,8 @@
 // Scenes that consist of the default scenes of glTF files, one after the other.
+#include <algorithm>
 #include <memory>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "core/base/error.h"
@@ -16,14 +19,17 @@ namespace {
 struct SceneFile {
   SceneFile(FileSystem& files, const std::string& path, MemoryBudget& budget,
             const CancelToken& cancel)
-      : file(files.open_read(path)), document(gltf::read_document(*file, budget, cancel)) {
+      : file(files.open_read(path)),
+        document(gltf::read_document(*file, budget, cancel)),
+        external_files(path, budget) {
     gltf::check_document(document);
-    buffers = std::make_unique<gltf::BufferReader>(files, *file, document, budget);
+    gltf::BufferReader(files, *file, document, external_files, budget).check_lengths();
   }
 
   const std::unique_ptr<ReadableFile> file;
   gltf::Document document;
-  std::unique_ptr<gltf::BufferReader> buffers;
+  gltf::ExternalFiles external_files;
+  uint64_t first_triangle = 0, end_triangle = 0;  // of those that the scene declares
 };
 
 // Declared triangles of the scene to draw, every instance counted.
@@ -40,37 +46,79 @@ uint128 count_triangles(const gltf::Document& document, MemoryBudget& budget) {
   return total;
 }
 
+class GltfCursor : public TriangleCursor {
+ public:
+  GltfCursor(FileSystem& files, std::span<const std::unique_ptr<SceneFile>> scene_files,
+             const gltf::ReaderOptions& options, MemoryBudget& budget, const CancelToken& cancel)
+      : files_(files),
+        scene_files_(scene_files),
+        options_(options),
+        budget_(budget),
+        cancel_(cancel) {}
+
+  void read(uint64_t first, uint64_t count, const Visitor& visit) override {
+    const uint64_t end = first + count;
+    while (first < end) {
+      SceneFile& file = **std::ranges::upper_bound(scene_files_, first, {},
+                                                   [](const auto& f) { return f->end_triangle; });
+      const uint64_t n = std::min(end, file.end_triangle) - first;
+      reader_of(file).read(first - file.first_triangle, n, visit);
+      first += n;
+    }
+  }
+
+ private:
+  // The reader of one file is open at a time.
+  gltf::TriangleReader& reader_of(SceneFile& file) {
+    if (open_ != &file) {
+      open_ = nullptr;
+      reader_.reset();
+      buffers_.emplace(files_, *file.file, file.document, file.external_files, budget_);
+      reader_.emplace(file.document, *buffers_, options_, budget_, cancel_);
+      open_ = &file;
+    }
+    return *reader_;
+  }
+
+  FileSystem& files_;
+  const std::span<const std::unique_ptr<SceneFile>> scene_files_;
+  const gltf::ReaderOptions options_;
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+  const SceneFile* open_ = nullptr;
+  std::optional<gltf::BufferReader> buffers_;
+  std::optional<gltf::TriangleReader> reader_;
+};
+
 class GltfScene : public TriangleSource {
  public:
   GltfScene(FileSystem& files, const std::vector<std::string>& paths, const SceneOptions& options,
             MemoryBudget& budget, const CancelToken& cancel)
-      : options_(options), budget_(budget), cancel_(cancel) {
+      : file_system_(files), options_(options), budget_(budget), cancel_(cancel) {
     uint128 total = 0;
     for (const std::string& path : paths) {
       cancel.check();
       files_.push_back(std::make_unique<SceneFile>(files, path, budget, cancel));
+      files_.back()->first_triangle = static_cast<uint64_t>(total);
       total += count_triangles(files_.back()->document, budget);
       if (total > INT64_MAX)
         throw Error(ErrorCode::kLimit, path + ": over 2^63 triangles, instances counted");
+      files_.back()->end_triangle = static_cast<uint64_t>(total);
     }
     declared_ = static_cast<uint64_t>(total);
   }
 
-  void for_each_batch_from(uint64_t first, const Visitor& visit) override {
-    position_ = {};
-    gltf::Batch batch(visit, position_, first, budget_, cancel_);
-    for (const auto& f : files_)
-      gltf::TriangleReader(f->document, *f->buffers, budget_, options_.skip_invalid, batch).run();
-    batch.flush();
+  std::unique_ptr<TriangleCursor> open(unsigned cursors) override {
+    return std::make_unique<GltfCursor>(file_system_, files_,
+                                        gltf::ReaderOptions{options_.skip_invalid, cursors},
+                                        budget_, cancel_);
   }
-  uint64_t position() const override { return position_.triangles; }
   uint64_t declared_triangles() const override { return declared_; }
-  uint64_t invalid_triangles() const override { return position_.invalid; }
   std::vector<SourceFile> files() const override {
     std::vector<SourceFile> all;
     for (const auto& f : files_) all.push_back({f->file->path(), f->file->identity()});
     for (const auto& f : files_)
-      for (const auto& [buffer, file] : f->buffers->external_files()) all.push_back(file);
+      for (const SourceFile& file : f->external_files.all()) all.push_back(file);
     return all;
   }
   std::vector<std::string> warnings() const override {
@@ -85,12 +133,12 @@ class GltfScene : public TriangleSource {
   }
 
  private:
+  FileSystem& file_system_;
   const SceneOptions options_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   std::vector<std::unique_ptr<SceneFile>> files_;
   uint64_t declared_ = 0;
-  gltf::PassPosition position_;
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
-// The interface of a scene: it streams its triangles in world space, always in the same order,
-// without having all of them in memory. Scenes are glTF files (open_scene) or made by tests.
+// The interface of a scene: it streams its triangles in world space, always in the same order and
+// for any number of threads, without having all of them in memory. Scenes are glTF files
+// (open_scene) or made by tests.
 #pragma once
 
 #include <cstdint>
@@ -22,27 +23,33 @@ struct SourceFile {
   bool operator==(const SourceFile&) const = default;
 };
 
-class TriangleSource {
+// Reads the triangles of a scene for one thread; any number of cursors may read at the same time.
+class TriangleCursor {
  public:
   using Visitor = std::function<void(std::span<const WorldTriangle>)>;
 
+  virtual ~TriangleCursor() = default;
+  // Calls `visit` with batches of 1 to 1024 triangles, all finite: those among the declared
+  // triangles [first, first + count) that skip_invalid does not drop, in the scene's order. Going
+  // back to earlier triangles takes longer. Throws Error naming scene file, node, mesh, primitive
+  // or accessor.
+  virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
+};
+
+class TriangleSource {
+ public:
+  using Visitor = TriangleCursor::Visitor;
+
   virtual ~TriangleSource() = default;
-  // Calls `visit` with batches of 1 to 4096 triangles, all finite, until none is left. Every call
-  // passes the same triangles in the same order. Throws Error naming scene file, node, mesh,
-  // primitive or accessor.
-  void for_each_batch(const Visitor& visit) { for_each_batch_from(0, visit); }
-  // Calls `visit` like for_each_batch(), but skips the first `first` declared triangles without
-  // reading them.
-  virtual void for_each_batch_from(uint64_t first, const Visitor& visit) = 0;
-  // The number of declared triangles up to the end of the batch that is being visited, from which
-  // another pass may begin.
-  virtual uint64_t position() const = 0;
-  // The triangles that the scene declares, instances counted: those that for_each_batch() visits
-  // and those that skip_invalid drops.
+  // A cursor, one of `cursors` that share the memory. The source must outlive it.
+  virtual std::unique_ptr<TriangleCursor> open(unsigned cursors) = 0;
+  // Calls `visit` with all triangles, by batches as TriangleCursor::read() does.
+  void for_each_batch(const Visitor& visit) { open(1)->read(0, declared_triangles(), visit); }
+  // The triangles that the scene declares, instances counted: those that are visited and those that
+  // skip_invalid drops.
   virtual uint64_t declared_triangles() const = 0;
-  // The triangles that skip_invalid dropped in the last pass.
-  virtual uint64_t invalid_triangles() const = 0;
-  // All files that the triangles come from, with their identity when they were opened.
+  // All files that the triangles come from, with their identity when they were first opened; that
+  // of a file that had changed when it was opened again is unknown.
   virtual std::vector<SourceFile> files() const { return {}; }
   // Warnings for the user, one sentence each (ignored optional extensions, points and lines that
   // make no voxels).

@@ -113,7 +113,7 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
   GBuffer buffer(width, height);
   progress.begin_stage("render", static_cast<uint64_t>(height), "rows");
   const auto for_each_row = [&](const auto& work) {
-    parallel_for(static_cast<unsigned>(options.threads), static_cast<size_t>(height),
+    parallel_for(options.threads, static_cast<size_t>(height),
                  [&](unsigned, size_t row) { work(static_cast<int>(row)); });
   };
   for_each_row([&](int y) {

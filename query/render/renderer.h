@@ -12,7 +12,7 @@ namespace voxdag::query {
 struct RenderOptions {
   int width = 1280, height = 720;
   int samples = 2;  // per pixel, along each of its sides
-  int threads = 1;
+  unsigned threads = 1;
 };
 
 // Shows a plain background if the DAG is empty. Throws Error{kCorrupt} for a damaged DAG, and

@@ -1,93 +1,157 @@
 #include "scheduler/ingest/ingest.h"
 
+#include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "core/base/bounded_queue.h"
 #include "core/base/error.h"
+#include "core/base/page_buffer.h"
+#include "core/base/turns.h"
+#include "scheduler/memory_plan.h"
+#include "scheduler/triangles/chunk.h"
 
 namespace voxdag {
 namespace {
 
-// A batch of the scene after snapping.
-struct SnappedBatch {
-  std::vector<FixedTriangle> inside;  // those that may touch the grid
-  std::vector<ExpectedWork> work;     // one for each of `inside`
-  uint64_t dropped_outside = 0;
-  uint64_t position = 0;  // in the scene, after the batch
+// Declared triangles of a piece. The digest and the plan depend on it.
+constexpr uint64_t kPieceTriangles = 16384;
+
+// Reads the scene from triangle `first` on: clears a Piece, adds to it all batches of a piece, and
+// commits it with the number of declared triangles up to its end.
+template <class Piece, class MakePiece, class Commit>
+void read_pieces(TriangleSource& scene, uint64_t first, const StageContext& context,
+                 MakePiece make_piece, Commit commit) {
+  const uint64_t declared = scene.declared_triangles();
+  const uint64_t pieces =
+      (declared - std::min(first, declared) + kPieceTriangles - 1) / kPieceTriangles;
+  const unsigned threads = static_cast<unsigned>(
+      std::clamp<uint64_t>(std::min(pieces, MemoryPlan::ingest_workers(context.budget.available())),
+                           1, context.threads));
+  struct Worker {
+    std::unique_ptr<TriangleCursor> cursor;
+    std::optional<Piece> piece;
+  };
+  std::vector<Worker> workers(threads);
+  const auto begin_of = [&](size_t item) { return first + item * kPieceTriangles; };
+  const auto end_of = [&](size_t item) { return std::min(begin_of(item + 1), declared); };
+  parallel_for_in_order(
+      threads, pieces,
+      [&](unsigned number, size_t item) {
+        Worker& worker = workers[number];
+        if (!worker.piece) {
+          worker.cursor = scene.open(threads);
+          make_piece(worker.piece);
+        }
+        worker.piece->clear();
+        worker.cursor->read(
+            begin_of(item), end_of(item) - begin_of(item),
+            [&](std::span<const WorldTriangle> batch) { worker.piece->add(batch); });
+        worker.piece->finish();
+      },
+      [&](unsigned number, size_t item) {
+        context.build.cancel.check();
+        commit(*workers[number].piece, end_of(item));
+        context.build.progress.advance(end_of(item) - begin_of(item));
+      });
+}
+
+class PieceBounds {
+ public:
+  void clear() { bounds_ = {}; }
+  void add(std::span<const WorldTriangle> batch) {
+    for (const WorldTriangle& triangle : batch)
+      for (const auto& vertex : triangle.v) bounds_.add(vertex);
+  }
+  void finish() {}
+  const WorldBounds& bounds() const { return bounds_; }
+
+ private:
+  WorldBounds bounds_;
 };
 
-// The producer: snaps what is read of the scene.
-class Snapper {
+// A piece of the scene after snapping.
+class SnappedPiece {
  public:
-  Snapper(const TriangleSource& scene, const IngestState& state)
-      : scene_(scene),
-        grid_(state.grid),
-        snapped_(state.counts.triangles + state.counts.dropped_outside) {}
+  SnappedPiece(const Grid& grid, const TopTree& top, size_t record_bytes, MemoryBudget& budget)
+      : grid_(grid),
+        record_bytes_(record_bytes),
+        records_(budget, kPieceTriangles * record_bytes, "a piece of the scene"),
+        tally_(top) {}
 
-  void snap(std::span<const WorldTriangle> batch, SnappedBatch& out) {
-    out.inside.clear();
-    out.work.clear();
-    out.dropped_outside = 0;
-    out.position = scene_.position();
+  void clear() {
+    counts_ = {};
+    too_far_.reset();
+    tally_.clear();
+  }
+
+  void add(std::span<const WorldTriangle> batch) {
     for (const WorldTriangle& world : batch) {
       FixedTriangle triangle;
       switch (snap_triangle(grid_, world, triangle)) {
         case SnapResult::kOutside:
-          ++out.dropped_outside;
+          ++counts_.dropped_outside;
           break;
         case SnapResult::kTooFar:
-          throw Error(ErrorCode::kLimit,
-                      "triangle " + std::to_string(snapped_) +
-                          " of the scene reaches into the grid from more than 2^32 voxels away: "
-                          "expected coordinates within 2^40 / 256 voxels (--bounds)");
+          if (!too_far_) too_far_ = counts_.triangles + counts_.dropped_outside;
+          break;
         case SnapResult::kInside:
-          out.inside.push_back(triangle);
-          out.work.push_back(expected_work(triangle));
+          add(triangle);
           break;
       }
-      ++snapped_;
     }
   }
+  void finish() { checksum_ = checksum128(records()); }
+
+  const IngestCounts& counts() const { return counts_; }
+  // How many triangles of the piece come before the first that reaches too far, if there is one.
+  const std::optional<uint64_t>& too_far() const { return too_far_; }
+  std::span<const std::byte> records() const {
+    return {records_.data(), counts_.triangles * record_bytes_};
+  }
+  const Checksum128& checksum() const { return checksum_; }
+  TopTree::Tally& tally() { return tally_; }
 
  private:
-  const TriangleSource& scene_;
+  void add(const FixedTriangle& triangle) {
+    const ExpectedWork work = expected_work(triangle);
+    counts_.expected_voxels += work.voxels;
+    tally_.add(triangle, work.bricks);
+    encode_triangle(triangle, record_bytes_, records_.data() + counts_.triangles * record_bytes_);
+    ++counts_.triangles;
+  }
+
   const Grid grid_;
-  uint64_t snapped_;
+  const size_t record_bytes_;
+  PageBuffer<std::byte> records_;
+  IngestCounts counts_;
+  std::optional<uint64_t> too_far_;
+  TopTree::Tally tally_;
+  Checksum128 checksum_;
 };
 
-// The consumer: counts and stores what was snapped.
-void consume(const SnappedBatch& batch, IngestState& state, BinWriter& writer, TopTree& top) {
-  for (size_t i = 0; i < batch.inside.size(); ++i) {
-    state.counts.expected_voxels += batch.work[i].voxels;
-    top.add(batch.inside[i], batch.work[i].bricks);
-    writer.append(0, batch.inside[i]);
-  }
-  state.counts.triangles += batch.inside.size();
-  state.counts.dropped_outside += batch.dropped_outside;
-  state.digest.add(batch.inside);
-  state.position = batch.position;
+void add(const IngestCounts& piece, IngestCounts& total) {
+  total.triangles += piece.triangles;
+  total.dropped_outside += piece.dropped_outside;
+  total.expected_voxels += piece.expected_voxels;
 }
-
-// Batches between the two threads, less than half a MiB each.
-constexpr size_t kQueuedBatches = 3;
 
 }  // namespace
 
-void scan(TriangleSource& scene, IngestState& state, const BuildContext& context,
-          const AfterBatch& after_batch) {
-  context.progress.begin_stage("scan", state.declared_triangles, "triangles");
-  context.progress.advance(state.position);
-  scene.for_each_batch_from(state.position, [&](std::span<const WorldTriangle> batch) {
-    context.cancel.check();
-    for (const WorldTriangle& triangle : batch)
-      for (const auto& vertex : triangle.v) state.bounds.add(vertex);
-    state.position = scene.position();
-    context.progress.advance(batch.size());
-    after_batch();
-  });
-  context.progress.end_stage();
+void scan(TriangleSource& scene, IngestState& state, const StageContext& context,
+          const AfterPiece& after_piece) {
+  Progress& progress = context.build.progress;
+  progress.begin_stage("scan", state.declared_triangles, "triangles");
+  progress.advance(state.position);
+  read_pieces<PieceBounds>(
+      scene, state.position, context, [](auto& piece) { piece.emplace(); },
+      [&](const PieceBounds& piece, uint64_t position) {
+        state.bounds.add(piece.bounds());
+        state.position = position;
+        after_piece();
+      });
+  progress.end_stage();
 }
 
 Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds) {
@@ -100,29 +164,32 @@ Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds) {
   return Grid::around(bounds, levels);
 }
 
-void ingest(TriangleSource& scene, unsigned threads, IngestState& state, BinWriter& writer,
-            TopTree& top, const BuildContext& context, const AfterBatch& after_batch) {
-  context.progress.begin_stage("ingest", state.declared_triangles, "triangles");
-  context.progress.advance(state.position);
-  Snapper snapper(scene, state);
-  const uint64_t first = state.position;
-  run_producer_consumer<SnappedBatch, kQueuedBatches>(
-      threads,
-      [&](auto pass) {
-        scene.for_each_batch_from(first, [&](std::span<const WorldTriangle> batch) {
-          pass([&](SnappedBatch& snapped) { snapper.snap(batch, snapped); });
-        });
-      },
-      [&](const SnappedBatch& batch) {
-        context.cancel.check();
-        consume(batch, state, writer, top);
-        context.progress.advance(batch.inside.size() + batch.dropped_outside);
-        after_batch();
+void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, TopTree& top,
+            const StageContext& context, const AfterPiece& after_piece) {
+  Progress& progress = context.build.progress;
+  progress.begin_stage("ingest", state.declared_triangles, "triangles");
+  progress.advance(state.position);
+  IngestCounts& counts = state.counts;
+  read_pieces<SnappedPiece>(
+      scene, state.position, context,
+      [&](auto& piece) { piece.emplace(state.grid, top, store.record_bytes(), context.budget); },
+      [&](SnappedPiece& piece, uint64_t position) {
+        if (piece.too_far())
+          throw Error(
+              ErrorCode::kLimit,
+              "triangle " +
+                  std::to_string(counts.triangles + counts.dropped_outside + *piece.too_far()) +
+                  " of the scene reaches into the grid from more than 2^32 voxels away: "
+                  "expected coordinates within 2^40 / 256 voxels (--bounds)");
+        add(piece.counts(), counts);
+        top.add(piece.tally());
+        add_records(store, kSceneBin, piece.records());
+        state.digest.add(piece.checksum());
+        state.position = position;
+        after_piece();
       });
-  writer.flush();
-  state.counts.dropped_invalid =
-      state.declared_triangles - state.counts.triangles - state.counts.dropped_outside;
-  context.progress.end_stage();
+  counts.dropped_invalid = state.declared_triangles - counts.triangles - counts.dropped_outside;
+  progress.end_stage();
 }
 
 }  // namespace voxdag

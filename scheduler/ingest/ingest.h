@@ -1,6 +1,10 @@
 // The two passes over a scene: the scan finds its bounds; ingest snaps its triangles to the grid,
 // counts them into the top tree and stores them in the scene's bin. Both continue from the state
 // that they are given, which may be that of an earlier run.
+//
+// Several threads read pieces of the scene, of 16384 declared triangles each, and hand on what they
+// made of them in the order of the pieces: the state, and so the plan, does not depend on the
+// number of threads.
 #pragma once
 
 #include <functional>
@@ -12,20 +16,19 @@
 
 namespace voxdag {
 
-// Called after each batch, when the state covers all triangles up to its position.
-using AfterBatch = std::function<void()>;
+// Called after each piece, when the state covers all triangles up to its position.
+using AfterPiece = std::function<void()>;
 
 // Adds the scene's triangles to the bounds of `state`.
-void scan(TriangleSource& scene, IngestState& state, const BuildContext& context,
-          const AfterBatch& after_batch);
+void scan(TriangleSource& scene, IngestState& state, const StageContext& context,
+          const AfterPiece& after_piece);
 
 // The grid that the geometry options describe, for a scene with these bounds.
 Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
 
-// Streams the scene into the only bin of `writer` and counts it into `top`. With `threads` > 1 the
-// scene is read and snapped on this thread; a second one does the rest and calls `after_batch`.
-// Throws Error{kLimit} for a triangle that reaches into the grid from beyond the coordinate limit.
-void ingest(TriangleSource& scene, unsigned threads, IngestState& state, BinWriter& writer,
-            TopTree& top, const BuildContext& context, const AfterBatch& after_batch);
+// Streams the scene into the scene's bin of `store` and counts it into `top`. Throws Error{kLimit}
+// for a triangle that reaches into the grid from beyond the coordinate limit.
+void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, TopTree& top,
+            const StageContext& context, const AfterPiece& after_piece);
 
 }  // namespace voxdag

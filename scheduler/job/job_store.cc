@@ -10,12 +10,12 @@ namespace {
 // "vdag": marks a database as a job store.
 constexpr int64_t kApplicationId = 0x76646167;
 
-constexpr int64_t kSchemaVersion = 5;
+constexpr int64_t kSchemaVersion = 6;
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE job (
   id INTEGER PRIMARY KEY CHECK (id = 1),
-  scene_sha256 TEXT NOT NULL,
+  scene_digest TEXT NOT NULL,
   geometry TEXT NOT NULL,
   format_version INTEGER NOT NULL,
   -- Their ids are 1, 2, ...
@@ -38,7 +38,8 @@ CREATE TABLE subvolume (
 CREATE INDEX subvolume_by_parent ON subvolume (parent);
 CREATE TABLE stage_time (
   id INTEGER PRIMARY KEY,
-  name TEXT NOT NULL, wall_s REAL NOT NULL, cpu_s REAL NOT NULL
+  name TEXT NOT NULL, wall_s REAL NOT NULL, cpu_s REAL NOT NULL,
+  largest_thread_share REAL NOT NULL
 );
 CREATE TABLE progress (
   id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -181,7 +182,7 @@ struct JobRow {
 template <class Row>
 void columns(Row& row, JobIdentity& job) {
   row.fixed("id", 1);
-  row("scene_sha256", job.scene_sha256);
+  row("scene_digest", job.scene_digest);
   row("geometry", job.geometry);
   row("format_version", job.format_version);
 }
@@ -212,6 +213,7 @@ void columns(Row& row, StageTime& time) {
   row("name", time.name);
   row("wall_s", time.wall_s);
   row("cpu_s", time.cpu_s);
+  row("largest_thread_share", time.largest_thread_share);
 }
 
 template <class Row>

@@ -35,7 +35,7 @@ namespace voxdag {
 
 // What must be the same for a build to be resumed.
 struct JobIdentity {
-  std::string scene_sha256;  // of the grid and the snapped triangles
+  std::string scene_digest;  // of the grid and the snapped triangles
   std::string geometry;      // geometry options as JSON, for messages
   int64_t format_version = 0;
   bool operator==(const JobIdentity&) const = default;

@@ -3,10 +3,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -256,9 +254,9 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
   check_disk("the global file", file, output_folder, output_free, progress);
 }
 
-// Makes the work folder of a plan where this process may write, in $TMPDIR, /tmp or the current
-// folder, under a name that nobody can foresee and for this user alone.
-std::string make_temporary_folder() {
+// Makes the work folder of a plan where this process may write: in $TMPDIR, /tmp or the current
+// folder.
+std::string make_plan_folder() {
   const char* chosen = std::getenv("TMPDIR");
   std::string parent = ".";
   for (const std::string candidate : {chosen ? chosen : "", "/tmp"})
@@ -266,11 +264,7 @@ std::string make_temporary_folder() {
       parent = candidate;
       break;
     }
-  std::string folder = parent + "/voxdag-plan-XXXXXX";
-  if (!mkdtemp(folder.data()))
-    throw Error(errno == ENOSPC ? ErrorCode::kNoSpace : ErrorCode::kIo,
-                "make directory " + folder + ": " + strerror(errno));
-  return folder;
+  return make_temporary_folder(parent + "/voxdag-plan-");
 }
 
 }  // namespace
@@ -283,7 +277,7 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   MemoryBudget budget(full.run.memory_bytes);
   StageClock clock;
   const std::string folder =
-      full.run.work_folder.empty() ? make_temporary_folder() : full.run.work_folder;
+      full.run.work_folder.empty() ? make_plan_folder() : full.run.work_folder;
   refuse_own_files(full, folder, {}, context);
   WorkFolder work(context, folder, full.run.lock_wait_s);
   // Removes spilled triangles; a job in the given work folder stays as it is.

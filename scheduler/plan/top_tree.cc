@@ -45,19 +45,46 @@ TopTree::TopTree(uint32_t grid_levels, MemoryBudget& budget, uint32_t depth)
       depth_(depth),
       cells_(budget, size_t{1} << (3 * depth), "the top tree's counters") {}
 
-void TopTree::add(const FixedTriangle& triangle, double weight) {
-  touched_.clear();
-  find_touched(triangle);
-  if (touched_.empty()) return;
-  const float each = static_cast<float>(weight / static_cast<double>(touched_.size()));
-  for (const uint64_t code : touched_) {
-    cells_[code].weight += each;
-    if (cells_[code].triangles < UINT32_MAX) ++cells_[code].triangles;
-  }
-  total_weight_ += weight;
+void TopTree::Tally::clear() {
+  entries_.clear();
+  large_.clear();
+  last_entry_.fill(0);
 }
 
-void TopTree::find_touched(const FixedTriangle& triangle) {
+// Neighbors in the scene mostly touch the same few cells, whose entries the slots find again.
+void TopTree::Tally::add(const FixedTriangle& triangle, double weight) {
+  find_touched(triangle);
+  if (touched_.size() > kMaxTouched) return large_.push_back({triangle, weight});
+  for (const uint64_t code : touched_) {
+    uint32_t& last = last_entry_[code % kSlots];
+    if (last >= entries_.size() || entries_[last].code != code) {
+      last = static_cast<uint32_t>(entries_.size());
+      entries_.push_back({.code = code});
+    }
+    entries_[last].weight += static_cast<float>(weight / static_cast<double>(touched_.size()));
+    ++entries_[last].triangles;
+  }
+}
+
+void TopTree::add(Tally& tally) {
+  const auto add_to_cell = [this](uint64_t code, float weight, uint32_t triangles) {
+    Cell& cell = cells_[code];
+    cell.weight += weight;
+    cell.triangles += std::min(triangles, UINT32_MAX - cell.triangles);
+    total_weight_ += static_cast<double>(weight);
+  };
+  for (const Tally::Entry& entry : tally.entries_)
+    add_to_cell(entry.code, entry.weight, entry.triangles);
+  for (const Tally::LargeTriangle& large : tally.large_) {
+    tally.find_touched(large.triangle);
+    const double cells = static_cast<double>(tally.touched_.size());
+    for (const uint64_t code : tally.touched_)
+      add_to_cell(code, static_cast<float>(large.weight / cells), 1);
+  }
+}
+
+void TopTree::Tally::find_touched(const FixedTriangle& triangle) {
+  touched_.clear();
   const CellBox box(triangle, grid_levels_, depth_);
   if (!box.is_inside_grid()) return collect(triangle, Cube{}, 0);
   int64_t cells = 1;
@@ -79,7 +106,7 @@ void TopTree::find_touched(const FixedTriangle& triangle) {
       }
 }
 
-void TopTree::collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code) {
+void TopTree::Tally::collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code) {
   if (cube.level == depth_) {
     touched_.push_back(code);
     return;

@@ -1,8 +1,9 @@
 // The dense top tree: for every cell of a coarse level, how many triangles touch it and how much
-// work they are expected to be. It decides which cubes of the grid become subvolumes. Not
-// thread-safe.
+// work they are expected to be. It decides which cubes of the grid become subvolumes. Several
+// threads can each fill a tally, which are then added to the tree one at a time.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -39,8 +40,40 @@ class TopTree {
   // The deepest tree whose counters take at most `bytes`.
   static uint32_t depth_within(uint32_t grid_levels, uint64_t bytes);
 
-  // `weight`: the bricks that the triangle is expected to touch.
-  void add(const FixedTriangle& triangle, double weight);
+  // What some triangles add to the cells of a tree. Not thread-safe.
+  class Tally {
+   public:
+    explicit Tally(const TopTree& top) : grid_levels_(top.grid_levels_), depth_(top.depth_) {}
+    void clear();
+    // `weight`: the bricks that the triangle is expected to touch.
+    void add(const FixedTriangle& triangle, double weight);
+
+   private:
+    friend class TopTree;
+    static constexpr size_t kSlots = 256;
+    static constexpr size_t kMaxTouched = 8;
+    struct Entry {
+      uint64_t code = 0;
+      float weight = 0;
+      uint32_t triangles = 0;
+    };
+    struct LargeTriangle {
+      FixedTriangle triangle;
+      double weight;
+    };
+
+    // Sets touched_ to the cells that the triangle touches.
+    void find_touched(const FixedTriangle& triangle);
+    void collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code);
+
+    const uint32_t grid_levels_;
+    const uint32_t depth_;
+    std::vector<Entry> entries_;                 // a cell may have several
+    std::vector<LargeTriangle> large_;           // those that touch more than kMaxTouched cells
+    std::array<uint32_t, kSlots> last_entry_{};  // of the cells of a slot
+    std::vector<uint64_t> touched_;              // by the last triangle
+  };
+  void add(Tally& tally);
   double total_weight() const { return total_weight_; }
   // The counters as plain bytes, with which another top tree of the same depth can be filled; the
   // total is separate.
@@ -68,17 +101,13 @@ class TopTree {
   // Most of the grid is empty: gather() first tests cubes this many levels above the cells.
   static constexpr uint32_t kSkippedLevels = 2;
   bool is_empty(uint64_t code) const;
-  // Sets touched_ to the cells that the triangle touches.
-  void find_touched(const FixedTriangle& triangle);
-  void collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code);
   template <class IsSmallEnough>
   SubvolumePlan gather(const Cube& cube, uint64_t code, const IsSmallEnough& is_small_enough,
                        std::vector<SubvolumePlan>& out) const;
 
   const uint32_t grid_levels_;
   const uint32_t depth_;
-  PageBuffer<Cell> cells_;         // by Morton code
-  std::vector<uint64_t> touched_;  // by the last triangle
+  PageBuffer<Cell> cells_;  // by Morton code
   double total_weight_ = 0;
 };
 

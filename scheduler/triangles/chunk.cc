@@ -33,11 +33,11 @@ class ChunkStream : public TriangleStream {
   }
   uint64_t count() const override { return list_.triangles - first_; }
   void rewind() override {
-    chunk_ = 0;
-    uint64_t left = first_;
-    while (chunk_ < list_.chunks.size() && left >= list_.chunks[chunk_].triangles)
-      left -= list_.chunks[chunk_++].triangles;
-    record_ = static_cast<size_t>(left);
+    const auto after = std::ranges::upper_bound(list_.chunks, first_, {}, &Chunk::first);
+    chunk_ = static_cast<size_t>(after - list_.chunks.begin());
+    if (chunk_ > 0) --chunk_;
+    record_ = chunk_ < list_.chunks.size() ? first_ - list_.chunks[chunk_].first : 0;
+    if (first_ >= list_.triangles) chunk_ = list_.chunks.size();
     loaded_ = kNoChunk;
   }
   size_t read(std::span<FixedTriangle> out) override {
@@ -89,6 +89,15 @@ class ChunkStream : public TriangleStream {
 };
 
 }  // namespace
+
+void ChunkList::sort_by_offset() {
+  std::ranges::sort(chunks, {}, [](const Chunk& chunk) { return chunk.extent.offset; });
+  triangles = 0;
+  for (Chunk& chunk : chunks) {
+    chunk.first = triangles;
+    triangles += chunk.triangles;
+  }
+}
 
 size_t triangle_record_bytes(bool wide) { return wide ? kWideBytes : kNarrowBytes; }
 

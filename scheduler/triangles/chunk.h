@@ -25,6 +25,7 @@ struct Chunk {
   std::vector<std::byte> memory;  // empty if the records are in a file
   Extent extent;                  // in that file
   uint32_t triangles = 0;
+  uint64_t first = 0;  // triangles of the list before this chunk, set by the list
 };
 
 // Bytes that a growing list of chunks takes for each of them.
@@ -35,9 +36,12 @@ struct ChunkList {
   uint64_t triangles = 0;
 
   void add(Chunk chunk) {
+    chunk.first = triangles;
     triangles += chunk.triangles;
     chunks.push_back(std::move(chunk));
   }
+  // Puts the chunks, all of which are in a file, in the order in which they lie there.
+  void sort_by_offset();
 };
 
 // Streams the triangles of a complete list from number `first` on; chunks that are not in memory

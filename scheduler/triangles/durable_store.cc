@@ -42,13 +42,12 @@ void DurableStore::read_chain() {
       if (chunk.bin >= bins_.size())
         throw DamagedTriangles("the stored triangles name bin " + std::to_string(chunk.bin) +
                                ": expected one of " + std::to_string(bins_.size()));
-      bins_[chunk.bin]->list.add({{}, chunk.extent, chunk.triangles});
+      bins_[chunk.bin]->list.add({.extent = chunk.extent, .triangles = chunk.triangles});
       list_bytes_ += kChunkListBytes;
     }
   }
   // The chain begins with the newest link; chunks are read in the order they were written.
-  for (const auto& bin : bins_)
-    std::ranges::sort(bin->list.chunks, {}, [](const Chunk& chunk) { return chunk.extent.offset; });
+  for (const auto& bin : bins_) bin->list.sort_by_offset();
   charge_.try_resize(list_bytes_);
 }
 
@@ -85,7 +84,7 @@ void DurableStore::add_chunk(BinId bin, std::span<const std::byte> records) {
   const auto triangles = static_cast<uint32_t>(records.size() / record_bytes());
   const Extent extent = file_->append(records);
   std::lock_guard lock(mutex_);
-  bins_[bin]->list.add({{}, extent, triangles});
+  bins_[bin]->list.add({.extent = extent, .triangles = triangles});
   unnamed_.push_back({bin, triangles, extent});
   // Where the list does not fit, it goes uncharged: it is small compared to the triangles.
   charge_.try_resize(list_bytes_ += kChunkListBytes);

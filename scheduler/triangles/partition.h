@@ -8,6 +8,7 @@
 
 #include "core/base/cancel_token.h"
 #include "core/geometry/octree_descent.h"
+#include "scheduler/build_spec.h"
 #include "scheduler/triangles/triangle_store.h"
 
 namespace voxdag {
@@ -66,15 +67,16 @@ class CubeTree {
 void partition(TriangleStore& store, BinId from, const CubeTree& tree,
                const std::vector<BinId>& leaf_bins, size_t buffer_bytes, const CancelToken& cancel);
 
-// Called after each batch with the number of the scene's triangles that were copied so far; those
+// Called after each piece with the number of the scene's triangles that were copied so far; those
 // are in the bins after writer.flush().
-using AfterPartitionBatch = std::function<void(uint64_t copied, BinWriter& writer)>;
+using AfterPartitionPiece = std::function<void(uint64_t copied, BinWriter& writer)>;
 
 // Copies the scene's triangles, from number `first` on, into the store's cube bins, created for
-// `cubes` if there are none yet. The scene's bin is dropped.
+// `cubes` if there are none yet; several threads find the cubes that pieces of them touch, and the
+// pieces are copied in their order. The scene's bin is dropped.
 void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const Cube> cubes,
-                     size_t buffer_bytes, const CancelToken& cancel, uint64_t first,
-                     const AfterPartitionBatch& after_batch);
+                     size_t buffer_bytes, uint64_t first, const StageContext& context,
+                     const AfterPartitionPiece& after_piece);
 
 // For each of `cubes` a bin with its triangles, in the same order: that of the cube, or else a part
 // filled from the bin of the nearest cube around it. Each has one reference; cube bins that none of

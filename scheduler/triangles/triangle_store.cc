@@ -11,6 +11,15 @@ constexpr size_t kMinChunkRecords = 16;
 
 }  // namespace
 
+void add_records(TriangleStore& store, BinId bin, std::span<const std::byte> records) {
+  const size_t chunk_bytes = store.max_chunk_records() * store.record_bytes();
+  while (!records.empty()) {
+    const size_t bytes = std::min(chunk_bytes, records.size());
+    store.add_chunk(bin, records.first(bytes));
+    records = records.subspan(bytes);
+  }
+}
+
 BinWriter::BinWriter(TriangleStore& store, std::vector<BinId> targets, size_t buffer_bytes)
     : store_(store),
       targets_(std::move(targets)),

@@ -64,6 +64,9 @@ class TriangleStore {
   virtual uint64_t file_bytes() const = 0;
 };
 
+// Adds records to a bin, in chunks of the store's size.
+void add_records(TriangleStore& store, BinId bin, std::span<const std::byte> records);
+
 // Fills a set of bins from one thread, collecting triangles into chunks.
 class BinWriter {
  public:

@@ -21,7 +21,6 @@ constexpr double kNoTimeLimit_s = 1e9;
 constexpr double kRetireInterval_s = 300;
 constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
 constexpr size_t kMaxRetiredAtOnce = 100;   // so that jobs can start in between
-constexpr double kSecondsPerDay = 86400;
 
 void sleep_s(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
@@ -78,7 +77,8 @@ void Dispatcher::recover() {
   std::set<std::string> running;
   for (const auto& [key, worker] : workers_)
     if (worker.runs()) running.insert(key);
-  for (const Job& job : queue_.recover(running, config_.jobs.max_attempts))
+  const auto pause = [this](unsigned attempt) { return pause_s(config_.jobs, attempt); };
+  for (const Job& job : queue_.recover(running, pause))
     log_("job " + job.id + " " + state_name(job.state));
 }
 
@@ -307,21 +307,10 @@ void Dispatcher::remove_work(const std::string& id) {
   });
 }
 
-// A clock that is wrong for a while must not cost all results.
-double Dispatcher::oldest_retained_s(double now_s) {
-  const double clock_s = unix_seconds();
-  if (clock_.has_jumped(clock_s, now_s))
-    log_(
-        "the clock is far ahead of when the service last saw it: for a day no job is deleted for "
-        "its age");
-  if (clock_.is_in_doubt(now_s)) return 0;
-  return clock_s - config_.retention.finished_days * kSecondsPerDay;
-}
-
 void Dispatcher::retire_old_jobs() {
   const double now_s = wall_seconds();
   if (now_s < next_retirement_s_) return;
-  const double oldest_s = oldest_retained_s(now_s);
+  const double oldest_s = clock_.oldest_s(config_.retention.finished_days, "job", log_);
   next_retirement_s_ = now_s + kRetireInterval_s;
   size_t removed = 0;
   for (const std::string& id : queue_.expired(oldest_s, config_.retention.finished_jobs)) {

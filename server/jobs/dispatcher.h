@@ -90,8 +90,6 @@ class Dispatcher {
   void finish_deletions();
   // If the job needs its work folder no more.
   void remove_work(const std::string& id);
-  // The time from which on ended jobs are not too old.
-  double oldest_retained_s(double now_s);
 
   // The thread that starts jobs.
   void dispatch();

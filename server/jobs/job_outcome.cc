@@ -30,12 +30,12 @@ void finish(Job& job, JobState state, double now_s) {
   job.finished_s = now_s;
 }
 
+}  // namespace
+
 double pause_s(const JobLimits& limits, unsigned attempts) {
   const double exponent = std::min(attempts, 32u) - 1.0;
   return std::min(limits.max_backoff_s, limits.backoff_s * std::exp2(std::max(0.0, exponent)));
 }
-
-}  // namespace
 
 void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
                    const JobLimits& limits, double now_s) {

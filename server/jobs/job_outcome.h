@@ -8,6 +8,9 @@
 
 namespace voxdag::server {
 
+// Seconds to wait after so many attempts that failed; they double.
+double pause_s(const JobLimits& limits, unsigned attempts);
+
 // Changes the job, which may have been suspended, resumed or asked to be canceled since it started:
 //   a result                      succeeded (canceled if that was asked for)
 //   stopped because we asked      as asked: canceled, suspended; queued again if the service stops

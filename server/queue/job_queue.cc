@@ -21,8 +21,10 @@ constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 // "vdsv": the queue of a service.
 constexpr int64_t kApplicationId = 0x76647376;
 constexpr int64_t kSchemaVersion = 3;
-// An interrupted run is no attempt of its job until there were so many in a row.
+// Interrupted runs in a row after which a job is tried again at once, and after which it is not
+// tried again: with the pauses in between it has then interrupted the service for over an hour.
 constexpr unsigned kFreeInterruptions = 5;
+constexpr unsigned kMaxInterruptions = 15;
 
 constexpr const char* kSchema = R"sql(
 CREATE TABLE job (
@@ -386,7 +388,8 @@ std::optional<Job> JobQueue::next_without_preview() {
   return jobs[0];
 }
 
-std::vector<Job> JobQueue::recover(const std::set<std::string>& running, unsigned max_attempts) {
+std::vector<Job> JobQueue::recover(const std::set<std::string>& running,
+                                   const std::function<double(unsigned attempt)>& pause_s) {
   std::vector<Job> ended;
   for (const Job& found :
        query("WHERE " + states_in({JobState::kRunning, JobState::kCanceling}) + " ORDER BY number",
@@ -395,9 +398,11 @@ std::vector<Job> JobQueue::recover(const std::set<std::string>& running, unsigne
     const Job job = change(found.id, [&](Job& j) {
       const bool cancels = j.state == JobState::kCanceling;
       const bool is_suspect = !cancels && ++j.interruptions > kFreeInterruptions;
-      const bool fails = is_suspect && j.attempts >= max_attempts;
+      const bool fails = is_suspect && j.interruptions > kMaxInterruptions;
       j.state = cancels ? JobState::kCanceled : fails ? JobState::kFailed : JobState::kQueued;
       j.front = j.state == JobState::kQueued && !is_suspect;
+      if (is_suspect && !fails)
+        j.not_before_s = unix_seconds() + pause_s(j.interruptions - kFreeInterruptions);
       if (has_ended(j.state)) j.finished_s = unix_seconds();
       if (fails)
         j.error = JobError{"internal",

@@ -77,10 +77,11 @@ class JobQueue {
   // A job that succeeded and has no preview yet.
   std::optional<Job> next_without_preview();
   // After a crash: jobs that are running or canceling, but not among `running`, are queued again,
-  // at the front, or canceled. A job that was interrupted often is not first any more, each of its
-  // further runs is an attempt, and after `max_attempts` of them it has failed: it may be what
-  // ended the service. Returns the jobs that have ended.
-  std::vector<Job> recover(const std::set<std::string>& running, unsigned max_attempts);
+  // at the front, or canceled. A job that was interrupted often may be what ended the service: it
+  // is not first any more and waits `pause_s` before each further attempt (1, 2, ...), and in the
+  // end it has failed. Returns the jobs that have ended.
+  std::vector<Job> recover(const std::set<std::string>& running,
+                           const std::function<double(unsigned attempt)>& pause_s);
   // Ended jobs that finished before `finished_before_s`, or are not among the `max_count` that
   // finished last of those with the same poster: nobody's jobs make those of others expire.
   std::vector<std::string> expired(double finished_before_s, uint64_t max_count);

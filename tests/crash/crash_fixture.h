@@ -118,7 +118,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
       const voxdag_reader::File file(output());
       voxdag::MemoryBudget budget(uint64_t{1} << 30);
       voxdag::NoProgress progress;
-      EXPECT_NO_THROW(voxdag::verify_global_file(file, budget, progress, voxdag::CancelToken{}));
+      EXPECT_NO_THROW(voxdag::verify_global_file(file, 2, budget, progress, voxdag::CancelToken{}));
     }
     EXPECT_EQ(run(voxdag::system_files()).sha256, expected_);
     EXPECT_FALSE(std::filesystem::exists(output() + ".work"));

@@ -87,6 +87,18 @@ TEST_P(DamageTest, BitsFlippedBetweenTwoRuns) {
   EXPECT_GT(flips, 0u);
 }
 
+// The first page tells a file of ours; with its job next to it the file is ours without it.
+TEST_P(DamageTest, FirstPageOfThePartialFile) {
+  const std::string partial = output() + ".partial";
+  uint64_t at = operations_of_a_build();
+  std::error_code missing;
+  while (--at > 0)
+    if (killed_at(at) && std::filesystem::file_size(partial, missing) > 4096 && !missing) break;
+  ASSERT_GT(at, 0u);
+  std::fstream(partial, std::ios::in | std::ios::out | std::ios::binary) << "damaged";
+  EXPECT_TRUE(expect_healed_or_refused());
+}
+
 // The same for the job store alone, which has no checksums of SQLite's: many bits of one store.
 TEST_P(DamageTest, BitsFlippedInTheJobStore) {
   const uint64_t operations = operations_of_a_build();

@@ -88,7 +88,7 @@ TEST_F(SharedScenes, HashBits) {
     voxdag::MemoryBudget budget(1024 * kMebibyte);
     voxdag::CancelToken never;
     const auto difference = voxdag::diff_global_files(
-        voxdag_reader::File(full.output), voxdag_reader::File(cut.output), budget, never);
+        voxdag_reader::File(full.output), voxdag_reader::File(cut.output), 2, budget, never);
     EXPECT_EQ(difference.only_a, 0u);
     EXPECT_EQ(difference.only_b, 0u);
     EXPECT_EQ(run_with(64 * kMebibyte, 64, 2).sha256, cut.sha256);

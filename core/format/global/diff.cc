@@ -1,7 +1,13 @@
 #include "core/format/global/diff.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <compare>
 #include <cstdio>
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +15,7 @@
 #include "core/base/error.h"
 #include "core/base/host_device.h"
 #include "core/base/page_buffer.h"
+#include "core/base/parallel_for.h"
 #include "core/dag/node_hash.h"
 #include "core/format/global/open_global.h"
 
@@ -17,20 +24,31 @@ namespace {
 
 constexpr uint64_t kAbsent = ~uint64_t{0};
 
-// The pairs of nodes of one level that were compared, with their results. Open addressing, at most
-// 3/4 full.
+// Nodes of one level of the two files, by their word offsets.
+struct NodePair {
+  uint64_t a = kAbsent, b = kAbsent;
+  friend auto operator<=>(const NodePair&, const NodePair&) = default;
+  uint64_t hash() const { return hash_brick(hash_brick(a) ^ b); }
+};
+
+DiffReport operator+(const DiffReport& a, const DiffReport& b) {
+  return {a.only_a + b.only_a, a.only_b + b.only_b};
+}
+
+// Pairs of nodes that were compared, with their results. Open addressing, at most 3/4 full.
 class PairTable {
  public:
   explicit PairTable(MemoryBudget& budget) : budget_(&budget) { grow(64); }
 
-  const DiffReport* find(uint64_t a, uint64_t b) const {
-    const Entry& entry = entries_[find_entry(a, b)];
-    return entry.taken() ? &entry.report : nullptr;
+  std::optional<DiffReport> find(const NodePair& pair, uint64_t hash) const {
+    const Entry& entry = entries_[find_entry(pair, hash)];
+    return entry.taken() ? std::optional(entry.report) : std::nullopt;
   }
-  void insert(uint64_t a, uint64_t b, const DiffReport& report) {
+  void insert(const NodePair& pair, uint64_t hash, const DiffReport& report) {
     if (4 * (count_ + 1) > 3 * entries_.size()) grow(2 * entries_.size());
-    entries_[find_entry(a, b)] = {a + 1, b + 1, report};
-    ++count_;
+    Entry& entry = entries_[find_entry(pair, hash)];
+    count_ += !entry.taken();
+    entry = {pair.a + 1, pair.b + 1, report};
   }
 
  private:
@@ -39,13 +57,13 @@ class PairTable {
     uint64_t a1 = 0, b1 = 0;
     DiffReport report;
     bool taken() const { return a1 != 0 || b1 != 0; }
+    NodePair pair() const { return {a1 - 1, b1 - 1}; }
   };
 
   // Index of the entry that has the pair, or of the free one where it belongs.
-  size_t find_entry(uint64_t a, uint64_t b) const {
-    const uint64_t a1 = a + 1, b1 = b + 1;
-    size_t at = hash_brick(hash_brick(a1) ^ b1) & (entries_.size() - 1);
-    while (entries_[at].taken() && (entries_[at].a1 != a1 || entries_[at].b1 != b1))
+  size_t find_entry(const NodePair& pair, uint64_t hash) const {
+    size_t at = hash & (entries_.size() - 1);
+    while (entries_[at].taken() && entries_[at].pair() != pair)
       at = (at + 1) & (entries_.size() - 1);
     return at;
   }
@@ -53,7 +71,7 @@ class PairTable {
     PageBuffer<Entry> old(*budget_, size, "pairs of nodes");
     std::swap(old, entries_);
     for (const Entry& entry : old)
-      if (entry.taken()) entries_[find_entry(entry.a1 - 1, entry.b1 - 1)] = entry;
+      if (entry.taken()) entries_[find_entry(entry.pair(), entry.pair().hash())] = entry;
   }
 
   MemoryBudget* budget_;
@@ -61,34 +79,96 @@ class PairTable {
   size_t count_ = 0;
 };
 
-class Differ {
+// The pairs of one level, for all threads. Parts of the table have locks of their own.
+class SharedPairTable {
  public:
-  Differ(const voxdag_reader::File& a, const voxdag_reader::File& b, MemoryBudget& budget,
-         const CancelToken& cancel)
-      : a_(a), b_(b), cancel_(cancel) {
-    for (uint32_t level = 0; level < a.brick_level(); ++level) compared_.emplace_back(budget);
+  explicit SharedPairTable(MemoryBudget& budget) {
+    for (size_t i = 0; i < kParts; ++i) parts_.push_back(std::make_unique<Part>(budget));
   }
-  DiffReport run() { return compare(0, a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0); }
+  std::optional<DiffReport> find(const NodePair& pair) const {
+    const uint64_t hash = pair.hash();
+    const Part& part = part_of(hash);
+    const std::lock_guard lock(part.mutex);
+    return part.table.find(pair, hash);
+  }
+  void insert(const NodePair& pair, const DiffReport& report) {
+    const uint64_t hash = pair.hash();
+    Part& part = part_of(hash);
+    const std::lock_guard lock(part.mutex);
+    part.table.insert(pair, hash, report);
+  }
 
  private:
-  DiffReport compare(uint32_t level, uint64_t a, uint64_t b) {
-    if (a == kAbsent && b == kAbsent) return {};
-    if (level == a_.brick_level()) return compare_bricks(a, b);
-    if (const DiffReport* known = compared_[level].find(a, b)) return *known;
+  static constexpr size_t kParts = 64;
+  struct Part {
+    explicit Part(MemoryBudget& budget) : table(budget) {}
+    mutable std::mutex mutex;
+    PairTable table;
+  };
+  // By the high bits; a table takes the low ones.
+  Part& part_of(uint64_t hash) const { return *parts_[hash >> 58]; }
+
+  std::vector<std::unique_ptr<Part>> parts_;
+};
+
+class Differ {
+ public:
+  Differ(const voxdag_reader::File& a, const voxdag_reader::File& b, unsigned threads,
+         MemoryBudget& budget, const CancelToken& cancel)
+      : a_(a), b_(b), threads_(threads), cancel_(cancel) {
+    for (uint32_t level = 0; level < a.brick_level(); ++level) compared_.emplace_back(budget);
+  }
+
+  // All threads compare pairs of one level and what is below them; what is above them is then a
+  // matter of adding.
+  DiffReport run() {
+    std::vector<NodePair> pairs{{a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0}};
+    const NodePair root = pairs[0];
+    uint32_t level = 0;
+    for (; level < a_.brick_level() && pairs.size() < kPairsPerThread * threads_; ++level)
+      pairs = pairs_below(level, pairs);
+    parallel_for(threads_, pairs.size(), [&](unsigned, size_t i) { compare(level, pairs[i]); });
+    return compare(0, root);
+  }
+
+ private:
+  static constexpr size_t kPairsPerThread = 256;
+
+  // By the index of the child; both are absent where neither node has that child.
+  std::array<NodePair, 8> children_of(uint32_t level, const NodePair& pair) const {
+    const voxdag_reader::Node a = node(a_, level, pair.a), b = node(b_, level, pair.b);
+    std::array<NodePair, 8> below;
+    for (int index = 0; index < 8; ++index)
+      below[static_cast<size_t>(index)] = {child(a, index), child(b, index)};
+    return below;
+  }
+
+  // Each once.
+  std::vector<NodePair> pairs_below(uint32_t level, const std::vector<NodePair>& pairs) const {
+    std::vector<NodePair> below;
+    for (const NodePair& pair : pairs)
+      for (const NodePair& children : children_of(level, pair)) below.push_back(children);
+    std::ranges::sort(below);
+    const auto repeated = std::ranges::unique(below);
+    below.erase(repeated.begin(), repeated.end());
+    return below;
+  }
+
+  DiffReport compare(uint32_t level, const NodePair& pair) {
+    if (pair == NodePair()) return {};
+    if (level == a_.brick_level()) return compare_bricks(pair);
+    if (const auto known = compared_[level].find(pair)) return *known;
     cancel_.check();
-    const voxdag_reader::Node node_a = node(a_, level, a), node_b = node(b_, level, b);
     DiffReport total;
-    for (int index = 0; index < 8; ++index) {
-      const DiffReport part = compare(level + 1, child(node_a, index), child(node_b, index));
-      total.only_a += part.only_a;
-      total.only_b += part.only_b;
-    }
-    compared_[level].insert(a, b, total);
+    for (const NodePair& children : children_of(level, pair))
+      total = total + compare(level + 1, children);
+    compared_[level].insert(pair, total);
     return total;
   }
 
-  DiffReport compare_bricks(uint64_t a, uint64_t b) const {
-    const uint64_t mask_a = a == kAbsent ? 0 : a_.brick(a), mask_b = b == kAbsent ? 0 : b_.brick(b);
+  DiffReport compare_bricks(const NodePair& pair) const {
+    const uint64_t mask_a = pair.a == kAbsent ? 0 : a_.brick(pair.a);
+    const uint64_t mask_b = pair.b == kAbsent ? 0 : b_.brick(pair.b);
     return {static_cast<uint64_t>(popcount64(mask_a & ~mask_b)),
             static_cast<uint64_t>(popcount64(mask_b & ~mask_a))};
   }
@@ -102,18 +182,32 @@ class Differ {
   }
 
   const voxdag_reader::File &a_, &b_;
+  const unsigned threads_;
   const CancelToken& cancel_;
-  std::vector<PairTable> compared_;  // by level
+  std::vector<SharedPairTable> compared_;  // by level
 };
 
+bool same_words(const voxdag_reader::Level& a, const voxdag_reader::Level& b, unsigned threads,
+                const CancelToken& cancel) {
+  constexpr uint64_t kWordsPerItem = uint64_t{1} << 20;
+  if (a.word_count != b.word_count || a.pointer_bits != b.pointer_bits) return false;
+  std::atomic<bool> same = true;
+  parallel_for(threads, (a.word_count + kWordsPerItem - 1) / kWordsPerItem,
+               [&](unsigned, size_t item) {
+                 if (!same) return;
+                 cancel.check();
+                 const uint64_t first = item * kWordsPerItem;
+                 const uint64_t end = std::min(first + kWordsPerItem, a.word_count);
+                 if (!std::equal(a.words + first, a.words + end, b.words + first)) same = false;
+               });
+  return same;
+}
+
 // Equal words mean equal voxels. Files of the same voxels and hash bits have equal words.
-bool same_words(const voxdag_reader::File& a, const voxdag_reader::File& b) {
-  for (uint32_t l = 0; l <= a.brick_level(); ++l) {
-    const voxdag_reader::Level &in_a = a.level(l), &in_b = b.level(l);
-    if (in_a.word_count != in_b.word_count || in_a.pointer_bits != in_b.pointer_bits ||
-        !std::equal(in_a.words, in_a.words + in_a.word_count, in_b.words))
-      return false;
-  }
+bool same_words(const voxdag_reader::File& a, const voxdag_reader::File& b, unsigned threads,
+                const CancelToken& cancel) {
+  for (uint32_t l = 0; l <= a.brick_level(); ++l)
+    if (!same_words(a.level(l), b.level(l), threads, cancel)) return false;
   return true;
 }
 
@@ -128,14 +222,14 @@ std::string grid_text(const voxdag_reader::File& file) {
 }  // namespace
 
 DiffReport diff_global_files(const voxdag_reader::File& a, const voxdag_reader::File& b,
-                             MemoryBudget& budget, const CancelToken& cancel) {
+                             unsigned threads, MemoryBudget& budget, const CancelToken& cancel) {
   if (a.resolution() != b.resolution() || a.edge() != b.edge() ||
       !std::equal(a.origin(), a.origin() + 3, b.origin()))
     throw Error(ErrorCode::kInvalidInput,
                 "only files of the same grid can be compared: " + a.path() + " has " +
                     grid_text(a) + "; " + b.path() + " has " + grid_text(b));
-  if (same_words(a, b)) return {};
-  return with_reader_errors([&] { return Differ(a, b, budget, cancel).run(); });
+  if (same_words(a, b, threads, cancel)) return {};
+  return with_reader_errors([&] { return Differ(a, b, threads, budget, cancel).run(); });
 }
 
 }  // namespace voxdag

@@ -1,17 +1,20 @@
 #include "core/format/global/verify.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/host_device.h"
 #include "core/base/page_buffer.h"
+#include "core/base/parallel_for.h"
 #include "core/base/popcount8.h"
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
+#include "core/format/global/node_index.h"
 
 namespace voxdag {
 
@@ -19,75 +22,11 @@ using namespace global_layout;
 
 namespace {
 
-constexpr uint64_t kNodesPerCheck = uint64_t{1} << 16;  // of the cancel token
+constexpr uint64_t kBlocksPerItem = 64;  // 4 MiB
+constexpr uint64_t kNodesPerItem = uint64_t{1} << 16;
 
-// Maps the word offset where a node of a level of the global file begins to its index in the level.
-// Takes 2 bits per word. Immutable after construction.
-class NodeIndex {
- public:
-  static constexpr uint64_t kNone = ~uint64_t{0};
-
-  NodeIndex() = default;
-  // Walks the words of the level, whose children are `wide` or not. Throws Error{kCorrupt}
-  // beginning with `where` unless every child mask is 1 to 255, the last node ends with the level,
-  // and there are as many nodes as the header says.
-  NodeIndex(const voxdag_reader::Level& level, bool bricks, bool wide, MemoryBudget& budget,
-            const std::string& where);
-
-  // The index of the node that begins at `offset`; kNone if none does.
-  uint64_t find(uint64_t offset) const {
-    if (offset >= words_) return kNone;
-    if (bricks_) return offset % 2 == 0 ? offset / 2 : kNone;
-    const uint64_t bits = starts_[offset / 64], bit = uint64_t{1} << offset % 64;
-    return bits & bit
-               ? nodes_before_[offset / 64] + static_cast<uint64_t>(popcount64(bits & (bit - 1)))
-               : kNone;
-  }
-
- private:
-  bool bricks_ = false;
-  uint64_t words_ = 0;
-  PageBuffer<uint64_t> starts_;        // one bit per word: a node begins here
-  PageBuffer<uint64_t> nodes_before_;  // for each 64 words
-};
-
-NodeIndex::NodeIndex(const voxdag_reader::Level& level, bool bricks, bool wide,
-                     MemoryBudget& budget, const std::string& where)
-    : bricks_(bricks), words_(level.word_count) {
-  const auto miscounted = [&](uint64_t nodes) {
-    throw Error(ErrorCode::kCorrupt, where + ": its words hold " + std::to_string(nodes) +
-                                         " nodes, expected " + std::to_string(level.node_count));
-  };
-  if (bricks) {
-    if (words_ != 2 * level.node_count) miscounted(words_ / 2);
-    return;
-  }
-  starts_ = PageBuffer<uint64_t>(budget, words_ / 64 + 1, "an index of nodes");
-  nodes_before_ = PageBuffer<uint64_t>(budget, words_ / 64 + 1, "an index of nodes");
-  uint64_t nodes = 0, at = 0;
-  for (; at < words_; ++nodes) {
-    const uint32_t mask = level.words[at];
-    if (mask == 0 || mask > 255)
-      throw Error(ErrorCode::kCorrupt, where + ", word " + std::to_string(at) + ": child mask " +
-                                           std::to_string(mask) + ", expected 1 to 255");
-    starts_[at / 64] |= uint64_t{1} << at % 64;
-    at += 1 + (uint64_t{kPopcount8[mask]} << wide);
-  }
-  if (at != words_)
-    throw Error(ErrorCode::kCorrupt, where + ": its last node ends at word " + std::to_string(at) +
-                                         ", the level at word " + std::to_string(words_));
-  if (nodes != level.node_count) miscounted(nodes);
-  uint64_t before = 0;
-  for (size_t i = 0; i < starts_.size(); ++i) {
-    nodes_before_[i] = before;
-    before += static_cast<uint64_t>(popcount64(starts_[i]));
-  }
-}
-
-// Whether `b` is after `a` in the total order.
-bool follows(uint64_t hash_a, const voxdag_reader::Node& a, uint64_t hash_b,
-             const voxdag_reader::Node& b) {
-  if (hash_a != hash_b) return hash_a < hash_b;
+// Whether `a` is before `b` in the total order of nodes whose hashes are equal.
+bool precedes(const voxdag_reader::Node& a, const voxdag_reader::Node& b) {
   if (a.child_mask != b.child_mask) return a.child_mask < b.child_mask;
   for (int c = 0; c < kPopcount8[a.child_mask]; ++c)
     if (a.child(c) != b.child(c)) return a.child(c) < b.child(c);
@@ -96,9 +35,10 @@ bool follows(uint64_t hash_a, const voxdag_reader::Node& a, uint64_t hash_b,
 
 class Verifier {
  public:
-  Verifier(const voxdag_reader::File& file, MemoryBudget& budget, Progress& progress,
-           const CancelToken& cancel)
+  Verifier(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
+           Progress& progress, const CancelToken& cancel)
       : file_(file),
+        threads_(threads),
         budget_(budget),
         progress_(progress),
         cancel_(cancel),
@@ -110,8 +50,7 @@ class Verifier {
     check_padding();
     if (!file_.empty()) {
       progress_.begin_stage("verify nodes", file_.dag_nodes(), "nodes");
-      check_bricks();
-      for (uint32_t level = file_.brick_level(); level-- > 0;) check_nodes(level);
+      for (uint32_t level = file_.brick_level() + 1; level-- > 0;) check_level(level);
       if (file_.level(0).node_count != 1)
         broken(where(0), std::to_string(file_.level(0).node_count) + " roots, expected 1");
       progress_.end_stage();
@@ -129,24 +68,31 @@ class Verifier {
   std::string where(uint32_t level, uint64_t word) const {
     return where(level) + ", word " + std::to_string(word);
   }
-  // Called before node `i` of `count`: reports the nodes up to the next check of the cancel token.
-  void advance(uint64_t i, uint64_t count) {
-    if (i % kNodesPerCheck != 0) return;
-    cancel_.check();
-    progress_.advance(std::min(kNodesPerCheck, count - i));
-  }
 
   void check_header() const;
   void check_blocks();
+  void check_block(uint64_t block, uint64_t table) const;
   void check_padding() const;
   void check_zeros(uint64_t begin, uint64_t end, const std::string& what) const;
-  void check_bricks();
-  void check_nodes(uint32_t level);
-  bool wide_children(uint32_t level) const { return file_.level(level + 1).pointer_bits == 64; }
+  void check_level(uint32_t level);
+  void check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& hashes);
+  uint64_t brick_hash(uint64_t at) const;
+  uint64_t node_hash(uint32_t level, uint64_t at);
   void check_all_used(uint32_t level) const;
   void check_counts() const;
 
+  Pointers pointers(uint32_t level) const {
+    if (level == file_.brick_level()) return Pointers::kNone;
+    return file_.level(level + 1).pointer_bits == 64 ? Pointers::kWide : Pointers::kNarrow;
+  }
+  // The node at a word where one begins.
+  voxdag_reader::Node node(uint32_t level, uint64_t at) const {
+    const uint32_t* const words = file_.level(level).words + at;
+    return {*words, words + 1, pointers(level) == Pointers::kWide};
+  }
+
   const voxdag_reader::File& file_;
+  const unsigned threads_;
   MemoryBudget& budget_;
   Progress& progress_;
   const CancelToken& cancel_;
@@ -180,21 +126,29 @@ void Verifier::check_header() const {
   check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "reserved");
 }
 
+void Verifier::check_block(uint64_t block, uint64_t table) const {
+  const uint64_t begin = kPageBytes + block * kChecksumBlockBytes;
+  const uint64_t size = std::min(kChecksumBlockBytes, table - begin);
+  uint64_t expected;
+  std::memcpy(&expected, file_.data() + table + 8 * block, sizeof(expected));
+  if (checksum64(std::as_bytes(std::span(file_.data() + begin, size))) != expected)
+    broken(file_.path() + ": bytes " + std::to_string(begin) + " to " +
+               std::to_string(begin + size - 1),
+           "the block fails its checksum");
+}
+
 void Verifier::check_blocks() {
-  const uint64_t table = file_.checksum_table_offset();
-  progress_.begin_stage("verify checksums", table - kPageBytes, "bytes");
-  for (uint64_t begin = kPageBytes, block = 0; begin < table;
-       begin += kChecksumBlockBytes, ++block) {
-    const uint64_t size = std::min(kChecksumBlockBytes, table - begin);
-    uint64_t expected;
-    std::memcpy(&expected, file_.data() + table + 8 * block, sizeof(expected));
-    if (checksum64(std::as_bytes(std::span(file_.data() + begin, size))) != expected)
-      broken(file_.path() + ": bytes " + std::to_string(begin) + " to " +
-                 std::to_string(begin + size - 1),
-             "the block fails its checksum");
-    progress_.advance(size);
-    cancel_.check();
-  }
+  const uint64_t table = file_.checksum_table_offset(), bytes = table - kPageBytes;
+  const uint64_t blocks = (bytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
+  progress_.begin_stage("verify checksums", bytes, "bytes");
+  parallel_for(
+      threads_, (blocks + kBlocksPerItem - 1) / kBlocksPerItem, [&](unsigned, size_t item) {
+        const uint64_t first = item * kBlocksPerItem;
+        const uint64_t end = std::min(first + kBlocksPerItem, blocks);
+        for (uint64_t block = first; block < end; ++block) check_block(block, table);
+        progress_.advance(std::min(end * kChecksumBlockBytes, bytes) - first * kChecksumBlockBytes);
+        cancel_.check();
+      });
   progress_.end_stage();
 }
 
@@ -207,86 +161,106 @@ void Verifier::check_padding() const {
   }
 }
 
-void Verifier::check_bricks() {
-  const uint32_t level = file_.brick_level();
-  const voxdag_reader::Level& bricks = file_.level(level);
-  indexes_[level] = NodeIndex(bricks, true, false, budget_, where(level));
-  hashes_ = PageBuffer<uint64_t>(budget_, bricks.node_count, "hashes of a level");
-  uint64_t last_mask = 0;
-  for (uint64_t i = 0; i < bricks.node_count; ++i) {
-    advance(i, bricks.node_count);
-    const uint64_t mask = file_.brick(2 * i);
-    const uint64_t hash = truncate_hash(hash_brick(mask), file_.hash_bits());
-    if (mask == 0) broken(where(level, 2 * i), "the brick is empty");
-    if (i > 0 && (hash < hashes_[i - 1] || (hash == hashes_[i - 1] && mask <= last_mask)))
-      broken(where(level, 2 * i), "the brick does not follow the one before it by hash and mask");
-    hashes_[i] = hash;
-    last_mask = mask;
-  }
+uint64_t Verifier::brick_hash(uint64_t at) const {
+  return truncate_hash(hash_brick(file_.brick(at)), file_.hash_bits());
 }
 
-void Verifier::check_nodes(uint32_t level) {
+// Checks the children of the node and marks them as used.
+uint64_t Verifier::node_hash(uint32_t level, uint64_t at) {
+  const voxdag_reader::Node parent = node(level, at);
+  const int children = kPopcount8[parent.child_mask];
+  uint64_t child_hashes[8];
+  for (int c = 0; c < children; ++c) {
+    const uint64_t child = indexes_[level + 1].find(parent.child(c));
+    if (child == NodeIndex::kNone)
+      broken(where(level, at + 1 + (static_cast<uint64_t>(c) << parent.wide)),
+             "a child at word " + std::to_string(parent.child(c)) + ", where no node of level " +
+                 std::to_string(level + 1) + " begins");
+    child_hashes[c] = hashes_[child];
+    const std::atomic_ref used(used_[child]);
+    if (used.load(std::memory_order_relaxed) == 0) used.store(1, std::memory_order_relaxed);
+  }
+  return truncate_hash(hash_node(parent.child_mask, child_hashes), file_.hash_bits());
+}
+
+// The hash of the last node before the span is computed again, since another thread may have that
+// span.
+void Verifier::check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& hashes) {
+  const NodeIndex& index = indexes_[level];
+  const bool bricks = level == file_.brick_level();
+  const auto hash_at = [&](uint64_t at) { return bricks ? brick_hash(at) : node_hash(level, at); };
+  uint64_t previous = span == 0 ? NodeIndex::kNone : index.last_before(span);
+  uint64_t previous_hash = span == 0 ? 0 : hash_at(previous);
+  uint64_t nodes = 0;
+  index.visit_span(span, [&](uint64_t i, uint64_t at) {
+    const uint64_t hash = hashes[i] = hash_at(at);
+    if (bricks && file_.brick(at) == 0) broken(where(level, at), "the brick is empty");
+    const auto in_order = [&] {
+      if (hash != previous_hash) return previous_hash < hash;
+      return bricks ? file_.brick(previous) < file_.brick(at)
+                    : precedes(node(level, previous), node(level, at));
+    };
+    if (previous != NodeIndex::kNone && !in_order())
+      broken(where(level, at), bricks
+                                   ? "the brick does not follow the one before it by hash and mask"
+                                   : "the node does not follow the one before it in the total "
+                                     "order");
+    previous = at;
+    previous_hash = hash;
+    ++nodes;
+  });
+  cancel_.check();
+  progress_.advance(nodes);
+}
+
+void Verifier::check_level(uint32_t level) {
   const voxdag_reader::Level& nodes = file_.level(level);
-  const NodeIndex& below = indexes_[level + 1];
-  const bool wide = wide_children(level);
-  indexes_[level] = NodeIndex(nodes, false, wide, budget_, where(level));
+  indexes_[level] = NodeIndex(nodes, pointers(level), threads_, budget_, cancel_, where(level));
   PageBuffer<uint64_t> hashes(budget_, nodes.node_count, "hashes of a level");
   used_ = PageBuffer<uint8_t>(budget_, hashes_.size(), "parents of a level");
-  voxdag_reader::Node previous;
-  uint64_t at = 0;
-  for (uint64_t i = 0; i < nodes.node_count; ++i) {
-    advance(i, nodes.node_count);
-    const voxdag_reader::Node node{nodes.words[at], nodes.words + at + 1, wide};
-    const int children = kPopcount8[node.child_mask];
-    uint64_t child_hashes[8];
-    for (int c = 0; c < children; ++c) {
-      const uint64_t child = below.find(node.child(c));
-      if (child == NodeIndex::kNone)
-        broken(where(level, at + 1 + (static_cast<uint64_t>(c) << wide)),
-               "a child at word " + std::to_string(node.child(c)) + ", where no node of level " +
-                   std::to_string(level + 1) + " begins");
-      child_hashes[c] = hashes_[child];
-      used_[child] = 1;
-    }
-    hashes[i] = truncate_hash(hash_node(node.child_mask, child_hashes), file_.hash_bits());
-    if (i > 0 && !follows(hashes[i - 1], previous, hashes[i], node))
-      broken(where(level, at), "the node does not follow the one before it in the total order");
-    previous = node;
-    at += 1 + (static_cast<uint64_t>(children) << wide);
-  }
-  check_all_used(level + 1);
+  parallel_for(threads_, indexes_[level].span_count(),
+               [&](unsigned, size_t span) { check_span(level, span, hashes); });
+  if (level < file_.brick_level()) check_all_used(level + 1);
   hashes_ = std::move(hashes);
 }
 
 void Verifier::check_all_used(uint32_t level) const {
-  for (uint64_t i = 0; i < used_.size(); ++i)
-    if (!used_[i]) broken(where(level), "node " + std::to_string(i) + " has no parent");
+  parallel_for(threads_, (used_.size() + kNodesPerItem - 1) / kNodesPerItem,
+               [&](unsigned, size_t item) {
+                 const uint64_t end = std::min((item + 1) * kNodesPerItem, used_.size());
+                 for (uint64_t i = item * kNodesPerItem; i < end; ++i)
+                   if (!used_[i])
+                     broken(where(level), "node " + std::to_string(i) + " has no parent");
+               });
 }
 
 // Counts how often each node occurs in the octree, from the root down, and from that the voxels.
 void Verifier::check_counts() const {
-  uint64_t svo_nodes = 0, voxels = 0;
+  std::atomic<uint64_t> svo_nodes = 0, voxels = 0;
   PageBuffer<uint64_t> times(budget_, file_.empty() ? 0 : 1, "counts of a level");
   if (!file_.empty()) times[0] = 1;
-  for (uint32_t level = 0; level < file_.brick_level() && !file_.empty(); ++level) {
-    const NodeIndex& below = indexes_[level + 1];
-    PageBuffer<uint64_t> child_times(budget_, file_.level(level + 1).node_count,
+  for (uint32_t level = 0; level <= file_.brick_level() && !file_.empty(); ++level) {
+    const bool bricks = level == file_.brick_level();
+    PageBuffer<uint64_t> child_times(budget_, bricks ? 0 : file_.level(level + 1).node_count,
                                      "counts of a level");
-    const bool wide = wide_children(level);
-    const uint32_t* word = file_.level(level).words;
-    for (uint64_t i = 0; i < times.size(); ++i) {
-      svo_nodes += times[i];
-      const voxdag_reader::Node node{*word, word + 1, wide};
-      const int children = kPopcount8[node.child_mask];
-      for (int c = 0; c < children; ++c) child_times[below.find(node.child(c))] += times[i];
-      word += 1 + (static_cast<uint64_t>(children) << wide);
-    }
+    parallel_for(threads_, indexes_[level].span_count(), [&](unsigned, size_t span) {
+      cancel_.check();
+      uint64_t span_nodes = 0, span_voxels = 0;
+      indexes_[level].visit_span(span, [&](uint64_t i, uint64_t at) {
+        span_nodes += times[i];
+        if (bricks) {
+          span_voxels += times[i] * static_cast<uint64_t>(popcount64(file_.brick(at)));
+          return;
+        }
+        const voxdag_reader::Node parent = node(level, at);
+        for (int c = 0; c < kPopcount8[parent.child_mask]; ++c)
+          std::atomic_ref(child_times[indexes_[level + 1].find(parent.child(c))])
+              .fetch_add(times[i], std::memory_order_relaxed);
+      });
+      svo_nodes += span_nodes;
+      voxels += span_voxels;
+    });
     times = std::move(child_times);
-    cancel_.check();
-  }
-  for (uint64_t i = 0; i < times.size(); ++i) {
-    svo_nodes += times[i];
-    voxels += times[i] * static_cast<uint64_t>(popcount64(file_.brick(2 * i)));
   }
   if (voxels != file_.voxels())
     broken(file_.path() + ": header",
@@ -299,9 +273,9 @@ void Verifier::check_counts() const {
 
 }  // namespace
 
-void verify_global_file(const voxdag_reader::File& file, MemoryBudget& budget, Progress& progress,
-                        const CancelToken& cancel) {
-  Verifier(file, budget, progress, cancel).run();
+void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
+                        Progress& progress, const CancelToken& cancel) {
+  Verifier(file, threads, budget, progress, cancel).run();
 }
 
 }  // namespace voxdag

@@ -8,8 +8,8 @@
 //   4. One root; every other node has a parent.
 //   5. The header's voxels and octree nodes are those of the DAG.
 //
-// Memory: 1.5 bits per word of the file, and 16 bytes per node of two levels, charged to the
-// budget.
+// Memory: 2 bits per word of the file, and 9 bytes per node of two levels, charged to the budget.
+// All threads work on one level at a time; what is found does not depend on their number.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,9 @@
 
 namespace voxdag {
 
-// Throws Error{kCorrupt} saying what is wrong, where, and what was expected.
-void verify_global_file(const voxdag_reader::File& file, MemoryBudget& budget, Progress& progress,
-                        const CancelToken& cancel);
+// Throws Error{kCorrupt} saying what is wrong, where, and what was expected. Works on up to
+// `threads` threads.
+void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
+                        Progress& progress, const CancelToken& cancel);
 
 }  // namespace voxdag

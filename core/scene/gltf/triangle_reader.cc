@@ -2,12 +2,11 @@
 
 #include <algorithm>
 
+#include "core/base/error.h"
 #include "core/scene/gltf/messages.h"
 
 namespace voxdag::gltf {
 namespace {
-
-constexpr uint64_t kNoWindow = ~uint64_t{0};
 
 uint64_t largest_vertex_count(const Document& document) {
   uint64_t largest = 0;
@@ -26,38 +25,74 @@ bool is_finite(const double* point) {
 }  // namespace
 
 TriangleReader::TriangleReader(const Document& document, BufferReader& buffers,
-                               MemoryBudget& budget, bool skip_invalid, Batch& batch)
+                               const ReaderOptions& options, MemoryBudget& budget,
+                               const CancelToken& cancel)
     : document_(document),
       buffers_(buffers),
       budget_(budget),
-      skip_invalid_(skip_invalid),
-      batch_(batch),
-      cache_(budget, largest_vertex_count(document)),
-      corners_(3 * Batch::kTriangles) {}
+      cancel_(cancel),
+      skip_invalid_(options.skip_invalid),
+      cache_(budget, largest_vertex_count(document), options.readers),
+      corners_(3 * kWindowTriangles),
+      batch_(budget, kBatchTriangles, "a batch of triangles") {}
 
-void TriangleReader::run() {
-  NodeWalk walk(document_, budget_);
-  while (walk.next()) draw_node(walk);
+void TriangleReader::read(uint64_t first, uint64_t count, const Visitor& visit) {
+  visit_ = &visit;
+  batch_size_ = 0;
+  for (const uint64_t end = first + count; first < end;) {
+    seek(first);
+    if (!draw_.is_bound) bind_draw();
+    cancel_.check();
+    const uint64_t of_draw = first - draw_.first;
+    const uint64_t of_instance = of_draw % draw_.triangles;
+    const uint64_t n = std::min(end - first, draw_.triangles - of_instance);
+    instance_ = of_draw / draw_.triangles;
+    // The joints of a skin place its vertices in world space already.
+    world_ = binding_.skin >= 0 ? Transform{} : walk_->global();
+    const Node& node = document_.nodes[static_cast<size_t>(draw_.node)];
+    if (node.instancing.present) world_ = multiply(world_, instances_->at(instance_));
+    read_instance(of_instance, n);
+    first += n;
+  }
+  flush();
 }
 
-void TriangleReader::draw_node(const NodeWalk& walk) {
-  node_ = walk.node();
-  const Node& node = document_.nodes[static_cast<size_t>(node_)];
-  const Mesh& mesh = document_.meshes[static_cast<size_t>(node.mesh)];
-  // The joints of a skin place its vertices in world space already.
-  const Transform global = node.skin >= 0 ? Transform{} : walk.global();
-  for (size_t p = 0; p < mesh.primitives.size(); ++p) {
-    const uint64_t triangles = triangle_count(document_, mesh.primitives[p]);
-    const uint64_t all = triangles * instance_count(document_, node);
-    const uint64_t skipped = batch_.skip(all);
-    if (skipped == all) continue;
-    bind(node, p);
-    InstanceReader instances(document_, buffers_, node);
-    uint64_t first = skipped % triangles;
-    for (instance_ = skipped / triangles; instance_ < instances.count(); ++instance_, first = 0)
-      draw_instance(node.instancing.present ? multiply(global, instances.at(instance_)) : global,
-                    first);
+// Makes draw_ the one of the triangle.
+void TriangleReader::seek(uint64_t triangle) {
+  if (!walk_ || triangle < draw_.first) {
+    walk_.emplace(document_, budget_);
+    draw_ = {};
   }
+  while (triangle >= draw_.end) next_draw();
+}
+
+void TriangleReader::next_draw() {
+  Draw next{.first = draw_.end, .node = draw_.node, .primitive = draw_.primitive + 1};
+  const auto primitives = [&]() -> const std::vector<Primitive>& {
+    const Node& node = document_.nodes[static_cast<size_t>(next.node)];
+    return document_.meshes[static_cast<size_t>(node.mesh)].primitives;
+  };
+  if (next.node < 0 || next.primitive == primitives().size()) {
+    do {
+      if (!walk_->next())
+        throw Error(ErrorCode::kCorrupt, document_.path + ": triangle " +
+                                             std::to_string(draw_.end) + " is not declared");
+      next.node = walk_->node();
+    } while (primitives().empty());
+    next.primitive = 0;
+  }
+  next.triangles = triangle_count(document_, primitives()[next.primitive]);
+  next.end =
+      next.first +
+      next.triangles * instance_count(document_, document_.nodes[static_cast<size_t>(next.node)]);
+  draw_ = next;
+}
+
+void TriangleReader::bind_draw() {
+  const Node& node = document_.nodes[static_cast<size_t>(draw_.node)];
+  bind(node, draw_.primitive);
+  instances_.emplace(document_, buffers_, node);
+  draw_.is_bound = true;
 }
 
 void TriangleReader::bind(const Node& node, size_t primitive_index) {
@@ -77,49 +112,63 @@ void TriangleReader::bind(const Node& node, size_t primitive_index) {
   corner_reader_.emplace(document_, buffers_, primitive);
   cache_.bind(*vertices_);
   vertex_count_ = vertices_->count();
-  triangle_count_ = triangle_count(document_, primitive);
-  window_first_ = kNoWindow;
+  window_count_ = 0;
   binding_ = next;
 }
 
-void TriangleReader::draw_instance(const Transform& world, uint64_t first_triangle) {
-  batch_.check_canceled();
-  for (uint64_t first = first_triangle; first < triangle_count_; first += Batch::kTriangles) {
-    const auto count =
-        static_cast<size_t>(std::min<uint64_t>(Batch::kTriangles, triangle_count_ - first));
-    if (first != window_first_) {
-      window_first_ = kNoWindow;
-      corner_reader_->read(first, count, corners_.data());
-      window_first_ = first;
-    }
-    draw_window(world, count);
+void TriangleReader::read_instance(uint64_t first, uint64_t count) {
+  while (count > 0) {
+    const uint32_t* const corners = load_corners(first, count);
+    const uint64_t n = std::min(count, window_first_ + window_count_ - first);
+    place_all(corners, n);
+    first += n;
+    count -= n;
   }
 }
 
-void TriangleReader::draw_window(const Transform& world, size_t count) {
-  const uint32_t* corners = corners_.data();
-  for (size_t i = 0; i < count; ++i, corners += 3) {
-    if (place(corners, world, batch_.next())) {
-      batch_.add();
-    } else {
-      if (!skip_invalid_) report(corners, world);
-      batch_.drop();
+// The corners of triangle `first` of the primitive, and of more behind it, `count` of which are
+// wanted. A primitive that fits the window is read as a whole.
+const uint32_t* TriangleReader::load_corners(uint64_t first, uint64_t count) {
+  if (first < window_first_ || first >= window_first_ + window_count_) {
+    window_count_ = 0;
+    const bool fits = draw_.triangles <= kWindowTriangles;
+    const uint64_t from = fits ? 0 : first;
+    const uint64_t n = fits ? draw_.triangles : std::min(count, kWindowTriangles);
+    corner_reader_->read(from, static_cast<size_t>(n), corners_.data());
+    window_first_ = from;
+    window_count_ = n;
+  }
+  return &corners_[3 * static_cast<size_t>(first - window_first_)];
+}
+
+void TriangleReader::place_all(const uint32_t* corners, uint64_t count) {
+  for (; count > 0; --count, corners += 3) {
+    if (!place(corners, batch_[batch_size_])) {
+      if (!skip_invalid_) report(corners);
+    } else if (++batch_size_ == kBatchTriangles) {
+      flush();
     }
   }
+}
+
+void TriangleReader::flush() {
+  cancel_.check();
+  if (batch_size_ > 0) (*visit_)({batch_.data(), batch_size_});
+  batch_size_ = 0;
 }
 
 // False for a corner out of range or a vertex that is not finite in world space.
-bool TriangleReader::place(const uint32_t* corners, const Transform& world, WorldTriangle& out) {
+bool TriangleReader::place(const uint32_t* corners, WorldTriangle& out) {
   if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
-  for (int k = 0; k < 3; ++k) apply(world, cache_.at(corners[k]), out.v[k]);
+  for (int k = 0; k < 3; ++k) apply(world_, cache_.at(corners[k]), out.v[k]);
   return is_finite(out.v[0]) && is_finite(out.v[1]) && is_finite(out.v[2]);
 }
 
-void TriangleReader::report(const uint32_t* corners, const Transform& world) const {
-  const Node& node = document_.nodes[static_cast<size_t>(node_)];
+void TriangleReader::report(const uint32_t* corners) const {
+  const Node& node = document_.nodes[static_cast<size_t>(draw_.node)];
   const Primitive& primitive =
       document_.meshes[static_cast<size_t>(binding_.mesh)].primitives[binding_.primitive];
-  std::string where = document_.name_node(node_);
+  std::string where = document_.name_node(draw_.node);
   if (node.instancing.present) where += ": instance " + std::to_string(instance_);
   where += ": " + document_.name_mesh(binding_.mesh) + ": primitive " +
            std::to_string(binding_.primitive) + ": triangle " +
@@ -131,8 +180,8 @@ void TriangleReader::report(const uint32_t* corners, const Transform& world) con
                                  document_.name_accessor(primitive.indices) + ", there are " +
                                  std::to_string(vertex_count_) + " vertices");
   refuse(document_.path, where + "a vertex of " + document_.name_accessor(primitive.position) +
-                             (gltf::is_finite(world) ? " is not a finite position"
-                                                     : " is not finite once transformed"));
+                             (gltf::is_finite(world_) ? " is not a finite position"
+                                                      : " is not finite once transformed"));
 }
 
 }  // namespace voxdag::gltf

@@ -1,9 +1,8 @@
-// Streams the triangles of one document in world space: node by node, primitive by primitive,
-// instance by instance. Vertices and indices stay in their windows while consecutive nodes or
-// instances draw the same primitive, so a mesh used by many nodes is read once. Not thread-safe.
+// Reads the triangles of one document in world space: node by node, primitive by primitive,
+// instance by instance. What was decoded of a primitive is used again by the next node or instance
+// that draws it. Not thread-safe.
 #pragma once
 
-#include <algorithm>
 #include <functional>
 #include <optional>
 #include <span>
@@ -19,75 +18,35 @@
 
 namespace voxdag::gltf {
 
-// How far a pass over the triangles has come.
-struct PassPosition {
-  uint64_t triangles = 0;  // skipped and invalid ones included
-  uint64_t invalid = 0;    // skipped ones not included
-};
-
-// Collects triangles into batches for the visitor of a pass, and counts them. Not thread-safe.
-class Batch {
- public:
-  using Visitor = std::function<void(std::span<const WorldTriangle>)>;
-  static constexpr size_t kTriangles = 4096;
-
-  // Counts in `position`. The first `skip_count` triangles of the pass are skipped.
-  Batch(const Visitor& visit, PassPosition& position, uint64_t skip_count, MemoryBudget& budget,
-        const CancelToken& cancel)
-      : visit_(visit),
-        position_(position),
-        left_to_skip_(skip_count),
-        cancel_(cancel),
-        triangles_(budget, kTriangles, "a batch of triangles") {}
-
-  // Skips the first of the next `count` triangles, as far as the pass requires, and returns how
-  // many.
-  uint64_t skip(uint64_t count) {
-    const uint64_t skipped = std::min(count, left_to_skip_);
-    left_to_skip_ -= skipped;
-    position_.triangles += skipped;
-    return skipped;
-  }
-  // The place of the next triangle, to be followed by add() or drop().
-  WorldTriangle& next() { return triangles_[size_]; }
-  // Adds the triangle in next() to the batch.
-  void add() {
-    ++position_.triangles;
-    if (++size_ == kTriangles) flush();
-  }
-  // Counts an invalid triangle.
-  void drop() {
-    ++position_.triangles;
-    ++position_.invalid;
-  }
-  // Passes the triangles of an incomplete batch on. Call at the end of the pass.
-  void flush() {
-    cancel_.check();
-    if (size_ > 0) visit_(std::span<const WorldTriangle>(triangles_.data(), size_));
-    size_ = 0;
-  }
-  void check_canceled() const { cancel_.check(); }
-
- private:
-  const Visitor& visit_;
-  PassPosition& position_;
-  uint64_t left_to_skip_;
-  const CancelToken& cancel_;
-  PageBuffer<WorldTriangle> triangles_;
-  size_t size_ = 0;
+struct ReaderOptions {
+  bool skip_invalid = false;  // drops invalid triangles
+  unsigned readers = 1;       // that share the memory
 };
 
 class TriangleReader {
  public:
-  TriangleReader(const Document& document, BufferReader& buffers, MemoryBudget& budget,
-                 bool skip_invalid, Batch& batch);
+  using Visitor = std::function<void(std::span<const WorldTriangle>)>;
 
-  // Adds every triangle to the batch, except those that the batch skips. Throws
-  // Error{kInvalidInput} naming node, mesh and primitive of an invalid triangle, unless
-  // `skip_invalid` drops it.
-  void run();
+  TriangleReader(const Document& document, BufferReader& buffers, const ReaderOptions& options,
+                 MemoryBudget& budget, const CancelToken& cancel);
+
+  // Visits the triangles of [first, first + count), numbered in the order in which the document
+  // declares them, in batches of up to 1024. Throws Error{kInvalidInput} naming node, mesh and
+  // primitive of an invalid triangle, unless `skip_invalid` drops it.
+  void read(uint64_t first, uint64_t count, const Visitor& visit);
 
  private:
+  static constexpr size_t kBatchTriangles = 1024;
+  static constexpr uint64_t kWindowTriangles = 4096;
+
+  // All instances of a primitive that a node draws.
+  struct Draw {
+    uint64_t first = 0, end = 0;  // numbers of its triangles
+    int node = -1;
+    size_t primitive = 0;
+    uint64_t triangles = 0;  // of one instance
+    bool is_bound = false;
+  };
   // What the readers are set up for.
   struct Binding {
     int mesh = -1;
@@ -97,18 +56,28 @@ class TriangleReader {
     bool operator==(const Binding&) const = default;
   };
 
-  void draw_node(const NodeWalk& at);
+  void seek(uint64_t triangle);
+  void next_draw();
+  void bind_draw();
   void bind(const Node& node, size_t primitive_index);
-  void draw_instance(const Transform& world, uint64_t first_triangle);
-  void draw_window(const Transform& world, size_t count);
-  bool place(const uint32_t* corners, const Transform& world, WorldTriangle& out);
-  void report(const uint32_t* corners, const Transform& world) const;
+  void read_instance(uint64_t first, uint64_t count);
+  const uint32_t* load_corners(uint64_t first, uint64_t count);
+  void place_all(const uint32_t* corners, uint64_t count);
+  bool place(const uint32_t* corners, WorldTriangle& out);
+  void flush();
+  void report(const uint32_t* corners) const;
 
   const Document& document_;
   BufferReader& buffers_;
   MemoryBudget& budget_;
+  const CancelToken& cancel_;
   const bool skip_invalid_;
-  Batch& batch_;
+
+  std::optional<NodeWalk> walk_;
+  Draw draw_;
+  std::optional<InstanceReader> instances_;  // of the draw
+  uint64_t instance_ = 0;
+  Transform world_;  // of the instance
 
   Binding binding_;
   PageBuffer<Transform> joints_;  // of the skin in binding_; empty without one
@@ -116,13 +85,14 @@ class TriangleReader {
   std::optional<CornerReader> corner_reader_;
   VertexCache cache_;
   uint64_t vertex_count_ = 0;
-  uint64_t triangle_count_ = 0;
 
-  std::vector<uint32_t> corners_;  // vertex indices from triangle window_first_ on
-  uint64_t window_first_ = 0;
+  std::vector<uint32_t>
+      corners_;  // vertex indices of window_count_ triangles from window_first_ on
+  uint64_t window_first_ = 0, window_count_ = 0;
 
-  int node_ = -1;          // being drawn, for messages
-  uint64_t instance_ = 0;  // being drawn, for messages
+  PageBuffer<WorldTriangle> batch_;
+  size_t batch_size_ = 0;
+  const Visitor* visit_ = nullptr;
 };
 
 }  // namespace voxdag::gltf

@@ -209,7 +209,7 @@ Response patch_job(Context& context, Call& call) {
 
 Response delete_job(Context& context, Call& call) {
   expect_no_body(call.request);
-  context.dispatcher.remove(call.names[0]);
+  context.disk.with_ballast([&] { context.dispatcher.remove(call.names[0]); });
   return no_content();
 }
 
@@ -221,6 +221,13 @@ Response retry_job(Context& context, Call& call) {
   if (job.state == JobState::kFailed || job.state == JobState::kCanceled)
     context.tasks.make(parse_job_request(job.request), Task::Kind::kBuild);
   return json_response(202, to_json(context, context.dispatcher.retry(job.id)));
+}
+
+Response cancel_job(Context& context, Call& call) {
+  expect_no_body(call.request);
+  const Job job =
+      context.disk.with_ballast([&] { return context.dispatcher.cancel(call.names[0]); });
+  return json_response(202, to_json(context, job));
 }
 
 // A handler that applies the action to a job.
@@ -246,7 +253,7 @@ void add_job_routes(Router& router) {
   router.add("GET", job, Role::kRead, get_job);
   router.add("PATCH", job, Role::kAdmin, patch_job);
   router.add("DELETE", job, Role::kAdmin, delete_job);
-  router.add("POST", job + "/cancel", Role::kSubmit, act(&Dispatcher::cancel));
+  router.add("POST", job + "/cancel", Role::kSubmit, cancel_job);
   router.add("POST", job + "/suspend", Role::kSubmit, act(&Dispatcher::suspend));
   router.add("POST", job + "/resume", Role::kSubmit, act(&Dispatcher::resume));
   router.add("POST", job + "/retry", Role::kSubmit, retry_job);

@@ -192,7 +192,8 @@ Response delete_scene(Context& context, Call& call) {
   std::lock_guard lock(context.scene_mutex);
   check_unused(context, name);
   if (context.planned_scenes.contains(name)) throw conflict("the scene is in use by a dry run");
-  if (!context.scenes.remove(name)) throw not_found("no such scene");
+  const bool found = context.disk.with_ballast([&] { return context.scenes.remove(name); });
+  if (!found) throw not_found("no such scene");
   return no_content();
 }
 

@@ -107,7 +107,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     NoProgress progress;
     bool is_sound = true;
     try {
-      verify_global_file(file, budget, progress, CancelToken());
+      verify_global_file(file, 1, budget, progress, CancelToken());
     } catch (const Error&) {
       is_sound = false;
     }

@@ -11,10 +11,13 @@ namespace {
 class DiffTest : public testing::Test {
  protected:
   DiffReport diff() {
+    const auto a = open_global_file(a_), b = open_global_file(b_);
     MemoryBudget budget(uint64_t{1} << 30);
     const CancelToken cancel;
-    const DiffReport report =
-        diff_global_files(*open_global_file(a_), *open_global_file(b_), budget, cancel);
+    const DiffReport report = diff_global_files(*a, *b, 1, budget, cancel);
+    const DiffReport same = diff_global_files(*a, *b, 3, budget, cancel);
+    EXPECT_EQ(report.only_a, same.only_a);
+    EXPECT_EQ(report.only_b, same.only_b);
     EXPECT_EQ(budget.used(), 0u);
     return report;
   }

@@ -16,7 +16,7 @@ void verify(const std::string& path) {
   MemoryBudget budget(uint64_t{1} << 20);
   NoProgress progress;
   const CancelToken cancel;
-  verify_global_file(*open_global_file(path), budget, progress, cancel);
+  verify_global_file(*open_global_file(path), 2, budget, progress, cancel);
 }
 
 TEST(GoldenTest, WriterMakesTheSameBytes) {

@@ -19,13 +19,14 @@ namespace {
 using namespace global_layout;
 using testing::HasSubstr;
 
-void verify(const std::string& path) {
+void verify(const std::string& path, unsigned threads) {
   MemoryBudget budget(uint64_t{1} << 30);
   NoProgress progress;
   const CancelToken cancel;
   const auto file = open_global_file(path);
-  with_reader_errors([&] { verify_global_file(*file, budget, progress, cancel); });
+  with_reader_errors([&] { verify_global_file(*file, threads, budget, progress, cancel); });
 }
+void verify(const std::string& path) { verify(path, 3); }
 
 template <class T>
 void put(ByteString& bytes, size_t at, T value) {
@@ -233,6 +234,26 @@ TEST_F(VerifyTest, OtherNodeOrdersAreNotRead) {
   EXPECT_EQ(error_of([&] { verify(path_); }).code(), ErrorCode::kUnsupportedVersion);
 }
 
+// Several defects in a file of many spans: any number of threads reports the first.
+TEST_F(VerifyTest, TheFirstDefectIsReported) {
+  oracle::Random random(3);
+  oracle::Voxels noise(128);
+  const auto at_random = [&] { return static_cast<int>(random.between(0, 127)); };
+  for (int i = 0; i < 200000; ++i) noise.set(at_random(), at_random(), at_random());
+  write_global(path_, noise);
+  const ByteString bytes = read_bytes(path_);
+  const auto words_end = static_cast<int64_t>(get<uint64_t>(bytes, kTableOffsetAt));
+  for (int round = 0; round < 30; ++round) {
+    ByteString changed = bytes;
+    for (int i = 0; i < 4; ++i)
+      changed[static_cast<size_t>(random.between(kPageBytes, words_end - 1))] ^= 1;
+    reseal(changed);
+    write_bytes(path_, changed);
+    const std::string message = error_of([&] { verify(path_, 1); }).message();
+    for (int i = 0; i < 5; ++i) EXPECT_EQ(error_of([&] { verify(path_, 4); }).message(), message);
+  }
+}
+
 // Hash bits are part of the order: a file that claims others than it was made with is caught.
 TEST_F(VerifyTest, WrongHashBitsAreCaught) {
   write_global(path_, random_voxels(3, 64), 64);
@@ -280,7 +301,7 @@ TEST_F(VerifyTest, MutatedFilesNeverCrash) {
       if (file->grid_levels() == 4) {
         MemoryBudget budget(uint64_t{1} << 30);
         const CancelToken cancel;
-        diff_global_files(*file, *whole, budget, cancel);
+        diff_global_files(*file, *whole, 2, budget, cancel);
       }
       verify(path_);
       struct {

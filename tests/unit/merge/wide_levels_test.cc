@@ -26,10 +26,10 @@ class WideLevels : public testing::TestWithParam<uint64_t> {
     MemoryBudget budget(uint64_t{1} << 30);
     NoProgress silent;
     const CancelToken never;
-    verify_global_file(*file, budget, silent, never);
+    verify_global_file(*file, 3, budget, silent, never);
     const auto other = open_global_file(narrow);
     EXPECT_EQ(other->version(), 1u);
-    const DiffReport difference = diff_global_files(*file, *other, budget, never);
+    const DiffReport difference = diff_global_files(*file, *other, 3, budget, never);
     EXPECT_EQ(difference.only_a + difference.only_b, 0u);
   }
 

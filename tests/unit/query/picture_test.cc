@@ -22,7 +22,7 @@ uint32_t big_endian(const std::string& bytes, size_t at) {
   return value;
 }
 
-Picture render(const VoxelScene& scene, const Placement& placement, int threads) {
+Picture render(const VoxelScene& scene, const Placement& placement, unsigned threads) {
   RenderOptions options;
   options.width = 64;
   options.height = 48;

@@ -1,8 +1,10 @@
-// Ingest on one thread and on two gives the same result, and reports the errors of both.
+// Ingest on any number of threads gives the same result, and reports the first error.
 #include "scheduler/ingest/ingest.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <stdexcept>
 
 #include "core/base/error.h"
@@ -14,35 +16,45 @@
 namespace voxdag {
 namespace {
 
-// Small triangles along a diagonal, every tenth far outside the grid; `fails_at` and `too_far_at`
-// are numbers of batches.
+// Small triangles along a diagonal, every tenth far outside the grid, every hundredth invalid;
+// `fails_at` and `too_far_at` are numbers of triangles.
 class Diagonal : public TriangleSource {
  public:
-  static constexpr size_t kBatches = 50, kBatch = 100;
-  size_t fails_at = kBatches, too_far_at = kBatches;
+  static constexpr uint64_t kTriangles = 200'000;
+  uint64_t fails_at = kTriangles, too_far_at = kTriangles;
+  std::atomic<uint64_t> read = 0;
 
-  void for_each_batch_from(uint64_t first, const Visitor& visit) override {
-    for (position_ = first; position_ < kBatches * kBatch;) {
-      const size_t number = position_ / kBatch;
-      if (number == fails_at) throw Error(ErrorCode::kIo, "the test's scene cannot be read");
-      std::vector<WorldTriangle> batch(kBatch);
-      for (size_t i = 0; i < kBatch; ++i) {
-        const double at = static_cast<double>(position_ + i) / (kBatches * kBatch);
-        const double x = i % 10 == 0 ? 5 : at;
-        batch[i] = {{{x, at, at}, {x + 0.001, at, at}, {x, at + 0.001, at}}};
-      }
-      if (number == too_far_at) batch[7].v[0][0] = -1e15;
-      position_ += kBatch;
-      visit(batch);
-    }
+  std::unique_ptr<TriangleCursor> open(unsigned) override {
+    return std::make_unique<Cursor>(*this);
   }
-  uint64_t position() const override { return position_; }
-  uint64_t declared_triangles() const override { return kBatches * kBatch; }
-  uint64_t invalid_triangles() const override { return 0; }
+  uint64_t declared_triangles() const override { return kTriangles; }
 
  private:
-  uint64_t position_ = 0;
+  class Cursor : public TriangleCursor {
+   public:
+    explicit Cursor(Diagonal& scene) : scene_(scene) {}
+    void read(uint64_t first, uint64_t count, const Visitor& visit) override {
+      std::vector<WorldTriangle> batch;
+      for (uint64_t i = first; i < first + count; ++i) {
+        if (i == scene_.fails_at) throw Error(ErrorCode::kIo, "the test's scene cannot be read");
+        const double at = static_cast<double>(i) / kTriangles;
+        const double x = i == scene_.too_far_at ? -1e15 : i % 10 == 0 ? 5 : at;
+        if (i % 100 != 1)
+          batch.push_back({{{x, at, at}, {x + 0.001, at, at}, {x, at + 0.001, at}}});
+        if (batch.size() == 100 || i + 1 == first + count) {
+          visit(batch);
+          batch.clear();
+        }
+      }
+      scene_.read += count;
+    }
+
+   private:
+    Diagonal& scene_;
+  };
 };
+
+constexpr uint64_t kPiece = 16384;
 
 class IngestTest : public testing::TestWithParam<unsigned> {
  protected:
@@ -51,19 +63,18 @@ class IngestTest : public testing::TestWithParam<unsigned> {
     state_.digest = ContentDigest(state_.grid);
     state_.declared_triangles = scene_.declared_triangles();
   }
-  void ingest_on(unsigned threads, const AfterBatch& after_batch) {
-    BinWriter writer(triangles_, {kSceneBin}, size_t{1} << 20);
-    ingest(scene_, threads, state_, writer, top_, {system_files(), progress_, cancel_},
-           after_batch);
+  void ingest_on(unsigned threads, const AfterPiece& after_piece) {
+    const BuildContext build{system_files(), progress_, cancel_};
+    ingest(scene_, state_, triangles_, top_, {build, threads, budget_}, after_piece);
   }
-  Error error_of_ingest(const AfterBatch& after_batch) {
-    return error_of([&] { ingest_on(GetParam(), after_batch); });
+  Error error_of_ingest(const AfterPiece& after_piece) {
+    return error_of([&] { ingest_on(GetParam(), after_piece); });
   }
 
   Diagonal scene_;
   IngestState state_;
   TemporaryFolder folder_;
-  MemoryBudget budget_{uint64_t{64} << 20};
+  MemoryBudget budget_{uint64_t{256} << 20};
   MemoryStore triangles_{system_files(), folder_.file("spill"), true, budget_};
   TopTree top_{10, budget_, 4};
   NoProgress progress_;
@@ -74,53 +85,88 @@ TEST_P(IngestTest, ReadsTheSceneInOrder) {
   std::vector<uint64_t> positions;
   ingest_on(GetParam(), [&] {
     positions.push_back(state_.position);
-    EXPECT_EQ(state_.counts.triangles + state_.counts.dropped_outside, state_.position);
+    EXPECT_EQ(state_.counts.triangles + state_.counts.dropped_outside,
+              state_.position - (state_.position + 98) / 100);
   });
-  ASSERT_EQ(positions.size(), Diagonal::kBatches);
-  for (size_t i = 0; i < positions.size(); ++i) EXPECT_EQ(positions[i], (i + 1) * Diagonal::kBatch);
-  EXPECT_EQ(state_.counts.dropped_outside, Diagonal::kBatches * Diagonal::kBatch / 10);
-  EXPECT_EQ(triangles_.count(kSceneBin), state_.counts.triangles);
-  // The triangles and their order, whatever the threads.
-  ContentDigest digest(state_.grid);
+  ASSERT_EQ(positions.size(), (Diagonal::kTriangles + kPiece - 1) / kPiece);
+  for (size_t i = 0; i < positions.size(); ++i)
+    EXPECT_EQ(positions[i], std::min((i + 1) * kPiece, Diagonal::kTriangles));
+  EXPECT_EQ(state_.counts.dropped_outside, Diagonal::kTriangles / 10);
+  EXPECT_EQ(state_.counts.dropped_invalid, Diagonal::kTriangles / 100);
+  ASSERT_EQ(triangles_.count(kSceneBin), state_.counts.triangles);
+  // The triangles in their order, and what was made of them, whatever the threads.
   std::vector<FixedTriangle> triangles(state_.counts.triangles);
   ASSERT_EQ(triangles_.open(kSceneBin)->read(triangles), triangles.size());
-  digest.add(triangles);
-  EXPECT_EQ(state_.digest.hex(), digest.hex());
+  for (size_t i = 1; i < triangles.size(); ++i)
+    ASSERT_LT(triangles[i - 1].v[0][1], triangles[i].v[0][1] + 2);
+  EXPECT_EQ(checksum64(std::as_bytes(std::span(triangles))), 0x1);
+  EXPECT_EQ(checksum64(top_.cells()), 0x2);
+  EXPECT_EQ(state_.digest.hex(), "");
+}
+
+// From any piece on, ingest ends with the state of a whole one.
+TEST_P(IngestTest, Continues) {
+  std::vector<IngestState> states;
+  std::vector<std::vector<std::byte>> cells;
+  ingest_on(1, [&] {
+    states.push_back(state_);
+    cells.emplace_back(top_.cells().begin(), top_.cells().end());
+  });
+  const std::string digest = state_.digest.hex();
+  for (size_t i = 0; i < states.size(); ++i) {
+    state_ = states[i];
+    std::ranges::copy(cells[i], top_.fill(state_.top_tree_weight).begin());
+    ingest_on(GetParam(), [] {});
+    EXPECT_EQ(state_.digest.hex(), digest);
+    EXPECT_TRUE(std::ranges::equal(top_.cells(), cells.back()));
+    EXPECT_EQ(state_.position, Diagonal::kTriangles);
+  }
 }
 
 // What was read before the scene failed is ingested, and the state covers it.
 TEST_P(IngestTest, ASceneThatFailsIsAnError) {
-  scene_.fails_at = 30;
+  scene_.fails_at = 5 * kPiece + 7;
   EXPECT_EQ(error_of_ingest([] {}).code(), ErrorCode::kIo);
-  EXPECT_EQ(state_.position, 30 * Diagonal::kBatch);
+  EXPECT_EQ(state_.position, 5 * kPiece);
 }
 
 TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
-  scene_.too_far_at = 30;
+  scene_.too_far_at = 5 * kPiece + 7;
   const Error error = error_of_ingest([] {});
   EXPECT_EQ(error.code(), ErrorCode::kLimit);
-  EXPECT_NE(error.message().find("triangle 3007 of the scene"), std::string::npos)
+  // Of 81927 triangles, 820 are invalid.
+  EXPECT_NE(error.message().find("triangle 81107 of the scene"), std::string::npos)
       << error.message();
 }
 
 // An error at a checkpoint, say of a full disk, ends the reading of the scene.
-TEST_P(IngestTest, AnErrorOfTheConsumerStopsReading) {
+TEST_P(IngestTest, AnErrorAtACheckpointStopsReading) {
   EXPECT_THROW(ingest_on(GetParam(),
                          [&] {
-                           if (state_.position == 10 * Diagonal::kBatch)
+                           if (state_.position == 2 * kPiece)
                              throw std::runtime_error("the checkpoint failed");
                          }),
                std::runtime_error);
-  EXPECT_EQ(state_.position, 10 * Diagonal::kBatch);
-  EXPECT_LT(scene_.position(), scene_.declared_triangles());
+  EXPECT_EQ(state_.position, 2 * kPiece);
+  EXPECT_LE(scene_.read, (2 + GetParam()) * kPiece);
 }
 
 TEST_P(IngestTest, IsCanceled) {
   EXPECT_EQ(error_of_ingest([&] { cancel_.cancel(); }).code(), ErrorCode::kCanceled);
-  EXPECT_EQ(state_.position, Diagonal::kBatch);
+  EXPECT_EQ(state_.position, kPiece);
 }
 
-INSTANTIATE_TEST_SUITE_P(Threads, IngestTest, testing::Values(1, 2),
+// The bounds of the triangles, invalid ones not counted.
+TEST_P(IngestTest, ScanFindsTheBounds) {
+  const BuildContext build{system_files(), progress_, cancel_};
+  uint64_t pieces = 0;
+  scan(scene_, state_, {build, GetParam(), budget_}, [&] { ++pieces; });
+  EXPECT_EQ(pieces, (Diagonal::kTriangles + kPiece - 1) / kPiece);
+  EXPECT_EQ(state_.bounds.low, (std::array<double, 3>{2e-6 / 0.4, 0, 0}));
+  EXPECT_EQ(state_.bounds.high[0], 5.001);
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, IngestTest, testing::Values(1, 2, 5),
                          testing::PrintToStringParamName());
 
 }  // namespace

@@ -41,7 +41,7 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
     EXPECT_FALSE(store.job().has_value());
     store.start(job_, plan(3));
     store.record_built(std::vector{built(store.leaves()[1])});
-    store.add_stage_time({"build", 1.5, 2.5});
+    store.add_stage_time({"build", 1.5, 2.5, 0.25});
   }
   JobStore store(path(), JobStore::Access::kBuild);
   EXPECT_EQ(store.job(), job_);
@@ -56,6 +56,7 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   EXPECT_EQ(leaves[2].weight, 20);
   ASSERT_EQ(store.stage_times().size(), 1u);
   EXPECT_EQ(store.stage_times()[0].cpu_s, 2.5);
+  EXPECT_EQ(store.stage_times()[0].largest_thread_share, 0.25);
 }
 
 // What is marked as built without a record is planned again when it is forgotten; records stay.
@@ -232,7 +233,7 @@ TEST_F(JobStoreTest, NoticesAChangeInAnyRowThatDecides) {
     std::function<void(JobStore&)> read;
   };
   for (const Change& change :
-       {Change{"UPDATE job SET scene_sha256 = 'abd'", [](JobStore& s) { s.job(); }},
+       {Change{"UPDATE job SET scene_digest = 'abd'", [](JobStore& s) { s.job(); }},
         Change{"UPDATE job SET subvolumes = 1", [](JobStore& s) { s.leaves(); }},
         Change{"UPDATE merge SET level = 4", [](JobStore& s) { s.merge(); }},
         Change{"UPDATE result SET sha256 = 'sho'", [](JobStore& s) { s.result(); }}}) {

@@ -38,7 +38,11 @@ std::vector<size_t> touched_by_brute_force(const FixedTriangle& t,
   return touched;
 }
 
-void add(TopTree& top, const FixedTriangle& t) { top.add(t, expected_work(t).bricks); }
+void add(TopTree& top, const FixedTriangle& t) {
+  TopTree::Tally tally(top);
+  tally.add(t, expected_work(t).bricks);
+  top.add(tally);
+}
 
 // Every triangle reaches every subvolume that it touches, wherever the cuts are, and the plan has a
 // subvolume wherever a triangle is.
@@ -164,6 +168,32 @@ TEST(TopTree, ExpectedVoxelsOfAnAxisAlignedTriangle) {
   FixedTriangle t{{{1, 1, 1}, {1 + 256 * 100, 1, 1}, {1, 1 + 256 * 50, 1}}};
   EXPECT_NEAR(expected_work(t).voxels, 0.5 * 100 * 50 + 100 + 50 + 1, 1e-6);
   EXPECT_NEAR(expected_work(t).bricks, 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
+}
+
+// A tally of many triangles, used again after clear(), adds what those of single triangles add.
+TEST(TopTree, TalliesAddUp) {
+  MemoryBudget budget(uint64_t{1} << 30);
+  std::mt19937_64 random(5);
+  const uint32_t depth = TopTree::depth_within(kLevels, 1 << 20);
+  TopTree one_by_one(kLevels, budget, depth), by_tally(kLevels, budget, depth);
+  TopTree::Tally tally(by_tally);
+  for (int piece = 0; piece < 3; ++piece) {
+    tally.clear();
+    for (int i = 0; i < 1000; ++i) {
+      const FixedTriangle t = triangle_near(random, i % 10 == 0 ? 400000 : 5000);
+      add(one_by_one, t);
+      tally.add(t, expected_work(t).bricks);
+    }
+    by_tally.add(tally);
+  }
+  EXPECT_NEAR(by_tally.total_weight(), one_by_one.total_weight(), 1e-5 * one_by_one.total_weight());
+  const auto plan = by_tally.subvolumes_by_edge(64), expected = one_by_one.subvolumes_by_edge(64);
+  ASSERT_EQ(plan.size(), expected.size());
+  for (size_t i = 0; i < plan.size(); ++i) {
+    EXPECT_EQ(plan[i].cube, expected[i].cube);
+    EXPECT_EQ(plan[i].triangles, expected[i].triangles);
+    EXPECT_NEAR(plan[i].weight, expected[i].weight, 1e-4 * expected[i].weight);
+  }
 }
 
 // Filled with the cells of another, a top tree continues as that one would have: the plans are

@@ -12,6 +12,7 @@ namespace {
 
 class Queue : public testing::Test {
  protected:
+  static double pause_(unsigned attempt) { return 100.0 * attempt; }
   Job post(int priority = 0, const IdempotencyKey& key = {}) {
     Job job;
     job.request = R"({"scene":["a.glb"],"resolution":64,"options":{}})";
@@ -97,7 +98,7 @@ TEST_F(Queue, RecoversWhatWasRunning) {
   set_state(running, JobState::kRunning);
   set_state(stopping, JobState::kCanceling);
   reopen();
-  const auto canceled = queue_->recover({}, 5);
+  const auto canceled = queue_->recover({}, pause_);
   ASSERT_EQ(canceled.size(), 1u);
   EXPECT_EQ(canceled[0].id, stopping);
   EXPECT_EQ(queue_->find(stopping)->state, JobState::kCanceled);
@@ -254,12 +255,13 @@ TEST_F(Queue, HardeningL8_InterruptedRunsCountInTheEnd) {
       j.state = JobState::kRunning;
     });
     reopen();
-    queue_->recover({}, 5);
+    queue_->recover({}, pause_);
     const Job job = *queue_->find(id);
     EXPECT_EQ(job.front, runs < 5) << runs;
-    EXPECT_EQ(job.attempts, runs < 6 ? 1u : static_cast<unsigned>(runs) - 4) << runs;
+    const bool waits = runs >= 5 && job.state == JobState::kQueued;
+    EXPECT_EQ(job.not_before_s > unix_seconds() + 100 * (runs - 4) - 10, waits) << runs;
   }
-  EXPECT_EQ(runs, 10);
+  EXPECT_EQ(runs, 16);
   EXPECT_EQ(queue_->find(id)->error->code, "internal");
   EXPECT_FALSE(queue_->find(id)->error->transient);
   EXPECT_EQ(queue_->next(1e12, 900, {})->id, other);
@@ -268,7 +270,7 @@ TEST_F(Queue, HardeningL8_InterruptedRunsCountInTheEnd) {
 TEST_F(Queue, RecoversNothingThatRuns) {
   const std::string id = post().id;
   set_state(id, JobState::kRunning);
-  EXPECT_TRUE(queue_->recover({id}, 5).empty());
+  EXPECT_TRUE(queue_->recover({id}, pause_).empty());
   EXPECT_EQ(queue_->find(id)->state, JobState::kRunning);
 }
 
@@ -318,7 +320,7 @@ TEST_F(Queue, ReadsTheLastVersion) {
   EXPECT_EQ(queue_->find(id)->interruptions, 0u);
   set_state(id, JobState::kRunning);
   reopen();
-  queue_->recover({}, 5);
+  queue_->recover({}, pause_);
   EXPECT_EQ(queue_->find(id)->interruptions, 1u);
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <string>
-#include <string_view>
 
 #include "core/scene/gltf/messages.h"
 
@@ -18,10 +17,6 @@ constexpr uint64_t kMaxWordCharacters = 1024;  // of a number or literal
 
 // ASCII that JSON does not escape within a string.
 bool is_plain(char c) { return c >= ' ' && c <= '~'; }
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
-bool is_punctuation(char c) {
-  return std::string_view("[]{},:\"").find(c) != std::string_view::npos;
-}
 
 }  // namespace
 
@@ -71,10 +66,29 @@ void JsonWindow::track(char c) {
 }
 
 void JsonWindow::track_outside_strings(char c) {
-  is_second_blank_ = is_blank(c) && is_blank(last_);
-  last_ = c;
-  word_ = is_blank(c) || is_punctuation(c) ? 0 : word_ + 1;
-  if (word_ == 1 && (c == '-' || (c >= '0' && c <= '9'))) collected_ = 0;
+  switch (c) {
+    case ' ':
+    case '\t':
+    case '\n':
+    case '\r':
+      is_second_blank_ = after_blank_;
+      after_blank_ = true;
+      word_ = 0;
+      return;
+    case '[':
+    case ']':
+    case '{':
+    case '}':
+    case ',':
+    case ':':
+    case '"':
+      word_ = 0;
+      break;
+    default:
+      ++word_;
+      if (word_ == 1 && (c == '-' || (c >= '0' && c <= '9'))) collected_ = 0;
+  }
+  is_second_blank_ = after_blank_ = false;
   if (word_ > kMaxWordCharacters)
     refuse(file_.path(), "its JSON has a number of over " + std::to_string(kMaxWordCharacters) +
                              " characters at byte " + std::to_string(position_));

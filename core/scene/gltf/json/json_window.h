@@ -50,11 +50,11 @@ class JsonWindow : public std::streambuf {
 
   bool in_string_ = false;
   bool after_backslash_ = false;
-  int hex_digits_left_ = 0;  // of an escape \uXXXX
-  bool in_escape_ = false;   // the last character is part of an escape
-  bool is_second_blank_ = false;
-  char last_ = 0;           // the last character outside of strings
-  uint64_t word_ = 0;       // characters of the number or literal so far
+  int hex_digits_left_ = 0;       // of an escape \uXXXX
+  bool in_escape_ = false;        // the last character is part of an escape
+  bool after_blank_ = false;      // the last character outside of strings is blank,
+  bool is_second_blank_ = false;  // and so is the one before it
+  uint64_t word_ = 0;             // characters of the number or literal so far
   uint64_t collected_ = 0;  // characters that the parser has, which begins again with each string
                             // or number
   RawString string_;

@@ -54,16 +54,33 @@ std::string resolve_uri(const std::string& scene_path, const std::string& uri,
 
 }  // namespace
 
+void ExternalFiles::add(int buffer, const SourceFile& file) {
+  const std::lock_guard lock(mutex_);
+  const auto [known, is_new] = by_buffer_.try_emplace(buffer, file);
+  if (is_new) charge_.add(sizeof(*known) + kMapNodeBytes + file.path.size());
+  if (known->second.identity != file.identity) known->second.identity = {};
+}
+
+std::vector<SourceFile> ExternalFiles::all() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<SourceFile> files;
+  for (const auto& [buffer, file] : by_buffer_) files.push_back(file);
+  return files;
+}
+
 BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
-                           const Document& document, MemoryBudget& budget)
+                           const Document& document, ExternalFiles& external_files,
+                           MemoryBudget& budget)
     : files_(files),
       scene_file_(scene_file),
       document_(document),
+      external_files_(external_files),
       budget_(budget),
-      window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()),
-      external_files_charge_(budget, "the list of external files of " + scene_file.path()) {
-  for (size_t i = 0; i < document.buffers.size(); ++i)
-    if (document.buffers[i].is_read) check_length(static_cast<int>(i));
+      window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()) {}
+
+void BufferReader::check_lengths() {
+  for (size_t i = 0; i < document_.buffers.size(); ++i)
+    if (document_.buffers[i].is_read) check_length(static_cast<int>(i));
 }
 
 std::span<const std::byte> BufferReader::window(int index, uint64_t offset, size_t size) {
@@ -119,10 +136,7 @@ const ReadableFile& BufferReader::external(int index) {
   } catch (const Error& e) {
     throw Error(e.code(), where + ": " + e.message());
   }
-  const FileIdentity identity = open_.back().file->identity();
-  const auto [known, is_new] = external_files_.try_emplace(index, SourceFile{path, identity});
-  if (is_new) external_files_charge_.add(sizeof(*known) + kMapNodeBytes + path.size());
-  if (known->second.identity != identity) known->second.identity = {};
+  external_files_.add(index, {path, open_.back().file->identity()});
   return *open_.back().file;
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,23 +19,36 @@
 
 namespace voxdag::gltf {
 
+// The external files of a document that were opened so far. Thread-safe.
+class ExternalFiles {
+ public:
+  ExternalFiles(const std::string& scene_path, MemoryBudget& budget)
+      : charge_(budget, "the list of external files of " + scene_path) {}
+  // The buffer's file was opened. If it is another one than before, its identity is unknown.
+  void add(int buffer, const SourceFile& file);
+  std::vector<SourceFile> all() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<int, SourceFile> by_buffer_;
+  GrowingCharge charge_;
+};
+
 class BufferReader {
  public:
   static constexpr size_t kWindowBytes = size_t{256} << 10;
 
-  // Checks every buffer that is read: throws Error{kInvalidInput} if it has fewer bytes than it
-  // claims, Error{kNotFound} if an external file does not exist. The references must outlive the
-  // reader.
+  // Adds the files that it opens to `external_files`. The references must outlive the reader.
   BufferReader(FileSystem& files, const ReadableFile& scene_file, const Document& document,
-               MemoryBudget& budget);
+               ExternalFiles& external_files, MemoryBudget& budget);
+
+  // Checks every buffer that is read: throws Error{kInvalidInput} if it has fewer bytes than it
+  // claims, Error{kNotFound} if an external file does not exist.
+  void check_lengths();
 
   // Bytes [offset, offset + size) of a buffer, at most kWindowBytes of them, inside it. Valid until
   // the next call.
   std::span<const std::byte> window(int buffer, uint64_t offset, size_t size);
-
-  // The external files that were opened, by buffer. The identity of a file that had changed when it
-  // was opened again is unknown.
-  const std::map<int, SourceFile>& external_files() const { return external_files_; }
 
   // What readers of the scene charge their own memory to.
   MemoryBudget& budget() { return budget_; }
@@ -47,6 +61,7 @@ class BufferReader {
   FileSystem& files_;
   const ReadableFile& scene_file_;
   const Document& document_;
+  ExternalFiles& external_files_;
   MemoryBudget& budget_;
   PageBuffer<std::byte> window_;
   PageBuffer<std::byte> characters_;  // base64 of a window; empty until a buffer needs it
@@ -55,8 +70,6 @@ class BufferReader {
     std::unique_ptr<ReadableFile> file;
   };
   std::vector<OpenFile> open_;  // a few external files; the oldest is closed for another one
-  std::map<int, SourceFile> external_files_;
-  GrowingCharge external_files_charge_;
 };
 
 }  // namespace voxdag::gltf

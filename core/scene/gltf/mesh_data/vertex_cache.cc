@@ -4,10 +4,11 @@
 
 namespace voxdag::gltf {
 
-VertexCache::VertexCache(MemoryBudget& budget, uint64_t vertices) {
+VertexCache::VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches) {
   constexpr uint64_t kSlotBytes = kBlockVertices * 3 * sizeof(double);
   const uint64_t wanted = std::bit_ceil((vertices + kBlockVertices - 1) / kBlockVertices);
-  const uint64_t affordable = std::bit_floor(budget.available() / kShareOfFree / kSlotBytes);
+  const uint64_t affordable =
+      std::bit_floor(budget.available() / kShareOfFree / caches / kSlotBytes);
   const uint64_t slots = std::clamp<uint64_t>(std::min(wanted, affordable), 1, wanted);
   positions_ = PageBuffer<double>(budget, static_cast<size_t>(slots * kBlockVertices * 3),
                                   "vertices of a scene");

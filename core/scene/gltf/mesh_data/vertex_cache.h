@@ -14,11 +14,11 @@ namespace voxdag::gltf {
 
 class VertexCache {
  public:
-  // The cache takes at most one part in so many of what the budget has free.
+  // All caches of a scene together take at most one part in so many of what the budget has free.
   static constexpr uint64_t kShareOfFree = 4;
 
-  // Room for `vertices`, or for as many as fit that share.
-  VertexCache(MemoryBudget& budget, uint64_t vertices);
+  // One of `caches`. Room for `vertices`, or for as many as fit its part of that share.
+  VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches);
 
   // Forgets everything and serves `source` from now on, which must outlive its use.
   void bind(VertexSource& source);

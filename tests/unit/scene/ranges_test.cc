@@ -1,4 +1,4 @@
-// A pass over a scene may begin anywhere: it gives what a whole pass gives from there on.
+// Any range of a scene can be read, by any number of cursors.
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
@@ -33,9 +33,10 @@ SceneBuilder repeated_meshes() {
   return scene;
 }
 
-std::vector<Corners> triangles_from(TriangleSource& source, uint64_t first) {
+std::vector<Corners> triangles_between(TriangleCursor& cursor, uint64_t first, uint64_t end) {
   std::vector<Corners> all;
-  source.for_each_batch_from(first, [&](std::span<const WorldTriangle> batch) {
+  cursor.read(first, end - first, [&](std::span<const WorldTriangle> batch) {
+    EXPECT_TRUE(!batch.empty() && batch.size() <= 1024);
     for (const WorldTriangle& t : batch) {
       Corners corners;
       for (size_t k = 0; k < 3; ++k) std::copy_n(t.v[k], 3, corners[k].begin());
@@ -45,25 +46,31 @@ std::vector<Corners> triangles_from(TriangleSource& source, uint64_t first) {
   return all;
 }
 
-// From every declared triangle on: the same tail, and the invalid ones of the tail counted.
-TEST(ScenePosition, AnyTriangleMayBeTheFirst) {
+// Every range of the declared triangles, in any order: the same triangles as when each is read
+// alone.
+TEST(SceneRanges, AnyTriangleMayBeTheFirst) {
   OpenScene open(repeated_meshes().glb(), {true});
-  const std::vector<Corners> whole = triangles_of(*open.source);
   const uint64_t declared = open.source->declared_triangles();
   ASSERT_EQ(declared, 7u * (4 + 18));
-  ASSERT_EQ(whole.size() + open.source->invalid_triangles(), declared);
-  EXPECT_EQ(open.source->position(), declared);
-  for (uint64_t first = 0; first <= declared; ++first) {
-    SCOPED_TRACE(first);
-    const std::vector<Corners> tail = triangles_from(*open.source, first);
-    ASSERT_EQ(tail.size() + open.source->invalid_triangles(), declared - first);
-    EXPECT_TRUE(std::equal(tail.rbegin(), tail.rend(), whole.rbegin()));
-    EXPECT_EQ(open.source->position(), declared);
+  const auto cursor = open.source->open(1);
+  std::vector<std::vector<Corners>> each;
+  size_t valid = 0;
+  for (uint64_t i = 0; i < declared; ++i) {
+    each.push_back(triangles_between(*cursor, i, i + 1));
+    valid += each.back().size();
   }
+  EXPECT_EQ(valid, declared - 7);
+  for (uint64_t first = 0; first <= declared; ++first)
+    for (uint64_t end = first; end <= declared; end += 5) {
+      std::vector<Corners> expected;
+      for (uint64_t i = first; i < end; ++i)
+        expected.insert(expected.end(), each[i].begin(), each[i].end());
+      ASSERT_EQ(triangles_between(*cursor, first, end), expected) << first << " to " << end;
+    }
 }
 
-// Where a visited batch ends is where the next one begins, across windows, instances and scenes.
-TEST(ScenePosition, GoesOnWhereABatchEnded) {
+// Pieces of a scene of several windows, instances and files, read by two cursors in turn.
+TEST(SceneRanges, CursorsDoNotDisturbEachOther) {
   SceneBuilder scene;
   std::vector<float> corners;
   for (int i = 0; i < 3 * 3000; ++i) corners.push_back(static_cast<float>(i % 1009));
@@ -74,22 +81,24 @@ TEST(ScenePosition, GoesOnWhereABatchEnded) {
   const int index_accessor = scene.add_accessor("SCALAR", kU32, indices);
   scene.add_mesh({{"attributes", {{"POSITION", positions}}}, {"indices", index_accessor}});
   for (int i = 0; i < 3; ++i) scene.add_root({{"mesh", 0}, {"translation", {i, 0, 0}}});
-  OpenScene open(scene.glb(), {true});
-  const std::vector<Corners> whole = triangles_of(*open.source);
-  struct Mark {
-    uint64_t position, valid;
-  };
-  std::vector<Mark> marks;
-  uint64_t valid = 0;
-  open.source->for_each_batch([&](std::span<const WorldTriangle> batch) {
-    marks.push_back({open.source->position(), valid += batch.size()});
-  });
-  ASSERT_EQ(marks.size(), 4u);
-  for (const Mark& mark : marks) {
-    SCOPED_TRACE(mark.position);
-    const std::vector<Corners> tail = triangles_from(*open.source, mark.position);
-    ASSERT_EQ(tail.size(), whole.size() - mark.valid);
-    EXPECT_TRUE(std::equal(tail.rbegin(), tail.rend(), whole.rbegin()));
+  MemoryFiles files;
+  files.contents["a.glb"] = files.contents["b.glb"] = scene.glb();
+  MemoryBudget budget(uint64_t{1} << 30);
+  const CancelToken never;
+  const auto source = open_scene(files, {"a.glb", "b.glb"}, {true}, budget, never);
+  const std::vector<Corners> whole = triangles_of(*source);
+  ASSERT_EQ(source->declared_triangles(), 2u * 3 * 5000);
+  EXPECT_EQ(whole.size(), 2u * 3 * 4998);
+  for (const uint64_t piece : {700u, 4096u, 5000u, 16384u}) {
+    SCOPED_TRACE(piece);
+    const std::unique_ptr<TriangleCursor> cursors[] = {source->open(2), source->open(2)};
+    std::vector<Corners> all;
+    for (uint64_t first = 0, i = 0; first < source->declared_triangles(); first += piece, ++i) {
+      const uint64_t end = std::min(first + piece, source->declared_triangles());
+      const auto part = triangles_between(*cursors[i % 2], first, end);
+      all.insert(all.end(), part.begin(), part.end());
+    }
+    EXPECT_EQ(all, whole);
   }
 }
 

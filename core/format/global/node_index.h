@@ -1,0 +1,85 @@
+// Where the nodes of a level of the global file begin. Nodes vary in size, so that this takes a
+// walk over the level from its first word. It is cut into spans for several threads: each span but
+// the first is walked from a word that looks like the beginning of a node, and walked again if the
+// span before it does not end there.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/host_device.h"
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/format/global/voxdag_reader.h"
+
+namespace voxdag {
+
+// What the nodes of a level point to their children with; bricks have none.
+enum class Pointers { kNone, kNarrow, kWide };
+
+// Maps the word offset where a node of a level of the global file begins to its index in the level.
+// Takes 2 bits per word, nothing for bricks. Immutable after construction.
+class NodeIndex {
+ public:
+  static constexpr uint64_t kNone = ~uint64_t{0};
+
+  NodeIndex() = default;
+  // Walks the words of the level on up to `threads` threads. Throws Error{kCorrupt} beginning with
+  // `where` unless every child mask is 1 to 255, the last node ends with the level, and there are
+  // as many nodes as the header says.
+  NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsigned threads,
+            MemoryBudget& budget, const CancelToken& cancel, const std::string& where);
+
+  // The index of the node that begins at `offset`; kNone if none does.
+  uint64_t find(uint64_t offset) const {
+    if (offset >= level_.word_count) return kNone;
+    if (pointers_ == Pointers::kNone) return offset % 2 == 0 ? offset / 2 : kNone;
+    const uint64_t bits = starts_[offset / 64], bit = uint64_t{1} << offset % 64;
+    return bits & bit
+               ? nodes_before_[offset / 64] + static_cast<uint64_t>(popcount64(bits & (bit - 1)))
+               : kNone;
+  }
+
+  // The nodes that begin in a span are visited by one thread: visit(index, offset) in their order.
+  uint64_t span_count() const { return (level_.word_count + kSpanWords - 1) / kSpanWords; }
+  template <class Visit>
+  void visit_span(uint64_t span, Visit&& visit) const {
+    const uint64_t end = std::min(level_.word_count, (span + 1) * kSpanWords);
+    if (pointers_ == Pointers::kNone) {
+      for (uint64_t at = span * kSpanWords; at < end; at += 2) visit(at / 2, at);
+      return;
+    }
+    uint64_t index = nodes_before_[span * kSpanWords / 64];
+    for (uint64_t i = span * kSpanWords / 64; i * 64 < end; ++i)
+      for (uint64_t bits = starts_[i]; bits != 0; bits &= bits - 1)
+        visit(index++, i * 64 + static_cast<uint64_t>(std::countr_zero(bits)));
+  }
+  // Where the last node before the span begins; the span is not the first.
+  uint64_t last_before(uint64_t span) const;
+
+ private:
+  static constexpr uint64_t kSpanWords = uint64_t{1} << 16;  // a multiple of 64
+
+  struct Span {
+    uint64_t begin = 0;  // where its first node begins
+    uint64_t end = 0;    // where its last node ends
+    uint64_t nodes = 0;
+    bool broken = false;  // at `end`, no node can begin there
+  };
+
+  uint64_t words_of_node(uint64_t at) const;
+  uint64_t guess_begin(uint64_t span) const;
+  Span walk(uint64_t span, uint64_t begin);
+  uint64_t join(std::vector<Span>& spans, const std::string& where);
+
+  voxdag_reader::Level level_;
+  Pointers pointers_ = Pointers::kNone;
+  PageBuffer<uint64_t> starts_;        // one bit per word: a node begins here
+  PageBuffer<uint64_t> nodes_before_;  // for each 64 words
+};
+
+}  // namespace voxdag
