@@ -22,8 +22,8 @@ size_t triangle_record_bytes(bool wide);
 void encode_triangle(const FixedTriangle& triangle, size_t record_bytes, std::byte* out);
 
 struct Chunk {
-  std::vector<std::byte> memory;  // empty if the records are in a file
-  Extent extent;                  // in that file
+  std::vector<std::byte> memory = {};  // empty if the records are in a file
+  Extent extent = {};                  // in that file
   uint32_t triangles = 0;
   uint64_t first = 0;  // triangles of the list before this chunk, set by the list
 };
