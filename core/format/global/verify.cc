@@ -122,6 +122,11 @@ void Verifier::check_header() const {
     check_zeros(there ? last : entry, entry + kLevelEntryBytes, "a reserved field");
   }
   const bool has_features = file_.version() != kVersion;
+  bool any_wide = false;
+  for (uint32_t level = 0; level <= file_.brick_level() && !file_.empty(); ++level)
+    any_wide |= file_.level(level).pointer_bits == 64;
+  if (has_features && !any_wide)
+    broken(file_.path() + ": header", "version 2 without a wide level, expected version 1");
   check_zeros(kAttributesAt, kFeaturesAt, "reserved");
   check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "reserved");
 }

@@ -335,6 +335,7 @@ class File {
     if (features & ~kWideLevels)
       throw Error(Problem::kUnsupportedVersion,
                   path_ + ": feature bits " + std::to_string(features) + ", expected none but 1");
+    const uint32_t most_pointer_bits = features & kWideLevels ? 64 : 32;
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
     expect(
@@ -374,8 +375,8 @@ class File {
       }
       expect(level.file_offset == end, "a level does not follow the one below it");
       if (version_ != 1) level.pointer_bits = get<uint32_t>(entry + 24);
-      expect(level.pointer_bits == 32 || level.pointer_bits == 64,
-             "expected pointers of 32 or 64 bits");
+      expect(level.pointer_bits == 32 || level.pointer_bits == most_pointer_bits,
+             "expected pointers of 32 bits, or of 64 with wide levels");
       expect(level.word_count <= uint64_t{1} << (level.pointer_bits == 32 ? 32 : 40),
              "a level has more words than pointers into it can count, or over 2^40");
       expect(4 * level.word_count <= bytes_.size() - end, "a level ends beyond the file");

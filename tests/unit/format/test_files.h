@@ -53,8 +53,10 @@ inline oracle::Voxels random_voxels(uint64_t seed, int edge) {
   return voxels;
 }
 
-// The words of the oracle's levels as the global file has them: bricks first.
-inline std::vector<std::vector<uint32_t>> level_words(const oracle::Dag& dag) {
+// The words of the oracle's levels as the global file has them: bricks first. Levels of over
+// `narrow_words` words are wide.
+inline std::vector<std::vector<uint32_t>> level_words(
+    const oracle::Dag& dag, uint64_t narrow_words = global_layout::kNarrowLevelWords) {
   std::vector<std::vector<uint32_t>> levels;
   if (dag.bricks.empty()) return levels;
   std::vector<uint32_t> offsets, words;
@@ -70,7 +72,10 @@ inline std::vector<std::vector<uint32_t>> level_words(const oracle::Dag& dag) {
     for (const oracle::Node& node : nodes) {
       own_offsets.push_back(static_cast<uint32_t>(words.size()));
       words.push_back(node.mask);
-      for (const uint32_t child : node.children) words.push_back(offsets[child]);
+      for (const uint32_t child : node.children) {
+        words.push_back(offsets[child]);
+        if (levels.back().size() > narrow_words) words.push_back(0);
+      }
     }
     offsets = own_offsets;
     levels.push_back(words);
@@ -87,10 +92,11 @@ inline Grid grid_of(int edge) {
 }
 
 inline GlobalFileSummary write_global(const std::string& path, const oracle::Dag& dag,
-                                      const Grid& grid, uint32_t hash_bits = 64) {
-  GlobalFileWriter writer(system_files(), path, grid, hash_bits);
+                                      const Grid& grid, uint32_t hash_bits = 64,
+                                      uint64_t narrow_words = global_layout::kNarrowLevelWords) {
+  GlobalFileWriter writer(system_files(), path, grid, hash_bits, narrow_words);
   uint32_t level = grid.levels - 2;
-  const auto levels = level_words(dag);
+  const auto levels = level_words(dag, narrow_words);
   for (size_t i = 0; i < levels.size(); ++i, --level) {
     writer.begin_level(level);
     writer.checksum_words(levels[i]);

@@ -1,0 +1,113 @@
+// Files with wide levels, version 2 of the format, and headers that lie about them.
+#include <gmock/gmock.h>
+
+#include <cstring>
+
+#include "core/format/checksum.h"
+#include "core/format/global/diff.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/open_global.h"
+#include "core/format/global/verify.h"
+#include "tests/unit/format/test_files.h"
+
+namespace voxdag {
+namespace {
+
+using namespace global_layout;
+using testing::HasSubstr;
+
+constexpr int kEdge = 64;
+constexpr uint32_t kBrickLevel = 4;
+constexpr size_t kPointerBitsAt = 24;  // in a level's entry
+
+class WideFileTest : public testing::Test {
+ protected:
+  WideFileTest() { write_global(path_, dag_, grid_of(kEdge), 64, 100); }
+
+  static void verify(const std::string& path) {
+    MemoryBudget budget(uint64_t{1} << 30);
+    NoProgress progress;
+    const auto file = open_global_file(path);
+    verify_global_file(*file, 2, budget, progress, {});
+  }
+  // What opening or verifying the file with a changed header says.
+  template <class T>
+  Error error_with(size_t at, T value) const {
+    ByteString bytes = read_bytes(path_);
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+    const auto header = std::as_bytes(std::span(bytes)).first(kHeaderChecksumAt);
+    const uint64_t checksum = checksum64(header);
+    std::memcpy(bytes.data() + kHeaderChecksumAt, &checksum, sizeof checksum);
+    const std::string changed = folder_.file("changed.vdag");
+    write_bytes(changed, bytes);
+    return error_of([&] { verify(changed); });
+  }
+
+  TemporaryFolder folder_;
+  const std::string path_ = folder_.file("wide.vdag");
+  const oracle::Dag dag_ = oracle::build_dag(random_voxels(9, kEdge), 64);
+};
+
+TEST_F(WideFileTest, HasTheVoxelsOfTheNarrowFile) {
+  const std::string narrow = folder_.file("narrow.vdag");
+  for (const uint64_t words : {2u, 100u, 1000u}) {
+    SCOPED_TRACE(words);
+    write_global(path_, dag_, grid_of(kEdge), 64, words);
+    write_global(narrow, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
+    EXPECT_NO_THROW(verify(path_));
+    const auto a = open_global_file(path_), b = open_global_file(narrow);
+    EXPECT_EQ(a->version(), 2u);
+    EXPECT_EQ(b->version(), 1u);
+    for (uint32_t level = 0; level <= kBrickLevel; ++level)
+      EXPECT_EQ(a->level(level).pointer_bits, a->level(level).word_count > words ? 64u : 32u);
+    MemoryBudget budget(uint64_t{1} << 30);
+    EXPECT_TRUE(diff_global_files(*a, *b, 2, budget, {}).same());
+    oracle::Random random(1);
+    for (int i = 0; i < 1000; ++i) {
+      const int64_t x = random.between(-1, kEdge), y = random.between(-1, kEdge),
+                    z = random.between(-1, kEdge);
+      EXPECT_EQ(a->voxel(x, y, z), b->voxel(x, y, z));
+    }
+  }
+}
+
+TEST_F(WideFileTest, UnknownFeaturesAreNotRead) {
+  for (const uint64_t features : {uint64_t{2}, uint64_t{3}, uint64_t{1} << 63}) {
+    const Error error = error_with(kFeaturesAt, features);
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupportedVersion);
+    EXPECT_THAT(error.message(), HasSubstr("feature bits " + std::to_string(features)));
+  }
+  EXPECT_EQ(error_with(kVersionAt, uint32_t{3}).code(), ErrorCode::kUnsupportedVersion);
+}
+
+TEST_F(WideFileTest, PointersOfOtherWidthsAreRefused) {
+  const size_t bricks = kLevelsAt + kBrickLevel * kLevelEntryBytes + kPointerBitsAt;
+  for (const uint32_t bits : {0u, 1u, 16u, 63u, 65u, 128u, ~0u})
+    EXPECT_THAT(error_with(bricks, bits).message(), HasSubstr("expected pointers of 32 bits"));
+  // The other width: the words of the parents make no sense then.
+  EXPECT_EQ(error_with(bricks, uint32_t{32}).code(), ErrorCode::kCorrupt);
+  EXPECT_EQ(error_with(kLevelsAt + kPointerBitsAt, uint32_t{33}).code(), ErrorCode::kCorrupt);
+}
+
+TEST_F(WideFileTest, VersionAndFeaturesBelongTogether) {
+  EXPECT_THAT(error_with(kFeaturesAt, uint64_t{0}).message(),
+              HasSubstr("expected pointers of 32 bits, or of 64 with wide levels"));
+  // What version 1 has reserved is not 0.
+  EXPECT_EQ(error_with(kVersionAt, uint32_t{1}).code(), ErrorCode::kCorrupt);
+  write_global(path_, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
+  EXPECT_THAT(error_with(kFeaturesAt, uint64_t{1}).message(), HasSubstr("reserved"));
+  EXPECT_EQ(error_with(kVersionAt, uint32_t{2}).code(), ErrorCode::kCorrupt);
+}
+
+// A level of more words than pointers of 32 bits can count.
+TEST_F(WideFileTest, NarrowPointersReachTwoToThe32) {
+  const size_t bricks = kLevelsAt + kBrickLevel * kLevelEntryBytes;
+  EXPECT_THAT(error_with(bricks + 16, (uint64_t{1} << 40) + 1).message(),
+              HasSubstr("a level has more words than pointers into it can count"));
+  write_global(path_, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
+  EXPECT_THAT(error_with(bricks + 16, (uint64_t{1} << 32) + 1).message(),
+              HasSubstr("a level has more words than pointers into it can count"));
+}
+
+}  // namespace
+}  // namespace voxdag
