@@ -335,7 +335,7 @@ class File {
     if (features & ~kWideLevels)
       throw Error(Problem::kUnsupportedVersion,
                   path_ + ": feature bits " + std::to_string(features) + ", expected none but 1");
-    const uint32_t most_pointer_bits = features & kWideLevels ? 64 : 32;
+    most_pointer_bits_ = features & kWideLevels ? 64 : 32;
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
     expect(
@@ -375,7 +375,7 @@ class File {
       }
       expect(level.file_offset == end, "a level does not follow the one below it");
       if (version_ != 1) level.pointer_bits = get<uint32_t>(entry + 24);
-      expect(level.pointer_bits == 32 || level.pointer_bits == most_pointer_bits,
+      expect(level.pointer_bits == 32 || level.pointer_bits == most_pointer_bits_,
              "expected pointers of 32 bits, or of 64 with wide levels");
       expect(level.word_count <= uint64_t{1} << (level.pointer_bits == 32 ? 32 : 40),
              "a level has more words than pointers into it can count, or over 2^40");
@@ -406,7 +406,7 @@ class File {
   const Bytes bytes_;
   double origin_[3] = {};
   double edge_ = 0;
-  uint32_t version_ = 0, grid_levels_ = 0, hash_bits_ = 0;
+  uint32_t version_ = 0, most_pointer_bits_ = 32, grid_levels_ = 0, hash_bits_ = 0;
   uint64_t voxels_ = 0, svo_nodes_ = 0, dag_nodes_ = 0, table_offset_ = 0;
   Level levels_[kMaxBrickLevel + 1];
 };
