@@ -17,9 +17,9 @@ WORKDIR /src
 COPY tools/packages tools/packages
 RUN tools/packages build
 COPY . .
-RUN cmake --preset cpu -DVOXDAG_TESTS=OFF -DVOXDAG_BENCH=OFF \
-    && cmake --build --preset cpu --target voxdag \
-    && install -D --strip build/cpu/voxdag /out/voxdag \
+RUN cmake --preset quick \
+    && cmake --build --preset quick --target voxdag \
+    && install -D --strip build/quick/voxdag /out/voxdag \
     && ldd /out/voxdag | awk '/=> \//{print $3}' | xargs -n 1 basename | sed 's|^|*/|' \
       | xargs dpkg-query -S | cut -d : -f 1 | sort -u > /out/packages
 

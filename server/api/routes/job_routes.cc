@@ -209,7 +209,7 @@ Response patch_job(Context& context, Call& call) {
 
 Response delete_job(Context& context, Call& call) {
   expect_no_body(call.request);
-  context.disk.with_ballast([&] { context.dispatcher.remove(call.names[0]); });
+  context.dispatcher.remove(call.names[0]);
   return no_content();
 }
 
@@ -223,18 +223,18 @@ Response retry_job(Context& context, Call& call) {
   return json_response(202, to_json(context, context.dispatcher.retry(job.id)));
 }
 
-Response cancel_job(Context& context, Call& call) {
-  expect_no_body(call.request);
-  const Job job =
-      context.disk.with_ballast([&] { return context.dispatcher.cancel(call.names[0]); });
-  return json_response(202, to_json(context, job));
-}
-
 // A handler that applies the action to a job.
 Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   return [action](Context& context, Call& call) {
     expect_no_body(call.request);
     return json_response(202, to_json(context, (context.dispatcher.*action)(call.names[0])));
+  };
+}
+
+// A handler of what frees disk space, even where none is left to record it.
+Router::Handler freeing_space(Router::Handler handler) {
+  return [handler = std::move(handler)](Context& context, Call& call) {
+    return context.disk.with_ballast([&] { return handler(context, call); });
   };
 }
 
@@ -252,8 +252,8 @@ void add_job_routes(Router& router) {
   router.add("GET", "/api/v1/jobs", Role::kRead, list_jobs, {"state", "limit", "cursor"});
   router.add("GET", job, Role::kRead, get_job);
   router.add("PATCH", job, Role::kAdmin, patch_job);
-  router.add("DELETE", job, Role::kAdmin, delete_job);
-  router.add("POST", job + "/cancel", Role::kSubmit, cancel_job);
+  router.add("DELETE", job, Role::kAdmin, freeing_space(delete_job));
+  router.add("POST", job + "/cancel", Role::kSubmit, freeing_space(act(&Dispatcher::cancel)));
   router.add("POST", job + "/suspend", Role::kSubmit, act(&Dispatcher::suspend));
   router.add("POST", job + "/resume", Role::kSubmit, act(&Dispatcher::resume));
   router.add("POST", job + "/retry", Role::kSubmit, retry_job);

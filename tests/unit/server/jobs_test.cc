@@ -312,6 +312,19 @@ TEST_F(JobOutcome, ACrashIsReported) {
   EXPECT_EQ(job_.error->code, "out_of_memory");
 }
 
+// The signal to stop arrives before the process can handle it, or a second one does.
+TEST_F(JobOutcome, AProcessThatWasStoppedAtOnceRunsAgain) {
+  live_.stop();
+  for (const ChildProcess::End& end :
+       {ChildProcess::End{0, SIGTERM}, ChildProcess::End{128 + SIGTERM, 0},
+        ChildProcess::End{0, SIGKILL}, ChildProcess::End{}}) {
+    job_.state = JobState::kRunning;
+    apply(end);
+    EXPECT_EQ(job_.state, JobState::kQueued);
+    EXPECT_FALSE(job_.error);
+  }
+}
+
 TEST_F(JobOutcome, AStoppedRunGetsTheStateThatWasAskedFor) {
   live_.stop();
   fail("canceled");
