@@ -67,7 +67,8 @@ class Download {
       if (head.status != 206) offset = 0;  // the server sends the whole file
       guard_file(
           [&] { file = offset > 0 ? files_.open_write(partial_) : files_.create(partial_); });
-      progress_.begin_stage("download", size_ - offset, "bytes");
+      progress_.begin_stage("download", size_, "bytes");
+      progress_.resume_at(offset);
       return true;
     };
     const auto sink = [&](std::string_view bytes) {

@@ -86,7 +86,8 @@ class Upload {
   // connection within a large one. If no bytes are missing, an empty part finishes the upload.
   // False if a retry is needed, for the reason in failure_.
   bool send_rest() {
-    progress_.begin_stage("upload", size_ - offset_, "bytes");
+    progress_.begin_stage("upload", size_, "bytes");
+    progress_.resume_at(offset_);
     uint64_t part_bytes = kFirstPartBytes;
     do {
       const uint64_t end = std::min(size_, offset_ + part_bytes);

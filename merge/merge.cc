@@ -30,14 +30,13 @@ class Merger {
   void run(GlobalFileWriter& out) {
     PassProgress progress = recovery_.restore(out);
     const uint64_t rows_before = context_.report.input_nodes;
-    const auto rows_to_merge = [&] {
-      const uint64_t merged = context_.report.input_nodes - rows_before;
-      return merged + (fit_at_once() ? 1 : 2) * pending_.rows();
+    const auto all_rows = [&] {
+      return context_.report.input_nodes + (fit_at_once() ? 1 : 2) * pending_.rows();
     };
-    context_.progress.begin(rows_to_merge());
+    context_.progress.begin(all_rows(), rows_before);
     while (!progress.level && !fit_at_once()) {
       run_pass();
-      context_.progress.set_total(rows_to_merge());
+      context_.progress.set_total(all_rows());
     }
     run_final_pass(out, std::move(progress));
     recovery_.finish();
@@ -50,10 +49,16 @@ class Merger {
   // Merges groups of neighboring artifacts into one artifact each.
   void run_pass() {
     const std::vector<size_t> ends = pending_.group_ends(pass_bytes_, kMaxArtifactRows);
-    if (ends.size() == pending_.size())
+    if (ends.size() == pending_.size()) {
+      const bool too_many_rows =
+          pending_.group_ends(UINT64_MAX, kMaxArtifactRows).size() == pending_.size();
       throw Error(ErrorCode::kOutOfMemory,
-                  "out of memory: merging any two neighboring subvolumes takes more than " +
-                      std::to_string(context_.budget.available()) + " bytes");
+                  "out of memory: merging " +
+                      std::string(too_many_rows ? "all subvolumes, any two of which have over 2^32 "
+                                                  "rows,"
+                                                : "any two neighboring subvolumes") +
+                      " takes more than " + std::to_string(context_.budget.available()) + " bytes");
+    }
     PassSegment& segment =
         pending_.add_segment(std::make_unique<PassSegment>(context_.scratch, context_.budget));
     std::vector<ArtifactRef> merged;
@@ -80,7 +85,8 @@ class Merger {
     GlobalOutput output(out);
     const ArtifactSet artifacts = pending_.open(0, pending_.size(), context_.budget);
     if (progress.level)
-      context_.progress.set_total(rows_above(*progress.level, artifacts.readers()));
+      context_.progress.set_total(context_.report.input_nodes +
+                                  rows_above(*progress.level, artifacts.readers()));
     const auto after_level = [&](const PassProgress& done) {
       if (recovery_.due()) recovery_.save_level(done, artifacts.readers(), out);
     };

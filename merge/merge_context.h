@@ -22,7 +22,11 @@ namespace voxdag {
 class MergeProgress {
  public:
   explicit MergeProgress(Progress& progress) : progress_(progress) {}
-  void begin(uint64_t total) { progress_.begin_stage("merge", total_ = total, "nodes"); }
+  // `done` of them were merged by an earlier run.
+  void begin(uint64_t total, uint64_t done) {
+    progress_.begin_stage("merge", total_ = total, "nodes");
+    progress_.resume_at(done);
+  }
   void set_total(uint64_t total) { progress_.set_total(total_ = total); }
   void expect_more(uint64_t rows) {
     if (rows > 0) set_total(total_ + rows);

@@ -8,6 +8,7 @@
 //   ingest until  triangles; the rest is spilled    up to 1/3                    TriangleStore
 //   built
 //                 cursors and pieces of the scene   1/2 of what is free          each part
+//                   their top tree cells            up to 3 MiB each             nobody
 //   partition     half-filled chunks of triangles   1/8                          nobody
 //   estimate      pilot build, one at a time        3/4 of what is free          Backend
 //   build         WorkerMemory, for every worker    what is free / workers
@@ -41,9 +42,9 @@
 namespace voxdag {
 
 struct MemoryPlan {
-  // Of a thread that reads the scene: windows, batches and a piece, its share of the vertices not
-  // counted.
-  static constexpr uint64_t kIngestWorkerBytes = uint64_t{4} << 20;
+  // Of a thread that reads the scene: windows, batches and a piece with what it counts into the top
+  // tree, its share of the vertices not counted.
+  static constexpr uint64_t kIngestWorkerBytes = uint64_t{6} << 20;
   static constexpr uint64_t kSplitBufferBytes = uint64_t{512} << 10;
 
   uint64_t top_tree_bytes = 0;          // counters of the top tree

@@ -259,7 +259,9 @@ class Build {
     options.first_segment_id = work_.next_segment_id();
     options.checkpoint_interval_s = spec_.run.checkpoint_interval_s;
     if (cache_) options.cache = &*cache_;
-    context_.progress.begin_stage("build", queue.size(), "subvolumes");
+    options.built = report_.subvolumes_reused;
+    context_.progress.begin_stage("build", options.built + queue.size(), "subvolumes");
+    context_.progress.resume_at(options.built);
     const ExecutorCounts counts = build_subvolumes(options, std::move(queue), *scene.triangles,
                                                    *jobs_, commits_, budget_, context_);
     checkpoint_.finish();

@@ -208,8 +208,7 @@ std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube
     checkpoint.save(state);
     triangles.release(kSceneBin);
   }
-  const auto bins =
-      assign_bins(triangles, state.grid.levels, cubes, buffer_bytes, context.build.cancel);
+  const auto bins = assign_bins(triangles, state.grid.levels, cubes, buffer_bytes, context);
   // Chunks of triangles are small blocks of the heap, which would keep them resident.
   trim_heap();
   return bins;

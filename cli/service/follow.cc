@@ -43,7 +43,8 @@ class JobView {
   }
 
   static double average_rate(const Json& stage) {
-    return stage.at("done").get<double>() / std::max(stage.at("wall_s").get<double>(), 1e-9);
+    const double done = stage.at("done").get<double>() - stage.value("resumed_at", 0.0);
+    return done / std::max(stage.at("wall_s").get<double>(), 1e-9);
   }
 
   ProgressLine line_;

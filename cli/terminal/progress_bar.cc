@@ -56,8 +56,12 @@ class ProgressBar : public Progress {
     stage_ = stage;
     unit_ = unit;
     total_ = total;
-    done_ = 0;
+    done_ = resumed_at_ = 0;
     start_s_ = last_shown_s_ = wall_seconds();
+  }
+  void resume_at(uint64_t done) override {
+    std::lock_guard lock(mutex_);
+    done_ = resumed_at_ = done;
   }
   void advance(uint64_t count) override {
     done_ += count;
@@ -85,17 +89,18 @@ class ProgressBar : public Progress {
   void show(double now, bool ended) {
     const uint64_t done = done_;
     const double elapsed = std::max(now - start_s_, 1e-9);
-    const double part =
-        total_ ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total_)) : 0;
+    const auto done_here = static_cast<double>(done - resumed_at_);
+    const auto missing = static_cast<double>(total_ - std::min(total_, resumed_at_));
+    const double part = missing > 0 ? std::min(1.0, done_here / missing) : 0;
     const double left = part >= kMinPartForEstimate ? elapsed / part - elapsed : 0;
-    const double rate = static_cast<double>(done) / elapsed;
+    const double rate = done_here / elapsed;
     line_.show({stage_, unit_, done, total_, elapsed, rate, left}, ended);
   }
 
   ProgressLine line_;
   std::mutex mutex_;  // guards all below but done_
   std::string stage_, unit_;
-  uint64_t total_ = 0;
+  uint64_t total_ = 0, resumed_at_ = 0;
   std::atomic<uint64_t> done_{0};
   double start_s_ = 0, last_shown_s_ = 0;
 };

@@ -26,6 +26,9 @@ class Progress {
   virtual ~Progress() = default;
   // A stage starts; `total` counts `unit`s ("triangles", "subvolumes", "nodes"), 0 if unknown.
   virtual void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) = 0;
+  // The stage goes on where an earlier run left it: `done` units count toward the total but not
+  // toward the rate. Called after begin_stage(), if at all.
+  virtual void resume_at(uint64_t done) = 0;
   // `count` more units are done.
   virtual void advance(uint64_t count) = 0;
   // The total became known or changed (a subvolume was split, say).
@@ -48,6 +51,7 @@ class Progress {
 class NoProgress : public Progress {
  public:
   void begin_stage(std::string_view, uint64_t, std::string_view) override {}
+  void resume_at(uint64_t) override {}
   void advance(uint64_t) override {}
   void set_total(uint64_t) override {}
   void end_stage() override {}

@@ -39,15 +39,15 @@ double largest_extent(const WorldBounds& bounds) {
   return extent;
 }
 
-}  // namespace
-
-void WorldBounds::add(const double (&point)[3]) {
-  for (int a = 0; a < 3; ++a) {
-    low[a] = empty ? point[a] : std::min(low[a], point[a]);
-    high[a] = empty ? point[a] : std::max(high[a], point[a]);
-  }
-  empty = false;
+// floor(x), and a whole number near x beyond 2^51. Every processor does it on several numbers at
+// once, which it cannot do with std::floor before SSE4.1.
+double floor_of(double x) {
+  constexpr double kNoFraction = 0x1.8p52;
+  const double nearest = (x + kNoFraction) - kNoFraction;
+  return nearest - (nearest > x ? 1.0 : 0.0);
 }
+
+}  // namespace
 
 void WorldBounds::add(const WorldBounds& other) {
   if (other.empty) return;
@@ -56,6 +56,23 @@ void WorldBounds::add(const WorldBounds& other) {
     high[a] = empty ? other.high[a] : std::max(high[a], other.high[a]);
   }
   empty = false;
+}
+
+WorldBounds bounds_of(std::span<const WorldTriangle> triangles) {
+  if (triangles.empty()) return {};
+  WorldTriangle low = triangles[0], high = triangles[0];  // of the three vertices each
+  for (const WorldTriangle& triangle : triangles)
+    for (int i = 0; i < 3; ++i)
+      for (int a = 0; a < 3; ++a) {
+        low.v[i][a] = std::min(low.v[i][a], triangle.v[i][a]);
+        high.v[i][a] = std::max(high.v[i][a], triangle.v[i][a]);
+      }
+  WorldBounds bounds{.empty = false};
+  for (int a = 0; a < 3; ++a) {
+    bounds.low[a] = std::min({low.v[0][a], low.v[1][a], low.v[2][a]});
+    bounds.high[a] = std::max({high.v[0][a], high.v[1][a], high.v[2][a]});
+  }
+  return bounds;
 }
 
 Grid Grid::around(const WorldBounds& bounds, uint32_t levels) {
@@ -90,17 +107,21 @@ Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_
 SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out) {
   const double resolution = static_cast<double>(grid.resolution());
   double u[3][3];
-  bool far = false;
   for (int i = 0; i < 3; ++i)
     for (int a = 0; a < 3; ++a) {
       const double x = ((world.v[i][a] - grid.origin[a]) / grid.edge) * resolution;
-      u[i][a] = 2.0 * std::floor(128.0 * x) + 1.0;
-      far |= !(std::abs(u[i][a]) < static_cast<double>(kCoordinateLimit));
+      u[i][a] = 2.0 * floor_of(128.0 * x) + 1.0;
     }
   const double end = static_cast<double>(grid.resolution() * kUnitsPerVoxel);
-  for (int a = 0; a < 3; ++a)
-    if (std::max({u[0][a], u[1][a], u[2][a]}) < 0 || std::min({u[0][a], u[1][a], u[2][a]}) > end)
-      return SnapResult::kOutside;
+  const double limit = static_cast<double>(kCoordinateLimit);
+  bool outside = false, far = false;
+  for (int a = 0; a < 3; ++a) {
+    const double low = std::min(std::min(u[0][a], u[1][a]), u[2][a]);
+    const double high = std::max(std::max(u[0][a], u[1][a]), u[2][a]);
+    outside |= high < 0 || low > end;
+    far |= !(low > -limit && high < limit);
+  }
+  if (outside) return SnapResult::kOutside;
   if (far) return SnapResult::kTooFar;
   for (int i = 0; i < 3; ++i)
     for (int a = 0; a < 3; ++a) out.v[i][a] = static_cast<int64_t>(u[i][a]);

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "core/geometry/fixed_triangle.h"
 
@@ -19,7 +20,6 @@ struct WorldBounds {
   std::array<double, 3> high{};
   bool empty = true;
 
-  void add(const double (&point)[3]);
   void add(const WorldBounds& other);
 };
 
@@ -27,6 +27,9 @@ struct WorldBounds {
 struct WorldTriangle {
   double v[3][3];
 };
+
+// The bounds of triangles of finite vertices.
+WorldBounds bounds_of(std::span<const WorldTriangle> triangles);
 
 struct Grid {
   uint32_t levels = 2;  // L; R = 2^L voxels along an edge

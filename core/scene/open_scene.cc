@@ -23,7 +23,7 @@ struct SceneFile {
         document(gltf::read_document(*file, budget, cancel)),
         external_files(path, budget) {
     gltf::check_document(document);
-    gltf::BufferReader(files, *file, document, external_files, budget).check_lengths();
+    gltf::BufferReader(files, *file, document, external_files, budget, 1).check_lengths();
   }
 
   const std::unique_ptr<ReadableFile> file;
@@ -73,7 +73,8 @@ class GltfCursor : public TriangleCursor {
     if (open_ != &file) {
       open_ = nullptr;
       reader_.reset();
-      buffers_.emplace(files_, *file.file, file.document, file.external_files, budget_);
+      buffers_.emplace(files_, *file.file, file.document, file.external_files, budget_,
+                       options_.readers);
       reader_.emplace(file.document, *buffers_, options_, budget_, cancel_);
       open_ = &file;
     }

@@ -56,13 +56,16 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
     throw Error(ErrorCode::kOutOfMemory,
                 "out of memory: the merge to resume was begun with more: expected as much memory "
                 "as before (--memory), or --restart");
+  if (state.narrow_words != out.narrow_words())
+    throw Error(ErrorCode::kCorrupt, "the merge to resume has wide levels from " +
+                                         std::to_string(state.narrow_words) + " words on, not " +
+                                         std::to_string(out.narrow_words()));
   auto file = std::make_unique<ScratchFile>(context_.scratch, state.map);
   saver_.add_named(file->path());
   uint64_t map_rows = 0;
   for (const uint64_t rows : state.map_rows) map_rows += rows;
   if (state.map_rows.size() != pending_.size() + 1 ||
-      (state.map.words != map_rows && state.map.words != 2 * map_rows) ||
-      state.narrow_words != out.narrow_words() || state.file.levels.empty())
+      (state.map.words != map_rows && state.map.words != 2 * map_rows) || state.file.levels.empty())
     throw Error(ErrorCode::kCorrupt, "the saved position maps are not those of the subvolumes");
   PassProgress progress;
   progress.level = state.level;

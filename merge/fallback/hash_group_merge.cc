@@ -52,9 +52,9 @@ class GroupFile {
   }
 
   size_t frames_that_fit(const LevelRun& run, size_t begin, size_t limit) const {
+    const uint64_t bytes = std::min(bytes_ / 2, kMaxPartitionBytes);
     size_t end = begin + 1;
-    while (end < limit && HashPartition::bytes_for(run.count({begin, end + 1}), 0) <= bytes_ / 2)
-      ++end;
+    while (end < limit && HashPartition::bytes_for(run.count({begin, end + 1}), 0) <= bytes) ++end;
     return end;
   }
 

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/base/error.h"
+#include "core/base/thread_times.h"
 #include "core/format/artifact/artifact_writer.h"
 #include "scheduler/job/job_progress.h"
 #include "scheduler/memory_plan.h"
@@ -203,7 +204,7 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options,
                                 std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
                                 JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,
                                 const BuildContext& context) {
-  uint64_t total = subvolumes.size();
+  uint64_t total = options.built + subvolumes.size();
   Queue queue(std::move(subvolumes));
   const auto memory = WorkerMemory::divide(budget.available(), options.threads);
   std::vector<std::unique_ptr<Worker>> workers;
@@ -225,8 +226,11 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options,
   };
   std::vector<std::thread> threads;
   queue.guard([&] {
-    for (const auto& worker : workers)
-      threads.emplace_back([&work, &queue, &worker] { queue.guard([&] { work(*worker); }); });
+    for (size_t i = 0; i < workers.size(); ++i)
+      threads.emplace_back([&, i] {
+        queue.guard([&] { work(*workers[i]); });
+        ThreadTimes::add(i);
+      });
   });
   for (std::thread& thread : threads) thread.join();
   ExecutorCounts counts;

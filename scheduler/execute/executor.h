@@ -27,6 +27,7 @@ struct QueuedSubvolume {
 struct ExecutorOptions {
   DagShape shape;
   unsigned threads = 1;
+  uint64_t built = 0;  // subvolumes that need not be built, for the progress
   // Subvolumes with longer edges are split before they are tried.
   int64_t longest_edge = INT64_MAX;
   std::function<std::unique_ptr<Backend>()> open_backend;

@@ -18,52 +18,72 @@ namespace {
 // Declared triangles of a piece. The digest and the plan depend on it.
 constexpr uint64_t kPieceTriangles = 16384;
 
-// Reads the scene from triangle `first` on: clears a Piece, adds to it all batches of a piece, and
-// commits it with the number of declared triangles up to its end.
+// The budget has no room for all readers of the scene.
+class TooManyReaders : public Error {
+ public:
+  explicit TooManyReaders(const Error& error) : Error(error) {}
+};
+
+unsigned readers_of(uint64_t pieces, const StageContext& context) {
+  const uint64_t affordable = MemoryPlan::ingest_workers(context.budget.available());
+  return static_cast<unsigned>(
+      std::clamp<uint64_t>(std::min(pieces, affordable), 1, context.threads));
+}
+
+// Reads the scene from triangle `position` on: clears a Piece, adds to it all batches of a piece,
+// and commits it, which moves `position` to its end.
 template <class Piece, class MakePiece, class Commit>
-void read_pieces(TriangleSource& scene, uint64_t first, const StageContext& context,
+void read_pieces(TriangleSource& scene, const uint64_t& position, const StageContext& context,
                  MakePiece make_piece, Commit commit) {
-  const uint64_t declared = scene.declared_triangles();
-  const uint64_t pieces =
-      (declared - std::min(first, declared) + kPieceTriangles - 1) / kPieceTriangles;
-  const unsigned threads = static_cast<unsigned>(
-      std::clamp<uint64_t>(std::min(pieces, MemoryPlan::ingest_workers(context.budget.available())),
-                           1, context.threads));
-  struct Worker {
-    std::unique_ptr<TriangleCursor> cursor;
-    std::optional<Piece> piece;
+  const auto read_rest = [&](unsigned max_readers) {
+    const uint64_t first = position;
+    const uint64_t declared = scene.declared_triangles();
+    const uint64_t pieces =
+        (declared - std::min(first, declared) + kPieceTriangles - 1) / kPieceTriangles;
+    const unsigned readers = std::min(readers_of(pieces, context), max_readers);
+    struct Reader {
+      std::unique_ptr<TriangleCursor> cursor;
+      std::optional<Piece> piece;
+    };
+    std::vector<Reader> all(readers);
+    const auto begin_of = [&](size_t item) { return first + item * kPieceTriangles; };
+    const auto end_of = [&](size_t item) { return std::min(begin_of(item + 1), declared); };
+    parallel_for_in_order(
+        readers, pieces,
+        [&](unsigned number, size_t item) {
+          Reader& reader = all[number];
+          try {
+            if (!reader.piece) {
+              reader.cursor = scene.open(readers);
+              make_piece(reader.piece);
+            }
+            reader.piece->clear();
+            reader.cursor->read(
+                begin_of(item), end_of(item) - begin_of(item),
+                [&](std::span<const WorldTriangle> batch) { reader.piece->add(batch); });
+          } catch (const Error& error) {
+            if (readers == 1 || error.code() != ErrorCode::kOutOfMemory) throw;
+            throw TooManyReaders(error);
+          }
+          reader.piece->finish();
+        },
+        [&](unsigned number, size_t item) {
+          context.build.cancel.check();
+          commit(*all[number].piece, end_of(item));
+          context.build.progress.advance(end_of(item) - begin_of(item));
+        });
   };
-  std::vector<Worker> workers(threads);
-  const auto begin_of = [&](size_t item) { return first + item * kPieceTriangles; };
-  const auto end_of = [&](size_t item) { return std::min(begin_of(item + 1), declared); };
-  parallel_for_in_order(
-      threads, pieces,
-      [&](unsigned number, size_t item) {
-        Worker& worker = workers[number];
-        if (!worker.piece) {
-          worker.cursor = scene.open(threads);
-          make_piece(worker.piece);
-        }
-        worker.piece->clear();
-        worker.cursor->read(
-            begin_of(item), end_of(item) - begin_of(item),
-            [&](std::span<const WorldTriangle> batch) { worker.piece->add(batch); });
-        worker.piece->finish();
-      },
-      [&](unsigned number, size_t item) {
-        context.build.cancel.check();
-        commit(*workers[number].piece, end_of(item));
-        context.build.progress.advance(end_of(item) - begin_of(item));
-      });
+  try {
+    read_rest(context.threads);
+  } catch (const TooManyReaders&) {
+    read_rest(1);
+  }
 }
 
 class PieceBounds {
  public:
   void clear() { bounds_ = {}; }
-  void add(std::span<const WorldTriangle> batch) {
-    for (const WorldTriangle& triangle : batch)
-      for (const auto& vertex : triangle.v) bounds_.add(vertex);
-  }
+  void add(std::span<const WorldTriangle> batch) { bounds_.add(bounds_of(batch)); }
   void finish() {}
   const WorldBounds& bounds() const { return bounds_; }
 
@@ -143,7 +163,7 @@ void scan(TriangleSource& scene, IngestState& state, const StageContext& context
           const AfterPiece& after_piece) {
   Progress& progress = context.build.progress;
   progress.begin_stage("scan", state.declared_triangles, "triangles");
-  progress.advance(state.position);
+  progress.resume_at(state.position);
   read_pieces<PieceBounds>(
       scene, state.position, context, [](auto& piece) { piece.emplace(); },
       [&](const PieceBounds& piece, uint64_t position) {
@@ -168,7 +188,7 @@ void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, Top
             const StageContext& context, const AfterPiece& after_piece) {
   Progress& progress = context.build.progress;
   progress.begin_stage("ingest", state.declared_triangles, "triangles");
-  progress.advance(state.position);
+  progress.resume_at(state.position);
   IngestCounts& counts = state.counts;
   read_pieces<SnappedPiece>(
       scene, state.position, context,

@@ -46,10 +46,15 @@ void JobProgress::begin_stage(std::string_view stage, uint64_t total, std::strin
   update(true, [&](ProgressSnapshot& s) {
     s.stage = stage;
     s.unit = unit;
-    s.done = 0;
+    s.done = s.resumed_at = 0;
     s.total = total;
     s.stage_started_s = unix_seconds();
   });
+}
+
+void JobProgress::resume_at(uint64_t done) {
+  shown_.resume_at(done);
+  update(true, [&](ProgressSnapshot& s) { s.done = s.resumed_at = done; });
 }
 
 void JobProgress::advance(uint64_t count) {

@@ -20,6 +20,7 @@ class JobProgress : public Progress {
       : shown_(shown), work_(work), store_(&store) {}
 
   void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
+  void resume_at(uint64_t done) override;
   void advance(uint64_t count) override;
   void set_total(uint64_t total) override;
   void end_stage() override;

@@ -10,7 +10,7 @@ namespace voxdag {
 double JobStatus::rate() const {
   if (!progress) return 0;
   const double elapsed = progress->updated_s - progress->stage_started_s;
-  return elapsed > 0 ? static_cast<double>(progress->done) / elapsed : 0;
+  return elapsed > 0 ? static_cast<double>(progress->done - progress->resumed_at) / elapsed : 0;
 }
 
 double JobStatus::eta_s() const {

@@ -44,6 +44,7 @@ CREATE TABLE stage_time (
 CREATE TABLE progress (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   stage TEXT NOT NULL, unit TEXT NOT NULL, done INTEGER NOT NULL, total INTEGER NOT NULL,
+  resumed_at INTEGER NOT NULL,
   stage_started_s REAL NOT NULL, updated_s REAL NOT NULL,
   memory_bytes INTEGER NOT NULL, disk_bytes INTEGER NOT NULL, last_error TEXT NOT NULL
 );
@@ -223,6 +224,7 @@ void columns(Row& row, ProgressSnapshot& progress) {
   row("unit", progress.unit);
   row("done", progress.done);
   row("total", progress.total);
+  row("resumed_at", progress.resumed_at);
   row("stage_started_s", progress.stage_started_s);
   row("updated_s", progress.updated_s);
   row("memory_bytes", progress.memory_bytes);

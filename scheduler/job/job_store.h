@@ -75,6 +75,7 @@ struct ProgressSnapshot {
   std::string unit;
   uint64_t done = 0;
   uint64_t total = 0;
+  uint64_t resumed_at = 0;     // units that earlier runs did
   double stage_started_s = 0;  // Unix time
   double updated_s = 0;
   uint64_t memory_bytes = 0;  // resident

@@ -9,6 +9,7 @@ namespace {
 constexpr size_t kCoordinates = 9;
 constexpr size_t kNarrowBytes = kCoordinates * sizeof(int32_t);
 constexpr size_t kWideBytes = kCoordinates * sizeof(int64_t);
+static_assert(kWideBytes == kMaxTriangleRecordBytes);
 
 template <class Coordinate>
 void encode(const FixedTriangle& triangle, std::byte* out) {

@@ -17,6 +17,7 @@
 
 namespace voxdag {
 
+inline constexpr size_t kMaxTriangleRecordBytes = 72;
 size_t triangle_record_bytes(bool wide);
 // `out` has room for one record of `record_bytes`.
 void encode_triangle(const FixedTriangle& triangle, size_t record_bytes, std::byte* out);

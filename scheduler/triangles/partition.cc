@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <optional>
+#include <memory>
 #include <string>
 
 #include "core/base/page_buffer.h"
 #include "core/base/turns.h"
 #include "scheduler/memory_plan.h"
+#include "scheduler/triangles/chunk.h"
 #include "scheduler/triangles/triangle_file.h"
 
 namespace voxdag {
@@ -26,52 +27,83 @@ void partition(TriangleStream& triangles, const CubeTree& tree, BinWriter& write
 }
 
 constexpr size_t kPieceTriangles = 16384;
-// What a thread finds before the piece's turn; large triangles touch thousands of leaves each.
-constexpr size_t kMaxTouches = size_t{1} << 17;
+constexpr size_t kBatchTriangles = 256;
 
-// Some triangles of the scene, and the leaves that they touch.
+// Some triangles of the scene, encoded for each leaf that they touch, in their order.
 class TouchedPiece {
  public:
-  explicit TouchedPiece(MemoryBudget& budget)
-      : triangles_(budget, kPieceTriangles, "a piece of the scene"),
-        touches_(budget, kMaxTouches, "a piece of the scene") {}
+  // Room for kPieceTriangles and whatever one triangle touches.
+  TouchedPiece(const CubeTree& tree, size_t leaves, size_t record_bytes, MemoryBudget& budget)
+      : tree_(tree),
+        leaves_(leaves),
+        record_bytes_(record_bytes),
+        capacity_(kPieceTriangles + std::max(kPieceTriangles, leaves)),
+        records_(budget, capacity_ * record_bytes, "a piece of the scene") {}
 
-  // Reads the piece and finds the leaves of its triangles, or of the first of them.
-  void read(TriangleStream& stream, const CubeTree& tree) {
-    count_ = stream.read({triangles_.data(), kPieceTriangles});
-    touch_count_ = 0;
-    for (known_ = 0; known_ < count_; ++known_) {
-      size_t touches = touch_count_;
-      tree.for_each_touched(triangles_[known_], [&](size_t leaf) {
-        if (touches < kMaxTouches)
-          touches_[touches] = {static_cast<uint32_t>(known_), static_cast<uint32_t>(leaf)};
-        ++touches;
+  void begin(std::unique_ptr<TriangleStream> triangles) {
+    triangles_ = std::move(triangles);
+    left_ = kPieceTriangles;
+    batch_size_ = next_ = 0;
+    fill();
+  }
+  // The leaves of the next triangles, as many as there is room for; false if there are none left.
+  bool fill() {
+    runs_.clear();
+    used_ = 0;
+    while (capacity_ - used_ >= leaves_ && read()) {
+      const FixedTriangle& triangle = batch_[next_++];
+      tree_.for_each_touched(triangle, [&](size_t leaf) {
+        if (runs_.empty() || runs_.back().leaf != leaf) runs_.push_back({leaf, 0});
+        ++runs_.back().records;
+        encode_triangle(triangle, record_bytes_, records_.data() + used_++ * record_bytes_);
       });
-      if (touches > kMaxTouches) break;
-      touch_count_ = touches;
+    }
+    return used_ > 0;
+  }
+  void copy(BinWriter& writer) const {
+    const std::byte* from = records_.data();
+    for (const Run& run : runs_) {
+      const size_t bytes = run.records * record_bytes_;
+      writer.append(run.leaf, {from, bytes});
+      from += bytes;
     }
   }
-  // Copies the triangles to the leaves.
-  void copy(const CubeTree& tree, BinWriter& writer) const {
-    for (size_t i = 0; i < touch_count_; ++i)
-      writer.append(touches_[i].leaf, triangles_[touches_[i].triangle]);
-    for (size_t i = known_; i < count_; ++i)
-      tree.for_each_touched(triangles_[i],
-                            [&](size_t leaf) { writer.append(leaf, triangles_[i]); });
-  }
-  size_t count() const { return count_; }
 
  private:
-  struct Touch {
-    uint32_t triangle, leaf;
+  // Consecutive records of a leaf.
+  struct Run {
+    size_t leaf, records;
   };
 
-  PageBuffer<FixedTriangle> triangles_;
-  PageBuffer<Touch> touches_;
-  size_t count_ = 0;  // of triangles
-  size_t known_ = 0;  // of triangles whose touches are in touches_
-  size_t touch_count_ = 0;
+  // Makes batch_[next_] the next triangle; false if there is none.
+  bool read() {
+    if (next_ < batch_size_) return true;
+    const size_t n = std::min(left_, batch_.size());
+    batch_size_ = n > 0 ? triangles_->read(std::span(batch_).first(n)) : 0;
+    left_ -= batch_size_;
+    next_ = 0;
+    return batch_size_ > 0;
+  }
+
+  const CubeTree& tree_;
+  const size_t leaves_;
+  const size_t record_bytes_;
+  const size_t capacity_;  // records
+  PageBuffer<std::byte> records_;
+  size_t used_ = 0;
+  std::vector<Run> runs_;
+  std::unique_ptr<TriangleStream> triangles_;
+  size_t left_ = 0;  // triangles of the piece that were not read
+  std::array<FixedTriangle, kBatchTriangles> batch_;
+  size_t batch_size_ = 0, next_ = 0;
 };
+
+// As many threads as have something to do and fit in memory.
+unsigned threads_for(uint64_t items, const StageContext& context) {
+  const uint64_t affordable = MemoryPlan::ingest_workers(context.budget.available());
+  return static_cast<unsigned>(
+      std::clamp<uint64_t>(std::min(items, affordable), 1, context.threads));
+}
 
 using BinsByCube = std::map<Cube, CubeBin>;
 
@@ -128,24 +160,30 @@ void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const
   BinWriter writer(store, targets, buffer_bytes);
   const uint64_t end = std::max(store.count(kSceneBin), first);
   const uint64_t pieces = (end - first + kPieceTriangles - 1) / kPieceTriangles;
-  const auto threads = static_cast<unsigned>(
-      std::clamp<uint64_t>(std::min(pieces, MemoryPlan::ingest_workers(context.budget.available())),
-                           1, context.threads));
-  std::vector<std::optional<TouchedPiece>> worker_pieces(threads);
+  const unsigned threads = threads_for(pieces, context);
+  std::vector<std::unique_ptr<TouchedPiece>> worker_pieces(threads);
   context.build.progress.begin_stage("partition", end, "triangles");
-  context.build.progress.advance(first);
+  context.build.progress.resume_at(first);
   parallel_for_in_order(
       threads, pieces,
       [&](unsigned worker, size_t item) {
         context.build.cancel.check();
-        if (!worker_pieces[worker]) worker_pieces[worker].emplace(context.budget);
-        worker_pieces[worker]->read(*store.open(kSceneBin, first + item * kPieceTriangles), tree);
+        auto& piece = worker_pieces[worker];
+        if (!piece)
+          piece = std::make_unique<TouchedPiece>(tree, leaves.size(), store.record_bytes(),
+                                                 context.budget);
+        piece->begin(store.open(kSceneBin, first + item * kPieceTriangles));
       },
       [&](unsigned worker, size_t item) {
-        const TouchedPiece& piece = *worker_pieces[worker];
-        piece.copy(tree, writer);
-        context.build.progress.advance(piece.count());
-        after_piece(first + item * kPieceTriangles + piece.count(), writer);
+        TouchedPiece& piece = *worker_pieces[worker];
+        do {
+          context.build.cancel.check();
+          piece.copy(writer);
+        } while (piece.fill());
+        const uint64_t begin = first + item * kPieceTriangles;
+        const uint64_t count = std::min<uint64_t>(kPieceTriangles, end - begin);
+        context.build.progress.advance(count);
+        after_piece(begin + count, writer);
       });
   writer.flush();
   context.build.progress.end_stage();
@@ -154,11 +192,11 @@ void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const
 
 std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
                                std::span<const Cube> cubes, size_t buffer_bytes,
-                               const CancelToken& cancel) {
+                               const StageContext& context) {
   BinsByCube by_cube;
   for (const CubeBin& bin : store.cube_bins()) by_cube[bin.cube] = bin;
   std::vector<BinId> assigned(cubes.size());
-  std::map<Cube, std::vector<size_t>> parts;  // indexes into `cubes`, by the cube around them
+  std::map<Cube, std::vector<size_t>> parts_of;  // indexes into `cubes`, by the cube around them
   for (size_t i = 0; i < cubes.size(); ++i) {
     const CubeBin& found = nearest(by_cube, cubes[i]);
     if (found.cube == cubes[i]) {
@@ -166,20 +204,22 @@ std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
       store.retain(found.bin);
     } else {
       assigned[i] = store.add_part(found.bin);
-      parts[found.cube].push_back(i);
+      parts_of[found.cube].push_back(i);
     }
   }
-  for (const auto& [key, indexes] : parts) {
-    const CubeBin& whole = by_cube[key];
+  const std::vector<std::pair<Cube, std::vector<size_t>>> wholes(parts_of.begin(), parts_of.end());
+  const unsigned threads = threads_for(wholes.size(), context);
+  parallel_for(threads, wholes.size(), [&](unsigned, size_t item) {
+    const auto& [whole, parts] = wholes[item];
     std::vector<Cube> leaves;
     std::vector<BinId> targets;
-    for (const size_t i : indexes) {
+    for (const size_t i : parts) {
       leaves.push_back(cubes[i]);
       targets.push_back(assigned[i]);
     }
-    partition(store, whole.bin, CubeTree(grid_levels, whole.cube, leaves), targets, buffer_bytes,
-              cancel);
-  }
+    partition(store, by_cube.at(whole).bin, CubeTree(grid_levels, whole, leaves), targets,
+              buffer_bytes / threads, context.build.cancel);
+  });
   // What was made of the others may be durable already.
   for (const CubeBin& bin : store.cube_bins()) store.release(bin.bin);
   return assigned;

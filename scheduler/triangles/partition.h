@@ -83,6 +83,6 @@ void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const
 // them needs are released. Throws DamagedTriangles for a cube without any cube bin around it.
 std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
                                std::span<const Cube> cubes, size_t buffer_bytes,
-                               const CancelToken& cancel);
+                               const StageContext& context);
 
 }  // namespace voxdag

@@ -1,6 +1,7 @@
 #include "scheduler/triangles/triangle_store.h"
 
 #include <algorithm>
+#include <array>
 
 #include "scheduler/triangles/chunk.h"
 
@@ -30,13 +31,21 @@ BinWriter::BinWriter(TriangleStore& store, std::vector<BinId> targets, size_t bu
 }
 
 void BinWriter::append(size_t target, const FixedTriangle& triangle) {
+  std::array<std::byte, kMaxTriangleRecordBytes> record;
+  encode_triangle(triangle, record_bytes_, record.data());
+  append(target, std::span(record).first(record_bytes_));
+}
+
+void BinWriter::append(size_t target, std::span<const std::byte> records) {
   std::vector<std::byte>& tail = tails_[target];
-  const size_t at = tail.size();
-  tail.resize(at + record_bytes_);
-  encode_triangle(triangle, record_bytes_, tail.data() + at);
-  if (tail.size() < chunk_bytes_) return;
-  store_.add_chunk(targets_[target], tail);
-  tail.clear();
+  while (!records.empty()) {
+    const size_t bytes = std::min(records.size(), chunk_bytes_ - tail.size());
+    tail.insert(tail.end(), records.begin(), records.begin() + static_cast<ptrdiff_t>(bytes));
+    records = records.subspan(bytes);
+    if (tail.size() < chunk_bytes_) return;
+    store_.add_chunk(targets_[target], tail);
+    tail.clear();
+  }
 }
 
 void BinWriter::flush() {

@@ -74,6 +74,7 @@ class BinWriter {
   BinWriter(TriangleStore& store, std::vector<BinId> targets, size_t buffer_bytes);
   // `target` is an index into `targets`.
   void append(size_t target, const FixedTriangle& triangle);
+  void append(size_t target, std::span<const std::byte> records);
   // All that was appended is in the bins when this returns.
   void flush();
 

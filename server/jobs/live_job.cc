@@ -1,5 +1,7 @@
 #include "server/jobs/live_job.h"
 
+#include <algorithm>
+
 #include "server/json_text.h"
 
 namespace voxdag::server {
@@ -16,8 +18,11 @@ void LiveJob::apply(const Message& message) {
   const double now = wall_seconds();
   if (const auto* begun = std::get_if<StageBegun>(&message)) {
     if (stages_.size() == kMaxStages) stages_.erase(stages_.begin());
-    stages_.push_back({begun->stage, begun->unit, 0, begun->total, now, 0, false});
+    stages_.push_back(
+        {.name = begun->stage, .unit = begun->unit, .total = begun->total, .start_s = now});
   }
+  if (const auto* resumed = std::get_if<StageResumed>(&message); resumed && !stages_.empty())
+    stages_.back().done = stages_.back().resumed_at = resumed->done;
   if (const auto* advanced = std::get_if<StageAdvanced>(&message); advanced && !stages_.empty()) {
     Stage& stage = stages_.back();
     stage.wall_s = now - stage.start_s;
@@ -51,7 +56,8 @@ std::string LiveJob::make_progress() const {
   using nlohmann::ordered_json;
   if (stages_.empty()) return "";
   const Stage& now = stages_.back();
-  const double rate = now.wall_s > 0 ? static_cast<double>(now.done) / now.wall_s : 0;
+  const auto done_here = static_cast<double>(now.done - std::min(now.resumed_at, now.done));
+  const double rate = now.wall_s > 0 ? done_here / now.wall_s : 0;
   const double left = now.total > now.done ? static_cast<double>(now.total - now.done) : 0;
   ordered_json stages = ordered_json::array();
   for (const Stage& stage : stages_)
@@ -59,6 +65,7 @@ std::string LiveJob::make_progress() const {
                       {"unit", stage.unit},
                       {"done", stage.done},
                       {"total", stage.total},
+                      {"resumed_at", stage.resumed_at},
                       {"wall_s", stage.wall_s},
                       {"ended", stage.ended}});
   return json_text(ordered_json{

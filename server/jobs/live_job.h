@@ -37,7 +37,7 @@ class LiveJob {
  private:
   struct Stage {
     std::string name, unit;
-    uint64_t done = 0, total = 0;
+    uint64_t done = 0, total = 0, resumed_at = 0;
     double start_s = 0, wall_s = 0;
     bool ended = false;
   };

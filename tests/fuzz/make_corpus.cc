@@ -87,14 +87,23 @@ void add_artifacts(const Corpus& corpus) {
 // The used part of the header page and the levels, without the checksum table.
 void add_global_files(const Corpus& corpus) {
   TemporaryFolder folder;
-  for (const int edge : {4, 16, 64}) {
-    const std::string path = folder.path() + "/" + std::to_string(edge) + ".vdag";
-    write_global(path, random_voxels(1, edge));
+  struct Input {
+    const char* name;
+    int edge;
+    uint64_t narrow_words;
+  };
+  constexpr uint64_t kNever = uint64_t{1} << 32;
+  for (const auto& [name, edge, narrow_words] :
+       {Input{"4", 4, kNever}, Input{"16", 16, kNever}, Input{"64", 64, kNever},
+        Input{"wide_16", 16, 2}, Input{"wide_64", 64, 2}}) {
+    const std::string path = folder.path() + "/" + name + ".vdag";
+    write_global(path, oracle::build_dag(random_voxels(1, edge), 64), grid_of(edge), 64,
+                 narrow_words);
     const std::string file = read_bytes(path);
     uint64_t table_at = 0;
     std::memcpy(&table_at, file.data() + global_layout::kTableOffsetAt, sizeof table_at);
     const size_t page = global_layout::kPageBytes;
-    corpus.add("global_file", std::to_string(edge),
+    corpus.add("global_file", name,
                file.substr(0, global_layout::kAttributesAt) + file.substr(page, table_at - page));
   }
 }

@@ -9,13 +9,14 @@
 namespace reference {
 namespace {
 
-std::map<uint32_t, uint32_t> index_of_offset(const voxdag_reader::File& file, uint32_t level) {
-  std::map<uint32_t, uint32_t> index;
+std::map<uint64_t, uint32_t> index_of_offset(const voxdag_reader::File& file, uint32_t level) {
+  std::map<uint64_t, uint32_t> index;
   const voxdag_reader::Level& l = file.level(level);
+  const bool bricks = level == file.brick_level();
+  const uint64_t pointer_words = bricks ? 0 : file.level(level + 1).pointer_bits / 32;
   for (uint64_t word = 0; word < l.word_count;) {
-    index.emplace(static_cast<uint32_t>(word), static_cast<uint32_t>(index.size()));
-    word +=
-        level == file.brick_level() ? 2u : 1u + static_cast<uint32_t>(std::popcount(l.words[word]));
+    index.emplace(word, static_cast<uint32_t>(index.size()));
+    word += bricks ? 2 : 1 + pointer_words * static_cast<uint64_t>(std::popcount(l.words[word]));
   }
   return index;
 }
@@ -57,7 +58,7 @@ FileDag read_dag(const voxdag_reader::File& file) {
       oracle::Node& to = nodes.emplace_back();
       to.mask = node.child_mask;
       for (int c = 0; c < std::popcount(node.child_mask); ++c)
-        to.children.push_back(below.at(node.children[c]));
+        to.children.push_back(below.at(node.child(c)));
     }
     below = std::move(here);
   }

@@ -125,14 +125,15 @@ class Differ {
     std::vector<NodePair> pairs{{a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0}};
     const NodePair root = pairs[0];
     uint32_t level = 0;
-    for (; level < a_.brick_level() && pairs.size() < kPairsPerThread * threads_; ++level)
+    for (; level < a_.brick_level() && pairs.size() < kPairsToDivide; ++level)
       pairs = pairs_below(level, pairs);
     parallel_for(threads_, pairs.size(), [&](unsigned, size_t i) { compare(level, pairs[i]); });
     return compare(0, root);
   }
 
  private:
-  static constexpr size_t kPairsPerThread = 256;
+  // Enough for any number of threads. The same for all, so that all find the same first error.
+  static constexpr size_t kPairsToDivide = 16384;
 
   // By the index of the child; both are absent where neither node has that child.
   std::array<NodePair, 8> children_of(uint32_t level, const NodePair& pair) const {
@@ -178,7 +179,9 @@ class Differ {
     return offset == kAbsent ? voxdag_reader::Node() : file.node(level, offset);
   }
   static uint64_t child(const voxdag_reader::Node& node, int index) {
-    return node.child_mask >> index & 1 ? voxdag_reader::File::child(node, index) : kAbsent;
+    if (!(node.child_mask >> index & 1)) return kAbsent;
+    // No pointer of a damaged file means a child that is absent.
+    return std::min(voxdag_reader::File::child(node, index), kAbsent - 1);
   }
 
   const voxdag_reader::File &a_, &b_;

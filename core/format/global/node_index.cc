@@ -53,10 +53,14 @@ NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
 
 // Returns the number of nodes, once each span begins where the one before it ends. Sets
 // nodes_before_ where spans begin.
-uint64_t NodeIndex::join(std::vector<Span>& spans, const std::string& where) {
+uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
+                         const std::string& where) {
   uint64_t nodes = 0, at = 0;
   for (uint64_t span = 0; span < spans.size(); ++span) {
-    if (spans[span].begin != at) spans[span] = walk(span, at);
+    if (spans[span].begin != at) {
+      cancel.check();
+      spans[span] = walk(span, at);
+    }
     at = spans[span].end;
     if (spans[span].broken)
       throw Error(ErrorCode::kCorrupt, where + ", word " + std::to_string(at) + ": child mask " +
@@ -85,12 +89,12 @@ NodeIndex::NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsig
   }
   starts_ = PageBuffer<uint64_t>(budget, level.word_count / 64 + 1, "an index of nodes");
   nodes_before_ = PageBuffer<uint64_t>(budget, level.word_count / 64 + 1, "an index of nodes");
-  std::vector<Span> spans(span_count());
+  PageBuffer<Span> spans(budget, span_count(), "an index of nodes");
   parallel_for(threads, spans.size(), [&](unsigned, size_t span) {
     cancel.check();
     spans[span] = walk(span, guess_begin(span));
   });
-  const uint64_t nodes = join(spans, where);
+  const uint64_t nodes = join({spans.data(), spans.size()}, cancel, where);
   if (nodes != level.node_count) miscounted(nodes);
   parallel_for(threads, spans.size(), [&](unsigned, size_t span) {
     const uint64_t first = span * kSpanWords / 64;

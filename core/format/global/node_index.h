@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <string>
-#include <vector>
 
 #include "core/base/cancel_token.h"
 #include "core/base/host_device.h"
@@ -74,7 +74,7 @@ class NodeIndex {
   uint64_t words_of_node(uint64_t at) const;
   uint64_t guess_begin(uint64_t span) const;
   Span walk(uint64_t span, uint64_t begin);
-  uint64_t join(std::vector<Span>& spans, const std::string& where);
+  uint64_t join(std::span<Span> spans, const CancelToken& cancel, const std::string& where);
 
   voxdag_reader::Level level_;
   Pointers pointers_ = Pointers::kNone;

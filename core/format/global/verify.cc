@@ -36,12 +36,13 @@ bool precedes(const voxdag_reader::Node& a, const voxdag_reader::Node& b) {
 class Verifier {
  public:
   Verifier(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-           Progress& progress, const CancelToken& cancel)
+           Progress& progress, const CancelToken& cancel, uint64_t narrow_words)
       : file_(file),
         threads_(threads),
         budget_(budget),
         progress_(progress),
         cancel_(cancel),
+        narrow_words_(narrow_words),
         indexes_(file.brick_level() + 1) {}
 
   void run() {
@@ -96,6 +97,7 @@ class Verifier {
   MemoryBudget& budget_;
   Progress& progress_;
   const CancelToken& cancel_;
+  const uint64_t narrow_words_;
   std::vector<NodeIndex> indexes_;  // of the levels checked so far
   PageBuffer<uint64_t> hashes_;     // truncated, of the level checked last
   PageBuffer<uint8_t> used_;        // by the level above it
@@ -123,8 +125,15 @@ void Verifier::check_header() const {
   }
   const bool has_features = file_.version() != kVersion;
   bool any_wide = false;
-  for (uint32_t level = 0; level <= file_.brick_level() && !file_.empty(); ++level)
-    any_wide |= file_.level(level).pointer_bits == 64;
+  for (uint32_t level = 0; level <= file_.brick_level() && !file_.empty(); ++level) {
+    const voxdag_reader::Level& words = file_.level(level);
+    const uint32_t bits = words.word_count > narrow_words_ ? 64 : 32;
+    if (words.pointer_bits != bits)
+      broken(where(level), "pointers of " + std::to_string(words.pointer_bits) + " bits into " +
+                               std::to_string(words.word_count) + " words, expected " +
+                               std::to_string(bits));
+    any_wide |= bits == 64;
+  }
   if (has_features && !any_wide)
     broken(file_.path() + ": header", "version 2 without a wide level, expected version 1");
   check_zeros(kAttributesAt, kFeaturesAt, "reserved");
@@ -279,8 +288,8 @@ void Verifier::check_counts() const {
 }  // namespace
 
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-                        Progress& progress, const CancelToken& cancel) {
-  Verifier(file, threads, budget, progress, cancel).run();
+                        Progress& progress, const CancelToken& cancel, uint64_t narrow_words) {
+  Verifier(file, threads, budget, progress, cancel, narrow_words).run();
 }
 
 }  // namespace voxdag

@@ -1,6 +1,6 @@
 // Checks every invariant of a global file:
 //
-//   1. Header, sizes, checksums, zeros in all reserved fields and padding.
+//   1. Header, sizes, widths of pointers, checksums, zeros in all reserved fields and padding.
 //   2. Every node has a child mask of 1 to 255, and its children begin nodes of the next level. No
 //      brick is empty.
 //   3. Levels strictly increase in the total order (hash, mask, child indices), the hashes
@@ -18,13 +18,15 @@
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
+#include "core/format/global/global_layout.h"
 #include "core/format/global/voxdag_reader.h"
 
 namespace voxdag {
 
 // Throws Error{kCorrupt} saying what is wrong, where, and what was expected. Works on up to
-// `threads` threads.
+// `threads` threads. Levels of over `narrow_words` words must be wide, others not.
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-                        Progress& progress, const CancelToken& cancel);
+                        Progress& progress, const CancelToken& cancel,
+                        uint64_t narrow_words = global_layout::kNarrowLevelWords);
 
 }  // namespace voxdag

@@ -61,15 +61,17 @@ struct Level {
   uint32_t pointer_bits = 32;
 };
 
-// A node of a level above the bricks. The children belong to the File.
+// A node of a level above the bricks. The words belong to the File.
 struct Node {
   uint32_t child_mask = 0;
-  const uint32_t* children = nullptr;  // word offsets in the next level, in child order,
-  bool wide = false;                   // one word each, or two, low half first
+  // Offsets in the next level, in child order: one word each, or, if `wide`, two, low half first.
+  const uint32_t* child_words = nullptr;
+  bool wide = false;
 
   // Word offset of the n-th child that the node has, in child order.
   uint64_t child(int n) const {
-    return wide ? children[2 * n] | static_cast<uint64_t>(children[2 * n + 1]) << 32 : children[n];
+    return wide ? child_words[2 * n] | static_cast<uint64_t>(child_words[2 * n + 1]) << 32
+                : child_words[n];
   }
 };
 
@@ -375,10 +377,14 @@ class File {
       }
       expect(level.file_offset == end, "a level does not follow the one below it");
       if (version_ != 1) level.pointer_bits = get<uint32_t>(entry + 24);
-      expect(level.pointer_bits == 32 || level.pointer_bits == most_pointer_bits_,
-             "expected pointers of 32 bits, or of 64 with wide levels");
-      expect(level.word_count <= uint64_t{1} << (level.pointer_bits == 32 ? 32 : 40),
-             "a level has more words than pointers into it can count, or over 2^40");
+      const uint32_t bits = level.pointer_bits;
+      if (bits != 32 && bits != most_pointer_bits_)
+        corrupt("header: level " + std::to_string(l) + ": pointers of " + std::to_string(bits) +
+                " bits, expected 32" + (most_pointer_bits_ == 64 ? " or 64" : ""));
+      if (level.word_count > uint64_t{1} << (bits == 32 ? 32 : 40))
+        corrupt("header: level " + std::to_string(l) + ": " + std::to_string(level.word_count) +
+                " words, more than pointers of " + std::to_string(bits) +
+                " bits into it can count" + (bits == 32 ? "" : ", or over 2^40"));
       expect(4 * level.word_count <= bytes_.size() - end, "a level ends beyond the file");
       expect(level.node_count > 0 && level.node_count <= level.word_count / 2,
              "a level has more nodes than its words hold");

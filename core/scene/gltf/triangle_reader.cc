@@ -18,8 +18,11 @@ uint64_t largest_vertex_count(const Document& document) {
   return largest;
 }
 
-bool is_finite(const double* point) {
-  return (point[0] - point[0]) + (point[1] - point[1]) + (point[2] - point[2]) == 0;
+bool is_finite(const WorldTriangle& triangle) {
+  double sum = 0;  // of zeros, or of one that is not a number
+  for (const auto& vertex : triangle.v)
+    for (const double x : vertex) sum += x - x;
+  return sum == 0;
 }
 
 }  // namespace
@@ -51,6 +54,7 @@ void TriangleReader::read(uint64_t first, uint64_t count, const Visitor& visit) 
     world_ = binding_.skin >= 0 ? Transform{} : walk_->global();
     const Node& node = document_.nodes[static_cast<size_t>(draw_.node)];
     if (node.instancing.present) world_ = multiply(world_, instances_->at(instance_));
+    cache_.place(world_);
     read_instance(of_instance, n);
     first += n;
   }
@@ -160,8 +164,8 @@ void TriangleReader::flush() {
 // False for a corner out of range or a vertex that is not finite in world space.
 bool TriangleReader::place(const uint32_t* corners, WorldTriangle& out) {
   if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
-  for (int k = 0; k < 3; ++k) apply(world_, cache_.at(corners[k]), out.v[k]);
-  return is_finite(out.v[0]) && is_finite(out.v[1]) && is_finite(out.v[2]);
+  for (int k = 0; k < 3; ++k) std::copy_n(cache_.at(corners[k]), 3, out.v[k]);
+  return is_finite(out);
 }
 
 void TriangleReader::report(const uint32_t* corners) const {

@@ -8,6 +8,7 @@
 namespace voxdag::server {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageBegun, stage, unit, total)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageResumed, done)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageAdvanced, done, total)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SubvolumeTotals, built, total, voxels, nodes, bytes)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Usage, memory_bytes, disk_bytes)
@@ -20,8 +21,9 @@ void from_json(const nlohmann::json&, StageEnded&) {}
 namespace {
 
 // In the order of the variant.
-constexpr std::string_view kNames[] = {"stage_begun", "stage_advanced", "stage_ended", "subvolumes",
-                                       "usage",       "warning",        "failure",     "result"};
+constexpr std::string_view kNames[] = {"stage_begun", "stage_resumed", "stage_advanced",
+                                       "stage_ended", "subvolumes",    "usage",
+                                       "warning",     "failure",       "result"};
 constexpr size_t kKinds = std::variant_size_v<Message>;
 static_assert(std::size(kNames) == kKinds);
 

@@ -20,6 +20,10 @@ struct StageBegun {
   std::string stage, unit;
   uint64_t total = 0;
 };
+// "stage_resumed": earlier attempts did so many units of the stage.
+struct StageResumed {
+  uint64_t done = 0;
+};
 // "stage_advanced"
 struct StageAdvanced {
   uint64_t done = 0, total = 0;
@@ -48,8 +52,8 @@ struct Result {
   std::string json;
 };
 
-using Message = std::variant<StageBegun, StageAdvanced, StageEnded, SubvolumeTotals, Usage, Warning,
-                             Failure, Result>;
+using Message = std::variant<StageBegun, StageResumed, StageAdvanced, StageEnded, SubvolumeTotals,
+                             Usage, Warning, Failure, Result>;
 
 // One line of JSON, without its end.
 std::string encode(const Message& message);

@@ -39,6 +39,12 @@ void ProgressPipe::begin_stage(std::string_view stage, uint64_t total, std::stri
   send(StageBegun{stage_, unit_, total_});
 }
 
+void ProgressPipe::resume_at(uint64_t done) {
+  std::lock_guard lock(mutex_);
+  done_ = done;
+  send(StageResumed{done});
+}
+
 void ProgressPipe::advance(uint64_t count) {
   std::lock_guard lock(mutex_);
   done_ += count;

@@ -18,6 +18,7 @@ class ProgressPipe : public Progress {
       : files_(files), subvolumes_path_(std::move(subvolumes_path)) {}
 
   void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
+  void resume_at(uint64_t done) override;
   void advance(uint64_t count) override;
   void set_total(uint64_t total) override;
   void end_stage() override;

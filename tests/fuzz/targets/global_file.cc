@@ -1,6 +1,6 @@
 // Global files: the reader, lookups, rays and the verifier. The input is the used part of the
-// header page and the levels; sizes, checksums and the checksum table are made to fit, so that a
-// mutation reaches what is behind them.
+// header page and the levels; feature bits, sizes, checksums and the checksum table are made to
+// fit, so that a mutation reaches what is behind them.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -23,6 +23,8 @@ namespace {
 namespace layout = global_layout;
 constexpr uint64_t kMaxVisits = 4096;
 constexpr uint64_t kBudgetBytes = uint64_t{16} << 20;
+// Of files with wide levels, which are small here.
+constexpr uint64_t kNarrowWords = 2;
 
 void put(std::vector<std::byte>& file, size_t at, uint64_t value) {
   std::memcpy(file.data() + at, &value, sizeof value);
@@ -41,6 +43,9 @@ std::vector<std::byte> make_file(std::span<const std::byte> input) {
         std::span(file).subspan(at, std::min<size_t>(layout::kChecksumBlockBytes, table_at - at))));
   const auto table_bytes = std::as_bytes(std::span(table));
   file.insert(file.end(), table_bytes.begin(), table_bytes.end());
+  uint32_t version = 0;
+  std::memcpy(&version, file.data() + layout::kVersionAt, sizeof version);
+  put(file, layout::kFeaturesAt, version == layout::kVersion ? 0 : 1);
   put(file, layout::kFileBytesAt, file.size());
   put(file, layout::kTableOffsetAt, table_at);
   put(file, layout::kTableCountAt, table.size());
@@ -107,7 +112,9 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     NoProgress progress;
     bool is_sound = true;
     try {
-      verify_global_file(file, 1, budget, progress, CancelToken());
+      const uint64_t narrow_words =
+          file.version() == layout::kVersion ? layout::kNarrowLevelWords : kNarrowWords;
+      verify_global_file(file, 1, budget, progress, CancelToken(), narrow_words);
     } catch (const Error&) {
       is_sound = false;
     }

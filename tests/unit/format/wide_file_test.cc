@@ -17,18 +17,19 @@ using namespace global_layout;
 using testing::HasSubstr;
 
 constexpr int kEdge = 64;
+constexpr uint64_t kNarrowWords = 50;  // fewer than the bricks have
 constexpr uint32_t kBrickLevel = 4;
 constexpr size_t kPointerBitsAt = 24;  // in a level's entry
 
 class WideFileTest : public testing::Test {
  protected:
-  WideFileTest() { write_global(path_, dag_, grid_of(kEdge), 64, 100); }
+  WideFileTest() { write_global(path_, dag_, grid_of(kEdge), 64, kNarrowWords); }
 
-  static void verify(const std::string& path) {
+  static void verify(const std::string& path, uint64_t narrow_words = kNarrowWords) {
     MemoryBudget budget(uint64_t{1} << 30);
     NoProgress progress;
     const auto file = open_global_file(path);
-    verify_global_file(*file, 2, budget, progress, {});
+    verify_global_file(*file, 2, budget, progress, {}, narrow_words);
   }
   // What opening or verifying the file with a changed header says.
   template <class T>
@@ -50,11 +51,11 @@ class WideFileTest : public testing::Test {
 
 TEST_F(WideFileTest, HasTheVoxelsOfTheNarrowFile) {
   const std::string narrow = folder_.file("narrow.vdag");
-  for (const uint64_t words : {2u, 100u, 1000u}) {
+  for (const uint64_t words : {2u, 50u, 100u}) {
     SCOPED_TRACE(words);
     write_global(path_, dag_, grid_of(kEdge), 64, words);
     write_global(narrow, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
-    EXPECT_NO_THROW(verify(path_));
+    EXPECT_NO_THROW(verify(path_, words));
     const auto a = open_global_file(path_), b = open_global_file(narrow);
     EXPECT_EQ(a->version(), 2u);
     EXPECT_EQ(b->version(), 1u);
@@ -83,15 +84,38 @@ TEST_F(WideFileTest, UnknownFeaturesAreNotRead) {
 TEST_F(WideFileTest, PointersOfOtherWidthsAreRefused) {
   const size_t bricks = kLevelsAt + kBrickLevel * kLevelEntryBytes + kPointerBitsAt;
   for (const uint32_t bits : {0u, 1u, 16u, 63u, 65u, 128u, ~0u})
-    EXPECT_THAT(error_with(bricks, bits).message(), HasSubstr("expected pointers of 32 bits"));
+    EXPECT_THAT(error_with(bricks, bits).message(),
+                HasSubstr("header: level 4: pointers of " + std::to_string(bits) +
+                          " bits, expected 32 or 64"));
   // The other width: the words of the parents make no sense then.
   EXPECT_EQ(error_with(bricks, uint32_t{32}).code(), ErrorCode::kCorrupt);
   EXPECT_EQ(error_with(kLevelsAt + kPointerBitsAt, uint32_t{33}).code(), ErrorCode::kCorrupt);
 }
 
+// The width of pointers follows from the number of words: there is one file for the same voxels.
+TEST_F(WideFileTest, OtherThresholdsAreNotCanonical) {
+  EXPECT_THAT(error_of([&] { verify(path_, uint64_t{1} << 32); }).message(),
+              HasSubstr("level 4: pointers of 64 bits into 94 words, expected 32"));
+  const std::string narrow = folder_.file("narrow.vdag");
+  write_global(narrow, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
+  EXPECT_THAT(error_of([&] { verify(narrow); }).message(),
+              HasSubstr("level 4: pointers of 32 bits into 94 words, expected 64"));
+}
+
+// The high half of a pointer counts.
+TEST(WideNodeTest, HasPointersOfTwoWords) {
+  const uint32_t words[] = {5, 255, 7, 0};
+  const voxdag_reader::Node node{0x82, words, true};
+  EXPECT_EQ(node.child(0), (uint64_t{255} << 32) + 5);
+  EXPECT_EQ(voxdag_reader::File::child(node, 7), 7u);
+  const voxdag_reader::Node narrow{0x82, words, false};
+  EXPECT_EQ(narrow.child(0), 5u);
+  EXPECT_EQ(narrow.child(1), 255u);
+}
+
 TEST_F(WideFileTest, VersionAndFeaturesBelongTogether) {
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{0}).message(),
-              HasSubstr("expected pointers of 32 bits, or of 64 with wide levels"));
+              HasSubstr("pointers of 64 bits, expected 32"));
   // What version 1 has reserved is not 0.
   EXPECT_EQ(error_with(kVersionAt, uint32_t{1}).code(), ErrorCode::kCorrupt);
   write_global(path_, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
@@ -103,10 +127,10 @@ TEST_F(WideFileTest, VersionAndFeaturesBelongTogether) {
 TEST_F(WideFileTest, NarrowPointersReachTwoToThe32) {
   const size_t bricks = kLevelsAt + kBrickLevel * kLevelEntryBytes;
   EXPECT_THAT(error_with(bricks + 16, (uint64_t{1} << 40) + 1).message(),
-              HasSubstr("a level has more words than pointers into it can count"));
+              HasSubstr(" words, more than pointers of "));
   write_global(path_, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
   EXPECT_THAT(error_with(bricks + 16, (uint64_t{1} << 32) + 1).message(),
-              HasSubstr("a level has more words than pointers into it can count"));
+              HasSubstr(" words, more than pointers of "));
 }
 
 }  // namespace

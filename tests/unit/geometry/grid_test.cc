@@ -34,16 +34,23 @@ void expect_error(ErrorCode code, const std::function<void()>& call) {
   }
 }
 
-// Bounds grow point by point, from nothing.
-TEST(WorldBounds, GrowByPoints) {
-  WorldBounds b;
+// Bounds grow from nothing, by all three vertices of every triangle.
+TEST(WorldBounds, GrowByTriangles) {
+  WorldBounds b = bounds_of({});
   EXPECT_TRUE(b.empty);
-  b.add({5, -6, 7});
+  const WorldTriangle point{{{5, -6, 7}, {5, -6, 7}, {5, -6, 7}}};
+  b.add(bounds_of({&point, 1}));
   EXPECT_FALSE(b.empty);
+  EXPECT_EQ(b.low, (std::array<double, 3>{5, -6, 7}));
   EXPECT_EQ(b.low, b.high);
-  b.add({4, 6, 7});
-  EXPECT_EQ(b.low, (std::array<double, 3>{4, -6, 7}));
-  EXPECT_EQ(b.high, (std::array<double, 3>{5, 6, 7}));
+  for (int i = 0; i < 3; ++i) {
+    WorldTriangle triangles[2] = {point, point};
+    triangles[1].v[i][0] = 4;
+    triangles[0].v[i][1] = 6;
+    const WorldBounds grown = bounds_of(triangles);
+    EXPECT_EQ(grown.low, (std::array<double, 3>{4, -6, 7})) << i;
+    EXPECT_EQ(grown.high, (std::array<double, 3>{5, 6, 7})) << i;
+  }
 }
 
 // The default cube, from numbers worked out by hand (all of them exact in binary).
@@ -63,13 +70,11 @@ TEST(Grid, VoxelsNestAcrossResolutions) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (int i = 0; i < 2000; ++i) {
-    WorldBounds b;
     const double scale = std::ldexp(1.0, static_cast<int>(random() % 60) - 30);
     WorldTriangle t;
-    for (auto& vertex : t.v) {
+    for (auto& vertex : t.v)
       for (double& x : vertex) x = scale * (uniform(random) + (i % 3 ? 0 : 100));
-      b.add(vertex);
-    }
+    const WorldBounds b = bounds_of({&t, 1});
     FixedTriangle coarse, fine;
     for (uint32_t levels = 2; levels < 20; ++levels) {
       const Grid grid = Grid::around(b, levels), next = Grid::around(b, levels + 1);
@@ -131,9 +136,7 @@ TEST(Grid, OfAVoxelSize) {
 // A grid whose origin or edge is not a finite number cannot be stored: it is refused, where it used
 // to give a file that no command opens.
 TEST(Hardening, M7_AGridOutOfTheRangeOfDoublesIsRefused) {
-  WorldBounds far;
-  far.add({1.5e308, 0, 0});
-  far.add({1.5e308, 1, 1});
+  const WorldBounds far = bounds({1.5e308, 0, 0}, {1.5e308, 1, 1});
   EXPECT_EQ(error_of([&] { Grid::around(far, 6); }).code(), ErrorCode::kLimit);
   EXPECT_EQ(error_of([&] { Grid::with_voxel_size(far, 1, 6); }).code(), ErrorCode::kLimit);
   EXPECT_EQ(error_of([] { Grid::with_voxel_size({}, 1e308, 10); }).code(), ErrorCode::kLimit);

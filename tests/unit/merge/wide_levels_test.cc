@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// Words that a level may have before it is wide: all levels but the highest are, some are, none is.
+// Words that a level may have before it is wide: all levels but the highest are, some, the bricks.
 class WideLevels : public testing::TestWithParam<uint64_t> {
  protected:
   // The merged file verifies, has wide levels, and the voxels of `narrow`.
@@ -26,7 +26,7 @@ class WideLevels : public testing::TestWithParam<uint64_t> {
     MemoryBudget budget(uint64_t{1} << 30);
     NoProgress silent;
     const CancelToken never;
-    verify_global_file(*file, 3, budget, silent, never);
+    verify_global_file(*file, 3, budget, silent, never, GetParam());
     const auto other = open_global_file(narrow);
     EXPECT_EQ(other->version(), 1u);
     const DiffReport difference = diff_global_files(*file, *other, 3, budget, never);

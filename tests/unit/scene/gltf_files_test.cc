@@ -3,10 +3,14 @@
 #include <gtest/gtest.h>
 #include <tiny_gltf.h>
 
+#include <filesystem>
+#include <fstream>
 #include <random>
 
 #include "core/scene/gltf/document/read_document.h"
 #include "core/scene/gltf/mesh_data/base64.h"
+#include "tests/unit/base/error_of.h"
+#include "tests/unit/io/temporary_folder.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {
@@ -135,6 +139,27 @@ TEST(GltfBuffers, ExternalThatIsMissingOrShort) {
   EXPECT_NE(cut.message().find("buffer 0 claims 42 bytes, 41 are there in a.bin"),
             std::string::npos)
       << cut.message();
+}
+
+// Triangles of two files of the same name are not mixed.
+TEST(GltfBuffers, ExternalThatIsReplacedWhileTheSceneIsRead) {
+  const SceneBuilder builder = one_triangle();
+  const TemporaryFolder folder;
+  const auto write = [&](const std::string& name, const std::string& bytes) {
+    std::ofstream(folder.file(name), std::ios::binary) << bytes;
+  };
+  write("scene.gltf", builder.gltf("a.bin"));
+  write("a.bin", builder.bin);
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelToken cancel;
+  const auto scene = open_scene(system_files(), {folder.file("scene.gltf")}, {}, budget, cancel);
+  EXPECT_EQ(triangles_of(*scene).size(), 1u);
+  write("b.bin", builder.bin);
+  std::filesystem::rename(folder.file("b.bin"), folder.file("a.bin"));
+  const Error error = error_of([&] { triangles_of(*scene); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+  EXPECT_NE(error.message().find("a.bin changed while the scene was read"), std::string::npos)
+      << error.message();
 }
 
 // A buffer that makes no triangles (of normals here) may be anywhere.

@@ -24,7 +24,10 @@ class Diagonal : public TriangleSource {
   uint64_t fails_at = kTriangles, too_far_at = kTriangles;
   std::atomic<uint64_t> read = 0;
 
-  std::unique_ptr<TriangleCursor> open(unsigned) override {
+  unsigned max_cursors = 256;
+
+  std::unique_ptr<TriangleCursor> open(unsigned cursors) override {
+    if (cursors > max_cursors) throw Error(ErrorCode::kOutOfMemory, "the cursors need more");
     return std::make_unique<Cursor>(*this);
   }
   uint64_t declared_triangles() const override { return kTriangles; }
@@ -151,6 +154,20 @@ TEST_P(IngestTest, AnErrorAtACheckpointStopsReading) {
   EXPECT_LE(scene_.read, (2 + GetParam()) * kPiece);
 }
 
+// A scene whose readers need more memory than there is for several is read by one.
+TEST_P(IngestTest, OneReaderIsEnough) {
+  ingest_on(GetParam(), [] {});
+  const std::string digest = state_.digest.hex();
+  state_.position = 0;
+  state_.digest = ContentDigest(state_.grid);
+  scene_.max_cursors = 1;
+  ingest_on(GetParam(), [] {});
+  EXPECT_EQ(state_.digest.hex(), digest);
+  scene_.max_cursors = 0;
+  state_.position = 0;
+  EXPECT_EQ(error_of_ingest([] {}).code(), ErrorCode::kOutOfMemory);
+}
+
 TEST_P(IngestTest, IsCanceled) {
   EXPECT_EQ(error_of_ingest([&] { cancel_.cancel(); }).code(), ErrorCode::kCanceled);
   EXPECT_EQ(state_.position, kPiece);
@@ -162,7 +179,7 @@ TEST_P(IngestTest, ScanFindsTheBounds) {
   uint64_t pieces = 0;
   scan(scene_, state_, {build, GetParam(), budget_}, [&] { ++pieces; });
   EXPECT_EQ(pieces, (Diagonal::kTriangles + kPiece - 1) / kPiece);
-  EXPECT_EQ(state_.bounds.low, (std::array<double, 3>{2e-6 / 0.4, 0, 0}));
+  EXPECT_EQ(state_.bounds.low, (std::array<double, 3>{2.0 / Diagonal::kTriangles, 0, 0}));
   EXPECT_EQ(state_.bounds.high[0], 5.001);
 }
 

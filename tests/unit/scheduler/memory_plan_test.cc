@@ -77,7 +77,9 @@ TEST(MemoryPlan, DividesTheMergesBudget) {
 TEST(MemoryPlan, PartsFitTheWhole) {
   for (const uint64_t budget : kBudgets) {
     const MemoryPlan plan = MemoryPlan::divide(budget);
-    uint64_t ingest = plan.top_tree_bytes + plan.triangle_bytes + MemoryPlan::kIngestBufferBytes;
+    const uint64_t readers = MemoryPlan::ingest_workers(budget - plan.top_tree_bytes);
+    uint64_t ingest =
+        plan.top_tree_bytes + plan.triangle_bytes + readers * MemoryPlan::kIngestWorkerBytes;
     ingest += (budget - ingest) / gltf::VertexCache::kShareOfFree;
     EXPECT_LE(ingest, budget);
     EXPECT_LE(plan.triangle_bytes + plan.partition_buffer_bytes, budget);

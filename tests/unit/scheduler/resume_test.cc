@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <mutex>
 #include <thread>
 
 #include "core/base/error.h"
@@ -30,6 +32,9 @@ class ResumeTest : public testing::Test {
   BuildSpec spec() const { return spheres_build(scene(), output()); }
   static BuildReport build(const BuildSpec& spec) {
     NoProgress progress;
+    return build(spec, progress);
+  }
+  static BuildReport build(const BuildSpec& spec, Progress& progress) {
     CancelToken cancel;
     return run_build(spec, {system_files(), progress, cancel});
   }
@@ -45,6 +50,61 @@ class ResumeTest : public testing::Test {
 
   TemporaryFolder folder_;
 };
+
+// How far the stages were when they ended.
+class StageRecord : public NoProgress {
+ public:
+  struct Stage {
+    uint64_t resumed_at = 0, done = 0, total = 0;
+  };
+  std::map<std::string, Stage> stages;
+
+  void begin_stage(std::string_view stage, uint64_t total, std::string_view) override {
+    const std::lock_guard lock(mutex_);
+    now_ = &stages[std::string(stage)];
+    *now_ = {0, 0, total};
+  }
+  void resume_at(uint64_t done) override {
+    const std::lock_guard lock(mutex_);
+    now_->resumed_at = now_->done = done;
+  }
+  void advance(uint64_t count) override {
+    const std::lock_guard lock(mutex_);
+    now_->done += count;
+  }
+  void set_total(uint64_t total) override {
+    const std::lock_guard lock(mutex_);
+    now_->total = total;
+  }
+
+ private:
+  std::mutex mutex_;
+  Stage* now_ = nullptr;
+};
+
+// The progress of a resumed build is that of the whole build.
+TEST_F(ResumeTest, ProgressGoesOnWhereItWas) {
+  StageRecord whole;
+  build(spec(), whole);
+  std::filesystem::remove(output());
+  for (const char* const stage : {"build", "merge"})
+    for (const uint64_t after : {1, 40}) {
+      SCOPED_TRACE(stage);
+      build_until(spec(), stage, after);
+      StageRecord resumed;
+      build(spec(), resumed);
+      std::filesystem::remove(output());
+      for (const auto& [name, end] : resumed.stages) {
+        EXPECT_EQ(end.done, end.total) << name;
+        EXPECT_EQ(end.total, whole.stages.at(name).total) << name;
+      }
+      if (std::string(stage) == "build") {
+        EXPECT_GT(resumed.stages.at("build").resumed_at, 0u);
+      } else {
+        EXPECT_FALSE(resumed.stages.contains("build"));
+      }
+    }
+}
 
 // Interrupted in any stage, the same call resumes, reuses what was built and ends with the same
 // bytes; afterwards only the result and its report are left.

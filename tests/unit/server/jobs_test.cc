@@ -106,6 +106,7 @@ TEST(Messages, AreReadAsTheyWereWritten) {
   EXPECT_EQ(begun.stage, "build");
   EXPECT_EQ(begun.unit, "subvolumes");
   EXPECT_EQ(begun.total, 64u);
+  EXPECT_EQ(sent(StageResumed{12}).done, 12u);
   const StageAdvanced advanced = sent(StageAdvanced{12, UINT64_MAX});
   EXPECT_EQ(advanced.done, 12u);
   EXPECT_EQ(advanced.total, UINT64_MAX);
@@ -175,6 +176,21 @@ TEST(Progress, IsPutTogetherFromMessages) {
   EXPECT_EQ(progress["bytes"], 300);
   EXPECT_EQ(progress["memory_bytes"], 5000);
   EXPECT_EQ(progress["disk_bytes"], 6000);
+}
+
+// What earlier attempts did is done, but not at this one's rate.
+TEST(Progress, GoesOnWhereAnEarlierAttemptEnded) {
+  LiveJob live(0);
+  live.apply(StageBegun{"build", "subvolumes", 4'000'000});
+  live.apply(StageResumed{3'000'000});
+  const auto resumed = nlohmann::json::parse(live.progress_json());
+  EXPECT_EQ(resumed["done"], 3'000'000);
+  EXPECT_EQ(resumed["stages"][0]["resumed_at"], 3'000'000);
+  EXPECT_EQ(resumed["rate"], 0);
+  live.apply(StageAdvanced{3'000'001, 4'000'000});
+  const auto advanced = nlohmann::json::parse(live.progress_json());
+  const double wall_s = advanced["stages"][0]["wall_s"];
+  EXPECT_DOUBLE_EQ(advanced["rate"].get<double>() * wall_s, 1);
 }
 
 // Built subvolumes of an earlier run count from the start; a split replaces one by its parts.

@@ -11,7 +11,8 @@
 namespace voxdag::gltf {
 namespace {
 
-constexpr size_t kMaxOpenFiles = 16;
+// Of all readers of a scene together, unless these are more.
+constexpr unsigned kMaxOpenFiles = 32;
 constexpr uint64_t kMapNodeBytes = 48;
 // A window that begins inside a group of three bytes and ends inside another.
 constexpr size_t kMaxGroups = BufferReader::kWindowBytes / 3 + 2;
@@ -58,7 +59,12 @@ void ExternalFiles::add(int buffer, const SourceFile& file) {
   const std::lock_guard lock(mutex_);
   const auto [known, is_new] = by_buffer_.try_emplace(buffer, file);
   if (is_new) charge_.add(sizeof(*known) + kMapNodeBytes + file.path.size());
-  if (known->second.identity != file.identity) known->second.identity = {};
+  const FileIdentity &before = known->second.identity, &now = file.identity;
+  if (before.inode != now.inode || before.bytes != now.bytes ||
+      before.modified_ns != now.modified_ns)
+    throw Error(ErrorCode::kInvalidInput,
+                printable(file.path) +
+                    " changed while the scene was read: expected files that stay as they are");
 }
 
 std::vector<SourceFile> ExternalFiles::all() const {
@@ -70,12 +76,13 @@ std::vector<SourceFile> ExternalFiles::all() const {
 
 BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
                            const Document& document, ExternalFiles& external_files,
-                           MemoryBudget& budget)
+                           MemoryBudget& budget, unsigned readers)
     : files_(files),
       scene_file_(scene_file),
       document_(document),
       external_files_(external_files),
       budget_(budget),
+      max_open_(std::max(kMaxOpenFiles / readers, 1u)),
       window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()) {}
 
 void BufferReader::check_lengths() {
@@ -130,7 +137,7 @@ const ReadableFile& BufferReader::external(int index) {
   const std::string where = document_.path + ": buffer " + std::to_string(index);
   const std::string& uri = document_.buffers[static_cast<size_t>(index)].uri;
   const std::string path = resolve_uri(document_.path, uri, where);
-  if (open_.size() == kMaxOpenFiles) open_.erase(open_.begin());
+  if (open_.size() == max_open_) open_.erase(open_.begin());
   try {
     open_.push_back({index, files_.open_read(path)});
   } catch (const Error& e) {

@@ -24,7 +24,7 @@ class ExternalFiles {
  public:
   ExternalFiles(const std::string& scene_path, MemoryBudget& budget)
       : charge_(budget, "the list of external files of " + scene_path) {}
-  // The buffer's file was opened. If it is another one than before, its identity is unknown.
+  // The buffer's file was opened. Throws Error{kInvalidInput} if it is another one than before.
   void add(int buffer, const SourceFile& file);
   std::vector<SourceFile> all() const;
 
@@ -38,9 +38,10 @@ class BufferReader {
  public:
   static constexpr size_t kWindowBytes = size_t{256} << 10;
 
-  // Adds the files that it opens to `external_files`. The references must outlive the reader.
+  // One of `readers` of the document. Adds the files that it opens to `external_files`. The
+  // references must outlive the reader.
   BufferReader(FileSystem& files, const ReadableFile& scene_file, const Document& document,
-               ExternalFiles& external_files, MemoryBudget& budget);
+               ExternalFiles& external_files, MemoryBudget& budget, unsigned readers);
 
   // Checks every buffer that is read: throws Error{kInvalidInput} if it has fewer bytes than it
   // claims, Error{kNotFound} if an external file does not exist.
@@ -63,6 +64,7 @@ class BufferReader {
   const Document& document_;
   ExternalFiles& external_files_;
   MemoryBudget& budget_;
+  const size_t max_open_;
   PageBuffer<std::byte> window_;
   PageBuffer<std::byte> characters_;  // base64 of a window; empty until a buffer needs it
   struct OpenFile {

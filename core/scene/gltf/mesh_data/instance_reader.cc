@@ -28,7 +28,8 @@ InstanceReader::InstanceReader(const Document& document, BufferReader& buffers, 
 
 Transform InstanceReader::at(uint64_t instance) {
   if (!present_) return {};
-  if (instance < first_ || instance >= first_ + window_.size()) read_window(instance);
+  if (instance < first_ || instance >= first_ + window_.size())
+    read_window(instance - instance % kWindow);
   return window_[static_cast<size_t>(instance - first_)];
 }
 

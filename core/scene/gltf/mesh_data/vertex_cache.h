@@ -1,6 +1,7 @@
-// Random access to the vertex positions of a primitive within a fixed amount of memory: blocks of
-// consecutive vertices, each cached in the one slot that its number maps to. A primitive that fits
-// is read once; so is, about, a larger one whose indices stay near each other.
+// Random access to the vertex positions of an instance of a primitive, in world space, within a
+// fixed amount of memory: blocks of consecutive vertices, each cached in the one slot that its
+// number maps to. An instance that fits is read once; so is, about, a larger one whose indices stay
+// near each other. A primitive of one block is decoded once for all its instances.
 #pragma once
 
 #include <bit>
@@ -20,8 +21,10 @@ class VertexCache {
   // One of `caches`. Room for `vertices`, or for as many as fit its part of that share.
   VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches);
 
-  // Forgets everything and serves `source` from now on, which must outlive its use.
+  // Forgets everything and serves `source` from now on, which must outlive its use. Needs place().
   void bind(VertexSource& source);
+  // Serves the source's vertices after this transform from now on.
+  void place(const Transform& world);
 
   // Three doubles, valid until the next call; `vertex` must be below the source's count.
   const double* at(uint64_t vertex) {
@@ -35,9 +38,12 @@ class VertexCache {
   static constexpr uint64_t kBlockVertices = 1024;
   static constexpr uint64_t kNoBlock = ~uint64_t{0};
 
+  void forget();
   void load(uint64_t block, size_t slot);
 
-  PageBuffer<double> positions_;
+  PageBuffer<double> positions_;   // in world space
+  std::vector<double> one_block_;  // a source of one block, untransformed; empty if it was not read
+  Transform world_;
   std::vector<uint64_t> block_in_slot_;
   size_t slot_mask_ = 0;
   size_t slots_used_ = 0;  // by the source, counted from the first
