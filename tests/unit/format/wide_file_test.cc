@@ -31,7 +31,8 @@ class WideFileTest : public testing::Test {
     const auto file = open_global_file(path);
     verify_global_file(*file, 2, budget, progress, {}, narrow_words);
   }
-  // What opening or verifying the file with a changed header says.
+  // What opening or verifying the file with a changed header says, the file at path_ having
+  // narrow_words_.
   template <class T>
   Error error_with(size_t at, T value) const {
     ByteString bytes = read_bytes(path_);
@@ -41,10 +42,16 @@ class WideFileTest : public testing::Test {
     std::memcpy(bytes.data() + kHeaderChecksumAt, &checksum, sizeof checksum);
     const std::string changed = folder_.file("changed.vdag");
     write_bytes(changed, bytes);
-    return error_of([&] { verify(changed); });
+    return error_of([&] { verify(changed, narrow_words_); });
+  }
+
+  void make_narrow() {
+    narrow_words_ = uint64_t{1} << 32;
+    write_global(path_, dag_, grid_of(kEdge), 64, narrow_words_);
   }
 
   TemporaryFolder folder_;
+  uint64_t narrow_words_ = kNarrowWords;
   const std::string path_ = folder_.file("wide.vdag");
   const oracle::Dag dag_ = oracle::build_dag(random_voxels(9, kEdge), 64);
 };
@@ -95,11 +102,11 @@ TEST_F(WideFileTest, PointersOfOtherWidthsAreRefused) {
 // The width of pointers follows from the number of words: there is one file for the same voxels.
 TEST_F(WideFileTest, OtherThresholdsAreNotCanonical) {
   EXPECT_THAT(error_of([&] { verify(path_, uint64_t{1} << 32); }).message(),
-              HasSubstr("level 4: pointers of 64 bits into 94 words, expected 32"));
+              HasSubstr(": pointers of 64 bits into 94 words, expected 32"));
   const std::string narrow = folder_.file("narrow.vdag");
   write_global(narrow, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
   EXPECT_THAT(error_of([&] { verify(narrow); }).message(),
-              HasSubstr("level 4: pointers of 32 bits into 94 words, expected 64"));
+              HasSubstr(": pointers of 32 bits into 51 words, expected 64"));
 }
 
 // The high half of a pointer counts.
@@ -118,7 +125,7 @@ TEST_F(WideFileTest, VersionAndFeaturesBelongTogether) {
               HasSubstr("pointers of 64 bits, expected 32"));
   // What version 1 has reserved is not 0.
   EXPECT_EQ(error_with(kVersionAt, uint32_t{1}).code(), ErrorCode::kCorrupt);
-  write_global(path_, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
+  make_narrow();
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{1}).message(), HasSubstr("reserved"));
   EXPECT_EQ(error_with(kVersionAt, uint32_t{2}).code(), ErrorCode::kCorrupt);
 }
@@ -128,7 +135,7 @@ TEST_F(WideFileTest, NarrowPointersReachTwoToThe32) {
   const size_t bricks = kLevelsAt + kBrickLevel * kLevelEntryBytes;
   EXPECT_THAT(error_with(bricks + 16, (uint64_t{1} << 40) + 1).message(),
               HasSubstr(" words, more than pointers of "));
-  write_global(path_, dag_, grid_of(kEdge), 64, uint64_t{1} << 32);
+  make_narrow();
   EXPECT_THAT(error_with(bricks + 16, (uint64_t{1} << 32) + 1).message(),
               HasSubstr(" words, more than pointers of "));
 }

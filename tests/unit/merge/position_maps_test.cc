@@ -38,6 +38,7 @@ TEST(Positions, OfWideMapsKeepTheirHighHalf) {
   for (const uint64_t resident_bytes : {0, 1 << 20}) {
     PositionMaps maps(rows, true, resident_bytes, scratch, budget);
     EXPECT_EQ(maps.resident(), resident_bytes > 0);
+    maps.store(0, 0, std::span(words).first(4));
     maps.store(1, 0, words);
     for (size_t i = 0; i < kPositions.size(); ++i) EXPECT_EQ(maps.at(1, i), kPositions[i]);
     std::vector<uint32_t> loaded(4);

@@ -35,7 +35,7 @@ class IngestCheckpointTest : public testing::Test {
     EXPECT_FALSE(files_.bytes_written.contains(durable()));
     std::filesystem::remove(output());
   }
-  void make_scene(uint64_t seed) const { write_spheres(scene(), 24000, seed); }
+  void make_scene(uint64_t seed) const { write_spheres(scene(), 80000, seed); }
   std::string scene() const { return folder_.file("scene.glb"); }
   std::string output() const { return folder_.file("out.vdag"); }
   std::string work() const { return output() + ".work"; }
@@ -48,7 +48,7 @@ class IngestCheckpointTest : public testing::Test {
     spec.run.durable_min_triangles = 1;
     return spec;
   }
-  // Has a checkpoint after every batch of triangles, too.
+  // Has a checkpoint after every piece of the scene, too.
   BuildSpec often() const {
     BuildSpec often = spec();
     often.run.checkpoint_interval_s = 0;
@@ -91,8 +91,8 @@ TEST_F(IngestCheckpointTest, ResumesWhereItWas) {
     double min_read, max_read;  // part of the scene that is read afterwards
   };
   for (const Moment& moment :
-       {Moment{"scan", 12000, 0.6, 0.9}, Moment{"ingest", 4096, 0.3, 0.6},
-        Moment{"ingest", 20000, 0.01, 0.3}, Moment{"build", 0, 0, 0}, Moment{"merge", 0, 0, 0}}) {
+       {Moment{"scan", 40000, 0.6, 0.9}, Moment{"ingest", 10000, 0.3, 0.6},
+        Moment{"ingest", 60000, 0.01, 0.3}, Moment{"build", 0, 0, 0}, Moment{"merge", 0, 0, 0}}) {
     SCOPED_TRACE(std::string(moment.stage) + " after " + std::to_string(moment.after));
     build_until(often(), moment.stage, moment.after, files_);
     expect_to_resume(often());
@@ -106,8 +106,8 @@ TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   build(often());
   std::filesystem::remove(output());
   const uint64_t syncs = files_.syncs[durable()];
-  ASSERT_GT(syncs, 20u);
-  for (const uint64_t at : {syncs, syncs - 1, syncs - 12}) {
+  ASSERT_GT(syncs, 10u);
+  for (const uint64_t at : {syncs, syncs - 1, syncs - 4}) {
     SCOPED_TRACE(testing::Message() << "sync " << at << " of " << syncs);
     files_.failing_sync[durable()] = at;
     EXPECT_THROW(build(often()), Error);

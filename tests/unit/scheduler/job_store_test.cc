@@ -177,7 +177,7 @@ TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
       EXPECT_EQ(error.code(), ErrorCode::kUnsupportedVersion);
       EXPECT_NE(error.message().find("--restart"), std::string::npos) << error.message();
     }
-  set_version("5");
+  set_version("6");
   EXPECT_EQ(JobStore(path(), JobStore::Access::kRead).leaves().size(), 3u);
 }
 
