@@ -17,6 +17,28 @@ inline Cube ancestor(const Cube& cube, uint32_t level) {
   return {level, {cube.position[0] >> up, cube.position[1] >> up, cube.position[2] >> up}};
 }
 
+// The inside of a cube. Neighbors in a scene mostly lie in the same cube, so that the last one is
+// worth asking before the octree is descended.
+class CubeInside {
+ public:
+  // Contains nothing.
+  CubeInside() = default;
+  CubeInside(const Cube& cube, uint32_t grid_levels)
+      : shift_(kUnitBits + static_cast<int>(grid_levels - cube.level)) {
+    for (int a = 0; a < 3; ++a) low_[a] = static_cast<int64_t>(cube.position[a]) << shift_;
+  }
+  bool contains(const FixedTriangle& triangle) const {
+    uint64_t distances = 0;  // from the low corner
+    for (const auto& vertex : triangle.v)
+      for (int a = 0; a < 3; ++a) distances |= static_cast<uint64_t>(vertex[a] - low_[a]);
+    return distances >> shift_ == 0;
+  }
+
+ private:
+  int64_t low_[3] = {};
+  int shift_ = 0;
+};
+
 // The cells of a level that a triangle's box reaches.
 struct CellBox {
   CellBox(const FixedTriangle& triangle, uint32_t grid_levels, uint32_t cell_level)

@@ -49,10 +49,16 @@ void TopTree::Tally::clear() {
   entries_.clear();
   large_.clear();
   last_entry_.fill(0);
+  last_cell_ = {};
 }
 
 // Neighbors in the scene mostly touch the same few cells, whose entries the slots find again.
 void TopTree::Tally::add(const FixedTriangle& triangle, double weight) {
+  if (last_cell_.contains(triangle)) {
+    entries_[entry_of_last_cell_].weight += static_cast<float>(weight);
+    ++entries_[entry_of_last_cell_].triangles;
+    return;
+  }
   find_touched(triangle);
   if (touched_.size() > kMaxTouched) return large_.push_back({triangle, weight});
   for (const uint64_t code : touched_) {
@@ -64,6 +70,19 @@ void TopTree::Tally::add(const FixedTriangle& triangle, double weight) {
     entries_[last].weight += static_cast<float>(weight / static_cast<double>(touched_.size()));
     ++entries_[last].triangles;
   }
+  if (touched_.size() == 1) remember_cell(triangle);
+}
+
+// The triangle touches one cell, and is inside it unless it leaves the grid.
+void TopTree::Tally::remember_cell(const FixedTriangle& triangle) {
+  const CellBox box(triangle, grid_levels_, depth_);
+  Cube cell{depth_, {}};
+  for (int a = 0; a < 3; ++a) {
+    if (box.low[a] != box.high[a]) return;
+    cell.position[a] = static_cast<uint32_t>(box.low[a]);
+  }
+  last_cell_ = CubeInside(cell, grid_levels_);
+  entry_of_last_cell_ = last_entry_[touched_[0] % kSlots];
 }
 
 void TopTree::add(Tally& tally) {

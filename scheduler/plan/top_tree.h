@@ -13,6 +13,7 @@
 #include "core/base/page_buffer.h"
 #include "core/geometry/cube.h"
 #include "core/geometry/fixed_triangle.h"
+#include "core/geometry/octree_descent.h"
 
 namespace voxdag {
 
@@ -65,6 +66,7 @@ class TopTree {
     // Sets touched_ to the cells that the triangle touches.
     void find_touched(const FixedTriangle& triangle);
     void collect(const FixedTriangle& triangle, const Cube& cube, uint64_t code);
+    void remember_cell(const FixedTriangle& triangle);
 
     const uint32_t grid_levels_;
     const uint32_t depth_;
@@ -72,6 +74,8 @@ class TopTree {
     std::vector<LargeTriangle> large_;           // those that touch more than kMaxTouched cells
     std::array<uint32_t, kSlots> last_entry_{};  // of the cells of a slot
     std::vector<uint64_t> touched_;              // by the last triangle
+    CubeInside last_cell_;                       // that a triangle was inside of
+    size_t entry_of_last_cell_ = 0;
   };
   void add(Tally& tally);
   double total_weight() const { return total_weight_; }

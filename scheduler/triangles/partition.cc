@@ -18,10 +18,11 @@ namespace {
 void partition(TriangleStream& triangles, const CubeTree& tree, BinWriter& writer,
                const CancelToken& cancel) {
   std::vector<FixedTriangle> batch(1024);
+  CubeTree::Hint hint;
   while (const size_t n = triangles.read(batch)) {
     cancel.check();
     for (size_t i = 0; i < n; ++i)
-      tree.for_each_touched(batch[i], [&](size_t leaf) { writer.append(leaf, batch[i]); });
+      tree.for_each_touched(batch[i], hint, [&](size_t leaf) { writer.append(leaf, batch[i]); });
   }
   writer.flush();
 }
@@ -52,7 +53,7 @@ class TouchedPiece {
     used_ = 0;
     while (capacity_ - used_ >= leaves_ && read()) {
       const FixedTriangle& triangle = batch_[next_++];
-      tree_.for_each_touched(triangle, [&](size_t leaf) {
+      tree_.for_each_touched(triangle, hint_, [&](size_t leaf) {
         if (runs_.empty() || runs_.back().leaf != leaf) runs_.push_back({leaf, 0});
         ++runs_.back().records;
         encode_triangle(triangle, record_bytes_, records_.data() + used_++ * record_bytes_);
@@ -86,6 +87,7 @@ class TouchedPiece {
   }
 
   const CubeTree& tree_;
+  CubeTree::Hint hint_;
   const size_t leaves_;
   const size_t record_bytes_;
   const size_t capacity_;  // records

@@ -18,9 +18,16 @@ class CubeTree {
  public:
   // All of `leaves` lie in `root`.
   CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves);
-  // Calls visit(index into leaves) for every leaf that the triangle touches.
+  // A leaf that a triangle was inside of.
+  struct Hint {
+    size_t leaf = 0;
+    CubeInside inside;
+  };
+  // Calls visit(index into leaves) for every leaf that the triangle touches. Fast if it is inside
+  // the leaf of `hint`, which is replaced if it is inside another one.
   template <class Visit>
-  void for_each_touched(const FixedTriangle& triangle, const Visit& visit) const {
+  void for_each_touched(const FixedTriangle& triangle, Hint& hint, const Visit& visit) const {
+    if (hint.inside.contains(triangle)) return visit(hint.leaf);
     int32_t node = 0;
     Cube cube = root_;
     // A triangle inside one cube touches no other, so that no overlap test is needed that far.
@@ -30,6 +37,8 @@ class CubeTree {
         cube = ancestor(around, cube.level + 1);
         node = nodes_[node].child[cube.child_index()];
         if (node == kNone) return;
+        if (nodes_[node].leaf != kNone)
+          hint = {static_cast<size_t>(nodes_[node].leaf), CubeInside(cube, grid_levels_)};
       }
     descend(node, cube, triangle, visit);
   }

@@ -61,9 +61,10 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
       std::vector<Cube> cubes;
       for (const SubvolumePlan& leaf : leaves) cubes.push_back(leaf.cube);
       const CubeTree tree(kLevels, Cube{}, cubes);
+      CubeTree::Hint hint;
       for (const FixedTriangle& t : triangles) {
         std::vector<size_t> got;
-        tree.for_each_touched(t, [&](size_t leaf) { got.push_back(leaf); });
+        tree.for_each_touched(t, hint, [&](size_t leaf) { got.push_back(leaf); });
         std::sort(got.begin(), got.end());
         // The tree may name a leaf too many (a box inside one cube is not tested), never too few.
         const auto touched = touched_by_brute_force(t, leaves);
@@ -88,6 +89,7 @@ TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
     parts.push_back({cubes.back(), 0, 0});
   }
   const CubeTree tree(kLevels, whole, cubes);
+  CubeTree::Hint hint;
   const int64_t units = whole.edge_voxels(kLevels) * kUnitsPerVoxel;
   int64_t low[3];
   for (int a = 0; a < 3; ++a) low[a] = static_cast<int64_t>(whole.position[a]) * units;
@@ -103,7 +105,7 @@ TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
         break;
       }
     std::vector<size_t> got;
-    tree.for_each_touched(t, [&](size_t leaf) { got.push_back(leaf); });
+    tree.for_each_touched(t, hint, [&](size_t leaf) { got.push_back(leaf); });
     std::sort(got.begin(), got.end());
     EXPECT_EQ(got, touched_by_brute_force(t, parts));
   }
