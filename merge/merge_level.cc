@@ -7,7 +7,6 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
-#include "core/base/turns.h"
 #include "merge/fallback/hash_group_merge.h"
 #include "merge/fallback/heap_merge.h"
 #include "merge/sort/bucket_sorter.h"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/base/clock.h"
-#include "core/base/thread_times.h"
 
 namespace voxdag {
 

@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "core/base/thread_times.h"
+#include "core/base/clock.h"
 
 namespace voxdag {
 

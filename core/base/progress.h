@@ -26,7 +26,7 @@ class Progress {
   virtual ~Progress() = default;
   // A stage starts; `total` counts `unit`s ("triangles", "subvolumes", "nodes"), 0 if unknown.
   virtual void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) = 0;
-  // The stage goes on where an earlier run left it: `done` units count toward the total but not
+  // The stage continues where an earlier run ended: `done` units count toward the total but not
   // toward the rate. Called after begin_stage(), if at all.
   virtual void resume_at(uint64_t done) = 0;
   // `count` more units are done.

@@ -7,8 +7,8 @@
 #include <optional>
 #include <thread>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
-#include "core/base/thread_times.h"
 #include "core/format/artifact/artifact_writer.h"
 #include "scheduler/job/job_progress.h"
 #include "scheduler/memory_plan.h"

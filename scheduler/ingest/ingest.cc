@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/page_buffer.h"
-#include "core/base/turns.h"
+#include "core/base/parallel_for.h"
 #include "scheduler/memory_plan.h"
 #include "scheduler/triangles/chunk.h"
 

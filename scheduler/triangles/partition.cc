@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/base/page_buffer.h"
-#include "core/base/turns.h"
+#include "core/base/parallel_for.h"
 #include "scheduler/memory_plan.h"
 #include "scheduler/triangles/chunk.h"
 #include "scheduler/triangles/triangle_file.h"

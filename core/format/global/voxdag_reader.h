@@ -337,7 +337,7 @@ class File {
     if (features & ~kWideLevels)
       throw Error(Problem::kUnsupportedVersion,
                   path_ + ": feature bits " + std::to_string(features) + ", expected none but 1");
-    most_pointer_bits_ = features & kWideLevels ? 64 : 32;
+    max_pointer_bits_ = features & kWideLevels ? 64 : 32;
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
     expect(
@@ -378,9 +378,9 @@ class File {
       expect(level.file_offset == end, "a level does not follow the one below it");
       if (version_ != 1) level.pointer_bits = get<uint32_t>(entry + 24);
       const uint32_t bits = level.pointer_bits;
-      if (bits != 32 && bits != most_pointer_bits_)
+      if (bits != 32 && bits != max_pointer_bits_)
         corrupt("header: level " + std::to_string(l) + ": pointers of " + std::to_string(bits) +
-                " bits, expected 32" + (most_pointer_bits_ == 64 ? " or 64" : ""));
+                " bits, expected 32" + (max_pointer_bits_ == 64 ? " or 64" : ""));
       if (level.word_count > uint64_t{1} << (bits == 32 ? 32 : 40))
         corrupt("header: level " + std::to_string(l) + ": " + std::to_string(level.word_count) +
                 " words, more than pointers of " + std::to_string(bits) +
@@ -412,7 +412,7 @@ class File {
   const Bytes bytes_;
   double origin_[3] = {};
   double edge_ = 0;
-  uint32_t version_ = 0, most_pointer_bits_ = 32, grid_levels_ = 0, hash_bits_ = 0;
+  uint32_t version_ = 0, max_pointer_bits_ = 32, grid_levels_ = 0, hash_bits_ = 0;
   uint64_t voxels_ = 0, svo_nodes_ = 0, dag_nodes_ = 0, table_offset_ = 0;
   Level levels_[kMaxBrickLevel + 1];
 };

@@ -165,7 +165,7 @@ void TriangleReader::flush() {
 bool TriangleReader::place(const uint32_t* corners, WorldTriangle& out) {
   if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
   for (int k = 0; k < 3; ++k) std::copy_n(cache_.at(corners[k]), 3, out.v[k]);
-  return is_finite(out);
+  return cache_.all_finite() || is_finite(out);
 }
 
 void TriangleReader::report(const uint32_t* corners) const {

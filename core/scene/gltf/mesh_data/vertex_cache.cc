@@ -33,6 +33,7 @@ void VertexCache::place(const Transform& world) {
 void VertexCache::forget() {
   const auto used = block_in_slot_.begin() + static_cast<ptrdiff_t>(slots_used_);
   std::fill(block_in_slot_.begin(), used, kNoBlock);
+  all_finite_ = true;
 }
 
 void VertexCache::load(uint64_t block, size_t slot) {
@@ -49,6 +50,7 @@ void VertexCache::load(uint64_t block, size_t slot) {
   for (double* vertex = out; vertex != out + 3 * count; vertex += 3) {
     const double local[3] = {vertex[0], vertex[1], vertex[2]};
     apply(world_, local, vertex);
+    all_finite_ &= (vertex[0] - vertex[0]) + (vertex[1] - vertex[1]) + (vertex[2] - vertex[2]) == 0;
   }
   block_in_slot_[slot] = block;
 }

@@ -26,6 +26,8 @@ class VertexCache {
   // Serves the source's vertices after this transform from now on.
   void place(const Transform& world);
 
+  // Whether all vertices that were served since place() are finite numbers.
+  bool all_finite() const { return all_finite_; }
   // Three doubles, valid until the next call; `vertex` must be below the source's count.
   const double* at(uint64_t vertex) {
     const uint64_t block = vertex / kBlockVertices;
@@ -44,6 +46,7 @@ class VertexCache {
   PageBuffer<double> positions_;   // in world space
   std::vector<double> one_block_;  // a source of one block, untransformed; empty if it was not read
   Transform world_;
+  bool all_finite_ = true;
   std::vector<uint64_t> block_in_slot_;
   size_t slot_mask_ = 0;
   size_t slots_used_ = 0;  // by the source, counted from the first

@@ -1,5 +1,5 @@
 // Items are committed in their order, all before the first that fails and none behind it.
-#include "core/base/turns.h"
+#include "core/base/parallel_for.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,206 @@
+// The buffers of a scene: external files, data: URIs, the binary chunk.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "core/scene/gltf/mesh_data/base64.h"
+#include "tests/unit/base/error_of.h"
+#include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+// Opens folder/scene among other files.
+std::vector<Corners> triangles_among(const std::map<std::string, std::string>& contents) {
+  MemoryFiles files;
+  files.contents = contents;
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelToken cancel;
+  return triangles_of(*open_scene(files, {"folder/scene"}, {}, budget, cancel));
+}
+
+Error error_among(const std::map<std::string, std::string>& contents) {
+  try {
+    triangles_among(contents);
+  } catch (const Error& e) {
+    return e;
+  }
+  return Error(ErrorCode::kInvalidInput, "");
+}
+
+// An external buffer is found in the folder of the scene, its name percent-encoded.
+TEST(GltfBuffers, External) {
+  const SceneBuilder scene = one_triangle();
+  EXPECT_EQ(triangles_among({{"folder/scene", scene.gltf("sub%20dir/my%2fb.bin")},
+                             {"folder/sub dir/my/b.bin", scene.bin}})
+                .size(),
+            1u);
+}
+
+TEST(GltfBuffers, ExternalThatIsMissingOrShort) {
+  const SceneBuilder scene = one_triangle();
+  const Error missing = error_among({{"folder/scene", scene.gltf("a.bin")}});
+  EXPECT_EQ(missing.code(), ErrorCode::kNotFound);
+  EXPECT_NE(missing.message().find("folder/scene: buffer 0: "), std::string::npos);
+  const Error cut =
+      error_among({{"folder/scene", scene.gltf("a.bin")}, {"folder/a.bin", scene.bin.substr(1)}});
+  EXPECT_EQ(cut.code(), ErrorCode::kInvalidInput);
+  EXPECT_NE(cut.message().find("buffer 0 claims 42 bytes, 41 are there in a.bin"),
+            std::string::npos)
+      << cut.message();
+}
+
+// Triangles of two files of the same name are not mixed.
+TEST(GltfBuffers, ExternalThatIsReplacedWhileTheSceneIsRead) {
+  const SceneBuilder builder = one_triangle();
+  const TemporaryFolder folder;
+  const auto write = [&](const std::string& name, const std::string& bytes) {
+    std::ofstream(folder.file(name), std::ios::binary) << bytes;
+  };
+  write("scene.gltf", builder.gltf("a.bin"));
+  write("a.bin", builder.bin);
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelToken cancel;
+  const auto scene = open_scene(system_files(), {folder.file("scene.gltf")}, {}, budget, cancel);
+  EXPECT_EQ(triangles_of(*scene).size(), 1u);
+  write("b.bin", builder.bin);
+  std::filesystem::rename(folder.file("b.bin"), folder.file("a.bin"));
+  const Error error = error_of([&] { triangles_of(*scene); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+  EXPECT_NE(error.message().find("a.bin changed while the scene was read"), std::string::npos)
+      << error.message();
+}
+
+// A buffer that makes no triangles (of normals here) may be anywhere.
+TEST(GltfBuffers, ExternalThatIsNotRead) {
+  SceneBuilder scene = one_triangle();
+  scene.root["bufferViews"].push_back({{"buffer", 1}, {"byteLength", 36}});
+  const int normals = scene.add(
+      "accessors", {{"bufferView", 2}, {"componentType", kF32}, {"count", 3}, {"type", "VEC3"}});
+  scene.root["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals;
+  scene.root["buffers"] = {{{"byteLength", scene.bin.size()}, {"uri", "a.bin"}},
+                           {{"byteLength", 36}, {"uri", "normals.bin"}}};
+  EXPECT_EQ(
+      triangles_among({{"folder/scene", scene.root.dump()}, {"folder/a.bin", scene.bin}}).size(),
+      1u);
+}
+
+// Only relative paths are followed.
+TEST(GltfBuffers, UrisThatAreNotFollowed) {
+  for (const char* uri : {"", "/etc/passwd", "http://example.org/a.bin", "file:a.bin", "C:\\a.bin",
+                          "a%2.bin", "a%zz", "a%00b"}) {
+    const Error error = error_among({{"folder/scene", one_triangle().gltf(uri)}});
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput) << uri;
+    EXPECT_NE(error.message().find("buffer 0: its uri"), std::string::npos) << error.message();
+  }
+}
+
+// Strings of many megabytes, read or not, take no memory: the budget here is far smaller. Only
+// strings with escapes, which the parser collects, are charged and refused if they do not fit.
+TEST(GltfBuffers, LongStringsTakeNoMemory) {
+  SceneBuilder scene = one_triangle();
+  const std::string picture = "data:image/png;base64," + std::string(3000000, 'A');
+  scene.root["images"] = {{{"uri", picture}}};
+  scene.root["nodes"][0]["name"] = std::string(3000000, 'x') + "\u00e4";
+  scene.root["asset"]["generator"] = std::string(3000000, '\t');
+  scene.root["extras"] = {{std::string(3000000, 'k'), 1}};
+  EXPECT_THROW(OpenScene(scene.glb(), {}, uint64_t{1} << 20), Error);
+  scene.root["asset"].erase("generator");
+  EXPECT_EQ(OpenScene(scene.glb(), {}, uint64_t{1} << 20).triangles().size(), 1u);
+}
+
+// Thousands of nodes, meshes and accessors are read in their order within a small budget.
+TEST(GltfBuffers, LargeStructure) {
+  constexpr int kCount = 20000;
+  SceneBuilder scene;
+  const int view = scene.add_view<float>(std::vector<float>(9 + kCount, 1));
+  for (int i = 0; i < kCount; ++i) {
+    scene.add("accessors", {{"bufferView", view},
+                            {"byteOffset", 4 * i},
+                            {"componentType", kF32},
+                            {"count", 3},
+                            {"type", "VEC3"}});
+    scene.add_mesh({{"attributes", {{"POSITION", i}}}, {"indices", 0}});
+    scene.add_root({{"mesh", kCount - 1 - i}, {"translation", {i, 0, 0}}});
+  }
+  const int indices = scene.add_accessor<uint16_t>("SCALAR", kU16, {0, 1, 2});
+  for (Json& mesh : scene.root["meshes"]) mesh["primitives"][0]["indices"] = indices;
+  OpenScene open(scene.glb(), {}, uint64_t{24} << 20);
+  const auto triangles = open.triangles();
+  ASSERT_EQ(triangles.size(), size_t{kCount});
+  for (int i = 0; i < kCount; ++i) ASSERT_EQ(triangles[static_cast<size_t>(i)][0][0], i + 1.0);
+}
+
+// A buffer without uri is the GLB's own or nobody's.
+TEST(GltfBuffers, WithoutUri) {
+  SceneBuilder scene = one_triangle();
+  scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
+  const Error error = error_of_file(scene.root.dump());
+  EXPECT_NE(error.message().find("buffer 0 has no uri and is not in the file"), std::string::npos);
+}
+
+// A data: URI longer than any window, read in pieces that begin at every remainder modulo three.
+TEST(GltfBuffers, LongDataUri) {
+  constexpr size_t kTriangles = 40000;
+  std::vector<float> positions;
+  for (size_t i = 0; i < 9 * kTriangles; ++i) positions.push_back(static_cast<float>(i % 1013));
+  for (size_t shift : {0, 1, 2}) {
+    SceneBuilder scene;
+    const int accessor = scene.add_positions(positions);
+    scene.add_root({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", accessor}}}})}});
+    scene.bin.insert(0, shift, 'x');
+    scene.root["bufferViews"][0]["byteOffset"] = shift;
+    const auto triangles =
+        triangles_of_file(scene.gltf("data:application/octet-stream;base64," + base64(scene.bin)));
+    ASSERT_EQ(triangles.size(), kTriangles);
+    for (size_t i = 0; i < 9 * kTriangles; ++i)
+      ASSERT_EQ(triangles[i / 9][i / 3 % 3][i % 3], positions[i]) << i;
+  }
+}
+
+// JSON may write base64's own characters as escapes, as some exporters do.
+TEST(GltfBuffers, DataUriWithJsonEscapes) {
+  SceneBuilder scene = one_triangle();
+  for (int i = 0; i < 10000; ++i) scene.bin += static_cast<char>(i * i % 251);
+  const std::string text = base64(scene.bin);
+  std::string escaped;
+  for (char c : text) escaped += c == 'A' ? "\\u0041" : c == '/' ? "\\/" : std::string(1, c);
+  ASSERT_NE(escaped, text);
+  std::string file = scene.gltf("data:;base64,HERE");
+  file.replace(file.find("HERE"), 4, escaped);
+  EXPECT_EQ(triangles_of_file(file).size(), 1u);
+}
+
+TEST(GltfBuffers, BrokenDataUris) {
+  const SceneBuilder scene = one_triangle();
+  const std::string text = base64(scene.bin);
+  const auto message = [&](const std::string& uri) {
+    return error_of_file(scene.gltf(uri)).message();
+  };
+  EXPECT_NE(message("data:text/plain,abc").find("is a data: URI that is not base64"),
+            std::string::npos);
+  EXPECT_NE(message("data:;base64").find("is a data: URI that is not base64"), std::string::npos);
+  EXPECT_NE(message("data:;base64," + text.substr(4)).find("buffer 0 claims 42 bytes, 39 are"),
+            std::string::npos)
+      << message("data:;base64," + text.substr(4));
+  EXPECT_NE(message("data:;base64,?" + text.substr(1)).find("is not base64"), std::string::npos);
+}
+
+TEST(Base64, DecodesTheExamplesOfTheRfc) {
+  const std::pair<const char*, const char*> examples[] = {
+      {"", ""},        {"Zg==", "f"},        {"Zm8=", "fo"},
+      {"Zm9v", "foo"}, {"Zm9vYg==", "foob"}, {"Zm8", "fo"}};
+  for (const auto& [text, expected] : examples) {
+    const std::string characters = text;
+    const auto bytes = std::as_bytes(std::span(characters));
+    std::string decoded(3 * ((characters.size() + 3) / 4), '\0');
+    ASSERT_TRUE(gltf::decode_base64(bytes, reinterpret_cast<std::byte*>(decoded.data())));
+    decoded.resize(gltf::base64_bytes(bytes.size(), bytes.last(std::min<size_t>(2, bytes.size()))));
+    EXPECT_EQ(decoded, expected);
+  }
+}
+
+}  // namespace
+}  // namespace voxdag::test
