@@ -70,6 +70,11 @@ class Turns {
     ++turn_;
     changed_.notify_all();
   }
+  // Whether an item before this one has failed.
+  bool is_lost(size_t item) {
+    const std::lock_guard lock(mutex_);
+    return item > failed_;
+  }
   // No item after this one gets its turn.
   void fail(size_t item) {
     const std::lock_guard lock(mutex_);
@@ -91,6 +96,7 @@ template <class Prepare, class Commit>
 void parallel_for_in_order(unsigned workers, size_t count, Prepare&& prepare, Commit&& commit) {
   Turns turns;
   parallel_for(workers, count, [&](unsigned worker, size_t item) {
+    if (turns.is_lost(item)) return;
     try {
       prepare(worker, item);
       if (!turns.wait_for(item)) return;
