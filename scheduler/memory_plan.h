@@ -8,7 +8,7 @@
 //   ingest until  triangles; the rest is spilled    up to 1/3                    TriangleStore
 //   built
 //                 cursors and pieces of the scene   1/2 of what is free          each part
-//                   their top tree cells            up to 3 MiB each             nobody
+//                   their cells and leaves          up to 3 MiB each             nobody
 //   partition     half-filled chunks of triangles   1/8                          nobody
 //   estimate      pilot build, one at a time        3/4 of what is free          Backend
 //   build         WorkerMemory, for every worker    what is free / workers

@@ -48,8 +48,8 @@ class TriangleSource {
   // The triangles that the scene declares, instances counted: those that are visited and those that
   // skip_invalid drops.
   virtual uint64_t declared_triangles() const = 0;
-  // All files that the triangles come from, with their identity when they were first opened.
-  // Reading one that was replaced or written since is an error.
+  // All files that the triangles come from, with their identity when they were first opened. One
+  // that turns out to be another when it is opened again is an error.
   virtual std::vector<SourceFile> files() const { return {}; }
   // Warnings for the user, one sentence each (ignored optional extensions, points and lines that
   // make no voxels).

@@ -150,8 +150,7 @@ class Differ {
     for (const NodePair& pair : pairs)
       for (const NodePair& children : children_of(level, pair)) below.push_back(children);
     std::ranges::sort(below);
-    const auto repeated = std::ranges::unique(below);
-    below.erase(repeated.begin(), repeated.end());
+    below.erase(std::unique(below.begin(), below.end()), below.end());
     return below;
   }
 

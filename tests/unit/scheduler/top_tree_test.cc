@@ -44,6 +44,36 @@ void add(TopTree& top, const FixedTriangle& t) {
   top.add(tally);
 }
 
+// Triangles next to each other, counted together, give what each of them gives alone.
+TEST(TopTree, OneTallyOrMany) {
+  MemoryBudget budget(uint64_t{1} << 30);
+  TopTree one(kLevels, budget, 5), many(kLevels, budget, 5);
+  TopTree::Tally tally(one);
+  std::mt19937_64 random(1);
+  for (int piece = 0; piece < 3; ++piece) {
+    tally.clear();
+    for (int cluster = 0; cluster < 20; ++cluster) {
+      const FixedTriangle first = triangle_near(random, 900);
+      for (int i = 0; i < 50; ++i) {
+        FixedTriangle t = first;
+        for (auto& vertex : t.v)
+          for (int64_t& u : vertex) u += 2 * static_cast<int64_t>(random() % 9000);
+        tally.add(t, expected_work(t).bricks);
+        add(many, t);
+      }
+    }
+    one.add(tally);
+  }
+  const auto a = one.subvolumes_by_edge(64), b = many.subvolumes_by_edge(64);
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_GT(a.size(), 60u);
+  for (size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].cube, b[i].cube);
+    EXPECT_EQ(a[i].triangles, b[i].triangles);
+    EXPECT_NEAR(a[i].weight, b[i].weight, 1e-3 * b[i].weight);
+  }
+}
+
 // Every triangle reaches every subvolume that it touches, wherever the cuts are, and the plan has a
 // subvolume wherever a triangle is.
 TEST(TopTree, PlansCoverAllThatTrianglesTouch) {

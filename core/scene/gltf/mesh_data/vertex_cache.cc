@@ -6,13 +6,19 @@
 namespace voxdag::gltf {
 
 VertexCache::VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches) {
-  constexpr uint64_t kSlotBytes = kBlockVertices * 3 * sizeof(double);
-  const uint64_t wanted = std::bit_ceil((vertices + kBlockVertices - 1) / kBlockVertices);
-  const uint64_t affordable =
-      std::bit_floor(budget.available() / kShareOfFree / caches / kSlotBytes);
-  const uint64_t slots = std::clamp<uint64_t>(std::min(wanted, affordable), 1, wanted);
-  positions_ = PageBuffer<double>(budget, static_cast<size_t>(slots * kBlockVertices * 3),
-                                  "vertices of a scene");
+  constexpr uint64_t kBlockBytes = kBlockVertices * 3 * sizeof(double);
+  const uint64_t blocks = (vertices + kBlockVertices - 1) / kBlockVertices;
+  const uint64_t affordable = budget.available() / kShareOfFree / caches / kBlockBytes;
+  const uint64_t retained = std::min({blocks, kMaxRetainedBlocks, affordable / 2});
+  const uint64_t wanted = std::bit_ceil(blocks);
+  const uint64_t slots =
+      std::clamp<uint64_t>(std::min(wanted, std::bit_floor(affordable - retained)), 1, wanted);
+  const auto positions = [&](uint64_t count) {
+    return PageBuffer<double>(budget, static_cast<size_t>(count * kBlockVertices * 3),
+                              "vertices of a scene");
+  };
+  positions_ = positions(slots);
+  untransformed_ = positions(retained);
   block_in_slot_.assign(static_cast<size_t>(slots), kNoBlock);
   slot_mask_ = static_cast<size_t>(slots - 1);
 }
@@ -21,7 +27,8 @@ void VertexCache::bind(VertexSource& source) {
   forget();
   const uint64_t blocks = (source.count() + kBlockVertices - 1) / kBlockVertices;
   slots_used_ = static_cast<size_t>(std::min<uint64_t>(blocks, block_in_slot_.size()));
-  one_block_.clear();
+  const bool is_retained = blocks * kBlockVertices * 3 <= untransformed_.size();
+  is_read_.assign(is_retained ? static_cast<size_t>(blocks) : 0, false);
   source_ = &source;
 }
 
@@ -38,21 +45,27 @@ void VertexCache::forget() {
 
 void VertexCache::load(uint64_t block, size_t slot) {
   block_in_slot_[slot] = kNoBlock;
-  const uint64_t first = block * kBlockVertices;
-  const auto count = static_cast<size_t>(std::min(kBlockVertices, source_->count() - first));
-  double* const out = &positions_[3 * slot * kBlockVertices];
-  if (one_block_.empty()) {
-    source_->read(first, count, out);
-    if (source_->count() <= kBlockVertices) one_block_.assign(out, out + 3 * count);
-  } else {
-    std::ranges::copy(one_block_, out);
-  }
-  for (double* vertex = out; vertex != out + 3 * count; vertex += 3) {
+  const auto count =
+      static_cast<size_t>(std::min(kBlockVertices, source_->count() - block * kBlockVertices));
+  const std::span<double> out(&positions_[3 * slot * kBlockVertices], 3 * count);
+  read(block, out);
+  for (size_t i = 0; i < out.size(); i += 3) {
+    double* const vertex = &out[i];
     const double local[3] = {vertex[0], vertex[1], vertex[2]};
     apply(world_, local, vertex);
     all_finite_ &= (vertex[0] - vertex[0]) + (vertex[1] - vertex[1]) + (vertex[2] - vertex[2]) == 0;
   }
   block_in_slot_[slot] = block;
+}
+
+// The vertices of a block as the source gives them.
+void VertexCache::read(uint64_t block, std::span<double> out) {
+  const uint64_t first = block * kBlockVertices;
+  if (is_read_.empty()) return source_->read(first, out.size() / 3, out.data());
+  double* const retained = &untransformed_[3 * first];
+  if (!is_read_[block]) source_->read(first, out.size() / 3, retained);
+  is_read_[block] = true;
+  std::copy_n(retained, out.size(), out.begin());
 }
 
 }  // namespace voxdag::gltf

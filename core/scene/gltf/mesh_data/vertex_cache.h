@@ -1,11 +1,12 @@
 // Random access to the vertex positions of an instance of a primitive, in world space, within a
 // fixed amount of memory: blocks of consecutive vertices, each cached in the one slot that its
 // number maps to. An instance that fits is read once; so is, about, a larger one whose indices stay
-// near each other. A primitive of one block is decoded once for all its instances.
+// near each other. A primitive of up to 262144 vertices is decoded once for all its instances.
 #pragma once
 
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/page_buffer.h"
@@ -38,13 +39,17 @@ class VertexCache {
 
  private:
   static constexpr uint64_t kBlockVertices = 1024;
+  static constexpr uint64_t kMaxRetainedBlocks = 256;
   static constexpr uint64_t kNoBlock = ~uint64_t{0};
 
   void forget();
   void load(uint64_t block, size_t slot);
+  void read(uint64_t block, std::span<double> out);
 
-  PageBuffer<double> positions_;   // in world space
-  std::vector<double> one_block_;  // a source of one block, untransformed; empty if it was not read
+  PageBuffer<double> positions_;  // in world space
+  // Of a source of few blocks, as it gives them, and which blocks were read.
+  PageBuffer<double> untransformed_;
+  std::vector<bool> is_read_;
   Transform world_;
   bool all_finite_ = true;
   std::vector<uint64_t> block_in_slot_;
