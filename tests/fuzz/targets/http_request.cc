@@ -49,6 +49,16 @@ class EchoServer {
   std::thread thread_;
 };
 
+// An address of the loopback, another one each time: one has not enough ports for the connections
+// that were closed in the last minute.
+sockaddr_in next_loopback_address() {
+  static uint32_t count = 0;
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK + 256 + count++ % 65536);
+  return address;
+}
+
 // Waits by the second: a machine that pauses for longer is no finding.
 bool has_something_to_read(int fd) {
   for (int i = 0; i < kMaxWaits; ++i) {
@@ -64,7 +74,10 @@ std::string exchange(int port, const uint8_t* data, size_t size) {
   to.sin_family = AF_INET;
   to.sin_port = htons(static_cast<uint16_t>(port));
   to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  fuzz::require(fd >= 0 && ::connect(fd, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0,
+  const sockaddr_in from = next_loopback_address();
+  fuzz::require(fd >= 0 && ::bind(fd, reinterpret_cast<const sockaddr*>(&from), sizeof from) == 0,
+                "the loopback has a free port");
+  fuzz::require(::connect(fd, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0,
                 "the service accepts connections");
   // The service may refuse the rest of what is sent to it.
   for (size_t sent = 0; sent < size;) {
