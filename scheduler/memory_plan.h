@@ -58,6 +58,11 @@ struct MemoryPlan {
   static constexpr uint64_t ingest_workers(uint64_t free_bytes) {
     return std::max<uint64_t>(free_bytes / 2 / kIngestWorkerBytes, 1);
   }
+  // How many of `threads` have one of `pieces` to read and the memory for it.
+  static constexpr unsigned ingest_threads(uint64_t pieces, uint64_t free_bytes, unsigned threads) {
+    return static_cast<unsigned>(
+        std::clamp<uint64_t>(std::min(pieces, ingest_workers(free_bytes)), 1, threads));
+  }
   // The budget of a pilot build, `free_bytes` being free.
   static constexpr uint64_t pilot_bytes(uint64_t free_bytes) { return free_bytes * 3 / 4; }
 };

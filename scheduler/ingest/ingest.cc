@@ -24,12 +24,6 @@ class TooManyReaders : public Error {
   explicit TooManyReaders(const Error& error) : Error(error) {}
 };
 
-unsigned readers_of(uint64_t pieces, const StageContext& context) {
-  const uint64_t affordable = MemoryPlan::ingest_workers(context.budget.available());
-  return static_cast<unsigned>(
-      std::clamp<uint64_t>(std::min(pieces, affordable), 1, context.threads));
-}
-
 // Reads the scene from triangle `position` on: clears a Piece, adds to it all batches of a piece,
 // and commits it, which moves `position` to its end.
 template <class Piece, class MakePiece, class Commit>
@@ -40,7 +34,8 @@ void read_pieces(TriangleSource& scene, const uint64_t& position, const StageCon
     const uint64_t declared = scene.declared_triangles();
     const uint64_t pieces =
         (declared - std::min(first, declared) + kPieceTriangles - 1) / kPieceTriangles;
-    const unsigned readers = std::min(readers_of(pieces, context), max_readers);
+    const unsigned readers =
+        MemoryPlan::ingest_threads(pieces, context.budget.available(), max_readers);
     struct Reader {
       std::unique_ptr<TriangleCursor> cursor;
       std::optional<Piece> piece;

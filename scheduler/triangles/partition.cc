@@ -100,13 +100,6 @@ class TouchedPiece {
   size_t batch_size_ = 0, next_ = 0;
 };
 
-// As many threads as have something to do and fit in memory.
-unsigned threads_for(uint64_t items, const StageContext& context) {
-  const uint64_t affordable = MemoryPlan::ingest_workers(context.budget.available());
-  return static_cast<unsigned>(
-      std::clamp<uint64_t>(std::min(items, affordable), 1, context.threads));
-}
-
 using BinsByCube = std::map<Cube, CubeBin>;
 
 // The bin of the cube or of the nearest cube around it.
@@ -162,7 +155,8 @@ void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const
   BinWriter writer(store, targets, buffer_bytes);
   const uint64_t end = std::max(store.count(kSceneBin), first);
   const uint64_t pieces = (end - first + kPieceTriangles - 1) / kPieceTriangles;
-  const unsigned threads = threads_for(pieces, context);
+  const unsigned threads =
+      MemoryPlan::ingest_threads(pieces, context.budget.available(), context.threads);
   std::vector<std::unique_ptr<TouchedPiece>> worker_pieces(threads);
   context.build.progress.begin_stage("partition", end, "triangles");
   context.build.progress.resume_at(first);
@@ -210,7 +204,8 @@ std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
     }
   }
   const std::vector<std::pair<Cube, std::vector<size_t>>> wholes(parts_of.begin(), parts_of.end());
-  const unsigned threads = threads_for(wholes.size(), context);
+  const unsigned threads =
+      MemoryPlan::ingest_threads(wholes.size(), context.budget.available(), context.threads);
   parallel_for(threads, wholes.size(), [&](unsigned, size_t item) {
     const auto& [whole, parts] = wholes[item];
     std::vector<Cube> leaves;
