@@ -42,7 +42,6 @@ double largest_extent(const WorldBounds& bounds) {
 
 // Two numbers that every processor computes with at once.
 using Pair = double __attribute__((vector_size(16)));
-constexpr size_t kPairs = 5;  // of the nine coordinates of a triangle and a zero
 
 // floor(x), and a whole number near x beyond 2^51, without a branch: half of all go up.
 Pair floor_of(Pair x) {
@@ -108,18 +107,32 @@ Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_
   return centered(bounds, edge, levels);
 }
 
-SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out) {
+void snap_vertices(const Grid& grid, std::span<double> coordinates) {
   // Both are powers of two, so that the order of their multiplications does not matter.
   const double scale = 128.0 * static_cast<double>(grid.resolution());
-  const double *const w = &world.v[0][0], *const o = grid.origin.data();
-  const Pair positions[kPairs] = {
-      {w[0], w[1]}, {w[2], w[3]}, {w[4], w[5]}, {w[6], w[7]}, {w[8], 0}};
-  const Pair origins[kPairs] = {{o[0], o[1]}, {o[2], o[0]}, {o[1], o[2]}, {o[0], o[1]}, {o[2], 0}};
-  double u[3][3];
-  Pair units[kPairs];
-  for (size_t i = 0; i < kPairs; ++i)
-    units[i] = 2.0 * floor_of(((positions[i] - origins[i]) / grid.edge) * scale) + 1.0;
-  std::memcpy(u, units, sizeof u);
+  const auto& o = grid.origin;
+  const Pair origins[3] = {{o[0], o[1]}, {o[2], o[0]}, {o[1], o[2]}};
+  const auto snap = [&](Pair position, Pair origin) {
+    return 2.0 * floor_of(((position - origin) / grid.edge) * scale) + 1.0;
+  };
+  double* x = coordinates.data();
+  double* const end = x + coordinates.size();
+  for (; end - x >= 6; x += 6)
+    for (size_t i = 0; i < 3; ++i) {
+      Pair position;
+      std::memcpy(&position, x + 2 * i, sizeof position);
+      position = snap(position, origins[i]);
+      std::memcpy(x + 2 * i, &position, sizeof position);
+    }
+  if (x == end) return;
+  const Pair low = snap(Pair{x[0], x[1]}, origins[0]), high = snap(Pair{x[2], x[2]}, origins[1]);
+  x[0] = low[0];
+  x[1] = low[1];
+  x[2] = high[0];
+}
+
+SnapResult to_fixed(const Grid& grid, const SnappedTriangle& snapped, FixedTriangle& out) {
+  const auto& u = snapped.v;
   const double end = static_cast<double>(grid.resolution() * kUnitsPerVoxel);
   const double limit = static_cast<double>(kCoordinateLimit);
   bool outside = false, far = false;
@@ -134,6 +147,12 @@ SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTria
   for (int i = 0; i < 3; ++i)
     for (int a = 0; a < 3; ++a) out.v[i][a] = static_cast<int64_t>(u[i][a]);
   return SnapResult::kInside;
+}
+
+SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out) {
+  SnappedTriangle snapped = world;
+  for (auto& vertex : snapped.v) snap_vertices(grid, vertex);
+  return to_fixed(grid, snapped, out);
 }
 
 uint32_t levels_of_resolution(uint64_t resolution) {

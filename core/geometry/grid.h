@@ -23,10 +23,14 @@ struct WorldBounds {
   void add(const WorldBounds& other);
 };
 
-// Vertex positions in world space, double precision, [vertex][axis].
-struct WorldTriangle {
+// Vertex positions, double precision, [vertex][axis].
+struct RealTriangle {
   double v[3][3];
 };
+// In world space.
+using WorldTriangle = RealTriangle;
+// On the lattice of a grid: whole odd numbers, of any magnitude.
+using SnappedTriangle = RealTriangle;
 
 // The bounds of triangles of finite vertices.
 WorldBounds bounds_of(std::span<const WorldTriangle> triangles);
@@ -37,6 +41,7 @@ struct Grid {
   double edge = 1.0;
 
   int64_t resolution() const { return int64_t{1} << levels; }
+  bool operator==(const Grid&) const = default;
 
   // The default cube around a scene. A scene without extent, or without triangles, gets edge 1.
   // Throws Error{kInvalidInput} for levels outside [2, 20], Error{kLimit} if the grid is not
@@ -55,7 +60,11 @@ enum class SnapResult {
   kTooFar,   // reaches the grid, but a coordinate is beyond kCoordinateLimit: a limit error
 };
 
-// Snaps a triangle of finite vertices. `out` is only meaningful for kInside.
+// Snaps vertices, three coordinates each, in place. What is not a number stays so.
+void snap_vertices(const Grid& grid, std::span<double> coordinates);
+// `out` is only meaningful for kInside.
+SnapResult to_fixed(const Grid& grid, const SnappedTriangle& snapped, FixedTriangle& out);
+// Both: snaps a triangle of finite vertices.
 SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out);
 
 // log2 of a resolution; throws Error{kInvalidInput} unless it is a power of two in [4, 2^20].

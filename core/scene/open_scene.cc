@@ -57,17 +57,38 @@ class GltfCursor : public TriangleCursor {
         cancel_(cancel) {}
 
   void read(uint64_t first, uint64_t count, const Visitor& visit) override {
+    for_each_file(first, count, [&](gltf::TriangleReader& reader, uint64_t begin, uint64_t n) {
+      reader.read(begin, n, nullptr, visit);
+    });
+  }
+  void read_snapped(uint64_t first, uint64_t count, const Grid& grid,
+                    const Visitor& visit) override {
+    for_each_file(first, count, [&](gltf::TriangleReader& reader, uint64_t begin, uint64_t n) {
+      reader.read(begin, n, &grid, visit);
+    });
+  }
+  WorldBounds read_bounds(uint64_t first, uint64_t count) override {
+    WorldBounds bounds;
+    for_each_file(first, count, [&](gltf::TriangleReader& reader, uint64_t begin, uint64_t n) {
+      bounds.add(reader.read_bounds(begin, n));
+    });
+    return bounds;
+  }
+
+ private:
+  // Calls body(reader, first, count) for each part of the triangles that one file declares.
+  template <class Body>
+  void for_each_file(uint64_t first, uint64_t count, const Body& body) {
     const uint64_t end = first + count;
     while (first < end) {
       SceneFile& file = **std::ranges::upper_bound(scene_files_, first, {},
                                                    [](const auto& f) { return f->end_triangle; });
       const uint64_t n = std::min(end, file.end_triangle) - first;
-      reader_of(file).read(first - file.first_triangle, n, visit);
+      body(reader_of(file), first - file.first_triangle, n);
       first += n;
     }
   }
 
- private:
   // The reader of one file is open at a time.
   gltf::TriangleReader& reader_of(SceneFile& file) {
     if (open_ != &file) {
@@ -143,6 +164,23 @@ class GltfScene : public TriangleSource {
 };
 
 }  // namespace
+
+void TriangleCursor::read_snapped(uint64_t first, uint64_t count, const Grid& grid,
+                                  const Visitor& visit) {
+  std::vector<SnappedTriangle> snapped;
+  read(first, count, [&](std::span<const WorldTriangle> batch) {
+    snapped.assign(batch.begin(), batch.end());
+    for (SnappedTriangle& triangle : snapped)
+      for (auto& vertex : triangle.v) snap_vertices(grid, vertex);
+    visit(snapped);
+  });
+}
+
+WorldBounds TriangleCursor::read_bounds(uint64_t first, uint64_t count) {
+  WorldBounds bounds;
+  read(first, count, [&](std::span<const WorldTriangle> batch) { bounds.add(bounds_of(batch)); });
+  return bounds;
+}
 
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
                                            const SceneOptions& options, MemoryBudget& budget,

@@ -26,7 +26,7 @@ struct SourceFile {
 // Reads the triangles of a scene for one thread; any number of cursors may read at the same time.
 class TriangleCursor {
  public:
-  using Visitor = std::function<void(std::span<const WorldTriangle>)>;
+  using Visitor = std::function<void(std::span<const RealTriangle>)>;
 
   virtual ~TriangleCursor() = default;
   // Calls `visit` with batches of 1 to 1024 triangles, all finite: those among the declared
@@ -34,6 +34,10 @@ class TriangleCursor {
   // back to earlier triangles takes longer. Throws Error naming scene file, node, mesh, primitive
   // or accessor.
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
+  // Does the same with each vertex snapped to `grid`.
+  virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
+  // The bounds of the triangles that read() visits.
+  virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
 };
 
 class TriangleSource {

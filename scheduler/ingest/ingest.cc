@@ -24,8 +24,8 @@ class TooManyReaders : public Error {
   explicit TooManyReaders(const Error& error) : Error(error) {}
 };
 
-// Reads the scene from triangle `position` on: clears a Piece, adds to it all batches of a piece,
-// and commits it, which moves `position` to its end.
+// Reads the scene from triangle `position` on: has a Piece read itself, and commits it, which moves
+// `position` to its end.
 template <class Piece, class MakePiece, class Commit>
 void read_pieces(TriangleSource& scene, const uint64_t& position, const StageContext& context,
                  MakePiece make_piece, Commit commit) {
@@ -52,15 +52,11 @@ void read_pieces(TriangleSource& scene, const uint64_t& position, const StageCon
               reader.cursor = scene.open(readers);
               make_piece(reader.piece);
             }
-            reader.piece->clear();
-            reader.cursor->read(
-                begin_of(item), end_of(item) - begin_of(item),
-                [&](std::span<const WorldTriangle> batch) { reader.piece->add(batch); });
+            reader.piece->read(*reader.cursor, begin_of(item), end_of(item) - begin_of(item));
           } catch (const Error& error) {
             if (readers == 1 || error.code() != ErrorCode::kOutOfMemory) throw;
             throw TooManyReaders(error);
           }
-          reader.piece->finish();
         },
         [&](unsigned number, size_t item) {
           context.build.cancel.check();
@@ -77,9 +73,9 @@ void read_pieces(TriangleSource& scene, const uint64_t& position, const StageCon
 
 class PieceBounds {
  public:
-  void clear() { bounds_ = {}; }
-  void add(std::span<const WorldTriangle> batch) { bounds_.add(bounds_of(batch)); }
-  void finish() {}
+  void read(TriangleCursor& cursor, uint64_t first, uint64_t count) {
+    bounds_ = cursor.read_bounds(first, count);
+  }
   const WorldBounds& bounds() const { return bounds_; }
 
  private:
@@ -95,29 +91,15 @@ class SnappedPiece {
         records_(budget, kPieceTriangles * record_bytes, "a piece of the scene"),
         tally_(top) {}
 
-  void clear() {
+  void read(TriangleCursor& cursor, uint64_t first, uint64_t count) {
     counts_ = {};
     too_far_.reset();
     tally_.clear();
+    cursor.read_snapped(first, count, grid_, [this](std::span<const SnappedTriangle> batch) {
+      for (const SnappedTriangle& triangle : batch) add(triangle);
+    });
+    checksum_ = checksum128(records());
   }
-
-  void add(std::span<const WorldTriangle> batch) {
-    for (const WorldTriangle& world : batch) {
-      FixedTriangle triangle;
-      switch (snap_triangle(grid_, world, triangle)) {
-        case SnapResult::kOutside:
-          ++counts_.dropped_outside;
-          break;
-        case SnapResult::kTooFar:
-          if (!too_far_) too_far_ = counts_.triangles + counts_.dropped_outside;
-          break;
-        case SnapResult::kInside:
-          add(triangle);
-          break;
-      }
-    }
-  }
-  void finish() { checksum_ = checksum128(records()); }
 
   const IngestCounts& counts() const { return counts_; }
   // How many triangles of the piece come before the first that reaches too far, if there is one.
@@ -129,8 +111,19 @@ class SnappedPiece {
   TopTree::Tally& tally() { return tally_; }
 
  private:
-  void add(const FixedTriangle& triangle) {
-    const ExpectedWork work = expected_work(triangle);
+  void add(const SnappedTriangle& snapped) {
+    FixedTriangle triangle;
+    switch (to_fixed(grid_, snapped, triangle)) {
+      case SnapResult::kOutside:
+        ++counts_.dropped_outside;
+        return;
+      case SnapResult::kTooFar:
+        if (!too_far_) too_far_ = counts_.triangles + counts_.dropped_outside;
+        return;
+      case SnapResult::kInside:
+        break;
+    }
+    const ExpectedWork work = expected_work(snapped);
     counts_.expected_voxels += work.voxels;
     tally_.add(triangle, work.bricks);
     encode_triangle(triangle, record_bytes_, records_.data() + counts_.triangles * record_bytes_);

@@ -16,13 +16,15 @@ constexpr int64_t kMinCellEdge = 2 * kSmallestEdge;
 
 }  // namespace
 
-ExpectedWork expected_work(const FixedTriangle& t) {
+ExpectedWork expected_work(const SnappedTriangle& t) {
   constexpr double kVoxel = 1.0 / kUnitsPerVoxel, kBrick = 1.0 / kBrickEdge;
   double e[2][3], extents = 0;  // in voxels
   for (int a = 0; a < 3; ++a) {
-    e[0][a] = static_cast<double>(t.v[1][a] - t.v[0][a]) * kVoxel;
-    e[1][a] = static_cast<double>(t.v[2][a] - t.v[0][a]) * kVoxel;
-    extents += static_cast<double>(t.high(a) - t.low(a)) * kVoxel;
+    e[0][a] = (t.v[1][a] - t.v[0][a]) * kVoxel;
+    e[1][a] = (t.v[2][a] - t.v[0][a]) * kVoxel;
+    const double low = std::min(std::min(t.v[0][a], t.v[1][a]), t.v[2][a]);
+    const double high = std::max(std::max(t.v[0][a], t.v[1][a]), t.v[2][a]);
+    extents += (high - low) * kVoxel;
   }
   double area = 0;  // of the three projections: area * (|nx| + |ny| + |nz|)
   for (int a = 0; a < 3; ++a) {

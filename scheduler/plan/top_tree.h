@@ -13,6 +13,7 @@
 #include "core/base/page_buffer.h"
 #include "core/geometry/cube.h"
 #include "core/geometry/fixed_triangle.h"
+#include "core/geometry/grid.h"
 #include "core/geometry/octree_descent.h"
 
 namespace voxdag {
@@ -23,7 +24,7 @@ namespace voxdag {
 struct ExpectedWork {
   double voxels, bricks;
 };
-ExpectedWork expected_work(const FixedTriangle& triangle);
+ExpectedWork expected_work(const SnappedTriangle& triangle);
 
 struct SubvolumePlan {
   Cube cube;

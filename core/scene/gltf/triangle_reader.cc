@@ -1,6 +1,7 @@
 #include "core/scene/gltf/triangle_reader.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/base/error.h"
 #include "core/scene/gltf/messages.h"
@@ -18,11 +19,10 @@ uint64_t largest_vertex_count(const Document& document) {
   return largest;
 }
 
-bool is_finite(const WorldTriangle& triangle) {
-  double sum = 0;  // of zeros, or of one that is not a number
-  for (const auto& vertex : triangle.v)
-    for (const double x : vertex) sum += x - x;
-  return sum == 0;
+// All coordinates of a vertex that is not finite are NaN.
+bool is_finite(const RealTriangle& triangle) {
+  return !std::isnan(triangle.v[0][0]) && !std::isnan(triangle.v[1][0]) &&
+         !std::isnan(triangle.v[2][0]);
 }
 
 }  // namespace
@@ -39,9 +39,38 @@ TriangleReader::TriangleReader(const Document& document, BufferReader& buffers,
       corners_(3 * kWindowTriangles),
       batch_(budget, kBatchTriangles, "a batch of triangles") {}
 
-void TriangleReader::read(uint64_t first, uint64_t count, const Visitor& visit) {
+void TriangleReader::read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit) {
   visit_ = &visit;
   batch_size_ = 0;
+  for_each_instance(first, count, grid, [&](uint64_t of_instance, uint64_t n) {
+    for_each_window(of_instance, n,
+                    [&](const uint32_t* corners, uint64_t size) { place_all(corners, size); });
+  });
+  flush();
+}
+
+WorldBounds TriangleReader::read_bounds(uint64_t first, uint64_t count) {
+  WorldBounds bounds;
+  const Visitor add_batch = [&](std::span<const WorldTriangle> batch) {
+    bounds.add(bounds_of(batch));
+  };
+  visit_ = &add_batch;
+  batch_size_ = 0;
+  for_each_instance(first, count, nullptr, [&](uint64_t of_instance, uint64_t n) {
+    for_each_window(of_instance, n, [&](const uint32_t* corners, uint64_t size) {
+      cancel_.check();
+      if (size < window_count_ || !add_bounds_of_window(bounds)) place_all(corners, size);
+    });
+  });
+  flush();
+  return bounds;
+}
+
+// Calls body(first, count) for each part of the triangles that one instance declares, which is
+// placed.
+template <class Body>
+void TriangleReader::for_each_instance(uint64_t first, uint64_t count, const Grid* grid,
+                                       const Body& body) {
   for (const uint64_t end = first + count; first < end;) {
     seek(first);
     if (!draw_.is_bound) bind_draw();
@@ -54,11 +83,10 @@ void TriangleReader::read(uint64_t first, uint64_t count, const Visitor& visit) 
     world_ = binding_.skin >= 0 ? Transform{} : walk_->global();
     const Node& node = document_.nodes[static_cast<size_t>(draw_.node)];
     if (node.instancing.present) world_ = multiply(world_, instances_->at(instance_));
-    cache_.place(world_);
-    read_instance(of_instance, n);
+    cache_.place(world_, grid);
+    body(of_instance, n);
     first += n;
   }
-  flush();
 }
 
 // Makes draw_ the one of the triangle.
@@ -120,11 +148,13 @@ void TriangleReader::bind(const Node& node, size_t primitive_index) {
   binding_ = next;
 }
 
-void TriangleReader::read_instance(uint64_t first, uint64_t count) {
+// Calls body(corners, count) for each part of an instance's triangles that the window holds.
+template <class Body>
+void TriangleReader::for_each_window(uint64_t first, uint64_t count, const Body& body) {
   while (count > 0) {
     const uint32_t* const corners = load_corners(first, count);
     const uint64_t n = std::min(count, window_first_ + window_count_ - first);
-    place_all(corners, n);
+    body(corners, n);
     first += n;
     count -= n;
   }
@@ -135,6 +165,7 @@ void TriangleReader::read_instance(uint64_t first, uint64_t count) {
 const uint32_t* TriangleReader::load_corners(uint64_t first, uint64_t count) {
   if (first < window_first_ || first >= window_first_ + window_count_) {
     window_count_ = 0;
+    used_vertices_.clear();
     const bool fits = draw_.triangles <= kWindowTriangles;
     const uint64_t from = fits ? 0 : first;
     const uint64_t n = fits ? draw_.triangles : std::min(count, kWindowTriangles);
@@ -143,6 +174,41 @@ const uint32_t* TriangleReader::load_corners(uint64_t first, uint64_t count) {
     window_count_ = n;
   }
   return &corners_[3 * static_cast<size_t>(first - window_first_)];
+}
+
+// Each vertex once if they lie near each other, as those of a mesh mostly do.
+void TriangleReader::find_used_vertices() {
+  const std::span<const uint32_t> corners(corners_.data(), 3 * static_cast<size_t>(window_count_));
+  const auto [low, high] = std::ranges::minmax(corners);
+  has_valid_indices_ = high < vertex_count_;
+  if (high - low > kMaxUsedRange) {
+    used_vertices_.assign(corners.begin(), corners.end());
+    return;
+  }
+  is_used_.assign(high - low + 1, 0);
+  for (const uint32_t corner : corners) is_used_[corner - low] = 1;
+  for (uint32_t i = 0; i <= high - low; ++i)
+    if (is_used_[i]) used_vertices_.push_back(low + i);
+}
+
+// False if a triangle of the window may be invalid; nothing is added then.
+bool TriangleReader::add_bounds_of_window(WorldBounds& bounds) {
+  if (used_vertices_.empty()) find_used_vertices();
+  if (!has_valid_indices_) return false;
+  WorldBounds window{.empty = false};
+  const double* const first = cache_.at(used_vertices_[0]);
+  std::copy_n(first, 3, window.low.begin());
+  std::copy_n(first, 3, window.high.begin());
+  for (const uint32_t vertex : used_vertices_) {
+    const double* const position = cache_.at(vertex);
+    for (size_t a = 0; a < 3; ++a) {
+      window.low[a] = std::min(window.low[a], position[a]);
+      window.high[a] = std::max(window.high[a], position[a]);
+    }
+  }
+  if (!cache_.all_finite()) return false;
+  bounds.add(window);
+  return true;
 }
 
 void TriangleReader::place_all(const uint32_t* corners, uint64_t count) {
@@ -162,7 +228,7 @@ void TriangleReader::flush() {
 }
 
 // False for a corner out of range or a vertex that is not finite in world space.
-bool TriangleReader::place(const uint32_t* corners, WorldTriangle& out) {
+bool TriangleReader::place(const uint32_t* corners, RealTriangle& out) {
   if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
   for (int k = 0; k < 3; ++k) std::copy_n(cache_.at(corners[k]), 3, out.v[k]);
   return cache_.all_finite() || is_finite(out);

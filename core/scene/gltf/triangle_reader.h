@@ -25,19 +25,23 @@ struct ReaderOptions {
 
 class TriangleReader {
  public:
-  using Visitor = std::function<void(std::span<const WorldTriangle>)>;
+  using Visitor = std::function<void(std::span<const RealTriangle>)>;
 
   TriangleReader(const Document& document, BufferReader& buffers, const ReaderOptions& options,
                  MemoryBudget& budget, const CancelToken& cancel);
 
   // Visits the triangles of [first, first + count), numbered in the order in which the document
-  // declares them, in batches of up to 1024. Throws Error{kInvalidInput} naming node, mesh and
-  // primitive of an invalid triangle, unless `skip_invalid` drops it.
-  void read(uint64_t first, uint64_t count, const Visitor& visit);
+  // declares them, in batches of up to 1024, in world space or snapped to the grid if there is one.
+  // Throws Error{kInvalidInput} naming node, mesh and primitive of an invalid triangle, unless
+  // `skip_invalid` drops it.
+  void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
+  // The bounds of those triangles in world space.
+  WorldBounds read_bounds(uint64_t first, uint64_t count);
 
  private:
   static constexpr size_t kBatchTriangles = 1024;
   static constexpr uint64_t kWindowTriangles = 4096;
+  static constexpr uint32_t kMaxUsedRange = 16 * kWindowTriangles;
 
   // All instances of a primitive that a node draws.
   struct Draw {
@@ -56,14 +60,19 @@ class TriangleReader {
     bool operator==(const Binding&) const = default;
   };
 
+  template <class Body>
+  void for_each_instance(uint64_t first, uint64_t count, const Grid* grid, const Body& body);
   void seek(uint64_t triangle);
   void next_draw();
   void bind_draw();
   void bind(const Node& node, size_t primitive_index);
-  void read_instance(uint64_t first, uint64_t count);
+  template <class Body>
+  void for_each_window(uint64_t first, uint64_t count, const Body& body);
+  void find_used_vertices();
+  bool add_bounds_of_window(WorldBounds& bounds);
   const uint32_t* load_corners(uint64_t first, uint64_t count);
   void place_all(const uint32_t* corners, uint64_t count);
-  bool place(const uint32_t* corners, WorldTriangle& out);
+  bool place(const uint32_t* corners, RealTriangle& out);
   void flush();
   void report(const uint32_t* corners) const;
 
@@ -89,8 +98,12 @@ class TriangleReader {
   std::vector<uint32_t>
       corners_;  // vertex indices of window_count_ triangles from window_first_ on
   uint64_t window_first_ = 0, window_count_ = 0;
+  // The vertices that the window's triangles use, some perhaps more than once; empty if not known.
+  std::vector<uint32_t> used_vertices_;
+  bool has_valid_indices_ = false;  // once used_vertices_ are known
+  std::vector<uint8_t> is_used_;
 
-  PageBuffer<WorldTriangle> batch_;
+  PageBuffer<RealTriangle> batch_;
   size_t batch_size_ = 0;
   const Visitor* visit_ = nullptr;
 };

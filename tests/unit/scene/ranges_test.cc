@@ -1,6 +1,8 @@
 // Any range of a scene can be read, by any number of cursors.
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "core/base/error.h"
 #include "tests/unit/scene/scene_files.h"
 
@@ -9,12 +11,13 @@ namespace {
 
 constexpr uint32_t kBeyond = 1000;  // no vertex has that index
 
-// A mesh of two primitives, one with an invalid triangle, drawn by a node, by one with five
+// A mesh of two primitives, each with an invalid triangle, drawn by a node, by one with five
 // instances, and by a third.
 SceneBuilder repeated_meshes() {
   SceneBuilder scene;
   std::vector<float> corners;
   for (int i = 0; i < 60; ++i) corners.push_back(static_cast<float>(i * i % 37));
+  corners.back() = std::numeric_limits<float>::infinity();
   const int positions = scene.add_positions(corners);
   const int indices =
       scene.add_accessor<uint32_t>("SCALAR", kU32, {0, 1, 2, 3, kBeyond, 5, 6, 7, 8, 9, 10, 11});
@@ -33,16 +36,35 @@ SceneBuilder repeated_meshes() {
   return scene;
 }
 
+Corners corners_of(const RealTriangle& triangle) {
+  Corners corners;
+  for (size_t k = 0; k < 3; ++k) std::copy_n(triangle.v[k], 3, corners[k].begin());
+  return corners;
+}
+
+// Checks also that what is read snapped, and the bounds, are those of these triangles.
 std::vector<Corners> triangles_between(TriangleCursor& cursor, uint64_t first, uint64_t end) {
-  std::vector<Corners> all;
+  const Grid grid = Grid::given({-3, 2, 0.1}, 70, 10);
+  std::vector<Corners> all, all_snapped, read_snapped;
+  WorldBounds bounds;
   cursor.read(first, end - first, [&](std::span<const WorldTriangle> batch) {
     EXPECT_TRUE(!batch.empty() && batch.size() <= 1024);
-    for (const WorldTriangle& t : batch) {
-      Corners corners;
-      for (size_t k = 0; k < 3; ++k) std::copy_n(t.v[k], 3, corners[k].begin());
-      all.push_back(corners);
+    bounds.add(bounds_of(batch));
+    for (RealTriangle t : batch) {
+      all.push_back(corners_of(t));
+      for (auto& vertex : t.v) snap_vertices(grid, vertex);
+      all_snapped.push_back(corners_of(t));
     }
   });
+  const WorldBounds read_bounds = cursor.read_bounds(first, end - first);
+  EXPECT_EQ(read_bounds.empty, bounds.empty);
+  EXPECT_EQ(read_bounds.low, bounds.low);
+  EXPECT_EQ(read_bounds.high, bounds.high);
+  cursor.read_snapped(first, end - first, grid, [&](std::span<const SnappedTriangle> batch) {
+    EXPECT_TRUE(!batch.empty() && batch.size() <= 1024);
+    for (const SnappedTriangle& t : batch) read_snapped.push_back(corners_of(t));
+  });
+  EXPECT_EQ(read_snapped, all_snapped);
   return all;
 }
 
@@ -59,7 +81,7 @@ TEST(SceneRanges, AnyTriangleMayBeTheFirst) {
     each.push_back(triangles_between(*cursor, i, i + 1));
     valid += each.back().size();
   }
-  EXPECT_EQ(valid, declared - 7);
+  EXPECT_EQ(valid, declared - 14);
   for (uint64_t first = 0; first <= declared; ++first)
     for (uint64_t end = first; end <= declared; end += 5) {
       std::vector<Corners> expected;
@@ -69,14 +91,19 @@ TEST(SceneRanges, AnyTriangleMayBeTheFirst) {
     }
 }
 
-// Pieces of a scene of several windows, instances and files, read by two cursors in turn.
+// Pieces of a scene of several windows, instances and files, read by two cursors in turn. Most of
+// its triangles use vertices near each other, the last ones use some that are far away, and none
+// uses those between.
 TEST(SceneRanges, CursorsDoNotDisturbEachOther) {
   SceneBuilder scene;
+  constexpr int kNear = 3000, kFar = 80'000, kVertices = kFar + kNear;
   std::vector<float> corners;
-  for (int i = 0; i < 3 * 3000; ++i) corners.push_back(static_cast<float>(i % 1009));
+  for (int i = 0; i < 3 * kVertices; ++i)
+    corners.push_back(i < 3 * kNear || i >= 3 * kFar ? static_cast<float>(i % 1009) : 1e6f);
   std::vector<uint32_t> indices;
-  for (uint32_t i = 0; i < 3 * 5000; ++i) indices.push_back(i * 7 % 3000);
-  indices[3 * 17] = indices[3 * 4096] = kBeyond * 1000;
+  for (uint32_t i = 0; i < 3 * 5000; ++i)
+    indices.push_back(i * 7 % kNear + (i % 3 == 1 && i > 3 * 4700 ? kFar : 0));
+  indices[3 * 17] = indices[3 * 4710] = kBeyond * 1000;
   const int positions = scene.add_positions(corners);
   const int index_accessor = scene.add_accessor("SCALAR", kU32, indices);
   scene.add_mesh({{"attributes", {{"POSITION", positions}}}, {"indices", index_accessor}});

@@ -38,6 +38,13 @@ std::vector<size_t> touched_by_brute_force(const FixedTriangle& t,
   return touched;
 }
 
+ExpectedWork expected_work(const FixedTriangle& t) {
+  SnappedTriangle snapped;
+  for (int i = 0; i < 3; ++i)
+    for (int a = 0; a < 3; ++a) snapped.v[i][a] = static_cast<double>(t.v[i][a]);
+  return voxdag::expected_work(snapped);
+}
+
 void add(TopTree& top, const FixedTriangle& t) {
   TopTree::Tally tally(top);
   tally.add(t, expected_work(t).bricks);

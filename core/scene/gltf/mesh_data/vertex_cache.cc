@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 namespace voxdag::gltf {
 
@@ -32,9 +33,12 @@ void VertexCache::bind(VertexSource& source) {
   source_ = &source;
 }
 
-void VertexCache::place(const Transform& world) {
-  if (std::memcmp(&world, &world_, sizeof world) != 0) forget();
+void VertexCache::place(const Transform& world, const Grid* grid) {
+  const bool is_same_grid = grid ? grid_ == *grid : !grid_;
+  if (is_same_grid && std::memcmp(&world, &world_, sizeof world) == 0) return;
+  forget();
   world_ = world;
+  if (!is_same_grid) grid_ = grid ? std::optional(*grid) : std::nullopt;
 }
 
 void VertexCache::forget() {
@@ -53,8 +57,12 @@ void VertexCache::load(uint64_t block, size_t slot) {
     double* const vertex = &out[i];
     const double local[3] = {vertex[0], vertex[1], vertex[2]};
     apply(world_, local, vertex);
-    all_finite_ &= (vertex[0] - vertex[0]) + (vertex[1] - vertex[1]) + (vertex[2] - vertex[2]) == 0;
+    if ((vertex[0] - vertex[0]) + (vertex[1] - vertex[1]) + (vertex[2] - vertex[2]) != 0) {
+      std::fill_n(vertex, 3, std::numeric_limits<double>::quiet_NaN());
+      all_finite_ = false;
+    }
   }
+  if (grid_) snap_vertices(*grid_, out);
   block_in_slot_[slot] = block;
 }
 

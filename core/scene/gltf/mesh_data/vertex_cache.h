@@ -1,15 +1,18 @@
-// Random access to the vertex positions of an instance of a primitive, in world space, within a
-// fixed amount of memory: blocks of consecutive vertices, each cached in the one slot that its
-// number maps to. An instance that fits is read once; so is, about, a larger one whose indices stay
-// near each other. A primitive of up to 262144 vertices is decoded once for all its instances.
+// Random access to the vertex positions of an instance of a primitive, in world space or snapped to
+// a grid, within a fixed amount of memory: blocks of consecutive vertices, each cached in the one
+// slot that its number maps to. An instance that fits is read once; so is, about, a larger one
+// whose indices stay near each other. A primitive of up to 262144 vertices is decoded once for all
+// its instances.
 #pragma once
 
 #include <bit>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "core/base/page_buffer.h"
+#include "core/geometry/grid.h"
 #include "core/scene/gltf/mesh_data/vertex_source.h"
 
 namespace voxdag::gltf {
@@ -24,10 +27,11 @@ class VertexCache {
 
   // Forgets everything and serves `source` from now on, which must outlive its use. Needs place().
   void bind(VertexSource& source);
-  // Serves the source's vertices after this transform from now on.
-  void place(const Transform& world);
+  // Serves the source's vertices after this transform, and snapped to the grid if there is one,
+  // from now on. All coordinates of a vertex that is not finite after the transform become NaN.
+  void place(const Transform& world, const Grid* grid);
 
-  // Whether all vertices that were served since place() are finite numbers.
+  // Whether all vertices that were served since place() are finite.
   bool all_finite() const { return all_finite_; }
   // Three doubles, valid until the next call; `vertex` must be below the source's count.
   const double* at(uint64_t vertex) {
@@ -46,11 +50,12 @@ class VertexCache {
   void load(uint64_t block, size_t slot);
   void read(uint64_t block, std::span<double> out);
 
-  PageBuffer<double> positions_;  // in world space
+  PageBuffer<double> positions_;  // as they are served
   // Of a source of few blocks, as it gives them, and which blocks were read.
   PageBuffer<double> untransformed_;
   std::vector<bool> is_read_;
   Transform world_;
+  std::optional<Grid> grid_;
   bool all_finite_ = true;
   std::vector<uint64_t> block_in_slot_;
   size_t slot_mask_ = 0;
