@@ -12,7 +12,7 @@ from pathlib import Path
 
 import measure
 
-RESOLUTIONS = [1024, 4096, 8192]
+RESOLUTIONS = [1024, 8192, 32768]
 # Upper limits of estimate / truth and of truth / estimate.
 WITHIN = {"voxels": 1.25, "file_bytes": 2.0, "disk_bytes": 2.0, "memory_bytes": 2.0}
 SHOWN = ["voxels", "file_bytes", "disk_bytes", "memory_bytes", "dag_nodes", "cpu_s"]

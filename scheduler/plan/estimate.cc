@@ -17,9 +17,12 @@
 namespace voxdag {
 namespace {
 
-// The growth of the DAG per doubling of R, above 2, falls by this factor per doubling: measured on
-// Sponza (2.98 at 2048 to 2.58 at 131072) and the dragon (2.77 to 3.17 and back to 2.74).
-constexpr double kGrowthDecay = 0.95;
+// What the growth of the DAG per doubling of R exceeds this by falls by this factor per doubling.
+// Measured from 8192 on: Sponza's falls from 2.72 to 2.52 at 524288, the dragon's from 3.17 to 2.75
+// at 32768 and 2.65 on average to 262144. At coarser resolutions it falls and rises again, while
+// triangles become larger than bricks: hence fine pilots.
+constexpr double kLateGrowth = 2.5;
+constexpr double kGrowthDecay = 0.75;
 // Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
 // Bytes per node of the global file: a pilot has fewer, since coarse levels repeat more.
@@ -33,13 +36,19 @@ constexpr double kArtifactBytesPerNode = 16;
 constexpr double kMaxDiskBytesPerNode = 40;
 constexpr double kBuildOverPilotTime = 1.5;
 // Peak memory of the merge per unique node, and memory of a process without a scene.
-constexpr double kMemoryBytesPerNode = 34;
+constexpr double kMemoryBytesPerNode = 26;
 constexpr double kBaseMemoryBytes = 24e6;
 
 // Below this resolution a build fits any disk that can hold its scene: no estimate is made.
 constexpr uint32_t kMinLevelsToEstimate = 12;
 // The pilot of this estimate is so much coarser than the build that it costs next to nothing.
 constexpr uint32_t kPilotLevelsBelow = 5;
+
+// The finer pilot of a plan: large builds are extrapolated from 8192^3, which costs a second or two
+// and the largest scenes' triangles twice.
+uint32_t plan_pilot_levels(uint32_t grid_levels) {
+  return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);
+}
 
 EstimateRange exactly(double value) { return {value, value, value}; }
 EstimateRange within(double value, double factor) {
@@ -113,19 +122,19 @@ std::optional<PilotCounts> build_pilot(const TriangleStore& triangles, uint32_t 
   return counts;
 }
 
-// Pilots at up to three resolutions, a doubling apart, coarsest first.
+// Pilots at two resolutions, a doubling apart, the coarser first: the finest that fit the budget.
+// Fewer if those of a few resolutions do not fit: what the triangles take does not depend on it.
 std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
                                       MemoryBudget& budget, const CancelToken& cancel) {
   const auto backend = make_cpu_backend();
   MemoryBudget share(MemoryPlan::pilot_bytes(budget.available()), &budget);
   std::vector<PilotCounts> pilots;
   const uint32_t finest = std::min(pilot_levels, scene.state.grid.levels);
-  const uint32_t coarsest = std::max<uint32_t>(kMinGridLevels, finest < 4 ? 2 : finest - 2);
-  for (uint32_t levels = coarsest; levels <= finest; ++levels) {
+  const uint32_t coarsest = std::max<uint32_t>(kMinGridLevels, finest - std::min(finest, 4u));
+  for (uint32_t levels = finest; levels >= coarsest && pilots.size() < 2; --levels) {
     const auto pilot =
         build_pilot(*scene.triangles, scene.state.grid.levels, levels, *backend, share, cancel);
-    if (!pilot) break;  // the finer ones would not fit either
-    pilots.push_back(*pilot);
+    if (pilot) pilots.insert(pilots.begin(), *pilot);
   }
   return pilots;
 }
@@ -138,15 +147,14 @@ double grow_as_surface(double coarse, double fine, uint32_t doublings) {
   return std::max(square * ratio * ratio + linear * ratio, fine);
 }
 
-// Growth per doubling observed over the pilots (their geometric mean), falling from there.
+// The growth from the last pilot but one to the last, falling from there.
 double grow_as_dag(const std::vector<PilotCounts>& pilots, uint32_t doublings) {
   const double nodes = pilots.back().dag_nodes;
   if (pilots.size() < 2 || nodes == 0) return nodes * std::exp2(1.5 * doublings);
-  const double steps = static_cast<double>(pilots.size() - 1);
-  double growth = std::pow(nodes / std::max(pilots.front().dag_nodes, 1.0), 1 / steps);
+  double growth = nodes / std::max(pilots[pilots.size() - 2].dag_nodes, 1.0);
   double result = nodes;
   for (uint32_t i = 0; i < doublings; ++i) {
-    if (growth > 2) growth = 2 + (growth - 2) * kGrowthDecay;
+    if (growth > kLateGrowth) growth = kLateGrowth + (growth - kLateGrowth) * kGrowthDecay;
     result *= growth;
   }
   return result;
@@ -270,8 +278,6 @@ std::string make_plan_folder() {
 }  // namespace
 
 Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
-  // A pilot of 2048^3 takes a second or two and holds for every resolution above.
-  constexpr uint32_t kPilotLevels = 11;
   const BuildSpec full = checked(spec);
   return_freed_memory_to_system();
   MemoryBudget budget(full.run.memory_bytes);
@@ -288,7 +294,8 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   } cleanup{work, full.run.work_folder.empty()};
   IngestCheckpoint no_checkpoints(full, nullptr, work, context);
   const PreparedScene scene = prepare_scene(full, budget, clock, context, no_checkpoints);
-  Estimate estimate = estimate_build(scene, kPilotLevels, full.run.threads, budget, context.cancel);
+  Estimate estimate = estimate_build(scene, plan_pilot_levels(scene.state.grid.levels),
+                                     full.run.threads, budget, context.cancel);
   estimate.free_disk = context.files.free_space(work.path());
   return estimate;
 }

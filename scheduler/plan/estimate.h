@@ -2,8 +2,8 @@
 // resolutions, extrapolated to the requested one.
 //
 // Voxels and octree nodes grow as a R^2 + b R (surfaces and their borders): two pilots give a and
-// b. DAG nodes grow by a factor per doubling of R that falls slowly toward 2 as surfaces flatten
-// under the voxel: three pilots give the factor and how fast it falls. The spread widens with the
+// b. DAG nodes grow by a factor per doubling of R: two pilots give the first, and how it falls from
+// there as surfaces flatten under the voxel is measured on real scenes. The spread widens with the
 // distance.
 #pragma once
 
