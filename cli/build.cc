@@ -12,6 +12,7 @@ struct BuildCommand {
   BuildOptions options;
   RunOptions run;
   std::string cache_size;
+  ClusterOptions cluster;
   bool json = false;
 };
 
@@ -26,6 +27,13 @@ void print(const BuildReport& r) {
               count_text(r.subvolumes).c_str(), count_text(r.subvolumes_split).c_str(),
               size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge.passes,
               r.merge.passes == 1 ? "" : "es");
+  if (const auto& c = r.cluster)
+    std::printf(
+        "  %s batches on %zu nodes, %s attempts failed, %s CPU in tasks; nodes that their merges "
+        "took %s, left %s\n",
+        count_text(c->batches).c_str(), c->batches_of_node.size(), count_text(c->attempts).c_str(),
+        duration_text(c->cpu_s).c_str(), count_text(c->rows_before).c_str(),
+        count_text(c->rows_after).c_str());
   std::printf(" ");
   for (const StageTime& stage : r.stages)
     std::printf(" %s %s%s", stage.name.c_str(), duration_text(stage.wall_s).c_str(),
@@ -46,6 +54,10 @@ void run(const BuildCommand& command, CommandContext& context) {
     spec.run.cache_bytes = parse_size(command.cache_size, "--cache-size");
   spec.run.restart = command.run.restart;
   spec.run.force = command.run.force;
+  if (!command.cluster.engine.empty()) {
+    spec.run.cluster = command.cluster;
+    spec.run.cluster->program_version = VOXDAG_VERSION;
+  }
   const auto progress = make_progress_bar();
   const BuildReport report = [&] {
     try {
@@ -69,6 +81,32 @@ void declare(Command& command, BuildCommand& state) {
   command.flag("--keep-work", state.run.keep_work, "do not remove the work folder");
   command.flag("--restart", state.run.restart, "start over instead of resuming the work folder");
   command.flag("--force", state.run.force, "build even if the estimate says it cannot fit");
+  constexpr const char* kCluster = "Cluster (docs/cluster.md)";
+  command.option("--cluster", state.cluster.engine, "build on a cluster: slurm")
+      .one_of({"slurm"})
+      .group(kCluster);
+  command.option("--cluster-tasks", state.cluster.tasks, "tasks (default: by expected work)")
+      .positive()
+      .group(kCluster);
+  command
+      .option("--cluster-running", state.cluster.max_running,
+              "tasks that run at a time (default: as many as the cluster starts)")
+      .positive()
+      .group(kCluster);
+  command
+      .option("--cluster-options", state.cluster.submit_options,
+              "options of sbatch, such as \"--partition=x --mem=8G --time=2:00:00\"")
+      .group(kCluster);
+  command
+      .option("--cluster-retries", state.cluster.max_retries,
+              "how often a batch that fails is submitted again")
+      .show_default()
+      .group(kCluster);
+  command
+      .option("--cluster-grace", state.cluster.grace_s,
+              "seconds that the shared disk may take to show what a task wrote")
+      .show_default()
+      .group(kCluster);
   command.json_flag(state.json);
 }
 

@@ -73,6 +73,7 @@ Option Command::option(const char* names, T& value, const char* description) {
 template Option Command::option(const char*, int&, const char*);
 template Option Command::option(const char*, unsigned&, const char*);
 template Option Command::option(const char*, uint64_t&, const char*);
+template Option Command::option(const char*, double&, const char*);
 template Option Command::option(const char*, std::optional<double>&, const char*);
 template Option Command::option(const char*, std::string&, const char*);
 template Option Command::option(const char*, std::vector<std::string>&, const char*);

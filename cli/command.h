@@ -111,6 +111,9 @@ State& add_command(CommandLine& line, const char* name, const char* description)
 }
 
 void add_build_command(CommandLine& line);
+// Started by the engine of a cluster.
+void add_build_batch_command(CommandLine& line);
+void add_stop_tasks_command(CommandLine& line);
 void add_plan_command(CommandLine& line);
 void add_status_command(CommandLine& line);
 void add_info_command(CommandLine& line);

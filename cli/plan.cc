@@ -3,6 +3,7 @@
 #include "cli/build_options.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
+#include "scheduler/cluster/cluster_plan.h"
 #include "scheduler/plan/estimate.h"
 
 namespace voxdag::cli {
@@ -10,6 +11,8 @@ namespace {
 
 struct PlanCommand {
   BuildOptions options;
+  std::string cluster;
+  uint64_t cluster_tasks = 0;
   bool json = false;
 };
 
@@ -37,19 +40,44 @@ void print(const Estimate& e) {
               size_text(e.free_memory).c_str());
 }
 
+void print(const ClusterPlan& plan) {
+  const auto size = [](double value) { return size_text(static_cast<uint64_t>(value)); };
+  const auto hours = [](double value) { return duration_text(3600 * value); };
+  std::printf("on the cluster: %s tasks of %s or more\n", count_text(plan.tasks).c_str(),
+              size_text(plan.memory_bytes).c_str());
+  print_range("CPU of all tasks", plan.cpu_hours, hours);
+  print_range("a task, one CPU", plan.task_s, duration_text);
+  print_range("merge, one CPU", plan.merge_s, duration_text);
+  print_range("shared disk", plan.shared_bytes, size);
+}
+
 void run(const PlanCommand& command, CommandContext& context) {
   const auto progress = make_progress_bar();
   const Estimate estimate =
       plan_build(command.options.spec(), {context.files, *progress, context.cancel});
-  if (command.json)
-    std::printf("%s\n", estimate_json(estimate).c_str());
-  else
+  if (command.cluster.empty()) {
+    if (command.json)
+      std::printf("%s\n", estimate_json(estimate).c_str());
+    else
+      print(estimate);
+    return;
+  }
+  const ClusterPlan plan = plan_cluster(estimate, command.cluster_tasks);
+  if (command.json) {
+    std::printf("%s\n", cluster_plan_json(estimate, plan).c_str());
+  } else {
     print(estimate);
+    print(plan);
+  }
 }
 
 void declare(Command& command, PlanCommand& state) {
   state.options.declare(command);
   state.options.declare_work_folder(command);
+  command.option("--cluster", state.cluster, "also what a cluster would take: slurm")
+      .one_of({"slurm"});
+  command.option("--cluster-tasks", state.cluster_tasks, "tasks (default: by expected work)")
+      .positive();
   command.json_flag(state.json);
 }
 

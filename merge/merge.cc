@@ -14,37 +14,59 @@ namespace {
 // Rows of an artifact are counted in 32 bits.
 constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
 
-// Merges in passes while not all artifacts fit at once, then into the global file.
+// Merges in passes while not all artifacts fit at once, then into the global file or an artifact.
 class Merger {
  public:
-  Merger(const MergeInputs& inputs, const MergeContext& context, const GlobalFileWriter& out,
+  Merger(const MergeInputs& inputs, const MergeContext& context, uint64_t narrow_words,
          Checkpoint* checkpoint)
       : inputs_(inputs),
         context_(context),
         // Passes before the final one also have the writer of a segment in memory.
         pass_bytes_(context.plan.partition_bytes -
                     std::min(context.plan.partition_bytes, kSegmentWriterBytes)),
-        pending_(inputs, out.narrow_words()),
+        pending_(inputs, narrow_words),
         recovery_(inputs, context, pending_, checkpoint) {}
 
   void run(GlobalFileWriter& out) {
     PassProgress progress = recovery_.restore(out);
-    const uint64_t rows_before = context_.report.input_nodes;
-    const auto all_rows = [&] {
-      return context_.report.input_nodes + (fit_at_once() ? 1 : 2) * pending_.rows();
-    };
-    context_.progress.begin(all_rows(), rows_before);
-    while (!progress.level && !fit_at_once()) {
-      run_pass();
-      context_.progress.set_total(all_rows());
-    }
+    context_.progress.begin(all_rows(), context_.report.input_nodes);
+    if (!progress.level) run_passes();
     run_final_pass(out, std::move(progress));
     recovery_.finish();
     context_.progress.end();
   }
 
+  ArtifactRef run(SegmentWriter& out) {
+    context_.progress.begin(all_rows(), 0);
+    run_passes();
+    const ArtifactSet artifacts = pending_.open(0, pending_.size(), context_.budget);
+    ArtifactWriter writer(out, inputs_.shape);
+    ArtifactOutput output(writer);
+    const PassTask task{inputs_.shape, false, artifacts.readers()};
+    const std::vector<ArtifactRoot> roots = run_merge_pass(context_, task, output, {}, {});
+    for (const ArtifactRoot& root : roots) {
+      context_.report.voxels += root.voxels;
+      context_.report.svo_nodes += root.svo_nodes;
+    }
+    ++context_.report.passes;
+    context_.progress.end();
+    return writer.finish(roots);
+  }
+
  private:
   bool fit_at_once() const { return pending_.fit_at_once(context_.plan.partition_bytes); }
+
+  uint64_t all_rows() const {
+    return context_.report.input_nodes + (fit_at_once() ? 1 : 2) * pending_.rows();
+  }
+
+  // Until all artifacts fit at once.
+  void run_passes() {
+    while (!fit_at_once()) {
+      run_pass();
+      context_.progress.set_total(all_rows());
+    }
+  }
 
   // Merges groups of neighboring artifacts into one artifact each.
   void run_pass() {
@@ -126,9 +148,22 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
   MergeProgress rows_merged(progress);
   const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
                              rows_merged, cancel, report};
-  Merger(inputs, context, out, checkpoint).run(out);
+  Merger(inputs, context, out.narrow_words(), checkpoint).run(out);
   report.scratch_bytes += scratch.bytes_written();
   return report;
+}
+
+ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, SegmentWriter& out,
+                              MemoryBudget& budget, unsigned threads, Progress& progress,
+                              const CancelToken& cancel, MergeReport& report) {
+  ScratchFolder scratch(files, inputs.scratch_folder);
+  MergeProgress rows_merged(progress);
+  const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
+                             rows_merged, cancel, report};
+  // Positions in an artifact count rows, of which it has less than a level of the file has words.
+  const ArtifactRef merged = Merger(inputs, context, UINT64_MAX, nullptr).run(out);
+  report.scratch_bytes += scratch.bytes_written();
+  return merged;
 }
 
 }  // namespace voxdag

@@ -1,5 +1,5 @@
-// The one public function of the merge: many sub-DAGs and the top tree above them become one global
-// DAG.
+// The public functions of the merge: many sub-DAGs and the top tree above them become one global
+// DAG, or one artifact.
 //
 // Levels are merged from the bricks up. The nodes above the subvolumes (the top tree) are one more
 // run of their level. A level is merged one hash partition at a time (usually one is enough):
@@ -32,6 +32,7 @@
 #include "core/base/progress.h"
 #include "core/dag/sub_dag.h"
 #include "core/format/artifact/artifact.h"
+#include "core/format/artifact/segment_writer.h"
 #include "core/format/global/global_writer.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
@@ -90,5 +91,13 @@ struct MergeReport {
 MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
                            MemoryBudget& budget, unsigned threads, Progress& progress,
                            const CancelToken& cancel, Checkpoint* checkpoint = nullptr);
+
+// Merges sub-DAGs into one artifact at the end of `out`, which has all their roots: rows that
+// several of them have become one, and a later merge has fewer to read. There must be an input.
+// Throws Error{kOutOfMemory} if even passes over neighbors do not fit the budget, or the artifact
+// would have over 2^32 rows.
+ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, SegmentWriter& out,
+                              MemoryBudget& budget, unsigned threads, Progress& progress,
+                              const CancelToken& cancel, MergeReport& report);
 
 }  // namespace voxdag

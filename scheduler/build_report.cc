@@ -12,7 +12,7 @@ std::string report_json(const BuildReport& report) {
                       {"wall_s", stage.wall_s},
                       {"cpu_s", stage.cpu_s},
                       {"largest_thread_share", stage.largest_thread_share}});
-  const ordered_json json = {
+  ordered_json json = {
       {"output", report.output},
       {"sha256", report.sha256},
       {"resolution", report.grid.resolution()},
@@ -44,6 +44,16 @@ std::string report_json(const BuildReport& report) {
       {"voxels_per_s",
        report.wall_s > 0 ? static_cast<double>(report.merge.voxels) / report.wall_s : 0.0},
   };
+  if (const auto& c = report.cluster)
+    json["cluster"] = {{"batches", c->batches},
+                       {"failed_attempts", c->attempts},
+                       {"cpu_s", c->cpu_s},
+                       {"longest_s", c->longest_s},
+                       {"first_task_s", c->first_task_s},
+                       {"rows_before", c->rows_before},
+                       {"rows_after", c->rows_after},
+                       {"requests", c->requests},
+                       {"batches_of_node", c->batches_of_node}};
   // A path need not be UTF-8; JSON must be.
   return json.dump(2, ' ', false, ordered_json::error_handler_t::replace);
 }

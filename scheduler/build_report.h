@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/geometry/grid.h"
 #include "merge/merge.h"
+#include "scheduler/cluster/cluster_state.h"
 #include "scheduler/stage_clock.h"
 
 namespace voxdag {
@@ -35,6 +37,7 @@ struct BuildReport {
   double wall_s = 0;
   double cpu_s = 0;
   uint64_t peak_rss_bytes = 0;
+  std::optional<ClusterTotals> cluster;  // of the tasks of a cluster build
 };
 
 // One JSON object; docs/cli.md lists its names.

@@ -16,6 +16,8 @@
 
 namespace voxdag {
 
+class CommandRunner;
+
 // Geometry options decide the bytes of the global file.
 struct GeometryOptions {
   std::vector<std::string> scenes;              // glTF files, together one scene
@@ -29,6 +31,22 @@ struct GeometryOptions {
 // Geometry options as one line of JSON, to compare jobs and for messages. Scenes are left out: only
 // their content counts.
 std::string geometry_json(const GeometryOptions& options);
+
+// Subvolumes are built by the tasks of a cluster's engine instead of this process's threads.
+struct ClusterOptions {
+  std::string engine;          // slurm
+  uint64_t tasks = 0;          // 0 for a choice by expected work
+  uint64_t max_running = 0;    // tasks at a time; 0 for as many as the cluster runs
+  std::string submit_options;  // further options of sbatch, as a shell would split them
+  std::string program_path;    // of voxdag, the same on all machines; "" for this program's
+  std::string program_version;
+  uint64_t max_retries = 3;  // of a batch that fails
+  // How long the shared disk may take to show the record of a task that ended.
+  double grace_s = 15;
+  double slurm_interval_s = 5;  // between two questions to Slurm
+  // Runs Slurm's commands; tests have others. Null for the system's.
+  CommandRunner* commands = nullptr;
+};
 
 // Run options never change the bytes of the global file.
 struct RunOptions {
@@ -50,6 +68,7 @@ struct RunOptions {
   bool keep_work = false;
   bool restart = false;  // start over, whatever the work folder holds
   bool force = false;    // build though the estimate says that it cannot fit
+  std::optional<ClusterOptions> cluster;
 };
 
 struct BuildSpec {

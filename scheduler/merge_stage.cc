@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
 
 #include "core/base/error.h"
 #include "core/format/artifact/artifact_reader.h"
 #include "core/format/checksum.h"
+#include "core/geometry/octree_descent.h"
 #include "merge/merge.h"
 
 namespace voxdag {
@@ -43,12 +45,16 @@ struct DamagedSubvolume {
   std::string what;  // what is wrong with its artifact
 };
 
+// Reads the frames only if `reads_frames`.
 void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
-                const StoredSubvolume& subvolume) {
+                const StoredSubvolume& subvolume, bool reads_frames) {
   const ArtifactReader reader(std::move(segment), subvolume.artifact);
-  const auto roots = reader.roots();
-  if (roots.size() != 1 || !(roots[0].cube == subvolume.cube))
+  // A cluster's task may have split the subvolume, and merged it with others.
+  if (std::ranges::none_of(reader.roots(), [&](const ArtifactRoot& root) {
+        return contains(subvolume.cube, root.cube);
+      }))
     throw Error(ErrorCode::kCorrupt, "the artifact is that of another cube");
+  if (!reads_frames) return;
   Frame frame;
   for (const ArtifactLevel& l : reader.levels())
     for (size_t i = 0; l.level < level && i < l.frames.size(); ++i)
@@ -62,13 +68,16 @@ std::vector<DamagedSubvolume> find_damaged(std::span<const StoredSubvolume> subv
                                            const CancelToken& cancel) {
   std::vector<DamagedSubvolume> damaged;
   std::map<uint32_t, std::shared_ptr<ReadableFile>> segments;
+  std::set<std::pair<uint32_t, uint64_t>> sound;  // artifacts, by their places
   for (const StoredSubvolume& subvolume : subvolumes) {
     if (subvolume.state != SubvolumeState::kBuilt || subvolume.summary.empty()) continue;
     cancel.check();
     try {
       auto& segment = segments[subvolume.artifact.segment];
       if (!segment) segment = work.open_segment(subvolume.artifact.segment);
-      read_above(level, segment, subvolume);
+      const std::pair place(subvolume.artifact.segment, subvolume.artifact.offset);
+      read_above(level, segment, subvolume, !sound.contains(place));
+      sound.insert(place);
     } catch (const Error& error) {
       if (!error.is_corruption()) throw;
       damaged.push_back({subvolume, error.message()});
@@ -78,6 +87,23 @@ std::vector<DamagedSubvolume> find_damaged(std::span<const StoredSubvolume> subv
 }
 
 }  // namespace
+
+std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes) {
+  std::vector<ArtifactRef> artifacts;
+  std::map<std::pair<uint32_t, uint64_t>, ArtifactRef> seen;
+  for (const StoredSubvolume& subvolume : subvolumes) {
+    if (subvolume.summary.empty()) continue;
+    const ArtifactRef& artifact = subvolume.artifact;
+    const auto [first, is_new] = seen.try_emplace({artifact.segment, artifact.offset}, artifact);
+    if (is_new)
+      artifacts.push_back(artifact);
+    else if (first->second != artifact)
+      throw Error(ErrorCode::kCorrupt, "job.db: two artifacts lie at byte " +
+                                           std::to_string(artifact.offset) + " of segment " +
+                                           std::to_string(artifact.segment));
+  }
+  return artifacts;
+}
 
 bool MergeStage::run(const RunOptions& options, BuildReport& report) {
   if (is_published(report)) return true;
@@ -107,8 +133,7 @@ bool MergeStage::is_published(BuildReport& report) {
 void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildReport& report) {
   MergeInputs inputs;
   inputs.shape = {.grid_levels = report.grid.levels, .hash_bits = report.hash_bits};
-  for (const StoredSubvolume& subvolume : store_.leaves())
-    if (!subvolume.summary.empty()) inputs.artifacts.push_back(subvolume.artifact);
+  inputs.artifacts = distinct_artifacts(store_.leaves());
   const MemoryCharge list(budget_, inputs.artifacts.size() * sizeof(ArtifactRef),
                           "the list of artifacts");
   inputs.open_segment = [&](uint32_t id) { return work_.open_segment(id); };

@@ -15,6 +15,9 @@
 
 namespace voxdag {
 
+// The artifacts of built subvolumes; several subvolumes may have one in common.
+std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes);
+
 class MergeStage {
  public:
   MergeStage(JobStore& store, CommitQueues& commits, WorkFolder& work, MemoryBudget& budget,

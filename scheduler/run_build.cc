@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/io/overwrite.h"
+#include "scheduler/cluster/cluster_build.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/execute/executor.h"
 #include "scheduler/job/build_locks.h"
@@ -106,6 +107,11 @@ std::string full_disk_advice(std::span<const StoredSubvolume> leaves) {
   return "; the job is paused: free " + needed + "disk space and run the same command again";
 }
 
+CommandRunner& commands_of(const BuildSpec& spec) {
+  return spec.run.cluster && spec.run.cluster->commands ? *spec.run.cluster->commands
+                                                        : system_commands();
+}
+
 // One build, stage by stage. What the work folder already has is not built again.
 class Build {
  public:
@@ -147,10 +153,12 @@ class Build {
  private:
   BuildReport run_stages() {
     const double start_s = wall_seconds();
-    if (start_over_)
+    if (start_over_) {
       checkpoint_.forget();
-    else
+      remove_tasks();
+    } else {
       refuse_other_options();
+    }
     work_.remove_spilled();
     build_artifacts();
     if (spec_.run.keep_work) commits_.commit_in_background();
@@ -208,7 +216,12 @@ class Build {
     report_subvolumes(jobs_->leaves(), scene.state.grid.levels, context_.progress);
     const std::vector<StoredSubvolume> planned = planned_leaves(*jobs_);
     report_.subvolumes_reused = jobs_->leaves().size() - planned.size();
-    if (!planned.empty()) build_subvolumes_of(scene, planned);
+    if (!planned.empty())
+      spec_.run.cluster ? build_on_cluster(scene, planned) : build_subvolumes_of(scene, planned);
+    if (spec_.run.cluster) {
+      report_.cluster = cluster_->totals();
+      report_.subvolumes_split = cluster_->totals().split;
+    }
     if (scene.triangles) report_.spill_bytes += scene.triangles->file_bytes();
     report_artifacts();
   }
@@ -229,11 +242,57 @@ class Build {
       jobs_->start({scene.digest(), geometry_json(spec_.geometry), kWorkFormatVersion}, plan);
       start_over_ = false;
     }
+    if (spec_.run.cluster || context_.files.exists(work_.cluster_path())) {
+      cluster_ = std::make_unique<ClusterBuild>(spec_, work_, *jobs_, context_, commands_of(spec_));
+      cluster_->resume(scene.digest(), {.grid_levels = scene.state.grid.levels,
+                                        .hash_bits = spec_.geometry.hash_bits});
+    }
+    if (!spec_.run.cluster) remove_tasks();
+    // After the cluster's records were taken over: the job store names all segments now.
     std::set<uint32_t> named;
     for (const StoredSubvolume& subvolume : jobs_->leaves())
       if (subvolume.state == SubvolumeState::kBuilt) named.insert(subvolume.artifact.segment);
     work_.remove_garbage([&](uint32_t segment) { return named.contains(segment); });
     if (!jobs_->merge()) work_.empty_scratch();
+  }
+
+  // The tasks of the cluster build what is planned. The triangles go to their batches.
+  void build_on_cluster(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
+    const std::set<SubvolumeId> covered = cluster_->covered();
+    std::vector<StoredSubvolume> added;
+    std::vector<Cube> cubes;
+    for (const StoredSubvolume& subvolume : planned) {
+      if (covered.contains(subvolume.id)) continue;
+      added.push_back(subvolume);
+      cubes.push_back(subvolume.cube);
+    }
+    if (!added.empty()) {
+      const std::vector<BinId> bins =
+          partition_prepared(scene, cubes, checkpoint_, {context_, spec_.run.threads, budget_});
+      clock_.finish("partition");
+      cluster_->add(added, bins, *scene.triangles, spec_.run.threads);
+    }
+    checkpoint_.finish();
+    report_.spill_bytes += scene.triangles ? scene.triangles->file_bytes() : 0;
+    scene.triangles.reset();
+    clock_.finish("batches");
+    report_.backend = "slurm";
+    cluster_->follow();
+    clock_.finish("build");
+  }
+
+  // Stops what may still run on a cluster for this work folder, a second attempt for instance, and
+  // removes what it has there.
+  void remove_tasks() {
+    cluster_.reset();
+    if (!context_.files.exists(work_.cluster_path())) return;
+    try {
+      ClusterBuild::stop_tasks(context_.files, work_.path(), commands_of(spec_));
+    } catch (const Error& error) {
+      // Tasks without their batches fail; they cannot harm this build.
+      context_.progress.warn(error.message());
+    }
+    work_.remove_cluster_files();
   }
 
   void build_subvolumes_of(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
@@ -278,10 +337,10 @@ class Build {
     const std::vector<StoredSubvolume> leaves = jobs_->leaves();
     report_.subvolumes = leaves.size();
     report_.artifact_bytes = report_.artifact_nodes = 0;
-    for (const StoredSubvolume& subvolume : leaves) {
-      report_.artifact_bytes += subvolume.artifact.bytes;
+    for (const ArtifactRef& artifact : distinct_artifacts(leaves))
+      report_.artifact_bytes += artifact.bytes;
+    for (const StoredSubvolume& subvolume : leaves)
       report_.artifact_nodes += subvolume.summary.dag_nodes;
-    }
   }
 
   void merge_artifacts() {
@@ -330,6 +389,9 @@ class Build {
 
   std::string advice(ErrorCode code) {
     if (code == ErrorCode::kNoSpace) return full_disk_advice(jobs_->leaves());
+    if (code == ErrorCode::kCanceled && spec_.run.cluster)
+      return "; its tasks run on: run the same command again to follow them, or stop them with "
+             "voxdag stop-tasks";
     if (code == ErrorCode::kCanceled) return "; run the same command again to resume";
     return "";
   }
@@ -337,6 +399,7 @@ class Build {
   void remove_work() {
     progress_.detach();
     commits_.clear();
+    remove_tasks();
     jobs_.reset();
     work_.remove();
   }
@@ -352,6 +415,7 @@ class Build {
   JobProgress progress_;
   const BuildContext context_;
   IngestCheckpoint checkpoint_;
+  std::unique_ptr<ClusterBuild> cluster_;  // if a cluster builds the subvolumes, or has begun to
   BuildReport report_;
   bool start_over_ = spec_.run.restart;
 };
@@ -362,6 +426,7 @@ BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
   const BuildSpec full = checked(spec);
   check_places(full, context);
   return_freed_memory_to_system();
+  if (full.run.cluster) ClusterBuild::check(full, commands_of(full), context.cancel);
   return Build(full, context).run();
 }
 

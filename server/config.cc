@@ -79,7 +79,7 @@ class Members {
 };
 
 Members members_of(ServerConfig& c) {
-  Members tls, jobs, transfers, connections, retention, all;
+  Members tls, jobs, cluster, transfers, connections, retention, all;
   tls.add("certificate_file", c.http.certificate_file).add("key_file", c.http.key_file);
   jobs.add("max_concurrent", c.jobs.max_concurrent)
       .add("memory", c.jobs.memory_bytes)
@@ -93,6 +93,13 @@ Members members_of(ServerConfig& c) {
       .add("max_queued", c.jobs.max_queued)
       .add("plan_timeout_s", c.jobs.plan_timeout_s)
       .add("max_concurrent_plans", c.jobs.max_concurrent_plans);
+  cluster.add("engine", c.cluster.engine)
+      .add("tasks", c.cluster.tasks)
+      .add("running", c.cluster.max_running)
+      .add("options", c.cluster.submit_options)
+      .add("program", c.cluster.program_path)
+      .add("retries", c.cluster.max_retries)
+      .add("grace_s", c.cluster.grace_s);
   transfers.add("max_scene_size", c.transfers.max_scene_bytes)
       .add("max_body_size", c.transfers.max_body_bytes)
       .add("max_concurrent", c.transfers.max_concurrent)
@@ -119,6 +126,7 @@ Members members_of(ServerConfig& c) {
       .add("drain_timeout_s", c.drain_timeout_s)
       .nest("tls", tls)
       .nest("jobs", jobs)
+      .nest("cluster", cluster)
       .nest("transfers", transfers)
       .nest("connections", connections)
       .nest("retention", retention);
@@ -159,6 +167,8 @@ void check_config(const ServerConfig& config) {
   expect(config.jobs.memory_bytes == 0 ||
              config.jobs.memory_bytes / config.jobs.max_concurrent >= kMinMemory,
          "jobs.memory: expected at least 64MiB for each of jobs.max_concurrent");
+  expect(config.cluster.engine.empty() || config.cluster.engine == "slurm",
+         "cluster.engine: expected slurm");
   for (const std::string& root : config.scene_roots)
     expect(root.starts_with('/'), "scene_roots: '" + root + "': expected an absolute folder");
 }

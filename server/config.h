@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/io/file_system.h"
+#include "scheduler/build_spec.h"
 #include "server/http/http_server.h"
 #include "server/steps.h"
 
@@ -51,6 +52,7 @@ struct ServerConfig {
   // Runs the jobs. This is this program, even after another was installed under the same name.
   std::string program = "/proc/self/exe";
   JobLimits jobs;
+  ClusterOptions cluster;  // where subvolumes are built; no engine: on this machine
   TransferLimits transfers;
   Retention retention;
   bool adopt = false;          // takes up jobs and scenes whose records are lost

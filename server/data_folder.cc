@@ -15,22 +15,6 @@ uint64_t inode_of(const std::string& path) {
 
 }  // namespace
 
-void remove_entries(FileSystem& files, const std::string& path) {
-  if (!files.exists(path)) return;
-  for (const DirectoryEntry& entry : files.list(path)) {
-    const std::string inner = path + "/" + entry.name;
-    if (entry.is_directory)
-      remove_tree(files, inner);
-    else
-      files.remove(inner);
-  }
-}
-
-void remove_tree(FileSystem& files, const std::string& path) {
-  remove_entries(files, path);
-  if (files.exists(path)) files.remove_directory(path);
-}
-
 bool has_entries(FileSystem& files, const std::string& path) {
   return files.exists(path) && !files.list(path).empty();
 }

@@ -13,10 +13,6 @@ namespace voxdag::server {
 // The name that something has once its deletion has begun. No scene and no job has such a name.
 inline constexpr const char* kDeleted = ".deleted";
 
-// Removes all that is in a folder, if it exists.
-void remove_entries(FileSystem& files, const std::string& path);
-// Removes a folder and all that is in it, if it exists.
-void remove_tree(FileSystem& files, const std::string& path);
 // Whether a folder exists and has any entry.
 bool has_entries(FileSystem& files, const std::string& path);
 

@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace voxdag {
@@ -19,6 +21,16 @@ struct SubvolumeStatus {
   uint64_t voxels = 0;
   uint64_t nodes = 0;
   uint64_t bytes = 0;
+};
+
+// The batches of a build on a cluster, and the tasks for them.
+struct ClusterTasks {
+  uint64_t batches = 0;                           // all of them
+  uint64_t built = 0;                             // batches
+  uint64_t waiting = 0;                           // tasks
+  uint64_t failed_attempts = 0;                   // of tasks
+  std::map<std::string, uint64_t> running;        // tasks, by node
+  std::map<std::string, uint64_t> built_of_node;  // batches
 };
 
 class Progress {
@@ -45,6 +57,8 @@ class Progress {
   virtual void subvolume_split(int64_t /*id*/, std::span<const SubvolumeStatus> /*parts*/) {}
   // What the build uses now: resident memory, and disk space of the work folder.
   virtual void set_usage(uint64_t /*memory_bytes*/, uint64_t /*disk_bytes*/) {}
+  // How the tasks of a cluster stand.
+  virtual void set_cluster_tasks(const ClusterTasks& /*tasks*/) {}
 };
 
 // Ignores everything.

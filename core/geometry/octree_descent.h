@@ -17,6 +17,11 @@ inline Cube ancestor(const Cube& cube, uint32_t level) {
   return {level, {cube.position[0] >> up, cube.position[1] >> up, cube.position[2] >> up}};
 }
 
+// Whether `inner` is `outer` or lies in it.
+inline bool contains(const Cube& outer, const Cube& inner) {
+  return inner.level >= outer.level && ancestor(inner, outer.level) == outer;
+}
+
 // The inside of a cube. Neighbors in a scene mostly lie in the same cube, so that the last one is
 // worth asking before the octree is descended.
 class CubeInside {

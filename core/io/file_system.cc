@@ -33,4 +33,20 @@ void write_file_atomically(FileSystem& files, const std::string& path, std::stri
   files.sync_directory(parent_directory(path));
 }
 
+void remove_entries(FileSystem& files, const std::string& path) {
+  if (!files.exists(path)) return;
+  for (const DirectoryEntry& entry : files.list(path)) {
+    const std::string inner = path + "/" + entry.name;
+    if (entry.is_directory)
+      remove_tree(files, inner);
+    else
+      files.remove(inner);
+  }
+}
+
+void remove_tree(FileSystem& files, const std::string& path) {
+  remove_entries(files, path);
+  if (files.exists(path)) files.remove_directory(path);
+}
+
 }  // namespace voxdag

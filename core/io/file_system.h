@@ -106,6 +106,11 @@ FileSystem& system_files();
 // foresee, and returns its path.
 std::string make_temporary_folder(const std::string& prefix);
 
+// Removes all that is in a folder, if it exists.
+void remove_entries(FileSystem& files, const std::string& path);
+// Removes a folder and all that is in it, if it exists.
+void remove_tree(FileSystem& files, const std::string& path);
+
 // The directory part of a path, "." if it has none.
 std::string parent_directory(const std::string& path);
 // The whole of a small file; one larger than `limit_bytes` is Error{kLimit}.

@@ -10,6 +10,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/artifact/artifact_writer.h"
+#include "scheduler/execute/split_subvolume.h"
 #include "scheduler/job/job_progress.h"
 #include "scheduler/memory_plan.h"
 #include "scheduler/triangles/partition.h"
@@ -153,36 +154,9 @@ class Worker {
                   "a subvolume of " + std::to_string(kSmallestEdge) +
                       " voxels per edge does not fit a worker's share of " +
                       std::to_string(share_.limit()) + " bytes: give it more memory (--memory)");
-    std::vector<Cube> parts(8);
-    std::vector<BinId> part_bins(8);
-    for (int c = 0; c < 8; ++c) {
-      parts[c] = subvolume.cube.child(c);
-      part_bins[c] = triangles_.add_part(whole.bin);
-    }
-    const CubeTree tree(options_.shape.grid_levels, subvolume.cube, parts);
-    partition(triangles_, whole.bin, tree, part_bins, MemoryPlan::kSplitBufferBytes, cancel_);
-    std::vector<QueuedSubvolume> queued;
-    std::vector<Cube> cubes;
-    for (int c = 0; c < 8; ++c) {
-      if (triangles_.count(part_bins[c]) == 0) {
-        triangles_.release(part_bins[c]);
-        continue;
-      }
-      cubes.push_back(parts[c]);
-      queued.push_back({StoredSubvolume{}, part_bins[c]});
-      queued.back().subvolume.cube = parts[c];
-      queued.back().subvolume.weight = subvolume.weight / 8;
-    }
-    const std::vector<SubvolumeId> ids = jobs_.record_split(subvolume, cubes);
-    std::vector<SubvolumeStatus> statuses;
-    for (size_t i = 0; i < ids.size(); ++i) {
-      queued[i].subvolume.id = ids[i];
-      statuses.push_back(status_of(queued[i].subvolume, options_.shape.grid_levels));
-    }
-    progress_.subvolume_split(subvolume.id, statuses);
-    triangles_.release(whole.bin);
     ++counts.split;
-    return queued;
+    return split_subvolume(whole, options_.shape.grid_levels, triangles_, jobs_, progress_,
+                           cancel_);
   }
 
   const ExecutorOptions& options_;

@@ -32,6 +32,7 @@ class JobProgress : public Progress {
   void subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) override {
     shown_.subvolume_split(id, parts);
   }
+  void set_cluster_tasks(const ClusterTasks& tasks) override { shown_.set_cluster_tasks(tasks); }
   void record_failure(const Error& error);
   // From here on progress is only passed on: the store is about to close.
   void detach();

@@ -37,7 +37,7 @@ JobStatus read_job_status(FileSystem& files, const std::string& work_folder) {
   return status;
 }
 
-std::string status_json(const JobStatus& status) {
+std::string status_json(const JobStatus& status, const std::string& cluster) {
   using nlohmann::ordered_json;
   ordered_json stages = ordered_json::array();
   for (const StageTime& stage : status.stages)
@@ -50,6 +50,7 @@ std::string status_json(const JobStatus& status) {
       {"stages", stages},
   };
   if (status.geometry.empty()) json["geometry"] = nullptr;
+  if (!cluster.empty()) json["cluster"] = ordered_json::parse(cluster);
   if (const auto& p = status.progress) {
     json["stage"] = p->stage;
     json["unit"] = p->unit;

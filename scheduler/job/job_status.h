@@ -30,6 +30,8 @@ struct JobStatus {
 JobStatus read_job_status(FileSystem& files, const std::string& work_folder);
 
 // One JSON object, names as in docs/cli.md.
-std::string status_json(const JobStatus& status);
+// `cluster`: that of a cluster build as JSON, if it
+// is one.
+std::string status_json(const JobStatus& status, const std::string& cluster = "");
 
 }  // namespace voxdag

@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::string_view kLockName = "lock";
 constexpr std::string_view kScratchName = "merge";
+constexpr std::string_view kClusterName = "cluster";
 // Threads that remove files, which takes half a second per GB of a file that is cached.
 constexpr unsigned kRemovers = 4;
 
@@ -36,10 +37,23 @@ bool is_scratch(const DirectoryEntry& entry) {
          (segment_id(entry.name) || entry.name.starts_with("merge-"));
 }
 
+// Files and folders of a cluster build; cluster/cluster_folder.h lists them.
+bool is_of_cluster(const DirectoryEntry& entry) {
+  if (entry.is_special) return false;
+  const std::string_view name = entry.name;
+  if (entry.is_directory) return name.starts_with("attempt-");
+  if (name.starts_with(".nfs")) return true;  // NFS: a file that was removed while it is open
+  const auto is = [&](std::string_view begin, std::string_view end) {
+    return name.starts_with(begin) && (name.ends_with(end) || name.ends_with(".partial"));
+  };
+  return is("batch-", ".vdbatch") || is("batch-", ".json") || is("log-", ".txt") ||
+         is("cluster.json", "cluster.json");
+}
+
 bool is_ours(const DirectoryEntry& entry) {
   if (entry.is_special) return false;
   const std::string_view name = entry.name;
-  if (entry.is_directory) return name == kScratchName;
+  if (entry.is_directory) return name == kScratchName || name == kClusterName;
   return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
          name == "job.db-journal" || name.ends_with(".vdspill") || name.ends_with(".vddurable") ||
          segment_id(name).has_value();
@@ -82,9 +96,14 @@ void WorkFolder::check_is_ours() const {
   };
   for (const DirectoryEntry& entry : files_.list(path_))
     if (!is_ours(entry)) refuse(entry.name);
-  if (!files_.exists(scratch_path())) return;
-  for (const DirectoryEntry& entry : files_.list(scratch_path()))
-    if (!is_scratch(entry)) refuse(std::string(kScratchName) + "/" + entry.name);
+  const auto check_folder = [&](std::string_view name, bool (*is_known)(const DirectoryEntry&)) {
+    const std::string folder = path_ + "/" + std::string(name);
+    if (!files_.exists(folder)) return;
+    for (const DirectoryEntry& entry : files_.list(folder))
+      if (!is_known(entry)) refuse(std::string(name) + "/" + entry.name);
+  };
+  check_folder(kScratchName, is_scratch);
+  check_folder(kClusterName, is_of_cluster);
 }
 
 std::string WorkFolder::holder(FileSystem& files, const std::string& folder) {
@@ -115,13 +134,14 @@ std::shared_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {
 uint32_t WorkFolder::next_segment_id() const {
   uint32_t next = 0;
   for (const DirectoryEntry& entry : files_.list(path_))
-    if (const auto id = segment_id(entry.name)) next = std::max(next, *id + 1);
+    if (const auto id = segment_id(entry.name); id && *id < kFirstClusterSegment)
+      next = std::max(next, *id + 1);
   return next;
 }
 
 uint64_t WorkFolder::bytes() const {
   uint64_t bytes = 0;
-  for (const std::string& folder : {path_, scratch_path()}) {
+  for (const std::string& folder : {path_, scratch_path(), cluster_path()}) {
     if (!files_.exists(folder)) continue;
     for (const DirectoryEntry& entry : files_.list(folder))
       if (!entry.is_directory) bytes += std::min(entry.bytes, entry.disk_bytes);
@@ -134,6 +154,28 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
     const auto id = segment_id(entry.name);
     if (id && !is_named(*id)) files_.remove(path_ + "/" + entry.name);
   }
+}
+
+// A task that still runs may add files at any time: the folder is left then.
+void WorkFolder::remove_cluster_files() {
+  if (!files_.exists(cluster_path())) return;
+  for (const DirectoryEntry& entry : files_.list(cluster_path())) {
+    if (!is_of_cluster(entry)) continue;
+    const std::string path = cluster_path() + "/" + entry.name;
+    if (!entry.is_directory) {
+      remove_silently(path);
+      continue;
+    }
+    // The attempt may remove it, too.
+    try {
+      for (const DirectoryEntry& inner : files_.list(path))
+        if (segment_id(inner.name)) remove_silently(path + "/" + inner.name);
+    } catch (const Error&) {
+      continue;
+    }
+    remove_if_empty(path);
+  }
+  remove_if_empty(cluster_path());
 }
 
 void WorkFolder::release(const SegmentRange& range) {
@@ -155,6 +197,14 @@ std::vector<std::string> WorkFolder::scratch_files() const {
   return paths;
 }
 
+void WorkFolder::remove_if_empty(const std::string& folder) {
+  try {
+    files_.remove_directory(folder);
+  } catch (const Error&) {
+    // What is not ours, or was added just now, stays.
+  }
+}
+
 void WorkFolder::remove_silently(const std::string& path) {
   try {
     if (files_.exists(path)) files_.remove(path);
@@ -172,6 +222,7 @@ void WorkFolder::remove() {
       if (is_ours(entry) && !entry.is_directory && entry.name != kLockName)
         others.push_back(path_ + "/" + entry.name);
     parallel_for(kRemovers, others.size(), [&](unsigned, size_t i) { files_.remove(others[i]); });
+    remove_cluster_files();
     if (files_.exists(scratch_path())) files_.remove_directory(scratch_path());
     files_.remove(path_ + "/" + std::string(kLockName));
     files_.remove_directory(path_);

@@ -16,6 +16,9 @@
 
 namespace voxdag {
 
+// Segments that tasks of a cluster wrote have ids from here on, those of this process below.
+inline constexpr uint32_t kFirstClusterSegment = uint32_t{1} << 24;
+
 class WorkFolder {
  public:
   // Makes the folder and locks it. Throws Error{kIo} if another process still has it locked after
@@ -35,6 +38,8 @@ class WorkFolder {
   // Triangles that outlive a run.
   std::string durable_path() const { return path_ + "/triangles.vddurable"; }
   std::string scratch_path() const { return path_ + "/merge"; }
+  // What a cluster build shares with its tasks.
+  std::string cluster_path() const { return path_ + "/cluster"; }
   std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
   // One more than the largest id of a segment that is there.
   uint32_t next_segment_id() const;
@@ -49,6 +54,8 @@ class WorkFolder {
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
   // Removes merge data.
   void empty_scratch();
+  // Removes what a cluster build has here. Silent, like remove().
+  void remove_cluster_files();
   // Removes spilled triangles. Silent, like remove().
   void remove_spilled() { remove_silently(spill_path()); }
   // Removes durable triangles. Silent, like remove().
@@ -60,6 +67,7 @@ class WorkFolder {
  private:
   void check_is_ours() const;
   std::vector<std::string> scratch_files() const;
+  void remove_if_empty(const std::string& folder);
   void remove_silently(const std::string& path);
 
   FileSystem& files_;

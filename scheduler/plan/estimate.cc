@@ -13,6 +13,7 @@
 #include "core/base/process_limits.h"
 #include "scheduler/job/work_folder.h"
 #include "scheduler/memory_plan.h"
+#include "scheduler/plan/pilot_triangles.h"
 
 namespace voxdag {
 namespace {
@@ -71,26 +72,6 @@ struct PilotCounts {
   double cpu_s = 0;
 };
 
-// The same triangles on a grid that is 2^shift times coarser; coordinates stay odd.
-class CoarserStream : public TriangleStream {
- public:
-  CoarserStream(std::unique_ptr<TriangleStream> fine, uint32_t shift)
-      : fine_(std::move(fine)), shift_(shift) {}
-  uint64_t count() const override { return fine_->count(); }
-  void rewind() override { fine_->rewind(); }
-  size_t read(std::span<FixedTriangle> out) override {
-    const size_t n = fine_->read(out);
-    for (FixedTriangle& triangle : out.first(n))
-      for (auto& vertex : triangle.v)
-        for (int64_t& u : vertex) u = (u >> shift_) | 1;
-    return n;
-  }
-
- private:
-  std::unique_ptr<TriangleStream> fine_;
-  const uint32_t shift_;
-};
-
 class CountingSink : public SubDagSink {
  public:
   void bricks(const BrickLevelView& level) override { words += 2 * level.masks.size(); }
@@ -100,40 +81,49 @@ class CountingSink : public SubDagSink {
   uint64_t words = 0;
 };
 
-// Builds the scene's triangles, snapped to 2^grid_levels, on a grid of 2^pilot_levels. Nothing if
-// that does not fit the budget.
-std::optional<PilotCounts> build_pilot(const TriangleStore& triangles, uint32_t grid_levels,
-                                       uint32_t pilot_levels, Backend& backend,
-                                       MemoryBudget& budget, const CancelToken& cancel) {
+// Builds triangles that are snapped to 2^levels, or finer ones by `shift`, on a grid of 2^levels.
+// Nothing if that does not fit the budget.
+std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t shift,
+                                       uint32_t levels, Backend& backend, MemoryBudget& budget,
+                                       const CancelToken& cancel) {
   const double start = thread_cpu_seconds();
-  CoarserStream stream(triangles.open(kSceneBin), grid_levels - pilot_levels);
+  const auto stream = triangles.open(shift);
   CountingSink sink;
   SubDagSummary summary;
-  if (backend.build({pilot_levels, Cube{}, 64}, stream, budget, cancel, sink, summary) ==
+  if (backend.build({levels, Cube{}, 64}, *stream, budget, cancel, sink, summary) ==
       BuildOutcome::kNeedsSplit)
     return std::nullopt;
   PilotCounts counts;
-  counts.levels = pilot_levels;
+  counts.levels = levels;
   counts.voxels = static_cast<double>(summary.voxels);
   counts.svo_nodes = static_cast<double>(summary.svo_nodes);
   counts.dag_nodes = static_cast<double>(summary.dag_nodes);
   counts.file_bytes = 4.0 * static_cast<double>(sink.words);
-  counts.cpu_s = thread_cpu_seconds() - start;
+  counts.cpu_s = thread_cpu_seconds() - start + triangles.cpu_s();
   return counts;
 }
 
-// Pilots at two resolutions, a doubling apart, the coarser first: the finest that fit the budget.
-// Fewer if those of a few resolutions do not fit: what the triangles take does not depend on it.
+// Pilots at two resolutions, a doubling apart, the coarser first: the finest of which triangles and
+// tables fit the budget. Fewer if those of a few resolutions do not fit.
 std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
-                                      MemoryBudget& budget, const CancelToken& cancel) {
+                                      const StageContext& context) {
   const auto backend = make_cpu_backend();
-  MemoryBudget share(MemoryPlan::pilot_bytes(budget.available()), &budget);
-  std::vector<PilotCounts> pilots;
-  const uint32_t finest = std::min(pilot_levels, scene.state.grid.levels);
+  MemoryBudget share(MemoryPlan::pilot_bytes(context.budget.available()), &context.budget);
+  MemoryBudget triangle_share(share.limit() / 2, &share);
+  const uint32_t grid_levels = scene.state.grid.levels;
+  const uint32_t finest = std::min(pilot_levels, grid_levels);
   const uint32_t coarsest = std::max<uint32_t>(kMinGridLevels, finest - std::min(finest, 4u));
+  std::vector<PilotCounts> pilots;
+  std::optional<PilotTriangles> triangles;
+  uint32_t triangle_levels = finest;
   for (uint32_t levels = finest; levels >= coarsest && pilots.size() < 2; --levels) {
-    const auto pilot =
-        build_pilot(*scene.triangles, scene.state.grid.levels, levels, *backend, share, cancel);
+    if (!triangles || !triangles->is_complete()) {
+      triangles.emplace(*scene.triangles, grid_levels - levels, triangle_share, context);
+      triangle_levels = levels;
+    }
+    if (!triangles->is_complete()) continue;
+    const auto pilot = build_pilot(*triangles, triangle_levels - levels, levels, *backend, share,
+                                   context.build.cancel);
     if (pilot) pilots.insert(pilots.begin(), *pilot);
   }
   return pilots;
@@ -170,14 +160,16 @@ EstimateRange triangles_on_disk(const PreparedScene& scene) {
 
 // Estimates the build of a prepared scene (its triangles stay where they are). The pilots have at
 // most 2^pilot_levels voxels per edge: the finer, the better the estimate and the longer it takes.
-// They run on this thread within `budget`.
-Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsigned threads,
-                        MemoryBudget& budget, const CancelToken& cancel) {
+// The pilots run on this thread, within the budget.
+Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels,
+                        const StageContext& context) {
+  const MemoryBudget& budget = context.budget;
   Estimate estimate;
   estimate.triangles = scene.state.counts.triangles;
   estimate.subvolumes = scene.plan.size();
+  for (const SubvolumePlan& subvolume : scene.plan) estimate.expected_bricks += subvolume.weight;
   estimate.free_memory = budget.limit();
-  const auto pilots = build_pilots(scene, pilot_levels, budget, cancel);
+  const auto pilots = build_pilots(scene, pilot_levels, context);
   if (pilots.empty()) {
     // Too many triangles even for a small grid: their expected voxels are an upper bound.
     estimate.voxels = {0, scene.state.counts.expected_voxels, scene.state.counts.expected_voxels};
@@ -212,7 +204,7 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels, unsig
     *figure = std::min(*figure, static_cast<double>(budget.limit())) + kBaseMemoryBytes;
   const double growth = last.dag_nodes > 0 ? nodes / last.dag_nodes : 1;
   estimate.cpu_s = within(last.cpu_s * growth * kBuildOverPilotTime, 1.5 * spread);
-  estimate.wall_s = (1.05 / std::max(1u, threads)) * estimate.cpu_s;
+  estimate.wall_s = (1.05 / std::max(1u, context.threads)) * estimate.cpu_s;
   return estimate;
 }
 
@@ -295,7 +287,7 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   IngestCheckpoint no_checkpoints(full, nullptr, work, context);
   const PreparedScene scene = prepare_scene(full, budget, clock, context, no_checkpoints);
   Estimate estimate = estimate_build(scene, plan_pilot_levels(scene.state.grid.levels),
-                                     full.run.threads, budget, context.cancel);
+                                     {context, full.run.threads, budget});
   estimate.free_disk = context.files.free_space(work.path());
   return estimate;
 }
@@ -310,7 +302,7 @@ bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene,
       std::min(context.files.free_space(work_folder), context.files.free_space(output_folder));
   if (max_disk_bytes(scene) < static_cast<double>(free_bytes)) return false;
   const Estimate estimate =
-      estimate_build(scene, levels - kPilotLevelsBelow, spec.run.threads, budget, context.cancel);
+      estimate_build(scene, levels - kPilotLevelsBelow, {context, spec.run.threads, budget});
   check_estimate(estimate, context.files, work_folder, output_folder, context.progress);
   return true;
 }

@@ -24,6 +24,7 @@ struct EstimateRange {
 struct Estimate {
   uint64_t triangles = 0;
   uint64_t subvolumes = 0;
+  double expected_bricks = 0;  // of all triangles, each its own
   uint64_t pilot_resolution = 0;
   EstimateRange voxels, svo_nodes, dag_nodes;
   EstimateRange file_bytes;    // of the global file

@@ -32,7 +32,8 @@ class CubeTree {
     Cube cube = root_;
     // A triangle inside one cube touches no other, so that no overlap test is needed that far.
     const CellBox box(triangle, grid_levels_, deepest_);
-    if (const Cube around = box.is_inside_grid() ? box.cube_around() : Cube{}; contains(around))
+    if (const Cube around = box.is_inside_grid() ? box.cube_around() : Cube{};
+        contains(root_, around))
       while (cube.level < around.level && nodes_[node].leaf == kNone) {
         cube = ancestor(around, cube.level + 1);
         node = nodes_[node].child[cube.child_index()];
@@ -50,9 +51,6 @@ class CubeTree {
     int32_t leaf = kNone;  // index of the leaf that this node is, if it is one
   };
 
-  bool contains(const Cube& cube) const {
-    return cube.level >= root_.level && ancestor(cube, root_.level) == root_;
-  }
   template <class Visit>
   void descend(int32_t node, const Cube& cube, const FixedTriangle& triangle,
                const Visit& visit) const {

@@ -5,8 +5,8 @@
 #include <ctime>
 
 #include "core/base/error.h"
+#include "core/io/random_id.h"
 #include "server/http/problem.h"
-#include "server/random_id.h"
 
 namespace voxdag::server {
 namespace {

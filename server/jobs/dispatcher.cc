@@ -7,6 +7,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "scheduler/cluster/cluster_build.h"
 #include "server/jobs/job_outcome.h"
 #include "server/jobs/process/job_task.h"
 
@@ -273,6 +274,7 @@ void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProces
   if (!after) return;
   log_("job " + job.id + " " + state_name(after->state) +
        (after->error ? ": " + after->error->code : ""));
+  if (after->state == JobState::kSuspended || after->state == JobState::kFailed) stop_tasks(job.id);
   remove_work(job.id);
   on_run_ended_(*after);
 }
@@ -296,6 +298,13 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
                     [&](Job& j) { j.preview = drawn ? Preview::kReady : Preview::kFailed; });
   });
   if (!recorded) sleep_s(kMaxSleep_s);
+}
+
+void Dispatcher::stop_tasks(const std::string& id) {
+  steps_.run("stop the cluster's tasks of job " + id, [&] {
+    const FilesLock lock(*this, id);
+    ClusterBuild::stop_tasks(files_, folder(id).work(), system_commands());
+  });
 }
 
 void Dispatcher::remove_work(const std::string& id) {
@@ -349,14 +358,21 @@ Job Dispatcher::cancel(const std::string& id) {
 }
 
 Job Dispatcher::suspend(const std::string& id) {
-  std::lock_guard lock(mutex_);
-  const Job job = queue_.change(id, [&](Job& j) {
-    if (j.state == JobState::kCanceling || has_ended(j.state))
-      throw state_conflict(j, "expected a job that is queued or running");
-    j.state = JobState::kSuspended;
-  });
-  const auto worker = workers_.find(id);
-  if (worker != workers_.end()) worker->second.live->stop();
+  bool runs = false;
+  Job job;
+  {
+    std::lock_guard lock(mutex_);
+    job = queue_.change(id, [&](Job& j) {
+      if (j.state == JobState::kCanceling || has_ended(j.state))
+        throw state_conflict(j, "expected a job that is queued or running");
+      j.state = JobState::kSuspended;
+    });
+    const auto worker = workers_.find(id);
+    runs = worker != workers_.end() && worker->second.runs();
+    if (runs) worker->second.live->stop();
+  }
+  // A service that was killed may have left tasks of a job that is queued since.
+  if (!runs) stop_tasks(id);
   return job;
 }
 
@@ -390,6 +406,8 @@ Job Dispatcher::retry(const std::string& id) {
 }
 
 void Dispatcher::remove(const std::string& id) {
+  queue_.check_removable(id);
+  stop_tasks(id);
   const FilesLock files_lock(*this, id);
   {
     std::lock_guard lock(mutex_);  // no retry
@@ -429,6 +447,19 @@ std::shared_ptr<LiveJob> Dispatcher::live(const std::string& id) const {
   std::lock_guard lock(live_mutex_);
   const auto found = live_.find(id);
   return found == live_.end() ? nullptr : found->second;
+}
+
+ClusterTasks Dispatcher::cluster_tasks() const {
+  ClusterTasks all;
+  std::lock_guard lock(live_mutex_);
+  for (const auto& [id, live] : live_) {
+    const auto tasks = live->cluster_tasks();
+    if (!tasks) continue;
+    all.waiting += tasks->waiting;
+    all.failed_attempts += tasks->failed_attempts;
+    for (const auto& [node, count] : tasks->running) all.running[node] += count;
+  }
+  return all;
 }
 
 size_t Dispatcher::running() const {

@@ -58,6 +58,8 @@ class Dispatcher {
   // Null unless the job's process runs.
   std::shared_ptr<LiveJob> live(const std::string& id) const;
   size_t running() const;
+  // Of all running jobs together.
+  ClusterTasks cluster_tasks() const;
   JobFolder folder(const std::string& id) const;
 
  private:
@@ -88,6 +90,8 @@ class Dispatcher {
   void retire_old_jobs();
   // Finishes deletions that a crash or an error has interrupted.
   void finish_deletions();
+  // Stops what the job left running on the cluster, since nobody follows it.
+  void stop_tasks(const std::string& id);
   // If the job needs its work folder no more.
   void remove_work(const std::string& id);
 

@@ -1,6 +1,7 @@
 #include "server/jobs/job_folders.h"
 
 #include "core/base/clock.h"
+#include "scheduler/cluster/cluster_build.h"
 #include "server/jobs/process/job_process.h"
 #include "server/jobs/process/job_task.h"
 #include "server/jobs/task_resolver.h"
@@ -64,7 +65,12 @@ void JobFolders::clean_up() {
   if (!foreign.empty()) log_("left alone, since it belongs to no job of the queue:" + foreign);
 }
 
-void JobFolders::remove_work(const std::string& id) { remove_tree(files_, of(id).work()); }
+void JobFolders::remove_work(const std::string& id) {
+  const std::string work = of(id).work();
+  steps_.run("stop the cluster's tasks of job " + id,
+             [&] { ClusterBuild::stop_tasks(files_, work, system_commands()); });
+  remove_tree(files_, work);
+}
 
 void JobFolders::mark(const std::string& id) {
   const std::string path = of(id).path;

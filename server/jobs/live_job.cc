@@ -10,6 +10,26 @@ namespace {
 constexpr size_t kMaxWarnings = 100;
 constexpr size_t kMaxStages = 64;
 
+nlohmann::ordered_json cluster_json(const ClusterTasks& tasks) {
+  using nlohmann::ordered_json;
+  std::map<std::string, uint64_t> names = tasks.running;
+  names.insert(tasks.built_of_node.begin(), tasks.built_of_node.end());
+  const auto count = [](const std::map<std::string, uint64_t>& counts, const std::string& name) {
+    const auto found = counts.find(name);
+    return found == counts.end() ? 0 : found->second;
+  };
+  ordered_json nodes = ordered_json::array();
+  for (const auto& [name, any] : names)
+    nodes.push_back({{"name", name},
+                     {"running", count(tasks.running, name)},
+                     {"built", count(tasks.built_of_node, name)}});
+  return {{"batches", tasks.batches},
+          {"built", tasks.built},
+          {"waiting", tasks.waiting},
+          {"failed_attempts", tasks.failed_attempts},
+          {"nodes", std::move(nodes)}};
+}
+
 }  // namespace
 
 void LiveJob::apply(const Message& message) {
@@ -36,6 +56,7 @@ void LiveJob::apply(const Message& message) {
   }
   if (const auto* subvolumes = std::get_if<SubvolumeTotals>(&message)) subvolumes_ = *subvolumes;
   if (const auto* usage = std::get_if<Usage>(&message)) usage_ = *usage;
+  if (const auto* tasks = std::get_if<ClusterTasks>(&message)) cluster_tasks_ = *tasks;
   if (const auto* warning = std::get_if<Warning>(&message);
       warning && warnings_.size() < kMaxWarnings)
     warnings_.push_back(warning->text);
@@ -68,7 +89,7 @@ std::string LiveJob::make_progress() const {
                       {"resumed_at", stage.resumed_at},
                       {"wall_s", stage.wall_s},
                       {"ended", stage.ended}});
-  return json_text(ordered_json{
+  ordered_json progress = {
       {"stage", now.name},
       {"unit", now.unit},
       {"done", now.done},
@@ -83,7 +104,9 @@ std::string LiveJob::make_progress() const {
       {"bytes", subvolumes_.bytes},
       {"memory_bytes", usage_.memory_bytes},
       {"disk_bytes", usage_.disk_bytes},
-  });
+  };
+  if (cluster_tasks_) progress["cluster"] = cluster_json(*cluster_tasks_);
+  return json_text(progress);
 }
 
 void LiveJob::stop() {

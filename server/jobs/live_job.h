@@ -24,6 +24,8 @@ class LiveJob {
   std::string progress_json() const;
   // Counts messages.
   uint64_t version() const { return locked(version_); }
+  // Of the last attempt; nothing if it does not run on a cluster.
+  std::optional<ClusterTasks> cluster_tasks() const { return locked(cluster_tasks_); }
   std::vector<std::string> warnings() const { return locked(warnings_); }
   std::optional<Failure> failure() const { return locked(failure_); }
   // JSON, "" if there is none.
@@ -54,6 +56,7 @@ class LiveJob {
   std::vector<Stage> stages_;
   SubvolumeTotals subvolumes_;
   Usage usage_;
+  std::optional<ClusterTasks> cluster_tasks_;
   std::vector<std::string> warnings_;
   std::optional<Failure> failure_;
   std::string result_;

@@ -76,6 +76,7 @@ Task TaskResolver::make(const JobRequest& request, Task::Kind kind) {
                        "'memory': a job of this service may have at most " +
                            std::to_string(memory_bytes_) + " bytes");
   task.threads = config_.jobs.threads;
+  task.cluster = config_.cluster;
   return task;
 }
 

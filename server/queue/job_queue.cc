@@ -5,8 +5,8 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/db/row.h"
+#include "core/io/random_id.h"
 #include "server/json_text.h"
-#include "server/random_id.h"
 
 namespace voxdag::server {
 

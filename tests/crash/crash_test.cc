@@ -117,7 +117,8 @@ TEST_P(CrashTest, ReadsThatFail) {
     FaultyFiles files({Fault::kReadError, at});
     try {
       run(files);
-      ADD_FAILURE() << "the build went through";
+      // Threads share blocks that are read, so that a run may have a few reads less.
+      EXPECT_LT(files.reads(), at) << "the build went through";
     } catch (const voxdag::Error& error) {
       EXPECT_EQ(error.code(), voxdag::ErrorCode::kIo) << error.what();
     }

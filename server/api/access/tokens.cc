@@ -6,7 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/format/checksum.h"
-#include "server/random_id.h"
+#include "core/io/random_id.h"
 
 namespace voxdag::server {
 namespace {

@@ -5,13 +5,13 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/checksum.h"
+#include "core/io/random_id.h"
 #include "server/api/context.h"
 #include "server/api/job_json.h"
 #include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
 #include "server/data_folder.h"
 #include "server/jobs/process/child_process.h"
-#include "server/random_id.h"
 
 namespace voxdag::server {
 namespace {

@@ -2,11 +2,11 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/io/random_id.h"
 #include "server/api/context.h"
 #include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
 #include "server/http/digest_field.h"
-#include "server/random_id.h"
 
 namespace voxdag::server {
 namespace {

@@ -77,6 +77,15 @@ Response get_metrics(Context& context, double started_s) {
   add("voxdag_free_disk_bytes", "Free disk space for the data folder.", context.disk.free());
   add("voxdag_job_memory_limit_bytes", "Memory limit of all running jobs together.",
       context.tasks.memory_bytes());
+  const ClusterTasks tasks = context.dispatcher.cluster_tasks();
+  uint64_t running = 0;
+  for (const auto& [node, count] : tasks.running) running += count;
+  add("voxdag_cluster_tasks_running", "Tasks of running jobs that run on the cluster.", running);
+  add("voxdag_cluster_tasks_waiting", "Tasks of running jobs that wait for the cluster.",
+      tasks.waiting);
+  add("voxdag_cluster_nodes", "Nodes of the cluster on which tasks run.", tasks.running.size());
+  add("voxdag_cluster_failed_attempts", "Failed attempts of the batches of running jobs.",
+      tasks.failed_attempts);
   add("voxdag_resident_memory_bytes", "Resident memory of the service without its jobs.",
       resident_bytes());
   add("voxdag_cpu_seconds_total", "CPU time of the service without its jobs.",

@@ -5,6 +5,13 @@
 
 #include "server/json_text.h"
 
+namespace voxdag {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ClusterTasks, batches, built, waiting, failed_attempts, running,
+                                   built_of_node)
+
+}  // namespace voxdag
+
 namespace voxdag::server {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageBegun, stage, unit, total)
@@ -21,11 +28,20 @@ void from_json(const nlohmann::json&, StageEnded&) {}
 namespace {
 
 // In the order of the variant.
-constexpr std::string_view kNames[] = {"stage_begun", "stage_resumed", "stage_advanced",
-                                       "stage_ended", "subvolumes",    "usage",
-                                       "warning",     "failure",       "result"};
+constexpr std::string_view kNames[] = {
+    "stage_begun", "stage_resumed", "stage_advanced", "stage_ended", "subvolumes",
+    "usage",       "cluster_tasks", "warning",        "failure",     "result"};
 constexpr size_t kKinds = std::variant_size_v<Message>;
 static_assert(std::size(kNames) == kKinds);
+
+// The library would convert other numbers.
+bool has_whole_numbers(const nlohmann::json& object, int depth) {
+  for (const auto& member : object) {
+    if (member.is_number() && !member.is_number_unsigned()) return false;
+    if (depth > 0 && member.is_object() && !has_whole_numbers(member, depth - 1)) return false;
+  }
+  return true;
+}
 
 template <size_t... I>
 std::optional<Message> message_of(const nlohmann::json& line, std::index_sequence<I...>) {
@@ -48,9 +64,7 @@ std::string encode(const Message& message) {
 std::optional<Message> decode(std::string_view text) {
   try {
     const auto line = nlohmann::json::parse(text);
-    // The library would convert other numbers.
-    for (const auto& member : line)
-      if (member.is_number() && !member.is_number_unsigned()) return {};
+    if (!has_whole_numbers(line, 1)) return {};
     return message_of(line, std::make_index_sequence<kKinds>());
   } catch (const nlohmann::json::exception&) {
     // A broken line is as good as none.

@@ -13,6 +13,8 @@
 #include <string_view>
 #include <variant>
 
+#include "core/base/progress.h"
+
 namespace voxdag::server {
 
 // "stage_begun": the first message of a stage; `total` counts `unit`s, 0 if unknown.
@@ -39,6 +41,8 @@ struct SubvolumeTotals {
 struct Usage {
   uint64_t memory_bytes = 0, disk_bytes = 0;
 };
+// "cluster_tasks": of a build on a cluster; members as of ClusterTasks.
+using voxdag::ClusterTasks;
 // "warning"
 struct Warning {
   std::string text;
@@ -53,7 +57,7 @@ struct Result {
 };
 
 using Message = std::variant<StageBegun, StageResumed, StageAdvanced, StageEnded, SubvolumeTotals,
-                             Usage, Warning, Failure, Result>;
+                             Usage, ClusterTasks, Warning, Failure, Result>;
 
 // One line of JSON, without its end.
 std::string encode(const Message& message);

@@ -3,11 +3,19 @@
 #include "core/base/error.h"
 #include "server/json_text.h"
 
+namespace voxdag {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ClusterOptions, engine, tasks, max_running, submit_options,
+                                   program_path, max_retries, grace_s)
+
+}  // namespace voxdag
+
 namespace voxdag::server {
 
 NLOHMANN_JSON_SERIALIZE_ENUM(Task::Kind,
                              {{Task::Kind::kBuild, "build"}, {Task::Kind::kPlan, "plan"}})
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Task, kind, request, uploads, readable, memory_bytes, threads)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Task, kind, request, uploads, readable, memory_bytes, threads,
+                                   cluster)
 
 void write_task(FileSystem& files, const std::string& path, const Task& task) {
   write_file_atomically(files, path, json_text(nlohmann::json(task)));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/io/file_system.h"
+#include "scheduler/build_spec.h"
 
 namespace voxdag::server {
 
@@ -18,6 +19,7 @@ struct Task {
   std::vector<std::string> readable;  // files, and folders ending in '/', that scenes may refer to
   uint64_t memory_bytes = 0;          // if the request does not say
   unsigned threads = 0;               // if the request does not say
+  ClusterOptions cluster;             // as in ServerConfig
 };
 void write_task(FileSystem& files, const std::string& path, const Task& task);
 // Throws Error{kCorrupt} for a file that is no task.

@@ -99,6 +99,11 @@ void ProgressPipe::set_usage(uint64_t memory_bytes, uint64_t disk_bytes) {
   send(Usage{memory_bytes, disk_bytes});
 }
 
+void ProgressPipe::set_cluster_tasks(const ClusterTasks& tasks) {
+  std::lock_guard lock(mutex_);
+  send(tasks);
+}
+
 void ProgressPipe::fail(const std::string& code, const std::string& text) {
   std::lock_guard lock(mutex_);
   report_subvolumes(true);

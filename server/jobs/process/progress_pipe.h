@@ -27,6 +27,7 @@ class ProgressPipe : public Progress {
   void subvolume_built(const SubvolumeStatus& built) override;
   void subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) override;
   void set_usage(uint64_t memory_bytes, uint64_t disk_bytes) override;
+  void set_cluster_tasks(const ClusterTasks& tasks) override;
 
   void fail(const std::string& code, const std::string& text);
   void finish(const std::string& result_json);

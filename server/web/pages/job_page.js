@@ -1,6 +1,7 @@
 // The page of one job, updated by its events.
 
 import {get_json, sleep} from "../lib/api.js";
+import {ClusterView} from "../views/cluster_view.js";
 import {CubesView} from "../views/cubes_view.js";
 import {announce, clear, fact, h, set_text} from "../lib/dom.js";
 import {follow} from "../lib/events.js";
@@ -33,6 +34,7 @@ class JobPage {
     this.link = h("span", {class: "link-state"});
     this.progress = new ProgressView();
     this.timeline = new Timeline();
+    this.cluster = new ClusterView();
     this.rate = new RatePlot(id);
     this.cubes = new CubesView(`${this.path}/subvolumes`, signal);
     this.log = new LogView(`${this.path}/log`, signal);
@@ -107,6 +109,7 @@ class JobPage {
     this.job.progress = progress;
     this.progress.show(this.job);
     this.timeline.show(this.job);
+    this.cluster.show(this.job);
     this.rate.add(this.job);
     this.rate_card.hidden = this.rate.empty && has_ended(this.job.state);
     this.cubes.update(this.job);
@@ -125,6 +128,7 @@ class JobPage {
         h("div", {class: "stack"},
           h("section", {class: "card", "aria-labelledby": "stages-title"},
             h("h2", {id: "stages-title"}, "Stages"), this.timeline.element),
+          this.cluster.element,
           this.rate_card = h("section", {class: "card", "aria-labelledby": "rate-title"},
             h("h2", {id: "rate-title"}, "Rate"), this.rate.element),
           h("section", {class: "card", "aria-labelledby": "about-title"},

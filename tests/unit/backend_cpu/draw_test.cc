@@ -72,6 +72,30 @@ TEST(Draw, AmbiguousHeightsAreExact) {
   }
 }
 
+// Bounds by edges are computed in doubles: edges of every length, also those parallel to an axis,
+// that pass through voxel corners or miss them by very little.
+TEST(Draw, AmbiguousEdgesAreExact) {
+  oracle::Random random(4);
+  const int64_t middle = int64_t{1} << 19;
+  const oracle::Region region{{middle, middle, middle}, 16};
+  for (int round = 0; round < 6000; ++round) {
+    const int64_t length = int64_t{1} << random.between(4, 26);
+    oracle::Triangle t;
+    for (int a = 0; a < 3; ++a) {
+      const int64_t corner = (middle + random.between(0, 16)) * 256 + random.between(-1, 1);
+      const int64_t half = random.between(0, 3) == 0 ? 0 : random.between(-length, length);
+      t[0][a] = (corner - half) | 1;
+      t[1][a] = (corner + half + random.between(-2, 2)) | 1;
+      t[2][a] = (corner + random.between(-length, length)) | 1;
+    }
+    SCOPED_TRACE(testing::Message() << "round " << round);
+    const Padded<int32_t> narrow(t);
+    const oracle::Voxels truth = oracle::voxelize({t}, region);
+    for (const Kernels* kernels : all_kernels())
+      ASSERT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
+  }
+}
+
 // Where a triangle covers a cube, drawing its plane alone makes no difference.
 TEST(Draw, InsideIsThePlaneOnly) {
   oracle::Random random(3);

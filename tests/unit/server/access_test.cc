@@ -192,6 +192,7 @@ TEST(Configs, ErrorsNameTheMember) {
       {"{\"jobs\": {\"memory\": \"many\"}}", "memory"},
       {"{\"jobs\": {\"max_concurrent\": -1}}", "'max_concurrent'"},
       {"{\"tls\": []}", "'tls'"},
+      {"{\"cluster\": {\"nodes\": 4}}", "'nodes'"},
       {"{\"scene_roots\": \"/x\"}", "'scene_roots'"}};
   for (const auto& [text, part] : texts) {
     SCOPED_TRACE(text);

@@ -120,6 +120,13 @@ TEST(Messages, AreReadAsTheyWereWritten) {
   const Usage usage = sent(Usage{6, 7});
   EXPECT_EQ(usage.memory_bytes, 6u);
   EXPECT_EQ(usage.disk_bytes, 7u);
+  const ClusterTasks tasks = sent(ClusterTasks{9, 2, 4, 1, {{"n1", 2}, {"n2", 1}}, {{"n3", 2}}});
+  EXPECT_EQ(tasks.batches, 9u);
+  EXPECT_EQ(tasks.built, 2u);
+  EXPECT_EQ(tasks.waiting, 4u);
+  EXPECT_EQ(tasks.failed_attempts, 1u);
+  EXPECT_EQ(tasks.running.at("n2"), 1u);
+  EXPECT_EQ(tasks.built_of_node.at("n3"), 2u);
   EXPECT_EQ(sent(Warning{"a \"text\"\nof two lines"}).text, "a \"text\"\nof two lines");
   EXPECT_EQ(sent(Warning{"no UTF-8: \xff"}).text.substr(0, 10), "no UTF-8: ");
   const Failure failure = sent(Failure{"no_space", "full"});
@@ -142,6 +149,9 @@ TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
         R"({"message":"stage_advanced","done":-1,"total":2})",
         R"({"message":"stage_advanced","done":1.5,"total":2})",
         R"({"message":"stage_begun","stage":"s","unit":"u","total":"3"})",
+        R"({"message":"cluster_tasks","batches":1})",
+        R"({"message":"cluster_tasks","batches":1,"built":0,"waiting":1,"failed_attempts":0,)"
+        R"("running":{"n1":-1},"built_of_node":{}})",
         R"({"message":"failure","code":"io"})", R"({"message":"result","json":{}})"}) {
     SCOPED_TRACE(line);
     EXPECT_FALSE(decode(line));
@@ -176,6 +186,12 @@ TEST(Progress, IsPutTogetherFromMessages) {
   EXPECT_EQ(progress["bytes"], 300);
   EXPECT_EQ(progress["memory_bytes"], 5000);
   EXPECT_EQ(progress["disk_bytes"], 6000);
+  EXPECT_FALSE(progress.contains("cluster"));
+  live.apply(ClusterTasks{9, 2, 4, 1, {{"n1", 2}}, {{"n1", 1}, {"n3", 1}}});
+  EXPECT_EQ(
+      nlohmann::json::parse(live.progress_json())["cluster"],
+      nlohmann::json::parse(R"({"batches":9,"built":2,"waiting":4,"failed_attempts":1,"nodes":[
+              {"name":"n1","running":2,"built":1},{"name":"n3","running":0,"built":1}]})"));
 }
 
 // What earlier attempts did is done, but not at this one's rate.

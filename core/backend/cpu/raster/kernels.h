@@ -1,7 +1,7 @@
-// The dispatch table of the inner loops: portable, for AVX2 with BMI2, and some of them for AVX-512
-// (F, BW, DQ, VL, VBMI), chosen at run time; all set the same voxels. Sources in avx2/ and avx512/
-// are compiled for these instruction sets, so nothing in them, including inline functions of shared
-// headers, may run before the choice is made. The kernels are stateless.
+// The dispatch table of the inner loops: portable, for AVX2 with FMA and BMI2, and some of them for
+// AVX-512 (F, BW, DQ, VL, VBMI), chosen at run time; all set the same voxels. Sources in avx2/ and
+// avx512/ are compiled for these instruction sets, so nothing in them, including inline functions
+// of shared headers, may run before the choice is made. The kernels are stateless.
 #pragma once
 
 #include <cstdint>
@@ -52,7 +52,7 @@ const Kernels* avx512_kernels();
 // Plain integer code, for narrow and wide triangles and for degenerate ones.
 template <class Coordinate>
 void draw_exactly(const TileTriangle<Coordinate>& triangle, TileBricks& tile);
-// Only for machines with AVX2 and BMI2.
+// Only for machines with AVX2, FMA and BMI2.
 void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile);
 // Only for machines with AVX-512 F, BW, DQ, VL and VBMI as well.
 void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile);

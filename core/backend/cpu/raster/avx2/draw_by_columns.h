@@ -1,81 +1,128 @@
-// The common part of the rasterizers for AVX2 and AVX-512: the choice of the columns' axis, and
-// triangles perpendicular to it. Each rasterizer supplies
-//   EdgeColumns<D>   Columns, with for_each_inner(visit), which calls visit(number, inner) for each
-//                    column of bricks that edges cross, `inner` having a bit per voxel column
-//                    inside
-//   ColumnWalk<D>    whose run() draws a triangle column by column
+// The rasterizer for AVX2 and AVX-512. Bricks are visited in columns along the axis of the normal's
+// largest component ("height"), where the plane passes a voxel column within a few voxels.
+//
+//   1. For each row of voxels of the tile, the edges bound its coordinates in the three
+//   projections:
+//      that along the columns gives the voxel columns inside (footprint.h), the two others bounds
+//      of heights (sides.h).
+//   2. All 16 voxel columns of a column of bricks at once: the heights between which the plane
+//      passes them (heights.h), and the bounds above.
+//   3. These become one bit per voxel of each brick, which is where the two rasterizers differ.
+//
+// Nothing branches on which edges cross a column of bricks: it would be mispredicted. A triangle
+// perpendicular to an axis is one layer of voxels: its columns are its voxels.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/avx2/column_set.h"
+#include "core/backend/cpu/raster/avx2/columns.h"
+#include "core/backend/cpu/raster/avx2/footprint.h"
+#include "core/backend/cpu/raster/avx2/heights.h"
+#include "core/backend/cpu/raster/avx2/sides.h"
 #include "core/backend/cpu/raster/kernels.h"
 
 namespace voxdag::cpu {
 namespace {
 
-// The columns of bricks that a triangle may touch. `Edges`: the edges in the projection along D.
-template <int D, class Edges>
-struct Columns {
-  const TileTriangle<int32_t>& t;
-  int first[3], last[3];  // bricks of the triangle's box
-  Edges over;             // undefined if the triangle covers the tile
-  ColumnSet plain, edge;  // crossed by no edge, and perhaps by some
+// [16-bit lane]: the bit of its voxel column in Footprint::inside.
+struct InsideBits {
+  alignas(32) uint16_t bit[16] = {};
+  constexpr InsideBits() {
+    for (int i = 0; i < 16; ++i)
+      bit[i] = static_cast<uint16_t>(1 << (column_p(i) + 4 * column_q(i)));
+  }
+};
+constexpr InsideBits kInsideBits;
 
-  VOXDAG_INLINE explicit Columns(const TileTriangle<int32_t>& triangle) : t(triangle) {
-    for (int a = 0; a < 3; ++a) {
-      first[a] = t.first_voxel[a] / 4;
-      last[a] = t.last_voxel[a] / 4;
-    }
+template <int D, class Spread>
+class ColumnWalk {
+ public:
+  VOXDAG_INLINE ColumnWalk(const TileTriangle<int32_t>& triangle, TileBricks& bricks)
+      : t(triangle), tile(bricks), footprint(triangle), heights(triangle) {}
+
+  VOXDAG_INLINE void run() {
+    const int first = t.first_voxel[D] / 4, last = t.last_voxel[D] / 4;
     if (t.inside) {
-      for (int q = first[Q]; q <= last[Q]; ++q) plain.rows[q] = ColumnSet::bits(first[P], last[P]);
-      return;
+      footprint.columns.for_each([ =, this ](int number) __attribute__((always_inline)) {
+        column<false>(number, first, last);
+      });
+    } else {
+      sides.set(t);
+      footprint.columns.for_each([ =, this ](int number) __attribute__((always_inline)) {
+        column<true>(number, first, last);
+      });
     }
-    over.set(t.edges[D], (D + 1) % 3 == Q);
-    over.find_columns(first[P], last[P], first[Q], last[Q], plain, edge);
   }
 
  private:
-  static constexpr int P = kP<D>, Q = kQ<D>;
+  template <bool Edges>
+  VOXDAG_INLINE void column(int number, int first, int last) {
+    const int p = number & 15, q = number >> 4;
+    const auto at = heights.column(p, q, first, last);
+    if (at.from > at.to) return;
+    __m256i outer = _mm256_setzero_si256();
+    if constexpr (Edges) {
+      const __m256i columns = _mm256_set1_epi16(static_cast<int16_t>(footprint.inside[q][p]));
+      outer = _mm256_cmpeq_epi16(_mm256_and_si256(columns, load(kInsideBits.bit)), outer);
+    }
+    HeightBounds bounds = heights.bounds(at, outer);
+    if constexpr (Edges) bounds = _mm256_max_epu8(bounds, sides.bounds(p, q, at.brick));
+    const Spread spread(bounds);
+    const uint32_t index = kBrickIndex<D>.of_column[number];
+    for (int64_t z = at.from; z <= at.to; ++z)
+      tile.add(index | kBrickIndex<D>.of_height[z], spread.mask(z - at.brick));
+  }
+
+  const TileTriangle<int32_t>& t;
+  TileBricks& tile;
+  const Footprint<D> footprint;
+  const Heights<D> heights;
+  Sides<D> sides;
 };
 
-// Draws a triangle perpendicular to D: one layer of voxels, which only the edges bound.
-template <int D, class EdgeColumns>
-VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
+// Voxel columns p + 4 q as a layer of a brick in Morton order.
+template <int D>
+VOXDAG_INLINE uint32_t in_layer(uint32_t columns) {
+  const uint32_t middle = (columns >> 2 ^ columns) & 0x0c0c;
+  columns ^= middle | middle << 2;
   // The voxels of a layer are numbered with the axis of the larger index first.
-  constexpr bool kTranspose = (kP<D>) < (kQ<D>);
-  const EdgeColumns columns(t);
+  return kP<D> < kQ<D> ? transposed(columns) : columns;
+}
+
+// Draws a triangle perpendicular to D: one layer of voxels, which only the edges bound.
+template <int D>
+VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
+  const Footprint<D> footprint(t);
   const int z = t.first_voxel[D];
   const uint32_t at_height = kBrickIndex<D>.of_height[z / 4];
   const uint64_t layer = kLayers.voxels[D][z % 4];
-  columns.for_each_inner([&](int number, uint32_t inner) __attribute__((always_inline)) {
-    if constexpr (kTranspose) inner = transposed(inner);
-    tile.add(kBrickIndex<D>.of_column[number] | at_height, _pdep_u64(inner, layer));
-  });
-  columns.plain.for_each([&](int number) __attribute__((always_inline)) {
-    tile.add(kBrickIndex<D>.of_column[number] | at_height, layer);
+  footprint.columns.for_each([&](int number) __attribute__((always_inline)) {
+    const uint32_t inside = in_layer<D>(footprint.inside[number >> 4][number & 15]);
+    tile.add(kBrickIndex<D>.of_column[number] | at_height, _pdep_u64(inside, layer));
   });
 }
 
-template <int D, class EdgeColumns, class ColumnWalk>
+template <int D, class Spread>
 VOXDAG_INLINE void draw_along(const TileTriangle<int32_t>& t, TileBricks& tile) {
   if ((t.normal[kP<D>] | t.normal[kQ<D>]) == 0)
-    draw_flat<D, EdgeColumns>(t, tile);
+    draw_flat<D>(t, tile);
   else
-    ColumnWalk(t, tile).run();
+    ColumnWalk<D, Spread>(t, tile).run();
 }
 
-template <template <int> class EdgeColumns, template <int> class ColumnWalk>
+// Spread<D>: made from HeightBounds; mask(up) is the set of voxels of the brick that is `up` bricks
+// above the one where the column begins, up < 4.
+template <template <int> class Spread>
 VOXDAG_INLINE void draw_by_columns(const TileTriangle<int32_t>& t, TileBricks& tile) {
   if (t.normal[t.dominant] == 0) return draw_exactly(t, tile);
   if (t.dominant == 0)
-    draw_along<0, EdgeColumns<0>, ColumnWalk<0>>(t, tile);
+    draw_along<0, Spread<0>>(t, tile);
   else if (t.dominant == 1)
-    draw_along<1, EdgeColumns<1>, ColumnWalk<1>>(t, tile);
+    draw_along<1, Spread<1>>(t, tile);
   else
-    draw_along<2, EdgeColumns<2>, ColumnWalk<2>>(t, tile);
+    draw_along<2, Spread<2>>(t, tile);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// The plane test of the AVX2 rasterizer (draw.cc): the heights between which the plane passes each
-// of the 16 voxel columns of a column of bricks, and the bits of the voxels between them.
+// The plane test: the heights between which the plane passes each of the 16 voxel columns of a
+// column of bricks.
 //
 // Along the axis D of the normal's largest component a column is touched at the heights z with
 //     0 <= n_D z + n.(p, q) + lowest <= width       (tile_triangle.h), that is
@@ -15,7 +15,6 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/avx2/edges.h"
 #include "core/backend/cpu/raster/avx2/sides.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
 
@@ -24,28 +23,6 @@ namespace {
 
 constexpr int kHeightBits = 12;  // below the voxel, in 16-bit lanes
 constexpr int kColumnBits = 40;  // below the voxel, per column of bricks in 64 bits
-
-// A brick's 64 voxels as bytes of two vectors: bit 5 of a voxel's number chooses the vector, bit 4
-// its half.
-template <int D>
-struct ByteOrder {
-  alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel's column
-  alignas(32) int8_t height[4][2][32] = {};  // of the voxel above the first of four bricks
-  alignas(32) int8_t depth[4][2][32] = {};   // below the highest voxel of the four
-  constexpr ByteOrder() {
-    for (int voxel = 0; voxel < 64; ++voxel) {
-      const int p = brick_coordinate(voxel, kP<D>), q = brick_coordinate(voxel, kQ<D>);
-      column[voxel / 32][voxel % 32] = static_cast<int8_t>((p & 1) | (q & 1) << 1 | (p & 2) << 1);
-      for (int brick = 0; brick < 4; ++brick) {
-        const int z = 4 * brick + brick_coordinate(voxel, D);
-        height[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(z);
-        depth[brick][voxel / 32][voxel % 32] = static_cast<int8_t>(kMaxHeight - z);
-      }
-    }
-  }
-};
-template <int D>
-inline constexpr ByteOrder<D> kByteOrder;
 
 VOXDAG_INLINE __m256i load(const void* at) {
   return _mm256_load_si256(static_cast<const __m256i*>(at));
@@ -60,26 +37,12 @@ struct SingleLanes {
 };
 constexpr SingleLanes kLanes;
 
+VOXDAG_INLINE int64_t above_zero(int64_t a) { return a > 0 ? a : 0; }
+VOXDAG_INLINE int64_t magnitude(int64_t a) { return a < 0 ? -a : a; }
+
 template <int D>
 class Heights {
  public:
-  // Bounds of columns (HeightBounds), a byte per voxel of a brick.
-  struct Spread {
-    __m256i below[2], over[2];
-
-    // The voxels of the brick that is `up` bricks above the one where the column begins, up < 4.
-    VOXDAG_INLINE uint64_t mask(int up) const {
-      uint32_t half[2];
-      for (int i = 0; i < 2; ++i) {
-        const __m256i z = load(kByteOrder<D>.height[up][i]);
-        const __m256i depth = load(kByteOrder<D>.depth[up][i]);
-        half[i] = static_cast<uint32_t>(_mm256_movemask_epi8(_mm256_andnot_si256(
-            _mm256_cmpgt_epi8(over[i], depth), _mm256_cmpgt_epi8(z, below[i]))));
-      }
-      return half[0] | static_cast<uint64_t>(half[1]) << 32;
-    }
-  };
-
   VOXDAG_INLINE explicit Heights(const TileTriangle<int32_t>& triangle) : t(triangle) {
     const int64_t np = t.normal[P], nq = t.normal[Q];
     const double inverse = 1.0 / static_cast<double>(t.normal[D]);
@@ -134,18 +97,6 @@ class Heights {
     // For the top, the distance from the highest voxel: all four bits inverted.
     return _mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
                                _mm256_srli_epi16(_mm256_andnot_si256(top, whole), kHeightBits));
-  }
-
-  // The half of a column is the high bit of its q: for D = 1 that bit selects the vector of its
-  // voxels, otherwise the half of a vector.
-  static VOXDAG_INLINE Spread spread(HeightBounds bounds) {
-    const __m256i order0 = load(kByteOrder<D>.column[0]), order1 = load(kByteOrder<D>.column[1]);
-    const __m256i eight = _mm256_set1_epi8(8);
-    const __m256i half0 = D == 1 ? _mm256_permute4x64_epi64(bounds, 0x44) : bounds;
-    const __m256i half1 = D == 1 ? _mm256_permute4x64_epi64(bounds, 0xee) : bounds;
-    return {{_mm256_shuffle_epi8(half0, order0), _mm256_shuffle_epi8(half1, order1)},
-            {_mm256_shuffle_epi8(half0, _mm256_add_epi8(order0, eight)),
-             _mm256_shuffle_epi8(half1, _mm256_add_epi8(order1, eight))}};
   }
 
  private:

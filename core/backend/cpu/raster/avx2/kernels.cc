@@ -54,18 +54,35 @@ int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbe
   return list_blocks_with(tile, groups, existing, numbers, keys, summarize);
 }
 
-VoxelBlockContent unpack(const VoxelBlock& block, uint64_t* bricks) {
-  const auto empty = [](__m256i x) {
-    return _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(x, _mm256_setzero_si256())));
-  };
-  const __m256i low = _mm256_load_si256(halves(block));
-  const __m256i high = _mm256_load_si256(halves(block) + 1);
-  const uint32_t mask = static_cast<uint32_t>(empty(low) | empty(high) << 4) ^ 0xff;
-  uint64_t voxels = 0;
-  for (uint32_t rest = mask; rest != 0; rest &= rest - 1) {
-    *bricks = block.bricks[__builtin_ctz(rest)];
-    voxels += static_cast<uint64_t>(_mm_popcnt_u64(*bricks++));
+// [set of four bricks]: their lanes, in halves of 32 bits, without gaps.
+struct Packing {
+  alignas(32) int32_t lanes[16][8] = {};
+  constexpr Packing() {
+    for (int set = 0; set < 16; ++set)
+      for (int brick = 0, count = 0; brick < 4; ++brick) {
+        if ((set >> brick & 1) == 0) continue;
+        lanes[set][count++] = 2 * brick;
+        lanes[set][count++] = 2 * brick + 1;
+      }
   }
+};
+constexpr Packing kPacking;
+
+VoxelBlockContent unpack(const VoxelBlock& block, uint64_t* bricks) {
+  uint32_t mask = 0;
+  for (int half = 0; half < 2; ++half) {
+    const __m256i four = _mm256_load_si256(halves(block) + half);
+    const __m256i empty = _mm256_cmpeq_epi64(four, _mm256_setzero_si256());
+    const uint32_t set =
+        static_cast<uint32_t>(_mm256_movemask_pd(_mm256_castsi256_pd(empty))) ^ 0xf;
+    const __m256i lanes = _mm256_load_si256(reinterpret_cast<const __m256i*>(kPacking.lanes[set]));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(bricks),
+                        _mm256_permutevar8x32_epi32(four, lanes));
+    bricks += _mm_popcnt_u32(set);
+    mask |= set << 4 * half;
+  }
+  uint64_t voxels = 0;
+  for (const uint64_t brick : block.bricks) voxels += static_cast<uint64_t>(_mm_popcnt_u64(brick));
   return {mask, static_cast<uint32_t>(voxels)};
 }
 
@@ -89,7 +106,9 @@ constexpr Kernels kAvx2 = {"avx2", draw_avx2, test_octants, find_in_range, list_
 }  // namespace
 
 const Kernels* avx2_kernels() {
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") ? &kAvx2 : nullptr;
+  const bool supported = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                         __builtin_cpu_supports("bmi2");
+  return supported ? &kAvx2 : nullptr;
 }
 
 }  // namespace voxdag::cpu

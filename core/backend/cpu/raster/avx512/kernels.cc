@@ -37,8 +37,7 @@ const Kernels* avx512_kernels() {
   static const bool supported =
       __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
       __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-      __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("fma") &&
-      avx2_kernels() != nullptr;
+      __builtin_cpu_supports("avx512vbmi") && avx2_kernels() != nullptr;
   if (!supported) return nullptr;
   static const Kernels kernels = [] {
     Kernels table = *avx2_kernels();

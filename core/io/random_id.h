@@ -3,9 +3,9 @@
 
 #include <string>
 
-namespace voxdag::server {
+namespace voxdag {
 
 // 16 hex digits (64 bits) from the system's random number generator.
 std::string random_id();
 
-}  // namespace voxdag::server
+}  // namespace voxdag

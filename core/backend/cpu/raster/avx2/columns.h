@@ -4,6 +4,8 @@
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
 
+#include <immintrin.h>
+
 #include <cstdint>
 
 #include "core/backend/cpu/raster/tile_bricks.h"
@@ -36,25 +38,22 @@ struct Layers {
 };
 constexpr Layers kLayers;
 
-// A set of columns of bricks: bit p of row q is column number p + 16 q. for_each() is one loop over
-// all rows, since the length of a loop per row would be mispredicted.
-struct ColumnSet {
-  alignas(32) uint16_t rows[16] = {};
+// Columns of bricks, numbered p + 16 q: one list of all rows, since the length of a loop per row
+// would be mispredicted.
+struct ColumnList {
+  int count = 0;
+  uint8_t numbers[256 + 16];  // add() writes 16
 
+  // Those of a row from first to last, 0 <= first <= last <= 15.
+  VOXDAG_INLINE void add(int q, int first, int last) {
+    const __m128i steps = _mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(numbers + count),
+                     _mm_add_epi8(steps, _mm_set1_epi8(static_cast<int8_t>(16 * q + first))));
+    count += last - first + 1;
+  }
   template <class Visit>
   VOXDAG_INLINE void for_each(Visit visit) const {
-    for (int part = 0; part < 4; ++part) {
-      uint64_t bits;
-      __builtin_memcpy(&bits, rows + 4 * part, 8);
-      for (; bits != 0; bits &= bits - 1) {
-        const int number = 64 * part + __builtin_ctzll(bits);
-        visit(number);
-      }
-    }
-  }
-  // Bits from..to, none if from > to; -16 <= to, from <= 16.
-  static VOXDAG_INLINE uint16_t bits(int from, int to) {
-    return static_cast<uint16_t>(0xffffu >> (15 - to) & 0xffffu << from);
+    for (int i = 0; i < count; ++i) visit(int{numbers[i]});
   }
 };
 

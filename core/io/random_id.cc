@@ -1,4 +1,4 @@
-#include "server/random_id.h"
+#include "core/io/random_id.h"
 
 #include <unistd.h>
 
@@ -8,7 +8,7 @@
 
 #include "core/base/text.h"
 
-namespace voxdag::server {
+namespace voxdag {
 
 std::string random_id() {
   std::array<unsigned char, 8> bytes{};
@@ -17,4 +17,4 @@ std::string random_id() {
   return hex_text(bytes);
 }
 
-}  // namespace voxdag::server
+}  // namespace voxdag

@@ -1,0 +1,33 @@
+#include <cstdio>
+
+#include "cli/command.h"
+#include "core/base/error.h"
+#include "scheduler/cluster/cluster_build.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct StopTasksCommand {
+  std::string work_folder;
+};
+
+void run(const StopTasksCommand& command, CommandContext& context) {
+  const auto state = read_cluster_state(context.files, command.work_folder);
+  if (!state)
+    throw Error(ErrorCode::kNotFound,
+                command.work_folder + ": expected the work folder of a build on a cluster");
+  ClusterBuild::stop_tasks(context.files, command.work_folder, system_commands());
+  std::printf("stopped the tasks %s; what they have built stays\n", state->task_name().c_str());
+}
+
+void declare(Command& command, StopTasksCommand& state) {
+  command.option("work", state.work_folder, "the work folder of the build").required();
+}
+
+}  // namespace
+
+void add_stop_tasks_command(CommandLine& line) {
+  add_command<StopTasksCommand>(line, "stop-tasks", "stop the cluster tasks of a build");
+}
+
+}  // namespace voxdag::cli

@@ -1,0 +1,132 @@
+// The edge tests in one projection, as bounds of one coordinate in each row of voxels: edges are
+// tested once per row of the tile, not once per column of bricks.
+//
+// An edge leaves the voxels x of row k with across k + up x + c >= 0 (tile_triangle.h). All of
+// these are integers, so with y = (t - 1/2) / |up| and t = -(across k + c):
+//     up > 0:  x > floor(y)
+//     up < 0:  -x > floor(y)
+//     up = 0:  all, or none if t > 0; divided by 2^-60 instead, y is far below or above all
+// y = slope k + start in doubles, where only the division, products and sums are rounded. It is at
+// least 1 / (2 |up|) >= 2^-28 away from a whole number, and its floor is exact where it matters:
+//     |c| <= 2^36   its error is below 2^-12 / |up| + 2^-45, including that of adding small numbers
+//     |c| > 2^36    |y| > 2^8 is beyond the tile, where only the side matters; its error is below 1
+//     up = 0        |y| >= 2^59, and its error is below 2^58
+//
+// Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
+#pragma once
+
+#include <immintrin.h>
+
+#include "core/backend/cpu/raster/avx2/columns.h"
+#include "core/backend/cpu/raster/tile_triangle.h"
+
+namespace voxdag::cpu {
+namespace {
+
+using Edge = TileTriangle<int32_t>::Edge;
+
+VOXDAG_INLINE __m256d load_doubles(const double* at) { return _mm256_load_pd(at); }
+
+// The rows 0..63 of a tile.
+struct Doubles {
+  alignas(32) double of[64] = {};
+  constexpr Doubles() {
+    for (int i = 0; i < 64; ++i) of[i] = i;
+  }
+};
+constexpr Doubles kDoubles;
+
+// Three edges, one per lane, the fourth lane unused.
+struct EdgeLanes {
+  __m256d a, b, c;
+
+  VOXDAG_INLINE explicit EdgeLanes(const Edge (&edges)[3]) {
+    static_assert(sizeof(Edge) == 3 * sizeof(int64_t));
+    const __m256d first = convert(&edges[0].a);   // a0 b0 c0 a1
+    const __m256d second = convert(&edges[1].b);  // b1 c1 a2 b2
+    const __m256d third = convert(&edges[1].c);   // c1 a2 b2 c2
+    a = _mm256_permute4x64_pd(_mm256_blend_pd(first, second, 0b0100), 0b00'10'11'00);
+    b = _mm256_permute4x64_pd(_mm256_blend_pd(first, second, 0b1001), 0b00'11'00'01);
+    c = _mm256_permute4x64_pd(_mm256_blend_pd(first, third, 0b1001), 0b00'11'00'10);
+  }
+
+ private:
+  // Integers from -2^51 to 2^51, as the low bits of doubles from 2^52 to 2^53.
+  static VOXDAG_INLINE __m256d convert(const int64_t* at) {
+    const __m256d origin = _mm256_set1_pd(0x1.8p52);
+    const __m256i four = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(at));
+    return _mm256_sub_pd(_mm256_castsi256_pd(_mm256_add_epi64(four, _mm256_castpd_si256(origin))),
+                         origin);
+  }
+};
+
+// [set of edges with up < 0]: the lanes, in halves of 32 bits, of two edges that bound x from below
+// and of two that bound it from above; lane 3 is none. Edges sum to 0, so one or two of them have
+// up < 0, unless up = 0 for all three: these may bound it from either side.
+struct BoundOrder {
+  alignas(32) int32_t lane[8][8] = {};
+  constexpr BoundOrder() {
+    for (int falling = 0; falling < 8; ++falling) {
+      int edges[4] = {3, 3, 3, 3}, below = 0, over = 2;
+      for (int edge = 0; edge < 3; ++edge) {
+        const bool falls = falling >> edge & 1;
+        edges[(falls && over < 4) || below == 2 ? over++ : below++] = edge;
+      }
+      for (int i = 0; i < 8; ++i) lane[falling][i] = 2 * edges[i / 2] + i % 2;
+    }
+  }
+};
+constexpr BoundOrder kBoundOrder;
+
+class EdgeBounds {
+ public:
+  // `bound_first`: the bounded coordinate is that of the edges' a, the rows' is that of b. Adds
+  // `below_more` to all bounds from below, `over_more` to those from above.
+  VOXDAG_INLINE EdgeBounds(const Edge (&edges)[3], bool bound_first, double below_more,
+                           double over_more) {
+    const EdgeLanes lanes(edges);
+    const __m256d up = bound_first ? lanes.a : lanes.b, across = bound_first ? lanes.b : lanes.a;
+    const __m256d sign = _mm256_set1_pd(-0.0);
+    const __m256d parallel = _mm256_cmp_pd(up, _mm256_setzero_pd(), _CMP_EQ_OQ);
+    const __m256d inverse = _mm256_div_pd(
+        _mm256_set1_pd(-1.0),
+        _mm256_blendv_pd(_mm256_andnot_pd(sign, up), _mm256_set1_pd(0x1p-60), parallel));
+    const __m256d half = _mm256_set1_pd(0.5);
+    const __m256d slope = _mm256_mul_pd(across, inverse);
+    const __m256d start = _mm256_mul_pd(_mm256_add_pd(lanes.c, half), inverse);
+    const __m256i order = _mm256_load_si256(
+        reinterpret_cast<const __m256i*>(kBoundOrder.lane[_mm256_movemask_pd(up) & 7]));
+    const __m256d slopes = permuted(_mm256_blend_pd(slope, _mm256_setzero_pd(), 0b1000), order);
+    const __m256d starts =
+        _mm256_add_pd(permuted(_mm256_blend_pd(start, _mm256_set1_pd(-0x1p60), 0b1000), order),
+                      _mm256_setr_pd(below_more, below_more, over_more, over_more));
+    spread(slopes, slope_);
+    spread(starts, start_);
+  }
+
+  // For the rows k, one per lane: the largest y of the edges on this side, not rounded yet.
+  VOXDAG_INLINE __m256d below(__m256d k) const {
+    return _mm256_max_pd(_mm256_fmadd_pd(slope_[0], k, start_[0]),
+                         _mm256_fmadd_pd(slope_[1], k, start_[1]));
+  }
+  VOXDAG_INLINE __m256d over(__m256d k) const {
+    return _mm256_max_pd(_mm256_fmadd_pd(slope_[2], k, start_[2]),
+                         _mm256_fmadd_pd(slope_[3], k, start_[3]));
+  }
+
+ private:
+  static VOXDAG_INLINE __m256d permuted(__m256d x, __m256i order) {
+    return _mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_castpd_ps(x), order));
+  }
+  static VOXDAG_INLINE void spread(__m256d lanes, __m256d (&out)[4]) {
+    out[0] = _mm256_permute4x64_pd(lanes, 0x00);
+    out[1] = _mm256_permute4x64_pd(lanes, 0x55);
+    out[2] = _mm256_permute4x64_pd(lanes, 0xaa);
+    out[3] = _mm256_permute4x64_pd(lanes, 0xff);
+  }
+
+  __m256d slope_[4], start_[4];
+};
+
+}  // namespace
+}  // namespace voxdag::cpu

@@ -1,0 +1,84 @@
+// The triangle's footprint: the voxel columns, and the columns of bricks, that its edges leave in
+// the projection along them, and its box. Exact: it is the overlap test of the projections.
+//
+// A row of bricks is four rows of 64 voxels, one bit each: the edges bound p in every row.
+//
+// Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
+#pragma once
+
+#include <immintrin.h>
+
+#include "core/backend/cpu/raster/avx2/columns.h"
+#include "core/backend/cpu/raster/avx2/edge_bounds.h"
+#include "core/backend/cpu/raster/tile_triangle.h"
+
+namespace voxdag::cpu {
+namespace {
+
+template <int D>
+struct Footprint {
+  ColumnList columns;  // of bricks, with a voxel column inside
+  // [q][p of a brick]: the voxel columns inside, bit p + 4 q; only set in the rows of `columns`.
+  alignas(32) uint16_t inside[16][16];
+
+  VOXDAG_INLINE explicit Footprint(const TileTriangle<int32_t>& t) {
+    const int first = t.first_voxel[Q] / 4, last = t.last_voxel[Q] / 4;
+    if (t.inside) {
+      for (int q = first; q <= last; ++q) {
+        columns.add(q, t.first_voxel[P] / 4, t.last_voxel[P] / 4);
+        store(inside[q], _mm256_set1_epi8(-1));
+      }
+      return;
+    }
+    const EdgeBounds bounds(t.edges[D], (D + 1) % 3 == P, 1, 64);
+    const __m256d low = _mm256_set1_pd(t.first_voxel[P]);
+    const __m256d high = _mm256_set1_pd(63 - t.last_voxel[P]);
+    const __m256d low_q = _mm256_set1_pd(t.first_voxel[Q]);
+    const __m256d high_q = _mm256_set1_pd(t.last_voxel[Q]);
+    const __m256i ones = _mm256_set1_epi8(-1);
+    for (int q = first; q <= last; ++q) {
+      const __m256d k = load_doubles(kDoubles.of + 4 * q);
+      const __m256i from = count(_mm256_max_pd(bounds.below(k), low));
+      const __m256i over = count(_mm256_max_pd(bounds.over(k), high));
+      const __m256d in_box =
+          _mm256_and_pd(_mm256_cmp_pd(k, low_q, _CMP_GE_OQ), _mm256_cmp_pd(k, high_q, _CMP_LE_OQ));
+      const __m256i voxels = _mm256_and_si256(
+          _mm256_castpd_si256(in_box),
+          _mm256_and_si256(_mm256_sllv_epi64(ones, from), _mm256_srlv_epi64(ones, over)));
+      const __m256i bytes = bytes_of_bricks(voxels);
+      const uint32_t empty = static_cast<uint32_t>(
+          _mm256_movemask_epi8(_mm256_cmpeq_epi8(bytes, _mm256_setzero_si256())));
+      const uint32_t there = ~(empty & empty >> 16) & 0xffff;
+      // The triangle is convex, so those between are there as well.
+      if (there != 0) columns.add(q, __builtin_ctz(there), 31 - __builtin_clz(there));
+      store(inside[q], interleaved(_mm256_permute4x64_epi64(bytes, 0b11'01'10'00)));
+    }
+  }
+
+ private:
+  static constexpr int P = kP<D>, Q = kQ<D>;
+
+  static VOXDAG_INLINE void store(uint16_t (&row)[16], __m256i bits) {
+    _mm256_store_si256(reinterpret_cast<__m256i*>(row), bits);
+  }
+  // A number of voxels to shift out; shifting by 64 leaves none.
+  static VOXDAG_INLINE __m256i count(__m256d x) {
+    return _mm256_cvtepi32_epi64(_mm256_cvttpd_epi32(_mm256_min_pd(x, _mm256_set1_pd(64.0))));
+  }
+  // In each half of 16 bytes, the lower eight and the upper eight in turns.
+  static VOXDAG_INLINE __m256i interleaved(__m256i x) {
+    return _mm256_unpacklo_epi8(x, _mm256_srli_si256(x, 8));
+  }
+  // From four rows of 64 voxels, a byte for each of the 16 bricks: its voxels in the first two
+  // rows, and in the upper half those in the other two. A byte of each of two rows has four voxels
+  // of one brick, then four of the next: of these four nibbles the middle ones are exchanged.
+  static VOXDAG_INLINE __m256i bytes_of_bricks(__m256i rows) {
+    const __m256i pairs = interleaved(rows);
+    const __m256i differ = _mm256_and_si256(_mm256_xor_si256(pairs, _mm256_srli_epi16(pairs, 4)),
+                                            _mm256_set1_epi16(0x00f0));
+    return _mm256_xor_si256(pairs, _mm256_xor_si256(differ, _mm256_slli_epi16(differ, 4)));
+  }
+};
+
+}  // namespace
+}  // namespace voxdag::cpu

@@ -1,0 +1,90 @@
+// What a cluster build asks of Slurm, through its commands: sbatch, squeue, scontrol, scancel and,
+// where there is accounting, sacct. Used by one thread.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scheduler/cluster/slurm/command_runner.h"
+
+namespace voxdag {
+
+// A task of an array is JOB_INDEX, for the user and for Slurm.
+struct SlurmTask {
+  std::string job;
+  uint32_t index = 0;
+  std::string state;   // "PENDING", "RUNNING", ...
+  std::string reason;  // why it waits
+  std::string node;    // "" before it runs
+  uint32_t first_batch = 0;
+
+  uint32_t batch() const { return first_batch + index; }
+  std::string name() const { return job + "_" + std::to_string(index); }
+  bool operator==(const SlurmTask&) const = default;
+};
+
+// How a task ended.
+struct SlurmEnd {
+  std::string state;  // "TIMEOUT", "OUT_OF_MEMORY", "NODE_FAIL", ...; "" if Slurm has forgotten it
+  std::string reason;
+  std::string node;
+  std::string exit_code;  // STATUS:SIGNAL
+
+  std::string text() const;
+  // Whether the task has not ended: it waits, runs or ends just now.
+  bool is_active() const;
+};
+
+struct ArrayRequest {
+  std::string name;  // by which its tasks are found again
+  // Each task runs `command` followed by the number of its batch.
+  std::vector<std::string> command;
+  std::vector<uint32_t> batches;
+  std::string log_folder;
+  std::vector<std::string> options;  // of sbatch, the user's
+  uint64_t max_running = 0;          // tasks at a time; 0 for no limit
+};
+
+class Slurm {
+ public:
+  // `cancel` ends a command that runs.
+  Slurm(CommandRunner& commands, const CancelToken& cancel)
+      : commands_(commands), cancel_(cancel) {}
+
+  // Throws Error{kInvalidInput} if there is no Slurm here, or if sbatch would refuse these options.
+  void check(const std::vector<std::string>& options);
+  // Submits arrays, several if the numbers of the batches differ by more than Slurm's MaxArraySize,
+  // and adds the task of each batch to `tasks` as soon as its array is accepted. Throws
+  // Error{kInvalidInput} with sbatch's message if it refuses, Error{kIo} if Slurm does not answer
+  // or cannot take it now: then the array may be there or not.
+  void submit(const ArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks);
+  // All tasks of that name that wait or run; nothing if Slurm does not answer now.
+  std::optional<std::vector<SlurmTask>> active(const std::string& name);
+  // Nothing if Slurm does not answer now.
+  std::optional<SlurmEnd> end_of(const SlurmTask& task);
+  // Returns whether Slurm has taken it.
+  bool cancel(const std::string& name);
+  // Commands so far.
+  uint64_t requests() const { return requests_; }
+
+ private:
+  static constexpr double kTimeout_s = 60;
+
+  CommandResult run(const std::vector<std::string>& command, const std::string& input = "");
+  // A setting of slurm.conf, "" if unknown.
+  std::string setting(const std::string& name);
+
+  CommandRunner& commands_;
+  const CancelToken& cancel_;
+  uint64_t requests_ = 0;
+  std::optional<std::string> configuration_;
+};
+
+// The words of a text as a shell would split it: at blanks, but not within quotes; a backslash
+// takes the next character as it is. Throws Error{kInvalidInput} for a quote that is not closed.
+std::vector<std::string> split_words(const std::string& text);
+
+}  // namespace voxdag

@@ -1,0 +1,369 @@
+#!/usr/bin/env python3
+"""Cluster builds under a real Slurm: usage cluster_test.py VOXDAG [unittest arguments].
+
+Tests that wait for Slurm to notice a lost node, or build long enough for many kills, run only with
+VOXDAG_LONG=1 in the environment (tools/test-long cluster).
+
+Exits with 77, which ctest shows as skipped, where Slurm is not installed (tools/packages cluster)."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import urllib.request
+from pathlib import Path
+
+from slurm_cluster import SlurmCluster, free_ports, missing_programs
+
+VOXDAG = ""
+SKIPPED = 77
+slow = unittest.skipUnless(os.environ.get("VOXDAG_LONG"), "in tools/test-long cluster")
+
+
+class ClusterTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        # Slurm's paths of sockets are short.
+        cls.folder = Path(tempfile.mkdtemp(prefix="vdslurm-", dir="/tmp"))
+        cls.scene = cls.folder / "city.glb"
+        subprocess.run([VOXDAG, "generate", "city", cls.scene, "--triangles", "60000"], check=True,
+                       capture_output=True)
+        cls.cluster = SlurmCluster(cls.folder / "slurm")
+        cls.cluster.__enter__()
+        cls.expected = {}
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.cluster.__exit__()
+        shutil.rmtree(cls.folder)
+
+    def setUp(self):
+        self.output = self.folder / f"{self.id().split('.')[-1]}.vdag"
+        self.work = Path(f"{self.output}.work")
+
+    def tearDown(self):
+        subprocess.run(["scancel", "--user", str(os.getuid())], env=self.cluster.environment,
+                       check=False, capture_output=True)
+        if self.work.exists():
+            shutil.rmtree(self.work)
+
+    def sha256(self, resolution):
+        """Of the file that this machine builds alone."""
+        if resolution not in self.expected:
+            out = self.folder / "local.vdag"
+            done = subprocess.run([VOXDAG, "build", self.scene, "-r", str(resolution), "-o", out,
+                                   "--json", "--force"], check=True, capture_output=True, text=True)
+            self.expected[resolution] = json.loads(done.stdout)["sha256"]
+            out.unlink()
+        return self.expected[resolution]
+
+    def start(self, resolution, tasks, *options):
+        return subprocess.Popen(
+            [VOXDAG, "build", self.scene, "-r", str(resolution), "-o", self.output, "--json",
+             "--cluster", "slurm", "--cluster-tasks", str(tasks), "--cluster-grace", "2", *options],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            env=self.cluster.environment)
+
+    def finish(self, build, resolution):
+        out, messages = build.communicate(timeout=300)
+        self.assertEqual(build.returncode, 0, messages + self.logs())
+        report = json.loads(out)
+        self.assertEqual(report["sha256"], self.sha256(resolution))
+        self.assertFalse(self.work.exists(), f"{self.work} is left")
+        return report, messages
+
+    def logs(self):
+        texts = [log.read_text(errors="replace")[-600:] for log in
+                 sorted(self.work.glob("cluster/log-*"))] if self.work.exists() else []
+        return "\n".join(texts[-5:])
+
+    def wait_for(self, condition, what, seconds=60):
+        end = time.monotonic() + seconds
+        while not (found := condition()):
+            self.assertLess(time.monotonic(), end, f"no {what() if callable(what) else what} after {seconds} s")
+            time.sleep(0.05)
+        return found
+
+    def tasks(self):
+        """Process ids of running tasks, by node."""
+        found = {}
+        for entry in Path("/proc").iterdir():
+            try:
+                command = (entry / "cmdline").read_bytes().split(b"\0")
+                if b"build-batch" not in command or str(self.work).encode() not in command:
+                    continue
+                environment = (entry / "environ").read_bytes().split(b"\0")
+            except OSError:
+                continue
+            for variable in environment:
+                if variable.startswith(b"SLURMD_NODENAME="):
+                    found.setdefault(variable.split(b"=")[1].decode(), []).append(int(entry.name))
+        return found
+
+    def a_task(self):
+        tasks = self.wait_for(self.tasks, "running task")
+        return random.choice([pid for pids in tasks.values() for pid in pids])
+
+    def test_same_bytes_from_any_number_of_tasks(self):
+        for tasks in [1, 3, 16]:
+            with self.subTest(tasks=tasks):
+                report, _ = self.finish(self.start(2048, tasks), 2048)
+                self.assertEqual(report["cluster"]["batches"], tasks)
+                self.assertEqual(report["cluster"]["failed_attempts"], 0)
+                self.assertLess(report["cluster"]["rows_after"], report["cluster"]["rows_before"])
+
+    def test_more_batches_than_an_array_holds(self):
+        report, _ = self.finish(self.start(2048, 120, "--subvolume", "128"), 2048)
+        self.assertGreater(report["cluster"]["batches"], 101)
+
+    def test_a_killed_task_is_submitted_again(self):
+        build = self.start(16384, 4)
+        os.kill(self.a_task(), signal.SIGKILL)
+        report, messages = self.finish(build, 16384)
+        self.assertEqual(report["cluster"]["failed_attempts"], 1)
+        self.assertRegex(messages, r"batch \d, task \d+_\d on n\d: FAILED.*; it is submitted again")
+
+    def test_a_batch_that_always_fails_ends_the_build(self):
+        build = self.start(2048, 2, "--cluster-options", "--export=NONE,PATH=/nowhere --chdir=/",
+                           "--cluster-retries", "1")
+        # A file in the place of the batch: every attempt finds it damaged.
+        batch = self.wait_for(lambda: sorted(self.work.glob("cluster/batch-*.vdbatch")), "batch")[0]
+        batch.write_bytes(b"vdbatch1" + bytes(100))
+        _, messages = build.communicate(timeout=120)
+        self.assertNotEqual(build.returncode, 0)
+        self.assertIn("it has failed 2 times", messages)
+        self.assertIn("batch-0.vdbatch", messages)
+
+    @slow
+    def test_a_lost_node(self):
+        build = self.start(16384, 8)
+        node = random.choice(sorted(self.wait_for(self.tasks, "running task")))
+        self.cluster.kill_machine(node)
+        try:
+            self.finish(build, 16384)
+        finally:
+            self.cluster.start_node(node)
+
+    @slow
+    def test_a_node_that_slurm_believes_lost_works_on(self):
+        build = self.start(16384, 4)
+        node, pids = random.choice(sorted(self.wait_for(self.tasks, "running task").items()))
+        for pid in pids:
+            os.kill(pid, signal.SIGSTOP)
+        self.cluster.kill(node)
+        try:
+            # Slurm starts its batch elsewhere; then it wakes up.
+            self.wait_for(lambda: self.cluster.command(
+                "sinfo", "--noheader", f"--nodes={node}", "--format=%t").stdout.startswith("down"),
+                "lost node", 90)
+            for pid in pids:
+                os.kill(pid, signal.SIGCONT)
+            self.finish(build, 16384)
+        finally:
+            self.cluster.start_node(node)
+
+    def test_slurm_restarts(self):
+        build = self.start(16384, 6)
+        self.wait_for(self.tasks, "running task")
+        self.cluster.kill("slurmctld")
+        time.sleep(8)
+        self.cluster.start_controller()
+        self.finish(build, 16384)
+
+    def test_the_same_command_attaches_after_ctrl_c(self):
+        self.interrupt(signal.SIGINT)
+
+    def test_the_same_command_attaches_after_a_kill(self):
+        self.interrupt(signal.SIGKILL)
+
+    def interrupt(self, how):
+        build = self.start(16384, 8)
+        self.wait_for(self.tasks, "running task")
+        build.send_signal(how)
+        _, messages = build.communicate(timeout=30)
+        self.assertNotEqual(build.returncode, 0)
+        if how == signal.SIGINT:
+            self.assertIn("its tasks run on", messages)
+        self.wait_for(lambda: list(self.work.glob("cluster/*.record-*.json")) or not self.queue(),
+                      "record")
+        report, _ = self.finish(self.start(16384, 8), 16384)
+        self.assertEqual(report["cluster"]["batches"], 8)
+        self.assertEqual(report["cluster"]["failed_attempts"], 0)
+
+    def queue(self):
+        return self.cluster.command("squeue", "--noheader", "--array").stdout
+
+    def test_restart_stops_the_tasks(self):
+        build = self.start(16384, 8)
+        self.wait_for(self.tasks, "running task")
+        build.kill()
+        build.communicate()
+        report, _ = self.finish(self.start(2048, 2, "--restart"), 2048)
+        self.assertEqual(report["cluster"]["batches"], 2)
+        self.wait_for(lambda: not self.queue(), "empty queue")
+
+    def test_the_rest_can_be_built_here(self):
+        build = self.start(16384, 8)
+        # A task that does not end is left for this machine.
+        stopped = self.a_task()
+        os.kill(stopped, signal.SIGSTOP)
+        self.wait_for(lambda: list(self.work.glob("segment-*.vdseg")), "accepted batch")
+        build.kill()
+        build.communicate()
+        done = subprocess.run([VOXDAG, "build", self.scene, "-r", "16384", "-o", self.output,
+                               "--json"], capture_output=True, text=True, check=True)
+        report = json.loads(done.stdout)
+        self.assertEqual(report["sha256"], self.sha256(16384))
+        self.assertGreater(report["subvolumes"]["reused"], 0)
+
+    def test_torn_and_foreign_records_do_not_count(self):
+        build = self.start(16384, 4)
+        folder = self.work / "cluster"
+        self.wait_for(lambda: list(folder.glob("batch-3.vdbatch")), "batch")
+        (folder / "batch-3.record-torn.json").write_text('{"program": "0.1.0", "bui')
+        (folder / "batch-2.record-foreign.json").write_text("{}\n17\n")
+        _, messages = self.finish(build, 16384)
+        self.assertIn("batch-3.record-torn.json does not count: it fails its checksum", messages)
+        self.assertIn("batch-2.record-foreign.json does not count", messages)
+
+    def test_a_requeued_task(self):
+        build = self.start(16384, 4)
+        self.wait_for(self.tasks, "running task")
+        running = self.cluster.command("squeue", "--noheader", "--array", "--states=RUNNING",
+                                       "--format=%F_%K").stdout.split()
+        self.cluster.command("scontrol", "requeue", random.choice(running))
+        report, _ = self.finish(build, 16384)
+        self.assertEqual(report["cluster"]["failed_attempts"], 0)
+
+    def test_the_shared_disk_is_full(self):
+        if os.geteuid() != 0:
+            self.skipTest("only root may mount a small disk")
+        disk = self.folder / "small"
+        disk.mkdir()
+        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64m", "tmpfs", disk], check=True)
+        self.addCleanup(lambda: subprocess.run(["umount", "--lazy", disk], check=True))
+        self.work = disk / "work"
+        options = ["--work", str(self.work), "--cluster-retries", "1"]
+        build = self.start(16384, 4, *options)
+        self.wait_for(lambda: list(self.work.glob("cluster/batch-3.vdbatch")), "batch")
+        filler = disk / "filler"
+        with self.assertRaises(OSError), open(filler, "wb", buffering=0) as file:
+            while True:
+                file.write(bytes(1 << 16))
+        _, messages = build.communicate(timeout=120)
+        self.assertNotEqual(build.returncode, 0)
+        self.assertRegex(messages, "disk is full|No space left on device")
+        filler.unlink()
+        self.finish(self.start(16384, 4, *options), 16384)
+
+    def test_the_service_builds_on_the_cluster(self):
+        with Service(self.folder / "service", self.scene, self.cluster.environment) as service:
+            job = service.submit(32768)
+            self.wait_for(lambda: service.tasks(job), lambda: f"tasks in {service.job(job)}", 20)
+            shown = service.job(job)["progress"]["cluster"]
+            self.assertEqual(shown["batches"], 8)
+            self.assertTrue(all(node["name"] in self.cluster.nodes for node in shown["nodes"]))
+            self.assertRegex(service.get("/metrics").decode(), r"voxdag_cluster_tasks_running [1-8]")
+            service.action(job, "cancel")
+            self.wait_for(lambda: service.job(job)["state"] == "canceled", "canceled job")
+            self.wait_for(lambda: not self.queue(), "empty queue")
+            service.action(job, "retry")
+            self.wait_for(self.queue, "tasks of the second attempt")
+            service.kill()
+            self.assertTrue(self.queue(), "the tasks do not run on")
+            service.start()
+            self.wait_for(lambda: service.job(job)["state"] == "succeeded", "result", 120)
+            self.assertEqual(service.job(job)["result"]["sha256"], self.sha256(32768))
+
+    @slow
+    def test_twenty_random_kills(self):
+        build = self.start(65536, 24, "--cluster-retries", "30")
+        kills = 0
+        while build.poll() is None and kills < 20:
+            time.sleep(random.uniform(0.02, 0.2))
+            running = self.tasks()
+            if not running:
+                continue
+            if random.random() < 0.15:
+                node = random.choice(sorted(running))
+                self.cluster.kill_machine(node)
+                self.cluster.start_node(node)
+            else:
+                os.kill(random.choice(random.choice(list(running.values()))), signal.SIGKILL)
+            kills += 1
+        report, _ = self.finish(build, 65536)
+        print(f"{kills} kills, {report['cluster']['failed_attempts']} failed attempts", flush=True)
+        self.assertEqual(kills, 20)
+
+
+class Service:
+    """`voxdag serve` whose jobs build on the cluster."""
+
+    def __init__(self, folder, scene, environment):
+        self.environment = environment
+        folder.mkdir()
+        self.settings = folder / "server.json"
+        self.port = free_ports(1)[0]
+        self.settings.write_text(json.dumps({
+            "port": self.port, "data_folder": str(folder / "data"), "scene_roots": [str(scene.parent)],
+            "cluster": {"engine": "slurm", "tasks": 8, "grace_s": 2}}))
+        self.scene = scene
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.wait(timeout=30)
+
+    def start(self):
+        self.process = subprocess.Popen([VOXDAG, "serve", "--config", self.settings],
+                                        stderr=subprocess.DEVNULL, env=self.environment)
+        for _ in range(200):
+            try:
+                self.get("/readyz")
+                return
+            except OSError:
+                time.sleep(0.05)
+        raise RuntimeError("the service does not start")
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+
+    def get(self, path, body=None, method=None):
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(f"http://127.0.0.1:{self.port}{path}", data, method=method,
+                                         headers={"Content-Type": "application/json"})
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return answer.read()
+
+    def submit(self, resolution):
+        body = {"scene": str(self.scene), "resolution": resolution}
+        return json.loads(self.get("/api/v1/jobs", body))["id"]
+
+    def job(self, job):
+        return json.loads(self.get(f"/api/v1/jobs/{job}"))
+
+    def action(self, job, name):
+        self.get(f"/api/v1/jobs/{job}/{name}", method="POST")
+
+    def tasks(self, job):
+        """The tasks that run now, by node."""
+        cluster = (self.job(job)["progress"] or {}).get("cluster")
+        return cluster and {n["name"]: n["running"] for n in cluster["nodes"] if n["running"]}
+
+
+if __name__ == "__main__":
+    VOXDAG = os.path.abspath(sys.argv.pop(1))
+    if missing := missing_programs():
+        print(f"skipped: {', '.join(missing)} not installed (tools/packages cluster)")
+        sys.exit(SKIPPED)
+    unittest.main(verbosity=2)

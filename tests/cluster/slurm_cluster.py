@@ -1,0 +1,181 @@
+"""A Slurm cluster on this machine, in a folder of its own: munged, slurmctld and some slurmd, each with
+its name and port. No systemd, no privileges of the tests' own; everything ends with the context."""
+
+import os
+import pwd
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+PROGRAMS = ["munged", "slurmctld", "slurmd", "sbatch", "squeue", "scontrol", "scancel"]
+
+
+def missing_programs():
+    """The programs of Slurm and munge that are not installed."""
+    path = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"
+    return [program for program in PROGRAMS if shutil.which(program, path=path) is None]
+
+
+def free_ports(count):
+    sockets = [socket.socket() for _ in range(count)]
+    for s in sockets:
+        s.bind(("127.0.0.1", 0))
+    ports = [s.getsockname()[1] for s in sockets]
+    for s in sockets:
+        s.close()
+    return ports
+
+
+class SlurmCluster:
+    """`nodes` machines of `cpus` CPUs each, all of them this one."""
+
+    def __init__(self, folder, nodes=4, cpus=2, settings=""):
+        self.folder = Path(folder)
+        self.nodes = [f"n{i}" for i in range(1, nodes + 1)]
+        self.cpus = cpus
+        self.settings = settings
+        self.processes = {}
+        self.environment = dict(os.environ)
+        self.environment["PATH"] += ":/usr/sbin:/sbin"
+        self.environment["SLURM_CONF"] = str(self.folder / "slurm.conf")
+
+    def __enter__(self):
+        try:
+            self.start()
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+
+    def start(self):
+        self.folder.mkdir(parents=True, exist_ok=True)
+        # munged refuses to work in a folder that others may write to.
+        self.folder.chmod(0o755)
+        for name in ["munge", "state", "log"] + [f"spool-{node}" for node in self.nodes]:
+            (self.folder / name).mkdir(exist_ok=True)
+        (self.folder / "munge").chmod(0o755)
+        key = self.folder / "munge" / "key"
+        key.write_bytes(os.urandom(1024))
+        key.chmod(0o600)
+        self.write_configuration()
+        munge = self.folder / "munge"
+        self.spawn("munged", ["munged", "--foreground", "--force", f"--socket={munge}/socket",
+                              f"--key-file={munge}/key", f"--pid-file={munge}/pid",
+                              f"--seed-file={munge}/seed", f"--log-file={munge}/log"])
+        self.wait_for(lambda: (munge / "socket").exists(), "munged")
+        self.start_controller()
+        for node in self.nodes:
+            self.start_node(node)
+        self.wait_for(lambda: self.count_idle() == len(self.nodes), "idle nodes")
+
+    def write_configuration(self):
+        user = pwd.getpwuid(os.getuid()).pw_name
+        self.controller_port, *self.node_ports = free_ports(1 + len(self.nodes))
+        lines = [
+            "ClusterName=test",
+            "SlurmctldHost=localhost(127.0.0.1)",
+            f"SlurmUser={user}",
+            f"SlurmdUser={user}",
+            f"SlurmctldPort={self.controller_port}",
+            "AuthType=auth/munge",
+            "CredType=cred/munge",
+            f"AuthInfo=socket={self.folder}/munge/socket",
+            f"StateSaveLocation={self.folder}/state",
+            f"SlurmdSpoolDir={self.folder}/spool-%n",
+            f"SlurmctldPidFile={self.folder}/slurmctld.pid",
+            f"SlurmdPidFile={self.folder}/slurmd-%n.pid",
+            f"SlurmctldLogFile={self.folder}/log/slurmctld",
+            f"SlurmdLogFile={self.folder}/log/slurmd-%n",
+            "ProctrackType=proctrack/linuxproc",
+            "TaskPlugin=task/none",
+            "JobAcctGatherType=jobacct_gather/none",
+            "AccountingStorageType=accounting_storage/none",
+            "SelectType=select/cons_tres",
+            "SelectTypeParameters=CR_CPU_Memory",
+            "SchedulerParameters=batch_sched_delay=0,sched_interval=2,sched_min_interval=0",
+            "MpiDefault=none",
+            "SwitchType=switch/none",
+            "ReturnToService=2",
+            "SlurmdTimeout=10",
+            "SlurmctldTimeout=10",
+            "InactiveLimit=0",
+            "KillWait=2",
+            "MinJobAge=300",
+            "MaxArraySize=101",
+            "SlurmdParameters=config_overrides",
+            self.settings,
+        ]
+        for node, port in zip(self.nodes, self.node_ports):
+            lines.append(f"NodeName={node} NodeHostname=localhost NodeAddr=127.0.0.1 Port={port} "
+                         f"CPUs={self.cpus} RealMemory=4096 State=UNKNOWN")
+        lines.append(f"PartitionName=all Nodes={','.join(self.nodes)} Default=YES MaxTime=INFINITE "
+                     "State=UP DefMemPerCPU=512")
+        (self.folder / "slurm.conf").write_text("\n".join(lines) + "\n")
+
+    def spawn(self, name, command):
+        with open(self.folder / "log" / f"{name}.out", "ab") as log:
+            self.processes[name] = subprocess.Popen(command, stdout=log, stderr=log,
+                                                    env=self.environment, start_new_session=True)
+
+    def start_controller(self):
+        self.spawn("slurmctld", ["slurmctld", "-D"])
+        self.wait_for(lambda: self.command("scontrol", "ping", check=False).returncode == 0,
+                      "slurmctld")
+
+    def start_node(self, node):
+        self.spawn(node, ["slurmd", "-D", "-N", node])
+
+    def kill(self, name, how=signal.SIGKILL):
+        """Ends a daemon; what a node runs is left running (as on a machine that lost its network)."""
+        process = self.processes.pop(name)
+        process.send_signal(how)
+        process.wait()
+
+    def kill_machine(self, node):
+        """Ends a node's daemon and all that it runs."""
+        self.kill(node)
+        marker = f"SLURMD_NODENAME={node}".encode()
+        for entry in Path("/proc").iterdir():
+            if not entry.name.isdigit():
+                continue
+            try:
+                environment = (entry / "environ").read_bytes().split(b"\0")
+                if (marker in environment and
+                        f"SLURM_CONF={self.folder}/slurm.conf".encode() in environment):
+                    os.kill(int(entry.name), signal.SIGKILL)
+            except OSError:
+                continue
+
+    def command(self, *command, check=True):
+        return subprocess.run(command, env=self.environment, capture_output=True, text=True,
+                              timeout=60, check=check)
+
+    def count_idle(self):
+        shown = self.command("sinfo", "--noheader", "--Node", "--format=%N %T", check=False)
+        return sum(line.split()[1:] == ["idle"] for line in shown.stdout.splitlines())
+
+    def wait_for(self, condition, what, seconds=60):
+        end = time.monotonic() + seconds
+        while not condition():
+            if time.monotonic() > end:
+                raise RuntimeError(f"no {what} after {seconds} s:\n{self.logs()}")
+            time.sleep(0.1)
+
+    def logs(self):
+        return "\n".join(f"--- {log.name}\n{log.read_text(errors='replace')[-1500:]}"
+                         for log in sorted((self.folder / "log").iterdir()))
+
+    def stop(self):
+        if "slurmctld" in self.processes:
+            self.command("scancel", "--user", pwd.getpwuid(os.getuid()).pw_name, check=False)
+        for node in self.nodes:
+            if node in self.processes:
+                self.kill_machine(node)
+        for name in list(self.processes):
+            self.kill(name)

@@ -1,0 +1,127 @@
+// A Slurm that is played by a test: its tasks run in this process, and end as the test says.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <climits>
+#include <deque>
+#include <functional>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "scheduler/cluster/run_batch.h"
+#include "scheduler/cluster/slurm/command_runner.h"
+
+namespace voxdag {
+
+inline constexpr const char* kVersion = "1.2.3";
+
+// Runs each task at once, unless a fate for it was given: then it ends in that state without having
+// done anything.
+class PlayedSlurm : public CommandRunner {
+ public:
+  std::deque<std::string> fates;  // of the next tasks; "" for one that does its work
+  uint32_t max_array_size = 1001;
+  size_t max_tasks = SIZE_MAX;  // of an array
+  int squeue_failures = 0;
+  std::string refusal;       // of sbatch
+  int refusals = INT_MAX;    // how often it refuses
+  std::string test_refusal;  // of sbatch --test-only
+  std::vector<std::vector<std::string>> commands;
+  std::string program = kVersion;
+  std::string temporary_folder;
+  std::function<void(uint32_t batch)> before_task;
+
+  CommandResult run(const std::vector<std::string>& command, const std::string& input, double,
+                    const CancelToken&) override {
+    commands.push_back(command);
+    if (command[0] == "sbatch")
+      return command[1] != "--test-only" ? submit(command, input)
+             : test_refusal.empty()      ? ok("")
+                                         : CommandResult{1, "", test_refusal};
+    if (command[0] == "squeue") {
+      if (squeue_failures > 0) {
+        --squeue_failures;
+        return {1, "", "slurm_load_jobs error: Unable to contact slurm controller"};
+      }
+      return ok("");
+    }
+    if (command[0] == "scontrol" && command[2] == "config")
+      return ok("MaxArraySize            = " + std::to_string(max_array_size) +
+                "\nAccountingStorageType   = accounting_storage/none\n");
+    if (command[0] == "scontrol") return ok(ends[command.back()]);
+    if (command[0] == "scancel") return ok("");
+    return {127, "", command[0] + ": command not found"};
+  }
+
+ private:
+  static CommandResult ok(const std::string& output) { return {0, output, ""}; }
+
+  CommandResult submit(const std::vector<std::string>& command, const std::string& script) {
+    if (!refusal.empty() && refusals-- > 0) return {1, "", refusal};
+    const std::string job = std::to_string(++jobs);
+    uint32_t first = 0;
+    std::string indexes;
+    for (const std::string& word : command) {
+      if (word.starts_with("--comment="))
+        first = static_cast<uint32_t>(std::stoul(word.substr(10)));
+      if (word.starts_with("--array=")) indexes = word.substr(8);
+    }
+    EXPECT_NE(script.find("$((" + std::to_string(first) + " + SLURM_ARRAY_TASK_ID))"),
+              std::string::npos);
+    std::vector<unsigned long> tasks;
+    std::istringstream in(indexes);
+    for (std::string range; std::getline(in, range, ',');) {
+      const size_t dash = range.find('-');
+      const unsigned long low = std::stoul(range);
+      const unsigned long high =
+          dash == std::string::npos ? low : std::stoul(range.substr(dash + 1));
+      EXPECT_LT(high, max_array_size);
+      for (unsigned long i = low; i <= high; ++i) tasks.push_back(i);
+    }
+    if (tasks.size() > max_tasks) return {1, "", "error: QOSMaxSubmitJobPerUserLimit"};
+    for (const unsigned long i : tasks)
+      run_task(work_of(script), job + "_" + std::to_string(i), first + static_cast<uint32_t>(i));
+    return ok(job + "\n");
+  }
+
+  static std::string work_of(const std::string& script) {
+    const size_t begin = script.find("'build-batch' '") + 15;
+    return script.substr(begin, script.find('\'', begin) - begin);
+  }
+
+  void run_task(const std::string& work, const std::string& task, uint32_t batch) {
+    std::string fate;
+    if (!fates.empty()) {
+      fate = fates.front();
+      fates.pop_front();
+    }
+    if (before_task) before_task(batch);
+    ends[task] =
+        "JobState=" + (fate.empty() ? "COMPLETED" : fate) + " Reason=None NodeList=n7 ExitCode=0:0";
+    if (!fate.empty()) return;
+    NoProgress progress;
+    CancelToken never;
+    try {
+      run_batch({.work_folder = work,
+                 .batch = batch,
+                 .program = program,
+                 .temporary_folder = temporary_folder,
+                 .memory_bytes = uint64_t{128} << 20,
+                 .threads = 2,
+                 .attempt = ""},
+                {system_files(), progress, never});
+    } catch (const Error&) {
+      ends[task] = "JobState=FAILED Reason=NonZeroExitCode NodeList=n7 ExitCode=2:0";
+    }
+  }
+
+  int jobs = 0;
+  std::map<std::string, std::string> ends;
+};
+
+}  // namespace voxdag
