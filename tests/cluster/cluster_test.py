@@ -86,7 +86,10 @@ class ClusterTest(unittest.TestCase):
     def wait_for(self, condition, what, seconds=60):
         end = time.monotonic() + seconds
         while not (found := condition()):
-            self.assertLess(time.monotonic(), end, f"no {what() if callable(what) else what} after {seconds} s")
+            if time.monotonic() > end:
+                self.fail(f"no {what() if callable(what) else what} after {seconds} s\n"
+                          + self.cluster.command("sinfo", "--long", "--Node", check=False).stdout
+                          + self.cluster.command("squeue", "--array", check=False).stdout)
             time.sleep(0.05)
         return found
 

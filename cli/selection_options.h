@@ -1,0 +1,26 @@
+// The options --region, --world, --level and --resolution of the commands that take a part of a
+// file.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "cli/command.h"
+#include "core/format/global/voxdag_reader.h"
+#include "query/selection.h"
+
+namespace voxdag::cli {
+
+struct SelectionOptions {
+  std::string region;  // as typed; "" for the whole grid
+  bool world = false;
+  std::optional<double> level, resolution;
+
+  void declare(Command& command);
+  // What of `file` is selected. Throws Error{kInvalidInput} for a grid that is finer than the
+  // file's or coarser than 4 cells per edge, and for a region that has no cell of the grid.
+  query::Selection selection(const voxdag_reader::File& file) const;
+};
+
+}  // namespace voxdag::cli
