@@ -44,6 +44,8 @@ struct ClusterOptions {
   // How long the shared disk may take to show the record of a task that ended.
   double grace_s = 15;
   double slurm_interval_s = 5;  // between two questions to Slurm
+  // How long Slurm may lack the nodes that tasks ask for: after its start it knows none.
+  double slurm_start_s = 15;
   // Runs Slurm's commands; tests have others. Null for the system's.
   CommandRunner* commands = nullptr;
 };

@@ -426,7 +426,7 @@ BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
   const BuildSpec full = checked(spec);
   check_places(full, context);
   return_freed_memory_to_system();
-  if (full.run.cluster) ClusterBuild::check(full, commands_of(full), context.cancel);
+  if (full.run.cluster) ClusterBuild::check(full, commands_of(full), context);
   return Build(full, context).run();
 }
 

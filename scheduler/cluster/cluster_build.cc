@@ -59,15 +59,18 @@ ClusterBuild::ClusterBuild(const BuildSpec& spec, const WorkFolder& work, JobSto
       context_(context),
       files_(context.files),
       folder_(work.path()),
-      slurm_(commands, context.cancel) {}
+      slurm_(commands, context.cancel, options_.slurm_start_s) {}
 
 void ClusterBuild::check(const BuildSpec& spec, CommandRunner& commands,
-                         const CancelToken& cancel) {
+                         const BuildContext& context) {
   if (!spec.run.cache_folder.empty())
     throw Error(ErrorCode::kInvalidInput,
                 "--cache: tasks of a cluster have no cache: expected "
                 "--cluster without it");
-  Slurm(commands, cancel).check(split_words(spec.run.cluster->submit_options));
+  const ClusterOptions& options = *spec.run.cluster;
+  Slurm(commands, context.cancel, options.slurm_start_s)
+      .check(split_words(options.submit_options), std::min(kFirstPause_s, options.slurm_interval_s),
+             context.progress);
 }
 
 void ClusterBuild::save_state() {

@@ -44,7 +44,7 @@ class ClusterBuild {
 
   // Throws Error{kInvalidInput} if there is no Slurm here, or if it would refuse the tasks of a
   // build with cluster options.
-  static void check(const BuildSpec& spec, CommandRunner& commands, const CancelToken& cancel);
+  static void check(const BuildSpec& spec, CommandRunner& commands, const BuildContext& context);
   // Takes over what an earlier run has left for the scene, and records what was built since then.
   // What is left of another build or another version is given up.
   void resume(const std::string& scene_digest, const DagShape& shape);

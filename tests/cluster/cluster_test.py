@@ -46,8 +46,12 @@ class ClusterTest(unittest.TestCase):
     def setUp(self):
         self.output = self.folder / f"{self.id().split('.')[-1]}.vdag"
         self.work = Path(f"{self.output}.work")
+        self.build = None
 
     def tearDown(self):
+        if self.build:
+            self.build.kill()
+            self.build.communicate()
         subprocess.run(["scancel", "--user", str(os.getuid())], env=self.cluster.environment,
                        check=False, capture_output=True)
         if self.work.exists():
@@ -64,14 +68,20 @@ class ClusterTest(unittest.TestCase):
         return self.expected[resolution]
 
     def start(self, resolution, tasks, *options):
-        return subprocess.Popen(
+        self.build = subprocess.Popen(
             [VOXDAG, "build", self.scene, "-r", str(resolution), "-o", self.output, "--json",
              "--cluster", "slurm", "--cluster-tasks", str(tasks), "--cluster-grace", "2", *options],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             env=self.cluster.environment)
+        return self.build
+
+    def end(self, build, timeout=300):
+        """What it has printed; no wait counts on it any more."""
+        self.build = None
+        return build.communicate(timeout=timeout)
 
     def finish(self, build, resolution):
-        out, messages = build.communicate(timeout=300)
+        out, messages = self.end(build)
         self.assertEqual(build.returncode, 0, messages + self.logs())
         report = json.loads(out)
         self.assertEqual(report["sha256"], self.sha256(resolution))
@@ -85,13 +95,17 @@ class ClusterTest(unittest.TestCase):
 
     def wait_for(self, condition, what, seconds=60):
         end = time.monotonic() + seconds
-        while not (found := condition()):
-            if time.monotonic() > end:
+        while True:
+            has_ended = self.build and self.build.poll() is not None
+            if found := condition():
+                return found
+            if has_ended or time.monotonic() > end:
                 self.fail(f"no {what() if callable(what) else what} after {seconds} s\n"
+                          + (f"the build has ended: {self.build.communicate()}\n"
+                             if has_ended else "")
                           + self.cluster.command("sinfo", "--long", "--Node", check=False).stdout
                           + self.cluster.command("squeue", "--array", check=False).stdout)
             time.sleep(0.05)
-        return found
 
     def tasks(self):
         """Process ids of running tasks, by node."""
@@ -138,7 +152,7 @@ class ClusterTest(unittest.TestCase):
         # A file in the place of the batch: every attempt finds it damaged.
         batch = self.wait_for(lambda: sorted(self.work.glob("cluster/batch-*.vdbatch")), "batch")[0]
         batch.write_bytes(b"vdbatch1" + bytes(100))
-        _, messages = build.communicate(timeout=120)
+        _, messages = self.end(build)
         self.assertNotEqual(build.returncode, 0)
         self.assertIn("it has failed 2 times", messages)
         self.assertIn("batch-0.vdbatch", messages)
@@ -189,7 +203,7 @@ class ClusterTest(unittest.TestCase):
         build = self.start(16384, 8)
         self.wait_for(self.tasks, "running task")
         build.send_signal(how)
-        _, messages = build.communicate(timeout=30)
+        _, messages = self.end(build, 30)
         self.assertNotEqual(build.returncode, 0)
         if how == signal.SIGINT:
             self.assertIn("its tasks run on", messages)
@@ -206,7 +220,7 @@ class ClusterTest(unittest.TestCase):
         build = self.start(16384, 8)
         self.wait_for(self.tasks, "running task")
         build.kill()
-        build.communicate()
+        self.end(build)
         report, _ = self.finish(self.start(2048, 2, "--restart"), 2048)
         self.assertEqual(report["cluster"]["batches"], 2)
         self.wait_for(lambda: not self.queue(), "empty queue")
@@ -218,7 +232,7 @@ class ClusterTest(unittest.TestCase):
         os.kill(stopped, signal.SIGSTOP)
         self.wait_for(lambda: list(self.work.glob("segment-*.vdseg")), "accepted batch")
         build.kill()
-        build.communicate()
+        self.end(build)
         done = subprocess.run([VOXDAG, "build", self.scene, "-r", "16384", "-o", self.output,
                                "--json"], capture_output=True, text=True, check=True)
         report = json.loads(done.stdout)
@@ -259,7 +273,7 @@ class ClusterTest(unittest.TestCase):
         with self.assertRaises(OSError), open(filler, "wb", buffering=0) as file:
             while True:
                 file.write(bytes(1 << 16))
-        _, messages = build.communicate(timeout=120)
+        _, messages = self.end(build)
         self.assertNotEqual(build.returncode, 0)
         self.assertRegex(messages, "disk is full|No space left on device")
         filler.unlink()

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <sstream>
+#include <thread>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
 
 namespace voxdag {
@@ -105,7 +107,14 @@ CommandResult Slurm::run(const std::vector<std::string>& command, const std::str
   return commands_.run(command, input, kTimeout_s, cancel_);
 }
 
-void Slurm::check(const std::vector<std::string>& options) {
+bool Slurm::may_be_starting(const CommandResult& refused) {
+  const std::string said = refused.error + refused.output;
+  if (said.find("Requested node configuration is not available") == std::string::npos) return false;
+  if (!without_nodes_since_s_) without_nodes_since_s_ = wall_seconds();
+  return wall_seconds() - *without_nodes_since_s_ < start_s_;
+}
+
+void Slurm::check(const std::vector<std::string>& options, double pause_s, Progress& progress) {
   // Our own, without which a task would not be found or would build another batch.
   for (const std::string& option : options)
     for (const std::string name :
@@ -119,7 +128,15 @@ void Slurm::check(const std::vector<std::string>& options) {
                         "(--cluster-running limits how many tasks run at a time)");
   std::vector<std::string> command{"sbatch", "--test-only"};
   command.insert(command.end(), options.begin(), options.end());
-  const CommandResult tested = run(command, "#!/bin/sh\nexit 0\n");
+  CommandResult tested = run(command, "#!/bin/sh\nexit 0\n");
+  for (bool is_first = true; tested.exit_status != 0 && may_be_starting(tested); is_first = false) {
+    if (is_first)
+      progress.warn("Slurm has no nodes for the tasks (" + trimmed(tested.error + tested.output) +
+                    "): asking again, in case that it has just been started");
+    std::this_thread::sleep_for(std::chrono::duration<double>(pause_s));
+    cancel_.check();
+    tested = run(command, "#!/bin/sh\nexit 0\n");
+  }
   if (tested.exit_status == 127)
     throw Error(ErrorCode::kInvalidInput, "--cluster slurm: " + trimmed(tested.error) +
                                               ": expected Slurm's commands on this machine");
@@ -181,10 +198,12 @@ void Slurm::submit(const ArrayRequest& request, std::map<uint32_t, SlurmTask>& t
       continue;
     }
     if (!number(job))
-      throw Error(is_unreachable(submitted) || is_too_much(submitted) ? ErrorCode::kIo
-                                                                      : ErrorCode::kInvalidInput,
+      throw Error(is_unreachable(submitted) || is_too_much(submitted) || may_be_starting(submitted)
+                      ? ErrorCode::kIo
+                      : ErrorCode::kInvalidInput,
                   "sbatch refused the array: " + trimmed(submitted.error + submitted.output) +
                       ": expected a job id (--cluster-options)");
+    without_nodes_since_s_.reset();
     for (const uint32_t index : indexes)
       tasks[first + index] = {.job = job,
                               .index = index,

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/progress.h"
 #include "scheduler/cluster/slurm/command_runner.h"
 
 namespace voxdag {
@@ -50,12 +51,14 @@ struct ArrayRequest {
 
 class Slurm {
  public:
-  // `cancel` ends a command that runs.
-  Slurm(CommandRunner& commands, const CancelToken& cancel)
-      : commands_(commands), cancel_(cancel) {}
+  // `cancel` ends a command that runs. For some seconds after its start Slurm knows no nodes, and
+  // says that no node is like those asked for: that is believed after `start_s` only.
+  Slurm(CommandRunner& commands, const CancelToken& cancel, double start_s = 0)
+      : commands_(commands), cancel_(cancel), start_s_(start_s) {}
 
   // Throws Error{kInvalidInput} if there is no Slurm here, or if sbatch would refuse these options.
-  void check(const std::vector<std::string>& options);
+  // Asks again every `pause_s` while Slurm may not know its nodes yet, with a warning.
+  void check(const std::vector<std::string>& options, double pause_s, Progress& progress);
   // Submits arrays, several if the numbers of the batches differ by more than Slurm's MaxArraySize,
   // and adds the task of each batch to `tasks` as soon as its array is accepted. Throws
   // Error{kInvalidInput} with sbatch's message if it refuses, Error{kIo} if Slurm does not answer
@@ -76,9 +79,13 @@ class Slurm {
   CommandResult run(const std::vector<std::string>& command, const std::string& input = "");
   // A setting of slurm.conf, "" if unknown.
   std::string setting(const std::string& name);
+  // Whether Slurm refused for want of nodes that it may not know yet.
+  bool may_be_starting(const CommandResult& refused);
 
   CommandRunner& commands_;
   const CancelToken& cancel_;
+  const double start_s_;
+  std::optional<double> without_nodes_since_s_;  // since Slurm refused so for the first time
   uint64_t requests_ = 0;
   std::optional<std::string> configuration_;
 };

@@ -173,6 +173,27 @@ TEST_F(Cluster, WaitsForASlurmThatTakesNoTasksNow) {
   EXPECT_NE(warnings_.text.find("Slurm takes no tasks now"), std::string::npos) << warnings_.text;
 }
 
+// For some seconds after its start Slurm knows no nodes, and refuses what it will take.
+TEST_F(Cluster, WaitsForASlurmThatHasJustBeenStarted) {
+  slurm_.test_refusal = "allocation failure: Requested node configuration is not available";
+  slurm_.refusal = "Batch job submission failed: Requested node configuration is not available";
+  slurm_.test_refusals = slurm_.refusals = 3;
+  build(spec(2));
+  EXPECT_NE(warnings_.text.find("Slurm has no nodes for the tasks (allocation failure"),
+            std::string::npos)
+      << warnings_.text;
+  EXPECT_NE(warnings_.text.find("Slurm takes no tasks now"), std::string::npos);
+  for (int* refusals : {&slurm_.test_refusals, &slurm_.refusals}) {
+    *refusals = INT_MAX;
+    BuildSpec never = spec(2);
+    never.run.cluster->slurm_start_s = 0.05;
+    const Error error = error_of([&] { run_build(never, context()); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+    EXPECT_NE(error.message().find("Requested node configuration"), std::string::npos);
+    *refusals = 0;
+  }
+}
+
 TEST_F(Cluster, AnArrayThatIsTooLargeForSlurmIsHalved) {
   slurm_.max_tasks = 3;
   EXPECT_EQ(build(spec(12)).cluster->batches, 12u);

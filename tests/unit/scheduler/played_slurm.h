@@ -31,6 +31,7 @@ class PlayedSlurm : public CommandRunner {
   std::string refusal;       // of sbatch
   int refusals = INT_MAX;    // how often it refuses
   std::string test_refusal;  // of sbatch --test-only
+  int test_refusals = INT_MAX;
   std::vector<std::vector<std::string>> commands;
   std::string program = kVersion;
   std::string temporary_folder;
@@ -40,9 +41,9 @@ class PlayedSlurm : public CommandRunner {
                     const CancelToken&) override {
     commands.push_back(command);
     if (command[0] == "sbatch")
-      return command[1] != "--test-only" ? submit(command, input)
-             : test_refusal.empty()      ? ok("")
-                                         : CommandResult{1, "", test_refusal};
+      return command[1] != "--test-only"                    ? submit(command, input)
+             : test_refusal.empty() || test_refusals-- <= 0 ? ok("")
+                                                            : CommandResult{1, "", test_refusal};
     if (command[0] == "squeue") {
       if (squeue_failures > 0) {
         --squeue_failures;
