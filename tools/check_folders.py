@@ -26,7 +26,7 @@ CORE = list(CORE_INCLUDES)
 PRODUCT_INCLUDES = CORE_INCLUDES | {
     "merge": CORE,
     "scheduler": CORE + ["merge"],
-    "query": CORE,
+    "query": CORE + ["merge"],
     "client": ["core/base", "core/io", "core/format"],  # core/format: SHA-256
     "server": CORE + ["scheduler", "query"],
     "cli": CORE + ["scheduler", "query", "client", "server"],

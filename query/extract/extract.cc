@@ -1,0 +1,291 @@
+#include "query/extract/extract.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/memory_budget.h"
+#include "core/base/parallel_for.h"
+#include "core/format/artifact/artifact_writer.h"
+#include "core/format/artifact/segment_writer.h"
+#include "core/format/global/global_writer.h"
+#include "core/geometry/octree_descent.h"
+#include "merge/merge.h"
+#include "query/extract/node_reader.h"
+#include "query/extract/part_builder.h"
+
+namespace voxdag::query {
+namespace {
+
+// A worker's share that suffices for every cube of a few bricks, and what it has besides: a segment
+// to write, a window of the file, and pages that are retained for its next cube.
+constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
+constexpr uint64_t kOutsideShareBytes =
+    kSegmentWriterBytes + NodeReader::kMemoryBytes + BackendMemory::kMinPageBytes;
+constexpr unsigned kMaxWorkers = 256;  // each has a file open
+// What a node takes while its cube is reduced, for a first guess at the number of cubes.
+constexpr uint64_t kBytesPerNode = 128;
+// So few nodes are reduced faster by one thread than by several that share none of the work.
+constexpr uint64_t kFewNodes = uint64_t{1} << 17;
+constexpr uint64_t kPartsPerWorker = 4;
+constexpr uint64_t kMaxFirstParts = 4096;
+
+// A folder that is removed with all that is in it.
+class TemporaryWork {
+ public:
+  TemporaryWork(FileSystem& files, const std::string& prefix)
+      : files_(files), path_(make_temporary_folder(prefix)) {}
+  ~TemporaryWork() {
+    try {
+      remove_tree(files_, path_);
+    } catch (const Error&) {
+      // What cannot be removed is of no use and does no harm.
+    }
+  }
+  TemporaryWork(const TemporaryWork&) = delete;
+  TemporaryWork& operator=(const TemporaryWork&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  FileSystem& files_;
+  const std::string path_;
+};
+
+class Extraction {
+ public:
+  Extraction(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
+             Progress& progress, const CancelToken& cancel)
+      : spec_(spec),
+        files_(files),
+        progress_(progress),
+        cancel_(cancel),
+        file_(file),
+        crop_(spec.crop ? crop_cube(spec.selection) : Cube{}),
+        budget_(spec.memory_bytes),
+        work_(files, spec.output + ".work-") {
+    report_.grid = new_grid();
+    shape_ = {.grid_levels = report_.grid.levels, .hash_bits = file.hash_bits()};
+  }
+
+  ExtractReport run() {
+    const MergeInputs inputs = merge_inputs(build_parts());
+    GlobalFileWriter out(files_, spec_.output, report_.grid, shape_.hash_bits, spec_.narrow_words);
+    const MergeReport merged =
+        merge_sub_dags(inputs, files_, out, budget_, spec_.threads, progress_, cancel_);
+    report_.voxels = merged.voxels;
+    report_.svo_nodes = merged.svo_nodes;
+    report_.dag_nodes = merged.dag_nodes;
+    report_.merge_passes = merged.passes;
+    report_.work_bytes += merged.scratch_bytes;
+    if (merged.voxels == 0) progress_.warn("nothing is set there: the file will have no nodes");
+    progress_.begin_stage("write", 1, "files");
+    const GlobalFileSummary summary =
+        out.seal({.voxels = merged.voxels, .svo_nodes = merged.svo_nodes}, spec_.threads, cancel_);
+    out.publish();
+    progress_.advance(1);
+    progress_.end_stage();
+    report_.bytes = summary.bytes;
+    report_.sha256 = summary.sha256;
+    return report_;
+  }
+
+ private:
+  // What one thread has, for all the cubes that it reduces.
+  struct Worker {
+    Worker(Extraction& all, unsigned id, uint64_t share_bytes)
+        : share(share_bytes, &all.budget_),
+          reader(*all.source_, all.budget_, all.cancel_),
+          builder(all.file_, all.spec_.selection, reader, {share, pages}, all.cancel_),
+          segment(all.files_, all.work_.path(), id, all.budget_) {}
+
+    MemoryBudget share;
+    cpu::PagePool pages;
+    NodeReader reader;
+    PartBuilder builder;
+    SegmentWriter segment;
+  };
+
+  Grid new_grid() const {
+    Grid grid;
+    grid.levels = spec_.selection.grid_levels - crop_.level;
+    grid.edge = std::ldexp(file_.edge(), -static_cast<int>(crop_.level));
+    for (size_t axis = 0; axis < 3; ++axis)
+      grid.origin[axis] = file_.origin()[axis] + crop_.position[axis] * grid.edge;
+    return grid;
+  }
+
+  // The cube in the new grid.
+  Cube in_new_grid(Cube cube) const {
+    cube.level -= crop_.level;
+    for (int axis = 0; axis < 3; ++axis) cube.position[axis] -= crop_.position[axis] << cube.level;
+    return cube;
+  }
+
+  std::vector<ArtifactRef> build_parts();
+  std::vector<Part> first_parts(Worker& worker, uint64_t wanted) const;
+  uint64_t wanted_parts(unsigned workers, uint64_t share_bytes) const;
+  std::vector<Part> build_part(Worker& worker, const Part& part, std::vector<ArtifactRef>& built);
+  MergeInputs merge_inputs(std::vector<ArtifactRef> artifacts);
+
+  const ExtractSpec& spec_;
+  FileSystem& files_;
+  Progress& progress_;
+  const CancelToken& cancel_;
+  const voxdag_reader::File& file_;
+  const Cube crop_;
+  DagShape shape_;
+  MemoryBudget budget_;
+  std::unique_ptr<SourceFile> source_;
+  TemporaryWork work_;
+  std::mutex mutex_;  // of report_ and the lists of parts and artifacts
+  ExtractReport report_;
+};
+
+uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const {
+  uint64_t nodes = 0;
+  const uint32_t deepest = std::min(spec_.selection.grid_levels - 1, file_.brick_level());
+  for (uint32_t l = 0; l <= deepest; ++l) nodes += file_.level(l).node_count;
+  if (nodes <= kFewNodes) return 1;
+  return std::clamp(nodes / (share_bytes / kBytesPerNode), workers * kPartsPerWorker,
+                    kMaxFirstParts);
+}
+
+// The cube of the new grid, divided until there are about as many parts as wanted.
+std::vector<Part> Extraction::first_parts(Worker& worker, uint64_t wanted) const {
+  if (file_.empty()) return {};
+  std::vector<Part> parts{{}};
+  for (uint32_t level = 0; level < crop_.level; ++level) {
+    const Cube next = ancestor(crop_, level + 1);
+    std::vector<Part> children = worker.builder.split(parts[0]);
+    std::erase_if(children, [&](const Part& child) { return child.cube != next; });
+    if (children.empty()) return {};
+    parts = std::move(children);
+  }
+  const uint32_t brick_level = spec_.selection.grid_levels - kBrickLevels;
+  while (parts.size() < wanted && !parts.empty() && parts[0].cube.level < brick_level) {
+    std::vector<Part> children;
+    for (const Part& part : parts) {
+      cancel_.check();
+      for (const Part& child : worker.builder.split(part)) children.push_back(child);
+    }
+    parts = std::move(children);
+  }
+  return parts;
+}
+
+// Returns the parts that replace one that does not fit.
+std::vector<Part> Extraction::build_part(Worker& worker, const Part& part,
+                                         std::vector<ArtifactRef>& built) {
+  const Cube cube = in_new_grid(part.cube);
+  try {
+    ArtifactWriter artifact(worker.segment, shape_);
+    const SubDagSummary summary =
+        worker.builder.build(part, {cube.level, shape_.grid_levels, shape_.hash_bits}, artifact);
+    if (summary.empty()) return {};
+    const ArtifactRoot root{cube, 0, summary.root_hash, summary.voxels, summary.svo_nodes};
+    const ArtifactRef ref = artifact.finish({&root, 1});
+    const std::lock_guard lock(mutex_);
+    built.push_back(ref);
+    ++report_.parts;
+    return {};
+  } catch (const OutOfBudget&) {
+    if (cube.level == shape_.brick_level())
+      throw Error(ErrorCode::kOutOfMemory, "a brick does not fit a worker's share of " +
+                                               std::to_string(worker.share.limit()) + " bytes");
+    return worker.builder.split(part);
+  }
+}
+
+std::vector<ArtifactRef> Extraction::build_parts() {
+  source_ = std::make_unique<SourceFile>(files_, file_, budget_);
+  const uint64_t free_bytes = budget_.available();
+  const unsigned count = static_cast<unsigned>(
+      std::clamp<uint64_t>(free_bytes / (kMinShareBytes + kOutsideShareBytes), 1,
+                           std::min(std::max(spec_.threads, 1u), kMaxWorkers)));
+  const uint64_t share_bytes =
+      free_bytes / count - std::min(free_bytes / count, kOutsideShareBytes);
+  std::vector<std::unique_ptr<Worker>> workers;
+  for (unsigned i = 0; i < count; ++i)
+    workers.push_back(std::make_unique<Worker>(*this, i, share_bytes));
+  std::vector<ArtifactRef> built;
+  std::vector<Part> parts = first_parts(*workers[0], wanted_parts(count, share_bytes));
+  uint64_t total = parts.size();
+  progress_.begin_stage("extract", total, "cubes");
+  while (!parts.empty()) {
+    std::vector<Part> smaller;
+    parallel_for(count, parts.size(), [&](unsigned worker, size_t i) {
+      const std::vector<Part> replaced = build_part(*workers[worker], parts[i], built);
+      const std::lock_guard lock(mutex_);
+      smaller.insert(smaller.end(), replaced.begin(), replaced.end());
+      total += replaced.size();
+      if (!replaced.empty()) {
+        ++report_.parts_split;
+        progress_.set_total(total);
+      }
+      progress_.advance(1);
+    });
+    parts = std::move(smaller);
+  }
+  for (const auto& worker : workers) {
+    worker->segment.complete();
+    report_.work_bytes += worker->segment.size();
+  }
+  progress_.end_stage();
+  source_.reset();
+  return built;
+}
+
+MergeInputs Extraction::merge_inputs(std::vector<ArtifactRef> artifacts) {
+  MergeInputs inputs;
+  inputs.shape = shape_;
+  inputs.artifacts = std::move(artifacts);
+  const auto segments = std::make_shared<std::map<uint32_t, std::shared_ptr<ReadableFile>>>();
+  const auto mutex = std::make_shared<std::mutex>();
+  inputs.open_segment = [this, segments, mutex](uint32_t id) {
+    const std::lock_guard lock(*mutex);
+    std::shared_ptr<ReadableFile>& segment = (*segments)[id];
+    if (!segment) segment = files_.open_read(segment_path(work_.path(), id));
+    return segment;
+  };
+  inputs.scratch_folder = work_.path() + "/merge";
+  return inputs;
+}
+
+}  // namespace
+
+Cube crop_cube(const Selection& selection) {
+  const Region& region = selection.region;
+  uint32_t up = kBrickLevels;
+  for (size_t axis = 0; axis < 3; ++axis)
+    while (region.low[axis] >> up != (region.high[axis] - 1) >> up) ++up;
+  Cube cube{selection.grid_levels - up, {}};
+  for (size_t axis = 0; axis < 3; ++axis)
+    cube.position[axis] = static_cast<uint32_t>(region.low[axis] >> up);
+  return cube;
+}
+
+ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
+                      Progress& progress, const CancelToken& cancel) {
+  const std::string lock_path = spec.output + ".lock";
+  auto lock = files.try_lock(lock_path);
+  if (!lock)
+    throw Error(ErrorCode::kIo, spec.output +
+                                    " is being written by another process: expected another file "
+                                    "(-o), or to wait for that process");
+  const std::shared_ptr<void> remove_lock(nullptr, [&](void*) {
+    try {
+      // A file of that name that is not empty is somebody else's.
+      if (files.open_read(lock_path)->size() == 0) files.remove(lock_path);
+    } catch (const Error&) {
+      // An empty file is left, which the next one that writes there locks again.
+    }
+  });
+  return Extraction(file, spec, files, progress, cancel).run();
+}
+
+}  // namespace voxdag::query

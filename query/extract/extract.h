@@ -1,0 +1,58 @@
+// Writes a part of a global file as a global file: the grid of a coarser level, a region of it, or
+// both. The result is canonical: that of the same voxels, wherever they come from.
+//
+// The grid is divided into octree-aligned cubes. For each cube the part of the DAG that it needs is
+// read and reduced in memory (part_builder.h), by several threads, and written as an artifact; a
+// cube that does not fit its share of the budget is divided into its children. The merge then makes
+// the file, as for a build. So memory is bounded by the budget, not by the file.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/base/cancel_token.h"
+#include "core/base/progress.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/voxdag_reader.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/grid.h"
+#include "core/io/file_system.h"
+#include "query/selection.h"
+
+namespace voxdag::query {
+
+struct ExtractSpec {
+  Selection selection;
+  // The new grid is the smallest octree-aligned cube around the region, instead of the whole grid.
+  bool crop = false;
+  std::string output;
+  uint64_t memory_bytes = uint64_t{1} << 30;
+  unsigned threads = 1;
+  // Levels of over this many words are wide; tests choose fewer.
+  uint64_t narrow_words = global_layout::kNarrowLevelWords;
+};
+
+struct ExtractReport {
+  Grid grid;
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;
+  uint64_t dag_nodes = 0;
+  uint64_t bytes = 0;
+  std::string sha256;
+  uint64_t parts = 0;        // cubes with voxels
+  uint64_t parts_split = 0;  // cubes that did not fit in memory
+  uint32_t merge_passes = 0;
+  uint64_t work_bytes = 0;  // written to temporary files
+};
+
+// The smallest cube of an octree, of the grid of a selection, that contains its region and has 4
+// cells per edge or more.
+Cube crop_cube(const Selection& selection);
+
+// Writes spec.output, which appears when it is complete; temporary files lie in a folder next to
+// it, which is removed whatever happens. Throws Error: kCorrupt for a damaged file, kNoSpace,
+// kOutOfMemory, kCanceled, kIo if another process is writing the output.
+ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
+                      Progress& progress, const CancelToken& cancel);
+
+}  // namespace voxdag::query

@@ -1,0 +1,98 @@
+// Reads nodes of a global file with bounded reads, never through a mapping, so that what is
+// resident does not grow with the file. Every checksum block is compared with its checksum when it
+// is first touched; no more than the blocks that are needed is read.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/format/global/voxdag_reader.h"
+#include "core/io/file_system.h"
+
+namespace voxdag::query {
+
+// A global file, and which of its checksum blocks were found intact. Thread-safe.
+class SourceFile {
+ public:
+  // `header` is the same file, of which only the header is read.
+  SourceFile(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
+
+  const voxdag_reader::File& header() const { return header_; }
+  // Fills `words` from word `first` of the level, within which they lie. `block` is a buffer of
+  // kBlockBytes. Throws Error{kCorrupt} for a block that fails its checksum.
+  void read(uint32_t level, uint64_t first, std::span<uint32_t> words, std::span<std::byte> block);
+
+  static constexpr uint64_t kBlockBytes = uint64_t{1} << 16;
+
+ private:
+  void check_block(uint64_t block, std::span<std::byte> buffer);
+
+  const voxdag_reader::File& header_;
+  const std::unique_ptr<ReadableFile> file_;
+  PageBuffer<uint64_t> intact_;  // one bit per checksum block
+};
+
+// An entry of a list of nodes: where the node begins, and its number among all that are wanted.
+struct WantedNode {
+  uint64_t offset = 0;
+  uint64_t index = 0;
+};
+
+// Reads nodes one by one, or many in the order of their offsets. Not thread-safe.
+class NodeReader {
+ public:
+  static constexpr uint64_t kBufferBytes = uint64_t{1} << 19;
+  // What a reader charges.
+  static constexpr uint64_t kMemoryBytes = kBufferBytes + SourceFile::kBlockBytes;
+
+  NodeReader(SourceFile& source, MemoryBudget& budget, const CancelToken& cancel)
+      : source_(source),
+        cancel_(cancel),
+        buffer_(budget, kBufferBytes / sizeof(uint32_t), "a window of a file"),
+        block_(budget, SourceFile::kBlockBytes, "a block of a file") {}
+
+  // The node, valid until the next call.
+  voxdag_reader::Node node(uint32_t level, uint64_t offset);
+  // Calls visit(index, words) for each wanted node; `words` begin with the node, and have all of it
+  // that lies within the level. `wanted` increases by offset.
+  template <class Visit>
+  void for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit);
+
+  // A node or a brick that begins with `words`, at `offset` of its level. Throws Error{kCorrupt} if
+  // none can begin there.
+  voxdag_reader::Node parse_node(uint32_t level, uint64_t offset,
+                                 std::span<const uint32_t> words) const;
+  uint64_t parse_brick(uint64_t offset, std::span<const uint32_t> words) const;
+
+ private:
+  // Reads a window that begins at the first of the wanted nodes and has some of those after it;
+  // returns how many.
+  size_t fill(uint32_t level, std::span<const WantedNode> wanted);
+  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
+
+  SourceFile& source_;
+  const CancelToken& cancel_;
+  PageBuffer<uint32_t> buffer_;
+  PageBuffer<std::byte> block_;
+  uint64_t first_ = 0;  // offset of the window's first word
+  uint64_t count_ = 0;  // words of the window
+};
+
+template <class Visit>
+void NodeReader::for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit) {
+  while (!wanted.empty()) {
+    cancel_.check();
+    const size_t count = fill(level, wanted);
+    const std::span<const uint32_t> window(buffer_.data(), count_);
+    for (const WantedNode& node : wanted.first(count))
+      visit(node, window.subspan(node.offset - first_));
+    wanted = wanted.subspan(count);
+  }
+}
+
+}  // namespace voxdag::query

@@ -1,0 +1,83 @@
+// Builds the sub-DAG of what a selection has in one octree-aligned cube, a part of the grid.
+//
+// From the cube's root down, every level's nodes are collected (part_level.h) and then read in the
+// order of their offsets. A cell of a coarser grid is set where the octree has a node, so the
+// bricks of the selected grid are made from the nodes two levels above its cells and their
+// children:
+//
+//     selected grid   nodes   ...   bricks          cells
+//     file            nodes   ...   nodes at l-2    their children's masks, at l-1
+//
+// Then, from these bricks up, nodes that have become equal are made one (hash-consing), as in the
+// build of a subvolume, whose tables are used. What a region cuts away is left out on the way down:
+// nodes that it cuts are taken once per position, all others once.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/backend/cpu/tables/sub_dag_tables.h"
+#include "core/base/cancel_token.h"
+#include "core/dag/sub_dag.h"
+#include "core/geometry/cube.h"
+#include "query/extract/node_reader.h"
+#include "query/extract/part_level.h"
+#include "query/selection.h"
+
+namespace voxdag::query {
+
+// A cube of the selected grid that has voxels of the file.
+struct Part {
+  Cube cube;
+  uint64_t offset = 0;  // of its root in level cube.level of the file
+};
+
+class PartBuilder {
+ public:
+  PartBuilder(const voxdag_reader::File& file, const Selection& selection, NodeReader& reader,
+              cpu::Memory memory, const CancelToken& cancel)
+      : file_(file), selection_(selection), reader_(reader), memory_(memory), cancel_(cancel) {}
+
+  // Passes the part's level arrays to the sink, `shape` being that of the new grid. Throws
+  // OutOfBudget, before the sink was called, if the budget cannot hold the part.
+  SubDagSummary build(const Part& part, const SubDagShape& shape, SubDagSink& sink);
+
+  // The parts that replace a part above the bricks: its children of which anything is selected.
+  std::vector<Part> split(const Part& part);
+
+ private:
+  struct Built {
+    cpu::NodeRef ref;
+    cpu::OctreeCounts counts;
+  };
+  // The children of a level's nodes, as numbers in the level below.
+  struct Children {
+    cpu::PooledArray<uint8_t> masks;   // by number; without what the region cuts away
+    cpu::PooledArray<uint32_t> first;  // by number
+    cpu::PooledArray<uint32_t> all;
+    uint64_t count = 0;
+  };
+
+  uint32_t brick_level() const { return selection_.grid_levels - kBrickLevels; }
+  // The low corner and the edge of a cube, in cells of the selected grid.
+  std::array<int64_t, 3> corner(uint32_t level, const PartLevel::Position& position) const;
+  int64_t edge(uint32_t level) const { return int64_t{1} << (selection_.grid_levels - level); }
+
+  void read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);
+  void read_all_children(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);
+  cpu::PooledArray<uint64_t> read_bricks(PartLevel& bricks);
+  cpu::PooledArray<uint8_t> read_cells(PartLevel& nodes);
+  uint64_t selected_bits(const PartLevel::Position& brick) const;
+  cpu::PooledArray<Built> build_bricks(PartLevel& bricks, cpu::SubDagTables& tables);
+  cpu::PooledArray<Built> build_nodes(uint32_t level, uint64_t count, const Children& children,
+                                      const cpu::PooledArray<Built>& below,
+                                      cpu::SubDagTables& tables);
+
+  const voxdag_reader::File& file_;
+  const Selection& selection_;
+  NodeReader& reader_;
+  cpu::Memory memory_;
+  const CancelToken& cancel_;
+};
+
+}  // namespace voxdag::query

@@ -1,0 +1,118 @@
+// The nodes of one level below a cube of the input that are wanted: each node of which everything
+// is wanted once, whatever the number of its parents, and each node that the region cuts once per
+// position. They are numbered in the order in which they were added.
+//
+//   slots     [tag | number + 1] ...    open addressing by the offset, for nodes that are not cut
+//
+// Not thread-safe. Throws OutOfBudget when the budget, or 2^32 - 1 numbers, cannot hold more.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/backend/cpu/memory.h"
+#include "query/extract/node_reader.h"
+
+namespace voxdag::query {
+
+class PartLevel {
+ public:
+  using Position = std::array<uint32_t, 3>;  // in cubes of the level
+
+  explicit PartLevel(cpu::Memory& memory) : memory_(&memory) {}
+
+  uint64_t size() const { return count_; }
+  bool is_cut(uint64_t index) const { return entries_[index].place != kWhole; }
+  Position position(uint64_t index) const {
+    const uint64_t place = entries_[index].place;
+    return {static_cast<uint32_t>(place & kAxisMask),
+            static_cast<uint32_t>(place >> kAxisBits & kAxisMask),
+            static_cast<uint32_t>(place >> 2 * kAxisBits)};
+  }
+
+  // The number of the node at `offset`, all of which is wanted.
+  uint32_t find_or_add(uint64_t offset) {
+    if (2 * count_ >= slots_size_) grow_slots();
+    const uint64_t hash = offset * kMultiplier;
+    uint64_t at = hash >> shift_;
+    for (; slots_[at] != 0; at = (at + 1) & (slots_size_ - 1)) {
+      const uint64_t index = (slots_[at] & UINT32_MAX) - 1;
+      if (slots_[at] >> 32 == (hash & UINT32_MAX) && entries_[index].offset == offset)
+        return static_cast<uint32_t>(index);
+    }
+    const uint32_t index = add({offset, kWhole});
+    slots_[at] = hash << 32 | (index + 1);
+    return index;
+  }
+  // The number of a node at a position where the region cuts it.
+  uint32_t add_cut(uint64_t offset, const Position& position) {
+    return add({offset, position[0] | uint64_t{position[1]} << kAxisBits |
+                            uint64_t{position[2]} << 2 * kAxisBits});
+  }
+
+  // All nodes in the order of their offsets. Nothing may be added after it.
+  struct Sorted {
+    cpu::PooledArray<WantedNode> nodes;
+    uint64_t count = 0;
+    std::span<const WantedNode> span() const { return {nodes.data(), count}; }
+  };
+  Sorted sort() {
+    slots_ = {};
+    slots_size_ = 0;
+    Sorted sorted{cpu::PooledArray<WantedNode>(*memory_, count_), count_};
+    for (uint64_t i = 0; i < count_; ++i) sorted.nodes[i] = {entries_[i].offset, i};
+    std::sort(sorted.nodes.data(), sorted.nodes.data() + count_,
+              [](const WantedNode& a, const WantedNode& b) { return a.offset < b.offset; });
+    return sorted;
+  }
+  // Forgets offsets and positions.
+  void release_entries() { entries_ = {}; }
+
+ private:
+  static constexpr uint64_t kWhole = ~uint64_t{0};
+  static constexpr int kAxisBits = 20;
+  static constexpr uint64_t kAxisMask = (uint64_t{1} << kAxisBits) - 1;
+  static constexpr uint64_t kMultiplier = 0x9e3779b97f4a7c15ull;
+
+  struct Entry {
+    uint64_t offset;
+    uint64_t place;  // the position, or kWhole
+  };
+
+  uint32_t add(const Entry& entry) {
+    if (count_ == UINT32_MAX) throw OutOfBudget{};
+    if (count_ == entries_.size()) entries_.grow(*memory_, count_ + kFirstEntries);
+    entries_[count_] = entry;
+    return static_cast<uint32_t>(count_++);
+  }
+  void grow_slots() {
+    uint64_t size = std::max(2 * slots_size_, kFirstSlots);
+    while (2 * count_ >= size) size *= 2;
+    cpu::PooledArray<uint64_t> slots(*memory_, size, cpu::PooledArray<uint64_t>::kZero);
+    const int shift = 64 - __builtin_ctzll(size);
+    for (uint64_t index = 0; index < count_; ++index) {
+      if (is_cut(index)) continue;
+      const uint64_t hash = entries_[index].offset * kMultiplier;
+      uint64_t at = hash >> shift;
+      while (slots[at] != 0) at = (at + 1) & (size - 1);
+      slots[at] = hash << 32 | (index + 1);
+    }
+    slots_ = std::move(slots);
+    slots_size_ = size;
+    shift_ = shift;
+  }
+
+  static constexpr uint64_t kFirstEntries = 256;
+  static constexpr uint64_t kFirstSlots = 512;
+
+  cpu::Memory* memory_;
+  cpu::PooledArray<Entry> entries_;
+  cpu::PooledArray<uint64_t> slots_;
+  uint64_t slots_size_ = 0;
+  int shift_ = 64;
+  uint64_t count_ = 0;
+};
+
+}  // namespace voxdag::query
