@@ -1,0 +1,90 @@
+#include "query/export/export.h"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "cli/output.h"
+#include "cli/selection_options.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/base/clock.h"
+#include "core/base/process_limits.h"
+#include "core/base/text.h"
+#include "core/format/global/open_global.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct ExportCommand {
+  std::string input, format, memory;
+  OutputFile output;
+  SelectionOptions selection;
+  bool json = false;
+};
+
+// The format does not show whether this command wrote a file.
+bool is_never_own(const ReadableFile&) { return false; }
+
+void check_outputs(const ExportCommand& command, const query::ExportFormat& format,
+                   FileSystem& files) {
+  for (const std::string& path : query::export_paths(format, command.output.path))
+    OutputFile{path, command.output.force}.check(files, command.input, is_never_own);
+}
+
+void print(const query::ExportReport& report, double wall_s) {
+  for (const std::string& file : report.files)
+    std::printf("%s%s", &file == report.files.data() ? "" : ", ", file.c_str());
+  std::printf(": %s, %s voxels, %s\n", size_text(report.bytes).c_str(),
+              count_text(report.voxels).c_str(), duration_text(wall_s).c_str());
+  for (const std::string& note : report.notes) std::printf("  %s\n", note.c_str());
+}
+
+void run(const ExportCommand& command, CommandContext& context) {
+  query::ExportRequest request;
+  request.format = &query::export_format(command.format);
+  request.output = command.output.path;
+  request.memory_bytes =
+      command.memory.empty() ? default_memory() : parse_size(command.memory, "--memory");
+  check_outputs(command, *request.format, context.files);
+  return_freed_memory_to_system();
+  const auto progress = make_progress_bar();
+  const auto file = open_global_file(command.input);
+  request.selection = command.selection.selection(*file);
+  const double start_s = wall_seconds();
+  const query::ExportReport report =
+      query::export_dag(context.files, *file, request, *progress, context.cancel);
+  const double wall_s = wall_seconds() - start_s;
+  if (!command.json) return print(report, wall_s);
+  print_json(nlohmann::ordered_json{{"format", command.format},
+                                    {"files", report.files},
+                                    {"bytes", report.bytes},
+                                    {"voxels", report.voxels},
+                                    {"notes", report.notes},
+                                    {"peak_rss_bytes", peak_resident_bytes()},
+                                    {"wall_s", wall_s}});
+}
+
+std::string formats_text() {
+  std::string text = "the format:";
+  for (const query::ExportFormat& format : query::export_formats())
+    text += std::string("\n") + format.name + ": " + format.summary;
+  return text;
+}
+
+void declare(Command& command, ExportCommand& state) {
+  command.option("input", state.input, "the .vdag file").required();
+  command.option("--to", state.format, formats_text().c_str()).required();
+  command.option("-o,--output", state.output.path, "the file to write").required();
+  state.selection.declare(command);
+  command.option("--memory", state.memory,
+                 "limit of the memory that is allocated (default: half the RAM)");
+  command.flag("--force", state.output.force, "replace existing files");
+  command.json_flag(state.json);
+}
+
+}  // namespace
+
+void add_export_command(CommandLine& line) {
+  add_command<ExportCommand>(line, "export", "write the voxels in the format of another program");
+}
+
+}  // namespace voxdag::cli

@@ -1,0 +1,52 @@
+#include "query/export/export.h"
+
+#include <array>
+
+#include "core/base/error.h"
+#include "query/export/export_job.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr ExportFormat kFormats[] = {
+    {"ply", "point cloud: the centers of the voxels, world units", nullptr, nullptr, write_ply},
+    {"npz", "numpy: the cells and the centers of the voxels", nullptr, nullptr, write_npz},
+};
+
+}  // namespace
+
+std::span<const ExportFormat> export_formats() { return kFormats; }
+
+const ExportFormat& export_format(const std::string& name) {
+  std::string names;
+  for (const ExportFormat& format : kFormats) {
+    if (name == format.name) return format;
+    names += std::string(names.empty() ? "" : ", ") + format.name;
+  }
+  throw Error(ErrorCode::kInvalidInput, "--to " + name + ": expected one of " + names);
+}
+
+std::vector<std::string> export_paths(const ExportFormat& format, const std::string& output) {
+  if (!format.suffix) return {output};
+  const std::string_view suffix = format.suffix;
+  if (output.size() <= suffix.size() || !output.ends_with(suffix))
+    throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a name that ends in '" +
+                                              format.suffix + "', which viewers look for");
+  const std::string stem = output.substr(0, output.size() - suffix.size());
+  return {output, stem + format.second_suffix};
+}
+
+ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
+                        const ExportRequest& request, Progress& progress,
+                        const CancelToken& cancel) {
+  const DagView dag(file);
+  MemoryBudget budget(request.memory_bytes);
+  const ExportJob job{files,          file,   dag,      request.selection,
+                      request.output, budget, progress, cancel};
+  if (dag.empty()) refuse_empty(job);
+  ExportReport report = request.format->write(job);
+  report.files = export_paths(*request.format, request.output);
+  return report;
+}
+
+}  // namespace voxdag::query

@@ -1,0 +1,59 @@
+// Writes a finished DAG, or a part of it, in the formats of other programs: docs/export.md says
+// which program reads what. All limits of a format are checked before anything is written.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/progress.h"
+#include "core/format/global/voxdag_reader.h"
+#include "core/io/file_system.h"
+#include "query/selection.h"
+
+namespace voxdag::query {
+
+struct ExportJob;
+
+struct ExportReport {
+  std::vector<std::string> files;  // that were written, the one that was asked for first
+  uint64_t bytes = 0;              // of all files
+  uint64_t voxels = 0;
+  std::vector<std::string> notes;  // what a user has to know to open the files, a sentence each
+};
+
+struct ExportFormat {
+  const char* name;
+  const char* summary;  // for a list of formats
+  // What names of its files end in. A format of two files needs it: the second name is the first
+  // one with `second_suffix` in its place. Otherwise both are null.
+  const char* suffix;
+  const char* second_suffix;
+  ExportReport (*write)(const ExportJob& job);
+};
+
+// The formats of this build, which may lack those that need a library.
+std::span<const ExportFormat> export_formats();
+// Throws Error{kInvalidInput} that lists the names if there is no such format.
+const ExportFormat& export_format(const std::string& name);
+// The names of all files of an export. Throws Error{kInvalidInput} if `output` has not the suffix
+// that the format needs.
+std::vector<std::string> export_paths(const ExportFormat& format, const std::string& output);
+
+struct ExportRequest {
+  const ExportFormat* format = nullptr;
+  Selection selection;
+  std::string output;
+  uint64_t memory_bytes = 0;  // the limit of what is allocated; the mapped file is not counted
+};
+
+// Writes the selected voxels. Each file appears under its name when all are whole; after an error
+// nothing is left. Throws Error{kLimit} if the format cannot hold them, Error{kOutOfMemory} if the
+// memory cannot; the message says what would do.
+ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
+                        const ExportRequest& request, Progress& progress,
+                        const CancelToken& cancel);
+
+}  // namespace voxdag::query

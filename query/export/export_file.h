@@ -1,0 +1,49 @@
+// A file that an export writes: buffered, under the name "<path>.partial" until it is published.
+// Destroyed before that, it removes what it has written. One thread uses it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/io/file_system.h"
+
+namespace voxdag::query {
+
+class ExportFile {
+ public:
+  ExportFile(FileSystem& files, const std::string& path);
+  ExportFile(const ExportFile&) = delete;
+  ExportFile& operator=(const ExportFile&) = delete;
+  ~ExportFile();
+
+  const std::string& path() const { return path_; }
+  uint64_t size() const { return size_; }
+  // Continues at `offset`, which may lie before or beyond the end.
+  void seek(uint64_t offset);
+  void write(std::span<const std::byte> bytes);
+  void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
+  template <class T>
+  void put(T value) {
+    write(std::as_bytes(std::span(&value, 1)));
+  }
+
+  // Makes the files durable and then visible under their names. Returns the bytes of all.
+  static uint64_t publish(std::span<ExportFile* const> written);
+
+ private:
+  void flush();
+
+  FileSystem& files_;
+  const std::string path_;
+  std::unique_ptr<WritableFile> file_;
+  std::vector<std::byte> buffer_;
+  uint64_t buffer_offset_ = 0;  // in the file
+  uint64_t size_ = 0;
+  bool published_ = false;
+};
+
+}  // namespace voxdag::query

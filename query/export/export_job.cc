@@ -1,0 +1,71 @@
+#include "query/export/export_job.h"
+
+#include <bit>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+#include "query/export/selected_bricks.h"
+
+namespace voxdag::query {
+
+Selection coarser(const Selection& selection, uint32_t grid_levels) {
+  const uint32_t shift = selection.grid_levels - grid_levels;
+  Selection coarse{grid_levels, {}};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    coarse.region.low[axis] = selection.region.low[axis] >> shift;
+    coarse.region.high[axis] = ((selection.region.high[axis] - 1) >> shift) + 1;
+  }
+  return coarse;
+}
+
+void require_space(const ExportJob& job, uint64_t bytes) {
+  const uint64_t free = job.files.free_space(parent_directory(job.output));
+  if (bytes > free)
+    throw Error(ErrorCode::kNoSpace, job.output + " will have " + size_text(bytes) +
+                                         ", but the disk has only " + size_text(free) + " free");
+}
+
+void refuse_size(const ExportJob& job, const std::string& problem,
+                 const std::function<bool(uint32_t grid_levels)>& fits) {
+  uint32_t level = job.selection.grid_levels - 1;
+  while (level >= kBrickLevels && !fits(level)) --level;
+  const std::string grid = std::to_string(int64_t{1} << level);
+  throw Error(ErrorCode::kLimit,
+              job.output + ": " + problem +
+                  (level >= kBrickLevels ? ". --level " + std::to_string(level) + " (" + grid +
+                                               " voxels per edge) fits, or take a smaller --region"
+                                         : ". Expected a smaller --region"));
+}
+
+uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit) {
+  const uint32_t levels = job.dag.grid_levels();
+  if (selection.grid_levels == levels && selection.region == whole_grid(levels))
+    return job.file.voxels();
+  uint64_t voxels = 0, bricks = 0;
+  for_each_selected_brick(job.dag, selection, [&](const CellCorner&, uint64_t mask) {
+    if (++bricks % 65536 == 0) job.cancel.check();
+    voxels += static_cast<uint64_t>(std::popcount(mask));
+    return voxels <= limit;
+  });
+  return voxels;
+}
+
+void refuse_empty(const ExportJob& job) {
+  throw Error(ErrorCode::kInvalidInput,
+              job.file.path() + ": the selection has no voxels: expected some to export");
+}
+
+uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason) {
+  const uint64_t voxels = count_voxels(job, job.selection, limit);
+  if (voxels == 0) refuse_empty(job);
+  if (voxels <= limit) return voxels;
+  const bool exact = job.selects_all_of(job.dag.grid_levels());
+  refuse_size(job,
+              (exact ? "" : "over ") + count_text(exact ? voxels : limit) +
+                  " voxels are selected, but " + reason + " at most " + count_text(limit),
+              [&](uint32_t level) {
+                return count_voxels(job, coarser(job.selection, level), limit) <= limit;
+              });
+}
+
+}  // namespace voxdag::query

@@ -1,0 +1,90 @@
+// What the writer of a format works with, and what writers have in common.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "core/base/memory_budget.h"
+#include "query/dag_view.h"
+#include "query/export/export.h"
+
+namespace voxdag::query {
+
+struct ExportJob {
+  FileSystem& files;
+  const voxdag_reader::File& file;
+  const DagView& dag;  // of the file; it has voxels
+  Selection selection;
+  std::string output;
+  MemoryBudget& budget;
+  Progress& progress;
+  const CancelToken& cancel;
+
+  // The edge of a cell of the selected grid in world space.
+  double cell_edge() const {
+    return file.edge() / static_cast<double>(int64_t{1} << selection.grid_levels);
+  }
+  // World coordinate of a position along an axis, in cells.
+  double world(size_t axis, double cells) const {
+    return file.origin()[axis] + cells * cell_edge();
+  }
+  bool selects_all_of(uint32_t grid_levels) const {
+    return selection.grid_levels == grid_levels && selection.region == whole_grid(grid_levels);
+  }
+};
+
+// A stage of the progress that also notices a request to stop; ends when destroyed.
+class ExportStage {
+ public:
+  ExportStage(const ExportJob& job, std::string_view name, uint64_t total, std::string_view unit)
+      : job_(job) {
+    job.progress.begin_stage(name, total, unit);
+  }
+  ExportStage(const ExportStage&) = delete;
+  ExportStage& operator=(const ExportStage&) = delete;
+  ~ExportStage() {
+    job_.progress.advance(pending_);
+    job_.progress.end_stage();
+  }
+  void advance(uint64_t count) {
+    pending_ += count;
+    if (++calls_ % kCallsPerCheck != 0) return;
+    job_.cancel.check();
+    job_.progress.advance(pending_);
+    pending_ = 0;
+  }
+
+ private:
+  static constexpr uint64_t kCallsPerCheck = 4096;
+  const ExportJob& job_;
+  uint64_t pending_ = 0, calls_ = 0;
+};
+
+// The same part of the file on a coarser grid.
+Selection coarser(const Selection& selection, uint32_t grid_levels);
+
+// Throws Error{kNoSpace} if the disk of the output has less than `bytes` free.
+void require_space(const ExportJob& job, uint64_t bytes);
+
+// Throws Error{kLimit}: "FORMAT: PROBLEM. --level 11 fits", or "a smaller --region is needed"
+// where no coarser level does; `fits` says whether a level would.
+[[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
+                              const std::function<bool(uint32_t grid_levels)>& fits);
+
+// The number of selected voxels, or anything over `limit` if there are more.
+uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
+
+// count_voxels() of the job's selection. Throws Error{kLimit} as above if there are more than
+// `limit`, which `reason` explains, Error{kInvalidInput} if there is none.
+uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason);
+
+[[noreturn]] void refuse_empty(const ExportJob& job);
+
+// One for each format; those of the libraries exist where the library was found.
+ExportReport write_ply(const ExportJob& job);
+ExportReport write_npz(const ExportJob& job);
+
+}  // namespace voxdag::query

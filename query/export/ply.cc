@@ -1,0 +1,44 @@
+// PLY, binary: the centers of the voxels as doubles, since floats cannot tell the voxels of a large
+// grid apart. The format: Greg Turk, "The PLY Polygon File Format", 1994.
+#include <bit>
+
+#include "query/export/export_file.h"
+#include "query/export/export_job.h"
+#include "query/export/selected_bricks.h"
+
+namespace voxdag::query {
+namespace {
+
+// Most readers count vertices in 32-bit integers.
+constexpr uint64_t kMaxPlyVertices = (uint64_t{1} << 31) - 1;
+
+std::string ply_header(uint64_t vertices) {
+  return "ply\nformat binary_little_endian 1.0\ncomment voxel centers by voxdag\nelement vertex " +
+         std::to_string(vertices) +
+         "\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+}
+
+}  // namespace
+
+ExportReport write_ply(const ExportJob& job) {
+  ExportReport report;
+  report.voxels = require_voxels(job, kMaxPlyVertices, "readers of PLY take");
+  const std::string header = ply_header(report.voxels);
+  require_space(job, header.size() + report.voxels * 3 * sizeof(double));
+  ExportFile file(job.files, job.output);
+  file.write(header);
+  ExportStage stage(job, "export", report.voxels, "voxels");
+  for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
+    for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+      for (size_t axis = 0; axis < 3; ++axis)
+        file.put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
+    });
+    stage.advance(static_cast<uint64_t>(std::popcount(mask)));
+    return true;
+  });
+  ExportFile* const written[] = {&file};
+  report.bytes = ExportFile::publish(written);
+  return report;
+}
+
+}  // namespace voxdag::query

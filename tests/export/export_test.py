@@ -1,0 +1,152 @@
+#!/usr/bin/env python3
+"""Exports of a generated scene in one format, decoded by other code and compared voxel by voxel.
+
+    export_test.py VOXDAG LIST_VOXELS FORMAT [TOOLS...]
+
+At three resolutions, at a coarser level, for one region, and for a region of a coarser level. TOOLS
+are programs of this folder that the decoder of the format starts. Exits with 77, which ctest counts
+as skipped, where the library that decodes is missing.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+# The libraries are packages of the system, which another interpreter does not see.
+SYSTEM_PYTHON = "/usr/bin/python3"
+
+try:
+    import numpy
+except ImportError:
+    if os.path.exists(SYSTEM_PYTHON) and not os.environ.get("VOXDAG_SYSTEM_PYTHON"):
+        os.execve(
+            SYSTEM_PYTHON, [SYSTEM_PYTHON, *sys.argv], os.environ | {"VOXDAG_SYSTEM_PYTHON": "1"}
+        )
+    print("skipped: there is no numpy here (python3-numpy)")
+    sys.exit(77)
+
+import decoders
+
+SUFFIXES = {"hashdag": ".basic_dag.dag.bin", "voxel": ".voxel.json"}
+# Resolution, options of the export.
+CASES = [
+    (64, []),
+    (256, []),
+    (1024, []),
+    (1024, ["--level", "7"]),
+    (256, ["--region", "37,0,90,150,201,133"]),
+    (1024, ["--level", "8", "--region", "101,3,50,170,201,133"]),
+]
+
+
+class Grid:
+    """The exported grid: the world coordinates of its cells."""
+
+    def __init__(self, info, levels):
+        self.levels = levels
+        self.resolution = 2**levels
+        self.origin = numpy.array(info["bounds"]["origin"])
+        self.edge = info["bounds"]["edge"]
+        self.voxel = self.edge / self.resolution
+
+    def cells(self, centers):
+        """The cells that have these centers in world space."""
+        cells = (centers - self.origin) / self.voxel - 0.5
+        rounded = numpy.rint(cells)
+        assert numpy.abs(cells - rounded).max() < 1e-3, "positions are not centers of voxels"
+        return rounded.astype(numpy.int64)
+
+
+def keys(cells):
+    cells = numpy.asarray(cells).astype(numpy.int64)
+    assert cells.min() >= 0 and cells.max() < 2**20, "cells outside the grid"
+    return cells[:, 0] << 40 | cells[:, 1] << 20 | cells[:, 2]
+
+
+class Test:
+    def __init__(self, voxdag, list_voxels, name, tools):
+        self.voxdag, self.list_voxels, self.name = voxdag, list_voxels, name
+        self.decode = getattr(decoders, name)
+        self.tools = tools
+        self.files = {}
+
+    def run(self, *args, status=0):
+        done = subprocess.run([self.voxdag, *args], capture_output=True, text=True)
+        assert done.returncode == status, f"{args}: {done.returncode}, {done.stderr}"
+        return done.stdout if status == 0 else done.stderr
+
+    def scene(self, resolution):
+        """A .vdag file of the generated city."""
+        if resolution not in self.files:
+            if not os.path.exists("city.glb"):
+                self.run("generate", "city", "city.glb", "--triangles", "20000")
+            path = f"city{resolution}.vdag"
+            self.run("build", "city.glb", "-r", str(resolution), "-o", path)
+            self.files[resolution] = path, json.loads(self.run("info", path, "--json"))
+        return self.files[resolution]
+
+    def expected(self, path, shift, region):
+        listed = subprocess.run([self.list_voxels, path, str(shift)], capture_output=True, check=True)
+        cells = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 3)
+        if region:
+            low, high = region[:3], region[3:]
+            cells = cells[((cells >= low) & (cells < high)).all(axis=1)]
+        return numpy.unique(keys(cells))
+
+    def check(self, resolution, options):
+        path, info = self.scene(resolution)
+        given = dict(zip(options[::2], options[1::2]))
+        full = resolution.bit_length() - 1
+        grid = Grid(info, int(given.get("--level", full)))
+        region = [int(x) for x in given["--region"].split(",")] if "--region" in given else None
+        output = "out" + SUFFIXES.get(self.name, "." + self.name)
+        report = json.loads(
+            self.run("export", path, "--to", self.name, "-o", output, "--json", "--force", *options)
+        )
+        expected = self.expected(path, full - grid.levels, region)
+        assert len(expected) > 100, "too small a scene"
+        found = keys(self.decode(output, grid, *self.tools))
+        assert len(numpy.unique(found)) == len(found), "a voxel comes twice"
+        wrong = numpy.setxor1d(expected, found)
+        assert len(wrong) == 0, f"{len(wrong)} of {len(expected)} voxels differ"
+        assert report["voxels"] == len(expected), report
+        assert report["bytes"] == sum(map(os.path.getsize, report["files"])), report
+        left = [name for name in os.listdir(".") if name.endswith(".partial")]
+        assert not left, left
+        print(f"{resolution} {' '.join(options)}: {len(expected)} voxels, {report['bytes']} bytes")
+
+    def check_refusals(self):
+        """What exists, or has no voxels, is refused, and nothing is left behind."""
+        path, _ = self.scene(64)
+        output = "refused" + SUFFIXES.get(self.name, "." + self.name)
+        nothing = ["--region", "0,63,0,1,64,1"]
+        message = self.run("export", path, "--to", self.name, "-o", output, *nothing, status=2)
+        assert "no voxels" in message, message
+        assert not [name for name in os.listdir(".") if name.startswith("refused")]
+        with open(output, "w", encoding="utf-8") as file:
+            file.write("somebody's")
+        message = self.run("export", path, "--to", self.name, "-o", output, status=2)
+        assert "--force" in message, message
+        with open(output, encoding="utf-8") as file:
+            assert file.read() == "somebody's"
+
+
+def main():
+    voxdag, list_voxels, name, *tools = sys.argv[1:]
+    missing = decoders.missing(name)
+    if missing:
+        print("skipped: there is no " + missing)
+        return 77
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        test = Test(voxdag, list_voxels, name, tools)
+        for resolution, options in CASES:
+            test.check(resolution, options)
+        test.check_refusals()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
