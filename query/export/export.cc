@@ -9,6 +9,12 @@ namespace voxdag::query {
 namespace {
 
 constexpr ExportFormat kFormats[] = {
+    {"hashdag", "HashDAG and its descendants", ".basic_dag.dag.bin",
+     ".basic_dag.uncompressed_colors.bin", write_hashdag},
+    {"svdag", "SymVox / SVDAG-Compression, and DAGger in the browser", nullptr, nullptr,
+     write_svdag},
+    {"voxel", "PlayCanvas and SuperSplat: NAME.voxel.json and NAME.voxel.bin", ".voxel.json",
+     ".voxel.bin", write_voxel},
     {"ply", "point cloud: the centers of the voxels, world units", nullptr, nullptr, write_ply},
     {"npz", "numpy: the cells and the centers of the voxels", nullptr, nullptr, write_npz},
 };
@@ -41,11 +47,12 @@ ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const CancelToken& cancel) {
   const DagView dag(file);
   MemoryBudget budget(request.memory_bytes);
-  const ExportJob job{files,          file,   dag,      request.selection,
-                      request.output, budget, progress, cancel};
+  const std::vector<std::string> paths = export_paths(*request.format, request.output);
+  const ExportJob job{files,  file,     dag,   request.selection, request.output, paths.back(),
+                      budget, progress, cancel};
   if (dag.empty()) refuse_empty(job);
   ExportReport report = request.format->write(job);
-  report.files = export_paths(*request.format, request.output);
+  report.files = paths;
   return report;
 }
 

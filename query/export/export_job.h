@@ -19,6 +19,7 @@ struct ExportJob {
   const DagView& dag;  // of the file; it has voxels
   Selection selection;
   std::string output;
+  std::string second_output;  // of a format of two files
   MemoryBudget& budget;
   Progress& progress;
   const CancelToken& cancel;
@@ -86,5 +87,8 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
 // One for each format; those of the libraries exist where the library was found.
 ExportReport write_ply(const ExportJob& job);
 ExportReport write_npz(const ExportJob& job);
+ExportReport write_hashdag(const ExportJob& job);
+ExportReport write_svdag(const ExportJob& job);
+ExportReport write_voxel(const ExportJob& job);
 
 }  // namespace voxdag::query

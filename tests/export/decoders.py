@@ -47,6 +47,117 @@ def npz(path, grid):
         return arrays["cells"]
 
 
+def words_of(data, count, at):
+    assert len(data) >= at + 4 * count, "too short"
+    return numpy.frombuffer(data, "<u4", count, at).astype(numpy.int64)
+
+
+def expand(words, roots, depth, children_of):
+    """The leaves `depth` levels below the root, and their corners in units of their edge."""
+    nodes, corners = roots, numpy.zeros((len(roots), 3), numpy.int64)
+    for level in range(depth):
+        masks, pointer = children_of(words, nodes, level)
+        rows, bits = child_bits(masks)
+        nodes = pointer(rows, bits)
+        corners = child_corners(corners[rows], bits)
+    return nodes, corners
+
+
+def voxels_of_bricks(bricks, corners):
+    """The voxels of 64-bit masks with bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0."""
+    rows, bits = numpy.nonzero(bricks[:, None] >> numpy.arange(64, dtype=numpy.uint64) & numpy.uint64(1))
+    inner = [(bits >> 2 - axis & 1) | (bits >> 5 - axis & 1) << 1 for axis in range(3)]
+    return 4 * corners[rows] + numpy.stack(inner, axis=1)
+
+
+def hashdag(path, grid):
+    with open(path, "rb") as file:
+        data = file.read()
+    assert (numpy.frombuffer(data, "<f8", 6) == [*grid.origin, *(grid.origin + grid.edge)]).all()
+    levels = int(words_of(data, 1, 48)[0])
+    count = int(numpy.frombuffer(data, "<u8", 1, 52)[0])
+    assert levels == grid.levels and len(data) == 60 + 4 * count
+    words = words_of(data, count, 60)
+
+    with open(path.replace(".dag.bin", ".uncompressed_colors.bin"), "rb") as file:
+        colors = file.read()
+    top_levels = int(words_of(colors, 1, 0)[0])
+    entries = int(numpy.frombuffer(colors, "<u8", 1, 4)[0])
+    enclosed = numpy.frombuffer(colors, "<u8", entries, 12).astype(numpy.int64)
+    assert numpy.frombuffer(colors, "<u8", 1, 12 + 8 * entries)[0] == 1, "expected one color"
+    assert len(colors) == 12 + 8 * entries + 8 + 4 and entries >= 1
+    visited = []
+
+    def children_of(words, nodes, level):
+        masks, upper = words[nodes] & 255, words[nodes] >> 8
+        visited.append((nodes, enclosed[upper] if level < top_levels else upper))
+        return masks, lambda rows, bits: words[nodes[rows] + 1 + popcount_below(masks[rows], bits)]
+
+    leaves, corners = expand(words, numpy.array([0]), levels - 2, children_of)
+    bricks = (words[leaves] | words[leaves + 1] << 32).view(numpy.uint64)
+    cells = voxels_of_bricks(bricks, corners)
+    # The voxels that a node says it encloses are as many as are found below all of its occurrences.
+    for nodes, counts in visited:
+        assert counts.sum() == len(cells)
+    return cells
+
+
+def svdag(path, grid):
+    with open(path, "rb") as file:
+        data = file.read()
+    box = numpy.frombuffer(data, "<f4", 7)
+    assert numpy.allclose(box, [*grid.origin, *(grid.origin + grid.edge), grid.edge], rtol=1e-6)
+    levels, _, first_leaf, count = words_of(data, 4, 28)
+    assert levels == grid.levels and len(data) == 44 + 4 * count
+    words = words_of(data, int(count), 44)
+
+    def children_of(words, nodes, _):
+        masks = words[nodes] & 255
+        table = numpy.array([bin(i).count("1") for i in range(256)])
+        return masks, lambda rows, bits: words[nodes[rows] + table[masks[rows] >> bits]]
+
+    leaves, corners = expand(words, numpy.array([0]), int(levels) - 1, children_of)
+    assert (leaves >= first_leaf).all() and (words[leaves] < 256).all()
+    rows, bits = child_bits(words[leaves])
+    return child_corners(corners[rows], bits)
+
+
+def voxel(path, grid):
+    with open(path, encoding="utf-8") as file:
+        meta = json.load(file)
+    with open(path.replace(".voxel.json", ".voxel.bin"), "rb") as file:
+        data = file.read()
+    assert meta["version"] == "1.1" and meta["leafSize"] == 4
+    assert meta["treeDepth"] == grid.levels - 2 and meta["voxelResolution"] == grid.voxel
+    assert (meta["gridBounds"]["min"] == grid.origin).all()
+    assert numpy.allclose(meta["gridBounds"]["max"], grid.origin + grid.edge, rtol=1e-15)
+    count, leaf_words = meta["nodeCount"], meta["leafDataCount"]
+    assert len(data) == 4 * (count + leaf_words)
+    nodes, leaf_data = words_of(data, count, 0), words_of(data, leaf_words, 4 * count)
+    cells = []
+    found, corners = nodes[:1], numpy.zeros((1, 3), numpy.int64)
+    for level in range(meta["treeDepth"] + 1):
+        solid = found == 0xFF000000
+        edge = 4 << meta["treeDepth"] - level
+        if solid.any():
+            inside = numpy.stack(numpy.meshgrid(*[range(edge)] * 3), axis=-1).reshape(-1, 3)
+            cells.append((corners[solid][:, None] * edge + inside).reshape(-1, 3))
+        found, corners = found[~solid], corners[~solid]
+        if level == meta["treeDepth"]:
+            break
+        masks = found >> 24
+        assert (masks != 0).all(), "a leaf above the last level"
+        rows, bits = child_bits(masks)
+        corners = child_corners(corners[rows], bits, axes=(1, 2, 4))
+        found = nodes[(found[rows] & 0xFFFFFF) + popcount_below(masks[rows], bits)]
+    assert (found >> 24 == 0).all()
+    bricks = (leaf_data[2 * found] | leaf_data[2 * found + 1] << 32).view(numpy.uint64)
+    rows, bits = numpy.nonzero(bricks[:, None] >> numpy.arange(64, dtype=numpy.uint64) & numpy.uint64(1))
+    inner = numpy.stack([bits & 3, bits >> 2 & 3, bits >> 4], axis=1)
+    cells.append(4 * corners[rows] + inner)
+    return numpy.concatenate(cells)
+
+
 def missing(name):
     """The library that decoding needs and that is not here, or nothing."""
     del name

@@ -1,0 +1,164 @@
+// The files of HashDAG (Careil, Billeter, Eisemann 2020) and of the viewers derived from it:
+//     NAME.basic_dag.dag.bin                   f64 x 6 bounds | u32 levels | u64 words | u32 ...
+//     NAME.basic_dag.uncompressed_colors.bin   u32 top levels | u64 n, u64 ... | u64 m, u32 ...
+// A node is one word (child mask, and above it the voxels that the node encloses) and the absolute
+// word index of each child; a leaf is two words, as our brick. In the top levels the count is an
+// index into the 64-bit numbers of the color file instead, which has one gray color here.
+#include <algorithm>
+#include <array>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+#include "query/export/export_file.h"
+#include "query/export/selected_dag.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint64_t kMaxHashDagWords = uint64_t{1} << 32;  // of 32-bit indices
+constexpr uint64_t kMaxCount = uint64_t{1} << 24;         // of the bits above the mask
+constexpr uint32_t kGray = 0xffb0b0b0;                    // A, B, G, R
+constexpr uint64_t kHashDagHeaderBytes = 6 * sizeof(double) + sizeof(uint32_t) + sizeof(uint64_t);
+
+// A node of level L - 7 encloses 128^3 voxels at most, so that the count always fits; HashDAG takes
+// up to ten top levels.
+uint32_t top_levels(uint32_t grid_levels) {
+  return std::clamp<uint32_t>(grid_levels > 7 ? grid_levels - 7 : 1, 1, 10);
+}
+
+class HashDagWriter {
+ public:
+  HashDagWriter(const ExportJob& job, const SelectedDag& dag, ExportFile& file)
+      : job_(job), dag_(dag), file_(file), top_levels_(top_levels(dag.grid_levels())) {
+    bases_.push_back(0);
+    for (uint32_t level = 0; level < dag.brick_level(); ++level)
+      bases_.push_back(bases_.back() + dag.words(level).size());
+    uint64_t top_nodes = 0;
+    for (uint32_t level = 0; level < std::min(top_levels_, dag.brick_level()); ++level) {
+      first_top_.push_back(top_nodes);
+      top_nodes += dag.node_count(level);
+    }
+    if (top_nodes >= kMaxCount)
+      throw Error(ErrorCode::kLimit,
+                  job.output + ": the top " + std::to_string(top_levels_) + " levels have " +
+                      count_text(top_nodes) + " nodes, but HashDAG takes less than " +
+                      count_text(kMaxCount) + ". Expected a coarser --level or a smaller --region");
+    enclosed_.resize(std::max<uint64_t>(top_nodes, 1));
+  }
+
+  void write() {
+    for (size_t axis = 0; axis < 3; ++axis) file_.put(job_.file.origin()[axis]);
+    for (size_t axis = 0; axis < 3; ++axis) file_.put(job_.file.origin()[axis] + job_.file.edge());
+    file_.put(dag_.grid_levels());
+    file_.put(dag_.word_count());
+    ExportStage stage(job_, "export", dag_.node_count(), "nodes");
+    NodeNumbers<uint64_t> below = write_bricks(stage);
+    // From the bricks up, since a node's count is the sum of its children's.
+    for (uint32_t level = dag_.brick_level(); level-- > 0;) {
+      NodeNumbers<uint64_t> counts(job_, dag_, level);
+      write_level(level, below, counts, stage);
+      below = std::move(counts);
+    }
+    // A grid of one brick has no node whose count could be looked up.
+    if (first_top_.empty()) enclosed_[0] = dag_.voxels();
+  }
+
+  void write_colors(ExportFile& colors) const {
+    colors.put(top_levels_);
+    colors.put<uint64_t>(enclosed_.size());
+    for (const uint64_t count : enclosed_) colors.put(count);
+    colors.put<uint64_t>(1);
+    colors.put(kGray);
+  }
+
+ private:
+  void seek_level(uint32_t level) {
+    file_.seek(kHashDagHeaderBytes + bases_[level] * sizeof(uint32_t));
+  }
+
+  NodeNumbers<uint64_t> write_bricks(ExportStage& stage) {
+    NodeNumbers<uint64_t> counts(job_, dag_, dag_.brick_level());
+    seek_level(dag_.brick_level());
+    file_.write(std::as_bytes(dag_.words(dag_.brick_level())));
+    dag_.for_each_brick([&](uint64_t offset, uint64_t mask) {
+      counts[offset] = static_cast<uint64_t>(std::popcount(mask));
+      stage.advance(1);
+    });
+    return counts;
+  }
+
+  void write_level(uint32_t level, NodeNumbers<uint64_t>& below, NodeNumbers<uint64_t>& counts,
+                   ExportStage& stage) {
+    seek_level(level);
+    uint64_t top = level < first_top_.size() ? first_top_[level] : 0;
+    dag_.for_each_node(level, [&](uint64_t offset, uint32_t mask, std::span<const uint32_t> nodes) {
+      uint64_t count = 0;
+      std::array<uint32_t, 9> words;
+      for (size_t i = 0; i < nodes.size(); ++i) {
+        count += below[nodes[i]];
+        words[i + 1] = static_cast<uint32_t>(bases_[level + 1] + nodes[i]);
+      }
+      counts[offset] = count;
+      if (level < top_levels_) {
+        enclosed_[top] = count;
+        words[0] = mask | static_cast<uint32_t>(top++) << 8;
+      } else if (count < kMaxCount) {
+        words[0] = mask | static_cast<uint32_t>(count) << 8;
+      } else {
+        throw Error(ErrorCode::kLimit, job_.output + ": a node of level " + std::to_string(level) +
+                                           " encloses " + count_text(count) +
+                                           " voxels, but HashDAG takes less than " +
+                                           count_text(kMaxCount) +
+                                           ". Expected a coarser --level or a smaller --region");
+      }
+      file_.write(std::as_bytes(std::span(words).first(nodes.size() + 1)));
+      stage.advance(1);
+    });
+  }
+
+  const ExportJob& job_;
+  const SelectedDag& dag_;
+  ExportFile& file_;
+  const uint32_t top_levels_;
+  std::vector<uint64_t> bases_;      // word index of the first word of each level
+  std::vector<uint64_t> first_top_;  // index of the first node of each top level
+  std::vector<uint64_t> enclosed_;
+};
+
+std::string scene_depth_note(uint32_t levels) {
+  const std::string depth = std::to_string(levels);
+  return "compile the viewer with SCENE_DEPTH " + depth +
+         (levels >= 10 ? ", and name the files data/<SCENE>" + std::to_string(1u << (levels - 10)) +
+                             "k.basic_dag.*"
+                       : "");
+}
+
+}  // namespace
+
+ExportReport write_hashdag(const ExportJob& job) {
+  const SelectedDag dag(job);
+  const uint64_t words = dag.word_count();
+  if (words > kMaxHashDagWords)
+    refuse_size(job,
+                count_text(words) + " words (" + size_text(4 * words) +
+                    ") are needed, but the indices of HashDAG reach " +
+                    count_text(kMaxHashDagWords),
+                [&](uint32_t level) { return dag.size_at(level).words <= kMaxHashDagWords; });
+  require_space(job, kHashDagHeaderBytes + 4 * words);
+  ExportReport report;
+  report.voxels = dag.voxels();
+  ExportFile file(job.files, job.output);
+  ExportFile colors(job.files, job.second_output);
+  HashDagWriter writer(job, dag, file);
+  writer.write();
+  writer.write_colors(colors);
+  ExportFile* const written[] = {&file, &colors};
+  report.bytes = ExportFile::publish(written);
+  report.notes.push_back(scene_depth_note(dag.grid_levels()));
+  if (dag.voxels() >> 32)
+    report.notes.push_back("HashDAG numbers voxels for colors with 32 bits: " +
+                           count_text(dag.voxels()) + " voxels have more");
+  return report;
+}
+
+}  // namespace voxdag::query

@@ -1,0 +1,94 @@
+// The selected cells as a DAG of their own grid, for formats that share equal subtrees. Of a whole
+// file it is the file's levels in place. Of a part it is built in memory, which is charged to the
+// budget: equal subtrees are shared again after clipping, and each node of the file that lies in
+// the region is visited once.
+//
+// Levels are as in the global file: a node is its child mask and the word offsets of its children
+// in the next level, one word each; a brick is two words, low half first.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/base/popcount8.h"
+#include "query/export/export_job.h"
+
+namespace voxdag::query {
+
+class SelectedDag {
+ public:
+  // Throws Error{kInvalidInput} if the selection has no voxels, Error{kOutOfMemory} if a DAG that
+  // has to be built does not fit in the job's memory.
+  explicit SelectedDag(const ExportJob& job);
+  ~SelectedDag();
+
+  uint32_t grid_levels() const { return grid_levels_; }
+  uint32_t brick_level() const { return grid_levels_ - 2; }
+  uint64_t voxels() const { return voxels_; }
+  std::span<const uint32_t> words(uint32_t level) const { return words_[level]; }
+  uint64_t node_count(uint32_t level) const { return nodes_[level]; }
+  uint64_t node_count() const;
+  uint64_t word_count() const;
+  DagView view() const;
+
+  // What it has at most on a coarser grid, whose bricks come of the nodes two levels above cells.
+  struct Size {
+    uint64_t words = 0, nodes = 0, bricks = 0;  // nodes without the bricks
+  };
+  Size size_at(uint32_t grid_levels) const;
+
+  // Calls visit(offset, mask, children) for each node of a level above the bricks, in order;
+  // children are offsets in the next level. Throws Error{kCorrupt} for words that are no node.
+  template <class Visit>
+  void for_each_node(uint32_t level, const Visit& visit) const {
+    const std::span<const uint32_t> words = words_[level], below = words_[level + 1];
+    for (uint64_t at = 0; at < words.size();) {
+      const uint32_t mask = words[at];
+      const auto count = static_cast<uint64_t>(popcount8(mask));
+      if (mask == 0 || mask > 255 || count >= words.size() - at) corrupt(level, at);
+      const std::span<const uint32_t> children = words.subspan(at + 1, count);
+      for (const uint32_t child : children)
+        if (below.size() < 2 || child > below.size() - 2) corrupt(level, at);
+      visit(at, mask, children);
+      at += 1 + count;
+    }
+  }
+  // Calls visit(offset, mask) for each brick, in order.
+  template <class Visit>
+  void for_each_brick(const Visit& visit) const {
+    const std::span<const uint32_t> words = words_[brick_level()];
+    for (uint64_t at = 0; at + 1 < words.size(); at += 2)
+      visit(at, words[at] | uint64_t{words[at + 1]} << 32);
+  }
+
+ private:
+  struct Built;
+  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
+
+  uint32_t grid_levels_;
+  uint64_t voxels_ = 0;
+  std::vector<std::span<const uint32_t>> words_;
+  std::vector<uint64_t> nodes_;
+  std::unique_ptr<Built> built_;
+};
+
+// A number per node or brick of a level, charged to the job's memory. It is found by the node's
+// offset: since each has two words or more, half the offset is a number of its own.
+template <class Number>
+class NodeNumbers {
+ public:
+  NodeNumbers() = default;
+  NodeNumbers(const ExportJob& job, const SelectedDag& dag, uint32_t level)
+      : charge_(job.budget, (dag.words(level).size() / 2 + 1) * sizeof(Number),
+                "a number per node of level " + std::to_string(level)),
+        numbers_(dag.words(level).size() / 2 + 1) {}
+  Number& operator[](uint64_t offset) { return numbers_[offset / 2]; }
+
+ private:
+  MemoryCharge charge_;
+  std::vector<Number> numbers_;
+};
+
+}  // namespace voxdag::query
