@@ -1,0 +1,72 @@
+// extract: the options, the report, and files that equal those of builds.
+#include <filesystem>
+
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+class Extract : public CommandLine {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(run({"generate", "soup", "s.glb", "--triangles", "2000"}).status, 0);
+    report_ = run_json({"build", "s.glb", "-r", "256", "-o", "s.vdag", "--bounds", kBounds});
+    const Json origin = report_["bounds"]["origin"];
+    ASSERT_EQ(origin.size(), 3u);
+  }
+  static constexpr const char* kBounds = "-512,-512,-512,1024";
+  Json report_;
+};
+
+// A cube of a build is the build of that cube, and the whole is the file itself.
+TEST_F(Extract, EqualsBuilds) {
+  const Json whole = run_json({"extract", "s.vdag", "-o", "whole.vdag", "--memory", "64MiB"});
+  EXPECT_EQ(whole["sha256"], report_["sha256"]);
+  run_json({"build", "s.glb", "-r", "64", "-o", "cube.vdag", "--bounds", "-256,-512,0,256"});
+  const Json cube = run_json({"extract", "s.vdag", "-o", "part.vdag", "--region",
+                              "64,0,128,128,64,192", "--crop", "--threads", "3"});
+  EXPECT_GT(cube["voxels"], 0);
+  EXPECT_TRUE(contents("part.vdag") == contents("cube.vdag"));
+  const Json world = run_json(
+      {"extract", "s.vdag", "-o", "world.vdag", "--region", "-256,-512,0,0,-256,256", "--world", "--crop"});
+  EXPECT_EQ(world["sha256"], cube["sha256"]);
+}
+
+// The report has what info and verify find.
+TEST_F(Extract, Report) {
+  const Json report = run_json({"extract", "s.vdag", "-o", "c.vdag", "--resolution", "32"});
+  const Json info = run_json({"info", "c.vdag", "--digest"});
+  for (const char* name : {"resolution", "bounds", "hash_bits", "voxels", "svo_nodes", "dag_nodes",
+                           "bytes", "levels", "sha256"})
+    EXPECT_EQ(report[name], info[name]) << name;
+  EXPECT_EQ(info["resolution"], 32);
+  EXPECT_EQ(info["bounds"], report_["bounds"]);
+  EXPECT_GT(report["wall_s"], 0);
+  EXPECT_EQ(run_json({"verify", "c.vdag"})["ok"], true);
+  const Answer plain = run({"extract", "s.vdag", "-o", "d.vdag", "--level", "5"});
+  EXPECT_EQ(plain.status, 0) << plain.err;
+  EXPECT_NE(plain.out.find(info["sha256"]), std::string::npos) << plain.out;
+  EXPECT_TRUE(contents("c.vdag") == contents("d.vdag"));
+}
+
+// Nothing but the output is left, and nothing is overwritten that should not be.
+TEST_F(Extract, Refusals) {
+  put("mine.txt", "not a DAG");
+  expect_error(2, "mine.txt", {"extract", "s.vdag", "-o", "mine.txt"});
+  EXPECT_EQ(contents("mine.txt"), "not a DAG");
+  expect_error(2, "s.vdag", {"extract", "s.vdag", "-o", "s.vdag", "--force"});
+  expect_error(2, "64MiB", {"extract", "s.vdag", "-o", "x.vdag", "--memory", "63MiB"});
+  expect_error(2, "--level", {"extract", "s.vdag", "-o", "x.vdag", "--level", "9"});
+  expect_error(3, "none", {"extract", "none.vdag", "-o", "x.vdag"});
+  expect_error(4, "mine.txt", {"extract", "mine.txt", "-o", "x.vdag"});
+  run_json({"extract", "s.vdag", "-o", "mine.txt", "--force"});
+  EXPECT_EQ(run_json({"verify", "mine.txt"})["ok"], true);
+  size_t others = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+    others += entry.path().string().find("x.vdag") != std::string::npos ||
+              entry.path().string().find(".work") != std::string::npos;
+  EXPECT_EQ(others, 0u);
+}
+
+}  // namespace
+}  // namespace command_line

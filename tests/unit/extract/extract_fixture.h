@@ -1,0 +1,96 @@
+// Extracts parts of small files, and makes the files that they must equal voxel by voxel from the
+// oracle's DAGs.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/progress.h"
+#include "core/format/global/open_global.h"
+#include "core/format/global/verify.h"
+#include "query/extract/extract.h"
+#include "tests/oracle/dag.h"
+#include "tests/unit/format/test_files.h"
+
+namespace voxdag::query {
+
+// Remembers the warnings.
+class Warnings : public NoProgress {
+ public:
+  void warn(std::string_view message) override { texts.emplace_back(message); }
+  std::vector<std::string> texts;
+};
+
+// The cells of the grid of 2^levels that have a voxel.
+inline oracle::Voxels coarser(const oracle::Voxels& voxels, uint32_t levels) {
+  oracle::Voxels cells(1 << levels);
+  const int size = voxels.edge() >> levels;
+  for (int x = 0; x < voxels.edge(); ++x)
+    for (int y = 0; y < voxels.edge(); ++y)
+      for (int z = 0; z < voxels.edge(); ++z)
+        if (voxels.at(x, y, z)) cells.set(x / size, y / size, z / size);
+  return cells;
+}
+
+// Those of a region, in the cube with that low corner and edge.
+inline oracle::Voxels part_of(const oracle::Voxels& voxels, const Region& region,
+                              const std::array<int64_t, 3>& low, int edge) {
+  oracle::Voxels part(edge);
+  for (int64_t x = region.low[0]; x < region.high[0]; ++x)
+    for (int64_t y = region.low[1]; y < region.high[1]; ++y)
+      for (int64_t z = region.low[2]; z < region.high[2]; ++z)
+        if (voxels.at(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)))
+          part.set(static_cast<int>(x - low[0]), static_cast<int>(y - low[1]),
+                   static_cast<int>(z - low[2]));
+  return part;
+}
+
+class Extract : public testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return folder_.file(name); }
+
+  ExtractSpec spec(const std::string& output, const Selection& selection, bool crop = false) const {
+    ExtractSpec spec;
+    spec.selection = selection;
+    spec.crop = crop;
+    spec.output = path(output);
+    spec.memory_bytes = uint64_t{64} << 20;
+    spec.threads = 2;
+    return spec;
+  }
+
+  // Extracts from one file of the folder to another, which must verify.
+  ExtractReport extract_file(const std::string& input, const ExtractSpec& spec) {
+    const auto file = open_global_file(path(input));
+    const ExtractReport report = extract(*file, spec, system_files(), warnings_, never_);
+    const auto written = open_global_file(spec.output);
+    MemoryBudget budget(uint64_t{1} << 30);
+    verify_global_file(*written, 2, budget, warnings_, never_, spec.narrow_words);
+    EXPECT_EQ(report.bytes, written->file_bytes());
+    EXPECT_EQ(report.voxels, written->voxels());
+    EXPECT_EQ(report.svo_nodes, written->svo_nodes());
+    EXPECT_EQ(report.dag_nodes, written->dag_nodes());
+    return report;
+  }
+  std::string bytes(const std::string& name) const { return read_bytes(path(name)); }
+
+  // The only files of the folder are these.
+  void expect_files(std::vector<std::string> names) const {
+    std::vector<std::string> found;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+      found.push_back(entry.path().filename());
+    std::sort(found.begin(), found.end());
+    std::sort(names.begin(), names.end());
+    EXPECT_EQ(found, names);
+  }
+
+  TemporaryFolder folder_;
+  Warnings warnings_;
+  CancelToken never_;
+};
+
+}  // namespace voxdag::query
