@@ -58,10 +58,16 @@ class NodeReader {
 
   // The node, valid until the next call.
   voxdag_reader::Node node(uint32_t level, uint64_t offset);
-  // Calls visit(index, words) for each wanted node; `words` begin with the node, and have all of it
-  // that lies within the level. `wanted` increases by offset.
+  // Calls visit(node, words) for each wanted node; `words` begin with the node, and have all of it
+  // that lies within the level. `wanted` is in the order of the offsets.
   template <class Visit>
-  void for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit);
+  void for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit) {
+    for_each(
+        level, wanted, [](std::span<const uint32_t>) {}, visit);
+  }
+  // The same; ahead(words) was called for most nodes some nodes before, so that it can prefetch.
+  template <class Ahead, class Visit>
+  void for_each(uint32_t level, std::span<const WantedNode> wanted, Ahead&& ahead, Visit&& visit);
 
   // A node or a brick that begins with `words`, at `offset` of its level. Throws Error{kCorrupt} if
   // none can begin there.
@@ -83,14 +89,18 @@ class NodeReader {
   uint64_t count_ = 0;  // words of the window
 };
 
-template <class Visit>
-void NodeReader::for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit) {
+template <class Ahead, class Visit>
+void NodeReader::for_each(uint32_t level, std::span<const WantedNode> wanted, Ahead&& ahead,
+                          Visit&& visit) {
+  constexpr size_t kAhead = 8;
   while (!wanted.empty()) {
     cancel_.check();
     const size_t count = fill(level, wanted);
     const std::span<const uint32_t> window(buffer_.data(), count_);
-    for (const WantedNode& node : wanted.first(count))
-      visit(node, window.subspan(node.offset - first_));
+    for (size_t i = 0; i < count; ++i) {
+      if (i + kAhead < count) ahead(window.subspan(wanted[i + kAhead].offset - first_));
+      visit(wanted[i], window.subspan(wanted[i].offset - first_));
+    }
     wanted = wanted.subspan(count);
   }
 }

@@ -1,5 +1,6 @@
 #include "query/extract/part_builder.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/popcount8.h"
@@ -8,6 +9,8 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kNodesBetweenChecks = 4096;  // of the cancel token
+// New nodes in the level below a node, on average: half of what surfaces have.
+constexpr uint64_t kExpectedChildren = 2;
 
 // Bit c is set if byte c of the mask is not 0.
 uint8_t coarser_cells(uint64_t mask) {
@@ -17,10 +20,10 @@ uint8_t coarser_cells(uint64_t mask) {
   return cells;
 }
 
-void append(cpu::Memory& memory, cpu::PooledArray<uint32_t>& all, uint64_t count, uint32_t child) {
+void append(cpu::Memory& memory, cpu::PooledArray<uint32_t>& all, uint64_t& count, uint32_t child) {
   if (count == UINT32_MAX) throw OutOfBudget{};
   if (count == all.size()) all.grow(memory, count + 1024);
-  all[count] = child;
+  all[count++] = child;
 }
 
 }  // namespace
@@ -45,62 +48,64 @@ std::vector<Part> PartBuilder::split(const Part& part) {
   return children;
 }
 
-// Nodes above the bricks of the selected grid.
-void PartBuilder::read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below,
-                             Children& children) {
+template <class Visit>
+void PartBuilder::read(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children,
+                       Visit visit) {
   const PartLevel::Sorted sorted = nodes.sort();
   children.masks = cpu::PooledArray<uint8_t>(memory_, nodes.size());
   children.first = cpu::PooledArray<uint32_t>(memory_, nodes.size());
-  const int64_t child_edge = edge(level + 1);
-  const auto add = [&](uint32_t number) {
-    append(memory_, children.all, children.count, number);
-    ++children.count;
+  below.reserve(std::min(kExpectedChildren * nodes.size(), file_.level(level + 1).node_count));
+  const int wide = file_.level(level + 1).pointer_bits == 64;
+  const auto prefetch = [&](std::span<const uint32_t> words) {
+    const size_t end = std::min(words.size(), size_t{1} + (kPopcount8[words[0] & 255] << wide));
+    for (size_t i = 1; i < end; i += size_t{1} << wide) below.prefetch(words[i]);
   };
-  reader_.for_each(
-      level, sorted.span(), [&](const WantedNode& wanted, std::span<const uint32_t> words) {
-        const voxdag_reader::Node node = reader_.parse_node(level, wanted.offset, words);
-        const int count = kPopcount8[node.child_mask];
-        children.first[wanted.index] = static_cast<uint32_t>(children.count);
-        if (!nodes.is_cut(wanted.index)) {
-          children.masks[wanted.index] = static_cast<uint8_t>(node.child_mask);
-          for (int n = 0; n < count; ++n) add(below.find_or_add(node.child(n)));
-          return;
-        }
-        const PartLevel::Position at = nodes.position(wanted.index);
-        uint32_t mask = 0;
-        int next = 0;
-        for (int c = 0; c < 8; ++c) {
-          if (!(node.child_mask >> c & 1)) continue;
-          const uint64_t offset = node.child(next++);
-          const PartLevel::Position child{
-              2 * at[0] + static_cast<uint32_t>(child_coordinate(c, 0)),
-              2 * at[1] + static_cast<uint32_t>(child_coordinate(c, 1)),
-              2 * at[2] + static_cast<uint32_t>(child_coordinate(c, 2))};
-          const auto low = corner(level + 1, child);
-          if (!selection_.region.intersects(low, child_edge)) continue;
-          mask |= 1u << c;
-          add(selection_.region.contains(low, child_edge) ? below.find_or_add(offset)
-                                                          : below.add_cut(offset, child));
-        }
-        children.masks[wanted.index] = static_cast<uint8_t>(mask);
-      });
+  reader_.for_each(level, sorted.span(), prefetch,
+                   [&](const WantedNode& wanted, std::span<const uint32_t> words) {
+                     children.first[wanted.index] = static_cast<uint32_t>(children.count);
+                     visit(wanted.index, reader_.parse_node(level, wanted.offset, words));
+                   });
+}
+
+// Nodes above the bricks of the selected grid.
+void PartBuilder::read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below,
+                             Children& children) {
+  const int64_t child_edge = edge(level + 1);
+  const auto add = [&](uint32_t number) { append(memory_, children.all, children.count, number); };
+  read(level, nodes, below, children, [&](uint64_t index, const voxdag_reader::Node& node) {
+    if (!nodes.is_cut(index)) {
+      children.masks[index] = static_cast<uint8_t>(node.child_mask);
+      for (int n = 0; n < kPopcount8[node.child_mask]; ++n) add(below.find_or_add(node.child(n)));
+      return;
+    }
+    const PartLevel::Position at = nodes.position(index);
+    uint32_t mask = 0;
+    int next = 0;
+    for (int c = 0; c < 8; ++c) {
+      if (!(node.child_mask >> c & 1)) continue;
+      const uint64_t offset = node.child(next++);
+      const PartLevel::Position child{2 * at[0] + static_cast<uint32_t>(child_coordinate(c, 0)),
+                                      2 * at[1] + static_cast<uint32_t>(child_coordinate(c, 1)),
+                                      2 * at[2] + static_cast<uint32_t>(child_coordinate(c, 2))};
+      const auto low = corner(level + 1, child);
+      if (!selection_.region.intersects(low, child_edge)) continue;
+      mask |= 1u << c;
+      add(selection_.region.contains(low, child_edge) ? below.find_or_add(offset)
+                                                      : below.add_cut(offset, child));
+    }
+    children.masks[index] = static_cast<uint8_t>(mask);
+  });
   nodes.release_entries();
 }
 
 // Nodes of the file that become bricks. What the region cuts away of these is left out later.
 void PartBuilder::read_all_children(uint32_t level, PartLevel& nodes, PartLevel& below,
                                     Children& children) {
-  const PartLevel::Sorted sorted = nodes.sort();
-  children.masks = cpu::PooledArray<uint8_t>(memory_, nodes.size());
-  children.first = cpu::PooledArray<uint32_t>(memory_, nodes.size());
-  reader_.for_each(
-      level, sorted.span(), [&](const WantedNode& wanted, std::span<const uint32_t> words) {
-        const voxdag_reader::Node node = reader_.parse_node(level, wanted.offset, words);
-        children.masks[wanted.index] = static_cast<uint8_t>(node.child_mask);
-        children.first[wanted.index] = static_cast<uint32_t>(children.count);
-        for (int n = 0; n < kPopcount8[node.child_mask]; ++n, ++children.count)
-          append(memory_, children.all, children.count, below.find_or_add(node.child(n)));
-      });
+  read(level, nodes, below, children, [&](uint64_t index, const voxdag_reader::Node& node) {
+    children.masks[index] = static_cast<uint8_t>(node.child_mask);
+    for (int n = 0; n < kPopcount8[node.child_mask]; ++n)
+      append(memory_, children.all, children.count, below.find_or_add(node.child(n)));
+  });
 }
 
 // The occupied octants of each node or brick: the cells of the selected grid in it.

@@ -63,6 +63,9 @@ class PartBuilder {
   std::array<int64_t, 3> corner(uint32_t level, const PartLevel::Position& position) const;
   int64_t edge(uint32_t level) const { return int64_t{1} << (selection_.grid_levels - level); }
 
+  // Reads the nodes of a level, whose children will be added to `below`.
+  template <class Visit>
+  void read(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children, Visit visit);
   void read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);
   void read_all_children(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);
   cpu::PooledArray<uint64_t> read_bricks(PartLevel& bricks);

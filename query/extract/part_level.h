@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 
@@ -32,9 +33,16 @@ class PartLevel {
             static_cast<uint32_t>(place >> 2 * kAxisBits)};
   }
 
+  // Makes room for about `count` nodes.
+  void reserve(uint64_t count) {
+    if (2 * count >= slots_size_) grow_slots(2 * count + 1);
+  }
+  void prefetch(uint64_t offset) const {
+    __builtin_prefetch(&slots_[offset * kMultiplier >> shift_]);
+  }
   // The number of the node at `offset`, all of which is wanted.
   uint32_t find_or_add(uint64_t offset) {
-    if (2 * count_ >= slots_size_) grow_slots();
+    if (2 * count_ >= slots_size_) grow_slots(2 * count_ + 1);
     const uint64_t hash = offset * kMultiplier;
     uint64_t at = hash >> shift_;
     for (; slots_[at] != 0; at = (at + 1) & (slots_size_ - 1)) {
@@ -87,11 +95,10 @@ class PartLevel {
     entries_[count_] = entry;
     return static_cast<uint32_t>(count_++);
   }
-  void grow_slots() {
-    uint64_t size = std::max(2 * slots_size_, kFirstSlots);
-    while (2 * count_ >= size) size *= 2;
+  void grow_slots(uint64_t slots_needed) {
+    const uint64_t size = std::bit_ceil(std::max(slots_needed, kFirstSlots));
     cpu::PooledArray<uint64_t> slots(*memory_, size, cpu::PooledArray<uint64_t>::kZero);
-    const int shift = 64 - __builtin_ctzll(size);
+    const int shift = 64 - std::countr_zero(size);
     for (uint64_t index = 0; index < count_; ++index) {
       if (is_cut(index)) continue;
       const uint64_t hash = entries_[index].offset * kMultiplier;

@@ -27,8 +27,8 @@ TEST_F(Extract, EqualsBuilds) {
                               "64,0,128,128,64,192", "--crop", "--threads", "3"});
   EXPECT_GT(cube["voxels"], 0);
   EXPECT_TRUE(contents("part.vdag") == contents("cube.vdag"));
-  const Json world = run_json(
-      {"extract", "s.vdag", "-o", "world.vdag", "--region", "-256,-512,0,0,-256,256", "--world", "--crop"});
+  const Json world = run_json({"extract", "s.vdag", "-o", "world.vdag", "--region",
+                               "-256,-512,0,0,-256,256", "--world", "--crop"});
   EXPECT_EQ(world["sha256"], cube["sha256"]);
 }
 
