@@ -11,6 +11,7 @@ namespace {
 constexpr uint64_t kNodesBetweenChecks = 4096;  // of the cancel token
 // New nodes in the level below a node, on average: half of what surfaces have.
 constexpr uint64_t kExpectedChildren = 2;
+constexpr uint64_t kPrefetchAhead = 8;  // nodes
 
 // Bit c is set if byte c of the mask is not 0.
 uint8_t coarser_cells(uint64_t mask) {
@@ -135,7 +136,7 @@ cpu::PooledArray<uint64_t> PartBuilder::read_bricks(PartLevel& bricks) {
                      });
     return masks;
   }
-  PartLevel below(memory_);
+  PartLevel below = level_of_part(brick_level() + 1);
   Children children;
   read_all_children(brick_level(), bricks, below, children);
   const cpu::PooledArray<uint8_t> cells = read_cells(below);
@@ -182,6 +183,13 @@ cpu::PooledArray<PartBuilder::Built> PartBuilder::build_nodes(uint32_t level, ui
   const int size_log2 = static_cast<int>(selection_.grid_levels - level);
   for (uint64_t i = 0; i < count; ++i) {
     if (i % kNodesBetweenChecks == 0) cancel_.check();
+    if (i + 2 * kPrefetchAhead < count)
+      __builtin_prefetch(&children.all[children.first[i + 2 * kPrefetchAhead]]);
+    if (i + kPrefetchAhead < count) {
+      const uint64_t ahead = i + kPrefetchAhead;
+      for (int n = 0; n < kPopcount8[children.masks[ahead]]; ++n)
+        __builtin_prefetch(&below[children.all[children.first[ahead] + n]]);
+    }
     cpu::NodeRef refs[8];
     cpu::OctreeCounts counts;
     uint64_t next = children.first[i];
@@ -201,7 +209,7 @@ cpu::PooledArray<PartBuilder::Built> PartBuilder::build_nodes(uint32_t level, ui
 SubDagSummary PartBuilder::build(const Part& part, const SubDagShape& shape, SubDagSink& sink) {
   const uint32_t top = part.cube.level, bricks = brick_level();
   std::vector<PartLevel> levels;
-  for (uint32_t l = top; l <= bricks; ++l) levels.emplace_back(memory_);
+  for (uint32_t l = top; l <= bricks; ++l) levels.push_back(level_of_part(l));
   std::vector<Children> children(bricks - top);
   const PartLevel::Position at{part.cube.position[0], part.cube.position[1], part.cube.position[2]};
   if (selection_.region.contains(corner(top, at), edge(top)))

@@ -61,6 +61,9 @@ class PartBuilder {
   uint32_t brick_level() const { return selection_.grid_levels - kBrickLevels; }
   // The low corner and the edge of a cube, in cells of the selected grid.
   std::array<int64_t, 3> corner(uint32_t level, const PartLevel::Position& position) const;
+  PartLevel level_of_part(uint32_t level) {
+    return PartLevel(memory_, file_.level(level).pointer_bits == 64);
+  }
   int64_t edge(uint32_t level) const { return int64_t{1} << (selection_.grid_levels - level); }
 
   // Reads the nodes of a level, whose children will be added to `below`.

@@ -4,12 +4,13 @@
 //
 //   slots     [tag | number + 1] ...    open addressing by the offset, for nodes that are not cut
 //
+// The tag is the lower half of the offset times an odd number, so that it determines the lower half
+// of the offset. Only in a wide level can two offsets have the same tag.
+//
 // Not thread-safe. Throws OutOfBudget when the budget, or 2^32 - 1 numbers, cannot hold more.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <span>
 
@@ -22,7 +23,8 @@ class PartLevel {
  public:
   using Position = std::array<uint32_t, 3>;  // in cubes of the level
 
-  explicit PartLevel(cpu::Memory& memory) : memory_(&memory) {}
+  // `wide`: the level of the file has over 2^32 words.
+  PartLevel(cpu::Memory& memory, bool wide) : memory_(&memory), wide_(wide) {}
 
   uint64_t size() const { return count_; }
   bool is_cut(uint64_t index) const { return entries_[index].place != kWhole; }
@@ -47,7 +49,7 @@ class PartLevel {
     uint64_t at = hash >> shift_;
     for (; slots_[at] != 0; at = (at + 1) & (slots_size_ - 1)) {
       const uint64_t index = (slots_[at] & UINT32_MAX) - 1;
-      if (slots_[at] >> 32 == (hash & UINT32_MAX) && entries_[index].offset == offset)
+      if (slots_[at] >> 32 == (hash & UINT32_MAX) && (!wide_ || entries_[index].offset == offset))
         return static_cast<uint32_t>(index);
     }
     const uint32_t index = add({offset, kWhole});
@@ -66,15 +68,7 @@ class PartLevel {
     uint64_t count = 0;
     std::span<const WantedNode> span() const { return {nodes.data(), count}; }
   };
-  Sorted sort() {
-    slots_ = {};
-    slots_size_ = 0;
-    Sorted sorted{cpu::PooledArray<WantedNode>(*memory_, count_), count_};
-    for (uint64_t i = 0; i < count_; ++i) sorted.nodes[i] = {entries_[i].offset, i};
-    std::sort(sorted.nodes.data(), sorted.nodes.data() + count_,
-              [](const WantedNode& a, const WantedNode& b) { return a.offset < b.offset; });
-    return sorted;
-  }
+  Sorted sort();
   // Forgets offsets and positions.
   void release_entries() { entries_ = {}; }
 
@@ -95,26 +89,13 @@ class PartLevel {
     entries_[count_] = entry;
     return static_cast<uint32_t>(count_++);
   }
-  void grow_slots(uint64_t slots_needed) {
-    const uint64_t size = std::bit_ceil(std::max(slots_needed, kFirstSlots));
-    cpu::PooledArray<uint64_t> slots(*memory_, size, cpu::PooledArray<uint64_t>::kZero);
-    const int shift = 64 - std::countr_zero(size);
-    for (uint64_t index = 0; index < count_; ++index) {
-      if (is_cut(index)) continue;
-      const uint64_t hash = entries_[index].offset * kMultiplier;
-      uint64_t at = hash >> shift;
-      while (slots[at] != 0) at = (at + 1) & (size - 1);
-      slots[at] = hash << 32 | (index + 1);
-    }
-    slots_ = std::move(slots);
-    slots_size_ = size;
-    shift_ = shift;
-  }
+  void grow_slots(uint64_t slots_needed);
 
   static constexpr uint64_t kFirstEntries = 256;
   static constexpr uint64_t kFirstSlots = 512;
 
   cpu::Memory* memory_;
+  bool wide_;
   cpu::PooledArray<Entry> entries_;
   cpu::PooledArray<uint64_t> slots_;
   uint64_t slots_size_ = 0;
