@@ -15,6 +15,8 @@ constexpr ExportFormat kFormats[] = {
      write_svdag},
     {"voxel", "PlayCanvas and SuperSplat: NAME.voxel.json and NAME.voxel.bin", ".voxel.json",
      ".voxel.bin", write_voxel},
+    {"vox", "MagicaVoxel", nullptr, nullptr, write_vox},
+    {"bt", "OctoMap", nullptr, nullptr, write_bt},
     {"ply", "point cloud: the centers of the voxels, world units", nullptr, nullptr, write_ply},
     {"npz", "numpy: the cells and the centers of the voxels", nullptr, nullptr, write_npz},
 };

@@ -90,5 +90,7 @@ ExportReport write_npz(const ExportJob& job);
 ExportReport write_hashdag(const ExportJob& job);
 ExportReport write_svdag(const ExportJob& job);
 ExportReport write_voxel(const ExportJob& job);
+ExportReport write_vox(const ExportJob& job);
+ExportReport write_bt(const ExportJob& job);
 
 }  // namespace voxdag::query

@@ -5,6 +5,8 @@ cells, n x 3, in any order. They share nothing with the exporter.
 """
 
 import json
+import struct
+import subprocess
 
 import numpy
 
@@ -158,7 +160,112 @@ def voxel(path, grid):
     return numpy.concatenate(cells)
 
 
-def missing(name):
+def bt(path, grid, reader):
+    listed = subprocess.run([reader, path], capture_output=True, check=True)
+    leaves = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 5)
+    corners, edges, occupied = leaves[:, :3] - 32768, leaves[:, 3], leaves[:, 4] == 1
+    assert (edges[occupied] == 1).all()
+    # What is known lies in the region, and of a whole grid all is known.
+    assert (corners >= grid.low).all() and (corners + edges[:, None] <= grid.high).all()
+    known = (edges.astype(numpy.int64) ** 3).sum()
+    assert known == grid.resolution**3 or (grid.high - grid.low < grid.resolution).any()
+    return corners[occupied]
+
+
+class VoxChunks:
+    """The chunks of a .vox file in order: (id, contents)."""
+
+    def __init__(self, data):
+        assert data[:4] == b"VOX " and struct.unpack_from("<i", data, 4)[0] == 150
+        name, size, below = struct.unpack_from("<4sii", data, 8)
+        assert name == b"MAIN" and size == 0 and 20 + below == len(data)
+        self.data, self.at = data, 20
+
+    def __iter__(self):
+        while self.at < len(self.data):
+            name, size, below = struct.unpack_from("<4sii", self.data, self.at)
+            assert below == 0
+            self.at += 12 + size
+            yield name.decode(), self.data[self.at - size : self.at]
+
+
+class VoxFields:
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def number(self):
+        self.at += 4
+        return struct.unpack_from("<i", self.data, self.at - 4)[0]
+
+    def text(self):
+        size = self.number()
+        self.at += size
+        return self.data[self.at - size : self.at].decode()
+
+    def dictionary(self):
+        return {self.text(): self.text() for _ in range(self.number())}
+
+
+def vox_node(name, data):
+    fields = VoxFields(data)
+    number, attributes = fields.number(), fields.dictionary()
+    if name == "nTRN":
+        child, _, _, frames = [fields.number() for _ in range(4)]
+        assert frames == 1
+        node = "nTRN", child, [int(x) for x in fields.dictionary().get("_t", "0 0 0").split()]
+    else:
+        count = fields.number()
+        assert name == "nGRP" or count == 1
+        node = name, [fields.number() for _ in range(count)]
+        if name == "nSHP":
+            assert fields.dictionary() == {}
+    assert attributes == {} and fields.at == len(data)
+    return number, node
+
+
+def vox(path, grid):
+    with open(path, "rb") as file:
+        data = file.read()
+    sizes, models, nodes, palettes = [], [], {}, 0
+    for name, contents in VoxChunks(data):
+        if name == "SIZE":
+            sizes.append(numpy.frombuffer(contents, "<i4"))
+            assert (sizes[-1] <= 256).all() and len(sizes[-1]) == 3
+        elif name == "XYZI":
+            assert struct.unpack_from("<i", contents)[0] * 4 + 4 == len(contents)
+            voxels = numpy.frombuffer(contents, "<u1", offset=4).reshape(-1, 4)
+            assert (voxels[:, 3] == 1).all() and (voxels[:, :3] < sizes[-1]).all()
+            models.append(voxels[:, :3].astype(numpy.int64))
+        elif name == "RGBA":
+            assert len(contents) == 1024
+            palettes += 1
+        else:
+            number, node = vox_node(name, contents)
+            nodes[number] = node
+    assert len(sizes) == len(models) and palettes == 1
+    cells = []
+
+    def visit(number, place):
+        node = nodes[number]
+        if node[0] == "nTRN":
+            visit(node[1], place + node[2])
+        elif node[0] == "nGRP":
+            for child in node[1]:
+                visit(child, place)
+        else:
+            model = node[1][0]
+            cells.append(models[model] + place - sizes[model] // 2)
+
+    visit(0, numpy.zeros(3, numpy.int64))
+    x, y, z = numpy.concatenate(cells).T
+    # z is up, the middle of the grid's floor is the origin. A voxel has the coordinate of its low
+    # corner, and that of -z is the high one of z.
+    middle = grid.resolution // 2
+    return numpy.stack([x + middle, z, middle - 1 - y], axis=1)
+
+
+def missing(name, tools):
     """The library that decoding needs and that is not here, or nothing."""
-    del name
+    if name == "bt" and not tools:
+        return "liboctomap-dev"
     return None

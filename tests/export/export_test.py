@@ -34,22 +34,24 @@ SUFFIXES = {"hashdag": ".basic_dag.dag.bin", "voxel": ".voxel.json"}
 CASES = [
     (64, []),
     (256, []),
-    (1024, []),
-    (1024, ["--level", "7"]),
+    (512, []),
+    (512, ["--level", "7"]),
     (256, ["--region", "37,0,90,150,201,133"]),
-    (1024, ["--level", "8", "--region", "101,3,50,170,201,133"]),
+    (512, ["--level", "8", "--region", "101,3,50,170,201,133"]),
 ]
 
 
 class Grid:
     """The exported grid: the world coordinates of its cells."""
 
-    def __init__(self, info, levels):
+    def __init__(self, info, levels, region):
         self.levels = levels
         self.resolution = 2**levels
         self.origin = numpy.array(info["bounds"]["origin"])
         self.edge = info["bounds"]["edge"]
         self.voxel = self.edge / self.resolution
+        self.low = numpy.array(region[:3] if region else [0] * 3)
+        self.high = numpy.array(region[3:] if region else [self.resolution] * 3)
 
     def cells(self, centers):
         """The cells that have these centers in world space."""
@@ -87,25 +89,23 @@ class Test:
             self.files[resolution] = path, json.loads(self.run("info", path, "--json"))
         return self.files[resolution]
 
-    def expected(self, path, shift, region):
+    def expected(self, path, shift, grid):
         listed = subprocess.run([self.list_voxels, path, str(shift)], capture_output=True, check=True)
         cells = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 3)
-        if region:
-            low, high = region[:3], region[3:]
-            cells = cells[((cells >= low) & (cells < high)).all(axis=1)]
+        cells = cells[((cells >= grid.low) & (cells < grid.high)).all(axis=1)]
         return numpy.unique(keys(cells))
 
     def check(self, resolution, options):
         path, info = self.scene(resolution)
         given = dict(zip(options[::2], options[1::2]))
         full = resolution.bit_length() - 1
-        grid = Grid(info, int(given.get("--level", full)))
         region = [int(x) for x in given["--region"].split(",")] if "--region" in given else None
+        grid = Grid(info, int(given.get("--level", full)), region)
         output = "out" + SUFFIXES.get(self.name, "." + self.name)
         report = json.loads(
             self.run("export", path, "--to", self.name, "-o", output, "--json", "--force", *options)
         )
-        expected = self.expected(path, full - grid.levels, region)
+        expected = self.expected(path, full - grid.levels, grid)
         assert len(expected) > 100, "too small a scene"
         found = keys(self.decode(output, grid, *self.tools))
         assert len(numpy.unique(found)) == len(found), "a voxel comes twice"
@@ -135,7 +135,7 @@ class Test:
 
 def main():
     voxdag, list_voxels, name, *tools = sys.argv[1:]
-    missing = decoders.missing(name)
+    missing = decoders.missing(name, tools)
     if missing:
         print("skipped: there is no " + missing)
         return 77

@@ -1,0 +1,274 @@
+// MagicaVoxel .vox, version 150: a model of at most 256^3 voxels for each different node of the DAG
+// with that edge, and an instance of it for each place where the node occurs.
+//     "VOX " | 150 | MAIN { (SIZE XYZI)... nTRN nGRP (nTRN nSHP)... LAYR RGBA }
+// MagicaVoxel's z is up: (x, y, z) of the file is (x, -z, y) of ours.
+#include <array>
+#include <bit>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+#include "core/format/bytes.h"
+#include "query/export/export_file.h"
+#include "query/export/selected_bricks.h"
+#include "query/export/selected_dag.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint32_t kModelLevels = 8;                         // 256^3 voxels
+constexpr uint64_t kMaxVoxBytes = (uint64_t{1} << 31) - 1;   // of a chunk: its size is an int32
+constexpr uint64_t kMaxVoxModels = (uint64_t{1} << 31) / 4;  // node ids are int32, too
+constexpr uint32_t kMagicaVoxelEdge = 2048;                  // what its editor shows
+constexpr uint64_t kModelBytes = 12 + 12 + 12 + 4;           // SIZE, and XYZI without voxels
+constexpr uint64_t kChunkHeaderBytes = 12;
+
+// A chunk of the scene graph, built in memory.
+class VoxChunk {
+ public:
+  VoxChunk(const char* id) : id_(id) {}
+  VoxChunk& number(int32_t value) {
+    ByteSink(bytes_).put(value);
+    return *this;
+  }
+  VoxChunk& text(std::string_view value) {
+    number(static_cast<int32_t>(value.size()));
+    ByteSink(bytes_).put_bytes(std::as_bytes(std::span(value)));
+    return *this;
+  }
+  VoxChunk& raw(std::span<const std::byte> bytes) {
+    ByteSink(bytes_).put_bytes(bytes);
+    return *this;
+  }
+  uint64_t size() const { return kChunkHeaderBytes + bytes_.size(); }
+  void write(ExportFile& file) const {
+    file.write(std::string_view(id_, 4));
+    file.put(static_cast<uint32_t>(bytes_.size()));
+    file.put<uint32_t>(0);  // bytes of children
+    file.write(bytes_);
+  }
+
+ private:
+  const char* id_;
+  std::vector<std::byte> bytes_;
+};
+
+VoxChunk transform_node(int32_t id, int32_t child, const std::string& place) {
+  VoxChunk chunk("nTRN");
+  chunk.number(id).number(0).number(child).number(-1).number(place.empty() ? -1 : 0).number(1);
+  if (place.empty()) return chunk.number(0);
+  return chunk.number(1).text("_t").text(place);
+}
+
+VoxChunk shape_node(int32_t id, int32_t model) {
+  VoxChunk chunk("nSHP");
+  chunk.number(id).number(0).number(1).number(model).number(0);
+  return chunk;
+}
+
+VoxChunk gray_palette() {
+  VoxChunk chunk("RGBA");
+  const uint32_t gray = 0xffb0b0b0, unused = 0xff000000;
+  for (int i = 0; i < 256; ++i) chunk.number(static_cast<int32_t>(i == 0 ? gray : unused));
+  return chunk;
+}
+
+class VoxWriter {
+ public:
+  VoxWriter(const ExportJob& job, const SelectedDag& dag)
+      : job_(job),
+        view_(dag.view()),
+        depth_(dag.grid_levels() > kModelLevels ? dag.grid_levels() - kModelLevels : 0),
+        edge_(int64_t{1} << (dag.grid_levels() - depth_)),
+        models_(job, dag, depth_),
+        charge_(job.budget, dag.node_count(depth_) * sizeof(uint64_t), "the models") {
+    number_models(dag);
+    find_instances(0, view_.root(), {0, 0, 0});
+  }
+
+  // What the file will have.
+  uint64_t bytes() const {
+    uint64_t bytes = nodes_bytes();
+    for (const uint64_t voxels : voxels_) bytes += kModelBytes + 4 * voxels;
+    return 8 + kChunkHeaderBytes + bytes;
+  }
+  size_t instance_count() const { return instances_; }
+
+  void write(ExportFile& file, ExportStage& stage, const SelectedDag& dag) {
+    const uint64_t total = bytes();
+    file.write("VOX ");
+    file.put<uint32_t>(150);
+    file.write("MAIN");
+    file.put<uint32_t>(0);
+    file.put(static_cast<uint32_t>(total - 8 - kChunkHeaderBytes));
+    size_t model = 0;
+    const auto write_next = [&](uint64_t offset) {
+      write_model(file, offset, voxels_[model]);
+      stage.advance(voxels_[model++]);
+    };
+    for_each_model_node(dag, write_next);
+    write_nodes(file);
+    gray_palette().write(file);
+    if (file.size() != total)
+      throw Error(ErrorCode::kCorrupt, job_.output + ": has " + std::to_string(file.size()) +
+                                           " bytes, expected " + std::to_string(total));
+  }
+
+ private:
+  template <class Visit>
+  void for_each_model_node(const SelectedDag& dag, const Visit& visit) const {
+    if (depth_ == dag.brick_level())
+      dag.for_each_brick([&](uint64_t offset, uint64_t) { visit(offset); });
+    else
+      dag.for_each_node(
+          depth_, [&](uint64_t offset, uint32_t, std::span<const uint32_t>) { visit(offset); });
+  }
+
+  // What a view of the model's node calls its content.
+  uint64_t content_at(uint64_t offset) const {
+    return depth_ + kBrickLevels == view_.grid_levels() ? view_.root() : offset;
+  }
+
+  void number_models(const SelectedDag& dag) {
+    voxels_.reserve(dag.node_count(depth_));
+    uint64_t total = 0;
+    for_each_model_node(dag, [&](uint64_t offset) {
+      // What is too large already need not be counted to the end.
+      if (4 * total > kMaxVoxBytes) return;
+      models_[offset] = static_cast<uint32_t>(voxels_.size());
+      uint64_t voxels = 0;
+      visit_bricks(depth_, content_at(offset), {0, 0, 0}, [&](const CellCorner&, uint64_t mask) {
+        voxels += static_cast<uint64_t>(std::popcount(mask));
+      });
+      voxels_.push_back(voxels);
+      total += voxels;
+      job_.cancel.check();
+    });
+  }
+
+  template <class Visit>
+  void visit_bricks(uint32_t depth, uint64_t content, const CellCorner& corner,
+                    const Visit& visit) const {
+    if (depth + kBrickLevels == view_.grid_levels()) return visit(corner, content);
+    const DagView::Children children = view_.children(depth, content);
+    const int64_t half = int64_t{1} << (view_.grid_levels() - depth - 1);
+    for (int i = 0; i < 8; ++i)
+      if (children.has(i))
+        visit_bricks(depth + 1, view_.content(depth, children, i), child_corner(corner, i, half),
+                     visit);
+  }
+
+  // Calls visit(corner, model) for each place of a model.
+  template <class Visit>
+  void visit_instances(uint32_t depth, uint64_t content, const CellCorner& corner,
+                       const Visit& visit) {
+    if (depth == depth_)
+      return visit(corner, depth_ + kBrickLevels == view_.grid_levels() ? 0 : models_[content]);
+    const DagView::Children children = view_.children(depth, content);
+    const int64_t half = int64_t{1} << (view_.grid_levels() - depth - 1);
+    for (int i = 0; i < 8; ++i)
+      if (children.has(i))
+        visit_instances(depth + 1, view_.content(depth, children, i), child_corner(corner, i, half),
+                        visit);
+  }
+
+  void find_instances(uint32_t depth, uint64_t content, const CellCorner& corner) {
+    visit_instances(depth, content, corner, [&](const CellCorner& at, uint32_t) {
+      instance_bytes_ += transform_node(0, 0, place_text(at)).size() + shape_node(0, 0).size();
+      ++instances_;
+    });
+  }
+
+  // Where the center of an instance is. The grid's center is at the origin of MagicaVoxel's x and
+  // y, its floor at that of z.
+  std::string place_text(const CellCorner& corner) const {
+    const int64_t half = edge_ / 2, middle = int64_t{1} << (view_.grid_levels() - 1);
+    return std::to_string(corner[0] + half - middle) + " " +
+           std::to_string(middle - corner[2] - half) + " " + std::to_string(corner[1] + half);
+  }
+
+  uint64_t nodes_bytes() const {
+    return transform_node(0, 1, "").size() + kChunkHeaderBytes + 12 + 4 * instances_ +
+           instance_bytes_ + gray_palette().size();
+  }
+
+  void write_model(ExportFile& file, uint64_t offset, uint64_t voxels) const {
+    file.write("SIZE");
+    file.put<uint32_t>(12);
+    file.put<uint32_t>(0);
+    for (int axis = 0; axis < 3; ++axis) file.put(static_cast<uint32_t>(edge_));
+    file.write("XYZI");
+    file.put(static_cast<uint32_t>(4 + 4 * voxels));
+    file.put<uint32_t>(0);
+    file.put(static_cast<uint32_t>(voxels));
+    visit_bricks(
+        depth_, content_at(offset), {0, 0, 0}, [&](const CellCorner& corner, uint64_t mask) {
+          for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+            const std::array<uint8_t, 4> voxel = {static_cast<uint8_t>(cell[0]),
+                                                  static_cast<uint8_t>(edge_ - 1 - cell[2]),
+                                                  static_cast<uint8_t>(cell[1]), 1};
+            file.write(std::as_bytes(std::span(voxel)));
+          });
+        });
+  }
+
+  void write_nodes(ExportFile& file) {
+    transform_node(0, 1, "").write(file);
+    file.write("nGRP");
+    file.put(static_cast<uint32_t>(12 + 4 * instances_));
+    file.put<uint32_t>(0);
+    file.put<int32_t>(1);
+    file.put<int32_t>(0);
+    file.put(static_cast<int32_t>(instances_));
+    for (size_t i = 0; i < instances_; ++i) file.put(static_cast<int32_t>(2 + 2 * i));
+    int32_t id = 2;
+    visit_instances(0, view_.root(), {0, 0, 0}, [&](const CellCorner& corner, uint32_t model) {
+      transform_node(id, id + 1, place_text(corner)).write(file);
+      shape_node(id + 1, static_cast<int32_t>(model)).write(file);
+      id += 2;
+    });
+  }
+
+  const ExportJob& job_;
+  const DagView view_;
+  const uint32_t depth_;  // of the models' nodes
+  const int64_t edge_;    // of a model
+  NodeNumbers<uint32_t> models_;
+  MemoryCharge charge_;
+  std::vector<uint64_t> voxels_;  // of each model
+  size_t instances_ = 0;
+  uint64_t instance_bytes_ = 0;
+};
+
+}  // namespace
+
+ExportReport write_vox(const ExportJob& job) {
+  const SelectedDag dag(job);
+  VoxWriter writer(job, dag);
+  const uint64_t bytes = writer.bytes();
+  if (bytes > kMaxVoxBytes || writer.instance_count() > kMaxVoxModels)
+    refuse_size(job,
+                size_text(bytes) +
+                    " or more are needed, but the chunks of a .vox file have at most " +
+                    size_text(kMaxVoxBytes),
+                [&](uint32_t level) {
+                  // Even if nothing is shared, and a fourth is left for models and instances.
+                  const uint64_t voxels = kMaxVoxBytes / 16 * 3;
+                  return count_voxels(job, coarser(job.selection, level), voxels) <= voxels;
+                });
+  require_space(job, bytes);
+  ExportReport report;
+  report.voxels = dag.voxels();
+  ExportFile file(job.files, job.output);
+  ExportStage stage(job, "export", 0, "voxels");
+  writer.write(file, stage, dag);
+  ExportFile* const written[] = {&file};
+  report.bytes = ExportFile::publish(written);
+  report.notes.push_back("z is up: a voxel (x, y, z) is at (x, -z, y); " +
+                         count_text(writer.instance_count()) + " instances");
+  if (dag.grid_levels() > std::bit_width(kMagicaVoxelEdge) - 1)
+    report.notes.push_back(
+        "MagicaVoxel shows at most 2048 voxels per edge; other readers take all");
+  return report;
+}
+
+}  // namespace voxdag::query
