@@ -17,8 +17,13 @@ constexpr ExportFormat kFormats[] = {
      ".voxel.bin", write_voxel},
     {"vox", "MagicaVoxel", nullptr, nullptr, write_vox},
     {"bt", "OctoMap", nullptr, nullptr, write_bt},
+#ifdef VOXDAG_HAS_VDB
+    {"vdb", "OpenVDB: Blender, Houdini", nullptr, nullptr, write_vdb},
+    {"nvdb", "NanoVDB: renderers on GPUs", nullptr, nullptr, write_nvdb},
+#endif
     {"ply", "point cloud: the centers of the voxels, world units", nullptr, nullptr, write_ply},
     {"npz", "numpy: the cells and the centers of the voxels", nullptr, nullptr, write_npz},
+    {"glb", "glTF: a mesh of the surface, for regions", nullptr, nullptr, write_glb},
 };
 
 }  // namespace

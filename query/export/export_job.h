@@ -92,5 +92,8 @@ ExportReport write_svdag(const ExportJob& job);
 ExportReport write_voxel(const ExportJob& job);
 ExportReport write_vox(const ExportJob& job);
 ExportReport write_bt(const ExportJob& job);
+ExportReport write_glb(const ExportJob& job);
+ExportReport write_vdb(const ExportJob& job);
+ExportReport write_nvdb(const ExportJob& job);
 
 }  // namespace voxdag::query

@@ -10,6 +10,11 @@ import subprocess
 
 import numpy
 
+try:
+    import pyopenvdb
+except ImportError:
+    pyopenvdb = None
+
 
 def child_bits(masks):
     """For an array of 8-bit masks the pairs (row, bit) of all set bits, by row and bit."""
@@ -264,8 +269,95 @@ def vox(path, grid):
     return numpy.stack([x + middle, z, middle - 1 - y], axis=1)
 
 
+def vdb(path, grid):
+    read = pyopenvdb.read(path, "voxels")
+    assert not read.background
+    low, high = read.evalActiveVoxelBoundingBox()
+    values = numpy.zeros(numpy.array(high) - low + 1, bool)
+    read.copyToArray(values, ijk=low)
+    cells = numpy.argwhere(values) + low
+    assert len(cells) == read.activeVoxelCount()
+    some = cells[:: max(1, len(cells) // 100)]
+    centers = [read.transform.indexToWorld(tuple(map(int, cell))) for cell in some]
+    assert (grid.cells(numpy.array(centers)) == some).all()
+    return cells
+
+
+def nvdb(path, grid, reader):
+    listed = subprocess.run([reader, path], capture_output=True, check=True)
+    return grid.cells(numpy.frombuffer(listed.stdout, "<f8").reshape(-1, 3))
+
+
+def glb_rectangles(path, grid):
+    """Corners of all rectangles, n x 4 x 3, in cells of the grid."""
+    with open(path, "rb") as file:
+        data = file.read()
+    magic, version, size, json_size, json_type = struct.unpack_from("<4sIII4s", data)
+    assert (magic, version, size, json_type) == (b"glTF", 2, len(data), b"JSON")
+    document = json.loads(data[20 : 20 + json_size])
+    binary_size, binary_type = struct.unpack_from("<I4s", data, 20 + json_size)
+    binary = data[28 + json_size :]
+    assert binary_type == b"BIN\0" and binary_size == len(binary) and binary_size % 4 == 0
+    assert document["buffers"] == [{"byteLength": len(binary)}]
+    views = [
+        binary[view.get("byteOffset", 0) :][: view["byteLength"]]
+        for view in document["bufferViews"]
+    ]
+    accessors = document["accessors"]
+    positions = numpy.frombuffer(views[0], "<f4").reshape(-1, 3)
+    indices = numpy.frombuffer(views[1], "<u4")
+    assert accessors[0]["count"] == len(positions) and accessors[1]["count"] == len(indices)
+    assert (positions.min(axis=0) == accessors[0]["min"]).all()
+    assert (positions.max(axis=0) == accessors[0]["max"]).all()
+    triangles = positions[indices].astype(numpy.float64).reshape(-1, 2, 3, 3)
+    assert (triangles[:, 0, 0] == triangles[:, 1, 0]).all()
+    assert (triangles[:, 0, 2] == triangles[:, 1, 1]).all()
+    corners = numpy.concatenate([triangles[:, 0], triangles[:, 1, 2:]], axis=1)
+    (node,) = document["nodes"]
+    cells = (corners * node["scale"] + node["translation"] - grid.origin) / grid.voxel
+    assert numpy.abs(cells - numpy.rint(cells)).max() < 1e-3
+    return numpy.rint(cells).astype(numpy.int64)
+
+
+def glb(path, grid):
+    corners = glb_rectangles(path, grid)
+    normals = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    found = []
+    # Along each axis faces that look back and forth take turns: between them is what is solid.
+    for axis in range(3):
+        here = normals[:, axis] != 0
+        assert (low[here, axis] == high[here, axis]).all()
+        u, v = [a for a in range(3) if a != axis]
+        sizes = high[here] - low[here]
+        areas = sizes[:, u] * sizes[:, v]
+        quad = numpy.repeat(numpy.arange(len(areas)), areas)
+        within = numpy.arange(len(quad)) - numpy.repeat(numpy.cumsum(areas) - areas, areas)
+        faces = low[here][quad]
+        faces[:, u] += within % sizes[quad, u]
+        faces[:, v] += within // sizes[quad, u]
+        signs = numpy.sign(normals[here][quad, axis])
+        order = numpy.lexsort((faces[:, axis], faces[:, u], faces[:, v]))
+        faces, signs = faces[order], signs[order]
+        begins, ends = faces[0::2], faces[1::2]
+        assert (signs[0::2] == -1).all() and (signs[1::2] == 1).all()
+        assert (begins[:, [u, v]] == ends[:, [u, v]]).all()
+        lengths = ends[:, axis] - begins[:, axis]
+        cells = numpy.repeat(begins, lengths, axis=0)
+        cells[:, axis] += numpy.arange(len(cells)) - numpy.repeat(
+            numpy.cumsum(lengths) - lengths, lengths
+        )
+        found.append(cells[numpy.lexsort(cells.T)])
+    assert (found[0] == found[1]).all() and (found[0] == found[2]).all()
+    return found[0]
+
+
 def missing(name, tools):
     """The library that decoding needs and that is not here, or nothing."""
     if name == "bt" and not tools:
         return "liboctomap-dev"
+    if name == "nvdb" and not tools:
+        return "libnanovdb-dev"
+    if name == "vdb" and not pyopenvdb:
+        return "python3-openvdb"
     return None

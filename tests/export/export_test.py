@@ -10,6 +10,7 @@ as skipped, where the library that decodes is missing.
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -136,6 +137,10 @@ class Test:
 def main():
     voxdag, list_voxels, name, *tools = sys.argv[1:]
     missing = decoders.missing(name, tools)
+    if not missing and not re.search(
+        rf"^\s*{name}: ", subprocess.getoutput(f"{voxdag} export --help"), re.MULTILINE
+    ):
+        missing = f"{name} in this build of voxdag: its library was not found"
     if missing:
         print("skipped: there is no " + missing)
         return 77

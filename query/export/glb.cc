@@ -1,0 +1,287 @@
+// A surface as a binary glTF 2.0: the faces between set voxels and empty ones, coplanar faces
+// merged to rectangles. Positions are whole numbers of cells from the low corner of the region,
+// which floats hold exactly; the node places and scales them.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdio>
+
+#include "core/base/text.h"
+#include "core/geometry/morton.h"
+#include "query/export/export_file.h"
+#include "query/export/export_job.h"
+#include "query/export/selected_bricks.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint64_t kMaxGlbBytes = (uint64_t{1} << 32) - 1;  // its length is a u32
+constexpr uint64_t kQuadBytes = 4 * 3 * sizeof(float) + 6 * sizeof(uint32_t);
+constexpr uint64_t kMaxQuads = (kMaxGlbBytes - 4096) / kQuadBytes;
+
+struct GlbBrick {
+  uint64_t morton = 0;  // of its corner, in bricks
+  uint64_t mask = 0;
+};
+
+// A rectangle of faces: at `plane` of an axis, over [u0, u1) x [v0, v1) of the next two axes.
+struct GlbQuad {
+  uint32_t plane = 0, u0 = 0, v0 = 0, u1 = 0, v1 = 0;
+  bool upward = false;  // it looks along the axis, or against it
+  uint8_t axis = 0;
+};
+
+class GlbSurface {
+ public:
+  explicit GlbSurface(const ExportJob& job) : job_(job) {
+    uint64_t count = 0;
+    const auto count_brick = [&](const CellCorner&, uint64_t mask) {
+      if (++count % 65536 == 0) job.cancel.check();
+      voxels_ += static_cast<uint64_t>(std::popcount(mask));
+      return true;
+    };
+    for_each_selected_brick(job.dag, job.selection, count_brick);
+    if (count == 0) refuse_empty(job);
+    bricks_charge_ = MemoryCharge(job.budget, count * sizeof(GlbBrick), kMemory);
+    bricks_.reserve(count);
+    for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
+      bricks_.push_back({morton_encode(static_cast<uint32_t>(corner[0] / kBrickEdge),
+                                       static_cast<uint32_t>(corner[1] / kBrickEdge),
+                                       static_cast<uint32_t>(corner[2] / kBrickEdge)),
+                         mask});
+      return true;
+    });
+    ExportStage stage(job, "find faces", 6 * count, "bricks");
+    for (uint8_t axis = 0; axis < 3; ++axis)
+      for (const bool upward : {false, true}) add_quads(axis, upward, stage);
+  }
+
+  uint64_t voxels() const { return voxels_; }
+  const std::vector<GlbQuad>& quads() const { return quads_; }
+
+ private:
+  static constexpr const char* kMemory =
+      "the surface (a smaller --region or a coarser --level needs less)";
+  // A face is sorted by plane, then v, then u: 21 bits each.
+  static constexpr int kCoordinateBits = 21;
+  static constexpr uint64_t kCoordinateMask = (uint64_t{1} << kCoordinateBits) - 1;
+
+  uint64_t mask_at(const CellCorner& corner) const {
+    for (const int64_t c : corner)
+      if (c < 0 || c >= int64_t{1} << job_.selection.grid_levels) return 0;
+    const uint64_t morton = morton_encode(static_cast<uint32_t>(corner[0] / kBrickEdge),
+                                          static_cast<uint32_t>(corner[1] / kBrickEdge),
+                                          static_cast<uint32_t>(corner[2] / kBrickEdge));
+    const auto found = std::ranges::lower_bound(bricks_, morton, {}, &GlbBrick::morton);
+    return found != bricks_.end() && found->morton == morton ? found->mask : 0;
+  }
+
+  // The faces of a brick that look into empty cells.
+  uint64_t exposed(const CellCorner& corner, uint64_t mask, uint8_t axis, bool upward) const {
+    CellCorner beside = corner;
+    beside[axis] += upward ? kBrickEdge : -kBrickEdge;
+    const uint64_t neighbor = mask_at(beside);
+    uint64_t faces = 0;
+    for (uint64_t rest = mask; rest != 0; rest &= rest - 1) {
+      const int bit = std::countr_zero(rest);
+      std::array<int, 3> at = {brick_coordinate(bit, 0), brick_coordinate(bit, 1),
+                               brick_coordinate(bit, 2)};
+      at[axis] += upward ? 1 : -1;
+      const bool inside = at[axis] >= 0 && at[axis] < kBrickEdge;
+      at[axis] &= kBrickEdge - 1;
+      if (!((inside ? mask : neighbor) >> brick_bit(at[0], at[1], at[2]) & 1))
+        faces |= uint64_t{1} << bit;
+    }
+    return faces;
+  }
+
+  CellCorner corner_of(const GlbBrick& brick) const {
+    uint32_t x, y, z;
+    morton_decode(brick.morton, x, y, z);
+    return {int64_t{x} * kBrickEdge, int64_t{y} * kBrickEdge, int64_t{z} * kBrickEdge};
+  }
+
+  void add_quads(uint8_t axis, bool upward, ExportStage& stage) {
+    uint64_t count = 0;
+    for (const GlbBrick& brick : bricks_) {
+      count +=
+          static_cast<uint64_t>(std::popcount(exposed(corner_of(brick), brick.mask, axis, upward)));
+      stage.advance(1);
+    }
+    const MemoryCharge charge(job_.budget, count * sizeof(uint64_t), kMemory);
+    std::vector<uint64_t> faces;
+    faces.reserve(count);
+    const size_t u = (axis + 1u) % 3, v = (axis + 2u) % 3;
+    for (const GlbBrick& brick : bricks_) {
+      const CellCorner corner = corner_of(brick);
+      for_each_cell_of(
+          corner, exposed(corner, brick.mask, axis, upward), [&](const CellCorner& cell) {
+            const auto part = [&](size_t a, int64_t more = 0) {
+              return static_cast<uint64_t>(cell[a] - job_.selection.region.low[a] + more);
+            };
+            faces.push_back((part(axis, upward) << kCoordinateBits | part(v)) << kCoordinateBits |
+                            part(u));
+          });
+    }
+    std::ranges::sort(faces);
+    job_.cancel.check();
+    merge(faces, axis, upward);
+  }
+
+  // Makes the longest runs along u, and merges a run with the equal one of the row before.
+  void merge(const std::vector<uint64_t>& faces, uint8_t axis, bool upward) {
+    std::vector<size_t> row, previous;  // quads of the current row and of the one before
+    size_t candidate = 0;
+    GlbQuad last{};
+    for (size_t i = 0; i < faces.size();) {
+      size_t end = i + 1;
+      while (end < faces.size() && faces[end] == faces[end - 1] + 1) ++end;
+      GlbQuad run;
+      run.axis = axis;
+      run.upward = upward;
+      run.u0 = static_cast<uint32_t>(faces[i] & kCoordinateMask);
+      run.u1 = run.u0 + static_cast<uint32_t>(end - i);
+      run.v0 = static_cast<uint32_t>(faces[i] >> kCoordinateBits & kCoordinateMask);
+      run.v1 = run.v0 + 1;
+      run.plane = static_cast<uint32_t>(faces[i] >> 2 * kCoordinateBits);
+      i = end;
+      if (run.plane != last.plane || run.v0 != last.v0) {
+        previous.clear();
+        if (run.plane == last.plane && run.v0 == last.v0 + 1) previous.swap(row);
+        row.clear();
+        candidate = 0;
+      }
+      last = run;
+      while (candidate < previous.size() && quads_[previous[candidate]].u0 < run.u0) ++candidate;
+      if (candidate < previous.size() && quads_[previous[candidate]].u0 == run.u0 &&
+          quads_[previous[candidate]].u1 == run.u1) {
+        quads_[previous[candidate]].v1 = run.v1;
+        row.push_back(previous[candidate]);
+      } else {
+        row.push_back(add(run));
+      }
+    }
+  }
+
+  size_t add(const GlbQuad& quad) {
+    if (quads_.size() == quads_.capacity()) {
+      const size_t count = std::max<size_t>(1024, 2 * quads_.capacity());
+      MemoryCharge charge(job_.budget, count * sizeof(GlbQuad), kMemory);
+      quads_.reserve(count);
+      quads_charge_ = std::move(charge);
+    }
+    quads_.push_back(quad);
+    return quads_.size() - 1;
+  }
+
+  const ExportJob& job_;
+  MemoryCharge bricks_charge_, quads_charge_;
+  std::vector<GlbBrick> bricks_;
+  std::vector<GlbQuad> quads_;
+  uint64_t voxels_ = 0;
+};
+
+// The corners of a rectangle, counterclockwise as seen from outside.
+std::array<std::array<float, 3>, 4> corners_of(const GlbQuad& quad) {
+  const std::array<std::array<uint32_t, 2>, 4> around = {
+      {{quad.u0, quad.v0}, {quad.u1, quad.v0}, {quad.u1, quad.v1}, {quad.u0, quad.v1}}};
+  std::array<std::array<float, 3>, 4> corners{};
+  for (size_t i = 0; i < 4; ++i) {
+    const auto& at = around[quad.upward ? i : 3 - i];
+    corners[i][quad.axis] = static_cast<float>(quad.plane);
+    corners[i][(quad.axis + 1u) % 3] = static_cast<float>(at[0]);
+    corners[i][(quad.axis + 2u) % 3] = static_cast<float>(at[1]);
+  }
+  return corners;
+}
+
+std::string numbers_text(const std::array<double, 3>& numbers) {
+  char text[100];
+  std::snprintf(text, sizeof(text), "[%.17g,%.17g,%.17g]", numbers[0], numbers[1], numbers[2]);
+  return text;
+}
+
+std::string glb_json(const ExportJob& job, const std::vector<GlbQuad>& quads) {
+  std::array<double, 3> low{}, high{}, place{};
+  low.fill(1e9);
+  for (const GlbQuad& quad : quads)
+    for (const auto& corner : corners_of(quad))
+      for (size_t axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], static_cast<double>(corner[axis]));
+        high[axis] = std::max(high[axis], static_cast<double>(corner[axis]));
+      }
+  for (size_t axis = 0; axis < 3; ++axis)
+    place[axis] = job.world(axis, static_cast<double>(job.selection.region.low[axis]));
+  const uint64_t positions = quads.size() * 4 * 3 * sizeof(float);
+  const uint64_t indices = quads.size() * 6 * sizeof(uint32_t);
+  const double edge = job.cell_edge();
+  std::string json =
+      "{\"asset\":{\"version\":\"2.0\",\"generator\":\"voxdag\"},\"scene\":0,"
+      "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0,\"translation\":" +
+      numbers_text(place) + ",\"scale\":" + numbers_text({edge, edge, edge}) +
+      "}],\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.7,0.7,0.7,1],"
+      "\"metallicFactor\":0}}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},"
+      "\"indices\":1,\"material\":0}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,"
+      "\"count\":" +
+      std::to_string(quads.size() * 4) + ",\"type\":\"VEC3\",\"min\":" + numbers_text(low) +
+      ",\"max\":" + numbers_text(high) +
+      "},{\"bufferView\":1,\"componentType\":5125,\"count\":" + std::to_string(quads.size() * 6) +
+      ",\"type\":\"SCALAR\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":" +
+      std::to_string(positions) +
+      ",\"target\":34962},{\"buffer\":0,\"byteOffset\":" + std::to_string(positions) +
+      ",\"byteLength\":" + std::to_string(indices) +
+      ",\"target\":34963}],\"buffers\":[{\"byteLength\":" + std::to_string(positions + indices) +
+      "}]}";
+  json.append((4 - json.size() % 4) % 4, ' ');
+  return json;
+}
+
+void put_glb(const ExportJob& job, const std::vector<GlbQuad>& quads, ExportFile& file) {
+  const std::string json = glb_json(job, quads);
+  const uint64_t binary = quads.size() * kQuadBytes;
+  file.write("glTF");
+  file.put<uint32_t>(2);
+  file.put(static_cast<uint32_t>(12 + 8 + json.size() + 8 + binary));
+  file.put(static_cast<uint32_t>(json.size()));
+  file.write("JSON");
+  file.write(json);
+  file.put(static_cast<uint32_t>(binary));
+  file.write(std::string_view("BIN\0", 4));
+  ExportStage stage(job, "export", 2 * quads.size(), "rectangles");
+  for (const GlbQuad& quad : quads) {
+    for (const auto& corner : corners_of(quad)) file.write(std::as_bytes(std::span(corner)));
+    stage.advance(1);
+  }
+  for (uint32_t i = 0; i < quads.size(); ++i) {
+    for (const uint32_t corner : {0, 1, 2, 0, 2, 3}) file.put(4 * i + corner);
+    stage.advance(1);
+  }
+}
+
+}  // namespace
+
+ExportReport write_glb(const ExportJob& job) {
+  const GlbSurface surface(job);
+  const uint64_t quads = surface.quads().size();
+  if (quads > kMaxQuads)
+    refuse_size(job,
+                count_text(quads) + " rectangles (" + size_text(quads * kQuadBytes) +
+                    ") are needed, but a .glb file has at most " + size_text(kMaxGlbBytes),
+                [&](uint32_t level) {
+                  // Even if no faces are merged.
+                  return count_voxels(job, coarser(job.selection, level), kMaxQuads / 6) <=
+                         kMaxQuads / 6;
+                });
+  require_space(job, quads * kQuadBytes + 4096);
+  ExportReport report;
+  report.voxels = surface.voxels();
+  ExportFile file(job.files, job.output);
+  put_glb(job, surface.quads(), file);
+  ExportFile* const written[] = {&file};
+  report.bytes = ExportFile::publish(written);
+  report.notes.push_back(count_text(quads) + " rectangles, " + count_text(2 * quads) +
+                         " triangles");
+  return report;
+}
+
+}  // namespace voxdag::query

@@ -1,0 +1,209 @@
+// OpenVDB's .vdb and NanoVDB's .nvdb, by their own libraries: a grid of voxels that are on. It is
+// in memory as a whole before it is written, so its size is counted first.
+#include <openvdb/openvdb.h>
+
+// NanoVDB's conversion needs the former first.
+#include <nanovdb/util/IO.h>
+#include <nanovdb/util/OpenToNanoVDB.h>
+#include <openvdb/io/Stream.h>
+
+#include <bit>
+#include <ostream>
+#include <streambuf>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+#include "query/export/export_file.h"
+#include "query/export/export_job.h"
+#include "query/export/selected_bricks.h"
+
+namespace voxdag::query {
+namespace {
+
+// Bytes of a node with all of its pointers, in memory: a leaf of 8^3 voxels, and the nodes of 128^3
+// and 4096^3.
+struct VdbNodeBytes {
+  uint64_t leaf, lower, upper;
+};
+constexpr VdbNodeBytes kOpenVdbBytes = {192, 34 << 10, 272 << 10};
+constexpr VdbNodeBytes kNanoVdbBytes = {96, 34 << 10, 272 << 10};
+constexpr const char* kGridName = "voxels";
+
+// Throws what a library threw as an Error; errors of ours, and those of memory, come through.
+template <class Work>
+auto with_vdb_errors(const ExportJob& job, const Work& work) {
+  try {
+    return work();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw Error(ErrorCode::kIo, job.output + ": OpenVDB: " + error.what());
+  }
+}
+
+// A stream into a file of ours. Its errors are rethrown after the library is done with it: streams
+// swallow exceptions.
+class FileBuffer : public std::streambuf {
+ public:
+  explicit FileBuffer(ExportFile& file) : file_(file) {}
+  void check() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
+
+ protected:
+  std::streamsize xsputn(const char* bytes, std::streamsize count) override {
+    const bool done = attempt([&] {
+      file_.write(std::string_view(bytes, static_cast<size_t>(count)));
+      at_ += count;
+    });
+    return done ? count : 0;
+  }
+  int_type overflow(int_type byte) override {
+    const char c = traits_type::to_char_type(byte);
+    return xsputn(&c, 1) == 1 ? byte : traits_type::eof();
+  }
+  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override {
+    if (from == std::ios_base::cur) offset += at_;
+    if (from == std::ios_base::end) offset += static_cast<off_type>(file_.size());
+    if (offset == at_) return at_;
+    return attempt([&] { file_.seek(static_cast<uint64_t>(at_ = offset)); }) ? pos_type(at_)
+                                                                             : pos_type(-1);
+  }
+  pos_type seekpos(pos_type at, std::ios_base::openmode mode) override {
+    return seekoff(at, std::ios_base::beg, mode);
+  }
+
+ private:
+  template <class Work>
+  bool attempt(const Work& work) {
+    if (failure_) return false;
+    try {
+      work();
+      return true;
+    } catch (...) {
+      failure_ = std::current_exception();
+      return false;
+    }
+  }
+
+  ExportFile& file_;
+  off_type at_ = 0;
+  std::exception_ptr failure_;
+};
+
+// The bytes that the trees of a selection take in memory, as far as `limit`: cubes follow one
+// another in Morton order, so that each is counted once.
+uint64_t vdb_bytes(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
+                   uint64_t limit) {
+  uint64_t bytes = 0, bricks = 0;
+  CellCorner leaf{-1, 0, 0}, lower{-1, 0, 0}, upper{-1, 0, 0};
+  const auto count = [&](const CellCorner& corner, int shift, CellCorner& last, uint64_t cost) {
+    const CellCorner cube = {corner[0] >> shift, corner[1] >> shift, corner[2] >> shift};
+    if (cube == last) return;
+    last = cube;
+    bytes += cost;
+  };
+  for_each_selected_brick(job.dag, selection, [&](const CellCorner& corner, uint64_t) {
+    if (++bricks % 65536 == 0) job.cancel.check();
+    count(corner, 3, leaf, node.leaf);
+    count(corner, 7, lower, node.lower);
+    count(corner, 12, upper, node.upper);
+    return bytes <= limit;
+  });
+  return bytes;
+}
+
+MemoryCharge charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
+  const uint64_t limit = job.budget.available();
+  const uint64_t bytes = vdb_bytes(job, job.selection, node, limit);
+  if (bytes == 0) refuse_empty(job);
+  if (bytes > limit)
+    refuse_size(job,
+                "the grid would take over " + size_text(limit) + " of memory, which is --memory",
+                [&](uint32_t level) {
+                  return vdb_bytes(job, coarser(job.selection, level), node, limit) <= limit;
+                });
+  return MemoryCharge(job.budget, bytes, "the grid");
+}
+
+template <class GridType>
+typename GridType::Ptr make_vdb_grid(const ExportJob& job, uint64_t& voxels) {
+  auto grid = GridType::create();
+  grid->setName(kGridName);
+  // A voxel's index is where its center is.
+  auto transform = openvdb::math::Transform::createLinearTransform(job.cell_edge());
+  transform->postTranslate({job.world(0, 0.5), job.world(1, 0.5), job.world(2, 0.5)});
+  grid->setTransform(transform);
+  ExportStage stage(job, "build grid", 0, "voxels");
+  typename GridType::Accessor accessor = grid->getAccessor();
+  for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
+    const auto coordinate = [](int64_t cell) { return static_cast<openvdb::Int32>(cell); };
+    auto* const leaf = accessor.touchLeaf(
+        openvdb::Coord(coordinate(corner[0]), coordinate(corner[1]), coordinate(corner[2])));
+    for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+      leaf->setValueOn(
+          openvdb::Coord(coordinate(cell[0]), coordinate(cell[1]), coordinate(cell[2])), true);
+    });
+    const auto count = static_cast<uint64_t>(std::popcount(mask));
+    voxels += count;
+    stage.advance(count);
+    return true;
+  });
+  return grid;
+}
+
+template <class Write>
+ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, const Write& write) {
+  ExportReport report;
+  report.voxels = voxels;
+  ExportFile file(job.files, job.output);
+  FileBuffer buffer(file);
+  std::ostream stream(&buffer);
+  {
+    const ExportStage stage(job, "export", 0, "bytes");
+    write(stream);
+  }
+  buffer.check();
+  job.cancel.check();
+  ExportFile* const written[] = {&file};
+  report.bytes = ExportFile::publish(written);
+  return report;
+}
+
+}  // namespace
+
+ExportReport write_vdb(const ExportJob& job) {
+  const MemoryCharge charge = charge_vdb(job, kOpenVdbBytes);
+  return with_vdb_errors(job, [&] {
+    openvdb::initialize();
+    uint64_t voxels = 0;
+    const auto grid = make_vdb_grid<openvdb::BoolGrid>(job, voxels);
+    return write_grid_file(job, voxels, [&](std::ostream& stream) {
+      // Without a codec that some readers may lack: leaves are bits anyway.
+      openvdb::io::Stream out(stream);
+      out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
+      out.write(openvdb::GridPtrVec{grid});
+    });
+  });
+}
+
+ExportReport write_nvdb(const ExportJob& job) {
+  const VdbNodeBytes both = {kOpenVdbBytes.leaf + kNanoVdbBytes.leaf,
+                             kOpenVdbBytes.lower + kNanoVdbBytes.lower,
+                             kOpenVdbBytes.upper + kNanoVdbBytes.upper};
+  const MemoryCharge charge = charge_vdb(job, both);
+  return with_vdb_errors(job, [&] {
+    openvdb::initialize();
+    uint64_t voxels = 0;
+    auto grid = make_vdb_grid<openvdb::MaskGrid>(job, voxels);
+    const auto handle = nanovdb::openToNanoVDB<nanovdb::HostBuffer>(*grid);
+    grid.reset();
+    return write_grid_file(job, voxels, [&](std::ostream& stream) {
+      nanovdb::io::writeGrid(stream, handle, nanovdb::io::Codec::NONE);
+    });
+  });
+}
+
+}  // namespace voxdag::query
