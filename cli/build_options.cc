@@ -13,7 +13,8 @@ constexpr const char* kRunGroup = "Run (never changes the bytes of the result)";
 void BuildOptions::declare(Command& command) {
   GeometryOptions& g = spec_.geometry;
   RunOptions& r = spec_.run;
-  command.option("scene", g.scenes, "glTF files (.glb, .gltf), together one scene").required();
+  command.option("scene", g.scenes, "glTF and PLY files (.glb, .gltf, .ply), together one scene")
+      .required();
   command.option("-r,--resolution", g.resolution, "voxels per edge, a power of two, 4 to 1048576")
       .required();
   const char* geometry = "Geometry (decides the bytes of the result)";

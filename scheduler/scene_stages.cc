@@ -49,7 +49,8 @@ BuildSpec checked(const BuildSpec& spec) {
   const GeometryOptions& g = spec.geometry;
   const RunOptions& r = spec.run;
   levels_of_resolution(g.resolution);
-  if (g.scenes.empty()) refuse("no scene was given: expected at least one .glb or .gltf file");
+  if (g.scenes.empty())
+    refuse("no scene was given: expected at least one .glb, .gltf or .ply file");
   if (g.hash_bits < 4 || g.hash_bits > 64)
     refuse("hash bits " + std::to_string(g.hash_bits) + ": expected 4 to 64");
   if (g.bounds && g.voxel_size) refuse("bounds and a voxel size were both given: expected one");

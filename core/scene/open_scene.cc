@@ -1,4 +1,4 @@
-// Scenes that consist of the default scenes of glTF files, one after the other.
+// Scenes that consist of glTF files (the default scene of each) and PLY files, one after the other.
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -7,9 +7,12 @@
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
+#include "core/scene/chained_scene.h"
 #include "core/scene/gltf/document/check_document.h"
 #include "core/scene/gltf/document/read_document.h"
 #include "core/scene/gltf/triangle_reader.h"
+#include "core/scene/ply/header.h"
+#include "core/scene/ply/ply_scene.h"
 #include "core/scene/triangle_source.h"
 
 namespace voxdag {
@@ -182,10 +185,29 @@ WorldBounds TriangleCursor::read_bounds(uint64_t first, uint64_t count) {
   return bounds;
 }
 
+// Files of one format that follow each other are one part.
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
                                            const SceneOptions& options, MemoryBudget& budget,
                                            const CancelToken& cancel) {
-  return std::make_unique<GltfScene>(files, paths, options, budget, cancel);
+  std::vector<std::unique_ptr<TriangleSource>> parts;
+  std::vector<std::string> gltf_paths;
+  const auto add_gltf = [&] {
+    if (gltf_paths.empty()) return;
+    parts.push_back(std::make_unique<GltfScene>(files, gltf_paths, options, budget, cancel));
+    gltf_paths.clear();
+  };
+  for (const std::string& path : paths) {
+    cancel.check();
+    std::unique_ptr<ReadableFile> file = files.open_read(path);
+    if (!ply::is_ply(*file)) {
+      gltf_paths.push_back(path);
+      continue;
+    }
+    add_gltf();
+    parts.push_back(ply::open_ply(std::move(file), options, budget, cancel));
+  }
+  add_gltf();
+  return chain_scenes(std::move(parts));
 }
 
 }  // namespace voxdag

@@ -1,5 +1,5 @@
 // The interface of a scene: it streams its triangles in world space, always in the same order and
-// for any number of threads, without having all of them in memory. Scenes are glTF files
+// for any number of threads, without having all of them in memory. Scenes are glTF and PLY files
 // (open_scene) or made by tests.
 #pragma once
 
@@ -66,11 +66,11 @@ struct SceneOptions {
   bool skip_invalid = false;
 };
 
-// One scene made of the default scenes of several glTF 2.0 files (.glb, or .gltf with external or
-// data-URI buffers). Geometry is read by windows charged to `budget`; images are never read. The
-// structure is checked here, contents while streaming; `cancel` is checked between batches. Throws
-// Error{kInvalidInput}, {kNotFound}, {kLimit} or {kOutOfMemory} naming the file. The references
-// must outlive the scene.
+// One scene made of several files: the default scenes of glTF 2.0 files (.glb, or .gltf with
+// external or data-URI buffers), and PLY files. Geometry is read by windows charged to `budget`;
+// images are never read. The structure is checked here, contents while streaming; `cancel` is
+// checked between batches. Throws Error{kInvalidInput}, {kNotFound}, {kLimit} or {kOutOfMemory}
+// naming the file. The references must outlive the scene.
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
                                            const SceneOptions& options, MemoryBudget& budget,
                                            const CancelToken& cancel);

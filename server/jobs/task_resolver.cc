@@ -44,8 +44,7 @@ void TaskResolver::add_scene(const std::string& scene, Task& task) {
     const std::string path = resolved_path(scene);
     const auto root = std::find_if(roots_.begin(), roots_.end(),
                                    [&](const std::string& r) { return lies_in(path, r); });
-    if (root == roots_.end() || (!path.ends_with(".glb") && !path.ends_with(".gltf")))
-      throw missing;
+    if (root == roots_.end() || !has_scene_ending(path)) throw missing;
     task.readable.push_back(*root);
     return;
   }

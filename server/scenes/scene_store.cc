@@ -62,7 +62,11 @@ bool is_scene_name(std::string_view name) {
   if (name.empty() || name.size() > kMaxNameBytes || !is_alphanumeric(name[0])) return false;
   for (const char c : name)
     if (!is_alphanumeric(c) && c != '.' && c != '_' && c != '-') return false;
-  return name.ends_with(".glb") || name.ends_with(".gltf");
+  return has_scene_ending(name);
+}
+
+bool has_scene_ending(std::string_view name) {
+  return name.ends_with(".glb") || name.ends_with(".gltf") || name.ends_with(".ply");
 }
 
 std::string file_sha256(FileSystem& files, const std::string& path, uint64_t size,

@@ -25,8 +25,10 @@
 
 namespace voxdag::server {
 
-// 1 to 128 of A–Z a–z 0–9 . _ -, first a letter or digit, last ".glb" or ".gltf".
+// 1 to 128 of A–Z a–z 0–9 . _ -, first a letter or digit, with the ending of a scene.
 bool is_scene_name(std::string_view name);
+// Whether it ends with ".glb", ".gltf" or ".ply".
+bool has_scene_ending(std::string_view name);
 
 struct Scene {
   std::string name;

@@ -15,6 +15,7 @@
 #include "core/scene/gltf/mesh_data/instance_reader.h"
 #include "core/scene/gltf/mesh_data/node_walk.h"
 #include "core/scene/gltf/mesh_data/vertex_cache.h"
+#include "core/scene/gltf/mesh_data/vertex_source.h"
 
 namespace voxdag::gltf {
 

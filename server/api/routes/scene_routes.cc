@@ -30,7 +30,7 @@ std::string checked_name(const Call& call) {
   if (!is_scene_name(call.names[0]))
     throw bad_request(
         "scene name: expected 1 to 128 of A-Z a-z 0-9 . _ -, beginning with a letter or digit and "
-        "ending with .glb or .gltf");
+        "ending with .glb, .gltf or .ply");
   return call.names[0];
 }
 

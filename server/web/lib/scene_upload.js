@@ -6,7 +6,7 @@ import {authorization, Problem, request, sleep} from "./api.js";
 const kPart_bytes = 8 << 20;
 const kMaxFailures = 6;  // in a row, each after a longer pause
 
-export const kSceneName = /^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\.(glb|gltf)$/;
+export const kSceneName = /^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\.(glb|gltf|ply)$/;
 
 // "My scene (2).glb" -> "My-scene-2.glb"
 export function scene_name(file_name) {

@@ -53,7 +53,7 @@ export function actions(job, reload) {
 }
 
 function file_name(job) {
-  return `${title_text(job).replace(/\.(glb|gltf)$/, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
+  return `${title_text(job).replace(/\.(glb|gltf|ply)$/, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
 }
 
 // Without a token the browser downloads the link itself, which is resumable. A link cannot carry a

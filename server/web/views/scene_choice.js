@@ -16,11 +16,11 @@ export class SceneChoice {
     this.select = h("select", {on: {change: changed}}, h("option", {value: ""}, "Loading…"));
     this.path = h("input", {autocomplete: "off", spellcheck: "false", placeholder: "/srv/scenes/building.glb",
                             on: {change: changed}});
-    this.file = h("input", {type: "file", accept: ".glb,.gltf", id: "scene-file", class: "unseen",
+    this.file = h("input", {type: "file", accept: ".glb,.gltf,.ply", id: "scene-file", class: "unseen",
                             on: {change: () => this.start_upload(this.file.files[0])}});
     const drop = h("div", {class: "drop"}, this.file,
       h("label", {for: "scene-file", class: "button"}, "Upload a scene…"),
-      h("span", {class: "hint"}, "or drop a .glb file here"));
+      h("span", {class: "hint"}, "or drop a .glb or .ply file here"));
     this.drop_target(drop);
     this.upload_place = h("div", {});
     this.element = h("section", {class: "card stack", "aria-labelledby": "scene-title"},
@@ -82,7 +82,7 @@ export class SceneChoice {
     this.stop?.abort();
     const name = scene_name(file.name);
     if (!kSceneName.test(name)) {
-      clear(this.upload_place, problem_box({code: "invalid_input", detail: `${file.name}: expected a .glb or .gltf file.`}));
+      clear(this.upload_place, problem_box({code: "invalid_input", detail: `${file.name}: expected a .glb, .gltf or .ply file.`}));
       return;
     }
     const view = new UploadView(name, file.size, () => this.stop.abort(), () => run());

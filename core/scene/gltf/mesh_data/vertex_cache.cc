@@ -24,7 +24,7 @@ VertexCache::VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned cache
   slot_mask_ = static_cast<size_t>(slots - 1);
 }
 
-void VertexCache::bind(VertexSource& source) {
+void VertexCache::bind(PositionSource& source) {
   forget();
   const uint64_t blocks = (source.count() + kBlockVertices - 1) / kBlockVertices;
   slots_used_ = static_cast<size_t>(std::min<uint64_t>(blocks, block_in_slot_.size()));

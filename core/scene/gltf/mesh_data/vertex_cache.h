@@ -13,7 +13,8 @@
 
 #include "core/base/page_buffer.h"
 #include "core/geometry/grid.h"
-#include "core/scene/gltf/mesh_data/vertex_source.h"
+#include "core/scene/gltf/mesh_data/position_source.h"
+#include "core/scene/gltf/transform.h"
 
 namespace voxdag::gltf {
 
@@ -26,7 +27,7 @@ class VertexCache {
   VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches);
 
   // Forgets everything and serves `source` from now on, which must outlive its use. Needs place().
-  void bind(VertexSource& source);
+  void bind(PositionSource& source);
   // Serves the source's vertices after this transform, and snapped to the grid if there is one,
   // from now on. All coordinates of a vertex that is not finite after the transform become NaN.
   void place(const Transform& world, const Grid* grid);
@@ -60,7 +61,7 @@ class VertexCache {
   std::vector<uint64_t> block_in_slot_;
   size_t slot_mask_ = 0;
   size_t slots_used_ = 0;  // by the source, counted from the first
-  VertexSource* source_ = nullptr;
+  PositionSource* source_ = nullptr;
 };
 
 }  // namespace voxdag::gltf

@@ -11,6 +11,7 @@
 
 #include "core/base/page_buffer.h"
 #include "core/scene/gltf/mesh_data/accessor_reader.h"
+#include "core/scene/gltf/mesh_data/position_source.h"
 
 namespace voxdag::gltf {
 
@@ -20,7 +21,7 @@ namespace voxdag::gltf {
 // the skin for more joints than fit the budget of `buffers`.
 PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buffers, int skin);
 
-class VertexSource {
+class VertexSource : public PositionSource {
  public:
   // `weights` are the node's, else the mesh's; `joints` are empty for a node without a skin. All
   // arguments must outlive the source. Throws Error{kOutOfMemory} for more targets and joint sets
@@ -28,11 +29,11 @@ class VertexSource {
   VertexSource(const Document& document, BufferReader& buffers, const Primitive& primitive,
                std::span<const double> weights, std::span<const Transform> joints);
 
-  uint64_t count() const { return positions_.count(); }
+  uint64_t count() const override { return positions_.count(); }
 
   // Reads the positions of vertices [first, first + count), three doubles each. A vertex whose
   // joints do not exist becomes NaN, so that it is refused only if a triangle uses it.
-  void read(uint64_t first, size_t count, double* out);
+  void read(uint64_t first, size_t count, double* out) override;
 
  private:
   struct Target {

@@ -1,0 +1,14 @@
+// Several scenes as one: the triangles of the first, then those of the next.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/scene/triangle_source.h"
+
+namespace voxdag {
+
+// Throws Error{kLimit} for 2^63 triangles and more.
+std::unique_ptr<TriangleSource> chain_scenes(std::vector<std::unique_ptr<TriangleSource>> parts);
+
+}  // namespace voxdag

@@ -1,0 +1,17 @@
+// The vertex positions of a mesh as its file has them: what a VertexCache reads.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace voxdag::gltf {
+
+class PositionSource {
+ public:
+  virtual ~PositionSource() = default;
+  virtual uint64_t count() const = 0;
+  // Reads the positions of vertices [first, first + count), three doubles each.
+  virtual void read(uint64_t first, size_t count, double* out) = 0;
+};
+
+}  // namespace voxdag::gltf

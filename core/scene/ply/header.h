@@ -1,0 +1,49 @@
+// The header of a PLY file: which elements it declares, and how the properties of each are stored.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+
+namespace voxdag::ply {
+
+enum class Format { kAscii, kLittleEndian, kBigEndian };
+enum class Type : uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
+
+constexpr size_t bytes_of(Type type) {
+  constexpr size_t kBytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return kBytes[static_cast<size_t>(type)];
+}
+constexpr bool is_integer(Type type) { return type < Type::kFloat; }
+
+struct Property {
+  std::string name;
+  Type type = Type::kFloat;  // of a list: of its entries
+  bool is_list = false;
+  Type count_type = Type::kUint8;  // of a list, an integer
+};
+
+struct Element {
+  std::string name;
+  uint64_t count = 0;
+  std::vector<Property> properties;
+};
+
+struct Header {
+  Format format = Format::kAscii;
+  std::vector<Element> elements;
+  uint64_t data_begin = 0;  // offset of the first element
+};
+
+// Whether the bytes begin as those of a PLY file do.
+bool is_ply(const ReadableFile& file);
+
+// The header of an open file. Throws Error{kInvalidInput} naming the line for one that is broken,
+// Error{kLimit} for one of over 64 KiB.
+Header read_header(const ReadableFile& file, MemoryBudget& budget);
+
+}  // namespace voxdag::ply

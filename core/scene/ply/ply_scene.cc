@@ -1,0 +1,139 @@
+#include "core/scene/ply/ply_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/page_buffer.h"
+#include "core/scene/gltf/mesh_data/vertex_cache.h"
+#include "core/scene/gltf/messages.h"
+#include "core/scene/ply/face_reader.h"
+#include "core/scene/ply/mesh.h"
+#include "core/scene/ply/vertex_reader.h"
+
+namespace voxdag::ply {
+namespace {
+
+constexpr size_t kBatchTriangles = 1024;
+
+class PlyCursor : public TriangleCursor {
+ public:
+  PlyCursor(const Mesh& mesh, const SceneOptions& options, unsigned cursors, MemoryBudget& budget,
+            const CancelToken& cancel)
+      : mesh_(mesh),
+        skip_invalid_(options.skip_invalid),
+        cancel_(cancel),
+        faces_(mesh, budget),
+        vertices_(mesh, budget),
+        cache_(budget, vertices_.count(), cursors),
+        corners_(3 * kBatchTriangles),
+        batch_(budget, kBatchTriangles, "a batch of triangles") {
+    cache_.bind(vertices_);
+  }
+
+  void read(uint64_t first, uint64_t count, const Visitor& visit) override {
+    read_placed(first, count, nullptr, visit);
+  }
+  void read_snapped(uint64_t first, uint64_t count, const Grid& grid,
+                    const Visitor& visit) override {
+    read_placed(first, count, &grid, visit);
+  }
+
+ private:
+  void read_placed(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit) {
+    cache_.place(Transform{}, grid);
+    for (const uint64_t end = first + count; first < end;) {
+      cancel_.check();
+      const uint64_t n = std::min<uint64_t>(end - first, kBatchTriangles);
+      faces_.read(first, n, corners_.data());
+      size_t placed = 0;
+      for (uint64_t i = 0; i < n; ++i) {
+        const uint32_t* const corners = &corners_[3 * static_cast<size_t>(i)];
+        if (place(corners, batch_[placed]))
+          ++placed;
+        else if (!skip_invalid_)
+          report(first + i, corners);
+      }
+      if (placed > 0) visit({batch_.data(), placed});
+      first += n;
+    }
+  }
+
+  // False for a corner out of range or a vertex that is not finite.
+  bool place(const uint32_t* corners, RealTriangle& out) {
+    if (std::max({corners[0], corners[1], corners[2]}) >= vertices_.count()) return false;
+    for (int k = 0; k < 3; ++k) std::copy_n(cache_.at(corners[k]), 3, out.v[k]);
+    // All coordinates of a vertex that is not finite are NaN.
+    return cache_.all_finite() ||
+           !(std::isnan(out.v[0][0]) || std::isnan(out.v[1][0]) || std::isnan(out.v[2][0]));
+  }
+
+  [[noreturn]] void report(uint64_t triangle, const uint32_t* corners) {
+    const std::string where = "face " + std::to_string(faces_.face_of(triangle)) + ": ";
+    const std::string& path = mesh_.file().path();
+    for (int k = 0; k < 3; ++k)
+      if (corners[k] >= vertices_.count())
+        gltf::refuse(path, where +
+                               (corners[k] == UINT32_MAX ? "an index that is negative or too large"
+                                                         : "index " + std::to_string(corners[k])) +
+                               ", there are " + std::to_string(vertices_.count()) + " vertices");
+    for (int k = 0; k < 3; ++k)
+      if (std::isnan(cache_.at(corners[k])[0]))
+        gltf::refuse(path,
+                     where + "vertex " + std::to_string(corners[k]) + " is not a finite position");
+    gltf::refuse(path, where + "is invalid");
+  }
+
+  using Transform = gltf::Transform;
+
+  const Mesh& mesh_;
+  const bool skip_invalid_;
+  const CancelToken& cancel_;
+  FaceReader faces_;
+  VertexReader vertices_;
+  gltf::VertexCache cache_;
+  std::vector<uint32_t> corners_;
+  PageBuffer<RealTriangle> batch_;
+};
+
+// A file without faces.
+class NoTriangles : public TriangleCursor {
+ public:
+  void read(uint64_t, uint64_t, const Visitor&) override {}
+};
+
+class PlyScene : public TriangleSource {
+ public:
+  PlyScene(std::unique_ptr<ReadableFile> file, const SceneOptions& options, MemoryBudget& budget,
+           const CancelToken& cancel)
+      : mesh_(std::move(file), budget, cancel),
+        options_(options),
+        budget_(budget),
+        cancel_(cancel) {}
+
+  std::unique_ptr<TriangleCursor> open(unsigned cursors) override {
+    if (mesh_.triangles() == 0) return std::make_unique<NoTriangles>();
+    return std::make_unique<PlyCursor>(mesh_, options_, cursors, budget_, cancel_);
+  }
+  uint64_t declared_triangles() const override { return mesh_.triangles(); }
+  std::vector<SourceFile> files() const override {
+    return {{mesh_.file().path(), mesh_.file().identity()}};
+  }
+  std::vector<std::string> warnings() const override { return mesh_.warnings(); }
+
+ private:
+  const Mesh mesh_;
+  const SceneOptions options_;
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+};
+
+}  // namespace
+
+std::unique_ptr<TriangleSource> open_ply(std::unique_ptr<ReadableFile> file,
+                                         const SceneOptions& options, MemoryBudget& budget,
+                                         const CancelToken& cancel) {
+  return std::make_unique<PlyScene>(std::move(file), options, budget, cancel);
+}
+
+}  // namespace voxdag::ply

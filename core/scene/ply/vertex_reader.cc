@@ -1,0 +1,88 @@
+#include "core/scene/ply/vertex_reader.h"
+
+#include <algorithm>
+
+#include "core/scene/gltf/messages.h"
+#include "core/scene/ply/numbers.h"
+
+namespace voxdag::ply {
+namespace {
+
+// Every third number of `out` from the rows of `row_bytes`.
+template <class T, bool kBigEndian>
+void decode_axis(const std::byte* bytes, size_t row_bytes, size_t count, double* out) {
+  for (size_t i = 0; i < count; ++i)
+    out[3 * i] = static_cast<double>(load<T>(bytes + i * row_bytes, kBigEndian));
+}
+
+}  // namespace
+
+VertexReader::VertexReader(const Mesh& mesh, MemoryBudget& budget) : mesh_(mesh) {
+  const auto& properties = mesh.vertex_element().properties;
+  for (size_t i = 0; i < properties.size(); ++i) {
+    for (size_t a = 0; a < 3; ++a)
+      if (mesh.axes()[a] == i) offsets_[a] = row_bytes_;
+    row_bytes_ += bytes_of(properties[i].type);
+  }
+  if (mesh.format() == Format::kAscii)
+    text_.emplace(mesh.file(), budget);
+  else
+    window_.emplace(mesh.file(), budget);
+}
+
+void VertexReader::read(uint64_t first, size_t count, double* out) {
+  if (text_)
+    read_text(first, count, out);
+  else
+    read_binary(first, count, out);
+}
+
+void VertexReader::read_binary(uint64_t first, size_t count, double* out) {
+  const size_t at_once = FileWindow::kBytes / row_bytes_;
+  const bool is_big_endian = mesh_.format() == Format::kBigEndian;
+  while (count > 0) {
+    const size_t n = std::min(count, at_once);
+    const auto bytes = window_->at(mesh_.vertices_begin() + first * row_bytes_, n * row_bytes_);
+    for (size_t a = 0; a < 3; ++a) {
+      const std::byte* const begin = bytes.data() + offsets_[a];
+      with_type(mesh_.vertex_element().properties[mesh_.axes()[a]].type, [&]<class T>(T) {
+        if (is_big_endian)
+          decode_axis<T, true>(begin, row_bytes_, n, out + a);
+        else
+          decode_axis<T, false>(begin, row_bytes_, n, out + a);
+      });
+    }
+    first += n;
+    count -= n;
+    out += 3 * n;
+  }
+}
+
+void VertexReader::read_text(uint64_t first, size_t count, double* out) {
+  uint64_t vertex = first / Mesh::kBlockRows * Mesh::kBlockRows;
+  text_->begin_row(mesh_.vertex_blocks()[static_cast<size_t>(vertex / Mesh::kBlockRows)]);
+  double skipped[3];
+  for (; vertex < first + count; ++vertex) {
+    read_line(vertex, vertex < first ? skipped : out);
+    if (vertex >= first) out += 3;
+  }
+}
+
+void VertexReader::read_line(uint64_t vertex, double* out) {
+  text_->begin_row(text_->offset());
+  const auto& properties = mesh_.vertex_element().properties;
+  for (size_t i = 0; i < properties.size(); ++i) {
+    const std::string_view word = text_->word();
+    for (size_t a = 0; a < 3; ++a) {
+      if (mesh_.axes()[a] != i) continue;
+      const auto value = parse_real(word, properties[i].type);
+      if (!value)
+        gltf::refuse(mesh_.file().path(), "vertex " + std::to_string(vertex) + " has " +
+                                              gltf::printable(word) + ", expected a number");
+      out[a] = *value;
+    }
+  }
+  text_->end_row();
+}
+
+}  // namespace voxdag::ply

@@ -1,0 +1,8 @@
+// PLY files: the header, the rows, and the triangles. The first bytes of every input are those of a
+// PLY file.
+#include "tests/fuzz/targets/scene_triangles.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  voxdag::fuzz::check_scene("ply\n" + std::string(reinterpret_cast<const char*>(data), size));
+  return 0;
+}

@@ -1,0 +1,38 @@
+// What the targets of scene formats check of a file.
+#pragma once
+
+#include <string>
+
+#include "core/scene/triangle_source.h"
+#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/unit/io/memory_files.h"
+
+namespace voxdag::fuzz {
+
+// A few bytes can declare any number of instances; drawing them tests nothing more.
+constexpr uint64_t kMaxTriangles = 2000;
+constexpr uint64_t kSceneBudgetBytes = uint64_t{16} << 20;
+
+// Reads all triangles of the file at once, and one by one, if it is a scene.
+inline void check_scene(std::string file) {
+  test::MemoryFiles files;
+  files.contents["scene"] = std::move(file);
+  MemoryBudget budget(kSceneBudgetBytes);
+  CancelToken cancel;
+  try {
+    const auto scene = open_scene(files, {"scene"}, {.skip_invalid = true}, budget, cancel);
+    if (scene->declared_triangles() > kMaxTriangles) return;
+    uint64_t visited = 0;
+    scene->for_each_batch([&](auto batch) { visited += batch.size(); });
+    require(visited <= scene->declared_triangles(), "no triangle is visited twice");
+    uint64_t again = 0;
+    const auto cursor = scene->open(2);
+    for (uint64_t i = 0; i < scene->declared_triangles(); ++i)
+      cursor->read(i, 1, [&](auto batch) { again += batch.size(); });
+    require(again == visited, "each triangle can be read alone");
+  } catch (const Error& error) {
+    require(!error.message().empty(), "an error has a message");
+  }
+}
+
+}  // namespace voxdag::fuzz

@@ -1,0 +1,343 @@
+// PLY files made here: every format and layout gives the triangles of the same mesh, and what is
+// broken is refused by name.
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstring>
+
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+enum class PlyFormat { kAscii, kLittle, kBig };
+
+// A file in the making: numbers appended by the type that a header line names.
+class PlyWriter {
+ public:
+  explicit PlyWriter(PlyFormat format, std::string line_end = "\n")
+      : format_(format), line_end_(std::move(line_end)) {
+    static const char* kNames[] = {"ascii", "binary_little_endian", "binary_big_endian"};
+    header("ply");
+    header(std::string("format ") + kNames[static_cast<int>(format)] + " 1.0");
+  }
+
+  PlyWriter& header(const std::string& line) {
+    text_ += line + line_end_;
+    return *this;
+  }
+  template <class T>
+  PlyWriter& put(T value) {
+    if (format_ == PlyFormat::kAscii) {
+      std::ostringstream number;
+      number.precision(17);
+      number << +value;
+      text_ += (at_line_begin_ ? "" : " ") + number.str();
+      at_line_begin_ = false;
+      return *this;
+    }
+    std::string bytes(sizeof(T), '\0');
+    std::memcpy(bytes.data(), &value, sizeof(T));
+    if (format_ == PlyFormat::kBig) std::reverse(bytes.begin(), bytes.end());
+    text_ += bytes;
+    return *this;
+  }
+  template <class T>
+  PlyWriter& put_all(std::initializer_list<T> values) {
+    for (T value : values) put(value);
+    return *this;
+  }
+  PlyWriter& end_row() {
+    if (format_ == PlyFormat::kAscii) text_ += line_end_;
+    at_line_begin_ = true;
+    return *this;
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  const PlyFormat format_;
+  const std::string line_end_;
+  std::string text_;
+  bool at_line_begin_ = true;
+};
+
+constexpr PlyFormat kFormats[] = {PlyFormat::kAscii, PlyFormat::kLittle, PlyFormat::kBig};
+const Corners kLower = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
+
+// The triangle (0 0 0) (1 0 0) (0 1 0), as most programs write it.
+std::string plain_triangle(PlyFormat format, const std::string& line_end = "\n") {
+  PlyWriter ply(format, line_end);
+  ply.header("comment made here").header("element vertex 3");
+  for (const char* axis : {"x", "y", "z"}) ply.header(std::string("property float ") + axis);
+  ply.header("element face 1").header("property list uchar int vertex_indices");
+  ply.header("end_header");
+  ply.put_all<float>({0, 0, 0}).end_row().put_all<float>({1, 0, 0}).end_row();
+  ply.put_all<float>({0, 1, 0}).end_row();
+  return ply.put<uint8_t>(3).put_all<int32_t>({0, 1, 2}).end_row().text();
+}
+
+TEST(Ply, TriangleInEveryFormatAndLineEnding) {
+  for (const PlyFormat format : kFormats)
+    for (const char* line_end : {"\n", "\r\n", "\r"})
+      EXPECT_EQ(triangles_of_file(plain_triangle(format, line_end)), std::vector<Corners>{kLower});
+}
+
+// Properties in another order and of other types, elements before and between, lists of any width
+// before and behind the indices; doubles keep their digits.
+TEST(Ply, OtherElementsAndPropertiesAreSkipped) {
+  for (const PlyFormat format : kFormats) {
+    PlyWriter ply(format);
+    ply.header("element camera 2").header("property double view").header("property uchar kind");
+    ply.header("element path 2").header("property list ushort double at");
+    ply.header("element vertex 4").header("property uchar red").header("property double z");
+    ply.header("property short label").header("property float x").header("property double y");
+    ply.header("element edge 1").header("property int32 vertex1");
+    ply.header("element face 1").header("property list int8 float texcoord");
+    ply.header("property uint8 flags").header("property list uint32 uint16 vertex_index");
+    ply.header("property list uint8 uint8 groups").header("property float area");
+    ply.header("element behind 1").header("property list int int more").header("end_header");
+    for (int i = 0; i < 2; ++i) ply.put(0.5).put<uint8_t>(1).end_row();
+    ply.put<uint16_t>(0).end_row().put<uint16_t>(2).put(1.0).put(2.0).end_row();
+    const double y[] = {0.1, 0.2, 0.30000000000000004, 9};
+    for (int i = 0; i < 4; ++i)
+      ply.put<uint8_t>(7).put(i + 1e-9).put<int16_t>(-3).put(0.1f).put(y[i]).end_row();
+    ply.put<int32_t>(1).end_row();
+    ply.put<int8_t>(2).put(1.5f).put(2.5f).put<uint8_t>(1);
+    ply.put<uint32_t>(3).put_all<uint16_t>({2, 0, 1});
+    ply.put<uint8_t>(1).put<uint8_t>(5).put(4.0f).end_row();
+    const double x = static_cast<double>(0.1f);
+    EXPECT_EQ(
+        triangles_of_file(ply.text()),
+        (std::vector<Corners>{{{{x, y[2], 2 + 1e-9}, {x, y[0], 1e-9}, {x, y[1], 1 + 1e-9}}}}));
+  }
+}
+
+// A header with vertices of floats and faces of a list of these types.
+PlyWriter mesh_header(PlyFormat format, size_t vertices, size_t faces, const char* list_types) {
+  PlyWriter ply(format);
+  ply.header("element vertex " + std::to_string(vertices));
+  for (const char* axis : {"x", "y", "z"}) ply.header(std::string("property float ") + axis);
+  ply.header("element face " + std::to_string(faces));
+  ply.header(std::string("property list ") + list_types + " vertex_indices").header("end_header");
+  return ply;
+}
+
+// Thousands of faces of 0 to 9 corners: the fan of each, in order, from whatever triangle on.
+TEST(Ply, PolygonsAreFansFromAnyTriangleOn) {
+  constexpr uint32_t kVertices = 5000, kFaces = 5000;
+  for (const PlyFormat format : kFormats) {
+    PlyWriter ply = mesh_header(format, kVertices, kFaces, "ushort uint");
+    for (uint32_t i = 0; i < kVertices; ++i)
+      ply.put(static_cast<float>(i)).put(static_cast<float>(i * i % 97)).put(1.0f).end_row();
+    std::vector<Corners> expected;
+    const auto corner = [](uint32_t v) {
+      return std::array<double, 3>{double(v), double(v * v % 97), 1};
+    };
+    for (uint32_t f = 0; f < kFaces; ++f) {
+      const uint32_t n = f * 7 % 10;
+      const auto index = [&](uint32_t k) { return (f * 31 + k * k) % kVertices; };
+      ply.put(static_cast<uint16_t>(n));
+      for (uint32_t k = 0; k < n; ++k) ply.put(index(k));
+      ply.end_row();
+      for (uint32_t k = 2; k < n; ++k)
+        expected.push_back({corner(index(0)), corner(index(k - 1)), corner(index(k))});
+    }
+    OpenScene open(ply.text());
+    EXPECT_EQ(open.source->declared_triangles(), expected.size());
+    EXPECT_EQ(open.triangles(), expected);
+    ASSERT_EQ(open.source->warnings().size(), 1u);
+    EXPECT_NE(open.source->warnings()[0].find("1500 faces of fewer than three corners"),
+              std::string::npos);
+    const auto cursor = open.source->open(3);
+    for (uint64_t first :
+         {uint64_t{9000}, uint64_t{1}, uint64_t{1022}, uint64_t{9001}, uint64_t{5}})
+      cursor->read(first, 3, [&](std::span<const WorldTriangle> batch) {
+        ASSERT_EQ(batch.size(), 3u);
+        for (size_t i = 0; i < 3; ++i)
+          for (size_t k = 0; k < 3; ++k)
+            EXPECT_EQ(batch[i].v[k][0], expected[first + i][k][0]) << first;
+      });
+  }
+}
+
+// The same mesh as glTF gives the same snapped triangles.
+TEST(Ply, SnapsAsTheSameMeshInGltf) {
+  std::vector<float> xyz;
+  for (uint32_t i = 0; i < 3000; ++i)
+    xyz.insert(xyz.end(), {static_cast<float>(i % 61) * 0.3f, static_cast<float>(i / 61) / 7,
+                           static_cast<float>(i * 13 % 101) - 0.1f});
+  std::vector<uint32_t> indices;
+  for (uint32_t i = 0; i < 12000; ++i) indices.push_back(i * 17 % 3000);
+  SceneBuilder gltf;
+  const int positions = gltf.add_positions(xyz);
+  const int list = gltf.add_accessor("SCALAR", kU32, indices);
+  gltf.add_root(
+      {{"mesh", gltf.add_mesh({{"attributes", {{"POSITION", positions}}}, {"indices", list}})}});
+  PlyWriter ply = mesh_header(PlyFormat::kBig, 3000, 4000, "uchar uint");
+  for (const float c : xyz) ply.put(c);
+  for (size_t i = 0; i < indices.size(); i += 3)
+    ply.put<uint8_t>(3).put_all<uint32_t>({indices[i], indices[i + 1], indices[i + 2]});
+
+  const auto snapped = [](std::string file) {
+    OpenScene open(std::move(file));
+    const auto cursor = open.source->open(1);
+    const uint64_t n = open.source->declared_triangles();
+    std::vector<double> all;
+    const Grid grid = Grid::around(cursor->read_bounds(0, n), 12);
+    cursor->read_snapped(0, n, grid, [&](std::span<const RealTriangle> batch) {
+      for (const RealTriangle& t : batch) all.insert(all.end(), &t.v[0][0], &t.v[0][0] + 9);
+    });
+    return all;
+  };
+  const auto expected = snapped(gltf.glb());
+  EXPECT_EQ(expected.size(), 4000u * 9);
+  EXPECT_EQ(snapped(ply.text()), expected);
+}
+
+// glTF and PLY files of one scene follow each other in the given order.
+TEST(Ply, FilesOfBothFormatsAreOneScene) {
+  MemoryFiles files;
+  files.contents["a"] = plain_triangle(PlyFormat::kLittle);
+  files.contents["b"] = one_triangle().glb();
+  files.contents["c"] = plain_triangle(PlyFormat::kAscii);
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelToken cancel;
+  const auto scene = open_scene(files, {"a", "b", "b", "c"}, {}, budget, cancel);
+  EXPECT_EQ(triangles_of(*scene), (std::vector<Corners>{kLower, kLower, kLower, kLower}));
+  ASSERT_EQ(scene->files().size(), 4u);
+  EXPECT_EQ(scene->files()[3].path, "c");
+}
+
+// A file that is cut anywhere is refused, whole words of its last line aside.
+TEST(Ply, TruncatedFilesAreRefused) {
+  for (const PlyFormat format : kFormats) {
+    const std::string whole = plain_triangle(format);
+    const size_t least = whole.size() - (format == PlyFormat::kAscii ? 1 : 0);
+    for (size_t size = 0; size < least; ++size) {
+      const Error error = error_of_file(whole.substr(0, size));
+      EXPECT_EQ(error.code(), ErrorCode::kInvalidInput) << size;
+      EXPECT_NE(error.message(), "") << size;
+    }
+  }
+}
+
+TEST(Ply, InvalidTrianglesAreNamedOrSkipped) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const PlyFormat format : kFormats) {
+    PlyWriter ply = mesh_header(format, 4, 4, "uchar int");
+    for (const float x : {0.0f, 1.0f, 0.0f, nan})
+      ply.put(x).put(ply.text().size() % 2 ? 1.0f : 0.0f).put(0.0f).end_row();
+    ply.put<uint8_t>(3).put_all<int32_t>({0, 1, 2}).end_row();
+    ply.put<uint8_t>(4).put_all<int32_t>({0, 1, 2, 3}).end_row();
+    ply.put<uint8_t>(3).put_all<int32_t>({0, 1, 4}).end_row();
+    ply.put<uint8_t>(3).put_all<int32_t>({0, -1, 1}).end_row();
+    const std::string message = error_of_file(ply.text()).message();
+    EXPECT_NE(message.find("folder/scene: face 1: vertex 3 is not a finite position"),
+              std::string::npos)
+        << message;
+    OpenScene skipping(ply.text(), {.skip_invalid = true});
+    EXPECT_EQ(skipping.source->declared_triangles(), 5u);
+    EXPECT_EQ(skipping.triangles().size(), 2u);
+  }
+  for (const auto& [index, text] : {std::pair{7, "face 0: index 7, there are 3 vertices"},
+                                    std::pair{-2, "face 0: an index that is negative"}}) {
+    PlyWriter ply = mesh_header(PlyFormat::kLittle, 3, 1, "uchar int");
+    for (int i = 0; i < 9; ++i) ply.put(0.0f);
+    ply.put<uint8_t>(3).put_all<int32_t>({0, 1, index});
+    EXPECT_NE(error_of_file(ply.text()).message().find(text), std::string::npos);
+  }
+}
+
+// Counts beyond what the file holds, and headers that are none.
+TEST(Ply, HostileHeadersAreRefused) {
+  const std::string begin = "ply\nformat binary_little_endian 1.0\n";
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
+  const std::string list = "property list uchar int vertex_indices\n";
+  const std::pair<std::string, const char*> cases[] = {
+      {begin + "element vertex 2147483648\n" + xyz + "end_header\n", "end past the"},
+      {begin + "element vertex 18446744073709551615\n" + xyz + "end_header\n", "limit is 2^32"},
+      {begin + "element vertex 18446744073709551616\n" + xyz + "end_header\n", "below 2^64"},
+      {begin + "element vertex -1\n" + xyz + "end_header\n", "below 2^64"},
+      {begin + "element vertex 0\n" + xyz + "element face 18446744073709551615\n" + list +
+           "end_header\n",
+       "face 0 ends past"},
+      {begin + "element a 18446744073709551615\nelement b 3\nproperty int c\nelement vertex 0\n" +
+           xyz + "end_header\n",
+       "element b"},
+      {begin + "element vertex 0\nproperty float x\nend_header\n", "without a property y"},
+      {begin + "element vertex 0\n" + xyz + "element face 0\nproperty int k\nend_header\n",
+       "vertex_indices"},
+      {begin + "element vertex 0\n" + xyz +
+           "element face 0\nproperty list uchar float vertex_indices\nend_header\n",
+       "no list of integers"},
+      {begin + "element vertex 0\nproperty list float int x\nend_header\n", "by a float"},
+      {begin + "element vertex 0\nproperty list uchar int x\nend_header\n", "as a property"},
+      {begin + "element tristrips 1\n" + list + "end_header\n", "tristrips"},
+      {begin + "element vertex 0\n" + xyz + "element vertex 0\nend_header\n", "there before"},
+      {begin + "property float x\nend_header\n", "line 3 of the header is a property without"},
+      {begin + "element vertex 0\nproperty int24 x\nend_header\n", "int24"},
+      {begin + "elements 0\nend_header\n", "begins with elements"},
+      {begin + "end_header\n", "no element vertex"},
+      {"ply\nformat binary 1.0\nend_header\n", "the format binary"},
+      {"ply\nformat ascii 2.0\nend_header\n", "expected 1.0"},
+      {"ply\ncomment\nend_header\n", "format NAME"},
+      {begin + std::string(70000, '\n'), "over 65536 bytes"},
+      {begin + "element vertex 0\n" + xyz +
+           "element face 1\nproperty list int int vertex_indices\nend_header\n" +
+           std::string("\xff\xff\xff\xff", 4),
+       "face 0 has a list of -1 entries"},
+      {begin + "element vertex 0\n" + xyz +
+           "element face 1\nproperty list uint int vertex_indices\nend_header\n" +
+           std::string("\xff\xff\xff\x7f", 4),
+       "the limit is 32768"},
+  };
+  for (const auto& [file, message] : cases) {
+    const Error error = error_of_file(file);
+    EXPECT_NE(error.message().find(message), std::string::npos) << file << "\n" << error.message();
+  }
+}
+
+TEST(Ply, HostileTextIsRefused) {
+  const std::string begin =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::pair<std::string, const char*> cases[] = {
+      {"0 0 0\n1 0 zero\n0 1 0\n3 0 1 2\n", "vertex 1 has zero, expected a number"},
+      {"0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "vertex 1 ends before its properties do"},
+      {"0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n", "vertex 1 has more on its line"},
+      {"0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "face 0 ends before"},
+      {"0 0 0\n1 0 0\n0 1 0\n3 0 1 2.5\n", "face 0 has 2.5, expected an integer"},
+      {"0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n", "a list of -3 entries"},
+      {"0 0 0\n1 0 0\n0 1 0\n99999999999999999999 0 1 2\n", "expected an integer"},
+      {"0 0 0\n1 0 0\n0 1 1" + std::string(100, '0') + "\n3 0 1 2\n", "vertex 2 ha"},
+      {"0 0 0\n1 0 0\n0 1 inf\n3 0 1 2\n", "vertex 2 is not a finite position"},
+      {"0 0 0\n1 0 0\n0 1 1e99\n3 0 1 2\n", "vertex 2 is not a finite position"},
+  };
+  for (const auto& [rows, message] : cases) {
+    const Error error = error_of_file(begin + rows);
+    EXPECT_NE(error.message().find(message), std::string::npos) << rows << "\n" << error.message();
+  }
+  EXPECT_EQ(triangles_of_file(begin + "\n 0\t0 -0 \n\n+1 0 1e-60\r\n0 1e0 0\n\n3 0 1 2"),
+            (std::vector<Corners>{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}));
+}
+
+// A cloud of points makes no voxels, which a warning says.
+TEST(Ply, PointsMakeNoTriangles) {
+  OpenScene open(
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\nend_header\n1 2 3\n");
+  EXPECT_EQ(open.triangles().size(), 0u);
+  ASSERT_EQ(open.source->warnings().size(), 1u);
+  EXPECT_NE(open.source->warnings()[0].find("no element face"), std::string::npos);
+}
+
+// What does not fit the budget is refused, not read.
+TEST(Ply, WindowsAreChargedToTheBudget) {
+  const std::string file = plain_triangle(PlyFormat::kLittle);
+  EXPECT_THROW(OpenScene(file, {}, 64 << 10), Error);
+  OpenScene open(file, {}, 2 << 20);
+  EXPECT_EQ(open.triangles(), std::vector<Corners>{kLower});
+}
+
+}  // namespace
+}  // namespace voxdag::test
