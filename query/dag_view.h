@@ -18,6 +18,14 @@
 
 namespace voxdag::query {
 
+// Which of the eight octants of a brick have voxels: bit i for byte i of its mask.
+inline uint32_t octants(uint64_t mask) {
+  constexpr uint64_t kLowBits = 0x7f7f7f7f7f7f7f7full;
+  // The top bit of each byte that is not 0; the product brings the eight of them together.
+  const uint64_t tops = (((mask & kLowBits) + kLowBits) | mask) & ~kLowBits;
+  return static_cast<uint32_t>((tops >> 7) * 0x0102040810204080ull >> 56);
+}
+
 class DagView {
  public:
   // The words of a level, and whether pointers into it take two words, low half first.
@@ -32,6 +40,14 @@ class DagView {
 
   bool empty() const { return levels_.empty(); }
   uint32_t grid_levels() const { return grid_levels_; }
+  // The level at `depth`, 0 to L - 2, as it lies in memory; the DAG must not be empty.
+  const Level& level(uint32_t depth) const { return levels_[depth]; }
+  // Begins to load the node or brick at this word offset, if there is such a word.
+  void prefetch(uint32_t depth, uint64_t offset) const {
+    const std::span<const uint32_t> words = levels_[depth].words;
+    if (offset < words.size()) __builtin_prefetch(words.data() + offset);
+  }
+  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
 
   // The occupied children of a cell larger than a voxel, at `depth` below the root (0 to L - 1).
@@ -45,13 +61,20 @@ class DagView {
     voxdag_reader::Node node_;
     uint64_t bits_ = 0;
   };
+  // The mask of the brick at this word offset.
+  uint64_t brick(uint64_t offset) const;
   uint64_t root() const { return grid_levels_ == kBrickLevels ? brick(0) : 0; }
   Children children(uint32_t depth, uint64_t content) const;
+  // Those of a node at a depth above the bricks.
+  Children children_of_node(uint32_t depth, uint64_t offset) const;
+  // The word offset of child `index`, which must be occupied, of a node.
+  uint64_t offset(const Children& children, int index) const {
+    return children.node_.child(kPopcount8[children.mask & ((1u << index) - 1)]);
+  }
   // The content of child `index`, which must be occupied, of a parent at `depth`.
   uint64_t content(uint32_t depth, const Children& children, int index) const {
     if (depth + kBrickLevels < grid_levels_) {
-      const uint32_t before = children.mask & ((1u << index) - 1);
-      const uint64_t offset = children.node_.child(kPopcount8[before]);
+      const uint64_t offset = this->offset(children, index);
       return depth + kBrickLevels + 1 == grid_levels_ ? brick(offset) : offset;
     }
     return depth + kBrickLevels == grid_levels_ ? children.bits_ >> (8 * index) & 255 : 1;
@@ -76,32 +99,32 @@ class DagView {
   template <class Select, class Visit>
   void visit_below(const Cell& cell, uint64_t content, uint32_t depth, const Select& select,
                    const Visit& visit) const;
-  uint64_t brick(uint64_t offset) const;
-  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
 
   uint32_t grid_levels_;
   std::vector<Level> levels_;
 };
 
-inline DagView::Children DagView::children(uint32_t depth, uint64_t content) const {
+inline DagView::Children DagView::children_of_node(uint32_t depth, uint64_t offset) const {
   Children c;
-  if (depth + kBrickLevels < grid_levels_) {
-    const std::span<const uint32_t> words = levels_[depth].words;
-    const bool wide = levels_[depth + 1].wide;
-    if (content >= words.size()) corrupt(depth, content);
-    c.mask = words[content];
-    c.node_ = {c.mask, words.data() + content + 1, wide};
-    if (c.mask == 0 || c.mask > 255 ||
-        uint64_t{kPopcount8[c.mask]} << wide >= words.size() - content)
-      corrupt(depth, content);
-    return c;
-  }
+  const std::span<const uint32_t> words = levels_[depth].words;
+  const bool wide = levels_[depth + 1].wide;
+  if (offset >= words.size()) corrupt(depth, offset);
+  c.mask = words[offset];
+  c.node_ = {c.mask, words.data() + offset + 1, wide};
+  if (c.mask == 0 || c.mask > 255 || uint64_t{kPopcount8[c.mask]} << wide >= words.size() - offset)
+    corrupt(depth, offset);
+  return c;
+}
+
+inline DagView::Children DagView::children(uint32_t depth, uint64_t content) const {
+  if (depth + kBrickLevels < grid_levels_) return children_of_node(depth, content);
+  Children c;
   if (depth + kBrickLevels > grid_levels_) {
     c.mask = static_cast<uint32_t>(content);
     return c;
   }
   c.bits_ = content;
-  for (int i = 0; i < 8; ++i) c.mask |= (content >> (8 * i) & 255 ? 1u : 0u) << i;
+  c.mask = octants(content);
   return c;
 }
 

@@ -1,0 +1,180 @@
+// Speed of queries on one core, warm: this library's, a plain loop over the reader, and OpenVDB and
+// OctoMap on the same cells where they are installed.
+//
+//     bench_query [--levels N] [--picture EDGE] [--no-others] FILE.vdag...
+//
+// --levels: the libraries are compared on the grid of 2^N per edge, which has to fit in their
+// memory (default: 11). For that grid this library is given a file of the grid's resolution only if
+// FILE is one; otherwise its rays stop at cells of that size.
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <limits>
+#include <string>
+
+#include "bench/query/others.h"
+#include "bench/query/query_set.h"
+#include "query/ray_caster.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr size_t kPoints = 4'000'000;
+constexpr size_t kNearestPoints = 200'000;
+constexpr int64_t kBoxEdge = 64;
+
+void print(const char* who, const char* what, const Timing& timing) {
+  if (timing.per_second == 0) return;
+  std::printf("  %-22s %-22s %10.3f M/s   found %llu\n", who, what, timing.per_second / 1e6,
+              static_cast<unsigned long long>(timing.found));
+  std::fflush(stdout);
+}
+
+uint64_t sum(const std::vector<uint8_t>& set) {
+  uint64_t found = 0;
+  for (const uint8_t s : set) found += s;
+  return found;
+}
+
+// A cell of a coarser grid is set where the reader has a node, or a voxel.
+bool reader_has(const voxdag_reader::File& file, uint32_t grid_levels, const Position& p) {
+  if (grid_levels == file.grid_levels()) return file.voxel(p[0], p[1], p[2]);
+  uint64_t offset = 0;
+  for (uint32_t l = 0; l < grid_levels; ++l) {
+    const uint32_t shift = grid_levels - 1 - l;
+    const int index =
+        static_cast<int>((p[0] >> shift & 1) << 2 | (p[1] >> shift & 1) << 1 | (p[2] >> shift & 1));
+    const voxdag_reader::Node node = file.node(l, offset);
+    if (!(node.child_mask >> index & 1)) return false;
+    offset = voxdag_reader::File::child(node, index);
+  }
+  return true;
+}
+
+void lookups(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+  std::vector<uint8_t> set(kPoints);
+  for (const auto& [what, points] : {std::pair("uniform points", &queries.uniform),
+                                     std::pair("set cells", &queries.set_cells)}) {
+    print("voxdag", what, best_of_three(kPoints, [&, p = points] {
+            dag.lookup(*p, grid_levels, set);
+            return sum(set);
+          }));
+    if (grid_levels + 2 <= dag.grid_levels() || grid_levels == dag.grid_levels())
+      print("loop over the reader", what, best_of_three(kPoints, [&, p = points] {
+              uint64_t found = 0;
+              for (const Position& point : *p) found += reader_has(dag.file(), grid_levels, point);
+              return found;
+            }));
+  }
+}
+
+void rays(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+  const double cell = static_cast<double>(int64_t{1} << (dag.grid_levels() - grid_levels));
+  std::vector<Coordinates> origins = queries.origins;
+  for (Coordinates& origin : origins)
+    for (double& c : origin) c *= cell;
+  const size_t count = origins.size();
+  std::vector<RayHit> hits(count);
+  print("voxdag", "primary rays", best_of_three(count, [&] {
+          dag.rays(origins, queries.directions, {std::numeric_limits<double>::infinity(), cell},
+                   hits);
+          uint64_t found = 0;
+          for (const RayHit& hit : hits) found += hit.hit;
+          return found;
+        }));
+  print("one ray per call", "primary rays", best_of_three(count, [&] {
+          const RayCaster caster(dag.view());
+          uint64_t found = 0;
+          for (size_t i = 0; i < count; ++i) {
+            const auto& [o, d] = std::pair(origins[i], queries.directions[i]);
+            Hit hit;
+            found +=
+                caster.cast({{{o[0], o[1], o[2]}}, {{d[0], d[1], d[2]}}}, {cell, 0}, 0, 1e30, hit);
+          }
+          return found;
+        }));
+}
+
+void regions(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+  std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);
+  constexpr size_t kBoxes = 2000;
+  const auto around = [&](size_t i) {
+    Selection selection{grid_levels, {}};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      selection.region.low[axis] = queries.set_cells[i][axis] - kBoxEdge / 2;
+      selection.region.high[axis] = selection.region.low[axis] + kBoxEdge;
+    }
+    return selection;
+  };
+  print("voxdag", "boxes of 64^3", best_of_three(kBoxes, [&] {
+          uint64_t found = 0;
+          for (size_t i = 0; i < kBoxes; ++i) {
+            dag.box(around(i), cells);
+            found += cells[cells.size() / 2];
+          }
+          return found;
+        }));
+  print("voxdag", "counts of 64^3", best_of_three(100 * kBoxes, [&] {
+          uint64_t found = 0;
+          for (size_t i = 0; i < 100 * kBoxes; ++i) found += dag.count(around(i));
+          return found;
+        }));
+  std::vector<Nearest> nearest(kNearestPoints);
+  print("voxdag", "nearest, uniform", best_of_three(kNearestPoints, [&] {
+          dag.nearest(std::span(queries.uniform).first(kNearestPoints), grid_levels,
+                      std::numeric_limits<double>::infinity(), nearest);
+          uint64_t found = 0;
+          for (const Nearest& n : nearest) found += n.found;
+          return found;
+        }));
+}
+
+void measure(const std::string& path, uint32_t grid_levels, int picture, bool others) {
+  const Dag dag(path);
+  for (const uint32_t levels : {dag.grid_levels(), std::min(grid_levels, dag.grid_levels())}) {
+    std::printf("%s, grid of 2^%u\n", path.c_str(), levels);
+    const QuerySet queries = make_queries(dag, levels, kPoints, picture);
+    lookups(dag, levels, queries);
+    rays(dag, levels, queries);
+    regions(dag, levels, queries);
+    if (levels == grid_levels && others)
+      for (const auto& [measure_other, who] : kOtherLibraries) {
+        const OtherTimings timings = measure_other(dag, levels, queries);
+        if (!timings.installed) std::printf("  %-22s not installed\n", who);
+        print(who, "uniform points", timings.uniform);
+        print(who, "set cells", timings.set_cells);
+        print(who, "primary rays", timings.rays);
+      }
+    if (levels == grid_levels) break;
+  }
+}
+
+int run(int argc, char** argv) {
+  uint32_t levels = 11;
+  int picture = 1024;
+  bool others = true;
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--levels") == 0 && i + 1 < argc)
+      levels = static_cast<uint32_t>(std::atoi(argv[++i]));
+    else if (std::strcmp(argv[i], "--picture") == 0 && i + 1 < argc)
+      picture = std::max(8, std::atoi(argv[++i]) / 8 * 8);
+    else if (std::strcmp(argv[i], "--no-others") == 0)
+      others = false;
+    else
+      measure(argv[i], levels, picture, others);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace voxdag::query
+
+int main(int argc, char** argv) {
+  try {
+    return voxdag::query::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_query: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,67 @@
+#include "bench/query/others.h"
+
+#ifdef VOXDAG_BENCH_OCTOMAP
+
+#include <octomap/octomap.h>
+
+#include <bit>
+
+namespace voxdag::query {
+
+OtherTimings measure_octomap(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+  octomap::OcTree tree(1.0);
+  const auto half = static_cast<double>(int64_t{1} << (grid_levels - 1));
+  // The grid around the origin, so that grids of up to 2^16 cells fit in the tree's keys.
+  const auto key_of = [&](const Position& p) {
+    const int64_t zero = 32768 - (int64_t{1} << (grid_levels - 1));
+    return octomap::OcTreeKey(static_cast<octomap::key_type>(p[0] + zero),
+                              static_cast<octomap::key_type>(p[1] + zero),
+                              static_cast<octomap::key_type>(p[2] + zero));
+  };
+  dag.bricks({grid_levels, whole_grid(grid_levels)}, [&](const Brick& brick) {
+    for (uint64_t left = brick.mask; left != 0; left &= left - 1)
+      tree.setNodeValue(key_of(brick_cell(brick, std::countr_zero(left))),
+                        tree.getClampingThresMaxLog(), true);
+  });
+  tree.updateInnerOccupancy();
+  OtherTimings timings{true, {}, {}, {}};
+  const auto look_up = [&](const std::vector<Position>& points) {
+    return best_of_three(points.size(), [&] {
+      uint64_t found = 0;
+      for (const Position& p : points) found += tree.search(key_of(p)) != nullptr;
+      return found;
+    });
+  };
+  timings.uniform = look_up(queries.uniform);
+  timings.set_cells = look_up(queries.set_cells);
+  // castRay() begins within the tree and steps from cell to cell, so rays are a sample.
+  const size_t step = std::max<size_t>(1, queries.origins.size() / 20000);
+  timings.rays = best_of_three(queries.origins.size() / step, [&] {
+    uint64_t found = 0;
+    for (size_t i = 0; i < queries.origins.size(); i += step) {
+      const auto& o = queries.origins[i];
+      const auto& d = queries.directions[i];
+      octomap::point3d end;
+      found += tree.castRay(
+          octomap::point3d(static_cast<float>(o[0] - half), static_cast<float>(o[1] - half),
+                           static_cast<float>(o[2] - half)),
+          octomap::point3d(static_cast<float>(d[0]), static_cast<float>(d[1]),
+                           static_cast<float>(d[2])),
+          end, true, 8 * half);
+    }
+    return found;
+  });
+  return timings;
+}
+
+}  // namespace voxdag::query
+
+#else
+
+namespace voxdag::query {
+
+OtherTimings measure_octomap(const Dag&, uint32_t, const QuerySet&) { return {}; }
+
+}  // namespace voxdag::query
+
+#endif

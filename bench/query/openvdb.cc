@@ -1,0 +1,66 @@
+#include "bench/query/others.h"
+
+#ifdef VOXDAG_BENCH_OPENVDB
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/RayIntersector.h>
+
+#include <bit>
+
+namespace voxdag::query {
+
+OtherTimings measure_openvdb(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+  openvdb::initialize();
+  const auto grid = openvdb::BoolGrid::create(false);
+  {
+    auto accessor = grid->getAccessor();
+    dag.bricks({grid_levels, whole_grid(grid_levels)}, [&](const Brick& brick) {
+      for (uint64_t left = brick.mask; left != 0; left &= left - 1) {
+        const Position p = brick_cell(brick, std::countr_zero(left));
+        accessor.setValueOn(
+            openvdb::Coord(static_cast<int>(p[0]), static_cast<int>(p[1]), static_cast<int>(p[2])),
+            true);
+      }
+    });
+  }
+  // Cells are centered at whole numbers in OpenVDB.
+  OtherTimings timings{true, {}, {}, {}};
+  const auto look_up = [&](const std::vector<Position>& points) {
+    return best_of_three(points.size(), [&] {
+      auto accessor = grid->getConstAccessor();
+      uint64_t found = 0;
+      for (const auto& [x, y, z] : points)
+        found += accessor.isValueOn(
+            openvdb::Coord(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)));
+      return found;
+    });
+  };
+  timings.uniform = look_up(queries.uniform);
+  timings.set_cells = look_up(queries.set_cells);
+  using Intersector = openvdb::tools::VolumeRayIntersector<openvdb::BoolGrid>;
+  Intersector intersector(*grid);
+  timings.rays = best_of_three(queries.origins.size(), [&] {
+    uint64_t found = 0;
+    for (size_t i = 0; i < queries.origins.size(); ++i) {
+      const auto& o = queries.origins[i];
+      const auto& d = queries.directions[i];
+      const Intersector::RayType ray({o[0] - 0.5, o[1] - 0.5, o[2] - 0.5}, {d[0], d[1], d[2]});
+      double t0 = 0, t1 = 0;
+      found += intersector.setIndexRay(ray) && intersector.march(t0, t1);
+    }
+    return found;
+  });
+  return timings;
+}
+
+}  // namespace voxdag::query
+
+#else
+
+namespace voxdag::query {
+
+OtherTimings measure_openvdb(const Dag&, uint32_t, const QuerySet&) { return {}; }
+
+}  // namespace voxdag::query
+
+#endif

@@ -1,0 +1,59 @@
+// Two doubles at once: SSE2, which every x86-64 has, or plain C++ elsewhere. Each operation rounds
+// as that on one double does.
+#pragma once
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+namespace voxdag::query {
+
+#ifdef __SSE2__
+
+struct DoublePair {
+  __m128d v;
+  static DoublePair load(const double* aligned) { return {_mm_load_pd(aligned)}; }
+  static DoublePair of(double both) { return {_mm_set1_pd(both)}; }
+  void store(double* aligned) const { _mm_store_pd(aligned, v); }
+};
+inline DoublePair operator-(DoublePair a, DoublePair b) { return {_mm_sub_pd(a.v, b.v)}; }
+inline DoublePair operator*(DoublePair a, DoublePair b) { return {_mm_mul_pd(a.v, b.v)}; }
+inline DoublePair max(DoublePair a, DoublePair b) { return {_mm_max_pd(a.v, b.v)}; }
+inline DoublePair min(DoublePair a, DoublePair b) { return {_mm_min_pd(a.v, b.v)}; }
+// Bit 0 for the first of the pair, bit 1 for the second.
+inline unsigned less(DoublePair a, DoublePair b) {
+  return static_cast<unsigned>(_mm_movemask_pd(_mm_cmplt_pd(a.v, b.v)));
+}
+inline unsigned equal(DoublePair a, DoublePair b) {
+  return static_cast<unsigned>(_mm_movemask_pd(_mm_cmpeq_pd(a.v, b.v)));
+}
+
+#else
+
+struct DoublePair {
+  double a, b;
+  static DoublePair load(const double* aligned) { return {aligned[0], aligned[1]}; }
+  static DoublePair of(double both) { return {both, both}; }
+  void store(double* aligned) const {
+    aligned[0] = a;
+    aligned[1] = b;
+  }
+};
+inline DoublePair operator-(DoublePair x, DoublePair y) { return {x.a - y.a, x.b - y.b}; }
+inline DoublePair operator*(DoublePair x, DoublePair y) { return {x.a * y.a, x.b * y.b}; }
+inline DoublePair max(DoublePair x, DoublePair y) {
+  return {x.a > y.a ? x.a : y.a, x.b > y.b ? x.b : y.b};
+}
+inline DoublePair min(DoublePair x, DoublePair y) {
+  return {x.a < y.a ? x.a : y.a, x.b < y.b ? x.b : y.b};
+}
+inline unsigned less(DoublePair x, DoublePair y) {
+  return (x.a < y.a ? 1u : 0u) | (x.b < y.b ? 2u : 0u);
+}
+inline unsigned equal(DoublePair x, DoublePair y) {
+  return (x.a == y.a ? 1u : 0u) | (x.b == y.b ? 2u : 0u);
+}
+
+#endif
+
+}  // namespace voxdag::query

@@ -1,0 +1,181 @@
+#include "query/lookup/dag.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/format/global/open_global.h"
+#include "query/lookup/points.h"
+#include "query/ray_packet.h"
+
+namespace voxdag::query {
+namespace {
+
+// Items that one thread takes at once: a multiple of a packet of rays.
+constexpr size_t kBatch = 4096;
+
+void require(bool right, const char* expected) {
+  if (!right) throw Error(ErrorCode::kInvalidInput, std::string("query: expected ") + expected);
+}
+
+// Calls body(first, count) for batches of `items`.
+template <class Body>
+void for_each_batch(unsigned threads, size_t items, const Body& body) {
+  parallel_for(std::max(1u, threads), (items + kBatch - 1) / kBatch, [&](unsigned, size_t batch) {
+    const size_t first = batch * kBatch;
+    body(first, std::min(kBatch, items - first));
+  });
+}
+
+// Errors of what is read of the file name it.
+template <class Use>
+auto naming_file(const std::string& path, const Use& use) {
+  try {
+    return use();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCorrupt) throw;
+    throw Error(ErrorCode::kCorrupt, path + ": " + error.message());
+  }
+}
+
+Ray make_ray(const Coordinates& origin, const Coordinates& direction) {
+  Ray ray{{{origin[0], origin[1], origin[2]}}, {{direction[0], direction[1], direction[2]}}};
+  bool finite = true;
+  double largest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    finite = finite && std::isfinite(ray.origin[axis]) && std::isfinite(ray.direction[axis]);
+    largest = std::max(largest, std::fabs(ray.direction[axis]));
+  }
+  require(finite && largest > 0, "rays of finite numbers with directions that are not 0");
+  // The largest component first, so that no square overflows or vanishes.
+  for (int axis = 0; axis < 3; ++axis) ray.direction[axis] /= largest;
+  ray.direction = normalized(ray.direction);
+  return ray;
+}
+
+RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
+  RayHit out;
+  out.hit = true;
+  out.distance = hit.t;
+  out.cell = {hit.cell[0], hit.cell[1], hit.cell[2]};
+  out.grid_levels = hit.depth;
+  out.axis = static_cast<int8_t>(hit.axis);
+  if (hit.axis >= 0) out.sign = ray.direction[hit.axis] >= 0 ? int8_t{-1} : int8_t{1};
+  return out;
+}
+
+}  // namespace
+
+Dag::Dag(const std::string& path, uint64_t memory_bytes)
+    : file_(open_global_file(path)), view_(*file_), budget_(memory_bytes) {}
+
+void Dag::lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
+                 unsigned threads) const {
+  check_grid_levels(view_, grid_levels);
+  require(points.size() == set.size(), "as many results as points");
+  naming_file(file_->path(), [&] {
+    for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
+      look_up(view_, grid_levels, points.subspan(first, count), set.subspan(first, count));
+    });
+  });
+}
+
+void Dag::rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
+               const RayLimits& limits, std::span<RayHit> hits, unsigned threads) const {
+  require(origins.size() == directions.size() && origins.size() == hits.size(),
+          "as many directions and results as origins");
+  require(limits.max_distance >= 0 && limits.stop_size >= 0, "limits of rays that are at least 0");
+  naming_file(file_->path(), [&] {
+    for_each_batch(threads, origins.size(), [&](size_t batch, size_t count) {
+      constexpr size_t kRays = RayPacket::kRays;
+      RayPacket packet(view_, limits.stop_size, 0, limits.max_distance);
+      Ray rays[kRays];
+      Hit found[kRays];
+      for (size_t first = batch; first < batch + count; first += kRays) {
+        const size_t n = std::min(kRays, batch + count - first);
+        for (size_t i = 0; i < n; ++i)
+          rays[i] = make_ray(origins[first + i], directions[first + i]);
+        const uint64_t have_hit = packet.cast({rays, n}, found);
+        for (size_t i = 0; i < n; ++i)
+          hits[first + i] = have_hit >> i & 1 ? as_ray_hit(found[i], rays[i]) : RayHit{};
+      }
+    });
+  });
+}
+
+void Dag::bricks(const Selection& selection, const std::function<void(const Brick&)>& visit) const {
+  naming_file(file_->path(), [&] { for_each_brick(view_, selection, visit); });
+}
+
+void Dag::box(const Selection& selection, std::span<uint8_t> cells) const {
+  const auto& [low, high] = selection.region;
+  check_grid_levels(view_, selection.grid_levels);
+  uint64_t size = 1;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const uint64_t edge = high[axis] <= low[axis] ? 0
+                                                  : static_cast<uint64_t>(high[axis]) -
+                                                        static_cast<uint64_t>(low[axis]);
+    require(!__builtin_mul_overflow(size, edge, &size), "a region that fits in memory");
+  }
+  require(cells.size() == size, "as many results as cells in the region");
+  std::fill(cells.begin(), cells.end(), uint8_t{0});
+  bricks(selection, [&](const Brick& brick) {
+    for (uint64_t left = brick.mask; left != 0; left &= left - 1) {
+      const Position p = brick_cell(brick, std::countr_zero(left));
+      const int64_t at =
+          ((p[0] - low[0]) * (high[1] - low[1]) + p[1] - low[1]) * (high[2] - low[2]) + p[2] -
+          low[2];
+      cells[static_cast<size_t>(at)] = 1;
+    }
+  });
+}
+
+uint64_t Dag::positions(const Selection& selection, std::span<Position> positions) const {
+  uint64_t count = 0;
+  bricks(selection, [&](const Brick& brick) {
+    if (count >= positions.size()) {
+      count += static_cast<uint64_t>(std::popcount(brick.mask));
+      return;
+    }
+    for (uint64_t left = brick.mask; left != 0; left &= left - 1, ++count)
+      if (count < positions.size()) positions[count] = brick_cell(brick, std::countr_zero(left));
+  });
+  return count;
+}
+
+const NodeCounts& Dag::counts(uint32_t grid_levels) const {
+  const std::lock_guard lock(mutex_);
+  std::unique_ptr<NodeCounts>& counts = counts_[grid_levels];
+  if (!counts) counts = std::make_unique<NodeCounts>(*file_, view_, grid_levels, budget_);
+  return *counts;
+}
+
+uint64_t Dag::count(const Selection& selection) const {
+  check_grid_levels(view_, selection.grid_levels);
+  return naming_file(file_->path(),
+                     [&] { return counts(selection.grid_levels).count(selection.region); });
+}
+
+void Dag::nearest(std::span<const Position> points, uint32_t grid_levels, double max_distance,
+                  std::span<Nearest> cells, unsigned threads) const {
+  check_grid_levels(view_, grid_levels);
+  require(points.size() == cells.size(), "as many results as points");
+  require(max_distance >= 0, "a distance that is at least 0");
+  // The largest square of a distance that is allowed; distances of more than 2^32 do not occur.
+  const double squared = std::floor(max_distance * max_distance);
+  const uint64_t max_squared =
+      squared < 0x1p63 ? static_cast<uint64_t>(squared) : uint64_t{1} << 63;
+  naming_file(file_->path(), [&] {
+    for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
+      for (size_t i = first; i < first + count; ++i) {
+        for (const int64_t c : points[i])
+          require(c >= -kMaxCoordinate && c <= kMaxCoordinate, "coordinates within 2^30");
+        cells[i] = find_nearest(view_, grid_levels, points[i], max_squared);
+      }
+    });
+  });
+}
+
+}  // namespace voxdag::query

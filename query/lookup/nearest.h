@@ -1,0 +1,30 @@
+// The set cell that is nearest to a point.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "query/dag_view.h"
+#include "query/lookup/position.h"
+
+namespace voxdag::query {
+
+// Points that are searched from lie within this distance of the grid's origin on every axis, so
+// that squares of distances fit in 64 bits.
+inline constexpr int64_t kMaxCoordinate = int64_t{1} << 30;
+
+struct Nearest {
+  Position cell{};
+  uint64_t squared_distance = 0;  // between the centers of the cells, in cells
+  bool found = false;
+};
+
+// The set cell of the grid of 2^grid_levels per edge whose center is nearest to that of the cell
+// `from`; of several the one with the lowest Morton code. None if it is farther than the root of
+// max_squared. Descends into near children first, and into none that is farther than what was
+// found. grid_levels is at most the file's, coordinates at most kMaxCoordinate. Throws
+// Error{kCorrupt} for a damaged DAG.
+Nearest find_nearest(const DagView& dag, uint32_t grid_levels, const Position& from,
+                     uint64_t max_squared);
+
+}  // namespace voxdag::query

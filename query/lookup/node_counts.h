@@ -1,0 +1,48 @@
+// How many set cells lie below each node, for exact counts of regions: one 64-bit number per node,
+// computed from the bricks up.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/format/global/node_index.h"
+#include "core/format/global/voxdag_reader.h"
+#include "query/dag_view.h"
+#include "query/lookup/position.h"
+#include "query/selection.h"
+
+namespace voxdag::query {
+
+// Of the cells of one grid. Immutable after construction; any number of threads may count.
+class NodeCounts {
+ public:
+  // Takes 8 bytes per node above the bricks and 2 bits per word of theirs. If that does not fit in
+  // the budget, no number is stored, and every count walks the octree below its region. `dag` is
+  // the view of `file`; both must outlive this. Throws Error{kCorrupt}.
+  NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint32_t grid_levels,
+             MemoryBudget& budget);
+
+  bool is_stored() const { return !levels_.empty(); }
+  // Set cells in the region. Throws Error{kCorrupt}.
+  uint64_t count(const Region& region) const;
+
+ private:
+  struct Level {
+    NodeIndex index;
+    PageBuffer<uint64_t> counts;
+  };
+
+  void store(const voxdag_reader::File& file, MemoryBudget& budget);
+  uint64_t count_below(uint32_t depth, uint64_t content) const;
+  uint64_t sum_children(uint32_t depth, uint64_t content) const;
+  uint64_t count_within(const Region& region, uint32_t depth, const Position& low,
+                        uint64_t content) const;
+
+  const DagView& dag_;
+  const uint32_t grid_levels_;
+  std::vector<Level> levels_;  // by depth
+};
+
+}  // namespace voxdag::query

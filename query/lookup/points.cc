@@ -1,0 +1,102 @@
+#include "query/lookup/points.h"
+
+#include <algorithm>
+
+#include "core/base/popcount8.h"
+
+namespace voxdag::query {
+namespace {
+
+// So many descents hide the latency of memory; more gain nothing. Measured.
+constexpr size_t kGroup = 32;
+
+// The descents of up to kGroup points.
+class Descents {
+ public:
+  Descents(const DagView& dag, uint32_t grid_levels) : dag_(dag), grid_levels_(grid_levels) {}
+
+  void run(std::span<const Position> points, uint8_t* set) {
+    const uint64_t edge = uint64_t{1} << grid_levels_;
+    count_ = 0;
+    for (size_t i = 0; i < points.size(); ++i) {
+      const auto [x, y, z] = points[i];
+      set[i] = 0;
+      // A negative coordinate is a large one without its sign.
+      if ((static_cast<uint64_t>(x) | static_cast<uint64_t>(y) | static_cast<uint64_t>(z)) >= edge)
+        continue;
+      descents_[count_++] = {dag_.root(), static_cast<uint32_t>(x), static_cast<uint32_t>(y),
+                             static_cast<uint32_t>(z), static_cast<uint32_t>(i)};
+    }
+    const uint32_t brick_depth = dag_.grid_levels() - 2;
+    for (uint32_t depth = 0; depth < std::min(grid_levels_, brick_depth); ++depth) descend(depth);
+    for (size_t i = 0; i < count_; ++i) set[descents_[i].point] = ends_set(descents_[i]);
+  }
+
+ private:
+  struct Descent {
+    uint64_t content;
+    uint32_t x, y, z, point;
+    int child_index(uint32_t shift) const {
+      return static_cast<int>((x >> shift & 1) << 2 | (y >> shift & 1) << 1 | (z >> shift & 1));
+    }
+  };
+
+  // Leads the descents from the nodes at `depth` to their children, and ends those without.
+  void descend(uint32_t depth) {
+    const std::span<const uint32_t> words = dag_.level(depth).words;
+    const DagView::Level& below = dag_.level(depth + 1);
+    const uint32_t shift = grid_levels_ - 1 - depth;
+    const bool last = depth + 1 == grid_levels_;
+    size_t left = 0;
+    for (size_t i = 0; i < count_; ++i) {
+      Descent d = descents_[i];
+      if (d.content >= words.size()) dag_.corrupt(depth, d.content);
+      const uint32_t mask = words[d.content];
+      const uint32_t bit = 1u << d.child_index(shift);
+      // No branch: whether a descent ends can hardly be predicted.
+      const uint64_t place = uint64_t{kPopcount8[mask & (bit - 1)]} << below.wide;
+      const bool has_child = mask & bit;
+      if (has_child && place + below.wide + 1 >= words.size() - d.content)
+        dag_.corrupt(depth, d.content);
+      const uint64_t at = has_child ? d.content + 1 + place : 0;
+      d.content = words[at];
+      if (below.wide && has_child) d.content |= uint64_t{words[at + 1]} << 32;
+      descents_[left] = d;
+      left += has_child;
+      if (!last && has_child && d.content < below.words.size())
+        __builtin_prefetch(below.words.data() + d.content);
+    }
+    count_ = left;
+  }
+
+  // Whether what a descent arrived at is set.
+  bool ends_set(const Descent& d) const {
+    if (grid_levels_ + 2 <= dag_.grid_levels()) return true;
+    const uint32_t voxel_levels = grid_levels_ + 2 - dag_.grid_levels();  // below the brick: 1 or 2
+    const uint64_t mask = dag_.grid_levels() == 2 ? d.content : dag_.brick(d.content);
+    const uint64_t octant = mask >> (8 * d.child_index(voxel_levels - 1)) & 255;
+    return voxel_levels == 1 ? octant != 0 : octant >> d.child_index(0) & 1;
+  }
+
+  const DagView& dag_;
+  const uint32_t grid_levels_;
+  size_t count_ = 0;
+  Descent descents_[kGroup];
+};
+
+}  // namespace
+
+void look_up(const DagView& dag, uint32_t grid_levels, std::span<const Position> points,
+             std::span<uint8_t> set) {
+  if (dag.empty()) {
+    std::fill(set.begin(), set.end(), uint8_t{0});
+    return;
+  }
+  Descents descents(dag, grid_levels);
+  for (size_t first = 0; first < points.size(); first += kGroup) {
+    const size_t count = std::min(kGroup, points.size() - first);
+    descents.run(points.subspan(first, count), set.data() + first);
+  }
+}
+
+}  // namespace voxdag::query

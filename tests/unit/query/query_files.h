@@ -1,0 +1,41 @@
+// Files of a few thousand voxels with shared nodes, and their voxels, for tests of query/lookup.
+#pragma once
+
+#include <set>
+#include <string>
+
+#include "query/lookup/dag.h"
+#include "tests/unit/format/test_files.h"
+
+// A file, and the cells of each of its grids by brute force.
+class QueryFile {
+ public:
+  using Cells = std::set<voxdag::query::Position>;  // in lexicographic order
+
+  // Levels of over `narrow_words` words are wide.
+  explicit QueryFile(const oracle::Voxels& voxels,
+                     uint64_t narrow_words = voxdag::global_layout::kNarrowLevelWords)
+      : levels_(voxdag::levels_of_resolution(static_cast<uint64_t>(voxels.edge()))) {
+    voxdag::write_global(path(), oracle::build_dag(voxels, 64), voxdag::grid_of(voxels.edge()), 64,
+                         narrow_words);
+    for (int x = 0; x < voxels.edge(); ++x)
+      for (int y = 0; y < voxels.edge(); ++y)
+        for (int z = 0; z < voxels.edge(); ++z)
+          if (voxels.at(x, y, z)) voxels_.insert({x, y, z});
+  }
+
+  std::string path() const { return folder_.file("scene.vdag"); }
+  uint32_t grid_levels() const { return levels_; }
+  // The set cells of the grid of 2^grid_levels.
+  Cells cells(uint32_t grid_levels) const {
+    Cells cells;
+    const uint32_t shift = levels_ - grid_levels;
+    for (const auto& [x, y, z] : voxels_) cells.insert({x >> shift, y >> shift, z >> shift});
+    return cells;
+  }
+
+ private:
+  voxdag::TemporaryFolder folder_;
+  uint32_t levels_;
+  Cells voxels_;
+};
