@@ -14,7 +14,7 @@ namespace {
 constexpr uint64_t kMaxNodeWords = 17;  // a child mask and eight wide offsets
 // Nodes that lie closer together than this are read at once: a read costs about as much as these
 // words do.
-constexpr uint64_t kGapWords = 4096;
+constexpr uint64_t kGapWords = 2048;
 
 static_assert(SourceFile::kBlockBytes == global_layout::kChecksumBlockBytes);
 
