@@ -80,7 +80,7 @@ void RayPacket::cast_alike(uint64_t rays) {
 void RayPacket::crossing(const Planes& planes, uint64_t rays, uint64_t& inside,
                          uint64_t& touching) const {
   const DoublePair t_min = DoublePair::of(t_min_), t_max = DoublePair::of(t_max_);
-  const auto& [low, high] = planes;
+  const double *const *const low = planes.low, *const *const high = planes.high;
   inside = touching = 0;
   for_each_pair(rays, [&](int i) {
     const DoublePair in = max(max(DoublePair::load(low[0] + i), DoublePair::load(low[1] + i)),

@@ -110,7 +110,7 @@ void Dag::bricks(const Selection& selection, const std::function<void(const Bric
 }
 
 void Dag::box(const Selection& selection, std::span<uint8_t> cells) const {
-  const auto& [low, high] = selection.region;
+  const Position &low = selection.region.low, &high = selection.region.high;
   check_grid_levels(view_, selection.grid_levels);
   uint64_t size = 1;
   for (size_t axis = 0; axis < 3; ++axis) {
