@@ -1,11 +1,10 @@
 // Speed of queries on one core, warm: this library's, a plain loop over the reader, and OpenVDB and
 // OctoMap on the same cells where they are installed.
 //
-//     bench_query [--levels N] [--picture EDGE] [--no-others] FILE.vdag...
+//     bench_query [--levels N] [--picture EDGE] FILE.vdag...
 //
-// --levels: the libraries are compared on the grid of 2^N per edge, which has to fit in their
-// memory (default: 11). For that grid this library is given a file of the grid's resolution only if
-// FILE is one; otherwise its rays stop at cells of that size.
+// --levels: on the grid of 2^N cells per edge (default: the file's); rays stop at its cells.
+// --picture: rays are those of the pixels of a square picture of that edge (default: 1024).
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -20,9 +19,11 @@
 namespace voxdag::query {
 namespace {
 
-constexpr size_t kPoints = 4'000'000;
-constexpr size_t kNearestPoints = 200'000;
+constexpr size_t kPoints = 2'000'000;
+constexpr size_t kNearestPoints = 2000;
 constexpr int64_t kBoxEdge = 64;
+// OctoMap takes some 5 GB for Sponza on a grid of 2048^3.
+constexpr uint32_t kMaxOtherLevels = 11;
 
 void print(const char* who, const char* what, const Timing& timing) {
   if (timing.per_second == 0) return;
@@ -98,7 +99,7 @@ void rays(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
 
 void regions(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
   std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);
-  constexpr size_t kBoxes = 2000;
+  constexpr size_t kBoxes = 1000;
   const auto around = [&](size_t i) {
     Selection selection{grid_levels, {}};
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -115,9 +116,9 @@ void regions(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
           }
           return found;
         }));
-  print("voxdag", "counts of 64^3", best_of_three(100 * kBoxes, [&] {
+  print("voxdag", "counts of 64^3", best_of_three(10 * kBoxes, [&] {
           uint64_t found = 0;
-          for (size_t i = 0; i < 100 * kBoxes; ++i) found += dag.count(around(i));
+          for (size_t i = 0; i < 10 * kBoxes; ++i) found += dag.count(around(i));
           return found;
         }));
   std::vector<Nearest> nearest(kNearestPoints);
@@ -130,39 +131,37 @@ void regions(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
         }));
 }
 
-void measure(const std::string& path, uint32_t grid_levels, int picture, bool others) {
+void measure(const std::string& path, uint32_t grid_levels, int picture) {
   const Dag dag(path);
-  for (const uint32_t levels : {dag.grid_levels(), std::min(grid_levels, dag.grid_levels())}) {
-    std::printf("%s, grid of 2^%u\n", path.c_str(), levels);
-    const QuerySet queries = make_queries(dag, levels, kPoints, picture);
-    lookups(dag, levels, queries);
-    rays(dag, levels, queries);
-    regions(dag, levels, queries);
-    if (levels == grid_levels && others)
-      for (const auto& [measure_other, who] : kOtherLibraries) {
-        const OtherTimings timings = measure_other(dag, levels, queries);
-        if (!timings.installed) std::printf("  %-22s not installed\n", who);
-        print(who, "uniform points", timings.uniform);
-        print(who, "set cells", timings.set_cells);
-        print(who, "primary rays", timings.rays);
-      }
-    if (levels == grid_levels) break;
+  const uint32_t levels = std::min(grid_levels, dag.grid_levels());
+  std::printf("%s, grid of 2^%u\n", path.c_str(), levels);
+  const QuerySet queries = make_queries(dag, levels, kPoints, picture);
+  lookups(dag, levels, queries);
+  rays(dag, levels, queries);
+  regions(dag, levels, queries);
+  for (const auto& [measure_other, who] : kOtherLibraries) {
+    if (levels > kMaxOtherLevels) {
+      std::printf("  %-22s its memory would not hold this grid\n", who);
+      continue;
+    }
+    const OtherTimings timings = measure_other(dag, levels, queries);
+    if (!timings.installed) std::printf("  %-22s not installed\n", who);
+    print(who, "uniform points", timings.uniform);
+    print(who, "set cells", timings.set_cells);
+    print(who, "primary rays", timings.rays);
   }
 }
 
 int run(int argc, char** argv) {
-  uint32_t levels = 11;
+  uint32_t levels = 20;
   int picture = 1024;
-  bool others = true;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--levels") == 0 && i + 1 < argc)
       levels = static_cast<uint32_t>(std::atoi(argv[++i]));
     else if (std::strcmp(argv[i], "--picture") == 0 && i + 1 < argc)
       picture = std::max(8, std::atoi(argv[++i]) / 8 * 8);
-    else if (std::strcmp(argv[i], "--no-others") == 0)
-      others = false;
     else
-      measure(argv[i], levels, picture, others);
+      measure(argv[i], levels, picture);
   }
   return 0;
 }
