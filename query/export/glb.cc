@@ -78,9 +78,9 @@ class GlbSurface {
 
   // The faces of a brick that look into empty cells.
   uint64_t exposed(const CellCorner& corner, uint64_t mask, uint8_t axis, bool upward) const {
-    CellCorner beside = corner;
-    beside[axis] += upward ? kBrickEdge : -kBrickEdge;
-    const uint64_t neighbor = mask_at(beside);
+    CellCorner next_to = corner;
+    next_to[axis] += upward ? kBrickEdge : -kBrickEdge;
+    const uint64_t neighbor = mask_at(next_to);
     uint64_t faces = 0;
     for (uint64_t rest = mask; rest != 0; rest &= rest - 1) {
       const int bit = std::countr_zero(rest);
