@@ -50,6 +50,8 @@ THIRD_PARTY = {
     "sqlite3.h": ["core/db"],
     "httplib.h": ["client"],
     "png.h": ["query"],
+    "openvdb/openvdb.h": ["query"],
+    "nanovdb/util/OpenToNanoVDB.h": ["query"],
 }
 # Folders that build with a C++20 compiler (and CUDA) alone.
 BARE = ["core/base", "core/geometry", "core/dag", "core/backend"]

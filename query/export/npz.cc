@@ -141,7 +141,7 @@ std::string npy_header(const char* type, uint64_t rows) {
 
 class NpzWriter {
  public:
-  explicit NpzWriter(const ExportJob& job) : job_(job), file_(job.files, job.output) {}
+  explicit NpzWriter(const ExportJob& job) : file_(job.files, job.output) {}
 
   // Adds an array of `count` numbers; fill(put) calls put(number) for each.
   template <class Number, class Fill>
@@ -178,7 +178,6 @@ class NpzWriter {
   }
 
  private:
-  const ExportJob& job_;
   ExportFile file_;
   std::vector<NpzMember> members_;
 };
