@@ -1,8 +1,12 @@
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 
 #include "cli/build_options.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
+#include "scheduler/cluster/run_batch.h"
+#include "scheduler/cluster/slurm/slurm.h"
 #include "scheduler/run_build.h"
 
 namespace voxdag::cli {
@@ -13,6 +17,8 @@ struct BuildCommand {
   RunOptions run;
   std::string cache_size;
   ClusterOptions cluster;
+  bool cluster_merge = false;
+  std::string merge_options;
   bool json = false;
 };
 
@@ -45,6 +51,44 @@ void print(const BuildReport& r) {
       size_text(r.peak_rss_bytes).c_str(), size_text(r.memory_bytes).c_str());
 }
 
+constexpr const char* kMergeJobFlag = "--cluster-merge-job";
+
+// The words of this command, but for the name of the program.
+std::vector<std::string> own_arguments() {
+  std::ifstream line("/proc/self/cmdline");
+  std::vector<std::string> words;
+  for (std::string word; std::getline(line, word, '\0');) words.push_back(word);
+  words.erase(words.begin());
+  return words;
+}
+
+// The merge gets the memory and threads that were asked for, if any were, else as much as a task.
+ClusterOptions::MergeJobOptions merge_job(const BuildCommand& command, const BuildSpec& spec) {
+  ClusterOptions::MergeJobOptions job;
+  job.arguments = own_arguments();
+  job.arguments.push_back(kMergeJobFlag);
+  job.folder = std::filesystem::current_path().string();
+  if (spec.run.memory_bytes > 0)
+    job.submit_options.push_back(
+        "--mem=" + std::to_string(allocation_for(spec.run.memory_bytes) >> 20) + "M");
+  if (spec.run.threads > 0)
+    job.submit_options.push_back("--cpus-per-task=" + std::to_string(spec.run.threads));
+  for (std::string& word : split_words(command.merge_options))
+    job.submit_options.push_back(std::move(word));
+  return job;
+}
+
+// What Slurm has given to this job, where the user does not say.
+void take_allocation(RunOptions& run) {
+  const Allocation given = slurm_allocation();
+  if (run.memory_bytes == 0 && given.memory_bytes > 0)
+    run.memory_bytes = batch_budget(given.memory_bytes);
+  if (run.threads == 0) run.threads = given.cpus;
+  // An earlier attempt at this job may be dying on another node.
+  run.lock_wait_s = 300;
+  run.restart = false;
+}
+
 void run(const BuildCommand& command, CommandContext& context) {
   BuildSpec spec = command.options.spec();
   spec.run.output = command.run.output;
@@ -57,6 +101,10 @@ void run(const BuildCommand& command, CommandContext& context) {
   if (!command.cluster.engine.empty()) {
     spec.run.cluster = command.cluster;
     spec.run.cluster->program_version = VOXDAG_VERSION;
+    if (command.cluster.is_merge_job)
+      take_allocation(spec.run);
+    else if (command.cluster_merge)
+      spec.run.cluster->merge_job = merge_job(command, spec);
   }
   const auto progress = make_progress_bar();
   const BuildReport report = [&] {
@@ -82,9 +130,22 @@ void declare(Command& command, BuildCommand& state) {
   command.flag("--restart", state.run.restart, "start over instead of resuming the work folder");
   command.flag("--force", state.run.force, "build even if the estimate says it cannot fit");
   constexpr const char* kCluster = "Cluster (docs/cluster.md)";
-  command.option("--cluster", state.cluster.engine, "build on a cluster: slurm")
-      .one_of({"slurm"})
+  const Option engine =
+      command.option("--cluster", state.cluster.engine, "build on a cluster: slurm")
+          .one_of({"slurm"})
+          .group(kCluster);
+  const Option merge =
+      command.flag("--cluster-merge", state.cluster_merge, "merge in a job of the cluster, too")
+          .needs(engine)
+          .group(kCluster);
+  command
+      .option("--cluster-merge-options", state.merge_options,
+              "options of sbatch for that job, after those of --cluster-options")
+      .needs(merge)
       .group(kCluster);
+  command.flag(kMergeJobFlag, state.cluster.is_merge_job, "this process is that job")
+      .needs(merge)
+      .group("");
   command.option("--cluster-tasks", state.cluster.tasks, "tasks (default: by expected work)")
       .positive()
       .group(kCluster);

@@ -38,9 +38,16 @@ struct BuildReport {
   double cpu_s = 0;
   uint64_t peak_rss_bytes = 0;
   std::optional<ClusterTotals> cluster;  // of the tasks of a cluster build
+  std::string merge_request;  // of a build that a job of the cluster merged (MergeJob::request())
 };
+
+// Where the report of the build of this file lies.
+inline std::string report_path(const std::string& output) { return output + ".report.json"; }
 
 // One JSON object; docs/cli.md lists its names.
 std::string report_json(const BuildReport& report);
+// Throws Error{kCorrupt} for a text that report_json() did not make. What is not in the text has
+// its default.
+BuildReport decode_report(const std::string& text);
 
 }  // namespace voxdag

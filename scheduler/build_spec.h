@@ -46,6 +46,14 @@ struct ClusterOptions {
   double slurm_interval_s = 5;  // between two questions to Slurm
   // How long Slurm may lack the nodes that tasks ask for: after its start it knows none.
   double slurm_start_s = 15;
+  // Of the job of the cluster that merges (cluster/merge/merge_job.h); none: this process merges.
+  struct MergeJobOptions {
+    std::vector<std::string> arguments;  // this program's, for the same build as that job
+    std::string folder;                  // in which it runs
+    std::vector<std::string> submit_options;
+  };
+  std::optional<MergeJobOptions> merge_job;
+  bool is_merge_job = false;  // this process is that job
   // Runs Slurm's commands; tests have others. Null for the system's.
   CommandRunner* commands = nullptr;
 };

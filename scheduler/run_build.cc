@@ -11,6 +11,7 @@
 #include "core/base/process_limits.h"
 #include "core/io/overwrite.h"
 #include "scheduler/cluster/cluster_build.h"
+#include "scheduler/cluster/merge/merge_job.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/execute/executor.h"
 #include "scheduler/job/build_locks.h"
@@ -30,7 +31,6 @@ constexpr int64_t kWorkFormatVersion = 4;
 constexpr int kMaxReads = 3;
 // How often the merge is run before artifacts may not be damaged again.
 constexpr int kMaxMerges = 3;
-constexpr const char* kReportSuffix = ".report.json";
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
 
@@ -54,7 +54,7 @@ void check_places(const BuildSpec& spec, const BuildContext& context) {
   if (!spec.run.cache_folder.empty() && resolved(spec.run.cache_folder) == resolved(work))
     throw Error(ErrorCode::kInvalidInput,
                 work + " is both the cache (--cache) and the work folder: expected two folders");
-  const std::string partial = output + ".partial", report = output + kReportSuffix;
+  const std::string partial = output + ".partial", report = report_path(output);
   const std::string outputs[] = {output, partial, report, report + ".partial",
                                  OutputLock::path_of(output)};
   refuse_own_files(spec, work, outputs, context);
@@ -112,6 +112,10 @@ CommandRunner& commands_of(const BuildSpec& spec) {
                                                         : system_commands();
 }
 
+bool is_merge_job(const BuildSpec& spec) {
+  return spec.run.cluster && spec.run.cluster->is_merge_job;
+}
+
 // One build, stage by stage. What the work folder already has is not built again.
 class Build {
  public:
@@ -133,8 +137,42 @@ class Build {
   }
 
   BuildReport run() {
+    const double start_s = wall_seconds();
+    resumable([&] {
+      if (is_merge_job(spec_)) {
+        // One that was submitted twice, or that Slurm has started again, may come too late.
+        const MergeJob merge_job(spec_, work_.path(), context_, commands_of(spec_));
+        if (const auto report = merge_job.finished()) {
+          report_ = *report;
+          return remove_work();
+        }
+        report_.merge_request = merge_job.request();
+      }
+      build_or_resume();
+      merge_and_report(start_s);
+    });
+    return report_;
+  }
+
+  // Leaves the merge, and what tasks have yet to build, to a job of the cluster: returns its id, or
+  // "" if there is such a job, or its result, by now.
+  std::string hand_over(MergeJob& merge_job) {
+    std::string id;
+    resumable([&] {
+      if (!start_over_ && merge_job.finished()) return remove_work();
+      if (!start_over_ && merge_job.is_alive()) return;
+      merge_job.forget_finished();
+      build_or_resume();
+      id = cluster_->submit_merge_job();
+    });
+    return id;
+  }
+
+ private:
+  // Runs a part of the build; if it fails, what it has built stays.
+  void resumable(const std::function<void()>& part) {
     try {
-      return run_stages();
+      part();
     } catch (const Error& error) {
       commit_best_effort();
       if (!is_worth_resuming(error)) {
@@ -150,9 +188,7 @@ class Build {
     }
   }
 
- private:
-  BuildReport run_stages() {
-    const double start_s = wall_seconds();
+  void build_or_resume() {
     if (start_over_) {
       checkpoint_.forget();
       remove_tasks();
@@ -161,6 +197,9 @@ class Build {
     }
     work_.remove_spilled();
     build_artifacts();
+  }
+
+  void merge_and_report(double start_s) {
     if (spec_.run.keep_work) commits_.commit_in_background();
     merge_artifacts();
     if (spec_.run.keep_work) commits_.commit();
@@ -168,10 +207,9 @@ class Build {
     report_.wall_s = wall_seconds() - start_s;
     report_.cpu_s = process_cpu_seconds();
     report_.peak_rss_bytes = peak_resident_bytes();
-    write_file_atomically(context_.files, spec_.run.output + kReportSuffix,
+    write_file_atomically(context_.files, report_path(spec_.run.output),
                           report_json(report_) + "\n");
     if (!spec_.run.keep_work) remove_work();
-    return report_;
   }
 
   // Builds what is missing. If stored triangles turn out damaged, the scene is read again; so it is
@@ -219,6 +257,7 @@ class Build {
     if (!planned.empty())
       spec_.run.cluster ? build_on_cluster(scene, planned) : build_subvolumes_of(scene, planned);
     if (spec_.run.cluster) {
+      report_.backend = "slurm";
       report_.cluster = cluster_->totals();
       report_.subvolumes_split = cluster_->totals().split;
     }
@@ -276,8 +315,7 @@ class Build {
     report_.spill_bytes += scene.triangles ? scene.triangles->file_bytes() : 0;
     scene.triangles.reset();
     clock_.finish("batches");
-    report_.backend = "slurm";
-    cluster_->follow();
+    if (!spec_.run.cluster->merge_job) cluster_->follow();
     clock_.finish("build");
   }
 
@@ -287,7 +325,8 @@ class Build {
     cluster_.reset();
     if (!context_.files.exists(work_.cluster_path())) return;
     try {
-      ClusterBuild::stop_tasks(context_.files, work_.path(), commands_of(spec_));
+      ClusterBuild::stop_tasks(context_.files, work_.path(), commands_of(spec_),
+                               is_merge_job(spec_));
     } catch (const Error& error) {
       // Tasks without their batches fail; they cannot harm this build.
       context_.progress.warn(error.message());
@@ -427,7 +466,15 @@ BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
   check_places(full, context);
   return_freed_memory_to_system();
   if (full.run.cluster) ClusterBuild::check(full, commands_of(full), context);
-  return Build(full, context).run();
+  const std::string work = work_folder_of(full.run);
+  // It may hold the locks.
+  if (full.run.restart) ClusterBuild::stop_merge_job(context.files, work, commands_of(full));
+  if (!full.run.cluster || !full.run.cluster->merge_job) return Build(full, context).run();
+  MergeJob merge_job(full, work, context, commands_of(full));
+  std::string id;
+  if (full.run.restart || !(merge_job.finished() || merge_job.is_alive()))
+    id = Build(full, context).hand_over(merge_job);
+  return merge_job.follow(id);
 }
 
 }  // namespace voxdag

@@ -98,7 +98,10 @@ void ClusterBuild::resume(const std::string& scene_digest, const DagShape& shape
       (earlier->program == options_.program_version || !spec_.run.cluster)) {
     state_ = *earlier;
   } else {
-    if (earlier) slurm_.cancel(earlier->task_name());
+    if (earlier) {
+      if (!options_.is_merge_job) slurm_.cancel(earlier->merge_job_name());
+      slurm_.cancel(earlier->task_name());
+    }
     state_.build = random_id();
     state_.program = options_.program_version;
     state_.scene_digest = scene_digest;
@@ -202,14 +205,17 @@ void ClusterBuild::open_batches(CutBatches cut, std::span<const BinId> bins,
   for (OpenBatch& open : cut.open) state_.open.push_back(std::move(open));
 }
 
+std::string ClusterBuild::program() const {
+  return options_.program_path.empty() ? this_program() : options_.program_path;
+}
+
 void ClusterBuild::submit(const std::vector<uint32_t>& batches) {
   if (batches.empty()) return;
   ArrayRequest request;
   request.name = state_.task_name();
   // Tasks run elsewhere: they need the whole path.
   const ClusterFolder there(whole_path(work_.path()));
-  request.command = {options_.program_path.empty() ? this_program() : options_.program_path,
-                     "build-batch", there.work_folder(), "--batch"};
+  request.command = {program(), "build-batch", there.work_folder(), "--batch"};
   request.batches = batches;
   request.log_folder = there.path();
   request.options = split_words(options_.submit_options);
@@ -225,13 +231,64 @@ void ClusterBuild::submit(const std::vector<uint32_t>& batches) {
   for (const auto& [batch, task] : tasks) {
     state_.find(batch)->task = task;
     missing_since_.erase(batch);
+    own_reasons_.erase(batch);
   }
   if (state_.submitted_s == 0) state_.submitted_s = unix_seconds();
   try_to_save_state();
   // What was not submitted, or perhaps was, is looked for the next time.
+  note_refusal(refusal);
+}
+
+// Says once that Slurm takes nothing now.
+void ClusterBuild::note_refusal(const std::string& refusal) {
   if (!refusal.empty() && is_taking_)
     context_.progress.warn("Slurm takes no tasks now (" + refusal + "): waiting for it");
   is_taking_ = refusal.empty();
+}
+
+// What failed before does not count against a batch: the user has decided to try again.
+void ClusterBuild::forget_failures() {
+  for (OpenBatch& batch : state_.open) {
+    batch.failures.clear();
+    if (batch.task) inherited_.insert(batch.number);
+  }
+  own_reasons_.clear();
+}
+
+std::string ClusterBuild::submit_merge_job() {
+  forget_failures();
+  JobRequest request;
+  request.name = state_.merge_job_name();
+  request.command = options_.merge_job->arguments;
+  request.command.insert(request.command.begin(), program());
+  request.folder = options_.merge_job->folder;
+  request.log_folder = whole_path(folder_.path());
+  request.options = split_words(options_.submit_options);
+  const std::vector<std::string>& own = options_.merge_job->submit_options;
+  request.options.insert(request.options.end(), own.begin(), own.end());
+  for (;;) {
+    accept_finished();
+    if (!state_.open.empty()) look_after_tasks();
+    std::set<std::string> arrays;
+    for (const OpenBatch& batch : state_.open)
+      if (batch.task && !missing_since_.contains(batch.number)) arrays.insert(batch.task->job);
+    if (!arrays.empty() || state_.open.empty()) {
+      request.after.assign(arrays.begin(), arrays.end());
+      try {
+        const std::string job = slurm_.submit_job(request);
+        save_state();
+        return job;
+      } catch (const Error& error) {
+        if (error.code() != ErrorCode::kIo) throw;
+        note_refusal(error.message());
+      }
+      // It may be there all the same.
+      if (const auto jobs = slurm_.jobs(request.name); jobs && !jobs->empty())
+        return jobs->front().id;
+    }
+    context_.cancel.check();
+    std::this_thread::sleep_for(std::chrono::duration<double>(options_.slurm_interval_s));
+  }
 }
 
 void ClusterBuild::follow() {
@@ -240,12 +297,7 @@ void ClusterBuild::follow() {
   for (const OpenBatch& batch : state_.open) open += batch.subvolumes.size();
   context_.progress.begin_stage("build", total, "subvolumes");
   context_.progress.resume_at(total - open);
-  // What failed before does not count against a batch: the user has decided to try again.
-  for (OpenBatch& batch : state_.open) {
-    batch.failures.clear();
-    if (batch.task) inherited_.insert(batch.number);
-  }
-  own_reasons_.clear();
+  forget_failures();
   if (!state_.open.empty()) look_after_tasks();
   double looked_s = wall_seconds();
   double pause_s = std::min(kFirstPause_s, options_.slurm_interval_s);
@@ -284,14 +336,18 @@ void ClusterBuild::accept_finished() {
 }
 
 void ClusterBuild::take_failure(const ClusterFolder::Entry& entry) {
-  if (state_.find(entry.batch)) {
+  if (const OpenBatch* const batch = state_.find(entry.batch)) {
     try {
       const AttemptFailure failure =
           decode_failure(read_small_file(files_, entry.path, kMaxRecordBytes));
+      // One of an earlier task, which the shared disk shows late, says nothing about this one.
+      const bool is_late =
+          batch->task && !failure.task.empty() && failure.task != batch->task->name();
       // Tasks know the work folder by its whole path; the user knows it by another, or not at all.
-      own_reasons_[entry.batch] =
-          replace_all(failure.message, whole_path(work_.path()), work_.path()) +
-          (failure.node.empty() ? "" : " (on " + failure.node + ")");
+      if (!is_late)
+        own_reasons_[entry.batch] =
+            replace_all(failure.message, whole_path(work_.path()), work_.path()) +
+            (failure.node.empty() ? "" : " (on " + failure.node + ")");
     } catch (const Error&) {
       // Slurm will say that the task ended.
     }
@@ -367,12 +423,22 @@ void ClusterBuild::accept(const CompletionRecord& record) {
 }
 
 void ClusterBuild::stop_tasks(FileSystem& files, const std::string& work_folder,
-                              CommandRunner& commands) {
+                              CommandRunner& commands, bool is_merge_job) {
   const auto state = read_cluster_state(files, work_folder);
+  if (!state) return;
   const CancelToken never;
-  if (state && !Slurm(commands, never).cancel(state->task_name()))
+  // The job that merges would submit again what is stopped.
+  if ((!is_merge_job && !stop_merge_job(files, work_folder, commands)) ||
+      !Slurm(commands, never).cancel(state->task_name()))
     throw Error(ErrorCode::kIo, "the tasks may run on: expected 'scancel --name=" +
                                     state->task_name() + "' to succeed");
+}
+
+bool ClusterBuild::stop_merge_job(FileSystem& files, const std::string& work_folder,
+                                  CommandRunner& commands) {
+  const auto state = read_cluster_state(files, work_folder);
+  const CancelToken never;
+  return !state || Slurm(commands, never).cancel(state->merge_job_name());
 }
 
 }  // namespace voxdag

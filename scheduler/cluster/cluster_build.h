@@ -37,10 +37,13 @@ class ClusterBuild {
   ClusterBuild(const BuildSpec& spec, const WorkFolder& work, JobStore& jobs,
                const BuildContext& context, CommandRunner& commands);
 
-  // Stops all tasks of the build in a work folder, if there is one. Throws Error{kIo} naming them
-  // if Slurm does not take that.
-  static void stop_tasks(FileSystem& files, const std::string& work_folder,
-                         CommandRunner& commands);
+  // Stops all tasks of the build in a work folder, if there is one, and first the job that merges,
+  // unless this process is that job. Throws Error{kIo} naming them if Slurm does not take that.
+  static void stop_tasks(FileSystem& files, const std::string& work_folder, CommandRunner& commands,
+                         bool is_merge_job = false);
+  // Stops that job only. Returns whether Slurm has taken it.
+  static bool stop_merge_job(FileSystem& files, const std::string& work_folder,
+                             CommandRunner& commands);
 
   // Throws Error{kInvalidInput} if there is no Slurm here, or if it would refuse the tasks of a
   // build with cluster options.
@@ -57,6 +60,10 @@ class ClusterBuild {
   // last reason if a batch has failed too often; what runs, runs on.
   void follow();
 
+  // Instead of follow(): submits what Slurm takes now, and a job that merges when that has ended.
+  // Returns the job's id. What was not taken, or fails, is for that job.
+  std::string submit_merge_job();
+
   const ClusterTotals& totals() const { return state_.totals; }
 
  private:
@@ -67,7 +74,10 @@ class ClusterBuild {
   uint64_t tasks_for(double weight, uint64_t subvolumes) const;
   void open_batches(CutBatches cut, std::span<const BinId> bins, const TriangleStore& triangles,
                     unsigned threads, const std::function<void()>& after_each);
+  void forget_failures();
+  std::string program() const;
   void submit(const std::vector<uint32_t>& batches);
+  void note_refusal(const std::string& refusal);
   void accept_finished();
   void take_failure(const ClusterFolder::Entry& entry);
   bool is_of_this_job(const OpenBatch& batch) const;

@@ -56,8 +56,8 @@ OpenBatch batch_of(const Json& json) {
 }  // namespace
 
 OpenBatch* ClusterState::find(uint32_t batch) {
-  const auto found = std::ranges::find(open, batch, &OpenBatch::number);
-  return found == open.end() ? nullptr : &*found;
+  const auto found = std::ranges::lower_bound(open, batch, {}, &OpenBatch::number);
+  return found == open.end() || found->number != batch ? nullptr : &*found;
 }
 
 std::string encode_state(const ClusterState& s) {
@@ -109,6 +109,7 @@ ClusterState decode_state(const std::string& text) {
     s.totals.requests = t.at("requests");
     s.totals.batches_of_node = t.at("batches_of_node").get<std::map<std::string, uint64_t>>();
     for (const Json& batch : json.at("open")) s.open.push_back(batch_of(batch));
+    std::ranges::sort(s.open, {}, &OpenBatch::number);
     return s;
   } catch (const nlohmann::json::exception& error) {
     throw Error(

@@ -57,10 +57,12 @@ struct ClusterState {
   DagShape shape;
   double submitted_s = 0;  // Unix time of the first submission
   uint32_t next_batch = 0;
-  std::vector<OpenBatch> open;
+  std::vector<OpenBatch> open;  // by number
   ClusterTotals totals;
 
   std::string task_name() const { return "voxdag-" + build; }
+  // Of the job that merges (merge/merge_job.h).
+  std::string merge_job_name() const { return task_name() + "-merge"; }
   OpenBatch* find(uint32_t batch);
 };
 

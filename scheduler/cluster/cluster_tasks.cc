@@ -76,7 +76,7 @@ void ClusterBuild::report_tasks() const {
 
 bool ClusterBuild::end_attempt(OpenBatch& batch, std::vector<uint32_t>& again,
                                std::vector<uint32_t>& to_split) {
-  const auto end = slurm_.end_of(*batch.task);
+  const auto end = slurm_.end_of(batch.task->name());
   if (!end) return false;
   const auto own = own_reasons_.find(batch.number);
   if (end->is_active() && own == own_reasons_.end()) return true;  // squeue did not list it.
@@ -99,7 +99,7 @@ bool ClusterBuild::end_attempt(OpenBatch& batch, std::vector<uint32_t>& again,
                            (attempt.node.empty() ? "" : " on " + attempt.node) + ": " +
                            attempt.reason;
   if (batch.failures.size() > options_.max_retries)
-    give_up(batch.number, ErrorCode::kIo,
+    give_up(batch.number, ErrorCode::kLimit,
             what + "; it has failed " + std::to_string(batch.failures.size()) +
                 " times: see the logs in " + folder_.path());
   context_.progress.warn(

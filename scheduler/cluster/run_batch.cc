@@ -42,6 +42,7 @@ uint64_t environment_number(const char* name) {
   return text ? std::strtoull(text, nullptr, 10) : 0;
 }
 
+constexpr uint64_t kProgramBytes = uint64_t{96} << 20;
 constexpr std::string_view kTemporaryName = "voxdag-batch-";
 constexpr const char* kTemporaryLock = "/lock";
 
@@ -309,9 +310,12 @@ Allocation slurm_allocation() {
 }
 
 uint64_t batch_budget(uint64_t given_bytes) {
-  constexpr uint64_t kProgramBytes = uint64_t{96} << 20;
   const uint64_t reserved = std::max(kProgramBytes, given_bytes / 8);
   return std::max(given_bytes - std::min(given_bytes, reserved), kMinMemory);
+}
+
+uint64_t allocation_for(uint64_t budget_bytes) {
+  return budget_bytes + std::max(kProgramBytes, budget_bytes / 7 + 1);
 }
 
 CompletionRecord run_batch(const BatchRun& run, const BuildContext& context) {

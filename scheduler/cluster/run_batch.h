@@ -37,5 +37,7 @@ Allocation slurm_allocation();
 // The build of a batch may take this much of what a task was given: the rest is for the program
 // itself, buffers and the page tables.
 uint64_t batch_budget(uint64_t given_bytes);
+// What a task has to be given for this budget.
+uint64_t allocation_for(uint64_t budget_bytes);
 
 }  // namespace voxdag

@@ -1,5 +1,8 @@
 #include "scheduler/job/job_progress.h"
 
+#include <set>
+#include <utility>
+
 #include "core/base/clock.h"
 #include "core/base/process_limits.h"
 
@@ -100,8 +103,13 @@ void report_subvolumes(std::span<const StoredSubvolume> all, uint32_t grid_level
                        Progress& progress) {
   std::vector<SubvolumeStatus> statuses;
   statuses.reserve(all.size());
-  for (const StoredSubvolume& subvolume : all)
+  std::set<std::pair<uint32_t, uint64_t>> artifacts;
+  for (const StoredSubvolume& subvolume : all) {
     statuses.push_back(status_of(subvolume, grid_levels));
+    // Those of a batch of a cluster share one, which counts once.
+    if (!artifacts.emplace(subvolume.artifact.segment, subvolume.artifact.offset).second)
+      statuses.back().bytes = 0;
+  }
   progress.set_subvolumes(uint64_t{1} << grid_levels, statuses);
 }
 

@@ -56,8 +56,10 @@ void JobFolders::clean_up() {
     if (!marked_job(entry).empty()) continue;
     steps_.run("clean up jobs/" + entry.name, [&] {
       const auto job = queue_.find(entry.name);
-      if (!job)
-        foreign += " jobs/" + entry.name;
+      if (!job) foreign += " jobs/" + entry.name;
+      // The service may have been killed before it had stopped them.
+      else if (job->state == JobState::kSuspended || job->state == JobState::kFailed)
+        ClusterBuild::stop_tasks(files_, of(entry.name).work(), system_commands());
       else if (has_ended(job->state) && job->state != JobState::kFailed)
         remove_work(entry.name);
     });

@@ -68,6 +68,7 @@ class ClusterTest(unittest.TestCase):
         return self.expected[resolution]
 
     def start(self, resolution, tasks, *options):
+        """The command that is followed: a wait for what its tasks do fails once it ends."""
         self.build = subprocess.Popen(
             [VOXDAG, "build", self.scene, "-r", str(resolution), "-o", self.output, "--json",
              "--cluster", "slurm", "--cluster-tasks", str(tasks), "--cluster-grace", "2", *options],
@@ -202,6 +203,7 @@ class ClusterTest(unittest.TestCase):
     def interrupt(self, how):
         build = self.start(16384, 8)
         self.wait_for(self.tasks, "running task")
+        name = self.task_name()
         build.send_signal(how)
         _, messages = self.end(build, 30)
         self.assertNotEqual(build.returncode, 0)
@@ -212,18 +214,50 @@ class ClusterTest(unittest.TestCase):
         report, _ = self.finish(self.start(16384, 8), 16384)
         self.assertEqual(report["cluster"]["batches"], 8)
         self.assertEqual(report["cluster"]["failed_attempts"], 0)
+        # What ran at the interruption is what was taken over: nothing was submitted twice.
+        self.wait_for_tasks(name, {"COMPLETED": 8})
 
     def queue(self):
         return self.cluster.command("squeue", "--noheader", "--array").stdout
 
+    def task_name(self):
+        """Of the tasks of this build."""
+        return "voxdag-" + json.loads((self.work / "cluster/cluster.json").read_text())["build"]
+
+    def submitted(self, name):
+        """How many tasks or jobs of this name were ever submitted, by their states."""
+        states = self.cluster.command("squeue", "--noheader", "--array", "--states=all",
+                                      f"--name={name}", "--format=%T").stdout.split()
+        return {state: states.count(state) for state in set(states)}
+
+    def wait_for_tasks(self, name, expected):
+        """Slurm learns a little later than the build that a task has ended."""
+        self.wait_for(lambda: self.submitted(name) == expected,
+                      lambda: f"{expected} of {self.submitted(name)}", 15)
+
+    def test_two_builds_at_once(self):
+        build = self.start(16384, 4)
+        a_task = self.a_task()
+        os.kill(a_task, signal.SIGSTOP)
+        second = self.start(16384, 4)
+        self.addCleanup(second.communicate)
+        self.addCleanup(second.kill)
+        self.assertIn("is in use by another build: waiting up to 30 s", second.stderr.readline())
+        os.kill(a_task, signal.SIGCONT)
+        second.kill()
+        self.finish(build, 16384)
+
     def test_restart_stops_the_tasks(self):
         build = self.start(16384, 8)
-        self.wait_for(self.tasks, "running task")
+        # It would run on for ever.
+        os.kill(self.a_task(), signal.SIGSTOP)
+        name = self.task_name()
         build.kill()
         self.end(build)
         report, _ = self.finish(self.start(2048, 2, "--restart"), 2048)
         self.assertEqual(report["cluster"]["batches"], 2)
-        self.wait_for(lambda: not self.queue(), "empty queue")
+        self.wait_for(lambda: not self.queue() and not self.tasks(), "end of all tasks")
+        self.assertIn("CANCELLED", self.submitted(name))
 
     def test_the_rest_can_be_built_here(self):
         build = self.start(16384, 8)
@@ -298,9 +332,82 @@ class ClusterTest(unittest.TestCase):
             self.wait_for(lambda: service.job(job)["state"] == "succeeded", "result", 120)
             self.assertEqual(service.job(job)["result"]["sha256"], self.sha256(32768))
 
+    def start_with_merge_job(self, *options):
+        return self.start(16384, 4, "--cluster-merge", *options)
+
+    def wait_for_merge_job(self):
+        self.wait_for(lambda: "-merge" in self.cluster.command(
+            "squeue", "--noheader", "--format=%j").stdout, "job that merges")
+        return self.task_name() + "-merge"
+
+    def test_the_merge_job_needs_nobody(self):
+        build = self.start_with_merge_job()
+        name = self.wait_for_merge_job()
+        build.kill()
+        self.end(build)
+        self.wait_for(lambda: not self.work.exists(), "finished build")
+        self.wait_for_tasks(name, {"COMPLETED": 1})
+        report, _ = self.finish(self.start_with_merge_job(), 16384)
+        self.assertEqual(report, json.loads(Path(f"{self.output}.report.json").read_text()))
+        self.assertEqual(report["cluster"]["batches"], 4)
+        self.assertEqual(self.queue(), "", "something was submitted again")
+
+    def test_a_killed_merge_job_is_submitted_again(self):
+        build = self.start_with_merge_job()
+        stopped = self.a_task()
+        os.kill(stopped, signal.SIGSTOP)
+        name = self.wait_for_merge_job()
+        # It attaches.
+        build.send_signal(signal.SIGINT)
+        _, messages = self.end(build)
+        self.assertIn("and its tasks run on", messages)
+        build = self.start_with_merge_job()
+        time.sleep(1)
+        self.cluster.command("scancel", f"--name={name}")
+        _, messages = self.end(build)
+        self.assertEqual(build.returncode, 6)
+        self.assertRegex(messages, r"job \d+ that merges has ended without a result: CANCELLED")
+        os.kill(stopped, signal.SIGCONT)
+        report, _ = self.finish(self.start_with_merge_job(), 16384)
+        self.assertEqual(report["cluster"]["batches"], 4)
+        self.wait_for_tasks(name, {"CANCELLED": 1, "COMPLETED": 1})
+
+    @slow
+    def test_a_task_that_is_out_of_time(self):
+        build = self.start(16384, 4, "--cluster-options", "--time=1")
+        os.kill(self.a_task(), signal.SIGSTOP)
+        report, messages = self.finish(build, 16384)
+        self.assertRegex(messages, "TIMEOUT.*; it is split and submitted again")
+        self.assertEqual(report["cluster"]["batches"], 5)
+        self.assertEqual(report["cluster"]["failed_attempts"], 1)
+
+    @slow
+    def test_a_task_that_is_out_of_memory(self):
+        # No task can do with so little. Without cgroups Slurm calls that FAILED or CANCELLED, too.
+        build = self.start(32768, 2, "--cluster-options", "--mem=8M", "--cluster-retries", "0")
+        _, messages = self.end(build)
+        self.assertEqual(build.returncode, 10, messages)
+        self.assertRegex(messages, "(OUT_OF_MEMORY|FAILED|CANCELLED).*; it has failed 1 times")
+        self.assertIn("exceeded memory limit", self.logs())
+        self.finish(self.start(32768, 2, "--cluster-options", "--mem=1G"), 32768)
+
+    @slow
+    def test_a_preempted_task(self):
+        build = self.start(16384, 4)
+        node, pids = random.choice(sorted(self.wait_for(self.tasks, "running task").items()))
+        for pid in pids:
+            os.kill(pid, signal.SIGSTOP)
+        self.cluster.command("sbatch", "--partition=urgent", f"--nodelist={node}", "--exclusive",
+                             "--output=/dev/null", "--wrap=sleep 1")
+        report, _ = self.finish(build, 16384)
+        self.assertEqual(report["cluster"]["batches"], 4)
+        self.assertFalse(any(Path(f"/proc/{pid}").exists() for pid in pids), "not preempted")
+
     @slow
     def test_twenty_random_kills(self):
         build = self.start(65536, 24, "--cluster-retries", "30")
+        self.wait_for(self.tasks, "running task")
+        name = self.task_name()
         kills = 0
         while build.poll() is None and kills < 20:
             time.sleep(random.uniform(0.02, 0.2))
@@ -317,6 +424,10 @@ class ClusterTest(unittest.TestCase):
         report, _ = self.finish(build, 65536)
         print(f"{kills} kills, {report['cluster']['failed_attempts']} failed attempts", flush=True)
         self.assertEqual(kills, 20)
+        # A task was submitted for each batch and for each attempt that failed, and for nothing that
+        # a record names.
+        self.assertEqual(sum(self.submitted(name).values()),
+                         report["cluster"]["batches"] + report["cluster"]["failed_attempts"])
 
 
 class Service:

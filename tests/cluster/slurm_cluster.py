@@ -94,7 +94,10 @@ class SlurmCluster:
             f"SlurmdLogFile={self.folder}/log/slurmd-%n",
             "ProctrackType=proctrack/linuxproc",
             "TaskPlugin=task/none",
-            "JobAcctGatherType=jobacct_gather/none",
+            # A task that takes more memory than it was given is killed, within a second.
+            "JobAcctGatherType=jobacct_gather/linux",
+            "JobAcctGatherFrequency=task=1",
+            "JobAcctGatherParams=OverMemoryKill",
             "AccountingStorageType=accounting_storage/none",
             "SelectType=select/cons_tres",
             "SelectTypeParameters=CR_CPU_Memory",
@@ -106,7 +109,9 @@ class SlurmCluster:
             "SlurmctldTimeout=10",
             "InactiveLimit=0",
             "KillWait=2",
-            "MinJobAge=300",
+            "MinJobAge=3600",
+            "PreemptType=preempt/partition_prio",
+            "PreemptMode=REQUEUE",
             "MaxArraySize=101",
             "SlurmdParameters=config_overrides",
             self.settings,
@@ -116,6 +121,8 @@ class SlurmCluster:
                          f"CPUs={self.cpus} RealMemory=4096 State=UNKNOWN")
         lines.append(f"PartitionName=all Nodes={','.join(self.nodes)} Default=YES MaxTime=INFINITE "
                      "State=UP DefMemPerCPU=512")
+        lines.append(f"PartitionName=urgent Nodes={','.join(self.nodes)} PriorityTier=10 "
+                     "PreemptMode=OFF")
         (self.folder / "slurm.conf").write_text("\n".join(lines) + "\n")
 
     def spawn(self, name, command):
@@ -157,7 +164,8 @@ class SlurmCluster:
                               timeout=60, check=check)
 
     def count_idle(self):
-        shown = self.command("sinfo", "--noheader", "--Node", "--format=%N %T", check=False)
+        shown = self.command("sinfo", "--noheader", "--Node", "--partition=all",
+                             "--format=%N %T", check=False)
         return sum(line.split()[1:] == ["idle"] for line in shown.stdout.splitlines())
 
     def wait_for(self, condition, what, seconds=60):

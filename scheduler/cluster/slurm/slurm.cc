@@ -59,6 +59,20 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
+// The script that runs a command, without the end of its last line.
+std::string script_line(const std::vector<std::string>& command) {
+  std::string line = "#!/bin/sh\nexec";
+  for (const std::string& word : command) line += " " + quoted(word);
+  return line;
+}
+
+// sbatch replaces what follows a percent sign: in the name of the log only.
+std::string output_option(const std::string& log_folder, const std::string& name) {
+  std::string option = "--output=";
+  for (const char c : log_folder) option += c == '%' ? "%%" : std::string(1, c);
+  return option + "/" + name;
+}
+
 // The value in "... NAME=value ...", up to the next blank.
 std::string field(const std::string& text, const std::string& name) {
   size_t at = text.find(name + "=");
@@ -68,6 +82,12 @@ std::string field(const std::string& text, const std::string& name) {
   at += name.size() + 1;
   const std::string value = text.substr(at, text.find(' ', at) - at);
   return value == "(null)" ? "" : trimmed(value);
+}
+
+// Whether the value of an option may be the word after it.
+bool takes_next_word(const std::string& option) {
+  return option.starts_with("--") ? option.find('=') == std::string::npos
+                                  : option.starts_with('-') && option.size() == 2;
 }
 
 // Whether a later try may succeed.
@@ -126,6 +146,13 @@ void Slurm::check(const std::vector<std::string>& options, double pause_s, Progr
                     "--cluster-options: " + option +
                         " is not for the user: expected options such as --partition, --mem, --time "
                         "(--cluster-running limits how many tasks run at a time)");
+  // sbatch takes any other word for a script, and the rest for its arguments.
+  for (size_t i = 0; i < options.size(); ++i) {
+    const bool may_be_value = i > 0 && takes_next_word(options[i - 1]);
+    if (!options[i].starts_with('-') && !may_be_value)
+      throw Error(ErrorCode::kInvalidInput,
+                  "--cluster-options: '" + options[i] + "': expected options, which begin with -");
+  }
   std::vector<std::string> command{"sbatch", "--test-only"};
   command.insert(command.end(), options.begin(), options.end());
   CommandResult tested = run(command, "#!/bin/sh\nexit 0\n");
@@ -167,17 +194,13 @@ void Slurm::submit(const ArrayRequest& request, std::map<uint32_t, SlurmTask>& t
   std::vector<uint32_t> batches = request.batches;
   std::ranges::sort(batches);
   for (const uint32_t batch : batches) arrays[batch / size * size].push_back(batch % size);
-  std::string line = "exec";
-  for (const std::string& word : request.command) line += " " + quoted(word);
-  // sbatch replaces what follows a percent sign.
-  std::string log_folder;
-  for (const char c : request.log_folder) log_folder += c == '%' ? "%%" : std::string(1, c);
+  const std::string line = script_line(request.command);
   std::vector<std::pair<uint32_t, std::vector<uint32_t>>> left(arrays.begin(), arrays.end());
   std::ranges::reverse(left);
   while (!left.empty()) {
     auto [first, indexes] = std::move(left.back());
     left.pop_back();
-    std::vector<std::string> command{"sbatch", "--output=" + log_folder + "/log-%A_%a.txt",
+    std::vector<std::string> command{"sbatch", output_option(request.log_folder, "log-%A_%a.txt"),
                                      "--open-mode=append", "--requeue"};
     command.insert(command.end(), request.options.begin(), request.options.end());
     const std::string limit =
@@ -186,24 +209,16 @@ void Slurm::submit(const ArrayRequest& request, std::map<uint32_t, SlurmTask>& t
                    {"--parsable", "--job-name=" + request.name,
                     "--comment=" + std::to_string(first), "--array=" + ranges(indexes) + limit});
     const CommandResult submitted =
-        run(command,
-            "#!/bin/sh\n" + line + " $((" + std::to_string(first) + " + SLURM_ARRAY_TASK_ID))\n");
-    // JOB, or JOB;CLUSTER.
-    const std::string job = trimmed(submitted.output.substr(0, submitted.output.find(';')));
+        run(command, line + " $((" + std::to_string(first) + " + SLURM_ARRAY_TASK_ID))\n");
     // Half of it may be taken now. If some are, the rest waits until they have ended.
-    if (!number(job) && is_too_much(submitted) && indexes.size() > 1 && tasks.empty()) {
+    if (submitted.exit_status != 0 && is_too_much(submitted) && indexes.size() > 1 &&
+        tasks.empty()) {
       const auto middle = indexes.begin() + static_cast<ptrdiff_t>(indexes.size() / 2);
       left.push_back({first, {middle, indexes.end()}});
       left.push_back({first, {indexes.begin(), middle}});
       continue;
     }
-    if (!number(job))
-      throw Error(is_unreachable(submitted) || is_too_much(submitted) || may_be_starting(submitted)
-                      ? ErrorCode::kIo
-                      : ErrorCode::kInvalidInput,
-                  "sbatch refused the array: " + trimmed(submitted.error + submitted.output) +
-                      ": expected a job id (--cluster-options)");
-    without_nodes_since_s_.reset();
+    const std::string job = accepted_job(submitted);
     for (const uint32_t index : indexes)
       tasks[first + index] = {.job = job,
                               .index = index,
@@ -212,6 +227,41 @@ void Slurm::submit(const ArrayRequest& request, std::map<uint32_t, SlurmTask>& t
                               .node = "",
                               .first_batch = first};
   }
+}
+
+std::string Slurm::accepted_job(const CommandResult& submitted) {
+  const std::string job = trimmed(submitted.output.substr(0, submitted.output.find(';')));
+  if (!number(job))
+    throw Error(is_unreachable(submitted) || is_too_much(submitted) || may_be_starting(submitted)
+                    ? ErrorCode::kIo
+                    : ErrorCode::kInvalidInput,
+                "sbatch refused: " + trimmed(submitted.error + submitted.output) +
+                    ": expected a job id (--cluster-options)");
+  without_nodes_since_s_.reset();
+  return job;
+}
+
+std::string Slurm::submit_job(const JobRequest& request) {
+  std::vector<std::string> command{"sbatch", output_option(request.log_folder, "log-%j.txt"),
+                                   "--open-mode=append", "--requeue"};
+  command.insert(command.end(), request.options.begin(), request.options.end());
+  command.insert(command.end(),
+                 {"--parsable", "--job-name=" + request.name, "--chdir=" + request.folder});
+  std::string after;
+  for (const std::string& job : request.after) after += ":" + job;
+  if (!after.empty()) command.push_back("--dependency=afterany" + after);
+  return accepted_job(run(command, script_line(request.command) + "\n"));
+}
+
+std::optional<std::vector<SlurmJob>> Slurm::jobs(const std::string& name) {
+  const CommandResult listed =
+      run({"squeue", "--noheader", "--all", "--name=" + name, "--format=%i|%T|%r"});
+  if (listed.exit_status != 0) return std::nullopt;
+  std::vector<SlurmJob> jobs;
+  for (const std::string& line : split(listed.output, '\n'))
+    if (const std::vector<std::string> fields = split(line, '|'); fields.size() == 3)
+      jobs.push_back({fields[0], fields[1], trimmed(fields[2])});
+  return jobs;
 }
 
 std::optional<std::vector<SlurmTask>> Slurm::active(const std::string& name) {
@@ -234,9 +284,9 @@ std::optional<std::vector<SlurmTask>> Slurm::active(const std::string& name) {
   return tasks;
 }
 
-std::optional<SlurmEnd> Slurm::end_of(const SlurmTask& task) {
+std::optional<SlurmEnd> Slurm::end_of(const std::string& task) {
   SlurmEnd end;
-  const CommandResult shown = run({"scontrol", "--oneliner", "show", "job", task.name()});
+  const CommandResult shown = run({"scontrol", "--oneliner", "show", "job", task});
   if (shown.exit_status != 0 && is_unreachable(shown)) return std::nullopt;
   if (shown.exit_status == 0) {
     end.state = field(shown.output, "JobState");
@@ -246,9 +296,8 @@ std::optional<SlurmEnd> Slurm::end_of(const SlurmTask& task) {
   }
   const std::string accounting = setting("AccountingStorageType");
   if (!end.state.empty() || accounting.empty() || accounting.ends_with("none")) return end;
-  const CommandResult accounted =
-      run({"sacct", "--noheader", "--parsable2", "--allocations", "--jobs=" + task.name(),
-           "--format=State,NodeList,ExitCode"});
+  const CommandResult accounted = run({"sacct", "--noheader", "--parsable2", "--allocations",
+                                       "--jobs=" + task, "--format=State,NodeList,ExitCode"});
   const std::vector<std::string> fields =
       split(accounted.output.substr(0, accounted.output.find('\n')), '|');
   if (accounted.exit_status == 0 && fields.size() == 3)

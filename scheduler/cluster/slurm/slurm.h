@@ -49,6 +49,22 @@ struct ArrayRequest {
   uint64_t max_running = 0;          // tasks at a time; 0 for no limit
 };
 
+// A job of its own, no array.
+struct JobRequest {
+  std::string name;
+  std::vector<std::string> command;
+  std::vector<std::string> after;  // jobs that have to end first
+  std::string folder;              // in which the command runs
+  std::string log_folder;
+  std::vector<std::string> options;  // of sbatch
+};
+
+struct SlurmJob {
+  std::string id;
+  std::string state;
+  std::string reason;  // why it waits
+};
+
 class Slurm {
  public:
   // `cancel` ends a command that runs. For some seconds after its start Slurm knows no nodes, and
@@ -66,8 +82,12 @@ class Slurm {
   void submit(const ArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks);
   // All tasks of that name that wait or run; nothing if Slurm does not answer now.
   std::optional<std::vector<SlurmTask>> active(const std::string& name);
-  // Nothing if Slurm does not answer now.
-  std::optional<SlurmEnd> end_of(const SlurmTask& task);
+  // Submits a job and returns its id. Throws as submit() does.
+  std::string submit_job(const JobRequest& request);
+  // All jobs of that name that wait or run; nothing if Slurm does not answer now.
+  std::optional<std::vector<SlurmJob>> jobs(const std::string& name);
+  // How a task JOB_INDEX or a job ended; nothing if Slurm does not answer now.
+  std::optional<SlurmEnd> end_of(const std::string& task);
   // Returns whether Slurm has taken it.
   bool cancel(const std::string& name);
   // Commands so far.
@@ -77,6 +97,8 @@ class Slurm {
   static constexpr double kTimeout_s = 60;
 
   CommandResult run(const std::vector<std::string>& command, const std::string& input = "");
+  // The job's id that sbatch printed, JOB or JOB;CLUSTER.
+  std::string accepted_job(const CommandResult& submitted);
   // A setting of slurm.conf, "" if unknown.
   std::string setting(const std::string& name);
   // Whether Slurm refused for want of nodes that it may not know yet.

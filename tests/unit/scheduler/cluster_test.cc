@@ -11,62 +11,10 @@
 #include "scheduler/cluster/run_batch.h"
 #include "scheduler/run_build.h"
 #include "tests/unit/base/error_of.h"
-#include "tests/unit/io/temporary_folder.h"
 #include "tests/unit/scheduler/played_slurm.h"
-#include "tests/unit/scheduler/spheres_build.h"
 
 namespace voxdag {
 namespace {
-
-class Warnings : public NoProgress {
- public:
-  void warn(std::string_view message) override { text += std::string(message) + "\n"; }
-  std::string text;
-};
-
-class Cluster : public testing::Test {
- protected:
-  void SetUp() override {
-    write_spheres(scene(), 20000);
-    expected_ = run_build(local_spec(), context()).sha256;
-    warnings_.text.clear();
-  }
-  std::string scene() const { return folder_.file("scene.glb"); }
-  std::string output() const { return folder_.file("out.vdag"); }
-  BuildSpec local_spec() const { return spheres_build(scene(), output()); }
-  BuildSpec spec(uint64_t tasks) {
-    BuildSpec cluster = local_spec();
-    cluster.run.subvolume_edge = 64;
-    cluster.run.cluster.emplace();
-    ClusterOptions& options = *cluster.run.cluster;
-    options.engine = "slurm";
-    options.tasks = tasks;
-    options.program_path = "/usr/bin/voxdag";
-    options.program_version = kVersion;
-    options.grace_s = 0;
-    options.slurm_interval_s = 0.01;
-    options.commands = &slurm_;
-    return cluster;
-  }
-  BuildContext context() { return {system_files(), warnings_, cancel_}; }
-  // Builds on the cluster, and expects the bytes of this machine.
-  BuildReport build(const BuildSpec& cluster_spec) {
-    BuildReport report = run_build(cluster_spec, context());
-    EXPECT_EQ(report.sha256, expected_);
-    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
-    return report;
-  }
-  size_t count(const std::string& program) const {
-    return static_cast<size_t>(std::ranges::count_if(
-        slurm_.commands, [&](const auto& command) { return command[0] == program; }));
-  }
-
-  const TemporaryFolder folder_;
-  PlayedSlurm slurm_;
-  Warnings warnings_;
-  CancelToken cancel_;
-  std::string expected_;
-};
 
 TEST_F(Cluster, SameBytesFromAnyNumberOfTasks) {
   for (const uint64_t tasks : {1, 2, 7, 30}) {
@@ -114,7 +62,7 @@ TEST_F(Cluster, TooManyFailuresEndTheBuildAndTheNextRunGoesOn) {
   hasty.run.cluster->max_retries = 1;
   slurm_.fates = {"", "FAILED", "", "FAILED"};
   const Error error = error_of([&] { run_build(hasty, context()); });
-  EXPECT_EQ(error.code(), ErrorCode::kIo);
+  EXPECT_EQ(error.code(), ErrorCode::kLimit);
   EXPECT_NE(error.message().find("batch 1, task 2_1 on n7: FAILED; it has failed 2 times"),
             std::string::npos)
       << error.message();
@@ -163,6 +111,14 @@ TEST_F(Cluster, BadOptionsAreRefusedBeforeTheSceneIsRead) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
     EXPECT_NE(error.message().find("is not for the user"), std::string::npos) << error.message();
   }
+  for (const char* option :
+       {"script.sh", "--mem=8G script.sh", "-n1 script.sh", "-n 1 script.sh"}) {
+    SCOPED_TRACE(option);
+    BuildSpec refused = spec(1);
+    refused.run.cluster->submit_options = option;
+    EXPECT_NE(error_of([&] { run_build(refused, context()); }).message().find("'script.sh'"),
+              std::string::npos);
+  }
   EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
 }
 
@@ -208,7 +164,7 @@ TEST_F(Cluster, ALostStateCostsNothingThatIsBuilt) {
     BuildSpec four = spec(4);
     four.run.cluster->max_retries = 0;
     slurm_.fates = {"", "", "FAILED", ""};
-    EXPECT_EQ(error_of([&] { run_build(four, context()); }).code(), ErrorCode::kIo);
+    EXPECT_EQ(error_of([&] { run_build(four, context()); }).code(), ErrorCode::kLimit);
     const std::string state = output() + ".work/cluster/cluster.json";
     if (is_lost) {
       std::filesystem::remove(state);
@@ -226,7 +182,7 @@ TEST_F(Cluster, BatchesOfAnotherPlanAreNotTakenOver) {
   BuildSpec fine = spec(4);
   fine.run.cluster->max_retries = 0;
   slurm_.fates = {"", "", "FAILED", ""};
-  EXPECT_EQ(error_of([&] { run_build(fine, context()); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(error_of([&] { run_build(fine, context()); }).code(), ErrorCode::kLimit);
   const std::string cluster = output() + ".work/cluster";
   const std::string copy = folder_.file("copy");
   std::filesystem::copy(cluster, copy, std::filesystem::copy_options::recursive);
@@ -235,7 +191,7 @@ TEST_F(Cluster, BatchesOfAnotherPlanAreNotTakenOver) {
   coarse.run.restart = true;
   coarse.run.cluster->max_retries = 0;
   slurm_.fates = {"FAILED", "FAILED"};
-  EXPECT_EQ(error_of([&] { run_build(coarse, context()); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(error_of([&] { run_build(coarse, context()); }).code(), ErrorCode::kLimit);
   std::filesystem::remove_all(cluster);
   std::filesystem::copy(copy, cluster, std::filesystem::copy_options::recursive);
   coarse.run.restart = false;
@@ -246,7 +202,7 @@ TEST_F(Cluster, ARestartOnThisMachineStopsTheTasks) {
   BuildSpec four = spec(4);
   four.run.cluster->max_retries = 0;
   slurm_.fates = {"", "", "FAILED", ""};
-  EXPECT_EQ(error_of([&] { run_build(four, context()); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(error_of([&] { run_build(four, context()); }).code(), ErrorCode::kLimit);
   BuildSpec again = spec(4);
   again.run.restart = true;
   slurm_.commands.clear();
@@ -258,7 +214,7 @@ TEST_F(Cluster, ThisMachineTakesOverWhatTasksHaveBuilt) {
   BuildSpec four = spec(4);
   four.run.cluster->max_retries = 0;
   slurm_.fates = {"", "", "FAILED", ""};
-  EXPECT_EQ(error_of([&] { run_build(four, context()); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(error_of([&] { run_build(four, context()); }).code(), ErrorCode::kLimit);
   BuildSpec local = local_spec();
   local.run.subvolume_edge = 64;
   const BuildReport report = run_build(local, context());

@@ -1,20 +1,27 @@
-// A Slurm that is played by a test: its tasks run in this process, and end as the test says.
+// A Slurm that is played by a test: its tasks run in this process, and end as the test says. And
+// the fixture of tests that build with it.
 #pragma once
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <climits>
 #include <deque>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "scheduler/cluster/run_batch.h"
 #include "scheduler/cluster/slurm/command_runner.h"
+#include "scheduler/run_build.h"
+#include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/scheduler/spheres_build.h"
 
 namespace voxdag {
 
@@ -36,6 +43,9 @@ class PlayedSlurm : public CommandRunner {
   std::string program = kVersion;
   std::string temporary_folder;
   std::function<void(uint32_t batch)> before_task;
+  std::function<void()> merge_job;  // what it does
+  std::string waiting_merge_job;    // its id
+  std::string merge_end = "COMPLETED Reason=None ExitCode=0:0";
 
   CommandResult run(const std::vector<std::string>& command, const std::string& input, double,
                     const CancelToken&) override {
@@ -44,6 +54,7 @@ class PlayedSlurm : public CommandRunner {
       return command[1] != "--test-only"                    ? submit(command, input)
              : test_refusal.empty() || test_refusals-- <= 0 ? ok("")
                                                             : CommandResult{1, "", test_refusal};
+    if (command[0] == "squeue" && command[3].ends_with("-merge")) return show_merge_job();
     if (command[0] == "squeue") {
       if (squeue_failures > 0) {
         --squeue_failures;
@@ -60,6 +71,15 @@ class PlayedSlurm : public CommandRunner {
   }
 
  private:
+  // A job that merges does its work as soon as somebody asks for it, and is gone then.
+  CommandResult show_merge_job() {
+    if (waiting_merge_job.empty()) return ok("");
+    const std::string id = std::exchange(waiting_merge_job, "");
+    ends[id] = "JobState=" + merge_end;
+    if (merge_job) merge_job();
+    return ok(id + "|RUNNING|None\n");
+  }
+
   static CommandResult ok(const std::string& output) { return {0, output, ""}; }
 
   CommandResult submit(const std::vector<std::string>& command, const std::string& script) {
@@ -72,6 +92,7 @@ class PlayedSlurm : public CommandRunner {
         first = static_cast<uint32_t>(std::stoul(word.substr(10)));
       if (word.starts_with("--array=")) indexes = word.substr(8);
     }
+    if (indexes.empty()) return ok((waiting_merge_job = job) + "\n");
     EXPECT_NE(script.find("$((" + std::to_string(first) + " + SLURM_ARRAY_TASK_ID))"),
               std::string::npos);
     std::vector<unsigned long> tasks;
@@ -123,6 +144,57 @@ class PlayedSlurm : public CommandRunner {
 
   int jobs = 0;
   std::map<std::string, std::string> ends;
+};
+
+// Builds on a played cluster, and their bytes on this machine.
+class Warnings : public NoProgress {
+ public:
+  void warn(std::string_view message) override { text += std::string(message) + "\n"; }
+  std::string text;
+};
+
+class Cluster : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_spheres(scene(), 20000);
+    expected_ = run_build(local_spec(), context()).sha256;
+    warnings_.text.clear();
+  }
+  std::string scene() const { return folder_.file("scene.glb"); }
+  std::string output() const { return folder_.file("out.vdag"); }
+  BuildSpec local_spec() const { return spheres_build(scene(), output()); }
+  BuildSpec spec(uint64_t tasks) {
+    BuildSpec cluster = local_spec();
+    cluster.run.subvolume_edge = 64;
+    cluster.run.cluster.emplace();
+    ClusterOptions& options = *cluster.run.cluster;
+    options.engine = "slurm";
+    options.tasks = tasks;
+    options.program_path = "/usr/bin/voxdag";
+    options.program_version = kVersion;
+    options.grace_s = 0;
+    options.slurm_interval_s = 0.01;
+    options.commands = &slurm_;
+    return cluster;
+  }
+  BuildContext context() { return {system_files(), warnings_, cancel_}; }
+  // Builds on the cluster, and expects the bytes of this machine.
+  BuildReport build(const BuildSpec& cluster_spec) {
+    BuildReport report = run_build(cluster_spec, context());
+    EXPECT_EQ(report.sha256, expected_);
+    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
+    return report;
+  }
+  size_t count(const std::string& program) const {
+    return static_cast<size_t>(std::ranges::count_if(
+        slurm_.commands, [&](const auto& command) { return command[0] == program; }));
+  }
+
+  const TemporaryFolder folder_;
+  PlayedSlurm slurm_;
+  Warnings warnings_;
+  CancelToken cancel_;
+  std::string expected_;
 };
 
 }  // namespace voxdag

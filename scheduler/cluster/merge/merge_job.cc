@@ -1,0 +1,180 @@
+#include "scheduler/cluster/merge/merge_job.h"
+
+#include <algorithm>
+#include <set>
+#include <thread>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "core/scene/triangle_source.h"
+#include "scheduler/cluster/cluster_state.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kMaxReportBytes = uint64_t{1} << 24;
+// Between two looks at the files.
+constexpr double kFilesPause_s = 0.5;
+// Of the end of a log, for a message.
+constexpr uint64_t kMaxTailBytes = 600;
+
+// The last lines of a file; "" if it cannot be read.
+std::string tail(FileSystem& files, const std::string& path) {
+  try {
+    const auto file = files.open_read(path);
+    const uint64_t bytes = std::min(file->size(), kMaxTailBytes);
+    std::string text(static_cast<size_t>(bytes), '\0');
+    file->read_at(file->size() - bytes, std::as_writable_bytes(std::span(text)));
+    if (bytes < file->size()) text.erase(0, text.find('\n') + 1);
+    while (text.ends_with('\n')) text.pop_back();
+    return text;
+  } catch (const Error&) {
+    return "";
+  }
+}
+
+// The code whose exit status Slurm has seen, in STATUS:SIGNAL.
+ErrorCode code_of(const SlurmEnd& end) {
+  for (int code = 0; code <= static_cast<int>(ErrorCode::kLimit); ++code)
+    if (end.exit_code == std::to_string(exit_status(static_cast<ErrorCode>(code))) + ":0")
+      return static_cast<ErrorCode>(code);
+  return ErrorCode::kIo;
+}
+
+std::string merge_request_of(const BuildSpec& spec, const BuildContext& context) {
+  MemoryBudget budget(spec.run.memory_bytes);
+  const auto scene = open_scene(context.files, spec.geometry.scenes, {spec.geometry.skip_invalid},
+                                budget, context.cancel);
+  std::string text = geometry_json(spec.geometry);
+  for (const auto& [path, identity] : scene->files())
+    text += '\0' + path + '\0' + std::to_string(identity.bytes) + '\0' +
+            std::to_string(identity.modified_ns);
+  return sha256_hex(text);
+}
+
+}  // namespace
+
+MergeJob::MergeJob(const BuildSpec& spec, const std::string& work_folder,
+                   const BuildContext& context, CommandRunner& commands)
+    : spec_(spec),
+      options_(*spec.run.cluster),
+      context_(context),
+      folder_(work_folder),
+      slurm_(commands, context.cancel),
+      request_(merge_request_of(spec, context)) {}
+
+std::optional<BuildReport> MergeJob::finished() const {
+  const std::string path = report_path(spec_.run.output);
+  try {
+    if (!context_.files.exists(path)) return std::nullopt;
+    const BuildReport report =
+        decode_report(read_small_file(context_.files, path, kMaxReportBytes));
+    if (report.merge_request == request_ &&
+        context_.files.open_read(spec_.run.output)->size() == report.bytes)
+      return report;
+  } catch (const Error&) {
+    // Whatever it is, it is no report of such a job.
+  }
+  return std::nullopt;
+}
+
+void MergeJob::forget_finished() {
+  if (finished()) context_.files.remove(report_path(spec_.run.output));
+}
+
+std::optional<std::vector<SlurmJob>> MergeJob::ask() {
+  const auto jobs = slurm_.jobs(name_);
+  if (!jobs && is_answering_)
+    context_.progress.warn("Slurm does not answer (squeue): waiting for it");
+  is_answering_ = jobs.has_value();
+  return jobs;
+}
+
+bool MergeJob::is_alive() {
+  const auto state = read_cluster_state(context_.files, folder_.work_folder());
+  if (!state) return false;
+  name_ = state->merge_job_name();
+  for (;;) {
+    if (const auto jobs = ask()) return !jobs->empty();
+    std::this_thread::sleep_for(std::chrono::duration<double>(options_.slurm_interval_s));
+    context_.cancel.check();
+  }
+}
+
+bool MergeJob::is_done() const {
+  return finished() && (spec_.run.keep_work || !context_.files.exists(folder_.work_folder()));
+}
+
+BuildReport MergeJob::follow(const std::string& submitted) {
+  std::string id = submitted;
+  double asked_s = -options_.slurm_interval_s, gone_since_s = 0;
+  if (const auto state = read_cluster_state(context_.files, folder_.work_folder()))
+    name_ = state->merge_job_name();
+  context_.progress.begin_stage("build", 0, "batches");
+  for (;;) {
+    if (is_done()) break;
+    show_progress();
+    const double now_s = wall_seconds();
+    if (now_s - asked_s >= options_.slurm_interval_s) {
+      asked_s = now_s;
+      const auto jobs = ask();
+      if (jobs && !jobs->empty()) {
+        id = jobs->front().id;
+        take_state(jobs->front());
+        gone_since_s = 0;
+      } else if (jobs) {
+        // The shared disk may show what the job wrote later than Slurm its end.
+        if (gone_since_s == 0) gone_since_s = now_s;
+        if (now_s - gone_since_s >= options_.grace_s) {
+          if (finished()) break;
+          fail(id);
+        }
+      }
+    }
+    if (context_.cancel.canceled())
+      throw Error(ErrorCode::kCanceled,
+                  "canceled; job " + id +
+                      " and its tasks run on: run the same command again to follow them, or stop "
+                      "them with voxdag stop-tasks");
+    std::this_thread::sleep_for(
+        std::chrono::duration<double>(std::min(kFilesPause_s, options_.slurm_interval_s)));
+  }
+  context_.progress.end_stage();
+  return *finished();
+}
+
+// Says once that the job runs.
+void MergeJob::take_state(const SlurmJob& job) {
+  if (job.state == "RUNNING" && !is_running_)
+    context_.progress.warn("job " + job.id + " merges: see its log in " + folder_.path());
+  is_running_ = job.state == "RUNNING";
+}
+
+// Batches that are built, by the records of tasks and, once it runs, by what the job has accepted.
+void MergeJob::show_progress() {
+  const auto state = read_cluster_state(context_.files, folder_.work_folder());
+  if (!state) return;
+  std::set<uint32_t> recorded;
+  for (const ClusterFolder::Entry& entry : folder_.list(context_.files))
+    if (entry.kind == ClusterFolder::Kind::kRecord) recorded.insert(entry.batch);
+  const uint64_t open = state->open.size();
+  const uint64_t built = state->totals.batches + std::min<uint64_t>(recorded.size(), open);
+  context_.progress.set_total(state->totals.batches + open);
+  if (built <= shown_built_) return;
+  context_.progress.advance(built - shown_built_);
+  shown_built_ = built;
+}
+
+void MergeJob::fail(const std::string& id) {
+  const auto end = id.empty() ? std::nullopt : slurm_.end_of(id);
+  const std::string log = folder_.path() + "/log-" + id + ".txt";
+  const std::string said = tail(context_.files, log);
+  throw Error(end ? code_of(*end) : ErrorCode::kIo,
+              "the job " + id + " that merges has ended without a result: " +
+                  (end ? end->text() : "Slurm does not say how") +
+                  (said.empty() ? "" : "; its log " + log + " ends with:\n" + said) +
+                  "\nthe same command submits it again");
+}
+
+}  // namespace voxdag
