@@ -144,7 +144,7 @@ class Build {
         const MergeJob merge_job(spec_, work_.path(), context_, commands_of(spec_));
         if (const auto report = merge_job.finished()) {
           report_ = *report;
-          return remove_work();
+          return remove_finished_work();
         }
         report_.merge_request = merge_job.request();
       }
@@ -159,7 +159,7 @@ class Build {
   std::string hand_over(MergeJob& merge_job) {
     std::string id;
     resumable([&] {
-      if (!start_over_ && merge_job.finished()) return remove_work();
+      if (!start_over_ && merge_job.finished()) return remove_finished_work();
       if (!start_over_ && merge_job.is_alive()) return;
       merge_job.forget_finished();
       build_or_resume();
@@ -209,7 +209,7 @@ class Build {
     report_.peak_rss_bytes = peak_resident_bytes();
     write_file_atomically(context_.files, report_path(spec_.run.output),
                           report_json(report_) + "\n");
-    if (!spec_.run.keep_work) remove_work();
+    remove_finished_work();
   }
 
   // Builds what is missing. If stored triangles turn out damaged, the scene is read again; so it is
@@ -433,6 +433,10 @@ class Build {
              "voxdag stop-tasks";
     if (code == ErrorCode::kCanceled) return "; run the same command again to resume";
     return "";
+  }
+
+  void remove_finished_work() {
+    if (!spec_.run.keep_work) remove_work();
   }
 
   void remove_work() {
