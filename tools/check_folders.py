@@ -30,6 +30,7 @@ PRODUCT_INCLUDES = CORE_INCLUDES | {
     "client": ["core/base", "core/io", "core/format"],  # core/format: SHA-256
     "server": CORE + ["scheduler", "query"],
     "cli": CORE + ["scheduler", "query", "client", "server"],
+    "python": CORE + ["scheduler", "query"],
 }
 # Tests mirror the folders, so they include what they test; nothing of the product includes them.
 ANYTHING = list(PRODUCT_INCLUDES)

@@ -1,0 +1,11 @@
+// What module.cc binds.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+namespace voxdag::python {
+
+void bind_build(nanobind::module_& module);  // build and plan
+void bind_dag(nanobind::module_& module);    // finished files
+
+}  // namespace voxdag::python

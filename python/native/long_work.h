@@ -1,0 +1,88 @@
+// Work that takes long, called from Python. It runs on a thread of its own without the interpreter's
+// lock; the calling thread meanwhile looks for signals (Ctrl-C is KeyboardInterrupt, as everywhere in
+// Python) and passes progress and warnings on. So Python code only ever runs on the caller's thread.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <chrono>
+#include <future>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/progress.h"
+
+namespace voxdag::python {
+
+namespace nb = nanobind;
+
+// Keeps the newest state of the work. Thread-safe.
+class LatestProgress : public Progress {
+ public:
+  struct State {
+    std::string stage, unit;
+    uint64_t done = 0, total = 0;
+    friend bool operator==(const State&, const State&) = default;
+  };
+
+  void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
+  void resume_at(uint64_t done) override;
+  void advance(uint64_t count) override;
+  void set_total(uint64_t total) override;
+  void end_stage() override;
+  void warn(std::string_view message) override;
+
+  State state() const;
+  std::vector<std::string> take_warnings();
+
+ private:
+  mutable std::mutex mutex_;
+  State state_;
+  std::vector<std::string> warnings_;
+};
+
+// Between two looks at the work.
+inline constexpr std::chrono::milliseconds kLookInterval{50};
+
+// Passes what is new on to Python, as warnings and calls of `callback` (None for nobody) with stage,
+// done, total and unit; raises what Python code raised, and KeyboardInterrupt.
+class Messenger {
+ public:
+  explicit Messenger(nb::object callback) : callback_(std::move(callback)) {}
+  void pass_on(LatestProgress& progress);
+
+ private:
+  nb::object callback_;
+  LatestProgress::State last_;
+};
+
+// Returns work(progress, cancel), or throws what it threw. If Python code raised something meanwhile,
+// the work is canceled and that is raised.
+template <class Work>
+auto run_long_work(nb::object callback, Work work) {
+  LatestProgress progress;
+  CancelToken cancel;
+  Messenger messenger(std::move(callback));
+  auto result = std::async(std::launch::async, [&] { return work(progress, cancel); });
+  std::optional<nb::python_error> raised;
+  for (bool ends = false; !ends;) {
+    {
+      const nb::gil_scoped_release released;
+      ends = result.wait_for(kLookInterval) == std::future_status::ready;
+    }
+    if (raised) continue;
+    try {
+      messenger.pass_on(progress);
+    } catch (nb::python_error& error) {
+      raised.emplace(std::move(error));
+      cancel.cancel();
+    }
+  }
+  if (raised) throw std::move(*raised);
+  return result.get();
+}
+
+}  // namespace voxdag::python

@@ -1,0 +1,33 @@
+// The native half of the module voxdag; python/voxdag has the half that users see.
+#include <nanobind/nanobind.h>
+
+#include "core/base/error.h"
+#include "core/format/global/open_global.h"
+#include "python/native/bindings.h"
+
+namespace nb = nanobind;
+
+namespace voxdag::python {
+namespace {
+
+// voxdag.Error, which the Python half defines.
+void raise(const Error& error) {
+  const nb::object type = nb::module_::import_("voxdag._error").attr("Error");
+  const nb::object raised = type(error.message(), error_name(error.code()));
+  PyErr_SetObject(type.ptr(), raised.ptr());
+}
+
+}  // namespace
+}  // namespace voxdag::python
+
+NB_MODULE(_native, module) {
+  nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const voxdag::Error& error) {
+      voxdag::python::raise(error);
+    }
+  });
+  voxdag::python::bind_build(module);
+//  voxdag::python::bind_dag(module);
+}

@@ -1,0 +1,45 @@
+"""A small scene that all tests share."""
+
+import numpy as np
+import pytest
+
+import voxdag
+
+
+def torus(around=48, across=24, big=3.0, small=1.25):
+    """Vertices (N, 3) and triangles (M, 3)."""
+    u, v = np.meshgrid(np.arange(around) * 2 * np.pi / around, np.arange(across) * 2 * np.pi / across,
+                       indexing="ij")
+    ring = big + small * np.cos(v)
+    vertices = np.stack([ring * np.cos(u), ring * np.sin(u), small * np.sin(v)], axis=-1)
+    a = np.arange(around)[:, None] * across + np.arange(across)
+    b = np.roll(a, -1, axis=0)
+    c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
+    triangles = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    return vertices.reshape(-1, 3), triangles
+
+
+@pytest.fixture(scope="session")
+def mesh():
+    return torus()
+
+
+@pytest.fixture(scope="session")
+def path(mesh, tmp_path_factory):
+    output = tmp_path_factory.mktemp("dag") / "torus.vdag"
+    voxdag.build(mesh, resolution=64, output=output, memory="64MiB")
+    return output
+
+
+@pytest.fixture()
+def dag(path):
+    with voxdag.open(path) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="session")
+def cells(path):
+    """All voxels as an array, read by lookups."""
+    with voxdag.open(path) as opened:
+        grid = np.stack(np.meshgrid(*[np.arange(64)] * 3, indexing="ij"), axis=-1)
+        return opened.lookup(grid.reshape(-1, 3)).reshape(64, 64, 64)

@@ -1,0 +1,101 @@
+"""Builds from Python: the same bytes as by the command line, and a way out of each."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+import voxdag
+
+
+def test_report_and_progress(mesh, tmp_path):
+    seen = []
+    report = voxdag.build(mesh, resolution=256, output=tmp_path / "a.vdag", threads=2,
+                          progress=lambda *status: seen.append(status))
+    data = (tmp_path / "a.vdag").read_bytes()
+    assert report["sha256"] == hashlib.sha256(data).hexdigest()
+    assert report["triangles"] == len(mesh[1])
+    assert sorted(os.listdir(tmp_path)) == ["a.vdag", "a.vdag.report.json"]
+    assert seen and all(len(status) == 4 and isinstance(status[1], int) for status in seen)
+
+
+def test_the_same_bytes_from_floats_lists_and_integers(mesh, tmp_path):
+    whole = np.round(mesh[0] * 16)
+    digests = {voxdag.build(scene, resolution=64, output=tmp_path / f"{i}.vdag")["sha256"]
+               for i, scene in enumerate([
+                   (whole, mesh[1]), (whole.astype(np.float32), mesh[1].astype(np.uint16)),
+                   (whole.astype(np.int32), mesh[1][:, :]), (whole.tolist(), mesh[1].tolist()),
+                   (np.asfortranarray(whole), mesh[1].astype(np.uint64))])}
+    assert len(digests) == 1
+
+
+def test_doubles_are_kept(tmp_path):
+    # A float32 has no place for the difference; the voxels of both ends have.
+    vertices = np.array([[1e9, 0, 0], [1e9 + 1, 0, 0], [1e9, 1, 0]])
+    voxdag.build((vertices, [[0, 1, 2]]), resolution=16, output=tmp_path / "far.vdag")
+    with voxdag.open(tmp_path / "far.vdag") as dag:
+        assert dag.count() > 100
+        assert dag.voxel_size == pytest.approx(1 / 16, rel=1e-3)
+
+
+def test_bounds(mesh, tmp_path):
+    voxdag.build(mesh, resolution=32, output=tmp_path / "part.vdag", bounds=(0, 0, 0, 4))
+    with voxdag.open(tmp_path / "part.vdag") as dag:
+        assert np.array_equal(dag.bounds, [[0, 0, 0], [4, 4, 4]])
+
+
+def test_plan(mesh):
+    estimate = voxdag.plan(mesh, resolution=1024)
+    assert estimate["voxels"]["low"] <= estimate["voxels"]["likely"] <= estimate["voxels"]["high"]
+
+
+@pytest.mark.parametrize("scene, options, code, text", [
+    ("nowhere.glb", {}, "not_found", "nowhere.glb"),
+    (([[0, 0, 0]], [[0, 0, 1]]), {}, "invalid_input", "triangle 0"),
+    (([[0, 0, 0]], [[0, 0, 0.5]]), {}, "invalid_input", "integers"),
+    (([[0, 0]], [[0, 0, 0]]), {}, "invalid_input", "(N, 3)"),
+    (([[0, 0, 0]], [[0, 0, 0]]), {"resolution": 100}, "invalid_input", "100"),
+    (([[0, 0, 0]], [[0, 0, 0]]), {"colour": True}, "invalid_input", "colour"),
+    (([[0, 0, 0]], [[0, 0, 0]]), {"threads": "many"}, "invalid_input", "threads"),
+    (([[0, 0, 0]], [[0, 0, 0]]), {"memory": "1MiB"}, "invalid_input", "memory"),
+    (([[np.nan, 0, 0]], [[0, 0, 0]]), {}, "invalid_input", "finite"),
+])
+def test_refuses(tmp_path, scene, options, code, text):
+    with pytest.raises(voxdag.Error) as refused:
+        voxdag.build(scene, **{"resolution": 64, "output": tmp_path / "x.vdag", **options})
+    assert refused.value.code == code, refused.value
+    assert text in str(refused.value)
+    assert os.listdir(tmp_path) == []
+
+
+def test_what_progress_raises_ends_the_build(mesh, tmp_path):
+    def stop(*_):
+        raise ZeroDivisionError("enough")
+
+    with pytest.raises(ZeroDivisionError, match="enough"):
+        voxdag.build(mesh, resolution=16384, output=tmp_path / "x.vdag", progress=stop)
+    assert not (tmp_path / "x.vdag").exists()
+
+
+def test_ctrl_c(tmp_path):
+    """The build stops, and the same call resumes it."""
+    program = textwrap.dedent(f"""
+        import sys
+        sys.path[:0] = {sys.path!r}
+        from conftest import torus
+        import voxdag
+        voxdag.build(torus(400, 200), resolution=16384, output={str(tmp_path / "x.vdag")!r}, threads=1,
+                     progress=lambda *status: print(*status, flush=True))
+    """)
+    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    _, messages = process.communicate(timeout=60)
+    assert process.returncode != 0 and "KeyboardInterrupt" in messages
+    assert not (tmp_path / "x.vdag").exists()

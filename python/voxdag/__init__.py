@@ -1,0 +1,18 @@
+"""Builds sparse voxel DAGs of huge triangle scenes, and queries them with numpy arrays.
+
+    report = voxdag.build("scene.glb", resolution=8192, output="scene.vdag")
+    with voxdag.open("scene.vdag") as dag:
+        dag.lookup([[10, 20, 30]])              # is the voxel set?
+        dag.rays(origins, directions)           # what do rays hit?
+        dag.dense(region, level=8)              # a box of the grid of 2^8 cells as an array
+
+Long calls release the interpreter's lock and stop on Ctrl-C. Errors of this package are
+`voxdag.Error`, with a `code`.
+"""
+
+from ._build import Mesh, Progress, Scene, build, plan
+from ._dag import Dag, Hits, Region, open
+from ._error import Error
+
+__all__ = ["Dag", "Error", "Hits", "Mesh", "Progress", "Region", "Scene", "build", "open", "plan"]
+__version__ = "0.1.0"

@@ -1,0 +1,115 @@
+"""Builds from files, and from meshes in memory."""
+
+import json
+import os
+from contextlib import contextmanager
+from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _native
+from ._error import Error
+
+# vertices (N, 3) of float, triangles (M, 3) of integers
+Mesh = Tuple[Any, Any]
+Scene = Union[str, os.PathLike, Sequence[Union[str, os.PathLike]], Mesh]
+# Called with the stage, units done, units in all (0 if unknown) and the unit.
+Progress = Callable[[str, int, int, str], None]
+
+# Rows that are converted and written at a time.
+_ROWS = 1 << 18
+
+
+def build(scene: Scene, *, resolution: int, output: Union[str, os.PathLike],
+          memory: Union[int, str, None] = None, progress: Optional[Progress] = None,
+          **options: Any) -> Dict[str, Any]:
+    """Builds the DAG of a scene, or resumes a build that was interrupted, and returns its report.
+
+    scene       one or several files, together one scene, or a mesh in memory: a tuple of vertices
+                (N, 3), of which doubles are kept as they are, and of indices of triangles (M, 3)
+    resolution  voxels per edge of the grid, a power of two from 4 to 2^20
+    output      the .vdag file to write
+    memory      bytes, or text such as "8GiB"; by default half of what the machine has
+    progress    called now and then; what it raises cancels the build and is raised here
+
+    The other options are those of the command line (docs/cli.md): bounds=(x, y, z, edge), voxel_size,
+    skip_invalid, hash_bits, work, threads, subvolume, backend, method, cache, keep_work, restart,
+    force. The report has the names of `voxdag build --json`. Raises Error.
+    """
+    output = os.fspath(output)
+    with _files_of(scene, output) as files:
+        return _call(_native.build, files, resolution, progress, output=output, memory=memory,
+                     **options)
+
+
+def plan(scene: Scene, *, resolution: int, memory: Union[int, str, None] = None,
+         output: Union[str, os.PathLike, None] = None, progress: Optional[Progress] = None,
+         **options: Any) -> Dict[str, Any]:
+    """What build() would need; builds nothing. The names are those of `voxdag plan --json`."""
+    output = "voxdag-plan" if output is None else os.fspath(output)
+    with _files_of(scene, output) as files:
+        return _call(_native.plan, files, resolution, progress, output=output, memory=memory,
+                     **options)
+
+
+def _call(function: Callable[..., str], files: List[str], resolution: int,
+          progress: Optional[Progress], memory: Union[int, str, None], **options: Any) -> Any:
+    if memory is not None:
+        options["memory"] = str(memory)
+    if options.get("bounds") is not None:
+        options["bounds"] = [float(number) for number in options["bounds"]]
+    for name in ("work", "cache"):
+        if options.get(name) is not None:
+            options[name] = os.fspath(options[name])
+    return json.loads(function(files, resolution, progress, options))
+
+
+@contextmanager
+def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
+    """The files of a scene. A mesh is a PLY file beside the output meanwhile."""
+    if isinstance(scene, (str, os.PathLike)):
+        yield [os.fspath(scene)]
+    elif _is_mesh(scene):
+        path = output + ".scene.ply"
+        try:
+            _write_ply(path, scene)
+            yield [path]
+        finally:
+            if os.path.exists(path):
+                os.remove(path)
+    else:
+        yield [os.fspath(file) for file in scene]
+
+
+def _is_mesh(scene: Scene) -> bool:
+    return (isinstance(scene, (tuple, list)) and len(scene) == 2
+            and not any(isinstance(part, (str, os.PathLike)) for part in scene))
+
+
+def _write_ply(path: str, mesh: Mesh) -> None:
+    vertices, triangles = (np.asarray(part) for part in mesh)
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
+        raise Error(f"the vertices are an array {vertices.shape} of {vertices.dtype}: "
+                    "expected (N, 3) numbers", "invalid_input")
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
+        raise Error(f"the triangles are an array {triangles.shape} of {triangles.dtype}: "
+                    "expected (M, 3) integers", "invalid_input")
+    if len(vertices) >= 1 << 32:
+        raise Error(f"the mesh has {len(vertices)} vertices: expected fewer than 2^32", "limit")
+    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(vertices)):
+        bad = np.flatnonzero(((triangles < 0) | (triangles >= len(vertices))).any(axis=1))[0]
+        raise Error(f"triangle {bad} has the vertices {triangles[bad].tolist()}: expected 0 to "
+                    f"{len(vertices) - 1}", "invalid_input")
+    with open(path, "wb") as file:
+        file.write((f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
+                    "property double x\nproperty double y\nproperty double z\n"
+                    f"element face {len(triangles)}\n"
+                    "property list uchar uint vertex_indices\nend_header\n").encode())
+        for first in range(0, len(vertices), _ROWS):
+            file.write(np.ascontiguousarray(vertices[first:first + _ROWS], dtype="<f8"))
+        for first in range(0, len(triangles), _ROWS):
+            part = triangles[first:first + _ROWS]
+            rows = np.empty(len(part), dtype=[("count", "u1"), ("corners", "<u4", 3)])
+            rows["count"] = 3
+            rows["corners"] = part
+            file.write(rows)

@@ -1,0 +1,218 @@
+"""A finished file, and what can be asked of it."""
+
+import os
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _native
+from ._error import Error
+
+# A half-open box: the low corner x, y, z and the high corner x, y, z.
+Region = Sequence[Any]
+
+
+class Hits(NamedTuple):
+    """What rays hit, one row per ray; a ray that hits nothing has an infinite distance."""
+
+    distance: np.ndarray  # (N,) float64, in units of the length of the ray's direction
+    voxel: np.ndarray  # (N, 3) int64, the low corner of the cell that was hit; -1 for nothing
+    normal: np.ndarray  # (N, 3) int8, of the face; 0 if the ray began inside, or hit nothing
+
+    @property
+    def hit(self) -> np.ndarray:
+        """(N,) bool"""
+        return np.isfinite(self.distance)
+
+
+def open(path: Union[str, os.PathLike]) -> "Dag":
+    """Opens a .vdag file. It is mapped, not read: opening takes no time at any size."""
+    return Dag(path)
+
+
+class Dag:
+    """A finished file. Immutable; any number of threads may ask at the same time.
+
+    Positions are voxels of the finest grid, (N, 3) integers, unless a `level` l says that they are
+    cells of the grid of 2^l per edge, a cell being set where any voxel in it is. A region is
+    half-open, in cells of that grid, and may reach beyond it. With world=True positions, regions and
+    distances are in the units of the scene. `threads` is 0 for all.
+    """
+
+    def __init__(self, path: Union[str, os.PathLike]) -> None:
+        self.path = os.fspath(path)
+        self._file: Optional[_native.Dag] = _native.Dag(self.path)
+
+    def close(self) -> None:
+        """Lets go of the file. Asking after that is an Error."""
+        self._file = None
+
+    def __enter__(self) -> "Dag":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        if self._file is None:
+            return f"<voxdag.Dag {self.path!r}, closed>"
+        return f"<voxdag.Dag {self.path!r}, {self.resolution}^3, {self.voxels} voxels>"
+
+    @property
+    def _dag(self) -> "_native.Dag":
+        if self._file is None:
+            raise Error(f"{self.path} is closed: expected an open file", "invalid_input")
+        return self._file
+
+    @property
+    def resolution(self) -> int:
+        """Voxels per edge of the grid."""
+        return 1 << self._dag.grid_levels
+
+    @property
+    def voxels(self) -> int:
+        """Set voxels in all."""
+        return self._dag.voxels
+
+    @property
+    def voxel_size(self) -> float:
+        """The edge of a voxel, in the units of the scene."""
+        return self._dag.edge / self.resolution
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """The low and the high corner of the grid in the units of the scene, (2, 3)."""
+        low = np.array(self._dag.origin)
+        return np.stack([low, low + self._dag.edge])
+
+    @property
+    def levels(self) -> List[Dict[str, int]]:
+        """Nodes and bytes of each level of the DAG, the root's first; the last has the bricks."""
+        return [{"level": level, "nodes": nodes, "bytes": size}
+                for level, (nodes, size) in enumerate(self._dag.levels())]
+
+    def to_world(self, positions: Any, level: Optional[int] = None) -> np.ndarray:
+        """Where positions in the grid lie in the scene; the center of voxel v is at v + 0.5."""
+        size = self._dag.edge / (1 << self._levels(level))
+        return np.asarray(self._dag.origin) + np.asarray(positions, np.float64) * size
+
+    def to_voxel(self, points: Any, level: Optional[int] = None) -> np.ndarray:
+        """The voxels (or cells) that points of the scene lie in, int64; they may lie outside."""
+        size = self._dag.edge / (1 << self._levels(level))
+        cells = (np.asarray(points, np.float64) - np.asarray(self._dag.origin)) / size
+        if not np.all(np.isfinite(cells)):
+            raise Error("a point is not finite: expected finite coordinates", "invalid_input")
+        return np.floor(np.clip(cells, -2.0**62, 2.0**62)).astype(np.int64)
+
+    def lookup(self, points: Any, level: Optional[int] = None, *, world: bool = False,
+               threads: int = 1) -> np.ndarray:
+        """Whether each voxel is set, (N,) bool. Those outside the grid are not."""
+        positions = self._positions(points, level, world)
+        found = np.empty(len(positions), np.bool_)
+        self._dag.lookup(positions, self._levels(level), found.view(np.uint8), threads)
+        return found
+
+    def rays(self, origins: Any, directions: Any, max_distance: float = np.inf,
+             stop_at: float = 1, *, world: bool = False, threads: int = 1) -> Hits:
+        """The first set voxel on each ray, (N, 3) origins and directions.
+
+        Distances are measured in lengths of the ray's direction, which need not be a unit vector.
+        `stop_at` is the edge of the cells, in voxels, that are hit as a whole: 1 for voxels.
+        """
+        starts = _rows(origins, np.float64, "origins")
+        ways = _rows(directions, np.float64, "directions")
+        if world:
+            starts = (starts - np.asarray(self._dag.origin)) / self.voxel_size
+            ways = ways / self.voxel_size
+        starts, ways = (np.ascontiguousarray(np.broadcast_to(
+            rows, (max(len(starts), len(ways)), 3))) for rows in (starts, ways))
+        hits = Hits(np.empty(len(starts)), np.empty((len(starts), 3), np.int64),
+                    np.empty((len(starts), 3), np.int8))
+        self._dag.rays(starts, ways, float(max_distance), float(stop_at), *hits, threads)
+        return hits
+
+    def dense(self, region: Optional[Region] = None, level: Optional[int] = None, *,
+              world: bool = False) -> np.ndarray:
+        """The cells of a region as an array of bool, indexed [x, y, z] from its low corner."""
+        low, high = self._region(region, level, world)
+        cells = np.empty([max(0, h - l) for l, h in zip(low, high)], np.bool_)
+        self._dag.dense(low, high, self._levels(level), cells.view(np.uint8))
+        return cells
+
+    def points(self, region: Optional[Region] = None, level: Optional[int] = None, *,
+               world: bool = False) -> np.ndarray:
+        """The set cells of a region in Morton order, (N, 3) int64.
+
+        With world=True their centers in the units of the scene, float64."""
+        low, high = self._region(region, level, world)
+        found = np.empty((self._dag.count(low, high, self._levels(level)), 3), np.int64)
+        self._dag.points(low, high, self._levels(level), found)
+        return self.to_world(found + 0.5, level) if world else found
+
+    def count(self, region: Optional[Region] = None, level: Optional[int] = None, *,
+              world: bool = False) -> int:
+        """How many cells of a region are set, exactly."""
+        low, high = self._region(region, level, world)
+        return self._dag.count(low, high, self._levels(level))
+
+    def nearest(self, points: Any, max_distance: float = np.inf,
+                *, threads: int = 1) -> Tuple[np.ndarray, np.ndarray]:
+        """The set voxel nearest to each voxel, (N, 3) int64, and the distances between the centers.
+
+        Of several the first in Morton order. Without one: -1, and an infinite distance."""
+        positions = self._positions(points, None, False)
+        voxels = np.empty_like(positions)
+        distances = np.empty(len(positions))
+        self._dag.nearest(positions, float(max_distance), voxels, distances, threads)
+        return voxels, distances
+
+    def _levels(self, level: Optional[int]) -> int:
+        if level is None:
+            return self._dag.grid_levels
+        if not 0 <= level <= self._dag.grid_levels or int(level) != level:
+            raise Error(f"level {level}: expected 0 to {self._dag.grid_levels}, for a grid of "
+                        "2^level cells per edge", "invalid_input")
+        return int(level)
+
+    def _positions(self, points: Any, level: Optional[int], world: bool) -> np.ndarray:
+        if world:
+            return np.ascontiguousarray(self.to_voxel(_rows(points, np.float64, "points"), level))
+        return _rows(points, np.int64, "points")
+
+    def _region(self, region: Optional[Region], level: Optional[int],
+                world: bool) -> Tuple[Tuple[int, ...], Tuple[int, ...]]:
+        edge = 1 << self._levels(level)
+        if region is None:
+            return (0, 0, 0), (edge, edge, edge)
+        corners = np.asarray(region, np.float64 if world else None).reshape(-1)
+        if corners.shape != (6,):
+            raise Error(f"the region {region!r}: expected x, y, z of its low and of its high corner",
+                        "invalid_input")
+        if world:
+            size = self._dag.edge / edge
+            corners = (corners.reshape(2, 3) - np.asarray(self._dag.origin)) / size
+            corners = np.concatenate([np.floor(corners[0]), np.ceil(corners[1])])
+            if not np.all(np.isfinite(corners)):
+                raise Error("the region is not finite: expected finite coordinates", "invalid_input")
+            corners = np.clip(corners, -2.0**62, 2.0**62).astype(np.int64)
+        elif corners.dtype.kind not in "iu":
+            raise Error(f"the region {region!r}: expected whole numbers, or world=True",
+                        "invalid_input")
+        numbers = tuple(int(number) for number in corners)
+        if any(low > high for low, high in zip(numbers[:3], numbers[3:])):
+            raise Error(f"the region {region!r}: expected the low corner before the high one",
+                        "invalid_input")
+        return numbers[:3], numbers[3:]
+
+
+def _rows(values: Any, dtype: Any, what: str) -> np.ndarray:
+    """An array (N, 3) of `dtype`, contiguous."""
+    array = np.asarray(values)
+    if array.ndim == 1 and array.shape == (3,):
+        array = array.reshape(1, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise Error(f"the {what} are an array {array.shape}: expected (N, 3)", "invalid_input")
+    if dtype == np.int64 and array.dtype.kind not in "iu":
+        raise Error(f"the {what} are {array.dtype}: expected integers, or world=True",
+                    "invalid_input")
+    return np.ascontiguousarray(array, dtype=dtype)
