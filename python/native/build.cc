@@ -15,7 +15,7 @@ namespace voxdag::python {
 namespace {
 
 // What Python gives; the names are those of the command line.
-BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::kwargs options) {
+BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::dict options) {
   BuildSpec spec;
   spec.geometry.scenes = std::move(scenes);
   spec.geometry.resolution = resolution;
@@ -46,12 +46,15 @@ BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::kwar
   take("keep_work", spec.run.keep_work);
   take("restart", spec.run.restart);
   take("force", spec.run.force);
+  for (const auto [name, value] : options)
+    throw Error(ErrorCode::kInvalidInput,
+                std::string(nb::str(name).c_str()) + ": expected an option of voxdag.build()");
   if (!memory.empty()) spec.run.memory_bytes = parse_size(memory, "memory");
   return spec;
 }
 
 std::string build(std::vector<std::string> scenes, uint64_t resolution, nb::object progress,
-                  nb::kwargs options) {
+                  nb::dict options) {
   const BuildSpec spec = spec_of(std::move(scenes), resolution, std::move(options));
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
     return report_json(run_build(spec, {system_files(), relay, cancel}));
@@ -59,7 +62,7 @@ std::string build(std::vector<std::string> scenes, uint64_t resolution, nb::obje
 }
 
 std::string plan(std::vector<std::string> scenes, uint64_t resolution, nb::object progress,
-                 nb::kwargs options) {
+                 nb::dict options) {
   const BuildSpec spec = spec_of(std::move(scenes), resolution, std::move(options));
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
     return estimate_json(plan_build(spec, {system_files(), relay, cancel}));
@@ -69,8 +72,8 @@ std::string plan(std::vector<std::string> scenes, uint64_t resolution, nb::objec
 }  // namespace
 
 void bind_build(nb::module_& module) {
-  module.def("build", &build, nb::arg("scenes"), nb::arg("resolution"),
-             nb::arg("progress").none(), nb::arg("options"));
+  module.def("build", &build, nb::arg("scenes"), nb::arg("resolution"), nb::arg("progress").none(),
+             nb::arg("options"));
   module.def("plan", &plan, nb::arg("scenes"), nb::arg("resolution"), nb::arg("progress").none(),
              nb::arg("options"));
 }

@@ -1,6 +1,7 @@
-// Work that takes long, called from Python. It runs on a thread of its own without the interpreter's
-// lock; the calling thread meanwhile looks for signals (Ctrl-C is KeyboardInterrupt, as everywhere in
-// Python) and passes progress and warnings on. So Python code only ever runs on the caller's thread.
+// Work that takes long, called from Python. It runs on a thread of its own without the
+// interpreter's lock; the calling thread meanwhile looks for signals (Ctrl-C is KeyboardInterrupt,
+// as everywhere in Python) and passes progress and warnings on. So Python code only ever runs on
+// the caller's thread.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -47,8 +48,8 @@ class LatestProgress : public Progress {
 // Between two looks at the work.
 inline constexpr std::chrono::milliseconds kLookInterval{50};
 
-// Passes what is new on to Python, as warnings and calls of `callback` (None for nobody) with stage,
-// done, total and unit; raises what Python code raised, and KeyboardInterrupt.
+// Passes what is new on to Python, as warnings and calls of `callback` (None for nobody) with
+// stage, done, total and unit; raises what Python code raised, and KeyboardInterrupt.
 class Messenger {
  public:
   explicit Messenger(nb::object callback) : callback_(std::move(callback)) {}
@@ -59,8 +60,8 @@ class Messenger {
   LatestProgress::State last_;
 };
 
-// Returns work(progress, cancel), or throws what it threw. If Python code raised something meanwhile,
-// the work is canceled and that is raised.
+// Returns work(progress, cancel), or throws what it threw. If Python code raised something
+// meanwhile, the work is canceled and that is raised.
 template <class Work>
 auto run_long_work(nb::object callback, Work work) {
   LatestProgress progress;

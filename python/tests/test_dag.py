@@ -84,11 +84,11 @@ def test_rays_along_an_axis(dag, cells):
         if len(column) == 0:
             assert not hits.hit[i] and (hits.voxel[i] == -1).all()
             continue
-        assert hits.distance[i] == pytest.approx((column[0] + 10) / 2)
+        assert hits.distance[i] == pytest.approx(column[0] + 10)
         assert tuple(hits.voxel[i]) == (column[0], y.flat[i], z.flat[i])
         assert tuple(hits.normal[i]) == (-1, 0, 0)
-    near = dag.rays(origins, [[2.0, 0, 0]], max_distance=5.5)
-    assert np.array_equal(near.hit, hits.distance <= 5.5)
+    near = dag.rays(origins, [[2.0, 0, 0]], max_distance=25.5)
+    assert np.array_equal(near.hit, hits.distance <= 25.5)
 
 
 def test_rays_in_the_scene(dag):

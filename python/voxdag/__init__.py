@@ -12,7 +12,9 @@ Long calls release the interpreter's lock and stop on Ctrl-C. Errors of this pac
 
 from ._build import Mesh, Progress, Scene, build, plan
 from ._dag import Dag, Hits, Region, open
+from ._derive import export, export_formats, extract
 from ._error import Error
 
-__all__ = ["Dag", "Error", "Hits", "Mesh", "Progress", "Region", "Scene", "build", "open", "plan"]
+__all__ = ["Dag", "Error", "Hits", "Mesh", "Progress", "Region", "Scene", "build", "export",
+           "export_formats", "extract", "open", "plan"]
 __version__ = "0.1.0"

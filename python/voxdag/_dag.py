@@ -15,7 +15,7 @@ Region = Sequence[Any]
 class Hits(NamedTuple):
     """What rays hit, one row per ray; a ray that hits nothing has an infinite distance."""
 
-    distance: np.ndarray  # (N,) float64, in units of the length of the ray's direction
+    distance: np.ndarray  # (N,) float64, in voxels, or in units of the scene if the rays were
     voxel: np.ndarray  # (N, 3) int64, the low corner of the cell that was hit; -1 for nothing
     normal: np.ndarray  # (N, 3) int8, of the face; 0 if the ray began inside, or hit nothing
 
@@ -114,21 +114,24 @@ class Dag:
 
     def rays(self, origins: Any, directions: Any, max_distance: float = np.inf,
              stop_at: float = 1, *, world: bool = False, threads: int = 1) -> Hits:
-        """The first set voxel on each ray, (N, 3) origins and directions.
+        """The first set voxel on each ray, (N, 3) origins and directions of any length; one of
+        them may be a single row for all.
 
-        Distances are measured in lengths of the ray's direction, which need not be a unit vector.
         `stop_at` is the edge of the cells, in voxels, that are hit as a whole: 1 for voxels.
         """
         starts = _rows(origins, np.float64, "origins")
         ways = _rows(directions, np.float64, "directions")
+        unit = self.voxel_size if world else 1.0
         if world:
-            starts = (starts - np.asarray(self._dag.origin)) / self.voxel_size
-            ways = ways / self.voxel_size
-        starts, ways = (np.ascontiguousarray(np.broadcast_to(
-            rows, (max(len(starts), len(ways)), 3))) for rows in (starts, ways))
+            starts = (starts - np.asarray(self._dag.origin)) / unit
+        if 1 in (len(starts), len(ways)):
+            shape = (max(len(starts), len(ways)), 3)
+            starts, ways = (np.ascontiguousarray(np.broadcast_to(rows, shape))
+                            for rows in (starts, ways))
         hits = Hits(np.empty(len(starts)), np.empty((len(starts), 3), np.int64),
                     np.empty((len(starts), 3), np.int8))
-        self._dag.rays(starts, ways, float(max_distance), float(stop_at), *hits, threads)
+        self._dag.rays(starts, ways, float(max_distance) / unit, float(stop_at), *hits, threads)
+        np.multiply(hits.distance, unit, out=hits.distance)
         return hits
 
     def dense(self, region: Optional[Region] = None, level: Optional[int] = None, *,

@@ -1,20 +1,26 @@
-/* Queries of finished .vdag files, for C and everything that can call it. libvoxdag.so holds nothing
- * but these functions; a .vdag file of any size is mapped, not read.
+/* Queries of finished .vdag files, for C and everything that can call it. libvoxdag.so holds
+ * nothing but these functions; a .vdag file of any size is mapped, not read.
  *
  *     voxdag_file* file;
  *     if (voxdag_open("scene.vdag", &file) != VOXDAG_OK) { puts(voxdag_error()); exit(1); }
  *     voxdag_lookup(file, 13, positions, count, set);
  *     voxdag_close(file);
  *
- * Positions are voxels, or cells of the coarser grid of 2^grid_levels per edge, a cell being set where
- * any voxel in it is. Every function that can fail returns a status; the text of the last failure on
- * the calling thread is voxdag_error(). A file is immutable: any number of threads may ask at the same
- * time. docs/query.md says more. */
+ * Positions are voxels, or cells of the coarser grid of 2^grid_levels per edge, a cell being set
+ * where any voxel in it is. Every function that can fail returns a status; the text of the last
+ * failure on the calling thread is voxdag_error(). A file is immutable: any number of threads may
+ * ask at the same time. docs/query.md says more. */
 #ifndef VOXDAG_H
 #define VOXDAG_H
 
 #include <stddef.h>
 #include <stdint.h>
+
+#if defined(__GNUC__)
+#define VOXDAG_API __attribute__((visibility("default")))
+#else
+#define VOXDAG_API
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -58,7 +64,7 @@ typedef struct voxdag_ray {
 } voxdag_ray;
 
 typedef struct voxdag_hit {
-  double distance;  /* in lengths of the direction; infinite if nothing was hit */
+  double distance;  /* in voxels; infinite if nothing was hit */
   int64_t voxel[3]; /* the low corner of the cell that was hit, in voxels; -1 for nothing */
   int8_t normal[3]; /* of the face; 0 if the ray began in the cell, or hit nothing */
   int8_t reserved[5];
@@ -66,41 +72,44 @@ typedef struct voxdag_hit {
 
 /* What the last function that failed on this thread has to say. Never null; valid until the next
  * call on this thread. */
-const char* voxdag_error(void);
+VOXDAG_API const char* voxdag_error(void);
 
-voxdag_status voxdag_open(const char* path, voxdag_file** file);
+VOXDAG_API voxdag_status voxdag_open(const char* path, voxdag_file** file);
 /* Nothing happens for a null pointer. No other thread may be using the file. */
-void voxdag_close(voxdag_file* file);
-voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts);
+VOXDAG_API void voxdag_close(voxdag_file* file);
+VOXDAG_API voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts);
 
 /* set[i] = 1 if cell i is set, else 0; cells outside the grid are not. */
-voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
-                            const int64_t (*cells)[3], size_t count, uint8_t* set);
+VOXDAG_API voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
+                                       const int64_t (*cells)[3], size_t count, uint8_t* set);
 
-/* What each ray hits first, up to max_distance (INFINITY for no limit). Cells of an edge up to stop_edge
- * voxels are hit as a whole: 1 for voxels. */
-voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays, size_t count,
-                               double max_distance, double stop_edge, voxdag_hit* hits);
+/* What each ray hits first, up to max_distance (INFINITY for no limit). Cells of an edge up to
+ * stop_edge voxels are hit as a whole: 1 for voxels. */
+VOXDAG_API voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays,
+                                          size_t count, double max_distance, double stop_edge,
+                                          voxdag_hit* hits);
 
 /* The number of set cells in a region. */
-voxdag_status voxdag_count(const voxdag_file* file, uint32_t grid_levels,
-                           const voxdag_region* region, uint64_t* count);
+VOXDAG_API voxdag_status voxdag_count(const voxdag_file* file, uint32_t grid_levels,
+                                      const voxdag_region* region, uint64_t* count);
 
-/* All cells of a region, 1 or 0 each: the cell low + (x, y, z) is cells[(x * ny + y) * nz + z], where
- * ny and nz are the lengths of the region along y and z. */
-voxdag_status voxdag_dense(const voxdag_file* file, uint32_t grid_levels,
-                           const voxdag_region* region, uint8_t* cells);
+/* All cells of a region, 1 or 0 each: the cell low + (x, y, z) is cells[(x * ny + y) * nz + z],
+ * where ny and nz are the lengths of the region along y and z. */
+VOXDAG_API voxdag_status voxdag_dense(const voxdag_file* file, uint32_t grid_levels,
+                                      const voxdag_region* region, uint8_t* cells);
 
 /* The set cells of a region, in Morton order. VOXDAG_INVALID_INPUT unless `capacity`, the length of
  * `cells`, is at least what voxdag_count() says. */
-voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_levels,
-                          const voxdag_region* region, size_t capacity, int64_t (*cells)[3]);
+VOXDAG_API voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_levels,
+                                     const voxdag_region* region, size_t capacity,
+                                     int64_t (*cells)[3]);
 
 /* For each voxel the nearest one that is set, by the distance between the centers, which is
- * written to `distances` unless that is null; of several the first in Morton order. Without one up to
- * max_distance: -1, and an infinite distance. */
-voxdag_status voxdag_nearest(const voxdag_file* file, const int64_t (*voxels)[3], size_t count,
-                             double max_distance, int64_t (*nearest)[3], double* distances);
+ * written to `distances` unless that is null; of several the first in Morton order. Without one up
+ * to max_distance: -1, and an infinite distance. */
+VOXDAG_API voxdag_status voxdag_nearest(const voxdag_file* file, const int64_t (*voxels)[3],
+                                        size_t count, double max_distance, int64_t (*nearest)[3],
+                                        double* distances);
 
 #ifdef __cplusplus
 }

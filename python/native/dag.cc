@@ -1,0 +1,157 @@
+#include "query/lookup/dag.h"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cmath>
+
+#include "core/base/process_limits.h"
+#include "python/native/bindings.h"
+
+namespace voxdag::python {
+
+namespace nb = nanobind;
+
+namespace {
+
+using query::Position;
+template <class Number>
+using Column = nb::ndarray<Number, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+template <class Number>
+using Rows = nb::ndarray<Number, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+template <class Number>
+using Cells = nb::ndarray<Number, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+
+// The rows of an array (N, 3) in place.
+std::span<const Position> positions_of(const Rows<const int64_t>& rows) {
+  return {reinterpret_cast<const Position*>(rows.data()), rows.shape(0)};
+}
+std::span<Position> positions_of(const Rows<int64_t>& rows) {
+  return {reinterpret_cast<Position*>(rows.data()), rows.shape(0)};
+}
+std::span<const query::Coordinates> coordinates_of(const Rows<const double>& rows) {
+  return {reinterpret_cast<const query::Coordinates*>(rows.data()), rows.shape(0)};
+}
+
+void expect_length(size_t length, size_t expected) {
+  if (length != expected)
+    throw Error(ErrorCode::kInvalidInput, "an array has " + std::to_string(length) +
+                                              " rows: expected " + std::to_string(expected));
+}
+
+unsigned threads_of(unsigned threads) { return threads ? threads : default_threads(); }
+
+void lookup(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+            const Column<uint8_t>& set, unsigned threads) {
+  expect_length(set.shape(0), points.shape(0));
+  const nb::gil_scoped_release released;
+  dag.lookup(positions_of(points), grid_levels, {set.data(), set.shape(0)}, threads_of(threads));
+}
+
+// Rays that are cast at a time, so that the hits as the library has them take little memory.
+constexpr size_t kRays = size_t{1} << 16;
+
+void rays(const query::Dag& dag, const Rows<const double>& origins,
+          const Rows<const double>& directions, double max_distance, double stop_size,
+          const Column<double>& distances, const Rows<int64_t>& voxels, const Rows<int8_t>& normals,
+          unsigned threads) {
+  const size_t count = origins.shape(0);
+  for (const size_t length :
+       {directions.shape(0), distances.shape(0), voxels.shape(0), normals.shape(0)})
+    expect_length(length, count);
+  const auto all_origins = coordinates_of(origins), all_directions = coordinates_of(directions);
+  const std::span<Position> all_voxels = positions_of(voxels);
+  const nb::gil_scoped_release released;
+  std::vector<query::RayHit> hits(std::min(count, kRays));
+  for (size_t first = 0; first < count; first += kRays) {
+    const size_t some = std::min(count - first, kRays);
+    dag.rays(all_origins.subspan(first, some), all_directions.subspan(first, some),
+             {max_distance, stop_size}, std::span(hits).first(some), threads_of(threads));
+    for (size_t i = 0; i < some; ++i) {
+      const query::RayHit& hit = hits[i];
+      distances.data()[first + i] = hit.hit ? hit.distance : HUGE_VAL;
+      int8_t* const normal = normals.data() + 3 * (first + i);
+      for (int axis = 0; axis < 3; ++axis) {
+        const uint32_t up = hit.hit ? dag.grid_levels() - hit.grid_levels : 0;
+        all_voxels[first + i][static_cast<size_t>(axis)] =
+            hit.hit ? hit.cell[static_cast<size_t>(axis)] << up : -1;
+        normal[axis] = hit.hit && hit.axis == axis ? hit.sign : int8_t{0};
+      }
+    }
+  }
+}
+
+void dense(const query::Dag& dag, const Position& low, const Position& high, uint32_t grid_levels,
+           const Cells<uint8_t>& cells) {
+  for (size_t axis = 0; axis < 3; ++axis)
+    expect_length(cells.shape(axis),
+                  static_cast<size_t>(std::max<int64_t>(0, high[axis] - low[axis])));
+  const nb::gil_scoped_release released;
+  dag.box({grid_levels, {low, high}}, {cells.data(), cells.size()});
+}
+
+void points(const query::Dag& dag, const Position& low, const Position& high, uint32_t grid_levels,
+            const Rows<int64_t>& found) {
+  const nb::gil_scoped_release released;
+  expect_length(found.shape(0), dag.positions({grid_levels, {low, high}}, positions_of(found)));
+}
+
+uint64_t count(const query::Dag& dag, const Position& low, const Position& high,
+               uint32_t grid_levels) {
+  const nb::gil_scoped_release released;
+  return dag.count({grid_levels, {low, high}});
+}
+
+void nearest(const query::Dag& dag, const Rows<const int64_t>& points, double max_distance,
+             const Rows<int64_t>& voxels, const Column<double>& distances, unsigned threads) {
+  expect_length(voxels.shape(0), points.shape(0));
+  expect_length(distances.shape(0), points.shape(0));
+  const std::span<Position> found_voxels = positions_of(voxels);
+  const nb::gil_scoped_release released;
+  std::vector<query::Nearest> found(points.shape(0));
+  dag.nearest(positions_of(points), dag.grid_levels(), max_distance, found, threads_of(threads));
+  for (size_t i = 0; i < found.size(); ++i) {
+    found_voxels[i] = found[i].found ? found[i].cell : Position{-1, -1, -1};
+    distances.data()[i] =
+        found[i].found ? std::sqrt(static_cast<double>(found[i].squared_distance)) : HUGE_VAL;
+  }
+}
+
+// Nodes and bytes of each level.
+std::vector<std::pair<uint64_t, uint64_t>> levels(const query::Dag& dag) {
+  std::vector<std::pair<uint64_t, uint64_t>> all;
+  for (uint32_t l = 0; l <= dag.file().brick_level(); ++l) {
+    const voxdag_reader::Level& level = dag.file().level(l);
+    all.emplace_back(level.node_count, level.word_count * sizeof(uint32_t));
+  }
+  return all;
+}
+
+}  // namespace
+
+void bind_dag(nb::module_& module) {
+  nb::class_<query::Dag>(module, "Dag")
+      .def("__init__",
+           [](query::Dag* dag, const std::string& path) {
+             const nb::gil_scoped_release released;
+             new (dag) query::Dag(path);
+           })
+      .def_prop_ro("grid_levels", &query::Dag::grid_levels)
+      .def_prop_ro("voxels", [](const query::Dag& dag) { return dag.file().voxels(); })
+      .def_prop_ro("edge", [](const query::Dag& dag) { return dag.file().edge(); })
+      .def_prop_ro("origin",
+                   [](const query::Dag& dag) { return std::to_array(dag.file().origin()); })
+      .def("levels", &levels)
+      .def("lookup", &lookup)
+      .def("rays", &rays)
+      .def("dense", &dense)
+      .def("points", &points)
+      .def("count", &count)
+      .def("nearest", &nearest);
+}
+
+}  // namespace voxdag::python

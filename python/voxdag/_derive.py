@@ -1,0 +1,69 @@
+"""What is made of finished files: parts of them, and the formats of other programs."""
+
+import json
+import os
+from typing import Any, Dict, Optional, Sequence, Union
+
+from . import _native
+from ._build import Progress
+from ._dag import Dag, Region
+from ._error import Error
+
+Path = Union[str, os.PathLike]
+
+
+def extract(path: Path, output: Path, *, region: Optional[Region] = None,
+            level: Optional[int] = None, world: bool = False, crop: bool = False,
+            memory: Union[int, str, None] = None, threads: int = 0, force: bool = False,
+            progress: Optional[Progress] = None) -> Dict[str, Any]:
+    """Writes a region of a .vdag file, or a coarser level of it, or both, as a .vdag file.
+
+    region, level, world  as in Dag
+    crop                  make the smallest octree cube around the region the new grid
+    force                 replace an output that exists
+
+    Returns counts, bounds and the SHA-256 of the new file. Raises Error.
+    """
+    path, output = os.fspath(path), os.fspath(output)
+    _check_output(path, [output], force)
+    with Dag(path) as dag:
+        low, high = dag._region(region, level, world)
+        levels = dag._levels(level)
+    return json.loads(_native.extract(path, output, levels, low, high, crop, _memory(memory),
+                                      threads, progress))
+
+
+def export(path: Path, output: Path, *, to: str, region: Optional[Region] = None,
+           level: Optional[int] = None, world: bool = False, memory: Union[int, str, None] = None,
+           force: bool = False, progress: Optional[Progress] = None) -> Dict[str, Any]:
+    """Writes a .vdag file, or a part of it, in the format of another program (docs/export.md).
+
+    `to` is one of export_formats(). Returns the files that were written, their bytes, the voxels,
+    and notes on how to open them. Raises Error.
+    """
+    path, output = os.fspath(path), os.fspath(output)
+    _check_output(path, _native.export_paths(to, output), force)
+    with Dag(path) as dag:
+        low, high = dag._region(region, level, world)
+        levels = dag._levels(level)
+    return json.loads(_native.export(path, output, to, levels, low, high, _memory(memory),
+                                     progress))
+
+
+def export_formats() -> Dict[str, str]:
+    """The formats of export(), and what each is."""
+    return dict(_native.export_formats())
+
+
+def _memory(memory: Union[int, str, None]) -> str:
+    return "" if memory is None else str(memory)
+
+
+def _check_output(path: str, outputs: Sequence[str], force: bool) -> None:
+    for output in outputs:
+        if not os.path.lexists(output):
+            continue
+        if os.path.exists(output) and os.path.exists(path) and os.path.samefile(path, output):
+            raise Error(f"{output} is the input: expected another file", "invalid_input")
+        if not force:
+            raise Error(f"{output} exists: expected another file, or force=True", "invalid_input")

@@ -1,0 +1,223 @@
+#include "query/c/voxdag.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "query/lookup/dag.h"
+
+using voxdag::query::Position;
+
+struct voxdag_file {
+  explicit voxdag_file(const char* path) : dag(path) {}
+  const voxdag::query::Dag dag;
+};
+
+namespace {
+
+thread_local std::string last_error;
+
+voxdag_status status_of(voxdag::ErrorCode code) {
+  switch (code) {
+    case voxdag::ErrorCode::kInvalidInput:
+      return VOXDAG_INVALID_INPUT;
+    case voxdag::ErrorCode::kNotFound:
+      return VOXDAG_NOT_FOUND;
+    case voxdag::ErrorCode::kCorrupt:
+      return VOXDAG_CORRUPT;
+    case voxdag::ErrorCode::kUnsupportedVersion:
+      return VOXDAG_UNSUPPORTED_VERSION;
+    case voxdag::ErrorCode::kIo:
+      return VOXDAG_IO;
+    case voxdag::ErrorCode::kOutOfMemory:
+      return VOXDAG_OUT_OF_MEMORY;
+    case voxdag::ErrorCode::kLimit:
+      return VOXDAG_LIMIT;
+    default:
+      return VOXDAG_INTERNAL;  // a query frees no disk, cancels nothing and has no device
+  }
+}
+
+// Runs `ask`; no exception passes into C.
+template <class Ask>
+voxdag_status answer(const Ask& ask) {
+  try {
+    ask();
+    return VOXDAG_OK;
+  } catch (const voxdag::Error& error) {
+    last_error = error.message();
+    return status_of(error.code());
+  } catch (const std::bad_alloc&) {
+    last_error = "there is not enough memory for the answer";
+    return VOXDAG_OUT_OF_MEMORY;
+  } catch (const std::exception& error) {
+    last_error = error.what();
+    return VOXDAG_INTERNAL;
+  }
+}
+
+void refuse(const std::string& what) {
+  throw voxdag::Error(voxdag::ErrorCode::kInvalidInput, what);
+}
+
+void expect_pointer(const void* pointer, const char* name) {
+  if (!pointer) refuse(std::string(name) + " is a null pointer: expected one to an object");
+}
+
+std::span<const Position> positions_of(const int64_t (*cells)[3], size_t count) {
+  if (count) expect_pointer(cells, "the array of positions");
+  return {reinterpret_cast<const Position*>(cells), count};
+}
+
+voxdag::query::Selection selection_of(uint32_t grid_levels, const voxdag_region* region) {
+  expect_pointer(region, "the region");
+  voxdag::query::Selection selection{grid_levels, {}};
+  std::copy_n(region->low, 3, selection.region.low.begin());
+  std::copy_n(region->high, 3, selection.region.high.begin());
+  return selection;
+}
+
+// Items for which memory is taken at a time.
+constexpr size_t kBatch = 4096;
+
+template <class Work>
+void for_each_batch(size_t count, const Work& work) {
+  for (size_t first = 0; first < count; first += kBatch)
+    work(first, std::min(count - first, kBatch));
+}
+
+void copy_hit(const voxdag::query::RayHit& from, uint32_t grid_levels, voxdag_hit& to) {
+  to = {HUGE_VAL, {-1, -1, -1}, {}, {}};
+  if (!from.hit) return;
+  to.distance = from.distance;
+  for (size_t axis = 0; axis < 3; ++axis)
+    to.voxel[axis] = from.cell[axis] << (grid_levels - from.grid_levels);
+  if (from.axis >= 0) to.normal[from.axis] = from.sign;
+}
+
+}  // namespace
+
+const char* voxdag_error(void) { return last_error.c_str(); }
+
+voxdag_status voxdag_open(const char* path, voxdag_file** file) {
+  return answer([&] {
+    expect_pointer(path, "the path");
+    expect_pointer(file, "the place of the file");
+    *file = nullptr;
+    *file = new voxdag_file(path);
+  });
+}
+
+void voxdag_close(voxdag_file* file) { delete file; }
+
+voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    expect_pointer(facts, "the place of the facts");
+    const voxdag_reader::File& f = file->dag.file();
+    *facts = {};
+    facts->grid_levels = f.grid_levels();
+    std::copy_n(f.origin(), 3, facts->origin);
+    facts->edge = f.edge();
+    facts->voxels = f.voxels();
+    facts->svo_nodes = f.svo_nodes();
+    facts->dag_nodes = f.dag_nodes();
+    facts->bytes = f.file_bytes();
+  });
+}
+
+voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
+                            const int64_t (*cells)[3], size_t count, uint8_t* set) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) expect_pointer(set, "the array of answers");
+    file->dag.lookup(positions_of(cells, count), grid_levels, {set, count});
+  });
+}
+
+voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays, size_t count,
+                               double max_distance, double stop_edge, voxdag_hit* hits) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) expect_pointer(rays, "the array of rays");
+    if (count) expect_pointer(hits, "the array of hits");
+    std::vector<voxdag::query::Coordinates> origins(std::min(count, kBatch)), directions(origins);
+    std::vector<voxdag::query::RayHit> found(origins.size());
+    for_each_batch(count, [&](size_t first, size_t some) {
+      for (size_t i = 0; i < some; ++i) {
+        std::copy_n(rays[first + i].origin, 3, origins[i].begin());
+        std::copy_n(rays[first + i].direction, 3, directions[i].begin());
+      }
+      file->dag.rays(std::span(origins).first(some), std::span(directions).first(some),
+                     {max_distance, stop_edge}, std::span(found).first(some));
+      for (size_t i = 0; i < some; ++i)
+        copy_hit(found[i], file->dag.grid_levels(), hits[first + i]);
+    });
+  });
+}
+
+voxdag_status voxdag_count(const voxdag_file* file, uint32_t grid_levels,
+                           const voxdag_region* region, uint64_t* count) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    expect_pointer(count, "the place of the count");
+    *count = file->dag.count(selection_of(grid_levels, region));
+  });
+}
+
+voxdag_status voxdag_dense(const voxdag_file* file, uint32_t grid_levels,
+                           const voxdag_region* region, uint8_t* cells) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    const voxdag::query::Selection selection = selection_of(grid_levels, region);
+    unsigned __int128 size = 1;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const auto length = static_cast<__int128>(region->high[axis]) - region->low[axis];
+      if (length <= 0) return;
+      size *= static_cast<unsigned __int128>(length);
+      if (size > PTRDIFF_MAX) refuse("the region has over 2^63 cells: expected fewer");
+    }
+    expect_pointer(cells, "the array of cells");
+    file->dag.box(selection, {cells, static_cast<size_t>(size)});
+  });
+}
+
+voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_levels,
+                          const voxdag_region* region, size_t capacity, int64_t (*cells)[3]) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (capacity) expect_pointer(cells, "the array of cells");
+    const uint64_t count = file->dag.positions(selection_of(grid_levels, region),
+                                               {reinterpret_cast<Position*>(cells), capacity});
+    if (count > capacity)
+      refuse("the region has " + std::to_string(count) +
+             " set cells: expected an array of so many, "
+             "not of " +
+             std::to_string(capacity));
+  });
+}
+
+voxdag_status voxdag_nearest(const voxdag_file* file, const int64_t (*voxels)[3], size_t count,
+                             double max_distance, int64_t (*nearest)[3], double* distances) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) expect_pointer(nearest, "the array of answers");
+    const std::span<const Position> from = positions_of(voxels, count);
+    std::vector<voxdag::query::Nearest> found(std::min(count, kBatch));
+    for_each_batch(count, [&](size_t first, size_t some) {
+      file->dag.nearest(from.subspan(first, some), file->dag.grid_levels(), max_distance,
+                        std::span(found).first(some));
+      for (size_t i = 0; i < some; ++i) {
+        const Position cell = found[i].found ? found[i].cell : Position{-1, -1, -1};
+        std::copy_n(cell.begin(), 3, nearest[first + i]);
+        if (distances)
+          distances[first + i] =
+              found[i].found ? std::sqrt(static_cast<double>(found[i].squared_distance)) : HUGE_VAL;
+      }
+    });
+  });
+}

@@ -1,0 +1,151 @@
+// The functions of voxdag.h against the class that they stand for, and what they say to bad
+// arguments.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <thread>
+
+#include "query/c/voxdag.h"
+#include "query/lookup/dag.h"
+
+namespace voxdag::query {
+namespace {
+
+const std::string kPath = VOXDAG_SOURCE_DIR "/tests/golden/floor_and_pillar.vdag";
+
+class CApiTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(voxdag_open(kPath.c_str(), &file_), VOXDAG_OK) << voxdag_error();
+  }
+  void TearDown() override { voxdag_close(file_); }
+  voxdag_region whole() const {
+    const int64_t edge = dag_.file().resolution();
+    return {{0, 0, 0}, {edge, edge, edge}};
+  }
+
+  const Dag dag_{kPath};
+  const uint32_t levels_ = dag_.grid_levels();
+  voxdag_file* file_ = nullptr;
+};
+
+TEST_F(CApiTest, Facts) {
+  voxdag_facts facts;
+  ASSERT_EQ(voxdag_get_facts(file_, &facts), VOXDAG_OK);
+  EXPECT_EQ(facts.grid_levels, levels_);
+  EXPECT_EQ(facts.voxels, dag_.file().voxels());
+  EXPECT_EQ(facts.dag_nodes, dag_.file().dag_nodes());
+  EXPECT_EQ(facts.svo_nodes, dag_.file().svo_nodes());
+  EXPECT_EQ(facts.bytes, dag_.file().file_bytes());
+  EXPECT_EQ(facts.edge, dag_.file().edge());
+  EXPECT_EQ(facts.origin[1], dag_.file().origin()[1]);
+}
+
+TEST_F(CApiTest, CellsOfEveryLevel) {
+  for (uint32_t levels = 0; levels <= levels_; ++levels) {
+    SCOPED_TRACE(levels);
+    const int64_t edge = int64_t{1} << levels;
+    const voxdag_region region{{-1, 0, 0}, {edge, edge, edge + 1}};
+    const size_t size = static_cast<size_t>((edge + 1) * edge * (edge + 1));
+    std::vector<uint8_t> dense(size, 2), expected(size, 2);
+    ASSERT_EQ(voxdag_dense(file_, levels, &region, dense.data()), VOXDAG_OK) << voxdag_error();
+    dag_.box({levels, {{-1, 0, 0}, {edge, edge, edge + 1}}}, expected);
+    EXPECT_EQ(dense, expected);
+    uint64_t count = 0;
+    ASSERT_EQ(voxdag_count(file_, levels, &region, &count), VOXDAG_OK);
+    EXPECT_EQ(count, static_cast<uint64_t>(std::count(dense.begin(), dense.end(), 1)));
+    EXPECT_GT(count, 0u);
+    std::vector<Position> cells(count);
+    const auto list = reinterpret_cast<int64_t(*)[3]>(cells.data());
+    ASSERT_EQ(voxdag_list(file_, levels, &region, count, list), VOXDAG_OK);
+    std::vector<uint8_t> set(count);
+    ASSERT_EQ(voxdag_lookup(file_, levels, list, count, set.data()), VOXDAG_OK);
+    EXPECT_EQ(set, std::vector<uint8_t>(count, 1));
+    EXPECT_EQ(voxdag_list(file_, levels, &region, count - 1, list), VOXDAG_INVALID_INPUT);
+    EXPECT_NE(std::string(voxdag_error()).find(std::to_string(count)), std::string::npos);
+  }
+}
+
+TEST_F(CApiTest, Rays) {
+  const double edge = static_cast<double>(dag_.file().resolution());
+  std::vector<voxdag_ray> rays;
+  for (int i = 0; i < 5000; ++i)
+    rays.push_back(
+        {{std::fmod(0.37 * i, edge), edge + 1, std::fmod(0.73 * i, edge)}, {0.01, -3, 0.02}});
+  std::vector<voxdag_hit> hits(rays.size());
+  ASSERT_EQ(voxdag_cast_rays(file_, rays.data(), rays.size(), INFINITY, 1, hits.data()), VOXDAG_OK);
+  uint64_t found = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    RayHit hit;
+    const Coordinates origin{rays[i].origin[0], rays[i].origin[1], rays[i].origin[2]};
+    const Coordinates direction{rays[i].direction[0], rays[i].direction[1], rays[i].direction[2]};
+    dag_.rays({&origin, 1}, {&direction, 1}, {}, {&hit, 1});
+    ASSERT_EQ(std::isfinite(hits[i].distance), hit.hit);
+    if (!hit.hit) {
+      EXPECT_EQ(hits[i].voxel[0], -1);
+      continue;
+    }
+    ++found;
+    EXPECT_EQ(hits[i].distance, hit.distance);
+    EXPECT_TRUE(std::equal(hit.cell.begin(), hit.cell.end(), hits[i].voxel));
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_EQ(hits[i].normal[axis], axis == hit.axis ? hit.sign : 0);
+  }
+  EXPECT_GT(found, 100u);
+}
+
+TEST_F(CApiTest, Nearest) {
+  const int64_t from[2][3] = {{0, 0, 0}, {100, -7, 3}};
+  int64_t nearest[2][3];
+  double distances[2];
+  ASSERT_EQ(voxdag_nearest(file_, from, 2, INFINITY, nearest, distances), VOXDAG_OK);
+  for (int i = 0; i < 2; ++i) {
+    Nearest expected;
+    const Position point{from[i][0], from[i][1], from[i][2]};
+    dag_.nearest({&point, 1}, levels_, INFINITY, {&expected, 1});
+    EXPECT_TRUE(std::equal(expected.cell.begin(), expected.cell.end(), nearest[i]));
+    EXPECT_EQ(distances[i] * distances[i], static_cast<double>(expected.squared_distance));
+  }
+  ASSERT_EQ(voxdag_nearest(file_, from + 1, 1, 0.5, nearest, nullptr), VOXDAG_OK);
+  EXPECT_EQ(nearest[0][0], -1);
+}
+
+TEST_F(CApiTest, Refuses) {
+  voxdag_file* other = file_;
+  EXPECT_EQ(voxdag_open("/nowhere/x.vdag", &other), VOXDAG_NOT_FOUND);
+  EXPECT_EQ(other, nullptr);
+  EXPECT_NE(std::string(voxdag_error()).find("/nowhere/x.vdag"), std::string::npos);
+  EXPECT_EQ(voxdag_open(VOXDAG_SOURCE_DIR "/README.md", &other), VOXDAG_CORRUPT);
+  EXPECT_EQ(voxdag_open(nullptr, &other), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_open(kPath.c_str(), nullptr), VOXDAG_INVALID_INPUT);
+
+  const voxdag_region region = whole();
+  uint64_t count = 7;
+  EXPECT_EQ(voxdag_count(nullptr, levels_, &region, &count), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_count(file_, levels_, nullptr, &count), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_count(file_, levels_ + 1, &region, &count), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(count, 7u);
+  EXPECT_EQ(voxdag_lookup(file_, levels_, nullptr, 1, nullptr), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_lookup(file_, levels_, nullptr, 0, nullptr), VOXDAG_OK);
+  const voxdag_region endless{{INT64_MIN, INT64_MIN, 0}, {INT64_MAX, INT64_MAX, INT64_MAX}};
+  uint8_t cell;
+  EXPECT_EQ(voxdag_dense(file_, levels_, &endless, &cell), VOXDAG_INVALID_INPUT);
+  const voxdag_ray still{{0, 0, 0}, {0, 0, 0}}, nowhere{{0, 0, 0}, {0, NAN, 1}};
+  voxdag_hit hit;
+  EXPECT_EQ(voxdag_cast_rays(file_, &still, 1, INFINITY, 1, &hit), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_cast_rays(file_, &nowhere, 1, INFINITY, 1, &hit), VOXDAG_INVALID_INPUT);
+  voxdag_close(nullptr);
+}
+
+TEST_F(CApiTest, ErrorsBelongToTheirThread) {
+  EXPECT_EQ(voxdag_open("/nowhere/a.vdag", &file_), VOXDAG_NOT_FOUND);
+  std::thread([] {
+    voxdag_file* none = nullptr;
+    EXPECT_STREQ(voxdag_error(), "");
+    EXPECT_EQ(voxdag_open("/nowhere/b.vdag", &none), VOXDAG_NOT_FOUND);
+  }).join();
+  EXPECT_NE(std::string(voxdag_error()).find("a.vdag"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace voxdag::query
