@@ -51,7 +51,7 @@ THIRD_PARTY = {
     "sqlite3.h": ["core/db"],
     "httplib.h": ["client"],
     "png.h": ["query"],
-    "openvdb/openvdb.h": ["query"],
+    "openvdb/openvdb.h": ["query", "bench"],
     "nanovdb/util/OpenToNanoVDB.h": ["query"],
 }
 # Folders that build with a C++20 compiler (and CUDA) alone.

@@ -22,15 +22,16 @@ STEP_X, STEP_Y, MARGIN = 175, 96, 16
 # Includers stand above what they include.
 BOXES = {
     "cli": (2.9, 0, "commands"),
+    "python": (4.4, 1, "Python package"),
     "client": (0, 1, "HTTP client"),
     "server": (2.5, 1, "HTTP service"),
     "scheduler": (2.9, 2, "the build"),
     "core/db": (0.9, 3, "SQLite"),
     "core/backend": (1.85, 3, "cpu, parallel, cuda"),
     "merge": (2.8, 3, "sub-DAGs to one DAG"),
-    "query": (4.4, 3, "rays, pictures"),
+    "query": (4.4, 3, "lookups, rays, exports"),
     "core/format": (2.9, 4, "artifacts, global file"),
-    "core/scene": (4.2, 4, "glTF, generators"),
+    "core/scene": (4.2, 4, "glTF, PLY, generators"),
     "core/dag": (2.2, 5, "brick, node, hash"),
     "core/geometry": (2.6, 6, "grid, overlap test"),
     "core/io": (3.9, 6, "file access"),

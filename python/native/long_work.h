@@ -1,5 +1,5 @@
 // Work that takes long, called from Python. It runs on a thread of its own without the
-// interpreter's lock; the calling thread meanwhile looks for signals (Ctrl-C is KeyboardInterrupt,
+// interpreter's lock; the calling thread also looks for signals (Ctrl-C is KeyboardInterrupt,
 // as everywhere in Python) and passes progress and warnings on. So Python code only ever runs on
 // the caller's thread.
 #pragma once
@@ -61,7 +61,7 @@ class Messenger {
 };
 
 // Returns work(progress, cancel), or throws what it threw. If Python code raised something
-// meanwhile, the work is canceled and that is raised.
+// by then, the work is canceled and that is raised.
 template <class Work>
 auto run_long_work(nb::object callback, Work work) {
   LatestProgress progress;

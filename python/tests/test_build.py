@@ -34,7 +34,7 @@ def test_the_same_bytes_from_floats_lists_and_integers(mesh, tmp_path):
     assert len(digests) == 1
 
 
-def test_doubles_are_kept(tmp_path):
+def test_doubles_stay_doubles(tmp_path):
     # A float32 has no place for the difference; the voxels of both ends have.
     vertices = np.array([[1e9, 0, 0], [1e9 + 1, 0, 0], [1e9, 1, 0]])
     voxdag.build((vertices, [[0, 1, 2]]), resolution=16, output=tmp_path / "far.vdag")
@@ -60,7 +60,7 @@ def test_plan(mesh):
     (([[0, 0, 0]], [[0, 0, 0.5]]), {}, "invalid_input", "integers"),
     (([[0, 0]], [[0, 0, 0]]), {}, "invalid_input", "(N, 3)"),
     (([[0, 0, 0]], [[0, 0, 0]]), {"resolution": 100}, "invalid_input", "100"),
-    (([[0, 0, 0]], [[0, 0, 0]]), {"colour": True}, "invalid_input", "colour"),
+    (([[0, 0, 0]], [[0, 0, 0]]), {"palette": True}, "invalid_input", "palette"),
     (([[0, 0, 0]], [[0, 0, 0]]), {"threads": "many"}, "invalid_input", "threads"),
     (([[0, 0, 0]], [[0, 0, 0]]), {"memory": "1MiB"}, "invalid_input", "memory"),
     (([[np.nan, 0, 0]], [[0, 0, 0]]), {}, "invalid_input", "finite"),

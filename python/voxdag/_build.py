@@ -26,7 +26,7 @@ def build(scene: Scene, *, resolution: int, output: Union[str, os.PathLike],
     """Builds the DAG of a scene, or resumes a build that was interrupted, and returns its report.
 
     scene       one or several files, together one scene, or a mesh in memory: a tuple of vertices
-                (N, 3), of which doubles are kept as they are, and of indices of triangles (M, 3)
+                (N, 3), of which doubles stay doubles, and of indices of triangles (M, 3)
     resolution  voxels per edge of the grid, a power of two from 4 to 2^20
     output      the .vdag file to write
     memory      bytes, or text such as "8GiB"; by default half of what the machine has
@@ -66,7 +66,7 @@ def _call(function: Callable[..., str], files: List[str], resolution: int,
 
 @contextmanager
 def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
-    """The files of a scene. A mesh is a PLY file beside the output meanwhile."""
+    """The files of a scene. A mesh is a PLY file next to the output."""
     if isinstance(scene, (str, os.PathLike)):
         yield [os.fspath(scene)]
     elif _is_mesh(scene):
