@@ -58,6 +58,10 @@ std::vector<std::string> own_arguments() {
   std::ifstream line("/proc/self/cmdline");
   std::vector<std::string> words;
   for (std::string word; std::getline(line, word, '\0');) words.push_back(word);
+  if (words.size() < 2)
+    throw Error(ErrorCode::kIo,
+                "/proc/self/cmdline cannot be read: expected this command, for the "
+                "job that merges (--cluster-merge)");
   words.erase(words.begin());
   return words;
 }
@@ -66,7 +70,8 @@ std::vector<std::string> own_arguments() {
 ClusterOptions::MergeJobOptions merge_job(const BuildCommand& command, const BuildSpec& spec) {
   ClusterOptions::MergeJobOptions job;
   job.arguments = own_arguments();
-  job.arguments.push_back(kMergeJobFlag);
+  // The command comes first; what follows "--" are scenes.
+  job.arguments.insert(job.arguments.begin() + 1, kMergeJobFlag);
   job.folder = std::filesystem::current_path().string();
   if (spec.run.memory_bytes > 0)
     job.submit_options.push_back(
@@ -151,7 +156,7 @@ void declare(Command& command, BuildCommand& state) {
       .group(kCluster);
   command
       .option("--cluster-running", state.cluster.max_running,
-              "tasks that run at a time (default: as many as the cluster starts)")
+              "tasks of an array that run at a time (default: as many as the cluster starts)")
       .positive()
       .group(kCluster);
   command

@@ -71,7 +71,12 @@ void run(const StatusCommand& command, CommandContext& context) {
     // A build that finishes between two queries removes its work folder.
     if (!first && !context.files.exists(WorkFolder::store_path(command.work_folder))) return;
     const JobStatus status = read_job_status(context.files, command.work_folder);
-    const auto cluster = read_cluster_state(context.files, command.work_folder);
+    std::optional<ClusterState> cluster;
+    try {
+      cluster = read_cluster_state(context.files, command.work_folder);
+    } catch (const Error& error) {
+      std::fprintf(stderr, "voxdag: %s\n", error.what());
+    }
     if (command.json)
       std::printf("%s\n", status_json(status, cluster ? encode_state(*cluster) : "").c_str());
     else

@@ -41,4 +41,8 @@ struct Selection {
   Region region;
 };
 
+// Throws Error{kInvalidInput} for a grid that is finer than that of a file of so many levels, or
+// coarser than a brick.
+void check_grid(const Selection& selection, uint32_t file_levels);
+
 }  // namespace voxdag::query

@@ -472,11 +472,18 @@ BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
   if (full.run.cluster) ClusterBuild::check(full, commands_of(full), context);
   const std::string work = work_folder_of(full.run);
   // It may hold the locks.
-  if (full.run.restart) ClusterBuild::stop_merge_job(context.files, work, commands_of(full));
+  if (full.run.restart) {
+    try {
+      ClusterBuild::stop_merge_job(context.files, work, commands_of(full));
+    } catch (const Error& error) {
+      context.progress.warn(error.message() + "; tasks of it may still run");
+    }
+  }
   if (!full.run.cluster || !full.run.cluster->merge_job) return Build(full, context).run();
   MergeJob merge_job(full, work, context, commands_of(full));
   std::string id;
-  if (full.run.restart || !(merge_job.finished() || merge_job.is_alive()))
+  const bool is_over = merge_job.finished() && !merge_job.has_left_work();
+  if (full.run.restart || !(is_over || merge_job.is_alive()))
     id = Build(full, context).hand_over(merge_job);
   return merge_job.follow(id);
 }

@@ -100,6 +100,13 @@ void points(const query::Dag& dag, const Position& low, const Position& high, ui
   expect_length(found.shape(0), dag.positions({grid_levels, {low, high}}, positions_of(found)));
 }
 
+// The number of rows that points() fills, found by a walk over the region alone.
+uint64_t point_count(const query::Dag& dag, const Position& low, const Position& high,
+                     uint32_t grid_levels) {
+  const nb::gil_scoped_release released;
+  return dag.positions({grid_levels, {low, high}}, {});
+}
+
 uint64_t count(const query::Dag& dag, const Position& low, const Position& high,
                uint32_t grid_levels) {
   const nb::gil_scoped_release released;
@@ -150,6 +157,7 @@ void bind_dag(nb::module_& module) {
       .def("rays", &rays)
       .def("dense", &dense)
       .def("points", &points)
+      .def("point_count", &point_count)
       .def("count", &count)
       .def("nearest", &nearest);
 }

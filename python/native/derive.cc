@@ -34,7 +34,10 @@ query::Selection selection_of(uint32_t grid_levels, const Corner& low, const Cor
 }
 
 uint64_t memory_of(const std::string& text) {
-  return text.empty() ? default_memory() : parse_size(text, "memory");
+  const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "memory");
+  if (bytes < kMinMemory)
+    throw Error(ErrorCode::kInvalidInput, "memory: " + text + ", expected at least 64MiB");
+  return bytes;
 }
 
 std::string extract(const std::string& path, const std::string& output, uint32_t grid_levels,

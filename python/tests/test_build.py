@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import voxdag
+from conftest import torus
 
 
 def test_report_and_progress(mesh, tmp_path):
@@ -99,3 +100,8 @@ def test_ctrl_c(tmp_path):
     _, messages = process.communicate(timeout=60)
     assert process.returncode != 0 and "KeyboardInterrupt" in messages
     assert not (tmp_path / "x.vdag").exists()
+    scene = torus(400, 200)
+    resumed = voxdag.build(scene, resolution=16384, output=tmp_path / "x.vdag")
+    whole = voxdag.build(scene, resolution=16384, output=tmp_path / "whole.vdag")
+    assert resumed["sha256"] == whole["sha256"]
+    assert not [name for name in os.listdir(tmp_path) if name.endswith(".ply")]

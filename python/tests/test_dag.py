@@ -114,6 +114,17 @@ def test_nearest(dag, cells):
         assert tuple(voxel) == tuple(all_set[squares.argmin()])  # in Morton order: the first
 
 
+def test_nearest_at_the_distance_that_it_returns(dag):
+    voxels, distances = dag.nearest([[-7, -9, -11], [31, 32, 33]])
+    for point, distance in zip([[-7, -9, -11], [31, 32, 33]], distances):
+        assert dag.nearest([point], distance)[1][0] == distance
+        assert np.isinf(dag.nearest([point], np.nextafter(distance, 0))[1][0])
+
+
+def test_no_rays(dag):
+    assert len(dag.rays([[0, 0, 0]], np.empty((0, 3))).distance) == 0
+
+
 def test_threads(dag, cells):
     wrong = []
 

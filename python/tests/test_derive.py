@@ -29,7 +29,8 @@ def test_export(path, dag, tmp_path):
     assert report["files"] == [str(tmp_path / "voxels.npz")]
     assert report["voxels"] == dag.count(level=5)
     arrays = np.load(tmp_path / "voxels.npz")
-    assert any(len(arrays[name]) == report["voxels"] for name in arrays.files if arrays[name].ndim)
+    assert np.array_equal(arrays["cells"], dag.points(level=5))
+    assert np.allclose(arrays["positions"], dag.to_world(dag.points(level=5) + 0.5, 5))
     assert "hashdag" in voxdag.export_formats()
 
 
@@ -37,6 +38,10 @@ def test_export(path, dag, tmp_path):
     (lambda path, out: voxdag.extract(path, path, force=True), "invalid_input"),
     (lambda path, out: voxdag.extract(path, out, region=(70, 0, 0, 80, 9, 9)), "invalid_input"),
     (lambda path, out: voxdag.extract(path, out, level=9), "invalid_input"),
+    (lambda path, out: voxdag.extract(path, out, level=1), "invalid_input"),
+    (lambda path, out: voxdag.extract(path, out, memory="8MiB"), "invalid_input"),
+    (lambda path, out: voxdag.export(path, out, to="svdag", level=0), "invalid_input"),
+    (lambda path, out: voxdag.export(path, out, to="bt", level=1), "invalid_input"),
     (lambda path, out: voxdag.extract(str(path) + "x", out), "not_found"),
     (lambda path, out: voxdag.export(path, out, to="obj"), "invalid_input"),
 ])

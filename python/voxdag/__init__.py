@@ -6,7 +6,7 @@
         dag.rays(origins, directions)           # what do rays hit?
         dag.dense(region, level=8)              # a box of the grid of 2^8 cells as an array
 
-Long calls release the interpreter's lock and stop on Ctrl-C. Errors of this package are
+Long calls release the interpreter's lock; build, plan, extract and export stop on Ctrl-C. Errors of this package are
 `voxdag.Error`, with a `code`.
 """
 

@@ -2,8 +2,9 @@
 
 import json
 import os
+import tempfile
 from contextlib import contextmanager
-from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import Any, BinaryIO, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -66,17 +67,20 @@ def _call(function: Callable[..., str], files: List[str], resolution: int,
 
 @contextmanager
 def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
-    """The files of a scene. A mesh is a PLY file next to the output."""
+    """The files of a scene. A mesh becomes a PLY file next to the output, which is removed."""
     if isinstance(scene, (str, os.PathLike)):
         yield [os.fspath(scene)]
     elif _is_mesh(scene):
-        path = output + ".scene.ply"
+        _check_mesh(*scene)
+        folder = os.path.dirname(os.path.abspath(output))
+        handle, path = tempfile.mkstemp(suffix=".ply", prefix=os.path.basename(output) + ".scene-",
+                                        dir=folder if os.path.isdir(folder) else None)
         try:
-            _write_ply(path, scene)
+            with os.fdopen(handle, "wb") as file:
+                _write_ply(file, *(np.asarray(part) for part in scene))
             yield [path]
         finally:
-            if os.path.exists(path):
-                os.remove(path)
+            os.remove(path)
     else:
         yield [os.fspath(file) for file in scene]
 
@@ -86,30 +90,32 @@ def _is_mesh(scene: Scene) -> bool:
             and not any(isinstance(part, (str, os.PathLike)) for part in scene))
 
 
-def _write_ply(path: str, mesh: Mesh) -> None:
-    vertices, triangles = (np.asarray(part) for part in mesh)
+def _check_mesh(vertices: Any, triangles: Any) -> None:
+    vertices, triangles = np.asarray(vertices), np.asarray(triangles)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
         raise Error(f"the vertices are an array {vertices.shape} of {vertices.dtype}: "
                     "expected (N, 3) numbers", "invalid_input")
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
         raise Error(f"the triangles are an array {triangles.shape} of {triangles.dtype}: "
                     "expected (M, 3) integers", "invalid_input")
-    if len(vertices) >= 1 << 32:
-        raise Error(f"the mesh has {len(vertices)} vertices: expected fewer than 2^32", "limit")
+    if len(vertices) > (1 << 32) - 2:
+        raise Error(f"the mesh has {len(vertices)} vertices: expected at most 2^32 - 2", "limit")
     if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(vertices)):
         bad = np.flatnonzero(((triangles < 0) | (triangles >= len(vertices))).any(axis=1))[0]
         raise Error(f"triangle {bad} has the vertices {triangles[bad].tolist()}: expected 0 to "
                     f"{len(vertices) - 1}", "invalid_input")
-    with open(path, "wb") as file:
-        file.write((f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
-                    "property double x\nproperty double y\nproperty double z\n"
-                    f"element face {len(triangles)}\n"
-                    "property list uchar uint vertex_indices\nend_header\n").encode())
-        for first in range(0, len(vertices), _ROWS):
-            file.write(np.ascontiguousarray(vertices[first:first + _ROWS], dtype="<f8"))
-        for first in range(0, len(triangles), _ROWS):
-            part = triangles[first:first + _ROWS]
-            rows = np.empty(len(part), dtype=[("count", "u1"), ("corners", "<u4", 3)])
-            rows["count"] = 3
-            rows["corners"] = part
-            file.write(rows)
+
+
+def _write_ply(file: BinaryIO, vertices: np.ndarray, triangles: np.ndarray) -> None:
+    file.write((f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
+                "property double x\nproperty double y\nproperty double z\n"
+                f"element face {len(triangles)}\n"
+                "property list uchar uint vertex_indices\nend_header\n").encode())
+    for first in range(0, len(vertices), _ROWS):
+        file.write(np.ascontiguousarray(vertices[first:first + _ROWS], dtype="<f8"))
+    for first in range(0, len(triangles), _ROWS):
+        part = triangles[first:first + _ROWS]
+        rows = np.empty(len(part), dtype=[("count", "u1"), ("corners", "<u4", 3)])
+        rows["count"] = 3
+        rows["corners"] = part
+        file.write(rows)

@@ -125,7 +125,7 @@ class Dag:
         if world:
             starts = (starts - np.asarray(self._dag.origin)) / unit
         if 1 in (len(starts), len(ways)):
-            shape = (max(len(starts), len(ways)), 3)
+            shape = (len(ways) if len(starts) == 1 else len(starts), 3)
             starts, ways = (np.ascontiguousarray(np.broadcast_to(rows, shape))
                             for rows in (starts, ways))
         hits = Hits(np.empty(len(starts)), np.empty((len(starts), 3), np.int64),
@@ -148,7 +148,8 @@ class Dag:
 
         With world=True their centers in the units of the scene, float64."""
         low, high = self._region(region, level, world)
-        found = np.empty((self._dag.count(low, high, self._levels(level)), 3), np.int64)
+        rows = self._dag.point_count(low, high, self._levels(level))
+        found = np.empty((rows, 3), np.int64)
         self._dag.points(low, high, self._levels(level), found)
         return self.to_world(found + 0.5, level) if world else found
 

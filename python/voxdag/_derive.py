@@ -60,7 +60,7 @@ def _memory(memory: Union[int, str, None]) -> str:
 
 
 def _check_output(path: str, outputs: Sequence[str], force: bool) -> None:
-    for output in outputs:
+    for output in [name + end for name in outputs for end in ("", ".partial")]:
         if not os.path.lexists(output):
             continue
         if os.path.exists(output) and os.path.exists(path) and os.path.samefile(path, output):

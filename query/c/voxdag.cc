@@ -1,7 +1,9 @@
 #include "query/c/voxdag.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <new>
 #include <string>
@@ -19,7 +21,12 @@ struct voxdag_file {
 
 namespace {
 
-thread_local std::string last_error;
+// Of a fixed size: to say that memory is short must not take memory.
+thread_local std::array<char, 1024> last_error;
+
+void set_error(const char* text) {
+  std::snprintf(last_error.data(), last_error.size(), "%s", text);
+}
 
 voxdag_status status_of(voxdag::ErrorCode code) {
   switch (code) {
@@ -49,13 +56,13 @@ voxdag_status answer(const Ask& ask) {
     ask();
     return VOXDAG_OK;
   } catch (const voxdag::Error& error) {
-    last_error = error.message();
+    set_error(error.what());
     return status_of(error.code());
   } catch (const std::bad_alloc&) {
-    last_error = "there is not enough memory for the answer";
+    set_error("there is not enough memory for the answer");
     return VOXDAG_OUT_OF_MEMORY;
   } catch (const std::exception& error) {
-    last_error = error.what();
+    set_error(error.what());
     return VOXDAG_INTERNAL;
   }
 }
@@ -101,7 +108,7 @@ void copy_hit(const voxdag::query::RayHit& from, uint32_t grid_levels, voxdag_hi
 
 }  // namespace
 
-const char* voxdag_error(void) { return last_error.c_str(); }
+const char* voxdag_error(void) { return last_error.data(); }
 
 voxdag_status voxdag_open(const char* path, voxdag_file** file) {
   return answer([&] {
@@ -177,11 +184,10 @@ voxdag_status voxdag_dense(const voxdag_file* file, uint32_t grid_levels,
     unsigned __int128 size = 1;
     for (size_t axis = 0; axis < 3; ++axis) {
       const auto length = static_cast<__int128>(region->high[axis]) - region->low[axis];
-      if (length <= 0) return;
-      size *= static_cast<unsigned __int128>(length);
+      size *= length > 0 ? static_cast<unsigned __int128>(length) : 0;
       if (size > PTRDIFF_MAX) refuse("the region has over 2^63 cells: expected fewer");
     }
-    expect_pointer(cells, "the array of cells");
+    if (size > 0) expect_pointer(cells, "the array of cells");
     file->dag.box(selection, {cells, static_cast<size_t>(size)});
   });
 }

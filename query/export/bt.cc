@@ -87,10 +87,8 @@ class BtWalk {
 };
 
 std::string bt_header(uint64_t nodes, double cell_edge) {
-  char edge[32];
-  std::snprintf(edge, sizeof(edge), "%.17g", cell_edge);
   return "# Octomap OcTree binary file\n# written by voxdag\nid OcTree\nsize " +
-         std::to_string(nodes) + "\nres " + edge + "\ndata\n";
+         std::to_string(nodes) + "\nres " + number_text(cell_edge) + "\ndata\n";
 }
 
 std::string translation_note(const ExportJob& job) {

@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "query/export/export_job.h"
+#include "query/output_lock.h"
 
 namespace voxdag::query {
 namespace {
@@ -52,6 +53,8 @@ std::vector<std::string> export_paths(const ExportFormat& format, const std::str
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel) {
+  check_grid(request.selection, file.grid_levels());
+  const OutputLock lock(files, request.output);
   const DagView dag(file);
   MemoryBudget budget(request.memory_bytes);
   const std::vector<std::string> paths = export_paths(*request.format, request.output);

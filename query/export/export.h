@@ -1,5 +1,6 @@
 // Writes a finished DAG, or a part of it, in the formats of other programs: docs/export.md says
-// which program reads what. All limits of a format are checked before anything is written.
+// which program reads what. What a format cannot hold is refused, mostly before anything is
+// written.
 #pragma once
 
 #include <cstdint>
@@ -50,8 +51,9 @@ struct ExportRequest {
 };
 
 // Writes the selected voxels. Each file appears under its name when all are whole; after an error
-// nothing is left. Throws Error{kLimit} if the format cannot hold them, Error{kOutOfMemory} if the
-// memory cannot; the message says what would do.
+// nothing is left, unless the disk refuses the second of two names. Throws Error{kLimit} if the
+// format cannot hold them, Error{kOutOfMemory} if the memory cannot; the message says what would
+// do.
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel);

@@ -1,6 +1,7 @@
 #include "query/export/export_job.h"
 
 #include <bit>
+#include <charconv>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
@@ -53,6 +54,18 @@ uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t
 void refuse_empty(const ExportJob& job) {
   throw Error(ErrorCode::kInvalidInput,
               job.file.path() + ": the selection has no voxels: expected some to export");
+}
+
+void require_written(const ExportJob& job, uint64_t written, uint64_t expected) {
+  if (written != expected)
+    throw Error(ErrorCode::kCorrupt, job.file.path() + ": " + count_text(written) +
+                                         " voxels were found, expected " + count_text(expected) +
+                                         ": the file is damaged (voxdag verify says where)");
+}
+
+std::string number_text(double number) {
+  char text[40];
+  return {text, std::to_chars(text, text + sizeof(text), number).ptr};
 }
 
 uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason) {

@@ -84,6 +84,12 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
 
 [[noreturn]] void refuse_empty(const ExportJob& job);
 
+// Throws Error{kCorrupt} unless as many voxels were written as the header of the file, or the count
+// before, has said.
+void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
+// A number that reads back as the same double, whatever the locale.
+std::string number_text(double number);
+
 // One for each format; those of the libraries exist where the library was found.
 ExportReport write_ply(const ExportJob& job);
 ExportReport write_npz(const ExportJob& job);

@@ -196,9 +196,8 @@ std::array<std::array<float, 3>, 4> corners_of(const GlbQuad& quad) {
 }
 
 std::string numbers_text(const std::array<double, 3>& numbers) {
-  char text[100];
-  std::snprintf(text, sizeof(text), "[%.17g,%.17g,%.17g]", numbers[0], numbers[1], numbers[2]);
-  return text;
+  return "[" + number_text(numbers[0]) + "," + number_text(numbers[1]) + "," +
+         number_text(numbers[2]) + "]";
 }
 
 std::string glb_json(const ExportJob& job, const std::vector<GlbQuad>& quads) {

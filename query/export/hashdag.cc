@@ -43,6 +43,7 @@ class HashDagWriter {
                   job.output + ": the top " + std::to_string(top_levels_) + " levels have " +
                       count_text(top_nodes) + " nodes, but HashDAG takes less than " +
                       count_text(kMaxCount) + ". Expected a coarser --level or a smaller --region");
+    charge_ = MemoryCharge(job.budget, (top_nodes + 1) * sizeof(uint64_t), "counts of top nodes");
     enclosed_.resize(std::max<uint64_t>(top_nodes, 1));
   }
 
@@ -91,6 +92,7 @@ class HashDagWriter {
                    ExportStage& stage) {
     seek_level(level);
     uint64_t top = level < first_top_.size() ? first_top_[level] : 0;
+    const uint64_t end = top + dag_.node_count(level);
     dag_.for_each_node(level, [&](uint64_t offset, uint32_t mask, std::span<const uint32_t> nodes) {
       uint64_t count = 0;
       std::array<uint32_t, 9> words;
@@ -100,6 +102,11 @@ class HashDagWriter {
       }
       counts[offset] = count;
       if (level < top_levels_) {
+        if (top == end)
+          throw Error(ErrorCode::kCorrupt, job_.file.path() + ": level " + std::to_string(level) +
+                                               " has more nodes than the " +
+                                               count_text(dag_.node_count(level)) +
+                                               " of the header");
         enclosed_[top] = count;
         words[0] = mask | static_cast<uint32_t>(top++) << 8;
       } else if (count < kMaxCount) {
@@ -122,6 +129,7 @@ class HashDagWriter {
   const uint32_t top_levels_;
   std::vector<uint64_t> bases_;      // word index of the first word of each level
   std::vector<uint64_t> first_top_;  // index of the first node of each top level
+  MemoryCharge charge_;
   std::vector<uint64_t> enclosed_;
 };
 

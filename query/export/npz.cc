@@ -141,7 +141,7 @@ std::string npy_header(const char* type, uint64_t rows) {
 
 class NpzWriter {
  public:
-  explicit NpzWriter(const ExportJob& job) : file_(job.files, job.output) {}
+  explicit NpzWriter(const ExportJob& job) : job_(job), file_(job.files, job.output) {}
 
   // Adds an array of `count` numbers; fill(put) calls put(number) for each.
   template <class Number, class Fill>
@@ -152,6 +152,7 @@ class NpzWriter {
     crc.add(std::as_bytes(std::span(header)));
     file_.write(header);
     std::vector<Number> block;
+    uint64_t written = 0;
     const auto flush = [&] {
       crc.add(std::as_bytes(std::span(block)));
       file_.write(std::as_bytes(std::span(block)));
@@ -159,9 +160,12 @@ class NpzWriter {
     };
     fill([&](Number number) {
       block.push_back(number);
+      ++written;
       if (block.size() == 8192) flush();
     });
     flush();
+    // In voxels, of three numbers each.
+    require_written(job_, written / 3, count / 3);
     member.crc = crc.value();
     // Only now is the checksum known.
     const uint64_t end = file_.size();
@@ -178,6 +182,7 @@ class NpzWriter {
   }
 
  private:
+  const ExportJob& job_;
   ExportFile file_;
   std::vector<NpzMember> members_;
 };

@@ -28,14 +28,18 @@ ExportReport write_ply(const ExportJob& job) {
   ExportFile file(job.files, job.output);
   file.write(header);
   ExportStage stage(job, "export", report.voxels, "voxels");
+  uint64_t written_voxels = 0;
   for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
     for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
       for (size_t axis = 0; axis < 3; ++axis)
         file.put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
     });
-    stage.advance(static_cast<uint64_t>(std::popcount(mask)));
+    const auto voxels = static_cast<uint64_t>(std::popcount(mask));
+    written_voxels += voxels;
+    stage.advance(voxels);
     return true;
   });
+  require_written(job, written_voxels, report.voxels);
   ExportFile* const written[] = {&file};
   report.bytes = ExportFile::publish(written);
   return report;

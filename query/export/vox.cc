@@ -1,6 +1,6 @@
 // MagicaVoxel .vox, version 150: a model of at most 256^3 voxels for each different node of the DAG
 // with that edge, and an instance of it for each place where the node occurs.
-//     "VOX " | 150 | MAIN { (SIZE XYZI)... nTRN nGRP (nTRN nSHP)... LAYR RGBA }
+//     "VOX " | 150 | MAIN { (SIZE XYZI)... nTRN nGRP (nTRN nSHP)... RGBA }
 // MagicaVoxel's z is up: (x, y, z) of the file is (x, -z, y) of ours.
 #include <array>
 #include <bit>
@@ -79,6 +79,7 @@ class VoxWriter {
         view_(dag.view()),
         depth_(dag.grid_levels() > kModelLevels ? dag.grid_levels() - kModelLevels : 0),
         edge_(int64_t{1} << (dag.grid_levels() - depth_)),
+        level_words_(dag.words(depth_).size()),
         models_(job, dag, depth_),
         charge_(job.budget, dag.node_count(depth_) * sizeof(uint64_t), "the models") {
     number_models(dag);
@@ -161,8 +162,15 @@ class VoxWriter {
   template <class Visit>
   void visit_instances(uint32_t depth, uint64_t content, const CellCorner& corner,
                        const Visit& visit) {
-    if (depth == depth_)
-      return visit(corner, depth_ + kBrickLevels == view_.grid_levels() ? 0 : models_[content]);
+    if (depth == depth_) {
+      job_.cancel.check();
+      if (depth_ + kBrickLevels == view_.grid_levels()) return visit(corner, 0);
+      if (content >= level_words_)
+        throw Error(ErrorCode::kCorrupt, job_.file.path() + ": level " + std::to_string(depth_) +
+                                             ", word " + std::to_string(content) +
+                                             ": no node lies here");
+      return visit(corner, models_[content]);
+    }
     const DagView::Children children = view_.children(depth, content);
     const int64_t half = int64_t{1} << (view_.grid_levels() - depth - 1);
     for (int i = 0; i < 8; ++i)
@@ -232,6 +240,7 @@ class VoxWriter {
   const DagView view_;
   const uint32_t depth_;  // of the models' nodes
   const int64_t edge_;    // of a model
+  const uint64_t level_words_;
   NodeNumbers<uint32_t> models_;
   MemoryCharge charge_;
   std::vector<uint64_t> voxels_;  // of each model

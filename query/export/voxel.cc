@@ -64,21 +64,16 @@ class VoxelWriter {
   void write_json(ExportFile& json) const {
     const auto corner = [&](double offset) {
       std::string text;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        char number[40];
-        std::snprintf(number, sizeof(number), "%s%.17g", axis ? ", " : "",
-                      job_.file.origin()[axis] + offset);
-        text += number;
-      }
+      for (size_t axis = 0; axis < 3; ++axis)
+        text += (axis ? ", " : "") + number_text(job_.file.origin()[axis] + offset);
       return "[" + text + "]";
     };
     const std::string bounds =
         "{ \"min\": " + corner(0) + ", \"max\": " + corner(job_.file.edge()) + " }";
-    char edge[32];
-    std::snprintf(edge, sizeof(edge), "%.17g", job_.cell_edge());
     json.write("{\n  \"version\": \"1.1\",\n  \"asset\": { \"generator\": \"voxdag\" },\n");
     json.write("  \"gridBounds\": " + bounds + ",\n  \"sceneBounds\": " + bounds + ",\n");
-    json.write("  \"voxelResolution\": " + std::string(edge) + ",\n  \"leafSize\": 4,\n");
+    json.write("  \"voxelResolution\": " + number_text(job_.cell_edge()) +
+               ",\n  \"leafSize\": 4,\n");
     const auto number = [&](const char* name, uint64_t value, const char* end = ",\n") {
       json.write("  \"" + std::string(name) + "\": " + std::to_string(value) + end);
     };

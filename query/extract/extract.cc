@@ -18,6 +18,7 @@
 #include "merge/merge.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_builder.h"
+#include "query/output_lock.h"
 
 namespace voxdag::query {
 namespace {
@@ -151,8 +152,8 @@ uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const 
   const uint32_t deepest = std::min(spec_.selection.grid_levels - 1, file_.brick_level());
   for (uint32_t l = 0; l <= deepest; ++l) nodes += file_.level(l).node_count;
   if (nodes <= kFewNodes) return 1;
-  return std::clamp(nodes / (share_bytes / kBytesPerNode), workers * kPartsPerWorker,
-                    kMaxFirstParts);
+  return std::clamp(nodes / std::max<uint64_t>(share_bytes / kBytesPerNode, 1),
+                    workers * kPartsPerWorker, kMaxFirstParts);
 }
 
 // The cube of the new grid, divided until there are about as many parts as wanted.
@@ -271,20 +272,8 @@ Cube crop_cube(const Selection& selection) {
 
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel) {
-  const std::string lock_path = spec.output + ".lock";
-  auto lock = files.try_lock(lock_path);
-  if (!lock)
-    throw Error(ErrorCode::kIo, spec.output +
-                                    " is being written by another process: expected another file "
-                                    "(-o), or to wait for that process");
-  const std::shared_ptr<void> remove_lock(nullptr, [&](void*) {
-    try {
-      // A file of that name that is not empty is somebody else's.
-      if (files.open_read(lock_path)->size() == 0) files.remove(lock_path);
-    } catch (const Error&) {
-      // An empty file is left, which the next one that writes there locks again.
-    }
-  });
+  check_grid(spec.selection, file.grid_levels());
+  const OutputLock lock(files, spec.output);
   return Extraction(file, spec, files, progress, cancel).run();
 }
 

@@ -66,6 +66,16 @@ RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
   return out;
 }
 
+// The largest square whose root, as a double, is at most `distance`. Distances of more than 2^31 do
+// not occur.
+uint64_t largest_square(double distance) {
+  if (distance >= 0x1p31) return uint64_t{1} << 62;
+  auto square = static_cast<uint64_t>(distance * distance);
+  while (square > 0 && std::sqrt(static_cast<double>(square)) > distance) --square;
+  while (std::sqrt(static_cast<double>(square + 1)) <= distance) ++square;
+  return square;
+}
+
 }  // namespace
 
 Dag::Dag(const std::string& path, uint64_t memory_bytes)
@@ -163,10 +173,7 @@ void Dag::nearest(std::span<const Position> points, uint32_t grid_levels, double
   check_grid_levels(view_, grid_levels);
   require(points.size() == cells.size(), "as many results as points");
   require(max_distance >= 0, "a distance that is at least 0");
-  // The largest square of a distance that is allowed; distances of more than 2^32 do not occur.
-  const double squared = std::floor(max_distance * max_distance);
-  const uint64_t max_squared =
-      squared < 0x1p63 ? static_cast<uint64_t>(squared) : uint64_t{1} << 63;
+  const uint64_t max_squared = largest_square(max_distance);
   naming_file(file_->path(), [&] {
     for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
       for (size_t i = first; i < first + count; ++i) {

@@ -68,9 +68,14 @@ void ClusterBuild::check(const BuildSpec& spec, CommandRunner& commands,
                 "--cache: tasks of a cluster have no cache: expected "
                 "--cluster without it");
   const ClusterOptions& options = *spec.run.cluster;
-  Slurm(commands, context.cancel, options.slurm_start_s)
-      .check(split_words(options.submit_options), std::min(kFirstPause_s, options.slurm_interval_s),
-             context.progress);
+  Slurm slurm(commands, context.cancel, options.slurm_start_s);
+  const double pause_s = std::min(kFirstPause_s, options.slurm_interval_s);
+  std::vector<std::string> words = split_words(options.submit_options);
+  slurm.check(words, pause_s, context.progress);
+  if (!options.merge_job || options.merge_job->submit_options.empty()) return;
+  const std::vector<std::string>& own = options.merge_job->submit_options;
+  words.insert(words.end(), own.begin(), own.end());
+  slurm.check(words, pause_s, context.progress);
 }
 
 void ClusterBuild::save_state() {
@@ -428,9 +433,10 @@ void ClusterBuild::stop_tasks(FileSystem& files, const std::string& work_folder,
   if (!state) return;
   const CancelToken never;
   // The job that merges would submit again what is stopped.
-  if ((!is_merge_job && !stop_merge_job(files, work_folder, commands)) ||
-      !Slurm(commands, never).cancel(state->task_name()))
+  const bool is_merge_stopped = is_merge_job || stop_merge_job(files, work_folder, commands);
+  if (!Slurm(commands, never).cancel(state->task_name()) || !is_merge_stopped)
     throw Error(ErrorCode::kIo, "the tasks may run on: expected 'scancel --name=" +
+                                    (is_merge_job ? "" : state->merge_job_name() + ",") +
                                     state->task_name() + "' to succeed");
 }
 

@@ -72,10 +72,14 @@ ClusterFolder::Entry parse_cluster_name(const std::string& name) {
 
 std::vector<ClusterFolder::Entry> ClusterFolder::list(FileSystem& files) const {
   std::vector<Entry> entries;
-  if (!files.exists(path_)) return entries;
-  for (const DirectoryEntry& found : files.list(path_)) {
-    entries.push_back(parse_cluster_name(found.name));
-    entries.back().path = path_ + "/" + found.name;
+  try {
+    for (const DirectoryEntry& found : files.list(path_)) {
+      entries.push_back(parse_cluster_name(found.name));
+      entries.back().path = path_ + "/" + found.name;
+    }
+  } catch (const Error& error) {
+    // There is none, or the build that ends removes it.
+    if (error.code() != ErrorCode::kNotFound) throw;
   }
   std::ranges::sort(entries, {}, &Entry::path);
   return entries;

@@ -120,11 +120,15 @@ ClusterState decode_state(const std::string& text) {
 
 std::optional<ClusterState> read_cluster_state(FileSystem& files, const std::string& work_folder) {
   const std::string path = ClusterFolder(work_folder).state_path();
+  if (!files.exists(path)) return std::nullopt;
   try {
-    if (!files.exists(path)) return std::nullopt;
     return decode_state(read_small_file(files, path, kMaxStateBytes));
-  } catch (const Error&) {
-    return std::nullopt;
+  } catch (const Error& error) {
+    // The build that ended just now has removed it.
+    if (error.code() == ErrorCode::kNotFound) return std::nullopt;
+    throw Error(error.code(), path + ": " + error.message() +
+                                  ": expected the state of the tasks; without that file the "
+                                  "subvolumes that no run has accepted are built again");
   }
 }
 

@@ -1,7 +1,7 @@
 // What the submitting process of a cluster build knows, in cluster.json: the batches that are not
 // built, their tasks and what went wrong with them, and totals. Written by that process only, whole
-// or not at all; read by `voxdag status`. What is built stands in the job store and in records, so
-// that a lost state costs the tasks that run, not what they have built.
+// or not at all; read by `voxdag status`. Which batch a record belongs to stands here only: without
+// a state, what tasks have built and no run has accepted is built again.
 #pragma once
 
 #include <cstdint>
@@ -69,7 +69,8 @@ struct ClusterState {
 std::string encode_state(const ClusterState& state);
 // Throws Error{kCorrupt} for a text that encode_state() did not make.
 ClusterState decode_state(const std::string& text);
-// The state of the build in a work folder; nothing if there is none, or it cannot be read.
+// The state of the build in a work folder; nothing if there is none. Throws Error that names the
+// file if it cannot be read, or is damaged.
 std::optional<ClusterState> read_cluster_state(FileSystem& files, const std::string& work_folder);
 
 }  // namespace voxdag

@@ -37,12 +37,15 @@ bool is_scratch(const DirectoryEntry& entry) {
          (segment_id(entry.name) || entry.name.starts_with("merge-"));
 }
 
+// NFS gives such a name to a file that is removed while somebody has it open.
+bool is_left_by_nfs(std::string_view name) { return name.starts_with(".nfs"); }
+
 // Files and folders of a cluster build; cluster/cluster_folder.h lists them.
 bool is_of_cluster(const DirectoryEntry& entry) {
   if (entry.is_special) return false;
   const std::string_view name = entry.name;
   if (entry.is_directory) return name.starts_with("attempt-");
-  if (name.starts_with(".nfs")) return true;  // NFS: a file that was removed while it is open
+  if (is_left_by_nfs(name)) return true;
   const auto is = [&](std::string_view begin, std::string_view end) {
     return name.starts_with(begin) && (name.ends_with(end) || name.ends_with(".partial"));
   };
@@ -53,6 +56,7 @@ bool is_of_cluster(const DirectoryEntry& entry) {
 bool is_ours(const DirectoryEntry& entry) {
   if (entry.is_special) return false;
   const std::string_view name = entry.name;
+  if (is_left_by_nfs(name)) return true;
   if (entry.is_directory) return name == kScratchName || name == kClusterName;
   return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
          name == "job.db-journal" || name.ends_with(".vdspill") || name.ends_with(".vddurable") ||

@@ -59,7 +59,8 @@ void JobFolders::clean_up() {
       if (!job) foreign += " jobs/" + entry.name;
       // The service may have been killed before it had stopped them.
       else if (job->state == JobState::kSuspended || job->state == JobState::kFailed)
-        ClusterBuild::stop_tasks(files_, of(entry.name).work(), system_commands());
+        // None of the service's jobs has a job that merges.
+        ClusterBuild::stop_tasks(files_, of(entry.name).work(), system_commands(), true);
       else if (has_ended(job->state) && job->state != JobState::kFailed)
         remove_work(entry.name);
     });

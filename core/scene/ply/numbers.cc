@@ -1,6 +1,7 @@
 #include "core/scene/ply/numbers.h"
 
 #include <charconv>
+#include <clocale>
 #include <cstdlib>
 #include <string>
 
@@ -13,15 +14,21 @@ std::string_view without_plus(std::string_view text) {
   return text;
 }
 
+// In which a program that links this library may not be.
+locale_t c_locale() {
+  static const locale_t locale = newlocale(LC_ALL_MASK, "C", nullptr);
+  return locale;
+}
+
 template <class T>
 std::optional<double> parse_as(std::string_view text) {
   T value{};
   const char* const end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, value);
   if (parsed.ptr != end || parsed.ec == std::errc::invalid_argument) return std::nullopt;
-  // Too large, or too close to zero: std::strtod says which.
+  // Too large, or too close to zero: strtod says which.
   if (parsed.ec == std::errc::result_out_of_range)
-    return static_cast<T>(std::strtod(std::string(text).c_str(), nullptr));
+    return static_cast<T>(strtod_l(std::string(text).c_str(), nullptr, c_locale()));
   return value;
 }
 

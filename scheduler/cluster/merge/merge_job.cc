@@ -9,6 +9,7 @@
 #include "core/format/checksum.h"
 #include "core/scene/triangle_source.h"
 #include "scheduler/cluster/cluster_state.h"
+#include "scheduler/job/work_folder.h"
 
 namespace voxdag {
 namespace {
@@ -16,6 +17,9 @@ namespace {
 constexpr uint64_t kMaxReportBytes = uint64_t{1} << 24;
 // Between two looks at the files.
 constexpr double kFilesPause_s = 0.5;
+// How long an NFS client may believe that a file is not there which it has looked for before
+// (acdirmax, nfs(5)), and some more.
+constexpr double kShown_s = 75;
 // Of the end of a log, for a message.
 constexpr uint64_t kMaxTailBytes = 600;
 
@@ -36,6 +40,7 @@ std::string tail(FileSystem& files, const std::string& path) {
 
 // The code whose exit status Slurm has seen, in STATUS:SIGNAL.
 ErrorCode code_of(const SlurmEnd& end) {
+  if (end.state != "FAILED") return ErrorCode::kIo;
   for (int code = 0; code <= static_cast<int>(ErrorCode::kLimit); ++code)
     if (end.exit_code == std::to_string(exit_status(static_cast<ErrorCode>(code))) + ":0")
       return static_cast<ErrorCode>(code);
@@ -102,18 +107,19 @@ bool MergeJob::is_alive() {
   }
 }
 
-bool MergeJob::is_done() const {
-  return finished() && (spec_.run.keep_work || !context_.files.exists(folder_.work_folder()));
+bool MergeJob::has_left_work() const {
+  return !spec_.run.keep_work &&
+         context_.files.exists(WorkFolder::store_path(folder_.work_folder()));
 }
 
 BuildReport MergeJob::follow(const std::string& submitted) {
   std::string id = submitted;
   double asked_s = -options_.slurm_interval_s, gone_since_s = 0;
-  if (const auto state = read_cluster_state(context_.files, folder_.work_folder()))
-    name_ = state->merge_job_name();
   context_.progress.begin_stage("build", 0, "batches");
+  std::optional<BuildReport> report;
   for (;;) {
-    if (is_done()) break;
+    report = finished();
+    if (report && !has_left_work()) break;
     show_progress();
     const double now_s = wall_seconds();
     if (now_s - asked_s >= options_.slurm_interval_s) {
@@ -126,9 +132,12 @@ BuildReport MergeJob::follow(const std::string& submitted) {
       } else if (jobs) {
         // The shared disk may show what the job wrote later than Slurm its end.
         if (gone_since_s == 0) gone_since_s = now_s;
-        if (now_s - gone_since_s >= options_.grace_s) {
-          if (finished()) break;
-          fail(id);
+        const double gone_s = now_s - gone_since_s;
+        if (gone_s >= options_.grace_s) {
+          if (report) break;
+          const auto end = id.empty() ? std::nullopt : slurm_.end_of(id);
+          if (!end || end->state != "COMPLETED" || gone_s >= options_.grace_s + kShown_s)
+            fail(id, end);
         }
       }
     }
@@ -141,7 +150,7 @@ BuildReport MergeJob::follow(const std::string& submitted) {
         std::chrono::duration<double>(std::min(kFilesPause_s, options_.slurm_interval_s)));
   }
   context_.progress.end_stage();
-  return *finished();
+  return *report;
 }
 
 // Says once that the job runs.
@@ -153,8 +162,14 @@ void MergeJob::take_state(const SlurmJob& job) {
 
 // Batches that are built, by the records of tasks and, once it runs, by what the job has accepted.
 void MergeJob::show_progress() {
-  const auto state = read_cluster_state(context_.files, folder_.work_folder());
+  std::optional<ClusterState> state;
+  try {
+    state = read_cluster_state(context_.files, folder_.work_folder());
+  } catch (const Error&) {
+    // The job itself says so, if it lasts.
+  }
   if (!state) return;
+  name_ = state->merge_job_name();
   std::set<uint32_t> recorded;
   for (const ClusterFolder::Entry& entry : folder_.list(context_.files))
     if (entry.kind == ClusterFolder::Kind::kRecord) recorded.insert(entry.batch);
@@ -166,8 +181,7 @@ void MergeJob::show_progress() {
   shown_built_ = built;
 }
 
-void MergeJob::fail(const std::string& id) {
-  const auto end = id.empty() ? std::nullopt : slurm_.end_of(id);
+void MergeJob::fail(const std::string& id, const std::optional<SlurmEnd>& end) const {
   const std::string log = folder_.path() + "/log-" + id + ".txt";
   const std::string said = tail(context_.files, log);
   throw Error(end ? code_of(*end) : ErrorCode::kIo,

@@ -29,6 +29,9 @@ class MergeJob {
   const std::string& request() const { return request_; }
   // The report of a merge job that did the same, if its output is there.
   std::optional<BuildReport> finished() const;
+  // Whether a job that was stopped while it cleaned up, or is cleaning up, has left its work
+  // folder.
+  bool has_left_work() const;
   // Forgets what an earlier one has done.
   void forget_finished();
   // Whether such a job of the work folder's build waits or runs. Asks until Slurm answers.
@@ -40,10 +43,9 @@ class MergeJob {
 
  private:
   std::optional<std::vector<SlurmJob>> ask();
-  bool is_done() const;
   void take_state(const SlurmJob& job);
   void show_progress();
-  [[noreturn]] void fail(const std::string& id);
+  [[noreturn]] void fail(const std::string& id, const std::optional<SlurmEnd>& end) const;
 
   const BuildSpec& spec_;
   const ClusterOptions& options_;

@@ -138,9 +138,9 @@ TEST_F(CApiTest, Refuses) {
 }
 
 TEST_F(CApiTest, ErrorsBelongToTheirThread) {
-  EXPECT_EQ(voxdag_open("/nowhere/a.vdag", &file_), VOXDAG_NOT_FOUND);
-  std::thread([] {
-    voxdag_file* none = nullptr;
+  voxdag_file* none = nullptr;
+  EXPECT_EQ(voxdag_open("/nowhere/a.vdag", &none), VOXDAG_NOT_FOUND);
+  std::thread([&] {
     EXPECT_STREQ(voxdag_error(), "");
     EXPECT_EQ(voxdag_open("/nowhere/b.vdag", &none), VOXDAG_NOT_FOUND);
   }).join();

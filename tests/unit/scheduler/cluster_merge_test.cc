@@ -52,11 +52,11 @@ TEST_F(ClusterMergeJob, ItsReportIsThatOfTheCommand) {
   // The same command again finds the result; another scene or a restart does not.
   slurm_.commands.clear();
   EXPECT_EQ(report_json(build(merging_spec())), report_json(report));
-  EXPECT_EQ(count("sbatch"), 1u);  // tests the options
+  EXPECT_EQ(count("sbatch"), 2u);  // tests the options of the tasks, and of the job
   BuildSpec restarted = merging_spec();
   restarted.run.restart = true;
   build(restarted);
-  EXPECT_EQ(count("sbatch"), 1u + 4);
+  EXPECT_EQ(count("sbatch"), 2u + 5);
   write_spheres(scene(), 20000, 2);
   EXPECT_NE(run_build(merging_spec(), context()).sha256, expected_);
 }
@@ -99,7 +99,7 @@ TEST_F(ClusterMergeJob, WhoComesBackFollowsAndWhoStopsTheTasksStopsItFirst) {
   };
   const BuildReport report = run_build(merging_spec(), {system_files(), warnings_, never_});
   EXPECT_EQ(report.sha256, expected_);
-  EXPECT_EQ(count("sbatch"), 2u);  // both test the options only
+  EXPECT_EQ(count("sbatch"), 3u);  // both test the options only
   // Neither did the job stop itself.
   for (const auto& command : slurm_.commands)
     EXPECT_FALSE(command[0] == "scancel" && command[1].ends_with("-merge"));
