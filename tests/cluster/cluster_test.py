@@ -274,7 +274,8 @@ class ClusterTest(unittest.TestCase):
         self.assertGreater(report["subvolumes"]["reused"], 0)
 
     def test_torn_and_foreign_records_do_not_count(self):
-        build = self.start(16384, 4)
+        # The tasks begin only once the records are there.
+        build = self.start(16384, 4, "--cluster-options", "--begin=now+4")
         folder = self.work / "cluster"
         self.wait_for(lambda: list(folder.glob("batch-3.vdbatch")), "batch")
         (folder / "batch-3.record-torn.json").write_text('{"program": "0.1.0", "bui')
@@ -315,7 +316,8 @@ class ClusterTest(unittest.TestCase):
 
     def test_the_service_builds_on_the_cluster(self):
         with Service(self.folder / "service", self.scene, self.cluster.environment) as service:
-            job = service.submit(32768)
+            # Long enough for the service to ask Slurm while tasks run.
+            job = service.submit(131072)
             self.wait_for(lambda: service.tasks(job), lambda: f"tasks in {service.job(job)}", 20)
             shown = service.job(job)["progress"]["cluster"]
             self.assertEqual(shown["batches"], 8)
@@ -330,7 +332,7 @@ class ClusterTest(unittest.TestCase):
             self.assertTrue(self.queue(), "the tasks do not run on")
             service.start()
             self.wait_for(lambda: service.job(job)["state"] == "succeeded", "result", 120)
-            self.assertEqual(service.job(job)["result"]["sha256"], self.sha256(32768))
+            self.assertEqual(service.job(job)["result"]["sha256"], self.sha256(131072))
 
     def start_with_merge_job(self, *options):
         return self.start(16384, 4, "--cluster-merge", *options)
