@@ -76,10 +76,14 @@ class ClusterTest(unittest.TestCase):
             env=self.cluster.environment)
         return self.build
 
-    def end(self, build, timeout=300):
+    def end(self, build, timeout=150):
         """What it has printed; no wait counts on it any more."""
         self.build = None
-        return build.communicate(timeout=timeout)
+        try:
+            return build.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            build.kill()
+            self.fail(f"not ended after {timeout} s: {build.communicate()}\n{self.cluster.logs()}")
 
     def finish(self, build, resolution):
         out, messages = self.end(build)
