@@ -79,11 +79,7 @@ class ClusterTest(unittest.TestCase):
     def end(self, build, timeout=150):
         """What it has printed; no wait counts on it any more."""
         self.build = None
-        try:
-            return build.communicate(timeout=timeout)
-        except subprocess.TimeoutExpired:
-            build.kill()
-            self.fail(f"not ended after {timeout} s: {build.communicate()}\n{self.cluster.logs()}")
+        return build.communicate(timeout=timeout)
 
     def finish(self, build, resolution):
         out, messages = self.end(build)
