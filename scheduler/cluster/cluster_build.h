@@ -87,6 +87,7 @@ class ClusterBuild {
   void report_tasks() const;
   // False if Slurm does not answer.
   bool end_attempt(OpenBatch& batch, std::vector<uint32_t>& again, std::vector<uint32_t>& to_split);
+  void cancel_given_up(OpenBatch* batch, const SlurmTask& task);
   void note_reason(const SlurmTask& task);
   [[noreturn]] void give_up(uint32_t batch, ErrorCode code, const std::string& why);
   bool can_be_split(const OpenBatch& batch) const;

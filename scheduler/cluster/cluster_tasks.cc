@@ -23,6 +23,10 @@ void ClusterBuild::look_after_tasks() {
   std::set<uint32_t> listed;
   for (const SlurmTask& task : *active) {
     OpenBatch* const batch = state_.find(task.batch());
+    if (task.is_given_up()) {
+      cancel_given_up(batch, task);
+      continue;
+    }
     listed.insert(task.batch());
     note_reason(task);
     missing_since_.erase(task.batch());
@@ -48,6 +52,14 @@ void ClusterBuild::look_after_tasks() {
     for (const uint32_t part : split(batch)) again.push_back(part);
   submit(again);
   report_tasks();
+}
+
+// A task that Slurm will never start has failed.
+void ClusterBuild::cancel_given_up(OpenBatch* batch, const SlurmTask& task) {
+  if (!slurm_.cancel_one(task.name()) || !batch) return;
+  if (!batch->task) batch->task = task;
+  if (batch->task->name() == task.name())
+    own_reasons_[batch->number] = "Slurm could not start it (" + task.reason + ")";
 }
 
 // Says once why tasks wait, if it is not just for their turn.

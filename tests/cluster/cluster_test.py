@@ -16,10 +16,10 @@ import sys
 import tempfile
 import time
 import unittest
-import urllib.request
 from pathlib import Path
 
-from slurm_cluster import SlurmCluster, free_ports, missing_programs
+from slurm_cluster import SlurmCluster, missing_programs
+from voxdag_service import Service
 
 VOXDAG = ""
 SKIPPED = 77
@@ -54,8 +54,15 @@ class ClusterTest(unittest.TestCase):
             self.build.communicate()
         subprocess.run(["scancel", "--user", str(os.getuid())], env=self.cluster.environment,
                        check=False, capture_output=True)
+        # Nodes that Slurm does not trust any more.
+        if drained := self.nodes("drained,draining"):
+            self.cluster.command("scontrol", "update", f"nodename={drained}", "state=resume")
         if self.work.exists():
             shutil.rmtree(self.work)
+
+    def nodes(self, states):
+        return ",".join(self.cluster.command("sinfo", "--noheader", "--Node", "--partition=all",
+                                             f"--states={states}", "--format=%N").stdout.split())
 
     def sha256(self, resolution):
         """Of the file that this machine builds alone."""
@@ -79,7 +86,12 @@ class ClusterTest(unittest.TestCase):
     def end(self, build, timeout=150):
         """What it has printed; no wait counts on it any more."""
         self.build = None
-        return build.communicate(timeout=timeout)
+        try:
+            return build.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            build.kill()
+            _, messages = build.communicate()
+            self.fail(f"the build has not ended after {timeout} s\n{messages}\n{self.state()}")
 
     def finish(self, build, resolution):
         out, messages = self.end(build)
@@ -94,6 +106,12 @@ class ClusterTest(unittest.TestCase):
                  sorted(self.work.glob("cluster/log-*"))] if self.work.exists() else []
         return "\n".join(texts[-5:])
 
+    def state(self):
+        """What a test that waits in vain has to say."""
+        commands = [["sinfo", "--long", "--Node"], ["scontrol", "show", "job"]]
+        return "\n".join([self.cluster.command(*command, check=False).stdout for command in commands]
+                         + [self.logs(), self.cluster.logs()])
+
     def wait_for(self, condition, what, seconds=60):
         end = time.monotonic() + seconds
         while True:
@@ -103,9 +121,7 @@ class ClusterTest(unittest.TestCase):
             if has_ended or time.monotonic() > end:
                 self.fail(f"no {what() if callable(what) else what} after {seconds} s\n"
                           + (f"the build has ended: {self.build.communicate()}\n"
-                             if has_ended else "")
-                          + self.cluster.command("sinfo", "--long", "--Node", check=False).stdout
-                          + self.cluster.command("squeue", "--array", check=False).stdout)
+                             if has_ended else "") + self.state())
             time.sleep(0.05)
 
     def tasks(self):
@@ -193,6 +209,24 @@ class ClusterTest(unittest.TestCase):
         time.sleep(8)
         self.cluster.start_controller()
         self.finish(build, 16384)
+        # Nodes hold on to the ids of tasks that the new controller may know nothing of, and gives again.
+        self.cluster.restart_nodes()
+
+    def test_a_node_that_cannot_start_tasks(self):
+        # Slurm holds for ever what such a node was given.
+        spool = self.folder / "slurm" / "spool-n1"
+        away = spool.rename(f"{spool}.away")
+        spool.touch()
+        try:
+            build = self.start(16384, 8)
+            self.wait_for(lambda: "held" in self.cluster.command(
+                "squeue", "--noheader", "--format=%r").stdout, "task that is held")
+        finally:
+            spool.unlink()
+            away.rename(spool)
+        report, messages = self.finish(build, 16384)
+        self.assertRegex(messages, r"Slurm could not start it \(launch.failed.requeued.held\)")
+        self.assertGreater(report["cluster"]["failed_attempts"], 0)
 
     def test_the_same_command_attaches_after_ctrl_c(self):
         self.interrupt(signal.SIGINT)
@@ -315,7 +349,7 @@ class ClusterTest(unittest.TestCase):
         self.finish(self.start(16384, 4, *options), 16384)
 
     def test_the_service_builds_on_the_cluster(self):
-        with Service(self.folder / "service", self.scene, self.cluster.environment) as service:
+        with Service(VOXDAG, self.folder / "service", self.scene, self.cluster.environment) as service:
             # Long enough for the service to ask Slurm while tasks run.
             job = service.submit(131072)
             self.wait_for(lambda: service.tasks(job), lambda: f"tasks in {service.job(job)}", 20)
@@ -430,65 +464,6 @@ class ClusterTest(unittest.TestCase):
         # a record names.
         self.assertEqual(sum(self.submitted(name).values()),
                          report["cluster"]["batches"] + report["cluster"]["failed_attempts"])
-
-
-class Service:
-    """`voxdag serve` whose jobs build on the cluster."""
-
-    def __init__(self, folder, scene, environment):
-        self.environment = environment
-        folder.mkdir()
-        self.settings = folder / "server.json"
-        self.port = free_ports(1)[0]
-        self.settings.write_text(json.dumps({
-            "port": self.port, "data_folder": str(folder / "data"), "scene_roots": [str(scene.parent)],
-            "cluster": {"engine": "slurm", "tasks": 8, "grace_s": 2}}))
-        self.scene = scene
-
-    def __enter__(self):
-        self.start()
-        return self
-
-    def __exit__(self, *_):
-        self.process.terminate()
-        self.process.wait(timeout=30)
-
-    def start(self):
-        self.process = subprocess.Popen([VOXDAG, "serve", "--config", self.settings],
-                                        stderr=subprocess.DEVNULL, env=self.environment)
-        for _ in range(200):
-            try:
-                self.get("/readyz")
-                return
-            except OSError:
-                time.sleep(0.05)
-        raise RuntimeError("the service does not start")
-
-    def kill(self):
-        self.process.kill()
-        self.process.wait()
-
-    def get(self, path, body=None, method=None):
-        data = None if body is None else json.dumps(body).encode()
-        request = urllib.request.Request(f"http://127.0.0.1:{self.port}{path}", data, method=method,
-                                         headers={"Content-Type": "application/json"})
-        with urllib.request.urlopen(request, timeout=30) as answer:
-            return answer.read()
-
-    def submit(self, resolution):
-        body = {"scene": str(self.scene), "resolution": resolution}
-        return json.loads(self.get("/api/v1/jobs", body))["id"]
-
-    def job(self, job):
-        return json.loads(self.get(f"/api/v1/jobs/{job}"))
-
-    def action(self, job, name):
-        self.get(f"/api/v1/jobs/{job}/{name}", method="POST")
-
-    def tasks(self, job):
-        """The tasks that run now, by node."""
-        cluster = (self.job(job)["progress"] or {}).get("cluster")
-        return cluster and {n["name"]: n["running"] for n in cluster["nodes"] if n["running"]}
 
 
 if __name__ == "__main__":

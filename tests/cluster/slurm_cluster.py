@@ -72,7 +72,7 @@ class SlurmCluster:
         self.start_controller()
         for node in self.nodes:
             self.start_node(node)
-        self.wait_for(lambda: self.count_idle() == len(self.nodes), "idle nodes")
+        self.wait_for_idle_nodes()
 
     def write_configuration(self):
         user = pwd.getpwuid(os.getuid()).pw_name
@@ -137,6 +137,15 @@ class SlurmCluster:
 
     def start_node(self, node):
         self.spawn(node, ["slurmd", "-D", "-N", node])
+
+    def restart_nodes(self):
+        for node in self.nodes:
+            self.kill_machine(node)
+            self.start_node(node)
+        self.wait_for_idle_nodes()
+
+    def wait_for_idle_nodes(self):
+        self.wait_for(lambda: self.count_idle() == len(self.nodes), "idle nodes")
 
     def kill(self, name, how=signal.SIGKILL):
         """Ends a daemon; what a node runs is left running (as on a machine that lost its network)."""

@@ -99,7 +99,7 @@ std::optional<std::vector<SlurmJob>> MergeJob::ask() {
 bool MergeJob::is_alive() {
   const auto state = read_cluster_state(context_.files, folder_.work_folder());
   if (!state) return false;
-  name_ = state->merge_job_name();
+  take_names(*state);
   for (;;) {
     if (const auto jobs = ask()) return !jobs->empty();
     std::this_thread::sleep_for(std::chrono::duration<double>(options_.slurm_interval_s));
@@ -110,6 +110,11 @@ bool MergeJob::is_alive() {
 bool MergeJob::has_left_work() const {
   return !spec_.run.keep_work &&
          context_.files.exists(WorkFolder::store_path(folder_.work_folder()));
+}
+
+void MergeJob::take_names(const ClusterState& state) {
+  name_ = state.merge_job_name();
+  task_name_ = state.task_name();
 }
 
 BuildReport MergeJob::follow(const std::string& submitted) {
@@ -128,6 +133,7 @@ BuildReport MergeJob::follow(const std::string& submitted) {
       if (jobs && !jobs->empty()) {
         id = jobs->front().id;
         take_state(jobs->front());
+        cancel_given_up(jobs->front());
         gone_since_s = 0;
       } else if (jobs) {
         // The shared disk may show what the job wrote later than Slurm its end.
@@ -153,6 +159,21 @@ BuildReport MergeJob::follow(const std::string& submitted) {
   return *report;
 }
 
+// Slurm holds what it could not start. A batch is submitted again by the job that merges, which
+// waits until the batch's task has ended; that job itself by the next command.
+void MergeJob::cancel_given_up(const SlurmJob& job) {
+  std::vector<std::string> given_up;
+  if (job.is_given_up()) given_up.push_back(job.id);
+  if (job.state == "PENDING") {
+    const auto tasks = slurm_.active(task_name_);
+    for (const SlurmTask& task : tasks.value_or(std::vector<SlurmTask>{}))
+      if (task.is_given_up()) given_up.push_back(task.name());
+  }
+  for (const std::string& task : given_up)
+    if (slurm_.cancel_one(task))
+      context_.progress.warn("Slurm could not start task " + task + " and holds it: canceled");
+}
+
 // Says once that the job runs.
 void MergeJob::take_state(const SlurmJob& job) {
   if (job.state == "RUNNING" && !is_running_)
@@ -169,7 +190,7 @@ void MergeJob::show_progress() {
     // The job itself says so, if it lasts.
   }
   if (!state) return;
-  name_ = state->merge_job_name();
+  take_names(*state);
   std::set<uint32_t> recorded;
   for (const ClusterFolder::Entry& entry : folder_.list(context_.files))
     if (entry.kind == ClusterFolder::Kind::kRecord) recorded.insert(entry.batch);

@@ -43,7 +43,9 @@ class MergeJob {
 
  private:
   std::optional<std::vector<SlurmJob>> ask();
+  void take_names(const ClusterState& state);
   void take_state(const SlurmJob& job);
+  void cancel_given_up(const SlurmJob& job);
   void show_progress();
   [[noreturn]] void fail(const std::string& id, const std::optional<SlurmEnd>& end) const;
 
@@ -56,7 +58,8 @@ class MergeJob {
   bool is_answering_ = true;
   bool is_running_ = false;
   uint64_t shown_built_ = 0;
-  std::string name_;  // as last known: the state is removed when the job is done
+  // As last known: the state is removed when the job is done.
+  std::string name_, task_name_;
 };
 
 }  // namespace voxdag

@@ -105,7 +105,18 @@ bool is_too_much(const CommandResult& result) {
   return false;
 }
 
+// Slurm's commands print such a reason with blanks, or with underscores.
+bool is_held_for_ever(const std::string& state, std::string reason) {
+  std::ranges::replace(reason, ' ', '_');
+  return state == "PENDING" &&
+         (reason == "launch_failed_requeued_held" || reason == "JobHoldMaxRequeue");
+}
+
 }  // namespace
+
+bool SlurmTask::is_given_up() const { return is_held_for_ever(state, reason); }
+
+bool SlurmJob::is_given_up() const { return is_held_for_ever(state, reason); }
 
 std::string SlurmEnd::text() const {
   if (state.empty()) return "ended, and Slurm has forgotten how";
@@ -308,6 +319,8 @@ std::optional<SlurmEnd> Slurm::end_of(const std::string& task) {
 bool Slurm::cancel(const std::string& name) {
   return run({"scancel", "--name=" + name}).exit_status == 0;
 }
+
+bool Slurm::cancel_one(const std::string& task) { return run({"scancel", task}).exit_status == 0; }
 
 std::vector<std::string> split_words(const std::string& text) {
   std::vector<std::string> words;

@@ -13,6 +13,10 @@
 
 namespace voxdag {
 
+// A task or job is_given_up() if Slurm could not start it and holds it until an operator releases
+// it: it waits for ever. After a crash slurmctld may give new tasks the ids of tasks that nodes
+// still know; these refuse them.
+
 // A task of an array is JOB_INDEX, for the user and for Slurm.
 struct SlurmTask {
   std::string job;
@@ -24,6 +28,7 @@ struct SlurmTask {
 
   uint32_t batch() const { return first_batch + index; }
   std::string name() const { return job + "_" + std::to_string(index); }
+  bool is_given_up() const;
   bool operator==(const SlurmTask&) const = default;
 };
 
@@ -63,6 +68,7 @@ struct SlurmJob {
   std::string id;
   std::string state;
   std::string reason;  // why it waits
+  bool is_given_up() const;
 };
 
 class Slurm {
@@ -88,8 +94,10 @@ class Slurm {
   std::optional<std::vector<SlurmJob>> jobs(const std::string& name);
   // How a task JOB_INDEX or a job ended; nothing if Slurm does not answer now.
   std::optional<SlurmEnd> end_of(const std::string& task);
-  // Returns whether Slurm has taken it.
+  // Cancels all tasks and jobs of that name. Returns whether Slurm has taken it.
   bool cancel(const std::string& name);
+  // Cancels a task JOB_INDEX or a job.
+  bool cancel_one(const std::string& task);
   // Commands so far.
   uint64_t requests() const { return requests_; }
 

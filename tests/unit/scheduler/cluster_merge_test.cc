@@ -61,6 +61,23 @@ TEST_F(ClusterMergeJob, ItsReportIsThatOfTheCommand) {
   EXPECT_NE(run_build(merging_spec(), context()).sha256, expected_);
 }
 
+TEST_F(ClusterMergeJob, ATaskThatSlurmHoldsForEverDoesNotHoldItUp) {
+  slurm_.fates = {"", PlayedSlurm::kHeld};
+  const auto merge = std::exchange(slurm_.merge_job, nullptr);
+  slurm_.merge_job = [&] {
+    // It depends on the array.
+    if (count("scancel") > 0)
+      merge();
+    else
+      slurm_.waiting_merge_job = "2";
+  };
+  slurm_.merge_state = "PENDING";
+  EXPECT_EQ(build(merging_spec()).cluster->attempts, 1u);
+  EXPECT_NE(warnings_.text.find("Slurm could not start task 1_1 and holds it: canceled"),
+            std::string::npos)
+      << warnings_.text;
+}
+
 TEST_F(ClusterMergeJob, IfItIsLostTheSameCommandSubmitsItAgain) {
   const auto merge = std::exchange(slurm_.merge_job, nullptr);
   slurm_.merge_end = "CANCELLED Reason=None ExitCode=0:15";

@@ -40,6 +40,16 @@ TEST_F(Cluster, FailedTasksAreSubmittedAgainWithSlurmsReason) {
   EXPECT_NE(warnings_.text.find("PREEMPTED"), std::string::npos);
 }
 
+TEST_F(Cluster, ATaskThatSlurmHoldsForEverIsSubmittedAgain) {
+  slurm_.fates = {"", PlayedSlurm::kHeld, PlayedSlurm::kHeld};
+  const BuildReport report = build(spec(3));
+  EXPECT_EQ(report.cluster->attempts, 2u);
+  EXPECT_NE(warnings_.text.find("batch 1, task 1_1: CANCELLED: Slurm could not start it (launch "
+                                "failed requeued held); it is submitted again"),
+            std::string::npos)
+      << warnings_.text;
+}
+
 TEST_F(Cluster, ABatchThatIsOutOfTimeIsSplit) {
   slurm_.fates = {"TIMEOUT", "", "TIMEOUT"};
   const BuildReport report = build(spec(2));

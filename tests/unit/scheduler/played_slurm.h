@@ -28,9 +28,10 @@ namespace voxdag {
 inline constexpr const char* kVersion = "1.2.3";
 
 // Runs each task at once, unless a fate for it was given: then it ends in that state without having
-// done anything.
+// done anything; or, if that is kHeld, waits until it is canceled.
 class PlayedSlurm : public CommandRunner {
  public:
+  static constexpr const char* kHeld = "held";
   std::deque<std::string> fates;  // of the next tasks; "" for one that does its work
   uint32_t max_array_size = 1001;
   size_t max_tasks = SIZE_MAX;  // of an array
@@ -43,8 +44,9 @@ class PlayedSlurm : public CommandRunner {
   std::string program = kVersion;
   std::string temporary_folder;
   std::function<void(uint32_t batch)> before_task;
-  std::function<void()> merge_job;  // what it does
-  std::string waiting_merge_job;    // its id
+  std::function<void()> merge_job;      // what it does
+  std::string waiting_merge_job;        // its id
+  std::string merge_state = "RUNNING";  // while it is not done
   std::string merge_end = "COMPLETED Reason=None ExitCode=0:0";
 
   CommandResult run(const std::vector<std::string>& command, const std::string& input, double,
@@ -60,12 +62,16 @@ class PlayedSlurm : public CommandRunner {
         --squeue_failures;
         return {1, "", "slurm_load_jobs error: Unable to contact slurm controller"};
       }
-      return ok("");
+      std::string listed;
+      for (const auto& [task, line] : held) listed += line;
+      return ok(listed);
     }
     if (command[0] == "scontrol" && command[2] == "config")
       return ok("MaxArraySize            = " + std::to_string(max_array_size) +
                 "\nAccountingStorageType   = accounting_storage/none\n");
     if (command[0] == "scontrol") return ok(ends[command.back()]);
+    if (command[0] == "scancel" && held.erase(command[1]) > 0)
+      ends[command[1]] = "JobState=CANCELLED Reason=None NodeList= ExitCode=0:0";
     if (command[0] == "scancel") return ok("");
     return {127, "", command[0] + ": command not found"};
   }
@@ -77,7 +83,7 @@ class PlayedSlurm : public CommandRunner {
     const std::string id = std::exchange(waiting_merge_job, "");
     ends[id] = "JobState=" + merge_end;
     if (merge_job) merge_job();
-    return ok(id + "|RUNNING|None\n");
+    return ok(id + "|" + merge_state + "|None\n");
   }
 
   static CommandResult ok(const std::string& output) { return {0, output, ""}; }
@@ -123,6 +129,13 @@ class PlayedSlurm : public CommandRunner {
       fates.pop_front();
     }
     if (before_task) before_task(batch);
+    if (fate == kHeld) {
+      const size_t index = task.find('_') + 1;
+      held[task] = task.substr(0, index - 1) + "|" + task.substr(index) + "|PENDING|" +
+                   std::to_string(batch - std::stoul(task.substr(index))) +
+                   "||launch failed requeued held\n";
+      return;
+    }
     ends[task] =
         "JobState=" + (fate.empty() ? "COMPLETED" : fate) + " Reason=None NodeList=n7 ExitCode=0:0";
     if (!fate.empty()) return;
@@ -144,6 +157,7 @@ class PlayedSlurm : public CommandRunner {
 
   int jobs = 0;
   std::map<std::string, std::string> ends;
+  std::map<std::string, std::string> held;  // what squeue prints, by task
 };
 
 // Builds on a played cluster, and their bytes on this machine.
