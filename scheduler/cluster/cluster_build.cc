@@ -288,9 +288,17 @@ std::string ClusterBuild::submit_merge_job() {
         note_refusal(error.message());
       }
       // It may be there all the same.
-      if (const auto jobs = slurm_.jobs(request.name); jobs && !jobs->empty())
-        return jobs->front().id;
+      if (const std::string job = find_job(request.name); !job.empty()) return job;
     }
+    context_.cancel.check();
+    std::this_thread::sleep_for(std::chrono::duration<double>(options_.slurm_interval_s));
+  }
+}
+
+// The id of a job, "" if there is none. Asks until Slurm answers.
+std::string ClusterBuild::find_job(const std::string& name) {
+  for (;;) {
+    if (const auto jobs = slurm_.jobs(name)) return jobs->empty() ? "" : jobs->front().id;
     context_.cancel.check();
     std::this_thread::sleep_for(std::chrono::duration<double>(options_.slurm_interval_s));
   }
@@ -350,9 +358,10 @@ void ClusterBuild::take_failure(const ClusterFolder::Entry& entry) {
           batch->task && !failure.task.empty() && failure.task != batch->task->name();
       // Tasks know the work folder by its whole path; the user knows it by another, or not at all.
       if (!is_late)
-        own_reasons_[entry.batch] =
+        own_reasons_[entry.batch] = {
             replace_all(failure.message, whole_path(work_.path()), work_.path()) +
-            (failure.node.empty() ? "" : " (on " + failure.node + ")");
+                (failure.node.empty() ? "" : " (on " + failure.node + ")"),
+            true};
     } catch (const Error&) {
       // Slurm will say that the task ended.
     }
@@ -379,7 +388,7 @@ void ClusterBuild::take_record(const ClusterFolder::Entry& entry) {
         error.code() != ErrorCode::kUnsupportedVersion)
       throw;
     context_.progress.warn("the record " + entry.path + " does not count: " + error.message());
-    own_reasons_[entry.batch] = error.message();
+    own_reasons_.try_emplace(entry.batch, OwnReason{error.message(), false});
     folder_.remove_attempt(files_, entry.batch, entry.attempt);
   }
 }

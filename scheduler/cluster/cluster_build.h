@@ -68,6 +68,12 @@ class ClusterBuild {
 
  private:
   using Seconds = double;
+  // Why a task failed, as it said itself. A record that does not count may be an earlier task's:
+  // then the last one need not have ended.
+  struct OwnReason {
+    std::string text;
+    bool has_ended;
+  };
 
   void save_state();
   void try_to_save_state();
@@ -77,6 +83,7 @@ class ClusterBuild {
   void forget_failures();
   std::string program() const;
   void submit(const std::vector<uint32_t>& batches);
+  std::string find_job(const std::string& name);
   void note_refusal(const std::string& refusal);
   void accept_finished();
   void take_failure(const ClusterFolder::Entry& entry);
@@ -87,6 +94,7 @@ class ClusterBuild {
   void report_tasks() const;
   // False if Slurm does not answer.
   bool end_attempt(OpenBatch& batch, std::vector<uint32_t>& again, std::vector<uint32_t>& to_split);
+  bool says_that_it_ended(const OpenBatch& batch) const;
   void cancel_given_up(OpenBatch* batch, const SlurmTask& task);
   void note_reason(const SlurmTask& task);
   [[noreturn]] void give_up(uint32_t batch, ErrorCode code, const std::string& why);
@@ -107,7 +115,7 @@ class ClusterBuild {
   std::map<SubvolumeId, StoredSubvolume> subvolumes_;  // of open batches
   std::map<uint32_t, Seconds> missing_since_;          // batches whose tasks Slurm does not list
   std::map<std::string, Seconds> incomplete_since_;    // records whose segments are not there yet
-  std::map<uint32_t, std::string> own_reasons_;        // what tasks themselves said
+  std::map<uint32_t, OwnReason> own_reasons_;          // by batch
   uint64_t earlier_requests_ = 0;
   std::set<uint32_t> inherited_;                 // batches with tasks of an earlier run
   std::set<std::string> noted_reasons_;          // why tasks wait

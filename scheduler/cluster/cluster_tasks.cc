@@ -45,7 +45,7 @@ void ClusterBuild::look_after_tasks() {
     }
     const auto [since, is_new] = missing_since_.try_emplace(batch.number, wall_seconds());
     const bool is_over =
-        own_reasons_.contains(batch.number) || wall_seconds() - since->second >= options_.grace_s;
+        says_that_it_ended(batch) || wall_seconds() - since->second >= options_.grace_s;
     if (is_over && !end_attempt(batch, again, to_split)) break;
   }
   for (const uint32_t batch : to_split)
@@ -59,15 +59,13 @@ void ClusterBuild::cancel_given_up(OpenBatch* batch, const SlurmTask& task) {
   if (!slurm_.cancel_one(task.name()) || !batch) return;
   if (!batch->task) batch->task = task;
   if (batch->task->name() == task.name())
-    own_reasons_[batch->number] = "Slurm could not start it (" + task.reason + ")";
+    own_reasons_[batch->number] = {"Slurm could not start it (" + task.reason + ")", true};
 }
 
 // Says once why tasks wait, if it is not just for their turn.
 void ClusterBuild::note_reason(const SlurmTask& task) {
-  for (const char* usual : {"", "None", "Priority", "Resources", "JobArrayTaskLimit", "BeginTime",
-                            "Cleaning", "NodeDown", "Prolog"})
-    if (task.reason == usual) return;
-  if (task.state == "PENDING" && noted_reasons_.insert(task.reason).second)
+  if (task.state == "PENDING" && !waits_for_its_turn(task.reason) &&
+      noted_reasons_.insert(task.reason).second)
     context_.progress.warn("task " + task.name() + " waits: " + task.reason);
 }
 
@@ -86,16 +84,21 @@ void ClusterBuild::report_tasks() const {
   context_.progress.set_cluster_tasks(tasks);
 }
 
+bool ClusterBuild::says_that_it_ended(const OpenBatch& batch) const {
+  const auto own = own_reasons_.find(batch.number);
+  return own != own_reasons_.end() && own->second.has_ended;
+}
+
 bool ClusterBuild::end_attempt(OpenBatch& batch, std::vector<uint32_t>& again,
                                std::vector<uint32_t>& to_split) {
   const auto end = slurm_.end_of(batch.task->name());
   if (!end) return false;
   const auto own = own_reasons_.find(batch.number);
-  if (end->is_active() && own == own_reasons_.end()) return true;  // squeue did not list it.
+  if (end->is_active() && !says_that_it_ended(batch)) return true;  // squeue did not list it.
   AttemptEnd attempt{batch.task->name(), end->node.empty() ? batch.task->node : end->node,
                      end->text()};
   if (own != own_reasons_.end()) {
-    attempt.reason += ": " + own->second;
+    attempt.reason += ": " + own->second.text;
     own_reasons_.erase(own);
   }
   ++state_.totals.attempts;

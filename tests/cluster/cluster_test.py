@@ -79,7 +79,7 @@ class ClusterTest(unittest.TestCase):
         self.build = subprocess.Popen(
             [VOXDAG, "build", self.scene, "-r", str(resolution), "-o", self.output, "--json",
              "--cluster", "slurm", "--cluster-tasks", str(tasks), "--cluster-grace", "2", *options],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=self.folder,
             env=self.cluster.environment)
         return self.build
 

@@ -174,8 +174,11 @@ void MergeJob::cancel_given_up(const SlurmJob& job) {
       context_.progress.warn("Slurm could not start task " + task + " and holds it: canceled");
 }
 
-// Says once that the job runs.
+// Says once that the job runs, or why it does not.
 void MergeJob::take_state(const SlurmJob& job) {
+  if (job.state == "PENDING" && !waits_for_its_turn(job.reason) &&
+      noted_reasons_.insert(job.reason).second)
+    context_.progress.warn("job " + job.id + ", which merges, waits: " + job.reason);
   if (job.state == "RUNNING" && !is_running_)
     context_.progress.warn("job " + job.id + " merges: see its log in " + folder_.path());
   is_running_ = job.state == "RUNNING";

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 
 #include "scheduler/build_report.h"
@@ -58,6 +59,7 @@ class MergeJob {
   bool is_answering_ = true;
   bool is_running_ = false;
   uint64_t shown_built_ = 0;
+  std::set<std::string> noted_reasons_;  // why the job waits
   // As last known: the state is removed when the job is done.
   std::string name_, task_name_;
 };

@@ -322,6 +322,13 @@ bool Slurm::cancel(const std::string& name) {
 
 bool Slurm::cancel_one(const std::string& task) { return run({"scancel", task}).exit_status == 0; }
 
+bool waits_for_its_turn(const std::string& reason) {
+  for (const char* usual : {"", "None", "Priority", "Resources", "JobArrayTaskLimit", "BeginTime",
+                            "Cleaning", "NodeDown", "Prolog", "Dependency"})
+    if (reason == usual) return true;
+  return false;
+}
+
 std::vector<std::string> split_words(const std::string& text) {
   std::vector<std::string> words;
   std::string word;

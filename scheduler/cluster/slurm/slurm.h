@@ -120,6 +120,9 @@ class Slurm {
   std::optional<std::string> configuration_;
 };
 
+// Whether what waits for this reason need only wait; not so if a person has to do something.
+bool waits_for_its_turn(const std::string& reason);
+
 // The words of a text as a shell would split it: at blanks, but not within quotes; a backslash
 // takes the next character as it is. Throws Error{kInvalidInput} for a quote that is not closed.
 std::vector<std::string> split_words(const std::string& text);

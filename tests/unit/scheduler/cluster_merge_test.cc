@@ -71,11 +71,27 @@ TEST_F(ClusterMergeJob, ATaskThatSlurmHoldsForEverDoesNotHoldItUp) {
     else
       slurm_.waiting_merge_job = "2";
   };
-  slurm_.merge_state = "PENDING";
+  slurm_.merge_state = "PENDING|Dependency";
   EXPECT_EQ(build(merging_spec()).cluster->attempts, 1u);
   EXPECT_NE(warnings_.text.find("Slurm could not start task 1_1 and holds it: canceled"),
             std::string::npos)
       << warnings_.text;
+}
+
+TEST_F(ClusterMergeJob, WhatAPersonHasToDoIsSaid) {
+  const auto merge = std::exchange(slurm_.merge_job, nullptr);
+  int looks = 0;
+  slurm_.merge_state = "PENDING|JobHeldUser";
+  slurm_.merge_job = [&] {
+    if (++looks < 3)
+      slurm_.waiting_merge_job = "2";
+    else
+      merge();
+  };
+  build(merging_spec());
+  const std::string said = "job 2, which merges, waits: JobHeldUser\n";
+  EXPECT_EQ(warnings_.text.find(said), warnings_.text.rfind(said));
+  EXPECT_NE(warnings_.text.find(said), std::string::npos) << warnings_.text;
 }
 
 TEST_F(ClusterMergeJob, IfItIsLostTheSameCommandSubmitsItAgain) {

@@ -44,9 +44,9 @@ class PlayedSlurm : public CommandRunner {
   std::string program = kVersion;
   std::string temporary_folder;
   std::function<void(uint32_t batch)> before_task;
-  std::function<void()> merge_job;      // what it does
-  std::string waiting_merge_job;        // its id
-  std::string merge_state = "RUNNING";  // while it is not done
+  std::function<void()> merge_job;           // what it does
+  std::string waiting_merge_job;             // its id
+  std::string merge_state = "RUNNING|None";  // while it is not done
   std::string merge_end = "COMPLETED Reason=None ExitCode=0:0";
 
   CommandResult run(const std::vector<std::string>& command, const std::string& input, double,
@@ -83,7 +83,7 @@ class PlayedSlurm : public CommandRunner {
     const std::string id = std::exchange(waiting_merge_job, "");
     ends[id] = "JobState=" + merge_end;
     if (merge_job) merge_job();
-    return ok(id + "|" + merge_state + "|None\n");
+    return ok(id + "|" + merge_state + "\n");
   }
 
   static CommandResult ok(const std::string& output) { return {0, output, ""}; }
