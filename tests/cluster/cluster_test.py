@@ -54,15 +54,9 @@ class ClusterTest(unittest.TestCase):
             self.build.communicate()
         subprocess.run(["scancel", "--user", str(os.getuid())], env=self.cluster.environment,
                        check=False, capture_output=True)
-        # Nodes that Slurm does not trust any more.
-        if drained := self.nodes("drained,draining"):
-            self.cluster.command("scontrol", "update", f"nodename={drained}", "state=resume")
+        self.cluster.resume_nodes()
         if self.work.exists():
             shutil.rmtree(self.work)
-
-    def nodes(self, states):
-        return ",".join(self.cluster.command("sinfo", "--noheader", "--Node", "--partition=all",
-                                             f"--states={states}", "--format=%N").stdout.split())
 
     def sha256(self, resolution):
         """Of the file that this machine builds alone."""

@@ -142,7 +142,15 @@ class SlurmCluster:
         for node in self.nodes:
             self.kill_machine(node)
             self.start_node(node)
+        self.resume_nodes()
         self.wait_for_idle_nodes()
+
+    def resume_nodes(self):
+        """Makes nodes that Slurm has ceased to trust work again."""
+        drained = self.command("sinfo", "--noheader", "--Node", "--partition=all",
+                               "--states=drained,draining", "--format=%N").stdout.split()
+        if drained:
+            self.command("scontrol", "update", f"nodename={','.join(drained)}", "state=resume")
 
     def wait_for_idle_nodes(self):
         self.wait_for(lambda: self.count_idle() == len(self.nodes), "idle nodes")
