@@ -1,0 +1,134 @@
+#include "query/tiles/tile.h"
+
+#include <bit>
+#include <string>
+
+#include "core/base/error.h"
+#include "query/tiles/offset_table.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint32_t kBrickLevels = 2;
+constexpr size_t kHeaderWords = 4;
+constexpr uint32_t kLeavesAreBricks = 1u << 16;
+
+void check_address(const DagView& dag, const TileAddress& root) {
+  const bool has_level = !dag.empty() && root.level < dag.grid_levels() - kBrickLevels;
+  const auto is_node = [&] {
+    const auto& [words, wide] = dag.level(root.level);
+    return root.offset < words.size() && words[root.offset] - 1 < 255;
+  };
+  if (!has_level || !is_node())
+    throw Error(ErrorCode::kNotFound, "level " + std::to_string(root.level) + ", word " +
+                                          std::to_string(root.offset) + ": no node lies here");
+}
+
+// Appends the nodes of a level, with the numbers of their children in place of words, and numbers
+// the children. Returns the word of each node.
+std::vector<uint32_t> add_nodes(const DagView& dag, uint32_t level,
+                                const std::vector<uint64_t>& offsets, OffsetTable& children,
+                                std::vector<uint32_t>& words) {
+  std::vector<uint32_t> starts;
+  starts.reserve(offsets.size());
+  for (const uint64_t offset : offsets) dag.prefetch(level, offset);
+  for (const uint64_t offset : offsets) {
+    const DagView::Children c = dag.children_of_node(level, offset);
+    starts.push_back(static_cast<uint32_t>(words.size() - kHeaderWords));
+    words.push_back(c.mask);
+    for (int i = 0; i < 8; ++i)
+      if (c.has(i)) words.push_back(children.add(dag.offset(c, i)));
+  }
+  return starts;
+}
+
+// Replaces the numbers of children from word `begin` to `end` by the words where they lie.
+void point_to(const std::vector<uint32_t>& child_starts, size_t begin, size_t end,
+              std::vector<uint32_t>& words) {
+  while (begin < end) {
+    const int children = std::popcount(words[begin++]);
+    for (int i = 0; i < children; ++i, ++begin) words[begin] = child_starts[words[begin]];
+  }
+}
+
+void add_64(uint64_t value, std::vector<uint32_t>& words) {
+  words.push_back(static_cast<uint32_t>(value));
+  words.push_back(static_cast<uint32_t>(value >> 32));
+}
+
+void add_bricks(const DagView& dag, const std::vector<uint64_t>& offsets,
+                std::vector<uint32_t>& words) {
+  const uint32_t level = dag.grid_levels() - kBrickLevels;
+  for (const uint64_t offset : offsets) dag.prefetch(level, offset);
+  for (const uint64_t offset : offsets) {
+    if (offset % 2 != 0) dag.corrupt(level, offset);
+    add_64(dag.brick(offset), words);
+  }
+}
+
+// The occupied cells of a quarter of the node's edge, in the order of the voxels of a brick.
+uint64_t coarse_brick(const DagView& dag, uint32_t level, const DagView::Children& node) {
+  uint64_t mask = 0;
+  for (int i = 0; i < 8; ++i)
+    if (node.has(i))
+      mask |= uint64_t{dag.children(level + 1, dag.content(level, node, i)).mask} << (8 * i);
+  return mask;
+}
+
+// What a coarse brick needs is all over the file: each loop begins to load what the next one reads.
+void add_cut_off(const DagView& dag, uint32_t level, const std::vector<uint64_t>& offsets,
+                 std::vector<uint32_t>& words) {
+  std::vector<DagView::Children> nodes;
+  nodes.reserve(offsets.size());
+  for (const uint64_t offset : offsets) dag.prefetch(level, offset);
+  for (const uint64_t offset : offsets) {
+    nodes.push_back(dag.children_of_node(level, offset));
+    for (int i = 0; i < 8; ++i)
+      if (nodes.back().has(i)) dag.prefetch(level + 1, dag.offset(nodes.back(), i));
+  }
+  for (size_t i = 0; i < offsets.size(); ++i) {
+    add_64(offsets[i], words);
+    add_64(coarse_brick(dag, level, nodes[i]), words);
+  }
+}
+
+}  // namespace
+
+uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level) {
+  const uint32_t below = grid_levels - kBrickLevels - level;  // levels below it, bricks included
+  return level + (below - 1) % tile_levels + 1;
+}
+
+std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels,
+                                  const TileAddress& root) {
+  if (tile_levels < 1 || tile_levels > kMaxTileLevels)
+    throw Error(ErrorCode::kInvalidInput, std::to_string(tile_levels) +
+                                              " levels in a tile: expected 1 to " +
+                                              std::to_string(kMaxTileLevels));
+  check_address(dag, root);
+  const uint32_t end = tile_end(dag.grid_levels(), tile_levels, root.level);
+  const bool has_bricks = end + kBrickLevels == dag.grid_levels();
+  std::vector<uint32_t> words(kHeaderWords);
+  OffsetTable nodes;
+  nodes.add(root.offset);
+  size_t parents = kHeaderWords;  // the word where the nodes of the level above begin
+  for (uint32_t level = root.level; level < end; ++level) {
+    OffsetTable children;
+    const size_t begin = words.size();
+    const auto starts = add_nodes(dag, level, nodes.offsets(), children, words);
+    if (level > root.level) point_to(starts, parents, begin, words);
+    parents = begin;
+    nodes = std::move(children);
+  }
+  words[0] = kTileMagic;
+  words[1] = root.level | (end - root.level) << 8 | (has_bricks ? kLeavesAreBricks : 0);
+  words[2] = static_cast<uint32_t>(words.size() - kHeaderWords);
+  words[3] = static_cast<uint32_t>(nodes.offsets().size());
+  if (has_bricks)
+    add_bricks(dag, nodes.offsets(), words);
+  else
+    add_cut_off(dag, end, nodes.offsets(), words);
+  return words;
+}
+
+}  // namespace voxdag::query
