@@ -123,6 +123,7 @@ void add_generate_command(CommandLine& line);
 void add_render_command(CommandLine& line);
 void add_extract_command(CommandLine& line);
 void add_export_command(CommandLine& line);
+void add_view_command(CommandLine& line);
 // Adds `serve`, `token`, and the hidden command that `serve` starts for each job.
 void add_serve_commands(CommandLine& line);
 void add_health_command(CommandLine& line);

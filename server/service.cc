@@ -17,6 +17,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr std::chrono::minutes kCleanUpInterval{10};
+constexpr double kMaxIdleOfViews_s = 600;
 constexpr size_t kMaxLoggedChars = 200;
 
 ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
@@ -87,6 +88,7 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
   steps_.run("remove the folders of old plans", [this] { remove_plans(files_, config_); });
   add_job_routes(router_);
   add_result_routes(router_);
+  add_job_tile_routes(router_);
   add_event_routes(router_);
   add_scene_routes(router_);
   add_system_routes(router_);
@@ -133,6 +135,8 @@ void Service::clean_up_periodically() {
       scenes_.remove_stale_uploads(clock_.oldest_s(config_.retention.upload_days, "upload", log_));
     });
     steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
+    steps_.run("close files that nobody views",
+               [this] { context_.viewed.close_stale(kMaxIdleOfViews_s); });
     steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });
     std::unique_lock lock(stop_mutex_);
     stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });

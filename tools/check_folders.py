@@ -51,13 +51,14 @@ THIRD_PARTY = {
     "sqlite3.h": ["core/db"],
     "httplib.h": ["client"],
     "png.h": ["query"],
+    "zlib.h": ["server"],
     "openvdb/openvdb.h": ["query", "bench"],
     "nanovdb/util/OpenToNanoVDB.h": ["query"],
 }
 # Folders that build with a C++20 compiler (and CUDA) alone.
 BARE = ["core/base", "core/geometry", "core/dag", "core/backend"]
 LIBRARY = re.compile(
-    r"(zstd|tiny_gltf|sqlite3|httplib|png|xxhash)\.h$|^(nlohmann|openssl|CLI|gtest|gmock|benchmark)/"
+    r"(zstd|tiny_gltf|sqlite3|httplib|png|zlib|xxhash)\.h$|^(nlohmann|openssl|CLI|gtest|gmock|benchmark)/"
 )
 # The reader that users copy into their engine: the standard library is all it may need.
 STANDALONE_HEADER = "core/format/global/voxdag_reader.h"

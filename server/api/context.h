@@ -15,6 +15,7 @@
 #include "server/jobs/task_resolver.h"
 #include "server/queue/job_queue.h"
 #include "server/scenes/scene_store.h"
+#include "server/tiles/viewed_files.h"
 
 namespace voxdag::server {
 
@@ -33,7 +34,9 @@ struct Context {
                                    config.transfers.max_event_streams_per_client};
   ConcurrencyLimiter uploads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter downloads{config.transfers.max_concurrent, config.transfers.max_per_client};
+  ConcurrencyLimiter tiles{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
+  ViewedFiles viewed{files, 16};
   // Held while a job that uses scenes is added or tried again, and while a scene that no job uses
   // is replaced or removed: neither may happen between the other's check and its change.
   std::mutex scene_mutex = {};

@@ -31,4 +31,16 @@ bool equal_ignoring_case(std::string_view a, std::string_view b) {
                     [](char x, char y) { return lower(x) == lower(y); });
 }
 
+bool has_tag(std::string_view list, std::string_view tag) {
+  if (trimmed(list) == "*") return true;
+  while (!list.empty()) {
+    const size_t comma = std::min(list.find(','), list.size());
+    std::string_view entry = trimmed(list.substr(0, comma));
+    if (entry.starts_with("W/")) entry.remove_prefix(2);
+    if (entry == tag) return true;
+    list.remove_prefix(std::min(comma + 1, list.size()));
+  }
+  return false;
+}
+
 }  // namespace voxdag::server

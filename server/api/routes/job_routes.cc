@@ -209,6 +209,7 @@ Response patch_job(Context& context, Call& call) {
 
 Response delete_job(Context& context, Call& call) {
   expect_no_body(call.request);
+  context.viewed.close(context.dispatcher.folder(call.names[0]).result());
   context.dispatcher.remove(call.names[0]);
   return no_content();
 }

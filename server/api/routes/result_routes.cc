@@ -43,19 +43,6 @@ std::string file_name(const Job& job) {
          ".vdag";
 }
 
-// Whether the value of If-None-Match has this entity tag. The comparison is weak.
-bool has_tag(std::string_view list, std::string_view tag) {
-  if (trimmed(list) == "*") return true;
-  while (!list.empty()) {
-    const size_t comma = std::min(list.find(','), list.size());
-    std::string_view entry = trimmed(list.substr(0, comma));
-    if (entry.starts_with("W/")) entry.remove_prefix(2);
-    if (entry == tag) return true;
-    list.remove_prefix(std::min(comma + 1, list.size()));
-  }
-  return false;
-}
-
 std::string content_range(const ByteRange& range, uint64_t size) {
   return "bytes " + std::to_string(range.begin) + "-" + std::to_string(range.end - 1) + "/" +
          std::to_string(size);

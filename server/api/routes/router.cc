@@ -50,6 +50,16 @@ uint64_t Call::query_integer(const std::string& name, uint64_t default_value, ui
 
 void Router::add(const std::string& method, const std::string& pattern, Role role, Handler handler,
                  const QueryNames& query) {
+  add(
+      method, pattern, role,
+      [context = context_, handler = std::move(handler)](Call& call) {
+        return handler(*context, call);
+      },
+      query);
+}
+
+void Router::add(const std::string& method, const std::string& pattern, Role role,
+                 PlainHandler handler, const QueryNames& query) {
   routes_.push_back({method, parse_target(pattern).segments, role, std::move(handler), query});
 }
 
@@ -62,7 +72,7 @@ Response Router::route(Request& request, AccessControl& access) const {
     if (route.method == method) {
       call.caller = access.admit(request, route.role);
       check_query(request, route.query);
-      return route.handler(context_, call);
+      return route.handler(call);
     }
     allowed += (allowed.empty() ? "" : ", ") + route.method;
     if (route.method == "GET") allowed += ", HEAD";

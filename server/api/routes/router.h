@@ -33,11 +33,18 @@ inline const QueryNames kAnyQuery = {"*"};
 class Router {
  public:
   using Handler = std::function<Response(Context&, Call&)>;
+  using PlainHandler = std::function<Response(Call&)>;
 
-  explicit Router(Context& context) : context_(context) {}
+  // Of routes that need no Context.
+  Router() = default;
+  explicit Router(Context& context) : context_(&context) {}
+
+  Context& context() const { return *context_; }
 
   // `pattern` is like "/api/v1/jobs/{id}/dag". A GET route answers HEAD, too.
   void add(const std::string& method, const std::string& pattern, Role role, Handler handler,
+           const QueryNames& query = {});
+  void add(const std::string& method, const std::string& pattern, Role role, PlainHandler handler,
            const QueryNames& query = {});
   // Throws Problem: 404, 405 with Allow, and as `access` and the handler do.
   Response route(Request& request, AccessControl& access) const;
@@ -47,15 +54,19 @@ class Router {
     std::string method;
     std::vector<std::string> pattern;
     Role role;
-    Handler handler;
+    PlainHandler handler;
     QueryNames query;
   };
-  Context& context_;
+  Context* const context_ = nullptr;
   std::vector<Route> routes_;
 };
 
+// "/NAME" for each file that is compiled in, and `start_page` also as "/".
+void add_asset_routes(Router& router, const std::string& start_page);
 void add_job_routes(Router& router);
 void add_result_routes(Router& router);
+// The tiles of the results of jobs.
+void add_job_tile_routes(Router& router);
 void add_event_routes(Router& router);
 void add_scene_routes(Router& router);
 void add_system_routes(Router& router);

@@ -1,4 +1,4 @@
-// Health, readiness, version, metrics, and the embedded files.
+// Health, readiness, version and metrics.
 #include <unistd.h>
 
 #include <memory>
@@ -10,28 +10,9 @@
 #include "server/api/context.h"
 #include "server/api/public_problem.h"
 #include "server/api/routes/router.h"
-#include "server/web/assets.h"
 
 namespace voxdag::server {
 namespace {
-
-constexpr const char* kPagePolicy =
-    "default-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; "
-    "frame-ancestors 'none'";
-
-Response get_asset(Call& call, const Asset& asset) {
-  Response response;
-  response.headers.emplace("ETag", asset.etag);
-  response.headers.emplace("Cache-Control", "no-cache");
-  response.headers.emplace("Content-Security-Policy", kPagePolicy);
-  if (call.request.header("If-None-Match") == asset.etag) {
-    response.status = 304;
-    return response;
-  }
-  response.headers.emplace("Content-Type", asset.type);
-  response.body = asset.contents;
-  return response;
-}
 
 // Whether the data folder can be written, tried at most once per second. Thread-safe.
 class WriteProbe {
@@ -112,11 +93,7 @@ void add_system_routes(Router& router) {
   add("/metrics", Role::kRead, [started_s = wall_seconds()](Context& context, Call&) {
     return get_metrics(context, started_s);
   });
-  for (const Asset& asset : embedded_assets()) {
-    const auto get = [asset](Context&, Call& call) { return get_asset(call, asset); };
-    add('/' + asset.name, Role::kNone, get);
-    if (asset.name == "index.html") add("/", Role::kNone, get);
-  }
+  add_asset_routes(router, "index.html");
 }
 
 }  // namespace voxdag::server

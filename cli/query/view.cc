@@ -1,0 +1,74 @@
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "cli/command.h"
+#include "server/view_service.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct ViewCommand {
+  std::string input;
+  int port = 0;
+  bool open = false;
+};
+
+// Starts the user's browser, which is nobody's child: whatever becomes of it concerns it alone.
+void open_in_browser(const std::string& url) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const int null = open("/dev/null", O_RDWR);
+    for (const int fd : {0, 1, 2}) dup2(null, fd);
+    setsid();
+    if (fork() == 0) execlp("xdg-open", "xdg-open", url.c_str(), nullptr);
+    _exit(0);
+  }
+  if (child > 0) waitpid(child, nullptr, 0);
+}
+
+void run(const ViewCommand& command, CommandContext& context) {
+  server::ViewService service(
+      command.input, command.port, context.files,
+      [](const std::string& line) { std::fprintf(stderr, "voxdag: %s\n", line.c_str()); });
+  std::printf("%s\n", service.url().c_str());
+  std::fflush(stdout);
+  if (command.open) open_in_browser(service.url());
+  // A signal handler may only set the token, so a thread watches it.
+  std::thread watcher([&] {
+    while (!context.cancel.canceled()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    service.stop();
+  });
+  const auto end_watcher = [&] {
+    context.cancel.cancel();
+    watcher.join();
+  };
+  try {
+    service.run();
+  } catch (...) {
+    end_watcher();
+    throw;
+  }
+  end_watcher();
+}
+
+void declare(Command& command, ViewCommand& state) {
+  command.option("input", state.input, "the .vdag file").required();
+  command
+      .option("--port", state.port,
+              "port to listen on, on this machine only (default: any free one)")
+      .range(0, 65535);
+  command.flag("--open", state.open, "open the page in the browser, by xdg-open");
+}
+
+}  // namespace
+
+void add_view_command(CommandLine& line) {
+  add_command<ViewCommand>(line, "view", "look around in a DAG, in the browser");
+}
+
+}  // namespace voxdag::cli

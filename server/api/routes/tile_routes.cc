@@ -1,0 +1,152 @@
+#include "server/api/routes/tile_routes.h"
+
+#include <bit>
+#include <cstring>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+#include "core/format/checksum.h"
+#include "query/tiles/tile.h"
+#include "server/api/context.h"
+#include "server/api/gzip.h"
+#include "server/api/public_problem.h"
+
+namespace voxdag::server {
+namespace {
+
+// What has a digest in its URL never changes.
+constexpr const char* kForEver = "private, max-age=31536000, immutable";
+constexpr size_t kTagDigits = 32;
+
+static_assert(std::endian::native == std::endian::little, "tiles are sent as they lie in memory");
+
+void append_words(const std::vector<uint32_t>& words, std::string& bytes) {
+  bytes.append(reinterpret_cast<const char*>(words.data()), words.size() * sizeof(uint32_t));
+}
+
+std::vector<uint32_t> make_tile(const ViewedFile& file, const query::TileAddress& address) {
+  try {
+    return query::encode_tile(file.dag(), kTileLevels, address);
+  } catch (const Error& error) {
+    // Whether the file is damaged, or the offset that of no node, looks the same from here.
+    throw not_found(error.message());
+  }
+}
+
+// LEVEL and OFFSET of a tile. Throws Problem with this status unless they are numbers.
+query::TileAddress parse_address(const std::string& text, int status) {
+  const auto numbers = parse_numbers<uint64_t, 2>(text, '.');
+  if (!numbers || (*numbers)[0] > UINT32_MAX)
+    throw problem(status == 404 ? ErrorCode::kNotFound : ErrorCode::kInvalidInput,
+                  "expected the level and the word offset of a node");
+  return {static_cast<uint32_t>((*numbers)[0]), (*numbers)[1]};
+}
+
+std::vector<query::TileAddress> parse_batch(std::string_view nodes) {
+  std::vector<query::TileAddress> addresses;
+  for (size_t comma;; nodes.remove_prefix(comma + 1)) {
+    if (addresses.size() == kMaxTilesOfBatch)
+      throw bad_request("'nodes': expected at most " + std::to_string(kMaxTilesOfBatch));
+    comma = nodes.find(',');
+    addresses.push_back(parse_address(std::string(nodes.substr(0, comma)), 400));
+    if (comma == std::string_view::npos) return addresses;
+  }
+}
+
+void check_digest(const Call& call, const ViewedFile& file) {
+  const std::string digest = call.query("v");
+  if (digest.empty()) throw bad_request("'v': expected the digest of the manifest");
+  if (digest != file.digest())
+    throw Problem(410, "gone",
+                  "the file was replaced, or its tiles are made otherwise now: get the manifest");
+}
+
+// `make` returns the bytes of the answer. They depend on nothing but the digest and what the
+// request names, which are the entity tag.
+template <class Make>
+Response answer_for_ever(const Call& call, const ViewedFile& file, const std::string& name,
+                         const Make& make) {
+  check_digest(call, file);
+  Response response = make_response(200, "application/octet-stream", kForEver);
+  const std::string tag = sha256_hex(file.digest() + ' ' + name).substr(0, kTagDigits);
+  response.headers.emplace("ETag", "W/\"" + tag + '"');
+  response.headers.emplace("Vary", "Accept-Encoding");
+  if (has_tag(call.request.header("If-None-Match"), '"' + tag + '"')) {
+    response.status = 304;
+    return response;
+  }
+  response.body = make();
+  if (accepts_gzip(call.request.header("Accept-Encoding"))) {
+    std::string packed = gzip(response.body);
+    if (packed.size() < response.body.size()) {
+      response.body = std::move(packed);
+      response.headers.emplace("Content-Encoding", "gzip");
+    }
+  }
+  return response;
+}
+
+Response get_manifest(const Call&, const ViewedFile& file) {
+  return json_response(200, file.manifest());
+}
+
+Response get_tile(const Call& call, const ViewedFile& file) {
+  const std::string name = *(call.names.end() - 2) + '.' + call.names.back();
+  const query::TileAddress address = parse_address(name, 404);
+  return answer_for_ever(call, file, name, [&] {
+    std::string bytes;
+    append_words(make_tile(file, address), bytes);
+    return bytes;
+  });
+}
+
+Response get_batch(const Call& call, const ViewedFile& file) {
+  const std::string nodes = call.query("nodes");
+  const std::vector<query::TileAddress> addresses = parse_batch(nodes);
+  return answer_for_ever(call, file, nodes, [&] {
+    std::string bytes;
+    for (const query::TileAddress& address : addresses) {
+      const std::vector<uint32_t> words = make_tile(file, address);
+      append_words({static_cast<uint32_t>(words.size() * sizeof(uint32_t))}, bytes);
+      append_words(words, bytes);
+    }
+    return bytes;
+  });
+}
+
+Viewed result_of_job(Context& context, const Call& call) {
+  const Job job = find_job(context.queue, call.names[0]);
+  if (job.state != JobState::kSucceeded) {
+    Problem problem = conflict("the job has no result yet: expected a succeeded job");
+    problem.state = state_name(job.state);
+    throw problem;
+  }
+  auto permit = context.tiles.acquire(call.caller.client);
+  if (!permit) throw busy("too many requests for tiles at a time, of this client or of all", 1);
+  return {context.viewed.open(context.dispatcher.folder(job.id).result()), std::move(permit)};
+}
+
+}  // namespace
+
+void add_tile_routes(Router& router, const std::string& base, const FindViewedFile& find) {
+  const auto add = [&](const std::string& path, auto answer, const QueryNames& query) {
+    const auto handler = [find, answer](Call& call) {
+      Viewed viewed = find(call);
+      Response response = answer(call, *viewed.file);
+      response.permit = std::move(viewed.permit);
+      return response;
+    };
+    router.add("GET", base + path, Role::kRead, handler, query);
+  };
+  add("/tiles", get_manifest, {});
+  add("/tiles/batch", get_batch, {"v", "nodes"});
+  add("/tiles/{level}/{offset}", get_tile, {"v"});
+}
+
+void add_job_tile_routes(Router& router) {
+  add_tile_routes(router, "/api/v1/jobs/{id}", [&context = router.context()](const Call& call) {
+    return result_of_job(context, call);
+  });
+}
+
+}  // namespace voxdag::server

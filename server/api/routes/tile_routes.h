@@ -1,0 +1,24 @@
+// The routes by which a viewer gets a finished DAG in tiles; docs/api.md.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "server/api/routes/router.h"
+#include "server/tiles/viewed_file.h"
+
+namespace voxdag::server {
+
+// The file that a call asks for, and a permit to do so, null if none is needed.
+struct Viewed {
+  std::shared_ptr<const ViewedFile> file;
+  std::shared_ptr<void> permit;
+};
+// Throws Problem if there is no such file, or no permit is free.
+using FindViewedFile = std::function<Viewed(const Call&)>;
+
+// Adds BASE/tiles, BASE/tiles/batch and BASE/tiles/{level}/{offset}.
+void add_tile_routes(Router& router, const std::string& base, const FindViewedFile& find);
+
+}  // namespace voxdag::server

@@ -1,0 +1,78 @@
+#include "server/tiles/viewed_file.h"
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "core/format/checksum.h"
+#include "core/format/global/open_global.h"
+#include "query/render/views.h"
+
+namespace voxdag::server {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kHeaderBytes = 4096;
+constexpr size_t kDigestDigits = 32;
+// Of the pictures that the named views are made for.
+constexpr double kAspect = 16.0 / 9;
+
+// The header page has the checksum of the table of the checksums of all other bytes.
+std::string digest_of(const voxdag_reader::File& file) {
+  std::string text(reinterpret_cast<const char*>(file.data()), kHeaderBytes);
+  text += "tiles 1 " + std::to_string(kTileLevels);
+  return sha256_hex(text).substr(0, kDigestDigits);
+}
+
+Json world(const query::Vec& point, const voxdag_reader::File& file) {
+  const double voxel = file.edge() / static_cast<double>(file.resolution());
+  Json json = Json::array();
+  for (int axis = 0; axis < 3; ++axis) json.push_back(file.origin()[axis] + point[axis] * voxel);
+  return json;
+}
+
+Json camera(const std::string& view, const query::DagView& dag, const voxdag_reader::File& file) {
+  const query::Placement p = query::named_view(view, dag, kAspect, {});
+  return {{"position", world(p.eye, file)},
+          {"target", world(p.target, file)},
+          {"fov_degrees", p.fov_degrees}};
+}
+
+Json describe(const voxdag_reader::File& file, const query::DagView& dag,
+              const std::string& digest) {
+  const uint32_t levels = file.grid_levels();
+  Json json = {{"digest", digest},
+               {"resolution", file.resolution()},
+               {"levels", levels},
+               {"tile_levels", kTileLevels},
+               {"batch_max", kMaxTilesOfBatch},
+               {"origin", file.origin()},
+               {"edge", file.edge()},
+               {"voxels", std::to_string(file.voxels())},
+               {"root", nullptr}};
+  if (dag.empty()) return json;
+  json["root"] = {{"level", 0}, {"offset", 0}};
+  if (file.brick_level() == 0) {
+    const uint64_t mask = dag.brick(0);
+    json["root_brick"] = {static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)};
+  }
+  json["camera"] = camera("auto", dag, file);
+  for (const std::string& view : query::view_names())
+    if (view != "auto" && view != "inside") json["views"][view] = camera(view, dag, file);
+  return json;
+}
+
+}  // namespace
+
+ViewedFile::ViewedFile(const std::string& path, const FileIdentity& identity)
+    : identity_(identity),
+      file_(open_global_file(path)),
+      dag_(*file_),
+      digest_(digest_of(*file_)) {}
+
+const std::string& ViewedFile::manifest() const {
+  std::call_once(manifest_once_, [&] { manifest_ = describe(*file_, dag_, digest_).dump(); });
+  return manifest_;
+}
+
+}  // namespace voxdag::server

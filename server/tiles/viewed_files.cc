@@ -1,0 +1,55 @@
+#include "server/tiles/viewed_files.h"
+
+#include <algorithm>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+
+namespace voxdag::server {
+
+std::shared_ptr<const ViewedFile> ViewedFiles::open(const std::string& path) {
+  const FileIdentity identity = files_.open_read(path)->identity();
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = std::find_if(entries_.begin(), entries_.end(),
+                                    [&](const Entry& e) { return e.path == path; });
+    if (found != entries_.end() && found->file->identity() == identity) {
+      found->used_s = wall_seconds();
+      entries_.splice(entries_.begin(), entries_, found);
+      return found->file;
+    }
+  }
+  // Outside of the lock: other files need not wait for this one's disk.
+  auto file = std::make_shared<const ViewedFile>(path, identity);
+  const std::lock_guard lock(mutex_);
+  entries_.remove_if([&](const Entry& e) { return e.path == path; });
+  entries_.push_front({path, file, wall_seconds()});
+  if (entries_.size() > max_open_) entries_.pop_back();
+  return file;
+}
+
+void ViewedFiles::close(const std::string& path) {
+  const std::lock_guard lock(mutex_);
+  entries_.remove_if([&](const Entry& e) { return e.path == path; });
+}
+
+void ViewedFiles::close_stale(double max_idle_s) {
+  const std::lock_guard lock(mutex_);
+  const double oldest_s = wall_seconds() - max_idle_s;
+  entries_.remove_if([&](const Entry& e) { return e.used_s < oldest_s || !is_current(e); });
+}
+
+size_t ViewedFiles::size() const {
+  const std::lock_guard lock(mutex_);
+  return entries_.size();
+}
+
+bool ViewedFiles::is_current(const Entry& entry) const {
+  try {
+    return files_.open_read(entry.path)->identity() == entry.file->identity();
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace voxdag::server

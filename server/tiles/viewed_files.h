@@ -1,0 +1,42 @@
+// The files that viewers look at now, so that a request need not open and check its file again: a
+// few, those asked for last. A file that was removed or replaced is closed when it is asked for, by
+// close(), or by close_stale(), which is to be called now and then. Thread-safe.
+#pragma once
+
+#include <list>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "core/io/file_system.h"
+#include "server/tiles/viewed_file.h"
+
+namespace voxdag::server {
+
+class ViewedFiles {
+ public:
+  ViewedFiles(FileSystem& files, size_t max_open) : files_(files), max_open_(max_open) {}
+
+  // Throws Error{kNotFound}, or as ViewedFile. Requests that still use a file that is closed
+  // finish.
+  std::shared_ptr<const ViewedFile> open(const std::string& path);
+  void close(const std::string& path);
+  // Closes what was removed or replaced, or not asked for in `max_idle_s`.
+  void close_stale(double max_idle_s);
+  size_t size() const;
+
+ private:
+  struct Entry {
+    std::string path;
+    std::shared_ptr<const ViewedFile> file;
+    double used_s;
+  };
+  bool is_current(const Entry& entry) const;
+
+  FileSystem& files_;
+  const size_t max_open_;
+  mutable std::mutex mutex_;  // guards the next
+  std::list<Entry> entries_;  // used last first
+};
+
+}  // namespace voxdag::server

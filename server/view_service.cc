@@ -1,0 +1,64 @@
+#include "server/view_service.h"
+
+#include <exception>
+#include <thread>
+
+#include "server/api/public_problem.h"
+#include "server/api/routes/tile_routes.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr double kDrain_s = 1;
+// The old and the new file, while one is replaced.
+constexpr size_t kMaxOpen = 2;
+
+HttpOptions options(int port) {
+  HttpOptions options;
+  options.port = port;
+  return options;
+}
+
+}  // namespace
+
+ViewService::ViewService(const std::string& path, int port, FileSystem& files, Log log)
+    : path_(path),
+      log_(std::move(log)),
+      viewed_(files, kMaxOpen),
+      access_(ServerConfig{}, files),
+      http_(options(port), [this](Request& request) { return answer(request); }) {
+  viewed_.open(path_);
+  add_tile_routes(router_, "/api/v1/view", [this](const Call&) {
+    return Viewed{viewed_.open(path_), nullptr};
+  });
+  add_asset_routes(router_, "viewer.html");
+}
+
+std::string ViewService::url() const {
+  return "http://127.0.0.1:" + std::to_string(http_.port()) + "/";
+}
+
+void ViewService::run() {
+  // The cameras are looked for while a browser starts. If that fails, so will the request for them.
+  std::thread cameras([file = viewed_.open(path_)] {
+    try {
+      file->manifest();
+    } catch (const std::exception&) {
+    }
+  });
+  http_.run(kDrain_s);
+  cameras.join();
+}
+
+Response ViewService::answer(Request& request) {
+  try {
+    return router_.route(request, access_);
+  } catch (const std::exception& error) {
+    const Problem problem = public_problem(error);
+    if (problem.detail != error.what())  // clients do not see this text
+      log_(request.method + " failed: " + error.what());
+    return problem_response(problem);
+  }
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,40 @@
+// Shows one finished DAG in a browser on this machine: what `voxdag view` runs. It listens on the
+// loopback only, reads that file and writes nothing. If the file is replaced, the new one is shown.
+// Thread-safe.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "server/api/access/access_control.h"
+#include "server/api/routes/router.h"
+#include "server/http/http_server.h"
+#include "server/steps.h"
+#include "server/tiles/viewed_files.h"
+
+namespace voxdag::server {
+
+class ViewService {
+ public:
+  // Opens the file and listens; port 0 is any free one. `log` gets what fails. Throws Error.
+  ViewService(const std::string& path, int port, FileSystem& files, Log log);
+
+  // "http://127.0.0.1:40123/"
+  std::string url() const;
+  // Serves until stop().
+  void run();
+  // From any thread.
+  void stop() { http_.stop(); }
+
+ private:
+  Response answer(Request& request);
+
+  const std::string path_;
+  const Log log_;
+  ViewedFiles viewed_;
+  AccessControl access_;
+  Router router_;
+  HttpServer http_;
+};
+
+}  // namespace voxdag::server
