@@ -10,6 +10,7 @@
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
+#include "query/render/depth.h"
 #include "query/render/renderer.h"
 #include "query/render/views.h"
 
@@ -21,6 +22,7 @@ constexpr int kMaxPictureEdge = 16384;
 struct RenderCommand {
   std::string input;
   OutputFile output;
+  std::string depth;  // "" for none
   std::string view = "auto";
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
@@ -68,8 +70,10 @@ void report(const RenderCommand& command, const query::Placement& placement,
             const voxdag_reader::File& file, double wall_s) {
   const auto eye = world_point(placement.eye, file), target = world_point(placement.target, file);
   if (command.json) {
-    return print_json(nlohmann::ordered_json{
-        {"output", command.output.path},
+    nlohmann::ordered_json json;
+    if (!command.output.path.empty()) json["output"] = command.output.path;
+    if (!command.depth.empty()) json["depth"] = command.depth;
+    json.update({
         {"width", command.options.width},
         {"height", command.options.height},
         {"camera", eye},
@@ -77,11 +81,26 @@ void report(const RenderCommand& command, const query::Placement& placement,
         {"fov", placement.fov_degrees},
         {"wall_s", wall_s},
     });
+    return print_json(json);
   }
-  std::printf("%s: %d x %d, %s\n", command.output.path.c_str(), command.options.width,
-              command.options.height, duration_text(wall_s).c_str());
+  const std::string& name = command.output.path.empty() ? command.depth : command.output.path;
+  std::printf("%s: %d x %d, %s\n", name.c_str(), command.options.width, command.options.height,
+              duration_text(wall_s).c_str());
   std::printf("  --camera %.6g,%.6g,%.6g --target %.6g,%.6g,%.6g --fov %.4g\n", eye[0], eye[1],
               eye[2], target[0], target[1], target[2], placement.fov_degrees);
+}
+
+void check_outputs(const RenderCommand& command, FileSystem& files) {
+  if (command.output.path.empty() && command.depth.empty())
+    throw Error(ErrorCode::kInvalidInput, "expected --output, --depth or both");
+  if (command.output.path == command.depth)
+    throw Error(ErrorCode::kInvalidInput, "--output and --depth name the same file");
+  if (!command.output.path.empty())
+    command.output.check(files, command.input, query::is_rendered_png);
+  // An array does not say who wrote it.
+  if (!command.depth.empty())
+    command.output.check(files, command.depth, command.input,
+                         [](const ReadableFile&) { return false; });
 }
 
 void run(RenderCommand& command, CommandContext& context) {
@@ -92,22 +111,31 @@ void run(RenderCommand& command, CommandContext& context) {
                                               std::to_string(kMaxPictureEdge) + " pixels");
   command.options.width = width;
   command.options.height = height;
-  command.output.check(context.files, command.input, query::is_rendered_png);
+  check_outputs(command, context.files);
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
   if (dag.empty()) progress->warn(command.input + " has no voxels");
   const double start_s = wall_seconds();
   const query::Placement placement = place_camera(command, *file, dag);
-  const query::Picture picture =
-      query::render_picture(dag, placement, command.options, *progress, context.cancel);
-  write_file_atomically(context.files, command.output.path, query::encode_png(picture));
+  if (!command.output.path.empty()) {
+    const query::Picture picture =
+        query::render_picture(dag, placement, command.options, *progress, context.cancel);
+    write_file_atomically(context.files, command.output.path, query::encode_png(picture));
+  }
+  if (!command.depth.empty()) {
+    const query::DepthMap map =
+        query::render_depth(dag, placement, width, height, command.options.threads, context.cancel);
+    write_file_atomically(context.files, command.depth, query::encode_npy(map));
+  }
   report(command, placement, *file, wall_seconds() - start_s);
 }
 
 void declare(Command& command, RenderCommand& state) {
   command.option("input", state.input, "the .vdag file").required();
-  command.option("-o,--output", state.output.path, "the .png file to write").required();
+  command.option("-o,--output", state.output.path, "the .png file to write");
+  command.option("--depth", state.depth,
+                 "the .npy file to write: distances in voxels, inf where there is no surface");
   const Option view =
       command.option("--view", state.view, "named view").one_of(query::view_names()).show_default();
   Option camera = command.option("--camera", state.camera, "X,Y,Z of the camera, in scene units");

@@ -74,10 +74,9 @@ Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
 }  // namespace
 
 bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surface& s) {
-  constexpr double kFar = 1e30;
   const RayCaster caster(dag);
   Hit hit;
-  if (!caster.cast(ray, {0, 0.75 * pixel_spread}, 0, kFar, hit)) return false;
+  if (!caster.cast(ray, visible_cone(pixel_spread), 0, kFarthest, hit)) return false;
   s.t = hit.t;
   s.size = static_cast<double>(dag.resolution() >> hit.depth);
   const double pixels = s.size / std::max(s.t * pixel_spread, 1e-9);

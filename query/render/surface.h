@@ -8,6 +8,12 @@
 
 namespace voxdag::query {
 
+// A ray that sees as far as any does.
+inline constexpr double kFarthest = 1e30;
+// The cone of a ray through a pixel that is `pixel_spread` wide at distance 1: cells of up to three
+// quarters of a pixel are seen as a whole.
+inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread}; }
+
 struct Surface {
   double t = 0;     // ray parameter of the hit
   double size = 0;  // edge of the cell that was hit, in voxels

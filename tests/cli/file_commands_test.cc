@@ -99,6 +99,24 @@ TEST_F(FileCommands, RenderMakesAPicture) {
   EXPECT_FALSE(exists("x.png"));
 }
 
+// Distances need no picture; both are of the same camera.
+TEST_F(FileCommands, RenderMeasuresDistances) {
+  const Json depth = run_json({"render", "m.vdag", "--depth", "d.npy", "--size", "64x48"});
+  EXPECT_EQ(depth["depth"], "d.npy");
+  EXPECT_FALSE(depth.contains("output"));
+  const std::string array = contents("d.npy");
+  EXPECT_NE(array.find("'shape': (48, 64)"), std::string::npos);
+  EXPECT_EQ(array.size(), 128u + 4 * 64 * 48);
+  expect_error(2, "--force", {"render", "m.vdag", "--depth", "d.npy", "--size", "64x48"});
+  const Json both = run_json(
+      {"render", "m.vdag", "--depth", "d.npy", "-o", "both.png", "--size", "64x48", "--force"});
+  EXPECT_EQ(both["camera"], depth["camera"]);
+  EXPECT_EQ(contents("d.npy"), array);
+  EXPECT_TRUE(exists("both.png"));
+  expect_error(2, "--depth", {"render", "m.vdag"});
+  expect_error(2, "same file", {"render", "m.vdag", "-o", "x.png", "--depth", "x.png"});
+}
+
 // The estimate has a range for every value, and plan builds nothing.
 TEST_F(FileCommands, PlanNames) {
   const Json plan = run_json({"plan", "m.glb", "-r", "1024"});

@@ -1,0 +1,28 @@
+// How far a camera sees: for each pixel the distance to what the renderer shows there, for programs
+// that compare or combine pictures.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "query/dag_view.h"
+#include "query/render/camera.h"
+
+namespace voxdag::query {
+
+struct DepthMap {
+  int width = 0, height = 0;
+  // Rows from the top: voxels along the ray through the center of the pixel, infinity where there
+  // is no surface.
+  std::vector<float> depths;
+};
+
+// Of a grid without voxels all is infinite. Throws as render_picture().
+DepthMap render_depth(const DagView& dag, const Placement& placement, int width, int height,
+                      unsigned threads, const CancelToken& cancel);
+
+// The bytes of a file that numpy.load() reads: an array (height, width) of float32.
+std::string encode_npy(const DepthMap& map);
+
+}  // namespace voxdag::query
