@@ -23,6 +23,13 @@ const NamedDirection kDirections[] = {
     {"left", {{-1, 0, 0}}},     {"right", {{1, 0, 0}}}, {"top", {{0, 1, 0}}},
 };
 
+// The width of rays that choose a view of a large grid. Its finer cells are all over the file,
+// which may have to be read from a disk, to the same effect.
+double finest_width(const DagView& dag) {
+  constexpr int64_t kCells = 4096;
+  return dag.resolution() > kCells ? static_cast<double>(dag.resolution() / kCells) : 0;
+}
+
 // How far one sees from places on the surface, as a share of the scene's diagonal; a place from
 // which one can see out of the scene counts as 0. Near 0 for an object, or for caves; more for
 // interiors.
@@ -33,13 +40,14 @@ double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
   for (int i = 0; i < 27; ++i)
     if (i != 13) directions.push_back(normalized({{i / 9 - 1.0, i / 3 % 3 - 1.0, i % 3 - 1.0}}));
   const double start = 3 * static_cast<double>(dag.resolution()) / 64;
+  const double width = std::max(1.0, finest_width(dag));
   double sum = 0;
   for (size_t i = 0; i < kPlaces; ++i) {
     const Vec& place = points[i * points.size() / kPlaces];
     double longest = 0;
     for (const Vec& direction : directions) {
       Hit hit;
-      const bool escaped = !caster.cast({place, direction}, {1, 0}, start, box.diagonal(), hit);
+      const bool escaped = !caster.cast({place, direction}, {width, 0}, start, box.diagonal(), hit);
       longest = escaped ? 0 : std::max(longest, hit.t);
       if (escaped) break;
     }
@@ -50,7 +58,7 @@ double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
 
 // How much there is to see, by a few rays: higher for long views with much detail, lower close to a
 // wall or where the camera looks out of the scene. A distance below `near` is too close.
-double score(const RayCaster& caster, const Placement& placement, double near) {
+double score(const RayCaster& caster, const Placement& placement, double width, double near) {
   constexpr int kColumns = 24, kRows = 14;
   constexpr double kRays = kColumns * kRows;
   const Camera camera(placement, kColumns, kRows);
@@ -64,7 +72,7 @@ double score(const RayCaster& caster, const Placement& placement, double near) {
     for (int x = 0; x < kColumns; ++x) {
       Hit hit;
       const bool seen =
-          caster.cast(camera.ray(x + 0.5, y + 0.5), {0, camera.pixel_spread()}, 0, kFar, hit);
+          caster.cast(camera.ray(x + 0.5, y + 0.5), {width, camera.pixel_spread()}, 0, kFar, hit);
       const double d = depth[y][x] = seen ? std::max(hit.t, 1.0) : kFar;
       close += d < near;
       out += !seen;
@@ -77,7 +85,7 @@ double score(const RayCaster& caster, const Placement& placement, double near) {
 }
 
 // The best-scoring of some hundreds of random places in the lower half of the scene.
-Placement inside_view(const RayCaster& caster, const Box& box, double fov_degrees) {
+Placement inside_view(const RayCaster& caster, const Box& box, double width, double fov_degrees) {
   constexpr uint64_t kPlaces = 400;
   constexpr int kYaws = 8;
   const Sampler sampler(2);
@@ -93,7 +101,7 @@ Placement inside_view(const RayCaster& caster, const Box& box, double fov_degree
       const double angle = 2 * kPi * (yaw + up.v) / kYaws;
       const Vec forward{{std::cos(angle), 0.08, std::sin(angle)}};
       const Placement trial{eye, eye + forward * (0.25 * box.diagonal()), fov_degrees};
-      const double trial_score = score(caster, trial, 0.04 * box.diagonal());
+      const double trial_score = score(caster, trial, width, 0.04 * box.diagonal());
       if (trial_score <= best_score) continue;
       best_score = trial_score;
       best = trial;
@@ -143,7 +151,7 @@ Placement named_view(const std::string& name, const DagView& dag, double aspect,
   const Box box = occupied_box(dag);
   const bool automatic = name == "auto";
   if (name == "inside" || (automatic && enclosure(caster, dag, box) > kMinEnclosureOfRooms))
-    return inside_view(caster, box, fov_degrees.value_or(kInsideFov));
+    return inside_view(caster, box, finest_width(dag), fov_degrees.value_or(kInsideFov));
   for (const NamedDirection& d : kDirections)
     if ((automatic ? "iso" : name) == d.name)
       return fit_camera(occupied_points(dag), d.toward_eye, fov_degrees.value_or(kOutsideFov),
