@@ -1,0 +1,167 @@
+// Tiles of different depths: how many and how many bytes five pictures need, and how fast one core
+// encodes them.
+//
+//     bench_tiles [--size WxH] FILE.vdag
+//
+// For each depth: the tiles and bytes (as they are, and with gzip, tile by tile) until no cell of
+// view `auto` is wider than 16 pixels; until none of each of five views is wider than one pixel;
+// and of all five together. Then the sizes and the speed over those tiles in random order, the
+// first time after the file was dropped from memory (if nothing else holds it there), then from
+// memory.
+#include <fcntl.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <random>
+#include <string>
+
+#include "bench/tiles/needed_tiles.h"
+#include "core/base/clock.h"
+#include "core/format/global/open_global.h"
+#include "query/ray_caster.h"
+#include "query/render/views.h"
+
+namespace voxdag::query {
+namespace {
+
+using Addresses = NeededTiles::Addresses;
+
+constexpr double kFirstPixels = 16, kLastPixels = 1;
+
+uint64_t packed_bytes(const std::vector<uint32_t>& words, int level) {
+  z_stream stream{};
+  deflateInit2(&stream, level, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY);
+  std::vector<Bytef> out(deflateBound(&stream, words.size() * 4));
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<uint32_t*>(words.data()));
+  stream.avail_in = static_cast<uInt>(words.size() * 4);
+  stream.next_out = out.data();
+  stream.avail_out = static_cast<uInt>(out.size());
+  deflate(&stream, Z_FINISH);
+  deflateEnd(&stream);
+  return stream.total_out;
+}
+
+struct Bytes {
+  uint64_t plain = 0, packed = 0;
+};
+Bytes bytes_of(const DagView& dag, uint32_t depth, const Addresses& tiles) {
+  Bytes sum;
+  for (const auto& [level, offset] : tiles) {
+    const auto words = encode_tile(dag, depth, {level, offset});
+    sum.plain += words.size() * 4;
+    sum.packed += packed_bytes(words, 1);
+  }
+  return sum;
+}
+
+struct View {
+  std::string name;
+  Placement placement;
+};
+// The named views, and one from where a voxel of what `auto` sees in its middle is four pixels
+// wide.
+std::vector<View> views_of(const DagView& dag, double aspect, int width, int height) {
+  std::vector<View> views;
+  for (const char* name : {"auto", "iso", "front", "left"})
+    views.push_back({name, named_view(name, dag, aspect, {})});
+  const Camera camera(views[0].placement, width, height);
+  const Ray ray = camera.ray(width / 2.0, height / 2.0);
+  Hit hit;
+  if (RayCaster(dag).cast(ray, {0, camera.pixel_spread()}, 0, 1e30, hit)) {
+    Placement close = views[0].placement;
+    close.eye = ray.at(std::max(0.0, hit.t - 1 / (4 * camera.pixel_spread())));
+    close.target = ray.at(hit.t);
+    views.push_back({"close", close});
+  }
+  return views;
+}
+
+void print(uint32_t depth, const char* what, size_t tiles, const Bytes& bytes) {
+  std::printf("depth %u  %-14s %7zu tiles  %8.2f MB  %8.2f MB packed\n", depth, what, tiles,
+              static_cast<double>(bytes.plain) / 1e6, static_cast<double>(bytes.packed) / 1e6);
+  std::fflush(stdout);
+}
+
+void forget(const std::string& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY);
+  posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
+  ::close(fd);
+}
+
+// Encodes all the tiles in random order, and prints their sizes and the speed.
+void time_tiles(const std::string& path, uint32_t depth, const Addresses& tiles) {
+  std::vector<TileAddress> order;
+  for (const auto& [level, offset] : tiles) order.push_back({level, offset});
+  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
+  forget(path);
+  const auto file = open_global_file(path);
+  const DagView dag(*file);
+  for (const char* what : {"cold", "warm"}) {
+    std::vector<size_t> sizes;
+    const double start_s = wall_seconds(), start_cpu_s = process_cpu_seconds();
+    for (const TileAddress& address : order)
+      sizes.push_back(encode_tile(dag, depth, address).size() * 4);
+    const double wall_s = wall_seconds() - start_s, cpu_s = process_cpu_seconds() - start_cpu_s;
+    uint64_t sum = 0;
+    for (const size_t size : sizes) sum += size;
+    std::sort(sizes.begin(), sizes.end());
+    std::printf(
+        "depth %u  %s: %.0f tiles/s, %.0f MB/s (%.3f s, %.3f s CPU); mean %llu bytes, "
+        "p99 %zu, largest %zu\n",
+        depth, what, static_cast<double>(order.size()) / wall_s,
+        static_cast<double>(sum) / 1e6 / wall_s, wall_s, cpu_s,
+        static_cast<unsigned long long>(sum / sizes.size()), sizes[sizes.size() * 99 / 100],
+        sizes.back());
+    std::fflush(stdout);
+  }
+}
+
+void run(const std::string& path, int width, int height) {
+  std::vector<Addresses> all(kMaxTileLevels + 1);
+  {
+    const auto file = open_global_file(path);
+    const DagView dag(*file);
+    const auto views = views_of(dag, static_cast<double>(width) / height, width, height);
+    const auto first = NeededTiles(dag, kFirstPixels).find(views[0].placement, width, height);
+    for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth)
+      print(depth, "first picture", first[depth].size(), bytes_of(dag, depth, first[depth]));
+    for (const View& view : views) {
+      const auto tiles = NeededTiles(dag, kLastPixels).find(view.placement, width, height);
+      for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) {
+        all[depth].insert(tiles[depth].begin(), tiles[depth].end());
+        print(depth, view.name.c_str(), tiles[depth].size(), bytes_of(dag, depth, tiles[depth]));
+      }
+    }
+    for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth)
+      print(depth, "all views", all[depth].size(), bytes_of(dag, depth, all[depth]));
+  }
+  for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) time_tiles(path, depth, all[depth]);
+}
+
+}  // namespace
+}  // namespace voxdag::query
+
+int main(int argc, char** argv) {
+  int width = 1920, height = 1080;
+  const char* path = nullptr;
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--size") == 0 && i + 1 < argc)
+      std::sscanf(argv[++i], "%dx%d", &width, &height);
+    else
+      path = argv[i];
+  }
+  if (!path) {
+    std::fprintf(stderr, "usage: bench_tiles [--size WxH] FILE.vdag\n");
+    return 2;
+  }
+  try {
+    voxdag::query::run(path, width, height);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_tiles: %s\n", error.what());
+    return 1;
+  }
+}
