@@ -28,7 +28,7 @@ ViewService::ViewService(const std::string& path, int port, FileSystem& files, L
       access_(ServerConfig{}, files),
       http_(options(port), [this](Request& request) { return answer(request); }) {
   viewed_.open(path_);
-  add_tile_routes(router_, "/api/v1/view", [this](const Call&) {
+  add_tile_routes(router_, "/api/v1/view", Packing::kNone, [this](const Call&) {
     return Viewed{viewed_.open(path_), nullptr};
   });
   add_asset_routes(router_, "viewer.html");

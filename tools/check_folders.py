@@ -51,7 +51,7 @@ THIRD_PARTY = {
     "sqlite3.h": ["core/db"],
     "httplib.h": ["client"],
     "png.h": ["query"],
-    "zlib.h": ["server"],
+    "zlib.h": ["server", "tests", "bench"],
     "openvdb/openvdb.h": ["query", "bench"],
     "nanovdb/util/OpenToNanoVDB.h": ["query"],
 }

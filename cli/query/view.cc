@@ -4,9 +4,10 @@
 
 #include <chrono>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <thread>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "server/view_service.h"
 
 namespace voxdag::cli {
@@ -16,6 +17,7 @@ struct ViewCommand {
   std::string input;
   int port = 0;
   bool open = false;
+  bool json = false;
 };
 
 // Starts the user's browser, which is nobody's child: whatever becomes of it concerns it alone.
@@ -35,7 +37,10 @@ void run(const ViewCommand& command, CommandContext& context) {
   server::ViewService service(
       command.input, command.port, context.files,
       [](const std::string& line) { std::fprintf(stderr, "voxdag: %s\n", line.c_str()); });
-  std::printf("%s\n", service.url().c_str());
+  if (command.json)
+    print_json(nlohmann::json{{"url", service.url()}});
+  else
+    std::printf("%s\n", service.url().c_str());
   std::fflush(stdout);
   if (command.open) open_in_browser(service.url());
   // A signal handler may only set the token, so a thread watches it.
@@ -63,6 +68,7 @@ void declare(Command& command, ViewCommand& state) {
               "port to listen on, on this machine only (default: any free one)")
       .range(0, 65535);
   command.flag("--open", state.open, "open the page in the browser, by xdg-open");
+  command.json_flag(state.json, "print the URL as a JSON object on standard output");
 }
 
 }  // namespace

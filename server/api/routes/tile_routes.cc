@@ -70,20 +70,22 @@ Response answer_for_ever(const Call& call, const ViewedFile& file, const std::st
   Response response = make_response(200, "application/octet-stream", kForEver);
   const std::string tag = sha256_hex(file.digest() + ' ' + name).substr(0, kTagDigits);
   response.headers.emplace("ETag", "W/\"" + tag + '"');
-  response.headers.emplace("Vary", "Accept-Encoding");
+  response.headers.emplace("Vary", "Accept-Encoding, Authorization");
   if (has_tag(call.request.header("If-None-Match"), '"' + tag + '"')) {
     response.status = 304;
     return response;
   }
   response.body = make();
-  if (accepts_gzip(call.request.header("Accept-Encoding"))) {
-    std::string packed = gzip(response.body);
-    if (packed.size() < response.body.size()) {
-      response.body = std::move(packed);
-      response.headers.emplace("Content-Encoding", "gzip");
-    }
-  }
   return response;
+}
+
+// Compresses the body if the client accepts that and it gains something.
+void pack(const Call& call, Response& response) {
+  if (response.body.empty() || !accepts_gzip(call.request.header("Accept-Encoding"))) return;
+  std::string packed = gzip(response.body);
+  if (packed.size() >= response.body.size()) return;
+  response.body = std::move(packed);
+  response.headers.emplace("Content-Encoding", "gzip");
 }
 
 Response get_manifest(const Call&, const ViewedFile& file) {
@@ -103,7 +105,7 @@ Response get_tile(const Call& call, const ViewedFile& file) {
 Response get_batch(const Call& call, const ViewedFile& file) {
   const std::string nodes = call.query("nodes");
   const std::vector<query::TileAddress> addresses = parse_batch(nodes);
-  return answer_for_ever(call, file, nodes, [&] {
+  return answer_for_ever(call, file, "batch " + nodes, [&] {
     std::string bytes;
     for (const query::TileAddress& address : addresses) {
       const std::vector<uint32_t> words = make_tile(file, address);
@@ -128,11 +130,13 @@ Viewed result_of_job(Context& context, const Call& call) {
 
 }  // namespace
 
-void add_tile_routes(Router& router, const std::string& base, const FindViewedFile& find) {
+void add_tile_routes(Router& router, const std::string& base, Packing packing,
+                     const FindViewedFile& find) {
   const auto add = [&](const std::string& path, auto answer, const QueryNames& query) {
-    const auto handler = [find, answer](Call& call) {
+    const auto handler = [find, answer, packing](Call& call) {
       Viewed viewed = find(call);
       Response response = answer(call, *viewed.file);
+      if (packing == Packing::kGzip) pack(call, response);
       response.permit = std::move(viewed.permit);
       return response;
     };
@@ -144,9 +148,10 @@ void add_tile_routes(Router& router, const std::string& base, const FindViewedFi
 }
 
 void add_job_tile_routes(Router& router) {
-  add_tile_routes(router, "/api/v1/jobs/{id}", [&context = router.context()](const Call& call) {
+  const auto find = [&context = router.context()](const Call& call) {
     return result_of_job(context, call);
-  });
+  };
+  add_tile_routes(router, "/api/v1/jobs/{id}", Packing::kGzip, find);
 }
 
 }  // namespace voxdag::server

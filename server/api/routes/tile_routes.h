@@ -18,7 +18,12 @@ struct Viewed {
 // Throws Problem if there is no such file, or no permit is free.
 using FindViewedFile = std::function<Viewed(const Call&)>;
 
+// Whether tiles are compressed for clients that accept it. It halves their bytes, at about 80 MB/s
+// of one core: a gain on a network, a loss on the loopback.
+enum class Packing { kNone, kGzip };
+
 // Adds BASE/tiles, BASE/tiles/batch and BASE/tiles/{level}/{offset}.
-void add_tile_routes(Router& router, const std::string& base, const FindViewedFile& find);
+void add_tile_routes(Router& router, const std::string& base, Packing packing,
+                     const FindViewedFile& find);
 
 }  // namespace voxdag::server

@@ -1,0 +1,51 @@
+// `voxdag view`: the page of one file on this machine, until Ctrl-C.
+#include <signal.h>
+
+#include <chrono>
+#include <thread>
+
+#include "client/http_client.h"
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+class View : public CommandLine {
+ protected:
+  void SetUp() override {
+    make_scene();
+    ASSERT_EQ(run({"build", "m.glb", "-r", "64", "-o", "m.vdag"}).status, 0);
+  }
+  // Its standard output, once there is a line.
+  std::string first_line() {
+    for (int i = 0; i < 3000 && contents(".stdout").find('\n') == std::string::npos; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return contents(".stdout");
+  }
+};
+
+TEST_F(View, ServesUntilItIsInterrupted) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    put(".stdout", "");
+    const pid_t pid = start({"view", "m.vdag", "--json"});
+    const std::string url = Json::parse(first_line())["url"];
+    EXPECT_TRUE(url.starts_with("http://127.0.0.1:")) << url;
+    voxdag::client::HttpClient http({url.substr(0, url.size() - 1), "", "", 60});
+    const Json manifest = Json::parse(http.get("/api/v1/view/tiles").body);
+    EXPECT_EQ(manifest["resolution"], 64);
+    kill(pid, signal);
+    const Answer answer = wait_for(pid);
+    EXPECT_EQ(answer.status, 0);
+    EXPECT_EQ(answer.err, "");
+  }
+}
+
+TEST_F(View, RefusesWhatItCannotShow) {
+  put("text.vdag", std::string(10000, 'x'));
+  expect_error(3, "none.vdag", {"view", "none.vdag"});
+  expect_error(4, "text.vdag", {"view", "text.vdag"});
+  expect_error(2, "--port", {"view", "m.vdag", "--port", "65536"});
+}
+
+}  // namespace
+}  // namespace command_line
