@@ -143,7 +143,8 @@ TEST(ReaderExampleTest, CompilesOnItsOwnAndRuns) {
   TemporaryFolder folder;
   const std::string program = folder.file("reader_example"), output = folder.file("output");
   ASSERT_EQ(std::system(("c++ -std=c++17 -pedantic -Wall -Wextra -Wshadow -Werror -I " + kSource +
-                         "/core/format/global " + kSource + "/docs/reader_example.cc -o " + program)
+                         "/core/format/global " + kSource + "/docs/examples/reader_example.cc -o " +
+                         program)
                             .c_str()),
             0);
   ASSERT_EQ(std::system((program + " " + kScene + " > " + output).c_str()), 0);

@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
 #include <map>
 #include <set>
+#include <sstream>
 
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
@@ -169,6 +171,22 @@ void check_tiles(const QueryFile& scene, uint64_t seed) {
         Comparison(file, tile).run(offset);
       }
     }
+}
+
+// The example in docs/format.md is the tile of the root of the file that is explained there.
+TEST(Tile, IsTheExampleOfTheDocuments) {
+  const std::string source = VOXDAG_SOURCE_DIR;
+  std::ifstream document(source + "/docs/format.md");
+  std::string line;
+  while (std::getline(document, line) && line != "```words") continue;
+  Words expected;
+  while (std::getline(document, line) && line != "```") {
+    std::istringstream words(line);
+    for (std::string word; words >> word;)
+      expected.push_back(static_cast<uint32_t>(std::stoul(word, nullptr, 16)));
+  }
+  const File file(source + "/tests/golden/floor_and_pillar.vdag");
+  EXPECT_EQ(encode_tile(DagView(file), 3, {0, 0}), expected);
 }
 
 // Each tile, decoded by other code, is the part of the file that it stands for.

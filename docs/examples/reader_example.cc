@@ -1,5 +1,5 @@
 // Opens a .vdag file, prints its counts and finds its highest voxel, using only the reader:
-//     c++ -std=c++17 -I core/format/global docs/reader_example.cc -o reader_example
+//     c++ -std=c++17 -I core/format/global docs/examples/reader_example.cc -o reader_example
 //     ./reader_example scene.vdag
 #include <cstdio>
 
