@@ -153,12 +153,15 @@ TEST_F(Tiles, ComeInBatches) {
 TEST_F(Tiles, OfWhatIsNotThereAreRefused) {
   finish_job();
   // Level 6 has the bricks.
-  for (const char* path : {"/6/0", "/0/1", "/0/9", "/4294967295/0", "/4294967296/0", "/0/-1",
-                           "/x/0", "/0/18446744073709551615", "/0/18446744073709551616", "/0/0x"})
+  for (const char* path :
+       {"/6/0", "/0/1", "/0/9", "/18/0", "/0/1099511627776", "/4294967295/0", "/4294967296/0",
+        "/0/-1", "/x/0", "/0/18446744073709551615", "/0/18446744073709551616", "/0/0x"})
     EXPECT_EQ(error(path + version_, 404, "not_found"), "") << path;
   EXPECT_EQ(error("/0/0", 400, "invalid_input"), "");
-  EXPECT_EQ(error("/0/0?v=0123", 410, "gone"), "");
-  EXPECT_EQ(error("/batch?v=0123&nodes=0.0", 410, "gone"), "");
+  EXPECT_EQ(error("/0/0?v=null", 400, "invalid_input"), "");
+  const std::string other(32, '0');
+  EXPECT_EQ(error("/0/0?v=" + other, 410, "gone"), "");
+  EXPECT_EQ(error("/batch?v=" + other + "&nodes=0.0", 410, "gone"), "");
   EXPECT_EQ(error("/0/0" + version_ + "&depth=2", 400, "invalid_input"), "");
   EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/none/tiles"), 404, "not_found"), "");
   const std::string unfinished = post_job({{"scene", "m.glb"}, {"resolution", 16384}});

@@ -17,6 +17,8 @@ namespace {
 // What has a digest in its URL never changes.
 constexpr const char* kForEver = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
+// Of a node above the bricks in any file (docs/format.md).
+constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
 
 static_assert(std::endian::native == std::endian::little, "tiles are sent as they lie in memory");
 
@@ -33,10 +35,10 @@ std::vector<uint32_t> make_tile(const ViewedFile& file, const query::TileAddress
   }
 }
 
-// LEVEL and OFFSET of a tile. Throws Problem with this status unless they are numbers.
+// LEVEL.OFFSET of a tile. Throws Problem with this status unless a file could have such a node.
 query::TileAddress parse_address(const std::string& text, int status) {
   const auto numbers = parse_numbers<uint64_t, 2>(text, '.');
-  if (!numbers || (*numbers)[0] > UINT32_MAX)
+  if (!numbers || (*numbers)[0] > kMaxLevel || (*numbers)[1] > kMaxOffset)
     throw problem(status == 404 ? ErrorCode::kNotFound : ErrorCode::kInvalidInput,
                   "expected the level and the word offset of a node");
   return {static_cast<uint32_t>((*numbers)[0]), (*numbers)[1]};
@@ -55,7 +57,9 @@ std::vector<query::TileAddress> parse_batch(std::string_view nodes) {
 
 void check_digest(const Call& call, const ViewedFile& file) {
   const std::string digest = call.query("v");
-  if (digest.empty()) throw bad_request("'v': expected the digest of the manifest");
+  if (digest.size() != file.digest().size() ||
+      digest.find_first_not_of("0123456789abcdef") != std::string::npos)
+    throw bad_request("'v': expected the digest of the manifest, 32 hex digits");
   if (digest != file.digest())
     throw Problem(410, "gone",
                   "the file was replaced, or its tiles are made otherwise now: get the manifest");
