@@ -82,7 +82,8 @@ void refuse_own_files(const BuildSpec& spec, const std::string& work_folder,
   if (!is_first && !is_unknown) return;
   MemoryBudget budget(spec.run.memory_bytes);
   const auto scene =
-      open_scene(files, spec.geometry.scenes, {spec.geometry.skip_invalid}, budget, context.cancel);
+      open_scene(files, spec.geometry.scenes, {.skip_invalid = spec.geometry.skip_invalid}, budget,
+                 context.cancel);
   std::vector<std::string> inputs;
   for (const SourceFile& file : scene->files()) inputs.push_back(file.path);
   refuse_inputs(files, own, inputs);
@@ -110,8 +111,9 @@ class Preparation {
 
  private:
   void reopen() {
-    scene_ = open_scene(context_.files, spec_.geometry.scenes, {spec_.geometry.skip_invalid},
-                        budget_, context_.cancel);
+    scene_ = open_scene(context_.files, spec_.geometry.scenes,
+                        {spec_.geometry.skip_invalid, checkpoint_.decoded_path()}, budget_,
+                        context_.cancel);
   }
 
   void open() {

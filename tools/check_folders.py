@@ -48,6 +48,8 @@ BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 THIRD_PARTY = {
     "zstd.h": ["core/format"],
     "tiny_gltf.h": ["core/scene", "tests"],
+    "draco/compression/mesh/mesh_edgebreaker_decoder.h": ["core/scene"],
+    "meshoptimizer.h": ["core/scene", "tests"],
     "sqlite3.h": ["core/db"],
     "httplib.h": ["client"],
     "png.h": ["query"],

@@ -102,6 +102,8 @@ class FileSystem {
 // The file system of this machine.
 FileSystem& system_files();
 
+// Where this process may write what it needs for a while: $TMPDIR, /tmp or the current folder.
+std::string temporary_parent();
 // Makes a folder that only this user may enter, under `prefix` and six characters that nobody can
 // foresee, and returns its path.
 std::string make_temporary_folder(const std::string& prefix);

@@ -253,6 +253,13 @@ FileSystem& system_files() {
   return files;
 }
 
+std::string temporary_parent() {
+  const char* const chosen = std::getenv("TMPDIR");
+  for (const std::string candidate : {chosen ? chosen : "", "/tmp"})
+    if (!candidate.empty() && access(candidate.c_str(), W_OK | X_OK) == 0) return candidate;
+  return ".";
+}
+
 std::string make_temporary_folder(const std::string& prefix) {
   std::string path = prefix + "XXXXXX";
   if (!mkdtemp(path.data())) fail("make directory", path, errno);

@@ -18,20 +18,26 @@
 namespace voxdag {
 namespace {
 
+gltf::Document checked(gltf::Document document) {
+  gltf::check_document(document);
+  return document;
+}
+
 // An open scene file and its checked document.
 struct SceneFile {
-  SceneFile(FileSystem& files, const std::string& path, MemoryBudget& budget,
-            const CancelToken& cancel)
+  SceneFile(FileSystem& files, const std::string& path, const SceneOptions& options,
+            MemoryBudget& budget, const CancelToken& cancel)
       : file(files.open_read(path)),
-        document(gltf::read_document(*file, budget, cancel)),
-        external_files(path, budget) {
-    gltf::check_document(document);
-    gltf::BufferReader(files, *file, document, external_files, budget, 1).check_lengths();
+        document(checked(gltf::read_document(*file, budget, cancel))),
+        external_files(path, budget),
+        decoded(files, options.scratch_path, document, budget) {
+    gltf::BufferReader(files, *file, document, external_files, decoded, budget, 1).check_lengths();
   }
 
   const std::unique_ptr<ReadableFile> file;
   gltf::Document document;
   gltf::ExternalFiles external_files;
+  gltf::DecodedBuffers decoded;
   uint64_t first_triangle = 0, end_triangle = 0;  // of those that the scene declares
 };
 
@@ -97,8 +103,8 @@ class GltfCursor : public TriangleCursor {
     if (open_ != &file) {
       open_ = nullptr;
       reader_.reset();
-      buffers_.emplace(files_, *file.file, file.document, file.external_files, budget_,
-                       options_.readers);
+      buffers_.emplace(files_, *file.file, file.document, file.external_files, file.decoded,
+                       budget_, options_.readers);
       reader_.emplace(file.document, *buffers_, options_, budget_, cancel_);
       open_ = &file;
     }
@@ -123,7 +129,7 @@ class GltfScene : public TriangleSource {
     uint128 total = 0;
     for (const std::string& path : paths) {
       cancel.check();
-      files_.push_back(std::make_unique<SceneFile>(files, path, budget, cancel));
+      files_.push_back(std::make_unique<SceneFile>(files, path, options, budget, cancel));
       files_.back()->first_triangle = static_cast<uint64_t>(total);
       total += count_triangles(files_.back()->document, budget);
       if (total > INT64_MAX)

@@ -64,6 +64,9 @@ struct SceneOptions {
   // Drop and count invalid triangles (non-finite vertices, indices out of range) instead of
   // refusing the scene.
   bool skip_invalid = false;
+  // Where compressed geometry is decoded to: a file in a folder that exists, which never has this
+  // name for long. "": in a folder of its own in temporary_parent().
+  std::string scratch_path = {};
 };
 
 // One scene made of several files: the default scenes of glTF 2.0 files (.glb, or .gltf with

@@ -98,12 +98,6 @@ class TemporaryFolder {
   std::unique_ptr<FileLock> lock_;
 };
 
-std::string temporary_parent(const BatchRun& run) {
-  if (!run.temporary_folder.empty()) return run.temporary_folder;
-  const char* const chosen = std::getenv("TMPDIR");
-  return chosen && access(chosen, W_OK | X_OK) == 0 ? chosen : "/tmp";
-}
-
 class Task {
  public:
   Task(const BatchRun& run, const BuildContext& context)
@@ -165,7 +159,8 @@ class Task {
     options.method = batch.method;
     check_backend(options);
     MemoryBudget budget(options.memory_bytes);
-    TemporaryFolder temporary(files, temporary_parent(run_));
+    TemporaryFolder temporary(
+        files, run_.temporary_folder.empty() ? temporary_parent() : run_.temporary_folder);
 
     CompletionRecord record;
     record.program = batch.program;

@@ -64,6 +64,9 @@ class IngestCheckpoint {
   // lets a later run know the scene without reading it.
   void finish();
 
+  // Where the scene may decode compressed geometry.
+  std::string decoded_path() const { return work_.decoded_path(); }
+
   // Whether the job store has a checkpoint, of whatever scene.
   bool has_saved();
   // Removes all checkpoints, and disables them until the next enable().

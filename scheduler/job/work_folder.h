@@ -35,6 +35,8 @@ class WorkFolder {
   // The files in a folder that have names of ours: a build there may remove or change them.
   static std::vector<std::string> files_in(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
+  // What a scene's compressed geometry is decoded to.
+  std::string decoded_path() const { return path_ + "/decoded.vdspill"; }
   // Triangles that outlive a run.
   std::string durable_path() const { return path_ + "/triangles.vddurable"; }
   std::string scratch_path() const { return path_ + "/merge"; }

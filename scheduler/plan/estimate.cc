@@ -1,10 +1,7 @@
 #include "scheduler/plan/estimate.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -254,19 +251,6 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
   check_disk("the global file", file, output_folder, output_free, progress);
 }
 
-// Makes the work folder of a plan where this process may write: in $TMPDIR, /tmp or the current
-// folder.
-std::string make_plan_folder() {
-  const char* chosen = std::getenv("TMPDIR");
-  std::string parent = ".";
-  for (const std::string candidate : {chosen ? chosen : "", "/tmp"})
-    if (!candidate.empty() && access(candidate.c_str(), W_OK | X_OK) == 0) {
-      parent = candidate;
-      break;
-    }
-  return make_temporary_folder(parent + "/voxdag-plan-");
-}
-
 }  // namespace
 
 Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
@@ -274,8 +258,9 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   return_freed_memory_to_system();
   MemoryBudget budget(full.run.memory_bytes);
   StageClock clock;
-  const std::string folder =
-      full.run.work_folder.empty() ? make_plan_folder() : full.run.work_folder;
+  const std::string folder = full.run.work_folder.empty()
+                                 ? make_temporary_folder(temporary_parent() + "/voxdag-plan-")
+                                 : full.run.work_folder;
   refuse_own_files(full, folder, {}, context);
   WorkFolder work(context, folder, full.run.lock_wait_s);
   // Removes spilled triangles; a job in the given work folder stays as it is.

@@ -49,8 +49,9 @@ ErrorCode code_of(const SlurmEnd& end) {
 
 std::string merge_request_of(const BuildSpec& spec, const BuildContext& context) {
   MemoryBudget budget(spec.run.memory_bytes);
-  const auto scene = open_scene(context.files, spec.geometry.scenes, {spec.geometry.skip_invalid},
-                                budget, context.cancel);
+  const auto scene =
+      open_scene(context.files, spec.geometry.scenes, {.skip_invalid = spec.geometry.skip_invalid},
+                 budget, context.cancel);
   std::string text = geometry_json(spec.geometry);
   for (const auto& [path, identity] : scene->files())
     text += '\0' + path + '\0' + std::to_string(identity.bytes) + '\0' +

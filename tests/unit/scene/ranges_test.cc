@@ -112,7 +112,7 @@ TEST(SceneRanges, CursorsDoNotDisturbEachOther) {
   files.contents["a.glb"] = files.contents["b.glb"] = scene.glb();
   MemoryBudget budget(uint64_t{1} << 30);
   const CancelToken never;
-  const auto source = open_scene(files, {"a.glb", "b.glb"}, {true}, budget, never);
+  const auto source = open_scene(files, {"a.glb", "b.glb"}, {.skip_invalid = true}, budget, never);
   const std::vector<Corners> whole = triangles_of(*source);
   ASSERT_EQ(source->declared_triangles(), 2u * 3 * 5000);
   EXPECT_EQ(whole.size(), 2u * 3 * 4998);

@@ -112,6 +112,7 @@ void check_view(Document& d, const BufferView& view, const std::string& where) {
            where + " ends past the " + std::to_string(buffer.byte_length) + " bytes of " + name);
   if (buffer.kind == BufferSource::Kind::kNone)
     refuse(d.path, where + ": " + name + " has no uri and is not in the file");
+  if (buffer.kind == BufferSource::Kind::kDecoded) check_compressed(d, buffer, where);
   buffer.is_read = true;
 }
 
@@ -237,15 +238,6 @@ void check_joint_sets(Document& d, const Primitive& primitive, uint64_t vertices
   }
 }
 
-// The accessors of a compressed primitive may have no bytes of their own.
-void check_draco(const Document& d, const Primitive& primitive, const std::string& where) {
-  if (!primitive.draco) return;
-  for (int accessor : {primitive.position, primitive.indices})
-    if (accessor >= 0 && at(d.accessors, accessor).view < 0)
-      refuse(d.path,
-             where + " is compressed by KHR_draco_mesh_compression, which voxdag does not read");
-}
-
 void warn_of_leftovers(Document& d, const Primitive& primitive, const std::string& where) {
   const int corners = primitive.indices >= 0 ? primitive.indices : primitive.position;
   if (primitive.mode != kTriangleList || at(d.accessors, corners).count % 3 == 0) return;
@@ -253,13 +245,13 @@ void warn_of_leftovers(Document& d, const Primitive& primitive, const std::strin
          " is no multiple of three, the corners left over are ignored");
 }
 
-void check_triangles(Document& d, const Primitive& primitive, const std::vector<double>& weights,
+void check_triangles(Document& d, Primitive& primitive, const std::vector<double>& weights,
                      const std::string& where) {
   if (primitive.position < 0) refuse(d.path, where + " has no POSITION");
+  place_draco_primitive(d, primitive, where);
   check_accessor(d, primitive.position, position_use(d, where + ": POSITION"));
   check_accessor(d, primitive.indices,
                  {where + ": indices", 1, {kUnsignedByte, kUnsignedShort, kUnsignedInt}});
-  check_draco(d, primitive, where);
   const uint64_t vertices = at(d.accessors, primitive.position).count;
   for (int target : primitive.targets) {
     check_accessor(d, target, displacement_use(d, where + ": POSITION of a morph target"));
@@ -271,10 +263,10 @@ void check_triangles(Document& d, const Primitive& primitive, const std::vector<
 }
 
 void check_mesh(Document& d, int index) {
-  const Mesh& mesh = at(d.meshes, index);
+  Mesh& mesh = d.meshes[static_cast<size_t>(index)];
   int without_triangles = 0;
   for (int p = 0; p < size_of(mesh.primitives); ++p) {
-    const Primitive& primitive = at(mesh.primitives, p);
+    Primitive& primitive = mesh.primitives[static_cast<size_t>(p)];
     const std::string where = d.name_mesh(index) + ": primitive " + std::to_string(p);
     if (primitive.mode > kTriangleFan)
       refuse(d.path, where + " has mode " + std::to_string(primitive.mode) + ", expected 0 to 6");
@@ -334,6 +326,7 @@ void check_node(Document& d, int index) {
 void check_document(Document& d) {
   link_parents(d);
   choose_scene(d);
+  place_meshopt_views(d);
   for (int i = 0; i < size_of(d.meshes); ++i) check_mesh(d, i);
   for (int i = 0; i < size_of(d.skins); ++i) check_skin(d, i);
   for (int i = 0; i < size_of(d.nodes); ++i) check_node(d, i);

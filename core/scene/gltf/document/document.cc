@@ -42,7 +42,10 @@ std::string Document::name_node(int node) const { return name_of("node ", nodes,
 std::string Document::name_mesh(int mesh) const { return name_of("mesh ", meshes, mesh); }
 std::string Document::name_skin(int skin) const { return name_of("skin ", skins, skin); }
 std::string Document::name_accessor(int accessor) const {
-  return name_of("accessor ", accessors, accessor);
+  const bool is_copy = accessor >= 0 && static_cast<size_t>(accessor) < accessors.size() &&
+                       accessors[static_cast<size_t>(accessor)].same_as >= 0;
+  return name_of("accessor ", accessors,
+                 is_copy ? accessors[static_cast<size_t>(accessor)].same_as : accessor);
 }
 
 int component_bytes(int component_type) { return component_info(component_type).bytes; }

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/scene/gltf/document/compression.h"
 #include "core/scene/gltf/growing_charge.h"
 #include "core/scene/gltf/json/file_range.h"
 #include "core/scene/gltf/transform.h"
@@ -33,20 +34,25 @@ struct BufferSource {
     kExternal,  // the file `uri`, percent-encoded and relative to the scene file
     kBase64,    // the base64 characters `range` of the scene file
     kMemory,    // the base64 in `characters`, which has JSON escapes in the file
+    kDecoded,   // what `meshopt` or `draco` decodes to; no buffer of the file
   };
   Kind kind = Kind::kNone;
   uint64_t byte_length = 0;
-  bool is_read = false;  // triangles use some of it; set by check_document()
+  bool is_read = false;      // triangles use some of it; set by check_document()
+  bool is_fallback = false;  // for readers without EXT_meshopt_compression; never the BIN chunk
   FileRange range;
   std::string uri;
   std::string characters;
+  std::shared_ptr<const MeshoptView> meshopt;
+  std::shared_ptr<const DracoPart> draco;
 };
 
 struct BufferView {
   int buffer = -1;
   uint64_t byte_offset = 0;
   uint64_t byte_length = 0;
-  uint64_t byte_stride = 0;  // 0: elements are packed
+  uint64_t byte_stride = 0;                    // 0: elements are packed
+  std::shared_ptr<const MeshoptView> meshopt;  // null: not compressed
 };
 
 enum ComponentType : int {
@@ -78,6 +84,7 @@ struct Accessor {
   bool normalized = false;
   bool is_sparse = false;
   Sparse sparse;
+  int same_as = -1;  // the accessor of the file that this is a copy of
 };
 
 // The accessors JOINTS_n and WEIGHTS_n of one n: four influences per vertex.
@@ -95,7 +102,7 @@ struct Primitive {
   int indices = -1;
   std::vector<int> targets;  // POSITION of each morph target, -1 if it has none
   std::vector<JointSet> joint_sets;
-  bool draco = false;  // carries KHR_draco_mesh_compression
+  std::shared_ptr<const DracoExtension> draco;  // null: not compressed
 
   bool makes_triangles() const { return mode >= kTriangleList; }
 };

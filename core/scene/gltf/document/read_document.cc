@@ -16,7 +16,8 @@ namespace voxdag::gltf {
 namespace {
 
 // The extensions that voxdag reads.
-constexpr std::string_view kRead[] = {"EXT_mesh_gpu_instancing", "KHR_mesh_quantization"};
+constexpr std::string_view kRead[] = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
+                                      "KHR_draco_mesh_compression", "KHR_mesh_quantization"};
 
 // Beginnings of the names of extensions for looks, lights, motion and metadata, which no vertex
 // depends on.
@@ -50,7 +51,7 @@ void check_version(const std::string& path, const tinygltf::Asset& asset) {
 void place_bin_chunk(const Container& container, Document& d) {
   if (!container.has_bin || d.buffers.empty()) return;
   BufferSource& first = d.buffers[0];
-  if (first.kind != BufferSource::Kind::kNone) return;
+  if (first.kind != BufferSource::Kind::kNone || first.is_fallback) return;
   first.kind = BufferSource::Kind::kBinChunk;
   first.range = container.bin;
 }

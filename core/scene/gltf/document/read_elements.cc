@@ -98,9 +98,8 @@ Primitive read_primitive(const JsonElement& element) {
     });
   }
   if (const auto extensions = element.find("extensions")) {
-    const auto draco = extensions->find("KHR_draco_mesh_compression");
-    out.draco = draco.has_value();
-    if (draco) draco->expect_object();
+    if (const auto draco = extensions->find("KHR_draco_mesh_compression"))
+      out.draco = read_draco(*draco);
   }
   return out;
 }
@@ -176,6 +175,9 @@ BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_f
                          MemoryBudget& budget) {
   BufferSource out;
   out.byte_length = element.at("byteLength").as_size();
+  if (const auto extensions = element.find("extensions"))
+    if (const auto meshopt = extensions->find("EXT_meshopt_compression"))
+      if (const auto fallback = meshopt->find("fallback")) out.is_fallback = fallback->as_boolean();
   const auto member = element.find("uri");
   if (!member) return out;
   const std::string& text = member->as_string();
@@ -200,8 +202,15 @@ BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_f
 }
 
 BufferView read_view(const JsonElement& element) {
-  return {element.at("buffer").as_index(), size_or_zero(element, "byteOffset"),
-          element.at("byteLength").as_size(), stride(element)};
+  BufferView out;
+  out.buffer = element.at("buffer").as_index();
+  out.byte_offset = size_or_zero(element, "byteOffset");
+  out.byte_length = element.at("byteLength").as_size();
+  out.byte_stride = stride(element);
+  if (const auto extensions = element.find("extensions"))
+    if (const auto meshopt = extensions->find("EXT_meshopt_compression"))
+      out.meshopt = read_meshopt(*meshopt);
+  return out;
 }
 
 Accessor read_accessor(const JsonElement& element) {
@@ -256,7 +265,8 @@ std::vector<int> read_scene(const JsonElement& element) {
 uint64_t heap_bytes(const Accessor& accessor) { return accessor.name.capacity(); }
 uint64_t heap_bytes(const Mesh& mesh) {
   uint64_t bytes = mesh.name.capacity() + bytes_of(mesh.primitives) + bytes_of(mesh.weights);
-  for (const Primitive& p : mesh.primitives) bytes += bytes_of(p.targets) + bytes_of(p.joint_sets);
+  for (const Primitive& p : mesh.primitives)
+    bytes += bytes_of(p.targets) + bytes_of(p.joint_sets) + (p.draco ? heap_bytes(*p.draco) : 0);
   return bytes;
 }
 uint64_t heap_bytes(const Skin& skin) { return skin.name.capacity() + bytes_of(skin.joints); }

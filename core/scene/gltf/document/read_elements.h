@@ -26,7 +26,9 @@ Node read_node(const JsonElement& element, int index, Document& document);
 std::vector<int> read_scene(const JsonElement& element);
 
 // Bytes that a struct owns outside of itself.
-inline uint64_t heap_bytes(const BufferView&) { return 0; }
+inline uint64_t heap_bytes(const BufferView& view) {
+  return view.meshopt ? sizeof(MeshoptView) : 0;
+}
 uint64_t heap_bytes(const Accessor& accessor);
 uint64_t heap_bytes(const Mesh& mesh);
 uint64_t heap_bytes(const Skin& skin);

@@ -76,11 +76,12 @@ std::vector<SourceFile> ExternalFiles::all() const {
 
 BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
                            const Document& document, ExternalFiles& external_files,
-                           MemoryBudget& budget, unsigned readers)
+                           DecodedBuffers& decoded, MemoryBudget& budget, unsigned readers)
     : files_(files),
       scene_file_(scene_file),
       document_(document),
       external_files_(external_files),
+      decoded_(decoded),
       budget_(budget),
       max_open_(std::max(kMaxOpenFiles / readers, 1u)),
       window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()) {}
@@ -95,11 +96,24 @@ std::span<const std::byte> BufferReader::window(int index, uint64_t offset, size
   if (buffer.kind == BufferSource::Kind::kBase64 || buffer.kind == BufferSource::Kind::kMemory)
     return decode_base64(index, offset, size);
   const std::span<std::byte> bytes(window_.data(), size);
-  if (buffer.kind == BufferSource::Kind::kBinChunk)
+  if (buffer.kind == BufferSource::Kind::kDecoded)
+    decoded_.read(index, offset, bytes, [this](int from, uint64_t begin, std::span<std::byte> out) {
+      read(from, begin, out);
+    });
+  else if (buffer.kind == BufferSource::Kind::kBinChunk)
     scene_file_.read_at(buffer.range.begin + offset, bytes);
   else
     external(index).read_at(offset, bytes);
   return bytes;
+}
+
+void BufferReader::read(int buffer, uint64_t offset, std::span<std::byte> out) {
+  while (!out.empty()) {
+    const auto bytes = window(buffer, offset, std::min(kWindowBytes, out.size()));
+    std::ranges::copy(bytes, out.begin());
+    out = out.subspan(bytes.size());
+    offset += bytes.size();
+  }
 }
 
 void BufferReader::check_length(int index) {
@@ -107,6 +121,7 @@ void BufferReader::check_length(int index) {
   uint64_t there = 0;
   switch (buffer.kind) {
     case BufferSource::Kind::kNone:
+    case BufferSource::Kind::kDecoded:
       return;
     case BufferSource::Kind::kBinChunk:
       there = buffer.range.size;

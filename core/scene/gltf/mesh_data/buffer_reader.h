@@ -1,5 +1,5 @@
 // The bytes of the buffers of a scene, read by windows: from the scene file, from an external file,
-// or out of base64 characters. Not thread-safe.
+// out of base64 characters, or decoded from one of these. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +13,7 @@
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "core/io/file_system.h"
+#include "core/scene/gltf/compressed/decoded_buffers.h"
 #include "core/scene/gltf/document/document.h"
 #include "core/scene/gltf/growing_charge.h"
 #include "core/scene/triangle_source.h"
@@ -41,7 +42,8 @@ class BufferReader {
   // One of `readers` of the document. Adds the files that it opens to `external_files`. The
   // references must outlive the reader.
   BufferReader(FileSystem& files, const ReadableFile& scene_file, const Document& document,
-               ExternalFiles& external_files, MemoryBudget& budget, unsigned readers);
+               ExternalFiles& external_files, DecodedBuffers& decoded, MemoryBudget& budget,
+               unsigned readers);
 
   // Checks every buffer that is read: throws Error{kInvalidInput} if it has fewer bytes than it
   // claims, Error{kNotFound} if an external file does not exist.
@@ -56,6 +58,8 @@ class BufferReader {
 
  private:
   void check_length(int buffer);
+  // Fills `out`, of any size, from `offset` of a buffer.
+  void read(int buffer, uint64_t offset, std::span<std::byte> out);
   const ReadableFile& external(int buffer);
   std::span<const std::byte> decode_base64(int buffer, uint64_t offset, size_t size);
 
@@ -63,6 +67,7 @@ class BufferReader {
   const ReadableFile& scene_file_;
   const Document& document_;
   ExternalFiles& external_files_;
+  DecodedBuffers& decoded_;
   MemoryBudget& budget_;
   const size_t max_open_;
   PageBuffer<std::byte> window_;

@@ -1,0 +1,366 @@
+// KHR_draco_mesh_compression: a compressed primitive gives the triangles of the same scene with
+// what Draco's own decoder makes of it stored uncompressed.
+#include <gtest/gtest.h>
+
+#include <random>
+#include <thread>
+
+#include "tests/unit/scene/scene_files.h"
+
+#ifdef VOXDAG_HAS_DRACO
+#include <draco/compression/decode.h>
+#include <draco/compression/expert_encode.h>
+#include <draco/metadata/geometry_metadata.h>
+#endif
+
+namespace voxdag::test {
+namespace {
+
+Json draco_extension(int view, Json attributes) {
+  return {{"KHR_draco_mesh_compression",
+           {{"bufferView", view}, {"attributes", std::move(attributes)}}}};
+}
+
+// A scene whose only primitive is compressed.
+SceneBuilder compressed_scene(const std::vector<char>& data, uint64_t vertices, uint64_t indices,
+                              Json attributes = {{"POSITION", 0}}) {
+  SceneBuilder scene;
+  const int view = scene.add_view(data);
+  const int positions =
+      scene.add("accessors", {{"componentType", kF32}, {"count", vertices}, {"type", "VEC3"}});
+  const int corners =
+      scene.add("accessors", {{"componentType", kU16}, {"count", indices}, {"type", "SCALAR"}});
+  const int mesh = scene.add_mesh({{"attributes", {{"POSITION", positions}}},
+                                   {"indices", corners},
+                                   {"extensions", draco_extension(view, std::move(attributes))}});
+  scene.add_root({{"mesh", mesh}});
+  scene.root["extensionsUsed"] = {"KHR_draco_mesh_compression"};
+  scene.root["extensionsRequired"] = {"KHR_draco_mesh_compression"};
+  return scene;
+}
+
+#ifdef VOXDAG_HAS_DRACO
+
+// A bumpy grid of 2 * n * n triangles, with normals that differ from face to face if wanted.
+std::unique_ptr<draco::Mesh> bumpy_grid(uint32_t n, bool with_normals) {
+  auto mesh = std::make_unique<draco::Mesh>();
+  const uint32_t points = with_normals ? 6 * n * n : (n + 1) * (n + 1);
+  mesh->set_num_points(points);
+  draco::GeometryAttribute position, normal;
+  position.Init(draco::GeometryAttribute::POSITION, nullptr, 3, draco::DT_FLOAT32, false, 12, 0);
+  normal.Init(draco::GeometryAttribute::NORMAL, nullptr, 3, draco::DT_FLOAT32, false, 12, 0);
+  const int positions = mesh->AddAttribute(position, true, points);
+  const int normals = with_normals ? mesh->AddAttribute(normal, true, points) : -1;
+  std::mt19937 random(7);
+  std::vector<float> height((n + 1) * (n + 1));
+  for (float& h : height) h = static_cast<float>(random() % 1000) / 300;
+  const auto set = [&](uint32_t point, uint32_t x, uint32_t y, uint32_t face) {
+    const float at[3] = {static_cast<float>(x) * 1.37f, static_cast<float>(y),
+                         height[y * (n + 1) + x]};
+    mesh->attribute(positions)->SetAttributeValue(draco::AttributeValueIndex(point), at);
+    const float direction[3] = {face % 2 ? 1.f : 0.f, face % 3 ? 0.f : 1.f, 1.f};
+    if (with_normals)
+      mesh->attribute(normals)->SetAttributeValue(draco::AttributeValueIndex(point), direction);
+  };
+  uint32_t face = 0;
+  for (uint32_t y = 0; y < n; ++y) {
+    for (uint32_t x = 0; x < n; ++x) {
+      const uint32_t corners[2][3][2] = {{{x, y}, {x + 1, y}, {x, y + 1}},
+                                         {{x + 1, y}, {x + 1, y + 1}, {x, y + 1}}};
+      for (const auto& triangle : corners) {
+        draco::Mesh::Face indices;
+        for (uint32_t k = 0; k < 3; ++k) {
+          const auto [cx, cy] = std::pair(triangle[k][0], triangle[k][1]);
+          const uint32_t point = with_normals ? 3 * face + k : cy * (n + 1) + cx;
+          set(point, cx, cy, face);
+          indices[k] = point;
+        }
+        mesh->AddFace(indices);
+        ++face;
+      }
+    }
+  }
+  if (with_normals) {
+    mesh->DeduplicateAttributeValues();
+    mesh->DeduplicatePointIds();
+  }
+  return mesh;
+}
+
+std::vector<char> encode(const draco::Mesh& mesh, int method, int quantization_bits) {
+  draco::ExpertEncoder encoder(mesh);
+  encoder.SetEncodingMethod(method);
+  if (quantization_bits > 0) encoder.SetAttributeQuantization(0, quantization_bits);
+  draco::EncoderBuffer buffer;
+  EXPECT_TRUE(encoder.EncodeToBuffer(&buffer).ok());
+  return {buffer.data(), buffer.data() + buffer.size()};
+}
+
+std::unique_ptr<draco::Mesh> decode(const std::vector<char>& data) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(data.data(), data.size());
+  draco::Decoder decoder;
+  return std::move(decoder.DecodeMeshFromBuffer(&buffer)).value();
+}
+
+template <class T>
+std::vector<T> values_of(const draco::Mesh& mesh, int unique_id) {
+  const draco::PointAttribute& attribute =
+      *mesh.GetAttributeByUniqueId(static_cast<uint32_t>(unique_id));
+  const auto components = static_cast<size_t>(attribute.num_components());
+  std::vector<T> all(mesh.num_points() * components);
+  for (uint32_t p = 0; p < mesh.num_points(); ++p)
+    attribute.GetMappedValue(draco::PointIndex(p), &all[p * components]);
+  return all;
+}
+
+std::vector<uint32_t> faces_of(const draco::Mesh& mesh) {
+  std::vector<uint32_t> all;
+  for (uint32_t f = 0; f < mesh.num_faces(); ++f)
+    for (int k = 0; k < 3; ++k) all.push_back(mesh.face(draco::FaceIndex(f))[k].value());
+  return all;
+}
+
+// The scene with everything as Draco decodes it, uncompressed.
+SceneBuilder plain_scene(const draco::Mesh& mesh) {
+  SceneBuilder scene;
+  const int positions = scene.add_positions(values_of<float>(mesh, 0));
+  const int indices = scene.add_accessor("SCALAR", kU32, faces_of(mesh));
+  scene.add_root({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", positions}}},
+                                           {"indices", indices}})}});
+  return scene;
+}
+
+SceneBuilder compressed_scene_of(const std::vector<char>& data) {
+  const auto mesh = decode(data);
+  return compressed_scene(data, mesh->num_points(), 3 * mesh->num_faces());
+}
+
+TEST(GltfDraco, EqualsTheDecodedScene) {
+  for (const bool with_normals : {false, true}) {
+    for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
+      for (const int bits : {0, 9, 14}) {
+        SCOPED_TRACE(testing::Message() << with_normals << ' ' << method << ' ' << bits);
+        const auto data = encode(*bumpy_grid(40, with_normals), method, bits);
+        const auto triangles = triangles_of_file(compressed_scene_of(data).glb());
+        ASSERT_EQ(triangles.size(), 3200u);
+        EXPECT_EQ(triangles, triangles_of_file(plain_scene(*decode(data)).glb()));
+      }
+    }
+  }
+}
+
+TEST(GltfDraco, MetadataArePassedOver) {
+  auto mesh = bumpy_grid(5, false);
+  auto metadata = std::make_unique<draco::GeometryMetadata>();
+  metadata->AddEntryString("name", "a grid");
+  metadata->AddEntryInt("number", 7);
+  auto inner = std::make_unique<draco::Metadata>();
+  inner->AddEntryString("deep", "down");
+  auto innermost = std::make_unique<draco::Metadata>();
+  innermost->AddEntryDouble("x", 1.5);
+  inner->AddSubMetadata("deeper", std::move(innermost));
+  metadata->AddSubMetadata("inner", std::move(inner));
+  metadata->AddSubMetadata("empty", std::make_unique<draco::Metadata>());
+  auto of_attribute = std::make_unique<draco::AttributeMetadata>();
+  of_attribute->AddEntryString("name", "position");
+  mesh->AddMetadata(std::move(metadata));
+  mesh->AddAttributeMetadata(0, std::move(of_attribute));
+  const auto data = encode(*mesh, draco::MESH_EDGEBREAKER_ENCODING, 11);
+  EXPECT_EQ(triangles_of_file(compressed_scene_of(data).glb()),
+            triangles_of_file(plain_scene(*decode(data)).glb()));
+}
+
+// Joints and weights come from generic attributes, and the skin moves the vertices.
+TEST(GltfDraco, SkinsAreCompressedToo) {
+  auto mesh = bumpy_grid(6, false);
+  const uint32_t points = mesh->num_points();
+  draco::GeometryAttribute joints, weights;
+  joints.Init(draco::GeometryAttribute::GENERIC, nullptr, 4, draco::DT_UINT8, false, 4, 0);
+  weights.Init(draco::GeometryAttribute::GENERIC, nullptr, 4, draco::DT_FLOAT32, false, 16, 0);
+  const int joints_id = mesh->AddAttribute(joints, true, points);
+  const int weights_id = mesh->AddAttribute(weights, true, points);
+  for (uint32_t p = 0; p < points; ++p) {
+    const uint8_t j[4] = {static_cast<uint8_t>(p % 2), 1, 0, 0};
+    const float w[4] = {static_cast<float>(p % 5) / 4, 1 - static_cast<float>(p % 5) / 4, 0, 0};
+    mesh->attribute(joints_id)->SetAttributeValue(draco::AttributeValueIndex(p), j);
+    mesh->attribute(weights_id)->SetAttributeValue(draco::AttributeValueIndex(p), w);
+  }
+  draco::ExpertEncoder encoder(*mesh);
+  encoder.SetAttributeQuantization(0, 12);
+  encoder.SetAttributeQuantization(weights_id, 8);
+  draco::EncoderBuffer buffer;
+  ASSERT_TRUE(encoder.EncodeToBuffer(&buffer).ok());
+  const std::vector<char> data(buffer.data(), buffer.data() + buffer.size());
+  const auto decoded = decode(data);
+
+  const auto add_skin = [](SceneBuilder& scene, int j, int w) {
+    Json& attributes = scene.root["meshes"][0]["primitives"][0]["attributes"];
+    attributes["JOINTS_0"] = j;
+    attributes["WEIGHTS_0"] = w;
+    scene.root["nodes"][0]["skin"] = 0;
+    const int a = scene.add_root({{"translation", {10, 0, 0}}});
+    const int b = scene.add_root({{"scale", {1, 2, 3}}});
+    scene.add("skins", {{"joints", {a, b}}});
+  };
+  SceneBuilder compressed =
+      compressed_scene(data, points, 3 * decoded->num_faces(),
+                       {{"POSITION", 0}, {"JOINTS_0", joints_id}, {"WEIGHTS_0", weights_id}});
+  const auto accessor = [&](int type) {
+    return compressed.add("accessors",
+                          {{"componentType", type}, {"count", points}, {"type", "VEC4"}});
+  };
+  const int j = accessor(kU8), w = accessor(kF32);
+  add_skin(compressed, j, w);
+  SceneBuilder plain = plain_scene(*decoded);
+  const int pj = plain.add_accessor("VEC4", kU8, values_of<uint8_t>(*decoded, joints_id));
+  const int pw = plain.add_accessor("VEC4", kF32, values_of<float>(*decoded, weights_id));
+  add_skin(plain, pj, pw);
+  EXPECT_EQ(triangles_of_file(compressed.glb()), triangles_of_file(plain.glb()));
+}
+
+// The triangles of a strip are faces in the Draco data; those that only join two strips are not.
+TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
+  const auto data = encode(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
+  SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);
+  scene.root["meshes"][0]["primitives"][0]["mode"] = 5;
+  auto strip = triangles_of_file(scene.glb());
+  EXPECT_EQ(strip.size(), 44u);
+  auto faces = triangles_of_file(plain_scene(*decode(data)).glb());
+  for (auto* all : {&strip, &faces}) {
+    std::ranges::sort(*all);
+    all->erase(std::unique(all->begin(), all->end()), all->end());
+  }
+  EXPECT_EQ(strip, faces);
+}
+
+// Any number of readers decode each primitive once, and can begin anywhere.
+TEST(GltfDraco, ReadersShareWhatIsDecoded) {
+  const auto data = encode(*bumpy_grid(60, false), draco::MESH_EDGEBREAKER_ENCODING, 12);
+  OpenScene scene(compressed_scene_of(data).glb());
+  const auto expected = triangles_of_file(plain_scene(*decode(data)).glb());
+  std::vector<std::thread> threads;
+  std::atomic<int> equal = 0;
+  for (uint64_t first : {7000, 3, 6000, 100}) {
+    threads.emplace_back([&, first] {
+      std::vector<Corners> part;
+      scene.source->open(4)->read(first, 150, [&](std::span<const WorldTriangle> batch) {
+        for (const WorldTriangle& t : batch) {
+          part.emplace_back();
+          for (size_t k = 0; k < 3; ++k) std::copy_n(t.v[k], 3, part.back()[k].begin());
+        }
+      });
+      const auto from = expected.begin() + static_cast<ptrdiff_t>(first);
+      equal += std::equal(part.begin(), part.end(), from, from + 150);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(equal, 4);
+}
+
+std::string message_of(const SceneBuilder& scene, ErrorCode code = ErrorCode::kInvalidInput) {
+  const Error error = error_of_file(scene.glb());
+  EXPECT_EQ(error.code(), code) << error.message();
+  return error.message();
+}
+
+TEST(GltfDraco, WhatDoesNotFitIsRefusedByName) {
+  using testing::HasSubstr;
+  const auto data = encode(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
+  const std::string where = "folder/scene: mesh 0: primitive 0: ";
+  EXPECT_THAT(message_of(compressed_scene(data, 24, 96)),
+              HasSubstr(where + "its Draco data have 25 vertices, its accessors 24"));
+  EXPECT_THAT(message_of(compressed_scene(data, 25, 93)),
+              HasSubstr(where + "its Draco data have 32 faces, its indices 31 triangles"));
+  EXPECT_THAT(message_of(compressed_scene(data, 25, 96, {{"POSITION", 3}})),
+              HasSubstr(where + "its Draco data have no attribute 3, which is POSITION"));
+  EXPECT_THAT(message_of(compressed_scene(data, 25, 96, {{"NORMAL", 0}})),
+              HasSubstr("KHR_draco_mesh_compression has no POSITION"));
+  SceneBuilder fan = compressed_scene(data, 25, 96);
+  fan.root["meshes"][0]["primitives"][0]["mode"] = 6;
+  EXPECT_THAT(message_of(fan), HasSubstr("not for fans"));
+  SceneBuilder strip = compressed_scene(data, 25, 3000);
+  strip.root["meshes"][0]["primitives"][0]["mode"] = 5;
+  EXPECT_THAT(message_of(strip), HasSubstr("its Draco data have 32 faces, its indices 2998"));
+  SceneBuilder no_indices = compressed_scene(data, 25, 96);
+  no_indices.root["meshes"][0]["primitives"][0].erase("indices");
+  EXPECT_THAT(message_of(no_indices), HasSubstr("needs an accessor of indices"));
+  SceneBuilder no_view = compressed_scene(data, 25, 96);
+  no_view.root["meshes"][0]["primitives"][0]["extensions"] = draco_extension(9, {{"POSITION", 0}});
+  EXPECT_THAT(message_of(no_view), HasSubstr("bufferView 9 does not exist"));
+  SceneBuilder shorts = compressed_scene(data, 25, 96);
+  shorts.root["accessors"][0]["componentType"] = kI16;
+  shorts.root["extensionsUsed"].push_back("KHR_mesh_quantization");
+  EXPECT_THAT(message_of(shorts), HasSubstr("is of floats, its accessor of short"));
+  auto of_version_1 = data;
+  of_version_1[5] = 1;
+  EXPECT_THAT(message_of(compressed_scene(of_version_1, 25, 96)), HasSubstr("version 1.2"));
+  EXPECT_THAT(message_of(compressed_scene({'G', 'I', 'F', '8', '9', 'a'}, 25, 96)),
+              HasSubstr("its data do not begin with DRACO"));
+}
+
+// Whatever is cut off or changed, the scene has triangles or an error, and no others than declared.
+TEST(GltfDraco, DamagedDataAreErrors) {
+  for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
+    const auto data = encode(*bumpy_grid(6, true), method, 10);
+    const auto mesh = decode(data);
+    const auto read = [&](const std::vector<char>& damaged) {
+      return error_of_file(
+          compressed_scene(damaged, mesh->num_points(), 3 * mesh->num_faces()).glb());
+    };
+    EXPECT_EQ(read(data).message(), "");
+    for (size_t size = 0; size + 1 < data.size(); size += 1 + size / 10)
+      EXPECT_NE(read({data.begin(), data.begin() + static_cast<ptrdiff_t>(size)}).message(), "")
+          << size;
+    std::mt19937 random(11);
+    size_t refused = 0;
+    for (int i = 0; i < 300; ++i) {
+      auto damaged = data;
+      for (int changes = 1 + i % 3; changes > 0; --changes)
+        damaged[random() % damaged.size()] ^= static_cast<char>(1 << random() % 8);
+      refused += !read(damaged).message().empty();
+    }
+    EXPECT_GT(refused, 0u);
+  }
+}
+
+// What a file claims is compared with the budget before memory is allocated for it.
+TEST(GltfDraco, WhatDoesNotFitTheBudgetIsRefused) {
+  const auto data = encode(*bumpy_grid(150, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
+  try {
+    OpenScene(compressed_scene_of(data).glb(), {}, uint64_t{6} << 20).triangles();
+    FAIL() << "45000 faces decoded within 6 MiB";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory);
+    EXPECT_THAT(error.message(), testing::HasSubstr("primitive 0: decoding its Draco data takes"));
+    EXPECT_THAT(error.message(), testing::HasSubstr("give it more memory, or decompress"));
+  }
+  auto huge = compressed_scene(data, uint64_t{1} << 31, uint64_t{3} << 30);
+  EXPECT_THAT(message_of(huge), testing::HasSubstr("its Draco data have 45000 faces"));
+}
+
+#else
+
+// Without the library a file is refused, unless it has the same geometry uncompressed.
+TEST(GltfDraco, IsRefusedWithoutTheLibrary) {
+  const Error error = error_of_file(compressed_scene({'D', 'R', 'A', 'C', 'O'}, 3, 3).glb());
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+  for (const char* word : {"folder/scene", "mesh 0: primitive 0", "KHR_draco_mesh_compression",
+                           "libdraco-dev", "gltf-transform"})
+    EXPECT_THAT(error.message(), testing::HasSubstr(word));
+}
+
+#endif
+
+// Uncompressed geometry next to the compressed one is read, with and without the library.
+TEST(GltfDraco, AFallbackIsRead) {
+  SceneBuilder scene = one_triangle();
+  const auto expected = triangles_of_file(scene.glb());
+  scene.root["meshes"][0]["primitives"][0]["extensions"] =
+      draco_extension(scene.add_view<char>({'n', 'o', 'n', 'e'}), {{"POSITION", 0}});
+  scene.root["extensionsUsed"] = {"KHR_draco_mesh_compression"};
+  EXPECT_EQ(triangles_of_file(scene.glb()), expected);
+}
+
+}  // namespace
+}  // namespace voxdag::test

@@ -1,0 +1,310 @@
+// EXT_meshopt_compression: compressed views give the triangles of the same scene with the decoded
+// bytes stored as they are.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/unit/scene/scene_files.h"
+
+#ifdef VOXDAG_HAS_MESHOPT
+#include <meshoptimizer.h>
+#endif
+
+namespace voxdag::test {
+namespace {
+
+// A view that `bytes` are compressed to, whose own buffer, the second one, is not there.
+int add_compressed(SceneBuilder& scene, const std::vector<unsigned char>& bytes, size_t count,
+                   size_t stride, const char* mode, Json more = Json::object()) {
+  const int from = scene.add_view(bytes);
+  const Json source = scene.root["bufferViews"][static_cast<size_t>(from)];
+  Json extension = {{"buffer", 0},
+                    {"byteOffset", source["byteOffset"]},
+                    {"byteLength", bytes.size()},
+                    {"byteStride", stride},
+                    {"count", count},
+                    {"mode", mode}};
+  extension.update(more);
+  Json view = {{"buffer", 1},
+               {"byteLength", count * stride},
+               {"extensions", {{"EXT_meshopt_compression", extension}}}};
+  if (std::string(mode) == "ATTRIBUTES") view["byteStride"] = stride;
+  return scene.add("bufferViews", std::move(view));
+}
+
+std::string glb_of(const SceneBuilder& scene) {
+  Json whole = scene.root;
+  whole["buffers"] = {{{"byteLength", scene.bin.size()}},
+                      {{"byteLength", 1 << 30},
+                       {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}}};
+  whole["extensionsUsed"].push_back("EXT_meshopt_compression");
+  whole["extensionsRequired"] = {"EXT_meshopt_compression"};
+  return make_glb(whole.dump(), scene.bin);
+}
+
+int add_accessor_of(SceneBuilder& scene, int view, int type, size_t count, const char* shape) {
+  return scene.add(
+      "accessors",
+      {{"bufferView", view}, {"componentType", type}, {"count", count}, {"type", shape}});
+}
+
+void draw(SceneBuilder& scene, int positions, int indices, int mode = 4) {
+  scene.add_root({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", positions}}},
+                                           {"indices", indices},
+                                           {"mode", mode}})}});
+}
+
+#ifdef VOXDAG_HAS_MESHOPT
+
+constexpr uint32_t kSide = 60;  // vertices along each side of the grid
+
+template <class T>
+std::vector<unsigned char> encode_vertices(const std::vector<T>& values, size_t stride) {
+  const size_t count = values.size() * sizeof(T) / stride;
+  std::vector<unsigned char> out(meshopt_encodeVertexBufferBound(count, stride));
+  out.resize(meshopt_encodeVertexBuffer(out.data(), out.size(), values.data(), count, stride));
+  return out;
+}
+
+std::vector<unsigned char> encode_triangles(const std::vector<uint32_t>& indices) {
+  std::vector<unsigned char> out(meshopt_encodeIndexBufferBound(indices.size(), kSide * kSide));
+  out.resize(meshopt_encodeIndexBuffer(out.data(), out.size(), indices.data(), indices.size()));
+  return out;
+}
+
+std::vector<unsigned char> encode_sequence(const std::vector<uint32_t>& indices) {
+  std::vector<unsigned char> out(meshopt_encodeIndexSequenceBound(indices.size(), kSide * kSide));
+  out.resize(meshopt_encodeIndexSequence(out.data(), out.size(), indices.data(), indices.size()));
+  return out;
+}
+
+// The codec turns triangles, so what it makes of them is what is stored uncompressed.
+std::vector<uint32_t> turned(const std::vector<uint32_t>& indices) {
+  const auto bytes = encode_triangles(indices);
+  std::vector<uint32_t> out(indices.size());
+  EXPECT_EQ(meshopt_decodeIndexBuffer(out.data(), out.size(), bytes.data(), bytes.size()), 0);
+  return out;
+}
+
+std::vector<uint32_t> grid_triangles() {
+  std::vector<uint32_t> all;
+  for (uint32_t y = 0; y + 1 < kSide; ++y)
+    for (uint32_t x = 0; x + 1 < kSide; ++x) {
+      const uint32_t v = y * kSide + x;
+      all.insert(all.end(), {v, v + 1, v + kSide, v + 1, v + kSide + 1, v + kSide});
+    }
+  return all;
+}
+
+// `extra` more components follow each position.
+template <class T>
+std::vector<T> grid_positions(size_t extra) {
+  std::vector<T> all;
+  std::mt19937 random(5);
+  for (uint32_t y = 0; y < kSide; ++y)
+    for (uint32_t x = 0; x < kSide; ++x) {
+      for (const uint32_t c : {13 * x, 11 * y, static_cast<uint32_t>(random() % 200)})
+        all.push_back(static_cast<T>(c) / (std::is_floating_point_v<T> ? T{7} : T{1}));
+      all.insert(all.end(), extra, T{1});
+    }
+  return all;
+}
+
+SceneBuilder compressed_grid(const std::vector<unsigned char>& positions,
+                             const std::vector<unsigned char>& triangles, size_t index_bytes,
+                             Json of_positions = Json::object(),
+                             Json of_triangles = Json::object()) {
+  SceneBuilder scene;
+  const size_t count = kSide * kSide, corners = 6 * (kSide - 1) * (kSide - 1);
+  const int p = add_compressed(scene, positions, count, 12, "ATTRIBUTES", std::move(of_positions));
+  const int t =
+      add_compressed(scene, triangles, corners, index_bytes, "TRIANGLES", std::move(of_triangles));
+  draw(scene, add_accessor_of(scene, p, kF32, count, "VEC3"),
+       add_accessor_of(scene, t, index_bytes == 2 ? kU16 : kU32, corners, "SCALAR"));
+  return scene;
+}
+
+TEST(GltfMeshopt, EqualsTheDecodedScene) {
+  const auto positions = grid_positions<float>(0);
+  const auto triangles = grid_triangles();
+  SceneBuilder plain;
+  draw(plain, plain.add_positions(positions),
+       plain.add_accessor("SCALAR", kU32, turned(triangles)));
+  const auto expected = triangles_of_file(plain.glb());
+  for (const size_t index_bytes : {2u, 4u}) {
+    const auto scene =
+        compressed_grid(encode_vertices(positions, 12), encode_triangles(triangles), index_bytes);
+    EXPECT_EQ(triangles_of_file(glb_of(scene)), expected) << index_bytes;
+  }
+}
+
+// What gltfpack makes: positions of 16 bits with KHR_mesh_quantization, and a strip's sequence.
+TEST(GltfMeshopt, QuantizedPositionsAndStrips) {
+  const auto positions = grid_positions<uint16_t>(1);
+  std::vector<uint32_t> strip;
+  for (uint32_t x = 0; x < kSide; ++x) strip.insert(strip.end(), {x, x + kSide});
+  SceneBuilder plain, compressed;
+  const size_t count = kSide * kSide;
+  const int p = plain.add_view(positions, {{"byteStride", 8}});
+  draw(plain, add_accessor_of(plain, p, kU16, count, "VEC3"),
+       plain.add_accessor("SCALAR", kU32, strip), 5);
+  const int q = add_compressed(compressed, encode_vertices(positions, 8), count, 8, "ATTRIBUTES");
+  const int s = add_compressed(compressed, encode_sequence(strip), strip.size(), 4, "INDICES");
+  draw(compressed, add_accessor_of(compressed, q, kU16, count, "VEC3"),
+       add_accessor_of(compressed, s, kU32, strip.size(), "SCALAR"), 5);
+  for (SceneBuilder* scene : {&plain, &compressed})
+    scene->root["extensionsUsed"] = {"KHR_mesh_quantization"};
+  const auto triangles = triangles_of_file(glb_of(compressed));
+  EXPECT_EQ(triangles.size(), 2u * kSide - 2);
+  EXPECT_EQ(triangles, triangles_of_file(plain.glb()));
+}
+
+// EXPONENTIAL stores 24 bits of mantissa below 8 bits of exponent.
+TEST(GltfMeshopt, ExponentialFilter) {
+  std::vector<uint32_t> encoded;
+  std::vector<float> decoded;
+  std::mt19937 random(3);
+  for (size_t i = 0; i < 3 * kSide * kSide; ++i) {
+    const int mantissa = static_cast<int>(random() % 20000) - 10000;
+    const int exponent = static_cast<int>(random() % 20) - 15;
+    encoded.push_back(static_cast<uint32_t>(exponent) << 24 |
+                      (static_cast<uint32_t>(mantissa) & 0xffffff));
+    decoded.push_back(std::ldexp(static_cast<float>(mantissa), exponent));
+  }
+  const auto triangles = grid_triangles();
+  SceneBuilder plain;
+  draw(plain, plain.add_positions(decoded), plain.add_accessor("SCALAR", kU32, turned(triangles)));
+  const auto compressed = compressed_grid(encode_vertices(encoded, 12), encode_triangles(triangles),
+                                          4, {{"filter", "EXPONENTIAL"}});
+  EXPECT_EQ(triangles_of_file(glb_of(compressed)), triangles_of_file(plain.glb()));
+}
+
+// Rotations of instances, which decode to quaternions of 16 bits.
+TEST(GltfMeshopt, QuaternionFilterOfInstances) {
+  const std::vector<int16_t> encoded{100, 200, -300, 0x7ff0 | 3, -500, 0, 900, 0x7ff0 | 1};
+  std::vector<int16_t> decoded = encoded;
+  meshopt_decodeFilterQuat(decoded.data(), 2, 8);
+  SceneBuilder plain = one_triangle(), compressed = one_triangle();
+  const auto instance = [](SceneBuilder& scene, int view) {
+    scene.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["ROTATION"] =
+        scene.add("accessors", {{"bufferView", view},
+                                {"componentType", kI16},
+                                {"normalized", true},
+                                {"count", 2},
+                                {"type", "VEC4"}});
+    scene.root["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+  };
+  instance(plain, plain.add_view(decoded));
+  instance(compressed, add_compressed(compressed, encode_vertices(encoded, 8), 2, 8, "ATTRIBUTES",
+                                      {{"filter", "QUATERNION"}}));
+  const auto triangles = triangles_of_file(glb_of(compressed));
+  EXPECT_EQ(triangles.size(), 2u);
+  EXPECT_EQ(triangles, triangles_of_file(plain.glb()));
+}
+
+std::string message_of_glb(std::string file, ErrorCode code = ErrorCode::kInvalidInput) {
+  const Error error = error_of_file(std::move(file));
+  EXPECT_EQ(error.code(), code) << error.message();
+  return error.message();
+}
+
+TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
+  using testing::HasSubstr;
+  const auto positions = encode_vertices(grid_positions<float>(0), 12);
+  const auto triangles = encode_triangles(grid_triangles());
+  const auto with = [&](const Json& of_positions, const Json& of_triangles) {
+    return message_of_glb(
+        glb_of(compressed_grid(positions, triangles, 4, of_positions, of_triangles)));
+  };
+  const Json same = Json::object();
+  EXPECT_THAT(with({{"mode", "POINTS"}}, same), HasSubstr("expected ATTRIBUTES, TRIANGLES or"));
+  EXPECT_THAT(with({{"filter", "ROUND"}}, same), HasSubstr("filter is ROUND, expected NONE"));
+  EXPECT_THAT(with({{"filter", "QUATERNION"}}, same), HasSubstr("not 8, as QUATERNION needs"));
+  EXPECT_THAT(with({{"filter", "OCTAHEDRAL"}}, same), HasSubstr("not 4 or 8, as OCTAHEDRAL"));
+  EXPECT_THAT(with({{"byteStride", 10}}, same), HasSubstr("not a multiple of 4 up to 256"));
+  EXPECT_THAT(with({{"byteStride", 16}}, same), HasSubstr("bufferView 1: its EXT_meshopt_compr"));
+  EXPECT_THAT(with({{"count", 3599}}, same),
+              HasSubstr("makes 43188 bytes, its byteLength is 43200"));
+  EXPECT_THAT(with({{"buffer", 7}}, same), HasSubstr("EXT_meshopt_compression: buffer 7"));
+  EXPECT_THAT(with({{"byteLength", 1 << 20}}, same), HasSubstr("ends past the"));
+  EXPECT_THAT(with({{"buffer", 1}}, same), HasSubstr("buffer 1 has no uri"));
+  EXPECT_THAT(with({{"byteLength", 1000}}, same), HasSubstr("do not hold 3600 elements"));
+  EXPECT_THAT(with(same, {{"byteStride", 3}}), HasSubstr("not 2 or 4, as that of indices"));
+  EXPECT_THAT(with(same, {{"count", 20887}}), HasSubstr("no multiple of three"));
+  EXPECT_THAT(with(same, {{"filter", "EXPONENTIAL"}}), HasSubstr("for ATTRIBUTES only"));
+  EXPECT_THAT(with(same, {{"mode", "INDICES"}}), HasSubstr("do not hold 20886 elements"));
+}
+
+// Whatever is cut off or changed, the scene has triangles or an error.
+TEST(GltfMeshopt, DamagedDataAreErrors) {
+  const auto positions = encode_vertices(grid_positions<float>(0), 12);
+  const auto triangles = encode_triangles(grid_triangles());
+  const auto read = [&](const auto& p, const auto& t) {
+    return error_of_file(glb_of(compressed_grid(p, t, 2))).message();
+  };
+  EXPECT_EQ(read(positions, triangles), "");
+  for (size_t cut : {1u, 30u, 400u, 2000u}) {
+    EXPECT_NE(read(std::vector(positions.begin(), positions.end() - static_cast<ptrdiff_t>(cut)),
+                   triangles),
+              "");
+    EXPECT_NE(read(positions,
+                   std::vector(triangles.begin(), triangles.end() - static_cast<ptrdiff_t>(cut))),
+              "");
+  }
+  std::mt19937 random(2);
+  size_t refused = 0;
+  for (int i = 0; i < 100; ++i) {
+    auto p = positions;
+    auto t = triangles;
+    p[random() % p.size()] ^= static_cast<unsigned char>(1 << random() % 8);
+    t[random() % t.size()] ^= static_cast<unsigned char>(1 << random() % 8);
+    refused += !read(p, t).empty();
+  }
+  EXPECT_GT(refused, 0u);
+}
+
+// A count of a few bytes can be huge; it is refused before anything is allocated.
+TEST(GltfMeshopt, WhatDoesNotFitTheBudgetIsRefused) {
+  SceneBuilder scene;
+  const size_t count = size_t{1} << 24;
+  const int p =
+      add_compressed(scene, encode_vertices(std::vector<float>(30), 12), count, 12, "ATTRIBUTES");
+  draw(scene, add_accessor_of(scene, p, kF32, count, "VEC3"),
+       scene.add_accessor<uint16_t>("SCALAR", kU16, {0, 1, 2}));
+  const std::string message = message_of_glb(glb_of(scene), ErrorCode::kOutOfMemory);
+  EXPECT_THAT(message, testing::HasSubstr("folder/scene: EXT_meshopt_compression of 16777216"));
+  EXPECT_THAT(message, testing::HasSubstr("201326592"));
+  EXPECT_THAT(message, testing::HasSubstr("give it more memory, or decompress the file first"));
+}
+
+#else
+
+// Without the library a file is refused, unless it has the same geometry uncompressed.
+TEST(GltfMeshopt, IsRefusedWithoutTheLibrary) {
+  SceneBuilder scene;
+  const int p = add_compressed(scene, {1, 2, 3}, 3, 12, "ATTRIBUTES");
+  draw(scene, add_accessor_of(scene, p, kF32, 3, "VEC3"),
+       scene.add_accessor<uint16_t>("SCALAR", kU16, {0, 1, 2}));
+  const Error error = error_of_file(glb_of(scene));
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+  for (const char* word : {"folder/scene", "mesh 0: primitive 0", "EXT_meshopt_compression",
+                           "libmeshoptimizer-dev", "gltf-transform"})
+    EXPECT_THAT(error.message(), testing::HasSubstr(word));
+}
+
+#endif
+
+// Views whose own buffer has the bytes are read from there, with and without the library.
+TEST(GltfMeshopt, AFallbackIsRead) {
+  SceneBuilder scene = one_triangle();
+  const auto expected = triangles_of_file(scene.glb());
+  const Json broken = {
+      {"buffer", 0}, {"byteLength", 3}, {"byteStride", 12}, {"count", 3}, {"mode", "ATTRIBUTES"}};
+  scene.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"] = broken;
+  scene.root["extensionsUsed"] = {"EXT_meshopt_compression"};
+  EXPECT_EQ(triangles_of_file(scene.glb()), expected);
+}
+
+}  // namespace
+}  // namespace voxdag::test
