@@ -1,0 +1,119 @@
+// The triangles of a glTF scene in another format give the same bytes, also by a build that is
+// killed while it ingests them and run again.
+#include <cstring>
+
+#include "core/scene/triangle_source.h"
+#include "tests/crash/crash_fixture.h"
+
+#ifdef VOXDAG_HAS_MESHOPT
+#include <meshoptimizer.h>
+#endif
+
+namespace crash {
+namespace {
+
+template <class T>
+void append(std::string& bytes, T value) {
+  char own[sizeof(T)];
+  std::memcpy(own, &value, sizeof(T));
+  bytes.append(own, sizeof(T));
+}
+
+// `expected_` is of scene.glb; what is built is a file of its triangles.
+class FormatTest : public CrashTest {
+ protected:
+  BuildSpec spec() const override {
+    BuildSpec spec = CrashTest::spec();
+    if (!path_.empty()) spec.geometry.scenes = {path_};
+    return spec;
+  }
+
+  // The corners of all triangles of scene.glb, three numbers each.
+  std::vector<double> corners() const {
+    voxdag::MemoryBudget budget(uint64_t{1} << 28);
+    const voxdag::CancelToken cancel;
+    const auto scene =
+        voxdag::open_scene(voxdag::system_files(), {folder_.file("scene.glb")}, {}, budget, cancel);
+    std::vector<double> all;
+    scene->for_each_batch([&](auto batch) {
+      for (const auto& triangle : batch)
+        for (const auto& corner : triangle.v) all.insert(all.end(), corner, corner + 3);
+    });
+    return all;
+  }
+
+  void expect_the_same_bytes(const char* name, const std::string& bytes) {
+    const std::string path = folder_.file(name);
+    const auto file = voxdag::system_files().create(path);
+    file->write_at(0, std::as_bytes(std::span(bytes)));
+    file->close();
+    path_ = path;
+    const uint64_t operations = operations_of_a_build();
+    expect_to_resume();
+    uint64_t kills = 0;
+    for (const uint64_t at : moments(operations)) {
+      SCOPED_TRACE(testing::Message() << "at operation " << at << " of " << operations);
+      kills += killed({Fault::kKillAfter, at});
+      expect_to_resume();
+    }
+    EXPECT_GT(kills, 0u);
+  }
+
+ private:
+  std::string path_;
+};
+
+TEST_P(FormatTest, Ply) {
+  const std::vector<double> all = corners();
+  const std::string triangles = std::to_string(all.size() / 9);
+  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
+                      std::to_string(all.size() / 3) +
+                      "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+                      triangles + "\nproperty list uchar uint vertex_indices\nend_header\n";
+  for (const double number : all) append(bytes, number);
+  for (uint32_t corner = 0; corner < all.size() / 3; corner += 3) {
+    bytes += '\3';
+    for (uint32_t k = 0; k < 3; ++k) append(bytes, corner + k);
+  }
+  expect_the_same_bytes("scene.ply", bytes);
+}
+
+#ifdef VOXDAG_HAS_MESHOPT
+
+// Positions are compressed, and decoded in the work folder by each run.
+TEST_P(FormatTest, Meshopt) {
+  const std::vector<double> all = corners();
+  std::vector<float> positions(all.begin(), all.end());
+  EXPECT_TRUE(std::ranges::equal(positions, all)) << "the scene has other numbers than floats";
+  const size_t count = positions.size() / 3;
+  std::string data(meshopt_encodeVertexBufferBound(count, 12), '\0');
+  data.resize(meshopt_encodeVertexBuffer(reinterpret_cast<unsigned char*>(data.data()), data.size(),
+                                         positions.data(), count, 12));
+  std::string json =
+      R"({"asset":{"version":"2.0"},"extensionsRequired":["EXT_meshopt_compression"],"buffers":[{"byteLength":)" +
+      std::to_string(data.size()) +
+      R"(},{"byteLength":1}],"bufferViews":[{"buffer":1,"byteLength":)" +
+      std::to_string(12 * count) +
+      R"(,"byteStride":12,"extensions":{"EXT_meshopt_compression":{"buffer":0,"byteLength":)" +
+      std::to_string(data.size()) + R"(,"byteStride":12,"count":)" + std::to_string(count) +
+      R"(,"mode":"ATTRIBUTES"}}}],"accessors":[{"bufferView":0,"componentType":5126,"count":)" +
+      std::to_string(count) +
+      R"(,"type":"VEC3"}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}]})";
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  data.resize((data.size() + 3) / 4 * 4, '\0');
+  std::string bytes = "glTF";
+  append(bytes, uint32_t{2});
+  append(bytes, static_cast<uint32_t>(28 + json.size() + data.size()));
+  append(bytes, static_cast<uint32_t>(json.size()));
+  bytes += "JSON" + json;
+  append(bytes, static_cast<uint32_t>(data.size()));
+  bytes += std::string("BIN\0", 4) + data;
+  expect_the_same_bytes("compressed.glb", bytes);
+}
+
+#endif
+
+INSTANTIATE_TEST_SUITE_P(Ingested, FormatTest, testing::Values(Ingested::kDurable), name_of);
+
+}  // namespace
+}  // namespace crash
