@@ -1,0 +1,278 @@
+// The viewer: the picture, what moves it, and the panel.
+
+import {announce, h, set_text} from "../lib/dom.js";
+import {Camera} from "./camera.js";
+import {camera_fragment, camera_text, fragment_text, GridSpace, parse_camera_fragment, parse_camera_text} from "./camera_text.js";
+import {Controls} from "./controls.js";
+import {keys_help, listen_to_keys} from "./keys.js";
+import {Markers} from "./markers.js";
+import {Motion} from "./motion.js";
+import {Panel} from "./panel.js";
+import {length, scale, subtract} from "./vector.js";
+
+const kDefaultFov = 35;
+const kPictureAspect = 16 / 9;   // of the views in the manifest
+const kSeenInterval_ms = 250;    // between two looks at how far away things are
+const kStatisticsInterval_ms = 500;
+const kBookmarkDelay_ms = 250;
+
+export class Viewer {
+  // `renderer` has started; `places` are the elements of viewer.html.
+  constructor({canvas, renderer, manifest, places, file_name, signal}) {
+    Object.assign(this, {canvas, renderer, manifest, places, file_name, signal});
+    this.space = new GridSpace(manifest);
+    this.camera = new Camera(manifest.resolution);
+    this.options = this.default_options();
+    this.seen = {distance: manifest.resolution, time: -Infinity};
+    this.motion = new Motion(this.camera, () => this.seen.distance);
+    this.markers = new Markers(canvas.parentElement);
+    this.panel = new Panel(this);
+    places.panel.replaceChildren(this.panel.element);
+    this.controls = new Controls(canvas, this.camera, this.motion, {
+      pick: async (x, y) => (await renderer.pick(x, y))?.position ?? null,
+      on_click: (x, y) => this.pick(x, y),
+      on_double_click: (x, y) => this.set_pivot(x, y),
+      on_change: () => this.schedule(),
+    }, signal);
+    listen_to_keys(canvas, this.motion, this.actions(), () => this.schedule(), signal);
+    for (const button of places.tools.querySelectorAll("[data-tool]"))
+      button.addEventListener("click", () => this.actions()[button.dataset.tool](), {signal});
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    window.addEventListener("hashchange", () => this.follow_bookmark(), {signal});
+    setInterval(() => this.show_statistics(), kStatisticsInterval_ms);
+    this.resize();
+    this.camera.set(this.first_camera());
+    if (!this.follow_bookmark()) this.set_options({});
+    this.show_mode();
+    // What is seen first need not be waited for: until then the target is as good.
+    this.seen.distance = this.camera.distance;
+  }
+
+  default_options() {
+    return {level: this.manifest.levels, wire: null, clip: null, occlusion: true, shadows: true};
+  }
+
+  first_camera() {
+    const {camera} = this.manifest;
+    return camera ? this.fit(this.space.placement(camera)) : this.camera.get();
+  }
+
+  // A scene that fits a wide picture is moved away until it fits a narrow one too.
+  fit(placement) {
+    const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
+    const outside = placement.eye.some((c) => c < 0 || c > this.manifest.resolution);
+    if (!outside || aspect >= kPictureAspect) return placement;
+    const offset = scale(subtract(placement.eye, placement.target), Math.min(4, kPictureAspect / aspect));
+    return {...placement, eye: placement.target.map((c, axis) => c + offset[axis])};
+  }
+
+  actions() {
+    const center = () => [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
+    return {
+      toggle_fly: () => {
+        this.motion.flying = !this.motion.flying;
+        this.motion.stop();
+        this.show_mode();
+        announce(this.motion.flying ? "Flight: the keys and drags look around." : "Orbit.");
+      },
+      reset: () => {
+        this.fly_to(this.first_camera());
+        announce("The camera is reset.");
+      },
+      pick_center: () => this.pick(...center()),
+      pivot_center: () => this.set_pivot(...center()),
+      measure: () => this.panel.pick.toggle_measure(),
+      screenshot: () => this.save_picture(),
+      toggle_panel: () => this.toggle_panel(),
+      help: () => this.show_help(),
+    };
+  }
+
+  show_mode() {
+    const button = this.places.tools.querySelector('[data-tool="toggle_fly"]');
+    button.setAttribute("aria-pressed", String(Boolean(this.motion.flying)));
+    this.canvas.classList.toggle("flying", Boolean(this.motion.flying));
+  }
+
+  toggle_panel() {
+    const {panel, tools} = this.places;
+    const had_focus = panel.contains(document.activeElement);
+    panel.hidden = !panel.hidden;
+    tools.querySelector('[data-tool="toggle_panel"]').setAttribute("aria-expanded", String(!panel.hidden));
+    if (had_focus) this.canvas.focus();
+  }
+
+  show_help() {
+    const dialog = h("dialog", {class: "help", "aria-labelledby": "help-title"},
+      h("form", {method: "dialog"}, h("h2", {id: "help-title"}, "Keys and pointers"), keys_help(),
+        h("div", {class: "buttons end"}, h("button", {class: "primary", autofocus: true}, "Close"))));
+    document.body.append(dialog);
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      this.canvas.focus();
+    });
+    dialog.showModal();
+  }
+
+  resize() {
+    if (!this.canvas.clientWidth || !this.canvas.clientHeight) return;
+    this.renderer.resize(this.canvas.clientWidth, this.canvas.clientHeight, window.devicePixelRatio || 1);
+    this.schedule();
+  }
+
+  // Draws until the picture is complete and nothing moves.
+  schedule() {
+    if (this.scheduled || this.signal.aborted) return;
+    this.scheduled = true;
+    requestAnimationFrame((now) => {
+      this.scheduled = false;
+      this.frame(now);
+    });
+  }
+
+  frame(now) {
+    if (this.signal.aborted) return;
+    const moving = this.motion.step(now);
+    this.apply_camera();
+    const drawn = this.renderer.frame(now);
+    this.show_markers();
+    if (now - this.seen.time > kSeenInterval_ms) this.look_ahead(now);
+    if (moving || drawn.moving || !drawn.complete) this.schedule();
+  }
+
+  show_markers() {
+    const {pick, start} = this.panel.pick;
+    this.markers.show([pick?.position, start?.position], this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+  }
+
+  apply_camera() {
+    const {eye, target, fov_degrees} = this.camera;
+    const key = [...eye, ...target, fov_degrees].join();
+    if (key === this.camera_key) return;
+    this.camera_key = key;
+    this.renderer.setView({eye: [...eye], target: [...target], up: this.camera.axes().up, fovDegrees: fov_degrees});
+    this.bookmark();
+  }
+
+  // Speeds follow the distance of what is in the center; without anything there, they grow slowly.
+  async look_ahead(now) {
+    if (this.seen.key === this.camera_key) return;
+    this.seen.time = now;
+    this.seen.key = this.camera_key;
+    const hit = await this.renderer.pick(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
+    const free = Math.min(1.3 * this.seen.distance, Math.max(this.manifest.resolution / 4, this.camera.distance));
+    this.seen.distance = Math.max(1, hit ? hit.distance : free);
+  }
+
+  // What the picture shows: {level, wire, clip, occlusion, shadows}, any of them.
+  set_options(changed) {
+    Object.assign(this.options, changed);
+    const {level, wire, clip, occlusion, shadows} = this.options;
+    this.renderer.setOptions({maxLevel: level, wireLevel: wire, clip, ambientOcclusion: occlusion, sunShadows: shadows});
+    this.panel.show_options(this.options);
+    this.bookmark();
+    this.schedule();
+  }
+
+  fly_to(placement) {
+    this.motion.fly_to(placement);
+    this.schedule();
+  }
+  fly_to_text(text) {
+    const placement = parse_camera_text(this.space, text, this.camera.fov_degrees);
+    new Camera(this.manifest.resolution).set(placement);  // throws if there is no such picture
+    this.fly_to(placement);
+  }
+
+  async pick(x, y) {
+    this.panel.pick.set(await this.renderer.pick(x, y));
+  }
+
+  async set_pivot(x, y) {
+    const hit = await this.renderer.pick(x, y);
+    if (!hit) return announce("Nothing there to orbit around.");
+    const {eye, fov_degrees} = this.camera.get();
+    if (!(length(subtract(hit.position, eye)) > 0)) return;
+    this.fly_to({eye, target: hit.position, fov_degrees});
+    announce("The camera orbits around this place.");
+  }
+
+  // The address bar follows, without an entry in the history for each motion.
+  bookmark() {
+    if (this.bookmark_timer) return;
+    this.bookmark_timer = setTimeout(() => {
+      this.bookmark_timer = null;
+      if (this.signal.aborted) return;
+      this.panel.show_camera(camera_text(this.space, this.camera));
+      this.fragment = `#${fragment_text(this.bookmark_members())}`;
+      history.replaceState(null, "", this.fragment);
+    }, kBookmarkDelay_ms);
+  }
+
+  bookmark_members() {
+    const {level, wire, clip, occlusion, shadows} = this.options;
+    return {...camera_fragment(this.space, this.camera),
+            level: level < this.manifest.levels ? level : null, wire,
+            clip: clip && [...clip.low, ...clip.high].join(","),
+            occlusion: occlusion ? null : 0, shadows: shadows ? null : 0};
+  }
+
+  // Returns whether the address names a camera that can be used.
+  follow_bookmark() {
+    if (location.hash === this.fragment) return false;
+    const members = new URLSearchParams(location.hash.slice(1));
+    try {
+      const placement = parse_camera_fragment(this.space, members, kDefaultFov);
+      if (!placement) return false;
+      this.camera.set(placement);
+    } catch (error) {
+      announce(error.message);
+      return false;
+    }
+    this.set_options(this.options_of(members));
+    return true;
+  }
+
+  options_of(members) {
+    const options = this.default_options();
+    const level = (name) => /^\d+$/.test(members.get(name) ?? "")
+      ? Math.min(Number(members.get(name)), this.manifest.levels) : null;
+    const box = (members.get("clip") ?? "").split(",").map(Number);
+    const is_box = box.length === 6 && box.every(Number.isFinite) && [0, 1, 2].every((axis) => box[axis] < box[axis + 3]);
+    return {...options, level: level("level") ?? options.level, wire: level("wire"),
+            clip: is_box ? {low: box.slice(0, 3), high: box.slice(3)} : null,
+            occlusion: members.get("occlusion") !== "0", shadows: members.get("shadows") !== "0"};
+  }
+
+  // The drawing buffer is only valid until the browser has shown it: draws and reads at once.
+  save_picture() {
+    this.renderer.frame(performance.now());
+    this.canvas.toBlob((blob) => {
+      if (!blob) return announce("The picture could not be saved.");
+      const url = URL.createObjectURL(blob);
+      const link = h("a", {href: url, download: `${this.file_name}.png`});
+      document.body.append(link);
+      link.click();
+      link.remove();
+      setTimeout(() => URL.revokeObjectURL(url), 60000);
+      announce("The picture is saved.");
+    }, "image/png");
+  }
+
+  show_statistics() {
+    if (this.signal.aborted) return;
+    const statistics = this.renderer.statistics();
+    this.panel.show_statistics(statistics);
+    const {problem} = this.renderer;
+    const {loading} = statistics;
+    set_text(this.places.status, problem ? problem_text(problem)
+      : loading > 0 ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"}…` : "");
+    this.places.status.classList.toggle("bad", Boolean(problem));
+  }
+}
+
+function problem_text({code, message}) {
+  if (code === "replaced") return "The file was replaced by another one: reload the page.";
+  if (code === "unauthorized") return "The service no longer accepts the token: reload the page.";
+  return `${message} What is missing is drawn coarse and asked for again.`;
+}

@@ -1,0 +1,62 @@
+// The keys of the canvas. Held keys move the camera, the others are actions. The same list is the help.
+
+import {h} from "../lib/dom.js";
+
+const kHeld = {
+  ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down",
+  KeyW: "forward", KeyS: "back", KeyA: "strafe_left", KeyD: "strafe_right", KeyE: "rise", KeyQ: "sink",
+};
+// By the character, since these keys are elsewhere on other keyboards.
+const kHeldCharacters = {"+": "zoom_in", "=": "zoom_in", "-": "zoom_out", "_": "zoom_out"};
+const kActions = {
+  f: "toggle_fly", r: "reset", home: "reset", enter: "pick_center", " ": "pick_center", c: "pivot_center",
+  m: "measure", p: "screenshot", o: "toggle_panel", "?": "help", h: "help",
+};
+
+const kHelp = [
+  ["Drag, one finger, arrow keys", "orbit; in flight look around"],
+  ["Right button, Shift and drag, two fingers", "pan"],
+  ["Wheel, pinch, + and −", "zoom, by wheel and pinch to the place that is pointed at"],
+  ["W A S D, E and Q", "fly forward, left, back, right, up and down; Shift: faster"],
+  ["F", "switch between orbit and flight"],
+  ["Double click or tap; C", "orbit around the place that is pointed at; around the center of the picture"],
+  ["Click or tap; Enter", "pick a voxel; the one in the center of the picture"],
+  ["M", "measure from the picked voxel"],
+  ["R", "reset the camera"],
+  ["P", "save the picture"],
+  ["O", "show or hide the panel"],
+  ["H", "this help"],
+];
+
+// Key names of `motion`; actions by name.
+export function listen_to_keys(canvas, motion, actions, on_change, signal) {
+  const held = new Map();  // by event.code: a character may change while its key is down
+  canvas.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const action = kActions[event.key.toLowerCase()];
+    const motion_key = kHeld[event.code] ?? kHeldCharacters[event.key];
+    if (!action && !motion_key) return;
+    event.preventDefault();
+    if (motion_key) {
+      held.set(event.code, motion_key);
+      motion.press(motion_key, event.shiftKey);
+      on_change();
+    } else if (!event.repeat) {
+      actions[action]();
+    }
+  }, {signal});
+  const release = (event) => {
+    motion.fast = event.shiftKey;
+    if (held.has(event.code)) motion.release(held.get(event.code));
+    held.delete(event.code);
+  };
+  canvas.addEventListener("keyup", release, {signal});
+  canvas.addEventListener("blur", () => {
+    held.clear();
+    motion.release_all();
+  }, {signal});
+}
+
+export function keys_help() {
+  return h("dl", {class: "keys"}, kHelp.map(([keys, what]) => h("div", {}, h("dt", {}, keys), h("dd", {}, what))));
+}

@@ -1,0 +1,143 @@
+// The page of the viewer: viewer.html?job=ID shows a job of the service, viewer.html alone the file of
+// `voxdag view`. ?budget=MiB limits the memory of the tiles.
+
+import {authorization, get_json, Problem, sleep, token} from "../lib/api.js";
+import {clear, h, set_text} from "../lib/dom.js";
+import {has_ended, state_text, title_text} from "../lib/format.js";
+import {problem_box} from "../views/parts.js";
+import {Viewer} from "./app.js";
+import {Renderer} from "./renderer.js";
+import {TileSource} from "./tile_source.js";
+
+const kBudgetMiB = 256;
+const kPhoneBudgetMiB = 64;
+const kPause_ms = 3000;
+
+const place = (id) => document.getElementById(id);
+const parameters = new URLSearchParams(location.search);
+const job_id = /^[0-9a-f]{1,32}$/.exec(parameters.get("job") ?? "")?.[0] ?? null;
+const lifetime = new AbortController();
+
+function budget_bytes() {
+  const asked = Number(parameters.get("budget"));
+  const small = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
+  return (asked > 0 ? asked : small ? kPhoneBudgetMiB : kBudgetMiB) * 2 ** 20;
+}
+
+// Instead of the picture; nothing hides it again but a new message.
+function show_message(...content) {
+  place("scene").hidden = true;
+  place("message").hidden = false;
+  clear(place("message"), h("div", {class: "card stack narrow"}, ...content));
+}
+function hide_message() {
+  place("scene").hidden = false;
+  place("message").hidden = true;
+}
+
+function show_title(title) {
+  document.title = `${title} · voxdag`;
+  set_text(place("title"), title);
+}
+
+// Waits until the job has a result; returns it, or null when it will have none.
+async function finished_job() {
+  let cubes = null;
+  for (;;) {
+    const job = await get_json(`/api/v1/jobs/${job_id}`, lifetime.signal);
+    show_title(title_text(job));
+    if (job.state === "succeeded") return job;
+    cubes ??= new (await import("../views/cubes_view.js")).CubesView(`/api/v1/jobs/${job_id}/subvolumes`, lifetime.signal);
+    show_message(h("h1", {}, `This job is ${state_text(job.state)}.`),
+      h("p", {}, has_ended(job.state) ? "It has no result to look at." : "Its result is shown here when it is done."),
+      cubes.element, h("div", {class: "buttons"}, h("a", {class: "button", href: `/#/jobs/${job_id}`}, "The job's page")));
+    cubes.update(job);
+    if (has_ended(job.state)) return null;
+    await sleep(kPause_ms, lifetime.signal, true);
+  }
+}
+
+function camera_of_address() {
+  const members = new URLSearchParams(location.hash.slice(1));
+  return ["camera", "target", "fov"].filter((name) => members.has(name))
+                                    .map((name) => ` --${name} ${members.get(name)}`).join("");
+}
+
+// Without WebGL2 there is still a picture.
+async function show_without_webgl(reason, job) {
+  const content = [h("h1", {}, "This browser cannot draw the scene."),
+    h("p", {}, `The viewer needs WebGL2: ${reason}`)];
+  if (job?.preview) {
+    const response = await fetch(job.links.preview, {headers: authorization()});
+    const url = URL.createObjectURL(await response.blob());
+    content.push(h("img", {class: "still", src: url, alt: `Rendering of the voxels of ${title_text(job)}`}));
+  }
+  content.push(h("p", {}, "A picture from any place is rendered by"),
+    h("code", {}, `voxdag render FILE.vdag -o picture.png${camera_of_address()}`));
+  show_message(...content);
+}
+
+async function start() {
+  const job = job_id ? await finished_job() : null;
+  if (job_id && !job) return;
+  const source = new TileSource({base: job_id ? `/api/v1/jobs/${job_id}` : "/api/v1/view", headers: authorization()});
+  const manifest = await source.manifest();
+  if (!job) show_title(manifest.name ?? "voxdag view");
+  const canvas = place("scene");
+  let viewer = null;
+  let renderer;
+  hide_message();
+  try {
+    renderer = new Renderer(canvas, source, {budgetBytes: budget_bytes(), onChange: () => viewer?.schedule()});
+  } catch (error) {
+    return show_without_webgl(error.message, job);
+  }
+  await renderer.start();
+  place("tools").hidden = false;
+  if (matchMedia("(max-width: 700px)").matches) place("panel").hidden = true;
+  viewer = new Viewer({canvas, renderer, manifest, signal: lifetime.signal,
+    file_name: (job ? title_text(job) : document.title).replace(/[^A-Za-z0-9._-]+/g, "-"),
+    places: {panel: place("panel"), tools: place("tools"), status: place("status")}});
+  canvas.addEventListener("webglcontextlost", () => {
+    lifetime.abort();
+    show_message(h("h1", {}, "The graphics card was lost."), h("p", {}, "Reload the page to continue where you are."),
+      h("button", {type: "button", on: {click: () => location.reload()}}, "Reload"));
+  });
+  window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
+  canvas.focus({preventScroll: true});
+}
+
+function show_failure(error) {
+  if (!(error instanceof Problem) && error.status === undefined) {
+    show_message(h("h1", {}, "The viewer failed."), h("p", {}, error.message));
+    throw error;
+  }
+  const problem = error instanceof Problem ? error
+    : new Problem(error.status, error.status ? `http_${error.status}` : "unreachable", error.message);
+  show_message(problem_box(problem), h("div", {class: "buttons"},
+    h("button", {type: "button", on: {click: () => location.reload()}}, "Try again")));
+}
+
+// The service asks for a token: the page of the dashboard that does so is loaded only then.
+async function sign_in() {
+  const rejected = Boolean(token.get());
+  token.remove();
+  const {login_page} = await import("../pages/login_page.js");
+  place("scene").hidden = true;
+  place("message").hidden = false;
+  clear(place("message"), login_page(rejected, run).content);
+}
+
+function run() {
+  hide_message();
+  start().catch((error) => {
+    if (error.status !== 401) show_failure(error);
+  });
+}
+
+if (job_id) {
+  place("home").href = `/#/jobs/${job_id}`;
+  set_text(place("home-text"), "Job");
+  window.addEventListener("voxdag-login", sign_in);
+}
+run();

@@ -1,0 +1,91 @@
+// What was picked, and the distance between two picks.
+
+import {announce, clear, fact, h} from "../lib/dom.js";
+import {count_text} from "../lib/format.js";
+import {distance, subtract} from "./vector.js";
+
+export class PickView {
+  // on_change() is called when there is one more or one less to show.
+  constructor(space, on_change) {
+    this.space = space;
+    this.on_change = on_change;
+    this.pick = this.start = null;
+    this.element = h("div", {class: "stack"});
+    this.show();
+  }
+
+  set(pick) {
+    this.pick = pick;
+    this.show();
+    if (!pick) announce("No voxel there.");
+    else announce(`Picked voxel ${pick.voxel.join(", ")}.${this.start ? ` Distance ${this.measure_text()}.` : ""}`);
+  }
+
+  // Measures from the current pick, or no longer.
+  toggle_measure() {
+    this.start = this.start ? null : this.pick;
+    announce(this.start ? "Measuring from this voxel: pick another one." : "Not measuring.");
+    this.show();
+  }
+
+  // {low, high} of the two picks in voxels, or null.
+  box() {
+    if (!this.start || !this.pick) return null;
+    const edge = (pick) => this.cell_edge(pick);
+    return {low: this.pick.voxel.map((c, axis) => Math.min(c, this.start.voxel[axis])),
+            high: this.pick.voxel.map((c, axis) =>
+              Math.max(c + edge(this.pick), this.start.voxel[axis] + edge(this.start)))};
+  }
+
+  cell_edge({level}) {
+    return this.space.resolution / 2 ** level;
+  }
+
+  measure_text() {
+    const voxels = distance(this.pick.position, this.start.position);
+    return `${length_text(voxels)} voxels, ${length_text(voxels * this.space.edge / this.space.resolution)} in scene units`;
+  }
+
+  show() {
+    const {pick, start} = this;
+    clear(this.element,
+      !pick && h("p", {class: "faint"}, "Click a voxel, or press Enter for the one in the center."),
+      pick && h("dl", {class: "facts pick"},
+        fact("Voxel", h("code", {"data-fact": "voxel"}, pick.voxel.join(", "))),
+        fact("In scene units", h("code", {"data-fact": "scene"},
+          this.space.text(pick.position).replaceAll(",", ", "))),
+        fact("Level", h("span", {"data-fact": "level"}, String(pick.level)), this.edge_note(pick)),
+        fact("Node", h("code", {"data-fact": "node"}, `${pick.nodeLevel} / ${pick.nodeOffset}`)),
+        fact("Distance from the camera", `${length_text(pick.distance)} voxels`)),
+      start && pick && h("dl", {class: "facts measure"},
+        fact("From voxel", h("code", {}, start.voxel.join(", "))),
+        fact("Distance", h("span", {"data-fact": "measure"}, this.measure_text())),
+        fact("Along the axes, in voxels",
+          h("code", {}, subtract(pick.position, start.position).map((c) => Number(c.toFixed(2))).join(", ")))),
+      pick && h("div", {class: "buttons"},
+        h("button", {type: "button", class: "small", "aria-pressed": String(Boolean(start)), "data-action": "measure",
+                     on: {click: () => this.toggle_measure_and_focus()}}, "Measure from here"),
+        h("button", {type: "button", class: "small quiet", on: {click: () => this.forget()}}, "Clear")));
+    this.on_change();
+  }
+
+  // The buttons are replaced: the focus stays on the new one.
+  toggle_measure_and_focus() {
+    this.toggle_measure();
+    this.element.querySelector('[data-action="measure"]')?.focus();
+  }
+
+  forget() {
+    this.pick = this.start = null;
+    this.show();
+  }
+
+  edge_note(pick) {
+    const edge = this.cell_edge(pick);
+    return h("span", {class: "faint"}, edge === 1 ? " (a voxel)" : ` (a cube of ${count_text(edge)} voxels; more detail is not loaded or not visible)`);
+  }
+}
+
+function length_text(value) {
+  return String(Number(value.toPrecision(6)));
+}
