@@ -1,0 +1,301 @@
+"""Mouse, touch, keyboard, panel, address and messages of the viewer."""
+
+import json
+import math
+import re
+
+CAMERA_DIGITS = 5  # that `render` prints agree with what it was given
+
+
+def numbers(text):
+    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", text)]
+
+
+def distance(a, b):
+    return math.dist(a, b)
+
+
+def center_of(page):
+    box = page.locator("#scene").bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def wait_for_pick(page):
+    page.locator('[data-fact="voxel"]').wait_for()
+    return {name: page.locator(f'[data-fact="{name}"]').inner_text() for name in ("voxel", "scene", "level", "node")}
+
+
+def check_pick(visitor, dag, camera):
+    """A picked voxel is one of the file, with its node, and where the picture says that it is."""
+    visitor.show(camera)
+    page = visitor.page
+    page.mouse.click(*center_of(page))
+    facts = wait_for_pick(page)
+    voxel = [int(number) for number in numbers(facts["voxel"])]
+    level = int(facts["level"].split()[0])
+    node_level, offset = (int(number) for number in facts["node"].split("/"))
+    assert level == dag.levels, f"not a voxel: {facts}"
+    assert dag.is_set(voxel), f"the file has no voxel {voxel}"
+    assert node_level == dag.levels - 2 and dag.find(voxel, node_level) == offset, facts
+    scene = numbers(facts["scene"])
+    size = dag.edge / dag.resolution
+    for axis in range(3):
+        in_voxels = (scene[axis] - dag.origin[axis]) / size
+        assert voxel[axis] - 0.01 <= in_voxels <= voxel[axis] + 1.01, facts
+    eye = visitor.camera()["eye"]
+    forward = [b - a for a, b in zip(eye, visitor.camera()["target"])]
+    # In the center of the picture: nothing of the file is nearer along the ray.
+    far = distance(eye, [(scene[axis] - dag.origin[axis]) / size for axis in range(3)])
+    for step in range(int(far) - 2):
+        cell = [math.floor(a + step * f / math.hypot(*forward)) for a, f in zip(eye, forward)]
+        inside = all(0 <= c < dag.resolution for c in cell)
+        assert not (inside and dag.is_set(cell)), f"{cell} is in front of {voxel}"
+
+
+def check_measure(visitor):
+    """The distance between two picks is that of their positions."""
+    page = visitor.page
+    x, y = center_of(page)
+    first = numbers(wait_for_pick(page)["scene"])
+    page.get_by_role("button", name="Measure from here").click()
+    page.mouse.click(x + 25, y + 20)
+    page.wait_for_function("document.querySelector('[data-fact=\"measure\"]')?.textContent.startsWith('0 ') === false")
+    second = numbers(wait_for_pick(page)["scene"])
+    in_scene = numbers(page.locator('[data-fact="measure"]').inner_text())[1]
+    assert first != second and math.isclose(in_scene, distance(first, second), rel_tol=1e-3)
+    page.locator("summary", has_text="Clipping box").click()
+    page.get_by_role("button", name="Box of the two picks").click()
+    low, high = page.evaluate("(({low, high}) => [low, high])(voxdagViewer.viewer.options.clip)")
+    assert all(a < b for a, b in zip(low, high))
+    page.get_by_label("Show only what is in a box").uncheck()
+    assert page.evaluate("voxdagViewer.viewer.options.clip") is None
+
+
+def check_mouse(visitor, camera):
+    """Drags orbit and pan, the wheel zooms to the cursor, a double click sets the pivot."""
+    page = visitor.page
+    visitor.show(camera)
+    x, y = center_of(page)
+    before = visitor.camera()
+
+    def drag(button, dx, dy):
+        page.mouse.move(x, y)
+        page.mouse.down(button=button)
+        page.mouse.move(x + dx / 2, y + dy / 2)
+        page.mouse.move(x + dx, y + dy)
+        page.mouse.up(button=button)
+        return visitor.camera()
+
+    orbited = drag("left", 60, 10)
+    assert orbited["target"] == before["target"] and distance(orbited["eye"], before["eye"]) > 1
+    assert math.isclose(distance(orbited["eye"], orbited["target"]), distance(before["eye"], before["target"]), rel_tol=1e-9)
+    panned = drag("right", 40, 0)
+    shift = [b - a for a, b in zip(orbited["eye"], panned["eye"])]
+    assert distance(shift, [b - a for a, b in zip(orbited["target"], panned["target"])]) < 1e-6 * math.hypot(*shift)
+
+    visitor.show(camera)
+    point = page.evaluate("async () => (await voxdagViewer.renderer.pick(250, 150)).position")
+    box = page.locator("#scene").bounding_box()
+    page.mouse.move(box["x"] + 250, box["y"] + 150)
+    for _ in range(3):
+        page.mouse.wheel(0, -200)
+        page.wait_for_timeout(120)
+    zoomed = visitor.camera()
+    assert distance(zoomed["eye"], point) < 0.8 * distance(before["eye"], point)
+    again = page.evaluate("async () => (await voxdagViewer.renderer.pick(250, 150)).position")
+    assert distance(point, again) < 0.1 * distance(zoomed["eye"], point), "the cursor's place has moved"
+    page.mouse.dblclick(box["x"] + 250, box["y"] + 150)
+    page.wait_for_function("([x]) => Math.abs(voxdagViewer.camera.target[0] - x) < 1e-6 + Math.abs(x) / 50", arg=again)
+    assert visitor.camera()["eye"] == zoomed["eye"]
+    page.get_by_role("button", name="Reset").click()
+    page.wait_for_timeout(100)
+    assert distance(visitor.camera()["eye"], zoomed["eye"]) > 1
+
+
+def check_camera_text(visitor, voxdag, built, camera):
+    """The same string in the panel, in the address, and of `render`."""
+    page = visitor.page
+    visitor.show(camera, complete=False)
+    page.keyboard.press("w")
+    text = visitor.camera_text()
+    printed = voxdag.printed_camera(built, text)
+    mine = numbers(text)
+    theirs = [*printed["camera"], *printed["target"], printed["fov"]]
+    assert all(math.isclose(a, b, rel_tol=10 ** -CAMERA_DIGITS, abs_tol=1e-9) for a, b in zip(mine, theirs)), (mine, theirs)
+    before, address = visitor.camera(), page.url
+    visitor.show(camera, complete=False)
+    page.get_by_label("Take the camera of").fill(f"voxdag render x.vdag {text} --samples 2")
+    page.get_by_role("button", name="Show").click()
+    size = distance(before["eye"], before["target"])
+    assert distance(visitor.camera()["eye"], before["eye"]) < 1e-3 + 1e-6 * size
+    assert visitor.camera_text() == text and page.url == address
+    visitor.open(address)
+    assert visitor.camera_text() == text and page.url == address, "the address does not bring the camera back"
+    page.get_by_label("Take the camera of").fill("--camera 1,2")
+    page.keyboard.press("Enter")
+    page.get_by_text("Expected --camera X,Y,Z.").wait_for()
+
+
+def focused(page):
+    return page.evaluate("document.activeElement.id || document.activeElement.textContent || document.activeElement.tagName")
+
+
+def tab_to(page, wanted, max_steps=60):
+    for _ in range(max_steps):
+        page.keyboard.press("Tab")
+        if page.evaluate("(selector) => document.activeElement.matches(selector)", wanted):
+            style = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+            assert style != "none", f"the focus on {wanted} cannot be seen"
+            return
+    raise AssertionError(f"the Tab key does not reach {wanted}; it is at {focused(page)}")
+
+
+def check_keyboard(visitor, url, camera):
+    """All of it without a mouse, from the top of the page."""
+    visitor.open(url)
+    visitor.show(camera)
+    page = visitor.page
+    page.evaluate("document.activeElement.blur()")
+    tab_to(page, "#home")
+    tab_to(page, "#scene")
+    for key, what in (("ArrowLeft", "orbit"), ("w", "fly"), ("e", "rise"), ("+", "zoom in"), ("-", "zoom out")):
+        before = visitor.camera()["eye"]
+        page.keyboard.press(key)
+        assert visitor.camera()["eye"] != before, f"{key} does not {what}"
+    page.keyboard.press("f")
+    before = visitor.camera()
+    page.keyboard.press("ArrowRight")
+    assert visitor.camera()["eye"] == before["eye"] and visitor.camera()["target"] != before["target"], "no flight"
+    page.keyboard.press("f")
+    visitor.show(camera)
+    page.keyboard.press("Enter")
+    wait_for_pick(page)
+    page.wait_for_function("document.getElementById('announcer').textContent.startsWith('Picked voxel')")
+    page.keyboard.press("m")
+    page.get_by_role("button", name="Measure from here", pressed=True).wait_for()
+    page.keyboard.press("c")
+    page.get_by_text("orbits around this place").wait_for(state="attached")
+    page.keyboard.press("h")
+    page.get_by_role("dialog").wait_for()
+    visitor.picture("help")
+    page.keyboard.press("Escape")
+    page.get_by_role("dialog").wait_for(state="detached")
+    assert focused(page) == "scene"
+    with page.expect_download() as download:
+        page.keyboard.press("p")
+    with open(download.value.path(), "rb") as file:
+        head = file.read(24)
+    assert head[:8] == b"\x89PNG\r\n\x1a\n" and int.from_bytes(head[16:20], "big") > 100
+    check_keyboard_in_panel(visitor)
+
+
+def check_keyboard_in_panel(visitor):
+    page = visitor.page
+    option = "voxdagViewer.viewer.options"
+    tab_to(page, ".panel-part:nth-child(3) summary")
+    page.keyboard.press("Enter")
+    tab_to(page, "#clip-on")
+    page.keyboard.press("Space")
+    tab_to(page, ".clip-axis input")
+    page.keyboard.press("PageUp")
+    assert page.evaluate(f"{option}.clip.low[0]") > 0
+    tab_to(page, '.panel input[type="range"][max]:not(.clip-axis input)')
+    level = page.evaluate(f"{option}.level")
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate(f"{option}.level") == level - 1
+    tab_to(page, ".panel .field select")
+    page.keyboard.press("ArrowDown")
+    assert page.evaluate(f"{option}.wire") == 0
+    tab_to(page, "#switch-occlusion")
+    page.keyboard.press("Space")
+    assert page.evaluate(f"{option}.occlusion") is False
+    visitor.camera_text()
+    for part in ("clip=", f"level={level - 1}", "wire=0", "occlusion=0"):
+        assert part in page.url, f"{part} is not in the address {page.url}"
+    page.reload()
+    page.wait_for_function("window.voxdagViewer")
+    assert page.evaluate(f"[{option}.level, {option}.wire, {option}.occlusion]") == [level - 1, 0, False]
+    visitor.picture("options")
+
+
+def check_phone(visitor, url, camera):
+    """390 x 844: nothing is wider; one finger orbits, two fingers zoom, a tap picks."""
+    visitor.open(url)
+    page = visitor.page
+    box = page.locator("#scene").bounding_box()
+    assert box["width"] == 390 and box["height"] > 500, box
+    visitor.picture("first")
+    visitor.show(camera)
+    x, y = center_of(page)
+    session = visitor.context.new_cdp_session(page)
+
+    def touch(kind, *points):
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints":
+                     [{"x": px, "y": py, "id": i} for i, (px, py) in enumerate(points)]})
+
+    before = visitor.camera()
+    touch("touchStart", (x, y))
+    for step in (10, 30, 60):
+        touch("touchMove", (x + step, y))
+    touch("touchEnd")
+    assert visitor.camera()["target"] == before["target"] and visitor.camera()["eye"] != before["eye"]
+    before = visitor.camera()
+    touch("touchStart", (x - 30, y))
+    touch("touchStart", (x - 30, y), (x + 30, y))
+    for step in (40, 60, 90):
+        touch("touchMove", (x - step, y), (x + step, y))
+    touch("touchEnd")
+    after = visitor.camera()
+    assert distance(after["eye"], after["target"]) < 0.6 * distance(before["eye"], before["target"]), "no pinch"
+    visitor.show(camera)
+    page.touchscreen.tap(x, y)
+    page.get_by_role("button", name="Panel").tap()
+    wait_for_pick(page)
+    box = page.locator("#scene").bounding_box()
+    assert box["height"] >= 844 * 0.4, "the panel leaves too little of the picture"
+    visitor.picture("panel")
+
+
+NO_WEBGL = """
+const get_context = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
+  return kind === "webgl2" ? null : get_context.call(this, kind, ...more);
+};
+"""
+
+
+def check_without_webgl(visitor, url, still):
+    """A message, with the command for a picture; for a job its still picture."""
+    visitor.context.add_init_script(NO_WEBGL)
+    visitor.open(url, wait=False)
+    page = visitor.page
+    page.get_by_text("needs WebGL2").wait_for()
+    page.get_by_text("voxdag render FILE.vdag").wait_for()
+    if still:
+        page.wait_for_function("document.querySelector('img.still')?.naturalWidth > 100")
+    visitor.picture("no-webgl")
+
+
+def check_job(visitor, server, token):
+    """From the job's page to the viewer, with the token if there is one."""
+    headers = {"Authorization": f"Bearer {token}"} if token else {}
+    job = server.post("/api/v1/jobs", {"scene": "menger.glb", "resolution": 256}, headers)
+    page = visitor.page
+    if token:
+        visitor.expected = "status of 401"
+        visitor.open(f"{server.url}/viewer.html?job={job['id']}", wait=False)
+        page.get_by_label("Token").fill(token)
+        page.keyboard.press("Enter")
+    else:
+        visitor.open(f"{server.url}/#/jobs/{job['id']}", wait=False)
+        page.locator('[data-action="view"]').click()
+    page.wait_for_function("window.voxdagViewer")
+    page.evaluate("voxdagViewer.renderer.complete()")
+    depth, _ = visitor.capture(64, 36)
+    assert any(math.isfinite(d) for d in depth) and any(math.isinf(d) for d in depth)
+    while not json.loads(server.get(f"/api/v1/jobs/{job['id']}", headers))["preview"]:
+        page.wait_for_timeout(200)
+    visitor.picture("job")
+    page.locator("#home").click()
+    page.locator(".title-row .state.succeeded").wait_for()
+    return f"{server.url}/viewer.html?job={job['id']}"

@@ -1,0 +1,120 @@
+"""A browser window with the viewer in it, and what the test does there."""
+
+import base64
+import contextlib
+import os
+import re
+from array import array
+from pathlib import Path
+
+TIMEOUT_MS = 60_000
+
+WATCH_POLICY = """
+window.violations = [];
+document.addEventListener("securitypolicyviolation", (event) =>
+  window.violations.push(`${event.violatedDirective} ${event.blockedURI}`));
+"""
+
+# The picture's frame has the new camera after two animation frames.
+SHOW = """async ([camera, complete]) => {
+  const {viewer, renderer} = window.voxdagViewer;
+  viewer.fly_to_text(camera);
+  const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+  await frame();
+  await frame();
+  if (complete) await renderer.complete();
+}"""
+
+CAPTURE = """async ([width, height]) => {
+  const {depth, level} = await window.voxdagViewer.renderer.capture({width, height});
+  const text = (bytes) => {
+    let out = "";
+    for (let i = 0; i < bytes.length; i += 32768) out += String.fromCharCode(...bytes.subarray(i, i + 32768));
+    return btoa(out);
+  };
+  return [text(new Uint8Array(depth.buffer, depth.byteOffset, depth.byteLength)), text(level)];
+}"""
+
+
+class Visitor:
+    """Records every error that the browser reports; leave() fails if there were any."""
+
+    def __init__(self, browser, pictures, name, width=800, height=320, **options):
+        self.name, self.pictures = name, pictures
+        self.context = browser.new_context(viewport={"width": width, "height": height}, accept_downloads=True,
+                                           reduced_motion=options.pop("reduced_motion", "reduce"), **options)
+        self.context.set_default_timeout(TIMEOUT_MS)
+        self.context.add_init_script(WATCH_POLICY)
+        self.page = self.context.new_page()
+        self.errors = []
+        self.expected = None  # pattern of console errors that the current step causes
+        self.page.on("console", self.on_console)
+        self.page.on("pageerror", lambda error: self.errors.append(f"page error: {error}"))
+
+    def on_console(self, message):
+        if message.type == "error" and not (self.expected and re.search(self.expected, message.text)):
+            self.errors.append(f"console: {message.text} ({message.location.get('url')})")
+
+    def open(self, url, wait=True):
+        self.page.goto("about:blank")  # a new fragment alone would not reload the page
+        self.page.goto(url)
+        if wait:
+            self.page.wait_for_function("window.voxdagViewer")
+
+    @contextlib.contextmanager
+    def expecting(self, pattern):
+        self.expected = pattern
+        yield
+        self.expected = None
+
+    def show(self, camera, complete=True):
+        self.page.evaluate(SHOW, [camera, complete])
+
+    def capture(self, width, height):
+        depth_text, level_text = self.page.evaluate(CAPTURE, [width, height])
+        depths = array("f")
+        depths.frombytes(base64.b64decode(depth_text))
+        levels = base64.b64decode(level_text)
+        assert len(depths) == len(levels) == width * height
+        return depths, levels
+
+    def statistics(self):
+        return self.page.evaluate("window.voxdagViewer.renderer.statistics()")
+
+    def camera(self):
+        return self.page.evaluate("window.voxdagViewer.camera.get()")
+
+    def camera_text(self):
+        """The string in the panel, which follows the camera after a moment."""
+        self.page.wait_for_timeout(400)
+        return self.page.locator("#camera-text").inner_text()
+
+    def picture(self, name):
+        self.page.screenshot(path=self.pictures / f"{name}-{self.name}.png")
+        wide = self.page.evaluate("document.documentElement.scrollWidth - innerWidth")
+        assert wide <= 0, f"{name} ({self.name}): {wide} pixels wider than the window"
+
+    def leave(self):
+        violations = self.page.evaluate("window.violations")
+        assert not violations, f"{self.name}: policy violated: {violations}"
+        assert not self.errors, f"{self.name}: {self.errors}"
+        self.context.close()
+
+
+def resident_bytes_of_descendants():
+    """Of all processes that this one has started, and those that they have: the browser, most of all."""
+    parents, pages = {}, {}
+    for folder in Path("/proc").iterdir():
+        if not folder.name.isdigit():
+            continue
+        with contextlib.suppress(OSError):
+            stat = (folder / "stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
+            parents[int(folder.name)] = int(stat[1])
+            pages[int(folder.name)] = int(stat[21])
+    total = 0
+    for pid, count in pages.items():
+        ancestor = pid
+        while ancestor in parents and ancestor != os.getpid():
+            ancestor = parents[ancestor]
+        total += count if ancestor == os.getpid() and pid != os.getpid() else 0
+    return total * os.sysconf("SC_PAGE_SIZE")
