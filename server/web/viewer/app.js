@@ -17,9 +17,10 @@ const kStatisticsInterval_ms = 500;
 const kBookmarkDelay_ms = 250;
 
 export class Viewer {
-  // `renderer` has started; `places` are the elements of viewer.html.
-  constructor({canvas, renderer, manifest, places, file_name, signal}) {
-    Object.assign(this, {canvas, renderer, manifest, places, file_name, signal});
+  // `renderer` has started; `places` are the elements {panel, tools, status}. With `bookmarks` the
+  // fragment of the address is that of the camera. Ends when `signal` aborts.
+  constructor({canvas, renderer, manifest, places, file_name, signal, bookmarks = true}) {
+    Object.assign(this, {canvas, renderer, manifest, places, file_name, signal, bookmarks});
     this.space = new GridSpace(manifest);
     this.camera = new Camera(manifest.resolution);
     this.options = this.default_options();
@@ -37,9 +38,15 @@ export class Viewer {
     listen_to_keys(canvas, this.motion, this.actions(), () => this.schedule(), signal);
     for (const button of places.tools.querySelectorAll("[data-tool]"))
       button.addEventListener("click", () => this.actions()[button.dataset.tool](), {signal});
-    new ResizeObserver(() => this.resize()).observe(canvas);
-    window.addEventListener("hashchange", () => this.follow_bookmark(), {signal});
-    setInterval(() => this.show_statistics(), kStatisticsInterval_ms);
+    const resizes = new ResizeObserver(() => this.resize());
+    resizes.observe(canvas);
+    if (bookmarks) window.addEventListener("hashchange", () => this.follow_bookmark(), {signal});
+    const timer = setInterval(() => this.show_statistics(), kStatisticsInterval_ms);
+    signal.addEventListener("abort", () => {
+      clearInterval(timer);
+      resizes.disconnect();
+      renderer.dispose();
+    }, {once: true});
     this.resize();
     this.camera.set(this.first_camera());
     if (!this.follow_bookmark()) this.set_options({});
@@ -98,7 +105,7 @@ export class Viewer {
     const {panel, tools} = this.places;
     const had_focus = panel.contains(document.activeElement);
     panel.hidden = !panel.hidden;
-    tools.querySelector('[data-tool="toggle_panel"]').setAttribute("aria-expanded", String(!panel.hidden));
+    tools.querySelector('[data-tool="toggle_panel"]')?.setAttribute("aria-expanded", String(!panel.hidden));
     if (had_focus) this.canvas.focus();
   }
 
@@ -202,7 +209,7 @@ export class Viewer {
     if (this.bookmark_timer) return;
     this.bookmark_timer = setTimeout(() => {
       this.bookmark_timer = null;
-      if (this.signal.aborted) return;
+      if (this.signal.aborted || !this.bookmarks) return;
       this.panel.show_camera(camera_text(this.space, this.camera));
       this.fragment = `#${fragment_text(this.bookmark_members())}`;
       history.replaceState(null, "", this.fragment);
@@ -219,7 +226,7 @@ export class Viewer {
 
   // Returns whether the address names a camera that can be used.
   follow_bookmark() {
-    if (location.hash === this.fragment) return false;
+    if (!this.bookmarks || location.hash === this.fragment) return false;
     const members = new URLSearchParams(location.hash.slice(1));
     try {
       const placement = parse_camera_fragment(this.space, members, kDefaultFov);

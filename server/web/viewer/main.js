@@ -8,6 +8,7 @@ import {problem_box} from "../views/parts.js";
 import {Viewer} from "./app.js";
 import {Renderer} from "./renderer.js";
 import {TileSource} from "./tile_source.js";
+import {fill_tools} from "./tools.js";
 
 const kBudgetMiB = 256;
 const kPhoneBudgetMiB = 64;
@@ -93,8 +94,11 @@ async function start() {
     return show_without_webgl(error.message, job);
   }
   await renderer.start();
+  const narrow = matchMedia("(max-width: 700px)").matches;
+  place("panel").hidden = narrow;
   place("tools").hidden = false;
-  if (matchMedia("(max-width: 700px)").matches) place("panel").hidden = true;
+  fill_tools(place("tools"), h("button", {type: "button", class: "small", "data-tool": "toggle_panel",
+                                          "aria-expanded": String(!narrow), "aria-controls": "panel"}, "Panel"));
   viewer = new Viewer({canvas, renderer, manifest, signal: lifetime.signal,
     file_name: (job ? title_text(job) : document.title).replace(/[^A-Za-z0-9._-]+/g, "-"),
     places: {panel: place("panel"), tools: place("tools"), status: place("status")}});

@@ -34,7 +34,7 @@ export function actions(job, reload) {
   const may = (...states) => states.includes(job.state);
   const buttons = [
     may("succeeded") && button("Download", () => download(job), "primary"),
-    may("succeeded") && h("a", {class: "button", "data-action": "view", href: `/viewer.html?job=${job.id}`}, "View"),
+    may("succeeded") && h("a", {class: "button", href: `/viewer.html?job=${job.id}`}, "View"),
     may("suspended") && button("Resume", post("resume"), "primary"),
     may("failed", "canceled") && button("Retry", post("retry"), "primary"),
     may("queued", "running") && button("Suspend", post("suspend")),

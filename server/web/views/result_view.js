@@ -1,7 +1,7 @@
 // The result of a job: preview, numbers and levels.
 
 import {request} from "../lib/api.js";
-import {clear, fact, h} from "../lib/dom.js";
+import {clear, fact, h, set_text} from "../lib/dom.js";
 import {count_text, duration_text, grid_text, size_text, title_text} from "../lib/format.js";
 import {download_command} from "./job_actions.js";
 import {copy_button} from "./parts.js";
@@ -10,13 +10,14 @@ import {copy_button} from "./parts.js";
 export function result_view(place, job, signal) {
   const key = `${job.result.sha256} ${job.preview}`;
   if (place.dataset.key === key && place.firstChild) return;
+  if (place.querySelector("canvas.scene") && place.dataset.key?.startsWith(job.result.sha256)) return;  // in use
   place.dataset.key = key;
   const r = job.result;
   const saved = 100 * (1 - r.dag_nodes / Math.max(1, r.svo_nodes));
   clear(place,
     h("section", {class: "card result-card", "aria-labelledby": "result-title"},
       h("h2", {id: "result-title"}, "Result"),
-      h("div", {class: "seen"}, preview(job, signal), h("dl", {class: "figures"}, [
+      h("div", {class: "seen"}, picture(job, signal), h("dl", {class: "figures"}, [
         ["Voxels", count_text(r.voxels)], ["Octree nodes", count_text(r.svo_nodes)],
         ["DAG nodes", count_text(r.dag_nodes)], ["Nodes saved", `${saved.toFixed(1)} %`],
         ["File", size_text(r.bytes)], ["Triangles", count_text(r.triangles)],
@@ -36,6 +37,28 @@ function cube_text({origin, edge}) {
   return `from ${origin.map(short).join(", ")}, edge ${short(edge)}`;
 }
 
+// The picture, and below it the ways to look around.
+function picture(job, signal) {
+  const place = preview(job, signal);
+  const error = h("p", {class: "bad", role: "alert"});
+  const button = h("button", {type: "button", class: "small", "data-action": "look"}, "Look around here");
+  button.addEventListener("click", async () => {
+    if (button.hasAttribute("aria-busy")) return;
+    button.setAttribute("aria-busy", "true");
+    try {
+      const {embed_viewer} = await import("../viewer/embedded.js");
+      await embed_viewer(place, job, signal);
+      button.hidden = true;
+    } catch (problem) {
+      set_text(error, problem.message);
+    } finally {
+      button.removeAttribute("aria-busy");
+    }
+  });
+  return h("div", {class: "picture-frame"}, place, error, h("div", {class: "buttons"}, button,
+    h("a", {class: "button small", "data-action": "view", href: `/viewer.html?job=${job.id}`}, "View in the whole window")));
+}
+
 function preview(job, signal) {
   const place = h("div", {class: "picture"});
   if (!job.preview) {
@@ -45,6 +68,7 @@ function preview(job, signal) {
   request("GET", job.links.preview, {signal}).then((response) => response.blob()).then((blob) => {
     const url = URL.createObjectURL(blob);
     signal.addEventListener("abort", () => URL.revokeObjectURL(url), {once: true});
+    if (place.querySelector("canvas")) return;
     clear(place, h("img", {src: url, width: "960", height: "540", alt: `Rendering of the voxels of ${title_text(job)}`}));
   }).catch(() => {
     if (!signal.aborted) clear(place, h("p", {class: "empty"}, "The preview could not be loaded."));
