@@ -4,6 +4,7 @@ import base64
 import contextlib
 import os
 import re
+import time
 from array import array
 from pathlib import Path
 
@@ -59,7 +60,14 @@ class Visitor:
         self.page.goto("about:blank")  # a new fragment alone would not reload the page
         self.page.goto(url)
         if wait:
-            self.page.wait_for_function("window.voxdagViewer")
+            self.wait_until("Boolean(window.voxdagViewer)")
+
+    def wait_until(self, expression, argument=None):
+        """Playwright's wait_for_function evaluates in the page, which the policy forbids."""
+        deadline = time.monotonic() + TIMEOUT_MS / 1000
+        while not self.page.evaluate(expression, argument):
+            assert time.monotonic() < deadline, f"{self.name}: not within {TIMEOUT_MS} ms: {expression}"
+            self.page.wait_for_timeout(50)
 
     @contextlib.contextmanager
     def expecting(self, pattern):

@@ -42,6 +42,7 @@ export class Viewer {
     resizes.observe(canvas);
     if (bookmarks) window.addEventListener("hashchange", () => this.follow_bookmark(), {signal});
     const timer = setInterval(() => this.show_statistics(), kStatisticsInterval_ms);
+    canvas.addEventListener("webglcontextrestored", () => this.schedule(), {signal});
     signal.addEventListener("abort", () => {
       clearInterval(timer);
       resizes.disconnect();
@@ -272,7 +273,8 @@ export class Viewer {
     this.panel.show_statistics(statistics);
     const {problem} = this.renderer;
     const {loading} = statistics;
-    set_text(this.places.status, problem ? problem_text(problem)
+    set_text(this.places.status, this.renderer.lost ? "The graphics card is not available: waiting for it."
+      : problem ? problem_text(problem)
       : loading > 0 ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"}…` : "");
     this.places.status.classList.toggle("bad", Boolean(problem));
   }

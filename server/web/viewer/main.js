@@ -102,11 +102,6 @@ async function start() {
   viewer = new Viewer({canvas, renderer, manifest, signal: lifetime.signal,
     file_name: (job ? title_text(job) : document.title).replace(/[^A-Za-z0-9._-]+/g, "-"),
     places: {panel: place("panel"), tools: place("tools"), status: place("status")}});
-  canvas.addEventListener("webglcontextlost", () => {
-    lifetime.abort();
-    show_message(h("h1", {}, "The graphics card was lost."), h("p", {}, "Reload the page to continue where you are."),
-      h("button", {type: "button", on: {click: () => location.reload()}}, "Reload"));
-  });
   window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
   canvas.focus({preventScroll: true});
 }

@@ -72,7 +72,7 @@ export class Panel {
 
   detail_part() {
     const {viewer, levels} = this;
-    this.level = h("input", {type: "range", min: "0", max: String(levels), step: "1",
+    this.level = h("input", {type: "range", min: "1", max: String(levels), step: "1",
                              on: {input: () => viewer.set_options({level: Number(this.level.value)})}});
     this.level_note = h("output", {class: "faint"});
     this.wire = h("select", {on: {change: () => viewer.set_options({wire: this.wire.value === "" ? null : Number(this.wire.value)})}},
@@ -119,7 +119,7 @@ export class Panel {
       ["Received", size_text(s.fetchedBytes)],
       ["Failed requests", count_text(s.failed)],
       ["Compiling the shaders", `${Math.round(s.compileMs)} ms`],
-      ["First picture", `${Math.round(s.firstPictureMs)} ms`],
+      ["First picture", s.firstPictureMs === null ? "–" : `${Math.round(s.firstPictureMs)} ms`],
     ];
     clear(this.statistics, rows.map(([name, value]) => fact(name, value)));
   }
