@@ -94,17 +94,17 @@ def check_mouse(visitor, camera):
     assert distance(shift, [b - a for a, b in zip(orbited["target"], panned["target"])]) < 1e-6 * math.hypot(*shift)
 
     visitor.show(camera)
-    point = page.evaluate("async () => (await voxdagViewer.renderer.pick(250, 150)).position")
+    point = page.evaluate("async () => (await voxdagViewer.renderer.pick(250, 100)).position")
     box = page.locator("#scene").bounding_box()
-    page.mouse.move(box["x"] + 250, box["y"] + 150)
+    page.mouse.move(box["x"] + 250, box["y"] + 100)
     for _ in range(3):
         page.mouse.wheel(0, -200)
         page.wait_for_timeout(120)
     zoomed = visitor.camera()
     assert distance(zoomed["eye"], point) < 0.8 * distance(before["eye"], point)
-    again = page.evaluate("async () => (await voxdagViewer.renderer.pick(250, 150)).position")
+    again = page.evaluate("async () => (await voxdagViewer.renderer.pick(250, 100)).position")
     assert distance(point, again) < 0.1 * distance(zoomed["eye"], point), "the cursor's place has moved"
-    page.mouse.dblclick(box["x"] + 250, box["y"] + 150)
+    page.mouse.dblclick(box["x"] + 250, box["y"] + 100)
     visitor.wait_until("([x]) => Math.abs(voxdagViewer.camera.target[0] - x) < 1e-6 + Math.abs(x) / 50", again)
     assert visitor.camera()["eye"] == zoomed["eye"]
     page.get_by_role("button", name="Reset").click()

@@ -40,7 +40,7 @@ CAPTURE = """async ([width, height]) => {
 class Visitor:
     """Records every error that the browser reports; leave() fails if there were any."""
 
-    def __init__(self, browser, pictures, name, width=800, height=320, **options):
+    def __init__(self, browser, pictures, name, width=720, height=230, **options):
         self.name, self.pictures = name, pictures
         self.context = browser.new_context(viewport={"width": width, "height": height}, accept_downloads=True,
                                            reduced_motion=options.pop("reduced_motion", "reduce"), **options)
@@ -53,7 +53,8 @@ class Visitor:
         self.page.on("pageerror", lambda error: self.errors.append(f"page error: {error}"))
 
     def on_console(self, message):
-        if message.type == "error" and not (self.expected and re.search(self.expected, message.text)):
+        is_error = message.type == "error" or "GL_INVALID" in message.text
+        if is_error and not (self.expected and re.search(self.expected, message.text)):
             self.errors.append(f"console: {message.text} ({message.location.get('url')})")
 
     def open(self, url, wait=True):

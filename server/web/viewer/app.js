@@ -50,7 +50,7 @@ export class Viewer {
     }, {once: true});
     this.resize();
     this.camera.set(this.first_camera());
-    if (!this.follow_bookmark()) this.set_options({});
+    this.follow_bookmark();
     this.show_mode();
     // What is seen first need not be waited for: until then the target is as good.
     this.seen.distance = this.camera.distance;
@@ -225,20 +225,17 @@ export class Viewer {
             occlusion: occlusion ? null : 0, shadows: shadows ? null : 0};
   }
 
-  // Returns whether the address names a camera that can be used.
+  // Takes camera and options from the address; a camera that cannot be used is left out.
   follow_bookmark() {
-    if (!this.bookmarks || location.hash === this.fragment) return false;
-    const members = new URLSearchParams(location.hash.slice(1));
+    if (location.hash === this.fragment) return;
+    const members = new URLSearchParams(this.bookmarks ? location.hash.slice(1) : "");
     try {
       const placement = parse_camera_fragment(this.space, members, kDefaultFov);
-      if (!placement) return false;
-      this.camera.set(placement);
+      if (placement) this.camera.set(placement);
     } catch (error) {
       announce(error.message);
-      return false;
     }
     this.set_options(this.options_of(members));
-    return true;
   }
 
   options_of(members) {
