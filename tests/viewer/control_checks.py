@@ -153,7 +153,7 @@ def tab_to(page, wanted, max_steps=60):
 def check_keyboard(visitor, url, camera):
     """All of it without a mouse, from the top of the page."""
     visitor.open(url)
-    visitor.show(camera)
+    visitor.show(camera, complete=False)
     page = visitor.page
     page.evaluate("document.activeElement.blur()")
     tab_to(page, "#home")
@@ -167,7 +167,7 @@ def check_keyboard(visitor, url, camera):
     page.keyboard.press("ArrowRight")
     assert visitor.camera()["eye"] == before["eye"] and visitor.camera()["target"] != before["target"], "no flight"
     page.keyboard.press("f")
-    visitor.show(camera)
+    visitor.show(camera, complete=False)
     page.keyboard.press("Enter")
     wait_for_pick(page)
     visitor.wait_until("document.getElementById('announcer').textContent.startsWith('Picked voxel')")
@@ -208,13 +208,13 @@ def check_keyboard_in_panel(visitor):
     assert page.evaluate(f"{option}.wire") == 0
     tab_to(page, "#switch-occlusion")
     page.keyboard.press("Space")
-    assert page.evaluate(f"{option}.occlusion") is False
+    assert page.evaluate(f"{option}.occlusion") is True
     visitor.camera_text()
-    for part in ("clip=", f"level={level - 1}", "wire=0", "occlusion=0"):
+    for part in ("clip=", f"level={level - 1}", "wire=0", "shadows=0"):
         assert part in page.url, f"{part} is not in the address {page.url}"
     page.reload()
     visitor.wait_until("Boolean(window.voxdagViewer)")
-    assert page.evaluate(f"[{option}.level, {option}.wire, {option}.occlusion]") == [level - 1, 0, False]
+    assert page.evaluate(f"[{option}.level, {option}.wire, {option}.occlusion]") == [level - 1, 0, True]
     visitor.picture("options")
 
 
@@ -225,7 +225,7 @@ def check_phone(visitor, url, camera):
     box = page.locator("#scene").bounding_box()
     assert box["width"] == 390 and box["height"] > 500, box
     visitor.picture("first")
-    visitor.show(camera)
+    visitor.show(camera, complete=False)
     x, y = center_of(page)
     session = visitor.context.new_cdp_session(page)
 
@@ -247,7 +247,7 @@ def check_phone(visitor, url, camera):
     touch("touchEnd")
     after = visitor.camera()
     assert distance(after["eye"], after["target"]) < 0.6 * distance(before["eye"], before["target"]), "no pinch"
-    visitor.show(camera)
+    visitor.show(camera, complete=False)
     page.touchscreen.tap(x, y)
     page.get_by_role("button", name="Panel").tap()
     wait_for_pick(page)
