@@ -1,0 +1,146 @@
+// Small helpers over WebGL2: programs whose uniforms are set by name, and render targets.
+
+import {kQuad} from "./picture_shaders.js";
+
+export class WebGLUnavailable extends Error {}
+
+const kSegmentUnits = 5;   // texture units of the pool and its table, from unit 0 on
+
+export class Program {
+  // Compilation runs in the background until ready() or use().
+  constructor(gl, name, fragment) {
+    this.gl = gl;
+    this.name = name;
+    this.program = gl.createProgram();
+    this.shaders = [[gl.VERTEX_SHADER, kQuad], [gl.FRAGMENT_SHADER, fragment]].map(([kind, text]) => {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      gl.attachShader(this.program, shader);
+      return shader;
+    });
+    gl.linkProgram(this.program);
+    this.uniforms = null;
+  }
+
+  // Whether the compiler is done, if `parallel` (KHR_parallel_shader_compile) can say so.
+  done(parallel) {
+    return !parallel || this.gl.getProgramParameter(this.program, parallel.COMPLETION_STATUS_KHR);
+  }
+
+  finish() {
+    const {gl} = this;
+    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
+      const logs = this.shaders.map((shader) => gl.getShaderInfoLog(shader) || "").join("\n");
+      throw new WebGLUnavailable(`The shader "${this.name}" does not compile: ` +
+                                 `${gl.getProgramInfoLog(this.program) || ""}\n${logs}`);
+    }
+    for (const shader of this.shaders) gl.deleteShader(shader);
+    this.uniforms = new Map();
+    let unit = kSegmentUnits;
+    gl.useProgram(this.program);
+    for (let i = 0; i < gl.getProgramParameter(this.program, gl.ACTIVE_UNIFORMS); ++i) {
+      const {name, type} = gl.getActiveUniform(this.program, i);
+      const location = gl.getUniformLocation(this.program, name);
+      const sampler = type === gl.SAMPLER_2D || type === gl.UNSIGNED_INT_SAMPLER_2D;
+      const pool = ["u_pool0", "u_pool1", "u_pool2", "u_pool3", "u_table"].indexOf(name);
+      const entry = {location, type, unit: pool >= 0 ? pool : sampler ? unit++ : -1};
+      if (sampler) gl.uniform1i(location, entry.unit);
+      this.uniforms.set(name, entry);
+    }
+  }
+
+  // Sets the uniforms that the program has, and runs it over the viewport. `target`: null for the canvas.
+  draw(target, values, width, height) {
+    const {gl} = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
+    gl.viewport(0, 0, width, height);
+    gl.useProgram(this.program);
+    for (const [name, {location, type, unit}] of this.uniforms) {
+      if (unit >= 0 && unit < kSegmentUnits) continue;
+      const value = values[name];
+      if (value === undefined) throw new Error(`The uniform ${name} of "${this.name}" has no value.`);
+      if (unit >= 0) {
+        gl.activeTexture(gl.TEXTURE0 + unit);
+        gl.bindTexture(gl.TEXTURE_2D, value);
+      } else {
+        set_uniform(gl, location, type, value);
+      }
+    }
+    gl.activeTexture(gl.TEXTURE0);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+}
+
+function set_uniform(gl, location, type, value) {
+  switch (type) {
+    case gl.FLOAT: return gl.uniform1f(location, value);
+    case gl.FLOAT_VEC2: return gl.uniform2f(location, ...value);
+    case gl.FLOAT_VEC3: return gl.uniform3f(location, ...value);
+    case gl.INT: case gl.BOOL: return gl.uniform1i(location, value);
+    case gl.INT_VEC2: return gl.uniform2i(location, ...value);
+    case gl.INT_VEC3: return gl.uniform3i(location, ...value);
+    case gl.UNSIGNED_INT: return gl.uniform1ui(location, value);
+    default: throw new Error(`a uniform has the type ${type}`);
+  }
+}
+
+// A framebuffer with textures of the formats, "RGBA32UI" and so on.
+export class Target {
+  constructor(gl, width, height, formats) {
+    this.gl = gl;
+    this.width = width;
+    this.height = height;
+    this.framebuffer = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
+    this.textures = formats.map((format, i) => {
+      const texture = gl.createTexture();
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      const filter = format === "RGBA16F" || format === "RGBA8" ? gl.LINEAR : gl.NEAREST;
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, filter);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, filter);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+      gl.texStorage2D(gl.TEXTURE_2D, 1, gl[format], width, height);
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, texture, 0);
+      return texture;
+    });
+    gl.drawBuffers(formats.map((_, i) => gl.COLOR_ATTACHMENT0 + i));
+  }
+
+  dispose() {
+    this.gl.deleteFramebuffer(this.framebuffer);
+    for (const texture of this.textures) this.gl.deleteTexture(texture);
+  }
+}
+
+// The pixels of an integer target, read without waiting for the GPU.
+export class AsyncReading {
+  constructor(gl, target) {
+    this.gl = gl;
+    this.length = target.width * target.height * 4;
+    this.buffer = gl.createBuffer();
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.buffer);
+    gl.bufferData(gl.PIXEL_PACK_BUFFER, this.length * 4, gl.STREAM_READ);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    gl.readBuffer(gl.COLOR_ATTACHMENT0);
+    gl.readPixels(0, 0, target.width, target.height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 0);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+  }
+
+  get ready() {
+    return this.gl.getSyncParameter(this.fence, this.gl.SYNC_STATUS) === this.gl.SIGNALED;
+  }
+
+  take() {
+    const {gl} = this, words = new Uint32Array(this.length);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.buffer);
+    gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, words);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+    gl.deleteBuffer(this.buffer);
+    gl.deleteSync(this.fence);
+    return words;
+  }
+}

@@ -1,0 +1,114 @@
+// Programs and targets of a picture, and the order in which its passes run.
+
+import {AsyncReading, Program, Target} from "./gl_objects.js";
+import {kCombine, kFeedback, kLight, kPick, kPresent, kTrace} from "./picture_shaders.js";
+
+const kHalfRange = 1;        // brightest light of a target with half floats
+const kByteRange = 8;        // and of one with bytes
+export const kFeedbackBlock = 4;
+
+export class Passes {
+  constructor(gl) {
+    this.gl = gl;
+    this.floats = Boolean(gl.getExtension("EXT_color_buffer_float") || gl.getExtension("EXT_color_buffer_half_float"));
+    this.parallel = gl.getExtension("KHR_parallel_shader_compile");
+    this.trace = new Program(gl, "trace", kTrace);
+    this.light = new Program(gl, "light", kLight);
+    this.combine = new Program(gl, "combine", kCombine);
+    this.present = new Program(gl, "present", kPresent);
+    this.feedback = new Program(gl, "feedback", kFeedback);
+    this.pick = null;
+    this.targets = null;
+    this.vertex_array = gl.createVertexArray();
+  }
+
+  get color_range() {
+    return this.floats ? kHalfRange : kByteRange;
+  }
+
+  // Resolves when all programs are compiled; the page stays responsive where the browser can compile in
+  // the background. Throws WebGLUnavailable if one cannot be.
+  async compile() {
+    const programs = [this.trace, this.light, this.combine, this.present, this.feedback];
+    while (!programs.every((program) => program.done(this.parallel)))
+      await new Promise((resolve) => setTimeout(resolve, 4));
+    for (const program of programs) program.finish();
+    this.gl.bindVertexArray(this.vertex_array);
+  }
+
+  // Targets of the size; those of another size are released.
+  resize(width, height) {
+    const {gl, targets} = this;
+    if (targets && targets.width === width && targets.height === height) return;
+    this.release_targets();
+    const color = this.floats ? "RGBA16F" : "RGBA8";
+    this.targets = {
+      width, height,
+      hits: new Target(gl, width, height, ["RGBA32UI"]),
+      light: new Target(gl, width, height, ["RGBA8", "R32UI", "R32UI"]),
+      colors: [new Target(gl, width, height, [color]), new Target(gl, width, height, [color])],
+      feedback: new Target(gl, Math.ceil(width / kFeedbackBlock), Math.ceil(height / kFeedbackBlock), ["RGBA32UI"]),
+      current: 0,
+    };
+  }
+
+  // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Returns the reading of the
+  // feedback.
+  draw(values) {
+    const {targets, gl} = this, {width, height, hits, light, colors, feedback} = targets;
+    gl.disable(gl.BLEND);
+    this.trace.draw(hits, values, width, height);
+    const share = this.floats ? 1 / (values.u_frame + 1) : 1;
+    const [before, after] = [colors[targets.current], colors[1 - targets.current]];
+    const all = {...values, u_hits: hits.textures[0], u_light: light.textures[0], u_normals: light.textures[1],
+                 u_shadow_missing: light.textures[2], u_before: before.textures[0], u_share: share,
+                 u_range: this.color_range, u_block: kFeedbackBlock,
+                 u_sample: [values.u_seed % kFeedbackBlock, Math.floor(values.u_seed / kFeedbackBlock) % kFeedbackBlock]};
+    this.light.draw(light, all, width, height);
+    this.combine.draw(after, all, width, height);
+    targets.current = 1 - targets.current;
+    this.feedback.draw(feedback, all, feedback.width, feedback.height);
+    return new AsyncReading(gl, feedback);
+  }
+
+  // Draws the accumulated picture to the canvas.
+  show(exposure, width, height) {
+    const {targets} = this;
+    this.present.draw(null, {u_color: targets.colors[targets.current].textures[0], u_extent: [width, height],
+                             u_exposure: exposure * this.color_range}, width, height);
+  }
+
+  // The hits of a picture of any size, as words of pack_hit(), rows from the bottom.
+  capture(values, width, height) {
+    const {gl} = this, target = new Target(gl, width, height, ["RGBA32UI"]);
+    this.trace.draw(target, values, width, height);
+    const words = new Uint32Array(width * height * 4);
+    gl.readPixels(0, 0, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+    target.dispose();
+    return words;
+  }
+
+  // The hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of the tile it is in.
+  pick_one(values) {
+    const {gl} = this;
+    if (!this.pick) {
+      this.pick = new Program(gl, "pick", kPick);
+      this.pick.finish();
+    }
+    const target = new Target(gl, 1, 1, ["RGBA32UI", "RGBA32UI"]), words = new Uint32Array(8);
+    this.pick.draw(target, values, 1, 1);
+    for (let i = 0; i < 2; ++i) {
+      gl.readBuffer(gl.COLOR_ATTACHMENT0 + i);
+      gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words.subarray(4 * i, 4 * i + 4));
+    }
+    target.dispose();
+    return words;
+  }
+
+  release_targets() {
+    if (!this.targets) return;
+    const {hits, light, colors, feedback} = this.targets;
+    for (const target of [hits, light, ...colors, feedback]) target.dispose();
+    this.targets = null;
+  }
+}

@@ -1,0 +1,336 @@
+// GLSL of the passes of a picture: trace (G-buffer), light (sky and sun), combine (filter, accumulate),
+// present (tones), feedback (what is missing, what was used). Lighting as in query/render/lighting.cc.
+
+import {kCameraSource, kPrecision, kRaySource} from "./ray_shader.js";
+
+const kVersion = `#version 300 es\n${kPrecision}`;
+
+export const kQuad = `${kVersion}
+void main() {
+  vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+  gl_Position = vec4(corner, 0.0, 1.0);
+}`;
+
+const kTraceMain = `
+uniform vec2 u_jitter;       // the ray's place in its pixel, from the pixel's center
+uniform float u_cone;        // width of the cone at distance 1
+uniform uint u_seed;
+layout(location = 0) out uvec4 o_hit;
+#ifdef PICK
+layout(location = 1) out uvec4 o_cell;
+#endif
+
+uvec4 pack_hit(bool found, Hit hit, uint steps, bool wire, uint slot) {
+  uint axis = hit.axis < 0 ? 3u : uint(hit.axis);
+  return uvec4(found ? floatBitsToUint(hit.t) : 0u,
+               min(steps, 65535u) | uint(hit.scale) << 16 | axis << 21 | (found ? 1u << 23 : 0u) |
+                   (wire ? 1u << 24 : 0u),
+               found ? hit.missing : 0u, slot);
+}
+
+void main() {
+  random_state = uint(gl_FragCoord.x) * 1973u + uint(gl_FragCoord.y) * 9277u + u_seed * 26699u;
+  set_ray(u_eye_cell, u_eye_part, direction_of(gl_FragCoord.xy + u_jitter));
+  Hit hit;
+  bool found = trace(0.0, 1e30, vec2(0.0, u_cone), hit);
+#ifdef WIRE
+  o_hit = pack_hit(found, hit, uint(step_count), wire, entered_slot);
+#else
+  o_hit = pack_hit(found, hit, uint(step_count), false, entered_slot);
+#endif
+#ifdef PICK
+  uint slot = 0u;
+  for (int s = hit.scale + 1; s < u_levels && slot == 0u; ++s)
+    if ((u_boundaries >> s & 1u) != 0u) slot = picked_slots[s];
+  o_cell = uvec4(uvec3(picked_cell), slot);
+#endif
+}`;
+
+export const kTrace = `${kVersion}
+#define WIRE\n${kRaySource}${kCameraSource}${kTraceMain}`;
+export const kPick = `${kVersion}
+#define PICK\n${kRaySource}${kCameraSource}${kTraceMain}`;
+
+const kSky = `
+const float kPi = 3.14159265;
+const vec3 kZenith = vec3(0.62, 0.78, 1.00), kHorizon = vec3(0.95, 0.98, 1.02), kGround = vec3(0.40, 0.36, 0.31);
+vec3 sky_color(vec3 direction) {
+  return mix(kHorizon, direction.y >= 0.0 ? kZenith : kGround, sqrt(abs(direction.y)));
+}
+// Unit vectors as two numbers of 16 bits: an octahedron, unfolded.
+uint pack_normal(vec3 n) {
+  n /= abs(n.x) + abs(n.y) + abs(n.z);
+  vec2 folded = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
+  vec2 p = n.z >= 0.0 ? n.xy : folded;
+  return packSnorm2x16(p);
+}
+vec3 unpack_normal(uint packed_normal) {
+  vec2 p = unpackSnorm2x16(packed_normal);
+  vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+  float t = max(-n.z, 0.0);
+  n.x += n.x >= 0.0 ? -t : t;
+  n.y += n.y >= 0.0 ? -t : t;
+  return normalize(n);
+}
+`;
+
+export const kLight = `${kVersion}${kRaySource}${kCameraSource}${kSky}
+uniform usampler2D u_hits;
+uniform vec2 u_jitter;
+uniform vec3 u_sun;          // unit vector toward the sun
+uniform float u_sky_reach;   // distance beyond which nothing occludes the sky
+uniform int u_frame;         // number of the sample
+uniform bool u_occlusion, u_shadows;
+layout(location = 0) out vec4 o_light;    // sky: red, green, blue; sun
+layout(location = 1) out uint o_normal;
+layout(location = 2) out uint o_missing;
+
+const float kBounce = 0.42, kSkyWidening = 0.1, kSunWidening = 0.006, kSunRadius = 0.006;
+const int kReach = 3;
+
+vec3 offset_of(ivec2 pixel, float t) {
+  return direction_of(vec2(pixel) + 0.5 + u_jitter) * t;
+}
+
+// The normal of the plane that best fits the surface near the pixel: the eigenvector of the covariance's
+// smallest eigenvalue, by inverse iteration.
+vec3 plane_normal(ivec2 pixel, vec3 center, float size, vec3 face, vec3 direction) {
+  ivec2 extent = textureSize(u_hits, 0);
+  float footprint = u_pixel * length(center), reach = (float(kReach) + 0.5) * max(size, footprint);
+  int stride = int(clamp(size / footprint, 1.0, 5.0));
+  float weight = 0.0;
+  vec3 first = vec3(0), squares = vec3(0), products = vec3(0);
+  for (int j = -kReach; j <= kReach; ++j)
+    for (int i = -kReach; i <= kReach; ++i) {
+      ivec2 at = pixel + ivec2(i, j) * stride;
+      if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, extent))) continue;
+      uvec4 g = texelFetch(u_hits, at, 0);
+      if (!found_in(g)) continue;
+      vec3 d = (offset_of(at, t_in(g)) - center) / reach;
+      float rest = 1.0 - dot(d, d);
+      if (rest <= 0.0) continue;
+      float w = rest * rest;
+      weight += w;
+      first += w * d;
+      squares += w * d * d;
+      products += w * d.yzx * d.zxy;
+    }
+  if (weight < 2.0) return face;
+  vec3 c0 = vec3(squares.x, products.z, products.y) - first * (first.x / weight);
+  vec3 c1 = vec3(products.z, squares.y, products.x) - first * (first.y / weight);
+  vec3 c2 = vec3(products.y, products.x, squares.z) - first * (first.z / weight);
+  float trace_inverse = 1.0 / max(c0.x + c1.y + c2.z, 1e-9);
+  c0 = c0 * trace_inverse + vec3(1e-3, 0, 0);
+  c1 = c1 * trace_inverse + vec3(0, 1e-3, 0);
+  c2 = c2 * trace_inverse + vec3(0, 0, 1e-3);
+  vec3 a0 = cross(c1, c2), a1 = cross(c2, c0), a2 = cross(c0, c1);
+  float scale = 1.0 / (a0.x + a1.y + a2.z);
+  vec3 toward_eye = face - direction, n = toward_eye;
+  for (int i = 0; i < 8; ++i) n = vec3(dot(a0, n), dot(a1, n), dot(a2, n)) * scale;
+  n = normalize(n);
+  return dot(n, direction) > 0.0 ? -n : n;
+}
+
+void basis_around(vec3 n, out vec3 a, out vec3 b) {
+  a = normalize(abs(n.x) > 0.7 ? cross(n, vec3(0, 1, 0)) : cross(n, vec3(1, 0, 0)));
+  b = cross(n, a);
+}
+
+// Begins a ray at an offset from the eye.
+void set_ray_from(vec3 offset, vec3 direction) {
+  vec3 p = u_eye_part + offset, whole = floor(p);
+  set_ray(u_eye_cell + ivec3(whole), p - whole, direction);
+}
+
+// The R2 sequence, begun for each pixel at one of 16 places, that differ within every 4 x 4 pixels.
+vec2 sample_pair(ivec2 pixel, int dimension) {
+  int place = (pixel.x & 3) * 4 + (pixel.y & 3);
+  float n = float(u_frame * 16 + place * 7 % 16);
+  return fract(vec2(0.1 + 0.37 * float(dimension), 0.6 + 0.21 * float(dimension)) +
+               n * vec2(0.7548776662, 0.5698402910));
+}
+
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  uvec4 g = texelFetch(u_hits, pixel, 0);
+  o_light = vec4(0);
+  o_normal = 0u;
+  o_missing = 0u;
+  if (!found_in(g)) return;
+  vec3 direction = direction_of(gl_FragCoord.xy + u_jitter);
+  float t = t_in(g), size = size_in(g);
+  vec3 center = direction * t, face = -direction;
+  if (axis_in(g) < 3) {
+    face = vec3(0);
+    face[axis_in(g)] = direction[axis_in(g)] > 0.0 ? -1.0 : 1.0;
+  }
+  float cube = clamp((size / max(t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
+  vec3 normal = face;
+  if (cube < 1.0) normal = normalize(mix(plane_normal(pixel, center, size, face, direction), face, cube));
+  o_normal = pack_normal(normal);
+
+  // The start clears the steps that the cells of a slope form.
+  vec3 start = center + normal * (size * 2.2 * (1.0 - cube)) + face * (size * 0.01);
+  Hit hit;
+  vec3 a, b;
+  float sun = 1.0;
+  if (dot(normal, u_sun) <= 0.0) {
+    sun = 0.0;
+  } else if (u_shadows) {
+    basis_around(u_sun, a, b);
+    vec2 p = sample_pair(pixel, 1);
+    float r = kSunRadius * sqrt(p.x), angle = 2.0 * kPi * p.y;
+    vec3 toward = normalize(u_sun + a * (r * cos(angle)) + b * (r * sin(angle)));
+    vec2 cone = vec2(max(size, 1.5 * u_pixel * t), kSunWidening);
+    set_ray_from(start, toward);
+    bool blocked = trace(0.0, 1e30, cone, hit);
+    if (blocked && hit.t == 0.0) {
+      // In a narrow place the start may be occupied; the way that the ray came is free.
+      start = direction * (t - 1.5 * size);
+      set_ray_from(start, toward);
+      blocked = trace(0.0, 1e30, cone, hit);
+    }
+    if (blocked) {
+      sun = 0.0;
+      o_missing = hit.missing;
+    }
+  }
+  vec3 sky = sky_color(normal);
+  if (u_occlusion) {
+    basis_around(normal, a, b);
+    vec2 p = sample_pair(pixel, 0);
+    float r = sqrt(p.x), angle = 2.0 * kPi * p.y;
+    vec3 toward = a * (r * cos(angle)) + b * (r * sin(angle)) + normal * sqrt(1.0 - p.x);
+    set_ray_from(start, toward);
+    float open = 1.0;
+    if (trace(0.0, u_sky_reach, vec2(max(size, 1.5 * u_pixel * t), kSkyWidening), hit)) {
+      float distance = hit.t / u_sky_reach;
+      open = kBounce * sqrt(distance) * (1.0 - distance) + distance * distance * distance;
+    }
+    sky = sky_color(toward) * open;
+  }
+  o_light = vec4(sky / 1.1, sun);
+}`;
+
+const kReflected = `
+const vec3 kAlbedo = vec3(0.74, 0.70, 0.64), kSunlight = vec3(3.6, 3.2, 2.6);
+vec3 reflected(vec3 normal, vec4 light) {
+  return kAlbedo * (light.rgb * 1.1 + kSunlight * (light.a * max(0.0, dot(normal, u_sun))));
+}
+`;
+
+// Light is averaged over 4 x 4 pixels on the same plane, in which the samples differ. The result is
+// multiplied by its coverage, from which haze takes a share.
+export const kCombine = `${kVersion}${kCameraSource}${kSky}
+uniform usampler2D u_hits, u_normals;
+uniform sampler2D u_light, u_before;
+uniform vec2 u_jitter;
+uniform vec3 u_sun;
+uniform vec2 u_haze;         // where it begins, and 1 / the scene's diagonal
+uniform float u_share;       // of this sample among those so far
+uniform float u_range;       // the brightest light that the target can hold
+layout(location = 0) out vec4 o_color;
+${kReflected}
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy), extent = textureSize(u_hits, 0);
+  uvec4 g = texelFetch(u_hits, pixel, 0);
+  vec4 color = vec4(0);
+  if (found_in(g)) {
+    float t = t_in(g), slack = 3.0 * u_pixel * t + 0.5 * size_in(g);
+    vec3 center = direction_of(gl_FragCoord.xy + u_jitter) * t;
+    vec3 normal = unpack_normal(texelFetch(u_normals, pixel, 0).x);
+    vec4 sum = vec4(0);
+    float weights = 0.0;
+    for (int j = -2; j < 2; ++j)
+      for (int i = -2; i < 2; ++i) {
+        ivec2 at = clamp(pixel + ivec2(i, j), ivec2(0), extent - 1);
+        uvec4 other = texelFetch(u_hits, at, 0);
+        if (!found_in(other)) continue;
+        float alike = max(0.0, dot(normal, unpack_normal(texelFetch(u_normals, at, 0).x)));
+        vec3 offset = direction_of(vec2(at) + 0.5 + u_jitter) * t_in(other) - center;
+        float w = alike * alike * alike * alike * max(0.0, 1.0 - abs(dot(normal, offset)) / slack);
+        sum += w * texelFetch(u_light, at, 0);
+        weights += w;
+      }
+    vec4 light = texelFetch(u_light, pixel, 0);
+    if (weights > 0.0) light.rgb = sum.rgb / weights;
+    if (weights > 0.0) light.a = mix(light.a, sum.a / weights, 0.5);
+    float depth = max(0.0, t - u_haze.x) * u_haze.y;
+    float coverage = 1.0 - 0.25 * (1.0 - exp(-depth * depth));
+    color = vec4(reflected(normal, light) * coverage / u_range, coverage);
+  }
+  if (wire_in(g)) color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, 0.7), max(color.a, 0.7));
+  o_color = u_share < 1.0 ? mix(texelFetch(u_before, pixel, 0), color, u_share) : color;
+}`;
+
+export const kPresent = `${kVersion}
+uniform sampler2D u_color;
+uniform vec2 u_extent;       // of the canvas, in pixels
+uniform float u_exposure;    // includes the range of the target
+out vec4 o_color;
+
+const vec3 kTop = vec3(0.46, 0.54, 0.65), kBottom = vec3(0.86, 0.87, 0.88);
+
+// A filmic curve that compresses bright light: the ACES fit of Narkowicz 2015.
+vec3 tone_map(vec3 x) {
+  return min(vec3(1), x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14));
+}
+vec3 srgb(vec3 v) {
+  return mix(12.92 * v, 1.055 * pow(max(v, vec3(1e-5)), vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), v));
+}
+void main() {
+  vec2 place = gl_FragCoord.xy / u_extent;
+  vec4 color = texture(u_color, place);
+  vec3 background = mix(kBottom, kTop, place.y);
+  vec3 lit = tone_map(color.rgb / max(color.a, 1e-3) * u_exposure);
+  // Ordered dither, so that gradients show no steps.
+  ivec2 p = ivec2(gl_FragCoord.xy) & 3;
+  int order = (p.x ^ p.y) & 1 | (p.y & 1) << 1 | ((p.x ^ p.y) & 2) << 1 | (p.y & 2) << 2;
+  order = (order & 1) << 3 | (order & 2) << 1 | (order & 4) >> 1 | order >> 3;
+  o_color = vec4(srgb(mix(background, lit, color.a)) + (float(order) / 16.0 - 0.47) / 255.0, 1.0);
+}`;
+
+// One texel for each block of u_block x u_block pixels: a cut-off node whose tile is missing (that of the
+// largest cell), how many pixels wide that cell is and how bright a sample, a tile that was used and the
+// steps of a sample, the sample's t. A sample is a pixel of the block that changes with each frame.
+export const kFeedback = `${kVersion}${kCameraSource}${kSky}
+uniform usampler2D u_hits, u_normals, u_shadow_missing;
+uniform sampler2D u_light;
+uniform vec3 u_sun;
+uniform int u_block;
+uniform ivec2 u_sample;
+layout(location = 0) out uvec4 o_feedback;
+${kReflected}
+const float kShadowPixels = 0.25;  // weight of tiles that only shadows need
+
+void main() {
+  ivec2 first = ivec2(gl_FragCoord.xy) * u_block, last = textureSize(u_hits, 0) - 1;
+  uint missing = 0u, shadow_missing = 0u;
+  float pixels = 0.0;
+  for (int j = 0; j < u_block; ++j)
+    for (int i = 0; i < u_block; ++i) {
+      ivec2 at = min(first + ivec2(i, j), last);
+      uvec4 g = texelFetch(u_hits, at, 0);
+      if (!found_in(g)) continue;
+      float width = size_in(g) / max(t_in(g) * u_pixel, 1e-6);
+      if (g.z != 0u && width > pixels) {
+        pixels = width;
+        missing = g.z;
+      }
+      uint other = texelFetch(u_shadow_missing, at, 0).x;
+      if (other != 0u) shadow_missing = other;
+    }
+  if (missing == 0u && shadow_missing != 0u) {
+    missing = shadow_missing;
+    pixels = kShadowPixels;
+  }
+  ivec2 at = min(first + u_sample, last);
+  uvec4 g = texelFetch(u_hits, at, 0);
+  float luminance = 0.0;
+  if (found_in(g)) {
+    vec3 normal = unpack_normal(texelFetch(u_normals, at, 0).x);
+    luminance = dot(reflected(normal, texelFetch(u_light, at, 0)), vec3(0.2126, 0.7152, 0.0722));
+  }
+  o_feedback = uvec4(missing, packHalf2x16(vec2(min(pixels, 60000.0), luminance)),
+                     g.w | min(steps_in(g) >> 1, 1023u) << 22, g.x);
+}`;

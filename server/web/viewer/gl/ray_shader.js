@@ -1,0 +1,238 @@
+// GLSL: the pool's words, and the descent of one ray through the DAG (as query/ray_walk.h does it).
+//
+// The ray is mirrored so that its direction is positive on every axis. Voxel coordinates are integers.
+// A ray begins at an integer voxel plus a fraction, and the parameter of a plane is computed from the
+// difference of two integers by one formula, time_of: exact to the last step for any grid up to 2^20,
+// wherever the camera is. Cells on both sides of a plane agree to the last bit, so there are no cracks.
+
+export const kPrecision = `
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+precision highp sampler2D;
+`;
+
+export const kMaxSteps = 4096;
+
+// Uniforms of the pool, and of all rays of a picture.
+export const kPoolSource = `
+uniform usampler2D u_pool0, u_pool1, u_pool2, u_pool3, u_table;
+uniform uint u_segment;      // words per texture of the pool
+uniform uint u_root;         // address of the root
+uniform int u_levels;        // the grid has 2^u_levels voxels per edge
+uniform uint u_boundaries;   // bit s: nodes with 2^s voxels per edge are the roots of tiles
+uniform ivec3 u_clip_low, u_clip_high;
+uniform vec2 u_cell_sizes;   // smallest and largest cell that is hit as a whole, in voxels
+
+uint word(uint a) {
+  if (a < u_segment) return texelFetch(u_pool0, ivec2(a & 4095u, a >> 12), 0).x;
+  a -= u_segment;
+  if (a < u_segment) return texelFetch(u_pool1, ivec2(a & 4095u, a >> 12), 0).x;
+  a -= u_segment;
+  if (a < u_segment) return texelFetch(u_pool2, ivec2(a & 4095u, a >> 12), 0).x;
+  a -= u_segment;
+  return texelFetch(u_pool3, ivec2(a & 4095u, a >> 12), 0).x;
+}
+
+// 1 + the address of the slot's tile, 0 if it is not loaded.
+uint tile_of(uint slot) {
+  return slot == 0u ? 0u : texelFetch(u_table, ivec2(slot & 1023u, slot >> 10), 0).x;
+}
+
+uint popcount8(uint x) {
+  x -= x >> 1 & 0x55u;
+  x = (x & 0x33u) + (x >> 2 & 0x33u);
+  return (x + (x >> 4)) & 15u;
+}
+`;
+
+export const kRaySource = `${kPoolSource}
+struct Hit {
+  float t;
+  int scale;       // the cell has 2^scale voxels per edge
+  int axis;        // of the face that the ray entered by; -1 if it began in the cell
+  uint missing;    // address of the cut-off node whose tile would have been needed; 0: none
+};
+
+ivec3 ray_base;
+vec3 ray_shift, ray_inverse;
+uint ray_mirror;
+int step_count = 0;
+uint random_state = 1u;
+uint entered_count = 0u, entered_slot = 0u;  // one of the tiles that were entered, chosen at random
+#ifdef WIRE
+uniform int u_wire_scale;    // of the cubes that are drawn; -1: none
+uniform float u_wire_width;  // half of a line's, at distance 1
+bool wire = false;
+#endif
+#ifdef PICK
+ivec3 picked_cell;
+uint picked_slots[21];
+#endif
+
+// A ray that begins at cell + part, in voxels. A smaller component of a direction counts as 0.
+void set_ray(ivec3 cell, vec3 part, vec3 direction) {
+  ivec3 negative = ivec3(lessThan(direction, vec3(0)));
+  ray_base = cell + negative * ((1 << u_levels) - 2 * cell);
+  ray_shift = part * vec3(2 * negative - 1);
+  ray_inverse = 1.0 / max(abs(direction), vec3(1e-18));
+  ray_mirror = uint(negative.x << 2 | negative.y << 1 | negative.z);
+}
+
+vec3 time_of(ivec3 plane) {
+  return (vec3(plane - ray_base) + ray_shift) * ray_inverse;
+}
+
+uint child_at(ivec3 position, int scale) {
+  ivec3 bits = position >> scale & 1;
+  return uint(bits.x << 2 | bits.y << 1 | bits.z) ^ ray_mirror;
+}
+
+int nearest_axis(vec3 next) {
+  return next.x <= next.y ? (next.x <= next.z ? 0 : 2) : (next.y <= next.z ? 1 : 2);
+}
+
+void note_tile(uint slot) {
+  random_state = random_state * 1664525u + 1013904223u;
+  ++entered_count;
+  if ((random_state >> 8) % entered_count == 0u) entered_slot = slot;
+}
+
+#ifdef WIRE
+// Whether the ray enters the cell near an edge of the face.
+void note_wire(ivec3 position, int scale, int axis, float t) {
+  if (scale != u_wire_scale || axis < 0) return;
+  vec3 inward = (t - time_of(position)) / ray_inverse;
+  vec3 outward = (time_of(position + (1 << scale)) - t) / ray_inverse;
+  vec3 nearest = min(inward, outward);
+  nearest[axis] = 1e30;
+  if (min(nearest.x, min(nearest.y, nearest.z)) < u_wire_width * t) wire = true;
+}
+#endif
+
+// The first occupied cell between t_min and t_max. An occupied cell that is no wider than the cone,
+// which is cone.x + cone.y * t wide, is hit as a whole; so is the finest cell of the coarse brick of a
+// tile that is not loaded.
+bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
+  int edge = 1 << u_levels;
+  ivec3 mirrored = ivec3(ray_mirror >> 2 & 1u, ray_mirror >> 1 & 1u, ray_mirror & 1u);
+  vec3 first = time_of(u_clip_low + mirrored * (edge - u_clip_high - u_clip_low));
+  vec3 last = time_of(u_clip_high + mirrored * (edge - u_clip_high - u_clip_low));
+  float t = t_min;
+  int axis = -1;
+  if (first.x > t) { t = first.x; axis = 0; }
+  if (first.y > t) { t = first.y; axis = 1; }
+  if (first.z > t) { t = first.z; axis = 2; }
+  float t_end = min(min(last.x, last.y), min(last.z, t_max));
+  hit = Hit(t, u_levels, axis, 0u);
+  if (t > t_end) return false;
+  if (float(edge) <= clamp(cone.x + cone.y * t, u_cell_sizes.x, u_cell_sizes.y)) return true;
+
+  uint stack[21];            // at s: the node whose children have 2^s voxels per edge
+  uint mask = word(u_root), node = u_root, leaf = 0u, octant = 0u;
+  uvec2 brick = uvec2(0);
+  int brick_scale = -1;      // of the brick that the ray is in; -1: none
+  ivec3 position = ivec3(0);
+  int scale = u_levels - 1;
+  if (u_levels == 2) {
+    brick = uvec2(mask, word(u_root + 1u));
+    brick_scale = 2;
+  }
+  stack[scale] = node;
+  position += ivec3(greaterThanEqual(vec3(t), time_of(ivec3(1 << scale)))) << scale;
+  for (int i = 0; i < ${kMaxSteps}; ++i) {
+    ++step_count;
+    uint child = child_at(position, scale);
+    bool occupied;
+    if (scale >= brick_scale) {
+      occupied = (mask >> child & 1u) != 0u;
+    } else if (scale == brick_scale - 1) {
+      octant = (child < 4u ? brick.x : brick.y) >> (8u * (child & 3u)) & 255u;
+      occupied = octant != 0u;
+    } else {
+      occupied = (octant >> child & 1u) != 0u;
+    }
+    if (occupied) {
+#ifdef WIRE
+      note_wire(position, scale, axis, t);
+#endif
+      bool whole = float(1 << scale) <= clamp(cone.x + cone.y * t, u_cell_sizes.x, u_cell_sizes.y);
+      if (whole || scale < brick_scale - 1) {
+        hit = Hit(t, scale, axis, whole ? 0u : leaf);
+#ifdef PICK
+        picked_cell = position + mirrored * (edge - (1 << scale) - 2 * position);
+#endif
+        return true;
+      }
+      if (scale >= brick_scale) {
+        uint a = word(node + 1u + popcount8(mask & ((1u << child) - 1u)));
+        if (scale == 2) {
+          brick = uvec2(word(a), word(a + 1u));
+          brick_scale = 2;
+          leaf = 0u;
+        } else if ((u_boundaries >> scale & 1u) == 0u) {
+          node = a;
+          mask = word(node);
+          stack[scale - 1] = node;
+        } else {
+          uint slot = word(a), tile = tile_of(slot);
+          if (tile != 0u) {
+            node = tile - 1u;
+            mask = word(node);
+            stack[scale - 1] = node;
+            note_tile(slot);
+#ifdef PICK
+            picked_slots[scale] = slot;
+#endif
+          } else {
+            brick = uvec2(word(a + 1u), word(a + 2u));
+            brick_scale = scale;
+            leaf = a;
+          }
+        }
+      }
+      --scale;
+      position += ivec3(greaterThanEqual(vec3(t), time_of(position + (1 << scale)))) << scale;
+      continue;
+    }
+    vec3 next = time_of(position + (1 << scale));
+    axis = nearest_axis(next);
+    t = next[axis];
+    if (t >= t_end) return false;
+    int from = position[axis], to = from + (1 << scale), changed = from ^ to;
+    position[axis] = to;
+    if (changed >> scale > 1) {
+      // The ray leaves the parent: up to the lowest node that both cells are in.
+      scale = int(floatBitsToUint(float(changed)) >> 23) - 127;
+      if (scale >= u_levels) return false;
+      position &= -1 << scale;
+      if (scale >= brick_scale) {
+        brick_scale = -1;
+        node = stack[scale];
+        mask = word(node);
+      }
+    }
+  }
+  return false;
+}
+`;
+
+// The ray of a pixel, as query/render/camera.h; and the layout of a G-buffer's pixel.
+export const kCameraSource = `
+uniform ivec3 u_eye_cell;
+uniform vec3 u_eye_part, u_forward, u_right, u_up;
+uniform float u_pixel;       // width of a pixel at distance 1
+uniform vec2 u_center;       // of the picture, in pixels from its lower left corner
+
+vec3 direction_of(vec2 point) {
+  vec2 p = (point - u_center) * u_pixel;
+  return normalize(u_forward + u_right * p.x + u_up * p.y);
+}
+
+bool found_in(uvec4 g) { return (g.y >> 23 & 1u) != 0u; }
+bool wire_in(uvec4 g) { return (g.y >> 24 & 1u) != 0u; }
+float t_in(uvec4 g) { return uintBitsToFloat(g.x); }
+float size_in(uvec4 g) { return float(1 << int(g.y >> 16 & 31u)); }
+int axis_in(uvec4 g) { return int(g.y >> 21 & 3u); }
+uint steps_in(uvec4 g) { return g.y & 65535u; }
+`;

@@ -1,0 +1,357 @@
+// Draws a file of any size by casting rays through the tiles that are there, asks for those that are
+// missing, and does so within a budget of GPU memory (docs/view.md).
+
+import {WebGLUnavailable} from "./gl/gl_objects.js";
+import {Passes} from "./gl/passes.js";
+import {read_feedback} from "./gl/feedback.js";
+import {add, normalized, View} from "./gl/view.js";
+import {TileLoader} from "./tiles/tile_loader.js";
+import {TilePool} from "./tiles/tile_pool.js";
+import {TileStore} from "./tiles/tile_store.js";
+
+export {WebGLUnavailable};
+
+const kMebibyte = 1 << 20;
+const kBudgetBytes = 256 * kMebibyte, kPhoneBudgetBytes = 64 * kMebibyte;
+const kMovingMs = 180;          // after the last change of the view
+const kTargetMs = 40;           // of a frame while the camera moves
+const kSamples = 16;            // per pixel of a still picture
+const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
+const kConeShare = 0.75;        // of a pixel: the width at which a cell is hit as a whole
+const kFinePixels = 3;          // wide is a cell whose tile may arrive late
+const kQuietRounds = 2;         // readings without a missing tile until a view is complete
+
+export class Renderer {
+  constructor(canvas, source, {budgetBytes, onChange} = {}) {
+    this.canvas = canvas;
+    this.source = source;
+    this.on_change = onChange || (() => {});
+    const phone = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
+    this.budget_bytes = budgetBytes || (phone ? kPhoneBudgetBytes : kBudgetBytes);
+    this.options = {minLevel: 0, maxLevel: null, clip: null, ambientOcclusion: true, sunShadows: true,
+                    pixelTolerance: 1, wireLevel: null};
+    this.view = null;
+    this.sun = normalized([0.5, 0.8, 0.3]);
+    this.light = {exposure: 1, sky_reach: 1, haze_start: 0, known: false};
+    this.size = {width: canvas.width, height: canvas.height, css_width: canvas.width, css_height: canvas.height};
+    this.times = {view_ms: -1e9, frame_ms: 0, last_ms: 0, begin_ms: performance.now(), first_picture_ms: null, compile_ms: 0};
+    this.scale_index = 0;
+    this.seed = 0;
+    this.samples = 0;
+    this.quiet_rounds = 0;
+    this.coarse_pixels = 0;
+    this.stats = {steps_mean: 0, steps_99: 0, rays: 0};
+    this.waiting = [];
+    this.lost = false;
+    this.disposed = false;
+    this.gl = canvas.getContext("webgl2", {alpha: false, antialias: false, depth: false, powerPreference: "high-performance",
+                                           preserveDrawingBuffer: true});
+    if (!this.gl) throw new WebGLUnavailable("This browser or its graphics driver does not offer WebGL 2.");
+    canvas.addEventListener("webglcontextlost", this.on_lost);
+    canvas.addEventListener("webglcontextrestored", this.on_restored);
+    this.create_programs();
+  }
+
+  // Resolves when the first picture can be drawn.
+  async start() {
+    this.info = await this.source.manifest();
+    await this.compiled;
+    await this.load_root();
+    const camera = this.info.camera;
+    if (camera) this.place_sun(camera.position, camera.target);
+  }
+
+  setView(placement) {
+    const view = new View(placement);
+    if (view.equals(this.view)) return;
+    this.view = view;
+    this.times.view_ms = performance.now();
+    this.begin_epoch();
+  }
+
+  setOptions(options) {
+    Object.assign(this.options, options);
+    this.begin_epoch();
+  }
+
+  resize(css_width, css_height, pixel_ratio) {
+    const limit = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE);
+    const width = Math.min(limit, Math.max(1, Math.round(css_width * pixel_ratio)));
+    const height = Math.min(limit, Math.max(1, Math.round(css_height * pixel_ratio)));
+    const same = width === this.canvas.width && height === this.canvas.height && width === this.size.width;
+    this.size = {width, height, css_width, css_height};
+    if (same) return;
+    this.canvas.width = width;
+    this.canvas.height = height;
+    this.begin_epoch();
+  }
+
+  // Draws a frame if there is something new to draw and the GPU is done with the last one.
+  frame(now_ms) {
+    const now = performance.now(), moving = now - this.times.view_ms < kMovingMs;
+    if (this.lost || this.disposed || !this.view || !this.loader) return {moving, complete: false};
+    if (this.empty) {
+      this.draw_empty();
+      return {moving: false, complete: true};
+    }
+    if (this.reading) {
+      if (!this.reading.pass.ready) return {moving, complete: false};
+      this.take_reading(now);
+    }
+    if (!moving && this.samples >= kSamples && this.is_complete) return {moving, complete: true};
+    if (!moving && this.stuck(now)) return {moving, complete: true};
+    this.draw(now, moving);
+    return {moving, complete: false};
+  }
+
+  // Resolves when all tiles of the view have arrived.
+  complete() {
+    if (this.is_complete && !this.reading) return Promise.resolve();
+    return new Promise((resolve) => {
+      this.waiting.push(resolve);
+      this.on_change();
+    });
+  }
+
+  // What is seen at a point of the canvas, null for the sky.
+  async pick(css_x, css_y) {
+    if (this.empty || this.lost) return null;
+    const {width, height} = this.size;
+    const x = css_x / this.size.css_width * width, y = css_y / this.size.css_height * height;
+    const values = this.uniforms(width, height, width, height);
+    values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
+    this.store.pool.bind(0);
+    const words = this.passes.pick_one(values);
+    if (!(words[1] >>> 23 & 1)) return null;
+    const distance = new Float32Array(words.buffer, 0, 1)[0], scale = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
+    const direction = this.view.direction(x, y, width, height);
+    const normal = axis === 3 ? direction.map((d) => -d) : [0, 0, 0];
+    if (axis < 3) normal[axis] = direction[axis] > 0 ? -1 : 1;
+    const node = words[2] !== 0 ? this.store.cut_off_node(words[2]) : this.store.by_slot[words[7]]?.tile || this.info.root;
+    return {voxel: [...words.slice(4, 7)], level: this.info.levels - scale, position: add(this.view.eye, direction, distance),
+            distance, normal, nodeLevel: node.level, nodeOffset: String(node.offset)};
+  }
+
+  // Hits of a picture of any size with the tiles that are there, rows from the top.
+  async capture({width, height}) {
+    const depth = new Float32Array(width * height).fill(Infinity), level = new Uint8Array(width * height);
+    const steps = new Uint16Array(width * height);
+    if (this.empty) return {depth, level, steps};
+    this.store.pool.bind(0);
+    const words = this.passes.capture(this.uniforms(width, height, width, height), width, height);
+    const floats = new Float32Array(words.buffer);
+    for (let i = 0; i < width * height; ++i) {
+      const from = 4 * ((height - 1 - Math.floor(i / width)) * width + i % width);
+      steps[i] = words[from + 1] & 0xffff;
+      if (!(words[from + 1] >>> 23 & 1)) continue;
+      depth[i] = floats[from];
+      level[i] = this.info.levels - (words[from + 1] >>> 16 & 31);
+    }
+    return {depth, level, steps};
+  }
+
+  statistics() {
+    const {loader, store, passes, times} = this;
+    return {
+      fps: times.frame_ms > 0 ? 1000 / times.frame_ms : 0, tiles: store?.tiles.size || 0, tileBytes: store?.tile_bytes || 0,
+      poolBytes: store?.pool.bytes || 0, budgetBytes: this.budget_bytes, requested: loader?.requested_total || 0,
+      failed: loader?.failed_total || 0, loading: loader ? loader.loading.size + loader.queue.length : 0, full: loader?.is_full || false,
+      evicted: store?.evicted || 0, rays: this.stats.rays, stepsMean: this.stats.steps_mean, steps99: this.stats.steps_99,
+      internalWidth: passes?.targets?.width || 0, internalHeight: passes?.targets?.height || 0,
+      samples: this.samples, compileMs: times.compile_ms, firstPictureMs: times.first_picture_ms,
+      fetchedBytes: this.source.fetched_bytes,
+    };
+  }
+
+  // null, or {code, message} of what stops tiles from arriving.
+  get problem() {
+    return this.loader?.problem || null;
+  }
+
+  dispose() {
+    this.disposed = true;
+    this.canvas.removeEventListener("webglcontextlost", this.on_lost);
+    this.canvas.removeEventListener("webglcontextrestored", this.on_restored);
+    this.loader?.dispose();
+    this.passes.release_targets();
+    this.store?.pool.dispose();
+  }
+
+  create_programs() {
+    const begin = performance.now();
+    this.passes = new Passes(this.gl);
+    this.compiled = this.passes.compile().then(() => {
+      this.times.compile_ms = performance.now() - begin;
+    });
+    this.compiled.catch(() => {});  // start() reports it
+    this.reading = null;
+  }
+
+  async load_root() {
+    const {root, levels} = this.info;
+    this.empty = !root && !this.info.root_brick;
+    this.store = new TileStore(new TilePool(this.gl, this.budget_bytes));
+    this.loader = new TileLoader(this.source, this.store, () => this.on_arrival());
+    if (root && levels > 2) {
+      await this.loader.load_root(root.level, root.offset);
+      this.root_address = this.store.root.address;
+    } else if (!this.empty) {
+      this.root_address = this.store.add_brick(this.info.root_brick);
+    }
+    this.begin_epoch();
+    this.on_change();
+  }
+
+  begin_epoch() {
+    this.samples = 0;
+    this.quiet_rounds = 0;
+    this.store?.begin_epoch();
+    this.loader?.begin_epoch();
+    this.on_change();
+  }
+
+  // A few fine tiles that arrive late do not begin the picture again: its other samples will have them.
+  on_arrival() {
+    if (!this.is_complete || this.coarse_pixels > kFinePixels) {
+      this.samples = 0;
+      this.quiet_rounds = 0;
+    }
+    this.on_change();
+  }
+
+  on_lost = (event) => {
+    event.preventDefault();
+    this.lost = true;
+    this.loader?.dispose();
+    this.reading = null;
+  };
+
+  on_restored = async () => {
+    this.lost = false;
+    this.create_programs();
+    try {
+      await this.compiled;
+      await this.load_root();
+    } catch (error) {
+      console.error(error);
+    }
+  };
+
+  place_sun(position, target) {
+    const {origin, edge} = this.info, back = add(position, target, -1);
+    this.outside = position.some((x, i) => x < origin[i] || x > origin[i] + edge);
+    const turn = Math.atan2(back[2], back[0]) + 0.9, height = this.outside ? 0.65 : 0.9;
+    this.sun = [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
+  }
+
+  get is_complete() {
+    return this.quiet_rounds >= kQuietRounds;
+  }
+
+  // Whether tiles are missing that will not come, and all that can be drawn is drawn.
+  stuck(now) {
+    return this.samples >= kSamples && this.loader.is_idle && !this.loader.awaits_retry && this.last?.full &&
+           this.last.drawn_ms < now;
+  }
+
+  // The internal resolution: lower while the camera moves and while tiles arrive, if frames take long.
+  internal_size(moving) {
+    const {width, height} = this.size;
+    const coarse = moving || this.quiet_rounds === 0;
+    const scale = coarse ? kScales[this.scale_index] : 1;
+    return {width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)), full: scale === 1};
+  }
+
+  draw(now, moving) {
+    const {width, height, full} = this.internal_size(moving);
+    const before = this.passes.targets;
+    if (!before || before.width !== width || before.height !== height) this.samples = 0;
+    this.passes.resize(width, height);
+    // Cells are as fine as the still picture needs, unless the camera moves.
+    const lod_height = moving ? height : this.size.height;
+    const values = this.uniforms(width, height, this.size.width, lod_height);
+    const frame = this.samples;
+    this.seed++;
+    Object.assign(values, {u_frame: frame, u_seed: this.seed, u_jitter: jitter_of(full ? frame : this.seed)});
+    this.store.pool.bind(0);
+    const pass = this.passes.draw(values);
+    this.passes.show(this.light.exposure, this.canvas.width, this.canvas.height);
+    this.samples++;
+    this.stats.rays = width * height;
+    this.reading = {pass, begin_ms: now, epoch: this.store.epoch, moving, full};
+  }
+
+  uniforms(width, height, lod_width, lod_height) {
+    const {info, options, store, view, light} = this, levels = info.levels, edge = 2 ** levels;
+    const clip = options.clip || {low: [0, 0, 0], high: [edge, edge, edge]};
+    const bound = (p) => p.map((x) => Math.min(Math.max(Math.round(x), 0), edge));
+    const finest = 2 ** (levels - Math.min(levels, Math.max(1, options.maxLevel ?? levels)));
+    const coarsest = Math.max(finest, 2 ** (levels - Math.min(levels, options.minLevel || 0)));
+    let boundaries = 0;
+    for (let scale = 2; scale <= levels; scale += info.tile_levels) boundaries |= 1 << scale;
+    return {
+      ...view.uniforms(width, height), u_segment: store.pool.segment_words, u_root: this.root_address, u_levels: levels,
+      u_boundaries: boundaries, u_clip_low: bound(clip.low), u_clip_high: bound(clip.high), u_cell_sizes: [finest, coarsest],
+      u_cone: kConeShare * options.pixelTolerance * view.pixel(lod_height), u_seed: 0, u_jitter: [0, 0],
+      u_wire_scale: options.wireLevel === null ? -1 : levels - options.wireLevel, u_wire_width: view.pixel(height),
+      u_sun: this.sun, u_sky_reach: light.sky_reach, u_haze: [light.haze_start, 1 / (Math.sqrt(3) * edge)],
+      u_occlusion: options.ambientOcclusion, u_shadows: options.sunShadows, u_frame: 0,
+    };
+  }
+
+  take_reading(now) {
+    const {pass, begin_ms, epoch, moving, full} = this.reading;
+    this.reading = null;
+    const words = pass.take(), read = read_feedback(words);
+    this.stats.steps_mean = read.steps_mean;
+    this.stats.steps_99 = read.steps_99;
+    this.adapt(now - begin_ms, moving || !full);
+    for (const slot of read.slots) this.store.mark(slot, epoch, now);
+    this.adjust_light(read);
+    this.coarse_pixels = read.coarse_pixels;
+    if (epoch === this.store.epoch) this.store.rounds++;
+    if (read.wanted.size > 0) {
+      const linked = this.loader.demand(read.wanted, now);
+      if (linked > 0) this.on_arrival();
+    }
+    if (epoch !== this.store.epoch) return;
+    const nothing_comes = this.loader.is_idle && !this.loader.awaits_retry;
+    if (this.times.first_picture_ms === null && read.coarse_pixels < 16 && this.light.known)
+      this.times.first_picture_ms = now - this.times.begin_ms;
+    if (!moving && nothing_comes) this.quiet_rounds++;
+    else if (!this.is_complete || read.coarse_pixels > kFinePixels) this.quiet_rounds = 0;
+    this.last = {full, drawn_ms: now};
+    if (this.is_complete && full) for (const resolve of this.waiting.splice(0)) resolve();
+  }
+
+  adapt(frame_ms, counts) {
+    this.times.frame_ms = this.times.frame_ms > 0 ? 0.7 * this.times.frame_ms + 0.3 * frame_ms : frame_ms;
+    if (!counts && frame_ms < 2 * kTargetMs) return;
+    if (frame_ms > 1.5 * kTargetMs && this.scale_index < kScales.length - 1) this.scale_index++;
+    if (frame_ms < 0.5 * kTargetMs && this.scale_index > 0) this.scale_index--;
+  }
+
+  // Exposure and reach follow what is seen, smoothly once they are known.
+  adjust_light(read) {
+    if (read.exposure === null) return;
+    const {light} = this, share = light.known ? 0.2 : 1;
+    const toward = (from, to) => from * (to / from) ** share;
+    light.exposure = toward(light.exposure, read.exposure);
+    light.sky_reach = toward(light.sky_reach, Math.max(1, (this.outside ? 0.35 : 1) * read.median_t));
+    light.haze_start = light.known ? light.haze_start + share * (read.nearest_t - light.haze_start) : read.nearest_t;
+    light.known = true;
+  }
+
+  draw_empty() {
+    const {passes, canvas} = this;
+    passes.resize(canvas.width, canvas.height);
+    passes.show(1, canvas.width, canvas.height);
+    for (const resolve of this.waiting.splice(0)) resolve();
+  }
+}
+
+// Sample 0 is at the pixel's center.
+function jitter_of(sample) {
+  const wrap = (x) => x - Math.floor(x);
+  return [wrap(0.5 + 0.7548776662466927 * sample) - 0.5, wrap(0.5 + 0.5698402909980532 * sample) - 0.5];
+}

@@ -1,0 +1,152 @@
+// The tiles in the pool, by node, and which of them leave when it is full.
+//
+// Tiles refer to each other by slots: a cut-off node in the pool names the slot of its tile, and the
+// pool's table says where that is, or that it is not there. So equal subtrees share one tile, and a tile
+// that leaves costs one write. A slot lives while its tile is loaded or a loaded tile refers to it.
+//
+// A tile leaves only if it was not seen in the current view ("epoch"), and not at all recently while
+// the camera moves. What was loaded for a view stays until the next one. Therefore the number of tiles
+// that are fetched for one view is bounded, however small the pool is.
+
+import {decode_tile, kBlockWords} from "./tile_format.js";
+
+const kRecentMs = 1500;
+const kRoundsToKnow = 4;      // readings of the feedback after which unseen tiles are known to be so
+const kFreeShare = 1 / 64;    // of the pool, that leaves at once
+
+// A number for a node: offsets are below 2^40.
+export function key_of(level, offset) {
+  return offset * 32 + level;
+}
+
+export class TileStore {
+  constructor(pool) {
+    this.pool = pool;
+    this.tiles = new Map();     // key -> tile
+    this.slots = new Map();     // key -> slot
+    this.owner = [];            // block -> tile
+    this.ordinal = [];          // block -> its number within the tile
+    this.by_slot = [];          // slot -> {key, tile or null, references}
+    this.root = null;
+    this.tile_bytes = 0;
+    this.epoch = 0;
+    this.rounds = 0;            // readings of the feedback in this epoch
+    this.evicted = 0;
+  }
+
+  begin_epoch() {
+    this.epoch++;
+    this.rounds = 0;
+  }
+
+  get(level, offset) {
+    return this.tiles.get(key_of(level, offset));
+  }
+
+  // The cut-off node at an address of the pool, {tile, index, level, offset, key}; null if there is none
+  // (any more).
+  cut_off_node(address) {
+    const block = Math.floor(address / kBlockWords), tile = this.owner[block];
+    if (!tile || !tile.addresses) return null;
+    const index = (this.ordinal[block] * kBlockWords + address % kBlockWords - tile.leaf_begin) / 4;
+    if (!Number.isInteger(index) || index < 0 || index >= tile.addresses.length) return null;
+    const level = tile.level + tile.levels, offset = tile.addresses[index];
+    return {tile, index, level, offset, key: key_of(level, offset), address};
+  }
+
+  // Makes the cut-off node refer to its tile, which must be loaded.
+  link(node) {
+    const slot = this.slots.get(node.key);
+    if (node.tile.links.has(node.index) || slot === undefined) return false;
+    node.tile.links.set(node.index, slot);
+    this.by_slot[slot].references++;
+    this.pool.write(node.address, Uint32Array.of(slot));
+    return true;
+  }
+
+  // Stores a tile as fetched. False if the pool is full of what the view needs. Throws if the tile is
+  // damaged.
+  add(level, offset, words, now_ms) {
+    const key = key_of(level, offset);
+    if (this.tiles.has(key)) return true;
+    const decoded = decode_tile(words, level);
+    const count = decoded.words.length / kBlockWords;
+    if (!this.evict_for(count, now_ms)) return false;
+    const slot = this.slots.get(key) ?? this.pool.allocate_slot();
+    const blocks = slot ? this.pool.allocate(count) : null;
+    if (!blocks) return false;
+    const tile = {key, level, offset, levels: decoded.levels, slot, blocks, leaf_begin: decoded.leaf_begin,
+                  addresses: decoded.addresses, links: new Map(), used_ms: now_ms, epoch: this.epoch, address: 0};
+    tile.address = this.pool.upload(blocks, decoded);
+    blocks.forEach((block, i) => {
+      this.owner[block] = tile;
+      this.ordinal[block] = i;
+    });
+    this.pool.set_slot(slot, tile.address + 1);
+    this.slots.set(key, slot);
+    this.by_slot[slot] ??= {key, tile: null, references: 0};
+    this.by_slot[slot].tile = tile;
+    this.tiles.set(key, tile);
+    this.tile_bytes += count * kBlockWords * 4;
+    return true;
+  }
+
+  set_root(level, offset) {
+    this.root = this.get(level, offset);
+  }
+
+  // The only brick of a grid of 4^3 voxels, as 16 hexadecimal digits or two words. Returns its address.
+  add_brick(brick) {
+    const bits = Array.isArray(brick) ? null : BigInt(`0x${String(brick).replace(/^0x/, "")}`);
+    const words = new Uint32Array(kBlockWords);
+    words.set(bits === null ? brick : [Number(bits & 0xffffffffn), Number(bits >> 32n)]);
+    const blocks = this.pool.allocate(1);
+    return this.pool.upload(blocks, {words, pointers: []});
+  }
+
+  // The tile in a slot was seen in a picture of epoch `epoch`.
+  mark(slot, epoch, now_ms) {
+    const tile = this.by_slot[slot]?.tile;
+    if (!tile) return;
+    tile.used_ms = now_ms;
+    if (epoch > tile.epoch) tile.epoch = epoch;
+  }
+
+  evict_for(count, now_ms) {
+    if (this.pool.free_blocks >= count) return true;
+    const max_used_ms = now_ms - (this.rounds >= kRoundsToKnow ? 0 : kRecentMs);
+    const candidates = [];
+    for (const tile of this.tiles.values())
+      if (tile !== this.root && tile.epoch !== this.epoch && tile.used_ms < max_used_ms) candidates.push(tile);
+    candidates.sort((a, b) => a.used_ms - b.used_ms);
+    const target = count + this.pool.block_count * kFreeShare;
+    for (const tile of candidates) {
+      if (this.pool.free_blocks >= target) break;
+      this.evict(tile);
+    }
+    return this.pool.free_blocks >= count;
+  }
+
+  evict(tile) {
+    this.evicted++;
+    this.tile_bytes -= tile.blocks.length * kBlockWords * 4;
+    this.tiles.delete(tile.key);
+    for (const block of tile.blocks) this.owner[block] = undefined;
+    this.pool.release(tile.blocks);
+    this.pool.set_slot(tile.slot, 0);
+    this.by_slot[tile.slot].tile = null;
+    this.release_if_unused(tile.slot);
+    for (const slot of tile.links.values()) {
+      this.by_slot[slot].references--;
+      this.release_if_unused(slot);
+    }
+  }
+
+  release_if_unused(slot) {
+    const entry = this.by_slot[slot];
+    if (!entry || entry.tile || entry.references > 0) return;
+    this.by_slot[slot] = undefined;
+    this.slots.delete(entry.key);
+    this.pool.release_slot(slot);
+  }
+}
