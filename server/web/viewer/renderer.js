@@ -120,7 +120,6 @@ export class Renderer {
     const x = css_x / this.size.css_width * width, y = css_y / this.size.css_height * height;
     const values = this.uniforms(width, height, width, height);
     values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
-    this.store.pool.bind(0);
     const words = this.passes.pick_one(values);
     if (!(words[1] >>> 23 & 1)) return null;
     const distance = new Float32Array(words.buffer, 0, 1)[0], scale = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
@@ -137,7 +136,6 @@ export class Renderer {
     const depth = new Float32Array(width * height).fill(Infinity), level = new Uint8Array(width * height);
     const steps = new Uint16Array(width * height);
     if (this.empty) return {depth, level, steps};
-    this.store.pool.bind(0);
     const words = this.passes.capture(this.uniforms(width, height, width, height), width, height);
     const floats = new Float32Array(words.buffer);
     for (let i = 0; i < width * height; ++i) {
@@ -273,7 +271,6 @@ export class Renderer {
     const frame = this.samples;
     this.seed++;
     Object.assign(values, {u_frame: frame, u_seed: this.seed, u_jitter: jitter_of(full ? frame : this.seed)});
-    this.store.pool.bind(0);
     const pass = this.passes.draw(values);
     this.passes.show(this.light.exposure, this.canvas.width, this.canvas.height);
     this.samples++;
@@ -290,7 +287,7 @@ export class Renderer {
     let boundaries = 0;
     for (let scale = 2; scale <= levels; scale += info.tile_levels) boundaries |= 1 << scale;
     return {
-      ...view.uniforms(width, height), u_segment: store.pool.segment_words, u_root: this.root_address, u_levels: levels,
+      ...view.uniforms(width, height), pool: store.pool, u_segment: store.pool.segment_words, u_root: this.root_address, u_levels: levels,
       u_boundaries: boundaries, u_clip_low: bound(clip.low), u_clip_high: bound(clip.high), u_cell_sizes: [finest, coarsest],
       u_cone: kConeShare * options.pixelTolerance * view.pixel(lod_height), u_seed: 0, u_jitter: [0, 0],
       u_wire_scale: options.wireLevel === null ? -1 : levels - options.wireLevel, u_wire_width: view.pixel(height),

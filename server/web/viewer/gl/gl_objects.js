@@ -50,12 +50,13 @@ export class Program {
     }
   }
 
-  // Sets the uniforms that the program has, and runs it over the viewport. `target`: null for the canvas.
+  // Sets the uniforms that the program has (`values.pool`: those of the pool), and runs it over the viewport. `target`: null for the canvas.
   draw(target, values, width, height) {
     const {gl} = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
     gl.viewport(0, 0, width, height);
     gl.useProgram(this.program);
+    if (this.uniforms.has("u_table")) values.pool.bind(0);
     for (const [name, {location, type, unit}] of this.uniforms) {
       if (unit >= 0 && unit < kSegmentUnits) continue;
       const value = values[name];
