@@ -276,26 +276,36 @@ def check_without_webgl(visitor, url, still):
     visitor.picture("no-webgl")
 
 
-def check_job(visitor, server, token):
-    """From the job's page to the viewer, with the token if there is one."""
+def check_job(visitor, server, voxdag, scene, token):
+    """From the job's page to the viewer, or right into it by a token; and in the place of the picture."""
     headers = {"Authorization": f"Bearer {token}"} if token else {}
-    job = server.post("/api/v1/jobs", {"scene": "menger.glb", "resolution": 256}, headers)
+    token_file = ["--token-file", scene.parent / "token"] if token else []
+    job = json.loads(voxdag.run("submit", scene, "-r", 256, "--server", server.url, "--json", *token_file))
     page = visitor.page
+    viewer = f"{server.url}/viewer.html?job={job['id']}"
     if token:
-        visitor.expected = "status of 401"
-        visitor.open(f"{server.url}/viewer.html?job={job['id']}", wait=False)
-        page.get_by_label("Token").fill(token)
-        page.keyboard.press("Enter")
+        with visitor.expecting("status of 401"):
+            visitor.open(viewer, wait=False)
+            page.get_by_label("Token").fill(token)
+            page.keyboard.press("Enter")
+            visitor.wait_until("Boolean(window.voxdagViewer)")
     else:
         visitor.open(f"{server.url}/#/jobs/{job['id']}", wait=False)
         page.locator('[data-action="view"]').click()
-    visitor.wait_until("Boolean(window.voxdagViewer)")
-    page.evaluate("voxdagViewer.renderer.complete()")
-    depth, _ = visitor.capture(64, 36)
-    assert any(math.isfinite(d) for d in depth) and any(math.isinf(d) for d in depth)
-    while not json.loads(server.get(f"/api/v1/jobs/{job['id']}", headers))["preview"]:
-        page.wait_for_timeout(200)
+        visitor.wait_until("Boolean(window.voxdagViewer)")
+    depths, _ = visitor.capture(64, 36)
+    assert any(math.isfinite(d) for d in depths) and any(math.isinf(d) for d in depths)
     visitor.picture("job")
     page.locator("#home").click()
     page.locator(".title-row .state.succeeded").wait_for()
-    return f"{server.url}/viewer.html?job={job['id']}"
+    while not json.loads(server.get(f"/api/v1/jobs/{job['id']}", headers))["preview"]:
+        page.wait_for_timeout(200)
+    page.locator(".picture img").wait_for()
+    page.locator('[data-action="look"]').click()
+    page.locator(".picture canvas").wait_for()
+    page.keyboard.press("h")
+    page.get_by_role("dialog").wait_for()
+    page.keyboard.press("Escape")
+    assert page.url.endswith(f"#/jobs/{job['id']}"), "the picture's camera has replaced the page's address"
+    visitor.picture("page")
+    return viewer
