@@ -35,7 +35,7 @@ export class Viewer {
       on_double_click: (x, y) => this.set_pivot(x, y),
       on_change: () => this.schedule(),
     }, signal);
-    listen_to_keys(canvas, this.motion, this.actions(), () => this.schedule(), signal);
+    listen_to_keys(bookmarks ? window : canvas, canvas, this.motion, this.actions(), () => this.schedule(), signal);
     for (const button of places.tools.querySelectorAll("[data-tool]"))
       button.addEventListener("click", () => this.actions()[button.dataset.tool](), {signal});
     const resizes = new ResizeObserver(() => this.resize());

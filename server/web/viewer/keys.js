@@ -28,11 +28,13 @@ const kHelp = [
   ["H", "this help"],
 ];
 
-// Key names of `motion`; actions by name.
-export function listen_to_keys(canvas, motion, actions, on_change, signal) {
+// Calls actions by their names. `root` is the canvas, or the window: then the keys also act while nothing
+// has the focus.
+export function listen_to_keys(root, canvas, motion, actions, on_change, signal) {
   const held = new Map();  // by event.code: a character may change while its key is down
-  canvas.addEventListener("keydown", (event) => {
+  root.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.target !== canvas && event.target !== document.body) return;
     const action = kActions[event.key.toLowerCase()];
     const motion_key = kHeld[event.code] ?? kHeldCharacters[event.key];
     if (!action && !motion_key) return;
@@ -50,11 +52,13 @@ export function listen_to_keys(canvas, motion, actions, on_change, signal) {
     if (held.has(event.code)) motion.release(held.get(event.code));
     held.delete(event.code);
   };
-  canvas.addEventListener("keyup", release, {signal});
-  canvas.addEventListener("blur", () => {
+  const release_all = () => {
     held.clear();
     motion.release_all();
-  }, {signal});
+  };
+  root.addEventListener("keyup", release, {signal});
+  canvas.addEventListener("blur", release_all, {signal});
+  window.addEventListener("blur", release_all, {signal});
 }
 
 export function keys_help() {

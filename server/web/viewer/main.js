@@ -27,7 +27,7 @@ function budget_bytes() {
 
 // Instead of the picture; nothing hides it again but a new message.
 function show_message(...content) {
-  place("scene").hidden = true;
+  place("scene").hidden = place("panel").hidden = true;
   place("message").hidden = false;
   clear(place("message"), h("div", {class: "card stack narrow"}, ...content));
 }
@@ -103,7 +103,6 @@ async function start() {
     file_name: (job ? title_text(job) : document.title).replace(/[^A-Za-z0-9._-]+/g, "-"),
     places: {panel: place("panel"), tools: place("tools"), status: place("status")}});
   window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
-  canvas.focus({preventScroll: true});
 }
 
 function show_failure(error) {
