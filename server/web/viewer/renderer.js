@@ -13,6 +13,7 @@ export {WebGLUnavailable};
 
 const kMebibyte = 1 << 20;
 const kBudgetBytes = 256 * kMebibyte, kPhoneBudgetBytes = 64 * kMebibyte;
+const kBytesPerVoxel = 16;       // of the pool; files need less
 const kMovingMs = 180;          // after the last change of the view
 const kTargetMs = 40;           // of a frame while the camera moves
 const kSamples = 16;            // per pixel of a still picture
@@ -32,7 +33,7 @@ export class Renderer {
                     pixelTolerance: 1, wireLevel: null};
     this.view = null;
     this.sun = normalized([0.5, 0.8, 0.3]);
-    this.light = {exposure: 1, sky_reach: 1, haze_start: 0, known: false};
+    this.light = {exposure: 1, sky_reach: 1, haze_start: 1, readings: 0};
     this.size = {width: canvas.width, height: canvas.height, css_width: canvas.width, css_height: canvas.height};
     this.times = {view_ms: -1e9, frame_ms: 0, last_ms: 0, begin_ms: performance.now(), first_picture_ms: null, compile_ms: 0};
     this.scale_index = 0;
@@ -188,16 +189,21 @@ export class Renderer {
   async load_root() {
     const {root, levels} = this.info;
     this.empty = !root && !this.info.root_brick;
-    this.store = new TileStore(new TilePool(this.gl, this.budget_bytes));
+    this.store = new TileStore(new TilePool(this.gl, this.pool_bytes()));
     this.loader = new TileLoader(this.source, this.store, () => this.on_arrival());
     if (root && levels > 2) {
       await this.loader.load_root(root.level, root.offset);
-      this.root_address = this.store.root.address;
+      this.root_pointer = this.store.root.pointer;
     } else if (!this.empty) {
-      this.root_address = this.store.add_brick(this.info.root_brick);
+      this.root_pointer = this.store.add_brick(this.info.root_brick);
     }
     this.begin_epoch();
     this.on_change();
+  }
+
+  // A small file needs less than the budget.
+  pool_bytes() {
+    return Math.min(this.budget_bytes, 4 * kMebibyte + Number(this.info.voxels) * kBytesPerVoxel);
   }
 
   begin_epoch() {
@@ -287,7 +293,7 @@ export class Renderer {
     let boundaries = 0;
     for (let scale = 2; scale <= levels; scale += info.tile_levels) boundaries |= 1 << scale;
     return {
-      ...view.uniforms(width, height), pool: store.pool, u_segment: store.pool.segment_words, u_root: this.root_address, u_levels: levels,
+      ...view.uniforms(width, height), u_pool: store.pool.texels, u_table: store.pool.table, u_root: this.root_pointer, u_levels: levels,
       u_boundaries: boundaries, u_clip_low: bound(clip.low), u_clip_high: bound(clip.high), u_cell_sizes: [finest, coarsest],
       u_cone: kConeShare * options.pixelTolerance * view.pixel(lod_height), u_seed: 0, u_jitter: [0, 0],
       u_wire_scale: options.wireLevel === null ? -1 : levels - options.wireLevel, u_wire_width: view.pixel(height),
@@ -304,7 +310,7 @@ export class Renderer {
     this.stats.steps_99 = read.steps_99;
     this.adapt(now - begin_ms, moving || !full);
     for (const slot of read.slots) this.store.mark(slot, epoch, now);
-    this.adjust_light(read);
+    this.adjust_light(read, moving);
     this.coarse_pixels = read.coarse_pixels;
     if (epoch === this.store.epoch) this.store.rounds++;
     if (read.wanted.size > 0) {
@@ -313,7 +319,7 @@ export class Renderer {
     }
     if (epoch !== this.store.epoch) return;
     const nothing_comes = this.loader.is_idle && !this.loader.awaits_retry;
-    if (this.times.first_picture_ms === null && read.coarse_pixels < 16 && this.light.known)
+    if (this.times.first_picture_ms === null && read.coarse_pixels < 16)
       this.times.first_picture_ms = now - this.times.begin_ms;
     if (!moving && nothing_comes) this.quiet_rounds++;
     else if (!this.is_complete || read.coarse_pixels > kFinePixels) this.quiet_rounds = 0;
@@ -328,15 +334,17 @@ export class Renderer {
     if (frame_ms < 0.5 * kTargetMs && this.scale_index > 0) this.scale_index--;
   }
 
-  // Exposure and reach follow what is seen, smoothly once they are known.
-  adjust_light(read) {
-    if (read.exposure === null) return;
-    const {light} = this, share = light.known ? 0.2 : 1;
-    const toward = (from, to) => from * (to / from) ** share;
-    light.exposure = toward(light.exposure, read.exposure);
-    light.sky_reach = toward(light.sky_reach, Math.max(1, (this.outside ? 0.35 : 1) * read.median_t));
-    light.haze_start = light.known ? light.haze_start + share * (read.nearest_t - light.haze_start) : read.nearest_t;
-    light.known = true;
+  // Exposure and reach follow what is seen: smoothly while the camera moves, fast when it stands, and not
+  // at all while samples of a still picture are added up.
+  adjust_light(read, moving) {
+    if (read.exposure === null || this.samples > kSamples / 4) return;
+    const {light} = this, share = moving ? 0.15 : 0.5;
+    const toward = (from, to, known) => known ? from * (to / from) ** share : to;
+    light.sky_reach = toward(light.sky_reach, Math.max(1, (this.outside ? 0.35 : 1) * read.median_t), light.readings > 0);
+    light.haze_start = toward(light.haze_start, Math.max(1, read.nearest_t), light.readings > 0);
+    // The exposure that the first reading measures is that of light without a reach.
+    light.exposure = toward(light.exposure, read.exposure, light.readings > 1);
+    light.readings++;
   }
 
   draw_empty() {

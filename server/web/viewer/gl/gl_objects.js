@@ -4,8 +4,6 @@ import {kQuad} from "./picture_shaders.js";
 
 export class WebGLUnavailable extends Error {}
 
-const kSegmentUnits = 5;   // texture units of the pool and its table, from unit 0 on
-
 export class Program {
   // Compilation runs in the background until ready() or use().
   constructor(gl, name, fragment) {
@@ -37,28 +35,25 @@ export class Program {
     }
     for (const shader of this.shaders) gl.deleteShader(shader);
     this.uniforms = new Map();
-    let unit = kSegmentUnits;
+    let unit = 0;
     gl.useProgram(this.program);
     for (let i = 0; i < gl.getProgramParameter(this.program, gl.ACTIVE_UNIFORMS); ++i) {
       const {name, type} = gl.getActiveUniform(this.program, i);
       const location = gl.getUniformLocation(this.program, name);
       const sampler = type === gl.SAMPLER_2D || type === gl.UNSIGNED_INT_SAMPLER_2D;
-      const pool = ["u_pool0", "u_pool1", "u_pool2", "u_pool3", "u_table"].indexOf(name);
-      const entry = {location, type, unit: pool >= 0 ? pool : sampler ? unit++ : -1};
+      const entry = {location, type, unit: sampler ? unit++ : -1};
       if (sampler) gl.uniform1i(location, entry.unit);
       this.uniforms.set(name, entry);
     }
   }
 
-  // Sets the uniforms that the program has (`values.pool`: those of the pool), and runs it over the viewport. `target`: null for the canvas.
+  // Sets the uniforms that the program has, and runs it over the viewport. `target`: null for the canvas.
   draw(target, values, width, height) {
     const {gl} = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
     gl.viewport(0, 0, width, height);
     gl.useProgram(this.program);
-    if (this.uniforms.has("u_table")) values.pool.bind(0);
     for (const [name, {location, type, unit}] of this.uniforms) {
-      if (unit >= 0 && unit < kSegmentUnits) continue;
       const value = values[name];
       if (value === undefined) throw new Error(`The uniform ${name} of "${this.name}" has no value.`);
       if (unit >= 0) {

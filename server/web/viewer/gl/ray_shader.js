@@ -16,25 +16,18 @@ export const kMaxSteps = 4096;
 
 // Uniforms of the pool, and of all rays of a picture.
 export const kPoolSource = `
-uniform usampler2D u_pool0, u_pool1, u_pool2, u_pool3, u_table;
-uniform uint u_segment;      // words per texture of the pool
-uniform uint u_root;         // address of the root
+uniform usampler2D u_pool, u_table;
+uniform uint u_root;         // pointer to the root (tiles/tile_format.js says what a pointer is)
 uniform int u_levels;        // the grid has 2^u_levels voxels per edge
 uniform uint u_boundaries;   // bit s: nodes with 2^s voxels per edge are the roots of tiles
 uniform ivec3 u_clip_low, u_clip_high;
 uniform vec2 u_cell_sizes;   // smallest and largest cell that is hit as a whole, in voxels
 
-uint word(uint a) {
-  if (a < u_segment) return texelFetch(u_pool0, ivec2(a & 4095u, a >> 12), 0).x;
-  a -= u_segment;
-  if (a < u_segment) return texelFetch(u_pool1, ivec2(a & 4095u, a >> 12), 0).x;
-  a -= u_segment;
-  if (a < u_segment) return texelFetch(u_pool2, ivec2(a & 4095u, a >> 12), 0).x;
-  a -= u_segment;
-  return texelFetch(u_pool3, ivec2(a & 4095u, a >> 12), 0).x;
+uvec4 texel(uint address) {
+  return texelFetch(u_pool, ivec2(address & 4095u, address >> 12), 0);
 }
 
-// 1 + the address of the slot's tile, 0 if it is not loaded.
+// The pointer to the root of the slot's tile, 0 if it is not loaded.
 uint tile_of(uint slot) {
   return slot == 0u ? 0u : texelFetch(u_table, ivec2(slot & 1023u, slot >> 10), 0).x;
 }
@@ -44,6 +37,13 @@ uint popcount8(uint x) {
   x = (x & 0x33u) + (x >> 2 & 0x33u);
   return (x + (x >> 4)) & 15u;
 }
+
+uint child_pointer(uint node, uint child) {
+  uint rank = popcount8(node & ((1u << child) - 1u));
+  uvec4 pointers = texel((node >> 8) + (rank >> 2));
+  return (rank & 2u) == 0u ? ((rank & 1u) == 0u ? pointers.x : pointers.y)
+                           : ((rank & 1u) == 0u ? pointers.z : pointers.w);
+}
 `;
 
 export const kRaySource = `${kPoolSource}
@@ -51,7 +51,7 @@ struct Hit {
   float t;
   int scale;       // the cell has 2^scale voxels per edge
   int axis;        // of the face that the ray entered by; -1 if it began in the cell
-  uint missing;    // address of the cut-off node whose tile would have been needed; 0: none
+  uint missing;    // texel of the cut-off node whose tile would have been needed; 0: none
 };
 
 ivec3 ray_base;
@@ -105,7 +105,7 @@ void note_wire(ivec3 position, int scale, int axis, float t) {
   vec3 inward = (t - time_of(position)) / ray_inverse;
   vec3 outward = (time_of(position + (1 << scale)) - t) / ray_inverse;
   vec3 nearest = min(inward, outward);
-  nearest[axis] = 1e30;
+  nearest += vec3(equal(ivec3(axis), ivec3(0, 1, 2))) * 1e30;
   if (min(nearest.x, min(nearest.y, nearest.z)) < u_wire_width * t) wire = true;
 }
 #endif
@@ -129,13 +129,13 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
   if (float(edge) <= clamp(cone.x + cone.y * t, u_cell_sizes.x, u_cell_sizes.y)) return true;
 
   uint stack[21];            // at s: the node whose children have 2^s voxels per edge
-  uint mask = word(u_root), node = u_root, leaf = 0u, octant = 0u;
+  uint node = u_root, leaf = 0u, octant = 0u;
   uvec2 brick = uvec2(0);
   int brick_scale = -1;      // of the brick that the ray is in; -1: none
   ivec3 position = ivec3(0);
   int scale = u_levels - 1;
   if (u_levels == 2) {
-    brick = uvec2(mask, word(u_root + 1u));
+    brick = texel(u_root >> 8).xy;
     brick_scale = 2;
   }
   stack[scale] = node;
@@ -145,7 +145,7 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
     uint child = child_at(position, scale);
     bool occupied;
     if (scale >= brick_scale) {
-      occupied = (mask >> child & 1u) != 0u;
+      occupied = (node >> child & 1u) != 0u;
     } else if (scale == brick_scale - 1) {
       octant = (child < 4u ? brick.x : brick.y) >> (8u * (child & 3u)) & 255u;
       occupied = octant != 0u;
@@ -165,29 +165,29 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
         return true;
       }
       if (scale >= brick_scale) {
-        uint a = word(node + 1u + popcount8(mask & ((1u << child) - 1u)));
+        uint pointer = child_pointer(node, child);
         if (scale == 2) {
-          brick = uvec2(word(a), word(a + 1u));
+          uvec4 bricks = texel(pointer >> 8);
+          brick = (pointer & 1u) == 0u ? bricks.xy : bricks.zw;
           brick_scale = 2;
           leaf = 0u;
         } else if ((u_boundaries >> scale & 1u) == 0u) {
-          node = a;
-          mask = word(node);
+          node = pointer;
           stack[scale - 1] = node;
         } else {
-          uint slot = word(a), tile = tile_of(slot);
+          uvec4 cut_off = texel(pointer >> 8);
+          uint tile = tile_of(cut_off.x);
           if (tile != 0u) {
-            node = tile - 1u;
-            mask = word(node);
+            node = tile;
             stack[scale - 1] = node;
-            note_tile(slot);
+            note_tile(cut_off.x);
 #ifdef PICK
-            picked_slots[scale] = slot;
+            picked_slots[scale] = cut_off.x;
 #endif
           } else {
-            brick = uvec2(word(a + 1u), word(a + 2u));
+            brick = cut_off.yz;
             brick_scale = scale;
-            leaf = a;
+            leaf = pointer >> 8;
           }
         }
       }
@@ -195,12 +195,14 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
       position += ivec3(greaterThanEqual(vec3(t), time_of(position + (1 << scale)))) << scale;
       continue;
     }
+    // No component is addressed by a variable: some compilers would move the vector to memory.
     vec3 next = time_of(position + (1 << scale));
     axis = nearest_axis(next);
-    t = next[axis];
+    t = min(next.x, min(next.y, next.z));
     if (t >= t_end) return false;
-    int from = position[axis], to = from + (1 << scale), changed = from ^ to;
-    position[axis] = to;
+    ivec3 to = position + (ivec3(equal(ivec3(axis), ivec3(0, 1, 2))) << scale), flipped = position ^ to;
+    int changed = flipped.x | flipped.y | flipped.z;
+    position = to;
     if (changed >> scale > 1) {
       // The ray leaves the parent: up to the lowest node that both cells are in.
       scale = int(floatBitsToUint(float(changed)) >> 23) - 127;
@@ -209,7 +211,6 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
       if (scale >= brick_scale) {
         brick_scale = -1;
         node = stack[scale];
-        mask = word(node);
       }
     }
   }

@@ -1,11 +1,11 @@
 // Decodes a tile (docs/format.md) and lays its words out for the pool. Tiles come from the network: every
 // index is checked, so that a damaged tile is an error and never a wrong address on the GPU.
 
-export const kBlockWords = 64;  // of the pool; a node or leaf never crosses the end of a block
-export const kNodeWordsMax = 9;
+export const kTexelWords = 4;
+export const kBlockTexels = 16;  // of the pool; a node or leaf never crosses the end of a block
 const kMagic = 0x31544456;
 const kHeadWords = 4;
-const kCutWords = 4;  // of a cut-off node: in the tile and in the pool
+const kCutWords = 4;             // of a cut-off node in a tile
 
 export const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
   let bits = 0;
@@ -13,43 +13,42 @@ export const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
   return bits;
 });
 
-// In the pool a node is as in the tile, with absolute addresses in place of indices. A brick is its two
-// words. A cut-off node has: the slot of its tile (0: none), its coarse brick's two words, 0.
+// The pool has texels of four words, addressed by 24 bits. A *pointer* is the address of a texel times 256,
+// plus the child mask of the node there; so a ray knows a node's mask without reading the node. A node is
+// one pointer per child, in one or two texels. A cut-off node is one texel: the slot of its tile (0: none),
+// its coarse brick's two words, 0. Two bricks share a texel; the pointer's lowest bit says which.
 //
-// Returns {level, levels, bricks, words, leaf_begin, leaf_count, addresses, coarse}: `words` are the
-// pool's words at virtual addresses from 0 on, a multiple of kBlockWords; `pointers` are the positions
-// in `words` of the addresses, which the pool makes absolute; `addresses` are the word offsets of the
-// cut-off nodes in the file.
+// Returns {level, levels, words, pointers, root, leaf_begin, addresses, coarse}: `words` are the pool's
+// words at virtual addresses from 0 on, whole blocks; `pointers` are the positions in `words` of pointers
+// with virtual addresses, which the pool makes absolute; `root` is such a pointer; `leaf_begin` is the first
+// leaf's texel. `addresses` are the word offsets of the cut-off nodes in the file, and `coarse` their coarse
+// bricks; both are null for a tile with bricks.
 export function decode_tile(tile, expected_level) {
   const node_words = check_head(tile, expected_level);
   const levels = (tile[1] >>> 8) & 255, bricks = (tile[1] >>> 16 & 1) === 1;
   const leaf_count = tile[3];
   const nodes = tile.subarray(kHeadWords, kHeadWords + node_words);
-  const place = new Uint32Array(node_words);  // virtual address of the node that begins here, plus 1
+  const place = new Uint32Array(node_words);  // pointer to the node that begins here
   const depth = new Uint8Array(node_words);
-  const end = place_nodes(nodes, levels, place, depth);
-
-  const leaf_words = bricks ? 2 : kCutWords;
-  const leaf_begin = round_up(end, leaf_words);
-  const total = round_up(leaf_begin + leaf_count * leaf_words, kBlockWords);
-  const words = new Uint32Array(total);
+  const leaf_begin = place_nodes(nodes, levels, place, depth);
+  const texels = leaf_begin + (bricks ? Math.ceil(leaf_count / 2) : leaf_count);
+  const words = new Uint32Array(round_up(texels, kBlockTexels) * kTexelWords);
   const pointers = new Uint32Array(node_words);
   let pointer_count = 0;
   for (let at = 0; at < node_words;) {
-    const count = kPopcount[nodes[at]], to = place[at] - 1;
-    words[to] = nodes[at];
-    for (let child = 1; child <= count; ++child) {
-      const index = nodes[at + child];
-      const last = depth[at] === levels - 1;
-      if (last && index >= leaf_count) throw new Error("A tile has a leaf index beyond its leaves.");
-      words[to + child] = last ? leaf_begin + index * leaf_words : place[index] - 1;
+    const count = kPopcount[nodes[at]], to = (place[at] >>> 8) * kTexelWords;
+    for (let child = 0; child < count; ++child) {
+      const index = nodes[at + 1 + child];
+      if (depth[at] === levels - 1 && index >= leaf_count) throw new Error("A tile has a leaf index beyond its leaves.");
+      words[to + child] = depth[at] < levels - 1 ? place[index]
+        : bricks ? (leaf_begin + (index >>> 1)) * 256 + (index & 1) : (leaf_begin + index) * 256;
       pointers[pointer_count++] = to + child;
     }
     at += 1 + count;
   }
-  const addresses = copy_leaves(tile.subarray(kHeadWords + node_words), bricks, leaf_count, words, leaf_begin);
-  return {level: tile[1] & 255, levels, bricks, words, pointers: pointers.subarray(0, pointer_count),
-          leaf_begin, leaf_count, addresses};
+  const leaves = copy_leaves(tile.subarray(kHeadWords + node_words), bricks, leaf_count, words, leaf_begin);
+  return {level: tile[1] & 255, levels, words, pointers: pointers.subarray(0, pointer_count), root: place[0], leaf_begin,
+          ...leaves};
 }
 
 function check_head(tile, expected_level) {
@@ -63,16 +62,17 @@ function check_head(tile, expected_level) {
   return tile[2];
 }
 
-// Packs the nodes in their order, none across the end of a block. Returns the address after the last.
+// Packs the nodes in their order, none across the end of a block. Returns the texel after the last.
 function place_nodes(nodes, levels, place, depth) {
   let address = 0;
   for (let at = 0; at < nodes.length;) {
     const mask = nodes[at], count = kPopcount[mask & 255];
     if (mask === 0 || mask > 255 || at + count >= nodes.length)
       throw new Error(`A tile's node word ${at} is not a child mask.`);
-    if (address % kBlockWords + 1 + count > kBlockWords) address = round_up(address, kBlockWords);
-    place[at] = address + 1;
-    address += 1 + count;
+    const texels = Math.ceil(count / kTexelWords);
+    if (address % kBlockTexels + texels > kBlockTexels) address = round_up(address, kBlockTexels);
+    place[at] = address * 256 + mask;
+    address += texels;
     at += 1 + count;
   }
   // Children follow their parents, so one sweep finds every node's level.
@@ -91,17 +91,18 @@ function place_nodes(nodes, levels, place, depth) {
 
 function copy_leaves(leaves, bricks, count, words, begin) {
   if (bricks) {
-    words.set(leaves, begin);
-    return null;
+    words.set(leaves, begin * kTexelWords);
+    return {addresses: null, coarse: null};
   }
   const addresses = new Float64Array(count);  // exact: offsets are below 2^40
+  const coarse = new Uint32Array(2 * count);
   for (let i = 0; i < count; ++i) {
-    const from = i * kCutWords;
+    const from = i * kCutWords, to = (begin + i) * kTexelWords;
     addresses[i] = leaves[from] + leaves[from + 1] * 2 ** 32;
-    words[begin + from + 1] = leaves[from + 2];
-    words[begin + from + 2] = leaves[from + 3];
+    words[to + 1] = coarse[2 * i] = leaves[from + 2];
+    words[to + 2] = coarse[2 * i + 1] = leaves[from + 3];
   }
-  return addresses;
+  return {addresses, coarse};
 }
 
 function round_up(value, multiple) {

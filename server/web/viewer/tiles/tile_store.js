@@ -8,10 +8,11 @@
 // the camera moves. What was loaded for a view stays until the next one. Therefore the number of tiles
 // that are fetched for one view is bounded, however small the pool is.
 
-import {decode_tile, kBlockWords} from "./tile_format.js";
+import {decode_tile, kBlockTexels, kTexelWords} from "./tile_format.js";
 
 const kRecentMs = 1500;
 const kRoundsToKnow = 4;      // readings of the feedback after which unseen tiles are known to be so
+const kBlockBytes = kBlockTexels * kTexelWords * 4;
 const kFreeShare = 1 / 64;    // of the pool, that leaves at once
 
 // A number for a node: offsets are below 2^40.
@@ -43,15 +44,15 @@ export class TileStore {
     return this.tiles.get(key_of(level, offset));
   }
 
-  // The cut-off node at an address of the pool, {tile, index, level, offset, key}; null if there is none
+  // The cut-off node in a texel of the pool, {tile, index, level, offset, key}; null if there is none
   // (any more).
-  cut_off_node(address) {
-    const block = Math.floor(address / kBlockWords), tile = this.owner[block];
+  cut_off_node(texel) {
+    const block = Math.floor(texel / kBlockTexels), tile = this.owner[block];
     if (!tile || !tile.addresses) return null;
-    const index = (this.ordinal[block] * kBlockWords + address % kBlockWords - tile.leaf_begin) / 4;
-    if (!Number.isInteger(index) || index < 0 || index >= tile.addresses.length) return null;
+    const index = this.ordinal[block] * kBlockTexels + texel % kBlockTexels - tile.leaf_begin;
+    if (index < 0 || index >= tile.addresses.length) return null;
     const level = tile.level + tile.levels, offset = tile.addresses[index];
-    return {tile, index, level, offset, key: key_of(level, offset), address};
+    return {tile, index, level, offset, key: key_of(level, offset), texel};
   }
 
   // Makes the cut-off node refer to its tile, which must be loaded.
@@ -60,7 +61,8 @@ export class TileStore {
     if (node.tile.links.has(node.index) || slot === undefined) return false;
     node.tile.links.set(node.index, slot);
     this.by_slot[slot].references++;
-    this.pool.write(node.address, Uint32Array.of(slot));
+    const {coarse} = node.tile;
+    this.pool.write(node.texel, Uint32Array.of(slot, coarse[2 * node.index], coarse[2 * node.index + 1], 0));
     return true;
   }
 
@@ -70,24 +72,24 @@ export class TileStore {
     const key = key_of(level, offset);
     if (this.tiles.has(key)) return true;
     const decoded = decode_tile(words, level);
-    const count = decoded.words.length / kBlockWords;
+    const count = decoded.words.length * 4 / kBlockBytes;
     if (!this.evict_for(count, now_ms)) return false;
     const slot = this.slots.get(key) ?? this.pool.allocate_slot();
     const blocks = slot ? this.pool.allocate(count) : null;
     if (!blocks) return false;
     const tile = {key, level, offset, levels: decoded.levels, slot, blocks, leaf_begin: decoded.leaf_begin,
-                  addresses: decoded.addresses, links: new Map(), used_ms: now_ms, epoch: this.epoch, address: 0};
-    tile.address = this.pool.upload(blocks, decoded);
+                  addresses: decoded.addresses, coarse: decoded.coarse, links: new Map(), used_ms: now_ms, epoch: this.epoch, pointer: 0};
+    tile.pointer = this.pool.upload(blocks, decoded);
     blocks.forEach((block, i) => {
       this.owner[block] = tile;
       this.ordinal[block] = i;
     });
-    this.pool.set_slot(slot, tile.address + 1);
+    this.pool.set_slot(slot, tile.pointer);
     this.slots.set(key, slot);
     this.by_slot[slot] ??= {key, tile: null, references: 0};
     this.by_slot[slot].tile = tile;
     this.tiles.set(key, tile);
-    this.tile_bytes += count * kBlockWords * 4;
+    this.tile_bytes += count * kBlockBytes;
     return true;
   }
 
@@ -95,13 +97,11 @@ export class TileStore {
     this.root = this.get(level, offset);
   }
 
-  // The only brick of a grid of 4^3 voxels, as 16 hexadecimal digits or two words. Returns its address.
+  // The only brick of a grid of 4^3 voxels, as two words. Returns the pointer to it.
   add_brick(brick) {
-    const bits = Array.isArray(brick) ? null : BigInt(`0x${String(brick).replace(/^0x/, "")}`);
-    const words = new Uint32Array(kBlockWords);
-    words.set(bits === null ? brick : [Number(bits & 0xffffffffn), Number(bits >> 32n)]);
-    const blocks = this.pool.allocate(1);
-    return this.pool.upload(blocks, {words, pointers: []});
+    const words = new Uint32Array(kBlockTexels * kTexelWords);
+    words.set(brick);
+    return this.pool.upload(this.pool.allocate(1), {words, pointers: [], root: 0});
   }
 
   // The tile in a slot was seen in a picture of epoch `epoch`.
@@ -129,7 +129,7 @@ export class TileStore {
 
   evict(tile) {
     this.evicted++;
-    this.tile_bytes -= tile.blocks.length * kBlockWords * 4;
+    this.tile_bytes -= tile.blocks.length * kBlockBytes;
     this.tiles.delete(tile.key);
     for (const block of tile.blocks) this.owner[block] = undefined;
     this.pool.release(tile.blocks);
