@@ -36,7 +36,7 @@ export class Renderer {
     this.light = {exposure: 1, sky_reach: 1, haze_start: 1, readings: 0};
     this.size = {width: canvas.width, height: canvas.height, css_width: canvas.width, css_height: canvas.height};
     this.times = {view_ms: -1e9, frame_ms: 0, last_ms: 0, begin_ms: performance.now(), first_picture_ms: null, compile_ms: 0};
-    this.scale_index = 0;
+    this.scale_index = 4;
     this.seed = 0;
     this.samples = 0;
     this.quiet_rounds = 0;
@@ -327,11 +327,15 @@ export class Renderer {
     if (this.is_complete && full) for (const resolve of this.waiting.splice(0)) resolve();
   }
 
+  // Chooses the internal resolution by the time that a frame of the last one took.
   adapt(frame_ms, counts) {
     this.times.frame_ms = this.times.frame_ms > 0 ? 0.7 * this.times.frame_ms + 0.3 * frame_ms : frame_ms;
-    if (!counts && frame_ms < 2 * kTargetMs) return;
-    if (frame_ms > 1.5 * kTargetMs && this.scale_index < kScales.length - 1) this.scale_index++;
-    if (frame_ms < 0.5 * kTargetMs && this.scale_index > 0) this.scale_index--;
+    if (!counts) return;
+    const wanted = kScales[this.scale_index] * Math.sqrt(kTargetMs / Math.max(1, frame_ms));
+    const slower = frame_ms > 1.4 * kTargetMs, faster = wanted > 1.4 * kScales[this.scale_index];
+    if (!slower && !faster) return;
+    const index = kScales.findIndex((scale) => scale <= wanted);
+    this.scale_index = index < 0 ? kScales.length - 1 : faster ? Math.max(index, this.scale_index - 1) : index;
   }
 
   // Exposure and reach follow what is seen: smoothly while the camera moves, fast when it stands, and not

@@ -59,7 +59,8 @@ export class TileSource {
     const response = await this.request(path, {});
     try {
       const bytes = await response.arrayBuffer();
-      this.fetched_bytes += bytes.byteLength;
+      // Of the body as sent, which may be compressed.
+      this.fetched_bytes += Number(response.headers.get("Content-Length")) || bytes.byteLength;
       return bytes;
     } catch {
       throw new TileError(0, "The service stopped in the middle of an answer.");

@@ -1,7 +1,7 @@
 // Programs and targets of a picture, and the order in which its passes run.
 
 import {AsyncReading, Program, Target} from "./gl_objects.js";
-import {kCombine, kFeedback, kLight, kPick, kPresent, kTrace} from "./picture_shaders.js";
+import {kCombine, kFeedback, kLight, kOcclusion, kPick, kPresent, kTrace} from "./picture_shaders.js";
 
 const kHalfRange = 1;        // brightest light of a target with half floats
 const kByteRange = 8;        // and of one with bytes
@@ -14,6 +14,7 @@ export class Passes {
     this.parallel = gl.getExtension("KHR_parallel_shader_compile");
     this.trace = new Program(gl, "trace", kTrace);
     this.light = new Program(gl, "light", kLight);
+    this.occlusion = new Program(gl, "occlusion", kOcclusion);
     this.combine = new Program(gl, "combine", kCombine);
     this.present = new Program(gl, "present", kPresent);
     this.feedback = new Program(gl, "feedback", kFeedback);
@@ -29,7 +30,7 @@ export class Passes {
   // Resolves when all programs are compiled; the page stays responsive where the browser can compile in
   // the background. Throws WebGLUnavailable if one cannot be.
   async compile() {
-    const programs = [this.trace, this.light, this.combine, this.present, this.feedback];
+    const programs = [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback];
     while (!programs.every((program) => program.done(this.parallel)))
       await new Promise((resolve) => setTimeout(resolve, 4));
     for (const program of programs) program.finish();
@@ -45,7 +46,8 @@ export class Passes {
     this.targets = {
       width, height,
       hits: new Target(gl, width, height, ["RGBA32UI"]),
-      light: new Target(gl, width, height, ["RGBA8", "R32UI", "R32UI"]),
+      light: new Target(gl, width, height, ["R8", "R32UI", "R32UI"]),
+      sky: new Target(gl, Math.ceil(width / 2), Math.ceil(height / 2), ["RGBA8"]),
       colors: [new Target(gl, width, height, [color]), new Target(gl, width, height, [color])],
       feedback: new Target(gl, Math.ceil(width / kFeedbackBlock), Math.ceil(height / kFeedbackBlock), ["RGBA32UI"]),
       current: 0,
@@ -55,16 +57,17 @@ export class Passes {
   // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Returns the reading of the
   // feedback.
   draw(values) {
-    const {targets, gl} = this, {width, height, hits, light, colors, feedback} = targets;
+    const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback} = targets;
     gl.disable(gl.BLEND);
     this.trace.draw(hits, values, width, height);
     const share = this.floats ? 1 / (values.u_frame + 1) : 1;
     const [before, after] = [colors[targets.current], colors[1 - targets.current]];
-    const all = {...values, u_hits: hits.textures[0], u_light: light.textures[0], u_normals: light.textures[1],
+    const all = {...values, u_hits: hits.textures[0], u_light: light.textures[0], u_sky: sky.textures[0], u_normals: light.textures[1],
                  u_shadow_missing: light.textures[2], u_before: before.textures[0], u_share: share,
                  u_range: this.color_range, u_block: kFeedbackBlock,
                  u_sample: [values.u_seed % kFeedbackBlock, Math.floor(values.u_seed / kFeedbackBlock) % kFeedbackBlock]};
     this.light.draw(light, all, width, height);
+    this.occlusion.draw(sky, all, sky.width, sky.height);
     this.combine.draw(after, all, width, height);
     targets.current = 1 - targets.current;
     this.feedback.draw(feedback, all, feedback.width, feedback.height);
@@ -107,8 +110,8 @@ export class Passes {
 
   release_targets() {
     if (!this.targets) return;
-    const {hits, light, colors, feedback} = this.targets;
-    for (const target of [hits, light, ...colors, feedback]) target.dispose();
+    const {hits, light, sky, colors, feedback} = this.targets;
+    for (const target of [hits, light, sky, ...colors, feedback]) target.dispose();
     this.targets = null;
   }
 }

@@ -1,4 +1,4 @@
-// GLSL of the passes of a picture: trace (G-buffer), light (sky and sun), combine (filter, accumulate),
+// GLSL of the passes of a picture: trace (G-buffer), light (normals and sun), occlusion (sky), combine (filter, accumulate),
 // present (tones), feedback (what is missing, what was used). Lighting as in query/render/lighting.cc.
 
 import {kCameraSource, kPrecision, kRaySource} from "./ray_shader.js";
@@ -64,6 +64,10 @@ uint pack_normal(vec3 n) {
   vec2 p = n.z >= 0.0 ? n.xy : folded;
   return packSnorm2x16(p);
 }
+// Which of 2 x 2 pixels a sample of the sky's light is for.
+ivec2 chosen_of_four(int frame) {
+  return ivec2(frame & 1, (frame & 1) ^ (frame >> 1 & 1));
+}
 vec3 unpack_normal(uint packed_normal) {
   vec2 p = unpackSnorm2x16(packed_normal);
   vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
@@ -74,18 +78,60 @@ vec3 unpack_normal(uint packed_normal) {
 }
 `;
 
-export const kLight = `${kVersion}${kRaySource}${kCameraSource}${kSky}
+// What the passes of light share: rays that begin at the surface of a pixel.
+const kSurface = `
 uniform usampler2D u_hits;
 uniform vec2 u_jitter;
-uniform vec3 u_sun;          // unit vector toward the sun
-uniform float u_sky_reach;   // distance beyond which nothing occludes the sky
 uniform int u_frame;         // number of the sample
-uniform bool u_occlusion, u_shadows;
-layout(location = 0) out vec4 o_light;    // sky: red, green, blue; sun
+
+struct Surface {
+  vec3 center, face, direction;
+  float t, size, cube;       // cube: 1 if voxels are seen as cubes, 0 if they are parts of a surface
+};
+Surface surface_at(ivec2 pixel, uvec4 g) {
+  Surface s;
+  s.direction = direction_of(vec2(pixel) + 0.5 + u_jitter);
+  s.t = t_in(g);
+  s.size = size_in(g);
+  s.center = s.direction * s.t;
+  s.face = -s.direction;
+  if (axis_in(g) < 3) s.face = -sign(s.direction) * vec3(equal(ivec3(axis_in(g)), ivec3(0, 1, 2)));
+  s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
+  return s;
+}
+// The start of a ray clears the steps that the cells of a slope form.
+vec3 start_of(Surface s, vec3 normal) {
+  return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
+}
+void basis_around(vec3 n, out vec3 a, out vec3 b) {
+  a = normalize(abs(n.x) > 0.7 ? cross(n, vec3(0, 1, 0)) : cross(n, vec3(1, 0, 0)));
+  b = cross(n, a);
+}
+
+// Begins a ray at an offset from the eye.
+void set_ray_from(vec3 offset, vec3 direction) {
+  vec3 p = u_eye_part + offset, whole = floor(p);
+  set_ray(u_eye_cell + ivec3(whole), p - whole, direction);
+}
+
+// The R2 sequence, begun for each pixel at one of 16 places, that differ within every 4 x 4 pixels.
+vec2 sample_pair(ivec2 pixel, int dimension) {
+  int place = (pixel.x & 3) * 4 + (pixel.y & 3);
+  float n = float(u_frame * 16 + place * 7 % 16);
+  return fract(vec2(0.1 + 0.37 * float(dimension), 0.6 + 0.21 * float(dimension)) +
+               n * vec2(0.7548776662, 0.5698402910));
+}
+`;
+
+// The normal of each pixel, and whether it sees the sun.
+export const kLight = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}
+uniform vec3 u_sun;          // unit vector toward the sun
+uniform bool u_shadows;
+layout(location = 0) out float o_sun;
 layout(location = 1) out uint o_normal;
 layout(location = 2) out uint o_missing;
 
-const float kBounce = 0.42, kSkyWidening = 0.1, kSunWidening = 0.006, kSunRadius = 0.006;
+const float kSunWidening = 0.006, kSunRadius = 0.006;
 const int kReach = 3;
 
 vec3 offset_of(ivec2 pixel, float t) {
@@ -131,133 +177,124 @@ vec3 plane_normal(ivec2 pixel, vec3 center, float size, vec3 face, vec3 directio
   return dot(n, direction) > 0.0 ? -n : n;
 }
 
-void basis_around(vec3 n, out vec3 a, out vec3 b) {
-  a = normalize(abs(n.x) > 0.7 ? cross(n, vec3(0, 1, 0)) : cross(n, vec3(1, 0, 0)));
-  b = cross(n, a);
-}
-
-// Begins a ray at an offset from the eye.
-void set_ray_from(vec3 offset, vec3 direction) {
-  vec3 p = u_eye_part + offset, whole = floor(p);
-  set_ray(u_eye_cell + ivec3(whole), p - whole, direction);
-}
-
-// The R2 sequence, begun for each pixel at one of 16 places, that differ within every 4 x 4 pixels.
-vec2 sample_pair(ivec2 pixel, int dimension) {
-  int place = (pixel.x & 3) * 4 + (pixel.y & 3);
-  float n = float(u_frame * 16 + place * 7 % 16);
-  return fract(vec2(0.1 + 0.37 * float(dimension), 0.6 + 0.21 * float(dimension)) +
-               n * vec2(0.7548776662, 0.5698402910));
-}
-
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   uvec4 g = texelFetch(u_hits, pixel, 0);
-  o_light = vec4(0);
+  o_sun = 0.0;
   o_normal = 0u;
   o_missing = 0u;
   if (!found_in(g)) return;
-  vec3 direction = direction_of(gl_FragCoord.xy + u_jitter);
-  float t = t_in(g), size = size_in(g);
-  vec3 center = direction * t, face = -direction;
-  if (axis_in(g) < 3) {
-    face = vec3(0);
-    face[axis_in(g)] = direction[axis_in(g)] > 0.0 ? -1.0 : 1.0;
-  }
-  float cube = clamp((size / max(t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
-  vec3 normal = face;
-  if (cube < 1.0) normal = normalize(mix(plane_normal(pixel, center, size, face, direction), face, cube));
+  Surface s = surface_at(pixel, g);
+  vec3 normal = s.face;
+  if (s.cube < 1.0)
+    normal = normalize(mix(plane_normal(pixel, s.center, s.size, s.face, s.direction), s.face, s.cube));
   o_normal = pack_normal(normal);
-
-  // The start clears the steps that the cells of a slope form.
-  vec3 start = center + normal * (size * 2.2 * (1.0 - cube)) + face * (size * 0.01);
-  Hit hit;
+  if (dot(normal, u_sun) <= 0.0) return;
+  o_sun = 1.0;
+  if (!u_shadows) return;
   vec3 a, b;
-  float sun = 1.0;
-  if (dot(normal, u_sun) <= 0.0) {
-    sun = 0.0;
-  } else if (u_shadows) {
-    basis_around(u_sun, a, b);
-    vec2 p = sample_pair(pixel, 1);
-    float r = kSunRadius * sqrt(p.x), angle = 2.0 * kPi * p.y;
-    vec3 toward = normalize(u_sun + a * (r * cos(angle)) + b * (r * sin(angle)));
-    vec2 cone = vec2(max(size, 1.5 * u_pixel * t), kSunWidening);
-    set_ray_from(start, toward);
-    bool blocked = trace(0.0, 1e30, cone, hit);
-    if (blocked && hit.t == 0.0) {
-      // In a narrow place the start may be occupied; the way that the ray came is free.
-      start = direction * (t - 1.5 * size);
-      set_ray_from(start, toward);
-      blocked = trace(0.0, 1e30, cone, hit);
-    }
-    if (blocked) {
-      sun = 0.0;
-      o_missing = hit.missing;
-    }
+  basis_around(u_sun, a, b);
+  vec2 p = sample_pair(pixel, 1);
+  // A single sample has sharp shadows; noise disappears only where there are more.
+  float r = u_frame == 0 ? 0.0 : kSunRadius * sqrt(p.x), angle = 2.0 * kPi * p.y;
+  vec3 toward = normalize(u_sun + a * (r * cos(angle)) + b * (r * sin(angle)));
+  vec2 cone = vec2(max(s.size, 1.5 * u_pixel * s.t), kSunWidening);
+  Hit hit;
+  bool blocked = false;
+  // In a narrow place the start may be occupied; the way that the ray came is free.
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    set_ray_from(attempt == 0 ? start_of(s, normal) : s.direction * (s.t - 1.5 * s.size), toward);
+    blocked = trace(0.0, 1e30, cone, hit);
+    if (!blocked || hit.t > 0.0) break;
   }
-  vec3 sky = sky_color(normal);
+  if (blocked) {
+    o_sun = 0.0;
+    o_missing = hit.missing;
+  }
+}`;
+
+// Light from the sky, for one of every 2 x 2 pixels.
+export const kOcclusion = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}
+uniform usampler2D u_normals;
+uniform float u_sky_reach;   // distance beyond which nothing occludes the sky
+uniform bool u_occlusion;
+layout(location = 0) out vec4 o_sky;
+
+const float kBounce = 0.42, kSkyWidening = 0.1;
+
+void main() {
+  ivec2 place = ivec2(gl_FragCoord.xy), pixel = min(2 * place + chosen_of_four(u_frame), textureSize(u_hits, 0) - 1);
+  uvec4 g = texelFetch(u_hits, pixel, 0);
+  o_sky = vec4(0);
+  if (!found_in(g)) return;
+  Surface s = surface_at(pixel, g);
+  vec3 normal = unpack_normal(texelFetch(u_normals, pixel, 0).x), sky = sky_color(normal);
   if (u_occlusion) {
+    vec3 a, b;
     basis_around(normal, a, b);
-    vec2 p = sample_pair(pixel, 0);
+    vec2 p = sample_pair(place, 0);
     float r = sqrt(p.x), angle = 2.0 * kPi * p.y;
     vec3 toward = a * (r * cos(angle)) + b * (r * sin(angle)) + normal * sqrt(1.0 - p.x);
-    set_ray_from(start, toward);
+    Hit hit;
     float open = 1.0;
-    if (trace(0.0, u_sky_reach, vec2(max(size, 1.5 * u_pixel * t), kSkyWidening), hit)) {
+    set_ray_from(start_of(s, normal), toward);
+    if (trace(0.0, u_sky_reach, vec2(max(s.size, 1.5 * u_pixel * s.t), kSkyWidening), hit)) {
       float distance = hit.t / u_sky_reach;
       open = kBounce * sqrt(distance) * (1.0 - distance) + distance * distance * distance;
     }
     sky = sky_color(toward) * open;
   }
-  o_light = vec4(sky / 1.1, sun);
+  o_sky = vec4(sky / 1.1, 1.0);
 }`;
 
 const kReflected = `
 const vec3 kAlbedo = vec3(0.74, 0.70, 0.64), kSunlight = vec3(3.6, 3.2, 2.6);
-vec3 reflected(vec3 normal, vec4 light) {
-  return kAlbedo * (light.rgb * 1.1 + kSunlight * (light.a * max(0.0, dot(normal, u_sun))));
+vec3 reflected(vec3 normal, vec3 sky, float sun) {
+  return kAlbedo * (sky * 1.1 + kSunlight * (sun * max(0.0, dot(normal, u_sun))));
 }
 `;
 
-// Light is averaged over 4 x 4 pixels on the same plane, in which the samples differ. The result is
-// multiplied by its coverage, from which haze takes a share.
+// Light from the sky is averaged over 4 x 4 samples on the same plane. The result is multiplied by its
+// coverage, from which haze takes a share.
 export const kCombine = `${kVersion}${kCameraSource}${kSky}
 uniform usampler2D u_hits, u_normals;
-uniform sampler2D u_light, u_before;
+uniform sampler2D u_light, u_sky, u_before;
 uniform vec2 u_jitter;
 uniform vec3 u_sun;
 uniform vec2 u_haze;         // where it begins, and 1 / the scene's diagonal
 uniform float u_share;       // of this sample among those so far
 uniform float u_range;       // the brightest light that the target can hold
+uniform int u_frame;
 layout(location = 0) out vec4 o_color;
 ${kReflected}
 void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy), extent = textureSize(u_hits, 0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy), extent = textureSize(u_hits, 0), sky_extent = textureSize(u_sky, 0);
   uvec4 g = texelFetch(u_hits, pixel, 0);
   vec4 color = vec4(0);
   if (found_in(g)) {
     float t = t_in(g), slack = 3.0 * u_pixel * t + 0.5 * size_in(g);
     vec3 center = direction_of(gl_FragCoord.xy + u_jitter) * t;
     vec3 normal = unpack_normal(texelFetch(u_normals, pixel, 0).x);
-    vec4 sum = vec4(0);
+    ivec2 chosen = chosen_of_four(u_frame);
+    vec3 sum = vec3(0);
     float weights = 0.0;
     for (int j = -2; j < 2; ++j)
       for (int i = -2; i < 2; ++i) {
-        ivec2 at = clamp(pixel + ivec2(i, j), ivec2(0), extent - 1);
+        ivec2 place = (pixel + 1) / 2 + ivec2(i, j);
+        if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, sky_extent))) continue;
+        ivec2 at = min(2 * place + chosen, extent - 1);
         uvec4 other = texelFetch(u_hits, at, 0);
         if (!found_in(other)) continue;
         float alike = max(0.0, dot(normal, unpack_normal(texelFetch(u_normals, at, 0).x)));
         vec3 offset = direction_of(vec2(at) + 0.5 + u_jitter) * t_in(other) - center;
-        float w = alike * alike * alike * alike * max(0.0, 1.0 - abs(dot(normal, offset)) / slack);
-        sum += w * texelFetch(u_light, at, 0);
+        float w = alike * alike * alike * alike * max(0.0, 1.0 - abs(dot(normal, offset)) / slack) + 1e-4;
+        sum += w * texelFetch(u_sky, place, 0).rgb;
         weights += w;
       }
-    vec4 light = texelFetch(u_light, pixel, 0);
-    if (weights > 0.0) light.rgb = sum.rgb / weights;
-    if (weights > 0.0) light.a = mix(light.a, sum.a / weights, 0.5);
+    vec3 sky = weights > 0.0 ? sum / weights : 0.5 * sky_color(normal);
     float depth = max(0.0, t - u_haze.x) * u_haze.y;
     float coverage = 1.0 - 0.25 * (1.0 - exp(-depth * depth));
-    color = vec4(reflected(normal, light) * coverage / u_range, coverage);
+    color = vec4(reflected(normal, sky, texelFetch(u_light, pixel, 0).x) * coverage / u_range, coverage);
   }
   if (wire_in(g)) color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, 0.7), max(color.a, 0.7));
   o_color = u_share < 1.0 ? mix(texelFetch(u_before, pixel, 0), color, u_share) : color;
@@ -295,7 +332,7 @@ void main() {
 // steps of a sample, the sample's t. A sample is a pixel of the block that changes with each frame.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}
 uniform usampler2D u_hits, u_normals, u_shadow_missing;
-uniform sampler2D u_light;
+uniform sampler2D u_light, u_sky;
 uniform vec3 u_sun;
 uniform int u_block;
 uniform ivec2 u_sample;
@@ -329,7 +366,8 @@ void main() {
   float luminance = 0.0;
   if (found_in(g)) {
     vec3 normal = unpack_normal(texelFetch(u_normals, at, 0).x);
-    luminance = dot(reflected(normal, texelFetch(u_light, at, 0)), vec3(0.2126, 0.7152, 0.0722));
+    vec3 sky = texelFetch(u_sky, at / 2, 0).rgb;
+    luminance = dot(reflected(normal, sky, texelFetch(u_light, at, 0).x), vec3(0.2126, 0.7152, 0.0722));
   }
   o_feedback = uvec4(missing, packHalf2x16(vec2(min(pixels, 60000.0), luminance)),
                      g.w | min(steps_in(g) >> 1, 1023u) << 22, g.x);
