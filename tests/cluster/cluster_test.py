@@ -31,6 +31,8 @@ class ClusterTest(unittest.TestCase):
     def setUpClass(cls):
         # Slurm's paths of sockets are short.
         cls.folder = Path(tempfile.mkdtemp(prefix="vdslurm-", dir="/tmp"))
+        # Where a daemon that crashes leaves its core.
+        os.chdir(cls.folder)
         cls.scene = cls.folder / "city.glb"
         subprocess.run([VOXDAG, "generate", "city", cls.scene, "--triangles", "60000"], check=True,
                        capture_output=True)
@@ -73,7 +75,7 @@ class ClusterTest(unittest.TestCase):
         self.build = subprocess.Popen(
             [VOXDAG, "build", self.scene, "-r", str(resolution), "-o", self.output, "--json",
              "--cluster", "slurm", "--cluster-tasks", str(tasks), "--cluster-grace", "2", *options],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=self.folder,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             env=self.cluster.environment)
         return self.build
 
