@@ -15,6 +15,7 @@
 #include "server/jobs/task_resolver.h"
 #include "server/queue/job_queue.h"
 #include "server/scenes/scene_store.h"
+#include "server/tiles/partial_views.h"
 #include "server/tiles/viewed_files.h"
 
 namespace voxdag::server {
@@ -37,6 +38,7 @@ struct Context {
   ConcurrencyLimiter tiles{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
   ViewedFiles viewed{files, 16};
+  PartialViews partial{files, 16};
   // Held while a job that uses scenes is added or tried again, and while a scene that no job uses
   // is replaced or removed: neither may happen between the other's check and its change.
   std::mutex scene_mutex = {};

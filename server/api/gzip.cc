@@ -55,4 +55,12 @@ std::string gzip(std::string_view bytes) {
   return out;
 }
 
+void pack(const Request& request, Response& response) {
+  if (response.body.empty() || !accepts_gzip(request.header("Accept-Encoding"))) return;
+  std::string packed = gzip(response.body);
+  if (packed.size() >= response.body.size()) return;
+  response.body = std::move(packed);
+  response.headers.emplace("Content-Encoding", "gzip");
+}
+
 }  // namespace voxdag::server

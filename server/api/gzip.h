@@ -4,11 +4,16 @@
 #include <string>
 #include <string_view>
 
+#include "server/http/message.h"
+
 namespace voxdag::server {
 
 // Whether the value of Accept-Encoding allows it.
 bool accepts_gzip(std::string_view accepted);
 // Throws Error{kOutOfMemory}.
 std::string gzip(std::string_view bytes);
+
+// Compresses the body of an answer if the client accepts that and it saves bytes.
+void pack(const Request& request, Response& response);
 
 }  // namespace voxdag::server

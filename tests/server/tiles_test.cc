@@ -196,6 +196,37 @@ TEST_F(Tiles, NeedTheRoleRead) {
   }
 }
 
+// What is built can be seen while the job runs, and not after it: then there is the result.
+TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"},
+                                   {"resolution", 16384},
+                                   {"options", {{"subvolume", 1024}, {"threads", 1}}}});
+  const std::string path = "/api/v1/jobs/" + id + "/partial";
+  Json view;
+  ASSERT_TRUE(until([&] {
+    const ClientResponse answer = http_->get(path);
+    EXPECT_TRUE(answer.status == 200 || not_problem(answer, 404, "not_found").empty())
+        << answer.body << log();
+    view = Json::parse(answer.body);
+    return answer.status == 200 && !view["cubes"].empty();
+  }));
+  EXPECT_EQ(view["resolution"], 16384);
+  EXPECT_LE(view["cubes"].size(), view["built"].get<size_t>());
+  EXPECT_LT(view["built"], view["total"]);
+  for (const Json& cube : view["cubes"]) {
+    ASSERT_EQ(cube.size(), 6u);
+    EXPECT_EQ(cube[3], 1024);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(cube[axis].get<int>() % 1024, 0);
+    EXPECT_GT(cube[4].get<uint64_t>() + cube[5].get<uint64_t>(), 0u);
+  }
+  post("/api/v1/jobs/" + id + "/cancel");
+  const std::string done = post_job({{"scene", "m.glb"}, {"resolution", 64}});
+  ASSERT_TRUE(until_state(done, "succeeded"));
+  EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/" + done + "/partial"), 404, "not_found"), "");
+}
+
 // `voxdag view` of one file.
 class View : public testing::Test {
  protected:

@@ -1,7 +1,7 @@
 #include "server/api/routes/tile_routes.h"
 
 #include <bit>
-#include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
@@ -83,15 +83,6 @@ Response answer_for_ever(const Call& call, const ViewedFile& file, const std::st
   return response;
 }
 
-// Compresses the body if the client accepts that and it gains something.
-void pack(const Call& call, Response& response) {
-  if (response.body.empty() || !accepts_gzip(call.request.header("Accept-Encoding"))) return;
-  std::string packed = gzip(response.body);
-  if (packed.size() >= response.body.size()) return;
-  response.body = std::move(packed);
-  response.headers.emplace("Content-Encoding", "gzip");
-}
-
 Response get_manifest(const Call&, const ViewedFile& file) {
   return json_response(200, file.manifest());
 }
@@ -132,6 +123,27 @@ Viewed result_of_job(Context& context, const Call& call) {
   return {context.viewed.open(context.dispatcher.folder(job.id).result()), std::move(permit)};
 }
 
+// What a job that has not succeeded has built so far.
+Response get_partial(Context& context, Call& call) {
+  const Job job = find_job(context.queue, call.names[0]);
+  if (job.state == JobState::kSucceeded)
+    throw not_found("the job has its result: expected one that has not succeeded");
+  auto permit = context.tiles.acquire(call.caller.client);
+  if (!permit) throw busy("too many requests for tiles at a time, of this client or of all", 1);
+  const uint64_t resolution = nlohmann::json::parse(job.request).at("resolution");
+  try {
+    Response response = json_response(
+        200, context.partial.json(job.id, context.dispatcher.folder(job.id).work(), resolution));
+    pack(call.request, response);
+    response.permit = std::move(permit);
+    return response;
+  } catch (const Error& error) {
+    // A store that is just being made has no tables yet.
+    if (!error.is_corruption() && error.code() != ErrorCode::kInvalidInput) throw;
+    throw not_found("nothing is known of what the job has built");
+  }
+}
+
 }  // namespace
 
 void add_tile_routes(Router& router, const std::string& base, Packing packing,
@@ -140,7 +152,7 @@ void add_tile_routes(Router& router, const std::string& base, Packing packing,
     const auto handler = [find, answer, packing](Call& call) {
       Viewed viewed = find(call);
       Response response = answer(call, *viewed.file);
-      if (packing == Packing::kGzip) pack(call, response);
+      if (packing == Packing::kGzip) pack(call.request, response);
       response.permit = std::move(viewed.permit);
       return response;
     };
@@ -156,6 +168,7 @@ void add_job_tile_routes(Router& router) {
     return result_of_job(context, call);
   };
   add_tile_routes(router, "/api/v1/jobs/{id}", Packing::kGzip, find);
+  router.add("GET", "/api/v1/jobs/{id}/partial", Role::kRead, get_partial);
 }
 
 }  // namespace voxdag::server
