@@ -1,5 +1,5 @@
-// Global files: the reader, lookups, rays and the verifier. The input is the used part of the
-// header page and the levels; feature bits, sizes, checksums and the checksum table are made to
+// Global files: the reader, lookups, rays, tiles and the verifier. The input is the used part of
+// the header page and the levels; feature bits, sizes, checksums and the checksum table are made to
 // fit, so that a mutation reaches what is behind them.
 #include <sys/mman.h>
 #include <unistd.h>
@@ -15,6 +15,7 @@
 #include "core/format/global/verify.h"
 #include "core/format/global/voxdag_reader.h"
 #include "query/ray_caster.h"
+#include "query/tiles/tile.h"
 #include "tests/fuzz/targets/fuzz_target.h"
 
 namespace voxdag {
@@ -99,6 +100,16 @@ void cast_rays(const voxdag_reader::File& file) {
   }
 }
 
+// The tile of each level on the way down to the first brick.
+void encode_tiles(const voxdag_reader::File& file) {
+  const query::DagView view(file);
+  uint64_t offset = 0;
+  for (uint32_t level = 0; !view.empty() && level < file.brick_level(); ++level) {
+    query::encode_tile(view, 1 + level % 3, {level, offset});
+    offset = file.node(level, offset).child(0);
+  }
+}
+
 }  // namespace
 }  // namespace voxdag
 
@@ -121,6 +132,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     try {
       read_all(file);
       cast_rays(file);
+      encode_tiles(file);
     } catch (const std::exception&) {
       fuzz::require(!is_sound, "a file that verifies can be read");
       throw;
