@@ -6,9 +6,9 @@ namespace {
 
 using Help = CommandLine;
 
-constexpr const char* kCommands[] = {"build",    "plan",    "status",  "info",    "verify", "diff",
-                                     "generate", "render",  "extract", "submit",  "jobs",   "watch",
-                                     "cancel",   "suspend", "resume",  "download"};
+constexpr const char* kCommands[] = {
+    "build",  "plan", "status", "info",   "verify",  "diff",   "generate", "render", "extract",
+    "submit", "jobs", "watch",  "cancel", "suspend", "resume", "download", "view"};
 
 TEST_F(Help, ListsAllCommands) {
   const Answer answer = run({"--help"});
