@@ -176,39 +176,11 @@ const uint32_t* TriangleReader::load_corners(uint64_t first, uint64_t count) {
   return &corners_[3 * static_cast<size_t>(first - window_first_)];
 }
 
-// Each vertex once if they lie near each other, as those of a mesh mostly do.
-void TriangleReader::find_used_vertices() {
-  const std::span<const uint32_t> corners(corners_.data(), 3 * static_cast<size_t>(window_count_));
-  const auto [low, high] = std::ranges::minmax(corners);
-  has_valid_indices_ = high < vertex_count_;
-  if (high - low > kMaxUsedRange) {
-    used_vertices_.assign(corners.begin(), corners.end());
-    return;
-  }
-  is_used_.assign(high - low + 1, 0);
-  for (const uint32_t corner : corners) is_used_[corner - low] = 1;
-  for (uint32_t i = 0; i <= high - low; ++i)
-    if (is_used_[i]) used_vertices_.push_back(low + i);
-}
-
 // False if a triangle of the window may be invalid; nothing is added then.
 bool TriangleReader::add_bounds_of_window(WorldBounds& bounds) {
-  if (used_vertices_.empty()) find_used_vertices();
-  if (!has_valid_indices_) return false;
-  WorldBounds window{.empty = false};
-  const double* const first = cache_.at(used_vertices_[0]);
-  std::copy_n(first, 3, window.low.begin());
-  std::copy_n(first, 3, window.high.begin());
-  for (const uint32_t vertex : used_vertices_) {
-    const double* const position = cache_.at(vertex);
-    for (size_t a = 0; a < 3; ++a) {
-      window.low[a] = std::min(window.low[a], position[a]);
-      window.high[a] = std::max(window.high[a], position[a]);
-    }
-  }
-  if (!cache_.all_finite()) return false;
-  bounds.add(window);
-  return true;
+  if (used_vertices_.is_empty())
+    used_vertices_.find({corners_.data(), 3 * static_cast<size_t>(window_count_)});
+  return used_vertices_.add_to(bounds, cache_, vertex_count_);
 }
 
 void TriangleReader::place_all(const uint32_t* corners, uint64_t count) {

@@ -14,6 +14,7 @@
 #include "core/scene/gltf/mesh_data/corner_reader.h"
 #include "core/scene/gltf/mesh_data/instance_reader.h"
 #include "core/scene/gltf/mesh_data/node_walk.h"
+#include "core/scene/gltf/mesh_data/used_vertices.h"
 #include "core/scene/gltf/mesh_data/vertex_cache.h"
 #include "core/scene/gltf/mesh_data/vertex_source.h"
 
@@ -42,7 +43,6 @@ class TriangleReader {
  private:
   static constexpr size_t kBatchTriangles = 1024;
   static constexpr uint64_t kWindowTriangles = 4096;
-  static constexpr uint32_t kMaxUsedRange = 16 * kWindowTriangles;
 
   // All instances of a primitive that a node draws.
   struct Draw {
@@ -69,7 +69,6 @@ class TriangleReader {
   void bind(const Node& node, size_t primitive_index);
   template <class Body>
   void for_each_window(uint64_t first, uint64_t count, const Body& body);
-  void find_used_vertices();
   bool add_bounds_of_window(WorldBounds& bounds);
   const uint32_t* load_corners(uint64_t first, uint64_t count);
   void place_all(const uint32_t* corners, uint64_t count);
@@ -99,10 +98,7 @@ class TriangleReader {
   std::vector<uint32_t>
       corners_;  // vertex indices of window_count_ triangles from window_first_ on
   uint64_t window_first_ = 0, window_count_ = 0;
-  // The vertices that the window's triangles use, some perhaps more than once; empty if not known.
-  std::vector<uint32_t> used_vertices_;
-  bool has_valid_indices_ = false;  // once used_vertices_ are known
-  std::vector<uint8_t> is_used_;
+  UsedVertices used_vertices_;  // by the window's triangles; empty if not known
 
   PageBuffer<RealTriangle> batch_;
   size_t batch_size_ = 0;

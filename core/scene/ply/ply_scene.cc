@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/page_buffer.h"
+#include "core/scene/gltf/mesh_data/used_vertices.h"
 #include "core/scene/gltf/mesh_data/vertex_cache.h"
 #include "core/scene/gltf/messages.h"
 #include "core/scene/ply/face_reader.h"
@@ -15,6 +16,8 @@ namespace voxdag::ply {
 namespace {
 
 constexpr size_t kBatchTriangles = 1024;
+// Bounds are found of so many at a time, to see each vertex once.
+constexpr size_t kWindowTriangles = 4096;
 
 class PlyCursor : public TriangleCursor {
  public:
@@ -26,7 +29,7 @@ class PlyCursor : public TriangleCursor {
         faces_(mesh, budget),
         vertices_(mesh, budget),
         cache_(budget, vertices_.count(), cursors),
-        corners_(3 * kBatchTriangles),
+        corners_(3 * kWindowTriangles),
         batch_(budget, kBatchTriangles, "a batch of triangles") {
     cache_.bind(vertices_);
   }
@@ -37,6 +40,20 @@ class PlyCursor : public TriangleCursor {
   void read_snapped(uint64_t first, uint64_t count, const Grid& grid,
                     const Visitor& visit) override {
     read_placed(first, count, &grid, visit);
+  }
+  WorldBounds read_bounds(uint64_t first, uint64_t count) override {
+    WorldBounds bounds;
+    cache_.place(Transform{}, nullptr);
+    for (const uint64_t end = first + count; first < end;) {
+      cancel_.check();
+      const uint64_t n = std::min<uint64_t>(end - first, kWindowTriangles);
+      faces_.read(first, n, corners_.data());
+      used_vertices_.find({corners_.data(), 3 * static_cast<size_t>(n)});
+      if (!used_vertices_.add_to(bounds, cache_, vertices_.count()))
+        bounds.add(TriangleCursor::read_bounds(first, n));
+      first += n;
+    }
+    return bounds;
   }
 
  private:
@@ -93,6 +110,7 @@ class PlyCursor : public TriangleCursor {
   VertexReader vertices_;
   gltf::VertexCache cache_;
   std::vector<uint32_t> corners_;
+  gltf::UsedVertices used_vertices_;
   PageBuffer<RealTriangle> batch_;
 };
 

@@ -40,9 +40,15 @@ class BinaryRows : public Rows {
         bytes_before_ += bytes_of(property.type);
       }
     }
+    is_plain_ = lists_.size() == 1 && lists_[0].is_wanted && lists_[0].bytes_before == 0 &&
+                lists_[0].count_type == Type::kUint8;
   }
 
   uint64_t read(uint64_t row, uint64_t offset) override {
+    if (is_plain_) {
+      const uint64_t end = read_plain(offset);
+      if (end > offset) return end;
+    }
     entry_count_ = 0;
     for (const List& list : lists_) {
       offset += list.bytes_before;
@@ -69,8 +75,20 @@ class BinaryRows : public Rows {
     Decode decode;
   };
 
+  // Reads a row of a count of one byte, its entries and what is behind them, as most files have it,
+  // if all of it is in the window; returns `offset` if not.
+  uint64_t read_plain(uint64_t offset) {
+    const auto bytes = window_.at(offset, 1);
+    if (bytes.empty()) return offset;
+    const auto count = std::to_integer<size_t>(bytes[0]);
+    const size_t row_bytes = 1 + count * lists_[0].entry_bytes + bytes_before_;
+    if (bytes.size() < row_bytes) return offset;
+    lists_[0].decode(bytes.data() + 1, count, entries_.data());
+    entry_count_ = count;
+    return offset + row_bytes;
+  }
+
   int64_t count_at(const std::byte* bytes, Type type) const {
-    if (type == Type::kUint8) return std::to_integer<int64_t>(*bytes);  // as most files have it
     return with_type(
         type, [&]<class T>(T) { return static_cast<int64_t>(load<T>(bytes, is_big_endian_)); });
   }
@@ -90,6 +108,7 @@ class BinaryRows : public Rows {
   FileWindow window_;
   std::vector<List> lists_;
   size_t bytes_before_ = 0;  // behind the last list
+  bool is_plain_ = false;    // read_plain() may read its rows
 };
 
 class AsciiRows : public Rows {
