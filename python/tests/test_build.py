@@ -63,6 +63,8 @@ def test_plan(mesh):
     (([[0, 0, 0]], [[0, 0, 0]]), {"resolution": 100}, "invalid_input", "100"),
     (([[0, 0, 0]], [[0, 0, 0]]), {"palette": True}, "invalid_input", "palette"),
     (([[0, 0, 0]], [[0, 0, 0]]), {"threads": "many"}, "invalid_input", "threads"),
+    (([[0, 0, 0]], [[0, 0, 0]]), {"threads": -1}, "invalid_input", "threads=-1"),
+    (([[0, 0, 0]], [[0, 0, 0]]), {"resolution": -4}, "invalid_input", "resolution=-4"),
     (([[0, 0, 0]], [[0, 0, 0]]), {"memory": "1MiB"}, "invalid_input", "memory"),
     (([[np.nan, 0, 0]], [[0, 0, 0]]), {}, "invalid_input", "finite"),
 ])
@@ -72,6 +74,25 @@ def test_refuses(tmp_path, scene, options, code, text):
     assert refused.value.code == code, refused.value
     assert text in str(refused.value)
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("argument", [{"output": 7}, {"resolution": 64.0}, {"resolution": "64"},
+                                      {"progress": 5}, {"work": 1.5}])
+def test_types_that_cannot_be_meant(tmp_path, mesh, argument):
+    with pytest.raises(TypeError):
+        voxdag.build(mesh, **{"resolution": 64, "output": tmp_path / "x.vdag", **argument})
+    with pytest.raises(TypeError):
+        voxdag.open(7)
+    assert os.listdir(tmp_path) == []
+
+
+def test_paths_of_bytes(tmp_path, mesh):
+    output = os.fsencode(tmp_path / "x.vdag")
+    voxdag.build(mesh, resolution=64, output=output, work=os.fsencode(tmp_path / "work"))
+    with voxdag.open(output) as dag:
+        assert dag.path == os.fsdecode(output)
+    with pytest.raises(voxdag.Error, match="nowhere.glb"):
+        voxdag.build([b"nowhere.glb", b"there.glb"], resolution=64, output=output, force=True)
 
 
 def test_what_progress_raises_ends_the_build(mesh, tmp_path):

@@ -1,6 +1,7 @@
 """Builds from files, and from meshes in memory."""
 
 import json
+import operator
 import os
 import tempfile
 from contextlib import contextmanager
@@ -9,11 +10,11 @@ from typing import Any, BinaryIO, Callable, Dict, Iterator, List, Optional, Sequ
 import numpy as np
 
 from . import _native
-from ._error import Error
+from ._error import Error, Path
 
 # vertices (N, 3) of float, triangles (M, 3) of integers
 Mesh = Tuple[Any, Any]
-Scene = Union[str, os.PathLike, Sequence[Union[str, os.PathLike]], Mesh]
+Scene = Union[Path, Sequence[Path], Mesh]
 # Called with the stage, units done, units in all (0 if unknown) and the unit.
 Progress = Callable[[str, int, int, str], None]
 
@@ -21,7 +22,7 @@ Progress = Callable[[str, int, int, str], None]
 _ROWS = 1 << 18
 
 
-def build(scene: Scene, *, resolution: int, output: Union[str, os.PathLike],
+def build(scene: Scene, *, resolution: int, output: Path,
           memory: Union[int, str, None] = None, progress: Optional[Progress] = None,
           **options: Any) -> Dict[str, Any]:
     """Builds the DAG of a scene, or resumes a build that was interrupted, and returns its report.
@@ -37,17 +38,17 @@ def build(scene: Scene, *, resolution: int, output: Union[str, os.PathLike],
     skip_invalid, hash_bits, work, threads, subvolume, backend, method, cache, keep_work, restart,
     force. The report has the names of `voxdag build --json`. Raises Error.
     """
-    output = os.fspath(output)
+    output = os.fsdecode(output)
     with _files_of(scene, output) as files:
         return _call(_native.build, files, resolution, progress, output=output, memory=memory,
                      **options)
 
 
 def plan(scene: Scene, *, resolution: int, memory: Union[int, str, None] = None,
-         output: Union[str, os.PathLike, None] = None, progress: Optional[Progress] = None,
+         output: Optional[Path] = None, progress: Optional[Progress] = None,
          **options: Any) -> Dict[str, Any]:
     """What build() would need; builds nothing. The names are those of `voxdag plan --json`."""
-    output = "voxdag-plan" if output is None else os.fspath(output)
+    output = "voxdag-plan" if output is None else os.fsdecode(output)
     with _files_of(scene, output) as files:
         return _call(_native.plan, files, resolution, progress, output=output, memory=memory,
                      **options)
@@ -55,21 +56,27 @@ def plan(scene: Scene, *, resolution: int, memory: Union[int, str, None] = None,
 
 def _call(function: Callable[..., str], files: List[str], resolution: int,
           progress: Optional[Progress], memory: Union[int, str, None], **options: Any) -> Any:
+    resolution = operator.index(resolution)
+    if not 0 < resolution < 1 << 63:
+        raise Error(f"resolution={resolution}: expected a power of two from 4 to 2^20",
+                    "invalid_input")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress={progress!r}: expected a function or None")
     if memory is not None:
         options["memory"] = str(memory)
     if options.get("bounds") is not None:
         options["bounds"] = [float(number) for number in options["bounds"]]
     for name in ("work", "cache"):
         if options.get(name) is not None:
-            options[name] = os.fspath(options[name])
+            options[name] = os.fsdecode(options[name])
     return json.loads(function(files, resolution, progress, options))
 
 
 @contextmanager
 def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
     """The files of a scene. A mesh becomes a PLY file next to the output, which is removed."""
-    if isinstance(scene, (str, os.PathLike)):
-        yield [os.fspath(scene)]
+    if isinstance(scene, (str, bytes, os.PathLike)):
+        yield [os.fsdecode(scene)]
     elif _is_mesh(scene):
         _check_mesh(*scene)
         folder = os.path.dirname(os.path.abspath(output))
@@ -82,12 +89,12 @@ def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
         finally:
             os.remove(path)
     else:
-        yield [os.fspath(file) for file in scene]
+        yield [os.fsdecode(file) for file in scene]
 
 
 def _is_mesh(scene: Scene) -> bool:
     return (isinstance(scene, (tuple, list)) and len(scene) == 2
-            and not any(isinstance(part, (str, os.PathLike)) for part in scene))
+            and not any(isinstance(part, (str, bytes, os.PathLike)) for part in scene))
 
 
 def _check_mesh(vertices: Any, triangles: Any) -> None:
@@ -112,10 +119,10 @@ def _write_ply(file: BinaryIO, vertices: np.ndarray, triangles: np.ndarray) -> N
                 f"element face {len(triangles)}\n"
                 "property list uchar uint vertex_indices\nend_header\n").encode())
     for first in range(0, len(vertices), _ROWS):
-        file.write(np.ascontiguousarray(vertices[first:first + _ROWS], dtype="<f8"))
+        file.write(np.ascontiguousarray(vertices[first:first + _ROWS], dtype="<f8").data)
     for first in range(0, len(triangles), _ROWS):
         part = triangles[first:first + _ROWS]
         rows = np.empty(len(part), dtype=[("count", "u1"), ("corners", "<u4", 3)])
         rows["count"] = 3
         rows["corners"] = part
-        file.write(rows)
+        file.write(rows.data)

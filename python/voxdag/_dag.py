@@ -1,12 +1,12 @@
 """A finished file, and what can be asked of it."""
 
 import os
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from . import _native
-from ._error import Error
+from ._error import Error, Path
 
 # A half-open box: the low corner x, y, z and the high corner x, y, z.
 Region = Sequence[Any]
@@ -25,7 +25,7 @@ class Hits(NamedTuple):
         return np.isfinite(self.distance)
 
 
-def open(path: Union[str, os.PathLike]) -> "Dag":
+def open(path: Path) -> "Dag":
     """Opens a .vdag file. It is mapped, not read: opening takes no time at any size."""
     return Dag(path)
 
@@ -39,8 +39,8 @@ class Dag:
     distances are in the units of the scene. `threads` is 0 for all.
     """
 
-    def __init__(self, path: Union[str, os.PathLike]) -> None:
-        self.path = os.fspath(path)
+    def __init__(self, path: Path) -> None:
+        self.path = os.fsdecode(path)
         self._file: Optional[_native.Dag] = _native.Dag(self.path)
 
     def close(self) -> None:

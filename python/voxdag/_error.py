@@ -1,4 +1,9 @@
-"""The exception of this package."""
+"""The exception of this package, and the type of its paths."""
+
+import os
+from typing import Union
+
+Path = Union[str, bytes, "os.PathLike[str]", "os.PathLike[bytes]"]
 
 
 class Error(Exception):

@@ -1,0 +1,34 @@
+"""The package is typed: mypy finds no contradiction in it, and knows the types of what users call."""
+
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+
+import voxdag
+
+
+def mypy(folder, *arguments):
+    # The package apart, since mypy does not look at what is installed.
+    package = os.path.dirname(voxdag.__file__)
+    shutil.copytree(package, folder / "voxdag", ignore=shutil.ignore_patterns("*.so", "__pycache__"))
+    return subprocess.run([sys.executable, "-m", "mypy", "--cache-dir", str(folder / "cache"), *arguments],
+                          cwd=folder, capture_output=True, text=True)
+
+
+def test_types(tmp_path):
+    (tmp_path / "user.py").write_text(textwrap.dedent("""
+        import voxdag
+        dag = voxdag.open(b"scene.vdag")
+        reveal_type(dag.count())
+        voxdag.open(7)
+        voxdag.build("scene.glb", resolution="64", output="scene.vdag")
+    """))
+    checked = mypy(tmp_path, "-p", "voxdag")
+    assert checked.returncode == 0, checked.stdout
+    shutil.rmtree(tmp_path / "voxdag")
+    user = mypy(tmp_path, "user.py").stdout
+    assert 'user.py:4: note: Revealed type is "int"' in user.replace("builtins.", ""), user
+    assert "user.py:5: error: Argument 1" in user and "user.py:6: error: Argument" in user, user
+    assert "Found 2 errors" in user, user
