@@ -4,7 +4,7 @@
 import {WebGLUnavailable} from "./gl/gl_objects.js";
 import {Passes} from "./gl/passes.js";
 import {read_feedback} from "./gl/feedback.js";
-import {add, normalized, View} from "./gl/view.js";
+import {add, View} from "./gl/view.js";
 import {TileLoader} from "./tiles/tile_loader.js";
 import {TilePool} from "./tiles/tile_pool.js";
 import {TileStore} from "./tiles/tile_store.js";
@@ -19,6 +19,8 @@ const kTargetMs = 40;           // of a frame while the camera moves
 const kSamples = 16;            // per pixel of a still picture
 const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
 const kConeShare = 0.75;        // of a pixel: the width at which a cell is hit as a whole
+const kLitShare = 0.35;         // of what is seen within a scene
+const kSunTrials = 8;           // while tiles arrive that say more
 const kFinePixels = 3;          // wide is a cell whose tile may arrive late
 const kQuietRounds = 2;         // readings without a missing tile until a view is complete
 
@@ -32,7 +34,10 @@ export class Renderer {
     this.options = {minLevel: 0, maxLevel: null, clip: null, ambientOcclusion: true, sunShadows: true,
                     pixelTolerance: 1, wireLevel: null};
     this.view = null;
-    this.sun = normalized([0.5, 0.8, 0.3]);
+    this.outside = true;
+    this.sun_turn = 0;
+    this.sun_trials = 0;
+    this.set_sun(0);
     this.light = {exposure: 1, sky_reach: 1, haze_start: 1, readings: 0};
     this.size = {width: canvas.width, height: canvas.height, css_width: canvas.width, css_height: canvas.height};
     this.times = {view_ms: -1e9, frame_ms: 0, last_ms: 0, begin_ms: performance.now(), first_picture_ms: null, compile_ms: 0};
@@ -241,11 +246,35 @@ export class Renderer {
     }
   };
 
+  // The sun stands over the left shoulder of the first camera. If that is within the scene, the sun takes a
+  // better place as soon as the first view is complete.
   place_sun(position, target) {
     const {origin, edge} = this.info, back = add(position, target, -1);
     this.outside = position.some((x, i) => x < origin[i] || x > origin[i] + edge);
-    const turn = Math.atan2(back[2], back[0]) + 0.9, height = this.outside ? 0.65 : 0.9;
+    this.sun_turn = Math.atan2(back[2], back[0]) + 0.9;
+    this.set_sun(0);
+  }
+  set_sun(place) {
+    const turn = this.sun_turn - 2 * Math.PI * (place % 16) / 16, height = 0.65 + 0.25 * Math.floor(place / 16);
     this.sun = [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
+  }
+  // Returns whether the picture is final as far as the sun is concerned.
+  improve_sun(now_ms) {
+    if (this.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows) return true;
+    const {width, height} = this.passes.targets;
+    const values = {...this.uniforms(width, height, width, height), u_turn: this.sun_turn};
+    const {place, wanted} = this.passes.choose_sun(values, kLitShare);
+    this.sun_trials++;
+    if (wanted.size > 0 && this.sun_trials < kSunTrials && !this.loader.is_full) {
+      this.loader.demand(wanted, now_ms);
+      return false;
+    }
+    this.sun_trials = kSunTrials;
+    this.set_sun(place);
+    this.samples = 0;
+    this.quiet_rounds = 0;
+    this.light.readings = 0;
+    return false;
   }
 
   get is_complete() {
@@ -324,7 +353,7 @@ export class Renderer {
     if (!moving && nothing_comes) this.quiet_rounds++;
     else if (!this.is_complete || read.coarse_pixels > kFinePixels) this.quiet_rounds = 0;
     this.last = {full, drawn_ms: now};
-    if (this.is_complete && full) for (const resolve of this.waiting.splice(0)) resolve();
+    if (this.is_complete && full && nothing_comes && this.improve_sun(now)) for (const resolve of this.waiting.splice(0)) resolve();
   }
 
   // Chooses the internal resolution by the time that a frame of the last one took.

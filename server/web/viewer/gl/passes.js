@@ -1,7 +1,7 @@
 // Programs and targets of a picture, and the order in which its passes run.
 
 import {AsyncReading, Program, Target} from "./gl_objects.js";
-import {kCombine, kFeedback, kLight, kOcclusion, kPick, kPresent, kTrace} from "./picture_shaders.js";
+import {kCombine, kFeedback, kLight, kOcclusion, kPick, kPresent, kSun, kSunPlaces, kSunRows, kTrace} from "./picture_shaders.js";
 
 const kHalfRange = 1;        // brightest light of a target with half floats
 const kByteRange = 8;        // and of one with bytes
@@ -19,6 +19,7 @@ export class Passes {
     this.present = new Program(gl, "present", kPresent);
     this.feedback = new Program(gl, "feedback", kFeedback);
     this.pick = null;
+    this.sun = null;
     this.targets = null;
     this.vertex_array = gl.createVertexArray();
   }
@@ -106,6 +107,34 @@ export class Passes {
     }
     target.dispose();
     return words;
+  }
+
+  // {place: of the 48 of the sun, the one that lights nearest to `share` of what the last picture shows,
+  //  wanted: leaf address -> 1, tiles that would make the choice better}
+  choose_sun(values, share) {
+    const {gl, targets} = this, wanted = new Map();
+    if (!this.sun) {
+      this.sun = new Program(gl, "sun", kSun);
+      this.sun.finish();
+    }
+    const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]), words = new Uint32Array(kSunPlaces * kSunRows * 4);
+    this.sun.draw(target, {...values, u_hits: targets.hits.textures[0], u_normals: targets.light.textures[1]},
+                 kSunPlaces, kSunRows);
+    gl.readPixels(0, 0, kSunPlaces, kSunRows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+    target.dispose();
+    let best = 0, best_off = Infinity;
+    for (let place = 0; place < kSunPlaces; ++place) {
+      let seen = 0, lit = 0;
+      for (let row = 0; row < kSunRows; ++row) {
+        const at = 4 * (row * kSunPlaces + place), state = words[at];
+        if (words[at + 1] !== 0) wanted.set(words[at + 1], 1);
+        seen += state > 0;
+        lit += state === 2;
+      }
+      const off = Math.abs(lit / Math.max(1, seen) - share);
+      if (off < best_off) [best, best_off] = [place, off];
+    }
+    return {place: best, wanted};
   }
 
   release_targets() {

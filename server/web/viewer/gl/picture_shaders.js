@@ -247,6 +247,35 @@ void main() {
   o_sky = vec4(sky / 1.1, 1.0);
 }`;
 
+// For each of 48 places of the sun (columns) and some pixels (rows): 0 if the pixel sees no surface, 1 if
+// that is in shadow, 2 if it is lit; and the cut-off node whose tile would say more. The cones are wide:
+// few tiles are enough to choose.
+export const kSunPlaces = 48, kSunRows = 64;
+export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}
+uniform usampler2D u_normals;
+uniform float u_turn;
+layout(location = 0) out uvec4 o_lit;
+
+void main() {
+  ivec2 place = ivec2(gl_FragCoord.xy), extent = textureSize(u_hits, 0);
+  ivec2 pixel = ivec2(fract(0.5 + float(place.y) * vec2(0.7548776662, 0.5698402910)) * vec2(extent));
+  uvec4 g = texelFetch(u_hits, pixel, 0);
+  o_lit = uvec4(0);
+  if (!found_in(g)) return;
+  Surface s = surface_at(pixel, g);
+  vec3 normal = unpack_normal(texelFetch(u_normals, pixel, 0).x);
+  float turn = u_turn - 2.0 * kPi * float(place.x % 16) / 16.0, height = 0.65 + 0.25 * float(place.x / 16);
+  vec3 sun = vec3(cos(turn) * cos(height), sin(height), sin(turn) * cos(height));
+  Hit hit;
+  set_ray_from(start_of(s, normal), sun);
+  if (dot(normal, sun) <= 0.0) {
+    o_lit = uvec4(1, 0, 0, 0);
+    return;
+  }
+  bool blocked = trace(0.0, 1e30, vec2(max(s.size, 4.0 * u_pixel * s.t), 0.02), hit);
+  o_lit = uvec4(blocked ? 1u : 2u, blocked ? hit.missing : 0u, 0, 0);
+}`;
+
 const kReflected = `
 const vec3 kAlbedo = vec3(0.74, 0.70, 0.64), kSunlight = vec3(3.6, 3.2, 2.6);
 vec3 reflected(vec3 normal, vec3 sky, float sun) {
