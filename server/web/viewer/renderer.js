@@ -342,10 +342,7 @@ export class Renderer {
     this.adjust_light(read, moving);
     this.coarse_pixels = read.coarse_pixels;
     if (epoch === this.store.epoch) this.store.rounds++;
-    if (read.wanted.size > 0) {
-      const linked = this.loader.demand(read.wanted, now);
-      if (linked > 0) this.on_arrival();
-    }
+    if (this.loader.demand(read.wanted, now) > 0) this.on_arrival();
     if (epoch !== this.store.epoch) return;
     const nothing_comes = this.loader.is_idle && !this.loader.awaits_retry;
     if (this.times.first_picture_ms === null && read.coarse_pixels < 16)

@@ -25,6 +25,7 @@ export class TileLoader {
     this.full_until_ms = 0;      // Infinity: until the next epoch
     this.problem = null;
     this.timer = 0;
+    this.unmet = 0;              // wanted nodes of the last reading whose tiles may still come
     this.disposed = false;
   }
 
@@ -45,6 +46,7 @@ export class TileLoader {
   demand(wanted, now_ms) {
     const by_key = new Map();
     let linked = 0;
+    this.unmet = 0;
     for (const [address, priority] of wanted) {
       const node = this.store.cut_off_node(address);
       if (!node) continue;
@@ -54,12 +56,19 @@ export class TileLoader {
       }
       const request = this.loading.get(node.key) || by_key.get(node.key);
       if (request) {
+        this.unmet++;
         request.leaves.add(address);
         request.priority += priority;
-      } else if (this.may_ask(node.key, now_ms)) {
+      } else if (this.failures.get(node.key)?.count >= kMaxRefusals) {
+        continue;
+      } else if (!this.may_ask(node.key, now_ms)) {
+        this.unmet++;
+      } else {
+        this.unmet++;
         by_key.set(node.key, {key: node.key, level: node.level, offset: node.offset, priority, leaves: new Set([address])});
       }
     }
+    if (this.unmet === 0) this.end_outage();
     this.queue = [...by_key.values()].sort((a, b) => a.priority - b.priority);
     this.send(now_ms);
     return linked;
@@ -129,9 +138,13 @@ export class TileLoader {
     this.on_arrival();
   }
 
-  accept(batch, answer, now_ms) {
+  end_outage() {
     this.outage = {count: 0, retry_ms: 0};
-    if (this.problem && this.problem.code !== "replaced") this.problem = null;
+    if (this.problem?.code !== "replaced") this.problem = null;
+  }
+
+  accept(batch, answer, now_ms) {
+    this.end_outage();
     batch.forEach((request, i) => {
       try {
         if (this.store.add(request.level, request.offset, answer[i], now_ms)) {
@@ -193,7 +206,7 @@ export class TileLoader {
   // Whether a wanted tile may still arrive though no request is under way.
   get awaits_retry() {
     const now_ms = performance.now();
-    if (this.problem?.code === "replaced") return false;
+    if (this.problem?.code === "replaced" || this.unmet === 0) return false;
     return this.outage.count > 0 ||
            [...this.failures.values()].some((f) => f.count > 0 && f.count < kMaxRefusals && now_ms < f.retry_ms);
   }
