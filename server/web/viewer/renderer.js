@@ -34,6 +34,7 @@ export class Renderer {
     this.options = {minLevel: 0, maxLevel: null, clip: null, ambientOcclusion: true, sunShadows: true,
                     pixelTolerance: 1, wireLevel: null};
     this.view = null;
+    this.first_picture_bytes = 0;
     this.outside = true;
     this.sun_turn = 0;
     this.sun_trials = 0;
@@ -163,6 +164,7 @@ export class Renderer {
       evicted: store?.evicted || 0, rays: this.stats.rays, stepsMean: this.stats.steps_mean, steps99: this.stats.steps_99,
       internalWidth: passes?.targets?.width || 0, internalHeight: passes?.targets?.height || 0,
       samples: this.samples, compileMs: times.compile_ms, firstPictureMs: times.first_picture_ms,
+      firstPictureBytes: this.first_picture_bytes,
       fetchedBytes: this.source.fetched_bytes,
     };
   }
@@ -345,8 +347,10 @@ export class Renderer {
     if (this.loader.demand(read.wanted, now) > 0) this.on_arrival();
     if (epoch !== this.store.epoch) return;
     const nothing_comes = this.loader.is_idle && !this.loader.awaits_retry;
-    if (this.times.first_picture_ms === null && read.coarse_pixels < 16)
+    if (this.times.first_picture_ms === null && read.coarse_pixels < 16) {
       this.times.first_picture_ms = now - this.times.begin_ms;
+      this.first_picture_bytes = this.source.fetched_bytes;
+    }
     if (!moving && nothing_comes) this.quiet_rounds++;
     else if (!this.is_complete || read.coarse_pixels > kFinePixels) this.quiet_rounds = 0;
     this.last = {full, drawn_ms: now};
