@@ -309,3 +309,24 @@ def check_job(visitor, server, voxdag, scene, token):
     assert page.url.endswith(f"#/jobs/{job['id']}"), "the picture's camera has replaced the page's address"
     visitor.picture("page")
     return viewer
+
+
+def check_running_jobs(visitor, server, voxdag, folder):
+    """A running job shows its subvolumes; a queued one is viewed as soon as it has a result."""
+    def submit(scene, resolution):
+        return json.loads(voxdag.run("submit", folder / scene, "-r", resolution, "--server", server.url, "--json"))["id"]
+
+    running, queued = submit("soup.glb", 16384), submit("menger.glb", 128)
+    page = visitor.page
+    visitor.open(f"{server.url}/viewer.html?job={running}", wait=False)
+    page.get_by_role("heading", name="This job is running.").wait_for()
+    page.get_by_text(re.compile(r"^[1-9].* of .* occupied subvolumes are built")).wait_for()
+    assert page.locator("canvas.cubes").is_visible()
+    visitor.picture("running")
+    visitor.open(f"{server.url}/viewer.html?job={queued}", wait=False)
+    page.get_by_role("heading", name="This job is queued.").wait_for()
+    voxdag.run("cancel", running, "--server", server.url)
+    visitor.wait_until("Boolean(window.voxdagViewer)")
+    assert any(math.isfinite(d) for d in visitor.capture(64, 36)[0])
+    visitor.open(f"{server.url}/viewer.html?job={running}", wait=False)
+    page.get_by_text("It has no result to look at.").wait_for()

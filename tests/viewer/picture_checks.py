@@ -107,7 +107,7 @@ def check_budget(visitor, url, cameras, references):
 
 def check_missing_tiles(visitor, url, cameras, references):
     """Without any tile but the root's only detail is missing; it is there once the tiles come."""
-    name, camera = "street", cameras["street"]
+    name, camera = "wide", cameras["wide"]
     tiles = re.compile(r"/api/v1/.*/tiles/")  # not the scripts in viewer/tiles/
     for way in ("fail", "are late"):
         held, passing = [], []
