@@ -16,15 +16,17 @@ document.addEventListener("securitypolicyviolation", (event) =>
   window.violations.push(`${event.violatedDirective} ${event.blockedURI}`));
 """
 
-# The picture's frame has the new camera after two animation frames.
+# After two animation frames the picture has the new camera.
+TWO_FRAMES = """async () => {
+  for (let i = 0; i < 2; ++i) await new Promise((resolve) => requestAnimationFrame(resolve));
+}"""
+
 SHOW = """async ([camera, complete]) => {
   const {viewer, renderer} = window.voxdagViewer;
   viewer.fly_to_text(camera);
-  const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
-  await frame();
-  await frame();
+  await (%s)();
   if (complete) await renderer.complete();
-}"""
+}""" % TWO_FRAMES
 
 CAPTURE = """async ([width, height]) => {
   const {depth, level} = await window.voxdagViewer.renderer.capture({width, height});
@@ -95,7 +97,8 @@ class Visitor:
 
     def camera_text(self):
         """The string in the panel, which follows the camera after a moment."""
-        self.page.wait_for_timeout(400)
+        self.page.evaluate(TWO_FRAMES)
+        self.wait_until("!voxdagViewer.viewer.bookmark_timer")
         return self.page.locator("#camera-text").inner_text()
 
     def picture(self, name):
