@@ -55,7 +55,7 @@ export class PickView {
         fact("In scene units", h("code", {"data-fact": "scene"},
           this.space.text(pick.position).replaceAll(",", ", "))),
         fact("Level", h("span", {"data-fact": "level"}, String(pick.level)), this.edge_note(pick)),
-        fact("Node", h("code", {"data-fact": "node"}, `${pick.nodeLevel} / ${pick.nodeOffset}`)),
+        fact("Node of the tile: level / word offset", h("code", {"data-fact": "node"}, `${pick.nodeLevel} / ${pick.nodeOffset}`)),
         fact("Distance from the camera", `${length_text(pick.distance)} voxels`)),
       start && pick && h("dl", {class: "facts measure"},
         fact("From voxel", h("code", {}, start.voxel.join(", "))),
