@@ -312,7 +312,7 @@ export class Renderer {
     this.passes.show(this.light.exposure, this.canvas.width, this.canvas.height);
     this.samples++;
     this.stats.rays = width * height;
-    this.reading = {pass, begin_ms: now, epoch: this.store.epoch, moving, full};
+    this.reading = {pass, begin_ms: now, epoch: this.store.epoch, moving, full, height};
   }
 
   uniforms(width, height, lod_width, lod_height) {
@@ -334,9 +334,10 @@ export class Renderer {
   }
 
   take_reading(now) {
-    const {pass, begin_ms, epoch, moving, full} = this.reading;
+    const {pass, begin_ms, epoch, moving, full, height} = this.reading;
     this.reading = null;
-    const words = pass.take(), read = read_feedback(words);
+    const read = read_feedback(pass.take());
+    read.coarse_pixels *= this.size.height / height;  // pixels of the canvas
     this.stats.steps_mean = read.steps_mean;
     this.stats.steps_99 = read.steps_99;
     this.adapt(now - begin_ms, moving || !full);
