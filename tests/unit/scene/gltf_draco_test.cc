@@ -1,5 +1,6 @@
 // KHR_draco_mesh_compression: a compressed primitive gives the triangles of the same scene with
 // what Draco's own decoder makes of it stored uncompressed.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <random>

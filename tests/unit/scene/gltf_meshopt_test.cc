@@ -1,5 +1,6 @@
 // EXT_meshopt_compression: compressed views give the triangles of the same scene with the decoded
 // bytes stored as they are.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
