@@ -311,17 +311,33 @@ def check_job(visitor, server, voxdag, scene, token):
     return viewer
 
 
+# Pixels in the color of the upper faces of built cubes.
+PAINTED = """() => {
+  const canvas = document.querySelector("canvas.cubes");
+  const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  let count = 0;
+  for (let i = 0; i < data.length; i += 4)
+    count += data[i + 3] === 255 && data[i + 2] - data[i] > 50;
+  return count;
+}"""
+
+
 def check_running_jobs(visitor, server, voxdag, folder):
     """A running job shows its subvolumes; a queued one is viewed as soon as it has a result."""
     def submit(scene, resolution):
         return json.loads(voxdag.run("submit", folder / scene, "-r", resolution, "--server", server.url, "--json"))["id"]
 
+    visitor.expected = "status of 404"  # nothing to show before the subvolumes are planned, and after the end
     running, queued = submit("soup.glb", 16384), submit("menger.glb", 128)
     page = visitor.page
     visitor.open(f"{server.url}/viewer.html?job={running}", wait=False)
     page.get_by_role("heading", name="This job is running.").wait_for()
     page.get_by_text(re.compile(r"^[1-9].* of .* occupied subvolumes are built")).wait_for()
-    assert page.locator("canvas.cubes").is_visible()
+    page.locator("canvas.cubes").wait_for()
+    partial = json.loads(server.get(f"/api/v1/jobs/{running}/partial"))
+    assert partial["built"] > 0 and partial["total"] > partial["built"], partial
+    painted = page.evaluate(PAINTED)
+    assert painted > 20, f"{painted} pixels of what is built are painted"
     visitor.picture("running")
     visitor.open(f"{server.url}/viewer.html?job={queued}", wait=False)
     page.get_by_role("heading", name="This job is queued.").wait_for()

@@ -48,7 +48,7 @@ async function finished_job() {
     const job = await get_json(`/api/v1/jobs/${job_id}`, lifetime.signal);
     show_title(title_text(job));
     if (job.state === "succeeded") return job;
-    cubes ??= new (await import("../views/cubes_view.js")).CubesView(`/api/v1/jobs/${job_id}/subvolumes`, lifetime.signal);
+    cubes ??= new (await import("../views/partial_view.js")).PartialView(`/api/v1/jobs/${job_id}/partial`, lifetime.signal);
     show_message(h("h1", {}, `This job is ${state_text(job.state)}.`),
       h("p", {}, has_ended(job.state) ? "It has no result to look at." : "Its result is shown here when it is done."),
       cubes.element, h("div", {class: "buttons"}, h("a", {class: "button", href: `/#/jobs/${job_id}`}, "The job's page")));

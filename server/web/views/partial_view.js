@@ -1,0 +1,24 @@
+// The subvolumes that a running job has built, each by the coarse brick of its voxels.
+
+import {CubesView} from "./cubes_view.js";
+
+const kMaxDetailed = 1500;  // more subvolumes are drawn as the cubes they are
+
+export class PartialView extends CubesView {
+  // `cubes` of the service are [x, y, z, edge, low, high]: the halves of a brick.
+  show({resolution, built, total, cubes}) {
+    const parts = cubes.length <= kMaxDetailed ? cubes.flatMap(cells_of) : cubes.map(([x, y, z, edge]) => [x, y, z, edge, 1]);
+    super.show({resolution, built, total, cubes: parts});
+  }
+}
+
+// The occupied 64ths of a cube; the bits are in the order of a brick (docs/format.md).
+function cells_of([x, y, z, edge, ...halves]) {
+  const cells = [];
+  for (let bit = 0; bit < 64; ++bit) {
+    if (!(halves[bit >> 5] >>> (bit & 31) & 1)) continue;
+    const along = (axis) => (2 * (bit >> 5 - axis & 1) + (bit >> 2 - axis & 1)) * edge / 4;
+    cells.push([x + along(0), y + along(1), z + along(2), edge / 4, 1]);
+  }
+  return cells;
+}
