@@ -97,10 +97,10 @@ void check_outputs(const RenderCommand& command, FileSystem& files) {
     throw Error(ErrorCode::kInvalidInput, "--output and --depth name the same file");
   if (!command.output.path.empty())
     command.output.check(files, command.input, query::is_rendered_png);
+  if (command.depth.empty()) return;
+  const OutputFile depth{command.depth, command.output.force};
   // An array does not say who wrote it.
-  if (!command.depth.empty())
-    command.output.check(files, command.depth, command.input,
-                         [](const ReadableFile&) { return false; });
+  depth.check(files, command.input, [](const ReadableFile&) { return false; });
 }
 
 void run(RenderCommand& command, CommandContext& context) {

@@ -40,14 +40,13 @@ std::string ViewService::url() const {
 
 void ViewService::run() {
   // The cameras are looked for while a browser starts. If that fails, so will the request for them.
-  std::thread cameras([file = viewed_.open(path_)] {
+  const std::jthread cameras([file = viewed_.open(path_)] {
     try {
       file->manifest();
     } catch (const std::exception&) {
     }
   });
   http_.run(kDrain_s);
-  cameras.join();
 }
 
 Response ViewService::answer(Request& request) {

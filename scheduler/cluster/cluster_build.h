@@ -95,7 +95,7 @@ class ClusterBuild {
   // False if Slurm does not answer.
   bool end_attempt(OpenBatch& batch, std::vector<uint32_t>& again, std::vector<uint32_t>& to_split);
   bool says_that_it_ended(const OpenBatch& batch) const;
-  void cancel_given_up(OpenBatch* batch, const SlurmTask& task);
+  void cancel_given_up(const std::vector<SlurmTask>& tasks, std::set<uint32_t>& listed);
   void note_reason(const SlurmTask& task);
   [[noreturn]] void give_up(uint32_t batch, ErrorCode code, const std::string& why);
   bool can_be_split(const OpenBatch& batch) const;

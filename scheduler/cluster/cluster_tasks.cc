@@ -21,10 +21,11 @@ void ClusterBuild::look_after_tasks() {
   }
   is_answering_ = true;
   std::set<uint32_t> listed;
+  std::vector<SlurmTask> given_up;
   for (const SlurmTask& task : *active) {
     OpenBatch* const batch = state_.find(task.batch());
     if (task.is_given_up()) {
-      cancel_given_up(batch, task);
+      given_up.push_back(task);
       continue;
     }
     listed.insert(task.batch());
@@ -36,6 +37,7 @@ void ClusterBuild::look_after_tasks() {
     is_changed_ = is_changed_ || batch->task != task;
     batch->task = task;
   }
+  cancel_given_up(given_up, listed);
   std::vector<uint32_t> again, to_split;
   for (OpenBatch& batch : state_.open) {
     if (listed.contains(batch.number)) continue;
@@ -54,12 +56,21 @@ void ClusterBuild::look_after_tasks() {
   report_tasks();
 }
 
-// A task that Slurm will never start has failed.
-void ClusterBuild::cancel_given_up(OpenBatch* batch, const SlurmTask& task) {
-  if (!slurm_.cancel_one(task.name()) || !batch) return;
-  if (!batch->task) batch->task = task;
-  if (batch->task->name() == task.name())
-    own_reasons_[batch->number] = {"Slurm could not start it (" + task.reason + ")", true};
+// Tasks that Slurm will never start have failed, once it has canceled them; those that it has not
+// are `listed`. A node that fails at once may take them again: the grace lies between the attempts.
+void ClusterBuild::cancel_given_up(const std::vector<SlurmTask>& tasks,
+                                   std::set<uint32_t>& listed) {
+  std::vector<std::string> names;
+  for (const SlurmTask& task : tasks) names.push_back(task.name());
+  const bool are_canceled = slurm_.cancel_tasks(names);
+  for (const SlurmTask& task : tasks) {
+    OpenBatch* const batch = state_.find(task.batch());
+    if (!are_canceled) listed.insert(task.batch());
+    if (!batch || !are_canceled) continue;
+    if (!batch->task) batch->task = task;
+    if (batch->task->name() == task.name())
+      own_reasons_[batch->number] = {"Slurm could not start it (" + task.reason + ")", false};
+  }
 }
 
 // Says once why tasks wait, if it is not just for their turn.

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/clock.h"
+#include "core/base/error.h"
 #include "core/geometry/grid.h"
 
 namespace voxdag::server {
@@ -36,7 +37,14 @@ std::string PartialViews::json(const std::string& job, const std::string& work_f
   const auto view = view_of(job);
   const std::lock_guard lock(view->mutex);
   const double start_s = wall_seconds();
-  if (start_s < view->next_s) return view->json;
+  if (start_s < view->next_s) {
+    if (view->json.empty())
+      throw Error(ErrorCode::kInvalidInput, work_folder + ": nothing could be read a moment ago");
+    return view->json;
+  }
+  // Also if this fails.
+  view->next_s = start_s + kInterval_s;
+  view->json.clear();
   view->cubes.refresh(files_, work_folder);
   view->json = describe(view->cubes, resolution);
   const double took_s = wall_seconds() - start_s;

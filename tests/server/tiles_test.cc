@@ -189,7 +189,7 @@ TEST_F(Tiles, NeedTheRoleRead) {
   config_.token_file = folder_.file("tokens");
   start();
   HttpClient client({url(), reader.token, "", 60});
-  for (const char* path : {"/tiles", "/tiles/0/0?v=1", "/tiles/batch?v=1&nodes=0.0"}) {
+  for (const char* path : {"/tiles", "/tiles/0/0?v=1", "/tiles/batch?v=1&nodes=0.0", "/partial"}) {
     const std::string url = std::string("/api/v1/jobs/none") + path;
     EXPECT_EQ(not_problem(http_->get(url), 401, "unauthorized"), "") << path;
     EXPECT_EQ(not_problem(client.get(url), 404, "not_found"), "") << path;

@@ -170,9 +170,9 @@ void MergeJob::cancel_given_up(const SlurmJob& job) {
     for (const SlurmTask& task : tasks.value_or(std::vector<SlurmTask>{}))
       if (task.is_given_up()) given_up.push_back(task.name());
   }
-  for (const std::string& task : given_up)
-    if (slurm_.cancel_one(task))
-      context_.progress.warn("Slurm could not start task " + task + " and holds it: canceled");
+  if (!given_up.empty() && slurm_.cancel_tasks(given_up))
+    context_.progress.warn("Slurm could not start and holds " + std::to_string(given_up.size()) +
+                           " tasks, " + given_up[0] + " for one: canceled");
 }
 
 // Says once that the job runs, or why it does not.

@@ -13,6 +13,7 @@ namespace {
 
 // Slurm's own default.
 constexpr uint32_t kDefaultMaxArraySize = 1001;
+constexpr size_t kMaxTasksOfCommand = 200;
 
 std::string trimmed(std::string text) {
   while (!text.empty() && std::string_view(" \t\r\n").find(text.back()) != std::string_view::npos)
@@ -320,7 +321,17 @@ bool Slurm::cancel(const std::string& name) {
   return run({"scancel", "--name=" + name}).exit_status == 0;
 }
 
-bool Slurm::cancel_one(const std::string& task) { return run({"scancel", task}).exit_status == 0; }
+bool Slurm::cancel_tasks(const std::vector<std::string>& tasks) {
+  bool taken = true;
+  for (size_t begin = 0; begin < tasks.size() && taken; begin += kMaxTasksOfCommand) {
+    std::vector<std::string> command{"scancel"};
+    const size_t end = std::min(begin + kMaxTasksOfCommand, tasks.size());
+    command.insert(command.end(), tasks.begin() + static_cast<ptrdiff_t>(begin),
+                   tasks.begin() + static_cast<ptrdiff_t>(end));
+    taken = run(command).exit_status == 0;
+  }
+  return taken;
+}
 
 bool waits_for_its_turn(const std::string& reason) {
   for (const char* usual : {"", "None", "Priority", "Resources", "JobArrayTaskLimit", "BeginTime",

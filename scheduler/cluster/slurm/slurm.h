@@ -96,8 +96,8 @@ class Slurm {
   std::optional<SlurmEnd> end_of(const std::string& task);
   // Cancels all tasks and jobs of that name. Returns whether Slurm has taken it.
   bool cancel(const std::string& name);
-  // Cancels a task JOB_INDEX or a job.
-  bool cancel_one(const std::string& task);
+  // Cancels tasks JOB_INDEX and jobs.
+  bool cancel_tasks(const std::vector<std::string>& tasks);
   // Commands so far.
   uint64_t requests() const { return requests_; }
 

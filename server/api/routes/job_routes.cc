@@ -209,8 +209,11 @@ Response patch_job(Context& context, Call& call) {
 
 Response delete_job(Context& context, Call& call) {
   expect_no_body(call.request);
-  context.viewed.close(context.dispatcher.folder(call.names[0]).result());
+  const std::string result = context.dispatcher.folder(call.names[0]).result();
+  context.viewed.close(result);
   context.dispatcher.remove(call.names[0]);
+  // Somebody may have asked for a tile in between.
+  context.viewed.close(result);
   return no_content();
 }
 

@@ -30,6 +30,7 @@ std::vector<uint32_t> make_tile(const ViewedFile& file, const query::TileAddress
   try {
     return query::encode_tile(file.dag(), kTileLevels, address);
   } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound && !error.is_corruption()) throw;
     // Whether the file is damaged, or the offset that of no node, looks the same from here.
     throw not_found(error.message());
   }
@@ -75,7 +76,9 @@ Response answer_for_ever(const Call& call, const ViewedFile& file, const std::st
   const std::string tag = sha256_hex(file.digest() + ' ' + name).substr(0, kTagDigits);
   response.headers.emplace("ETag", "W/\"" + tag + '"');
   response.headers.emplace("Vary", "Accept-Encoding, Authorization");
-  if (has_tag(call.request.header("If-None-Match"), '"' + tag + '"')) {
+  const std::string known = call.request.header("If-None-Match");
+  // Whether there is such a tile at all, which "*" asks for, is not known before it is made.
+  if (trimmed(known) != "*" && has_tag(known, '"' + tag + '"')) {
     response.status = 304;
     return response;
   }

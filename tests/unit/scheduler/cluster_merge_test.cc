@@ -73,7 +73,7 @@ TEST_F(ClusterMergeJob, ATaskThatSlurmHoldsForEverDoesNotHoldItUp) {
   };
   slurm_.merge_state = "PENDING|Dependency";
   EXPECT_EQ(build(merging_spec()).cluster->attempts, 1u);
-  EXPECT_NE(warnings_.text.find("Slurm could not start task 1_1 and holds it: canceled"),
+  EXPECT_NE(warnings_.text.find("could not start and holds 1 tasks, 1_1 for one: canceled"),
             std::string::npos)
       << warnings_.text;
 }

@@ -70,9 +70,12 @@ class PlayedSlurm : public CommandRunner {
       return ok("MaxArraySize            = " + std::to_string(max_array_size) +
                 "\nAccountingStorageType   = accounting_storage/none\n");
     if (command[0] == "scontrol") return ok(ends[command.back()]);
-    if (command[0] == "scancel" && held.erase(command[1]) > 0)
-      ends[command[1]] = "JobState=CANCELLED Reason=None NodeList= ExitCode=0:0";
-    if (command[0] == "scancel") return ok("");
+    if (command[0] == "scancel") {
+      for (const std::string& task : command)
+        if (held.erase(task) > 0)
+          ends[task] = "JobState=CANCELLED Reason=None NodeList= ExitCode=0:0";
+      return ok("");
+    }
     return {127, "", command[0] + ": command not found"};
   }
 
