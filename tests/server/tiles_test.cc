@@ -201,8 +201,8 @@ TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
   start();
   put_scene("m.glb", scene_bytes());
   const std::string id = post_job({{"scene", "m.glb"},
-                                   {"resolution", 16384},
-                                   {"options", {{"subvolume", 1024}, {"threads", 1}}}});
+                                   {"resolution", 131072},
+                                   {"options", {{"subvolume", 2048}, {"threads", 1}}}});
   const std::string path = "/api/v1/jobs/" + id + "/partial";
   Json view;
   ASSERT_TRUE(until([&] {
@@ -212,13 +212,13 @@ TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
     view = Json::parse(answer.body);
     return answer.status == 200 && !view["cubes"].empty();
   }));
-  EXPECT_EQ(view["resolution"], 16384);
+  EXPECT_EQ(view["resolution"], 131072);
   EXPECT_LE(view["cubes"].size(), view["built"].get<size_t>());
   EXPECT_LT(view["built"], view["total"]);
   for (const Json& cube : view["cubes"]) {
     ASSERT_EQ(cube.size(), 6u);
-    EXPECT_EQ(cube[3], 1024);
-    for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(cube[axis].get<int>() % 1024, 0);
+    EXPECT_EQ(cube[3], 2048);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(cube[axis].get<int>() % 2048, 0);
     EXPECT_GT(cube[4].get<uint64_t>() + cube[5].get<uint64_t>(), 0u);
   }
   post("/api/v1/jobs/" + id + "/cancel");
