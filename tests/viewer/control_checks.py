@@ -262,18 +262,52 @@ HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
   return kind === "webgl2" ? null : get_context.call(this, kind, ...more);
 };
 """
+# A driver that offers WebGL2, but cannot compile the shaders.
+NO_PROGRAMS = """
+const parameter = WebGL2RenderingContext.prototype.getProgramParameter;
+WebGL2RenderingContext.prototype.getProgramParameter = function(program, name) {
+  return name === this.LINK_STATUS ? false : parameter.call(this, program, name);
+};
+"""
 
 
-def check_without_webgl(visitor, url, still):
+def check_without_webgl(visitor, url, still, lack=NO_WEBGL):
     """A message, with the command for a picture; for a job its still picture."""
-    visitor.context.add_init_script(NO_WEBGL)
-    visitor.open(url, wait=False)
+    visitor.context.add_init_script(lack)
+    visitor.open(f"{url}#camera=1,2.5,-3e2&target=0,0,0&fov=$(id)", wait=False)
     page = visitor.page
     page.get_by_text("needs WebGL2").wait_for()
-    page.get_by_text("voxdag render FILE.vdag").wait_for()
+    command = page.get_by_text("voxdag render FILE.vdag").inner_text()
+    assert command.endswith(" --camera 1,2.5,-3e2 --target 0,0,0"), f"not to be copied to a shell: {command}"
     if still:
         visitor.wait_until("document.querySelector('img.still')?.naturalWidth > 100")
     visitor.picture("no-webgl")
+
+
+def check_expired_token(visitor, viewer, token):
+    """A token that expires is asked for again: before the manifest at once, while tiles load by a message."""
+    page, expired = visitor.page, []
+
+    def expire(route):
+        if expired[0].search(route.request.url):
+            route.continue_(headers={**route.request.headers, "authorization": "Bearer expired"})
+        else:
+            route.continue_()
+
+    with visitor.expecting("status of 401"):
+        page.route(re.compile("/tiles"), expire)
+        expired[:] = [re.compile(r"/tiles$")]
+        visitor.open(viewer, wait=False)
+        page.get_by_label("Token").wait_for()
+        expired[:] = [re.compile(r"/tiles/batch|/tiles/[1-9]")]
+        page.get_by_label("Token").fill(token)
+        page.keyboard.press("Enter")
+        page.get_by_text("The service no longer accepts the token").wait_for()
+        depths, _ = visitor.capture(64, 36)
+        assert any(math.isfinite(d) for d in depths), "nothing is drawn without a token"
+        page.unroute(re.compile("/tiles"))
+        page.locator("#status:not(.bad)").wait_for(state="attached")
+    page.evaluate("voxdagViewer.renderer.complete()")
 
 
 def check_job(visitor, server, voxdag, scene, token):
@@ -308,6 +342,12 @@ def check_job(visitor, server, voxdag, scene, token):
     page.keyboard.press("Escape")
     assert page.url.endswith(f"#/jobs/{job['id']}"), "the picture's camera has replaced the page's address"
     visitor.picture("page")
+    page.evaluate("window.embedded = document.querySelector('.picture canvas').getContext('webgl2')")
+    assert not page.evaluate("embedded.isContextLost()")
+    page.evaluate("location.hash = '#/jobs'")
+    visitor.wait_until("embedded.isContextLost()")  # the page lives on, and a browser has few contexts
+    if token:
+        check_expired_token(visitor, viewer, token)
     return viewer
 
 

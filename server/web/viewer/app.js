@@ -14,7 +14,7 @@ const kDefaultFov = 35;
 const kPictureAspect = 16 / 9;   // of the views in the manifest
 const kSeenInterval_ms = 250;    // between two looks at how far away things are
 const kStatisticsInterval_ms = 500;
-const kBookmarkDelay_ms = 250;
+const kBookmarkDelay_ms = 400;    // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
   // `renderer` has started; `places` are the elements {panel, tools, status}. With `bookmarks` the
@@ -42,7 +42,6 @@ export class Viewer {
     resizes.observe(canvas);
     if (bookmarks) window.addEventListener("hashchange", () => this.follow_bookmark(), {signal});
     const timer = setInterval(() => this.show_statistics(), kStatisticsInterval_ms);
-    canvas.addEventListener("webglcontextrestored", () => this.schedule(), {signal});
     signal.addEventListener("abort", () => {
       clearInterval(timer);
       resizes.disconnect();
@@ -212,8 +211,13 @@ export class Viewer {
       this.bookmark_timer = null;
       if (this.signal.aborted || !this.bookmarks) return;
       this.panel.show_camera(camera_text(this.space, this.camera));
-      this.fragment = `#${fragment_text(this.bookmark_members())}`;
-      history.replaceState(null, "", this.fragment);
+      const fragment = `#${fragment_text(this.bookmark_members())}`;
+      try {
+        history.replaceState(null, "", fragment);
+        this.fragment = fragment;
+      } catch {
+        // Refused, as after too many changes: the address follows with a later motion.
+      }
     }, kBookmarkDelay_ms);
   }
 

@@ -22,11 +22,22 @@ export async function embed_viewer(place, job, signal) {
   const source = new TileSource({base: job.links.self, headers: authorization()});
   let viewer = null;
   const renderer = new Renderer(canvas, source, {budgetBytes: kBudgetBytes, onChange: () => viewer?.schedule()});
-  const manifest = await source.manifest();
-  await renderer.start();
-  if (signal.aborted) return renderer.dispose();
-  place.replaceChildren(stage);
-  viewer = new Viewer({canvas, renderer, manifest, signal, bookmarks: false, file_name: `job-${job.id}`,
-                       places: {panel: h("div"), tools, status}});
+  // A browser has few contexts: this one is released early, as the page that it was in lives on.
+  const release = () => {
+    renderer.dispose();
+    if (!renderer.gl.isContextLost()) renderer.gl.getExtension("WEBGL_lose_context")?.loseContext();
+  };
+  try {
+    const manifest = await source.manifest();
+    await renderer.start();
+    if (signal.aborted) return release();
+    place.replaceChildren(stage);
+    viewer = new Viewer({canvas, renderer, manifest, signal, bookmarks: false, file_name: `job-${job.id}`,
+                         places: {panel: h("div"), tools, status}});
+  } catch (error) {
+    release();
+    throw error;
+  }
+  signal.addEventListener("abort", release, {once: true});
   canvas.focus({preventScroll: true});
 }

@@ -6,7 +6,7 @@ import {clear, h, set_text} from "../lib/dom.js";
 import {has_ended, state_text, title_text} from "../lib/format.js";
 import {problem_box} from "../views/parts.js";
 import {Viewer} from "./app.js";
-import {Renderer} from "./renderer.js";
+import {Renderer, WebGLUnavailable} from "./renderer.js";
 import {TileSource} from "./tile_source.js";
 import {fill_tools} from "./tools.js";
 
@@ -58,9 +58,10 @@ async function finished_job() {
   }
 }
 
+// The address may be anybody's, and this is copied to a shell: only what consists of numbers is taken.
 function camera_of_address() {
   const members = new URLSearchParams(location.hash.slice(1));
-  return ["camera", "target", "fov"].filter((name) => members.has(name))
+  return ["camera", "target", "fov"].filter((name) => /^[-+0-9.eE,]+$/.test(members.get(name) ?? ""))
                                     .map((name) => ` --${name} ${members.get(name)}`).join("");
 }
 
@@ -86,14 +87,16 @@ async function start() {
   if (!job) show_title(manifest.name ?? "voxdag view");
   const canvas = place("scene");
   let viewer = null;
-  let renderer;
+  let renderer = null;
   hide_message();
   try {
     renderer = new Renderer(canvas, source, {budgetBytes: budget_bytes(), onChange: () => viewer?.schedule()});
+    await renderer.start();
   } catch (error) {
+    renderer?.dispose();
+    if (!(error instanceof WebGLUnavailable)) throw error;
     return show_without_webgl(error.message, job);
   }
-  await renderer.start();
   const narrow = matchMedia("(max-width: 700px)").matches;
   place("panel").hidden = narrow;
   place("tools").hidden = false;
@@ -130,6 +133,7 @@ function run() {
   hide_message();
   start().catch((error) => {
     if (error.status !== 401) show_failure(error);
+    else if (!(error instanceof Problem)) sign_in();  // a Problem has asked for it already
   });
 }
 
