@@ -39,6 +39,25 @@ CAPTURE = """async ([width, height]) => {
 }"""
 
 
+# What the canvas shows, rows from the top: red, green, blue, alpha.
+READ_CANVAS = """async () => {
+  const {renderer, viewer} = window.voxdagViewer;
+  while (renderer.statistics().samples < 16) {
+    viewer.schedule();
+    await new Promise((resolve) => requestAnimationFrame(resolve));
+  }
+  const scene = document.getElementById("scene"), copy = document.createElement("canvas");
+  copy.width = scene.width;
+  copy.height = scene.height;
+  const context = copy.getContext("2d");
+  context.drawImage(scene, 0, 0);
+  const {data} = context.getImageData(0, 0, copy.width, copy.height);
+  let out = "";
+  for (let i = 0; i < data.length; i += 32768) out += String.fromCharCode(...data.subarray(i, i + 32768));
+  return [copy.width, copy.height, btoa(out)];
+}"""
+
+
 class Visitor:
     """Records every error that the browser reports; leave() fails if there were any."""
 
@@ -88,6 +107,13 @@ class Visitor:
         levels = base64.b64decode(level_text)
         assert len(depths) == len(levels) == width * height
         return depths, levels
+
+    def canvas(self):
+        """Width, height and bytes of the canvas once the picture is complete, four bytes a pixel."""
+        width, height, text = self.page.evaluate(READ_CANVAS)
+        pixels = base64.b64decode(text)
+        assert len(pixels) == 4 * width * height
+        return width, height, pixels
 
     def statistics(self):
         return self.page.evaluate("window.voxdagViewer.renderer.statistics()")
