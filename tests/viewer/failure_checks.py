@@ -9,12 +9,13 @@ CONNECTION_LOST = "ERR_CONNECTION_REFUSED|ERR_FAILED|ERR_CONNECTION_RESET|ERR_EM
 
 # Requests for all tiles but the root's "arrive", "fail", or are "late" until their turn comes.
 TILES = """
-window.tiles = {way: "%s", asked: 0, held: []};
+window.tiles = {way: "%s", pause_ms: 0, asked: 0, held: []};
 const plain_fetch = window.fetch;
 window.fetch = async (url, options) => {
   if (/\\/tiles\\/(?!0\\/0\\?)/.test(url)) {
     ++tiles.asked;
     if (tiles.way === "fail") throw new TypeError("failed");
+    if (tiles.pause_ms) await new Promise((resolve) => setTimeout(resolve, tiles.pause_ms));
     if (tiles.way === "late") await new Promise((resolve) => tiles.held.push(resolve));
   }
   return plain_fetch(url, options);
@@ -58,3 +59,68 @@ def check_restart(visitor, server, cameras, references):
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(references["street"], depths, cameras["street"], "street, after a restart")
     visitor.page.locator("#status:not(.bad)").wait_for(state="attached")
+
+
+# Puts the first camera, which the sun follows, within the scene. Whether the view is complete within 20 s.
+COMPLETE_WITH_SUN = """async (pause_ms) => {
+  const {viewer, renderer, camera, manifest} = voxdagViewer, {eye, target} = camera.get();
+  renderer.place_sun(viewer.space.to_scene(eye), viewer.space.to_scene(target));
+  renderer.sun_trials = 6;  // of 8 that may wait for tiles
+  tiles.pause_ms = pause_ms;
+  tiles.asked = 0;
+  viewer.set_options({shadows: true});
+  return Promise.race([renderer.complete().then(() => true),
+                       new Promise((resolve) => setTimeout(() => resolve(false), 20000))]);
+}"""
+
+
+def check_late_sun(visitor, url, camera):
+    """From within the scene a view is complete with the sun in its place, though the tiles for it come late."""
+    visitor.context.add_init_script(TILES % "arrive")
+    visitor.open(f"{url}/{PLAIN}")
+    visitor.show(camera)
+    before = visitor.page.evaluate("voxdagViewer.renderer.sun")
+    assert visitor.page.evaluate(COMPLETE_WITH_SUN, 1500), "the view is never complete"
+    assert visitor.page.evaluate("tiles.asked") > 0, "the sun needs no tile: the check sees nothing"
+    assert visitor.page.evaluate("voxdagViewer.renderer.sun") != before, "the sun has not moved"
+
+
+# Draws and picks as soon as the context is back, when programs and tiles are not.
+LOSE = """() => {
+  const {viewer, renderer} = voxdagViewer;
+  window.lost = {context: renderer.gl.getExtension("WEBGL_lose_context"), restored: 0, errors: []};
+  viewer.canvas.addEventListener("webglcontextrestored", async () => {
+    ++lost.restored;
+    try {
+      renderer.setOptions({});  // begins the picture again
+      renderer.frame(performance.now());
+      await renderer.pick(10, 10);
+    } catch (error) {
+      lost.errors.push(String(error.stack));
+    }
+  });
+  lost.context.loseContext();
+}"""
+
+
+def check_lost_context(visitor, url, camera, reference):
+    """A lost context is said, and after it all is as it was: also if it is lost again while that is made."""
+    page = visitor.page
+    visitor.open(f"{url}/{PLAIN}")
+    visitor.show(camera)
+    with visitor.expecting("CONTEXT_LOST|Context lost"):
+        page.evaluate(LOSE)
+        page.get_by_text("The graphics card is not available").wait_for()
+        assert page.evaluate("voxdagViewer.renderer.pick(10, 10)") is None
+        page.evaluate("lost.context.restoreContext()")
+        visitor.wait_until("lost.restored === 1")
+        page.evaluate("lost.context.loseContext()")
+        visitor.wait_until("voxdagViewer.renderer.lost")
+        page.evaluate("lost.context.restoreContext()")
+        visitor.wait_until("lost.restored === 2")
+        visitor.show(camera)
+    depths, _ = visitor.capture(WIDTH, HEIGHT)
+    assert_equal(reference, depths, camera, "after a lost context")
+    errors = page.evaluate("lost.errors")
+    assert not errors, errors
+    visitor.wait_until("document.getElementById('status').textContent === ''")

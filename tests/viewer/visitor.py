@@ -74,7 +74,7 @@ class Visitor:
         self.page.on("pageerror", lambda error: self.errors.append(f"page error: {error}"))
 
     def on_console(self, message):
-        is_error = message.type == "error" or "GL_INVALID" in message.text
+        is_error = message.type == "error" or "INVALID_" in message.text
         if is_error and not (self.expected and re.search(self.expected, message.text)):
             self.errors.append(f"console: {message.text} ({message.location.get('url')})")
 
