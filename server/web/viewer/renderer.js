@@ -47,6 +47,7 @@ export class Renderer {
     this.samples = 0;
     this.quiet_rounds = 0;
     this.coarse_pixels = 0;
+    this.full_drawn = false;     // the last frame that was read had all pixels
     this.stats = {steps_mean: 0, steps_99: 0, rays: 0};
     this.waiting = [];
     this.lost = false;
@@ -105,8 +106,7 @@ export class Renderer {
       if (!this.reading.pass.ready) return {moving, complete: false};
       this.take_reading(now);
     }
-    if (!moving && this.samples >= kSamples && this.is_complete) return {moving, complete: true};
-    if (!moving && this.stuck(now)) return {moving, complete: true};
+    if (!moving && this.samples >= kSamples && (this.is_complete ? this.is_done : this.rests(now))) return {moving, complete: true};
     this.draw(now, moving);
     return {moving, complete: false};
   }
@@ -283,16 +283,20 @@ export class Renderer {
     return this.quiet_rounds >= kQuietRounds;
   }
 
-  // Whether tiles are missing that will not come, and all that can be drawn is drawn.
-  stuck(now) {
-    return this.samples >= kSamples && this.loader.is_idle && !this.loader.awaits_retry && this.last?.full &&
-           this.last.drawn_ms < now;
+  // Whether nobody waits for a complete view, and the sun has its place.
+  get is_done() {
+    return this.waiting.length === 0 && (this.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows);
+  }
+
+  // Whether all that can be drawn is drawn until the service is asked again.
+  rests(now) {
+    return this.full_drawn && this.loader.pauses(now);
   }
 
   // The internal resolution: lower while the camera moves and while tiles arrive, if frames take long.
   internal_size(moving) {
     const {width, height} = this.size;
-    const coarse = moving || this.quiet_rounds === 0;
+    const coarse = moving || (this.quiet_rounds === 0 && this.loader.outage.count === 0);
     const scale = coarse ? kScales[this.scale_index] : 1;
     return {width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)), full: scale === 1};
   }
@@ -354,7 +358,7 @@ export class Renderer {
     }
     if (!moving && nothing_comes) this.quiet_rounds++;
     else if (!this.is_complete || read.coarse_pixels > kFinePixels) this.quiet_rounds = 0;
-    this.last = {full, drawn_ms: now};
+    this.full_drawn = full;
     if (this.is_complete && full && nothing_comes && this.improve_sun(now)) for (const resolve of this.waiting.splice(0)) resolve();
   }
 

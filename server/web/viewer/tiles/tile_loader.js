@@ -2,6 +2,7 @@
 // so that what has left the picture is not fetched any more.
 
 import {TileError} from "../tile_source.js";
+import {kRoundsToKnow} from "./tile_store.js";
 
 const kMaxRequests = 4;        // at the same time
 const kMaxBatch = 48;
@@ -151,8 +152,8 @@ export class TileLoader {
           this.failures.delete(request.key);
           for (const address of request.leaves) this.link(address, request.key);
         } else {
-          // A view that stands still needs all that the pool holds; a moving one soon does not.
-          this.full_until_ms = this.store.rounds > 1 ? Infinity : now_ms + kFullPauseMs;
+          // When the store knows what the view does not need, all that is left is needed.
+          this.full_until_ms = this.store.rounds >= kRoundsToKnow ? Infinity : now_ms + kFullPauseMs;
           this.queue = [];
           this.wake_at(now_ms + kFullPauseMs, now_ms);
         }
@@ -207,8 +208,13 @@ export class TileLoader {
   get awaits_retry() {
     const now_ms = performance.now();
     if (this.problem?.code === "replaced" || this.unmet === 0) return false;
-    return this.outage.count > 0 ||
+    return this.outage.count > 0 || (now_ms < this.full_until_ms && this.full_until_ms !== Infinity) ||
            [...this.failures.values()].some((f) => f.count > 0 && f.count < kMaxRefusals && now_ms < f.retry_ms);
+  }
+
+  // Whether nothing is asked for until a time that wakes the renderer.
+  pauses(now_ms) {
+    return this.requests === 0 && now_ms < this.outage.retry_ms;
   }
 
   wake_at(time_ms, now_ms) {

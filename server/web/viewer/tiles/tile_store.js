@@ -11,7 +11,7 @@
 import {decode_tile, kBlockTexels, kTexelWords} from "./tile_format.js";
 
 const kRecentMs = 1500;
-const kRoundsToKnow = 4;      // readings of the feedback after which unseen tiles are known to be so
+export const kRoundsToKnow = 4;  // readings of the feedback after which unseen tiles are known to be so
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
 const kFreeShare = 1 / 64;    // of the pool, that leaves at once
 
