@@ -52,9 +52,12 @@ export class Renderer {
     this.waiting = [];
     this.lost = false;
     this.disposed = false;
+    this.ready = false;          // programs, pool and root are there
+    this.started = null;         // {resolve, reject} of start()
     this.gl = canvas.getContext("webgl2", {alpha: false, antialias: false, depth: false, powerPreference: "high-performance",
                                            preserveDrawingBuffer: true});
     if (!this.gl) throw new WebGLUnavailable("This browser or its graphics driver does not offer WebGL 2.");
+    this.max_size = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE) || 4096;
     canvas.addEventListener("webglcontextlost", this.on_lost);
     canvas.addEventListener("webglcontextrestored", this.on_restored);
     this.create_programs();
@@ -63,10 +66,13 @@ export class Renderer {
   // Resolves when the first picture can be drawn.
   async start() {
     this.info = await this.source.manifest();
-    await this.compiled;
-    await this.load_root();
     const camera = this.info.camera;
     if (camera) this.place_sun(camera.position, camera.target);
+    await new Promise((resolve, reject) => {
+      this.started = {resolve, reject};
+      if (this.disposed) resolve();
+      else this.load();
+    });
   }
 
   setView(placement) {
@@ -83,8 +89,7 @@ export class Renderer {
   }
 
   resize(css_width, css_height, pixel_ratio) {
-    const limit = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE);
-    const width = Math.min(limit, Math.max(1, Math.round(css_width * pixel_ratio)));
+    const limit = this.max_size, width = Math.min(limit, Math.max(1, Math.round(css_width * pixel_ratio)));
     const height = Math.min(limit, Math.max(1, Math.round(css_height * pixel_ratio)));
     const same = width === this.canvas.width && height === this.canvas.height && width === this.size.width;
     this.size = {width, height, css_width, css_height};
@@ -97,7 +102,7 @@ export class Renderer {
   // Draws a frame if there is something new to draw and the GPU is done with the last one.
   frame(now_ms) {
     const now = performance.now(), moving = now - this.times.view_ms < kMovingMs;
-    if (this.lost || this.disposed || !this.view || !this.loader) return {moving, complete: false};
+    if (!this.ready || !this.view) return {moving, complete: true};  // on_change() says when there is more
     if (this.empty) {
       this.draw_empty();
       return {moving: false, complete: true};
@@ -106,14 +111,14 @@ export class Renderer {
       if (!this.reading.pass.ready) return {moving, complete: false};
       this.take_reading(now);
     }
-    if (!moving && this.samples >= kSamples && (this.is_complete ? this.is_done : this.rests(now))) return {moving, complete: true};
+    if (!moving && this.samples >= kSamples && ((this.is_complete && this.is_done) || this.rests(now))) return {moving, complete: true};
     this.draw(now, moving);
     return {moving, complete: false};
   }
 
   // Resolves when all tiles of the view have arrived.
   complete() {
-    if (this.is_complete && !this.reading) return Promise.resolve();
+    if (this.ready && this.is_complete && !this.reading) return Promise.resolve();
     return new Promise((resolve) => {
       this.waiting.push(resolve);
       this.on_change();
@@ -122,7 +127,7 @@ export class Renderer {
 
   // What is seen at a point of the canvas, null for the sky.
   async pick(css_x, css_y) {
-    if (this.empty || this.lost) return null;
+    if (!this.ready || this.empty) return null;
     const {width, height} = this.size;
     const x = css_x / this.size.css_width * width, y = css_y / this.size.css_height * height;
     const values = this.uniforms(width, height, width, height);
@@ -142,7 +147,7 @@ export class Renderer {
   async capture({width, height}) {
     const depth = new Float32Array(width * height).fill(Infinity), level = new Uint8Array(width * height);
     const steps = new Uint16Array(width * height);
-    if (this.empty) return {depth, level, steps};
+    if (!this.ready || this.empty) return {depth, level, steps};
     const words = this.passes.capture(this.uniforms(width, height, width, height), width, height);
     const floats = new Float32Array(words.buffer);
     for (let i = 0; i < width * height; ++i) {
@@ -178,9 +183,11 @@ export class Renderer {
     this.disposed = true;
     this.canvas.removeEventListener("webglcontextlost", this.on_lost);
     this.canvas.removeEventListener("webglcontextrestored", this.on_restored);
+    this.ready = false;
     this.loader?.dispose();
-    this.passes.release_targets();
+    this.passes.dispose();
     this.store?.pool.dispose();
+    this.started?.resolve();
   }
 
   create_programs() {
@@ -189,8 +196,27 @@ export class Renderer {
     this.compiled = this.passes.compile().then(() => {
       this.times.compile_ms = performance.now() - begin;
     });
-    this.compiled.catch(() => {});  // start() reports it
+    this.compiled.catch(() => {});  // load() reports it
     this.reading = null;
+  }
+
+  // Makes the renderer ready, from the beginning if the context was lost meanwhile.
+  async load() {
+    const {passes} = this, is_over = () => this.disposed || this.lost || passes !== this.passes || this.gl.isContextLost();
+    try {
+      await this.compiled;
+      if (is_over()) return;
+      await this.load_root();
+      if (is_over()) return;
+      this.ready = true;
+      this.begin_epoch();
+      this.started.done = true;
+      this.started.resolve();
+    } catch (error) {
+      if (is_over()) return;
+      if (this.started.done) console.error(error);
+      this.started.reject(error);
+    }
   }
 
   async load_root() {
@@ -200,12 +226,10 @@ export class Renderer {
     this.loader = new TileLoader(this.source, this.store, () => this.on_arrival());
     if (root && levels > 2) {
       await this.loader.load_root(root.level, root.offset);
-      this.root_pointer = this.store.root.pointer;
+      this.root_pointer = this.store.root?.pointer;  // none if the loader was disposed
     } else if (!this.empty) {
       this.root_pointer = this.store.add_brick(this.info.root_brick);
     }
-    this.begin_epoch();
-    this.on_change();
   }
 
   // A small file needs less than the budget.
@@ -233,19 +257,15 @@ export class Renderer {
   on_lost = (event) => {
     event.preventDefault();
     this.lost = true;
+    this.ready = false;
     this.loader?.dispose();
     this.reading = null;
   };
 
-  on_restored = async () => {
+  on_restored = () => {
     this.lost = false;
     this.create_programs();
-    try {
-      await this.compiled;
-      await this.load_root();
-    } catch (error) {
-      console.error(error);
-    }
+    if (this.started) this.load();
   };
 
   // The sun stands over the left shoulder of the first camera. If that is within the scene, the sun takes a

@@ -47,6 +47,10 @@ export class Program {
     }
   }
 
+  dispose() {
+    this.gl.deleteProgram(this.program);
+  }
+
   // Sets the uniforms that the program has, and runs it over the viewport. `target`: null for the canvas.
   draw(target, values, width, height) {
     const {gl} = this;

@@ -29,11 +29,12 @@ export class Passes {
   }
 
   // Resolves when all programs are compiled; the page stays responsive where the browser can compile in
-  // the background. Throws WebGLUnavailable if one cannot be.
+  // the background. Throws WebGLUnavailable if one cannot be; does nothing if the context is lost.
   async compile() {
     const programs = [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback];
     while (!programs.every((program) => program.done(this.parallel)))
       await new Promise((resolve) => setTimeout(resolve, 4));
+    if (this.gl.isContextLost()) return;
     for (const program of programs) program.finish();
     this.gl.bindVertexArray(this.vertex_array);
   }
@@ -135,6 +136,13 @@ export class Passes {
       if (off < best_off) [best, best_off] = [place, off];
     }
     return {place: best, wanted};
+  }
+
+  dispose() {
+    this.release_targets();
+    for (const program of [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback, this.pick, this.sun])
+      program?.dispose();
+    this.gl.deleteVertexArray(this.vertex_array);
   }
 
   release_targets() {

@@ -86,6 +86,7 @@ export class TileLoader {
     for (let pause_ms = kFirstPauseMs; ; pause_ms = Math.min(2 * pause_ms, kMaxPauseMs)) {
       try {
         const [words] = await this.source.fetchTiles([{level, offset}]);
+        if (this.disposed) return;
         if (!this.store.add(level, offset, words, performance.now()))
           throw new Error("The budget is too small for a single tile.");
         this.store.set_root(level, offset);
