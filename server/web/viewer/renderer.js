@@ -16,9 +16,11 @@ const kBudgetBytes = 256 * kMebibyte, kPhoneBudgetBytes = 64 * kMebibyte;
 const kBytesPerVoxel = 16;       // of the pool; files need less
 const kMovingMs = 180;          // after the last change of the view
 const kTargetMs = 40;           // of a frame while the camera moves
+const kPartMs = 120;            // of what the GPU is given at once
 const kSamples = 16;            // per pixel of a still picture
 const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
 const kConeShare = 0.75;        // of a pixel: the width at which a cell is hit as a whole
+const kLeastPart = 1 << 12, kFirstPart = 1 << 17;     // pixels of one part, until it is known how long one takes
 const kLitShare = 0.35;         // of what is seen within a scene
 const kSunTrials = 8;           // while tiles arrive that say more
 const kFinePixels = 3;          // wide is a cell whose tile may arrive late
@@ -39,9 +41,11 @@ export class Renderer {
     this.sun_turn = 0;
     this.sun_trials = 0;
     this.set_sun(0);
+    this.sample = null;          // {parts, fence, part_ms, busy_ms, ...}: drawn in parts
+    this.part_pixels = kFirstPart;
     this.light = {exposure: 1, sky_reach: 1, haze_start: 1, readings: 0};
     this.size = {width: canvas.width, height: canvas.height, css_width: canvas.width, css_height: canvas.height};
-    this.times = {view_ms: -1e9, frame_ms: 0, last_ms: 0, begin_ms: performance.now(), first_picture_ms: null, compile_ms: 0};
+    this.times = {view_ms: -1e9, frame_ms: 0, call_ms: 0, interval_ms: 16, begin_ms: performance.now(), first_picture_ms: null, compile_ms: 0};
     this.scale_index = 4;
     this.seed = 0;
     this.samples = 0;
@@ -103,10 +107,14 @@ export class Renderer {
   frame(now_ms) {
     const now = performance.now(), moving = now - this.times.view_ms < kMovingMs;
     if (!this.ready || !this.view) return {moving, complete: true};  // on_change() says when there is more
+    const interval = now - this.times.call_ms;
+    this.times.call_ms = now;
+    if (interval > 4) this.times.interval_ms = Math.min(interval, 1.05 * this.times.interval_ms, kTargetMs);
     if (this.empty) {
       this.draw_empty();
       return {moving: false, complete: true};
     }
+    if (this.sample && !this.continue_sample(now)) return {moving, complete: false};
     if (this.reading) {
       if (!this.reading.pass.ready) return {moving, complete: false};
       this.take_reading(now);
@@ -237,9 +245,20 @@ export class Renderer {
     return Math.min(this.budget_bytes, 4 * kMebibyte + Number(this.info.voxels) * kBytesPerVoxel);
   }
 
-  begin_epoch() {
+  // Begins the picture again. What is missing is found sooner by a small picture than by the rest of a large one.
+  restart() {
     this.samples = 0;
     this.quiet_rounds = 0;
+    if (this.reading) this.reading.outdated = true;
+    if (!this.sample) return;
+    this.sample.outdated = true;
+    if (!this.sample.full || this.sample.moving) return;
+    this.gl.deleteSync(this.sample.fence);
+    this.sample = null;
+  }
+
+  begin_epoch() {
+    this.restart();
     this.store?.begin_epoch();
     this.loader?.begin_epoch();
     this.on_change();
@@ -247,10 +266,7 @@ export class Renderer {
 
   // A few fine tiles that arrive late do not begin the picture again: its other samples will have them.
   on_arrival() {
-    if (!this.is_complete || this.coarse_pixels > kFinePixels) {
-      this.samples = 0;
-      this.quiet_rounds = 0;
-    }
+    if (!this.is_complete || this.coarse_pixels > kFinePixels) this.restart();
     this.on_change();
   }
 
@@ -260,6 +276,7 @@ export class Renderer {
     this.ready = false;
     this.loader?.dispose();
     this.reading = null;
+    this.sample = null;
   };
 
   on_restored = () => {
@@ -293,8 +310,7 @@ export class Renderer {
     }
     this.sun_trials = kSunTrials;
     this.set_sun(place);
-    this.samples = 0;
-    this.quiet_rounds = 0;
+    this.restart();
     this.light.readings = 0;
     return false;
   }
@@ -316,7 +332,7 @@ export class Renderer {
   // The internal resolution: lower while the camera moves and while tiles arrive, if frames take long.
   internal_size(moving) {
     const {width, height} = this.size;
-    const coarse = moving || (this.quiet_rounds === 0 && this.loader.outage.count === 0);
+    const coarse = moving || (this.loader.outage.count === 0 && (this.quiet_rounds === 0 || (!this.is_complete && this.loader.requests > 0)));
     const scale = coarse ? kScales[this.scale_index] : 1;
     return {width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)), full: scale === 1};
   }
@@ -332,11 +348,43 @@ export class Renderer {
     const frame = this.samples;
     this.seed++;
     Object.assign(values, {u_frame: frame, u_seed: this.seed, u_jitter: jitter_of(full ? frame : this.seed)});
-    const pass = this.passes.draw(values);
+    this.sample = {parts: this.passes.draw(values, () => this.part_pixels), fence: null, part_ms: now, busy_ms: 0,
+                   epoch: this.store.epoch, moving, full, width, height, outdated: false};
+    this.draw_part(now);
+  }
+
+  // Gives the GPU as much of the sample as it can draw soon. More would stop the whole system, and some
+  // end a context that keeps them busy for seconds.
+  draw_part(now) {
+    const {sample, gl} = this, {value: pass, done} = sample.parts.next();
+    sample.part_ms = now;
+    if (!done) {
+      sample.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+      gl.flush();
+      return false;
+    }
     this.passes.show(this.light.exposure, this.canvas.width, this.canvas.height);
-    this.samples++;
-    this.stats.rays = width * height;
-    this.reading = {pass, begin_ms: now, epoch: this.store.epoch, moving, full, height};
+    this.samples = sample.outdated ? 0 : this.samples + 1;
+    this.stats.rays = sample.width * sample.height;
+    this.reading = {...sample, pass};
+    this.sample = null;
+    return true;
+  }
+
+  // Whether the sample is drawn.
+  continue_sample(now) {
+    const {sample, gl} = this;
+    if (gl.getSyncParameter(sample.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(sample.fence);
+    const part_ms = this.gpu_ms(now - sample.part_ms);
+    sample.busy_ms += part_ms;
+    this.part_pixels = Math.max(kLeastPart, Math.round(this.part_pixels * Math.min(2, kPartMs / part_ms)));
+    return this.draw_part(now);
+  }
+
+  // What is seen as done at a frame may have been done since the one before.
+  gpu_ms(seen_ms) {
+    return Math.max(1, seen_ms - this.times.interval_ms / 2);
   }
 
   uniforms(width, height, lod_width, lod_height) {
@@ -358,13 +406,15 @@ export class Renderer {
   }
 
   take_reading(now) {
-    const {pass, begin_ms, epoch, moving, full, height} = this.reading;
+    const {pass, part_ms, busy_ms, epoch, moving, full, width, height, outdated} = this.reading;
     this.reading = null;
     const read = read_feedback(pass.take());
     read.coarse_pixels *= this.size.height / height;  // pixels of the canvas
     this.stats.steps_mean = read.steps_mean;
     this.stats.steps_99 = read.steps_99;
-    this.adapt(now - begin_ms, moving || !full);
+    const frame_ms = busy_ms + this.gpu_ms(now - part_ms);
+    if (busy_ms === 0) this.part_pixels = Math.max(kLeastPart, Math.round(2.25 * width * height * kPartMs / frame_ms));
+    this.adapt(frame_ms, moving || !full);
     for (const slot of read.slots) this.store.mark(slot, epoch, now);
     this.adjust_light(read, moving);
     this.coarse_pixels = read.coarse_pixels;
@@ -376,7 +426,8 @@ export class Renderer {
       this.times.first_picture_ms = now - this.times.begin_ms;
       this.first_picture_bytes = this.source.fetched_bytes;
     }
-    if (!moving && nothing_comes) this.quiet_rounds++;
+    // What arrived since the sample began may refer to more that is missing.
+    if (!moving && nothing_comes && !outdated) this.quiet_rounds++;
     else if (!this.is_complete || read.coarse_pixels > kFinePixels) this.quiet_rounds = 0;
     this.full_drawn = full;
     if (this.is_complete && full && nothing_comes && this.improve_sun(now)) for (const resolve of this.waiting.splice(0)) resolve();
@@ -387,7 +438,7 @@ export class Renderer {
     this.times.frame_ms = this.times.frame_ms > 0 ? 0.7 * this.times.frame_ms + 0.3 * frame_ms : frame_ms;
     if (!counts) return;
     const wanted = kScales[this.scale_index] * Math.sqrt(kTargetMs / Math.max(1, frame_ms));
-    const slower = frame_ms > 1.4 * kTargetMs, faster = wanted > 1.4 * kScales[this.scale_index];
+    const slower = frame_ms > 1.4 * kTargetMs, faster = this.scale_index > 0 && wanted >= kScales[this.scale_index - 1];
     if (!slower && !faster) return;
     const index = kScales.findIndex((scale) => scale <= wanted);
     this.scale_index = index < 0 ? kScales.length - 1 : faster ? Math.max(index, this.scale_index - 1) : index;

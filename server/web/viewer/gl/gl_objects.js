@@ -51,8 +51,9 @@ export class Program {
     this.gl.deleteProgram(this.program);
   }
 
-  // Sets the uniforms that the program has, and runs it over the viewport. `target`: null for the canvas.
-  draw(target, values, width, height) {
+  // Sets the uniforms that the program has, and runs it over the viewport, or some rows of it. `target`:
+  // null for the canvas.
+  draw(target, values, width, height, {row = 0, rows = height} = {}) {
     const {gl} = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
     gl.viewport(0, 0, width, height);
@@ -68,7 +69,10 @@ export class Program {
       }
     }
     gl.activeTexture(gl.TEXTURE0);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(0, row, width, rows);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.SCISSOR_TEST);
   }
 }
 

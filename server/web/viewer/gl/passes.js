@@ -56,20 +56,27 @@ export class Passes {
     };
   }
 
-  // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Returns the reading of the
-  // feedback.
-  draw(values) {
+  // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Yields between parts of at
+  // most `part_pixels()` pixels. Returns the reading of the feedback.
+  *draw(values, part_pixels) {
     const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback} = targets;
-    gl.disable(gl.BLEND);
-    this.trace.draw(hits, values, width, height);
     const share = this.floats ? 1 / (values.u_frame + 1) : 1;
     const [before, after] = [colors[targets.current], colors[1 - targets.current]];
     const all = {...values, u_hits: hits.textures[0], u_light: light.textures[0], u_sky: sky.textures[0], u_normals: light.textures[1],
                  u_shadow_missing: light.textures[2], u_before: before.textures[0], u_share: share,
                  u_range: this.color_range, u_block: kFeedbackBlock,
                  u_sample: [values.u_seed % kFeedbackBlock, Math.floor(values.u_seed / kFeedbackBlock) % kFeedbackBlock]};
-    this.light.draw(light, all, width, height);
-    this.occlusion.draw(sky, all, sky.width, sky.height);
+    let left = part_pixels();
+    for (const [program, target] of [[this.trace, hits], [this.light, light], [this.occlusion, sky]])
+      for (let row = 0, rows; row < target.height; row += rows) {
+        if (left < target.width) {
+          yield null;
+          left = part_pixels();
+        }
+        rows = Math.min(target.height - row, Math.max(1, Math.floor(left / target.width)));
+        program.draw(target, all, target.width, target.height, {row, rows});
+        left -= rows * target.width;
+      }
     this.combine.draw(after, all, width, height);
     targets.current = 1 - targets.current;
     this.feedback.draw(feedback, all, feedback.width, feedback.height);
