@@ -13,7 +13,7 @@ export {WebGLUnavailable};
 
 const kMebibyte = 1 << 20;
 const kBudgetBytes = 256 * kMebibyte, kPhoneBudgetBytes = 64 * kMebibyte;
-const kBytesPerVoxel = 16;       // of the pool; files need less
+const kBlockBytes = 256;         // of the pool: the least that a tile takes
 const kMovingMs = 180;          // after the last change of the view
 const kTargetMs = 40;           // of a frame while the camera moves
 const kPartMs = 120;            // of what the GPU is given at once
@@ -240,9 +240,10 @@ export class Renderer {
     }
   }
 
-  // A small file needs less than the budget.
+  // A small file needs less than the budget: at worst each voxel has a path of tiles of its own.
   pool_bytes() {
-    return Math.min(this.budget_bytes, 4 * kMebibyte + Number(this.info.voxels) * kBytesPerVoxel);
+    const {voxels, levels, tile_levels} = this.info;
+    return Math.min(this.budget_bytes, 4 * kMebibyte + Number(voxels) * kBlockBytes * Math.ceil(levels / tile_levels));
   }
 
   // Begins the picture again. What is missing is found sooner by a small picture than by the rest of a large one.
