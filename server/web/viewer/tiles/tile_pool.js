@@ -51,6 +51,9 @@ export class TilePool {
     if (this.free_slots.length > 0) return this.free_slots.pop();
     return this.next_slot < this.slot_count ? this.next_slot++ : 0;
   }
+  get has_free_slot() {
+    return this.free_slots.length > 0 || this.next_slot < this.slot_count;
+  }
   release_slot(slot) {
     this.free_slots.push(slot);
   }

@@ -73,7 +73,7 @@ export class TileStore {
     if (this.tiles.has(key)) return true;
     const decoded = decode_tile(words, level);
     const count = decoded.words.length * 4 / kBlockBytes;
-    if (!this.evict_for(count, now_ms)) return false;
+    if (!this.evict_for(count, !this.slots.has(key), now_ms)) return false;
     const slot = this.slots.get(key) ?? this.pool.allocate_slot();
     const blocks = slot ? this.pool.allocate(count) : null;
     if (!blocks) return false;
@@ -112,8 +112,11 @@ export class TileStore {
     if (epoch > tile.epoch) tile.epoch = epoch;
   }
 
-  evict_for(count, now_ms) {
-    if (this.pool.free_blocks >= count) return true;
+  // Makes room for a tile of `count` blocks. A slot may be taken by a tile that has left, as long as others
+  // refer to it; so these leave until one is free.
+  evict_for(count, needs_slot, now_ms) {
+    const fits = (blocks) => this.pool.free_blocks >= blocks && (!needs_slot || this.pool.has_free_slot);
+    if (fits(count)) return true;
     const max_used_ms = now_ms - (this.rounds >= kRoundsToKnow ? 0 : kRecentMs);
     const candidates = [];
     for (const tile of this.tiles.values())
@@ -121,10 +124,10 @@ export class TileStore {
     candidates.sort((a, b) => a.used_ms - b.used_ms);
     const target = count + this.pool.block_count * kFreeShare;
     for (const tile of candidates) {
-      if (this.pool.free_blocks >= target) break;
+      if (fits(target)) break;
       this.evict(tile);
     }
-    return this.pool.free_blocks >= count;
+    return fits(count);
   }
 
   evict(tile) {
