@@ -1,6 +1,7 @@
 // What a reading of the feedback says: the tiles that are missing, those that were used, and statistics
 // of what is seen.
 
+const kMostSamples = 4096;  // that the statistics are of
 const kHalf = new DataView(new ArrayBuffer(4));
 
 function half_to_number(bits) {
@@ -19,8 +20,10 @@ function share_of(sorted, share) {
 // {wanted: Map of leaf address -> priority, slots: Set, coarse_pixels: of the largest missing cell,
 //  median_t, nearest_t, exposure (null: nothing is seen), steps_mean, steps_99}
 export function read_feedback(words) {
-  const wanted = new Map(), slots = new Set(), steps = [], distances = [], luminances = [];
-  let coarse_pixels = 0, step_sum = 0;
+  const wanted = new Map(), slots = new Set(), texels = words.length / 4;
+  const stride = Math.max(1, Math.ceil(texels / kMostSamples)), count = Math.ceil(texels / stride);
+  const steps = new Uint16Array(count), distances = new Float32Array(count), luminances = new Float32Array(count);
+  let coarse_pixels = 0, step_sum = 0, seen = 0;
   for (let at = 0; at < words.length; at += 4) {
     const missing = words[at], pair = words[at + 1];
     if (missing !== 0) {
@@ -28,18 +31,20 @@ export function read_feedback(words) {
       wanted.set(missing, (wanted.get(missing) || 0) + pixels);
       if (pixels > coarse_pixels) coarse_pixels = pixels;
     }
-    const slot = words[at + 2] & 0x3fffff, count = words[at + 2] >>> 22 << 1;
+    const slot = words[at + 2] & 0x3fffff;
     if (slot !== 0) slots.add(slot);
-    steps.push(count);
-    step_sum += count;
-    if (words[at + 3] !== 0 || pair >>> 16 !== 0) {
-      distances.push(bits_to_float(words[at + 3]));
-      luminances.push(1e-3 + half_to_number(pair >>> 16));
-    }
   }
-  for (const list of [steps, distances, luminances]) list.sort((a, b) => a - b);
-  return {wanted, slots, coarse_pixels, steps_mean: step_sum / Math.max(1, steps.length), steps_99: share_of(steps, 0.99),
-          median_t: share_of(distances, 0.5), nearest_t: distances[0] || 0,
-          exposure: luminances.length === 0 ? null
-            : Math.min(0.42 / share_of(luminances, 0.5), 0.85 / share_of(luminances, 0.9))};
+  for (let i = 0; i < count; ++i) {
+    const at = 4 * i * stride, pair = words[at + 1];
+    steps[i] = words[at + 2] >>> 22 << 1;
+    step_sum += steps[i];
+    if (words[at + 3] === 0 && pair >>> 16 === 0) continue;
+    distances[seen] = bits_to_float(words[at + 3]);
+    luminances[seen++] = 1e-3 + half_to_number(pair >>> 16);
+  }
+  const t = distances.subarray(0, seen).sort(), bright = luminances.subarray(0, seen).sort();
+  steps.sort();
+  return {wanted, slots, coarse_pixels, steps_mean: step_sum / Math.max(1, count), steps_99: share_of(steps, 0.99),
+          median_t: share_of(t, 0.5), nearest_t: t[0] || 0,
+          exposure: seen === 0 ? null : Math.min(0.42 / share_of(bright, 0.5), 0.85 / share_of(bright, 0.9))};
 }
