@@ -14,6 +14,7 @@ export {WebGLUnavailable};
 const kMebibyte = 1 << 20;
 const kBudgetBytes = 256 * kMebibyte, kPhoneBudgetBytes = 64 * kMebibyte;
 const kBlockBytes = 256;         // of the pool: the least that a tile takes
+const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;  // of the canvas: its targets are not part of the budget
 const kMovingMs = 180;          // after the last change of the view
 const kTargetMs = 40;           // of a frame while the camera moves
 const kPartMs = 120;            // of what the GPU is given at once
@@ -33,6 +34,7 @@ export class Renderer {
     this.on_change = onChange || (() => {});
     const phone = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
     this.budget_bytes = budgetBytes || (phone ? kPhoneBudgetBytes : kBudgetBytes);
+    this.max_pixels = phone ? kPhoneMaxPixels : kMaxPixels;
     this.options = {minLevel: 0, maxLevel: null, clip: null, ambientOcclusion: true, sunShadows: true,
                     pixelTolerance: 1, wireLevel: null};
     this.view = null;
@@ -92,7 +94,8 @@ export class Renderer {
     this.begin_epoch();
   }
 
-  resize(css_width, css_height, pixel_ratio) {
+  resize(css_width, css_height, device_ratio) {
+    const pixel_ratio = Math.min(device_ratio, Math.sqrt(this.max_pixels / Math.max(1, css_width * css_height)));
     const limit = this.max_size, width = Math.min(limit, Math.max(1, Math.round(css_width * pixel_ratio)));
     const height = Math.min(limit, Math.max(1, Math.round(css_height * pixel_ratio)));
     const same = width === this.canvas.width && height === this.canvas.height && width === this.size.width;
@@ -100,6 +103,7 @@ export class Renderer {
     if (same) return;
     this.canvas.width = width;
     this.canvas.height = height;
+    if (this.ready && this.passes.targets) this.show();  // the old picture, until there is a new one
     this.begin_epoch();
   }
 
@@ -364,12 +368,16 @@ export class Renderer {
       gl.flush();
       return false;
     }
-    this.passes.show(this.light.exposure, this.canvas.width, this.canvas.height);
+    this.show();
     this.samples = sample.outdated ? 0 : this.samples + 1;
     this.stats.rays = sample.width * sample.height;
     this.reading = {...sample, pass};
     this.sample = null;
     return true;
+  }
+
+  show() {
+    this.passes.show(this.light.exposure, this.canvas.width, this.canvas.height);
   }
 
   // Whether the sample is drawn.
