@@ -30,6 +30,9 @@ uvec4 pack_hit(bool found, Hit hit, uint steps, bool wire, uint slot) {
 
 void main() {
   random_state = uint(gl_FragCoord.x) * 1973u + uint(gl_FragCoord.y) * 9277u + u_seed * 26699u;
+#ifdef PICK
+  for (int s = 0; s < 21; ++s) picked_slots[s] = 0u;
+#endif
   set_ray(u_eye_cell, u_eye_part, direction_of(gl_FragCoord.xy + u_jitter));
   Hit hit;
   bool found = trace(0.0, 1e30, vec2(0.0, u_cone), hit);

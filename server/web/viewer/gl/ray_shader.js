@@ -188,6 +188,9 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
             brick = cut_off.yz;
             brick_scale = scale;
             leaf = pointer >> 8;
+#ifdef PICK
+            picked_slots[scale] = 0u;
+#endif
           }
         }
       }
