@@ -144,14 +144,14 @@ export class Renderer {
     const x = css_x / this.size.css_width * width, y = css_y / this.size.css_height * height;
     const values = this.uniforms(width, height, width, height);
     values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
-    const words = this.passes.pick_one(values);
-    if (!(words[1] >>> 23 & 1)) return null;
+    const {view, passes} = this, words = await passes.pick_one(values);
+    if (!words || !this.ready || (words[1] >>> 23 & 1) === 0) return null;
     const distance = new Float32Array(words.buffer, 0, 1)[0], scale = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
-    const direction = this.view.direction(x, y, width, height);
+    const direction = view.direction(x, y, width, height);
     const normal = axis === 3 ? direction.map((d) => -d) : [0, 0, 0];
     if (axis < 3) normal[axis] = direction[axis] > 0 ? -1 : 1;
     const node = words[2] !== 0 ? this.store.cut_off_node(words[2]) : this.store.by_slot[words[7]]?.tile || this.info.root;
-    return {voxel: [...words.slice(4, 7)], level: this.info.levels - scale, position: add(this.view.eye, direction, distance),
+    return {voxel: [...words.slice(4, 7)], level: this.info.levels - scale, position: add(view.eye, direction, distance),
             distance, normal, nodeLevel: node.level, nodeOffset: String(node.offset)};
   }
 
@@ -204,7 +204,9 @@ export class Renderer {
 
   create_programs() {
     const begin = performance.now();
+    if (this.passes) this.passes.disposed = true;  // with its context
     this.passes = new Passes(this.gl);
+    this.can_choose_sun = false;
     this.compiled = this.passes.compile().then(() => {
       this.times.compile_ms = performance.now() - begin;
     });
@@ -305,7 +307,12 @@ export class Renderer {
   // Returns whether the picture is final as far as the sun is concerned.
   improve_sun(now_ms) {
     if (this.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows) return true;
-    const {width, height} = this.passes.targets;
+    const {passes} = this, {width, height} = passes.targets;
+    if (!this.can_choose_sun) {
+      passes.compile_later().then((usable) => this.can_choose_sun = usable && passes === this.passes,
+                                  () => this.sun_trials = kSunTrials);
+      return false;
+    }
     const values = {...this.uniforms(width, height, width, height), u_turn: this.sun_turn};
     const {place, wanted} = this.passes.choose_sun(values, kLitShare);
     this.sun_trials++;

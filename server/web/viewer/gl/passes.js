@@ -7,6 +7,10 @@ const kHalfRange = 1;        // brightest light of a target with half floats
 const kByteRange = 8;        // and of one with bytes
 export const kFeedbackBlock = 4;
 
+function pause() {
+  return new Promise((resolve) => setTimeout(resolve, 4));
+}
+
 export class Passes {
   constructor(gl) {
     this.gl = gl;
@@ -20,6 +24,8 @@ export class Passes {
     this.feedback = new Program(gl, "feedback", kFeedback);
     this.pick = null;
     this.sun = null;
+    this.later = null;           // promise of these two
+    this.disposed = false;
     this.targets = null;
     this.vertex_array = gl.createVertexArray();
   }
@@ -31,12 +37,25 @@ export class Passes {
   // Resolves when all programs are compiled; the page stays responsive where the browser can compile in
   // the background. Throws WebGLUnavailable if one cannot be; does nothing if the context is lost.
   async compile() {
-    const programs = [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback];
-    while (!programs.every((program) => program.done(this.parallel)))
-      await new Promise((resolve) => setTimeout(resolve, 4));
-    if (this.gl.isContextLost()) return;
+    await this.finish([this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback]);
+    if (!this.gl.isContextLost() && !this.disposed) this.gl.bindVertexArray(this.vertex_array);
+  }
+
+  // The same for the programs that a first picture does not need. Resolves to whether they can be used.
+  compile_later() {
+    if (!this.later) {
+      this.pick = new Program(this.gl, "pick", kPick);
+      this.sun = new Program(this.gl, "sun", kSun);
+      this.later = this.finish([this.pick, this.sun]);
+    }
+    return this.later;
+  }
+
+  async finish(programs) {
+    while (!this.disposed && !programs.every((program) => program.done(this.parallel))) await pause();
+    if (this.disposed || this.gl.isContextLost()) return false;
     for (const program of programs) program.finish();
-    this.gl.bindVertexArray(this.vertex_array);
+    return true;
   }
 
   // Targets of the size; those of another size are released.
@@ -100,31 +119,26 @@ export class Passes {
     return words;
   }
 
-  // The hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of the tile it is in.
-  pick_one(values) {
+  // The hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of the tile it is in. Null if
+  // the context is lost. The page does not wait for the GPU.
+  async pick_one(values) {
     const {gl} = this;
-    if (!this.pick) {
-      this.pick = new Program(gl, "pick", kPick);
-      this.pick.finish();
-    }
-    const target = new Target(gl, 1, 1, ["RGBA32UI", "RGBA32UI"]), words = new Uint32Array(8);
-    this.pick.draw(target, values, 1, 1);
-    for (let i = 0; i < 2; ++i) {
-      gl.readBuffer(gl.COLOR_ATTACHMENT0 + i);
-      gl.readPixels(0, 0, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words.subarray(4 * i, 4 * i + 4));
-    }
+    if (!await this.compile_later()) return null;
+    const target = new Target(gl, 2, 1, ["RGBA32UI"]);
+    this.pick.draw(target, values, 2, 1);
+    const reading = new AsyncReading(gl, target);
     target.dispose();
-    return words;
+    while (!reading.ready) {
+      if (this.disposed || gl.isContextLost()) return null;
+      await pause();
+    }
+    return reading.take();
   }
 
   // {place: of the 48 of the sun, the one that lights nearest to `share` of what the last picture shows,
-  //  wanted: leaf address -> 1, tiles that would make the choice better}
+  //  wanted: leaf address -> 1, tiles that would make the choice better}. After compile_later().
   choose_sun(values, share) {
     const {gl, targets} = this, wanted = new Map();
-    if (!this.sun) {
-      this.sun = new Program(gl, "sun", kSun);
-      this.sun.finish();
-    }
     const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]), words = new Uint32Array(kSunPlaces * kSunRows * 4);
     this.sun.draw(target, {...values, u_hits: targets.hits.textures[0], u_normals: targets.light.textures[1]},
                  kSunPlaces, kSunRows);
@@ -146,6 +160,7 @@ export class Passes {
   }
 
   dispose() {
+    this.disposed = true;
     this.release_targets();
     for (const program of [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback, this.pick, this.sun])
       program?.dispose();

@@ -16,9 +16,6 @@ uniform vec2 u_jitter;       // the ray's place in its pixel, from the pixel's c
 uniform float u_cone;        // width of the cone at distance 1
 uniform uint u_seed;
 layout(location = 0) out uvec4 o_hit;
-#ifdef PICK
-layout(location = 1) out uvec4 o_cell;
-#endif
 
 uvec4 pack_hit(bool found, Hit hit, uint steps, bool wire, uint slot) {
   uint axis = hit.axis < 0 ? 3u : uint(hit.axis);
@@ -33,7 +30,12 @@ void main() {
 #ifdef PICK
   for (int s = 0; s < 21; ++s) picked_slots[s] = 0u;
 #endif
-  set_ray(u_eye_cell, u_eye_part, direction_of(gl_FragCoord.xy + u_jitter));
+#ifdef PICK
+  vec2 point = vec2(0.5);  // of both pixels: the second says more about the hit
+#else
+  vec2 point = gl_FragCoord.xy + u_jitter;
+#endif
+  set_ray(u_eye_cell, u_eye_part, direction_of(point));
   Hit hit;
   bool found = trace(0.0, 1e30, vec2(0.0, u_cone), hit);
 #ifdef WIRE
@@ -45,7 +47,7 @@ void main() {
   uint slot = 0u;
   for (int s = hit.scale + 1; s < u_levels && slot == 0u; ++s)
     if ((u_boundaries >> s & 1u) != 0u) slot = picked_slots[s];
-  o_cell = uvec4(uvec3(picked_cell), slot);
+  if (gl_FragCoord.x > 1.0) o_hit = uvec4(uvec3(picked_cell), slot);
 #endif
 }`;
 
