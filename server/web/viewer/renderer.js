@@ -21,7 +21,7 @@ const kPartMs = 120;            // of what the GPU is given at once
 const kSamples = 16;            // per pixel of a still picture
 const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
 const kConeShare = 0.75;        // of a pixel: the width at which a cell is hit as a whole
-const kLeastPart = 1 << 12, kFirstPart = 1 << 17;     // pixels of one part, until it is known how long one takes
+const kMinPart = 1 << 12, kFirstPart = 1 << 17;     // pixels of one part, until it is known how long one takes
 const kLitShare = 0.35;         // of what is seen within a scene
 const kSunTrials = 8;           // while tiles arrive that say more
 const kFinePixels = 3;          // wide is a cell whose tile may arrive late
@@ -214,7 +214,7 @@ export class Renderer {
     this.reading = null;
   }
 
-  // Makes the renderer ready, from the beginning if the context was lost meanwhile.
+  // Makes the renderer ready, from the beginning if the context was lost in between.
   async load() {
     const {passes} = this, is_over = () => this.disposed || this.lost || passes !== this.passes || this.gl.isContextLost();
     try {
@@ -394,7 +394,7 @@ export class Renderer {
     gl.deleteSync(sample.fence);
     const part_ms = this.gpu_ms(now - sample.part_ms);
     sample.busy_ms += part_ms;
-    this.part_pixels = Math.max(kLeastPart, Math.round(this.part_pixels * Math.min(2, kPartMs / part_ms)));
+    this.part_pixels = Math.max(kMinPart, Math.round(this.part_pixels * Math.min(2, kPartMs / part_ms)));
     return this.draw_part(now);
   }
 
@@ -429,7 +429,7 @@ export class Renderer {
     this.stats.steps_mean = read.steps_mean;
     this.stats.steps_99 = read.steps_99;
     const frame_ms = busy_ms + this.gpu_ms(now - part_ms);
-    if (busy_ms === 0) this.part_pixels = Math.max(kLeastPart, Math.round(2.25 * width * height * kPartMs / frame_ms));
+    if (busy_ms === 0) this.part_pixels = Math.max(kMinPart, Math.round(2.25 * width * height * kPartMs / frame_ms));
     this.adapt(frame_ms, moving || !full);
     for (const slot of read.slots) this.store.mark(slot, epoch, now);
     this.adjust_light(read, moving);

@@ -1,7 +1,7 @@
 // What a reading of the feedback says: the tiles that are missing, those that were used, and statistics
 // of what is seen.
 
-const kMostSamples = 4096;  // that the statistics are of
+const kMaxSamples = 4096;  // that the statistics are of
 const kHalf = new DataView(new ArrayBuffer(4));
 
 function half_to_number(bits) {
@@ -21,7 +21,7 @@ function share_of(sorted, share) {
 //  median_t, nearest_t, exposure (null: nothing is seen), steps_mean, steps_99}
 export function read_feedback(words) {
   const wanted = new Map(), slots = new Set(), texels = words.length / 4;
-  const stride = Math.ceil(texels / kMostSamples) | 1, count = Math.ceil(texels / stride);
+  const stride = Math.ceil(texels / kMaxSamples) | 1, count = Math.ceil(texels / stride);
   const steps = new Uint16Array(count), distances = new Float32Array(count), luminances = new Float32Array(count);
   let coarse_pixels = 0, step_sum = 0, seen = 0;
   for (let at = 0; at < words.length; at += 4) {
