@@ -201,7 +201,7 @@ TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
   start();
   put_scene("m.glb", scene_bytes());
   const std::string id = post_job({{"scene", "m.glb"},
-                                   {"resolution", 131072},
+                                   {"resolution", 65536},
                                    {"options", {{"subvolume", 2048}, {"threads", 1}}}});
   const std::string path = "/api/v1/jobs/" + id + "/partial";
   Json view;
@@ -212,7 +212,7 @@ TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
     view = Json::parse(answer.body);
     return answer.status == 200 && !view["cubes"].empty();
   }));
-  EXPECT_EQ(view["resolution"], 131072);
+  EXPECT_EQ(view["resolution"], 65536);
   EXPECT_LE(view["cubes"].size(), view["built"].get<size_t>());
   EXPECT_LT(view["built"], view["total"]);
   for (const Json& cube : view["cubes"]) {
