@@ -58,17 +58,10 @@ query::Placement place_camera(const RenderCommand& command, const voxdag_reader:
   return placement;
 }
 
-std::array<double, 3> world_point(const query::Vec& point, const voxdag_reader::File& file) {
-  const double voxel = file.edge() / static_cast<double>(file.resolution());
-  std::array<double, 3> world{};
-  for (int axis = 0; axis < 3; ++axis)
-    world[static_cast<size_t>(axis)] = file.origin()[axis] + point[axis] * voxel;
-  return world;
-}
-
 void report(const RenderCommand& command, const query::Placement& placement,
             const voxdag_reader::File& file, double wall_s) {
-  const auto eye = world_point(placement.eye, file), target = world_point(placement.target, file);
+  const auto eye = query::world_point(placement.eye, file),
+             target = query::world_point(placement.target, file);
   if (command.json) {
     nlohmann::ordered_json json;
     if (!command.output.path.empty()) json["output"] = command.output.path;

@@ -13,18 +13,11 @@
 #include <vector>
 
 #include "core/base/popcount8.h"
+#include "core/dag/brick.h"
 #include "core/format/global/voxdag_reader.h"
 #include "query/vec.h"
 
 namespace voxdag::query {
-
-// Which of the eight octants of a brick have voxels: bit i for byte i of its mask.
-inline uint32_t octants(uint64_t mask) {
-  constexpr uint64_t kLowBits = 0x7f7f7f7f7f7f7f7full;
-  // The top bit of each byte that is not 0; the product brings the eight of them together.
-  const uint64_t tops = (((mask & kLowBits) + kLowBits) | mask) & ~kLowBits;
-  return static_cast<uint32_t>((tops >> 7) * 0x0102040810204080ull >> 56);
-}
 
 class DagView {
  public:
@@ -94,8 +87,6 @@ class DagView {
   }
 
  private:
-  static constexpr uint32_t kBrickLevels = 2;
-
   template <class Select, class Visit>
   void visit_below(const Cell& cell, uint64_t content, uint32_t depth, const Select& select,
                    const Visit& visit) const;
@@ -126,6 +117,20 @@ inline DagView::Children DagView::children(uint32_t depth, uint64_t content) con
   c.bits_ = content;
   c.mask = octants(content);
   return c;
+}
+
+// The cells two levels below a node or brick at `depth`, as the mask of a brick.
+inline uint64_t brick_of_cells(const DagView& dag, uint32_t depth,
+                               const DagView::Children& children) {
+  uint64_t mask = 0;
+  for (int i = 0; i < 8; ++i)
+    if (children.has(i))
+      mask |= uint64_t{dag.children(depth + 1, dag.content(depth, children, i)).mask} << (8 * i);
+  return mask;
+}
+inline uint64_t brick_of_cells(const DagView& dag, uint32_t depth, uint64_t content) {
+  if (depth + kBrickLevels == dag.grid_levels()) return content;
+  return brick_of_cells(dag, depth, dag.children(depth, content));
 }
 
 template <class Select, class Visit>

@@ -2,12 +2,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "cli/output.h"
+#include "cli/service/run_until_canceled.h"
 #include "server/view_service.h"
 
 namespace voxdag::cli {
@@ -43,22 +42,8 @@ void run(const ViewCommand& command, CommandContext& context) {
     std::printf("%s\n", service.url().c_str());
   std::fflush(stdout);
   if (command.open) open_in_browser(service.url());
-  // A signal handler may only set the token, so a thread watches it.
-  std::thread watcher([&] {
-    while (!context.cancel.canceled()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    service.stop();
-  });
-  const auto end_watcher = [&] {
-    context.cancel.cancel();
-    watcher.join();
-  };
-  try {
-    service.run();
-  } catch (...) {
-    end_watcher();
-    throw;
-  }
-  end_watcher();
+  run_until_canceled(
+      context.cancel, [&] { service.run(); }, [&] { service.stop(); });
 }
 
 void declare(Command& command, ViewCommand& state) {

@@ -3,9 +3,9 @@
 #include <cstdio>
 #include <memory>
 #include <mutex>
-#include <thread>
 
 #include "cli/command.h"
+#include "cli/service/run_until_canceled.h"
 #include "core/base/text.h"
 #include "server/api/access/tokens.h"
 #include "server/jobs/process/job_process.h"
@@ -52,23 +52,12 @@ void serve(const ServeCommand& command, const Command& line, CommandContext& con
   umask(0077);  // scenes and results are for clients with a token, not for all users of the machine
   server::Service service(settings(command, line, context.files), context.files, log_line);
   log_line("listening on " + service.url());
-  // A signal handler may only set the token, so a thread watches it.
-  std::thread watcher([&] {
-    while (!context.cancel.canceled()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    log_line("stopping: waiting for builds to reach a checkpoint and answers to finish");
-    service.stop();
-  });
-  const auto end_watcher = [&] {
-    context.cancel.cancel();
-    watcher.join();
-  };
-  try {
-    service.run();
-  } catch (...) {
-    end_watcher();
-    throw;
-  }
-  end_watcher();
+  run_until_canceled(
+      context.cancel, [&] { service.run(); },
+      [&] {
+        log_line("stopping: waiting for builds to reach a checkpoint and answers to finish");
+        service.stop();
+      });
   log_line("stopped");
 }
 

@@ -9,6 +9,7 @@
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/export/selected_bricks.h"
+#include "query/npy_header.h"
 
 namespace voxdag::query {
 namespace {
@@ -126,19 +127,6 @@ std::vector<std::byte> central_directory(std::span<const NpzMember> members, uin
   return bytes;
 }
 
-// The header of an array of `rows` x 3 (or of 4 numbers if `rows` is 0), padded to 64 bytes.
-std::string npy_header(const char* type, uint64_t rows) {
-  std::string text = std::string("{'descr': '") + type + "', 'fortran_order': False, 'shape': " +
-                     (rows ? "(" + std::to_string(rows) + ", 3)" : "(4,)") + ", }";
-  text.append(63 - (10 + text.size()) % 64, ' ');
-  text += '\n';
-  const auto size = static_cast<uint16_t>(text.size());
-  std::string header("\x93NUMPY\x01\x00", 8);
-  header += static_cast<char>(size & 255);
-  header += static_cast<char>(size >> 8);
-  return header + text;
-}
-
 class NpzWriter {
  public:
   explicit NpzWriter(const ExportJob& job) : job_(job), file_(job.files, job.output) {}
@@ -206,18 +194,19 @@ ExportReport write_npz(const ExportJob& job) {
   require_space(job, voxels * 3 * (sizeof(int32_t) + sizeof(double)) + 4096);
   NpzWriter writer(job);
   ExportStage stage(job, "export", 2 * voxels, "rows");
-  writer.add<int32_t>("cells.npy", npy_header("<i4", voxels), 3 * voxels, [&](const auto& put) {
+  const std::string shape = "(" + std::to_string(voxels) + ", 3)";
+  writer.add<int32_t>("cells.npy", npy_header("<i4", shape), 3 * voxels, [&](const auto& put) {
     visit_cells(job, stage, [&](const CellCorner& cell) {
       for (size_t axis = 0; axis < 3; ++axis) put(static_cast<int32_t>(cell[axis]));
     });
   });
-  writer.add<double>("positions.npy", npy_header("<f8", voxels), 3 * voxels, [&](const auto& put) {
+  writer.add<double>("positions.npy", npy_header("<f8", shape), 3 * voxels, [&](const auto& put) {
     visit_cells(job, stage, [&](const CellCorner& cell) {
       for (size_t axis = 0; axis < 3; ++axis)
         put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
     });
   });
-  writer.add<double>("grid.npy", npy_header("<f8", 0), 4, [&](const auto& put) {
+  writer.add<double>("grid.npy", npy_header("<f8", "(4,)"), 4, [&](const auto& put) {
     for (size_t axis = 0; axis < 3; ++axis) put(job.file.origin()[axis]);
     put(job.cell_edge());
   });

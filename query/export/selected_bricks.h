@@ -21,17 +21,6 @@ inline CellCorner child_corner(const CellCorner& corner, int index, int64_t edge
           corner[2] + (index & 1 ? edge : 0)};
 }
 
-// The cells below a node at `depth`, two levels above the cells, as the mask of a brick.
-inline uint64_t brick_of_cells(const DagView& dag, uint32_t depth, uint64_t content) {
-  if (depth + kBrickLevels == dag.grid_levels()) return content;
-  const DagView::Children children = dag.children(depth, content);
-  uint64_t mask = 0;
-  for (int i = 0; i < 8; ++i)
-    if (children.has(i))
-      mask |= uint64_t{dag.children(depth + 1, dag.content(depth, children, i)).mask} << (8 * i);
-  return mask;
-}
-
 // Those cells of a brick that lie in the region.
 inline uint64_t clipped_brick(uint64_t mask, const CellCorner& corner, const Region& region) {
   if (region.contains(corner, kBrickEdge)) return mask;

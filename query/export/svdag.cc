@@ -6,6 +6,7 @@
 #include <array>
 
 #include "core/base/text.h"
+#include "core/dag/brick.h"
 #include "query/export/export_file.h"
 #include "query/export/selected_dag.h"
 
@@ -17,12 +18,6 @@ constexpr uint64_t kMaxSvdagWords = (uint64_t{1} << 32) - 1;  // its count has 3
 constexpr uint64_t kMaxViewedWords = (uint64_t{1} << 31) - 1;
 constexpr uint32_t kLeafWords = 255;  // one for each mask of 8 voxels but 0
 constexpr uint64_t kSvdagHeaderBytes = 7 * sizeof(float) + 4 * sizeof(uint32_t);
-
-uint32_t halves_of(uint64_t brick) {
-  uint32_t mask = 0;
-  for (int i = 0; i < 8; ++i) mask |= (brick >> (8 * i) & 255 ? 1u : 0u) << i;
-  return mask;
-}
 
 // Where each brick begins among the words of all. A brick takes one word and one for each child, so
 // the beginnings are remembered for every 16th and counted from there.
@@ -50,7 +45,7 @@ class BrickOffsets {
  private:
   static constexpr uint64_t kStep = 16;
   static uint64_t words_of(uint64_t mask) {
-    return 1 + static_cast<uint64_t>(popcount8(halves_of(mask)));
+    return 1 + static_cast<uint64_t>(popcount8(octants(mask)));
   }
 
   const std::span<const uint32_t> bricks_;
@@ -90,7 +85,7 @@ void put_svdag_nodes(const SelectedDag& dag, const BrickOffsets& bricks, ExportS
 void put_svdag_bricks(const SelectedDag& dag, uint64_t first_leaf, ExportStage& stage,
                       ExportFile& file) {
   dag.for_each_brick([&](uint64_t, uint64_t mask) {
-    file.put(halves_of(mask));
+    file.put(octants(mask));
     for (int i = 7; i >= 0; --i)
       if (const uint64_t voxels = mask >> (8 * i) & 255)
         file.put(static_cast<uint32_t>(first_leaf + voxels - 1));

@@ -29,7 +29,8 @@ class BrickWalk {
 
  private:
   void enter(uint32_t depth, const Position& low, uint64_t content) {
-    if (depth + 2 == selection_.grid_levels) return brick(low, mask_of(depth, content));
+    if (depth + 2 == selection_.grid_levels)
+      return brick(low, brick_of_cells(dag_, depth, content));
     const DagView::Children children = dag_.children(depth, content);
     const int64_t half = int64_t{1} << (selection_.grid_levels - depth - 1);
     for (int i = 0; i < 8; ++i) {
@@ -39,18 +40,6 @@ class BrickWalk {
       if (selection_.region.intersects(corner, half))
         enter(depth + 1, corner, dag_.content(depth, children, i));
     }
-  }
-
-  // A cell's children's children, in the order of the bits of a brick.
-  uint64_t mask_of(uint32_t depth, uint64_t content) const {
-    if (depth + 2 == dag_.grid_levels()) return content;
-    const DagView::Children children = dag_.children(depth, content);
-    uint64_t mask = 0;
-    for (int i = 0; i < 8; ++i)
-      if (children.has(i))
-        mask |= uint64_t{dag_.children(depth + 1, dag_.content(depth, children, i)).mask}
-                << (8 * i);
-    return mask;
   }
 
   void brick(const Position& low, uint64_t mask) const {

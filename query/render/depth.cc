@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/base/parallel_for.h"
+#include "query/npy_header.h"
 #include "query/ray_caster.h"
 #include "query/render/surface.h"
 
@@ -31,15 +32,8 @@ DepthMap render_depth(const DagView& dag, const Placement& placement, int width,
 
 std::string encode_npy(const DepthMap& map) {
   static_assert(std::endian::native == std::endian::little, "the file has little-endian numbers");
-  std::string text = "{'descr': '<f4', 'fortran_order': False, 'shape': (" +
-                     std::to_string(map.height) + ", " + std::to_string(map.width) + "), }";
-  // The numbers begin at a multiple of 64 bytes, after ten bytes, this text and an end of line.
-  text.append(63 - (10 + text.size()) % 64, ' ');
-  text += '\n';
-  std::string bytes("\x93NUMPY\x01\x00", 8);
-  bytes += static_cast<char>(text.size() & 255);
-  bytes += static_cast<char>(text.size() >> 8);
-  bytes += text;
+  std::string bytes =
+      npy_header("<f4", "(" + std::to_string(map.height) + ", " + std::to_string(map.width) + ")");
   bytes.append(reinterpret_cast<const char*>(map.depths.data()), map.depths.size() * sizeof(float));
   return bytes;
 }

@@ -112,6 +112,14 @@ Placement inside_view(const RayCaster& caster, const Box& box, double width, dou
 
 }  // namespace
 
+std::array<double, 3> world_point(const Vec& point, const voxdag_reader::File& file) {
+  const double voxel = file.edge() / static_cast<double>(file.resolution());
+  std::array<double, 3> world{};
+  for (int axis = 0; axis < 3; ++axis)
+    world[static_cast<size_t>(axis)] = file.origin()[axis] + point[axis] * voxel;
+  return world;
+}
+
 Box occupied_box(const DagView& dag) {
   Box box{{{1e30, 1e30, 1e30}}, {}};
   const auto reaches_out = [&](const DagView::Cell& cell) {

@@ -2,6 +2,7 @@
 // All functions of a DAG need one that is not empty.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,9 @@
 #include "query/render/camera.h"
 
 namespace voxdag::query {
+
+// Where a point in voxels is in the world.
+std::array<double, 3> world_point(const Vec& point, const voxdag_reader::File& file);
 
 struct Box {
   Vec low, high;  // in voxels

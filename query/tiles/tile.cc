@@ -4,12 +4,12 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/dag/brick.h"
 #include "query/tiles/offset_table.h"
 
 namespace voxdag::query {
 namespace {
 
-constexpr uint32_t kBrickLevels = 2;
 constexpr size_t kHeaderWords = 4;
 constexpr uint32_t kLeavesAreBricks = 1u << 16;
 
@@ -66,15 +66,6 @@ void add_bricks(const DagView& dag, const std::vector<uint64_t>& offsets,
   }
 }
 
-// The occupied cells of a quarter of the node's edge, in the order of the voxels of a brick.
-uint64_t coarse_brick(const DagView& dag, uint32_t level, const DagView::Children& node) {
-  uint64_t mask = 0;
-  for (int i = 0; i < 8; ++i)
-    if (node.has(i))
-      mask |= uint64_t{dag.children(level + 1, dag.content(level, node, i)).mask} << (8 * i);
-  return mask;
-}
-
 // What a coarse brick needs is all over the file: each loop begins to load what the next one reads.
 void add_cut_off(const DagView& dag, uint32_t level, const std::vector<uint64_t>& offsets,
                  std::vector<uint32_t>& words) {
@@ -88,7 +79,7 @@ void add_cut_off(const DagView& dag, uint32_t level, const std::vector<uint64_t>
   }
   for (size_t i = 0; i < offsets.size(); ++i) {
     add_64(offsets[i], words);
-    add_64(coarse_brick(dag, level, nodes[i]), words);
+    add_64(brick_of_cells(dag, level, nodes[i]), words);
   }
 }
 

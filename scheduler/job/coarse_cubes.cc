@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/popcount8.h"
+#include "core/dag/brick.h"
 #include "core/format/artifact/artifact_reader.h"
 #include "core/format/artifact/segment_writer.h"
 #include "scheduler/job/work_folder.h"
@@ -68,10 +69,7 @@ class ArtifactRows {
   // The child mask of a node, or which octants of a brick have voxels.
   uint32_t children_of(uint32_t level, uint32_t row) {
     if (level < reader_.shape().brick_level()) return frame_of(level, row).masks[row % kFrameRows];
-    uint32_t octants = 0;
-    for (int i = 0; i < 8; ++i)
-      if (brick(row) >> (8 * i) & 0xff) octants |= 1u << i;
-    return octants;
+    return octants(brick(row));
   }
 
   const ArtifactRef ref_;

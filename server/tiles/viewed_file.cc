@@ -24,17 +24,10 @@ std::string digest_of(const voxdag_reader::File& file) {
   return sha256_hex(text).substr(0, kDigestDigits);
 }
 
-Json world(const query::Vec& point, const voxdag_reader::File& file) {
-  const double voxel = file.edge() / static_cast<double>(file.resolution());
-  Json json = Json::array();
-  for (int axis = 0; axis < 3; ++axis) json.push_back(file.origin()[axis] + point[axis] * voxel);
-  return json;
-}
-
 Json camera(const std::string& view, const query::DagView& dag, const voxdag_reader::File& file) {
   const query::Placement p = query::named_view(view, dag, kAspect, {});
-  return {{"position", world(p.eye, file)},
-          {"target", world(p.target, file)},
+  return {{"position", query::world_point(p.eye, file)},
+          {"target", query::world_point(p.target, file)},
           {"fov_degrees", p.fov_degrees}};
 }
 

@@ -3,7 +3,7 @@
 // Invariants: the eye is not on the target; after a motion the view is at most kMaxPitch from the
 // horizontal, so that up stays up. Only a camera that was set may look straight up or down.
 
-import {add, cross, distance, dot, length, mix, normalize, scale, subtract} from "./vector.js";
+import {add, distance, dot, length, mix, picture_axes, picture_direction, scale, subtract} from "./vector.js";
 
 const kMaxPitch = 89.9 * Math.PI / 180;
 const kMinDistance = 1 / 64;  // voxels from the eye to the target
@@ -30,12 +30,9 @@ export class Camera {
     return distance(this.eye, this.target);
   }
 
-  // The unit vectors of the picture; looking straight down, up is -z.
+  // Looking straight down, up is -z.
   axes() {
-    const forward = normalize(subtract(this.target, this.eye));
-    const vertical = Math.abs(forward[1]) > 1 - 1e-9;
-    const right = normalize(cross(forward, vertical ? [0, 0, forward[1] < 0 ? -1 : 1] : [0, 1, 0]));
-    return {forward, right, up: cross(right, forward)};
+    return picture_axes(subtract(this.target, this.eye));
   }
 
   // The width of a pixel at distance 1 in a picture of this height.
@@ -45,9 +42,8 @@ export class Camera {
 
   // The unit direction through a point of the picture, in pixels from its upper left corner.
   direction(x, y, width, height) {
-    const {forward, right, up} = this.axes();
     const pixel = this.pixel_spread(height);
-    return normalize(add(forward, add(scale(right, (x - width / 2) * pixel), scale(up, (height / 2 - y) * pixel))));
+    return picture_direction(this.axes(), (x - width / 2) * pixel, (height / 2 - y) * pixel);
   }
 
   // Around the target: positive angles (radians) move the eye to the right and up.

@@ -4,10 +4,11 @@
 import {WebGLUnavailable} from "./gl/gl_objects.js";
 import {Passes} from "./gl/passes.js";
 import {read_feedback} from "./gl/feedback.js";
-import {add, View} from "./gl/view.js";
+import {View} from "./gl/view.js";
 import {TileLoader} from "./tiles/tile_loader.js";
 import {TilePool} from "./tiles/tile_pool.js";
 import {TileStore} from "./tiles/tile_store.js";
+import {add, scale, subtract} from "./vector.js";
 
 export {WebGLUnavailable};
 
@@ -146,12 +147,12 @@ export class Renderer {
     values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
     const {view, passes} = this, words = await passes.pick_one(values);
     if (!words || !this.ready || (words[1] >>> 23 & 1) === 0) return null;
-    const distance = new Float32Array(words.buffer, 0, 1)[0], scale = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
+    const distance = new Float32Array(words.buffer, 0, 1)[0], log2_edge = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
     const direction = view.direction(x, y, width, height);
     const normal = axis === 3 ? direction.map((d) => -d) : [0, 0, 0];
     if (axis < 3) normal[axis] = direction[axis] > 0 ? -1 : 1;
     const node = words[2] !== 0 ? this.store.cut_off_node(words[2]) : this.store.by_slot[words[7]]?.tile || this.info.root;
-    return {voxel: [...words.slice(4, 7)], level: this.info.levels - scale, position: add(view.eye, direction, distance),
+    return {voxel: [...words.slice(4, 7)], level: this.info.levels - log2_edge, position: add(view.eye, scale(direction, distance)),
             distance, normal, nodeLevel: node.level, nodeOffset: String(node.offset)};
   }
 
@@ -295,7 +296,7 @@ export class Renderer {
   // The sun stands over the left shoulder of the first camera. If that is within the scene, the sun takes a
   // better place as soon as the first view is complete.
   place_sun(position, target) {
-    const {origin, edge} = this.info, back = add(position, target, -1);
+    const {origin, edge} = this.info, back = subtract(position, target);
     this.outside = position.some((x, i) => x < origin[i] || x > origin[i] + edge);
     this.sun_turn = Math.atan2(back[2], back[0]) + 0.9;
     this.set_sun(0);

@@ -13,19 +13,10 @@ using namespace voxdag::query;
 namespace {
 
 constexpr int kWidth = 40, kHeight = 30;
-const Placement kFromTheFront{{{8, 9, 24}}, {{8, 8, 8}}, 40};
 
 DepthMap depth_of(const VoxelScene& scene, unsigned threads) {
   const DagView dag = scene.view();
   return render_depth(dag, kFromTheFront, kWidth, kHeight, threads, CancelToken());
-}
-
-VoxelScene block() {
-  std::set<VoxelScene::Voxel> voxels;
-  for (int64_t x = 6; x < 10; ++x)
-    for (int64_t y = 6; y < 10; ++y)
-      for (int64_t z = 6; z < 10; ++z) voxels.insert({x, y, z});
-  return VoxelScene(4, voxels);
 }
 
 // Where the ray through the center of a pixel enters the cube from 6 to 10, by its six planes.
@@ -47,7 +38,7 @@ double distance_to_block(int x, int y) {
 }
 
 TEST(Depth, IsTheDistanceAlongTheRay) {
-  const DepthMap map = depth_of(block(), 3);
+  const DepthMap map = depth_of(VoxelScene::block(), 3);
   int hits = 0;
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
@@ -60,7 +51,7 @@ TEST(Depth, IsTheDistanceAlongTheRay) {
         EXPECT_EQ(depth, INFINITY) << x << " " << y;
     }
   EXPECT_GT(hits, 50);
-  EXPECT_EQ(depth_of(block(), 1).depths, map.depths);
+  EXPECT_EQ(depth_of(VoxelScene::block(), 1).depths, map.depths);
 }
 
 TEST(Depth, OfAnEmptySceneIsInfinite) {

@@ -33,16 +33,6 @@ Picture render(const VoxelScene& scene, const Placement& placement, unsigned thr
   return render_picture(dag, placement, options, progress, cancel);
 }
 
-VoxelScene block() {
-  std::set<VoxelScene::Voxel> voxels;
-  for (int64_t x = 6; x < 10; ++x)
-    for (int64_t y = 6; y < 10; ++y)
-      for (int64_t z = 6; z < 10; ++z) voxels.insert({x, y, z});
-  return VoxelScene(4, voxels);
-}
-
-const Placement kFromTheFront{{{8, 9, 24}}, {{8, 8, 8}}, 40};
-
 // A PNG file is its signature, an IHDR chunk with the size and format (8 bits, RGB), and IEND last.
 TEST(Picture, IsAPngOfItsSize) {
   Picture picture(123, 45);
@@ -74,13 +64,15 @@ TEST(Picture, IsWrittenWhole) {
 
 // The same pixels for any number of threads.
 TEST(Renderer, ThreadsDoNotChangeThePicture) {
-  EXPECT_EQ(render(block(), kFromTheFront, 1).rgb, render(block(), kFromTheFront, 3).rgb);
+  EXPECT_EQ(render(VoxelScene::block(), kFromTheFront, 1).rgb,
+            render(VoxelScene::block(), kFromTheFront, 3).rgb);
 }
 
 // The block is seen in the center of the picture, lit, in front of the background.
 TEST(Renderer, ShowsTheBlockInTheMiddle) {
   const VoxelScene nothing(4, {});
-  Picture with = render(block(), kFromTheFront, 2), without = render(nothing, kFromTheFront, 2);
+  Picture with = render(VoxelScene::block(), kFromTheFront, 2),
+          without = render(nothing, kFromTheFront, 2);
   const auto differs = [&](int x, int y) {
     int sum = 0;
     for (int c = 0; c < 3; ++c) sum += std::abs(with.pixel(x, y)[c] - without.pixel(x, y)[c]);
@@ -101,7 +93,7 @@ TEST(Renderer, ShowsTheBlockInTheMiddle) {
 }
 
 TEST(Renderer, StopsWhenCanceled) {
-  const VoxelScene scene = block();
+  const VoxelScene scene = VoxelScene::block();
   const DagView dag = scene.view();
   NoProgress progress;
   CancelToken cancel;
@@ -111,7 +103,7 @@ TEST(Renderer, StopsWhenCanceled) {
 
 // An error on any thread stops the others and is rethrown to the caller.
 TEST(Renderer, ReportsDamage) {
-  VoxelScene scene = block();
+  VoxelScene scene = VoxelScene::block();
   scene.level_words(1).at(1) = 0x7fffffff;
   const DagView dag = scene.view();
   NoProgress progress;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "query/dag_view.h"
+#include "query/render/camera.h"
 
 // An octree, without shared nodes, of a set of voxels.
 class VoxelScene {
@@ -32,6 +33,15 @@ class VoxelScene {
         mask |= uint64_t{1} << voxdag_reader::File::brick_bit(plane & 3, y, z);
     scene.words_.back() = {static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)};
     return scene;
+  }
+
+  // The voxels from 6 to 9 along each axis of a grid of 16.
+  static VoxelScene block() {
+    std::set<Voxel> voxels;
+    for (int64_t x = 6; x < 10; ++x)
+      for (int64_t y = 6; y < 10; ++y)
+        for (int64_t z = 6; z < 10; ++z) voxels.insert({x, y, z});
+    return VoxelScene(4, voxels);
   }
 
   std::vector<uint32_t>& level_words(uint32_t level) { return words_[level]; }
@@ -76,3 +86,6 @@ class VoxelScene {
   uint32_t grid_levels_;
   std::vector<std::vector<uint32_t>> words_;
 };
+
+// Looks at VoxelScene::block().
+inline const voxdag::query::Placement kFromTheFront{{{8, 9, 24}}, {{8, 8, 8}}, 40};

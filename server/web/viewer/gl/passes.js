@@ -5,7 +5,7 @@ import {kCombine, kFeedback, kLight, kOcclusion, kPick, kPresent, kSun, kSunPlac
 
 const kHalfRange = 1;        // brightest light of a target with half floats
 const kByteRange = 8;        // and of one with bytes
-export const kFeedbackBlock = 4;
+const kFeedbackBlock = 4;
 
 function pause() {
   return new Promise((resolve) => setTimeout(resolve, 4));

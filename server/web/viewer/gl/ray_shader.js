@@ -12,10 +12,10 @@ precision highp usampler2D;
 precision highp sampler2D;
 `;
 
-export const kMaxSteps = 4096;
+const kMaxSteps = 4096;
 
 // Uniforms of the pool, and of all rays of a picture.
-export const kPoolSource = `
+const kPoolSource = `
 uniform usampler2D u_pool, u_table;
 uniform uint u_root;         // pointer to the root (tiles/tile_format.js says what a pointer is)
 uniform int u_levels;        // the grid has 2^u_levels voxels per edge

@@ -1,38 +1,20 @@
 // The camera as the shaders need it: as query/render/camera.h, with the eye as an integer voxel plus a
 // fraction, so that float32 holds all that is relative to it.
 
-export function add(a, b, scale = 1) {
-  return a.map((x, i) => x + scale * b[i]);
-}
-export function dot(a, b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-export function cross(a, b) {
-  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-}
-export function length(a) {
-  return Math.hypot(...a);
-}
-export function normalized(a) {
-  return a.map((x) => x / length(a));
-}
+import {length, picture_axes, picture_direction, subtract} from "../vector.js";
 
 const kFar = 2 ** 30;  // voxels; an eye beyond is drawn from there
 
 export class View {
   // In voxels; the vertical field of view in degrees.
   constructor({eye, target, up = [0, 1, 0], fovDegrees}) {
-    const forward = add(target, eye, -1);
+    const forward = subtract(target, eye);
     if (![...eye, ...target, ...up, fovDegrees].every(Number.isFinite)) throw new Error("A camera has a number that is not finite.");
     if (!(fovDegrees > 0 && fovDegrees < 180)) throw new Error("The field of view must lie between 0 and 180 degrees.");
     if (!(length(forward) > 0)) throw new Error("The camera must not be at its target.");
     this.eye = eye.map((x) => Math.min(Math.max(x, -kFar), kFar));
     this.target = target;
-    this.forward = normalized(forward);
-    const along = Math.abs(dot(this.forward, normalized(up)));
-    const reference = along > 1 - 1e-9 ? [0, 0, this.forward[1] < 0 ? -1 : 1] : up;
-    this.right = normalized(cross(this.forward, reference));
-    this.up = cross(this.right, this.forward);
+    Object.assign(this, picture_axes(forward, up));
     this.tangent = Math.tan(fovDegrees * Math.PI / 360);
   }
 
@@ -43,14 +25,14 @@ export class View {
 
   uniforms(width, height) {
     const cell = this.eye.map(Math.floor);
-    return {u_eye_cell: cell, u_eye_part: add(this.eye, cell, -1), u_forward: this.forward, u_right: this.right,
+    return {u_eye_cell: cell, u_eye_part: subtract(this.eye, cell), u_forward: this.forward, u_right: this.right,
             u_up: this.up, u_pixel: this.pixel(height), u_center: [width / 2, height / 2]};
   }
 
   // Unit vector through a point in pixels from the upper left corner.
   direction(x, y, width, height) {
     const pixel = this.pixel(height);
-    return normalized(add(add(this.forward, this.right, (x - width / 2) * pixel), this.up, (height / 2 - y) * pixel));
+    return picture_direction(this, (x - width / 2) * pixel, (height / 2 - y) * pixel);
   }
 
   equals(other) {

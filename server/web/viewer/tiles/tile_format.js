@@ -7,7 +7,7 @@ const kMagic = 0x31544456;
 const kHeadWords = 4;
 const kCutWords = 4;             // of a cut-off node in a tile
 
-export const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
+const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
   let bits = 0;
   for (let rest = i; rest; rest &= rest - 1) ++bits;
   return bits;

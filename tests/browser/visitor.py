@@ -3,18 +3,11 @@
 import base64
 import contextlib
 import os
-import re
 import time
 from array import array
 from pathlib import Path
 
-TIMEOUT_MS = 60_000
-
-WATCH_POLICY = """
-window.violations = [];
-document.addEventListener("securitypolicyviolation", (event) =>
-  window.violations.push(`${event.violatedDirective} ${event.blockedURI}`));
-"""
+from chromium import Window
 
 # After two animation frames the picture has the new camera.
 TWO_FRAMES = """async () => {
@@ -58,25 +51,10 @@ READ_CANVAS = """async () => {
 }"""
 
 
-class Visitor:
-    """Records every error that the browser reports; leave() fails if there were any."""
-
+class Visitor(Window):
     def __init__(self, browser, pictures, name, width=720, height=230, **options):
-        self.name, self.pictures = name, pictures
-        self.context = browser.new_context(viewport={"width": width, "height": height}, accept_downloads=True,
-                                           reduced_motion=options.pop("reduced_motion", "reduce"), **options)
-        self.context.set_default_timeout(TIMEOUT_MS)
-        self.context.add_init_script(WATCH_POLICY)
-        self.page = self.context.new_page()
-        self.errors = []
-        self.expected = None  # pattern of console errors that the current step causes
-        self.page.on("console", self.on_console)
-        self.page.on("pageerror", lambda error: self.errors.append(f"page error: {error}"))
-
-    def on_console(self, message):
-        is_error = message.type == "error" or "INVALID_" in message.text
-        if is_error and not (self.expected and re.search(self.expected, message.text)):
-            self.errors.append(f"console: {message.text} ({message.location.get('url')})")
+        options.setdefault("reduced_motion", "reduce")
+        super().__init__(browser, pictures, name, viewport={"width": width, "height": height}, **options)
 
     def open(self, url, wait=True):
         self.page.goto("about:blank")  # a new fragment alone would not reload the page
@@ -86,16 +64,10 @@ class Visitor:
 
     def wait_until(self, expression, argument=None):
         """Playwright's wait_for_function evaluates in the page, which the policy forbids."""
-        deadline = time.monotonic() + TIMEOUT_MS / 1000
+        deadline = time.monotonic() + self.timeout_ms / 1000
         while not self.page.evaluate(expression, argument):
-            assert time.monotonic() < deadline, f"{self.name}: not within {TIMEOUT_MS} ms: {expression}"
+            assert time.monotonic() < deadline, f"{self.name}: not within {self.timeout_ms} ms: {expression}"
             self.page.wait_for_timeout(50)
-
-    @contextlib.contextmanager
-    def expecting(self, pattern):
-        self.expected = pattern
-        yield
-        self.expected = None
 
     def show(self, camera, complete=True):
         self.page.evaluate(SHOW, [camera, complete])
@@ -126,17 +98,6 @@ class Visitor:
         self.page.evaluate(TWO_FRAMES)
         self.wait_until("!voxdagViewer.viewer.bookmark_timer")
         return self.page.locator("#camera-text").inner_text()
-
-    def picture(self, name):
-        self.page.screenshot(path=self.pictures / f"{name}-{self.name}.png")
-        wide = self.page.evaluate("document.documentElement.scrollWidth - innerWidth")
-        assert wide <= 0, f"{name} ({self.name}): {wide} pixels wider than the window"
-
-    def leave(self):
-        violations = self.page.evaluate("window.violations")
-        assert not violations, f"{self.name}: policy violated: {violations}"
-        assert not self.errors, f"{self.name}: {self.errors}"
-        self.context.close()
 
 
 def resident_bytes_of_descendants():

@@ -1,0 +1,33 @@
+// Servers that a command runs until a signal ends them.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include "core/base/cancel_token.h"
+
+namespace voxdag::cli {
+
+// Calls run(), which lasts until stop() is called. That is done on another thread, once `cancel` is
+// canceled: a signal handler may only set the token. Throws what run() throws.
+template <class Run>
+void run_until_canceled(CancelToken& cancel, const Run& run, const std::function<void()>& stop) {
+  std::thread watcher([&] {
+    while (!cancel.canceled()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    stop();
+  });
+  const auto end_watcher = [&] {
+    cancel.cancel();
+    watcher.join();
+  };
+  try {
+    run();
+  } catch (...) {
+    end_watcher();
+    throw;
+  }
+  end_watcher();
+}
+
+}  // namespace voxdag::cli
