@@ -19,8 +19,10 @@ CORE_INCLUDES = {
     "core/geometry": ["core/base"],
     "core/dag": ["core/base", "core/geometry"],
     "core/backend": ["core/base", "core/geometry", "core/dag"],
-    "core/format": ["core/base", "core/io", "core/geometry", "core/dag"],
-    "core/scene": ["core/base", "core/io", "core/geometry"],
+    "core/format": ["core/base", "core/io", "core/geometry", "core/dag", "core/color"],
+    "core/color": ["core/base", "core/geometry"],
+    "core/image": ["core/base", "core/io"],
+    "core/scene": ["core/base", "core/io", "core/geometry", "core/color", "core/image"],
 }
 CORE = list(CORE_INCLUDES)
 PRODUCT_INCLUDES = CORE_INCLUDES | {
@@ -58,7 +60,7 @@ THIRD_PARTY = {
     "nanovdb/util/OpenToNanoVDB.h": ["query"],
 }
 # Folders that build with a C++20 compiler (and CUDA) alone.
-BARE = ["core/base", "core/geometry", "core/dag", "core/backend"]
+BARE = ["core/base", "core/geometry", "core/dag", "core/color", "core/backend"]
 LIBRARY = re.compile(
     r"(zstd|tiny_gltf|sqlite3|httplib|png|zlib|xxhash)\.h$|^(nlohmann|openssl|CLI|gtest|gmock|benchmark)/"
 )

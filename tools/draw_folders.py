@@ -34,6 +34,8 @@ BOXES = {
     "core/scene": (4.2, 4, "glTF, PLY, generators"),
     "core/dag": (2.2, 5, "brick, node, hash"),
     "core/geometry": (2.6, 6, "grid, overlap test"),
+    "core/color": (3.2, 5, "color rule, blocks"),
+    "core/image": (4.4, 5, "PNG, JPEG"),
     "core/io": (3.9, 6, "file access"),
     "core/base": (1.6, 7, "errors, budget, text"),
 }

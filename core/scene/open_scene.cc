@@ -185,6 +185,15 @@ void TriangleCursor::read_snapped(uint64_t first, uint64_t count, const Grid& gr
   });
 }
 
+void TriangleCursor::read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit) {
+  std::vector<SurfaceTriangle> surfaces;
+  read(first, count, [&](std::span<const WorldTriangle> batch) {
+    surfaces.assign(batch.size(), SurfaceTriangle{});
+    for (size_t i = 0; i < batch.size(); ++i) surfaces[i].position = batch[i];
+    visit(surfaces);
+  });
+}
+
 WorldBounds TriangleCursor::read_bounds(uint64_t first, uint64_t count) {
   WorldBounds bounds;
   read(first, count, [&](std::span<const WorldTriangle> batch) { bounds.add(bounds_of(batch)); });

@@ -12,6 +12,7 @@
 
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
+#include "core/color/surface.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 
@@ -28,6 +29,8 @@ class TriangleCursor {
  public:
   using Visitor = std::function<void(std::span<const RealTriangle>)>;
 
+  using SurfaceVisitor = std::function<void(std::span<const SurfaceTriangle>)>;
+
   virtual ~TriangleCursor() = default;
   // Calls `visit` with batches of 1 to 1024 triangles, all finite: those among the declared
   // triangles [first, first + count) that skip_invalid does not drop, in the scene's order. Going
@@ -36,8 +39,24 @@ class TriangleCursor {
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
   // Does the same with each vertex snapped to `grid`.
   virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
+  // Does the same with what the triangles look like. The default: white, of material 0.
+  virtual void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
   // The bounds of the triangles that read() visits.
   virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
+};
+
+// An image of a scene, as it is stored: a PNG or JPEG file, or anything that claims to be one.
+struct ImageSource {
+  std::string name;  // for messages: which image of which scene file
+  SourceFile file;   // that has the bytes, unless they are in `bytes`
+  uint64_t offset = 0, size = 0;
+  std::vector<std::byte> bytes;  // of a data URI
+  std::string problem;           // why it cannot be read, if that is known; "" otherwise
+};
+
+struct SceneMaterials {
+  std::vector<Material> materials = {Material{}};  // at least one
+  std::vector<ImageSource> images;                 // those that materials use
 };
 
 class TriangleSource {
@@ -52,6 +71,8 @@ class TriangleSource {
   // The triangles that the scene declares, instances counted: those that are visited and those that
   // skip_invalid drops.
   virtual uint64_t declared_triangles() const = 0;
+  // What TriangleCursor::read_surfaces() refers to.
+  virtual SceneMaterials materials() const { return {}; }
   // All files that the triangles come from, with their identity when they were first opened. One
   // that turns out to be another when it is opened again is an error.
   virtual std::vector<SourceFile> files() const { return {}; }

@@ -1,0 +1,44 @@
+// What the surfaces in a cell of the color grid add up to, before it becomes one color. Sums
+// commute, so the order of triangles, threads and subvolumes does not matter, and the sum of a
+// coarser cell is that of its children.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/base/host_device.h"
+
+namespace voxdag {
+
+// Weights and weighted intensities (linear, 16 bits). Alpha has 8 bits here.
+struct ColorSum {
+  std::array<uint64_t, 3> seen{};   // of weight x alpha x intensity: red, green, blue
+  uint64_t seen_weight = 0;         // of weight x alpha
+  std::array<uint64_t, 3> plain{};  // of weight x intensity: what is used where all alpha is 0
+  uint64_t weight = 0;
+
+  VOXDAG_HD void add(const ColorSum& other) {
+    for (int c = 0; c < 3; ++c) {
+      seen[static_cast<size_t>(c)] += other.seen[static_cast<size_t>(c)];
+      plain[static_cast<size_t>(c)] += other.plain[static_cast<size_t>(c)];
+    }
+    seen_weight += other.seen_weight;
+    weight += other.weight;
+  }
+  bool operator==(const ColorSum&) const = default;
+};
+
+// A set cell of the color grid, in a region of 64^3 such cells.
+struct ColoredCell {
+  uint32_t code = 0;  // Morton code within the region, below 2^18
+  ColorSum sum;       // its weight is above 0
+};
+
+// The color of a cell, as it is stored: sRGB, 8 bits, and alpha, linear.
+struct Color {
+  std::array<uint8_t, 3> rgb{};
+  uint8_t alpha = 255;
+  bool operator==(const Color&) const = default;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,59 @@
+// What a triangle of a scene looks like: base color in the terms of glTF 2.0 (section 3.9), reduced
+// to integers, so that the color of a voxel is the same on every machine.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "core/geometry/fixed_triangle.h"
+#include "core/geometry/grid.h"
+
+namespace voxdag {
+
+// Fractional bits of texture coordinates.
+inline constexpr int kTextureBits = 24;
+// 1.0 of colors, factors and alpha: linear light in 16 bits.
+inline constexpr uint16_t kFullIntensity = 65535;
+
+// A corner of a triangle.
+struct SurfaceCorner {
+  // In images from the upper left corner, 2^kTextureBits to an image, magnitude at most 2^40; after
+  // KHR_texture_transform and before wrapping.
+  std::array<int64_t, 2> texture{};
+  // COLOR_0, or white: red, green, blue (linear) and alpha, kFullIntensity for 1.
+  std::array<uint16_t, 4> color{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
+};
+
+// A triangle in world space with its look.
+struct SurfaceTriangle {
+  WorldTriangle position;
+  std::array<SurfaceCorner, 3> corners;
+  uint32_t material = 0;  // index into SceneMaterials::materials
+};
+
+// The same, snapped to the lattice of the grid.
+struct FixedSurface {
+  FixedTriangle position;
+  std::array<SurfaceCorner, 3> corners;
+  uint32_t material = 0;
+};
+
+enum class AlphaMode : uint8_t { kOpaque, kMask, kBlend };
+enum class Wrap : uint8_t { kRepeat, kMirroredRepeat, kClampToEdge };
+
+struct Material {
+  static constexpr uint32_t kNoImage = UINT32_MAX;
+
+  std::string name;
+  // Base color, linear, and alpha; kFullIntensity for 1.
+  std::array<uint16_t, 4> factor{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
+  AlphaMode alpha_mode = AlphaMode::kOpaque;
+  uint16_t alpha_cutoff = kFullIntensity / 2;  // of kMask
+  uint32_t image = kNoImage;                   // index into SceneMaterials::images
+  std::array<Wrap, 2> wrap{Wrap::kRepeat, Wrap::kRepeat};
+
+  bool operator==(const Material&) const = default;
+};
+
+}  // namespace voxdag
