@@ -17,8 +17,12 @@ std::string lower_case(std::string_view name) {
   return lower;
 }
 
+// Bodies come as they are unless a caller asks otherwise: newer versions of httplib would ask for
+// compression.
 httplib::Headers to_httplib(const HeaderMap& headers) {
-  return httplib::Headers(headers.begin(), headers.end());
+  httplib::Headers all(headers.begin(), headers.end());
+  if (all.find("Accept-Encoding") == all.end()) all.emplace("Accept-Encoding", "identity");
+  return all;
 }
 
 ClientResponse from_httplib(const httplib::Response& response) {
