@@ -1,6 +1,8 @@
 #include "core/scene/chained_scene.h"
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
 #include <utility>
 
 #include "core/base/error.h"
@@ -11,6 +13,7 @@ namespace {
 struct Part {
   std::unique_ptr<TriangleSource> source;
   uint64_t first_triangle, end_triangle;
+  uint32_t first_material;
 };
 
 // Has a cursor of one part at a time, which takes the memory of all.
@@ -28,6 +31,11 @@ class ChainedCursor : public TriangleCursor {
                     const Visitor& visit) override {
     for_each_part(first, count, [&](TriangleCursor& cursor, uint64_t begin, uint64_t n) {
       cursor.read_snapped(begin, n, grid, visit);
+    });
+  }
+  void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit) override {
+    for_each_part(first, count, [&](TriangleCursor& cursor, uint64_t begin, uint64_t n) {
+      cursor.read_surfaces(begin, n, with_material_offset(open_->first_material, visit));
     });
   }
   WorldBounds read_bounds(uint64_t first, uint64_t count) override {
@@ -69,7 +77,9 @@ class ChainedScene : public TriangleSource {
       const uint64_t first = declared_triangles(), count = source->declared_triangles();
       if (count > INT64_MAX - first)
         throw Error(ErrorCode::kLimit, "the scene has over 2^63 triangles, instances counted");
-      parts_.push_back({std::move(source), first, first + count});
+      const uint32_t materials = source->material_count();
+      parts_.push_back({std::move(source), first, first + count, material_count_});
+      material_count_ += materials;
     }
   }
 
@@ -79,6 +89,13 @@ class ChainedScene : public TriangleSource {
   uint64_t declared_triangles() const override {
     return parts_.empty() ? 0 : parts_.back().end_triangle;
   }
+  SceneMaterials materials() const override {
+    SceneMaterials all;
+    all.materials.clear();
+    for (const Part& part : parts_) add_materials(all, part.source->materials());
+    return all;
+  }
+  uint32_t material_count() const override { return material_count_; }
   std::vector<SourceFile> files() const override {
     return all_of<SourceFile>([](const TriangleSource& source) { return source.files(); });
   }
@@ -96,9 +113,31 @@ class ChainedScene : public TriangleSource {
   }
 
   std::vector<Part> parts_;
+  uint32_t material_count_ = 0;
 };
 
 }  // namespace
+
+void add_materials(SceneMaterials& all, SceneMaterials more) {
+  for (Material& material : more.materials) {
+    if (material.image != Material::kNoImage)
+      material.image += static_cast<uint32_t>(all.images.size());
+    all.materials.push_back(std::move(material));
+  }
+  std::ranges::move(more.images, std::back_inserter(all.images));
+  std::ranges::move(more.warnings, std::back_inserter(all.warnings));
+}
+
+TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
+                                                    const TriangleCursor::SurfaceVisitor& visit) {
+  if (first_material == 0) return std::cref(visit);
+  return [first_material, &visit,
+          own = std::vector<SurfaceTriangle>()](std::span<const SurfaceTriangle> batch) mutable {
+    own.assign(batch.begin(), batch.end());
+    for (SurfaceTriangle& triangle : own) triangle.material += first_material;
+    visit(own);
+  };
+}
 
 std::unique_ptr<TriangleSource> chain_scenes(std::vector<std::unique_ptr<TriangleSource>> parts) {
   if (parts.size() == 1) return std::move(parts.front());

@@ -10,6 +10,8 @@
 #include "core/scene/chained_scene.h"
 #include "core/scene/gltf/document/check_document.h"
 #include "core/scene/gltf/document/read_document.h"
+#include "core/scene/gltf/looks/image_sources.h"
+#include "core/scene/gltf/looks/looks.h"
 #include "core/scene/gltf/triangle_reader.h"
 #include "core/scene/ply/header.h"
 #include "core/scene/ply/ply_scene.h"
@@ -20,6 +22,7 @@ namespace {
 
 gltf::Document checked(gltf::Document document) {
   gltf::check_document(document);
+  gltf::resolve_looks(document);
   return document;
 }
 
@@ -39,6 +42,7 @@ struct SceneFile {
   gltf::ExternalFiles external_files;
   gltf::DecodedBuffers decoded;
   uint64_t first_triangle = 0, end_triangle = 0;  // of those that the scene declares
+  uint32_t first_material = 0;                    // of those of the scene
 };
 
 // Declared triangles of the scene to draw, every instance counted.
@@ -66,26 +70,31 @@ class GltfCursor : public TriangleCursor {
         cancel_(cancel) {}
 
   void read(uint64_t first, uint64_t count, const Visitor& visit) override {
-    for_each_file(first, count, [&](gltf::TriangleReader& reader, uint64_t begin, uint64_t n) {
-      reader.read(begin, n, nullptr, visit);
+    for_each_file(first, count, [&](SceneFile& file, uint64_t begin, uint64_t n) {
+      reader_of(file).read(begin, n, nullptr, visit);
     });
   }
   void read_snapped(uint64_t first, uint64_t count, const Grid& grid,
                     const Visitor& visit) override {
-    for_each_file(first, count, [&](gltf::TriangleReader& reader, uint64_t begin, uint64_t n) {
-      reader.read(begin, n, &grid, visit);
+    for_each_file(first, count, [&](SceneFile& file, uint64_t begin, uint64_t n) {
+      reader_of(file).read(begin, n, &grid, visit);
+    });
+  }
+  void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit) override {
+    for_each_file(first, count, [&](SceneFile& file, uint64_t begin, uint64_t n) {
+      reader_of(file).read_surfaces(begin, n, with_material_offset(file.first_material, visit));
     });
   }
   WorldBounds read_bounds(uint64_t first, uint64_t count) override {
     WorldBounds bounds;
-    for_each_file(first, count, [&](gltf::TriangleReader& reader, uint64_t begin, uint64_t n) {
-      bounds.add(reader.read_bounds(begin, n));
+    for_each_file(first, count, [&](SceneFile& file, uint64_t begin, uint64_t n) {
+      bounds.add(reader_of(file).read_bounds(begin, n));
     });
     return bounds;
   }
 
  private:
-  // Calls body(reader, first, count) for each part of the triangles that one file declares.
+  // Calls body(file, first, count) for each part of the triangles that one file declares.
   template <class Body>
   void for_each_file(uint64_t first, uint64_t count, const Body& body) {
     const uint64_t end = first + count;
@@ -93,7 +102,7 @@ class GltfCursor : public TriangleCursor {
       SceneFile& file = **std::ranges::upper_bound(scene_files_, first, {},
                                                    [](const auto& f) { return f->end_triangle; });
       const uint64_t n = std::min(end, file.end_triangle) - first;
-      body(reader_of(file), first - file.first_triangle, n);
+      body(file, first - file.first_triangle, n);
       first += n;
     }
   }
@@ -135,6 +144,8 @@ class GltfScene : public TriangleSource {
       if (total > INT64_MAX)
         throw Error(ErrorCode::kLimit, path + ": over 2^63 triangles, instances counted");
       files_.back()->end_triangle = static_cast<uint64_t>(total);
+      files_.back()->first_material = material_count_;
+      material_count_ += static_cast<uint32_t>(files_.back()->document.looks->materials.size());
     }
     declared_ = static_cast<uint64_t>(total);
   }
@@ -145,6 +156,13 @@ class GltfScene : public TriangleSource {
                                         budget_, cancel_);
   }
   uint64_t declared_triangles() const override { return declared_; }
+  SceneMaterials materials() const override {
+    SceneMaterials all;
+    all.materials.clear();
+    for (const auto& f : files_) add_materials(all, materials_of(*f));
+    return all;
+  }
+  uint32_t material_count() const override { return material_count_; }
   std::vector<SourceFile> files() const override {
     std::vector<SourceFile> all;
     for (const auto& f : files_) all.push_back({f->file->path(), f->file->identity()});
@@ -164,12 +182,21 @@ class GltfScene : public TriangleSource {
   }
 
  private:
+  SceneMaterials materials_of(const SceneFile& f) const {
+    const gltf::Looks& looks = *f.document.looks;
+    SceneMaterials out{looks.materials, {}, looks.warnings};
+    for (int image : looks.images)
+      out.images.push_back(gltf::find_image(file_system_, *f.file, f.document, image));
+    return out;
+  }
+
   FileSystem& file_system_;
   const SceneOptions options_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   std::vector<std::unique_ptr<SceneFile>> files_;
   uint64_t declared_ = 0;
+  uint32_t material_count_ = 0;
 };
 
 }  // namespace

@@ -45,18 +45,23 @@ class TriangleCursor {
   virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
 };
 
-// An image of a scene, as it is stored: a PNG or JPEG file, or anything that claims to be one.
+// An image of a scene, as it is stored: a PNG or JPEG file, or anything that claims to be one. Its
+// bytes are `bytes` of those that [offset, offset + size) of the file hold, from `skip` on.
 struct ImageSource {
   std::string name;  // for messages: which image of which scene file
-  SourceFile file;   // that has the bytes, unless they are in `bytes`
+  SourceFile file;
   uint64_t offset = 0, size = 0;
-  std::vector<std::byte> bytes;  // of a data URI
-  std::string problem;           // why it cannot be read, if that is known; "" otherwise
+  // The file has base64 characters there, of which JSON may have escaped some.
+  bool is_base64 = false;
+  uint64_t skip = 0;
+  uint64_t bytes = UINT64_MAX;  // fewer if there are fewer
+  std::string problem;          // why it cannot be read, if that is known; "" otherwise
 };
 
 struct SceneMaterials {
   std::vector<Material> materials = {Material{}};  // at least one
   std::vector<ImageSource> images;                 // those that materials use
+  std::vector<std::string> warnings;               // as those of the source, but about looks alone
 };
 
 class TriangleSource {
@@ -71,8 +76,11 @@ class TriangleSource {
   // The triangles that the scene declares, instances counted: those that are visited and those that
   // skip_invalid drops.
   virtual uint64_t declared_triangles() const = 0;
-  // What TriangleCursor::read_surfaces() refers to.
+  // What TriangleCursor::read_surfaces() refers to. Opens image files, but reads no image; one that
+  // cannot be opened is no error.
   virtual SceneMaterials materials() const { return {}; }
+  // The number of those materials.
+  virtual uint32_t material_count() const { return 1; }
   // All files that the triangles come from, with their identity when they were first opened. One
   // that turns out to be another when it is opened again is an error.
   virtual std::vector<SourceFile> files() const { return {}; }

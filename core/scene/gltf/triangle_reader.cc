@@ -35,6 +35,7 @@ TriangleReader::TriangleReader(const Document& document, BufferReader& buffers,
       budget_(budget),
       cancel_(cancel),
       skip_invalid_(options.skip_invalid),
+      readers_(options.readers),
       cache_(budget, largest_vertex_count(document), options.readers),
       corners_(3 * kWindowTriangles),
       batch_(budget, kBatchTriangles, "a batch of triangles") {}
@@ -47,6 +48,33 @@ void TriangleReader::read(uint64_t first, uint64_t count, const Grid* grid, cons
                     [&](const uint32_t* corners, uint64_t size) { place_all(corners, size); });
   });
   flush();
+}
+
+void TriangleReader::read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit) {
+  if (!looks_) {
+    surfaces_ = PageBuffer<SurfaceTriangle>(budget_, kBatchTriangles, "a batch of triangles");
+    looks_.emplace(document_, buffers_, largest_vertex_count(document_), readers_);
+    draw_.is_bound = false;
+    binding_ = {};
+  }
+  batch_size_ = 0;
+  const auto flush_surfaces = [&] {
+    cancel_.check();
+    if (batch_size_ > 0) visit({surfaces_.data(), batch_size_});
+    batch_size_ = 0;
+  };
+  for_each_instance(first, count, nullptr, [&](uint64_t of_instance, uint64_t n) {
+    for_each_window(of_instance, n, [&](const uint32_t* corners, uint64_t size) {
+      while (size > 0) {
+        const uint64_t part = std::min<uint64_t>(size, kBatchTriangles - batch_size_);
+        place_all_surfaces(corners, part);
+        if (batch_size_ == kBatchTriangles) flush_surfaces();
+        corners += 3 * part;
+        size -= part;
+      }
+    });
+  });
+  flush_surfaces();
 }
 
 WorldBounds TriangleReader::read_bounds(uint64_t first, uint64_t count) {
@@ -145,6 +173,7 @@ void TriangleReader::bind(const Node& node, size_t primitive_index) {
   cache_.bind(*vertices_);
   vertex_count_ = vertices_->count();
   window_count_ = 0;
+  if (looks_) looks_->bind(primitive);
   binding_ = next;
 }
 
@@ -189,6 +218,19 @@ void TriangleReader::place_all(const uint32_t* corners, uint64_t count) {
       if (!skip_invalid_) report(corners);
     } else if (++batch_size_ == kBatchTriangles) {
       flush();
+    }
+  }
+}
+
+// The batch has room for them.
+void TriangleReader::place_all_surfaces(const uint32_t* corners, uint64_t count) {
+  for (; count > 0; --count, corners += 3) {
+    SurfaceTriangle& surface = surfaces_[batch_size_];
+    if (place(corners, surface.position)) {
+      looks_->read(corners, surface);
+      ++batch_size_;
+    } else if (!skip_invalid_) {
+      report(corners);
     }
   }
 }

@@ -11,6 +11,7 @@
 #include "core/base/cancel_token.h"
 #include "core/base/page_buffer.h"
 #include "core/geometry/grid.h"
+#include "core/scene/gltf/looks/look_reader.h"
 #include "core/scene/gltf/mesh_data/corner_reader.h"
 #include "core/scene/gltf/mesh_data/instance_reader.h"
 #include "core/scene/gltf/mesh_data/node_walk.h"
@@ -28,6 +29,7 @@ struct ReaderOptions {
 class TriangleReader {
  public:
   using Visitor = std::function<void(std::span<const RealTriangle>)>;
+  using SurfaceVisitor = std::function<void(std::span<const SurfaceTriangle>)>;
 
   TriangleReader(const Document& document, BufferReader& buffers, const ReaderOptions& options,
                  MemoryBudget& budget, const CancelToken& cancel);
@@ -37,6 +39,8 @@ class TriangleReader {
   // Throws Error{kInvalidInput} naming node, mesh and primitive of an invalid triangle, unless
   // `skip_invalid` drops it.
   void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
+  // Visits the same triangles in world space with what they look like, in such batches.
+  void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
   // The bounds of those triangles in world space.
   WorldBounds read_bounds(uint64_t first, uint64_t count);
 
@@ -72,6 +76,7 @@ class TriangleReader {
   bool add_bounds_of_window(WorldBounds& bounds);
   const uint32_t* load_corners(uint64_t first, uint64_t count);
   void place_all(const uint32_t* corners, uint64_t count);
+  void place_all_surfaces(const uint32_t* corners, uint64_t count);
   bool place(const uint32_t* corners, RealTriangle& out);
   void flush();
   void report(const uint32_t* corners) const;
@@ -81,6 +86,7 @@ class TriangleReader {
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const bool skip_invalid_;
+  const unsigned readers_;
 
   std::optional<NodeWalk> walk_;
   Draw draw_;
@@ -103,6 +109,9 @@ class TriangleReader {
   PageBuffer<RealTriangle> batch_;
   size_t batch_size_ = 0;
   const Visitor* visit_ = nullptr;
+
+  std::optional<LookReader> looks_;       // once surfaces were asked for
+  PageBuffer<SurfaceTriangle> surfaces_;  // a batch of them
 };
 
 }  // namespace voxdag::gltf

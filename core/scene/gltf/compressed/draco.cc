@@ -242,7 +242,7 @@ void decode_draco(const DracoPart& part, std::span<std::byte> compressed, Memory
     else
       decode_mesh<draco::MeshSequentialDecoder>(part, data, charge, mesh);
     check_faces(part, mesh.num_faces());
-    write_faces(part, mesh, write);
+    if (part.has_indices) write_faces(part, mesh, write);
     for (const DracoPart::Attribute& attribute : part.attributes)
       write_attribute(part, attribute, mesh, write);
   } catch (const std::bad_alloc&) {

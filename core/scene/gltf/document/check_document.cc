@@ -18,14 +18,6 @@ const auto& at(const Array& a, int i) {
   return a[static_cast<size_t>(i)];
 }
 
-// How an accessor is used, which determines the type it must have.
-struct AccessorUse {
-  std::string where;  // "mesh 0: primitive 2: POSITION"
-  int components;
-  std::vector<int> types;
-  std::vector<int> may_be_normalized = {};
-};
-
 void check_index(const Document& d, size_t size, int index, const std::string& where,
                  const char* what) {
   if (index < 0 || static_cast<size_t>(index) >= size)
@@ -102,9 +94,9 @@ struct Extent {
   bool may_be_strided;
 };
 
-void check_view(Document& d, const BufferView& view, const std::string& where) {
+void check_view(const Document& d, const BufferView& view, const std::string& where) {
   check_index(d, d.buffers.size(), view.buffer, where, "buffer");
-  BufferSource& buffer = d.buffers[static_cast<size_t>(view.buffer)];
+  const BufferSource& buffer = at(d.buffers, view.buffer);
   const std::string name = "buffer " + std::to_string(view.buffer);
   const uint128 end = static_cast<uint128>(view.byte_offset) + view.byte_length;
   if (end > buffer.byte_length)
@@ -113,10 +105,9 @@ void check_view(Document& d, const BufferView& view, const std::string& where) {
   if (buffer.kind == BufferSource::Kind::kNone)
     refuse(d.path, where + ": " + name + " has no uri and is not in the file");
   if (buffer.kind == BufferSource::Kind::kDecoded) check_compressed(d, buffer, where);
-  buffer.is_read = true;
 }
 
-void check_extent(Document& d, const Extent& extent, const std::string& where) {
+void check_extent(const Document& d, const Extent& extent, const std::string& where) {
   check_index(d, d.views.size(), extent.view, where, "bufferView");
   const BufferView& view = d.views[static_cast<size_t>(extent.view)];
   const std::string name = "bufferView " + std::to_string(extent.view);
@@ -136,7 +127,7 @@ void check_extent(Document& d, const Extent& extent, const std::string& where) {
            where + " ends past the " + std::to_string(view.byte_length) + " bytes of " + name);
 }
 
-void check_sparse(Document& d, const Accessor& accessor, const std::string& where) {
+void check_sparse(const Document& d, const Accessor& accessor, const std::string& where) {
   const Sparse& sparse = accessor.sparse;
   if (sparse.count > accessor.count)
     refuse(d.path, where + " replaces " + std::to_string(sparse.count) + " of " +
@@ -172,9 +163,9 @@ void check_type(const Document& d, const Accessor& accessor, const AccessorUse& 
            where + " has normalized components of type " + type + ", expected them not normalized");
 }
 
-// Checks that accessor `index`, unless it is -1, exists and has a type of the use, and that its
-// bytes lie inside its view and the length that its buffer claims. Marks its buffers as read.
-void check_accessor(Document& d, int index, const AccessorUse& use) {
+}  // namespace
+
+void check_accessor(const Document& d, int index, const AccessorUse& use) {
   if (index < 0) return;
   check_index(d, d.accessors.size(), index, use.where, "accessor");
   const Accessor& accessor = d.accessors[static_cast<size_t>(index)];
@@ -199,6 +190,34 @@ void check_count(const Document& d, int index, uint64_t count, const std::string
   if (found != count)
     refuse(d.path, where + ": " + d.name_accessor(index) + " has " + std::to_string(found) +
                        " elements, expected " + std::to_string(count));
+}
+
+std::vector<int> buffers_of(const Document& d, const Accessor& accessor) {
+  std::vector<int> buffers;
+  const auto add = [&](int view) {
+    if (view < 0) return;
+    const int buffer = at(d.views, view).buffer;
+    const BufferSource& source = at(d.buffers, buffer);
+    buffers.push_back(buffer);
+    if (source.meshopt) buffers.push_back(source.meshopt->from.buffer);
+    if (source.draco) buffers.push_back(source.draco->from.buffer);
+  };
+  add(accessor.view);
+  if (accessor.is_sparse) {
+    add(accessor.sparse.index_view);
+    add(accessor.sparse.value_view);
+  }
+  return buffers;
+}
+
+namespace {
+
+// Checks an accessor of the geometry, unless it is -1, and marks its buffers as read.
+void check_geometry(Document& d, int index, const AccessorUse& use) {
+  if (index < 0) return;
+  check_accessor(d, index, use);
+  for (int buffer : buffers_of(d, at(d.accessors, index)))
+    d.buffers[static_cast<size_t>(buffer)].is_read = true;
 }
 
 AccessorUse position_use(const Document& d, const std::string& where) {
@@ -231,8 +250,8 @@ void check_joint_sets(Document& d, const Primitive& primitive, uint64_t vertices
   for (const JointSet& set : primitive.joint_sets) {
     if (set.joints < 0 || set.weights < 0)
       refuse(d.path, where + " has JOINTS_n without WEIGHTS_n of the same n, or the reverse");
-    check_accessor(d, set.joints, joints);
-    check_accessor(d, set.weights, weights);
+    check_geometry(d, set.joints, joints);
+    check_geometry(d, set.weights, weights);
     check_count(d, set.joints, vertices, joints.where);
     check_count(d, set.weights, vertices, weights.where);
   }
@@ -249,12 +268,12 @@ void check_triangles(Document& d, Primitive& primitive, const std::vector<double
                      const std::string& where) {
   if (primitive.position < 0) refuse(d.path, where + " has no POSITION");
   place_draco_primitive(d, primitive, where);
-  check_accessor(d, primitive.position, position_use(d, where + ": POSITION"));
-  check_accessor(d, primitive.indices,
+  check_geometry(d, primitive.position, position_use(d, where + ": POSITION"));
+  check_geometry(d, primitive.indices,
                  {where + ": indices", 1, {kUnsignedByte, kUnsignedShort, kUnsignedInt}});
   const uint64_t vertices = at(d.accessors, primitive.position).count;
   for (int target : primitive.targets) {
-    check_accessor(d, target, displacement_use(d, where + ": POSITION of a morph target"));
+    check_geometry(d, target, displacement_use(d, where + ": POSITION of a morph target"));
     check_count(d, target, vertices, where + ": POSITION of a morph target");
   }
   check_joint_sets(d, primitive, vertices, where);
@@ -285,7 +304,7 @@ void check_skin(Document& d, int index) {
   const std::string where = d.name_skin(index);
   if (skin.joints.empty()) refuse(d.path, where + " has no joints");
   for (int joint : skin.joints) check_index(d, d.nodes.size(), joint, where, "joint node");
-  check_accessor(d, skin.inverse_bind, {where + ": inverseBindMatrices", 16, {kFloat}});
+  check_geometry(d, skin.inverse_bind, {where + ": inverseBindMatrices", 16, {kFloat}});
   if (skin.inverse_bind >= 0 && at(d.accessors, skin.inverse_bind).count < skin.joints.size())
     refuse(d.path, where + " has fewer inverse bind matrices than joints");
 }
@@ -296,10 +315,10 @@ void check_instancing(Document& d, const Node& node, const std::string& where) {
   if (node.skin >= 0)
     refuse(d.path, where + " has a skin and EXT_mesh_gpu_instancing, which do not go together");
   const std::string of = where + ": EXT_mesh_gpu_instancing";
-  check_accessor(d, instancing.translation, {of + ": TRANSLATION", 3, {kFloat}});
-  check_accessor(d, instancing.rotation,
+  check_geometry(d, instancing.translation, {of + ": TRANSLATION", 3, {kFloat}});
+  check_geometry(d, instancing.rotation,
                  {of + ": ROTATION", 4, {kFloat, kByte, kShort}, {kByte, kShort}});
-  check_accessor(d, instancing.scale, {of + ": SCALE", 3, {kFloat}});
+  check_geometry(d, instancing.scale, {of + ": SCALE", 3, {kFloat}});
   const uint64_t instances = instance_count(d, node);
   for (int accessor : {instancing.translation, instancing.rotation, instancing.scale})
     check_count(d, accessor, instances, of);

@@ -136,7 +136,7 @@ void check_parent(const Document& d, const BufferView& view, size_t index) {
 }  // namespace
 
 uint64_t DracoPart::decoded_bytes() const {
-  uint64_t bytes = corners * sizeof(uint32_t);
+  uint64_t bytes = has_indices ? corners * sizeof(uint32_t) : 0;
   for (const Attribute& a : attributes)
     bytes += vertices * static_cast<uint64_t>(component_bytes(a.component_type) * a.components);
   return bytes;
@@ -175,6 +175,12 @@ std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension) {
   const JsonElement attributes = extension.at("attributes");
   attributes.for_each_member([](const JsonElement& id) { id.as_index(); });
   out->position = index_or(attributes, "POSITION");
+  out->color = index_or(attributes, "COLOR_0");
+  for (size_t n = 0;; ++n) {
+    const int set = index_or(attributes, "TEXCOORD_" + std::to_string(n));
+    if (set < 0) break;
+    out->texture_coordinates.push_back(set);
+  }
   for (size_t n = 0;; ++n) {
     const DracoExtension::JointSet set{index_or(attributes, "JOINTS_" + std::to_string(n)),
                                        index_or(attributes, "WEIGHTS_" + std::to_string(n))};
@@ -185,7 +191,8 @@ std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension) {
 }
 
 uint64_t heap_bytes(const DracoExtension& draco) {
-  return sizeof(draco) + draco.joint_sets.capacity() * sizeof(DracoExtension::JointSet);
+  return sizeof(draco) + draco.joint_sets.capacity() * sizeof(DracoExtension::JointSet) +
+         draco.texture_coordinates.capacity() * sizeof(int);
 }
 
 void place_meshopt_views(Document& d) {
@@ -258,7 +265,41 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
   for (const Replaced& r : replaced) offset += move_accessor(d, *r.accessor, buffer, offset);
 }
 
-void check_compressed(Document& d, const BufferSource& buffer, const std::string& where) {
+void place_draco_look(Document& d, Primitive& primitive, int set) {
+  const int view = at(d, primitive.position).view;
+  if (!primitive.draco || view < 0) return;
+  const BufferView& positions = d.views[static_cast<size_t>(view)];
+  const std::shared_ptr<const DracoPart> geometry =
+      d.buffers[static_cast<size_t>(positions.buffer)].draco;
+  if (!geometry) return;  // the fallback is read
+  PrimitiveLook& look = primitive.look;
+  const std::vector<int>& ids = primitive.draco->texture_coordinates;
+  const auto n = static_cast<size_t>(set);
+  std::vector<Replaced> replaced{
+      {primitive.draco->color, &look.color, "COLOR_0"},
+      {n < ids.size() ? ids[n] : -1, &look.texture_coordinates, "TEXCOORD_" + std::to_string(set)}};
+  std::erase_if(replaced, [&](const Replaced& r) {
+    return r.id < 0 || !exists(d, *r.accessor) || at(d, *r.accessor).count != geometry->vertices;
+  });
+  if (replaced.empty()) return;
+  auto part = std::make_shared<DracoPart>(*geometry);
+  part->has_indices = false;
+  part->attributes.clear();
+  for (const Replaced& r : replaced) {
+    const Accessor& accessor = at(d, *r.accessor);
+    part->attributes.push_back(
+        {r.id, r.name, accessor.component_type, accessor.components, accessor.normalized});
+  }
+  BufferSource decoded;
+  decoded.kind = BufferSource::Kind::kDecoded;
+  decoded.byte_length = part->decoded_bytes();
+  decoded.draco = part;
+  const int buffer = add_buffer(d, std::move(decoded), sizeof(*part) + part->where.size() + 192);
+  uint64_t offset = 0;
+  for (const Replaced& r : replaced) offset += move_accessor(d, *r.accessor, buffer, offset);
+}
+
+void check_compressed(const Document& d, const BufferSource& buffer, const std::string& where) {
   const char* const name =
       buffer.meshopt ? "EXT_meshopt_compression" : "KHR_draco_mesh_compression";
   const CompressedBytes& from = buffer.meshopt ? buffer.meshopt->from : buffer.draco->from;
@@ -267,7 +308,7 @@ void check_compressed(Document& d, const BufferSource& buffer, const std::string
   if (from.buffer < 0 || index >= d.buffers.size() ||
       d.buffers[index].kind == BufferSource::Kind::kDecoded)
     refuse(d.path, what + ": buffer " + std::to_string(from.buffer) + " is not there");
-  BufferSource& source = d.buffers[index];
+  const BufferSource& source = d.buffers[index];
   const uint128 end = static_cast<uint128>(from.byte_offset) + from.byte_length;
   if (end > source.byte_length)
     refuse(d.path, what + " ends past the " + std::to_string(source.byte_length) +
@@ -281,7 +322,6 @@ void check_compressed(Document& d, const BufferSource& buffer, const std::string
                        "copy), or build voxdag where " +
                        (buffer.meshopt ? "libmeshoptimizer-dev" : "libdraco-dev") +
                        " is installed");
-  source.is_read = true;
 }
 
 }  // namespace voxdag::gltf

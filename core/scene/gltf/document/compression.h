@@ -49,11 +49,14 @@ struct DracoExtension {
   };
   int view = -1;
   int position = -1;
+  int color = -1;
+  std::vector<int> texture_coordinates;
   std::vector<JointSet> joint_sets;
 };
 
 // What a Draco primitive decodes to: `corners` indices of 32 bits, then the attributes one after
-// the other, each packed.
+// the other, each packed. What positions do not depend on is a part of its own, without indices:
+// who reads the geometry alone does not decode it.
 struct DracoPart {
   struct Attribute {
     int id = -1;  // in the Draco data
@@ -66,6 +69,7 @@ struct DracoPart {
   std::string where;  // "mesh 0: primitive 2"
   bool is_strip = false;
   uint64_t corners = 0;
+  bool has_indices = true;  // false: attributes alone
   uint64_t vertices = 0;
   std::vector<Attribute> attributes;
 
@@ -84,8 +88,12 @@ void place_meshopt_views(Document& document);
 // Does so with the accessors of a compressed primitive, which refer to copies of their own then.
 // Call it before the primitive's accessors are checked. Throws Error{kInvalidInput}.
 void place_draco_primitive(Document& document, Primitive& primitive, const std::string& where);
-// Checks a buffer that was made by one of these, and marks the buffer that it decodes from as read.
-// Throws Error{kInvalidInput}, also where voxdag was built without the library.
-void check_compressed(Document& document, const BufferSource& buffer, const std::string& where);
+// Does so with the accessors of the primitive's look, if its positions were placed by the function
+// above. `set` is the n of the TEXCOORD_n that the look has, unless it has none.
+void place_draco_look(Document& document, Primitive& primitive, int set);
+// Checks a buffer that was made by one of these. Throws Error{kInvalidInput}, also where voxdag was
+// built without the library.
+void check_compressed(const Document& document, const BufferSource& buffer,
+                      const std::string& where);
 
 }  // namespace voxdag::gltf

@@ -26,6 +26,8 @@ class Model;
 
 namespace voxdag::gltf {
 
+struct Looks;
+
 // Where the bytes of a buffer come from.
 struct BufferSource {
   enum class Kind {
@@ -33,7 +35,7 @@ struct BufferSource {
     kBinChunk,  // the bytes `range` of the scene file
     kExternal,  // the file `uri`, percent-encoded and relative to the scene file
     kBase64,    // the base64 characters `range` of the scene file
-    kMemory,    // the base64 in `characters`, which has JSON escapes in the file
+    kMemory,    // the base64 in `characters`, with JSON escapes in the file: the URI at `range`
     kDecoded,   // what `meshopt` or `draco` decodes to; no buffer of the file
   };
   Kind kind = Kind::kNone;
@@ -96,12 +98,23 @@ struct JointSet {
 // Primitive modes that make triangles; smaller ones are points and lines.
 enum Mode : int { kTriangleList = 4, kTriangleStrip = 5, kTriangleFan = 6 };
 
+// How the triangles of a primitive look. Set by resolve_looks().
+struct PrimitiveLook {
+  uint32_t material = 0;         // of Looks
+  int texture_coordinates = -1;  // accessor; -1: not needed
+  int color = -1;                // accessor; -1: white
+};
+
 struct Primitive {
   int mode = kTriangleList;
   int position = -1;
   int indices = -1;
   std::vector<int> targets;  // POSITION of each morph target, -1 if it has none
   std::vector<JointSet> joint_sets;
+  int material = -1;                     // as the file has it, unchecked like the next two
+  int color = -1;                        // COLOR_0
+  std::vector<int> texture_coordinates;  // TEXCOORD_n
+  PrimitiveLook look;
   std::shared_ptr<const DracoExtension> draco;  // null: not compressed
 
   bool makes_triangles() const { return mode >= kTriangleList; }
@@ -160,6 +173,7 @@ struct Document {
   std::deque<Skin> skins;
   std::deque<Node> nodes;
   std::deque<std::vector<int>> scenes;  // the root nodes of each
+  std::shared_ptr<const Looks> looks;   // set by resolve_looks()
   int scene = -1;                       // the default scene
   std::vector<int> roots;               // of the scene to draw, set by check_document()
   std::vector<std::string> warnings;    // the first few

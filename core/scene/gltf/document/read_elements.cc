@@ -14,6 +14,13 @@ int index_or_none(const JsonElement& object, const char* key) {
   return member ? member->as_index() : -1;
 }
 
+// What does not affect the geometry is no error: -1 for what is no index.
+int index_if_any(const JsonElement& element) {
+  const auto& value = element.value();
+  const bool is_index = value.is_number_unsigned() && value.get<uint64_t>() <= INT32_MAX;
+  return is_index ? value.get<int>() : -1;
+}
+
 uint64_t size_or_zero(const JsonElement& object, const char* key) {
   const auto member = object.find(key);
   return member ? member->as_size() : 0;
@@ -85,6 +92,13 @@ Primitive read_primitive(const JsonElement& element) {
   out.position = index_or_none(attributes, "POSITION");
   out.indices = index_or_none(element, "indices");
   if (const auto mode = element.find("mode")) out.mode = mode->as_index();
+  if (const auto material = element.find("material")) out.material = index_if_any(*material);
+  out.color = index_or_none(attributes, "COLOR_0");
+  for (size_t n = 0;; ++n) {
+    const int set = index_or_none(attributes, ("TEXCOORD_" + std::to_string(n)).c_str());
+    if (set < 0) break;
+    out.texture_coordinates.push_back(set);
+  }
   for (size_t n = 0;; ++n) {
     const JointSet set{index_or_none(attributes, ("JOINTS_" + std::to_string(n)).c_str()),
                        index_or_none(attributes, ("WEIGHTS_" + std::to_string(n)).c_str())};
@@ -194,6 +208,7 @@ BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_f
   if (uri.is_escaped) {
     out.kind = BufferSource::Kind::kMemory;
     out.characters = unescape(scene_file, uri, comma + 1, budget);
+    out.range = uri.characters;
   } else {
     out.kind = BufferSource::Kind::kBase64;
     out.range = {uri.characters.begin + comma + 1, uri.characters.size - comma - 1};
@@ -266,7 +281,8 @@ uint64_t heap_bytes(const Accessor& accessor) { return accessor.name.capacity();
 uint64_t heap_bytes(const Mesh& mesh) {
   uint64_t bytes = mesh.name.capacity() + bytes_of(mesh.primitives) + bytes_of(mesh.weights);
   for (const Primitive& p : mesh.primitives)
-    bytes += bytes_of(p.targets) + bytes_of(p.joint_sets) + (p.draco ? heap_bytes(*p.draco) : 0);
+    bytes += bytes_of(p.targets) + bytes_of(p.joint_sets) + bytes_of(p.texture_coordinates) +
+             (p.draco ? heap_bytes(*p.draco) : 0);
   return bytes;
 }
 uint64_t heap_bytes(const Skin& skin) { return skin.name.capacity() + bytes_of(skin.joints); }

@@ -41,8 +41,8 @@ bool has_scheme(const std::string& uri) {
   throw Error(ErrorCode::kInvalidInput, where + ": its uri " + what);
 }
 
-// The path of the file that `uri`, percent-encoded (RFC 3986), names relative to the folder of the
-// scene file.
+}  // namespace
+
 std::string resolve_uri(const std::string& scene_path, const std::string& uri,
                         const std::string& where) {
   if (uri.empty()) refuse_uri(where, "is empty");
@@ -52,8 +52,6 @@ std::string resolve_uri(const std::string& scene_path, const std::string& uri,
   if (path->find('\0') != std::string::npos) refuse_uri(where, "has a zero byte");
   return parent_directory(scene_path) + "/" + *path;
 }
-
-}  // namespace
 
 void ExternalFiles::add(int buffer, const SourceFile& file) {
   const std::lock_guard lock(mutex_);

@@ -35,6 +35,12 @@ class ExternalFiles {
   GrowingCharge charge_;
 };
 
+// The path of the file that `uri`, percent-encoded (RFC 3986), names relative to the folder of the
+// scene file. Throws Error{kInvalidInput}, which begins with `where`, for anything but a relative
+// path.
+std::string resolve_uri(const std::string& scene_path, const std::string& uri,
+                        const std::string& where);
+
 class BufferReader {
  public:
   static constexpr size_t kWindowBytes = size_t{256} << 10;
@@ -53,11 +59,13 @@ class BufferReader {
   // the next call.
   std::span<const std::byte> window(int buffer, uint64_t offset, size_t size);
 
+  // Does so with one buffer.
+  void check_length(int buffer);
+
   // What readers of the scene charge their own memory to.
   MemoryBudget& budget() { return budget_; }
 
  private:
-  void check_length(int buffer);
   // Fills `out`, of any size, from `offset` of a buffer.
   void read(int buffer, uint64_t offset, std::span<std::byte> out);
   const ReadableFile& external(int buffer);

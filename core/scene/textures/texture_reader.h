@@ -1,0 +1,90 @@
+// Texels of the pyramids of a TextureSet, for one thread: straight from memory where all of them
+// are there, and otherwise by pages of the scratch file, of which the reader caches as many as its
+// memory holds. Not thread-safe; any number of readers may be open.
+//
+// A level is cut into tiles of 32 x 32 texels, row by row, those at its right and lower border
+// padded. A tile is a page: its texels are stored row by row, eight bytes each.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/io/file_system.h"
+
+namespace voxdag {
+
+inline constexpr uint32_t kTileShift = 5;
+inline constexpr uint32_t kTileEdge = 1u << kTileShift;
+inline constexpr size_t kPageTexels = size_t{kTileEdge} * kTileEdge;
+inline constexpr size_t kPageBytes = kPageTexels * sizeof(uint64_t);
+
+// A level of a pyramid.
+struct TextureLevel {
+  uint32_t width = 0, height = 0;
+  uint32_t tiles_per_row = 0;
+  uint64_t first_page = 0;  // in the scratch file, or in memory
+
+  uint64_t pages() const {
+    return uint64_t{tiles_per_row} * ((height + kTileEdge - 1) >> kTileShift);
+  }
+};
+
+// The levels of all images, those of image i from first_level[i] on.
+struct TextureLayout {
+  std::vector<TextureLevel> levels;
+  std::vector<uint32_t> first_level;  // one more than there are images
+};
+
+class TextureReader {
+ public:
+  // Of pyramids in memory, which must outlive the reader, as the layout must.
+  TextureReader(const TextureLayout& layout, const uint64_t* pages)
+      : layout_(layout), all_(pages) {}
+  // Of pyramids in a file; caches pages of about `memory_bytes`, at least one.
+  TextureReader(const TextureLayout& layout, const ReadableFile& file, uint64_t memory_bytes,
+                MemoryBudget& budget);
+
+  // An image has one level at least, and further ones of half the width and height, rounded down,
+  // until both are 1. Images that no material refers to have none.
+  uint32_t levels(uint32_t image) const {
+    return layout_.first_level[image + 1] - layout_.first_level[image];
+  }
+  uint32_t width(uint32_t image, uint32_t level) const { return at(image, level).width; }
+  uint32_t height(uint32_t image, uint32_t level) const { return at(image, level).height; }
+
+  // Four linear channels of 16 bits: red in the lowest, then green, blue and alpha.
+  // 0 <= x < width, 0 <= y < height, counted from the upper left. Throws Error{kIo}.
+  uint64_t texel(uint32_t image, uint32_t level, uint32_t x, uint32_t y) {
+    const TextureLevel& l = at(image, level);
+    const uint64_t page =
+        l.first_page + uint64_t{y >> kTileShift} * l.tiles_per_row + (x >> kTileShift);
+    const size_t in_page = (size_t{y % kTileEdge} << kTileShift) | (x % kTileEdge);
+    if (all_) return all_[page * kPageTexels + in_page];
+    const size_t slot = static_cast<size_t>((page * kSpread) >> slot_shift_);
+    if (page_in_slot_[slot] != page) load(page, slot);
+    return cache_[slot * kPageTexels + in_page];
+  }
+
+ private:
+  static constexpr uint64_t kNoPage = ~uint64_t{0};
+  // Neighbors across rows of tiles are powers of two apart, which must not meet in a slot.
+  static constexpr uint64_t kSpread = 0x9e3779b97f4a7c15ull;
+
+  const TextureLevel& at(uint32_t image, uint32_t level) const {
+    return layout_.levels[layout_.first_level[image] + level];
+  }
+  void load(uint64_t page, size_t slot);
+
+  const TextureLayout& layout_;
+  const uint64_t* const all_ = nullptr;  // null: in the file
+  const ReadableFile* file_ = nullptr;
+  int slot_shift_ = 63;
+  std::vector<uint64_t> page_in_slot_;
+  MemoryCharge slots_charge_;
+  PageBuffer<uint64_t> cache_;
+};
+
+}  // namespace voxdag
