@@ -22,7 +22,8 @@ CORE_INCLUDES = {
     "core/format": ["core/base", "core/io", "core/geometry", "core/dag", "core/color"],
     "core/color": ["core/base", "core/geometry"],
     "core/image": ["core/base", "core/io"],
-    "core/scene": ["core/base", "core/io", "core/geometry", "core/color", "core/image"],
+    # core/format: SHA-256
+    "core/scene": ["core/base", "core/io", "core/geometry", "core/color", "core/image", "core/format"],
 }
 CORE = list(CORE_INCLUDES)
 PRODUCT_INCLUDES = CORE_INCLUDES | {
@@ -54,7 +55,8 @@ THIRD_PARTY = {
     "meshoptimizer.h": ["core/scene", "tests"],
     "sqlite3.h": ["core/db"],
     "httplib.h": ["client"],
-    "png.h": ["query"],
+    "png.h": ["core/image", "query"],
+    "jpeglib.h": ["core/image", "tests"],
     "zlib.h": ["server", "tests", "bench"],
     "openvdb/openvdb.h": ["query", "bench"],
     "nanovdb/util/OpenToNanoVDB.h": ["query"],

@@ -108,7 +108,7 @@ class LookResolver {
             {kFloat, kUnsignedByte, kUnsignedShort},
             {kUnsignedByte, kUnsignedShort}};
   }
-  // With KHR_mesh_quantization, signed ones too; they are told apart by nothing else.
+  // Signed ones are of KHR_mesh_quantization.
   AccessorUse texture_coordinate_use(int set) const {
     return {where_ + ": TEXCOORD_" + std::to_string(set),
             2,

@@ -1,0 +1,47 @@
+// The readers of the two formats, for open_image().
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+#include <memory>
+
+#include "core/image/image_reader.h"
+
+namespace voxdag {
+
+// A source whose first bytes were looked at. What it throws is stored, because it must not
+// pass through a decoder written in C.
+class PeekedSource {
+ public:
+  explicit PeekedSource(ByteSource& source) : source_(source) {
+    head_size_ = source.read({head_, sizeof head_});
+  }
+  std::span<const std::byte> head() const { return {head_, head_size_}; }
+  size_t read(std::byte* out, size_t size) noexcept {
+    const size_t from_head = std::min(size, head_size_ - head_read_);
+    std::memcpy(out, head_ + head_read_, from_head);
+    head_read_ += from_head;
+    if (from_head == size) return size;
+    try {
+      return from_head + source_.read({out + from_head, size - from_head});
+    } catch (...) {
+      failure_ = std::current_exception();
+      return from_head;
+    }
+  }
+  void rethrow() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
+
+ private:
+  ByteSource& source_;
+  std::byte head_[16];
+  size_t head_size_ = 0, head_read_ = 0;
+  std::exception_ptr failure_;
+};
+
+std::unique_ptr<ImageReader> open_png(std::unique_ptr<PeekedSource> source, MemoryBudget& budget);
+std::unique_ptr<ImageReader> open_jpeg(std::unique_ptr<PeekedSource> source, MemoryBudget& budget);
+
+}  // namespace voxdag

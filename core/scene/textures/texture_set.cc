@@ -1,0 +1,231 @@
+#include "core/scene/textures/texture_set.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <iterator>
+#include <mutex>
+#include <shared_mutex>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/format/checksum.h"
+#include "core/image/image_reader.h"
+#include "core/scene/gltf/messages.h"
+#include "core/scene/textures/image_bytes.h"
+#include "core/scene/textures/linear_light.h"
+#include "core/scene/textures/pyramid.h"
+
+namespace voxdag {
+namespace {
+
+// Rows of pixels to texels: linear light by a table, alpha as it is.
+class TexelRow {
+ public:
+  TexelRow(const ImageReader& image, MemoryBudget& budget)
+      : is_wide_(image.bits() == 16),
+        bytes_(budget, size_t{image.width()} * (is_wide_ ? 8 : 4), "a row of an image"),
+        texels_(budget, image.width(), "a row of an image"),
+        table_(is_wide_ ? 65536 : 256) {
+    for (size_t i = 0; i < table_.size(); ++i)
+      table_[i] = linear_light(static_cast<double>(i) / static_cast<double>(table_.size() - 1));
+  }
+  std::span<const uint64_t> read(ImageReader& image) {
+    image.read_row({bytes_.data(), bytes_.size()});
+    for (size_t x = 0; x < texels_.size(); ++x)
+      texels_[x] = linear(channel(4 * x)) | linear(channel(4 * x + 1)) << 16 |
+                   linear(channel(4 * x + 2)) << 32 |
+                   (is_wide_ ? channel(4 * x + 3) : channel(4 * x + 3) * 257) << 48;
+    return {texels_.data(), texels_.size()};
+  }
+
+ private:
+  uint64_t linear(uint64_t value) const { return table_[value]; }
+  uint64_t channel(size_t i) const {
+    if (!is_wide_) return static_cast<uint8_t>(bytes_[i]);
+    uint16_t value;
+    std::memcpy(&value, &bytes_[2 * i], sizeof value);
+    return value;
+  }
+
+  const bool is_wide_;
+  PageBuffer<std::byte> bytes_;
+  PageBuffer<uint64_t> texels_;
+  std::vector<uint16_t> table_;
+};
+
+std::string user_of(const SceneMaterials& materials, uint32_t image) {
+  const auto found = std::ranges::find(materials.materials, image, &Material::image);
+  if (found == materials.materials.end()) return "";
+  const auto index = static_cast<int>(found - materials.materials.begin());
+  return ", the base color of material " + gltf::numbered(index, found->name) + ",";
+}
+
+// What fails for want of memory while others decode may fit alone.
+template <class Body>
+void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
+  try {
+    const std::shared_lock lock(mutex);
+    return body();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kOutOfMemory) throw;
+  }
+  const std::unique_lock lock(mutex);
+  try {
+    body();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kOutOfMemory) throw;
+    throw Error(error.code(), name + ": " + error.message() + "; give it more memory");
+  }
+}
+
+template <class T>
+void add_number(Sha256& hash, T value) {
+  std::array<std::byte, 8> bytes;
+  for (size_t i = 0; i < 8; ++i)
+    bytes[i] = static_cast<std::byte>(static_cast<uint64_t>(value) >> 8 * i);
+  hash.add(bytes);
+}
+void add_text(Sha256& hash, const std::string& text) {
+  add_number(hash, text.size());
+  hash.add(std::as_bytes(std::span(text)));
+}
+
+std::string image_digest(FileSystem& files, const ImageSource& source, const CancelToken& cancel) {
+  if (!source.problem.empty()) return "unreadable";
+  Sha256 hash;
+  try {
+    ImageBytes bytes(files, source);
+    std::vector<std::byte> buffer(64 << 10);
+    while (const size_t size = bytes.read(buffer)) {
+      cancel.check();
+      hash.add(std::span(buffer).first(size));
+    }
+  } catch (const BrokenImage&) {
+    return "unreadable";
+  }
+  return hash.finish();
+}
+
+}  // namespace
+
+TextureReader::TextureReader(const TextureLayout& layout, const ReadableFile& file,
+                             uint64_t memory_bytes, MemoryBudget& budget)
+    : layout_(layout), file_(&file) {
+  constexpr uint64_t kSlotBytes = kPageBytes + sizeof(uint64_t);
+  const uint64_t slots = std::bit_floor(std::max<uint64_t>(memory_bytes / kSlotBytes, 2));
+  slot_shift_ = 64 - std::countr_zero(slots);
+  slots_charge_ = MemoryCharge(budget, slots * sizeof(uint64_t), "pages of textures");
+  page_in_slot_.assign(static_cast<size_t>(slots), kNoPage);
+  cache_ =
+      PageBuffer<uint64_t>(budget, static_cast<size_t>(slots) * kPageTexels, "pages of textures");
+}
+
+void TextureReader::load(uint64_t page, size_t slot) {
+  page_in_slot_[slot] = kNoPage;
+  file_->read_at(page * kPageBytes,
+                 std::as_writable_bytes(std::span(&cache_[slot * kPageTexels], kPageTexels)));
+  page_in_slot_[slot] = page;
+}
+
+std::unique_ptr<TextureReader> TextureSet::open(uint64_t memory_bytes) {
+  if (!file_) return std::make_unique<TextureReader>(layout_, memory_.data());
+  return std::make_unique<TextureReader>(layout_, *file_, memory_bytes, budget_);
+}
+
+std::string texture_digest(FileSystem& files, const SceneMaterials& materials,
+                           const CancelToken& cancel) {
+  Sha256 hash;
+  for (const Material& m : materials.materials) {
+    add_text(hash, m.name);
+    for (uint16_t f : m.factor) add_number(hash, f);
+    add_number(hash, m.alpha_mode);
+    add_number(hash, m.alpha_cutoff);
+    add_number(hash, m.image);
+    for (Wrap wrap : m.wrap) add_number(hash, wrap);
+  }
+  for (const ImageSource& image : materials.images)
+    add_text(hash, image_digest(files, image, cancel));
+  return hash.finish();
+}
+
+std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMaterials& materials,
+                                                const std::string& path, unsigned threads,
+                                                MemoryBudget& budget, Progress& progress,
+                                                const CancelToken& cancel) {
+  std::unique_ptr<TextureSet> set(new TextureSet(budget));
+  const size_t count = materials.images.size();
+  std::vector<std::string> problems(count);
+  std::vector<std::vector<TextureLevel>> levels(count);
+  std::shared_mutex mutex;
+  // Calls body(image reader) unless the image is broken.
+  const auto with_image = [&](size_t i, const auto& body) {
+    const ImageSource& source = materials.images[i];
+    problems[i] = source.problem;
+    if (!problems[i].empty()) return;
+    const std::string name = source.name + user_of(materials, static_cast<uint32_t>(i));
+    alone_if_necessary(mutex, name, [&] {
+      try {
+        ImageBytes bytes(files, source);
+        body(*open_image(bytes, budget));
+      } catch (const BrokenImage& broken) {
+        problems[i] = broken.message;
+      }
+    });
+  };
+  set->digest_ = texture_digest(files, materials, cancel);
+  parallel_for(threads, count, [&](unsigned, size_t i) {
+    cancel.check();
+    with_image(i, [&](const ImageReader& image) {
+      levels[i] = pyramid_levels(image.width(), image.height(), 0);
+    });
+  });
+  for (auto& image : levels)
+    for (TextureLevel& level : image) {
+      level.first_page = set->pages_;
+      set->pages_ += level.pages();
+    }
+  std::unique_ptr<WritableFile> writer;
+  if (set->bytes() <= budget.available() / 2) {
+    set->memory_ =
+        PageBuffer<uint64_t>(budget, static_cast<size_t>(set->pages_) * kPageTexels, "textures");
+  } else {
+    writer = files.create(path);
+    set->file_ = files.open_read(path);
+    files.remove(path);  // without a name it is gone when the process ends, however it ends
+  }
+  const PyramidBuilder::WritePages write = [&](uint64_t first, std::span<const uint64_t> texels) {
+    cancel.check();
+    if (writer)
+      writer->write_at(first * kPageBytes, std::as_bytes(texels));
+    else
+      std::ranges::copy(texels, &set->memory_[static_cast<size_t>(first) * kPageTexels]);
+  };
+  parallel_for(threads, count, [&](unsigned, size_t i) {
+    if (problems[i].empty())
+      with_image(i, [&](ImageReader& image) {
+        TexelRow row(image, budget);
+        PyramidBuilder builder(levels[i], budget, write);
+        for (uint32_t y = 0; y < image.height(); ++y) builder.add_row(row.read(image));
+      });
+    progress.advance(1);
+  });
+  for (const std::string& warning : materials.warnings) progress.warn(warning);
+  set->materials_ = materials.materials;
+  for (size_t i = 0; i < count; ++i) {
+    set->layout_.first_level.push_back(static_cast<uint32_t>(set->layout_.levels.size()));
+    std::ranges::copy(levels[i], std::back_inserter(set->layout_.levels));
+    if (problems[i].empty()) continue;
+    const auto image = static_cast<uint32_t>(i);
+    progress.warn(materials.images[i].name + user_of(materials, image) + " " + problems[i] +
+                  "; its base color factor is used alone");
+    for (Material& material : set->materials_)
+      if (material.image == image) material.image = Material::kNoImage;
+  }
+  set->layout_.first_level.push_back(static_cast<uint32_t>(set->layout_.levels.size()));
+  return set;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,194 @@
+// Surfaces and textures of small glTF scenes made here.
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <cmath>
+
+#include "core/scene/textures/texture_set.h"
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+std::string big_endian(uint32_t value) {
+  std::string bytes(4, '\0');
+  for (size_t i = 0; i < 4; ++i) bytes[i] = static_cast<char>(value >> (24 - 8 * i));
+  return bytes;
+}
+std::string chunk(const std::string& type, const std::string& data) {
+  const std::string body = type + data;
+  const auto crc =
+      crc32(0, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
+  return big_endian(static_cast<uint32_t>(data.size())) + body +
+         big_endian(static_cast<uint32_t>(crc));
+}
+// A PNG of 8-bit RGBA; `rows` has no filter bytes.
+std::string png_of(uint32_t width, uint32_t height, const std::string& pixels) {
+  std::string rows;
+  for (uint32_t y = 0; y < height; ++y) rows += '\0' + pixels.substr(4 * width * y, 4 * width);
+  uLongf size = compressBound(rows.size());
+  std::string packed(size, '\0');
+  compress(reinterpret_cast<Bytef*>(packed.data()), &size,
+           reinterpret_cast<const Bytef*>(rows.data()), rows.size());
+  packed.resize(size);
+  return "\x89PNG\r\n\x1a\n" +
+         chunk("IHDR", big_endian(width) + big_endian(height) + std::string("\x8\x6\0\0\0", 5)) +
+         chunk("IDAT", packed) + chunk("IEND", "");
+}
+std::string noise(size_t bytes) {
+  std::string all(bytes, '\0');
+  uint32_t state = 1;
+  for (char& c : all) c = static_cast<char>((state = state * 1664525 + 1013904223) >> 24);
+  return all;
+}
+
+SceneBuilder textured(const std::string& image) {
+  SceneBuilder scene = one_triangle();
+  scene.root["images"] = {{{"uri", "data:image/png;base64," + base64(image)}, {"name", "wood"}}};
+  scene.root["textures"] = {{{"source", 0}}};
+  scene.root["materials"] = {
+      {{"name", "floor"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  Json& primitive = scene.root["meshes"][0]["primitives"][0];
+  primitive["material"] = 0;
+  primitive["attributes"]["TEXCOORD_0"] =
+      scene.add_accessor<float>("VEC2", kF32, {0, 0, 1, 0, 0.5, -2});
+  return scene;
+}
+
+std::vector<SurfaceTriangle> surfaces_of(TriangleSource& source) {
+  std::vector<SurfaceTriangle> all;
+  source.open(1)->read_surfaces(0, source.declared_triangles(), [&](auto batch) {
+    all.insert(all.end(), batch.begin(), batch.end());
+  });
+  return all;
+}
+
+struct Warnings : NoProgress {
+  std::vector<std::string> all;
+  void warn(std::string_view message) override { all.emplace_back(message); }
+};
+
+// Reads the scene from memory and writes the scratch file to the disk.
+struct ScratchFiles : MemoryFiles {
+  std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
+    if (contents.contains(path)) return MemoryFiles::open_read(path);
+    return system_files().open_read(path);
+  }
+  std::unique_ptr<WritableFile> create(const std::string& path) override {
+    return system_files().create(path);
+  }
+  void remove(const std::string& path) override { system_files().remove(path); }
+};
+
+struct Textures {
+  explicit Textures(const std::string& glb, uint64_t bytes = uint64_t{64} << 20) : budget(bytes) {
+    files.contents["scene"] = glb;
+    MemoryBudget scene_budget(uint64_t{64} << 20);
+    const auto source = open_scene(files, {"scene"}, {}, scene_budget, cancel);
+    set = TextureSet::prepare(files, source->materials(),
+                              temporary_parent() + "/voxdag_textures_test", 2, budget, warnings,
+                              cancel);
+  }
+  ScratchFiles files;
+  MemoryBudget budget;
+  CancelToken cancel;
+  Warnings warnings;
+  std::unique_ptr<TextureSet> set;
+};
+
+uint64_t channel(uint64_t texel, int c) { return texel >> 16 * c & 0xffff; }
+
+TEST(Surfaces, TextureCoordinatesAndColorsOfCorners) {
+  SceneBuilder scene = textured("");
+  scene.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = scene.add_accessor<uint8_t>(
+      "VEC3", kU8, {255, 0, 128, 0, 0, 0, 1, 2, 3}, {{"normalized", true}});
+  OpenScene open(scene.glb());
+  const auto all = surfaces_of(*open.source);
+  ASSERT_EQ(all.size(), 1u);
+  constexpr int64_t kOne = int64_t{1} << kTextureBits;
+  EXPECT_EQ(all[0].corners[1].texture, (std::array<int64_t, 2>{kOne, 0}));
+  EXPECT_EQ(all[0].corners[2].texture, (std::array<int64_t, 2>{kOne / 2, -2 * kOne}));
+  EXPECT_EQ(all[0].corners[0].color, (std::array<uint16_t, 4>{65535, 0, 128 * 257, 65535}));
+  EXPECT_EQ(all[0].corners[2].color, (std::array<uint16_t, 4>{257, 514, 771, 65535}));
+  EXPECT_EQ(all[0].position.v[1][0], 1);
+}
+
+// The example of the extension: the lower left quarter of the image.
+TEST(Surfaces, TextureTransform) {
+  SceneBuilder scene = textured("");
+  scene.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = {
+      {"KHR_texture_transform",
+       {{"offset", {0, 1}}, {"rotation", 1.57079632679}, {"scale", {0.5, 0.5}}}}};
+  OpenScene open(scene.glb());
+  const auto corner = surfaces_of(*open.source).at(0).corners[1].texture;  // of (1, 0)
+  EXPECT_NEAR(std::ldexp(static_cast<double>(corner[0]), -kTextureBits), 0, 1e-6);
+  EXPECT_NEAR(std::ldexp(static_cast<double>(corner[1]), -kTextureBits), 0.5, 1e-6);
+}
+
+// Every level of an image of odd sizes is the mean over the areas of its texels, in memory and by
+// pages of the scratch file.
+TEST(Textures, PyramidOfOddSizes) {
+  const uint32_t width = 67, height = 45;
+  const std::string glb = textured(png_of(width, height, noise(4 * width * height))).glb();
+  Textures whole(glb), paged(glb, 5 << 18);
+  ASSERT_TRUE(whole.warnings.all.empty()) << whole.warnings.all[0];
+  const auto a = whole.set->open(0), b = paged.set->open(4 * kPageBytes);
+  ASSERT_EQ(a->levels(0), 7u);
+  for (uint32_t level = 1; level < 7; ++level) {
+    const uint32_t w = a->width(0, level), h = a->height(0, level);
+    const uint32_t fw = a->width(0, level - 1), fh = a->height(0, level - 1);
+    for (uint32_t y = 0; y < h; ++y)
+      for (uint32_t x = 0; x < w; ++x)
+        for (int c = 0; c < 4; ++c) {
+          double sum = 0;
+          for (uint32_t j = 0; j < fh; ++j)
+            for (uint32_t i = 0; i < fw; ++i) {
+              const auto overlap = [](uint32_t coarse, uint32_t n, uint32_t fine, uint32_t m) {
+                const double low = std::max<double>(coarse * m, fine * n);
+                const double high = std::min<double>((coarse + 1) * m, (fine + 1) * n);
+                return std::max(0.0, high - low) / m;
+              };
+              const double weight = overlap(x, w, i, fw) * overlap(y, h, j, fh);
+              if (weight > 0)
+                sum += weight * static_cast<double>(channel(a->texel(0, level - 1, i, j), c));
+            }
+          EXPECT_NEAR(static_cast<double>(channel(a->texel(0, level, x, y), c)), sum, 0.501);
+        }
+  }
+  for (uint32_t y = 0; y < height; ++y)
+    for (uint32_t x = 0; x < width; ++x) ASSERT_EQ(a->texel(0, 0, x, y), b->texel(0, 0, x, y));
+  EXPECT_EQ(whole.set->digest(), paged.set->digest());
+}
+
+// sRGB becomes linear light; alpha is linear.
+TEST(Textures, LinearLight) {
+  Textures t(textured(png_of(2, 1, std::string("\x00\xff\xbc\x80\x0a\x80\x01\xff", 8))).glb());
+  const auto reader = t.set->open(0);
+  for (const auto& [x, c, value] : {std::array{0, 1, 255}, {0, 2, 188}, {1, 0, 10}, {1, 1, 128}}) {
+    const double v = value / 255.0;
+    const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+    EXPECT_EQ(channel(reader->texel(0, 0, static_cast<uint32_t>(x), 0), c),
+              static_cast<uint64_t>(std::lround(linear * 65535)));
+  }
+  EXPECT_EQ(channel(reader->texel(0, 0, 0, 0), 3), 128u * 257);
+}
+
+// What cannot be read costs a warning that names image and material, and the image alone.
+TEST(Textures, BrokenImages) {
+  const std::string good = png_of(9, 9, noise(4 * 81));
+  std::string huge = good, flipped = good;
+  huge.replace(16, 4, big_endian(1u << 31));
+  flipped[60] = static_cast<char>(flipped[60] ^ 1);
+  for (const std::string& image :
+       {huge, flipped, good.substr(0, good.size() / 2), std::string("RIFF....WEBP"),
+        std::string("\xabKTX 20\xbb\r\n\x1a\n"), std::string("\xff\xd8\xff\xe0"), std::string()}) {
+    Textures t(textured(image).glb());
+    ASSERT_EQ(t.warnings.all.size(), 1u);
+    EXPECT_NE(t.warnings.all[0].find("image 0 \"wood\""), std::string::npos);
+    EXPECT_NE(t.warnings.all[0].find("material 0 \"floor\""), std::string::npos);
+    EXPECT_EQ(t.set->materials()[0].image, Material::kNoImage);
+  }
+}
+
+}  // namespace
+}  // namespace voxdag::test
