@@ -1,9 +1,9 @@
 // Offsets and sizes in the global file, as docs/format.md, "The global file", describes them.
 // voxdag_reader.h, which stands alone, repeats the numbers it needs.
 //
-//   [header page] [level L-2] [level L-3] ... [level 0] [checksum table]
+//   [header page] [level L-2] [level L-3] ... [level 0] [attribute sections] [checksum table]
 //
-// Levels begin at multiples of kPageBytes, with zeros between them. The table has one XXH64 for
+// Levels and sections begin at multiples of kPageBytes, with zeros between them. The table has one XXH64 for
 // each checksum block: 64 KiB of the bytes between the header page and the table.
 #pragma once
 
@@ -15,7 +15,8 @@ namespace voxdag::global_layout {
 inline constexpr uint64_t kMagic = 0x0a1a0a4741445689;  // 0x89 "VDAG" LF 0x1a LF
 inline constexpr uint32_t kVersion = 1;
 inline constexpr uint32_t kVersionWithFeatures = 2;
-inline constexpr uint64_t kWideLevels = 1;  // a feature bit
+inline constexpr uint64_t kWideLevels = 1;  // feature bits
+inline constexpr uint64_t kAttributes = 2;
 inline constexpr uint32_t kNodeOrderByHash = 1;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr uint64_t kChecksumBlockBytes = uint64_t{1} << 16;
@@ -25,6 +26,19 @@ inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 40;
 #define VOXDAG_NARROW_LEVEL_WORDS (uint64_t{1} << 32)
 #endif
 inline constexpr uint64_t kNarrowLevelWords = VOXDAG_NARROW_LEVEL_WORDS;
+
+// Kinds of attributes.
+inline constexpr uint32_t kColorAttribute = 1;
+
+// Offsets in an entry of the attribute table; what follows is reserved: 0.
+inline constexpr size_t kAttributeKindAt = 0;
+inline constexpr size_t kAttributeLevelsAt = 4;
+inline constexpr size_t kAttributeOffsetAt = 8;
+inline constexpr size_t kAttributeBytesAt = 16;
+inline constexpr size_t kAttributeCellsAt = 24;
+inline constexpr size_t kAttributeFinestCellsAt = 32;
+inline constexpr size_t kAttributeBlockBytesAt = 40;
+inline constexpr size_t kAttributeReservedAt = 44;
 
 // Offsets in the header page.
 inline constexpr size_t kMagicAt = 0;
@@ -43,7 +57,7 @@ inline constexpr size_t kFileBytesAt = 88;
 inline constexpr size_t kTableOffsetAt = 96;
 inline constexpr size_t kTableCountAt = 104;
 inline constexpr size_t kTableChecksumAt = 112;
-inline constexpr size_t kAttributeCountAt = 120;  // reserved: 0, as are the attributes
+inline constexpr size_t kAttributeCountAt = 120;
 inline constexpr size_t kLevelsAt = 128;          // entry l is level l
 inline constexpr size_t kLevelEntryBytes = 32;    // offset, nodes, words, pointer bits
 inline constexpr size_t kMaxLevels = 32;          // capacity of the table; 19 are used at most

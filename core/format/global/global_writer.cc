@@ -91,6 +91,13 @@ std::vector<uint64_t> BlockChecksums::values() const {
 
 uint64_t bytes_of(const GlobalLevel& level) { return sizeof(uint32_t) * level.words; }
 
+// An attribute section that was written.
+struct Section {
+  GlobalAttribute attribute;
+  uint64_t offset = 0;
+  uint64_t bytes = 0;
+};
+
 }  // namespace
 
 struct GlobalFileWriter::State {
@@ -102,11 +109,14 @@ struct GlobalFileWriter::State {
   const uint64_t narrow_words;
   std::unique_ptr<WritableFile> file;  // none before the first level or the header
   std::vector<GlobalLevel> levels;     // complete ones, from the bricks upwards
-  BlockChecksums block_checksums;      // of them and of the open one
+  std::vector<Section> sections;       // complete ones
+  BlockChecksums block_checksums;      // of them and of the open level or section
   uint64_t checksummed_words = 0;      // of the open level
   bool level_open = false;
+  uint64_t section_bytes = 0;  // of the open section
+  bool section_open = false;
   bool retained = false;      // the partial file outlives the writer
-  uint64_t end = kPageBytes;  // where the open level, the next one, or the table begins
+  uint64_t end = kPageBytes;  // where the open level or section, the next one, or the table begins
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }
   // The open level, or the next one to open.
@@ -115,6 +125,9 @@ struct GlobalFileWriter::State {
   void create_file() {
     if (!file) file = files.create(partial_path);
   }
+  // Pads what ends at byte `content_end` to whole pages.
+  void pad(uint64_t content_end);
+  void put_sections(HeaderPage& header) const;
   HeaderPage header(const VoxelCounts& counts, std::span<const std::byte> table) const;
   std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
                      unsigned threads, const CancelToken& cancel) const;
@@ -126,7 +139,7 @@ struct GlobalFileWriter::State {
 
 GlobalFileWriter::GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid,
                                    uint32_t hash_bits, uint64_t narrow_words)
-    : state_(new State{files, path, path + ".partial", grid, hash_bits, narrow_words, {}, {}, {}}) {
+    : state_(new State{files, path, path + ".partial", grid, hash_bits, narrow_words, {}, {}, {}, {}}) {
 }
 
 GlobalFileWriter::~GlobalFileWriter() {
@@ -210,23 +223,75 @@ void GlobalFileWriter::end_level(const GlobalLevel& level) {
                                          std::to_string(words) + " words, of which " +
                                          std::to_string(s.checksummed_words) + " were checksummed");
   s.levels.push_back(level);
-  const uint64_t level_end = s.end + bytes_of(s.levels.back());
-  s.end = round_up_to_page(level_end);
-  const std::byte zeros[kPageBytes] = {};
-  const auto padding = std::span(zeros).first(s.end - level_end);
-  s.block_checksums.add(padding);
-  s.file->write_at(level_end, padding);
+  s.pad(s.end + bytes_of(level));
   s.level_open = false;
+}
+
+void GlobalFileWriter::begin_section() {
+  State& s = *state_;
+  if (s.level_open || s.section_open || s.levels.empty() || !s.complete() ||
+      s.sections.size() == kMaxAttributes)
+    throw Error(ErrorCode::kCorrupt,
+                s.path + ": a section of attributes does not follow complete levels");
+  s.section_bytes = 0;
+  s.section_open = true;
+}
+
+void GlobalFileWriter::append(std::span<const std::byte> bytes) {
+  State& s = *state_;
+  s.file->write_at(s.end + s.section_bytes, bytes);
+  s.block_checksums.add(bytes);
+  s.section_bytes += bytes.size();
+}
+
+uint64_t GlobalFileWriter::section_bytes() const { return state_->section_bytes; }
+
+void GlobalFileWriter::end_section(const GlobalAttribute& attribute) {
+  State& s = *state_;
+  if (!s.section_open || s.section_bytes == 0 ||
+      (!s.sections.empty() && s.sections.back().attribute.kind >= attribute.kind))
+    throw Error(ErrorCode::kCorrupt, s.path + ": the section of attribute " +
+                                         std::to_string(attribute.kind) + " has " +
+                                         std::to_string(s.section_bytes) +
+                                         " bytes, or does not follow those of lower kinds");
+  s.sections.push_back({attribute, s.end, s.section_bytes});
+  s.pad(s.end + s.section_bytes);
+  s.section_open = false;
+}
+
+void GlobalFileWriter::State::pad(uint64_t content_end) {
+  end = round_up_to_page(content_end);
+  const std::byte zeros[kPageBytes] = {};
+  const auto padding = std::span(zeros).first(end - content_end);
+  block_checksums.add(padding);
+  file->write_at(content_end, padding);
+}
+
+void GlobalFileWriter::State::put_sections(HeaderPage& header) const {
+  header.put(kAttributeCountAt, uint64_t{sections.size()});
+  for (size_t i = 0; i < sections.size(); ++i) {
+    const Section& section = sections[i];
+    const size_t entry = kAttributesAt + i * kAttributeEntryBytes;
+    header.put(entry + kAttributeKindAt, section.attribute.kind);
+    header.put(entry + kAttributeLevelsAt, section.attribute.cell_levels);
+    header.put(entry + kAttributeOffsetAt, section.offset);
+    header.put(entry + kAttributeBytesAt, section.bytes);
+    header.put(entry + kAttributeCellsAt, section.attribute.cells);
+    header.put(entry + kAttributeFinestCellsAt, section.attribute.finest_cells);
+    header.put(entry + kAttributeBlockBytesAt, section.attribute.block_bytes);
+  }
 }
 
 HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
                                            std::span<const std::byte> table) const {
   const auto is_wide = [&](const GlobalLevel& level) { return level.words > narrow_words; };
   const bool has_wide_levels = std::ranges::any_of(levels, is_wide);
+  const uint64_t features =
+      (has_wide_levels ? kWideLevels : 0) | (sections.empty() ? 0 : kAttributes);
   HeaderPage header;
   header.put(kMagicAt, kMagic);
-  header.put(kVersionAt, has_wide_levels ? kVersionWithFeatures : kVersion);
-  if (has_wide_levels) header.put(kFeaturesAt, kWideLevels);
+  header.put(kVersionAt, features ? kVersionWithFeatures : kVersion);
+  header.put(kFeaturesAt, features);
   header.put(kHeaderBytesAt, static_cast<uint32_t>(kPageBytes));
   header.put(kGridLevelsAt, grid.levels);
   header.put(kHashBitsAt, hash_bits);
@@ -244,9 +309,10 @@ HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
     offset += round_up_to_page(bytes_of(levels[i]));
     header.put(entry + 8, levels[i].nodes);
     header.put(entry + 16, levels[i].words);
-    if (has_wide_levels) header.put(entry + 24, uint64_t{is_wide(levels[i]) ? 64u : 32u});
+    if (features) header.put(entry + 24, uint64_t{is_wide(levels[i]) ? 64u : 32u});
     dag_nodes += levels[i].nodes;
   }
+  put_sections(header);
   header.put(kDagNodesAt, dag_nodes);
   header.put(kFileBytesAt, end + table.size());
   header.put(kTableOffsetAt, end);
@@ -307,9 +373,12 @@ bool is_partial_global_file(const ReadableFile& file) {
 GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned threads,
                                          const CancelToken& cancel) {
   State& s = *state_;
-  if (s.level_open || !s.complete())
+  if (s.level_open || s.section_open || !s.complete())
     throw Error(ErrorCode::kCorrupt,
-                s.path + ": level " + std::to_string(s.current_level()) + " is not finished");
+                s.path +
+                    (s.section_open ? ": the attribute section"
+                                    : ": level " + std::to_string(s.current_level())) +
+                    " is not finished");
   s.create_file();
   const std::vector<uint64_t> checksums = s.block_checksums.values();
   const auto table = std::as_bytes(std::span(checksums));

@@ -43,6 +43,15 @@ struct GlobalLevel {
   uint64_t words = 0;
 };
 
+// What an attribute section holds: something for every set cell of the levels 0 to `cell_levels`.
+struct GlobalAttribute {
+  uint32_t kind = 0;
+  uint32_t cell_levels = 0;
+  uint32_t block_bytes = 0;   // for 32 cells
+  uint64_t cells = 0;         // of all levels
+  uint64_t finest_cells = 0;  // of the finest
+};
+
 // What an unfinished file holds, so that a later run can resume it.
 struct GlobalFileProgress {
   std::vector<GlobalLevel> levels;  // complete ones, from the bricks upwards
@@ -70,7 +79,7 @@ class GlobalFileWriter {
   // Error{kNotFound} or Error{kCorrupt} if the partial file is missing or too short, or if its last
   // checksum block, which is read here, is damaged; seal() checks the other blocks.
   void resume(const GlobalFileProgress& progress);
-  // Call it while no level is open.
+  // Call it while no level is open and before the first section.
   GlobalFileProgress progress() const;
   // Makes all complete levels durable, and retains the partial file for resume(). It may run
   // concurrently with the writing of the next levels.
@@ -87,6 +96,13 @@ class GlobalFileWriter {
   // Ends the level once all its words were written and added to the checksums. Throws Error{kLimit}
   // naming the level if it has over 2^40 words.
   void end_level(const GlobalLevel& level);
+
+  // Attribute sections follow the levels of a scene that has voxels, in increasing order of their
+  // kinds. The bytes of a section are appended in order. A run that resumes writes them again.
+  void begin_section();
+  void append(std::span<const std::byte> bytes);
+  uint64_t section_bytes() const;  // of the open section, so far
+  void end_section(const GlobalAttribute& attribute);
 
   // Writes checksums and header, syncs the file, and reads it to verify and digest it.
   GlobalFileSummary seal(const VoxelCounts& counts, unsigned threads = 1,

@@ -1,0 +1,27 @@
+// Encodes colors in blocks of 128 bits: up to 32 cells, 4 bits each. docs/format.md, "Color
+// blocks", is the layout; voxdag_reader_colors.h decodes it.
+//
+// A block has two ends and, for each cell, a weight between them. The ends come from the colors'
+// principal axis and one step of least squares, once for each of the two modes, of which the one
+// with the smaller squared error is taken. All of it is integer arithmetic, so that the same colors
+// are the same bytes on every machine. Blocks of one or two colors are exact.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/color/color_sum.h"
+
+namespace voxdag {
+
+inline constexpr size_t kBlockCells = 32;
+inline constexpr size_t kBlockBytes = 16;
+
+using ColorBlock = std::array<std::byte, kBlockBytes>;
+
+// 1 to 32 colors; their alpha is not stored. The weights of cells that are not there are 0.
+ColorBlock encode_block(std::span<const Color> colors);
+
+}  // namespace voxdag

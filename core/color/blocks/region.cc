@@ -1,0 +1,58 @@
+#include "core/color/blocks/region.h"
+
+#include <algorithm>
+
+#include "core/color/color_of.h"
+
+namespace voxdag {
+namespace {
+
+void add_colors(std::span<const ColoredCell> cells, std::vector<Color>& colors) {
+  for (const ColoredCell& cell : cells) colors.push_back(color_of(cell.sum));
+}
+
+// The cells' parents, in order.
+std::vector<ColoredCell> parents_of(std::span<const ColoredCell> cells) {
+  std::vector<ColoredCell> parents;
+  for (const ColoredCell& cell : cells) {
+    const uint32_t code = cell.code >> 3;
+    if (parents.empty() || parents.back().code != code) parents.push_back({code, {}});
+    parents.back().sum.add(cell.sum);
+  }
+  return parents;
+}
+
+void add_prefix(std::span<const ColoredCell> cells, std::vector<uint32_t>& prefix) {
+  constexpr uint32_t kBits = 3 * kPrefixLevels;
+  for (size_t i = 0; i < cells.size(); ++i)
+    if (i == 0 || cells[i].code >> kBits != cells[i - 1].code >> kBits)
+      prefix.push_back(static_cast<uint32_t>(i));
+}
+
+}  // namespace
+
+EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells) {
+  EncodedRegion region;
+  region.morton = morton;
+  std::vector<Color> colors;
+  colors.reserve(cells.size() + cells.size() / 2);
+  std::vector<ColoredCell> coarser;
+  for (uint32_t i = 0;; ++i) {
+    region.counts[i] = static_cast<uint32_t>(cells.size());
+    add_colors(cells, colors);
+    if (i + kPrefixLevels < levels) add_prefix(cells, region.prefix);
+    if (i == levels) break;
+    coarser = parents_of(cells);
+    cells = coarser;
+  }
+  region.total = cells.front().sum;
+  region.blocks.reserve((colors.size() + kBlockCells - 1) / kBlockCells * kBlockBytes);
+  for (size_t at = 0; at < colors.size(); at += kBlockCells) {
+    const ColorBlock block =
+        encode_block(std::span(colors).subspan(at, std::min(kBlockCells, colors.size() - at)));
+    region.blocks.insert(region.blocks.end(), block.begin(), block.end());
+  }
+  return region;
+}
+
+}  // namespace voxdag

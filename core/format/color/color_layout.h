@@ -1,0 +1,47 @@
+// Offsets and sizes in the color section of the global file, as docs/format.md, "The color
+// section", describes it.
+//
+//   [tier 0] [tier 1] ... [tier table]            tier: [regions' data] [directory]
+//
+// voxdag_reader_colors.h, which stands alone, repeats the numbers it needs.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/color/blocks/region.h"
+
+namespace voxdag::color_layout {
+
+// What the data of a region begin and end at multiples of.
+inline constexpr size_t kUnitBytes = 16;
+static_assert(kBlockBytes == kUnitBytes);
+
+// Offsets in an entry of a directory: a region.
+inline constexpr size_t kRegionMortonAt = 0;
+inline constexpr size_t kRegionFirstUnitAt = 8;
+inline constexpr size_t kRegionCountsAt = 16;  // u32, u16, u16, u16, u8, u8, u8
+inline constexpr size_t kRegionReservedAt = 29;
+inline constexpr size_t kRegionEntryBytes = 32;
+
+// Offsets in an entry of the tier table.
+inline constexpr size_t kTierOffsetAt = 0;  // of its data, from the section's first byte
+inline constexpr size_t kTierUnitsAt = 8;   // of its data; its directory follows
+inline constexpr size_t kTierRegionsAt = 16;
+inline constexpr size_t kTierCellsAt = 24;  // of all levels
+inline constexpr size_t kTierEntryBytes = 32;
+
+// Tier t has the levels from finest_level(c, t) up to region_level(c, t).
+inline constexpr uint32_t kTierLevels = kRegionLevels + 1;
+inline constexpr uint32_t tier_count(uint32_t color_levels) {
+  return color_levels / kTierLevels + 1;
+}
+inline constexpr uint32_t finest_level(uint32_t color_levels, uint32_t tier) {
+  return color_levels - tier * kTierLevels;
+}
+// From the finest level of a tier to that of its regions.
+inline constexpr uint32_t levels_in_region(uint32_t finest) {
+  return finest < kRegionLevels ? finest : kRegionLevels;
+}
+
+}  // namespace voxdag::color_layout
