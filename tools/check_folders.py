@@ -66,8 +66,12 @@ BARE = ["core/base", "core/geometry", "core/dag", "core/color", "core/backend"]
 LIBRARY = re.compile(
     r"(zstd|tiny_gltf|sqlite3|httplib|png|zlib|xxhash)\.h$|^(nlohmann|openssl|CLI|gtest|gmock|benchmark)/"
 )
-# The reader that users copy into their engine: the standard library is all it may need.
-STANDALONE_HEADER = "core/format/global/voxdag_reader.h"
+# The reader that users copy into their engine, in two headers: the standard library is all that
+# they may need, and each other.
+STANDALONE_HEADERS = {
+    "core/format/global/voxdag_reader.h": ["voxdag_reader_colors.h"],
+    "core/format/global/voxdag_reader_colors.h": [],
+}
 # Where code may ask which compiler is at work.
 CUDA_PLACES = ("core/base/host_device.h", "core/backend/")
 MAX_FILE_LINES = 500
@@ -99,7 +103,7 @@ def check_include(path, bracket, header):
         if layer in BARE and LIBRARY.search(header):
             return f"{layer} builds with a compiler alone, without <{header}>"
         return None
-    if path == STANDALONE_HEADER:
+    if path in STANDALONE_HEADERS and header not in STANDALONE_HEADERS[path]:
         return f'stands alone, yet includes "{header}"'
     target = layer_of(header)
     if target == layer or "/" not in header:

@@ -239,7 +239,7 @@ ColorBlock encode_block(std::span<const Color> colors) {
   const Fit b = fit_mode<ModeB>(block, projection);
   if (b.error == 0) return pack_b(b, colors.size());
   const Fit a = fit_mode<ModeA>(block, projection);
-  // Equal ends cannot be told from mode B.
+  // Equal ends would look like mode B.
   if (a.error < b.error && a.ends[0] != a.ends[1]) return pack_a(a, colors.size());
   return pack_b(b, colors.size());
 }

@@ -1,6 +1,6 @@
 // The colors of a region, in the order and the bytes in which the file stores them: the cells of
 // its finest level in Morton order, then those of the next coarser one, and so on down to the one
-// cell that is the region, in blocks of 32 cells that begin anew in each region. A coarser cell is
+// cell that is the region, in blocks of 32 cells that begin again in each region. A coarser cell is
 // the sum of its children, not the mean of their stored colors.
 #pragma once
 
@@ -32,7 +32,7 @@ struct EncodedRegion {
 
 // `levels` is kRegionLevels, or less where a grid, or what is left of its levels, has less; at
 // least 1 cell in increasing order, with codes below 8^levels. Thread-safe. Memory: up to 17 bytes
-// for each cell, and 72 for each cell of the next coarser level, beside what is returned.
+// for each cell, and 72 for each cell of the next coarser level, aside from what is returned.
 EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells);
 
 // How many entries `prefix` has with these counts.

@@ -3,8 +3,8 @@
 //
 //   [header page] [level L-2] [level L-3] ... [level 0] [attribute sections] [checksum table]
 //
-// Levels and sections begin at multiples of kPageBytes, with zeros between them. The table has one XXH64 for
-// each checksum block: 64 KiB of the bytes between the header page and the table.
+// Levels and sections begin at multiples of kPageBytes, with zeros between them. The table has one
+// XXH64 for each checksum block: 64 KiB of the bytes between the header page and the table.
 #pragma once
 
 #include <cstddef>
@@ -58,9 +58,9 @@ inline constexpr size_t kTableOffsetAt = 96;
 inline constexpr size_t kTableCountAt = 104;
 inline constexpr size_t kTableChecksumAt = 112;
 inline constexpr size_t kAttributeCountAt = 120;
-inline constexpr size_t kLevelsAt = 128;          // entry l is level l
-inline constexpr size_t kLevelEntryBytes = 32;    // offset, nodes, words, pointer bits
-inline constexpr size_t kMaxLevels = 32;          // capacity of the table; 19 are used at most
+inline constexpr size_t kLevelsAt = 128;        // entry l is level l
+inline constexpr size_t kLevelEntryBytes = 32;  // offset, nodes, words, pointer bits
+inline constexpr size_t kMaxLevels = 32;        // capacity of the table; 19 are used at most
 inline constexpr size_t kAttributesAt = kLevelsAt + kMaxLevels * kLevelEntryBytes;
 inline constexpr size_t kAttributeEntryBytes = 64;
 inline constexpr size_t kMaxAttributes = 16;

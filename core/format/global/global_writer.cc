@@ -139,8 +139,8 @@ struct GlobalFileWriter::State {
 
 GlobalFileWriter::GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid,
                                    uint32_t hash_bits, uint64_t narrow_words)
-    : state_(new State{files, path, path + ".partial", grid, hash_bits, narrow_words, {}, {}, {}, {}}) {
-}
+    : state_(new State{
+          files, path, path + ".partial", grid, hash_bits, narrow_words, {}, {}, {}, {}}) {}
 
 GlobalFileWriter::~GlobalFileWriter() {
   if (state_->retained || !state_->file) return;

@@ -1,9 +1,11 @@
-// Reads voxdag's global file (.vdag): one header, no dependencies but the C++17 standard library
-// and POSIX; copy it into your engine. docs/format.md describes the file.
+// Reads voxdag's global file (.vdag): no dependencies but the C++17 standard library, POSIX and
+// voxdag_reader_colors.h; copy both into your engine. docs/format.md describes the file.
 //
 //     voxdag_reader::File dag("scene.vdag");               // throws voxdag_reader::Error
 //     bool set = dag.voxel(x, y, z);                       // 0 <= x, y, z < dag.resolution()
 //     dag.walk(visitor);                                   // depth first, the visitor may prune
+//     if (auto rgb = dag.color(x, y, z, level)) ...        // of a cell of edge R/2^level
+//     voxdag_reader::ColorCursor colors(dag);              // the same, fast for cells nearby
 //     const voxdag_reader::Level& level = dag.level(l);    // raw words, for an upload to the GPU
 //
 // Level l has cubes of edge R/2^l voxels, 0 is the root; bricks (4x4x4 voxels) are level
@@ -31,25 +33,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <stdexcept>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "voxdag_reader_colors.h"
+
 namespace voxdag_reader {
-
-// What kind of error an Error is.
-enum class Problem { kNotFound, kIo, kCorrupt, kUnsupportedVersion };
-
-// The only exception that the reader throws, std::bad_alloc aside. Its message names the file.
-class Error : public std::runtime_error {
- public:
-  Error(Problem problem, const std::string& message)
-      : std::runtime_error(message), problem_(problem) {}
-  Problem problem() const { return problem_; }
-
- private:
-  Problem problem_;
-};
 
 // One level of the DAG. The words belong to the File.
 struct Level {
@@ -189,7 +179,7 @@ class File {
   uint32_t grid_levels() const { return grid_levels_; }
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
   uint32_t brick_level() const { return grid_levels_ - 2; }
-  // Of the format: 1, or 2 if the file has a feature that version 1 has not, wide levels.
+  // Of the format: 1, or 2 if the file has a feature that version 1 has not: wide levels, colors.
   uint32_t version() const { return version_; }
   // The bits of the node hash by which the nodes of a level are ordered, 4 to 64.
   uint32_t hash_bits() const { return hash_bits_; }
@@ -250,6 +240,21 @@ class File {
     return brick(offset) >> brick_bit(x, y, z) & 1;
   }
 
+  // Whether cells have colors: those of the levels 0 to color_levels(). An empty scene has none.
+  bool has_colors() const { return colors_.tier_count() > 0; }
+  uint32_t color_levels() const { return colors_.color_levels(); }
+  const ColorSection& colors() const { return colors_; }
+  // The color of a cell of level `level`, 0 to grid_levels(), which has 2^level cells along each
+  // axis; of its ancestor of level color_levels() if it is finer. None where the cell is not set or
+  // the file has no colors. A ColorCursor is faster where many cells are near each other.
+  std::optional<Rgb> color(int64_t x, int64_t y, int64_t z, uint32_t level) const {
+    return BasicColorCursor<File>(*this).color(x, y, z, level);
+  }
+  // Throws Error: the colors do not fit the DAG.
+  [[noreturn]] void broken_colors(const char* what) const {
+    corrupt(std::string("colors: ") + what);
+  }
+
   // Walks the octree depth first, children in child order, and calls
   //     bool visitor.node(level, x, y, z, offset)   returns false to skip the subtree
   //     void visitor.brick(x, y, z, mask, offset)
@@ -281,7 +286,7 @@ class File {
  private:
   static constexpr uint64_t kPageBytes = 4096, kChecksumBlockBytes = 65536;
   static constexpr uint32_t kMaxBrickLevel = 18;
-  static constexpr uint64_t kWideLevels = 1;  // a feature bit
+  static constexpr uint64_t kWideLevels = 1, kAttributes = 2;  // feature bits
 
   template <class T>
   static T get(const unsigned char* at) {
@@ -334,9 +339,10 @@ class File {
     expect(xxh64(page, kPageBytes - 8) == get<uint64_t>(page + kPageBytes - 8),
            "its checksum is wrong");
     const uint64_t features = version_ == 1 ? 0 : get<uint64_t>(page + 2176);
-    if (features & ~kWideLevels)
-      throw Error(Problem::kUnsupportedVersion,
-                  path_ + ": feature bits " + std::to_string(features) + ", expected none but 1");
+    if (features & ~(kWideLevels | kAttributes))
+      throw Error(
+          Problem::kUnsupportedVersion,
+          path_ + ": feature bits " + std::to_string(features) + ", expected none but 1 and 2");
     max_pointer_bits_ = features & kWideLevels ? 64 : 32;
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
@@ -357,6 +363,7 @@ class File {
       corrupt("the file has " + std::to_string(bytes_.size()) + " bytes, expected " +
               std::to_string(get<uint64_t>(page + 88)));
     read_levels(page);
+    if (features & kAttributes) read_attributes(page);
     read_table(page);
   }
 
@@ -397,6 +404,31 @@ class File {
     table_offset_ = end;
   }
 
+  // Sections lie behind the levels in the order of their kinds; those of other kinds are skipped.
+  void read_attributes(const unsigned char* page) {
+    const uint64_t count = get<uint64_t>(page + 120);
+    expect(count >= 1 && count <= 16 && dag_nodes_ > 0, "expected 1 to 16 attribute sections");
+    uint32_t last_kind = 0;
+    for (uint64_t i = 0; i < count; ++i) {
+      const unsigned char* const entry = page + 1152 + 64 * i;
+      const uint32_t kind = get<uint32_t>(entry), levels = get<uint32_t>(entry + 4);
+      const uint64_t bytes = get<uint64_t>(entry + 16);
+      expect(kind > last_kind, "attribute sections are not in the order of their kinds");
+      expect(get<uint64_t>(entry + 8) == table_offset_ && bytes > 0 &&
+                 bytes <= bytes_.size() - table_offset_,
+             "an attribute section does not follow what is before it, or ends beyond the file");
+      expect(levels >= 2 && levels <= grid_levels_, "expected attributes of a level of the grid");
+      if (kind == 1) {
+        expect(get<uint32_t>(entry + 40) == 16, "expected colors in blocks of 16 bytes");
+        const char* const wrong = colors_.open(data() + table_offset_, bytes, levels);
+        expect(!wrong, wrong);
+      }
+      table_offset_ = (table_offset_ + bytes + kPageBytes - 1) / kPageBytes * kPageBytes;
+      expect(table_offset_ <= bytes_.size(), "an attribute section ends beyond the file");
+      last_kind = kind;
+    }
+  }
+
   void read_table(const unsigned char* page) const {
     const uint64_t blocks =
         (table_offset_ - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
@@ -415,6 +447,10 @@ class File {
   uint32_t version_ = 0, max_pointer_bits_ = 32, grid_levels_ = 0, hash_bits_ = 0;
   uint64_t voxels_ = 0, svo_nodes_ = 0, dag_nodes_ = 0, table_offset_ = 0;
   Level levels_[kMaxBrickLevel + 1];
+  ColorSection colors_;
 };
+
+// Looks up colors; see voxdag_reader_colors.h.
+using ColorCursor = BasicColorCursor<File>;
 
 }  // namespace voxdag_reader

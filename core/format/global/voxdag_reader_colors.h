@@ -1,0 +1,357 @@
+// The part of voxdag_reader.h that reads colors; copy both into your engine, and include that one.
+// docs/format.md, "The color section", describes the bytes.
+//
+// The set cells of all levels from 0 to color_levels() have a color. They are stored by regions of
+// up to 64^3 cells of a tier's finest level: first the colors of the region's cells of that level
+// in Morton order, then those of the next coarser one, and so on. So the color of a cell is found
+// by its rank: how many set cells of its level are before it in the region, which the DAG tells.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace voxdag_reader {
+
+// What kind of error an Error is.
+enum class Problem { kNotFound, kIo, kCorrupt, kUnsupportedVersion };
+
+// The only exception that the reader throws, std::bad_alloc aside. Its message names the file.
+class Error : public std::runtime_error {
+ public:
+  Error(Problem problem, const std::string& message)
+      : std::runtime_error(message), problem_(problem) {}
+  Problem problem() const { return problem_; }
+
+ private:
+  Problem problem_;
+};
+
+// sRGB, as it is shown.
+struct Rgb {
+  unsigned char r = 0, g = 0, b = 0;
+  friend bool operator==(const Rgb& x, const Rgb& y) {
+    return x.r == y.r && x.g == y.g && x.b == y.b;
+  }
+  friend bool operator!=(const Rgb& x, const Rgb& y) { return !(x == y); }
+};
+
+// The color of cell `i`, 0 to 31, in a block of 16 bytes; any bytes are colors.
+inline Rgb block_color(const unsigned char* block, unsigned i) {
+  const auto u16 = [&](unsigned at) {
+    return static_cast<unsigned>(block[at] | block[at + 1] << 8);
+  };
+  const auto mix = [](unsigned a, unsigned b, unsigned weight, unsigned top) {
+    return static_cast<unsigned char>((a * (top - weight) + b * weight + top / 2) / top);
+  };
+  if (u16(0) == 0) {  // ends of 24 bits, weights of 2
+    const unsigned w = static_cast<unsigned>(block[8 + i / 4] >> 2 * (i % 4)) & 3;
+    return {mix(block[4], block[7], w, 3), mix(block[3], block[6], w, 3),
+            mix(block[2], block[5], w, 3)};
+  }
+  const unsigned bit = 32 + 3 * i, at = std::min(bit / 8, 14u), w = u16(at) >> (bit - 8 * at) & 7;
+  const auto channel = [&](int shift, int bits) {
+    const auto widen = [&](unsigned end) {
+      const unsigned value = end >> shift & ((1u << bits) - 1);
+      return value << (8 - bits) | value >> (2 * bits - 8);
+    };
+    return mix(widen(u16(0)), widen(u16(2)), w, 7);
+  };
+  return {channel(11, 5), channel(5, 6), channel(0, 5)};
+}
+
+inline int count_set_bits(uint64_t x) {
+  x -= x >> 1 & 0x5555555555555555u;
+  x = (x & 0x3333333333333333u) + (x >> 2 & 0x3333333333333333u);
+  return static_cast<int>(((x + (x >> 4)) & 0x0f0f0f0f0f0f0f0fu) * 0x0101010101010101u >> 56);
+}
+
+// Bits x, y and z interleaved, x highest: the order of the cells of a level. 21 bits each.
+inline uint64_t morton_code(int64_t x, int64_t y, int64_t z) {
+  const auto spread = [](int64_t coordinate) {
+    uint64_t v = static_cast<uint64_t>(coordinate) & 0x1fffff;
+    v = (v | v << 32) & 0x001f00000000ffffu;
+    v = (v | v << 16) & 0x001f0000ff0000ffu;
+    v = (v | v << 8) & 0x100f00f00f00f00fu;
+    v = (v | v << 4) & 0x10c30c30c30c30c3u;
+    return (v | v << 2) & 0x1249249249249249u;
+  };
+  return spread(x) << 2 | spread(y) << 1 | spread(z);
+}
+
+// The levels finest_level, finest_level - 1, ... region_level, by regions: cubes of the last one.
+// What they point to belongs to the File.
+struct ColorTier {
+  const unsigned char* data = nullptr;  // of its regions
+  uint64_t units = 0;                   // of 16 bytes
+  const unsigned char* directory = nullptr;
+  uint64_t region_count = 0;
+  uint64_t cell_count = 0;  // of all levels
+  uint32_t finest_level = 0, region_level = 0;
+};
+
+// The colors of a region. They belong to the File.
+struct ColorRegion {
+  uint64_t morton = 0;      // among the cubes of the tier's region level
+  uint64_t first_unit = 0;  // of its data
+  uint32_t level_count = 0;
+  uint32_t counts[7] = {};  // cells, the finest level first
+  uint64_t cells = 0;       // of all levels
+  const unsigned char* blocks = nullptr;
+
+  // The color of the `i`-th of all cells; below `cells`.
+  Rgb color(uint64_t i) const { return block_color(blocks + i / 32 * 16, unsigned(i % 32)); }
+  // Table 0 is for the cells of the finest level, 1 for the next one. Its entries are for their
+  // ancestors four levels above, in order: how many of the cells come before those below it.
+  uint64_t prefix_count(uint32_t table) const {
+    return table + 5 < level_count ? counts[table + 4] : 0;
+  }
+  uint32_t prefix(uint32_t table, uint64_t entry) const {
+    if (table == 1) entry += prefix_count(0);
+    uint32_t value;
+    std::memcpy(&value, blocks + (cells + 31) / 32 * 16 + 4 * entry, sizeof value);
+    return value;
+  }
+  // Of its data: blocks and prefixes.
+  uint64_t units() const { return (cells + 31) / 32 + (prefix_count(0) + prefix_count(1) + 3) / 4; }
+};
+
+// The colors of a file.
+class ColorSection {
+ public:
+  // The tiers of a section; returns what is wrong with them, or null.
+  const char* open(const unsigned char* section, uint64_t bytes, uint32_t color_levels) {
+    color_levels_ = color_levels;
+    tier_count_ = color_levels / 7 + 1;
+    if (bytes < 32 * tier_count_) return "the color section has no room for its tiers";
+    const uint64_t tables = bytes - 32 * tier_count_;
+    uint64_t end = 0;
+    for (uint32_t t = 0; t < tier_count_; ++t) {
+      const unsigned char* const entry = section + tables + 32 * t;
+      ColorTier& tier = tiers_[t];
+      tier.units = get<uint64_t>(entry + 8);
+      tier.region_count = get<uint64_t>(entry + 16);
+      tier.cell_count = get<uint64_t>(entry + 24);
+      tier.finest_level = color_levels - 7 * t;
+      tier.region_level = tier.finest_level - std::min<uint32_t>(tier.finest_level, 6);
+      if (get<uint64_t>(entry) != end) return "a tier of colors does not follow the one before it";
+      if (tier.units > (tables - end) / 16) return "colors end beyond their section";
+      tier.data = section + end;
+      end += 16 * tier.units;
+      if (tier.region_count == 0 || tier.region_count > (tables - end) / 32)
+        return "a directory of colors has no regions, or ends beyond the section";
+      tier.directory = section + end;
+      end += 32 * tier.region_count;
+    }
+    return end == tables ? nullptr : "the color section is longer than its tiers";
+  }
+
+  uint32_t color_levels() const { return color_levels_; }
+  uint32_t tier_count() const { return tier_count_; }
+  const ColorTier& tier(uint32_t t) const { return tiers_[t]; }
+  // The tier that has level `l`, 0 to color_levels().
+  const ColorTier& tier_of(uint32_t l) const { return tiers_[(color_levels_ - l) / 7]; }
+
+  // The i-th region of a tier, which owns all bytes that it names. False if the entry is damaged.
+  static bool region(const ColorTier& tier, uint64_t i, ColorRegion& region) {
+    const unsigned char* const entry = tier.directory + 32 * i;
+    region.morton = get<uint64_t>(entry);
+    region.first_unit = get<uint64_t>(entry + 8);
+    region.level_count = tier.finest_level - tier.region_level + 1;
+    region.cells = 0;
+    for (uint32_t j = 0; j < 7; ++j) {
+      const uint32_t count = j == 0  ? get<uint32_t>(entry + 16)
+                             : j < 4 ? get<uint16_t>(entry + 18 + 2 * j)
+                                     : entry[22 + j];
+      const uint32_t most = j < region.level_count ? 1u << 3 * (region.level_count - 1 - j) : 0;
+      if (count > most || (count == 0) != (most == 0)) return false;
+      region.counts[j] = count;
+      region.cells += count;
+    }
+    const uint64_t units = region.units();
+    if (units > tier.units || region.first_unit > tier.units - units) return false;
+    region.blocks = tier.data + 16 * region.first_unit;
+    return true;
+  }
+  // Index of the first region that is not before `morton`; region_count if there is none.
+  static uint64_t lower_bound(const ColorTier& tier, uint64_t morton) {
+    uint64_t low = 0, high = tier.region_count;
+    while (low < high) {
+      const uint64_t middle = low + (high - low) / 2;
+      if (get<uint64_t>(tier.directory + 32 * middle) < morton)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    return low;
+  }
+
+ private:
+  template <class T>
+  static T get(const unsigned char* at) {
+    T value;
+    std::memcpy(&value, at, sizeof(T));
+    return value;
+  }
+
+  uint32_t color_levels_ = 0, tier_count_ = 0;
+  ColorTier tiers_[3];
+};
+
+// Looks up colors, fast where a cell is near the one before. Refers to the File, which must outlive
+// it; each thread needs its own.
+template <class Dag>
+class BasicColorCursor {
+ public:
+  explicit BasicColorCursor(const Dag& dag) : dag_(&dag) { path_[0] = 0; }
+
+  // See File::color().
+  std::optional<Rgb> color(int64_t x, int64_t y, int64_t z, uint32_t level) {
+    if (!dag_->has_colors() || level > dag_->grid_levels()) return std::nullopt;
+    const int64_t edge = int64_t{1} << level;
+    if (x < 0 || y < 0 || z < 0 || x >= edge || y >= edge || z >= edge) return std::nullopt;
+    const uint64_t code = morton_code(x, y, z);
+    if (!descend(level, code)) return std::nullopt;
+    const uint32_t stored = std::min(level, dag_->color_levels());
+    return stored_color(stored, code >> 3 * (level - stored));
+  }
+
+ private:
+  // A place in the DAG is a word offset, below the bricks the mask of the cell's children.
+  uint32_t brick_level() const { return dag_->brick_level(); }
+  uint32_t mask(uint32_t level, uint64_t place) const {
+    if (level < brick_level()) return dag_->node(level, place).child_mask;
+    if (level > brick_level()) return static_cast<uint32_t>(place);
+    uint64_t any = dag_->brick(place);  // the lowest bit of each byte: whether there is one
+    any |= any >> 4;
+    any |= any >> 2;
+    any |= any >> 1;
+    return static_cast<uint32_t>((any & 0x0101010101010101u) * 0x0102040810204080u >> 56);
+  }
+  // The child must be there.
+  uint64_t child(uint32_t level, uint64_t place, unsigned index) const {
+    if (level < brick_level()) return Dag::child(dag_->node(level, place), static_cast<int>(index));
+    return level == brick_level() ? dag_->brick(place) >> 8 * index & 255 : 0;
+  }
+  // Set cells of level `target` in the cube at `place`, or in its first children only.
+  uint64_t count(uint32_t level, uint64_t place, uint32_t target, unsigned children = 8) const {
+    if (level == target) return 1;
+    const uint32_t there = mask(level, place) & ((1u << children) - 1);
+    if (level + 1 == target) return static_cast<uint64_t>(count_set_bits(there));
+    if (level == brick_level() && children == 8)
+      return static_cast<uint64_t>(count_set_bits(dag_->brick(place)));
+    uint64_t cells = 0;
+    for (unsigned i = 0; i < children; ++i)
+      if (there >> i & 1) cells += count(level + 1, child(level, place, i), target);
+    return cells;
+  }
+  unsigned step(uint32_t level) const {  // the child of path_[level] that the path goes to
+    return static_cast<unsigned>(path_code_ >> 3 * (depth_ - level - 1) & 7);
+  }
+  // Set cells of level `target` that are before path_[to] in the cube path_[from].
+  uint64_t count_before(uint32_t from, uint32_t to, uint32_t target) const {
+    uint64_t cells = 0;
+    for (uint32_t level = from; level < to; ++level)
+      cells += count(level, path_[level], target, step(level));
+    return cells;
+  }
+
+  // Makes the path that of a cell; false, and the path ends above it, if the cell is not set.
+  bool descend(uint32_t level, uint64_t code) {
+    if (dag_->empty()) return false;
+    uint32_t shared = std::min(level, depth_);
+    uint64_t differing = code >> 3 * (level - shared) ^ path_code_ >> 3 * (depth_ - shared);
+    for (; differing != 0; differing >>= 3) --shared;
+    depth_ = shared;
+    path_code_ = code >> 3 * (level - shared);
+    while (depth_ < level) {
+      const unsigned index = static_cast<unsigned>(code >> 3 * (level - depth_ - 1) & 7);
+      if (!(mask(depth_, path_[depth_]) >> index & 1)) return false;
+      path_[depth_ + 1] = child(depth_, path_[depth_], index);
+      path_code_ = path_code_ << 3 | index;
+      ++depth_;
+    }
+    return true;
+  }
+
+  // Of a cell on the path.
+  Rgb stored_color(uint32_t level, uint64_t code) {
+    const ColorTier& tier = dag_->colors().tier_of(level);
+    const uint32_t above = std::min<uint32_t>(3, level - tier.region_level);  // to the group
+    if (group_level_ != level || group_code_ != code >> 3 * above) {
+      group_level_ = kNone;
+      enter_region(tier, code >> 3 * (level - tier.region_level));
+      enter_group(tier, level, above);
+      group_level_ = level;
+      group_code_ = code >> 3 * above;
+    }
+    uint64_t rank = starts_[0];
+    if (above > 0) {
+      const unsigned parent = static_cast<unsigned>(code >> 3 & ((1u << 3 * (above - 1)) - 1));
+      rank = starts_[parent] +
+             static_cast<unsigned>(count_set_bits(masks_[parent] & ((1u << (code & 7)) - 1)));
+    }
+    if (rank >= region_.counts[tier.finest_level - level])
+      dag_->broken_colors("a region has more cells than colors");
+    uint64_t before = 0;
+    for (uint32_t finer = level + 1; finer <= tier.finest_level; ++finer)
+      before += region_.counts[tier.finest_level - finer];
+    return region_.color(before + rank);
+  }
+  void enter_region(const ColorTier& tier, uint64_t morton) {
+    if (region_tier_ == &tier && region_.morton == morton) return;
+    region_tier_ = nullptr;
+    const uint64_t i = ColorSection::lower_bound(tier, morton);
+    if (i == tier.region_count || !ColorSection::region(tier, i, region_) ||
+        region_.morton != morton)
+      dag_->broken_colors("a region is missing or damaged");
+    region_tier_ = &tier;
+  }
+  // Counts the cells before each parent in the cube `above` levels above the cell on the path.
+  void enter_group(const ColorTier& tier, uint32_t level, uint32_t above) {
+    const uint32_t table = tier.finest_level - level, group = level - above;
+    uint32_t from = tier.region_level;
+    uint64_t rank = 0;
+    if (table < 2 && level > tier.region_level + 4) {
+      from = level - 4;
+      const uint64_t entry = count_before(tier.region_level, from, from);
+      if (entry >= region_.prefix_count(table))
+        dag_->broken_colors("a region has too few prefixes");
+      rank = region_.prefix(table, entry);
+    }
+    rank += count_before(from, group, level);
+    if (above == 0)
+      starts_[0] = rank;
+    else
+      fill_group(group, path_[group], level, 0, rank);
+  }
+  void fill_group(uint32_t l, uint64_t place, uint32_t level, unsigned code, uint64_t& rank) {
+    const uint32_t there = mask(l, place);
+    if (l + 1 == level) {
+      masks_[code] = there;
+      starts_[code] = rank;
+      rank += static_cast<uint64_t>(count_set_bits(there));
+      return;
+    }
+    for (unsigned i = 0; i < 8; ++i)
+      if (there >> i & 1) fill_group(l + 1, child(l, place, i), level, 8 * code + i, rank);
+  }
+
+  static constexpr uint32_t kNone = ~uint32_t{0};
+  const Dag* dag_;
+  uint64_t path_[21] = {};  // places from the root to the cell looked up last
+  uint64_t path_code_ = 0;  // of that cell
+  uint32_t depth_ = 0;      // its level
+  const ColorTier* region_tier_ = nullptr;
+  ColorRegion region_;
+  uint32_t group_level_ = kNone;  // of the cells whose parents are below; a group is a cube
+  uint64_t group_code_ = 0;
+  uint64_t starts_[64] = {};  // how many cells of the region are before those of a parent
+  uint32_t masks_[64] = {};
+};
+
+}  // namespace voxdag_reader
