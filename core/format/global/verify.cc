@@ -13,6 +13,7 @@
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
 #include "core/format/checksum.h"
+#include "core/format/color/verify_colors.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/node_index.h"
 
@@ -57,6 +58,7 @@ class Verifier {
       progress_.end_stage();
     }
     check_counts();
+    verify_colors(file_, threads_, progress_, cancel_);
   }
 
  private:
@@ -71,6 +73,7 @@ class Verifier {
   }
 
   void check_header() const;
+  void check_attributes(bool has_attributes) const;
   void check_blocks();
   void check_block(uint64_t block, uint64_t table) const;
   void check_padding() const;
@@ -116,7 +119,6 @@ void Verifier::check_header() const {
   if (node_order != kNodeOrderByHash)
     throw Error(ErrorCode::kUnsupportedVersion,
                 file_.path() + ": node order " + std::to_string(node_order) + ", expected 1");
-  check_zeros(kAttributeCountAt, kLevelsAt, "attribute sections are reserved");
   for (size_t level = 0; level < kMaxLevels; ++level) {
     const size_t entry = kLevelsAt + level * kLevelEntryBytes;
     const bool there = level <= file_.brick_level();
@@ -134,10 +136,45 @@ void Verifier::check_header() const {
                                std::to_string(bits));
     any_wide |= bits == 64;
   }
-  if (has_features && !any_wide)
-    broken(file_.path() + ": header", "version 2 without a wide level, expected version 1");
-  check_zeros(kAttributesAt, kFeaturesAt, "reserved");
+  uint64_t features = 0;
+  if (has_features) std::memcpy(&features, file_.data() + kFeaturesAt, sizeof(features));
+  if (has_features && (features == 0 || any_wide != ((features & kWideLevels) != 0)))
+    broken(file_.path() + ": header",
+           "version 2 without a wide level or attributes, expected version 1; or a feature bit is "
+           "wrong");
+  check_attributes((features & kAttributes) != 0);
   check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "reserved");
+}
+
+// The only kind of attribute is color.
+void Verifier::check_attributes(bool has_attributes) const {
+  uint64_t count;
+  std::memcpy(&count, file_.data() + kAttributeCountAt, sizeof(count));
+  if (count != (has_attributes ? 1 : 0) || has_attributes != file_.has_colors())
+    broken(file_.path() + ": header",
+           std::to_string(count) +
+               " attribute sections, expected one of colors, or none and no "
+               "feature bit 2");
+  uint64_t entry[kAttributeEntryBytes / sizeof(uint64_t)];
+  std::memcpy(entry, file_.data() + kAttributesAt, sizeof(entry));
+  if (has_attributes) {
+    const voxdag_reader::ColorSection& colors = file_.colors();
+    uint64_t cells = 0, finest_cells = 0;
+    for (uint32_t t = 0; t < colors.tier_count(); ++t) cells += colors.tier(t).cell_count;
+    for (uint64_t i = 0; i < colors.tier(0).region_count; ++i) {
+      voxdag_reader::ColorRegion region;
+      if (!voxdag_reader::ColorSection::region(colors.tier(0), i, region))
+        broken(file_.path() + ": colors", "region " + std::to_string(i) + " is damaged");
+      finest_cells += region.counts[0];
+    }
+    if (entry[kAttributeCellsAt / 8] != cells || entry[kAttributeFinestCellsAt / 8] != finest_cells)
+      broken(file_.path() + ": header", std::to_string(entry[kAttributeCellsAt / 8]) +
+                                            " colors, the section has " + std::to_string(cells));
+    const uint64_t end = entry[kAttributeOffsetAt / 8] + entry[kAttributeBytesAt / 8];
+    check_zeros(end, round_up_to_page(end), "padding after the colors");
+  }
+  const size_t first = has_attributes ? kAttributeReservedAt : 0;
+  check_zeros(kAttributesAt + first, kFeaturesAt, "reserved");
 }
 
 void Verifier::check_block(uint64_t block, uint64_t table) const {

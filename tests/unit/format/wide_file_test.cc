@@ -81,7 +81,7 @@ TEST_F(WideFileTest, HasTheVoxelsOfTheNarrowFile) {
 }
 
 TEST_F(WideFileTest, UnknownFeaturesAreNotRead) {
-  for (const uint64_t features : {uint64_t{2}, uint64_t{3}, uint64_t{1} << 63}) {
+  for (const uint64_t features : {uint64_t{4}, uint64_t{5}, uint64_t{1} << 63}) {
     const Error error = error_with(kFeaturesAt, features);
     EXPECT_EQ(error.code(), ErrorCode::kUnsupportedVersion);
     EXPECT_THAT(error.message(), HasSubstr("feature bits " + std::to_string(features)));

@@ -1,0 +1,183 @@
+#include "core/format/color/verify_colors.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/color/blocks/region.h"
+#include "core/format/global/open_global.h"
+
+namespace voxdag {
+namespace {
+
+using voxdag_reader::ColorRegion;
+using voxdag_reader::ColorSection;
+using voxdag_reader::ColorTier;
+
+// Walks the set cells of the DAG below a cube, in Morton order.
+class CellWalk {
+ public:
+  explicit CellWalk(const voxdag_reader::File& file) : file_(file) {}
+
+  // Calls visit(level, code) for all cells of the levels down to `finest`, a parent first. `code`
+  // is relative to the cube.
+  template <class Visit>
+  void walk(uint32_t level, uint64_t place, uint64_t code, uint32_t finest, Visit& visit) const {
+    visit(level, code);
+    if (level == finest) return;
+    const uint32_t mask = mask_of(level, place);
+    for (unsigned i = 0; i < 8; ++i)
+      if (mask >> i & 1) walk(level + 1, child_of(level, place, i), 8 * code + i, finest, visit);
+  }
+  // The place of a cube; false if it is not set.
+  bool find(uint32_t level, uint64_t code, uint64_t& place) const {
+    place = 0;
+    for (uint32_t l = 0; l < level; ++l) {
+      const auto index = static_cast<unsigned>(code >> 3 * (level - l - 1) & 7);
+      if (!(mask_of(l, place) >> index & 1)) return false;
+      place = child_of(l, place, index);
+    }
+    return true;
+  }
+
+ private:
+  // A place is a word offset; below the bricks it is the mask of the cell's children.
+  uint32_t mask_of(uint32_t level, uint64_t place) const {
+    if (level < file_.brick_level()) return file_.node(level, place).child_mask;
+    if (level > file_.brick_level()) return static_cast<uint32_t>(place);
+    const uint64_t brick = file_.brick(place);
+    uint32_t mask = 0;
+    for (unsigned i = 0; i < 8; ++i) mask |= (brick >> 8 * i & 255 ? 1u : 0u) << i;
+    return mask;
+  }
+  uint64_t child_of(uint32_t level, uint64_t place, unsigned index) const {
+    if (level < file_.brick_level())
+      return voxdag_reader::File::child(file_.node(level, place), static_cast<int>(index));
+    return level == file_.brick_level() ? file_.brick(place) >> 8 * index & 255 : 0;
+  }
+
+  const voxdag_reader::File& file_;
+};
+
+class ColorVerifier {
+ public:
+  explicit ColorVerifier(const voxdag_reader::File& file) : file_(file), cells_(file) {}
+
+  uint64_t cells_of_level(uint32_t level) const {
+    uint64_t count = 0;
+    const auto visit = [&](uint32_t l, uint64_t) { count += l == level; };
+    cells_.walk(0, 0, 0, level, visit);
+    return count;
+  }
+
+  // The region is read; returns where the next one's data begin.
+  ColorRegion check_region(const ColorTier& tier, uint64_t i) const {
+    ColorRegion region;
+    if (!ColorSection::region(tier, i, region)) fail(tier, i, "its counts or its place are wrong");
+    for (int at = 29; at < 32; ++at)
+      if (tier.directory[32 * i + static_cast<uint64_t>(at)] != 0)
+        fail(tier, i, "a reserved byte is not 0");
+    uint64_t place;
+    if (region.morton >> 3 * tier.region_level != 0 ||
+        !cells_.find(tier.region_level, region.morton, place))
+      fail(tier, i, "the DAG has no cells there");
+    std::array<uint32_t, kRegionLevels + 1> counts{};
+    std::vector<uint32_t> prefix[2];
+    const auto visit = [&](uint32_t level, uint64_t) {
+      const uint32_t coarser = tier.finest_level - level;
+      if (coarser >= kPrefixLevels && coarser - kPrefixLevels < 2 && level > tier.region_level)
+        prefix[coarser - kPrefixLevels].push_back(counts[coarser - kPrefixLevels]);
+      ++counts[coarser];
+    };
+    cells_.walk(tier.region_level, place, 0, tier.finest_level, visit);
+    if (!std::equal(counts.begin(), counts.end(), region.counts))
+      fail(tier, i, "it does not have as many colors as the DAG has cells");
+    for (uint32_t table = 0; table < 2; ++table)
+      for (uint64_t entry = 0; entry < region.prefix_count(table); ++entry)
+        if (region.prefix(table, entry) != prefix[table][entry])
+          fail(tier, i, "prefix " + std::to_string(entry) + " is not the number of cells before");
+    check_blocks(tier, i, region);
+    return region;
+  }
+
+  [[noreturn]] void fail(const ColorTier& tier, uint64_t i, const std::string& what) const {
+    throw Error(ErrorCode::kCorrupt, file_.path() + ": colors of level " +
+                                         std::to_string(tier.finest_level) + ", region " +
+                                         std::to_string(i) + ": " + what);
+  }
+
+ private:
+  void check_blocks(const ColorTier& tier, uint64_t i, const ColorRegion& region) const {
+    const uint64_t blocks = (region.cells + 31) / 32;
+    for (uint64_t b = 0; b < blocks; ++b) {
+      const auto there = static_cast<unsigned>(std::min<uint64_t>(32, region.cells - 32 * b));
+      if (!is_canonical(region.blocks + 16 * b, there))
+        fail(tier, i, "block " + std::to_string(b) + " is not in the form of its mode");
+    }
+    const uint64_t prefix_bytes = 4 * (region.prefix_count(0) + region.prefix_count(1));
+    for (uint64_t at = 16 * blocks + prefix_bytes; at < 16 * region.units(); ++at)
+      if (region.blocks[at] != 0) fail(tier, i, "its padding is not 0");
+  }
+
+  static bool is_canonical(const unsigned char* block, unsigned cells) {
+    const auto bits = [&](unsigned bit, unsigned count) {
+      uint32_t value = 0;
+      for (unsigned n = count; n-- > 0;)
+        value = value << 1 | (block[(bit + n) / 8] >> (bit + n) % 8 & 1u);
+      return value;
+    };
+    const bool mode_b = bits(0, 16) == 0;
+    const uint32_t first = mode_b ? bits(16, 24) : bits(0, 16);
+    const uint32_t second = mode_b ? bits(40, 24) : bits(16, 16);
+    if (first < second || (first == second && !mode_b)) return false;
+    const unsigned width = mode_b ? 2 : 3, begin = mode_b ? 64 : 32;
+    const unsigned used = first == second ? 0 : width * cells;
+    for (unsigned bit = begin + used; bit < 128; ++bit)
+      if (bits(bit, 1) != 0) return false;
+    return true;
+  }
+
+  const voxdag_reader::File& file_;
+  const CellWalk cells_;
+};
+
+}  // namespace
+
+void verify_colors(const voxdag_reader::File& file, unsigned threads, Progress& progress,
+                   const CancelToken& cancel) {
+  if (!file.has_colors()) return;
+  with_reader_errors([&] {
+    const ColorVerifier verifier(file);
+    for (uint32_t t = 0; t < file.colors().tier_count(); ++t) {
+      const ColorTier& tier = file.colors().tier(t);
+      if (verifier.cells_of_level(tier.region_level) != tier.region_count)
+        verifier.fail(tier, tier.region_count, "the DAG has another number of regions");
+      progress.begin_stage("verify colors", tier.region_count, "regions");
+      std::atomic<uint64_t> cells = 0;
+      parallel_for(threads, tier.region_count, [&](unsigned, size_t i) {
+        cancel.check();
+        const ColorRegion region = verifier.check_region(tier, i);
+        uint64_t expected = 0;
+        ColorRegion before;
+        if (i > 0 && !ColorSection::region(tier, i - 1, before))
+          verifier.fail(tier, i - 1, "its counts or its place are wrong");
+        if (i > 0) expected = before.first_unit + before.units();
+        if (region.first_unit != expected || (i > 0 && region.morton <= before.morton))
+          verifier.fail(tier, i, "it does not follow the one before it");
+        if (i + 1 == tier.region_count && region.first_unit + region.units() != tier.units)
+          verifier.fail(tier, i, "the data of the tier do not end with it");
+        cells += region.cells;
+        progress.advance(1);
+      });
+      if (cells != tier.cell_count)
+        verifier.fail(tier, tier.region_count, "the tier names another number of cells");
+      progress.end_stage();
+    }
+  });
+}
+
+}  // namespace voxdag
