@@ -1,19 +1,83 @@
-// The stored color of what the surfaces in a cell add up to.
+// The stored color of a cell: the mean of what its surfaces look like, in sRGB.
 #pragma once
 
-#include <algorithm>
+#include <array>
+#include <cstdint>
 
+#include "core/base/host_device.h"
 #include "core/color/color_sum.h"
 
 namespace voxdag {
 
-inline Color color_of(const ColorSum& sum) {
-  const bool seen = sum.seen_weight != 0;
-  const uint64_t weight = std::max<uint64_t>(seen ? sum.seen_weight : sum.weight, 1);
+namespace color {
+
+// Element i - 1: the least linear intensity (65535 is 1) that is stored as i, which is
+// ceil(65535 f((i - 1/2) / 255)) with f the transfer function of IEC 61966-2-1. None of the 255
+// arguments of the ceiling is nearer than 10^-6 to a whole number.
+struct SrgbThresholds {
+  uint16_t of[256] = {
+      10,    30,    50,    70,    90,    110,   130,   150,   170,   189,   209,   230,   253,
+      276,   301,   327,   354,   382,   412,   443,   475,   509,   544,   580,   618,   657,
+      698,   740,   783,   828,   875,   923,   972,   1023,  1075,  1129,  1185,  1242,  1300,
+      1360,  1422,  1486,  1551,  1617,  1685,  1755,  1827,  1900,  1975,  2052,  2130,  2210,
+      2292,  2376,  2461,  2548,  2637,  2727,  2820,  2914,  3010,  3108,  3208,  3309,  3412,
+      3518,  3625,  3734,  3844,  3957,  4072,  4188,  4307,  4427,  4550,  4674,  4800,  4928,
+      5059,  5191,  5325,  5461,  5599,  5740,  5882,  6026,  6173,  6321,  6471,  6624,  6778,
+      6935,  7094,  7255,  7418,  7583,  7750,  7919,  8091,  8265,  8440,  8618,  8798,  8981,
+      9165,  9352,  9541,  9732,  9925,  10121, 10318, 10518, 10720, 10925, 11132, 11341, 11552,
+      11765, 11981, 12199, 12420, 12643, 12868, 13095, 13325, 13557, 13791, 14028, 14267, 14508,
+      14752, 14998, 15247, 15498, 15751, 16007, 16265, 16525, 16788, 17054, 17321, 17592, 17864,
+      18139, 18417, 18697, 18980, 19264, 19552, 19842, 20134, 20429, 20727, 21027, 21329, 21634,
+      21942, 22252, 22564, 22880, 23197, 23518, 23840, 24166, 24494, 24824, 25158, 25493, 25832,
+      26173, 26516, 26862, 27211, 27563, 27917, 28273, 28633, 28995, 29359, 29727, 30097, 30469,
+      30845, 31223, 31603, 31987, 32373, 32762, 33153, 33547, 33944, 34344, 34747, 35152, 35560,
+      35970, 36384, 36800, 37219, 37640, 38065, 38492, 38922, 39355, 39790, 40229, 40670, 41114,
+      41561, 42011, 42463, 42918, 43377, 43838, 44301, 44768, 45238, 45710, 46185, 46663, 47144,
+      47628, 48115, 48605, 49097, 49593, 50091, 50592, 51096, 51604, 52114, 52627, 53142, 53661,
+      54183, 54708, 55235, 55766, 56300, 56836, 57376, 57918, 58464, 59012, 59564, 60118, 60675,
+      61236, 61799, 62366, 62935, 63508, 64083, 64662, 65244, 65535};
+};
+// Element k: what is stored for the intensity 64 k, or one less.
+struct SrgbStarts {
+  uint8_t of[1024] = {};
+  constexpr SrgbStarts() {
+    constexpr SrgbThresholds kThresholds{};
+    uint32_t stored = 0;
+    for (uint32_t k = 0; k < 1024; ++k) {
+      while (stored < 255 && kThresholds.of[stored] <= 64 * k) ++stored;
+      of[k] = static_cast<uint8_t>(stored);
+    }
+  }
+};
+
+// Nearest in sRGB: how many thresholds are not above `intensity`, at most 65535.
+VOXDAG_HD inline uint8_t srgb_of(uint32_t intensity) {
+  constexpr SrgbThresholds kThresholds{};
+  constexpr SrgbStarts kStarts{};
+  uint32_t stored = kStarts.of[intensity >> 6];
+  while (stored < 255 && kThresholds.of[stored] <= intensity) ++stored;
+  return static_cast<uint8_t>(stored);
+}
+
+VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denominator) {
+  const uint64_t quotient = numerator / denominator, rest = numerator % denominator;
+  return quotient + (rest >= denominator - rest ? 1 : 0);
+}
+
+}  // namespace color
+
+// Of a sum whose weight is above 0. Surfaces count by weight and alpha; where all of them are
+// transparent, by weight, and alpha is 0.
+VOXDAG_HD inline Color color_of(const ColorSum& sum) {
+  const bool visible = sum.seen_weight != 0;
   Color color;
-  for (size_t c = 0; c < 3; ++c)
-    color.rgb[c] = static_cast<uint8_t>((seen ? sum.seen[c] : sum.plain[c]) / weight >> 8);
-  color.alpha = static_cast<uint8_t>(seen ? 255 : 0);
+  for (size_t c = 0; c < 3; ++c) {
+    const uint64_t mean = visible ? color::rounded_quotient(sum.seen[c], sum.seen_weight)
+                                  : color::rounded_quotient(sum.plain[c], sum.weight);
+    color.rgb[c] = color::srgb_of(static_cast<uint32_t>(mean < 65535 ? mean : 65535));
+  }
+  const uint64_t alpha = color::rounded_quotient(sum.seen_weight, sum.weight);
+  color.alpha = static_cast<uint8_t>(alpha < 255 ? alpha : 255);
   return color;
 }
 

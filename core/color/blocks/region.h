@@ -12,11 +12,10 @@
 
 #include "core/color/blocks/block_codec.h"
 #include "core/color/color_sum.h"
+#include "core/color/rule/color_grid.h"
 
 namespace voxdag {
 
-// Levels from the cells of a region to the region: 64^3 cells.
-inline constexpr uint32_t kRegionLevels = 6;
 // The rank of a cell is counted from its ancestor so many levels above.
 inline constexpr uint32_t kPrefixLevels = 4;
 

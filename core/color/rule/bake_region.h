@@ -1,0 +1,178 @@
+// What the surfaces in a region of the color grid look like: the rule of docs/color.md. The sum of
+// a cell is a function of the triangles that touch it, of their materials and of the images,
+// whatever the order of the triangles, and whichever region that contains the cell is baked.
+//
+// `Textures` is a reader of images, linear and with 16 bits per channel, as pyramids of
+// box-filtered levels, the first one being the image:
+//     uint32_t levels(uint32_t image), width(uint32_t image, uint32_t level), height(...);
+//     uint64_t texel(uint32_t image, uint32_t level, uint32_t x, uint32_t y);  // r lowest, then g,
+//     b, a
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/color/color_sum.h"
+#include "core/color/rule/cell_triangle.h"
+#include "core/color/rule/closest_point.h"
+#include "core/color/rule/color_grid.h"
+#include "core/color/rule/covered_surface.h"
+#include "core/color/rule/region_cells.h"
+#include "core/color/rule/surface_look.h"
+#include "core/color/rule/touched_cells.h"
+#include "core/color/surface.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/morton.h"
+#include "core/geometry/octree_descent.h"
+
+namespace voxdag {
+
+// Bakes one region after another, for one thread; the memory is used again.
+template <class Textures>
+class RegionBaker {
+ public:
+  // At most what it has allocated, `cells` not counted.
+  static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
+
+  // The references must outlive it. Each triangle's material is an index into `materials`.
+  RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures)
+      : grid_(grid), materials_(materials), textures_(textures) {
+    waiting_.reserve(kMaxWaiting);
+    for (uint32_t k = 0; k < 64; ++k) spread_[k] = static_cast<uint32_t>(spread_bits3(k));
+  }
+
+  // `region`: a cube of at most 64^3 color cells. `triangles`: all that may touch it, and at most
+  // 2^32. `cells` becomes the cells that they touch, in Morton order.
+  void bake(const Cube& region, std::span<const FixedSurface> triangles,
+            std::vector<ColoredCell>& cells) {
+    triangles_ = triangles;
+    const uint32_t down = grid_.color_levels - region.level;
+    for (int a = 0; a < 3; ++a) {
+      first_[a] = static_cast<int64_t>(region.position[a]) << down;
+      last_[a] = first_[a] + (int64_t{1} << down) - 1;
+    }
+    for (uint32_t i = 0; i < triangles.size(); ++i) add(i);
+    add_waiting();
+    cells_.take(cells);
+  }
+
+ private:
+  static constexpr size_t kMaxWaiting = 1 << 16;
+  // A triangle that touches a cell and covers no column of it.
+  struct Waiting {
+    uint32_t triangle, code;
+  };
+
+  void add(uint32_t index) {
+    const FixedTriangle& triangle = triangles_[index].position;
+    const CellBox box(triangle, grid_.levels, grid_.color_levels);
+    for (int a = 0; a < 3; ++a)
+      if (box.high[a] < first_[a] || box.low[a] > last_[a]) return;
+    if (box.low[0] == box.high[0] && box.low[1] == box.high[1] && box.low[2] == box.high[2] &&
+        !may_cover(triangle)) {
+      wait(index, code_of(box.low));
+    } else if (color::is_narrow(triangle)) {
+      add_in<int64_t>(index, box);
+    } else {
+      add_in<int128>(index, box);
+    }
+  }
+
+  // False if the triangle's box has no columns of any two axes: most tiny triangles.
+  bool may_cover(const FixedTriangle& triangle) const {
+    const int bits = grid_.cell_bits() - 2;
+    const int64_t half = int64_t{1} << (bits - 1);
+    int axes = 0;
+    for (int a = 0; a < 3; ++a)
+      axes += (triangle.low(a) + half - 1) >> bits != (triangle.high(a) + half) >> bits;
+    return axes >= 2;
+  }
+
+  template <class Int>
+  void add_in(uint32_t index, const CellBox& box) {
+    const FixedSurface& surface = triangles_[index];
+    const color::CellTriangle<Int> triangle(surface.position, grid_.cell_bits());
+    color::CellRange range;
+    for (int d = 0; d < 3; ++d) {
+      const int a = triangle.axis[d];
+      range.first[d] = std::max(box.low[a], first_[a]);
+      range.last[d] = std::min(box.high[a], last_[a]);
+    }
+    const color::CoveredSurface<Int> covered(triangle);
+    std::optional<color::SurfaceLook<Textures>> look;
+    color::TouchedCells<Int>(triangle, range)
+        .visit([&](int64_t p, int64_t q, int64_t r, uint32_t columns) {
+          int64_t position[3];
+          position[triangle.axis[0]] = p;
+          position[triangle.axis[1]] = q;
+          position[triangle.axis[2]] = r;
+          const uint32_t code = code_of(position);
+          if (columns == 0) return wait(index, code);
+          if (!look)
+            look.emplace(surface, materials_[surface.material], textures_, triangle.cell_bits,
+                         triangle.area);
+          const color::ColumnTotals totals = color::totals_of(columns);
+          look->add(covered.mean_point(p, q, totals), covered.weight(totals), cells_.cover(code));
+        });
+  }
+
+  void wait(uint32_t index, uint32_t code) {
+    if (cells_.is_covered(code)) return;
+    cells_.touch(code);
+    if (waiting_.size() == kMaxWaiting) add_waiting();
+    waiting_.push_back({index, code});
+  }
+  // Adds closest points to those cells that nothing covers so far.
+  void add_waiting() {
+    std::optional<color::SurfaceLook<Textures>> look;
+    uint32_t last = 0;
+    for (const Waiting& waiting : waiting_) {
+      if (cells_.is_covered(waiting.code)) continue;
+      const FixedSurface& surface = triangles_[waiting.triangle];
+      if (!look || last != waiting.triangle)
+        look.emplace(surface, materials_[surface.material], textures_, grid_.cell_bits(),
+                     color::area_of(surface.position));
+      last = waiting.triangle;
+      look->add(color::closest_point(surface.position, center_of(waiting.code)), 1,
+                cells_.touch(waiting.code));
+    }
+    waiting_.clear();
+  }
+
+  uint32_t code_of(const int64_t (&position)[3]) const {
+    return spread_[position[0] - first_[0]] << 2 | spread_[position[1] - first_[1]] << 1 |
+           spread_[position[2] - first_[2]];
+  }
+  // In lattice units.
+  std::array<int64_t, 3> center_of(uint32_t code) const {
+    uint32_t at[3];
+    morton_decode(code, at[0], at[1], at[2]);
+    std::array<int64_t, 3> center;
+    for (size_t a = 0; a < 3; ++a)
+      center[a] = (2 * (first_[a] + at[a]) + 1) << (grid_.cell_bits() - 1);
+    return center;
+  }
+
+  const ColorGrid grid_;
+  const std::span<const Material> materials_;
+  Textures& textures_;
+  uint32_t spread_[64];
+  std::span<const FixedSurface> triangles_;
+  int64_t first_[3] = {}, last_[3] = {};  // cells of the region
+  color::RegionCells cells_;
+  std::vector<Waiting> waiting_;
+};
+
+// RegionBaker::bake() for a single region.
+template <class Textures>
+void bake_region(const ColorGrid& grid, const Cube& region, std::span<const FixedSurface> triangles,
+                 std::span<const Material> materials, Textures& textures,
+                 std::vector<ColoredCell>& cells) {
+  RegionBaker<Textures>(grid, materials, textures).bake(region, triangles, cells);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,144 @@
+// A triangle prepared for the cells of the color grid: exact integer tests of what it touches
+// (core/geometry/overlap.h) and of what its columns cover (docs/color.md).
+//
+// Axes 0, 1, 2 are here a cyclic permutation of x, y, z such that axis 2 is the dominant one: that
+// of the largest component of the normal, which is made positive (n_2 > 0, and |n_0|, |n_1| <=
+// n_2).
+//
+//        axis 1                A cell's 16 columns run along axis 2, at 1/8, 3/8, 5/8 and 7/8 of
+//        its | . . . .             edge E. Column (P, Q) of the grid is at ((2 P + 1) E/8, (2 Q +
+//        1) E/8), | . . . .             so cell (p, q) has the columns 4p..4p+3 x 4q..4q+3.
+//        "Quarters" are | . . . .             units of E/4. | . . . .
+//        +--------- axis 0
+//
+// All tests are signs of linear functions with integer coefficients at cells or columns. Divided by
+// E (by E/4) they are A p + B q + C with C a quotient, rounded down or up without changing any
+// sign.
+//
+// Bounds. Int = int64_t for triangles in the narrow box: coordinates v with 0 <= v + 2^27 < 2^29
+// (the grid's are at most 2^28). Edges are below 2^29, normals at most 2^58, edge functions
+// anywhere in the box below 2^59 and, added over 16 columns inside the triangle, at most 2^62.
+// Values of the plane at columns of cells that it touches are below 10 n_2 < 2^62 in quarters;
+// other intermediate values wrap. Int = int128 for the rest: coordinates at most 2^40, normals at
+// most 2^82, n.v below 2^124.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "core/base/host_device.h"
+#include "core/base/integers.h"
+#include "core/color/rule/exact.h"
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag::color {
+
+VOXDAG_HD inline bool is_narrow(const FixedTriangle& t) {
+  constexpr int64_t kLow = int64_t{1} << 27;
+  uint64_t bits = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int a = 0; a < 3; ++a) bits |= static_cast<uint64_t>(t.v[i][a] + kLow);
+  return bits >> 29 == 0;
+}
+
+template <class Int>
+VOXDAG_HD inline void normal_of(const FixedTriangle& t, Int (&n)[3]) {
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    n[a] = static_cast<Int>(t.v[1][b] - t.v[0][b]) * (t.v[2][c] - t.v[1][c]) -
+           static_cast<Int>(t.v[1][c] - t.v[0][c]) * (t.v[2][b] - t.v[1][b]);
+  }
+}
+
+// Along x, y, z. The square root of IEEE 754 is exact for planes across an axis.
+template <class Int>
+VOXDAG_HD inline double length_of(const Int (&n)[3]) {
+  const double x = to_double(n[0]), y = to_double(n[1]), z = to_double(n[2]);
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+// Of the triangle, doubled, in lattice units.
+VOXDAG_HD inline double area_of(const FixedTriangle& triangle) {
+  if (is_narrow(triangle)) {
+    int64_t n[3];
+    normal_of(triangle, n);
+    return length_of(n);
+  }
+  int128 n[3];
+  normal_of(triangle, n);
+  return length_of(n);
+}
+
+template <class Int>
+struct CellTriangle {
+  // The edge function in a projection, >= 0 inside: a x + b y + base in lattice units.
+  struct Edge {
+    Int a, b, base;
+    // In cells: the largest value over the closed cell (p, q) is >= 0 iff a p + b q + touch >= 0.
+    Int touch;
+  };
+
+  int axis[3];
+  int cell_bits;    // log2 E
+  int64_t v[3][3];  // [vertex][permuted axis]
+  Int normal[3];    // all 0 if the triangle is degenerate
+  double slope[2];  // of its height along axis 2; only for estimates
+  bool degenerate;
+  double area;  // doubled, in lattice units: the length of the normal
+  // The plane's offset -n.v: in cells, rounded down and up; in quarters, at columns.
+  Int plane_floor, plane_ceil, column_floor, column_ceil;
+  // [projection along axis d][edge i from vertex i to i + 1], over axes d + 1 and d + 2.
+  Edge edges[3][3];
+  // Along axis 2: the edge functions at columns are 2^(cell_bits - 2) (a P + b Q) + at_column, and
+  // >= 0 iff a P + b Q + column >= 0.
+  Int at_column[3], column[3];
+
+  VOXDAG_HD CellTriangle(const FixedTriangle& triangle, int bits) : cell_bits(bits) {
+    Int n[3];
+    normal_of(triangle, n);
+    int dominant = magnitude(n[1]) > magnitude(n[0]) ? 1 : 0;
+    if (magnitude(n[2]) > magnitude(n[dominant])) dominant = 2;
+    degenerate = n[dominant] == 0;
+    area = length_of(n);
+    const Int sign = n[dominant] < 0 ? -1 : 1;
+    for (int d = 0; d < 3; ++d) {
+      axis[d] = (dominant + 1 + d) % 3;
+      normal[d] = sign * n[axis[d]];
+      for (int i = 0; i < 3; ++i) v[i][d] = triangle.v[i][axis[d]];
+    }
+    set_edges(2, sign);
+    set_edges(0, sign);
+    set_edges(1, sign);
+    if (!degenerate) set_plane();
+  }
+
+ private:
+  VOXDAG_HD void set_edges(int d, Int orientation) {
+    const int x = (d + 1) % 3, y = (d + 2) % 3;
+    const Int sign = normal[d] < 0 ? -orientation : orientation;
+    for (int i = 0; i < 3; ++i) {
+      const int j = i == 2 ? 0 : i + 1;
+      Edge& e = edges[d][i];
+      e.a = -sign * (v[j][y] - v[i][y]);
+      e.b = sign * (v[j][x] - v[i][x]);
+      e.base = -(e.a * v[i][x] + e.b * v[i][y]);
+      e.touch = (e.base >> cell_bits) + positive_part(e.a) + positive_part(e.b);
+      if (d != 2) continue;
+      at_column[i] = e.base + (e.a + e.b) * (Int{1} << (cell_bits - 3));
+      column[i] = at_column[i] >> (cell_bits - 2);
+    }
+  }
+
+  VOXDAG_HD void set_plane() {
+    int128 offset = 0;
+    for (int a = 0; a < 3; ++a) offset -= static_cast<int128>(normal[a]) * v[0][a];
+    plane_floor = static_cast<Int>(offset >> cell_bits);
+    plane_ceil = static_cast<Int>(-(-offset >> cell_bits));
+    offset += (static_cast<int128>(normal[0]) + normal[1]) << (cell_bits - 3);
+    column_floor = static_cast<Int>(offset >> (cell_bits - 2));
+    column_ceil = static_cast<Int>(-(-offset >> (cell_bits - 2)));
+    for (int a = 0; a < 2; ++a) slope[a] = -to_double(normal[a]) / to_double(normal[2]);
+  }
+};
+
+}  // namespace voxdag::color

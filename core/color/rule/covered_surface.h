@@ -1,0 +1,63 @@
+// A triangle where it covers columns of cells: how much it weighs there, and its mean point.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.h"
+#include "core/color/rule/cell_triangle.h"
+#include "core/color/rule/columns.h"
+#include "core/color/rule/surface_look.h"
+
+namespace voxdag::color {
+
+// What a column weighs where the surface is square to it; up to sqrt(3) times as much where it is
+// oblique, since it then has more area. Where nothing covers a column, each triangle weighs 1.
+inline constexpr double kColumnWeight = 64;
+
+struct Reciprocals {
+  double of[17] = {};
+  constexpr Reciprocals() {
+    for (int i = 1; i <= 16; ++i) of[i] = 1.0 / i;
+  }
+};
+
+template <class Int>
+class CoveredSurface {
+ public:
+  // The triangle must outlive it. One that is degenerate covers nothing.
+  VOXDAG_HD explicit CoveredSurface(const CellTriangle<Int>& triangle) : t_(triangle) {
+    if (t_.degenerate) return;
+    const double normal = to_double(t_.normal[2]);
+    scale_ = static_cast<double>(kPointOne) / normal;
+    column_weight_ = static_cast<uint64_t>(kColumnWeight * t_.area / normal + 0.5);
+  }
+
+  VOXDAG_HD uint64_t weight(const ColumnTotals& totals) const {
+    return column_weight_ * static_cast<uint64_t>(totals.count);
+  }
+
+  // The mean of the covered columns of a cell, at least one.
+  VOXDAG_HD SurfacePoint mean_point(int64_t p, int64_t q, const ColumnTotals& totals) const {
+    constexpr Reciprocals kReciprocals{};
+    const Int sum_p = 4 * p * totals.count + totals.sum_i;
+    const Int sum_q = 4 * q * totals.count + totals.sum_j;
+    const double share = kReciprocals.of[totals.count];
+    return surface_point(to_double(sum_of(2, sum_p, sum_q, totals.count)) * scale_ * share,
+                         to_double(sum_of(0, sum_p, sum_q, totals.count)) * scale_ * share);
+  }
+
+ private:
+  // Of the edge function, which is the area opposite to a vertex, over the columns: exact.
+  VOXDAG_HD Int sum_of(int i, Int sum_p, Int sum_q, Int count) const {
+    const auto& e = t_.edges[2][i];
+    const Int quarters = wrapping_sum(wrapping_product(e.a, sum_p), wrapping_product(e.b, sum_q));
+    return wrapping_sum(wrapping_product(quarters, Int{1} << (t_.cell_bits - 2)),
+                        wrapping_product(count, t_.at_column[i]));
+  }
+
+  const CellTriangle<Int>& t_;
+  double scale_ = 0;
+  uint64_t column_weight_ = 0;
+};
+
+}  // namespace voxdag::color

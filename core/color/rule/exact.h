@@ -1,0 +1,55 @@
+// Integers of the color rule: products that are exact, or exact modulo 2^64 where the result is
+// known to fit, and conversions to doubles that round alike everywhere.
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+#include "core/base/host_device.h"
+#include "core/base/integers.h"
+
+namespace voxdag::color {
+
+template <class Int>
+using UnsignedOf = std::conditional_t<sizeof(Int) == 8, uint64_t, uint128>;
+
+// Products and sums whose intermediate values may not fit in Int, but whose result does.
+template <class Int>
+VOXDAG_HD inline Int wrapping_product(Int a, Int b) {
+  return static_cast<Int>(static_cast<UnsignedOf<Int>>(a) * static_cast<UnsignedOf<Int>>(b));
+}
+template <class Int>
+VOXDAG_HD inline Int wrapping_sum(Int a, Int b) {
+  return static_cast<Int>(static_cast<UnsignedOf<Int>>(a) + static_cast<UnsignedOf<Int>>(b));
+}
+
+template <class Int>
+VOXDAG_HD inline Int magnitude(Int x) {
+  return x < 0 ? -x : x;
+}
+template <class Int>
+VOXDAG_HD inline Int positive_part(Int x) {
+  return x > 0 ? x : 0;
+}
+template <class Int>
+VOXDAG_HD inline Int negative_part(Int x) {
+  return x < 0 ? x : 0;
+}
+
+// Rounds to nearest, once. 128-bit numbers that do not fit in 64 bits are rounded by halves, since
+// compilers convert them by functions of their own.
+VOXDAG_HD inline double to_double(int64_t x) { return static_cast<double>(x); }
+VOXDAG_HD inline double to_double(int128 x) {
+  const int64_t low = static_cast<int64_t>(x);
+  if (low == x) return static_cast<double>(low);
+  return static_cast<double>(static_cast<int64_t>(x >> 64)) * 0x1p64 +
+         static_cast<double>(static_cast<uint64_t>(x));
+}
+
+// floor(x) of a number of magnitude below 2^62.
+VOXDAG_HD inline int64_t floor_of(double x) {
+  const int64_t whole = static_cast<int64_t>(x);
+  return static_cast<double>(whole) > x ? whole - 1 : whole;
+}
+
+}  // namespace voxdag::color

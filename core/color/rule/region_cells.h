@@ -1,0 +1,67 @@
+// The cells of a region that surfaces touch, and their sums, found by Morton code in the region.
+//
+// A cell is covered if a surface covers a column of it; surfaces that do not then count for
+// nothing. Since that is known at the end only, a cell has the sum of the latter until the first
+// one that covers a column starts it from zero. So the sums do not depend on the order.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "core/base/host_device.h"
+#include "core/color/color_sum.h"
+#include "core/color/rule/color_grid.h"
+
+namespace voxdag::color {
+
+class RegionCells {
+ public:
+  static constexpr uint32_t kMaxCells = 1u << (3 * kRegionLevels);
+  // At most, in all vectors together while they grow.
+  static constexpr uint64_t kMaxBytes =
+      uint64_t{kMaxCells} * (4 + 3 * sizeof(ColorSum)) + (64 << 10);
+
+  RegionCells() : places_(kMaxCells), touched_(kMaxCells / 64), covered_(kMaxCells / 64) {}
+
+  bool is_covered(uint32_t code) const { return covered_[code / 64] >> code % 64 & 1; }
+  // Makes the cell exist.
+  ColorSum& touch(uint32_t code) {
+    if (places_[code] == 0) {
+      sums_.emplace_back();
+      places_[code] = static_cast<uint32_t>(sums_.size());
+      touched_[code / 64] |= uint64_t{1} << code % 64;
+    }
+    return sums_[places_[code] - 1];
+  }
+  // The sum of surfaces that cover columns of the cell.
+  ColorSum& cover(uint32_t code) {
+    ColorSum& sum = touch(code);
+    if (!is_covered(code)) {
+      covered_[code / 64] |= uint64_t{1} << code % 64;
+      sum = {};
+    }
+    return sum;
+  }
+
+  // Moves the cells into `cells`, in Morton order.
+  void take(std::vector<ColoredCell>& cells) {
+    cells.clear();
+    cells.reserve(sums_.size());
+    for (uint32_t word = 0; word < touched_.size(); ++word) {
+      for (uint64_t rest = std::exchange(touched_[word], 0); rest != 0; rest &= rest - 1) {
+        const uint32_t code = word * 64 + static_cast<uint32_t>(lowest_bit(rest));
+        cells.push_back({code, sums_[std::exchange(places_[code], 0) - 1]});
+      }
+      covered_[word] = 0;
+    }
+    sums_.clear();
+  }
+
+ private:
+  std::vector<uint32_t> places_;  // in sums_, from 1; 0: not touched
+  std::vector<uint64_t> touched_, covered_;
+  std::vector<ColorSum> sums_;
+};
+
+}  // namespace voxdag::color

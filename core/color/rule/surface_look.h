@@ -1,0 +1,157 @@
+// What a triangle looks like at a point of it: texture, factor and vertex color, and alpha.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.h"
+#include "core/base/integers.h"
+#include "core/color/color_sum.h"
+#include "core/color/rule/texture_lookup.h"
+#include "core/color/surface.h"
+
+namespace voxdag::color {
+
+// A point of a triangle: 2^kPointBits times the weights of vertices 1 and 2, which with that of
+// vertex 0 add up to 2^kPointBits.
+inline constexpr int kPointBits = 30;
+inline constexpr int64_t kPointOne = int64_t{1} << kPointBits;
+struct SurfacePoint {
+  int64_t second, third;
+};
+
+// Clamped, so that no weight is negative.
+VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
+  constexpr double kOne = static_cast<double>(kPointOne);
+  SurfacePoint point{0, 0};
+  if (second > 0) point.second = second < kOne ? static_cast<int64_t>(second) : kPointOne;
+  if (third > 0) point.third = third < kOne ? static_cast<int64_t>(third) : kPointOne;
+  if (point.third > kPointOne - point.second) point.third = kPointOne - point.second;
+  return point;
+}
+
+// The level of the image's pyramid that has one to two texels along the edge of a color cell, on
+// the mean over the triangle: the largest l with 4^l <= texels in the triangle / its area in cells.
+// `area`: of the triangle, doubled, in lattice units. A triangle without area is taken for a square
+// over its longest edge, or over a lattice unit. All in IEEE doubles, in this order.
+template <class Textures>
+VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& textures,
+                                        uint32_t image, int cell_bits, double area) {
+  const auto& c = surface.corners;
+  double du[3], dv[3];  // along the edges
+  const double width = textures.width(image, 0), height = textures.height(image, 0);
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t j = (i + 1) % 3;
+    du[i] = static_cast<double>(c[j].texture[0] - c[i].texture[0]);
+    dv[i] = static_cast<double>(c[j].texture[1] - c[i].texture[1]);
+  }
+  double texels;  // 2^(2 kTextureBits) times their number
+  if (area > 0) {
+    const double determinant = du[0] * dv[1] - du[1] * dv[0];
+    texels = (determinant < 0 ? -determinant : determinant) * (width * height);
+  } else {
+    texels = 0;
+    area = 1;
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3;
+      double length = 0;
+      for (int a = 0; a < 3; ++a) {
+        const double d = static_cast<double>(surface.position.v[j][a] - surface.position.v[i][a]);
+        length += d * d;
+      }
+      const double across = du[i] * width, down = dv[i] * height;
+      const double texel_length = across * across + down * down;
+      if (length > area) area = length;
+      if (texel_length > texels) texels = texel_length;
+    }
+  }
+  const double cell = static_cast<double>(int64_t{1} << cell_bits);
+  const double available = texels * (cell * cell);
+  double needed = area * 0x1p50;  // 2^(2 kTextureBits), and 4 for level 1
+  const uint32_t levels = textures.levels(image);
+  uint32_t level = 0;
+  for (; level + 1 < levels && needed <= available; ++level) needed *= 4;
+  return level;
+}
+
+// How a triangle contributes to the cells that it touches. The textures must outlive it.
+template <class Textures>
+class SurfaceLook {
+ public:
+  VOXDAG_HD SurfaceLook(const FixedSurface& surface, const Material& material, Textures& textures,
+                        int cell_bits, double area)
+      : corners_(surface.corners.data()), material_(material), textures_(textures) {
+    for (size_t a = 0; a < 2; ++a) {
+      wrap_[a] = material.wrap[a];
+      for (size_t i = 0; i < 2; ++i)
+        change_[i][a] = corners_[i + 1].texture[a] - corners_[0].texture[a];
+    }
+    if (material.image != Material::kNoImage) {
+      level_ = pyramid_level(surface, textures, material.image, cell_bits, area);
+      width_ = textures.width(material.image, level_);
+      height_ = textures.height(material.image, level_);
+    }
+    one_tint_ = corners_[0].color == corners_[1].color && corners_[0].color == corners_[2].color;
+    if (one_tint_) set_tint({0, 0});
+  }
+
+  // Adds the look at a point, which stands for `weight`.
+  VOXDAG_HD void add(const SurfacePoint& point, uint64_t weight, ColorSum& sum) {
+    if (!one_tint_) set_tint(point);
+    Texel texel = ~Texel{0};
+    if (material_.image != Material::kNoImage)
+      texel = look_up(textures_, material_.image, level_, width_, height_, wrap_,
+                      coordinate(point, 0), coordinate(point, 1));
+    const uint64_t seen = weight * alpha_of(scaled(channel(texel, 3), tint_[3]));
+    for (int c = 0; c < 3; ++c) {
+      const uint64_t intensity = scaled(channel(texel, c), tint_[c]);
+      sum.plain[static_cast<size_t>(c)] += weight * intensity;
+      sum.seen[static_cast<size_t>(c)] += seen * intensity;
+    }
+    sum.weight += weight;
+    sum.seen_weight += seen;
+  }
+
+ private:
+  // The factor times the vertex color.
+  VOXDAG_HD void set_tint(const SurfacePoint& point) {
+    const int64_t first = kPointOne - point.second - point.third;
+    for (size_t c = 0; c < 4; ++c) {
+      const int64_t mean = (first * corners_[0].color[c] + point.second * corners_[1].color[c] +
+                            point.third * corners_[2].color[c] + kPointOne / 2) >>
+                           kPointBits;
+      tint_[c] = scaled(material_.factor[c], static_cast<uint32_t>(mean));
+    }
+  }
+
+  // Rounded down. Changes of 2^32 and more, 256 images, need 128 bits.
+  VOXDAG_HD int64_t coordinate(const SurfacePoint& point, int a) const {
+    constexpr int64_t kFits = int64_t{1} << 32;
+    const int64_t second = change_[0][a], third = change_[1][a];
+    int64_t change;
+    if (second < kFits && second > -kFits && third < kFits && third > -kFits)
+      change = (second * point.second + third * point.third) >> kPointBits;
+    else
+      change = static_cast<int64_t>(
+          (static_cast<int128>(second) * point.second + static_cast<int128>(third) * point.third) >>
+          kPointBits);
+    return corners_[0].texture[static_cast<size_t>(a)] + change;
+  }
+
+  // In 8 bits.
+  VOXDAG_HD uint32_t alpha_of(uint32_t alpha) const {
+    if (material_.alpha_mode == AlphaMode::kOpaque) return 255;
+    if (material_.alpha_mode == AlphaMode::kMask) return alpha >= material_.alpha_cutoff ? 255 : 0;
+    return (alpha * 255 + 32768) >> 16;
+  }
+
+  const SurfaceCorner* corners_;
+  const Material& material_;
+  Textures& textures_;
+  Wrap wrap_[2];
+  int64_t change_[2][2];  // of texture coordinates, from corner 0 to corners 1 and 2
+  uint32_t level_ = 0, width_ = 0, height_ = 0;
+  bool one_tint_;
+  uint32_t tint_[4];
+};
+
+}  // namespace voxdag::color

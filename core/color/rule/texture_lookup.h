@@ -1,0 +1,76 @@
+// A bilinear lookup in one level of an image's pyramid, in integers: texture coordinates are
+// wrapped in fixed point, then scaled to the level; the fraction of a texel has 8 bits.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.h"
+#include "core/color/surface.h"
+
+namespace voxdag::color {
+
+// Four channels of 16 bits, red lowest, alpha highest.
+using Texel = uint64_t;
+
+VOXDAG_HD inline uint32_t channel(Texel texel, int index) {
+  return static_cast<uint32_t>(texel >> (16 * index)) & 0xffff;
+}
+
+// a b / 65535, rounded to nearest: the product of two intensities.
+VOXDAG_HD inline uint32_t scaled(uint32_t a, uint32_t b) {
+  const uint32_t product = a * b + 32768;
+  return (product + (product >> 16)) >> 16;
+}
+
+// A coordinate in [0, 2^kTextureBits].
+VOXDAG_HD inline int64_t wrapped(int64_t coordinate, Wrap wrap) {
+  constexpr int64_t kOne = int64_t{1} << kTextureBits;
+  if (wrap == Wrap::kRepeat) return coordinate & (kOne - 1);
+  if (wrap == Wrap::kClampToEdge) return coordinate < 0 ? 0 : coordinate > kOne ? kOne : coordinate;
+  const int64_t in_two = coordinate & (2 * kOne - 1);
+  return in_two > kOne ? 2 * kOne - in_two : in_two;
+}
+
+// The two texels next to a coordinate along one axis, and how much of 256 the second one counts.
+struct TexelPair {
+  uint32_t first, second, fraction;
+};
+
+VOXDAG_HD inline TexelPair texels_at(int64_t coordinate, Wrap wrap, uint32_t size) {
+  const int64_t position = wrapped(coordinate, wrap) * size - (int64_t{1} << (kTextureBits - 1));
+  const int64_t first = position >> kTextureBits;
+  TexelPair pair;
+  pair.fraction = static_cast<uint32_t>(position >> (kTextureBits - 8)) & 255;
+  const uint32_t beyond_first = wrap == Wrap::kRepeat ? size - 1 : 0;
+  const uint32_t beyond_last = wrap == Wrap::kRepeat ? 0 : size - 1;
+  pair.first = first < 0 ? beyond_first : static_cast<uint32_t>(first);
+  pair.second =
+      first + 1 < static_cast<int64_t>(size) ? static_cast<uint32_t>(first + 1) : beyond_last;
+  return pair;
+}
+
+// Two channels each in one word of two 32-bit lanes, since 65535 * 65536 + 32768 < 2^32.
+VOXDAG_HD inline Texel blended(const Texel (&texels)[4], uint32_t x_fraction, uint32_t y_fraction) {
+  constexpr uint64_t kLanes = 0x0000ffff0000ffffull, kHalf = 0x0000800000008000ull;
+  const uint64_t x1 = x_fraction, x0 = 256 - x1, y1 = y_fraction, y0 = 256 - y1;
+  const uint64_t weights[4] = {x0 * y0, x1 * y0, x0 * y1, x1 * y1};
+  uint64_t even = kHalf, odd = kHalf;
+  for (int i = 0; i < 4; ++i) {
+    even += (texels[i] & kLanes) * weights[i];
+    odd += (texels[i] >> 16 & kLanes) * weights[i];
+  }
+  return (even >> 16 & kLanes) | (odd & ~kLanes);
+}
+
+template <class Textures>
+VOXDAG_HD inline Texel look_up(Textures& textures, uint32_t image, uint32_t level, uint32_t width,
+                               uint32_t height, const Wrap (&wrap)[2], int64_t u, int64_t v) {
+  const TexelPair x = texels_at(u, wrap[0], width), y = texels_at(v, wrap[1], height);
+  const Texel texels[4] = {textures.texel(image, level, x.first, y.first),
+                           textures.texel(image, level, x.second, y.first),
+                           textures.texel(image, level, x.first, y.second),
+                           textures.texel(image, level, x.second, y.second)};
+  return blended(texels, x.fraction, y.fraction);
+}
+
+}  // namespace voxdag::color

@@ -1,0 +1,77 @@
+// Images of tests: pyramids in memory, of seeded noise and stripes.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "tests/oracle/scenes.h"
+
+namespace voxdag {
+
+struct TestLevel {
+  uint32_t width = 0, height = 0;
+  std::vector<std::array<uint16_t, 4>> texels;
+  const std::array<uint16_t, 4>& at(uint32_t x, uint32_t y) const { return texels[y * width + x]; }
+};
+
+// As the rule wants its textures.
+class TestImages {
+ public:
+  // Smooth waves and some noise; alpha is 0 in stripes.
+  void add(uint32_t width, uint32_t height, uint64_t seed) {
+    oracle::Random random(seed);
+    TestLevel image{width, height, {}};
+    const double wave = static_cast<double>(random.between(3, 9));
+    for (uint32_t y = 0; y < height; ++y)
+      for (uint32_t x = 0; x < width; ++x) {
+        std::array<uint16_t, 4> texel;
+        for (int c = 0; c < 3; ++c) {
+          // Triangle waves: no libm, so that the digest is the same everywhere.
+          const double phase = wave * (c + 1) * x / width + (wave - c) * y / height;
+          const double up = phase - std::floor(phase);
+          texel[static_cast<size_t>(c)] =
+              static_cast<uint16_t>(static_cast<double>(random.between(0, 8000)) +
+                                    57000 * (up < 0.5 ? 2 * up : 2 - 2 * up));
+        }
+        texel[3] = (x * 8 / width) % 3 == 0 ? 0 : static_cast<uint16_t>(20000 + 40000 * y / height);
+        image.texels.push_back(texel);
+      }
+    pyramids_.push_back({image});
+    while (pyramids_.back().back().width > 1 || pyramids_.back().back().height > 1)
+      pyramids_.back().push_back(halved(pyramids_.back().back()));
+  }
+
+  uint32_t levels(uint32_t image) const { return static_cast<uint32_t>(pyramids_[image].size()); }
+  uint32_t width(uint32_t image, uint32_t level) const { return pyramids_[image][level].width; }
+  uint32_t height(uint32_t image, uint32_t level) const { return pyramids_[image][level].height; }
+  uint64_t texel(uint32_t image, uint32_t level, uint32_t x, uint32_t y) const {
+    const auto& t = pyramids_[image][level].at(x, y);
+    return t[0] | uint64_t{t[1]} << 16 | uint64_t{t[2]} << 32 | uint64_t{t[3]} << 48;
+  }
+  const TestLevel& image(uint32_t index) const { return pyramids_[index][0]; }
+
+ private:
+  static TestLevel halved(const TestLevel& fine) {
+    TestLevel coarse{std::max(1u, fine.width / 2), std::max(1u, fine.height / 2), {}};
+    for (uint32_t y = 0; y < coarse.height; ++y)
+      for (uint32_t x = 0; x < coarse.width; ++x) {
+        std::array<uint16_t, 4> texel;
+        for (size_t c = 0; c < 4; ++c) {
+          uint32_t sum = 2;
+          for (uint32_t i = 0; i < 4; ++i)
+            sum += fine.at(std::min(2 * x + (i & 1), fine.width - 1),
+                           std::min(2 * y + i / 2, fine.height - 1))[c];
+          texel[c] = static_cast<uint16_t>(sum / 4);
+        }
+        coarse.texels.push_back(texel);
+      }
+    return coarse;
+  }
+
+  std::vector<std::vector<TestLevel>> pyramids_;
+};
+
+}  // namespace voxdag
