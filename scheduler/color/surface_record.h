@@ -1,0 +1,41 @@
+// Snapped triangles with their look, as a spill file holds them until they are baked: records of
+// 41 to 149 bytes, one after another. What the color does not depend on is left out: texture
+// coordinates of materials without an image, and COLOR_0 where all corners are white.
+//
+//     u8   flags: 1 wide positions, 2 textured, 4 wide texture coordinates, 8 colored
+//     u32  material
+//     9 x  i32, or i64 if wide: positions, [vertex][axis]
+//     6 x  i32, or i64 if wide: texture coordinates, [corner][axis], if textured
+//     12 x u16: COLOR_0, [corner][channel], if colored
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/color/surface.h"
+#include "core/format/bytes.h"
+
+namespace voxdag {
+
+inline constexpr size_t kMaxSurfaceRecordBytes = 1 + 4 + 9 * 8 + 6 * 8 + 12 * 2;
+
+// Appends the record of a surface. `has_image`: whether its material has one that can be read.
+void append_surface(const FixedSurface& surface, bool has_image, std::vector<std::byte>& out);
+
+// Takes records from the front of bytes, which append_surface() wrote. They were read with their
+// checksum; what is wrong nevertheless is reported as damage of the file.
+class SurfaceRecords {
+ public:
+  explicit SurfaceRecords(std::span<const std::byte> bytes) : in_(bytes) {}
+  // The next surface, what its record left out being 0 or white; nothing after the last one.
+  // Throws DamagedTriangles for bytes that are no record.
+  std::optional<FixedSurface> next();
+
+ private:
+  ByteSource in_;
+};
+
+}  // namespace voxdag
