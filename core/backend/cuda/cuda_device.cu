@@ -29,6 +29,8 @@ std::vector<int> usable_devices(std::string& problem) {
         cudaDeviceGetAttribute(&pools, cudaDevAttrMemoryPoolsSupported, device) == cudaSuccess &&
         major >= kMinMajor && pools)
       usable.push_back(device);
+    else
+      cudaGetLastError();  // a failed query must not be taken for the failure of a later call
   }
   if (usable.empty())
     problem = "no usable CUDA device: expected compute capability 8.0 or later and memory pools";
@@ -124,7 +126,10 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   return memory;
 }
 
-void CudaDevice::release(void* memory) noexcept { cudaFreeAsync(memory, stream()); }
+// CUB returns the thread's last error as its own, so none may remain.
+void CudaDevice::release(void* memory) noexcept {
+  if (cudaFreeAsync(memory, stream()) != cudaSuccess) cudaGetLastError();
+}
 
 }  // namespace cuda
 

@@ -52,11 +52,11 @@ class CudaDevice {
 
   int device_ = 0;  // the runtime's number
   std::string place_;
-  Stream stream_;
   cudaMemPool_t pool_ = nullptr;  // the device's own
   Pinned<uint64_t> mailbox_;
   Staging staging_[2];
   int next_staging_ = 0;
+  Stream stream_;  // the last member: it is destroyed, and its work waited for, before the others
 };
 
 }  // namespace voxdag::cuda

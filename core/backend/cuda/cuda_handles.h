@@ -24,8 +24,12 @@ inline void check_call(cudaError_t status, const char* call, const std::string& 
                                       ")");
 }
 
+// Waits for the stream's work, which may still read pinned memory after a build that failed.
 struct DestroyStream {
-  void operator()(cudaStream_t stream) const { cudaStreamDestroy(stream); }
+  void operator()(cudaStream_t stream) const {
+    cudaStreamSynchronize(stream);
+    cudaStreamDestroy(stream);
+  }
 };
 struct DestroyEvent {
   void operator()(cudaEvent_t event) const { cudaEventDestroy(event); }

@@ -9,48 +9,10 @@
 #include <utility>
 
 #include "core/backend/cuda/cuda_device.h"
+#include "core/backend/cuda/kernels.h"
 #include "core/backend/parallel/space.h"
 
 namespace voxdag::cuda {
-
-inline constexpr unsigned kThreadsPerBlock = 256;
-
-template <class F>
-__global__ void __launch_bounds__(kThreadsPerBlock) run_for_each(uint32_t n, F f) {
-  const uint32_t i = blockIdx.x * kThreadsPerBlock + threadIdx.x;
-  if (i < n) f(i);
-}
-
-template <class Kernel>
-__global__ void __launch_bounds__(Kernel::kThreads, Kernel::kMinResidentBlocks)
-    run_block(Kernel kernel) {
-  __shared__ typename Kernel::Shared shared;
-#pragma unroll
-  for (int phase = 0; phase < Kernel::kPhases; ++phase) {
-    if (phase > 0) __syncthreads();
-    kernel(phase, blockIdx.x, threadIdx.x, shared);
-  }
-}
-
-// Output i of an expansion; its source is found by bisection.
-template <class F>
-struct ExpandOne {
-  const uint32_t* offsets;
-  uint32_t first, last;
-  F f;
-  VOXDAG_HD void operator()(uint32_t i) const {
-    const uint32_t base = offsets[first], output = i + base;
-    uint32_t source = first, end = last;
-    while (end - source > 1) {
-      const uint32_t middle = source + (end - source) / 2;
-      if (offsets[middle] <= output)
-        source = middle;
-      else
-        end = middle;
-    }
-    f(source, output - offsets[source], i);
-  }
-};
 
 class CudaSpace {
  public:
@@ -74,16 +36,16 @@ class CudaSpace {
     cancel_.check();
     if (n == 0) return;
     const unsigned blocks = static_cast<unsigned>((n + kThreadsPerBlock - 1) / kThreadsPerBlock);
-    run_for_each<<<blocks, kThreadsPerBlock, 0, stream()>>>(static_cast<uint32_t>(n), f);
-    check(cudaGetLastError(), "kernel launch");
+    launch({blocks, kThreadsPerBlock}, stream(), where_, run_for_each<F>, static_cast<uint32_t>(n),
+           f);
   }
 
   template <class Kernel>
   void for_each_thread_block(uint32_t blocks, Kernel kernel) {
     cancel_.check();
     if (blocks == 0) return;
-    run_block<<<blocks, Kernel::kThreads, 0, stream()>>>(kernel);
-    check(cudaGetLastError(), "block kernel launch");
+    launch({blocks, Kernel::kThreads, sizeof(typename Kernel::Shared)}, stream(), where_,
+           run_block<Kernel>, kernel);
   }
 
   template <class F>
@@ -108,6 +70,8 @@ class CudaSpace {
   template <class T>
   void upload(const T* from, T* to, uint64_t n) {
     transfer(from, to, n, cudaMemcpyHostToDevice);
+    // `from` may be gone soon, and whether the copy still reads it depends on the system.
+    check(cudaStreamSynchronize(stream()), "cudaStreamSynchronize");
   }
   template <class T>
   void download(const T* from, T* to, uint64_t n) {
