@@ -2,6 +2,8 @@
 // as that on one double does.
 #pragma once
 
+#include <cstdint>
+
 #ifdef __SSE2__
 #include <emmintrin.h>
 #endif
@@ -14,12 +16,20 @@ struct DoublePair {
   __m128d v;
   static DoublePair load(const double* aligned) { return {_mm_load_pd(aligned)}; }
   static DoublePair of(double both) { return {_mm_set1_pd(both)}; }
-  void store(double* aligned) const { _mm_store_pd(aligned, v); }
+  static DoublePair from(const int32_t* two) {
+    return {_mm_cvtepi32_pd(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(two)))};
+  }
 };
+inline DoublePair operator+(DoublePair a, DoublePair b) { return {_mm_add_pd(a.v, b.v)}; }
 inline DoublePair operator-(DoublePair a, DoublePair b) { return {_mm_sub_pd(a.v, b.v)}; }
 inline DoublePair operator*(DoublePair a, DoublePair b) { return {_mm_mul_pd(a.v, b.v)}; }
 inline DoublePair max(DoublePair a, DoublePair b) { return {_mm_max_pd(a.v, b.v)}; }
 inline DoublePair min(DoublePair a, DoublePair b) { return {_mm_min_pd(a.v, b.v)}; }
+// The first number of the pair twice, the second twice, and the first of one with the second of
+// another.
+inline DoublePair firsts(DoublePair a) { return {_mm_unpacklo_pd(a.v, a.v)}; }
+inline DoublePair seconds(DoublePair a) { return {_mm_unpackhi_pd(a.v, a.v)}; }
+inline DoublePair first_second(DoublePair a, DoublePair b) { return {_mm_shuffle_pd(a.v, b.v, 2)}; }
 // Bit 0 for the first of the pair, bit 1 for the second.
 inline unsigned less(DoublePair a, DoublePair b) {
   return static_cast<unsigned>(_mm_movemask_pd(_mm_cmplt_pd(a.v, b.v)));
@@ -34,11 +44,14 @@ struct DoublePair {
   double a, b;
   static DoublePair load(const double* aligned) { return {aligned[0], aligned[1]}; }
   static DoublePair of(double both) { return {both, both}; }
-  void store(double* aligned) const {
-    aligned[0] = a;
-    aligned[1] = b;
+  static DoublePair from(const int32_t* two) {
+    return {static_cast<double>(two[0]), static_cast<double>(two[1])};
   }
 };
+inline DoublePair firsts(DoublePair x) { return {x.a, x.a}; }
+inline DoublePair seconds(DoublePair x) { return {x.b, x.b}; }
+inline DoublePair first_second(DoublePair x, DoublePair y) { return {x.a, y.b}; }
+inline DoublePair operator+(DoublePair x, DoublePair y) { return {x.a + y.a, x.b + y.b}; }
 inline DoublePair operator-(DoublePair x, DoublePair y) { return {x.a - y.a, x.b - y.b}; }
 inline DoublePair operator*(DoublePair x, DoublePair y) { return {x.a * y.a, x.b * y.b}; }
 inline DoublePair max(DoublePair x, DoublePair y) {

@@ -43,10 +43,11 @@ std::vector<Ray> many_rays(int edge, uint64_t seed) {
   return rays;
 }
 
-void expect_equal(const DagView& dag, const std::vector<Ray>& rays, double stop_size, double t_min,
-                  double t_max, size_t packet_rays, uint64_t& hits) {
+void expect_equal(WalkPacket walk, const DagView& dag, const std::vector<Ray>& rays,
+                  double stop_size, double t_min, double t_max, size_t packet_rays,
+                  uint64_t& hits) {
   const RayCaster caster(dag);
-  const auto packet = std::make_unique<RayPacket>(dag, stop_size, t_min, t_max);
+  const auto packet = std::make_unique<RayPacket>(dag, stop_size, t_min, t_max, walk);
   Hit found[RayPacket::kRays];
   for (size_t first = 0; first < rays.size(); first += packet_rays) {
     const size_t count = std::min(packet_rays, rays.size() - first);
@@ -67,7 +68,7 @@ void expect_equal(const DagView& dag, const std::vector<Ray>& rays, double stop_
 }
 
 // To the last bit what the caster of single rays finds, in files of all shapes.
-TEST(RayPacket, EqualsTheCasterOfSingleRays) {
+void expect_single_rays(WalkPacket walk) {
   uint64_t hits = 0;
   for (const int edge : {4, 8, 64})
     for (const uint64_t narrow_words : {global_layout::kNarrowLevelWords, uint64_t{2}}) {
@@ -75,13 +76,20 @@ TEST(RayPacket, EqualsTheCasterOfSingleRays) {
       const QueryFile file(random_voxels(static_cast<uint64_t>(edge), edge), narrow_words);
       const Dag dag(file.path());
       const std::vector<Ray> rays = many_rays(edge, 5);
-      expect_equal(dag.view(), rays, 0, 0, kFar, 64, hits);
-      expect_equal(dag.view(), rays, 0, 0, std::numeric_limits<double>::infinity(), 33, hits);
-      expect_equal(dag.view(), rays, 0, 0, edge, 7, hits);
+      expect_equal(walk, dag.view(), rays, 0, 0, kFar, 64, hits);
+      expect_equal(walk, dag.view(), rays, 0, 0, std::numeric_limits<double>::infinity(), 33, hits);
+      expect_equal(walk, dag.view(), rays, 0, 0, edge, 7, hits);
       for (const double stop : {1.0, 2.0, 5.5, 2.0 * edge})
-        expect_equal(dag.view(), rays, stop, 0.25 * edge, kFar, 64, hits);
+        expect_equal(walk, dag.view(), rays, stop, 0.25 * edge, kFar, 64, hits);
     }
   EXPECT_GT(hits, 20000u);
+}
+
+TEST(RayPacket, EqualsTheCasterOfSingleRays) { expect_single_rays(walk_packet_portable); }
+
+TEST(RayPacket, EqualsTheCasterOfSingleRaysWithAvx2) {
+  if (!walk_packet_avx2()) GTEST_SKIP() << "this machine has no AVX2";
+  expect_single_rays(walk_packet_avx2());
 }
 
 class DagRays : public testing::Test {

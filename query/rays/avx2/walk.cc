@@ -1,0 +1,44 @@
+// Compiled for AVX2: nothing in here may run before the choice is made.
+#include <immintrin.h>
+
+#include "query/rays/packet_walk.h"
+
+namespace voxdag::query {
+namespace {
+
+struct Avx2Four {
+  __m256d v;
+  static Avx2Four load(const double* p) { return {_mm256_load_pd(p)}; }
+  static Avx2Four of(double all) { return {_mm256_set1_pd(all)}; }
+  static Avx2Four from(const int32_t* p) {
+    return {_mm256_cvtepi32_pd(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))};
+  }
+};
+VOXDAG_INLINE Avx2Four operator-(Avx2Four x, Avx2Four y) { return {_mm256_sub_pd(x.v, y.v)}; }
+VOXDAG_INLINE Avx2Four operator+(Avx2Four x, Avx2Four y) { return {_mm256_add_pd(x.v, y.v)}; }
+VOXDAG_INLINE Avx2Four operator*(Avx2Four x, Avx2Four y) { return {_mm256_mul_pd(x.v, y.v)}; }
+VOXDAG_INLINE Avx2Four max(Avx2Four x, Avx2Four y) { return {_mm256_max_pd(x.v, y.v)}; }
+VOXDAG_INLINE Avx2Four min(Avx2Four x, Avx2Four y) { return {_mm256_min_pd(x.v, y.v)}; }
+VOXDAG_INLINE unsigned less(Avx2Four x, Avx2Four y) {
+  return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(x.v, y.v, _CMP_LT_OQ)));
+}
+VOXDAG_INLINE unsigned equal(Avx2Four x, Avx2Four y) {
+  return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(x.v, y.v, _CMP_EQ_OQ)));
+}
+VOXDAG_INLINE Avx2Four first_lane(Avx2Four x) { return {_mm256_permute4x64_pd(x.v, 0x00)}; }
+VOXDAG_INLINE Avx2Four middle_lane(Avx2Four x) { return {_mm256_permute4x64_pd(x.v, 0x55)}; }
+VOXDAG_INLINE Avx2Four last_lane(Avx2Four x) { return {_mm256_permute4x64_pd(x.v, 0xaa)}; }
+VOXDAG_INLINE Avx2Four blend_high(Avx2Four x, Avx2Four y) {
+  return {_mm256_blend_pd(x.v, y.v, 0xc)};
+}
+VOXDAG_INLINE Avx2Four blend_odd(Avx2Four x, Avx2Four y) {
+  return {_mm256_blend_pd(x.v, y.v, 0xa)};
+}
+
+void walk(PacketJob& job, uint64_t rays) { PacketWalk<Avx2Four>(job, rays).run(rays); }
+
+}  // namespace
+
+WalkPacket walk_packet_avx2() { return __builtin_cpu_supports("avx2") ? walk : nullptr; }
+
+}  // namespace voxdag::query

@@ -1,0 +1,42 @@
+#include "query/double_pair.h"
+#include "query/rays/packet_walk.h"
+
+namespace voxdag::query {
+namespace {
+
+struct PlainFour {
+  DoublePair a, b;
+  static PlainFour load(const double* p) { return {DoublePair::load(p), DoublePair::load(p + 2)}; }
+  static PlainFour of(double all) { return {DoublePair::of(all), DoublePair::of(all)}; }
+  static PlainFour from(const int32_t* p) { return {DoublePair::from(p), DoublePair::from(p + 2)}; }
+};
+VOXDAG_INLINE PlainFour operator-(PlainFour x, PlainFour y) { return {x.a - y.a, x.b - y.b}; }
+VOXDAG_INLINE PlainFour operator+(PlainFour x, PlainFour y) { return {x.a + y.a, x.b + y.b}; }
+VOXDAG_INLINE PlainFour operator*(PlainFour x, PlainFour y) { return {x.a * y.a, x.b * y.b}; }
+VOXDAG_INLINE PlainFour max(PlainFour x, PlainFour y) { return {max(x.a, y.a), max(x.b, y.b)}; }
+VOXDAG_INLINE PlainFour min(PlainFour x, PlainFour y) { return {min(x.a, y.a), min(x.b, y.b)}; }
+VOXDAG_INLINE unsigned less(PlainFour x, PlainFour y) {
+  return less(x.a, y.a) | less(x.b, y.b) << 2;
+}
+VOXDAG_INLINE unsigned equal(PlainFour x, PlainFour y) {
+  return equal(x.a, y.a) | equal(x.b, y.b) << 2;
+}
+VOXDAG_INLINE PlainFour first_lane(PlainFour x) { return {firsts(x.a), firsts(x.a)}; }
+VOXDAG_INLINE PlainFour middle_lane(PlainFour x) { return {seconds(x.a), seconds(x.a)}; }
+VOXDAG_INLINE PlainFour last_lane(PlainFour x) { return {firsts(x.b), firsts(x.b)}; }
+VOXDAG_INLINE PlainFour blend_high(PlainFour x, PlainFour y) { return {x.a, y.b}; }
+VOXDAG_INLINE PlainFour blend_odd(PlainFour x, PlainFour y) {
+  return {first_second(x.a, y.a), first_second(x.b, y.b)};
+}
+
+}  // namespace
+
+void walk_packet_portable(PacketJob& job, uint64_t rays) {
+  PacketWalk<PlainFour>(job, rays).run(rays);
+}
+
+#ifndef __x86_64__
+WalkPacket walk_packet_avx2() { return nullptr; }
+#endif
+
+}  // namespace voxdag::query
