@@ -33,7 +33,8 @@ double finest_width(const DagView& dag) {
 // How far one sees from places on the surface, as a share of the scene's diagonal; a place from
 // which one can see out of the scene counts as 0. Near 0 for an object, or for caves; more for
 // interiors.
-double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
+double enclosure(const RayCaster& caster, const DagView& dag, const Box& box,
+                 const CancelToken& cancel) {
   constexpr size_t kPlaces = 1000;
   const std::vector<Vec> points = occupied_points(dag);
   std::vector<Vec> directions;  // toward the 26 neighbors of a cell
@@ -43,6 +44,7 @@ double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
   const double width = std::max(1.0, finest_width(dag));
   double sum = 0;
   for (size_t i = 0; i < kPlaces; ++i) {
+    cancel.check();
     const Vec& place = points[i * points.size() / kPlaces];
     double longest = 0;
     for (const Vec& direction : directions) {
@@ -58,8 +60,8 @@ double enclosure(const RayCaster& caster, const DagView& dag, const Box& box) {
 
 // How much there is to see, by a few rays: higher for long views with much detail, lower close to a
 // wall or where the camera looks out of the scene. A distance below `near` is too close.
+template <int kColumns, int kRows>
 double score(const RayCaster& caster, const Placement& placement, double width, double near) {
-  constexpr int kColumns = 24, kRows = 14;
   constexpr double kRays = kColumns * kRows;
   const Camera camera(placement, kColumns, kRows);
   double depth[kRows][kColumns], sum = 0;
@@ -84,28 +86,41 @@ double score(const RayCaster& caster, const Placement& placement, double width, 
   return breaks / kRays * std::sqrt(sum / kRays) * free * free * free * within;
 }
 
-// The best-scoring of some hundreds of random places in the lower half of the scene.
-Placement inside_view(const RayCaster& caster, const Box& box, double width, double fov_degrees) {
+// The best-scoring of some hundreds of random places in the lower half of the scene. A quarter of
+// the rays tells which of them could be that.
+Placement inside_view(const RayCaster& caster, const Box& box, double width, double fov_degrees,
+                      const CancelToken& cancel) {
   constexpr uint64_t kPlaces = 400;
   constexpr int kYaws = 8;
+  constexpr double kRoughShare = 0.6;  // of the best rough score; lower could not be the best
   const Sampler sampler(2);
   const Vec extent = box.high - box.low;
-  Placement best{box.center(), box.center() + Vec{{1, 0, 0}}, fov_degrees};
-  double best_score = 0;
+  const double near = 0.04 * box.diagonal();
+  std::vector<Placement> trials;
+  std::vector<double> rough;
   for (uint64_t i = 0; i < kPlaces; ++i) {
     const Sampler::Pair across = sampler.pair(2 * i), up = sampler.pair(2 * i + 1);
     const Vec eye =
         box.low + Vec{{extent[0] * (0.05 + 0.9 * across.u), extent[1] * (0.05 + 0.35 * up.u),
                        extent[2] * (0.05 + 0.9 * across.v)}};
+    cancel.check();
     for (int yaw = 0; yaw < kYaws; ++yaw) {
       const double angle = 2 * kPi * (yaw + up.v) / kYaws;
       const Vec forward{{std::cos(angle), 0.08, std::sin(angle)}};
-      const Placement trial{eye, eye + forward * (0.25 * box.diagonal()), fov_degrees};
-      const double trial_score = score(caster, trial, width, 0.04 * box.diagonal());
-      if (trial_score <= best_score) continue;
-      best_score = trial_score;
-      best = trial;
+      trials.push_back({eye, eye + forward * (0.25 * box.diagonal()), fov_degrees});
+      rough.push_back(score<12, 7>(caster, trials.back(), width, near));
     }
+  }
+  const double least = kRoughShare * *std::max_element(rough.begin(), rough.end());
+  Placement best{box.center(), box.center() + Vec{{1, 0, 0}}, fov_degrees};
+  double best_score = 0;
+  for (size_t i = 0; i < trials.size(); ++i) {
+    if (rough[i] < least) continue;
+    cancel.check();
+    const double trial_score = score<24, 14>(caster, trials[i], width, near);
+    if (trial_score <= best_score) continue;
+    best_score = trial_score;
+    best = trials[i];
   }
   return best;
 }
@@ -154,12 +169,14 @@ const std::vector<std::string>& view_names() {
 }
 
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
-                     std::optional<double> fov_degrees) {
-  const RayCaster caster(dag);
-  const Box box = occupied_box(dag);
+                     std::optional<double> fov_degrees, const CancelToken& cancel) {
   const bool automatic = name == "auto";
-  if (name == "inside" || (automatic && enclosure(caster, dag, box) > kMinEnclosureOfRooms))
-    return inside_view(caster, box, finest_width(dag), fov_degrees.value_or(kInsideFov));
+  if (name == "inside" || automatic) {
+    const RayCaster caster(dag);
+    const Box box = occupied_box(dag);
+    if (!automatic || enclosure(caster, dag, box, cancel) > kMinEnclosureOfRooms)
+      return inside_view(caster, box, finest_width(dag), fov_degrees.value_or(kInsideFov), cancel);
+  }
   for (const NamedDirection& d : kDirections)
     if ((automatic ? "iso" : name) == d.name)
       return fit_camera(occupied_points(dag), d.toward_eye, fov_degrees.value_or(kOutsideFov),

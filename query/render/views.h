@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/cancel_token.h"
 #include "query/dag_view.h"
 #include "query/render/camera.h"
 
@@ -33,8 +34,8 @@ const std::vector<std::string>& view_names();
 // around and a floor below; "auto" is "inside" for a scene most of which cannot be seen from
 // outside, and "iso" for any other. `aspect` is the picture's width divided by its height; without
 // `fov_degrees`, the view decides on the field of view. Throws Error{kInvalidInput} for another
-// name.
+// name, and as `cancel` does: "inside" and "auto" cast rays for up to half a second.
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
-                     std::optional<double> fov_degrees);
+                     std::optional<double> fov_degrees, const CancelToken& cancel = {});
 
 }  // namespace voxdag::query
