@@ -148,6 +148,7 @@ void Verifier::check_header() const {
 
 // The only kind of attribute is color.
 void Verifier::check_attributes(bool has_attributes) const {
+  if (!has_attributes) check_zeros(kAttributeCountAt, kLevelsAt, "attribute sections are reserved");
   uint64_t count;
   std::memcpy(&count, file_.data() + kAttributeCountAt, sizeof(count));
   if (count != (has_attributes ? 1 : 0) || has_attributes != file_.has_colors())
