@@ -13,9 +13,9 @@
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
 #include "core/format/checksum.h"
-#include "core/format/color/verify_colors.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/node_index.h"
+#include "core/format/global/verify_colors.h"
 
 namespace voxdag {
 
