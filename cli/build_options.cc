@@ -28,6 +28,12 @@ void BuildOptions::declare(Command& command) {
       .group(geometry);
   command.option("--hash-bits", g.hash_bits, "truncate node hashes to this many bits, 4 to 64")
       .group(geometry);
+  command.flag("--color", g.color, "store the colors of the scene's materials").group(geometry);
+  command
+      .option("--color-resolution", g.color_resolution,
+              "cells per edge of the color grid, a power of two, at most the resolution (default: "
+              "the resolution, 4096 at most)")
+      .group(geometry);
   command.config_option();
   command.option("--memory", memory_, "memory budget, 64MiB or more (default: half the RAM)")
       .group(kRunGroup);

@@ -47,6 +47,12 @@ std::string report_json(const BuildReport& report) {
       {"voxels_per_s",
        report.wall_s > 0 ? static_cast<double>(report.merge.voxels) / report.wall_s : 0.0},
   };
+  if (const auto& c = report.colors)
+    json["colors"] = {{"resolution", c->resolution},
+                      {"cells", c->cells},
+                      {"bytes", c->bytes},
+                      {"images", c->images},
+                      {"image_bytes", c->image_bytes}};
   if (const auto& c = report.cluster)
     json["cluster"] = {{"batches", c->batches},
                        {"failed_attempts", c->attempts},
@@ -99,6 +105,14 @@ BuildReport decode_report(const std::string& text) {
     r.wall_s = json.at("wall_s");
     r.cpu_s = json.at("cpu_s");
     r.peak_rss_bytes = json.at("peak_rss_bytes");
+    if (json.contains("colors")) {
+      const auto& c = json.at("colors");
+      r.colors = ColorReport{.resolution = c.at("resolution"),
+                             .cells = c.at("cells"),
+                             .bytes = c.at("bytes"),
+                             .images = c.at("images"),
+                             .image_bytes = c.at("image_bytes")};
+    }
     if (json.contains("cluster")) {
       const auto& c = json.at("cluster");
       r.cluster.emplace();

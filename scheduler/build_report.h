@@ -9,6 +9,7 @@
 #include "core/geometry/grid.h"
 #include "merge/merge.h"
 #include "scheduler/cluster/cluster_state.h"
+#include "scheduler/color/color_stage.h"
 #include "scheduler/stage_clock.h"
 
 namespace voxdag {
@@ -37,6 +38,7 @@ struct BuildReport {
   double wall_s = 0;
   double cpu_s = 0;
   uint64_t peak_rss_bytes = 0;
+  std::optional<ColorReport> colors;     // of a build with colors
   std::optional<ClusterTotals> cluster;  // of the tasks of a cluster build
   std::string merge_request;  // of a build that a job of the cluster merged (MergeJob::request())
 };

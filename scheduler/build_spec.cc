@@ -10,6 +10,7 @@ std::string geometry_json(const GeometryOptions& options) {
                                  {"skip_invalid", options.skip_invalid}};
   if (options.bounds) json["bounds"] = *options.bounds;
   if (options.voxel_size) json["voxel_size"] = *options.voxel_size;
+  if (options.color) json["color_resolution"] = options.color_resolution;
   return json.dump();
 }
 

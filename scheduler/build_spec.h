@@ -26,6 +26,9 @@ struct GeometryOptions {
   std::optional<double> voxel_size;
   bool skip_invalid = false;
   uint32_t hash_bits = 64;
+  bool color = false;
+  // K of the color grid, a power of two from 4 to the resolution; 0 for a choice by the build.
+  uint64_t color_resolution = 0;
 };
 
 // Geometry options as one line of JSON, to compare jobs and for messages. Scenes are left out: only

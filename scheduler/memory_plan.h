@@ -21,6 +21,14 @@
 //                     block memo                    1/16 of what is free         BackendMemory
 //                     more pages that it retains    1/8, up to 128 MiB           nobody
 //                     or: key for the cache         what those pages leave       ArtifactCache
+//   color         textures, if they take no more      up to 1/2 of what is free    TextureSet
+//                 surfaces; the rest is spilled     up to 1/3                    SurfaceStore
+//                   those on their way there        1/8                          nobody
+//                 ColorMemory, for every worker     what is free / workers
+//                   a region                        12 MiB; solid ones 50        CubeBaker
+//                   surfaces of a cube              1/2 of the rest              CubeBaker
+//                   pages of textures               1/4 of the rest              TextureReader
+//                   regions of a cube, encoded      the rest                     nobody
 //   merge         MergeMemory, of what is free
 //                   workers, together               1/4                          merge
 //                   positions of two levels         1/6 for each; then spilled   merge
@@ -65,6 +73,24 @@ struct MemoryPlan {
   }
   // The budget of a pilot build, `free_bytes` being free.
   static constexpr uint64_t pilot_bytes(uint64_t free_bytes) { return free_bytes * 3 / 4; }
+};
+
+// What the workers of the color stage get.
+struct ColorMemory {
+  static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
+
+  unsigned workers = 1;
+  uint64_t surface_bytes = 0;  // of each
+  uint64_t texture_bytes = 0;
+
+  // An eighth is for the directories of the section.
+  static constexpr ColorMemory divide(uint64_t free_bytes, unsigned wanted) {
+    const uint64_t bytes = free_bytes - free_bytes / 8;
+    const auto workers =
+        static_cast<unsigned>(std::clamp<uint64_t>(bytes / (2 * kRegionBytes), 1, wanted));
+    const uint64_t each = bytes / workers, rest = each - std::min(each, kRegionBytes);
+    return {workers, rest / 2, rest / 4};
+  }
 };
 
 // What the workers of the build stage get.

@@ -105,11 +105,13 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
   return artifacts;
 }
 
-bool MergeStage::run(const RunOptions& options, BuildReport& report) {
+bool MergeStage::run(const RunOptions& options, const AddSections& add_sections,
+                     BuildReport& report) {
   if (is_published(report)) return true;
   try {
     GlobalFileWriter out(context_.files, report.output, report.grid, report.hash_bits);
     merge(options, out, report);
+    add_sections(out);
     write(out, report);
     return true;
   } catch (const Error& error) {

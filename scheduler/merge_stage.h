@@ -4,6 +4,8 @@
 // them.
 #pragma once
 
+#include <functional>
+
 #include "core/base/memory_budget.h"
 #include "core/format/global/global_writer.h"
 #include "scheduler/build_report.h"
@@ -29,9 +31,12 @@ class MergeStage {
         clock_(clock),
         context_(context) {}
 
+  // Adds what follows the levels of the merged file.
+  using AddSections = std::function<void(GlobalFileWriter& out)>;
+
   // Writes the output file and fills in the report. False if something turned out damaged, and the
   // merge is to be run again once the subvolumes that were planned again are built.
-  bool run(const RunOptions& options, BuildReport& report);
+  bool run(const RunOptions& options, const AddSections& add_sections, BuildReport& report);
 
  private:
   bool is_published(BuildReport& report);

@@ -12,6 +12,7 @@
 #include "core/io/overwrite.h"
 #include "scheduler/cluster/cluster_build.h"
 #include "scheduler/cluster/merge/merge_job.h"
+#include "scheduler/color/color_stage.h"
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/execute/executor.h"
 #include "scheduler/job/build_locks.h"
@@ -384,13 +385,24 @@ class Build {
 
   void merge_artifacts() {
     MergeStage merge(*jobs_, commits_, work_, budget_, clock_, context_);
-    for (int run = 1; !merge.run(spec_.run, report_); ++run) {
+    for (int run = 1; !merge.run(
+             spec_.run, [this](GlobalFileWriter& out) { color(out); }, report_);
+         ++run) {
       if (run == kMaxMerges)
         throw Error(ErrorCode::kCorrupt, work_.path() +
                                              ": artifacts are damaged repeatedly: expected a disk "
                                              "that returns what was written");
       if (!planned_leaves(*jobs_).empty()) build_artifacts();
     }
+  }
+
+  void color(GlobalFileWriter& out) {
+    if (!spec_.geometry.color) return;
+    const ColorSource source{spec_.geometry, report_.grid, jobs_->job()->scene_digest,
+                             work_.path()};
+    report_.colors = add_colors(source, out, {context_, spec_.run.threads, budget_});
+    report_.spill_bytes += report_.colors->spill_bytes;
+    clock_.finish("color");
   }
 
   [[noreturn]] void refuse_job(const std::string& difference) const {

@@ -1,6 +1,7 @@
 #include "scheduler/scene_stages.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <span>
 #include <thread>
@@ -24,6 +25,8 @@ constexpr double kMinSubvolumes = 64;
 constexpr double kMinBricksPerSubvolume = 131072;
 // How long a build waits until the times of the scene's files can be trusted.
 constexpr int64_t kMaxWait_ns = 200'000'000;
+// Of the color grid, unless another one is asked for: colors do not repeat as geometry does.
+constexpr uint64_t kColorResolution = 4096;
 // More bins than this would make their buffers too small; large subvolumes are split later.
 constexpr size_t kMaxBins = 8192;
 
@@ -59,11 +62,19 @@ BuildSpec checked(const BuildSpec& spec) {
   const uint64_t edge = r.subvolume_edge;
   if (edge && ((edge & (edge - 1)) || edge < static_cast<uint64_t>(kSmallestEdge)))
     refuse("subvolume edge " + std::to_string(edge) + ": expected a power of two from 64 voxels");
+  if (g.color_resolution && !g.color)
+    refuse("a color resolution was given without colors: expected both (--color)");
+  if (g.color_resolution && (!std::has_single_bit(g.color_resolution) || g.color_resolution < 4 ||
+                             g.color_resolution > g.resolution))
+    refuse("color resolution " + std::to_string(g.color_resolution) +
+           ": expected a power of two from 4 to the resolution, " + std::to_string(g.resolution));
   choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that makes no grid
   check_backend(r);
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();
+  if (g.color && !g.color_resolution)
+    out.geometry.color_resolution = std::min(g.resolution, kColorResolution);
   return out;
 }
 

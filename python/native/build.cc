@@ -36,6 +36,8 @@ BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::dict
   take("voxel_size", spec.geometry.voxel_size);
   take("skip_invalid", spec.geometry.skip_invalid);
   take("hash_bits", spec.geometry.hash_bits);
+  take("color", spec.geometry.color);
+  take("color_resolution", spec.geometry.color_resolution);
   take("work", spec.run.work_folder);
   take("memory", memory);
   take("threads", spec.run.threads);

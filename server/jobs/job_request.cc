@@ -145,6 +145,9 @@ void read_options(const ordered_json& options, BuildSpec& spec) {
         [&](const auto& v) {
           g.hash_bits = static_cast<uint32_t>(count_of(v, "hash_bits", 4, 64));
         }},
+       {"color", [&](const auto& v) { g.color = flag_of(v, "color"); }},
+       {"color_resolution",
+        [&](const auto& v) { g.color_resolution = power_of_two(v, "color_resolution", 4); }},
        {"memory", [&](const auto& v) { r.memory_bytes = memory_of(v); }},
        {"threads",
         [&](const auto& v) { r.threads = static_cast<unsigned>(count_of(v, "threads", 1, 1024)); }},
@@ -158,6 +161,7 @@ void read_options(const ordered_json& options, BuildSpec& spec) {
           r.method = one_of(v, "method", {"consing", "pointers", "hashes"});
         }}});
   if (g.bounds && g.voxel_size) fail("voxel_size", "no bounds at the same time");
+  if (g.color_resolution && !g.color) fail("color_resolution", "color at the same time");
   if (g.voxel_size && *g.voxel_size <= 0) fail("voxel_size", "a number above 0");
 }
 

@@ -1,0 +1,165 @@
+#include "scheduler/color/bin_surfaces.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/format/checksum.h"
+#include "scheduler/ingest/content_digest.h"
+#include "scheduler/ingest/read_pieces.h"
+#include "scheduler/triangles/chunk.h"
+#include "scheduler/triangles/partition.h"
+
+namespace voxdag {
+namespace {
+
+// Collects records by bins, and hands them on in larger pieces.
+class SurfaceWriter {
+ public:
+  SurfaceWriter(SurfaceStore& store, std::vector<SurfaceStore::Bin>& bins, size_t buffer_bytes)
+      : store_(store),
+        bins_(bins),
+        tails_(bins.size()),
+        tail_bytes_(std::clamp<size_t>(buffer_bytes / bins.size(), 2048, 64 << 10)) {}
+
+  void append(size_t bin, std::span<const std::byte> record) {
+    Tail& tail = tails_[bin];
+    tail.records.insert(tail.records.end(), record.begin(), record.end());
+    ++tail.surfaces;
+    if (tail.records.size() >= tail_bytes_) hand_on(bin);
+  }
+  void flush() {
+    for (size_t bin = 0; bin < tails_.size(); ++bin)
+      if (tails_[bin].surfaces > 0) hand_on(bin);
+  }
+
+ private:
+  struct Tail {
+    std::vector<std::byte> records;
+    uint64_t surfaces = 0;
+  };
+
+  void hand_on(size_t bin) {
+    Tail& tail = tails_[bin];
+    store_.add(bins_[bin], tail.records, tail.surfaces);
+    tail.records.clear();
+    tail.surfaces = 0;
+  }
+
+  SurfaceStore& store_;
+  std::vector<SurfaceStore::Bin>& bins_;
+  std::vector<Tail> tails_;
+  const size_t tail_bytes_;
+};
+
+// A piece of the scene as records, with the bins that each belongs to.
+class SurfacePiece {
+ public:
+  SurfacePiece(const SurfaceBinning& binning, const CubeTree& tree, MemoryBudget& budget)
+      : binning_(binning),
+        tree_(tree),
+        charge_(budget,
+                kPieceTriangles * (kMaxSurfaceRecordBytes + binning.record_bytes) +
+                    kMaxPlaces * sizeof(Place),
+                "a piece of the scene") {}
+
+  void read(TriangleCursor& cursor, uint64_t first, uint64_t count) {
+    records_.clear();
+    triangles_.clear();
+    places_.clear();
+    late_ = kNone;
+    cursor.read_surfaces(first, count, [this](std::span<const SurfaceTriangle> batch) {
+      for (const SurfaceTriangle& surface : batch) add(surface);
+    });
+    checksum_ = checksum128(triangles_);
+  }
+  const Checksum128& checksum() const { return checksum_; }
+
+  void copy(SurfaceWriter& writer) {
+    const std::span<const std::byte> records(records_);
+    for (const Place& place : places_)
+      writer.append(place.bin, records.subspan(place.record, place.bytes));
+    if (late_ == kNone) return;
+    SurfaceRecords rest(records.subspan(late_));
+    std::vector<std::byte> record;
+    while (const auto surface = rest.next()) {
+      record.clear();
+      append_surface(*surface, has_image(surface->material), record);
+      tree_.for_each_touched(surface->position, hint_,
+                             [&](size_t bin) { writer.append(bin, record); });
+    }
+  }
+
+ private:
+  // A record and one of its bins.
+  struct Place {
+    uint32_t bin, record, bytes;
+  };
+  static constexpr size_t kNone = ~size_t{0};
+  // Triangles of a piece that all reach through the grid have more; their bins are found later.
+  static constexpr size_t kMaxPlaces = 4 * kPieceTriangles;
+
+  bool has_image(uint32_t material) const {
+    return binning_.materials[material].image != Material::kNoImage;
+  }
+
+  void add(const SurfaceTriangle& triangle) {
+    FixedSurface surface;
+    if (snap_triangle(binning_.grid, triangle.position, surface.position) != SnapResult::kInside)
+      return;
+    surface.corners = triangle.corners;
+    surface.material = triangle.material;
+    const size_t at = triangles_.size(), record = records_.size();
+    triangles_.resize(at + binning_.record_bytes);
+    encode_triangle(surface.position, binning_.record_bytes, triangles_.data() + at);
+    append_surface(surface, has_image(surface.material), records_);
+    if (late_ != kNone) return;
+    if (places_.size() >= kMaxPlaces - kMaxBins) {
+      late_ = record;
+      return;
+    }
+    const auto bytes = static_cast<uint32_t>(records_.size() - record);
+    tree_.for_each_touched(surface.position, hint_, [&](size_t bin) {
+      places_.push_back({static_cast<uint32_t>(bin), static_cast<uint32_t>(record), bytes});
+    });
+  }
+
+  static constexpr size_t kMaxBins = 4096;
+  const SurfaceBinning& binning_;
+  const CubeTree& tree_;
+  const MemoryCharge charge_;
+  CubeTree::Hint hint_;
+  std::vector<std::byte> records_, triangles_;
+  std::vector<Place> places_;
+  size_t late_ = kNone;  // the first record without places
+  Checksum128 checksum_;
+};
+
+}  // namespace
+
+std::vector<SurfaceStore::Bin> bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
+                                            SurfaceStore& store, const StageContext& context) {
+  const CubeTree tree(binning.grid.levels, Cube{}, binning.cubes);
+  std::vector<SurfaceStore::Bin> bins(binning.cubes.size());
+  SurfaceWriter writer(store, bins, binning.buffer_bytes);
+  ContentDigest digest(binning.grid);
+  uint64_t position = 0;
+  context.build.progress.begin_stage("surfaces", scene.declared_triangles(), "triangles");
+  read_pieces<SurfacePiece>(
+      scene, position, context, [&](auto& piece) { piece.emplace(binning, tree, context.budget); },
+      [&](SurfacePiece& piece, uint64_t end) {
+        piece.copy(writer);
+        digest.add(piece.checksum());
+        position = end;
+      });
+  writer.flush();
+  context.build.progress.end_stage();
+  if (digest.hex() != binning.digest)
+    throw Error(ErrorCode::kInvalidInput,
+                "the scene's triangles are not those that were built (digest " +
+                    binning.digest.substr(0, 16) + ", now " + digest.hex().substr(0, 16) +
+                    "): expected a scene that does not change during the build; start over "
+                    "(--restart)");
+  return bins;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,33 @@
+// Reads what the triangles of a scene look like, and puts each into the bins of all cubes of the
+// color grid that it touches.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/color/surface.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/grid.h"
+#include "core/scene/triangle_source.h"
+#include "scheduler/build_spec.h"
+#include "scheduler/color/surface_store.h"
+
+namespace voxdag {
+
+struct SurfaceBinning {
+  Grid grid;
+  std::span<const Material> materials;
+  std::span<const Cube> cubes;  // they cover the grid
+  size_t record_bytes;          // of a triangle, as ingest digests it (triangles/chunk.h)
+  std::string digest;           // of what ingest read
+  size_t buffer_bytes;          // for records on their way to the bins, uncharged
+};
+
+// One bin for each cube, in their order. Throws Error{kInvalidInput} if the triangles are not those
+// that ingest read: the scene was changed during the build.
+std::vector<SurfaceStore::Bin> bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
+                                            SurfaceStore& store, const StageContext& context);
+
+}  // namespace voxdag
