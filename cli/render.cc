@@ -28,6 +28,7 @@ struct RenderCommand {
   std::optional<double> fov_degrees;
   std::string size = "1280x720";
   query::RenderOptions options{.threads = default_threads()};
+  bool gray = false;
   bool json = false;
 };
 
@@ -108,6 +109,7 @@ void run(RenderCommand& command, CommandContext& context) {
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
+  if (!command.gray) command.options.colors = &*file;
   if (dag.empty()) progress->warn(command.input + " has no voxels");
   const double start_s = wall_seconds();
   const query::Placement placement = place_camera(command, *file, dag);
@@ -140,6 +142,7 @@ void declare(Command& command, RenderCommand& state) {
   command.option("--samples", state.options.samples, "N: N * N samples per pixel")
       .range(1, 8)
       .show_default();
+  command.flag("--gray", state.gray, "leave out the colors that the file may have");
   command.threads_option(state.options.threads);
   state.output.declare_force(command);
   command.json_flag(state.json);

@@ -21,6 +21,7 @@ struct GBufferPixel {
   float coverage = 0;  // share of the samples that met a surface
   Float3 offset;       // from the eye to the surface, in voxels
   Float3 normal;       // unit vector
+  Float3 albedo;       // red, green and blue share of light that is reflected
   Float3 sky;          // red, green and blue light from the sky; 1 is an open sky
   float sun = 0;       // share of the sun that is visible
   float floor = 1;     // brightness of the floor; 1 without a shadow

@@ -6,7 +6,6 @@ namespace voxdag::query {
 namespace {
 
 constexpr double kSkyDistance = 1e30;
-constexpr Vec kAlbedo{{0.74, 0.70, 0.64}};
 constexpr Vec kSunlight{{3.6, 3.2, 2.6}};
 constexpr Vec kZenith{{0.62, 0.78, 1.00}}, kHorizon{{0.95, 0.98, 1.02}};
 constexpr Vec kGround{{0.40, 0.36, 0.31}};
@@ -70,9 +69,9 @@ double Lighting::sun_light(const Surface& s, const Sampler& sampler) const {
   return sees(s, normalized(sun_ + u * (r * std::cos(angle)) + w * (r * std::sin(angle)))) ? 1 : 0;
 }
 
-Vec Lighting::reflected(const Vec& normal, const Vec& sky, double sun) const {
+Vec Lighting::reflected(const Vec& albedo, const Vec& normal, const Vec& sky, double sun) const {
   const Vec light = sky + kSunlight * (sun * std::max(0.0, dot(normal, sun_)));
-  return {{kAlbedo[0] * light[0], kAlbedo[1] * light[1], kAlbedo[2] * light[2]}};
+  return {{albedo[0] * light[0], albedo[1] * light[1], albedo[2] * light[2]}};
 }
 
 // The shadow fades with distance from the scene.

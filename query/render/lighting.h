@@ -23,8 +23,8 @@ class Lighting {
   Vec sky_light(const Surface& surface, int rays, const Sampler& sampler) const;
   // 1 if the surface sees the sampled point of the sun, 0 if not.
   double sun_light(const Surface& surface, const Sampler& sampler) const;
-  // What a surface with this normal reflects of both, red, green and blue.
-  Vec reflected(const Vec& normal, const Vec& sky, double sun) const;
+  // What a surface with this albedo and normal reflects of both, red, green and blue.
+  Vec reflected(const Vec& albedo, const Vec& normal, const Vec& sky, double sun) const;
   // Brightness of the floor where `ray` meets it; 1 without a floor or shadow.
   double floor_light(const Ray& ray, const Sampler& sampler) const;
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/parallel_for.h"
+#include "query/render/albedo.h"
 #include "query/render/g_buffer.h"
 #include "query/render/lighting.h"
 #include "query/render/surface.h"
@@ -37,15 +38,16 @@ std::vector<Surface> probe_view(const DagView& dag, const Camera& camera, int wi
 }
 
 // The factor that gives the median light of the probed surfaces a middle tone, and their brightest
-// tenth one below white.
+// tenth one below white, if all were of plaster: dark surfaces stay dark.
 double choose_exposure(const Lighting& lighting, const std::vector<Surface>& seen) {
   constexpr int kSkyRays = 8;
   if (seen.empty()) return 1;
   std::vector<double> luminance;
   for (const Surface& s : seen) {
     const Sampler sampler(luminance.size());
-    const Vec light = lighting.reflected(s.normal, lighting.sky_light(s, kSkyRays, sampler),
-                                         lighting.sun_light(s, sampler));
+    const Vec light =
+        lighting.reflected(kPlaster, s.normal, lighting.sky_light(s, kSkyRays, sampler),
+                           lighting.sun_light(s, sampler));
     luminance.push_back(1e-3 + dot(light, {{0.2126, 0.7152, 0.0722}}));
   }
   std::sort(luminance.begin(), luminance.end());
@@ -65,9 +67,9 @@ Vec tone_map(const Vec& light) {
 
 // Takes samples * samples samples of a pixel.
 GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighting& lighting,
-                          int samples, int x, int y) {
+                          Albedo& albedo, int samples, int x, int y) {
   constexpr int kSkyRays = 4;
-  Vec offset, normal, sky;
+  Vec offset, normal, reflecting, sky;
   double sun = 0, floor = 0;
   int surfaces = 0, misses = 0;
   for (int i = 0; i < samples * samples; ++i) {
@@ -84,6 +86,7 @@ GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighti
     ++surfaces;
     offset = offset + ray.direction * s.t;
     normal = normal + s.normal;
+    reflecting = reflecting + albedo.of(s);
     sky = sky + lighting.sky_light(s, kSkyRays, sampler);
     sun += lighting.sun_light(s, sampler);
   }
@@ -93,6 +96,7 @@ GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighti
   p.coverage = static_cast<float>(surfaces) / static_cast<float>(surfaces + misses);
   p.offset = offset * (1.0 / surfaces);
   p.normal = normal * (1 / std::max(length(normal), 1e-9));
+  p.albedo = reflecting * (1.0 / surfaces);
   p.sky = sky * (1.0 / surfaces);
   p.sun = static_cast<float>(sun / surfaces);
   return p;
@@ -112,28 +116,29 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
 
   GBuffer buffer(width, height);
   progress.begin_stage("render", static_cast<uint64_t>(height), "rows");
+  std::vector<Albedo> albedos(std::max(options.threads, 1u), Albedo(options.colors));
   const auto for_each_row = [&](const auto& work) {
     parallel_for(options.threads, static_cast<size_t>(height),
-                 [&](unsigned, size_t row) { work(static_cast<int>(row)); });
+                 [&](unsigned worker, size_t row) { work(worker, static_cast<int>(row)); });
   };
-  for_each_row([&](int y) {
+  for_each_row([&](unsigned worker, int y) {
     for (int x = 0; x < width; ++x) {
       cancel.check();
-      buffer.at(x, y) = sample_pixel(dag, camera, lighting, options.samples, x, y);
+      buffer.at(x, y) = sample_pixel(dag, camera, lighting, albedos[worker], options.samples, x, y);
     }
     progress.advance(1);
   });
   progress.end_stage();
 
   Picture picture(width, height);
-  for_each_row([&](int y) {
+  for_each_row([&](unsigned, int y) {
     constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
     const Vec background = mix(kTopColor, kBottomColor, (y + 0.5) / height);
     for (int x = 0; x < width; ++x) {
       const GBufferPixel p = buffer.smoothed(x, y, camera.pixel_spread());
       Vec color = background * p.floor;
       if (p.coverage > 0) {
-        const Vec lit = tone_map(lighting.reflected(p.normal, p.sky, p.sun) * exposure);
+        const Vec lit = tone_map(lighting.reflected(p.albedo, p.normal, p.sky, p.sun) * exposure);
         const double depth =
             std::max(0.0, length(p.offset) - haze_start) / std::max(1.0, box.diagonal());
         const Vec surface = mix(lit, background, kMaxHaze * (1 - std::exp(-depth * depth)));

@@ -13,6 +13,8 @@ struct RenderOptions {
   int width = 1280, height = 720;
   int samples = 2;  // per pixel, along each of its sides
   unsigned threads = 1;
+  // The file of the DAG, to show its colors if it has some; null for gray.
+  const voxdag_reader::File* colors = nullptr;
 };
 
 // Shows a plain background if the DAG is empty. Throws Error{kCorrupt} for a damaged DAG, and

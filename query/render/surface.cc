@@ -79,6 +79,8 @@ bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surfa
   if (!caster.cast(ray, visible_cone(pixel_spread), 0, kFarthest, hit)) return false;
   s.t = hit.t;
   s.size = static_cast<double>(dag.resolution() >> hit.depth);
+  s.depth = hit.depth;
+  std::copy_n(hit.cell, 3, s.cell);
   const double pixels = s.size / std::max(s.t * pixel_spread, 1e-9);
   const double cube = std::clamp((pixels - 5) / 8, 0.0, 1.0);
   const Vec face = face_normal(hit, ray.direction);

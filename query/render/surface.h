@@ -2,6 +2,8 @@
 // Stateless; thread-safe.
 #pragma once
 
+#include <cstdint>
+
 #include "query/dag_view.h"
 #include "query/ray_caster.h"
 #include "query/vec.h"
@@ -15,10 +17,12 @@ inline constexpr double kFarthest = 1e30;
 inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread}; }
 
 struct Surface {
-  double t = 0;     // ray parameter of the hit
-  double size = 0;  // edge of the cell that was hit, in voxels
-  Vec normal;       // unit vector on the side that the ray came from
-  Vec start;        // free space in front of the surface, where rays to the light start
+  double t = 0;          // ray parameter of the hit
+  double size = 0;       // edge of the cell that was hit, in voxels
+  uint32_t depth = 0;    // of that cell, below the root
+  int64_t cell[3] = {};  // its position, in units of its edge
+  Vec normal;            // unit vector on the side that the ray came from
+  Vec start;             // free space in front of the surface, where rays to the light start
 };
 
 // Finds the first surface on a ray through a pixel that is `pixel_spread` wide at distance 1; false

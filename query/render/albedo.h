@@ -1,0 +1,29 @@
+// The share of light that a surface reflects: that of the file's colors, or of gray plaster. Not
+// thread-safe; refers to the file.
+#pragma once
+
+#include <optional>
+
+#include "core/format/global/voxdag_reader.h"
+#include "query/render/surface.h"
+#include "query/vec.h"
+
+namespace voxdag::query {
+
+// Of a surface without a color.
+inline constexpr Vec kPlaster{{0.74, 0.70, 0.64}};
+
+class Albedo {
+ public:
+  // `colors`: the file whose colors are shown, or null; one without colors is gray.
+  explicit Albedo(const voxdag_reader::File* colors) {
+    if (colors && colors->has_colors()) cursor_.emplace(*colors);
+  }
+  // Red, green and blue, linear. Throws voxdag_reader::Error for damaged colors.
+  Vec of(const Surface& surface);
+
+ private:
+  std::optional<voxdag_reader::ColorCursor> cursor_;
+};
+
+}  // namespace voxdag::query

@@ -1,0 +1,223 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <filesystem>
+
+#include "core/format/color/color_section_writer.h"
+#include "core/format/global/open_global.h"
+#include "core/format/global/verify.h"
+#include "core/scene/generate/generate.h"
+#include "scheduler/color/cube_baker.h"
+#include "scheduler/run_build.h"
+#include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/scheduler/interruptions.h"
+#include "tests/unit/scheduler_color/painted_scene.h"
+
+namespace voxdag {
+namespace {
+
+class ColorStage : public testing::Test {
+ protected:
+  void SetUp() override { scene_ = PaintedScene::write(folder_.path()); }
+  std::string output() const { return folder_.path() + "/out.vdag"; }
+  BuildSpec spec(uint64_t resolution, uint64_t color_resolution = 0) const {
+    BuildSpec spec;
+    spec.geometry.scenes = {scene_};
+    spec.geometry.resolution = resolution;
+    spec.geometry.color = true;
+    spec.geometry.color_resolution = color_resolution;
+    spec.run.output = output();
+    spec.run.memory_bytes = uint64_t{256} << 20;
+    spec.run.threads = 2;
+    spec.run.force = true;
+    return spec;
+  }
+  static BuildReport build(const BuildSpec& spec) {
+    NoProgress progress;
+    CancelToken cancel;
+    return run_build(spec, {system_files(), progress, cancel});
+  }
+  static std::string refusal(const BuildSpec& spec) {
+    try {
+      build(spec);
+    } catch (const Error& error) {
+      return error.message();
+    }
+    return "";
+  }
+
+  TemporaryFolder folder_;
+  std::string scene_;
+};
+
+struct Counts {
+  uint64_t red = 0, blue = 0, green = 0, other = 0;
+};
+
+// The colors of all set cells of a level.
+Counts count_colors(const voxdag_reader::File& file, uint32_t level) {
+  Counts counts;
+  voxdag_reader::ColorCursor cursor(file);
+  const int64_t edge = int64_t{1} << level;
+  for (int64_t x = 0; x < edge; ++x)
+    for (int64_t y = 0; y < edge; ++y)
+      for (int64_t z = 0; z < edge; ++z) {
+        const auto color = cursor.color(x, y, z, level);
+        if (!color) continue;
+        // The sheet is in the lower half of the grid's middle, the triangle above it.
+        if (*color == voxdag_reader::Rgb{255, 0, 0} && x <= edge / 2)
+          ++counts.red;
+        else if (*color == voxdag_reader::Rgb{0, 0, 255} && x >= edge / 2 - 1)
+          ++counts.blue;
+        else if (*color == voxdag_reader::Rgb{0, 255, 0})
+          ++counts.green;
+        else
+          ++counts.other;
+      }
+  return counts;
+}
+
+TEST_F(ColorStage, AreThoseOfTheMaterials) {
+  const BuildReport report = build(spec(128));
+  ASSERT_TRUE(report.colors);
+  EXPECT_EQ(report.colors->resolution, 128u);
+  EXPECT_EQ(report.colors->cells, report.merge.voxels);
+  EXPECT_EQ(report.colors->images, 1u);
+  const auto file = open_global_file(output());
+  ASSERT_TRUE(file->has_colors());
+  EXPECT_EQ(file->color_levels(), 7u);
+  const Counts counts = count_colors(*file, 7);
+  EXPECT_EQ(counts.red + counts.blue + counts.green + counts.other, file->voxels());
+  EXPECT_GT(counts.red, 4000u);
+  EXPECT_GT(counts.blue, 4000u);
+  EXPECT_GT(counts.green, 500u);
+  // Where both halves, or sheet and triangle, share a block of colors.
+  EXPECT_LT(counts.other, file->voxels() / 10);
+  NoProgress progress;
+  MemoryBudget budget(uint64_t{64} << 20);
+  verify_global_file(*file, 1, budget, progress, CancelToken{});
+}
+
+TEST_F(ColorStage, AreTheSameBytesFromEveryRoute) {
+  for (const uint64_t color_resolution : {256u, 4u}) {
+    std::string expected;
+    for (const unsigned threads : {1u, 2u, 8u})
+      for (const uint64_t subvolume : {64u, 256u}) {
+        BuildSpec s = spec(256, color_resolution);
+        s.run.threads = threads;
+        s.run.subvolume_edge = subvolume;
+        s.run.memory_bytes = uint64_t{64} << (20 + threads);
+        if (threads == 1) s.run.memory_bytes = uint64_t{64} << 20;
+        const BuildReport report = build(s);
+        if (expected.empty()) expected = report.sha256;
+        EXPECT_EQ(report.sha256, expected) << threads << " threads, subvolumes of " << subvolume;
+      }
+  }
+}
+
+TEST_F(ColorStage, AreTheSameAfterAnInterruption) {
+  const std::string expected = build(spec(256, 128)).sha256;
+  std::filesystem::remove(output());
+  for (const char* stage : {"images", "surfaces", "color", "write"}) {
+    build_until(spec(256, 128), stage, 0);
+    EXPECT_TRUE(std::filesystem::exists(output() + ".work"));
+    EXPECT_EQ(build(spec(256, 128)).sha256, expected) << stage;
+    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
+    std::filesystem::remove(output());
+  }
+}
+
+TEST_F(ColorStage, FollowTheImage) {
+  const std::string red = build(spec(64)).sha256;
+  PaintedScene::write(folder_.path(), 128);
+  EXPECT_NE(build(spec(64)).sha256, red);
+  const auto file = open_global_file(output());
+  // Without colors the image does not matter.
+  BuildSpec plain = spec(64);
+  plain.geometry.color = false;
+  const std::string gray = build(plain).sha256;
+  PaintedScene::write(folder_.path(), 255);
+  EXPECT_EQ(build(plain).sha256, gray);
+  EXPECT_FALSE(open_global_file(output())->has_colors());
+}
+
+TEST_F(ColorStage, NeedNoMaterials) {
+  GenerateOptions options;
+  options.kind = SceneKind::kSpheres;
+  options.triangles = 2000;
+  scene_ = folder_.path() + "/spheres.glb";
+  NoProgress progress;
+  generate_scene(system_files(), scene_, options, progress, CancelToken{});
+  build(spec(64));
+  const auto file = open_global_file(output());
+  ASSERT_TRUE(file->has_colors());
+  EXPECT_EQ(file->color(0, 0, 0, 0), (voxdag_reader::Rgb{255, 255, 255}));
+}
+
+TEST_F(ColorStage, WithoutVoxelsAreNone) {
+  BuildSpec s = spec(64);
+  s.geometry.bounds = {{100, 100, 100, 1}};
+  const BuildReport report = build(s);
+  EXPECT_EQ(report.merge.voxels, 0u);
+  EXPECT_FALSE(open_global_file(output())->has_colors());
+}
+
+TEST_F(ColorStage, RefusesOptionsThatDoNotFit) {
+  EXPECT_NE(refusal(spec(64, 128)).find("color resolution 128: expected a power of two from 4"),
+            std::string::npos);
+  EXPECT_NE(refusal(spec(64, 48)).find("color resolution 48"), std::string::npos);
+  BuildSpec s = spec(64, 32);
+  s.geometry.color = false;
+  EXPECT_NE(refusal(s).find("without colors"), std::string::npos);
+}
+
+// Surfaces that do not fit the memory are divided among cubes, down to regions.
+TEST_F(ColorStage, AreTheSameWithLittleMemory) {
+  constexpr uint32_t kLevels = 9;
+  const ColorGrid grid{kLevels, kLevels};
+  MemoryBudget budget(uint64_t{1} << 30);
+  NoProgress progress;
+  CancelToken cancel;
+  const auto textures = TextureSet::prepare(
+      system_files(), SceneMaterials{}, folder_.path() + "/images", 1, budget, progress, cancel);
+  const auto reader = textures->open(1 << 20);
+  const auto bake = [&](uint64_t surface_bytes) {
+    MemoryBudget share(surface_bytes, &budget);
+    SurfaceStore store(system_files(), folder_.path() + "/surfaces", share);
+    SurfaceStore::Bin bin;
+    uint64_t state = 1;
+    std::vector<std::byte> record;
+    for (int i = 0; i < 3000; ++i) {
+      FixedSurface surface;
+      int64_t corner[3];
+      const auto random = [&](int64_t below) {
+        state = state * 6364136223846793005u + 1442695040888963407u;
+        return static_cast<int64_t>(state >> 33) % below;
+      };
+      for (int64_t& c : corner) c = random((int64_t{1} << (kLevels + kUnitBits)) - 8000);
+      for (auto& vertex : surface.position.v)
+        for (int a = 0; a < 3; ++a) vertex[a] = (corner[a] + random(8000)) | 1;
+      for (SurfaceCorner& c : surface.corners)
+        c.color = {static_cast<uint16_t>(random(65536)), 9, 40000, kFullIntensity};
+      record.clear();
+      append_surface(surface, false, record);
+      store.add(bin, record, 1);
+    }
+    CubeBaker baker(grid, textures->materials(), *reader, store, surface_bytes, budget, cancel);
+    std::vector<EncodedRegion> regions;
+    baker.bake(Cube{}, bin, regions);
+    EXPECT_EQ(bin.surfaces, 0u);
+    return regions;
+  };
+  const auto all = bake(uint64_t{64} << 20), divided = bake(60 << 10);
+  ASSERT_GT(all.size(), 100u);
+  ASSERT_EQ(all.size(), divided.size());
+  for (size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(all[i].morton, divided[i].morton);
+    EXPECT_EQ(all[i].blocks, divided[i].blocks);
+  }
+  EXPECT_THROW(bake(1 << 10), Error);
+}
+
+}  // namespace
+}  // namespace voxdag
