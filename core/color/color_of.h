@@ -52,8 +52,8 @@ struct SrgbStarts {
 
 // Nearest in sRGB: how many thresholds are not above `intensity`, at most 65535.
 VOXDAG_HD inline uint8_t srgb_of(uint32_t intensity) {
-  constexpr SrgbThresholds kThresholds{};
-  constexpr SrgbStarts kStarts{};
+  static constexpr SrgbThresholds kThresholds{};
+  static constexpr SrgbStarts kStarts{};
   uint32_t stored = kStarts.of[intensity >> 6];
   while (stored < 255 && kThresholds.of[stored] <= intensity) ++stored;
   return static_cast<uint8_t>(stored);
