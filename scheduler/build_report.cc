@@ -50,7 +50,6 @@ std::string report_json(const BuildReport& report) {
   if (const auto& c = report.colors)
     json["colors"] = {{"resolution", c->resolution},
                       {"cells", c->cells},
-                      {"bytes", c->bytes},
                       {"images", c->images},
                       {"image_bytes", c->image_bytes}};
   if (const auto& c = report.cluster)
@@ -109,7 +108,6 @@ BuildReport decode_report(const std::string& text) {
       const auto& c = json.at("colors");
       r.colors = ColorReport{.resolution = c.at("resolution"),
                              .cells = c.at("cells"),
-                             .bytes = c.at("bytes"),
                              .images = c.at("images"),
                              .image_bytes = c.at("image_bytes")};
     }

@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/text.h"
+#include "core/format/global/open_global.h"
 #include "query/export/selected_bricks.h"
 
 namespace voxdag::query {
@@ -61,6 +62,17 @@ void require_written(const ExportJob& job, uint64_t written, uint64_t expected) 
     throw Error(ErrorCode::kCorrupt, job.file.path() + ": " + count_text(written) +
                                          " voxels were found, expected " + count_text(expected) +
                                          ": the file is damaged (voxdag verify says where)");
+}
+
+voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
+                                 const std::array<int64_t, 3>& cell) {
+  const auto color = with_reader_errors(
+      [&] { return colors.color(cell[0], cell[1], cell[2], job.selection.grid_levels); });
+  if (!color)
+    throw Error(ErrorCode::kCorrupt, job.file.path() +
+                                         ": a cell has no color: the file is damaged "
+                                         "(voxdag verify says where)");
+  return *color;
 }
 
 std::string number_text(double number) {

@@ -87,6 +87,9 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
 // Throws Error{kCorrupt} unless as many voxels were written as the header of the file, or the count
 // before, has said.
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
+// The color of a selected cell. Throws Error{kCorrupt}.
+voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
+                                 const std::array<int64_t, 3>& cell);
 // A number that reads back as the same double, whatever the locale.
 std::string number_text(double number);
 

@@ -191,9 +191,10 @@ ExportReport write_npz(const ExportJob& job) {
   // No limit of the format is in reach: 2^48 voxels have more bytes than file systems take.
   const uint64_t voxels = require_voxels(job, uint64_t{1} << 48, "an array takes");
   report.voxels = voxels;
-  require_space(job, voxels * 3 * (sizeof(int32_t) + sizeof(double)) + 4096);
+  const bool has_colors = job.file.has_colors();
+  require_space(job, voxels * 3 * (sizeof(int32_t) + sizeof(double) + (has_colors ? 1 : 0)) + 4096);
   NpzWriter writer(job);
-  ExportStage stage(job, "export", 2 * voxels, "rows");
+  ExportStage stage(job, "export", (has_colors ? 3 : 2) * voxels, "rows");
   const std::string shape = "(" + std::to_string(voxels) + ", 3)";
   writer.add<int32_t>("cells.npy", npy_header("<i4", shape), 3 * voxels, [&](const auto& put) {
     visit_cells(job, stage, [&](const CellCorner& cell) {
@@ -206,6 +207,14 @@ ExportReport write_npz(const ExportJob& job) {
         put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
     });
   });
+  if (has_colors)
+    writer.add<uint8_t>("colors.npy", npy_header("|u1", shape), 3 * voxels, [&](const auto& put) {
+      voxdag_reader::ColorCursor colors(job.file);
+      visit_cells(job, stage, [&](const CellCorner& cell) {
+        const voxdag_reader::Rgb color = color_of_cell(job, colors, cell);
+        for (const uint8_t channel : {color.r, color.g, color.b}) put(channel);
+      });
+    });
   writer.add<double>("grid.npy", npy_header("<f8", "(4,)"), 4, [&](const auto& put) {
     for (size_t axis = 0; axis < 3; ++axis) put(job.file.origin()[axis]);
     put(job.cell_edge());
@@ -213,7 +222,8 @@ ExportReport write_npz(const ExportJob& job) {
   report.bytes = writer.finish();
   report.notes.push_back(
       "numpy.load() gives 'cells' (int32), 'positions' (their centers, float64) and 'grid' (low "
-      "corner of the grid and edge of a voxel)");
+      "corner of the grid and edge of a voxel)" +
+      std::string(has_colors ? ", and 'colors' (sRGB, uint8)" : ""));
   return report;
 }
 

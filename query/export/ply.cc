@@ -1,5 +1,6 @@
 // PLY, binary: the centers of the voxels as doubles, since floats cannot tell the voxels of a large
-// grid apart. The format: Greg Turk, "The PLY Polygon File Format", 1994.
+// grid apart, and their colors, if the file has some. The format: Greg Turk, "The PLY Polygon File
+// Format", 1994.
 #include <bit>
 
 #include "query/export/export_file.h"
@@ -12,10 +13,11 @@ namespace {
 // Most readers count vertices in 32-bit integers.
 constexpr uint64_t kMaxPlyVertices = (uint64_t{1} << 31) - 1;
 
-std::string ply_header(uint64_t vertices) {
+std::string ply_header(uint64_t vertices, bool has_colors) {
   return "ply\nformat binary_little_endian 1.0\ncomment voxel centers by voxdag\nelement vertex " +
-         std::to_string(vertices) +
-         "\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+         std::to_string(vertices) + "\nproperty double x\nproperty double y\nproperty double z\n" +
+         (has_colors ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "") +
+         "end_header\n";
 }
 
 }  // namespace
@@ -23,8 +25,10 @@ std::string ply_header(uint64_t vertices) {
 ExportReport write_ply(const ExportJob& job) {
   ExportReport report;
   report.voxels = require_voxels(job, kMaxPlyVertices, "readers of PLY take");
-  const std::string header = ply_header(report.voxels);
-  require_space(job, header.size() + report.voxels * 3 * sizeof(double));
+  const bool has_colors = job.file.has_colors();
+  const std::string header = ply_header(report.voxels, has_colors);
+  require_space(job, header.size() + report.voxels * (3 * sizeof(double) + (has_colors ? 3 : 0)));
+  voxdag_reader::ColorCursor colors(job.file);
   ExportFile file(job.files, job.output);
   file.write(header);
   ExportStage stage(job, "export", report.voxels, "voxels");
@@ -33,6 +37,7 @@ ExportReport write_ply(const ExportJob& job) {
     for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
       for (size_t axis = 0; axis < 3; ++axis)
         file.put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
+      if (has_colors) file.put(color_of_cell(job, colors, cell));
     });
     const auto voxels = static_cast<uint64_t>(std::popcount(mask));
     written_voxels += voxels;

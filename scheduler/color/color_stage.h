@@ -22,7 +22,6 @@ struct ColorSource {
 struct ColorReport {
   uint64_t resolution = 0;               // of the color grid; 0 for a file without colors
   uint64_t cells = 0;                    // of that grid, that have a color
-  uint64_t bytes = 0;                    // that the colors take in the file
   uint64_t images = 0, image_bytes = 0;  // and their pyramids
   uint64_t spill_bytes = 0;
 };

@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "core/format/color/color_section_writer.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
 #include "core/scene/generate/generate.h"
+#include "query/export/export.h"
 #include "scheduler/color/cube_baker.h"
 #include "scheduler/run_build.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -125,6 +128,44 @@ TEST_F(ColorStage, AreTheSameAfterAnInterruption) {
     EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
     std::filesystem::remove(output());
   }
+}
+
+// PLY and npz have the colors of the cells in their order.
+TEST_F(ColorStage, AreExported) {
+  build(spec(64));
+  const auto file = open_global_file(output());
+  NoProgress progress;
+  const auto export_as = [&](const char* format) {
+    query::ExportRequest request;
+    request.format = &query::export_format(format);
+    request.selection = {6, query::whole_grid(6)};
+    request.output = folder_.path() + "/voxels." + format;
+    request.memory_bytes = uint64_t{256} << 20;
+    query::export_dag(system_files(), *file, request, progress, CancelToken{});
+    std::ifstream in(request.output, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const std::string ply = export_as("ply"), npz = export_as("npz");
+  const size_t body = ply.find("end_header\n") + 11;
+  ASSERT_NE(ply.find("property uchar red\nproperty uchar green\nproperty uchar blue\nend_header"),
+            std::string::npos);
+  ASSERT_EQ(ply.size() - body, 27 * file->voxels());
+  std::string colors;
+  for (size_t at = body; at < ply.size(); at += 27) {
+    double position[3];
+    std::memcpy(position, ply.data() + at, sizeof position);
+    int64_t cell[3];
+    for (int a = 0; a < 3; ++a)
+      cell[a] = static_cast<int64_t>((position[a] - file->origin()[a]) / file->edge() * 64);
+    const auto color = file->color(cell[0], cell[1], cell[2], 6);
+    ASSERT_TRUE(color);
+    const std::string written = ply.substr(at + 24, 3);
+    EXPECT_EQ(written, (std::string{static_cast<char>(color->r), static_cast<char>(color->g),
+                                    static_cast<char>(color->b)}));
+    colors += written;
+  }
+  EXPECT_NE(npz.find("colors.npy"), std::string::npos);
+  EXPECT_NE(npz.find(colors), std::string::npos);
 }
 
 TEST_F(ColorStage, FollowTheImage) {
