@@ -15,9 +15,8 @@
 namespace voxdag {
 namespace {
 
-// Of what libpng allocates: zlib's window and states, and the buffers of chunks.
+// Of what libpng allocates: zlib's window and states, and buffers.
 constexpr uint64_t kPngStateBytes = uint64_t{1} << 20;
-constexpr png_alloc_size_t kMaxChunkBytes = 256 << 10;
 
 class PngReader : public ImageReader {
  public:
@@ -73,8 +72,9 @@ class PngReader : public ImageReader {
     if (setjmp(png_jmpbuf(png_))) return false;
     png_set_read_fn(png_, this, on_read);
     png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // checked here
-    png_set_chunk_malloc_max(png_, kMaxChunkBytes);
-    png_set_chunk_cache_max(png_, 16);
+    // Texts, profiles and the like are passed over, of whatever size they are.
+    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+    png_set_chunk_malloc_max(png_, 0);
     png_read_info(png_, info_);
     return true;
   }

@@ -1,0 +1,26 @@
+// PNG and JPEG files made by tests: PNG from its bytes, JPEG by the library.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace voxdag::test {
+
+struct PngFormat {
+  uint32_t width = 1, height = 1;
+  int depth = 8;
+  int color_type = 6;  // 0 gray, 2 RGB, 3 palette, 4 gray and alpha, 6 RGBA
+  std::string chunks;  // between IHDR and IDAT
+  bool is_interlaced = false;
+};
+// Length, type, data and checksum.
+std::string png_chunk(const std::string& type, const std::string& data);
+std::string big_endian(uint32_t value);
+// `pixels` without filter bytes: whole bytes per row. Interlaced ones have whole bytes per pixel.
+std::string png_file(const PngFormat& format, const std::string& pixels);
+
+// `pixels` has 1 (gray), 3 (RGB) or 4 (CMYK) bytes each.
+std::string jpeg_file(uint32_t width, uint32_t height, int components, const std::string& pixels,
+                      bool is_progressive = false);
+
+}  // namespace voxdag::test
