@@ -172,6 +172,59 @@ TEST(GltfDraco, MetadataArePassedOver) {
             triangles_of_file(plain_scene(*decode(data)).glb()));
 }
 
+// Texture coordinates and colors as Draco's own decoder gives them.
+TEST(GltfDraco, LooksAreCompressedToo) {
+  auto mesh = bumpy_grid(6, false);
+  const uint32_t points = mesh->num_points();
+  draco::GeometryAttribute texture, color;
+  texture.Init(draco::GeometryAttribute::TEX_COORD, nullptr, 2, draco::DT_FLOAT32, false, 8, 0);
+  color.Init(draco::GeometryAttribute::COLOR, nullptr, 4, draco::DT_UINT8, true, 4, 0);
+  const int texture_id = mesh->AddAttribute(texture, true, points);
+  const int color_id = mesh->AddAttribute(color, true, points);
+  for (uint32_t p = 0; p < points; ++p) {
+    const float uv[2] = {static_cast<float>(p % 7) / 6, static_cast<float>(p) / 40};
+    const uint8_t rgba[4] = {static_cast<uint8_t>(p), static_cast<uint8_t>(255 - p), 7, 200};
+    mesh->attribute(texture_id)->SetAttributeValue(draco::AttributeValueIndex(p), uv);
+    mesh->attribute(color_id)->SetAttributeValue(draco::AttributeValueIndex(p), rgba);
+  }
+  const auto data = encode(*mesh, draco::MESH_EDGEBREAKER_ENCODING, 12);
+  const auto decoded = decode(data);
+
+  const auto add_look = [](SceneBuilder& scene, int uv, int rgba) {
+    scene.root["images"] = {{{"uri", "data:image/png;base64,"}}};
+    scene.root["textures"] = {{{"source", 0}}};
+    scene.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+    Json& primitive = scene.root["meshes"][0]["primitives"][0];
+    primitive["material"] = 0;
+    primitive["attributes"]["TEXCOORD_0"] = uv;
+    primitive["attributes"]["COLOR_0"] = rgba;
+    OpenScene open(scene.glb());
+    EXPECT_TRUE(open.source->materials().warnings.empty());
+    return surfaces_of(*open.source);
+  };
+  SceneBuilder plain = plain_scene(*decoded);
+  const int uv = plain.add_accessor("VEC2", kF32, values_of<float>(*decoded, texture_id));
+  const int rgba = plain.add_accessor("VEC4", kU8, values_of<uint8_t>(*decoded, color_id),
+                                      {{"normalized", true}});
+  const auto expected = add_look(plain, uv, rgba);
+  SceneBuilder scene =
+      compressed_scene(data, points, 3 * mesh->num_faces(),
+                       {{"POSITION", 0}, {"TEXCOORD_0", texture_id}, {"COLOR_0", color_id}});
+  const int own_uv =
+      scene.add("accessors", {{"componentType", kF32}, {"count", points}, {"type", "VEC2"}});
+  const int own_rgba = scene.add(
+      "accessors",
+      {{"componentType", kU8}, {"count", points}, {"type", "VEC4"}, {"normalized", true}});
+  const auto found = add_look(scene, own_uv, own_rgba);
+  ASSERT_EQ(found.size(), 72u);
+  ASSERT_EQ(expected.size(), 72u);
+  for (size_t i = 0; i < found.size(); ++i)
+    for (size_t k = 0; k < 3; ++k) {
+      EXPECT_EQ(found[i].corners[k].texture, expected[i].corners[k].texture);
+      EXPECT_EQ(found[i].corners[k].color, expected[i].corners[k].color);
+    }
+}
+
 // Joints and weights come from generic attributes, and the skin moves the vertices.
 TEST(GltfDraco, SkinsAreCompressedToo) {
   auto mesh = bumpy_grid(6, false);

@@ -133,6 +133,29 @@ inline std::vector<Corners> triangles_of(TriangleSource& source) {
   return all;
 }
 
+// The same with texture coordinates and a base color texture, of this image.
+inline SceneBuilder textured(const std::string& image) {
+  SceneBuilder scene = one_triangle();
+  scene.root["images"] = {{{"uri", "data:image/png;base64," + base64(image)}, {"name", "wood"}}};
+  scene.root["textures"] = {{{"source", 0}}};
+  scene.root["materials"] = {
+      {{"name", "floor"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  Json& primitive = scene.root["meshes"][0]["primitives"][0];
+  primitive["material"] = 0;
+  primitive["attributes"]["TEXCOORD_0"] =
+      scene.add_accessor<float>("VEC2", kF32, {0, 0, 1, 0, 0.5, -2});
+  return scene;
+}
+
+// What all triangles look like.
+inline std::vector<SurfaceTriangle> surfaces_of(TriangleSource& source) {
+  std::vector<SurfaceTriangle> all;
+  source.open(1)->read_surfaces(0, source.declared_triangles(), [&](auto batch) {
+    all.insert(all.end(), batch.begin(), batch.end());
+  });
+  return all;
+}
+
 // A scene file in memory, opened.
 struct OpenScene {
   explicit OpenScene(std::string file, SceneOptions options = {},

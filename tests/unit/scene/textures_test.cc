@@ -1,4 +1,4 @@
-// Surfaces and textures of small glTF scenes made here.
+// Textures of small glTF scenes made here.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -42,27 +42,6 @@ std::string noise(size_t bytes) {
   return all;
 }
 
-SceneBuilder textured(const std::string& image) {
-  SceneBuilder scene = one_triangle();
-  scene.root["images"] = {{{"uri", "data:image/png;base64," + base64(image)}, {"name", "wood"}}};
-  scene.root["textures"] = {{{"source", 0}}};
-  scene.root["materials"] = {
-      {{"name", "floor"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
-  Json& primitive = scene.root["meshes"][0]["primitives"][0];
-  primitive["material"] = 0;
-  primitive["attributes"]["TEXCOORD_0"] =
-      scene.add_accessor<float>("VEC2", kF32, {0, 0, 1, 0, 0.5, -2});
-  return scene;
-}
-
-std::vector<SurfaceTriangle> surfaces_of(TriangleSource& source) {
-  std::vector<SurfaceTriangle> all;
-  source.open(1)->read_surfaces(0, source.declared_triangles(), [&](auto batch) {
-    all.insert(all.end(), batch.begin(), batch.end());
-  });
-  return all;
-}
-
 struct Warnings : NoProgress {
   std::vector<std::string> all;
   void warn(std::string_view message) override { all.emplace_back(message); }
@@ -97,33 +76,6 @@ struct Textures {
 };
 
 uint64_t channel(uint64_t texel, int c) { return texel >> 16 * c & 0xffff; }
-
-TEST(Surfaces, TextureCoordinatesAndColorsOfCorners) {
-  SceneBuilder scene = textured("");
-  scene.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = scene.add_accessor<uint8_t>(
-      "VEC3", kU8, {255, 0, 128, 0, 0, 0, 1, 2, 3}, {{"normalized", true}});
-  OpenScene open(scene.glb());
-  const auto all = surfaces_of(*open.source);
-  ASSERT_EQ(all.size(), 1u);
-  constexpr int64_t kOne = int64_t{1} << kTextureBits;
-  EXPECT_EQ(all[0].corners[1].texture, (std::array<int64_t, 2>{kOne, 0}));
-  EXPECT_EQ(all[0].corners[2].texture, (std::array<int64_t, 2>{kOne / 2, -2 * kOne}));
-  EXPECT_EQ(all[0].corners[0].color, (std::array<uint16_t, 4>{65535, 0, 128 * 257, 65535}));
-  EXPECT_EQ(all[0].corners[2].color, (std::array<uint16_t, 4>{257, 514, 771, 65535}));
-  EXPECT_EQ(all[0].position.v[1][0], 1);
-}
-
-// The example of the extension: the lower left quarter of the image.
-TEST(Surfaces, TextureTransform) {
-  SceneBuilder scene = textured("");
-  scene.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = {
-      {"KHR_texture_transform",
-       {{"offset", {0, 1}}, {"rotation", 1.57079632679}, {"scale", {0.5, 0.5}}}}};
-  OpenScene open(scene.glb());
-  const auto corner = surfaces_of(*open.source).at(0).corners[1].texture;  // of (1, 0)
-  EXPECT_NEAR(std::ldexp(static_cast<double>(corner[0]), -kTextureBits), 0, 1e-6);
-  EXPECT_NEAR(std::ldexp(static_cast<double>(corner[1]), -kTextureBits), 0.5, 1e-6);
-}
 
 // Every level of an image of odd sizes is the mean over the areas of its texels, in memory and by
 // pages of the scratch file.

@@ -1,0 +1,205 @@
+// What triangles of small glTF scenes made here look like: corners and materials.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(Surfaces, TextureCoordinatesAndColorsOfCorners) {
+  SceneBuilder scene = textured("");
+  scene.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = scene.add_accessor<uint8_t>(
+      "VEC3", kU8, {255, 0, 128, 0, 0, 0, 1, 2, 3}, {{"normalized", true}});
+  OpenScene open(scene.glb());
+  const auto all = surfaces_of(*open.source);
+  ASSERT_EQ(all.size(), 1u);
+  constexpr int64_t kOne = int64_t{1} << kTextureBits;
+  EXPECT_EQ(all[0].corners[1].texture, (std::array<int64_t, 2>{kOne, 0}));
+  EXPECT_EQ(all[0].corners[2].texture, (std::array<int64_t, 2>{kOne / 2, -2 * kOne}));
+  EXPECT_EQ(all[0].corners[0].color, (std::array<uint16_t, 4>{65535, 0, 128 * 257, 65535}));
+  EXPECT_EQ(all[0].corners[2].color, (std::array<uint16_t, 4>{257, 514, 771, 65535}));
+  EXPECT_EQ(all[0].position.v[1][0], 1);
+}
+
+// The example of the extension: the lower left quarter of the image.
+TEST(Surfaces, TextureTransform) {
+  SceneBuilder scene = textured("");
+  scene.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = {
+      {"KHR_texture_transform",
+       {{"offset", {0, 1}}, {"rotation", 1.57079632679}, {"scale", {0.5, 0.5}}}}};
+  OpenScene open(scene.glb());
+  const auto corner = surfaces_of(*open.source).at(0).corners[1].texture;  // of (1, 0)
+  EXPECT_NEAR(std::ldexp(static_cast<double>(corner[0]), -kTextureBits), 0, 1e-6);
+  EXPECT_NEAR(std::ldexp(static_cast<double>(corner[1]), -kTextureBits), 0.5, 1e-6);
+}
+
+constexpr int64_t kOneImage = int64_t{1} << kTextureBits;
+using Channels = std::array<uint16_t, 4>;
+
+Json& only_primitive(SceneBuilder& scene) { return scene.root["meshes"][0]["primitives"][0]; }
+
+SurfaceTriangle with_colors(SceneBuilder scene, int accessor) {
+  only_primitive(scene)["attributes"]["COLOR_0"] = accessor;
+  OpenScene open(scene.glb());
+  EXPECT_TRUE(open.source->materials().warnings.empty());
+  return surfaces_of(*open.source).at(0);
+}
+
+TEST(Surfaces, ColorsOfEveryComponentType) {
+  const Json normalized = {{"normalized", true}};
+  SceneBuilder scene = one_triangle();
+  const auto bytes =
+      scene.add_accessor<uint8_t>("VEC4", kU8, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 255}, normalized);
+  const auto shorts =
+      scene.add_accessor<uint16_t>("VEC3", kU16, {0, 1, 65535, 3, 4, 5, 6, 7, 300}, normalized);
+  const auto wide = scene.add_accessor<uint16_t>(
+      "VEC4", kU16, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 40000}, normalized);
+  const auto reals =
+      scene.add_accessor<float>("VEC3", kF32, {0, 1, 0.5, -1, 2, NAN, 0.25, 0, INFINITY});
+  const auto transparent =
+      scene.add_accessor<float>("VEC4", kF32, {0, 1, 0.5, 0.25, 0, 0, 0, 0, 1, 1, 1, 1});
+  EXPECT_EQ(with_colors(scene, bytes).corners[1].color,
+            (Channels{4 * 257, 5 * 257, 6 * 257, 7 * 257}));
+  EXPECT_EQ(with_colors(scene, bytes).corners[2].color[3], 65535);
+  EXPECT_EQ(with_colors(scene, shorts).corners[0].color, (Channels{0, 1, 65535, 65535}));
+  EXPECT_EQ(with_colors(scene, shorts).corners[2].color, (Channels{6, 7, 300, 65535}));
+  EXPECT_EQ(with_colors(scene, wide).corners[2].color, (Channels{8, 9, 10, 40000}));
+  EXPECT_EQ(with_colors(scene, reals).corners[0].color, (Channels{0, 65535, 32768, 65535}));
+  EXPECT_EQ(with_colors(scene, reals).corners[1].color, (Channels{0, 65535, 0, 65535}));
+  EXPECT_EQ(with_colors(scene, reals).corners[2].color, (Channels{16384, 0, 65535, 65535}));
+  EXPECT_EQ(with_colors(scene, transparent).corners[0].color, (Channels{0, 65535, 32768, 16384}));
+}
+
+// What cannot be read is left out with a warning; the geometry is the same.
+TEST(Surfaces, BrokenColorsAreLeftOut) {
+  SceneBuilder scene = one_triangle();
+  const int too_few = scene.add_accessor<float>("VEC3", kF32, {0, 1, 0.5});
+  const int pairs = scene.add_accessor<float>("VEC2", kF32, {0, 1, 0.5, 0, 0, 0});
+  for (const int accessor : {too_few, pairs, 999}) {
+    only_primitive(scene)["attributes"]["COLOR_0"] = accessor;
+    OpenScene open(scene.glb());
+    ASSERT_EQ(open.source->materials().warnings.size(), 1u);
+    EXPECT_THAT(open.source->materials().warnings[0], HasSubstr("COLOR_0"));
+    EXPECT_EQ(surfaces_of(*open.source).at(0).corners[0].color,
+              Channels({65535, 65535, 65535, 65535}));
+    EXPECT_EQ(open.triangles().size(), 1u);
+  }
+}
+
+TEST(Surfaces, TextureCoordinatesOfOtherTypesAndSets) {
+  SceneBuilder scene = textured("");
+  Json& attributes = only_primitive(scene)["attributes"];
+  attributes["TEXCOORD_1"] =
+      scene.add_accessor<uint8_t>("VEC2", kU8, {0, 0, 255, 0, 0, 51}, {{"normalized", true}});
+  attributes["TEXCOORD_2"] = scene.add_accessor<uint16_t>("VEC2", kU16, {0, 0, 0, 65535, 13107, 0},
+                                                          {{"normalized", true}});
+  Json& use = scene.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"];
+  const auto corner = [&](size_t k) {
+    OpenScene open(scene.glb());
+    return surfaces_of(*open.source).at(0).corners[k].texture;
+  };
+  use["texCoord"] = 1;
+  EXPECT_EQ(corner(1), (std::array<int64_t, 2>{kOneImage, 0}));
+  EXPECT_EQ(corner(2), (std::array<int64_t, 2>{0, (kOneImage + 2) / 5}));
+  // The transform names another set.
+  use["extensions"] = {{"KHR_texture_transform", {{"texCoord", 2}, {"offset", {0, 0.5}}}}};
+  EXPECT_EQ(corner(1), (std::array<int64_t, 2>{0, kOneImage / 2 * 3}));
+  EXPECT_EQ(corner(2), (std::array<int64_t, 2>{(kOneImage + 2) / 5, kOneImage / 2}));
+  // A set that the primitive lacks: the factor alone.
+  use["extensions"] = {{"KHR_texture_transform", {{"texCoord", 3}}}};
+  OpenScene open(scene.glb());
+  const SceneMaterials looks = open.source->materials();
+  ASSERT_EQ(looks.warnings.size(), 1u);
+  EXPECT_THAT(looks.warnings[0], HasSubstr("TEXCOORD_3"));
+  const uint32_t material = surfaces_of(*open.source).at(0).material;
+  ASSERT_LT(material, looks.materials.size());
+  EXPECT_EQ(looks.materials[material].image, Material::kNoImage);
+}
+
+std::vector<Material> materials_of(const SceneBuilder& scene) {
+  return OpenScene(scene.glb()).source->materials().materials;
+}
+
+TEST(Materials, FactorsAndAlphaModes) {
+  SceneBuilder scene = one_triangle();
+  scene.root["materials"] = {
+      {{"name", "a"}, {"pbrMetallicRoughness", {{"baseColorFactor", {0.5, 0, 1, 0.25}}}}},
+      {{"name", "b"}, {"alphaMode", "MASK"}, {"alphaCutoff", 0.25}},
+      {{"name", "c"}, {"alphaMode", "MASK"}},
+      {{"name", "d"}, {"alphaMode", "BLEND"}},
+      {{"name", "e"},
+       {"extensions",
+        {{"KHR_materials_pbrSpecularGlossiness", {{"diffuseFactor", {0, 0.5, 1, 1}}}}}}}};
+  only_primitive(scene)["material"] = 1;
+  const auto all = materials_of(scene);
+  ASSERT_EQ(all.size(), 5u);
+  EXPECT_EQ(all[0].factor, (Channels{32768, 0, 65535, 16384}));
+  EXPECT_EQ(all[0].alpha_mode, AlphaMode::kOpaque);
+  EXPECT_EQ(all[1].alpha_mode, AlphaMode::kMask);
+  EXPECT_EQ(all[1].alpha_cutoff, 16384);
+  EXPECT_EQ(all[2].alpha_cutoff, 32768);
+  EXPECT_EQ(all[3].alpha_mode, AlphaMode::kBlend);
+  EXPECT_EQ(all[4].factor, (Channels{0, 32768, 65535, 65535}));
+  OpenScene open(scene.glb());
+  EXPECT_EQ(surfaces_of(*open.source).at(0).material, 1u);
+}
+
+TEST(Materials, WrapModes) {
+  SceneBuilder scene = textured("");
+  EXPECT_EQ(materials_of(scene).at(0).wrap, (std::array{Wrap::kRepeat, Wrap::kRepeat}));
+  scene.root["textures"][0]["sampler"] = 0;
+  scene.root["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}}};
+  EXPECT_EQ(materials_of(scene).at(0).wrap,
+            (std::array{Wrap::kClampToEdge, Wrap::kMirroredRepeat}));
+  scene.root["samplers"] = {{{"wrapS", 10497}, {"wrapT", 33071}}};
+  EXPECT_EQ(materials_of(scene).at(0).wrap, (std::array{Wrap::kRepeat, Wrap::kClampToEdge}));
+}
+
+TEST(Materials, DiffuseTextureOfSpecularGlossiness) {
+  SceneBuilder scene = textured("");
+  const Json transform = {{"KHR_texture_transform", {{"scale", {2, 2}}}}};
+  scene.root["materials"] = {
+      {{"extensions",
+        {{"KHR_materials_pbrSpecularGlossiness",
+          {{"diffuseTexture", {{"index", 0}, {"extensions", transform}}}}}}}}};
+  OpenScene open(scene.glb());
+  const SceneMaterials looks = open.source->materials();
+  EXPECT_EQ(looks.materials.at(0).image, 0u);
+  ASSERT_EQ(looks.images.size(), 1u);
+  EXPECT_THAT(looks.images[0].name, HasSubstr("image 0 \"wood\""));
+  EXPECT_EQ(surfaces_of(*open.source).at(0).corners[1].texture[0], 2 * kOneImage);
+}
+
+// The materials and images of each file follow those of the files before it.
+TEST(Materials, OfSeveralFiles) {
+  MemoryFiles files;
+  SceneBuilder plain = one_triangle();
+  plain.root["materials"] = {{{"name", "first"}}, {{"name", "second"}}};
+  only_primitive(plain)["material"] = 1;
+  files.contents["plain"] = plain.glb();
+  files.contents["textured"] = textured("").glb();
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelToken cancel;
+  const auto scene = open_scene(files, {"textured", "plain", "textured"}, {}, budget, cancel);
+  const SceneMaterials looks = scene->materials();
+  ASSERT_EQ(looks.materials.size(), scene->material_count());
+  ASSERT_EQ(looks.images.size(), 2u);
+  const auto triangles = surfaces_of(*scene);
+  ASSERT_EQ(triangles.size(), 3u);
+  const auto material = [&](size_t i) { return looks.materials.at(triangles[i].material); };
+  EXPECT_EQ(material(0).name, "floor");
+  EXPECT_EQ(material(0).image, 0u);
+  EXPECT_EQ(material(1).name, "second");
+  EXPECT_EQ(material(1).image, Material::kNoImage);
+  EXPECT_EQ(material(2).name, "floor");
+  EXPECT_EQ(material(2).image, 1u);
+  EXPECT_THAT(looks.images[1].name, HasSubstr("textured"));
+}
+
+}  // namespace
+}  // namespace voxdag::test
