@@ -59,6 +59,13 @@ void Mesh::find_vertex_properties() {
     if (axes_[a] == vertex.properties.size())
       refuse(std::string("has vertices without a property ") + kNames[a]);
   }
+  for (const char* name : {"red", "green", "blue", "alpha"}) {
+    const size_t property = find_property(vertex, name);
+    if (property < vertex.properties.size())
+      colors_.push_back(property);
+    else if (name[0] != 'a')
+      return colors_.clear();
+  }
 }
 
 void Mesh::find_face_list() {

@@ -46,6 +46,8 @@ class Mesh {
   const std::deque<uint64_t>& vertex_blocks() const { return vertex_blocks_; }
   // The properties x, y and z.
   const std::array<size_t, 3>& axes() const { return axes_; }
+  // The properties red, green, blue and, if it is there, alpha; none if one of the three lacks.
+  const std::vector<size_t>& colors() const { return colors_; }
 
   const std::deque<FaceBlock>& face_blocks() const { return face_blocks_; }
   std::unique_ptr<Rows> open_faces(MemoryBudget& budget) const;
@@ -63,6 +65,7 @@ class Mesh {
   Header header_;
   size_t vertex_, face_;  // elements; one that is not there is the number of elements
   std::array<size_t, 3> axes_{};
+  std::vector<size_t> colors_;
   size_t face_list_ = Rows::kNoList;
   uint64_t vertices_begin_ = 0;
   uint64_t triangles_ = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/base/page_buffer.h"
@@ -10,6 +11,7 @@
 #include "core/scene/gltf/messages.h"
 #include "core/scene/ply/face_reader.h"
 #include "core/scene/ply/mesh.h"
+#include "core/scene/ply/vertex_colors.h"
 #include "core/scene/ply/vertex_reader.h"
 
 namespace voxdag::ply {
@@ -25,9 +27,11 @@ class PlyCursor : public TriangleCursor {
             const CancelToken& cancel)
       : mesh_(mesh),
         skip_invalid_(options.skip_invalid),
+        cursors_(cursors),
+        budget_(budget),
         cancel_(cancel),
         faces_(mesh, budget),
-        vertices_(mesh, budget),
+        vertices_(mesh, mesh.axes(), budget),
         cache_(budget, vertices_.count(), cursors),
         corners_(3 * kWindowTriangles),
         batch_(budget, kBatchTriangles, "a batch of triangles") {
@@ -35,11 +39,19 @@ class PlyCursor : public TriangleCursor {
   }
 
   void read(uint64_t first, uint64_t count, const Visitor& visit) override {
-    read_placed(first, count, nullptr, visit);
+    read_placed(first, count, nullptr, batch_, visit);
   }
   void read_snapped(uint64_t first, uint64_t count, const Grid& grid,
                     const Visitor& visit) override {
-    read_placed(first, count, &grid, visit);
+    read_placed(first, count, &grid, batch_, visit);
+  }
+  void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit) override {
+    if (mesh_.colors().empty()) return TriangleCursor::read_surfaces(first, count, visit);
+    if (!colors_) {
+      surfaces_ = PageBuffer<SurfaceTriangle>(budget_, kBatchTriangles, "a batch of triangles");
+      colors_.emplace(mesh_, cursors_, budget_);
+    }
+    read_placed(first, count, nullptr, surfaces_, visit);
   }
   WorldBounds read_bounds(uint64_t first, uint64_t count) override {
     WorldBounds bounds;
@@ -57,7 +69,10 @@ class PlyCursor : public TriangleCursor {
   }
 
  private:
-  void read_placed(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit) {
+  // Of RealTriangle or SurfaceTriangle.
+  template <class T, class VisitBatch>
+  void read_placed(uint64_t first, uint64_t count, const Grid* grid, PageBuffer<T>& batch,
+                   const VisitBatch& visit) {
     cache_.place(Transform{}, grid);
     for (const uint64_t end = first + count; first < end;) {
       cancel_.check();
@@ -66,14 +81,21 @@ class PlyCursor : public TriangleCursor {
       size_t placed = 0;
       for (uint64_t i = 0; i < n; ++i) {
         const uint32_t* const corners = &corners_[3 * static_cast<size_t>(i)];
-        if (place(corners, batch_[placed]))
+        if (place(corners, batch[placed]))
           ++placed;
         else if (!skip_invalid_)
           report(first + i, corners);
       }
-      if (placed > 0) visit({batch_.data(), placed});
+      if (placed > 0) visit({batch.data(), placed});
       first += n;
     }
+  }
+
+  bool place(const uint32_t* corners, SurfaceTriangle& out) {
+    if (!place(corners, out.position)) return false;
+    out.material = 0;
+    for (size_t k = 0; k < 3; ++k) out.corners[k] = {{}, colors_->at(corners[k])};
+    return true;
   }
 
   // False for a corner out of range or a vertex that is not finite.
@@ -105,6 +127,8 @@ class PlyCursor : public TriangleCursor {
 
   const Mesh& mesh_;
   const bool skip_invalid_;
+  const unsigned cursors_;
+  MemoryBudget& budget_;
   const CancelToken& cancel_;
   FaceReader faces_;
   VertexReader vertices_;
@@ -112,6 +136,9 @@ class PlyCursor : public TriangleCursor {
   std::vector<uint32_t> corners_;
   gltf::UsedVertices used_vertices_;
   PageBuffer<RealTriangle> batch_;
+  // Made by the first read_surfaces().
+  PageBuffer<SurfaceTriangle> surfaces_;
+  std::optional<VertexColors> colors_;
 };
 
 // A file without faces.

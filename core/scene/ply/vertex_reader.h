@@ -1,9 +1,11 @@
-// The positions of the vertices of a PLY file. Not thread-safe.
+// Numbers of the vertices of a PLY file: the values of some of their properties, such as positions.
+// Not thread-safe.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "core/scene/gltf/mesh_data/position_source.h"
 #include "core/scene/ply/ascii_text.h"
@@ -14,11 +16,12 @@ namespace voxdag::ply {
 
 class VertexReader : public gltf::PositionSource {
  public:
-  // The mesh must outlive the reader.
-  VertexReader(const Mesh& mesh, MemoryBudget& budget);
+  // Of the vertex element's properties with these indices. The mesh must outlive the reader.
+  VertexReader(const Mesh& mesh, std::span<const size_t> properties, MemoryBudget& budget);
 
   uint64_t count() const override { return mesh_.vertex_element().count; }
-  // Throws Error{kInvalidInput} naming the vertex for text that is no number.
+  // As many numbers for each vertex as there are properties. Throws Error{kInvalidInput} naming the
+  // vertex for text that is no number.
   void read(uint64_t first, size_t count, double* out) override;
 
  private:
@@ -29,8 +32,9 @@ class VertexReader : public gltf::PositionSource {
   const Mesh& mesh_;
   std::optional<FileWindow> window_;
   std::optional<AsciiText> text_;
+  const std::vector<size_t> properties_;
+  std::vector<size_t> offsets_;  // of each of them in a row
   size_t row_bytes_ = 0;
-  std::array<size_t, 3> offsets_{};  // of x, y and z in a row
 };
 
 }  // namespace voxdag::ply

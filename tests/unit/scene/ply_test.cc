@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 #include "tests/unit/scene/scene_files.h"
@@ -192,6 +193,100 @@ TEST(Ply, SnapsAsTheSameMeshInGltf) {
   const auto expected = snapped(gltf.glb());
   EXPECT_EQ(expected.size(), 4000u * 9);
   EXPECT_EQ(snapped(ply.text()), expected);
+}
+
+// Three vertices and a face; T the type of the colors.
+template <class T>
+std::string colored_triangle(PlyFormat format, const std::string& type, bool has_alpha,
+                             const std::vector<T>& colors) {
+  PlyWriter ply(format);
+  ply.header("element vertex 3").header("property float x").header("property " + type + " blue");
+  ply.header("property " + type + " red").header("property " + type + " green");
+  if (has_alpha) ply.header("property " + type + " alpha");
+  ply.header("property double y").header("property short z").header("element face 1");
+  ply.header("property list uchar int vertex_indices").header("end_header");
+  for (size_t v = 0; v < 3; ++v) {
+    const size_t channels = has_alpha ? 4 : 3;
+    const T* const rgba = &colors[channels * v];
+    ply.put<float>(v == 1 ? 1 : 0).put(rgba[2]).put(rgba[0]).put(rgba[1]);
+    if (has_alpha) ply.put(rgba[3]);
+    ply.put<double>(v == 2 ? 1 : 0).put<int16_t>(0).end_row();
+  }
+  return ply.put<uint8_t>(3).put_all<int32_t>({0, 1, 2}).end_row().text();
+}
+
+// The nearest 16-bit number to the linear light of an sRGB value.
+uint16_t light(double v) {
+  const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+  return static_cast<uint16_t>(std::lround(linear * 65535));
+}
+
+TEST(Ply, ColorsOfVertices) {
+  using Color = std::array<uint16_t, 4>;
+  const auto colors_of = [](const std::string& file) {
+    OpenScene open(file);
+    EXPECT_EQ(open.triangles(), std::vector<Corners>{kLower});
+    const auto all = surfaces_of(*open.source);
+    EXPECT_EQ(all.at(0).position.v[2][1], 1);
+    EXPECT_EQ(all.at(0).material, 0u);
+    std::array<Color, 3> colors;
+    for (size_t k = 0; k < 3; ++k) colors[k] = all.at(0).corners[k].color;
+    return colors;
+  };
+  for (const PlyFormat format : kFormats) {
+    EXPECT_EQ(colors_of(colored_triangle<uint8_t>(format, "uchar", true,
+                                                  {0, 255, 10, 128, 1, 2, 3, 0, 188, 11, 12, 255})),
+              (std::array{Color{0, 65535, light(10 / 255.0), 128 * 257},
+                          Color{light(1 / 255.0), light(2 / 255.0), light(3 / 255.0), 0},
+                          Color{light(188 / 255.0), light(11 / 255.0), light(12 / 255.0), 65535}}));
+    EXPECT_EQ(colors_of(colored_triangle<uint16_t>(format, "ushort", false,
+                                                   {0, 65535, 300, 1, 2, 3, 40000, 255, 256}))[2],
+              (Color{light(40000 / 65535.0), light(255 / 65535.0), light(256 / 65535.0), 65535}));
+    EXPECT_EQ(colors_of(colored_triangle<float>(format, "float", true,
+                                                {0, 1, 0.5, 0.25, -1, 7, 0, 2, 1, 1, 1, 1})),
+              (std::array{Color{0, 65535, light(0.5), 16384}, Color{0, 65535, 0, 65535},
+                          Color{65535, 65535, 65535, 65535}}));
+    EXPECT_EQ(colors_of(colored_triangle<int32_t>(format, "int", false,
+                                                  {300, -5, 77, 0, 0, 0, 0, 0, 0}))[0],
+              (Color{65535, 0, light(77 / 255.0), 65535}));
+  }
+  // Without blue there are no colors.
+  std::string file =
+      colored_triangle<uint8_t>(PlyFormat::kLittle, "uchar", false, {0, 0, 0, 0, 0, 0, 0, 0, 0});
+  file.replace(file.find("blue"), 4, "glue");
+  EXPECT_EQ(colors_of(file)[1], (Color{65535, 65535, 65535, 65535}));
+}
+
+// All 256 bytes, and blocks of vertices that take turns in a cache too small for them.
+TEST(Ply, ColorsOfManyVertices) {
+  constexpr uint32_t kVertices = 50000;
+  PlyWriter ply(PlyFormat::kLittle);
+  ply.header("element vertex " + std::to_string(kVertices));
+  for (const char* axis : {"x", "y", "z"}) ply.header(std::string("property uchar ") + axis);
+  for (const char* name : {"red", "green", "blue"})
+    ply.header(std::string("property uchar ") + name);
+  ply.header("element face 400").header("property list uchar int vertex_indices");
+  ply.header("end_header");
+  for (uint32_t v = 0; v < kVertices; ++v)
+    for (const uint32_t number : {v, 2 * v, 3 * v, v, v / 256, v % 251})
+      ply.put(static_cast<uint8_t>(number));
+  const auto vertex = [](uint32_t face, uint32_t k) {
+    return (face * 77771 + k * 31337) % kVertices;
+  };
+  for (uint32_t f = 0; f < 400; ++f) {
+    ply.put<uint8_t>(3);
+    for (uint32_t k = 0; k < 3; ++k) ply.put(static_cast<int32_t>(vertex(f, k)));
+  }
+  OpenScene open(ply.text(), {}, 2 << 20);
+  const auto all = surfaces_of(*open.source);
+  ASSERT_EQ(all.size(), 400u);
+  for (uint32_t f = 0; f < 400; ++f)
+    for (uint32_t k = 0; k < 3; ++k) {
+      const uint32_t v = vertex(f, k);
+      ASSERT_EQ(all[f].corners[k].color,
+                (std::array<uint16_t, 4>{light(v % 256 / 255.0), light(v / 256 / 255.0),
+                                         light(v % 251 / 255.0), 65535}));
+    }
 }
 
 // glTF and PLY files of one scene follow each other in the given order.
