@@ -55,7 +55,7 @@ THIRD_PARTY = {
     "meshoptimizer.h": ["core/scene", "tests"],
     "sqlite3.h": ["core/db"],
     "httplib.h": ["client"],
-    "png.h": ["core/image", "query"],
+    "png.h": ["core/image"],
     "jpeglib.h": ["core/image", "tests"],
     "zlib.h": ["server", "tests", "bench"],
     "openvdb/openvdb.h": ["query", "bench"],

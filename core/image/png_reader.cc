@@ -1,4 +1,4 @@
-// The only place that reads with libpng. Its errors are jumps: each function that calls it has
+// Reads with libpng. Its errors are jumps: each function that calls it has
 // nothing to destroy.
 #include <png.h>
 

@@ -4,13 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/image/image_reader.h"
+#include "core/image/png_writer.h"
 #include "tests/unit/image/image_files.h"
 
 namespace voxdag::test {
@@ -200,6 +205,16 @@ TEST(Png, WhatIsIgnored) {
       png_chunk("gAMA", big_endian(100000)) + png_chunk("iCCP", noise(1 << 20));
   EXPECT_EQ(decode(png_file({1, 1, 8, 6, chunks}, "\x0a\x14\x1e\x28")).at(0, 0),
             (Pixel{10, 20, 30, 40}));
+}
+
+TEST(Png, Writer) {
+  const std::string pixels = noise(3 * 13 * 9);
+  const std::span rgb(reinterpret_cast<const uint8_t*>(pixels.data()), pixels.size());
+  const Decoded image = decode(encode_png(13, 9, rgb));
+  ASSERT_EQ(image.width, 13u);
+  ASSERT_EQ(image.height, 9u);
+  for (uint32_t i = 0; i < 13 * 9; ++i)
+    EXPECT_EQ(image.at(i % 13, i / 13), (Pixel{rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2], 255}));
 }
 
 TEST(Png, HugeSizes) {

@@ -1,0 +1,23 @@
+#include "core/image/png_writer.h"
+
+#include <png.h>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+
+std::string encode_png(uint32_t width, uint32_t height, std::span<const uint8_t> rgb) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = width;
+  image.height = height;
+  image.format = PNG_FORMAT_RGB;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string png(size, '\0');
+  if (!png_image_write_to_memory(&image, png.data(), &size, 0, rgb.data(), 0, nullptr))
+    throw Error(ErrorCode::kOutOfMemory, std::string("writing PNG: ") + image.message);
+  png.resize(size);
+  return png;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,14 @@
+// Writes PNG images.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace voxdag {
+
+// The bytes of a PNG file of 8-bit sRGB pixels: rows from the top, 3 bytes per pixel. Throws
+// Error{kOutOfMemory} if libpng runs out of memory.
+std::string encode_png(uint32_t width, uint32_t height, std::span<const uint8_t> rgb);
+
+}  // namespace voxdag
