@@ -1,7 +1,6 @@
 #include "scheduler/run_build.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -16,6 +15,7 @@
 #include "scheduler/execute/choose_backend.h"
 #include "scheduler/execute/executor.h"
 #include "scheduler/job/build_locks.h"
+#include "scheduler/job/full_disk_advice.h"
 #include "scheduler/job/job_progress.h"
 #include "scheduler/job/work_folder.h"
 #include "scheduler/memory_plan.h"
@@ -90,22 +90,6 @@ std::vector<StoredSubvolume> planned_leaves(JobStore& jobs) {
   std::erase_if(leaves,
                 [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });
   return leaves;
-}
-
-// What to do about a full disk, as the end of an error message. The artifacts of all subvolumes,
-// estimated from those that are built, and a global file of about the same size must fit.
-std::string full_disk_advice(std::span<const StoredSubvolume> leaves) {
-  double built = 0, planned = 0, bytes = 0;
-  for (const StoredSubvolume& subvolume : leaves) {
-    (subvolume.state == SubvolumeState::kBuilt ? built : planned) += subvolume.weight;
-    bytes += static_cast<double>(subvolume.artifact.bytes);
-  }
-  std::string needed;
-  if (built > 0) {
-    const double artifacts = bytes * (1 + planned / built);
-    needed = "about " + std::to_string(std::llround((2 * artifacts - bytes) / 1e6)) + " MB of ";
-  }
-  return "; the job is paused: free " + needed + "disk space and run the same command again";
 }
 
 CommandRunner& commands_of(const BuildSpec& spec) {
@@ -398,9 +382,9 @@ class Build {
 
   void color(GlobalFileWriter& out) {
     if (!spec_.geometry.color) return;
-    const ColorSource source{spec_.geometry, report_.grid, jobs_->job()->scene_digest,
-                             work_.path()};
-    report_.colors = add_colors(source, out, {context_, spec_.run.threads, budget_});
+    report_.colors =
+        add_colors({spec_.geometry, report_.grid, jobs_->job()->scene_digest, work_.path()}, out,
+                   {context_, spec_.run.threads, budget_});
     report_.spill_bytes += report_.colors->spill_bytes;
     clock_.finish("color");
   }

@@ -1,6 +1,6 @@
 // The colors of a scene (docs/color.md): its surfaces are read once more, binned by cubes of the
 // color grid, baked on all threads, and written in Morton order behind the levels of the global
-// file. Nothing of it is durable before the file is: a build that is stopped meanwhile bakes again.
+// file. Nothing of it is durable before the file is: a build that is stopped before bakes again.
 #pragma once
 
 #include <cstdint>
