@@ -1,0 +1,35 @@
+# The CUDA backend's sources as C++, against the simulated device's headers. Every access to memory
+# in them calls a function of the simulation (-fsanitize=thread, whose own library is not linked),
+# so there is no simulation in builds with a sanitizer.
+if(VOXDAG_SANITIZE)
+  return()
+endif()
+file(GLOB cuda_sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/core/backend/cuda/*.cu)
+file(GLOB simulation_sources CONFIGURE_DEPENDS cuda_sim/sim/*.cc)
+set_source_files_properties(${cuda_sources} PROPERTIES LANGUAGE CXX COMPILE_OPTIONS
+  "-x;c++;-include;cuda_runtime.h;-fsanitize=thread;-D__CUDA_ARCH__=900;-Wno-unknown-pragmas")
+# Fibers jump to frames that a fortified longjmp() does not know.
+set_source_files_properties(cuda_sim/sim/thread_blocks.cc PROPERTIES COMPILE_OPTIONS
+  "-U_FORTIFY_SOURCE")
+add_library(voxdag_cuda_sim STATIC ${cuda_sources} ${simulation_sources})
+target_include_directories(voxdag_cuda_sim BEFORE PUBLIC cuda_sim/include)
+target_link_libraries(voxdag_cuda_sim PUBLIC voxdag_base voxdag_geometry voxdag_dag)
+
+# Not voxdag_backend_parallel: the linker might choose its copies of the same inline functions, which
+# call nothing.
+file(GLOB conformance_sources CONFIGURE_DEPENDS conformance/*.cc)
+list(FILTER conformance_sources EXCLUDE REGEX "/(backends|cuda_test|large_grid_test)\\.cc$")
+file(GLOB cuda_sim_tests CONFIGURE_DEPENDS cuda_sim/*.cc)
+add_executable(test_cuda_sim ${conformance_sources} ${cuda_sim_tests})
+target_link_libraries(test_cuda_sim PRIVATE voxdag_cuda_sim voxdag_backend_cpu voxdag_oracle
+                      GTest::gmock GTest::gtest_main)
+voxdag_compile_quickly(test_cuda_sim)
+target_compile_definitions(test_cuda_sim PRIVATE
+  VOXDAG_SHARED_SCENES="${CMAKE_SOURCE_DIR}/../shared/scenes"
+  VOXDAG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+# The tests that only repeat the pipeline on large inputs take minutes on the simulated device.
+foreach(method fast hashes pointers)
+  gtest_discover_tests(test_cuda_sim DISCOVERY_TIMEOUT 60
+    TEST_FILTER "*/cuda_sim_${method}-*Memory.*:*Reuse.*:*CountsAddUp*:*RegionsOfLargeCubes*"
+    PROPERTIES LABELS cuda_sim_${method} TIMEOUT 900)
+endforeach()

@@ -1,0 +1,82 @@
+// Each call of the runtime fails in turn, once: the outcome is right, or says what went wrong, and
+// the backend is usable afterwards.
+#include "tests/cuda_sim/sim/faults.h"
+
+#include "core/base/error.h"
+#include "tests/conformance/harness.h"
+
+namespace voxdag {
+namespace {
+
+using Faults = Conformance;
+VOXDAG_FOR_ALL_BACKENDS(Faults);
+
+const SubvolumeTask kTask{6, {0, {0, 0, 0}}, 64};
+
+oracle::Triangles scene() {
+  return oracle::make_scene(oracle::SceneKind::kSpanning, 5, oracle::region_of(kTask.cube, 6), 6);
+}
+
+// Builds with a failure of call number `skipped`; returns whether there is such a call.
+bool build_with(Backend& backend, const cuda_sim::Fault& fault, const oracle::Dag& truth) {
+  cuda_sim::plan_fault(fault);
+  try {
+    const Built built = build(backend, kTask, scene());
+    if (built.outcome == BuildOutcome::kBuilt) {
+      expect_equals(built, truth, kTask);
+    } else {
+      EXPECT_EQ(fault.status, cudaErrorMemoryAllocation);
+      EXPECT_EQ(built.outcome, BuildOutcome::kNeedsSplit);
+    }
+  } catch (const Error& error) {
+    EXPECT_EQ(fault.status, cudaErrorLaunchFailure) << error.what();
+    EXPECT_EQ(error.code(), ErrorCode::kDevice);
+    EXPECT_NE(std::string(error.what()).find("unspecified launch failure"), std::string::npos);
+  }
+  const bool happened = cuda_sim::fault_happened();
+  cuda_sim::plan_no_fault();
+  return happened;
+}
+
+oracle::Dag expected() {
+  return oracle::build_dag(oracle::voxelize(scene(), oracle::region_of(kTask.cube, 6)), 64);
+}
+
+// A failure that passes is repaired by returning the pool's memory; one that stays means a split.
+TEST_P(Faults, EveryAllocation) {
+  const auto backend = open();
+  const oracle::Dag truth = expected();
+  for (const bool sticky : {false, true}) {
+    uint64_t n = 0;
+    while (build_with(*backend, {cuda_sim::Call::kAllocation, n, cudaErrorMemoryAllocation, sticky},
+                      truth)) {
+      if (HasFailure()) FAIL() << "when allocation " << n << " fails";
+      ++n;
+    }
+    EXPECT_GT(n, 10u);
+    expect_equals(build(*backend, kTask, scene()), truth, kTask);
+  }
+}
+
+TEST_P(Faults, EveryOtherCall) {
+  const auto backend = open();
+  const oracle::Dag truth = expected();
+  uint64_t n = 0;
+  for (; build_with(*backend, {cuda_sim::Call::kOther, n}, truth); ++n)
+    if (HasFailure()) FAIL() << "when call " << n << " fails";
+  EXPECT_GT(n, 50u);
+  expect_equals(build(*backend, kTask, scene()), truth, kTask);
+}
+
+TEST_P(Faults, ADeviceThatStaysBroken) {
+  const auto backend = open();
+  const oracle::Dag truth = expected();
+  for (uint64_t n = 0;
+       build_with(*backend, {cuda_sim::Call::kOther, n, cudaErrorLaunchFailure, true}, truth);
+       n += 7)
+    if (HasFailure()) FAIL() << "from call " << n << " on";
+  expect_equals(build(*backend, kTask, scene()), truth, kTask);
+}
+
+}  // namespace
+}  // namespace voxdag

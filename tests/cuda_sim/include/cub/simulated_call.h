@@ -1,0 +1,23 @@
+// What all simulated calls of CUB do about their temporary storage.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <functional>
+
+namespace voxdag::cuda_sim {
+
+// First phase: answers the bytes that n items need. Second phase: queues `work`, before which the
+// storage becomes junk. CUB returns the thread's last error as its own.
+cudaError_t cub_call(const char* name, void* storage, size_t& bytes, size_t n, cudaStream_t stream,
+                     std::function<void()> work);
+
+// What a call reads and writes; a violation where it may not.
+void cub_reads(const void* p, size_t bytes);
+void cub_may_read(const void* p, size_t bytes);
+void cub_writes(void* p, size_t bytes);
+void cub_spoils(void* p, size_t bytes);
+bool cub_coin();
+
+}  // namespace voxdag::cuda_sim

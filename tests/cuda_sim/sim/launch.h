@@ -1,0 +1,24 @@
+// What launches and kernels of the simulated device need: the part of it that is compiled into the
+// backend's sources.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstdint>
+#include <memory>
+
+#include "tests/cuda_sim/sim/thread_blocks.h"
+
+namespace voxdag::cuda_sim {
+
+struct Index {
+  unsigned x;
+};
+Index block_index();
+Index thread_index();
+
+// `arguments` lives until the kernel has run.
+cudaError_t queue_kernel(const KernelLaunch& launch, std::shared_ptr<void> arguments,
+                         cudaStream_t stream);
+
+}  // namespace voxdag::cuda_sim
