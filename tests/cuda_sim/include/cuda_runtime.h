@@ -21,7 +21,8 @@ inline int __ffsll(long long x) { return __builtin_ffsll(x); }
 unsigned atomicOr(unsigned* word, unsigned bits);
 
 struct dim3 {
-  unsigned x = 1, y = 1, z = 1;
+  dim3(unsigned blocks = 1) : x(blocks) {}
+  unsigned x, y = 1, z = 1;
 };
 
 struct cudaLaunchConfig_t {
