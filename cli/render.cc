@@ -109,7 +109,7 @@ void run(RenderCommand& command, CommandContext& context) {
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
-  if (!command.gray) command.options.colors = &*file;
+  if (!command.gray) command.options.colors = file.get();
   if (dag.empty()) progress->warn(command.input + " has no voxels");
   const double start_s = wall_seconds();
   const query::Placement placement = place_camera(command, *file, dag);

@@ -1,8 +1,5 @@
 #include "scheduler/color/bin_surfaces.h"
 
-#include <algorithm>
-#include <array>
-
 #include "core/format/checksum.h"
 #include "scheduler/ingest/content_digest.h"
 #include "scheduler/ingest/read_pieces.h"
@@ -11,45 +8,6 @@
 
 namespace voxdag {
 namespace {
-
-// Collects records by bins, and hands them on in larger pieces.
-class SurfaceWriter {
- public:
-  SurfaceWriter(SurfaceStore& store, std::vector<SurfaceStore::Bin>& bins, size_t buffer_bytes)
-      : store_(store),
-        bins_(bins),
-        tails_(bins.size()),
-        tail_bytes_(std::clamp<size_t>(buffer_bytes / bins.size(), 2048, 64 << 10)) {}
-
-  void append(size_t bin, std::span<const std::byte> record) {
-    Tail& tail = tails_[bin];
-    tail.records.insert(tail.records.end(), record.begin(), record.end());
-    ++tail.surfaces;
-    if (tail.records.size() >= tail_bytes_) hand_on(bin);
-  }
-  void flush() {
-    for (size_t bin = 0; bin < tails_.size(); ++bin)
-      if (tails_[bin].surfaces > 0) hand_on(bin);
-  }
-
- private:
-  struct Tail {
-    std::vector<std::byte> records;
-    uint64_t surfaces = 0;
-  };
-
-  void hand_on(size_t bin) {
-    Tail& tail = tails_[bin];
-    store_.add(bins_[bin], tail.records, tail.surfaces);
-    tail.records.clear();
-    tail.surfaces = 0;
-  }
-
-  SurfaceStore& store_;
-  std::vector<SurfaceStore::Bin>& bins_;
-  std::vector<Tail> tails_;
-  const size_t tail_bytes_;
-};
 
 // A piece of the scene as records, with the bins that each belongs to.
 class SurfacePiece {
@@ -113,7 +71,7 @@ class SurfacePiece {
     encode_triangle(surface.position, binning_.record_bytes, triangles_.data() + at);
     append_surface(surface, has_image(surface.material), records_);
     if (late_ != kNone) return;
-    if (places_.size() >= kMaxPlaces - kMaxBins) {
+    if (places_.size() + binning_.cubes.size() > kMaxPlaces) {
       late_ = record;
       return;
     }
@@ -123,7 +81,6 @@ class SurfacePiece {
     });
   }
 
-  static constexpr size_t kMaxBins = 4096;
   const SurfaceBinning& binning_;
   const CubeTree& tree_;
   const MemoryCharge charge_;

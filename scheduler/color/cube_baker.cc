@@ -58,33 +58,22 @@ void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin,
                     std::to_string(bin.surfaces * kSurfaceBytes >> 20) + " MiB of " +
                     std::to_string(surface_bytes_ >> 20) +
                     ": expected more --memory, fewer --threads or a larger --color-resolution");
-  struct Part {
-    SurfaceStore::Bin bin;
-    std::vector<std::byte> records;
-    uint64_t surfaces = 0;
-  };
-  std::array<Part, 8> parts;
-  const auto hand_on = [&](Part& part) {
-    store_.add(part.bin, part.records, part.surfaces);
-    part.records.clear();
-    part.surfaces = 0;
-  };
+  std::array<SurfaceStore::Bin, 8> children;
+  SurfaceWriter writer(store_, children, kPartBytes * children.size());
+  std::vector<std::byte> record;
   const int64_t units = cube.edge_voxels(grid_.levels) * kUnitsPerVoxel;
   store_.for_each(bin, [&](const FixedSurface& surface) {
-    for (uint32_t mask = touched_children(surface.position, cube, units); mask; mask &= mask - 1) {
-      Part& part = parts[static_cast<size_t>(lowest_bit(mask))];
-      // Whether it has an image does not matter for what was stored without coordinates.
-      append_surface(surface, true, part.records);
-      ++part.surfaces;
-      if (part.records.size() >= kPartBytes) hand_on(part);
-    }
+    record.clear();
+    // Whether it has an image does not matter for what was stored without coordinates.
+    append_surface(surface, true, record);
+    for (uint32_t mask = touched_children(surface.position, cube, units); mask; mask &= mask - 1)
+      writer.append(static_cast<size_t>(lowest_bit(mask)), record);
   });
   store_.clear(bin);
-  for (Part& part : parts)
-    if (part.surfaces > 0) hand_on(part);
+  writer.flush();
   for (int child = 0; child < 8; ++child) {
     cancel_.check();
-    bake(cube.child(child), parts[static_cast<size_t>(child)].bin, regions);
+    bake(cube.child(child), children[static_cast<size_t>(child)], regions);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "scheduler/color/surface_store.h"
 
+#include <algorithm>
 #include <exception>
 
 namespace voxdag {
@@ -43,11 +44,13 @@ std::span<const std::byte> SurfaceStore::bytes_of(const Piece& piece,
 }
 
 void SurfaceStore::clear(Bin& bin) {
-  for (const Piece& piece : bin.pieces)
-    if (piece.memory.empty()) spill_->release(piece.extent);
   uint64_t bytes = 0;
-  for (const Piece& piece : bin.pieces)
-    if (!piece.memory.empty()) bytes += piece.memory.size() + sizeof(Piece);
+  for (const Piece& piece : bin.pieces) {
+    if (piece.memory.empty())
+      spill_->release(piece.extent);
+    else
+      bytes += piece.memory.size() + sizeof(Piece);
+  }
   bin = {};
   const std::lock_guard lock(mutex_);
   memory_bytes_ -= bytes;
@@ -57,6 +60,32 @@ void SurfaceStore::clear(Bin& bin) {
 uint64_t SurfaceStore::file_bytes() const {
   const std::lock_guard lock(mutex_);
   return spill_ ? spill_->appended_bytes() : 0;
+}
+
+SurfaceWriter::SurfaceWriter(SurfaceStore& store, std::span<SurfaceStore::Bin> bins,
+                             size_t buffer_bytes)
+    : store_(store),
+      bins_(bins),
+      tails_(bins.size()),
+      tail_bytes_(std::clamp<size_t>(buffer_bytes / bins.size(), 2048, 64 << 10)) {}
+
+void SurfaceWriter::append(size_t bin, std::span<const std::byte> record) {
+  Tail& tail = tails_[bin];
+  tail.records.insert(tail.records.end(), record.begin(), record.end());
+  ++tail.surfaces;
+  if (tail.records.size() >= tail_bytes_) hand_on(bin);
+}
+
+void SurfaceWriter::flush() {
+  for (size_t bin = 0; bin < tails_.size(); ++bin)
+    if (tails_[bin].surfaces > 0) hand_on(bin);
+}
+
+void SurfaceWriter::hand_on(size_t bin) {
+  Tail& tail = tails_[bin];
+  store_.add(bins_[bin], tail.records, tail.surfaces);
+  tail.records.clear();
+  tail.surfaces = 0;
 }
 
 }  // namespace voxdag

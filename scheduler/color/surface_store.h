@@ -61,4 +61,27 @@ class SurfaceStore {
   std::unique_ptr<TriangleFile> spill_;
 };
 
+// Fills bins of a store from one thread, collecting records into larger pieces.
+class SurfaceWriter {
+ public:
+  // The incomplete pieces of all bins take at most about `buffer_bytes`.
+  SurfaceWriter(SurfaceStore& store, std::span<SurfaceStore::Bin> bins, size_t buffer_bytes);
+  void append(size_t bin, std::span<const std::byte> record);
+  // All that was appended is in the bins when this returns.
+  void flush();
+
+ private:
+  struct Tail {
+    std::vector<std::byte> records;
+    uint64_t surfaces = 0;
+  };
+
+  void hand_on(size_t bin);
+
+  SurfaceStore& store_;
+  const std::span<SurfaceStore::Bin> bins_;
+  std::vector<Tail> tails_;
+  const size_t tail_bytes_;
+};
+
 }  // namespace voxdag

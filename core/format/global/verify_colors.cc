@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/color/blocks/region.h"
+#include "core/dag/brick.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag {
@@ -49,10 +50,7 @@ class CellWalk {
   uint32_t mask_of(uint32_t level, uint64_t place) const {
     if (level < file_.brick_level()) return file_.node(level, place).child_mask;
     if (level > file_.brick_level()) return static_cast<uint32_t>(place);
-    const uint64_t brick = file_.brick(place);
-    uint32_t mask = 0;
-    for (unsigned i = 0; i < 8; ++i) mask |= (brick >> 8 * i & 255 ? 1u : 0u) << i;
-    return mask;
+    return octants(file_.brick(place));
   }
   uint64_t child_of(uint32_t level, uint64_t place, unsigned index) const {
     if (level < file_.brick_level())

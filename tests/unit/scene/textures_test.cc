@@ -1,39 +1,21 @@
 // Textures of small glTF scenes made here.
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <cmath>
 
 #include "core/scene/textures/texture_set.h"
+#include "tests/unit/image/image_files.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {
 namespace {
 
-std::string big_endian(uint32_t value) {
-  std::string bytes(4, '\0');
-  for (size_t i = 0; i < 4; ++i) bytes[i] = static_cast<char>(value >> (24 - 8 * i));
-  return bytes;
-}
-std::string chunk(const std::string& type, const std::string& data) {
-  const std::string body = type + data;
-  const auto crc =
-      crc32(0, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
-  return big_endian(static_cast<uint32_t>(data.size())) + body +
-         big_endian(static_cast<uint32_t>(crc));
-}
-// A PNG of 8-bit RGBA; `rows` has no filter bytes.
+// 8-bit RGBA.
 std::string png_of(uint32_t width, uint32_t height, const std::string& pixels) {
-  std::string rows;
-  for (uint32_t y = 0; y < height; ++y) rows += '\0' + pixels.substr(4 * width * y, 4 * width);
-  uLongf size = compressBound(rows.size());
-  std::string packed(size, '\0');
-  compress(reinterpret_cast<Bytef*>(packed.data()), &size,
-           reinterpret_cast<const Bytef*>(rows.data()), rows.size());
-  packed.resize(size);
-  return "\x89PNG\r\n\x1a\n" +
-         chunk("IHDR", big_endian(width) + big_endian(height) + std::string("\x8\x6\0\0\0", 5)) +
-         chunk("IDAT", packed) + chunk("IEND", "");
+  PngFormat format;
+  format.width = width;
+  format.height = height;
+  return png_file(format, pixels);
 }
 std::string noise(size_t bytes) {
   std::string all(bytes, '\0');

@@ -213,6 +213,26 @@ void place_meshopt_views(Document& d) {
   }
 }
 
+namespace {
+
+void add_attribute(const Document& d, const Replaced& r, DracoPart& part) {
+  const Accessor& accessor = at(d, *r.accessor);
+  part.attributes.push_back(
+      {r.id, r.name, accessor.component_type, accessor.components, accessor.normalized});
+}
+
+// A buffer of what the part is decoded to; returns its index.
+int add_part(Document& d, const std::shared_ptr<const DracoPart>& part) {
+  BufferSource decoded;
+  decoded.kind = BufferSource::Kind::kDecoded;
+  decoded.byte_length = part->decoded_bytes();
+  decoded.draco = part;
+  return add_buffer(d, std::move(decoded),
+                    sizeof(*part) + part->where.size() + part->attributes.size() * 96);
+}
+
+}  // namespace
+
 void place_draco_primitive(Document& d, Primitive& primitive, const std::string& where) {
   if (!primitive.draco) return;
   const std::string what = where + ": KHR_draco_mesh_compression";
@@ -239,20 +259,14 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
   const std::vector<Replaced> replaced = replaced_attributes(*primitive.draco, primitive);
   for (const Replaced& r : replaced) {
     if (!exists(d, *r.accessor)) return;
-    const Accessor& accessor = at(d, *r.accessor);
-    if (accessor.count != part->vertices)
+    const uint64_t count = at(d, *r.accessor).count;
+    if (count != part->vertices)
       refuse(d.path, what + ": " + d.name_accessor(*r.accessor) + " of " + r.name + " has " +
-                         std::to_string(accessor.count) + " elements, expected " +
+                         std::to_string(count) + " elements, expected " +
                          std::to_string(part->vertices));
-    part->attributes.push_back(
-        {r.id, r.name, accessor.component_type, accessor.components, accessor.normalized});
+    add_attribute(d, r, *part);
   }
-  BufferSource decoded;
-  decoded.kind = BufferSource::Kind::kDecoded;
-  decoded.byte_length = part->decoded_bytes();
-  decoded.draco = part;
-  const int buffer = add_buffer(d, std::move(decoded),
-                                sizeof(*part) + where.size() + part->attributes.size() * 96);
+  const int buffer = add_part(d, part);
   // The faces are a list whatever the mode was.
   primitive.mode = kTriangleList;
   const uint64_t corners = part->corners;
@@ -285,16 +299,8 @@ void place_draco_look(Document& d, Primitive& primitive, int set) {
   auto part = std::make_shared<DracoPart>(*geometry);
   part->has_indices = false;
   part->attributes.clear();
-  for (const Replaced& r : replaced) {
-    const Accessor& accessor = at(d, *r.accessor);
-    part->attributes.push_back(
-        {r.id, r.name, accessor.component_type, accessor.components, accessor.normalized});
-  }
-  BufferSource decoded;
-  decoded.kind = BufferSource::Kind::kDecoded;
-  decoded.byte_length = part->decoded_bytes();
-  decoded.draco = part;
-  const int buffer = add_buffer(d, std::move(decoded), sizeof(*part) + part->where.size() + 192);
+  for (const Replaced& r : replaced) add_attribute(d, r, *part);
+  const int buffer = add_part(d, part);
   uint64_t offset = 0;
   for (const Replaced& r : replaced) offset += move_accessor(d, *r.accessor, buffer, offset);
 }
