@@ -309,7 +309,7 @@ class File {
             ": no node lies here");
   }
   void expect(bool right, const char* what) const {
-    if (!right) corrupt(std::string("header: ") + what);
+    if (!right) throw Error(Problem::kCorrupt, path_ + ": header: " + what);
   }
 
   template <class Visitor>
