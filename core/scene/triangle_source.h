@@ -53,6 +53,7 @@ struct ImageSource {
   uint64_t offset = 0, size = 0;
   // The file has base64 characters there, of which JSON may have escaped some.
   bool is_base64 = false;
+  bool is_data_uri = false;  // base64 that begins behind the first comma
   uint64_t skip = 0;
   uint64_t bytes = UINT64_MAX;  // fewer if there are fewer
   std::string problem;          // why it cannot be read, if that is known; "" otherwise

@@ -35,15 +35,9 @@ ImageBytes::ImageBytes(FileSystem& files, const ImageSource& source)
     at_ = std::min(end_, at_ + std::min(source.skip, end_ - std::min(at_, end_)));
     return;
   }
-  // A data: URI begins with its type, which ends at a comma.
-  char c = 0;
-  for (bool is_first = true; next_character(c) && c != ','; is_first = false)
-    if (is_first && c != 'd') {
-      at_ = source.offset;
-      window_.clear();
-      window_at_ = 0;
-      break;
-    }
+  char c = source.is_data_uri ? '\0' : ',';
+  while (c != ',' && next_character(c)) {
+  }
   for (uint64_t i = 0; i < source.skip; ++i) {
     if (group_at_ == group_size_ && !next_group()) break;
     ++group_at_;

@@ -107,6 +107,27 @@ TEST(Textures, LinearLight) {
   EXPECT_EQ(channel(reader->texel(0, 0, 0, 0), 3), 128u * 257);
 }
 
+// An image in a buffer view of a data: URI, whose slashes JSON may escape, is found whatever the
+// buffer begins with; "dA" is what the byte 't' begins in base64.
+TEST(Textures, InBase64Buffers) {
+  SceneBuilder scene = textured("");
+  const std::string png = png_of(1, 1, "\xff\xff\xff\x80");
+  scene.root["images"] = {
+      {{"bufferView", scene.add_view(std::vector<uint8_t>(png.begin(), png.end()))}}};
+  for (const char first : {'\0', 't'}) {
+    scene.bin[0] = first;
+    const std::string gltf =
+        scene.gltf("data:application/octet-stream;base64," + base64(scene.bin));
+    std::string escaped = gltf;
+    escaped.replace(gltf.find("/octet"), 1, "\\/");
+    for (const std::string& text : {gltf, escaped}) {
+      Textures t(text);
+      ASSERT_TRUE(t.warnings.all.empty()) << t.warnings.all[0];
+      EXPECT_EQ(t.set->open(0)->texel(0, 0, 0, 0), 0x8080ffffffffffffu);
+    }
+  }
+}
+
 // What cannot be read costs a warning that names image and material, and the image alone.
 TEST(Textures, BrokenImages) {
   const std::string good = png_of(9, 9, noise(4 * 81));

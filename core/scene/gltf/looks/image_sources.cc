@@ -48,6 +48,7 @@ void set_buffer(FileSystem& files, const ReadableFile& scene_file, const Documen
     case BufferSource::Kind::kMemory:
       set_file(scene_file, buffer.range, out);
       out.is_base64 = true;
+      out.is_data_uri = buffer.kind == BufferSource::Kind::kMemory;
       break;
   }
   out.skip = view.byte_offset;
@@ -60,7 +61,7 @@ void find(FileSystem& files, const ReadableFile& scene_file, const Document& d, 
   const RawString& uri = d.image_uris[static_cast<size_t>(index)];
   if (image.uri.starts_with("data:")) {
     set_file(scene_file, uri.characters, out);
-    out.is_base64 = true;
+    out.is_base64 = out.is_data_uri = true;
     if (!image.uri.ends_with(";base64,")) out.problem = "has a data: URI that is not base64";
   } else if (!image.uri.empty()) {
     if (uri.is_clipped)
