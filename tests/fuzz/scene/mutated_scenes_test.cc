@@ -7,6 +7,7 @@
 #include <iterator>
 #include <random>
 
+#include "core/scene/textures/texture_set.h"
 #include "tests/fuzz/scene/rich_scene.h"
 
 namespace voxdag::test {
@@ -44,13 +45,35 @@ std::string mutate(std::string file, std::mt19937& random) {
 struct Outcomes {
   int worked = 0;
   int refused = 0;
+  int with_image = 0;
 };
+
+// Reads what the triangles look like. Returns how many have an image.
+int read_looks(OpenScene& open) {
+  NoProgress progress;
+  const auto textures = TextureSet::prepare(open.files, open.source->materials(), "scratch", 1,
+                                            open.budget, progress, open.cancel);
+  const auto reader = textures->open(0);
+  int with_image = 0;
+  for (const SurfaceTriangle& surface : surfaces_of(*open.source)) {
+    const uint32_t image = textures->materials().at(surface.material).image;
+    if (image == Material::kNoImage) continue;
+    ++with_image;
+    for (uint32_t level = 0; level < reader->levels(image); ++level)
+      reader->texel(image, level, reader->width(image, level) - 1,
+                    reader->height(image, level) - 1);
+  }
+  return with_image;
+}
 
 // Reads mutation `i` of a file.
 void read(const std::string& file, int i, Outcomes& outcomes) {
   try {
     OpenScene open(file, {.skip_invalid = i % 2 == 0}, uint64_t{16} << 20);
-    if (open.source->declared_triangles() <= kMaxTriangles) open.triangles();
+    if (open.source->declared_triangles() <= kMaxTriangles) {
+      open.triangles();
+      if (read_looks(open) > 0) ++outcomes.with_image;
+    }
     ++outcomes.worked;
   } catch (const Error& e) {
     ++outcomes.refused;
@@ -87,8 +110,20 @@ TEST(FuzzScene, MutatedGltfWithDataUri) {
   EXPECT_GT(outcomes.refused, 100);
 }
 
+// Materials, images and what they are read from.
+TEST(FuzzScene, MutatedLooks) {
+  const SceneBuilder scene = rich_painted_scene();
+  OpenScene open(scene.glb());
+  ASSERT_GT(read_looks(open), 1);
+  Outcomes outcomes;
+  run(scene.glb(), 1500, 4, outcomes);
+  run(scene.gltf("data:application/octet-stream;base64," + base64(scene.bin)), 1500, 5, outcomes);
+  EXPECT_GT(outcomes.with_image, 100);
+  EXPECT_GT(outcomes.refused, 100);
+}
+
 // Only numbers of the JSON change, so that most mutations reach the checks behind the parser.
-TEST(FuzzScene, MutatedNumbers) {
+void run_with_numbers(SceneBuilder scene, uint32_t seed, Outcomes& outcomes) {
   const std::vector<uint64_t> kNumbers{0,
                                        1,
                                        2,
@@ -104,13 +139,11 @@ TEST(FuzzScene, MutatedNumbers) {
                                        uint64_t{1} << 40,
                                        INT64_MAX,
                                        UINT64_MAX};
-  std::mt19937 random(3);
-  SceneBuilder scene = rich_scene();
+  std::mt19937 random(seed);
   const std::string bin = scene.bin;
   const std::string text = scene.root.dump();
-  Outcomes outcomes;
   for (int i = 0; i < 3000; ++i) {
-    SCOPED_TRACE("seed 3, mutation " + std::to_string(i));
+    SCOPED_TRACE("seed " + std::to_string(seed) + ", mutation " + std::to_string(i));
     std::string changed = text;
     for (size_t k = 0, n = 1 + random() % 2; k < n; ++k) {
       size_t at = random() % changed.size();
@@ -122,7 +155,19 @@ TEST(FuzzScene, MutatedNumbers) {
     changed.insert(1, R"("buffers":[{"byteLength":)" + std::to_string(bin.size()) + "}],");
     read(make_glb(changed, bin), i, outcomes);
   }
+}
+
+TEST(FuzzScene, MutatedNumbers) {
+  Outcomes outcomes;
+  run_with_numbers(rich_scene(), 3, outcomes);
   EXPECT_GT(outcomes.worked, 100);
+  EXPECT_GT(outcomes.refused, 100);
+}
+
+TEST(FuzzScene, MutatedNumbersOfLooks) {
+  Outcomes outcomes;
+  run_with_numbers(rich_painted_scene(), 6, outcomes);
+  EXPECT_GT(outcomes.with_image, 100);
   EXPECT_GT(outcomes.refused, 100);
 }
 

@@ -2,6 +2,7 @@
 // from.
 #pragma once
 
+#include "core/image/png_writer.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {
@@ -31,9 +32,42 @@ inline SceneBuilder rich_scene() {
        {"scale", {1, 2, 3}},
        {"extensions",
         {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", translations}}}}}}}});
-  scene.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0.5, 0, 1}}}}}};
-  scene.root["images"] = {{{"uri", "data:image/png;base64,AAAA"}}};
-  scene.root["textures"] = {{{"source", 0}}};
+  return scene;
+}
+
+// The same with everything that looks are read from.
+inline SceneBuilder rich_painted_scene() {
+  SceneBuilder scene = rich_scene();
+  Json& primitives = scene.root["meshes"][0]["primitives"];
+  Json& list = primitives[0]["attributes"];
+  list["COLOR_0"] =
+      scene.add_accessor<uint8_t>("VEC3", kU8, {1, 2, 3, 4, 5, 6, 7, 8, 9}, {{"normalized", true}});
+  list["TEXCOORD_0"] = scene.add_accessor<float>("VEC2", kF32, {0, 0, 1, 0, 0.5, -2});
+  list["TEXCOORD_1"] =
+      scene.add_accessor<uint16_t>("VEC2", kU16, {0, 1, 2, 3, 4, 65535}, {{"normalized", true}});
+  scene.root["accessors"][list["TEXCOORD_0"].get<size_t>()]["sparse"] = {
+      {"count", 1},
+      {"indices", {{"bufferView", scene.add_view<uint8_t>({1})}, {"componentType", kU8}}},
+      {"values", {{"bufferView", scene.add_view<float>({3, 4})}}}};
+  primitives[0]["material"] = 0;
+  primitives[1]["attributes"]["TEXCOORD_0"] = list["TEXCOORD_0"];
+  primitives[1]["material"] = 1;
+  const std::string png = encode_png(3, 2, std::vector<uint8_t>(18, 77));
+  scene.root["images"] = {
+      {{"bufferView", scene.add_view(std::vector<uint8_t>(png.begin(), png.end()))}},
+      {{"uri", "data:image/png;base64," + base64(png)}}};
+  scene.root["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}}};
+  scene.root["textures"] = {{{"source", 0}, {"sampler", 0}}, {{"source", 1}}};
+  const Json transform = {{"offset", {0.5, 7}}, {"rotation", 1.5}, {"scale", {2, 3}}};
+  const Json use = {
+      {"index", 0}, {"texCoord", 1}, {"extensions", {{"KHR_texture_transform", transform}}}};
+  scene.root["materials"] = {
+      {{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0.5, 0, 1}}, {"baseColorTexture", use}}},
+       {"alphaMode", "MASK"},
+       {"alphaCutoff", 0.25}},
+      {{"extensions",
+        {{"KHR_materials_pbrSpecularGlossiness",
+          {{"diffuseFactor", {1, 1, 1, 1}}, {"diffuseTexture", {{"index", 1}}}}}}}}};
   return scene;
 }
 
