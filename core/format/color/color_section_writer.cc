@@ -10,6 +10,7 @@
 #include "core/base/page_buffer.h"
 #include "core/format/bytes.h"
 #include "core/format/color/color_layout.h"
+#include "core/format/color/wide_sum.h"
 
 namespace voxdag {
 
@@ -19,7 +20,14 @@ namespace {
 
 constexpr uint32_t kMaxTiers = 3;
 static_assert(tier_count(20) == kMaxTiers);
-constexpr uint64_t kEncodeBytesPerCell = 128;  // of encode_region(), its result included
+// Of encode_region(), what it is given and its result included.
+constexpr uint64_t kEncodeBytesPerCell = 128 + sizeof(ColoredCell);
+
+// A cell of a coarser tier.
+struct WideCell {
+  uint32_t code = 0;  // Morton code within the region
+  WideSum sum;
+};
 
 // An array that grows, in pages that are charged to the budget.
 template <class T>
@@ -64,10 +72,10 @@ struct Tier {
 
   const uint32_t finest;
   GrowingBuffer<std::byte> directory;
-  GrowingBuffer<std::byte> data;     // of its regions; tier 0 has none here
-  GrowingBuffer<ColoredCell> cells;  // of the open region; tier 0 has none
-  uint64_t open_morton = 0;          // of that region
-  uint64_t last_morton = 0;          // of the last complete one
+  GrowingBuffer<std::byte> data;  // of its regions; tier 0 has none here
+  GrowingBuffer<WideCell> cells;  // of the open region; tier 0 has none
+  uint64_t open_morton = 0;       // of that region
+  uint64_t last_morton = 0;       // of the last complete one
   uint64_t regions = 0, units = 0, cell_count = 0, finest_cells = 0;
 
   uint32_t levels() const { return levels_in_region(finest); }
@@ -81,11 +89,11 @@ struct ColorSectionWriter::State {
   MemoryBudget& budget;
   std::vector<Tier> tiers;
 
-  // `write` gets the bytes of the region in order.
+  // `total`: of the region's cells. `write` gets the bytes of the region in order.
   template <class Write>
-  void add(uint32_t tier_index, const EncodedRegion& region, Write write);
+  void add(uint32_t tier_index, const EncodedRegion& region, const WideSum& total, Write write);
   void check(const Tier& tier, const EncodedRegion& region) const;
-  void add_cell_above(uint32_t tier_index, const EncodedRegion& region);
+  void add_cell_above(uint32_t tier_index, uint64_t region_morton, const WideSum& total);
   void close_region(uint32_t tier_index);
 };
 
@@ -125,7 +133,8 @@ void ColorSectionWriter::State::check(const Tier& tier, const EncodedRegion& reg
 }
 
 template <class Write>
-void ColorSectionWriter::State::add(uint32_t tier_index, const EncodedRegion& region, Write write) {
+void ColorSectionWriter::State::add(uint32_t tier_index, const EncodedRegion& region,
+                                    const WideSum& total, Write write) {
   Tier& tier = tiers[tier_index];
   check(tier, region);
   std::vector<std::byte> entry;
@@ -150,38 +159,49 @@ void ColorSectionWriter::State::add(uint32_t tier_index, const EncodedRegion& re
   tier.finest_cells += counts[0];
   tier.last_morton = region.morton;
   ++tier.regions;
-  if (tier_index + 1 < tiers.size()) add_cell_above(tier_index + 1, region);
+  if (tier_index + 1 < tiers.size()) add_cell_above(tier_index + 1, region.morton, total);
 }
 
 // The parent of a region is a cell of the next tier's finest level.
-void ColorSectionWriter::State::add_cell_above(uint32_t tier_index, const EncodedRegion& region) {
+void ColorSectionWriter::State::add_cell_above(uint32_t tier_index, uint64_t region_morton,
+                                               const WideSum& total) {
   Tier& tier = tiers[tier_index];
-  const uint64_t cell = region.morton >> 3;
+  const uint64_t cell = region_morton >> 3;
   const uint32_t bits = 3 * tier.levels();
   if (!tier.cells.empty() && cell >> bits != tier.open_morton) close_region(tier_index);
   tier.open_morton = cell >> bits;
   const auto code = static_cast<uint32_t>(cell & ((uint64_t{1} << bits) - 1));
   if (tier.cells.empty() || tier.cells.last().code != code) {
-    const ColoredCell added{code, {}};
+    const WideCell added{code, {}};
     tier.cells.append(std::span(&added, 1));
   }
-  tier.cells.last().sum.add(region.total);
+  tier.cells.last().sum.add(total);
 }
 
 void ColorSectionWriter::State::close_region(uint32_t tier_index) {
   Tier& tier = tiers[tier_index];
   EncodedRegion region;
+  WideSum total;
   {
-    const MemoryCharge charge(budget, tier.cells.values().size() * kEncodeBytesPerCell,
-                              "colors of coarse levels");
-    region = encode_region(tier.levels(), tier.open_morton, tier.cells.values());
+    const std::span<const WideCell> wide = tier.cells.values();
+    const MemoryCharge charge(budget, wide.size() * kEncodeBytesPerCell, "colors of coarse levels");
+    for (const WideCell& cell : wide) total.add(cell.sum);
+    const int excess_bits = total.excess_bits();
+    std::vector<ColoredCell> cells;
+    cells.reserve(wide.size());
+    for (const WideCell& cell : wide) cells.push_back({cell.code, cell.sum.narrow(excess_bits)});
+    region = encode_region(tier.levels(), tier.open_morton, cells);
     tier.cells.clear();
   }
-  add(tier_index, region, [&](std::span<const std::byte> bytes) { tier.data.append(bytes); });
+  add(tier_index, region, total,
+      [&](std::span<const std::byte> bytes) { tier.data.append(bytes); });
 }
 
 void ColorSectionWriter::add_region(const EncodedRegion& region) {
-  state_->add(0, region, [&](std::span<const std::byte> bytes) { state_->file.append(bytes); });
+  WideSum total;
+  total.add(region.total);
+  state_->add(0, region, total,
+              [&](std::span<const std::byte> bytes) { state_->file.append(bytes); });
 }
 
 void ColorSectionWriter::finish() {

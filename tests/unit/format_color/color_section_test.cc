@@ -107,6 +107,41 @@ TEST_F(ColorSectionTest, FlatColorsAreExact) {
   EXPECT_EQ(check({9, 8, random_codes(5, 9, 3000), flat}), 0);
 }
 
+// What a scene of 10^10 cells and more adds up to does not fit in 64 bits. A cell that counts for
+// next to nothing keeps its color.
+TEST_F(ColorSectionTest, LargeSumsDoNotOverflow) {
+  constexpr int kDust = 170, kDark = 10, kBright = 250;
+  const auto gray = [](int value, uint64_t weight) {
+    return sum_of_color(value, value, value, weight);
+  };
+  for (const uint32_t levels : {8u, 15u}) {
+    SCOPED_TRACE(levels);
+    // A cell in each of 57 regions of level 2: one of dust in its octant, the others dark or
+    // bright.
+    Codes codes{0};
+    for (uint64_t i = 8; i < 64; ++i) codes.push_back(i << 3 * (levels - 2));
+    write_colored(path_, {levels, levels, codes, [&](uint64_t code) {
+                            const bool bright = code >> (3 * levels - 1);
+                            return code == 0 ? gray(kDust, 1)
+                                             : gray(bright ? kBright : kDark, uint64_t{1} << 38);
+                          }});
+    verify(path_);
+    const auto file = open_global_file(path_);
+    const auto stored = [](const ColorSum& sum) { return color_of(sum).rgb[1]; };
+    const int dust = stored(gray(kDust, 1)), dark = stored(gray(kDark, 1));
+    const int bright = stored(gray(kBright, 1));
+    ColorSum all = gray(kDark, 24);
+    all.add(gray(kBright, 32));
+    for (uint32_t level = 2; level <= levels; ++level)
+      EXPECT_EQ(file->color(0, 0, 0, level)->g, dust) << level;
+    const int half_step = (bright - dark + 13) / 14;  // of the colors in a block
+    EXPECT_NEAR(file->color(0, 0, 0, 1)->g, dust, half_step);
+    EXPECT_NEAR(file->color(0, 0, 1, 1)->g, dark, half_step);
+    EXPECT_NEAR(file->color(1, 1, 1, 1)->g, bright, half_step);
+    EXPECT_NEAR(file->color(0, 0, 0, 0)->g, stored(all), half_step);
+  }
+}
+
 TEST_F(ColorSectionTest, FinerCellsHaveTheColorOfTheirAncestor) {
   const ColoredScene scene{9, 5, random_codes(8, 9, 1000), smooth_colors(5, 20)};
   write_colored(path_, scene);

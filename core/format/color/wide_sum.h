@@ -1,0 +1,65 @@
+// Sums of colors that no scene overflows. A ColorSum is full with about 10^9 white cells, which are
+// not too many for the levels near the root.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/base/integers.h"
+#include "core/color/color_sum.h"
+
+namespace voxdag {
+
+struct WideSum {
+  std::array<uint128, 3> seen{}, plain{};
+  uint128 seen_weight = 0, weight = 0;
+
+  // Of ColorSum or WideSum.
+  template <class Sum>
+  void add(const Sum& other) {
+    for (size_t c = 0; c < 3; ++c) {
+      seen[c] += other.seen[c];
+      plain[c] += other.plain[c];
+    }
+    seen_weight += other.seen_weight;
+    weight += other.weight;
+  }
+
+  // How many bits have to go so that the sum fits a ColorSum, with room for what narrow() rounds
+  // up; 0 if it fits as it is.
+  int excess_bits() const {
+    uint128 all = seen_weight | weight;
+    for (size_t c = 0; c < 3; ++c) all |= seen[c] | plain[c];
+    const auto high = static_cast<uint64_t>(all >> 64);
+    return high == 0 ? 0 : static_cast<int>(std::bit_width(high)) + 1;
+  }
+
+  // Without the lowest `bits`. A small sum keeps its color, and a weight of 1 at least.
+  ColorSum narrow(int bits) const {
+    constexpr uint64_t kPrecise = uint64_t{1} << 16;
+    ColorSum sum;
+    sum.weight = static_cast<uint64_t>(weight >> bits);
+    sum.seen_weight = static_cast<uint64_t>(seen_weight >> bits);
+    const bool is_precise =
+        bits == 0 || sum.seen_weight >= kPrecise || (seen_weight == 0 && sum.weight >= kPrecise);
+    if (!is_precise) {
+      sum.weight = std::max<uint64_t>(sum.weight, 1);
+      const auto alpha = static_cast<uint64_t>(seen_weight / weight);
+      sum.seen_weight = seen_weight == 0 ? 0 : std::max<uint64_t>(sum.weight * alpha, 1);
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      sum.plain[c] = is_precise ? static_cast<uint64_t>(plain[c] >> bits)
+                                : sum.weight * static_cast<uint64_t>(plain[c] / weight);
+      sum.seen[c] = is_precise ? static_cast<uint64_t>(seen[c] >> bits)
+                    : seen_weight == 0
+                        ? 0
+                        : sum.seen_weight * static_cast<uint64_t>(seen[c] / seen_weight);
+    }
+    return sum;
+  }
+};
+
+}  // namespace voxdag
