@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/format/global/open_global.h"
+
 namespace voxdag::query {
 namespace {
 
@@ -23,7 +25,9 @@ const std::array<double, 256>& linear_of() {
 
 Vec Albedo::of(const Surface& surface) {
   if (!cursor_) return kPlaster;
-  const auto rgb = cursor_->color(surface.cell[0], surface.cell[1], surface.cell[2], surface.depth);
+  const auto rgb = with_reader_errors([&] {
+    return cursor_->color(surface.cell[0], surface.cell[1], surface.cell[2], surface.depth);
+  });
   if (!rgb) return kPlaster;
   const auto& linear = linear_of();
   return {{linear[rgb->r], linear[rgb->g], linear[rgb->b]}};

@@ -19,7 +19,7 @@ class Albedo {
   explicit Albedo(const voxdag_reader::File* colors) {
     if (colors && colors->has_colors()) cursor_.emplace(*colors);
   }
-  // Red, green and blue, linear. Throws voxdag_reader::Error for damaged colors.
+  // Red, green and blue, linear. Throws Error{kCorrupt} for damaged colors.
   Vec of(const Surface& surface);
 
  private:
