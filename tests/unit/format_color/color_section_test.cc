@@ -302,6 +302,36 @@ TEST_F(ColorSectionTest, DamageIsAnError) {
 }
 
 // A scene without voxels has no colors.
+// A solid grid of 2^20 voxels along an edge is a node for each level, and has 8^14 regions, of
+// which this file has one: that is found before they are counted.
+TEST_F(ColorSectionTest, MissingRegionsAreNotCounted) {
+  constexpr uint32_t kLevels = 20;
+  GlobalFileWriter writer(system_files(), path_, Grid::given({0, 0, 0}, 1, kLevels), 64);
+  uint64_t nodes = 1, svo_nodes = 0;
+  for (uint32_t level = kLevels - 1; level-- > 0; nodes *= 8) {
+    const bool is_brick = level == kLevels - 2;
+    const std::vector<uint32_t> words = is_brick
+                                            ? std::vector<uint32_t>(2, ~0u)
+                                            : std::vector<uint32_t>{255, 0, 0, 0, 0, 0, 0, 0, 0};
+    writer.begin_level(level);
+    writer.checksum_words(words);
+    writer.write_words(0, words);
+    writer.end_level({1, words.size()});
+    svo_nodes += nodes;
+  }
+  ColoredCell cell;
+  cell.sum = sum_of_color(1, 2, 3, 1);
+  std::vector<ColoredCell> cells(size_t{1} << 18, cell);
+  for (uint32_t code = 0; code < cells.size(); ++code) cells[code].code = code;
+  MemoryBudget budget(uint64_t{64} << 20);
+  ColorSectionWriter section(writer, kLevels, budget);
+  section.add_region(encode_region(6, 0, cells));
+  section.finish();
+  writer.finish({uint64_t{1} << 60, svo_nodes});
+  EXPECT_THAT(error_of([&] { verify(path_); }).message(),
+              HasSubstr("the DAG has another number of regions"));
+}
+
 TEST_F(ColorSectionTest, NothingIsNotColored) {
   GlobalFileWriter writer(system_files(), path_, Grid::given({0, 0, 0}, 1, 8), 64);
   MemoryBudget budget(uint64_t{1} << 20);
