@@ -1,0 +1,43 @@
+// Some of the colored cells of a file, and the triangles near each of them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "core/format/global/voxdag_reader.h"
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag {
+
+using CellPosition = std::array<uint32_t, 3>;
+
+class SampledCells {
+ public:
+  // About `wanted` of the file's colored cells, chosen by a hash of their positions: the same ones
+  // for each file with these cells. The file must have colors.
+  SampledCells(const voxdag_reader::File& file, uint64_t wanted);
+
+  // In Morton order.
+  const std::vector<CellPosition>& positions() const { return positions_; }
+  // Of all cells that the file has colors of, the finest level alone.
+  uint64_t file_cells() const { return file_cells_; }
+  // log2 of a cell's edge in lattice units.
+  int cell_bits() const { return cell_bits_; }
+  // Appends the indices of all cells that the closed triangle touches, and of some that are near.
+  void find_near(const FixedTriangle& triangle, std::vector<uint32_t>& cells) const;
+
+ private:
+  struct Plane;
+  void descend(const Plane& plane, const FixedTriangle& triangle, uint32_t level, CellPosition low,
+               size_t first, size_t last, std::vector<uint32_t>& cells) const;
+
+  uint32_t color_levels_;
+  int cell_bits_;
+  uint64_t file_cells_ = 0;
+  std::vector<CellPosition> positions_;
+  std::vector<uint64_t> codes_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,27 @@
+// What a scene looks like, for the oracle: decoded images and materials, and its surfaces. Scene
+// readers and image decoders are those of the product, all the rest is not.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/scene/triangle_source.h"
+#include "tests/oracle/surface_color.h"
+
+namespace voxdag {
+
+class SceneLooks {
+ public:
+  // Decodes all images, 16 bytes a texel. An image that is broken is not used.
+  SceneLooks(const SceneMaterials& materials, MemoryBudget& budget);
+  // Refers to the materials here.
+  oracle::Surface surface(const FixedSurface& surface) const;
+  size_t texels() const;
+
+ private:
+  std::vector<std::unique_ptr<oracle::ColorImage>> images_;
+  std::vector<oracle::SurfaceMaterial> materials_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,72 @@
+// The color of a cube of the grid as a reference has it: the mean of what the surfaces in the
+// closed cube look like, in linear light, over many points that are spread evenly over their area.
+// Triangles are clipped to the cube; images are looked at in their finest texels, bilinearly. All
+// of it in doubles.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "tests/oracle/triangle.h"
+
+namespace oracle {
+
+using Rgba = std::array<double, 4>;  // linear, 0 to 1
+
+struct ColorImage {
+  int width = 0, height = 0;
+  std::vector<std::array<float, 4>> texels;  // linear, row by row from the top
+};
+
+enum class Border { kRepeat, kMirror, kClamp };
+enum class Transparency { kNone, kCutoff, kBlend };
+
+struct SurfaceMaterial {
+  Rgba factor{1, 1, 1, 1};
+  const ColorImage* image = nullptr;
+  std::array<Border, 2> borders{};
+  Transparency transparency = Transparency::kNone;
+  double cutoff = 0.5;
+};
+
+struct Surface {
+  struct Corner {
+    std::array<double, 2> texture{};  // 1 is the width and the height of the image
+    Rgba color{1, 1, 1, 1};
+  };
+  Triangle position{};
+  std::array<Corner, 3> corners;
+  const SurfaceMaterial* material = nullptr;
+};
+
+// sRGB of IEC 61966-2-1, from 0 to 1 both.
+double srgb_to_linear(double encoded);
+double linear_to_srgb(double linear);
+
+// In 8 bits; nothing where the surfaces have no area in the cube: they touch it in points or lines.
+// Surfaces count by area and by alpha, or by area alone where all points are transparent.
+// `points`: how many are looked at.
+std::optional<std::array<uint8_t, 3>> mean_color(std::span<const Surface* const> surfaces,
+                                                 const Point& low, int64_t edge, int points = 128);
+
+// Sums squared differences of 8-bit colors.
+class ColorError {
+ public:
+  void add(const std::array<uint8_t, 3>& a, const std::array<uint8_t, 3>& b);
+  uint64_t colors() const { return colors_; }
+  // Peak signal-to-noise ratio in dB; infinite if all were equal.
+  double psnr() const;
+  // Which part of the colors differ by more than this in any channel.
+  double part_above(int difference) const;
+
+ private:
+  double squares_ = 0;
+  uint64_t colors_ = 0;
+  std::array<uint64_t, 256> worst_{};
+};
+
+}  // namespace oracle
