@@ -17,7 +17,7 @@ void ImageReader::check_size(uint64_t width, uint64_t height) {
   height_ = static_cast<uint32_t>(height);
 }
 
-std::unique_ptr<ImageReader> open_image(ByteSource& bytes, MemoryBudget& budget) {
+std::unique_ptr<ImageReader> open_image(EncodedBytes& bytes, MemoryBudget& budget) {
   auto source = std::make_unique<PeekedSource>(bytes);
   const std::string_view head(reinterpret_cast<const char*>(source->head().data()),
                               source->head().size());

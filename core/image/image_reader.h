@@ -16,10 +16,10 @@
 
 namespace voxdag {
 
-// Bytes from front to back.
-class ByteSource {
+// The bytes of an image file, from front to back.
+class EncodedBytes {
  public:
-  virtual ~ByteSource() = default;
+  virtual ~EncodedBytes() = default;
   // Fills `out` and returns its size, or less where the bytes end.
   virtual size_t read(std::span<std::byte> out) = 0;
 };
@@ -55,6 +55,6 @@ class ImageReader {
 
 // The source must outlive the reader. Throws BrokenImage, Error{kOutOfMemory} where decoding does
 // not fit the budget, and what the source throws.
-std::unique_ptr<ImageReader> open_image(ByteSource& source, MemoryBudget& budget);
+std::unique_ptr<ImageReader> open_image(EncodedBytes& source, MemoryBudget& budget);
 
 }  // namespace voxdag

@@ -14,7 +14,7 @@ namespace voxdag {
 // pass through a decoder written in C.
 class PeekedSource {
  public:
-  explicit PeekedSource(ByteSource& source) : source_(source) {
+  explicit PeekedSource(EncodedBytes& source) : source_(source) {
     head_size_ = source.read({head_, sizeof head_});
   }
   std::span<const std::byte> head() const { return {head_, head_size_}; }
@@ -35,7 +35,7 @@ class PeekedSource {
   }
 
  private:
-  ByteSource& source_;
+  EncodedBytes& source_;
   std::byte head_[16];
   size_t head_size_ = 0, head_read_ = 0;
   std::exception_ptr failure_;

@@ -16,6 +16,8 @@
 #include "tests/fuzz/scene/rich_scene.h"
 #include "tests/unit/format/test_artifacts.h"
 #include "tests/unit/format/test_files.h"
+#include "tests/unit/format_color/colored_files.h"
+#include "tests/unit/image/image_files.h"
 
 namespace voxdag::test {
 namespace {
@@ -108,6 +110,34 @@ void add_global_files(const Corpus& corpus) {
   }
 }
 
+// The same with colors, and the header up to the end of the attribute table.
+void add_colored_files(const Corpus& corpus) {
+  TemporaryFolder folder;
+  struct Input {
+    const char* name;
+    uint32_t levels, color_levels;
+    int lines;
+    uint64_t narrow_words;
+  };
+  constexpr uint64_t kNever = uint64_t{1} << 32;
+  for (const auto& [name, levels, color_levels, lines, narrow_words] :
+       {Input{"colored_4", 2, 2, 3, kNever}, Input{"colored_16", 4, 3, 8, kNever},
+        Input{"colored_64", 6, 6, 4, kNever}, Input{"colored_wide_32", 5, 5, 9, 2},
+        Input{"colored_two_tiers", 7, 7, 2, kNever}}) {
+    const std::string path = folder.path() + "/" + name;
+    write_colored(path,
+                  {levels, color_levels, random_codes(levels, levels, lines * 10),
+                   smooth_colors(color_levels, 9)},
+                  true, narrow_words);
+    const std::string file = read_bytes(path);
+    uint64_t table_at = 0;
+    std::memcpy(&table_at, file.data() + global_layout::kTableOffsetAt, sizeof table_at);
+    const size_t page = global_layout::kPageBytes;
+    corpus.add("global_file", name,
+               file.substr(0, global_layout::kFeaturesAt) + file.substr(page, table_at - page));
+  }
+}
+
 void add_records(const Corpus& corpus) {
   const auto without_checksum = [](const std::vector<std::byte>& bytes) {
     return text_of(std::span(bytes).first(bytes.size() - sizeof(uint64_t)));
@@ -131,6 +161,34 @@ void add_records(const Corpus& corpus) {
   record.files = {{"scene.glb", {1, 2, 3, 4}}};
   record.state.digest = ContentDigest(grid_of(64));
   corpus.add("ingest_record", "one_file", without_checksum(encode(record)));
+}
+
+// Small images of every kind, and the first bytes of what is not read.
+void add_images(const Corpus& corpus) {
+  std::string pixels;
+  for (size_t i = 0; i < size_t{16} * 12 * 8; ++i) pixels += static_cast<char>(i * i / 7 % 251);
+  const auto png = [&](const std::string& name, const PngFormat& format, size_t bytes) {
+    corpus.add("image_file", name + ".png", png_file(format, pixels.substr(0, bytes)));
+  };
+  const std::string palette =
+      png_chunk("PLTE", pixels.substr(0, 12)) + png_chunk("tRNS", "\x10\x7f");
+  png("rgba", {16, 12, 8, 6, ""}, 16 * 12 * 4);
+  png("rgb_16_interlaced", {9, 11, 16, 2, "", true}, 9 * 11 * 6);
+  png("gray_1", {16, 12, 1, 0, png_chunk("tRNS", std::string("\0\1", 2))}, 2 * 12);
+  png("gray_alpha", {7, 5, 8, 4, png_chunk("gAMA", big_endian(45455))}, 7 * 5 * 2);
+  png("palette_2", {16, 12, 2, 3, palette}, 4 * 12);
+  png("palette_8_interlaced", {5, 4, 8, 3, palette, true}, 5 * 4);
+  const auto jpeg = [&](const std::string& name, int components, bool is_progressive) {
+    corpus.add(
+        "image_file", name + ".jpg",
+        jpeg_file(24, 17, components, pixels.substr(0, 24 * 17 * 3) + pixels, is_progressive));
+  };
+  jpeg("gray", 1, false);
+  jpeg("color", 3, false);
+  jpeg("color_progressive", 3, true);
+  jpeg("cmyk", 4, false);
+  corpus.add("image_file", "webp", std::string("RIFF\x24\0\0\0WEBPVP8 ", 16));
+  corpus.add("image_file", "ktx2", "\xabKTX 20\xbb\r\n\x1a\n");
 }
 
 void add_requests(const Corpus& corpus) {
@@ -168,7 +226,9 @@ int main(int argc, char** argv) {
   voxdag::test::add_scenes(corpus);
   voxdag::test::add_artifacts(corpus);
   voxdag::test::add_global_files(corpus);
+  voxdag::test::add_colored_files(corpus);
   voxdag::test::add_records(corpus);
+  voxdag::test::add_images(corpus);
   voxdag::test::add_requests(corpus);
   return 0;
 }

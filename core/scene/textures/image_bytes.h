@@ -11,7 +11,7 @@
 
 namespace voxdag {
 
-class ImageBytes : public ByteSource {
+class ImageBytes : public EncodedBytes {
  public:
   // Throws Error{kInvalidInput} if the file is another one than when the scene was opened.
   ImageBytes(FileSystem& files, const ImageSource& source);

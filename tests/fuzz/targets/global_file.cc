@@ -1,5 +1,6 @@
-// Global files: the reader, lookups, rays, tiles and the verifier. The input is the used part of
-// the header page and the levels; feature bits, sizes, checksums and the checksum table are made to
+// Global files: the reader, lookups, colors, rays, tiles and the verifier. The input is the used
+// part of the header page, up to the attribute table or, if attributes are counted, up to its end,
+// and what is behind that page; feature bits, sizes, checksums and the checksum table are made to
 // fit, so that a mutation reaches what is behind them.
 #include <sys/mman.h>
 #include <unistd.h>
@@ -31,8 +32,28 @@ void put(std::vector<std::byte>& file, size_t at, uint64_t value) {
   std::memcpy(file.data() + at, &value, sizeof value);
 }
 
+template <class T>
+T get(std::span<const std::byte> bytes, size_t at) {
+  T value{};
+  if (bytes.size() >= at + sizeof value) std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
+// Of a file of version 2: one without attributes is there for its wide levels.
+uint64_t features_of(std::span<const std::byte> header, bool has_attributes) {
+  if (!has_attributes) return layout::kWideLevels;
+  for (size_t l = 0; l < layout::kMaxLevels; ++l)
+    if (get<uint32_t>(header, layout::kLevelsAt + l * layout::kLevelEntryBytes + 24) == 64)
+      return layout::kWideLevels | layout::kAttributes;
+  return layout::kAttributes;
+}
+
 std::vector<std::byte> make_file(std::span<const std::byte> input) {
-  const auto head = input.first(std::min(input.size(), layout::kAttributesAt));
+  const bool is_first_version = get<uint32_t>(input, layout::kVersionAt) == layout::kVersion;
+  const bool has_attributes =
+      !is_first_version && get<uint64_t>(input, layout::kAttributeCountAt) != 0;
+  const auto head = input.first(
+      std::min(input.size(), has_attributes ? layout::kFeaturesAt : layout::kAttributesAt));
   const auto levels = input.subspan(head.size());
   std::vector<std::byte> file(layout::kPageBytes + layout::round_up_to_page(levels.size()));
   std::ranges::copy(head, file.begin());
@@ -44,9 +65,7 @@ std::vector<std::byte> make_file(std::span<const std::byte> input) {
         std::span(file).subspan(at, std::min<size_t>(layout::kChecksumBlockBytes, table_at - at))));
   const auto table_bytes = std::as_bytes(std::span(table));
   file.insert(file.end(), table_bytes.begin(), table_bytes.end());
-  uint32_t version = 0;
-  std::memcpy(&version, file.data() + layout::kVersionAt, sizeof version);
-  put(file, layout::kFeaturesAt, version == layout::kVersion ? 0 : 1);
+  put(file, layout::kFeaturesAt, is_first_version ? 0 : features_of(file, has_attributes));
   put(file, layout::kFileBytesAt, file.size());
   put(file, layout::kTableOffsetAt, table_at);
   put(file, layout::kTableCountAt, table.size());
@@ -72,15 +91,34 @@ class NamelessFile {
   const int fd_;
 };
 
-// Visits a part of the octree.
+// Visits a part of the octree, and looks at the color of each cube there.
 struct BoundedVisitor {
+  const voxdag_reader::File& file;
   uint64_t left = kMaxVisits;
-  bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) { return left > 0 && --left > 0; }
-  void brick(int64_t, int64_t, int64_t, uint64_t, uint64_t) {}
+  voxdag_reader::ColorCursor colors{file};
+
+  bool node(uint32_t level, int64_t x, int64_t y, int64_t z, uint64_t) {
+    if (left == 0) return false;
+    --left;
+    look_at(level, x, y, z);
+    return true;
+  }
+  void brick(int64_t x, int64_t y, int64_t z, uint64_t mask, uint64_t) {
+    for (int64_t i = 0; i < 64; i += 21) {
+      const int64_t vx = x + (i >> 5 & 1) * 2 + (i >> 2 & 1),
+                    vy = y + (i >> 4 & 1) * 2 + (i >> 1 & 1), vz = z + (i >> 3 & 1) * 2 + (i & 1);
+      if (mask >> i & 1) look_at(file.grid_levels(), vx, vy, vz);
+    }
+  }
+  void look_at(uint32_t level, int64_t x, int64_t y, int64_t z) {
+    const uint32_t up = file.grid_levels() - level;
+    fuzz::require(colors.color(x >> up, y >> up, z >> up, level).has_value() == file.has_colors(),
+                  "what is set has a color if anything has");
+  }
 };
 
 void read_all(const voxdag_reader::File& file) {
-  BoundedVisitor visitor;
+  BoundedVisitor visitor{file};
   file.walk(visitor);
   const int64_t last = file.resolution() - 1;
   for (const int64_t at : {int64_t{0}, last / 3, last}) (void)file.voxel(at, last - at, at / 2);
@@ -123,8 +161,13 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     NoProgress progress;
     bool is_sound = true;
     try {
+      bool is_wide = false;
+      for (uint32_t l = 0; l <= file.brick_level(); ++l)
+        is_wide |= file.level(l).pointer_bits == 64;
       const uint64_t narrow_words =
-          file.version() == layout::kVersion ? layout::kNarrowLevelWords : kNarrowWords;
+          is_wide || (file.version() != layout::kVersion && !file.has_colors())
+              ? kNarrowWords
+              : layout::kNarrowLevelWords;
       verify_global_file(file, 1, budget, progress, CancelToken(), narrow_words);
     } catch (const Error&) {
       is_sound = false;

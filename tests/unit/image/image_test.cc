@@ -23,7 +23,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-struct StringSource : ByteSource {
+struct StringSource : EncodedBytes {
   explicit StringSource(std::string all) : bytes(std::move(all)) {}
   size_t read(std::span<std::byte> out) override {
     const size_t size = std::min(out.size(), bytes.size() - at);
