@@ -39,6 +39,10 @@ class JpegReader : public ImageReader {
       const J_COLOR_SPACE space = jpeg_.jpeg_color_space;
       if (space != JCS_GRAYSCALE && space != JCS_YCbCr && space != JCS_RGB)
         throw BrokenImage{"is a JPEG image that is neither gray nor YCbCr nor RGB (CMYK, say)"};
+      // Not every version and build of the library decodes these. In the first scan of a lossless
+      // image, Ss is its predictor; that of others begins with the mean of each block.
+      if (jpeg_.arith_code || jpeg_.data_precision != 8 || jpeg_.Ss != 0)
+        throw BrokenImage{"is a JPEG image with arithmetic coding, lossless or not of 8 bits"};
       charge_decoder(budget);
       if (!start()) fail();
     } catch (...) {

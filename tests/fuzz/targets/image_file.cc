@@ -54,7 +54,7 @@ std::string decode(std::span<const std::byte> bytes) {
     fuzz::require(error.code() == ErrorCode::kOutOfMemory, "no error but that of memory");
     result = error.message();
   }
-  fuzz::require(budget.used() == 0, "all memory is given back");
+  fuzz::require(budget.used() == 0, "no memory stays charged");
   return result;
 }
 

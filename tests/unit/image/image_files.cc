@@ -66,8 +66,12 @@ std::string png_file(const PngFormat& f, const std::string& pixels) {
          png_chunk("IDAT", packed(rows)) + png_chunk("IEND", "");
 }
 
-std::string jpeg_file(uint32_t width, uint32_t height, int components, const std::string& pixels,
-                      bool is_progressive) {
+namespace {
+
+// `prepare` chooses the scans.
+template <class Prepare>
+std::string compressed(uint32_t width, uint32_t height, int components, const std::string& pixels,
+                       const Prepare& prepare) {
   jpeg_compress_struct jpeg{};
   jpeg_error_mgr errors{};
   jpeg.err = jpeg_std_error(&errors);
@@ -81,7 +85,7 @@ std::string jpeg_file(uint32_t width, uint32_t height, int components, const std
   jpeg.in_color_space = components == 1 ? JCS_GRAYSCALE : components == 3 ? JCS_RGB : JCS_CMYK;
   jpeg_set_defaults(&jpeg);
   jpeg_set_quality(&jpeg, 95, TRUE);
-  if (is_progressive) jpeg_simple_progression(&jpeg);
+  prepare(jpeg);
   jpeg_start_compress(&jpeg, TRUE);
   std::string copy = pixels;
   const size_t row_bytes = static_cast<size_t>(components) * width;
@@ -94,6 +98,28 @@ std::string jpeg_file(uint32_t width, uint32_t height, int components, const std
   jpeg_destroy_compress(&jpeg);
   std::free(bytes);
   return out;
+}
+
+}  // namespace
+
+std::string jpeg_file(uint32_t width, uint32_t height, int components, const std::string& pixels,
+                      bool is_progressive) {
+  return compressed(width, height, components, pixels, [&](jpeg_compress_struct& jpeg) {
+    if (is_progressive) jpeg_simple_progression(&jpeg);
+  });
+}
+
+std::string jpeg_of_scans(uint32_t width, uint32_t height, const std::string& pixels, int repeats) {
+  jpeg_scan_info scans[3] = {};
+  for (int i = 0; i < 3; ++i) scans[i] = {1, {i}, 0, 63, 0, 0};
+  std::string file = compressed(width, height, 3, pixels, [&](jpeg_compress_struct& jpeg) {
+    jpeg.scan_info = scans;
+    jpeg.num_scans = 3;
+  });
+  const size_t last = file.rfind("\xff\xda"), end = file.size() - 2;
+  std::string repeated;
+  for (int i = 1; i < repeats; ++i) repeated += file.substr(last, end - last);
+  return file.insert(end, repeated);
 }
 
 }  // namespace voxdag::test

@@ -124,6 +124,31 @@ TEST(Jpeg, CmykIsRefused) {
   EXPECT_THAT(problem_of(jpeg_file(16, 16, 4, gradient(16, 16, 4))), HasSubstr("CMYK"));
 }
 
+// A few hundred bytes for each pass over all coefficients.
+TEST(Jpeg, ManyScans) {
+  const std::string pixels = gradient(48, 40, 3);
+  expect_gradient(jpeg_of_scans(48, 40, pixels, 1), 48, 40, 3);
+  expect_gradient(jpeg_of_scans(48, 40, pixels, 400), 48, 40, 3);
+  EXPECT_THAT(problem_of(jpeg_of_scans(48, 40, pixels, 600)), HasSubstr("over 500 scans"));
+}
+
+// Kinds of JPEG that need other decoders: the frame header has it.
+TEST(Jpeg, OtherFrames) {
+  const std::string file = jpeg_file(16, 16, 3, gradient(16, 16, 3));
+  const size_t frame = file.find("\xff\xc0");
+  ASSERT_NE(frame, std::string::npos);
+  const auto with = [&](size_t at, const std::string& bytes) {
+    std::string changed = file;
+    return changed.replace(frame + at, bytes.size(), bytes);
+  };
+  EXPECT_EQ(problem_of(with(1, "\xc0")), "");
+  EXPECT_THAT(problem_of(with(1, "\xc9")), HasSubstr("arithmetic"));
+  EXPECT_THAT(problem_of(with(1, "\xc3")), HasSubstr("JPEG"));                // lossless
+  EXPECT_THAT(problem_of(with(1, "\xc5")), HasSubstr("JPEG"));                // differential
+  EXPECT_THAT(problem_of(with(4, "\x0c")), HasSubstr("JPEG"));                // 12 bits
+  EXPECT_THAT(problem_of(with(5, std::string(2, '\0'))), HasSubstr("JPEG"));  // height comes later
+}
+
 // Baseline images decode by rows, whatever their height; progressive ones need all coefficients.
 TEST(Jpeg, MemoryOfProgressiveImages) {
   const std::string pixels = gradient(1024, 1024, 1);
@@ -187,6 +212,17 @@ TEST(Png, PaletteWithTransparency) {
   EXPECT_EQ(image.at(3, 0), (Pixel{255, 0, 0, 16}));
 }
 
+// Pixels beyond the palette are black; no palette, or too long a one, is a problem.
+TEST(Png, BrokenPalettes) {
+  const std::string palette = png_chunk("PLTE", "abcdef");
+  const Decoded image = decode(png_file({2, 1, 8, 3, palette}, "\x01\xff"));
+  EXPECT_EQ(image.at(0, 0), (Pixel{'d', 'e', 'f', 255}));
+  EXPECT_EQ(image.at(1, 0), (Pixel{0, 0, 0, 255}));
+  EXPECT_THAT(problem_of(png_file({2, 1, 8, 3, ""}, "\x01\x02")), HasSubstr("broken PNG"));
+  const std::string long_one = png_chunk("PLTE", std::string(768 * 100, 'a'));
+  EXPECT_THAT(problem_of(png_file({2, 1, 8, 3, long_one}, "\x01\x02")), HasSubstr("broken PNG"));
+}
+
 TEST(Png, TransparentColor) {
   const Decoded rgb = decode(png_file(
       {2, 1, 8, 2, png_chunk("tRNS", std::string("\0\1\0\2\0\3", 6))}, "\x01\x02\x03\x01\x02\x04"));
@@ -243,6 +279,13 @@ TEST(Png, DecompressionBombs) {
   const std::string text = png_chunk("zTXt", std::string("a\0\0", 3) + packed);
   EXPECT_EQ(decode(png_file({1, 1, 8, 6, text}, "abcd"), 2 << 20).at(0, 0),
             (Pixel{'a', 'b', 'c', 'd'}));
+}
+
+TEST(Images, OtherFormats) {
+  EXPECT_THAT(problem_of(std::string("RIFF\x24\0\0\0WEBPVP8 ", 16)), HasSubstr("a WebP image"));
+  EXPECT_THAT(problem_of("\xabKTX 20\xbb\r\n\x1a\n"), HasSubstr("a KTX2 image"));
+  EXPECT_THAT(problem_of("GIF89a......"), HasSubstr("unknown format"));
+  EXPECT_THAT(problem_of(""), HasSubstr("empty"));
 }
 
 TEST(Images, MemoryIsRefused) {
