@@ -32,6 +32,7 @@ void print(const Estimate& e) {
   print_range("octree nodes", e.svo_nodes, count);
   print_range("DAG nodes", e.dag_nodes, count);
   print_range("global file", e.file_bytes, size);
+  if (e.colors) print_range("colors in it", e.colors->file_bytes, size);
   print_range("disk, at most", e.disk_bytes, size);
   print_range("memory, at most", e.memory_bytes, size);
   print_range("CPU time", e.cpu_s, duration_text);

@@ -51,7 +51,8 @@ std::string report_json(const BuildReport& report) {
     json["colors"] = {{"resolution", c->resolution},
                       {"cells", c->cells},
                       {"images", c->images},
-                      {"image_bytes", c->image_bytes}};
+                      {"image_bytes", c->image_bytes},
+                      {"cubes", {{"total", c->cubes}, {"reused", c->cubes_reused}}}};
   if (const auto& c = report.cluster)
     json["cluster"] = {{"batches", c->batches},
                        {"failed_attempts", c->attempts},
@@ -109,7 +110,9 @@ BuildReport decode_report(const std::string& text) {
       r.colors = ColorReport{.resolution = c.at("resolution"),
                              .cells = c.at("cells"),
                              .images = c.at("images"),
-                             .image_bytes = c.at("image_bytes")};
+                             .image_bytes = c.at("image_bytes"),
+                             .cubes = c.at("cubes").at("total"),
+                             .cubes_reused = c.at("cubes").at("reused")};
     }
     if (json.contains("cluster")) {
       const auto& c = json.at("cluster");

@@ -21,8 +21,8 @@
 //                     block memo                    1/16 of what is free         BackendMemory
 //                     more pages that it retains    1/8, up to 128 MiB           nobody
 //                     or: key for the cache         what those pages leave       ArtifactCache
-//   color         textures, if they take no more      up to 1/2 of what is free    TextureSet
-//                 surfaces; the rest is spilled     up to 1/3                    SurfaceStore
+//   color         surfaces; the rest is spilled     up to 1/3 of what is free    SurfaceStore
+//                 textures, if they take no more    up to 1/2 of the rest        TextureSet
 //                   those on their way there        1/8                          nobody
 //                 ColorMemory, for every worker     what is free / workers
 //                   a region                        12 MiB; solid ones 50        CubeBaker

@@ -105,14 +105,13 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
   return artifacts;
 }
 
-bool MergeStage::run(const RunOptions& options, const AddSections& add_sections,
-                     BuildReport& report) {
-  if (is_published(report)) return true;
+bool MergeStage::run(const RunOptions& options, const Sections& sections, BuildReport& report) {
+  if (is_published(sections, report)) return true;
   try {
     GlobalFileWriter out(context_.files, report.output, report.grid, report.hash_bits);
     merge(options, out, report);
-    add_sections(out);
-    write(out, report);
+    sections.add(out);
+    write(out, sections, report);
     return true;
   } catch (const Error& error) {
     if (!error.is_corruption() || !heal(error)) throw;
@@ -121,10 +120,11 @@ bool MergeStage::run(const RunOptions& options, const AddSections& add_sections,
 }
 
 // An earlier run may have been stopped after the file got its name.
-bool MergeStage::is_published(BuildReport& report) {
+bool MergeStage::is_published(const Sections& sections, BuildReport& report) {
   const auto result = store_.result();
   if (!result || result->output != report.output || !context_.files.exists(report.output) ||
-      sha256_of_file(*context_.files.open_read(report.output), context_.cancel) != result->sha256)
+      sha256_of_file(*context_.files.open_read(report.output), context_.cancel) != result->sha256 ||
+      sections.digest() != result->sections)
     return false;
   report.sha256 = result->sha256;
   report.bytes = result->bytes;
@@ -151,12 +151,12 @@ void MergeStage::merge(const RunOptions& options, GlobalFileWriter& out, BuildRe
   clock_.finish("merge");
 }
 
-void MergeStage::write(GlobalFileWriter& out, BuildReport& report) {
+void MergeStage::write(GlobalFileWriter& out, const Sections& sections, BuildReport& report) {
   context_.progress.begin_stage("write", 1, "files");
   const GlobalFileSummary file =
       out.seal({.voxels = report.merge.voxels, .svo_nodes = report.merge.svo_nodes}, report.threads,
                context_.cancel);
-  store_.record_result({report.output, file.sha256, file.bytes, report.merge});
+  store_.record_result({report.output, file.sha256, file.bytes, report.merge, sections.digest()});
   out.publish();
   context_.progress.advance(1);
   context_.progress.end_stage();

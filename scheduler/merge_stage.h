@@ -31,17 +31,21 @@ class MergeStage {
         clock_(clock),
         context_(context) {}
 
-  // Adds what follows the levels of the merged file.
-  using AddSections = std::function<void(GlobalFileWriter& out)>;
+  // What follows the levels of the merged file.
+  struct Sections {
+    std::function<void(GlobalFileWriter& out)> add;
+    // Of all that they depend on.
+    std::function<std::string()> digest;
+  };
 
   // Writes the output file and fills in the report. False if something turned out damaged, and the
   // merge is to be run again once the subvolumes that were planned again are built.
-  bool run(const RunOptions& options, const AddSections& add_sections, BuildReport& report);
+  bool run(const RunOptions& options, const Sections& sections, BuildReport& report);
 
  private:
-  bool is_published(BuildReport& report);
+  bool is_published(const Sections& sections, BuildReport& report);
   void merge(const RunOptions& options, GlobalFileWriter& out, BuildReport& report);
-  void write(GlobalFileWriter& out, BuildReport& report);
+  void write(GlobalFileWriter& out, const Sections& sections, BuildReport& report);
   bool heal(const Error& error);
 
   JobStore& store_;

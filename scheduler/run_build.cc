@@ -176,6 +176,7 @@ class Build {
   void build_or_resume() {
     if (start_over_) {
       checkpoint_.forget();
+      work_.remove_colors();
       remove_tasks();
     } else {
       refuse_other_options();
@@ -369,9 +370,9 @@ class Build {
 
   void merge_artifacts() {
     MergeStage merge(*jobs_, commits_, work_, budget_, clock_, context_);
-    for (int run = 1; !merge.run(
-             spec_.run, [this](GlobalFileWriter& out) { color(out); }, report_);
-         ++run) {
+    const MergeStage::Sections sections{[this](GlobalFileWriter& out) { color(out); },
+                                        [this] { return color_digest(); }};
+    for (int run = 1; !merge.run(spec_.run, sections, report_); ++run) {
       if (run == kMaxMerges)
         throw Error(ErrorCode::kCorrupt, work_.path() +
                                              ": artifacts are damaged repeatedly: expected a disk "
@@ -382,11 +383,22 @@ class Build {
 
   void color(GlobalFileWriter& out) {
     if (!spec_.geometry.color) return;
-    report_.colors =
-        add_colors({spec_.geometry, report_.grid, jobs_->job()->scene_digest, work_.path()}, out,
-                   {context_, spec_.run.threads, budget_});
+    ColorStage stage = color_stage();
+    report_.colors = stage.add_to(out);
+    color_digest_ = stage.digest();
     report_.spill_bytes += report_.colors->spill_bytes;
     clock_.finish("color");
+  }
+
+  // Of what the colors depend on: as they were baked, or as it is now.
+  std::string color_digest() {
+    return spec_.geometry.color && color_digest_.empty() ? color_stage().digest() : color_digest_;
+  }
+
+  ColorStage color_stage() {
+    return {{spec_.geometry, report_.grid, jobs_->job()->scene_digest, work_.path(),
+             work_.colors_path(), spec_.run.checkpoint_interval_s},
+            {context_, spec_.run.threads, budget_}};
   }
 
   [[noreturn]] void refuse_job(const std::string& difference) const {
@@ -456,6 +468,7 @@ class Build {
   IngestCheckpoint checkpoint_;
   std::unique_ptr<ClusterBuild> cluster_;  // if a cluster builds the subvolumes, or has begun to
   BuildReport report_;
+  std::string color_digest_;  // of the colors that were added to the output
   bool start_over_ = spec_.run.restart;
 };
 

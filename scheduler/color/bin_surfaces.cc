@@ -16,11 +16,12 @@ class SurfacePiece {
       : binning_(binning),
         tree_(tree),
         charge_(budget,
-                kPieceTriangles * (kMaxSurfaceRecordBytes + binning.record_bytes) +
+                kPieceTriangles * (kMaxSurfaceRecordBytes + binning.record_bytes + sizeof(Record)) +
                     kMaxPlaces * sizeof(Place),
                 "a piece of the scene") {}
 
   void read(TriangleCursor& cursor, uint64_t first, uint64_t count) {
+    bytes_.clear();
     records_.clear();
     triangles_.clear();
     places_.clear();
@@ -32,30 +33,41 @@ class SurfacePiece {
   }
   const Checksum128& checksum() const { return checksum_; }
 
-  void copy(SurfaceWriter& writer) {
-    const std::span<const std::byte> records(records_);
-    for (const Place& place : places_)
-      writer.append(place.bin, records.subspan(place.record, place.bytes));
-    if (late_ == kNone) return;
-    SurfaceRecords rest(records.subspan(late_));
-    std::vector<std::byte> record;
-    while (const auto surface = rest.next()) {
-      record.clear();
-      append_surface(*surface, has_image(surface->material), record);
+  void copy(SurfaceWriter& writer, std::span<BinContent> contents) {
+    const auto copy_to = [&](size_t bin, const Record& record) {
+      writer.append(bin, bytes_of(record));
+      BinContent& content = contents[bin];
+      ++content.surfaces;
+      content.sum.low += record.digest.low;
+      content.sum.high += record.digest.high;
+      const uint32_t image = binning_.materials[record.material].image;
+      if (image != Material::kNoImage) content.images.set(image % content.images.size());
+    };
+    for (const Place& place : places_) copy_to(place.bin, records_[place.record]);
+    for (size_t i = late_; i < records_.size(); ++i) {
+      const auto surface = SurfaceRecords(bytes_of(records_[i])).next();
       tree_.for_each_touched(surface->position, hint_,
-                             [&](size_t bin) { writer.append(bin, record); });
+                             [&](size_t bin) { copy_to(bin, records_[i]); });
     }
   }
 
  private:
+  struct Record {
+    uint32_t offset, bytes;  // in bytes_
+    uint32_t material;
+    Checksum128 digest;
+  };
   // A record and one of its bins.
   struct Place {
-    uint32_t bin, record, bytes;
+    uint32_t bin, record;
   };
   static constexpr size_t kNone = ~size_t{0};
   // Triangles of a piece that all reach through the grid have more; their bins are found later.
   static constexpr size_t kMaxPlaces = 4 * kPieceTriangles;
 
+  std::span<const std::byte> bytes_of(const Record& record) const {
+    return std::span(bytes_).subspan(record.offset, record.bytes);
+  }
   bool has_image(uint32_t material) const {
     return binning_.materials[material].image != Material::kNoImage;
   }
@@ -66,18 +78,23 @@ class SurfacePiece {
       return;
     surface.corners = triangle.corners;
     surface.material = triangle.material;
-    const size_t at = triangles_.size(), record = records_.size();
+    const size_t at = triangles_.size(), begin = bytes_.size(), record = records_.size();
     triangles_.resize(at + binning_.record_bytes);
     encode_triangle(surface.position, binning_.record_bytes, triangles_.data() + at);
-    append_surface(surface, has_image(surface.material), records_);
+    append_surface(surface, has_image(surface.material), bytes_);
+    records_.push_back({static_cast<uint32_t>(begin),
+                        static_cast<uint32_t>(bytes_.size() - begin),
+                        surface.material,
+                        {}});
+    records_.back().digest =
+        surface_digest(bytes_of(records_.back()), binning_.looks[surface.material]);
     if (late_ != kNone) return;
     if (places_.size() + binning_.cubes.size() > kMaxPlaces) {
       late_ = record;
       return;
     }
-    const auto bytes = static_cast<uint32_t>(records_.size() - record);
     tree_.for_each_touched(surface.position, hint_, [&](size_t bin) {
-      places_.push_back({static_cast<uint32_t>(bin), static_cast<uint32_t>(record), bytes});
+      places_.push_back({static_cast<uint32_t>(bin), static_cast<uint32_t>(record)});
     });
   }
 
@@ -85,7 +102,8 @@ class SurfacePiece {
   const CubeTree& tree_;
   const MemoryCharge charge_;
   CubeTree::Hint hint_;
-  std::vector<std::byte> records_, triangles_;
+  std::vector<std::byte> bytes_, triangles_;
+  std::vector<Record> records_;  // of bytes_
   std::vector<Place> places_;
   size_t late_ = kNone;  // the first record without places
   Checksum128 checksum_;
@@ -93,18 +111,20 @@ class SurfacePiece {
 
 }  // namespace
 
-std::vector<SurfaceStore::Bin> bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
-                                            SurfaceStore& store, const StageContext& context) {
+BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
+                            SurfaceStore& store, const StageContext& context) {
   const CubeTree tree(binning.grid.levels, Cube{}, binning.cubes);
-  std::vector<SurfaceStore::Bin> bins(binning.cubes.size());
-  SurfaceWriter writer(store, bins, binning.buffer_bytes);
+  BinnedSurfaces binned;
+  binned.bins.resize(binning.cubes.size());
+  binned.contents.resize(binning.cubes.size());
+  SurfaceWriter writer(store, binned.bins, binning.buffer_bytes);
   ContentDigest digest(binning.grid);
   uint64_t position = 0;
   context.build.progress.begin_stage("surfaces", scene.declared_triangles(), "triangles");
   read_pieces<SurfacePiece>(
       scene, position, context, [&](auto& piece) { piece.emplace(binning, tree, context.budget); },
       [&](SurfacePiece& piece, uint64_t end) {
-        piece.copy(writer);
+        piece.copy(writer, binned.contents);
         digest.add(piece.checksum());
         position = end;
       });
@@ -116,7 +136,7 @@ std::vector<SurfaceStore::Bin> bin_surfaces(TriangleSource& scene, const Surface
                     binning.digest.substr(0, 16) + ", now " + digest.hex().substr(0, 16) +
                     "): expected a scene that does not change during the build; start over "
                     "(--restart)");
-  return bins;
+  return binned;
 }
 
 }  // namespace voxdag

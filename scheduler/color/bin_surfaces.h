@@ -12,6 +12,7 @@
 #include "core/geometry/grid.h"
 #include "core/scene/triangle_source.h"
 #include "scheduler/build_spec.h"
+#include "scheduler/color/color_keys.h"
 #include "scheduler/color/surface_store.h"
 
 namespace voxdag {
@@ -19,15 +20,21 @@ namespace voxdag {
 struct SurfaceBinning {
   Grid grid;
   std::span<const Material> materials;
-  std::span<const Cube> cubes;  // they cover the grid
-  size_t record_bytes;          // of a triangle, as ingest digests it (triangles/chunk.h)
-  std::string digest;           // of what ingest read
-  size_t buffer_bytes;          // for records on their way to the bins, uncharged
+  std::span<const Checksum128> looks;  // look_digests() of them
+  std::span<const Cube> cubes;         // they cover the grid
+  size_t record_bytes;                 // of a triangle, as ingest digests it (triangles/chunk.h)
+  std::string digest;                  // of what ingest read
+  size_t buffer_bytes;                 // for records on their way to the bins, uncharged
 };
 
-// One bin for each cube, in their order. Throws Error{kInvalidInput} if the triangles are not those
-// that ingest read: the scene was changed during the build.
-std::vector<SurfaceStore::Bin> bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
-                                            SurfaceStore& store, const StageContext& context);
+struct BinnedSurfaces {
+  std::vector<SurfaceStore::Bin> bins;  // one for each cube, in their order
+  std::vector<BinContent> contents;     // and what is in it
+};
+
+// Throws Error{kInvalidInput} if the triangles are not those that ingest read: the scene was
+// changed during the build.
+BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
+                            SurfaceStore& store, const StageContext& context);
 
 }  // namespace voxdag

@@ -3,15 +3,22 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
+#include "core/format/checksum.h"
 #include "core/format/color/color_section_writer.h"
 #include "core/geometry/morton.h"
 #include "core/scene/textures/texture_set.h"
 #include "scheduler/color/bin_surfaces.h"
+#include "scheduler/color/color_keys.h"
+#include "scheduler/color/color_store.h"
 #include "scheduler/color/cube_baker.h"
+#include "scheduler/color/region_record.h"
 #include "scheduler/memory_plan.h"
 #include "scheduler/triangles/chunk.h"
 
@@ -35,79 +42,173 @@ std::vector<Cube> bins_of(const ColorGrid& grid) {
 struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
-  std::vector<EncodedRegion> regions;
+  std::vector<std::byte> records;
 };
 
-ColorReport bake(const ColorGrid& grid, TextureSet& textures, std::span<const Cube> cubes,
-                 std::vector<SurfaceStore::Bin>& bins, SurfaceStore& store, GlobalFileWriter& out,
-                 const StageContext& context) {
+}  // namespace
+
+struct ColorStage::State {
+  const ColorSource source;
+  const StageContext context;
+  const ColorGrid grid;
+  const std::vector<Cube> cubes;
+  std::unique_ptr<TriangleSource> scene;
+  SceneMaterials materials;
+  std::vector<std::string> images;  // their digests
+  // Once the surfaces are read:
+  std::optional<MemoryBudget> share;
+  std::optional<SurfaceStore> store;
+  BinnedSurfaces surfaces;
+  std::vector<Checksum128> keys;
+
+  State(const ColorSource& s, const StageContext& c)
+      : source(s),
+        context(c),
+        grid{s.grid.levels, levels_of_resolution(s.options.color_resolution)},
+        cubes(bins_of(grid)) {}
+
+  void open();
+  void read_surfaces();
+  std::unique_ptr<TextureSet> decode_images(const ColorStore& artifacts);
+  void bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
+            ColorReport& report);
+};
+
+void ColorStage::State::open() {
+  const BuildContext& build = context.build;
+  scene = open_scene(build.files, source.options.scenes,
+                     {source.options.skip_invalid, source.work_folder + "/decoded.vdspill"},
+                     context.budget, build.cancel);
+  materials = scene->materials();
+  for (const std::string& warning : std::exchange(materials.warnings, {}))
+    build.progress.warn(warning);
+  images = image_digests(build.files, materials.images, context.threads, build.cancel);
+}
+
+void ColorStage::State::read_surfaces() {
+  if (store) return;
+  share.emplace(context.budget.available() / 3, &context.budget);
+  store.emplace(context.build.files, source.work_folder + "/surfaces.vdspill", *share);
+  const std::vector<Checksum128> looks = look_digests(materials.materials, images);
+  const SurfaceBinning binning{
+      .grid = source.grid,
+      .materials = materials.materials,
+      .looks = looks,
+      .cubes = cubes,
+      .record_bytes = triangle_record_bytes(source.options.bounds.has_value()),
+      .digest = source.digest,
+      .buffer_bytes = MemoryPlan::divide(context.budget.limit()).partition_buffer_bytes};
+  surfaces = bin_surfaces(*scene, binning, *store, context);
+  scene.reset();
+  trim_heap();
+  for (size_t i = 0; i < cubes.size(); ++i)
+    keys.push_back(color_key(grid, cubes[i], surfaces.contents[i]));
+}
+
+// Those that cubes show which are to be baked.
+std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& artifacts) {
+  ImageClasses needed;
+  for (size_t i = 0; i < cubes.size(); ++i)
+    if (!artifacts.has(keys[i])) needed |= surfaces.contents[i].images;
+  uint64_t count = 0;
+  for (size_t i = 0; i < materials.images.size(); ++i) count += needed.test(i % needed.size());
+  SceneMaterials shown = materials;
+  for (Material& material : shown.materials)
+    if (material.image != Material::kNoImage && !needed.test(material.image % needed.size()))
+      material.image = Material::kNoImage;
+  const BuildContext& build = context.build;
+  const auto prepare = [&] {
+    build.progress.begin_stage("images", materials.images.size(), "images");
+    build.progress.resume_at(materials.images.size() - count);
+    auto textures =
+        TextureSet::prepare(build.files, shown, source.work_folder + "/images.vdspill",
+                            context.threads, context.budget, build.progress, build.cancel);
+    build.progress.end_stage();
+    return textures;
+  };
+  try {
+    return prepare();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kOutOfMemory) throw;
+  }
+  // Large images may be decoded in the memory of the surfaces.
+  store->move_to_file(surfaces.bins);
+  trim_heap();
+  return prepare();
+}
+
+void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
+                             ColorReport& report) {
+  const BuildContext& build = context.build;
   const auto memory = ColorMemory::divide(context.budget.available(), context.threads);
   std::vector<BakeWorker> workers(memory.workers);
   ColorSectionWriter section(out, grid.color_levels, context.budget);
-  ColorReport report;
-  report.resolution = uint64_t{1} << grid.color_levels;
-  context.build.progress.begin_stage("color", cubes.size(), "cubes");
+  build.progress.begin_stage("color", report.cubes, "cubes");
+  build.progress.resume_at(report.cubes_reused);
   parallel_for_in_order(
       memory.workers, cubes.size(),
       [&](unsigned number, size_t item) {
         BakeWorker& worker = workers[number];
-        worker.regions.clear();
-        if (bins[item].surfaces == 0) return;
+        worker.records.clear();
+        if (surfaces.contents[item].surfaces == 0) return;
+        if (artifacts.has(keys[item])) return artifacts.read(keys[item], worker.records);
         if (!worker.baker) {
           worker.textures = textures.open(memory.texture_bytes);
-          worker.baker.emplace(grid, textures.materials(), *worker.textures, store,
-                               memory.surface_bytes, context.budget, context.build.cancel);
+          worker.baker.emplace(grid, textures.materials(), *worker.textures, *store,
+                               memory.surface_bytes, context.budget, build.cancel);
         }
-        worker.baker->bake(cubes[item], bins[item], worker.regions);
+        worker.baker->bake(cubes[item], surfaces.bins[item], worker.records);
+        artifacts.add(keys[item], worker.records);
       },
-      [&](unsigned number, size_t) {
-        context.build.cancel.check();
-        for (const EncodedRegion& region : workers[number].regions) {
-          section.add_region(region);
-          report.cells += region.counts[0];
+      [&](unsigned number, size_t item) {
+        build.cancel.check();
+        RegionRecords records(workers[number].records);
+        while (const auto region = records.next()) {
+          section.add_region(*region);
+          report.cells += region->counts[0];
         }
-        workers[number].regions.clear();
-        context.build.progress.advance(1);
+        if (surfaces.contents[item].surfaces > 0 && !artifacts.has(keys[item]))
+          build.progress.advance(1);
       });
-  context.build.progress.end_stage();
+  build.progress.end_stage();
   if (report.cells > 0) section.finish();
-  return report;
 }
 
-}  // namespace
+ColorStage::ColorStage(const ColorSource& source, const StageContext& context)
+    : state_(std::make_unique<State>(source, context)) {
+  state_->open();
+}
 
-ColorReport add_colors(const ColorSource& source, GlobalFileWriter& out,
-                       const StageContext& context) {
+ColorStage::~ColorStage() = default;
+
+std::string ColorStage::digest() {
+  state_->read_surfaces();
+  Sha256 hash;
+  hash.add(std::as_bytes(std::span(state_->keys)));
+  return hash.finish();
+}
+
+ColorReport ColorStage::add_to(GlobalFileWriter& out) {
   if (out.progress().levels.empty()) return {};
-  const GeometryOptions& options = source.options;
-  const ColorGrid grid{source.grid.levels, levels_of_resolution(options.color_resolution)};
-  const auto scene = open_scene(context.build.files, options.scenes,
-                                {options.skip_invalid, source.work_folder + "/decoded.vdspill"},
-                                context.budget, context.build.cancel);
-  const SceneMaterials materials = scene->materials();
-  for (const std::string& warning : materials.warnings) context.build.progress.warn(warning);
-  context.build.progress.begin_stage("images", materials.images.size(), "images");
-  const auto textures = TextureSet::prepare(
-      context.build.files, materials, source.work_folder + "/images.vdspill", context.threads,
-      context.budget, context.build.progress, context.build.cancel);
-  context.build.progress.end_stage();
-
-  MemoryBudget share(context.budget.available() / 3, &context.budget);
-  SurfaceStore store(context.build.files, source.work_folder + "/surfaces.vdspill", share);
-  const std::vector<Cube> cubes = bins_of(grid);
-  const SurfaceBinning binning{
-      .grid = source.grid,
-      .materials = textures->materials(),
-      .cubes = cubes,
-      .record_bytes = triangle_record_bytes(options.bounds.has_value()),
-      .digest = source.digest,
-      .buffer_bytes = MemoryPlan::divide(context.budget.limit()).partition_buffer_bytes};
-  std::vector<SurfaceStore::Bin> bins = bin_surfaces(*scene, binning, store, context);
-  trim_heap();
-  ColorReport report = bake(grid, *textures, cubes, bins, store, out, context);
-  report.images = materials.images.size();
+  const StageContext& context = state_->context;
+  state_->read_surfaces();
+  ColorStore artifacts(context.build.files, state_->source.artifact_path,
+                       state_->source.checkpoint_interval_s, context.build.progress,
+                       context.build.cancel);
+  ColorReport report;
+  report.resolution = uint64_t{1} << state_->grid.color_levels;
+  for (size_t i = 0; i < state_->cubes.size(); ++i) {
+    if (state_->surfaces.contents[i].surfaces == 0) continue;
+    ++report.cubes;
+    if (!artifacts.has(state_->keys[i])) continue;
+    ++report.cubes_reused;
+    state_->store->clear(state_->surfaces.bins[i]);
+  }
+  const auto textures = state_->decode_images(artifacts);
+  state_->bake(artifacts, *textures, out, report);
+  report.images = state_->materials.images.size();
   report.image_bytes = textures->bytes();
-  report.spill_bytes = store.file_bytes();
+  report.spill_bytes = state_->store->file_bytes();
   return report;
 }
 

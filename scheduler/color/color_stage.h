@@ -1,9 +1,15 @@
-// The colors of a scene (docs/color.md): its surfaces are read once more, binned by cubes of the
-// color grid, baked on all threads, and written in Morton order behind the levels of the global
-// file. Nothing of it is durable before the file is: a build that is stopped before bakes again.
+// The colors of a scene (docs/color.md): its surfaces are read once more and binned by cubes of the
+// color grid; the cubes are baked on all threads, and written in Morton order behind the levels of
+// the global file.
+//
+// A cube is a task: what it became is stored in the work folder (color_store.h) under a key of all
+// that it depends on (color_keys.h), and used again by a later run for which the key is the same.
+// So a run that is stopped loses the cubes that it was baking, and a changed texture those that
+// show it. Images that no missing cube shows are not decoded.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "core/format/global/global_writer.h"
@@ -15,19 +21,35 @@ namespace voxdag {
 struct ColorSource {
   const GeometryOptions& options;  // with a color resolution
   Grid grid;
-  std::string digest;       // of the scene's triangles, as ingest read them
-  std::string work_folder;  // for scratch files
+  std::string digest;            // of the scene's triangles, as ingest read them
+  std::string work_folder;       // for scratch files
+  std::string artifact_path;     // of the colors that outlive a run
+  double checkpoint_interval_s;  // between two times that those are made durable
 };
 
 struct ColorReport {
   uint64_t resolution = 0;               // of the color grid; 0 for a file without colors
   uint64_t cells = 0;                    // of that grid, that have a color
-  uint64_t images = 0, image_bytes = 0;  // and their pyramids
+  uint64_t images = 0, image_bytes = 0;  // and pyramids of those that were decoded
+  uint64_t cubes = 0, cubes_reused = 0;  // with surfaces, and those that an earlier run baked
   uint64_t spill_bytes = 0;
 };
 
-// `out` has all its levels, and is not sealed; it stays as it is if there are none. Throws Error.
-ColorReport add_colors(const ColorSource& source, GlobalFileWriter& out,
-                       const StageContext& context);
+class ColorStage {
+ public:
+  // Opens the scene. What both refer to must outlive the stage. Throws Error, as all below.
+  ColorStage(const ColorSource& source, const StageContext& context);
+  ~ColorStage();
+
+  // SHA-256 of the keys of all cubes: equal where the colors are equal. Reads the scene and its
+  // images.
+  std::string digest();
+  // `out` has all its levels, and is not sealed; it stays as it is if there are none. Once.
+  ColorReport add_to(GlobalFileWriter& out);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace voxdag

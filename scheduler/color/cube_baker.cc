@@ -1,12 +1,12 @@
 #include "scheduler/color/cube_baker.h"
 
+#include <algorithm>
 #include <array>
 #include <numeric>
-#include <string>
 
-#include "core/base/error.h"
 #include "core/geometry/morton.h"
 #include "core/geometry/octree_descent.h"
+#include "scheduler/color/region_record.h"
 #include "scheduler/memory_plan.h"
 
 namespace voxdag {
@@ -30,11 +30,10 @@ CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const Material> materials,
       charge_(budget, ColorMemory::kRegionBytes, "baking colors"),
       baker_(grid, materials, textures) {}
 
-void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin,
-                     std::vector<EncodedRegion>& regions) {
+void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, std::vector<std::byte>& records) {
   if (bin.surfaces == 0) return;
   const uint64_t bytes = bin.surfaces * kSurfaceBytes;
-  if (bytes > surface_bytes_) return divide(cube, bin, regions);
+  if (bytes > surface_bytes_) return divide(cube, bin, records);
   const MemoryCharge charge(budget_, bytes, "surfaces to be baked");
   surfaces_.clear();
   surfaces_.reserve(bin.surfaces);
@@ -42,22 +41,14 @@ void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin,
   store_.clear(bin);
   std::vector<uint32_t> all(surfaces_.size());
   std::iota(all.begin(), all.end(), 0u);
-  descend(cube, all, regions);
+  descend(cube, all, records);
   surfaces_ = {};
   touching_ = {};
 }
 
 // Too many surfaces for the memory: those of the eight children are stored apart.
-void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin,
-                       std::vector<EncodedRegion>& regions) {
-  if (cube.level == grid_.region_level())
-    throw Error(ErrorCode::kOutOfMemory,
-                "the region of 64^3 color cells at (" + std::to_string(cube.position[0]) + ", " +
-                    std::to_string(cube.position[1]) + ", " + std::to_string(cube.position[2]) +
-                    ") has " + std::to_string(bin.surfaces) + " triangles, which take " +
-                    std::to_string(bin.surfaces * kSurfaceBytes >> 20) + " MiB of " +
-                    std::to_string(surface_bytes_ >> 20) +
-                    ": expected more --memory, fewer --threads or a larger --color-resolution");
+void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin, std::vector<std::byte>& records) {
+  if (cube.level == grid_.region_level()) return bake_in_parts(cube, bin, records);
   std::array<SurfaceStore::Bin, 8> children;
   SurfaceWriter writer(store_, children, kPartBytes * children.size());
   std::vector<std::byte> record;
@@ -73,14 +64,14 @@ void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin,
   writer.flush();
   for (int child = 0; child < 8; ++child) {
     cancel_.check();
-    bake(cube.child(child), children[static_cast<size_t>(child)], regions);
+    bake(cube.child(child), children[static_cast<size_t>(child)], records);
   }
 }
 
 void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching,
-                        std::vector<EncodedRegion>& regions) {
+                        std::vector<std::byte>& records) {
   if (touching.empty()) return;
-  if (cube.level == grid_.region_level()) return bake_region(cube, touching, regions);
+  if (cube.level == grid_.region_level()) return bake_region(cube, touching, records);
   std::array<std::vector<uint32_t>, 8> parts;
   const int64_t units = cube.edge_voxels(grid_.levels) * kUnitsPerVoxel;
   for (const uint32_t i : touching)
@@ -88,18 +79,48 @@ void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching,
          mask &= mask - 1)
       parts[static_cast<size_t>(lowest_bit(mask))].push_back(i);
   for (int child = 0; child < 8; ++child)
-    descend(cube.child(child), parts[static_cast<size_t>(child)], regions);
+    descend(cube.child(child), parts[static_cast<size_t>(child)], records);
 }
 
 void CubeBaker::bake_region(const Cube& region, std::span<const uint32_t> touching,
-                            std::vector<EncodedRegion>& regions) {
+                            std::vector<std::byte>& records) {
   cancel_.check();
   touching_.clear();
   for (const uint32_t i : touching) touching_.push_back(surfaces_[i]);
-  baker_.bake(region, touching_, cells_);
+  baker_.begin(region);
+  baker_.add(touching_);
+  append(region, records);
+}
+
+// A region is not divided: its sums take what they take, and the surfaces come one part after the
+// other.
+void CubeBaker::bake_in_parts(const Cube& region, SurfaceStore::Bin& bin,
+                              std::vector<std::byte>& records) {
+  const size_t most = std::max<size_t>(surface_bytes_ / sizeof(FixedSurface), 1);
+  const MemoryCharge charge(budget_, most * sizeof(FixedSurface), "surfaces to be baked");
+  touching_.clear();
+  touching_.reserve(most);
+  baker_.begin(region);
+  const auto add_part = [&] {
+    cancel_.check();
+    baker_.add(touching_);
+    touching_.clear();
+  };
+  store_.for_each(bin, [&](const FixedSurface& surface) {
+    touching_.push_back(surface);
+    if (touching_.size() == most) add_part();
+  });
+  add_part();
+  store_.clear(bin);
+  append(region, records);
+  touching_ = {};
+}
+
+void CubeBaker::append(const Cube& region, std::vector<std::byte>& records) {
+  baker_.finish(cells_);
   if (cells_.empty()) return;
   const uint64_t morton = morton_encode(region.position[0], region.position[1], region.position[2]);
-  regions.push_back(encode_region(grid_.color_levels - grid_.region_level(), morton, cells_));
+  append_region(encode_region(grid_.color_levels - grid_.region_level(), morton, cells_), records);
 }
 
 }  // namespace voxdag

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
 namespace voxdag {
 
@@ -27,12 +28,28 @@ void SurfaceStore::add(Bin& bin, std::span<const std::byte> records, uint64_t su
     lock.unlock();
     piece.memory.assign(records.begin(), records.end());
   } else {
-    if (!spill_) spill_ = std::make_unique<TriangleFile>(files_, spill_path_);
     lock.unlock();
-    piece.extent = spill_->append(records);
+    piece.extent = append_to_file(records);
   }
   bin.pieces.push_back(std::move(piece));
   bin.surfaces += surfaces;
+}
+
+Extent SurfaceStore::append_to_file(std::span<const std::byte> records) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!spill_) spill_ = std::make_unique<TriangleFile>(files_, spill_path_);
+  }
+  return spill_->append(records);
+}
+
+void SurfaceStore::move_to_file(std::span<Bin> bins) {
+  for (Bin& bin : bins)
+    for (Piece& piece : bin.pieces) {
+      if (piece.memory.empty()) continue;
+      piece.extent = append_to_file(piece.memory);
+      free_memory(std::exchange(piece.memory, {}).size() + sizeof(Piece));
+    }
 }
 
 std::span<const std::byte> SurfaceStore::bytes_of(const Piece& piece,
@@ -52,6 +69,10 @@ void SurfaceStore::clear(Bin& bin) {
       bytes += piece.memory.size() + sizeof(Piece);
   }
   bin = {};
+  free_memory(bytes);
+}
+
+void SurfaceStore::free_memory(uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   memory_bytes_ -= bytes;
   charge_.try_resize(memory_bytes_);

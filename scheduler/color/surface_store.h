@@ -45,12 +45,16 @@ class SurfaceStore {
       while (const auto surface = records.next()) visit(*surface);
     }
   }
+  // Writes to the file what the bins have in memory.
+  void move_to_file(std::span<Bin> bins);
   // Frees what the bin has.
   void clear(Bin& bin);
   // Bytes that were written to the file.
   uint64_t file_bytes() const;
 
  private:
+  Extent append_to_file(std::span<const std::byte> records);
+  void free_memory(uint64_t bytes);
   std::span<const std::byte> bytes_of(const Piece& piece, std::vector<std::byte>& read) const;
 
   FileSystem& files_;

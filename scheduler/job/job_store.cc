@@ -10,7 +10,7 @@ namespace {
 // "vdag": marks a database as a job store.
 constexpr int64_t kApplicationId = 0x76646167;
 
-constexpr int64_t kSchemaVersion = 6;
+constexpr int64_t kSchemaVersion = 7;
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE job (
@@ -60,7 +60,7 @@ CREATE TABLE result (
   output TEXT NOT NULL, sha256 TEXT NOT NULL, bytes INTEGER NOT NULL,
   voxels INTEGER NOT NULL, svo_nodes INTEGER NOT NULL, dag_nodes INTEGER NOT NULL,
   merge_passes INTEGER NOT NULL, merge_partitions INTEGER NOT NULL,
-  merge_streamed_groups INTEGER NOT NULL,
+  merge_streamed_groups INTEGER NOT NULL, sections TEXT NOT NULL,
   row_checksum INTEGER NOT NULL
 );
 -- The progress of scan, ingest and partition; the triangles are in a file.
@@ -207,6 +207,7 @@ void columns(Row& row, JobResult& result) {
   row("merge_passes", result.merge.passes);
   row("merge_partitions", result.merge.hash_partitions);
   row("merge_streamed_groups", result.merge.streamed_groups);
+  row("sections", result.sections);
 }
 
 template <class Row>

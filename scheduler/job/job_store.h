@@ -66,7 +66,8 @@ struct JobResult {
   std::string output;
   std::string sha256;
   uint64_t bytes = 0;
-  MergeReport merge;  // without input_nodes and scratch_bytes
+  MergeReport merge;     // without input_nodes and scratch_bytes
+  std::string sections;  // digest of what is behind the levels; "" if nothing is
 };
 
 // The progress of a build as other processes see it.

@@ -39,6 +39,8 @@ class WorkFolder {
   std::string decoded_path() const { return path_ + "/decoded.vdspill"; }
   // Triangles that outlive a run.
   std::string durable_path() const { return path_ + "/triangles.vddurable"; }
+  // Colors of cubes that outlive a run.
+  std::string colors_path() const { return path_ + "/colors.vddurable"; }
   std::string scratch_path() const { return path_ + "/merge"; }
   // What a cluster build shares with its tasks.
   std::string cluster_path() const { return path_ + "/cluster"; }
@@ -62,6 +64,8 @@ class WorkFolder {
   void remove_spilled() { remove_silently(spill_path()); }
   // Removes durable triangles. Silent, like remove().
   void remove_durable() { remove_silently(durable_path()); }
+  // Removes colors. Silent, like remove().
+  void remove_colors() { remove_silently(colors_path()); }
   // Removes all files of voxdag, and the folder if it is empty then. Silent: what cannot be removed
   // costs space, not correctness.
   void remove();

@@ -33,6 +33,8 @@ constexpr double kArtifactBytesPerNode = 16;
 // More than an uncompressed node takes, in an artifact or in the global file.
 constexpr double kMaxDiskBytesPerNode = 40;
 constexpr double kBuildOverPilotTime = 1.5;
+// A surface that crosses a brick sets about 16 of its voxels.
+constexpr double kMaxCellsPerBrick = 32;
 // Peak memory of the merge per unique node, and memory of a process without a scene.
 constexpr double kMemoryBytesPerNode = 26;
 constexpr double kBaseMemoryBytes = 24e6;
@@ -46,17 +48,6 @@ constexpr uint32_t kPilotLevelsBelow = 5;
 // and the largest scenes' triangles twice.
 uint32_t plan_pilot_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);
-}
-
-EstimateRange exactly(double value) { return {value, value, value}; }
-EstimateRange within(double value, double factor) {
-  return {value / factor, value, value * factor};
-}
-EstimateRange operator+(const EstimateRange& a, const EstimateRange& b) {
-  return {a.low + b.low, a.likely + b.likely, a.high + b.high};
-}
-EstimateRange operator*(double factor, const EstimateRange& a) {
-  return {factor * a.low, factor * a.likely, factor * a.high};
 }
 
 // A pilot build: the whole scene as one subvolume on a coarser grid, counted and thrown away.
@@ -126,21 +117,22 @@ std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot
   return pilots;
 }
 
-// a R^2 + b R through the last two pilots, at `doublings` past the last.
-double grow_as_surface(double coarse, double fine, uint32_t doublings) {
+// a R^2 + b R through the last two pilots, at `doublings` past the last, or before it.
+double grow_as_surface(double coarse, double fine, int doublings) {
   const double ratio = std::exp2(doublings);
   const double square = 2 * (fine - 2 * coarse), linear = fine - square;  // of the fine pilot
   if (square <= 0) return fine * ratio * ratio;
-  return std::max(square * ratio * ratio + linear * ratio, fine);
+  const double grown = square * ratio * ratio + linear * ratio;
+  return doublings < 0 ? std::max(grown, 1.0) : std::max(grown, fine);
 }
 
 // The growth from the last pilot but one to the last, falling from there.
-double grow_as_dag(const std::vector<PilotCounts>& pilots, uint32_t doublings) {
+double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
   const double nodes = pilots.back().dag_nodes;
   if (pilots.size() < 2 || nodes == 0) return nodes * std::exp2(1.5 * doublings);
   double growth = nodes / std::max(pilots[pilots.size() - 2].dag_nodes, 1.0);
   double result = nodes;
-  for (uint32_t i = 0; i < doublings; ++i) {
+  for (int i = 0; i < doublings; ++i) {
     if (growth > kLateGrowth) growth = kLateGrowth + (growth - kLateGrowth) * kGrowthDecay;
     result *= growth;
   }
@@ -155,11 +147,22 @@ EstimateRange triangles_on_disk(const PreparedScene& scene) {
           std::max(spilled, scene.max_durable_bytes)};
 }
 
+void add_colors(const ColorEstimate& colors, Estimate& estimate) {
+  estimate.colors = colors;
+  estimate.file_bytes = estimate.file_bytes + colors.file_bytes;
+  estimate.disk_bytes = estimate.disk_bytes + colors.disk_bytes();
+  const EstimateRange memory = colors.memory_bytes + exactly(kBaseMemoryBytes);
+  estimate.memory_bytes = {std::max(estimate.memory_bytes.low, memory.low),
+                           std::max(estimate.memory_bytes.likely, memory.likely),
+                           std::max(estimate.memory_bytes.high, memory.high)};
+  estimate.cpu_s = estimate.cpu_s + colors.cpu_s;
+}
+
 // Estimates the build of a prepared scene (its triangles stay where they are). The pilots have at
 // most 2^pilot_levels voxels per edge: the finer, the better the estimate and the longer it takes.
 // The pilots run on this thread, within the budget.
-Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels,
-                        const StageContext& context) {
+Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
+                        uint32_t pilot_levels, const StageContext& context) {
   const MemoryBudget& budget = context.budget;
   Estimate estimate;
   estimate.triangles = scene.state.counts.triangles;
@@ -174,7 +177,7 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels,
   }
   const PilotCounts& last = pilots.back();
   const PilotCounts& before = pilots[pilots.size() > 1 ? pilots.size() - 2 : 0];
-  const uint32_t doublings = scene.state.grid.levels - last.levels;
+  const int doublings = static_cast<int>(scene.state.grid.levels - last.levels);
   estimate.pilot_resolution = uint64_t{1} << last.levels;
 
   const double surface_spread = 1 + 0.02 * doublings;
@@ -201,20 +204,36 @@ Estimate estimate_build(const PreparedScene& scene, uint32_t pilot_levels,
     *figure = std::min(*figure, static_cast<double>(budget.limit())) + kBaseMemoryBytes;
   const double growth = last.dag_nodes > 0 ? nodes / last.dag_nodes : 1;
   estimate.cpu_s = within(last.cpu_s * growth * kBuildOverPilotTime, 1.5 * spread);
+  if (options.color) {
+    const int color_doublings = static_cast<int>(levels_of_resolution(options.color_resolution)) -
+                                static_cast<int>(last.levels);
+    const EstimateRange cells = within(grow_as_surface(before.voxels, last.voxels, color_doublings),
+                                       1.02 + 0.02 * std::abs(color_doublings));
+    add_colors(estimate_colors(options, cells, estimate.triangles, context), estimate);
+  }
   estimate.wall_s = (1.05 / std::max(1u, context.threads)) * estimate.cpu_s;
   return estimate;
 }
 
 // An upper bound for the disk that a build of the scene needs, computed without pilots: several
 // times what it will need.
-double max_disk_bytes(const PreparedScene& scene) {
+double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
+                      const StageContext& context) {
   // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
   // (expected_work()): over all levels twice its bricks, and one cube per level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.state.counts.triangles);
   const double octree_nodes = 2 * bricks + scene.state.grid.levels * triangles;
-  return kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
+  const double geometry = kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
+  if (!options.color) return geometry;
+  const uint32_t color_levels = levels_of_resolution(options.color_resolution);
+  const double cells =
+      kMaxCellsPerBrick * bricks * std::exp2(-2.0 * (scene.state.grid.levels - color_levels)) +
+      triangles;
+  return geometry + estimate_colors(options, exactly(cells), scene.state.counts.triangles, context)
+                        .disk_bytes()
+                        .high;
 }
 
 void check_disk(const char* what, const EstimateRange& bytes, const std::string& folder,
@@ -271,8 +290,9 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   } cleanup{work, full.run.work_folder.empty()};
   IngestCheckpoint no_checkpoints(full, nullptr, work, context);
   const PreparedScene scene = prepare_scene(full, budget, clock, context, no_checkpoints);
-  Estimate estimate = estimate_build(scene, plan_pilot_levels(scene.state.grid.levels),
-                                     {context, full.run.threads, budget});
+  Estimate estimate =
+      estimate_build(full.geometry, scene, plan_pilot_levels(scene.state.grid.levels),
+                     {context, full.run.threads, budget});
   estimate.free_disk = context.files.free_space(work.path());
   return estimate;
 }
@@ -285,9 +305,9 @@ bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene,
   const std::string output_folder = parent_directory(spec.run.output);
   const uint64_t free_bytes =
       std::min(context.files.free_space(work_folder), context.files.free_space(output_folder));
-  if (max_disk_bytes(scene) < static_cast<double>(free_bytes)) return false;
-  const Estimate estimate =
-      estimate_build(scene, levels - kPilotLevelsBelow, {context, spec.run.threads, budget});
+  const StageContext stage{context, spec.run.threads, budget};
+  if (max_disk_bytes(spec.geometry, scene, stage) < static_cast<double>(free_bytes)) return false;
+  const Estimate estimate = estimate_build(spec.geometry, scene, levels - kPilotLevelsBelow, stage);
   check_estimate(estimate, context.files, work_folder, output_folder, context.progress);
   return true;
 }
@@ -297,7 +317,7 @@ std::string estimate_json(const Estimate& e) {
   const auto range = [](const EstimateRange& r) {
     return ordered_json{{"low", r.low}, {"likely", r.likely}, {"high", r.high}};
   };
-  return ordered_json{
+  ordered_json json = {
       {"triangles", e.triangles},
       {"subvolumes", e.subvolumes},
       {"pilot_resolution", e.pilot_resolution},
@@ -311,8 +331,14 @@ std::string estimate_json(const Estimate& e) {
       {"wall_s", range(e.wall_s)},
       {"free_disk_bytes", e.free_disk},
       {"memory_budget_bytes", e.free_memory},
-  }
-      .dump(2);
+  };
+  if (const auto& c = e.colors)
+    json["colors"] = {{"cells", range(c->cells)},
+                      {"file_bytes", range(c->file_bytes)},
+                      {"artifact_bytes", range(c->artifact_bytes)},
+                      {"spill_bytes", range(c->spill_bytes)},
+                      {"cpu_s", range(c->cpu_s)}};
+  return json.dump(2);
 }
 
 }  // namespace voxdag

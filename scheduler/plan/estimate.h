@@ -8,18 +8,16 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "scheduler/build_spec.h"
+#include "scheduler/plan/color_estimate.h"
+#include "scheduler/plan/estimate_range.h"
 #include "scheduler/scene_stages.h"
 
 namespace voxdag {
-
-// A quantity and the range in which it is expected.
-struct EstimateRange {
-  double low = 0, likely = 0, high = 0;
-};
 
 struct Estimate {
   uint64_t triangles = 0;
@@ -28,12 +26,13 @@ struct Estimate {
   uint64_t pilot_resolution = 0;
   EstimateRange voxels, svo_nodes, dag_nodes;
   EstimateRange file_bytes;    // of the global file
-  EstimateRange disk_bytes;    // at the peak: spilled triangles, artifacts and the file
+  EstimateRange disk_bytes;    // at the peak: what is spilled, artifacts and the file
   EstimateRange memory_bytes;  // peak resident memory within the budget
   EstimateRange cpu_s;
   EstimateRange wall_s;
-  uint64_t free_disk = 0;    // on the disk of the work folder; 0 if unknown
-  uint64_t free_memory = 0;  // the budget
+  std::optional<ColorEstimate> colors;  // of a build with colors: a part of what is above
+  uint64_t free_disk = 0;               // on the disk of the work folder; 0 if unknown
+  uint64_t free_memory = 0;             // the budget
 };
 
 // The whole of `voxdag plan`: reads the scene, plans, estimates, builds nothing.

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Builds are killed at random moments, and the same command runs again at once.
 
-    tests/long/kill_builds.py [--voxdag build/cpu/voxdag] [--kills 300] [--scene FILE] [-r 2048]
+    tests/long/kill_builds.py [--voxdag build/cpu/voxdag] [--kills 300] [--scene FILE] [-r 2048] [--color]
 
-Without --scene a terrain is generated. The build is killed (SIGKILL) one to six times, each time at a
+Without --scene a terrain is generated. With --color the file has colors. The build is killed (SIGKILL) one to six times, each time at a
 random moment of what is left of it, and started again without a pause; then it runs to its end. What
 must hold:
 
@@ -33,7 +33,7 @@ class Builds:
             subprocess.run([options.voxdag, "generate", "terrain", scene, "--triangles", "400000"],
                            check=True, stdout=subprocess.DEVNULL)
         self.command = [options.voxdag, "build", scene, "-r", str(options.resolution), "-o",
-                        self.output, "--json"] + options.build_options.split()
+                        self.output, "--json"] + options.build_options.split() + ["--color"] * options.color
         self.kills = self.waits = self.finished_early = 0
         self.failures = []
 
@@ -118,6 +118,7 @@ def main():
     parser.add_argument("--scene", type=Path)
     parser.add_argument("-r", "--resolution", default=2048, type=int)
     parser.add_argument("--build-options", default="--threads 2", help="for voxdag build")
+    parser.add_argument("--color", action="store_true", help="with colors")
     parser.add_argument("--seed", default=1, type=int)
     options = parser.parse_args()
     options.voxdag = options.voxdag.resolve()

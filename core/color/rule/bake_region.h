@@ -49,16 +49,25 @@ class RegionBaker {
   // 2^32. `cells` becomes the cells that they touch, in Morton order.
   void bake(const Cube& region, std::span<const FixedSurface> triangles,
             std::vector<ColoredCell>& cells) {
-    triangles_ = triangles;
+    begin(region);
+    add(triangles);
+    finish(cells);
+  }
+
+  // The same for triangles that come in any number of parts.
+  void begin(const Cube& region) {
     const uint32_t down = grid_.color_levels - region.level;
     for (int a = 0; a < 3; ++a) {
       first_[a] = static_cast<int64_t>(region.position[a]) << down;
       last_[a] = first_[a] + (int64_t{1} << down) - 1;
     }
-    for (uint32_t i = 0; i < triangles.size(); ++i) add(i);
-    add_waiting();
-    cells_.take(cells);
   }
+  void add(std::span<const FixedSurface> triangles) {
+    triangles_ = triangles;
+    for (uint32_t i = 0; i < triangles.size(); ++i) add_triangle(i);
+    add_waiting();
+  }
+  void finish(std::vector<ColoredCell>& cells) { cells_.take(cells); }
 
  private:
   static constexpr size_t kMaxWaiting = 1 << 16;
@@ -67,7 +76,7 @@ class RegionBaker {
     uint32_t triangle, code;
   };
 
-  void add(uint32_t index) {
+  void add_triangle(uint32_t index) {
     const FixedTriangle& triangle = triangles_[index].position;
     const CellBox box(triangle, grid_.levels, grid_.color_levels);
     for (int a = 0; a < 3; ++a)

@@ -1,7 +1,6 @@
 #include "core/scene/textures/texture_set.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstring>
 #include <iterator>
@@ -81,18 +80,6 @@ void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const
   }
 }
 
-template <class T>
-void add_number(Sha256& hash, T value) {
-  std::array<std::byte, 8> bytes;
-  for (size_t i = 0; i < 8; ++i)
-    bytes[i] = static_cast<std::byte>(static_cast<uint64_t>(value) >> 8 * i);
-  hash.add(bytes);
-}
-void add_text(Sha256& hash, const std::string& text) {
-  add_number(hash, text.size());
-  hash.add(std::as_bytes(std::span(text)));
-}
-
 std::string image_digest(FileSystem& files, const ImageSource& source, const CancelToken& cancel) {
   if (!source.problem.empty()) return "unreadable";
   Sha256 hash;
@@ -135,20 +122,30 @@ std::unique_ptr<TextureReader> TextureSet::open(uint64_t memory_bytes) {
   return std::make_unique<TextureReader>(layout_, *file_, memory_bytes, budget_);
 }
 
-std::string texture_digest(FileSystem& files, const SceneMaterials& materials,
-                           const CancelToken& cancel) {
-  Sha256 hash;
-  for (const Material& m : materials.materials) {
-    add_text(hash, m.name);
-    for (uint16_t f : m.factor) add_number(hash, f);
-    add_number(hash, m.alpha_mode);
-    add_number(hash, m.alpha_cutoff);
-    add_number(hash, m.image);
-    for (Wrap wrap : m.wrap) add_number(hash, wrap);
+uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
+                       const CancelToken& cancel) {
+  uint64_t pages = 0;
+  for (const ImageSource& source : materials.images) {
+    cancel.check();
+    if (!source.problem.empty()) continue;
+    try {
+      ImageBytes bytes(files, source);
+      const auto image = open_image(bytes, budget);
+      for (const TextureLevel& level : pyramid_levels(image->width(), image->height(), 0))
+        pages += level.pages();
+    } catch (const BrokenImage&) {
+      // It has no pyramid.
+    }
   }
-  for (const ImageSource& image : materials.images)
-    add_text(hash, image_digest(files, image, cancel));
-  return hash.finish();
+  return pages * kPageBytes;
+}
+
+std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
+                                       unsigned threads, const CancelToken& cancel) {
+  std::vector<std::string> digests(images.size());
+  parallel_for(threads, images.size(),
+               [&](unsigned, size_t i) { digests[i] = image_digest(files, images[i], cancel); });
+  return digests;
 }
 
 std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMaterials& materials,
@@ -163,9 +160,11 @@ std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMa
   // Calls body(image reader) unless the image is broken.
   const auto with_image = [&](size_t i, const auto& body) {
     const ImageSource& source = materials.images[i];
+    const std::string user = user_of(materials, static_cast<uint32_t>(i));
+    if (user.empty()) return;
     problems[i] = source.problem;
     if (!problems[i].empty()) return;
-    const std::string name = source.name + user_of(materials, static_cast<uint32_t>(i));
+    const std::string name = source.name + user;
     alone_if_necessary(mutex, name, [&] {
       try {
         ImageBytes bytes(files, source);
@@ -175,7 +174,6 @@ std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMa
       }
     });
   };
-  set->digest_ = texture_digest(files, materials, cancel);
   parallel_for(threads, count, [&](unsigned, size_t i) {
     cancel.check();
     with_image(i, [&](const ImageReader& image) {

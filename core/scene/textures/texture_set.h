@@ -13,6 +13,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,8 @@ class TextureSet {
   // Of one image: 16384 x 16384.
   static constexpr uint64_t kMaxTexels = uint64_t{1} << 28;
 
-  // Decodes the images on up to `threads` threads and warns of those that cannot be read. Advances
+  // Decodes the images that materials refer to, on up to `threads` threads, and warns of those that
+  // cannot be read. Advances
   // `progress` by one for each image, in a stage that the caller began. The scratch file is made at
   // `path`, in a folder that exists, only if it is needed, and has this name for an instant only.
   // Throws Error{kOutOfMemory} naming image and material, {kNoSpace}, {kIo}, {kCanceled}, and
@@ -46,8 +48,6 @@ class TextureSet {
   // A reader for one thread, with a cache of about `memory_bytes`, unless all is in memory: then
   // that is shared, and the reader itself takes none. The set must outlive it. Thread-safe.
   std::unique_ptr<TextureReader> open(uint64_t memory_bytes);
-  // texture_digest() of the scene's materials.
-  const std::string& digest() const { return digest_; }
   // Bytes of all pyramids, and whether they are in memory.
   uint64_t bytes() const { return pages_ * kPageBytes; }
   bool is_in_memory() const { return !file_; }
@@ -57,16 +57,19 @@ class TextureSet {
 
   MemoryBudget& budget_;
   std::vector<Material> materials_;
-  std::string digest_;
   TextureLayout layout_;
   uint64_t pages_ = 0;
   PageBuffer<uint64_t> memory_;
   std::unique_ptr<ReadableFile> file_;
 };
 
-// SHA-256 over the materials and what their images contain, as lower-case hex digits: equal where
-// the colors are equal. Reads all images, decodes none. Throws as TextureSet::prepare() does.
-std::string texture_digest(FileSystem& files, const SceneMaterials& materials,
-                           const CancelToken& cancel);
+// What TextureSet::bytes() would be. Reads the headers of the images.
+uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
+                       const CancelToken& cancel);
+
+// SHA-256 of what each image contains as it is stored, as lower-case hex digits; "unreadable" for
+// one that cannot be read. Reads all images, decodes none. Throws as TextureSet::prepare() does.
+std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
+                                       unsigned threads, const CancelToken& cancel);
 
 }  // namespace voxdag

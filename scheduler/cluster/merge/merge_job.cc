@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 #include <thread>
+#include <vector>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
@@ -53,7 +54,10 @@ std::string merge_request_of(const BuildSpec& spec, const BuildContext& context)
       open_scene(context.files, spec.geometry.scenes, {.skip_invalid = spec.geometry.skip_invalid},
                  budget, context.cancel);
   std::string text = geometry_json(spec.geometry);
-  for (const auto& [path, identity] : scene->files())
+  std::vector<SourceFile> files = scene->files();
+  if (spec.geometry.color)
+    for (const ImageSource& image : scene->materials().images) files.push_back(image.file);
+  for (const auto& [path, identity] : files)
     text += '\0' + path + '\0' + std::to_string(identity.bytes) + '\0' +
             std::to_string(identity.modified_ns);
   return sha256_hex(text);

@@ -25,8 +25,8 @@ class MergeJob {
   MergeJob(const BuildSpec& spec, const std::string& work_folder, const BuildContext& context,
            CommandRunner& commands);
 
-  // The geometry options and the scene's files, their sizes and times included, as a digest; of the
-  // time when this was made.
+  // The geometry options and the scene's files, those of its images too if there are to be colors,
+  // with their sizes and times, as a digest; of the time when this was made.
   const std::string& request() const { return request_; }
   // The report of a merge job that did the same, if its output is there.
   std::optional<BuildReport> finished() const;

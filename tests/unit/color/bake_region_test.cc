@@ -98,6 +98,27 @@ TEST(BakeRegion, SumsAreFunctionsOfTheCell) {
     }
 }
 
+// Nor how many of them come at a time: what covers a cell may come after what only touches it.
+TEST(BakeRegion, TrianglesMayComeInParts) {
+  const TestLooks looks;
+  for (const SceneKind kind : oracle::kAllKinds) {
+    SCOPED_TRACE(oracle::kind_name(kind));
+    const ColorGrid grid{8, 4};
+    const auto surfaces = scene(looks, kind, 11, grid, 40);
+    RegionBaker<const TestImages> baker(grid, looks.materials, looks.images);
+    for (const size_t part : {size_t{1}, size_t{7}}) {
+      baker.begin(Cube{});
+      for (size_t at = 0; at < surfaces.size(); at += part)
+        baker.add(std::span(surfaces).subspan(at, std::min(part, surfaces.size() - at)));
+      std::vector<ColoredCell> cells;
+      baker.finish(cells);
+      Sums sums;
+      collect(grid, Cube{}, cells, sums);
+      EXPECT_EQ(sums, bake_grid(grid, 0, surfaces, looks));
+    }
+  }
+}
+
 // More triangles than wait for the end: those that wait are added when there are too many.
 TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   TestLooks looks;

@@ -177,14 +177,14 @@ TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
       EXPECT_EQ(error.code(), ErrorCode::kUnsupportedVersion);
       EXPECT_NE(error.message().find("--restart"), std::string::npos) << error.message();
     }
-  set_version("6");
+  set_version("7");
   EXPECT_EQ(JobStore(path(), JobStore::Access::kRead).leaves().size(), 3u);
 }
 
 // An unfinished merge and its result are remembered, replaced and forgotten; a new job has neither.
 TEST_F(JobStoreTest, RemembersTheMerge) {
   const std::vector<std::byte> state = {std::byte{0}, std::byte{7}, std::byte{255}};
-  JobResult result{"out", "sha", 1ull << 40, {}};
+  JobResult result{"out", "sha", 1ull << 40, {}, "colors"};
   result.merge.voxels = 2;
   result.merge.streamed_groups = 7;
   JobStore store(path(), JobStore::Access::kBuild);
@@ -200,6 +200,7 @@ TEST_F(JobStoreTest, RemembersTheMerge) {
   ASSERT_TRUE(store.result().has_value());
   EXPECT_EQ(store.result()->bytes, result.bytes);
   EXPECT_EQ(store.result()->merge.streamed_groups, 7u);
+  EXPECT_EQ(store.result()->sections, "colors");
   store.forget_merge();
   EXPECT_FALSE(store.merge().has_value());
   EXPECT_FALSE(store.result().has_value());
@@ -241,7 +242,7 @@ TEST_F(JobStoreTest, NoticesAChangeInAnyRowThatDecides) {
     JobStore store(path(), JobStore::Access::kBuild);
     store.start(job_, plan(2));
     store.save_merge(5, {});
-    store.record_result({"out", "sha", 1, {}});
+    store.record_result({"out", "sha", 1, {}, ""});
     EXPECT_NO_THROW(change.read(store));
     SqlDatabase(path(), SqlDatabase::Mode::kReadWrite).execute(change.sql);
     EXPECT_EQ(error_of([&] { change.read(store); }).code(), ErrorCode::kCorrupt);

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "core/geometry/fixed_triangle.h"
+#include "scheduler/color/surface_store.h"
 #include "scheduler/triangles/triangle_file.h"
+#include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag {
 namespace {
@@ -77,6 +79,35 @@ TEST(SurfaceRecord, RefusesWhatIsNoRecord) {
     EXPECT_THROW(SurfaceRecords(std::span(bytes).first(size)).next(), DamagedTriangles) << size;
   bytes[0] = std::byte{16};
   EXPECT_THROW(SurfaceRecords(bytes).next(), DamagedTriangles);
+}
+
+// What was in memory comes from the file afterwards, and the memory is free.
+TEST(SurfaceStore, MovesToItsFile) {
+  const TemporaryFolder folder;
+  MemoryBudget budget(1 << 20);
+  SurfaceStore store(system_files(), folder.file("surfaces"), budget);
+  std::vector<SurfaceStore::Bin> bins(3);
+  std::vector<FixedSurface> expected;
+  for (int64_t i = 0; i < 9; ++i) {
+    expected.push_back(numbered_surface(1, i, 60000));
+    std::vector<std::byte> record;
+    append_surface(expected.back(), true, record);
+    store.add(bins[i % 3 == 0 ? 0 : 2], record, 1);
+  }
+  EXPECT_GT(budget.used(), 900u);
+  EXPECT_EQ(store.file_bytes(), 0u);
+  for (int times = 0; times < 2; ++times) {
+    store.move_to_file(bins);
+    EXPECT_EQ(budget.used(), 0u);
+    std::vector<FixedSurface> found;
+    for (const auto& bin : bins)
+      store.for_each(bin, [&](const FixedSurface& surface) { found.push_back(surface); });
+    ASSERT_EQ(found.size(), 9u);
+    for (size_t i = 0; i < 3; ++i) expect_equal(found[i], expected[3 * i]);
+    expect_equal(found[8], expected[8]);
+  }
+  EXPECT_GT(store.file_bytes(), 500u);
+  for (auto& bin : bins) store.clear(bin);
 }
 
 }  // namespace

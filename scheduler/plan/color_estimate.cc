@@ -1,0 +1,64 @@
+#include "scheduler/plan/color_estimate.h"
+
+#include <algorithm>
+
+#include "core/scene/textures/texture_set.h"
+#include "core/scene/triangle_source.h"
+#include "scheduler/memory_plan.h"
+
+namespace voxdag {
+namespace {
+
+// Measured on Sponza at 4096: 4 bits for each cell, a third of that for the coarser levels, and
+// prefixes.
+// The padding of regions with few cells is more.
+constexpr double kFileBytesPerCell = 0.69;
+constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};
+// Its header, tables and padding.
+constexpr double kFixedFileBytes = 8192;
+// Sums and lengths of regions.
+constexpr double kArtifactOverFile = 1.02;
+// A surface with an image and without vertex colors, in all its cubes.
+constexpr double kSurfaceBytes = 65;
+constexpr EstimateRange kSurfaceCopies = {1, 1.5, 3};
+constexpr double kSecondsPerCell = 1.2e-7;
+// An image's page is decoded, filtered and stored.
+constexpr double kSecondsPerPage = 3e-5;
+
+EstimateRange above(const EstimateRange& range, double limit) {
+  const auto rest = [&](double value) { return std::max(value - limit, 0.0); };
+  return {rest(range.low), rest(range.likely), rest(range.high)};
+}
+
+}  // namespace
+
+ColorEstimate estimate_colors(const GeometryOptions& options, const EstimateRange& cells,
+                              uint64_t triangles, const StageContext& context) {
+  const BuildContext& build = context.build;
+  const auto scene = open_scene(build.files, options.scenes, {.skip_invalid = options.skip_invalid},
+                                context.budget, build.cancel);
+  const auto image_bytes = static_cast<double>(
+      pyramid_bytes(build.files, scene->materials(), context.budget, build.cancel));
+  const double limit = static_cast<double>(context.budget.limit());
+  const double share = limit / 3;
+  const EstimateRange surfaces = kSurfaceBytes * static_cast<double>(triangles) * kSurfaceCopies;
+  ColorEstimate estimate;
+  estimate.cells = cells;
+  estimate.file_bytes = {kFileBytesPerCell * kFileSpread.low * cells.low,
+                         kFileBytesPerCell * kFileSpread.likely * cells.likely,
+                         kFileBytesPerCell * kFileSpread.high * cells.high};
+  estimate.file_bytes = estimate.file_bytes + exactly(kFixedFileBytes);
+  estimate.artifact_bytes = kArtifactOverFile * estimate.file_bytes;
+  estimate.spill_bytes = above(surfaces, share) + exactly(image_bytes > share ? image_bytes : 0.0);
+  const double workers = static_cast<double>(context.threads * ColorMemory::kRegionBytes);
+  estimate.memory_bytes = surfaces + exactly(image_bytes + workers);
+  for (double* figure :
+       {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})
+    *figure = std::min(*figure, limit);
+  const double seconds = kSecondsPerCell * cells.likely +
+                         kSecondsPerPage * image_bytes / static_cast<double>(kPageBytes);
+  estimate.cpu_s = within(seconds, 1.5);
+  return estimate;
+}
+
+}  // namespace voxdag
