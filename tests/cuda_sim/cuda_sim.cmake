@@ -6,12 +6,13 @@ if(VOXDAG_SANITIZE)
 endif()
 file(GLOB cuda_sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/core/backend/cuda/*.cu)
 file(GLOB simulation_sources CONFIGURE_DEPENDS cuda_sim/sim/*.cc)
-set_source_files_properties(${cuda_sources} PROPERTIES LANGUAGE CXX COMPILE_OPTIONS
+set(program_sources cuda_sim/rules/programs.cc)
+set_source_files_properties(${cuda_sources} ${program_sources} PROPERTIES LANGUAGE CXX COMPILE_OPTIONS
   "-x;c++;-include;cuda_runtime.h;-fsanitize=thread;-D__CUDA_ARCH__=900;-Wno-unknown-pragmas")
 # Fibers jump to frames that a fortified longjmp() does not know.
 set_source_files_properties(cuda_sim/sim/thread_blocks.cc PROPERTIES COMPILE_OPTIONS
   "-U_FORTIFY_SOURCE")
-add_library(voxdag_cuda_sim STATIC ${cuda_sources} ${simulation_sources})
+add_library(voxdag_cuda_sim STATIC ${cuda_sources} ${program_sources} ${simulation_sources})
 target_include_directories(voxdag_cuda_sim BEFORE PUBLIC cuda_sim/include)
 target_link_libraries(voxdag_cuda_sim PUBLIC voxdag_base voxdag_geometry voxdag_dag)
 
@@ -27,9 +28,31 @@ voxdag_compile_quickly(test_cuda_sim)
 target_compile_definitions(test_cuda_sim PRIVATE
   VOXDAG_SHARED_SCENES="${CMAKE_SOURCE_DIR}/../shared/scenes"
   VOXDAG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
-# The tests that only repeat the pipeline on large inputs take minutes on the simulated device.
+# What takes minutes on the simulated device runs in tools/test-long.
+set(long_tests "*AnyTriangles*:*ASplit*:*Reuse.*:*CountsAddUp*:*RegionsOfLargeCubes*")
 foreach(method fast hashes pointers)
   gtest_discover_tests(test_cuda_sim DISCOVERY_TIMEOUT 60
-    TEST_FILTER "*/cuda_sim_${method}-*Memory.*:*Reuse.*:*CountsAddUp*:*RegionsOfLargeCubes*"
+    TEST_FILTER "*/cuda_sim_${method}-${long_tests}"
     PROPERTIES LABELS cuda_sim_${method} TIMEOUT 900)
 endforeach()
+gtest_discover_tests(test_cuda_sim DISCOVERY_TIMEOUT 60 TEST_FILTER "SimulatedDevice.*"
+  PROPERTIES LABELS cuda_sim_fast TIMEOUT 900)
+
+# What each kernel takes of a device, and the toolkit's oldest and newest architecture.
+if(VOXDAG_HAS_CUDA AND Python3_FOUND)
+  add_test(NAME cuda_kernels COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tools/check-kernels
+                                     --nvcc ${CMAKE_CUDA_COMPILER})
+  set_tests_properties(cuda_kernels PROPERTIES LABELS conformance TIMEOUT 900)
+endif()
+
+# Whole builds, with the scheduler's workers.
+add_executable(test_cuda_sim_builds cuda_sim/builds/whole_build_test.cc)
+target_link_libraries(test_cuda_sim_builds PRIVATE voxdag_cuda_sim voxdag_scheduler
+                      GTest::gmock GTest::gtest_main)
+target_sources(test_cuda_sim_builds PRIVATE crash/faulty_files.cc)
+voxdag_compile_quickly(test_cuda_sim_builds)
+target_compile_definitions(test_cuda_sim_builds PRIVATE
+  VOXDAG_SHARED_SCENES="${CMAKE_SOURCE_DIR}/../shared/scenes"
+  VOXDAG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+gtest_discover_tests(test_cuda_sim_builds DISCOVERY_TIMEOUT 60
+  PROPERTIES LABELS cuda_sim_fast TIMEOUT 900)

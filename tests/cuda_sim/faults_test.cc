@@ -78,5 +78,16 @@ TEST_P(Faults, ADeviceThatStaysBroken) {
   expect_equals(build(*backend, kTask, scene()), truth, kTask);
 }
 
+// A backend that is closed after a failure waits for the copies that still use its pinned memory.
+TEST_P(Faults, ClosedAfterAnyFailure) {
+  const oracle::Dag truth = expected();
+  for (uint64_t n = 0;; n += 3) {
+    const auto backend = open();
+    if (!build_with(*backend, {cuda_sim::Call::kOther, n, cudaErrorLaunchFailure, true}, truth))
+      break;
+    if (HasFailure()) FAIL() << "from call " << n << " on";
+  }
+}
+
 }  // namespace
 }  // namespace voxdag

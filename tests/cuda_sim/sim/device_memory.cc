@@ -199,6 +199,10 @@ void DeviceMemory::kernel_write(void* p, uint64_t bytes, uint32_t first, uint32_
   dirty_[(at + bytes - 1) / kChunk] = true;
 }
 
+void DeviceMemory::forget_writers() {
+  madvise(writer_, kBytes * sizeof(uint32_t), MADV_DONTNEED);  // zeros from now on
+}
+
 void DeviceMemory::kernel_atomic(void* p, uint64_t bytes, uint32_t first) {
   if (!life_at(p, bytes)) fault(p, bytes, "a kernel updates");
   const uint64_t at = offset(p);

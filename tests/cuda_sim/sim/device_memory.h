@@ -54,6 +54,8 @@ class DeviceMemory {
   // For kernels. Thread `writer` of a launch; its threads' numbers begin with `first`.
   void kernel_read(const void* p, uint64_t bytes, uint32_t first, uint32_t writer);
   void kernel_write(void* p, uint64_t bytes, uint32_t first, uint32_t writer);
+  // For a launch whose numbers begin at 1 again.
+  void forget_writers();
   void kernel_atomic(void* p, uint64_t bytes, uint32_t first);
 
  private:

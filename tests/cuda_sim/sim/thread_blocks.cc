@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/cuda_sim/sim/device_memory.h"
 #include "tests/cuda_sim/sim/schedule.h"
 #include "tests/cuda_sim/sim/shared_memory.h"
 #include "tests/cuda_sim/sim/violation.h"
@@ -146,6 +147,10 @@ void block_barrier() { the_block().wait(); }
 
 void run_kernel(const KernelLaunch& launch) {
   g_running.launch = &launch;
+  if (uint64_t{g_next_number} + uint64_t{launch.blocks} * launch.threads > UINT32_MAX) {
+    device_memory().forget_writers();
+    g_next_number = 1;
+  }
   g_running.first = g_next_number;
   g_next_number += launch.blocks * launch.threads;
   RandomOrder order(launch.blocks);

@@ -1,0 +1,121 @@
+// Whole builds with --backend cuda on the simulated device: the scheduler's workers share it, and
+// the file is the CPU backend's, byte for byte, whatever fails on the way.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+#include "core/backend/backend.h"
+#include "core/scene/generate/generate.h"
+#include "scheduler/run_build.h"
+#include "tests/crash/faulty_files.h"
+#include "tests/cuda_sim/sim/faults.h"
+#include "tests/cuda_sim/sim/schedule.h"
+#include "tests/unit/io/temporary_folder.h"
+
+namespace voxdag {
+namespace {
+
+class SimulatedBuild : public testing::Test {
+ protected:
+  void SetUp() override {
+    // That these are called here makes the linker take all of the backend from the simulation.
+    ASSERT_EQ(cuda_device_count(), 1);
+    ASSERT_EQ(make_cuda_backend()->name(), "cuda");
+    GenerateOptions options;
+    options.kind = SceneKind::kCity;
+    options.triangles = 400;
+    NoProgress progress;
+    generate_scene(system_files(), folder_.file("scene.glb"), options, progress, CancelToken{});
+    expected_ = run(spec("cpu", ""), system_files()).sha256;
+    std::filesystem::remove(output());
+  }
+
+  std::string output() const { return folder_.file("out.vdag"); }
+
+  BuildSpec spec(const std::string& backend, const std::string& method) const {
+    BuildSpec spec;
+    spec.geometry.scenes = {folder_.file("scene.glb")};
+    spec.geometry.resolution = 256;
+    spec.run.output = output();
+    spec.run.memory_bytes = uint64_t{64} << 20;
+    spec.run.threads = 2;
+    spec.run.subvolume_edge = 64;
+    spec.run.checkpoint_interval_s = 0;
+    spec.run.backend = backend;
+    spec.run.method = method;
+    return spec;
+  }
+
+  static BuildReport run(const BuildSpec& spec, FileSystem& files) {
+    NoProgress progress;
+    return run_build(spec, {files, progress, CancelToken{}});
+  }
+
+  TemporaryFolder folder_;
+  std::string expected_;
+};
+
+TEST_F(SimulatedBuild, HasTheBytesOfTheCpuBackend) {
+  uint64_t seed = 1;
+  for (const std::string method : {"", "hashes", "pointers"}) {
+    cuda_sim::set_schedule({seed % 2 == 0, seed});
+    ++seed;
+    const BuildReport report = run(spec("cuda", method), system_files());
+    EXPECT_EQ(report.sha256, expected_) << method;
+    EXPECT_EQ(report.backend, "cuda");
+    EXPECT_EQ(cuda_sim::bytes_in_use(), 0u);
+    std::filesystem::remove(output());
+  }
+}
+
+// Killed at some operations on the disk, and resumed on the device or on the CPU.
+TEST_F(SimulatedBuild, ResumesAfterAKill) {
+  crash::FaultyFiles counting({});
+  run(spec("cuda", ""), counting);
+  std::filesystem::remove(output());
+  int kills = 0;
+  for (uint64_t part = 1; part <= 6; ++part) {
+    const uint64_t at = counting.operations() * part / 7;
+    SCOPED_TRACE(testing::Message() << "at operation " << at << " of " << counting.operations());
+    const pid_t child = fork();
+    if (child == 0) {
+      crash::FaultyFiles files({crash::Fault::kKillAfter, at});
+      try {
+        run(spec("cuda", ""), files);
+      } catch (...) {
+        _exit(1);
+      }
+      _exit(0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    kills += WIFSIGNALED(status) ? 1 : 0;
+    EXPECT_EQ(run(spec(part % 2 ? "cuda" : "cpu", ""), system_files()).sha256, expected_);
+    std::filesystem::remove(output());
+  }
+  EXPECT_GT(kills, 0);
+}
+
+// A device that fails in the middle ends the build with an error that names it; what was stored is
+// used by the next one.
+TEST_F(SimulatedBuild, SaysThatTheDeviceFailed) {
+  cuda_sim::plan_fault({cuda_sim::Call::kOther, 2000, cudaErrorLaunchFailure, true});
+  try {
+    run(spec("cuda", ""), system_files());
+    FAIL() << "the device failed, and the build did not";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kDevice) << error.what();
+    EXPECT_NE(std::string(error.what()).find("CUDA device 0"), std::string::npos) << error.what();
+  }
+  EXPECT_TRUE(cuda_sim::fault_happened());
+  cuda_sim::plan_no_fault();
+  const BuildReport report = run(spec("cpu", ""), system_files());
+  EXPECT_EQ(report.sha256, expected_);
+  EXPECT_GT(report.subvolumes_reused, 0u);
+}
+
+}  // namespace
+}  // namespace voxdag
