@@ -65,6 +65,8 @@ void declare(Command& command, GenerateCommand& state) {
   command.option("--level", state.options.level, "menger: recursion depth, 0 to 5").show_default();
   command.flag("--instances", state.options.instances,
                "city, spheres: store repeated parts once, with EXT_mesh_gpu_instancing");
+  command.flag("--colors", state.options.colors,
+               "city: materials and colors of vertices, for build --color; not with --instances");
   state.output.declare_force(command);
   command.json_flag(state.json);
 }

@@ -9,6 +9,9 @@
 
 namespace voxdag {
 
+// Positions in kCityMaterials.
+enum CityMaterial : uint32_t { kGround, kBuildings, kPlants, kCars };
+
 // Parts stored once: a stretch of wall with a window in it for each of four directions, a tree, a
 // car along x and one along z.
 struct CityParts {
@@ -23,6 +26,7 @@ struct Lot {
   Vec3 center;  // on the ground
   double width = 0;
   uint32_t floors = 0;
+  Rgba8 wall = kWhite, roof = kWhite;  // in a city with colors
 };
 
 void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, Random& random);

@@ -8,6 +8,7 @@ namespace {
 constexpr double kFloorHeight = 3.25;
 constexpr double kWindowDepth = 0.25;
 constexpr double kSlabHeight = 0.5;
+constexpr Rgba8 kSlab{175, 172, 168, 255};
 
 // A storey or more of a building: walls made of bays, a window in each.
 struct Tier {
@@ -39,8 +40,10 @@ void add_wall(SceneBuilder& scene, const CityParts& parts, const Tier& tier, uin
 }
 
 // Adds the walls, and a slab on top that juts out.
-void add_tier(SceneBuilder& scene, const CityParts& parts, const Tier& tier) {
+void add_tier(SceneBuilder& scene, const CityParts& parts, const Tier& tier, const Lot& lot) {
+  scene.paint(kBuildings, lot.wall);
   for (uint32_t direction = 0; direction < 4; ++direction) add_wall(scene, parts, tier, direction);
+  scene.paint(kBuildings, kSlab);
   const double x = tier.half_x() + 0.375, z = tier.half_z() + 0.375;
   scene.mesh_for(8, 12).box({tier.x - x, tier.top(), tier.z - z},
                             {tier.x + x, tier.top() + kSlabHeight, tier.z + z});
@@ -111,13 +114,14 @@ void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, R
     // Tall buildings become narrower twice or more on their way up.
     const bool last = !tall || left < 6 || tier.bays_x < 4 || tier.bays_z < 4;
     tier.floors = last ? left : left / 2 + random.below(left / 4);
-    add_tier(scene, parts, tier);
+    add_tier(scene, parts, tier, lot);
     left -= tier.floors;
     if (left == 0) break;
     tier.y = tier.top() + kSlabHeight;
     tier.bays_x -= 1 + random.below(2);
     tier.bays_z -= 1 + random.below(2);
   }
+  scene.paint(kBuildings, lot.roof);
   add_roof(scene, tier, tall, random);
 }
 
@@ -126,7 +130,9 @@ void add_turned_house(SceneBuilder& scene, const Lot& lot, Random& random) {
   const double x = lot.width * (0.25 + 0.09375 * random.unit());
   const double z = lot.width * (0.25 + 0.09375 * random.unit());
   const double height = kFloorHeight * lot.floors;
+  scene.paint(kBuildings, lot.wall);
   scene.mesh_for(8, 10).turned_box(lot.center, {x, height, z}, turn);
+  scene.paint(kBuildings, lot.roof);
   const Vec3 eaves{lot.center.x, lot.center.y + height, lot.center.z};
   scene.mesh_for(5, 4).pyramid(eaves, {x + 0.5, (x + z) * (0.375 + 0.25 * random.unit()), z + 0.5},
                                turn);

@@ -6,6 +6,8 @@
 namespace voxdag {
 namespace {
 
+constexpr Rgba8 kGlass{40, 62, 92, 255}, kTrunk{205, 51, 100, 255}, kLeaves{200, 225, 160, 255};
+
 // A unit of wall, its window's four corners set back behind the wall's plane: 12 corners in three
 // rings (the wall's edge, the window in the wall, the pane), 18 triangles.
 //
@@ -22,6 +24,7 @@ Mesh window_wall(const Vec3& u, const Vec3& w) {
   Mesh mesh;
   for (int ring = 0; ring < 3; ++ring) {
     const auto& [left, right, bottom, top] = kRings[ring];
+    mesh.color = ring == 2 ? kGlass : kWhite;
     const Vec3 depth = w * (ring == 2 ? -1.0 : 0.0);
     for (const auto& [across, up] : {std::pair(left, bottom), std::pair(right, bottom),
                                      std::pair(right, top), std::pair(left, top)})
@@ -41,7 +44,9 @@ Mesh window_wall(const Vec3& u, const Vec3& w) {
 // A trunk and two crowns, each two pyramids base to base.
 Mesh tree_mesh() {
   Mesh mesh;
+  mesh.color = kTrunk;
   mesh.box({-0.03125, 0, -0.03125}, {0.03125, 0.3125, 0.03125}, false);
+  mesh.color = kLeaves;
   for (const auto& [low, middle, high, radius] :
        {std::array{0.1875, 0.375, 0.75, 0.25}, std::array{0.46875, 0.5625, 1.0, 0.1875}}) {
     const uint32_t first = mesh.add_vertices({{radius, middle, 0},
@@ -66,7 +71,9 @@ Mesh car_mesh(bool along_z) {
     along_z ? mesh.box({-half_width, y0, length_from}, {half_width, y1, length_to})
             : mesh.box({length_from, y0, -half_width}, {length_to, y1, half_width});
   };
+  mesh.color = kWhite;
   box(-2.125, 2.125, 0.875, 0.25, 0.875);
+  mesh.color = kGlass;
   box(-1.25, 0.875, 0.75, 0.875, 1.5);
   return mesh;
 }

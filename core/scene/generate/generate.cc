@@ -12,12 +12,16 @@ namespace {
 
 constexpr SceneKindInfo kKinds[] = {
     {SceneKind::kCity, "city", "streets, houses with rotated roofs, windows, trees", 400'000,
-     make_city},
-    {SceneKind::kMenger, "menger", "Menger's sponge on the integer lattice", 0, make_menger},
-    {SceneKind::kTerrain, "terrain", "a fractal heightfield", 1'000'000, make_terrain},
-    {SceneKind::kSoup, "soup", "random triangles, slivers and degenerate ones among them", 100'000,
-     make_soup},
-    {SceneKind::kSpheres, "spheres", "spheres of many sizes", 500'000, make_spheres},
+     make_city, kCityMaterials},
+    {SceneKind::kMenger, "menger", "Menger's sponge on the integer lattice", 0, make_menger, {}},
+    {SceneKind::kTerrain, "terrain", "a fractal heightfield", 1'000'000, make_terrain, {}},
+    {SceneKind::kSoup,
+     "soup",
+     "random triangles, slivers and degenerate ones among them",
+     100'000,
+     make_soup,
+     {}},
+    {SceneKind::kSpheres, "spheres", "spheres of many sizes", 500'000, make_spheres, {}},
 };
 
 constexpr const char* kGenerator = "voxdag generate ";
@@ -43,13 +47,19 @@ void check(const GenerateOptions& options) {
   const bool has_parts = options.kind == SceneKind::kCity || options.kind == SceneKind::kSpheres;
   if (options.instances && !has_parts)
     throw Error(ErrorCode::kInvalidInput, name + " has no repeated parts to write as instances");
+  if (options.colors && scene_kind(options.kind).materials.empty())
+    throw Error(ErrorCode::kInvalidInput, name + " has no colors; expected city");
+  if (options.colors && options.instances)
+    throw Error(ErrorCode::kInvalidInput,
+                "instances of a part have the same color, those of a city with colors have not: "
+                "expected colors or instances");
   if (options.kind == SceneKind::kMenger && options.triangles != 0)
     throw Error(ErrorCode::kInvalidInput, "menger is sized by its level, not by triangles");
   check_size(options);
 }
 
 void make(const GenerateOptions& options, BlockSink& sink) {
-  SceneBuilder scene(sink, options.instances);
+  SceneBuilder scene(sink, options.instances, options.colors);
   scene_kind(options.kind).make(options, scene);
   scene.finish();
 }
@@ -85,7 +95,10 @@ GenerateReport generate_scene(FileSystem& files, const std::string& path,
 
   progress.begin_stage("write", layout.stored_triangles(), "triangles");
   const std::string generator = std::string(kGenerator) + info.name;
-  GlbWriter writer(files, path, layout.json_text(generator), layout.bin_bytes(), progress, cancel);
+  GlbWriter writer(files, path,
+                   layout.json_text(generator, options.colors ? info.materials
+                                                              : std::span<const SceneMaterial>()),
+                   layout.bin_bytes(), progress, cancel);
   make(options, writer);
   const uint64_t bytes = writer.finish();
   progress.end_stage();

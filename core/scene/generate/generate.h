@@ -20,12 +20,20 @@ enum class SceneKind { kCity, kMenger, kTerrain, kSoup, kSpheres };
 class SceneBuilder;
 struct GenerateOptions;
 
+// A material of a scene with colors: vertices have colors of their own, which are multiplied with
+// it.
+struct SceneMaterial {
+  const char* name;
+  float base_color[3];  // linear
+};
+
 struct SceneKindInfo {
   SceneKind kind;
   const char* name;
   const char* summary;
   uint64_t default_triangles;  // 0 for the kind that is sized by its level
   void (*make)(const GenerateOptions& options, SceneBuilder& scene);
+  std::span<const SceneMaterial> materials;  // none for a kind that has no colors
 };
 std::span<const SceneKindInfo> scene_kinds();
 // Throws Error{kInvalidInput} listing the known names for another one.
@@ -42,6 +50,8 @@ struct GenerateOptions {
   uint32_t level = 3;
   // city and spheres: repeated parts are stored once and placed by EXT_mesh_gpu_instancing.
   bool instances = false;
+  // city only, not with instances: materials and colors of vertices. The triangles are the same.
+  bool colors = false;
 };
 
 struct GenerateReport {

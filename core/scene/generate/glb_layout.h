@@ -2,7 +2,8 @@
 // describes it.
 //
 //     header 12 | JSON chunk: head 8, text padded with spaces | BIN chunk: head 8, blocks
-//     mesh, part:  positions (12 bytes per vertex) | indices (2 bytes each), padded to 4
+//     mesh, part:  positions (12 bytes per vertex) | colors (4 bytes each), if there are some |
+//                  indices (2 bytes each), padded to 4
 //     instances:   translations (12 bytes each)    | scales (12 bytes each)
 //
 // Each array is a bufferView and an accessor of the same number.
@@ -31,7 +32,9 @@ class GlbLayout : public BlockSink {
 
   // The text of the JSON chunk, padded to a multiple of 4 with spaces. `generator` becomes the
   // asset's generator.
-  std::string json_text(const std::string& generator) const;
+  // `materials`: those that meshes have, none without colors.
+  std::string json_text(const std::string& generator,
+                        std::span<const SceneMaterial> materials) const;
   uint64_t bin_bytes() const { return bin_bytes_; }
   uint64_t triangles() const { return triangles_; }
   uint64_t stored_triangles() const { return stored_triangles_; }
@@ -45,6 +48,8 @@ class GlbLayout : public BlockSink {
     uint32_t first;   // number of vertices or of instances
     uint32_t second;  // number of indices
     Float3 low, high;
+    uint32_t material = 0;
+    bool has_colors = false;
   };
   void add_geometry(Kind kind, const Mesh& mesh);
   void add_bytes(uint64_t bytes);

@@ -59,6 +59,7 @@ void GlbWriter::instances(uint32_t, std::span<const Float3> translations,
 void GlbWriter::write_geometry(const Mesh& mesh) {
   cancel_.check();
   put(mesh.positions.data(), mesh.positions.size() * sizeof(Float3));
+  put(mesh.colors.data(), mesh.colors.size() * sizeof(Rgba8));
   const size_t bytes = mesh.indices.size() * sizeof(uint16_t);
   put(mesh.indices.data(), bytes);
   const std::byte padding[4] = {};

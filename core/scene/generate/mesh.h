@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <vector>
 
 namespace voxdag {
@@ -16,6 +17,10 @@ struct Vec3 {
 inline Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec3 operator*(const Vec3& a, double s) { return {a.x * s, a.y * s, a.z * s}; }
+
+// Red, green, blue, alpha: linear, as glTF wants the colors of vertices.
+using Rgba8 = std::array<uint8_t, 4>;
+constexpr Rgba8 kWhite{255, 255, 255, 255};
 
 using Float3 = std::array<float, 3>;
 inline Float3 rounded(const Vec3& v) {
@@ -34,12 +39,20 @@ struct Mesh {
   static constexpr uint32_t kMaxTriangles = 131072;
 
   std::vector<Float3> positions;
+  std::vector<Rgba8> colors;  // of the vertices; empty in a scene without colors
   std::vector<uint16_t> indices;
 
   uint32_t vertices() const { return static_cast<uint32_t>(positions.size()); }
   uint32_t triangles() const { return static_cast<uint32_t>(indices.size() / 3); }
 
-  void add_vertex(const Vec3& p) { positions.push_back(rounded(p)); }
+  // Of vertices that are added from now on; without it the mesh has no colors.
+  std::optional<Rgba8> color;
+  uint32_t material = 0;
+
+  void add_vertex(const Vec3& p) {
+    positions.push_back(rounded(p));
+    if (color) colors.push_back(*color);
+  }
   // Returns the index of the first.
   uint32_t add_vertices(std::initializer_list<Vec3> corners);
   void add_triangle(uint32_t a, uint32_t b, uint32_t c);

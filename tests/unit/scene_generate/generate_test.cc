@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 
 #include "core/scene/generate/glb_layout.h"
 #include "tests/unit/scene_generate/glb.h"
@@ -171,6 +172,35 @@ TEST(GenerateInstances, ACityOfInstancesIsTheSameCity) {
   EXPECT_TRUE(a == b);
 }
 
+// Colors are those of vertices times their material's, and the triangles are the same.
+TEST(GenerateColors, ACityWithColorsIsTheSameCity) {
+  GenerateOptions options = small(SceneKind::kCity);
+  const Made plain = make(options);
+  options.colors = true;
+  const Made colored = make(options);
+  EXPECT_EQ(fnv1a(colored.bytes), 0x885dbacad3eaa635u);
+  const glb::File file(colored.bytes);
+  auto a = glb::File(plain.bytes).triangles(), b = file.triangles();
+  std::sort(a.begin(), a.end());
+  std::sort(b.begin(), b.end());
+  EXPECT_TRUE(a == b);
+  ASSERT_EQ(file.json["materials"].size(), 4u);
+  std::set<std::array<uint8_t, 4>> colors;
+  std::set<size_t> materials;
+  for (const auto& mesh : file.json["meshes"])
+    for (const auto& p : mesh["primitives"]) {
+      const size_t positions = p["attributes"]["POSITION"], of = p["attributes"]["COLOR_0"];
+      materials.insert(p["material"].get<size_t>());
+      EXPECT_EQ(file.json["accessors"][of]["normalized"], true);
+      const auto found = file.elements<std::array<uint8_t, 4>>(of, 5121, "VEC4");
+      EXPECT_EQ(file.json["accessors"][positions]["count"], found.size());
+      colors.insert(found.begin(), found.end());
+    }
+  EXPECT_EQ(materials.size(), 4u);
+  EXPECT_GT(colors.size(), 30u);
+  EXPECT_FALSE(glb::File(plain.bytes).json.contains("materials"));
+}
+
 TEST(GenerateInstances, SpheresHaveAsManyTriangles) {
   const Made plain = make(small(SceneKind::kSpheres));
   const Made shared = make(small(SceneKind::kSpheres, true));
@@ -289,6 +319,12 @@ TEST(GenerateLimit, CountingStopsAtTheLimit) {
 TEST(GenerateOptions, WhatDoesNotApplyIsRefused) {
   EXPECT_EQ(refusal(small(SceneKind::kSoup, true)), ErrorCode::kInvalidInput);
   EXPECT_EQ(refusal(small(SceneKind::kTerrain, true)), ErrorCode::kInvalidInput);
+  GenerateOptions colored = small(SceneKind::kSpheres);
+  colored.colors = true;
+  EXPECT_EQ(refusal(colored), ErrorCode::kInvalidInput);
+  colored = small(SceneKind::kCity, true);
+  colored.colors = true;
+  EXPECT_EQ(refusal(colored), ErrorCode::kInvalidInput);
   GenerateOptions menger = small(SceneKind::kMenger);
   menger.triangles = 100;
   EXPECT_EQ(refusal(menger), ErrorCode::kInvalidInput);
