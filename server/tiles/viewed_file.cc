@@ -3,6 +3,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
 #include "query/render/views.h"
@@ -60,12 +61,19 @@ Json describe(const voxdag_reader::File& file, const query::DagView& dag,
 ViewedFile::ViewedFile(const std::string& path, const FileIdentity& identity)
     : identity_(identity),
       file_(open_global_file(path)),
+      mapping_(file_->data(), file_->file_bytes()),
       dag_(*file_),
       digest_(digest_of(*file_)) {}
 
 const std::string& ViewedFile::manifest() const {
   std::call_once(manifest_once_, [&] { manifest_ = describe(*file_, dag_, digest_).dump(); });
   return manifest_;
+}
+
+void ViewedFile::expect_whole() const {
+  if (mapping_.is_damaged())
+    throw Error(ErrorCode::kIo,
+                "the DAG became shorter, or its disk failed, while it was looked at");
 }
 
 }  // namespace voxdag::server

@@ -8,6 +8,7 @@
 
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
+#include "core/io/watched_mapping.h"
 #include "query/dag_view.h"
 
 namespace voxdag::server {
@@ -30,10 +31,14 @@ class ViewedFile {
   // What a viewer needs to begin, as JSON. The first call looks for the cameras, which may take a
   // second, or longer if the file is not in memory; others wait for it.
   const std::string& manifest() const;
+  // Throws Error{kIo} if a part of the file could not be read since it was opened, because it
+  // became shorter or its disk failed: what was made from it then is wrong.
+  void expect_whole() const;
 
  private:
   const FileIdentity identity_;
   const std::unique_ptr<voxdag_reader::File> file_;
+  const WatchedMapping mapping_;
   const query::DagView dag_;
   const std::string digest_;
   mutable std::once_flag manifest_once_;

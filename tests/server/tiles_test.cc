@@ -289,6 +289,20 @@ TEST_F(View, NoticesThatTheFileWasReplaced) {
   EXPECT_EQ(status("0/0", m["digest"]), 404);
 }
 
+// Somebody truncates the file between a request's look at it and its reads.
+TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
+  build("64");
+  const ViewedFile file(path_, system_files().open_read(path_)->identity());
+  EXPECT_NO_THROW(file.expect_whole());
+  std::filesystem::resize_file(path_, 4096);
+  try {
+    query::encode_tile(file.dag(), kTileLevels, {0, 0});
+  } catch (const Error&) {
+    // Or the zeros make a tile.
+  }
+  EXPECT_THROW(file.expect_whole(), Error);
+}
+
 TEST_F(View, ShowsASingleBrickAndAnEmptyScene) {
   build("4");
   start();

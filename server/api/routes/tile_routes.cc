@@ -86,6 +86,19 @@ Response answer_for_ever(const Call& call, const ViewedFile& file, const std::st
   return response;
 }
 
+// An answer, or an error, that comes from zeros in place of what cannot be read is none.
+template <class Answer>
+Response answer_of_whole(const Call& call, const ViewedFile& file, const Answer& answer) {
+  try {
+    Response response = answer(call, file);
+    file.expect_whole();
+    return response;
+  } catch (...) {
+    file.expect_whole();
+    throw;
+  }
+}
+
 Response get_manifest(const Call&, const ViewedFile& file) {
   return json_response(200, file.manifest());
 }
@@ -154,7 +167,7 @@ void add_tile_routes(Router& router, const std::string& base, Packing packing,
   const auto add = [&](const std::string& path, auto answer, const QueryNames& query) {
     const auto handler = [find, answer, packing](Call& call) {
       Viewed viewed = find(call);
-      Response response = answer(call, *viewed.file);
+      Response response = answer_of_whole(call, *viewed.file, answer);
       if (packing == Packing::kGzip) pack(call.request, response);
       response.permit = std::move(viewed.permit);
       return response;

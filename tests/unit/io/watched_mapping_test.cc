@@ -1,0 +1,90 @@
+#include "core/io/watched_mapping.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+namespace voxdag {
+namespace {
+
+// A mapped temporary file of some pages of ones.
+class Mapped {
+ public:
+  explicit Mapped(size_t pages) : bytes_(pages * sysconf(_SC_PAGESIZE)) {
+    char name[] = "/tmp/voxdag-mapping-XXXXXX";
+    fd_ = mkstemp(name);
+    unlink(name);
+    const std::vector<char> ones(bytes_, 1);
+    EXPECT_EQ(write(fd_, ones.data(), bytes_), static_cast<ssize_t>(bytes_));
+    data_ = static_cast<char*>(mmap(nullptr, bytes_, PROT_READ, MAP_SHARED, fd_, 0));
+  }
+  ~Mapped() {
+    munmap(data_, bytes_);
+    close(fd_);
+  }
+  Mapped(const Mapped&) = delete;
+  const char* data() const { return data_; }
+  size_t bytes() const { return bytes_; }
+  void truncate(size_t bytes) const { EXPECT_EQ(ftruncate(fd_, static_cast<off_t>(bytes)), 0); }
+  int sum() const {
+    int sum = 0;
+    for (size_t i = 0; i < bytes_; i += 1024)
+      sum += reinterpret_cast<const volatile char*>(data_)[i];
+    return sum;
+  }
+
+ private:
+  size_t bytes_;
+  int fd_ = -1;
+  char* data_ = nullptr;
+};
+
+TEST(WatchedMapping, WhatIsGoneReadsAsZeros) {
+  const Mapped file(8), other(8);
+  const int whole = file.sum();
+  const WatchedMapping watched(file.data(), file.bytes()), undamaged(other.data(), other.bytes());
+  EXPECT_FALSE(watched.is_damaged());
+  file.truncate(file.bytes() / 2);
+  EXPECT_EQ(file.sum(), whole / 2);
+  EXPECT_TRUE(watched.is_damaged());
+  EXPECT_EQ(other.sum(), whole);
+  EXPECT_FALSE(undamaged.is_damaged());
+}
+
+// The next mapping that is watched begins undamaged.
+TEST(WatchedMapping, DamageEndsWithTheWatch) {
+  const Mapped file(2);
+  {
+    const WatchedMapping watched(file.data(), file.bytes());
+    file.truncate(0);
+    file.sum();
+    EXPECT_TRUE(watched.is_damaged());
+  }
+  const Mapped next(2);
+  EXPECT_FALSE(WatchedMapping(next.data(), next.bytes()).is_damaged());
+}
+
+TEST(WatchedMapping, MoreThanAreWatchedAreAsBefore) {
+  const Mapped file(1);
+  std::vector<std::unique_ptr<WatchedMapping>> all;
+  for (int i = 0; i < WatchedMapping::kMaxWatched + 1; ++i)
+    all.push_back(std::make_unique<WatchedMapping>(file.data(), file.bytes()));
+  EXPECT_FALSE(all.back()->is_damaged());
+}
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST(WatchedMapping, OthersStillEndTheProcess) {
+  const Mapped watched_file(1), file(1);
+  const WatchedMapping watched(watched_file.data(), watched_file.bytes());
+  file.truncate(0);
+  EXPECT_EXIT(file.sum(), testing::KilledBySignal(SIGBUS), "");
+}
+#endif
+
+}  // namespace
+}  // namespace voxdag
