@@ -18,7 +18,7 @@ struct ExportCommand {
   std::string input, format, memory;
   OutputFile output;
   SelectionOptions selection;
-  bool json = false;
+  bool gray = false, json = false;
 };
 
 // The format does not show whether this command wrote a file.
@@ -44,6 +44,7 @@ void run(const ExportCommand& command, CommandContext& context) {
   request.output = command.output.path;
   request.memory_bytes =
       command.memory.empty() ? default_memory() : parse_size(command.memory, "--memory");
+  request.gray = command.gray;
   check_outputs(command, *request.format, context.files);
   return_freed_memory_to_system();
   const auto progress = make_progress_bar();
@@ -77,6 +78,7 @@ void declare(Command& command, ExportCommand& state) {
   state.selection.declare(command);
   command.option("--memory", state.memory,
                  "limit of the memory that is allocated (default: half the RAM)");
+  command.flag("--gray", state.gray, "leave out the colors that the file may have");
   command.flag("--force", state.output.force, "replace existing files");
   command.json_flag(state.json);
 }

@@ -58,8 +58,9 @@ ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
   const DagView dag(file);
   MemoryBudget budget(request.memory_bytes);
   const std::vector<std::string> paths = export_paths(*request.format, request.output);
-  const ExportJob job{files,  file,     dag,   request.selection, request.output, paths.back(),
-                      budget, progress, cancel};
+  const bool has_colors = file.has_colors() && !request.gray;
+  const ExportJob job{files,        file,       dag,    request.selection, request.output,
+                      paths.back(), has_colors, budget, progress,          cancel};
   if (dag.empty()) refuse_empty(job);
   ExportReport report = request.format->write(job);
   report.files = paths;

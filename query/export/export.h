@@ -48,6 +48,7 @@ struct ExportRequest {
   Selection selection;
   std::string output;
   uint64_t memory_bytes = 0;  // the limit of what is allocated; the mapped file is not counted
+  bool gray = false;          // leaves out the colors that the file may have
 };
 
 // Writes the selected voxels. Each file appears under its name when all are whole; after an error

@@ -20,6 +20,7 @@ struct ExportJob {
   Selection selection;
   std::string output;
   std::string second_output;  // of a format of two files
+  bool has_colors;            // that are to be written, where the format has a place for them
   MemoryBudget& budget;
   Progress& progress;
   const CancelToken& cancel;

@@ -1,6 +1,7 @@
 // A surface as a binary glTF 2.0: the faces between set voxels and empty ones, coplanar faces
-// merged to rectangles. Positions are whole numbers of cells from the low corner of the region,
-// which floats hold exactly; the node places and scales them.
+// merged to rectangles, of one color where the file has colors. Positions are whole numbers of
+// cells from the low corner of the region, which floats hold exactly; the node places and scales
+// them. COLOR_0 is linear light, as glTF asks for, in 16 bits: dark sRGB bytes need them.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -8,6 +9,7 @@
 
 #include "core/base/text.h"
 #include "core/geometry/morton.h"
+#include "query/export/color/linear_colors.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/export/selected_bricks.h"
@@ -17,7 +19,13 @@ namespace {
 
 constexpr uint64_t kMaxGlbBytes = (uint64_t{1} << 32) - 1;  // its length is a u32
 constexpr uint64_t kQuadBytes = 4 * 3 * sizeof(float) + 6 * sizeof(uint32_t);
-constexpr uint64_t kMaxQuads = (kMaxGlbBytes - 4096) / kQuadBytes;
+constexpr uint64_t kQuadColorBytes = 4 * 4 * sizeof(uint16_t);
+
+// Bytes of a rectangle, and how many of them fit.
+uint64_t quad_bytes(const ExportJob& job) {
+  return kQuadBytes + (job.has_colors ? kQuadColorBytes : 0);
+}
+uint64_t max_quads(const ExportJob& job) { return (kMaxGlbBytes - 4096) / quad_bytes(job); }
 
 struct GlbBrick {
   uint64_t morton = 0;  // of its corner, in bricks
@@ -27,13 +35,15 @@ struct GlbBrick {
 // A rectangle of faces: at `plane` of an axis, over [u0, u1) x [v0, v1) of the next two axes.
 struct GlbQuad {
   uint32_t plane = 0, u0 = 0, v0 = 0, u1 = 0, v1 = 0;
-  bool upward = false;  // it looks along the axis, or against it
-  uint8_t axis = 0;
+  bool upward : 1 = false;  // it looks along the axis, or against it
+  uint8_t axis : 2 = 0;
+  voxdag_reader::Rgb color;
 };
+static_assert(sizeof(GlbQuad) == 24);
 
 class GlbSurface {
  public:
-  explicit GlbSurface(const ExportJob& job) : job_(job) {
+  explicit GlbSurface(const ExportJob& job) : job_(job), colors_(job.file) {
     uint64_t count = 0;
     const auto count_brick = [&](const CellCorner&, uint64_t mask) {
       if (++count % 65536 == 0) job.cancel.check();
@@ -128,15 +138,33 @@ class GlbSurface {
     merge(faces, axis, upward);
   }
 
-  // Makes the longest runs along u, and merges a run with the equal one of the row before.
+  // Of the cell that a face belongs to; the same for all without colors.
+  voxdag_reader::Rgb color_of(uint64_t face, uint8_t axis, bool upward) {
+    if (!job_.has_colors) return {};
+    std::array<int64_t, 3> cell = job_.selection.region.low;
+    cell[(axis + 1u) % 3] += static_cast<int64_t>(face & kCoordinateMask);
+    cell[(axis + 2u) % 3] += static_cast<int64_t>(face >> kCoordinateBits & kCoordinateMask);
+    cell[axis] += static_cast<int64_t>(face >> 2 * kCoordinateBits) - upward;
+    return color_of_cell(job_, colors_, cell);
+  }
+
+  // Makes the longest runs of a color along u, and merges a run with the equal one of the row
+  // before.
   void merge(const std::vector<uint64_t>& faces, uint8_t axis, bool upward) {
     std::vector<size_t> row, previous;  // quads of the current row and of the one before
     size_t candidate = 0;
     GlbQuad last{};
+    voxdag_reader::Rgb next;  // color of the face that the next run begins with
+    if (!faces.empty()) next = color_of(faces[0], axis, upward);
     for (size_t i = 0; i < faces.size();) {
-      size_t end = i + 1;
-      while (end < faces.size() && faces[end] == faces[end - 1] + 1) ++end;
       GlbQuad run;
+      run.color = next;
+      size_t end = i;
+      while (++end < faces.size()) {
+        if (end % 65536 == 0) job_.cancel.check();
+        next = color_of(faces[end], axis, upward);
+        if (faces[end] != faces[end - 1] + 1 || next != run.color) break;
+      }
       run.axis = axis;
       run.upward = upward;
       run.u0 = static_cast<uint32_t>(faces[i] & kCoordinateMask);
@@ -154,7 +182,8 @@ class GlbSurface {
       last = run;
       while (candidate < previous.size() && quads_[previous[candidate]].u0 < run.u0) ++candidate;
       if (candidate < previous.size() && quads_[previous[candidate]].u0 == run.u0 &&
-          quads_[previous[candidate]].u1 == run.u1) {
+          quads_[previous[candidate]].u1 == run.u1 &&
+          quads_[previous[candidate]].color == run.color) {
         quads_[previous[candidate]].v1 = run.v1;
         row.push_back(previous[candidate]);
       } else {
@@ -175,6 +204,7 @@ class GlbSurface {
   }
 
   const ExportJob& job_;
+  voxdag_reader::ColorCursor colors_;
   MemoryCharge bricks_charge_, quads_charge_;
   std::vector<GlbBrick> bricks_;
   std::vector<GlbQuad> quads_;
@@ -213,31 +243,47 @@ std::string glb_json(const ExportJob& job, const std::vector<GlbQuad>& quads) {
     place[axis] = job.world(axis, static_cast<double>(job.selection.region.low[axis]));
   const uint64_t positions = quads.size() * 4 * 3 * sizeof(float);
   const uint64_t indices = quads.size() * 6 * sizeof(uint32_t);
+  const uint64_t colors = job.has_colors ? quads.size() * kQuadColorBytes : 0;
+  const std::string vertices = std::to_string(quads.size() * 4);
   const double edge = job.cell_edge();
   std::string json =
       "{\"asset\":{\"version\":\"2.0\",\"generator\":\"voxdag\"},\"scene\":0,"
       "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0,\"translation\":" +
       numbers_text(place) + ",\"scale\":" + numbers_text({edge, edge, edge}) +
-      "}],\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.7,0.7,0.7,1],"
-      "\"metallicFactor\":0}}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},"
-      "\"indices\":1,\"material\":0}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,"
+      "}],\"materials\":[{\"pbrMetallicRoughness\":{" +
+      (job.has_colors ? "" : "\"baseColorFactor\":[0.7,0.7,0.7,1],") +
+      "\"metallicFactor\":0}}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0" +
+      (job.has_colors ? ",\"COLOR_0\":2" : "") +
+      "},\"indices\":1,\"material\":0}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,"
       "\"count\":" +
-      std::to_string(quads.size() * 4) + ",\"type\":\"VEC3\",\"min\":" + numbers_text(low) +
+      vertices + ",\"type\":\"VEC3\",\"min\":" + numbers_text(low) +
       ",\"max\":" + numbers_text(high) +
       "},{\"bufferView\":1,\"componentType\":5125,\"count\":" + std::to_string(quads.size() * 6) +
-      ",\"type\":\"SCALAR\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":" +
-      std::to_string(positions) +
+      ",\"type\":\"SCALAR\"}" +
+      (job.has_colors ? ",{\"bufferView\":2,\"componentType\":5123,\"normalized\":true,\"count\":" +
+                            vertices + ",\"type\":\"VEC4\"}"
+                      : "") +
+      "],\"bufferViews\":[{\"buffer\":0,\"byteLength\":" + std::to_string(positions) +
       ",\"target\":34962},{\"buffer\":0,\"byteOffset\":" + std::to_string(positions) +
-      ",\"byteLength\":" + std::to_string(indices) +
-      ",\"target\":34963}],\"buffers\":[{\"byteLength\":" + std::to_string(positions + indices) +
-      "}]}";
+      ",\"byteLength\":" + std::to_string(indices) + ",\"target\":34963}" +
+      (job.has_colors ? ",{\"buffer\":0,\"byteOffset\":" + std::to_string(positions + indices) +
+                            ",\"byteLength\":" + std::to_string(colors) + ",\"target\":34962}"
+                      : "") +
+      "],\"buffers\":[{\"byteLength\":" + std::to_string(positions + indices + colors) + "}]}";
   json.append((4 - json.size() % 4) % 4, ' ');
   return json;
 }
 
+// Of four vertices. Alpha is there to keep elements at multiples of four bytes.
+void put_colors(voxdag_reader::Rgb color, ExportFile& file) {
+  const auto& linear = linear_of_srgb();
+  const std::array<uint16_t, 4> vertex = {linear[color.r], linear[color.g], linear[color.b], 65535};
+  for (int i = 0; i < 4; ++i) file.write(std::as_bytes(std::span(vertex)));
+}
+
 void put_glb(const ExportJob& job, const std::vector<GlbQuad>& quads, ExportFile& file) {
   const std::string json = glb_json(job, quads);
-  const uint64_t binary = quads.size() * kQuadBytes;
+  const uint64_t binary = quads.size() * quad_bytes(job);
   file.write("glTF");
   file.put<uint32_t>(2);
   file.put(static_cast<uint32_t>(12 + 8 + json.size() + 8 + binary));
@@ -246,7 +292,7 @@ void put_glb(const ExportJob& job, const std::vector<GlbQuad>& quads, ExportFile
   file.write(json);
   file.put(static_cast<uint32_t>(binary));
   file.write(std::string_view("BIN\0", 4));
-  ExportStage stage(job, "export", 2 * quads.size(), "rectangles");
+  ExportStage stage(job, "export", (job.has_colors ? 3 : 2) * quads.size(), "rectangles");
   for (const GlbQuad& quad : quads) {
     for (const auto& corner : corners_of(quad)) file.write(std::as_bytes(std::span(corner)));
     stage.advance(1);
@@ -255,23 +301,28 @@ void put_glb(const ExportJob& job, const std::vector<GlbQuad>& quads, ExportFile
     for (const uint32_t corner : {0, 1, 2, 0, 2, 3}) file.put(4 * i + corner);
     stage.advance(1);
   }
+  if (job.has_colors)
+    for (const GlbQuad& quad : quads) {
+      put_colors(quad.color, file);
+      stage.advance(1);
+    }
 }
 
 }  // namespace
 
 ExportReport write_glb(const ExportJob& job) {
   const GlbSurface surface(job);
-  const uint64_t quads = surface.quads().size();
-  if (quads > kMaxQuads)
+  const uint64_t quads = surface.quads().size(), most = max_quads(job);
+  if (quads > most)
     refuse_size(job,
-                count_text(quads) + " rectangles (" + size_text(quads * kQuadBytes) +
-                    ") are needed, but a .glb file has at most " + size_text(kMaxGlbBytes),
+                count_text(quads) + " rectangles (" + size_text(quads * quad_bytes(job)) +
+                    ") are needed" + (job.has_colors ? " with colors (--gray merges more)" : "") +
+                    ", but a .glb file has at most " + size_text(kMaxGlbBytes),
                 [&](uint32_t level) {
                   // Even if no faces are merged.
-                  return count_voxels(job, coarser(job.selection, level), kMaxQuads / 6) <=
-                         kMaxQuads / 6;
+                  return count_voxels(job, coarser(job.selection, level), most / 6) <= most / 6;
                 });
-  require_space(job, quads * kQuadBytes + 4096);
+  require_space(job, quads * quad_bytes(job) + 4096);
   ExportReport report;
   report.voxels = surface.voxels();
   ExportFile file(job.files, job.output);

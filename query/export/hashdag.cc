@@ -3,21 +3,25 @@
 //     NAME.basic_dag.uncompressed_colors.bin   u32 top levels | u64 n, u64 ... | u64 m, u32 ...
 // A node is one word (child mask, and above it the voxels that the node encloses) and the absolute
 // word index of each child; a leaf is two words, as our brick. In the top levels the count is an
-// index into the 64-bit numbers of the color file instead, which has one gray color here.
+// index into the 64-bit numbers of the color file instead. The colors are bytes R, G, B and 255 for
+// each voxel in Morton order, or one gray if there are none.
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "query/export/export_file.h"
+#include "query/export/selected_bricks.h"
 #include "query/export/selected_dag.h"
 
 namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxHashDagWords = uint64_t{1} << 32;  // of 32-bit indices
-constexpr uint64_t kMaxCount = uint64_t{1} << 24;         // of the bits above the mask
-constexpr uint32_t kGray = 0xffb0b0b0;                    // A, B, G, R
+constexpr uint64_t kMaxHashDagColors = (uint64_t{1} << 32) - 1;
+constexpr uint64_t kMaxCount = uint64_t{1} << 24;  // of the bits above the mask
+constexpr uint32_t kGray = 0xffb0b0b0;             // A, B, G, R
 constexpr uint64_t kHashDagHeaderBytes = 6 * sizeof(double) + sizeof(uint32_t) + sizeof(uint64_t);
 
 // A node of level L - 7 encloses 128^3 voxels at most, so that the count always fits; HashDAG takes
@@ -68,11 +72,30 @@ class HashDagWriter {
     colors.put(top_levels_);
     colors.put<uint64_t>(enclosed_.size());
     for (const uint64_t count : enclosed_) colors.put(count);
+    if (job_.has_colors) return write_voxel_colors(colors);
     colors.put<uint64_t>(1);
     colors.put(kGray);
   }
 
  private:
+  void write_voxel_colors(ExportFile& colors) const {
+    colors.put(dag_.voxels());
+    voxdag_reader::ColorCursor cursor(job_.file);
+    ExportStage stage(job_, "export colors", dag_.voxels(), "voxels");
+    uint64_t written = 0;
+    for_each_selected_brick(job_.dag, job_.selection, [&](const CellCorner& corner, uint64_t mask) {
+      for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+        const voxdag_reader::Rgb color = color_of_cell(job_, cursor, cell);
+        const std::array<uint8_t, 4> bytes = {color.r, color.g, color.b, 255};
+        colors.write(std::as_bytes(std::span(bytes)));
+      });
+      const auto voxels = static_cast<uint64_t>(std::popcount(mask));
+      written += voxels;
+      stage.advance(voxels);
+      return true;
+    });
+    require_written(job_, written, dag_.voxels());
+  }
   void seek_level(uint32_t level) {
     file_.seek(kHashDagHeaderBytes + bases_[level] * sizeof(uint32_t));
   }
@@ -134,8 +157,8 @@ class HashDagWriter {
 };
 
 std::string scene_depth_note(uint32_t levels) {
-  const std::string depth = std::to_string(levels);
-  return "compile the viewer with SCENE_DEPTH " + depth +
+  return "compile the viewer with SCENE_DEPTH " + std::to_string(levels) +
+         ", LOAD_UNCOMPRESSED_COLORS 1 and LOAD_COMPRESSED_COLORS 0" +
          (levels >= 10 ? ", and name the files data/<SCENE>" + std::to_string(1u << (levels - 10)) +
                              "k.basic_dag.*"
                        : "");
@@ -152,7 +175,15 @@ ExportReport write_hashdag(const ExportJob& job) {
                     ") are needed, but the indices of HashDAG reach " +
                     count_text(kMaxHashDagWords),
                 [&](uint32_t level) { return dag.size_at(level).words <= kMaxHashDagWords; });
-  require_space(job, kHashDagHeaderBytes + 4 * words);
+  if (job.has_colors && dag.voxels() > kMaxHashDagColors)
+    refuse_size(job,
+                count_text(dag.voxels()) + " voxels are selected, but HashDAG numbers at most " +
+                    count_text(kMaxHashDagColors) + " for colors (--gray leaves them out)",
+                [&](uint32_t level) {
+                  return count_voxels(job, coarser(job.selection, level), kMaxHashDagColors) <=
+                         kMaxHashDagColors;
+                });
+  require_space(job, kHashDagHeaderBytes + 4 * words + (job.has_colors ? 4 * dag.voxels() : 0));
   ExportReport report;
   report.voxels = dag.voxels();
   ExportFile file(job.files, job.output);

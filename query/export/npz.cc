@@ -191,7 +191,7 @@ ExportReport write_npz(const ExportJob& job) {
   // No limit of the format is in reach: 2^48 voxels have more bytes than file systems take.
   const uint64_t voxels = require_voxels(job, uint64_t{1} << 48, "an array takes");
   report.voxels = voxels;
-  const bool has_colors = job.file.has_colors();
+  const bool has_colors = job.has_colors;
   require_space(job, voxels * 3 * (sizeof(int32_t) + sizeof(double) + (has_colors ? 1 : 0)) + 4096);
   NpzWriter writer(job);
   ExportStage stage(job, "export", (has_colors ? 3 : 2) * voxels, "rows");

@@ -25,7 +25,7 @@ std::string ply_header(uint64_t vertices, bool has_colors) {
 ExportReport write_ply(const ExportJob& job) {
   ExportReport report;
   report.voxels = require_voxels(job, kMaxPlyVertices, "readers of PLY take");
-  const bool has_colors = job.file.has_colors();
+  const bool has_colors = job.has_colors;
   const std::string header = ply_header(report.voxels, has_colors);
   require_space(job, header.size() + report.voxels * (3 * sizeof(double) + (has_colors ? 3 : 0)));
   voxdag_reader::ColorCursor colors(job.file);

@@ -1,13 +1,16 @@
 // MagicaVoxel .vox, version 150: a model of at most 256^3 voxels for each different node of the DAG
-// with that edge, and an instance of it for each place where the node occurs.
+// with that edge, and an instance of it for each place where the node occurs. With colors each
+// place has a model of its own, since equal nodes have different colors.
 //     "VOX " | 150 | MAIN { (SIZE XYZI)... nTRN nGRP (nTRN nSHP)... RGBA }
 // MagicaVoxel's z is up: (x, y, z) of the file is (x, -z, y) of ours.
 #include <array>
 #include <bit>
+#include <optional>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "core/format/bytes.h"
+#include "query/export/color/color_palette.h"
 #include "query/export/export_file.h"
 #include "query/export/selected_bricks.h"
 #include "query/export/selected_dag.h"
@@ -65,12 +68,51 @@ VoxChunk shape_node(int32_t id, int32_t model) {
   return chunk;
 }
 
-VoxChunk gray_palette() {
+// A voxel of the index i has the color i - 1.
+VoxChunk palette_chunk(std::span<const voxdag_reader::Rgb> colors) {
   VoxChunk chunk("RGBA");
-  const uint32_t gray = 0xffb0b0b0, unused = 0xff000000;
-  for (int i = 0; i < 256; ++i) chunk.number(static_cast<int32_t>(i == 0 ? gray : unused));
+  for (size_t i = 0; i < 256; ++i) {
+    const voxdag_reader::Rgb color = i < colors.size() ? colors[i] : voxdag_reader::Rgb{};
+    const std::array<uint8_t, 4> entry = {color.r, color.g, color.b, 255};
+    chunk.raw(std::as_bytes(std::span(entry)));
+  }
   return chunk;
 }
+
+// The voxels' colors, two passes: which there are, and what becomes of each.
+class VoxColors {
+ public:
+  explicit VoxColors(const ExportJob& job) : job_(job) {
+    if (!job.has_colors) return;
+    palette_.emplace(job.budget);
+    voxdag_reader::ColorCursor cursor(job.file);
+    ExportStage stage(job, "find colors", 0, "voxels");
+    for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
+      for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+        palette_->add(color_of_cell(job, cursor, cell));
+      });
+      stage.advance(static_cast<uint64_t>(std::popcount(mask)));
+      return true;
+    });
+    palette_->make();
+    cursor_.emplace(job.file);
+  }
+
+  size_t count() const { return palette_ ? palette_->colors().size() : 0; }
+  VoxChunk palette() const {
+    static constexpr voxdag_reader::Rgb kOneGray[] = {{0xb0, 0xb0, 0xb0}};
+    return palette_ ? palette_chunk(palette_->colors()) : palette_chunk(kOneGray);
+  }
+  uint8_t index_of(const CellCorner& cell) {
+    if (!palette_) return 1;
+    return static_cast<uint8_t>(palette_->index_of(color_of_cell(job_, *cursor_, cell)) + 1);
+  }
+
+ private:
+  const ExportJob& job_;
+  std::optional<ColorPalette> palette_;
+  std::optional<voxdag_reader::ColorCursor> cursor_;
+};
 
 class VoxWriter {
  public:
@@ -87,28 +129,32 @@ class VoxWriter {
   }
 
   // What the file will have.
-  uint64_t bytes() const {
-    uint64_t bytes = nodes_bytes();
-    for (const uint64_t voxels : voxels_) bytes += kModelBytes + 4 * voxels;
-    return 8 + kChunkHeaderBytes + bytes;
-  }
+  uint64_t bytes() const { return 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_; }
   size_t instance_count() const { return instances_; }
 
-  void write(ExportFile& file, ExportStage& stage, const SelectedDag& dag) {
+  void write(ExportFile& file, ExportStage& stage, const SelectedDag& dag, VoxColors& colors) {
     const uint64_t total = bytes();
     file.write("VOX ");
     file.put<uint32_t>(150);
     file.write("MAIN");
     file.put<uint32_t>(0);
     file.put(static_cast<uint32_t>(total - 8 - kChunkHeaderBytes));
-    size_t model = 0;
-    const auto write_next = [&](uint64_t offset) {
-      write_model(file, offset, voxels_[model]);
-      stage.advance(voxels_[model++]);
+    const auto write_next = [&](uint64_t content, const CellCorner& corner, uint64_t voxels) {
+      write_model(file, content, corner, voxels, colors);
+      stage.advance(voxels);
     };
-    for_each_model_node(dag, write_next);
+    if (job_.has_colors) {
+      visit_instances(0, view_.root(), {0, 0, 0}, [&](const CellCorner& corner, uint64_t content) {
+        write_next(content, corner, voxels_[model_of(content)]);
+      });
+    } else {
+      size_t model = 0;
+      for_each_model_node(dag, [&](uint64_t offset) {
+        write_next(content_at(offset), {0, 0, 0}, voxels_[model++]);
+      });
+    }
     write_nodes(file);
-    gray_palette().write(file);
+    colors.palette().write(file);
     if (file.size() != total)
       throw Error(ErrorCode::kCorrupt, job_.output + ": has " + std::to_string(file.size()) +
                                            " bytes, expected " + std::to_string(total));
@@ -158,18 +204,22 @@ class VoxWriter {
                      visit);
   }
 
-  // Calls visit(corner, model) for each place of a model.
+  // Of the node that is content() where an instance is.
+  uint32_t model_of(uint64_t content) {
+    return depth_ + kBrickLevels == view_.grid_levels() ? 0 : models_[content];
+  }
+
+  // Calls visit(corner, content) for each place of a model.
   template <class Visit>
   void visit_instances(uint32_t depth, uint64_t content, const CellCorner& corner,
                        const Visit& visit) {
     if (depth == depth_) {
       job_.cancel.check();
-      if (depth_ + kBrickLevels == view_.grid_levels()) return visit(corner, 0);
-      if (content >= level_words_)
+      if (depth_ + kBrickLevels != view_.grid_levels() && content >= level_words_)
         throw Error(ErrorCode::kCorrupt, job_.file.path() + ": level " + std::to_string(depth_) +
                                              ", word " + std::to_string(content) +
                                              ": no node lies here");
-      return visit(corner, models_[content]);
+      return visit(corner, content);
     }
     const DagView::Children children = view_.children(depth, content);
     const int64_t half = int64_t{1} << (view_.grid_levels() - depth - 1);
@@ -180,10 +230,13 @@ class VoxWriter {
   }
 
   void find_instances(uint32_t depth, uint64_t content, const CellCorner& corner) {
-    visit_instances(depth, content, corner, [&](const CellCorner& at, uint32_t) {
+    visit_instances(depth, content, corner, [&](const CellCorner& at, uint64_t of_instance) {
       instance_bytes_ += transform_node(0, 0, place_text(at)).size() + shape_node(0, 0).size();
       ++instances_;
+      if (job_.has_colors) models_bytes_ += model_bytes(voxels_[model_of(of_instance)]);
     });
+    if (job_.has_colors) return;
+    for (const uint64_t voxels : voxels_) models_bytes_ += model_bytes(voxels);
   }
 
   // Where the center of an instance is. The grid's center is at the origin of MagicaVoxel's x and
@@ -194,12 +247,15 @@ class VoxWriter {
            std::to_string(middle - corner[2] - half) + " " + std::to_string(corner[1] + half);
   }
 
+  static uint64_t model_bytes(uint64_t voxels) { return kModelBytes + 4 * voxels; }
+
   uint64_t nodes_bytes() const {
     return transform_node(0, 1, "").size() + kChunkHeaderBytes + 12 + 4 * instances_ +
-           instance_bytes_ + gray_palette().size();
+           instance_bytes_ + palette_chunk({}).size();
   }
 
-  void write_model(ExportFile& file, uint64_t offset, uint64_t voxels) const {
+  void write_model(ExportFile& file, uint64_t content, const CellCorner& place, uint64_t voxels,
+                   VoxColors& colors) const {
     file.write("SIZE");
     file.put<uint32_t>(12);
     file.put<uint32_t>(0);
@@ -208,15 +264,16 @@ class VoxWriter {
     file.put(static_cast<uint32_t>(4 + 4 * voxels));
     file.put<uint32_t>(0);
     file.put(static_cast<uint32_t>(voxels));
-    visit_bricks(
-        depth_, content_at(offset), {0, 0, 0}, [&](const CellCorner& corner, uint64_t mask) {
-          for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
-            const std::array<uint8_t, 4> voxel = {static_cast<uint8_t>(cell[0]),
-                                                  static_cast<uint8_t>(edge_ - 1 - cell[2]),
-                                                  static_cast<uint8_t>(cell[1]), 1};
-            file.write(std::as_bytes(std::span(voxel)));
-          });
-        });
+    visit_bricks(depth_, content, {0, 0, 0}, [&](const CellCorner& corner, uint64_t mask) {
+      for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+        const uint8_t index =
+            colors.index_of({place[0] + cell[0], place[1] + cell[1], place[2] + cell[2]});
+        const std::array<uint8_t, 4> voxel = {static_cast<uint8_t>(cell[0]),
+                                              static_cast<uint8_t>(edge_ - 1 - cell[2]),
+                                              static_cast<uint8_t>(cell[1]), index};
+        file.write(std::as_bytes(std::span(voxel)));
+      });
+    });
   }
 
   void write_nodes(ExportFile& file) {
@@ -229,9 +286,10 @@ class VoxWriter {
     file.put(static_cast<int32_t>(instances_));
     for (size_t i = 0; i < instances_; ++i) file.put(static_cast<int32_t>(2 + 2 * i));
     int32_t id = 2;
-    visit_instances(0, view_.root(), {0, 0, 0}, [&](const CellCorner& corner, uint32_t model) {
+    visit_instances(0, view_.root(), {0, 0, 0}, [&](const CellCorner& corner, uint64_t content) {
+      const int32_t model = job_.has_colors ? id / 2 - 1 : static_cast<int32_t>(model_of(content));
       transform_node(id, id + 1, place_text(corner)).write(file);
-      shape_node(id + 1, static_cast<int32_t>(model)).write(file);
+      shape_node(id + 1, model).write(file);
       id += 2;
     });
   }
@@ -243,7 +301,8 @@ class VoxWriter {
   const uint64_t level_words_;
   NodeNumbers<uint32_t> models_;
   MemoryCharge charge_;
-  std::vector<uint64_t> voxels_;  // of each model
+  std::vector<uint64_t> voxels_;  // of each model's node
+  uint64_t models_bytes_ = 0;
   size_t instances_ = 0;
   uint64_t instance_bytes_ = 0;
 };
@@ -256,9 +315,9 @@ ExportReport write_vox(const ExportJob& job) {
   const uint64_t bytes = writer.bytes();
   if (bytes > kMaxVoxBytes || writer.instance_count() > kMaxVoxModels)
     refuse_size(job,
-                size_text(bytes) +
-                    " or more are needed, but the chunks of a .vox file have at most " +
-                    size_text(kMaxVoxBytes),
+                size_text(bytes) + " or more are needed" +
+                    (job.has_colors ? " with colors (--gray leaves them out)" : "") +
+                    ", but the chunks of a .vox file have at most " + size_text(kMaxVoxBytes),
                 [&](uint32_t level) {
                   // Even if nothing is shared, and a fourth is left for models and instances.
                   const uint64_t voxels = kMaxVoxBytes / 16 * 3;
@@ -267,13 +326,17 @@ ExportReport write_vox(const ExportJob& job) {
   require_space(job, bytes);
   ExportReport report;
   report.voxels = dag.voxels();
+  VoxColors colors(job);
   ExportFile file(job.files, job.output);
   ExportStage stage(job, "export", 0, "voxels");
-  writer.write(file, stage, dag);
+  writer.write(file, stage, dag, colors);
   ExportFile* const written[] = {&file};
   report.bytes = ExportFile::publish(written);
   report.notes.push_back("z is up: a voxel (x, y, z) is at (x, -z, y); " +
                          count_text(writer.instance_count()) + " instances");
+  if (job.has_colors)
+    report.notes.push_back("a palette of " + count_text(colors.count()) +
+                           " colors; each place has its own model (--gray shares equal ones)");
   if (dag.grid_levels() > std::bit_width(kMagicaVoxelEdge) - 1)
     report.notes.push_back(
         "MagicaVoxel shows at most 2048 voxels per edge; other readers take all");

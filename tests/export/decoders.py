@@ -288,6 +288,31 @@ def nvdb(path, grid, reader):
     return grid.cells(numpy.frombuffer(listed.stdout, "<f8").reshape(-1, 3))
 
 
+def srgb_of(linear):
+    """The bytes of sRGB that are nearest to linear light."""
+    low, high = 12.92 * linear, 1.055 * numpy.maximum(linear, 0) ** (1 / 2.4) - 0.055
+    return numpy.rint(255 * numpy.where(linear <= 0.0031308, low, high)).astype(numpy.int64)
+
+
+def vdb_colors(path, grid):
+    """Cells, and red, green and blue of each."""
+    read = pyopenvdb.read(path, "Cd")
+    low, high = read.evalActiveVoxelBoundingBox()
+    values = numpy.zeros((*(numpy.array(high) - low + 1), 3), numpy.float32)
+    read.copyToArray(values, ijk=low)
+    cells = vdb(path, grid)  # which are the active ones of this grid, too
+    assert len(cells) == read.activeVoxelCount()
+    accessor = read.getConstAccessor()
+    assert all(accessor.isValueOn(tuple(map(int, cell))) for cell in cells[::97])
+    return cells, srgb_of(values[tuple((cells - low).T)])
+
+
+def nvdb_colors(path, grid, reader):
+    listed = subprocess.run([reader, path, "Cd"], capture_output=True, check=True)
+    numbers = numpy.frombuffer(listed.stdout, "<f8").reshape(-1, 6)
+    return grid.cells(numbers[:, :3]), srgb_of(numbers[:, 3:])
+
+
 def glb_rectangles(path, grid):
     """Corners of all rectangles, n x 4 x 3, in cells of the grid."""
     with open(path, "rb") as file:

@@ -3,8 +3,8 @@
 
     export_test.py VOXDAG LIST_VOXELS FORMAT [TOOLS...]
 
-At three resolutions, at a coarser level, for one region, and for a region of a coarser level. TOOLS
-are programs of this folder that the decoder of the format starts. Exits with 77, which ctest counts
+At three resolutions, at a coarser level, for one region, and for a region of a coarser level; and
+the colors of a scene, for formats whose libraries unit tests do not have. TOOLS are programs of this folder that the decoder of the format starts. Exits with 77, which ctest counts
 as skipped, where the library that decodes is missing.
 """
 
@@ -118,6 +118,55 @@ class Test:
         assert not left, left
         print(f"{resolution} {' '.join(options)}: {len(expected)} voxels, {report['bytes']} bytes")
 
+    def colored_scene(self):
+        """A .vdag file of a bumpy sheet with colored corners."""
+        corners = []
+        for i in range(21):
+            for j in range(21):
+                color = f"{12 * i} {12 * j} {(37 * i * j) % 256}"
+                corners.append(f"{i} {(i * j) % 5} {j} {color}\n")
+        faces = []
+        for a in range(20 * 21):
+            if a % 21 != 20:
+                faces += [f"3 {a} {a + 1} {a + 21}\n", f"3 {a + 1} {a + 22} {a + 21}\n"]
+        with open("sheet.ply", "w", encoding="ascii") as file:
+            file.write(
+                "ply\nformat ascii 1.0\n"
+                f"element vertex {len(corners)}\n"
+                + "".join(f"property float {axis}\n" for axis in "xyz")
+                + "".join(f"property uchar {channel}\n" for channel in ("red", "green", "blue"))
+                + f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+            )
+            file.writelines(corners + faces)
+        self.run("build", "sheet.ply", "-r", "128", "--color", "-o", "sheet.vdag")
+        return "sheet.vdag", json.loads(self.run("info", "sheet.vdag", "--json"))
+
+    def check_colors(self):
+        """Each voxel has the color that the reader finds, and none if that is asked for."""
+        decode = getattr(decoders, self.name + "_colors", None)
+        if not decode:
+            return
+        path, info = self.colored_scene()
+        output = "colored." + self.name
+        for level in (7, 5):
+            grid = Grid(info, level, None)
+            options = ["--to", self.name, "-o", output, "--force", "--level", str(level)]
+            self.run("export", path, *options)
+            cells, colors = decode(output, grid, *self.tools)
+            found = numpy.stack([keys(cells), colors @ [65536, 256, 1]], axis=1)
+            listed = subprocess.run(
+                [self.list_voxels, path, str(7 - level), "colors"], capture_output=True, check=True
+            )
+            listed = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 4)
+            expected = numpy.stack([keys(listed[:, :3]), listed[:, 3]], axis=1)
+            expected = numpy.unique(expected, axis=0)
+            assert len(expected) > 100 and len(numpy.unique(expected[:, 1])) > 100
+            assert (found[numpy.argsort(found[:, 0])] == expected).all(), "other colors"
+            colored_bytes = os.path.getsize(output)
+            self.run("export", path, *options, "--gray")
+            assert os.path.getsize(output) < colored_bytes
+            print(f"colors of level {level}: {len(expected)} voxels, {colored_bytes} bytes")
+
     def check_refusals(self):
         """What exists, or has no voxels, is refused, and nothing is left behind."""
         path, _ = self.scene(64)
@@ -149,6 +198,7 @@ def main():
         test = Test(voxdag, list_voxels, name, tools)
         for resolution, options in CASES:
             test.check(resolution, options)
+        test.check_colors()
         test.check_refusals()
     return 0
 

@@ -1,6 +1,8 @@
-// list_voxels FILE SHIFT: writes x, y, z of the voxels of a .vdag file, shifted right by SHIFT
-// bits, to the standard output as 32-bit integers. What exports are compared with: it shares
-// nothing with them but the file, which it reads with the standalone reader.
+// list_voxels FILE SHIFT [colors]: writes x, y, z of the voxels of a .vdag file, shifted right by
+// SHIFT bits, to the standard output as 32-bit integers, and with `colors` red * 65536 + green *
+// 256
+// + blue of the cell that has these coordinates. What exports are compared with: it shares nothing
+// with them but the file, which it reads with the standalone reader.
 #include <cstdio>
 #include <cstdlib>
 
@@ -10,6 +12,8 @@ namespace {
 
 struct Lister {
   int shift;
+  voxdag_reader::ColorCursor* colors;
+  uint32_t level;
   static bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) { return true; }
   void brick(int64_t x, int64_t y, int64_t z, uint64_t mask, uint64_t) const {
     for (int64_t i = 0; i < 4; ++i)
@@ -20,6 +24,11 @@ struct Lister {
                                      static_cast<int32_t>((y + j) >> shift),
                                      static_cast<int32_t>((z + k) >> shift)};
             std::fwrite(voxel, sizeof(voxel), 1, stdout);
+            if (!colors) continue;
+            const auto color = colors->color(voxel[0], voxel[1], voxel[2], level);
+            if (!color) std::exit(1);
+            const int32_t packed = color->r << 16 | color->g << 8 | color->b;
+            std::fwrite(&packed, sizeof(packed), 1, stdout);
           }
   }
 };
@@ -27,8 +36,11 @@ struct Lister {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) return 2;
+  if (argc != 3 && argc != 4) return 2;
   const voxdag_reader::File file(argv[1]);
-  file.walk(Lister{std::atoi(argv[2])});
+  const int shift = std::atoi(argv[2]);
+  voxdag_reader::ColorCursor colors(file);
+  file.walk(Lister{shift, argc == 4 ? &colors : nullptr,
+                   file.grid_levels() - static_cast<uint32_t>(shift)});
   return std::fflush(stdout) == 0 ? 0 : 1;
 }

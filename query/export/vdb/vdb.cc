@@ -1,5 +1,9 @@
-// OpenVDB's .vdb and NanoVDB's .nvdb, by their own libraries: a grid of voxels that are on. It is
-// in memory as a whole before it is written, so its size is counted first.
+// OpenVDB's .vdb and NanoVDB's .nvdb, by their own libraries: a grid of voxels that are on, and
+// where the file has colors a grid of linear light with the name that Houdini and Blender give it.
+// They are in memory as a whole before they are written, so their size is counted first.
+//
+// Half floats are converted without Imath's table, whose library would have to be linked.
+#define IMATH_HALF_NO_LOOKUP_TABLE
 #include <openvdb/openvdb.h>
 
 // NanoVDB's conversion needs the former first.
@@ -10,9 +14,11 @@
 #include <bit>
 #include <ostream>
 #include <streambuf>
+#include <vector>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
+#include "query/export/color/linear_colors.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/export/selected_bricks.h"
@@ -27,7 +33,14 @@ struct VdbNodeBytes {
 };
 constexpr VdbNodeBytes kOpenVdbBytes = {192, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kNanoVdbBytes = {96, 34 << 10, 272 << 10};
+// A color is three floats; a node has one, padded, or a pointer for each child.
+constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
 constexpr const char* kGridName = "voxels";
+constexpr const char* kColorGridName = "Cd";
+
+VdbNodeBytes operator+(const VdbNodeBytes& a, const VdbNodeBytes& b) {
+  return {a.leaf + b.leaf, a.lower + b.lower, a.upper + b.upper};
+}
 
 // Throws what a library threw as an Error; errors of ours, and those of memory, come through.
 template <class Work>
@@ -121,30 +134,41 @@ MemoryCharge charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
   if (bytes == 0) refuse_empty(job);
   if (bytes > limit)
     refuse_size(job,
-                "the grid would take over " + size_text(limit) + " of memory, which is --memory",
+                "the grid would take over " + size_text(limit) + " of memory, which is --memory" +
+                    (job.has_colors ? " (without colors, --gray, it takes less)" : ""),
                 [&](uint32_t level) {
                   return vdb_bytes(job, coarser(job.selection, level), node, limit) <= limit;
                 });
   return MemoryCharge(job.budget, bytes, "the grid");
 }
 
+openvdb::Coord vdb_coord(const CellCorner& cell) {
+  return openvdb::Coord(static_cast<openvdb::Int32>(cell[0]), static_cast<openvdb::Int32>(cell[1]),
+                        static_cast<openvdb::Int32>(cell[2]));
+}
+
 template <class GridType>
-typename GridType::Ptr make_vdb_grid(const ExportJob& job, uint64_t& voxels) {
+typename GridType::Ptr empty_vdb_grid(const ExportJob& job, const char* name) {
   auto grid = GridType::create();
-  grid->setName(kGridName);
+  grid->setName(name);
   // A voxel's index is where its center is.
   auto transform = openvdb::math::Transform::createLinearTransform(job.cell_edge());
   transform->postTranslate({job.world(0, 0.5), job.world(1, 0.5), job.world(2, 0.5)});
   grid->setTransform(transform);
+  return grid;
+}
+
+// The selected voxels in a grid, where value(cell) is what a voxel has.
+template <class GridType, class Value>
+typename GridType::Ptr make_vdb_grid(const ExportJob& job, const char* name, uint64_t& voxels,
+                                     const Value& value) {
+  const auto grid = empty_vdb_grid<GridType>(job, name);
   ExportStage stage(job, "build grid", 0, "voxels");
   typename GridType::Accessor accessor = grid->getAccessor();
   for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
-    const auto coordinate = [](int64_t cell) { return static_cast<openvdb::Int32>(cell); };
-    auto* const leaf = accessor.touchLeaf(
-        openvdb::Coord(coordinate(corner[0]), coordinate(corner[1]), coordinate(corner[2])));
+    auto* const leaf = accessor.touchLeaf(vdb_coord(corner));
     for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
-      leaf->setValueOn(
-          openvdb::Coord(coordinate(cell[0]), coordinate(cell[1]), coordinate(cell[2])), true);
+      leaf->setValueOn(vdb_coord(cell), value(cell));
     });
     const auto count = static_cast<uint64_t>(std::popcount(mask));
     voxels += count;
@@ -152,6 +176,23 @@ typename GridType::Ptr make_vdb_grid(const ExportJob& job, uint64_t& voxels) {
     return true;
   });
   return grid;
+}
+
+template <class GridType>
+typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t& voxels) {
+  return make_vdb_grid<GridType>(job, kGridName, voxels, [](const CellCorner&) { return true; });
+}
+
+openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job) {
+  voxdag_reader::ColorCursor colors(job.file);
+  const auto& linear = linear_of_srgb();
+  const auto light = [&](uint8_t channel) { return static_cast<float>(linear[channel]) / 65535; };
+  uint64_t voxels = 0;
+  return make_vdb_grid<openvdb::Vec3SGrid>(
+      job, kColorGridName, voxels, [&](const CellCorner& cell) {
+        const voxdag_reader::Rgb color = color_of_cell(job, colors, cell);
+        return openvdb::Vec3f(light(color.r), light(color.g), light(color.b));
+      });
 }
 
 template <class Write>
@@ -175,33 +216,41 @@ ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, const Write&
 }  // namespace
 
 ExportReport write_vdb(const ExportJob& job) {
-  const MemoryCharge charge = charge_vdb(job, kOpenVdbBytes);
+  const MemoryCharge charge =
+      charge_vdb(job, job.has_colors ? kOpenVdbBytes + kColorBytes : kOpenVdbBytes);
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
     uint64_t voxels = 0;
-    const auto grid = make_vdb_grid<openvdb::BoolGrid>(job, voxels);
+    openvdb::GridPtrVec grids = {make_voxel_grid<openvdb::BoolGrid>(job, voxels)};
+    if (job.has_colors) {
+      grids.push_back(make_color_grid(job));
+      // Half floats tell all bytes of sRGB apart.
+      grids.back()->setSaveFloatAsHalf(true);
+    }
     return write_grid_file(job, voxels, [&](std::ostream& stream) {
       // Without a codec that some readers may lack: leaves are bits anyway.
       openvdb::io::Stream out(stream);
       out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
-      out.write(openvdb::GridPtrVec{grid});
+      out.write(grids);
     });
   });
 }
 
 ExportReport write_nvdb(const ExportJob& job) {
-  const VdbNodeBytes both = {kOpenVdbBytes.leaf + kNanoVdbBytes.leaf,
-                             kOpenVdbBytes.lower + kNanoVdbBytes.lower,
-                             kOpenVdbBytes.upper + kNanoVdbBytes.upper};
+  VdbNodeBytes both = kOpenVdbBytes + kNanoVdbBytes;
+  if (job.has_colors) both = both + kColorBytes + kColorBytes;
   const MemoryCharge charge = charge_vdb(job, both);
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
     uint64_t voxels = 0;
-    auto grid = make_vdb_grid<openvdb::MaskGrid>(job, voxels);
-    const auto handle = nanovdb::openToNanoVDB<nanovdb::HostBuffer>(*grid);
-    grid.reset();
+    std::vector<nanovdb::GridHandle<nanovdb::HostBuffer>> grids;
+    grids.push_back(nanovdb::openToNanoVDB<nanovdb::HostBuffer>(
+        *make_voxel_grid<openvdb::MaskGrid>(job, voxels)));
+    if (job.has_colors)
+      grids.push_back(nanovdb::openToNanoVDB<nanovdb::HostBuffer>(*make_color_grid(job)));
     return write_grid_file(job, voxels, [&](std::ostream& stream) {
-      nanovdb::io::writeGrid(stream, handle, nanovdb::io::Codec::NONE);
+      nanovdb::io::writeGrids<nanovdb::HostBuffer, std::vector>(stream, grids,
+                                                                nanovdb::io::Codec::NONE);
     });
   });
 }
