@@ -65,8 +65,10 @@ std::string extract(const std::string& path, const std::string& output, uint32_t
 
 std::string export_file(const std::string& path, const std::string& output,
                         const std::string& format, uint32_t grid_levels, const Corner& low,
-                        const Corner& high, const std::string& memory, nb::object progress) {
+                        const Corner& high, const std::string& memory, bool gray,
+                        nb::object progress) {
   query::ExportRequest request;
+  request.gray = gray;
   request.format = &query::export_format(format);
   request.selection = selection_of(grid_levels, low, high);
   request.output = output;
@@ -103,7 +105,7 @@ void bind_derive(nb::module_& module) {
              nb::arg("threads"), nb::arg("progress").none());
   module.def("export", &export_file, nb::arg("path"), nb::arg("output"), nb::arg("format"),
              nb::arg("grid_levels"), nb::arg("low"), nb::arg("high"), nb::arg("memory"),
-             nb::arg("progress").none());
+             nb::arg("gray"), nb::arg("progress").none());
   module.def("export_paths", &export_paths, nb::arg("format"), nb::arg("output"));
   module.def("export_formats", &export_formats);
 }

@@ -32,6 +32,9 @@ def test_export(path, dag, tmp_path):
     assert np.array_equal(arrays["cells"], dag.points(level=5))
     assert np.allclose(arrays["positions"], dag.to_world(dag.points(level=5) + 0.5, 5))
     assert "hashdag" in voxdag.export_formats()
+    # A file without colors is the same with gray=True.
+    voxdag.export(path, tmp_path / "gray.npz", to="npz", level=5, gray=True)
+    assert (tmp_path / "gray.npz").read_bytes() == (tmp_path / "voxels.npz").read_bytes()
 
 
 @pytest.mark.parametrize("derive, code", [

@@ -33,9 +33,11 @@ def extract(path: Path, output: Path, *, region: Optional[Region] = None,
 
 def export(path: Path, output: Path, *, to: str, region: Optional[Region] = None,
            level: Optional[int] = None, world: bool = False, memory: Union[int, str, None] = None,
-           force: bool = False, progress: Optional[Progress] = None) -> Dict[str, Any]:
+           gray: bool = False, force: bool = False,
+           progress: Optional[Progress] = None) -> Dict[str, Any]:
     """Writes a .vdag file, or a part of it, in the format of another program (docs/export.md).
 
+    Formats that have a place for colors get those of the file, unless `gray` is True.
     `to` is one of export_formats(). Returns the files that were written, their bytes, the voxels,
     and notes on how to open them. Raises Error.
     """
@@ -44,7 +46,7 @@ def export(path: Path, output: Path, *, to: str, region: Optional[Region] = None
     with Dag(path) as dag:
         low, high = dag._region(region, level, world)
         levels = dag._levels(level)
-    return json.loads(_native.export(path, output, to, levels, low, high, _memory(memory),
+    return json.loads(_native.export(path, output, to, levels, low, high, _memory(memory), gray,
                                      progress))
 
 

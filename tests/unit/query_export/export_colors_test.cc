@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 #include <set>
 
 #include "core/format/global/open_global.h"
@@ -164,6 +165,32 @@ TEST_F(ExportColors, HashDagHasThemInTheOrderOfItsVoxels) {
     EXPECT_EQ(colors.count(), cells.size());
     for (const auto& [cell, color] : cells) ASSERT_EQ(colors.color(cell), color);
   });
+}
+
+// Damage of the colors or of the levels is an Error, or a file; never a crash.
+TEST_F(ExportColors, DamageIsAnErrorOrHarmless) {
+  open(6, 6, smooth_colors(6, 20), 6);
+  file_.reset();
+  const std::string intact = read_bytes(folder_.file("a.vdag"));
+  std::mt19937 random(3);
+  int refused = 0;
+  for (int round = 0; round < 45; ++round) {
+    std::string damaged = intact;
+    const size_t from = 4096 + random() % (intact.size() - 4096 - 64);
+    for (size_t i = 0; i < 64; ++i) damaged[from + i] = static_cast<char>(random());
+    write_bytes(folder_.file("a.vdag"), damaged);
+    SCOPED_TRACE(testing::Message() << "64 bytes from byte " << from);
+    try {
+      file_ = open_global_file(folder_.file("a.vdag"));
+      bytes_of(std::array{"vox", "glb", "hashdag"}[static_cast<size_t>(round) % 3],
+               {6, whole_grid(6)});
+    } catch (const Error&) {
+      ++refused;
+    }
+    for (const DirectoryEntry& entry : system_files().list(folder_.path()))
+      EXPECT_FALSE(entry.name.ends_with(".partial")) << entry.name;
+  }
+  EXPECT_GT(refused, 5);
 }
 
 // Without its colors a file is written like one that has none.
