@@ -1,178 +1,165 @@
-// How near the colors of a file are to the scene's: peak signal-to-noise ratios, over a sample of
-// its cells, of the colors by the rule and of those in the file against the oracle
-// (tests/oracle/surface_color.h).
+// What a color costs: the rule and the encoding, on one core, for a generated scene.
 //
-//     bench_color [--cells N] [--points N] SCENE FILE.vdag
+//     bench_color [K]
 //
-// --cells: about how many cells are compared (default: 200000).
-// --points: how many points of a cell the oracle looks at (default: 128).
-#include <cinttypes>
+// A wavy, tilted sphere in a color grid of K^3 cells (default 1024), with an image of 1024^2
+// texels, is baked region by region as a build does it. Printed are the nanoseconds of CPU time per
+// colored cell, the least of three runs.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
-#include <exception>
-#include <string>
+#include <ctime>
+#include <random>
 #include <vector>
 
-#include "bench/color/sampled_cells.h"
-#include "bench/color/scene_looks.h"
-#include "core/base/error.h"
-#include "core/color/color_of.h"
+#include "core/color/blocks/region.h"
 #include "core/color/rule/bake_region.h"
-#include "core/format/global/open_global.h"
-#include "core/scene/textures/texture_set.h"
+#include "core/scene/textures/pyramid.h"
 
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kMemoryBytes = uint64_t{16} << 30;
+constexpr int kRuns = 3;
+constexpr uint32_t kImageEdge = 1024;
+// The sphere's triangles, of some 16 x 16 cells.
+constexpr double kTriangleCells = 16;
 
-struct Arguments {
-  uint64_t cells = 200000;
-  int points = 128;
-  std::vector<std::string> files;
+double cpu_seconds() {
+  timespec time;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+// The pyramid of one image of noise on waves.
+struct Image {
+  MemoryBudget budget{uint64_t{1} << 30};
+  TextureLayout layout;
+  std::vector<uint64_t> pages;
+
+  Image() {
+    layout.levels = pyramid_levels(kImageEdge, kImageEdge, 0);
+    layout.first_level = {0, static_cast<uint32_t>(layout.levels.size())};
+    const TextureLevel& last = layout.levels.back();
+    pages.resize(static_cast<size_t>(last.first_page + last.pages()) * kPageTexels);
+    PyramidBuilder builder(layout.levels, budget, [&](uint64_t first, auto texels) {
+      std::ranges::copy(texels, pages.begin() + static_cast<ptrdiff_t>(first * kPageTexels));
+    });
+    std::mt19937 random(1);
+    std::vector<uint64_t> row(kImageEdge);
+    for (uint32_t y = 0; y < kImageEdge; ++y) {
+      for (uint32_t x = 0; x < kImageEdge; ++x) {
+        row[x] = uint64_t{0xffff} << 48;
+        for (uint32_t c = 0; c < 3; ++c) {
+          const double wave = std::sin(0.013 * (c + 1) * x + 0.021 * y) + 1;
+          row[x] |= static_cast<uint64_t>(28000 * wave + random() % 9000) << 16 * c;
+        }
+      }
+      builder.add_row(row);
+    }
+  }
 };
 
-// Cells with the triangles near them.
-struct Neighborhood {
+// The sphere's point at these shares of its circles.
+std::array<int64_t, 3> point_at(const ColorGrid& grid, double along, double up) {
+  const double edge = static_cast<double>(uint64_t{kUnitsPerVoxel} << grid.levels);
+  const double angle = 2 * M_PI * along, height = M_PI * up;
+  const double radius = edge * (0.38 + 0.02 * std::sin(7 * angle) * std::sin(5 * height));
+  const double x = std::sin(height) * std::cos(angle), y = std::sin(height) * std::sin(angle),
+               z = std::cos(height);
+  const auto place = [&](double at) { return static_cast<int64_t>(edge / 2 + radius * at) | 1; };
+  return {place(0.8 * x + 0.6 * z), place(y), place(0.8 * z - 0.6 * x)};
+}
+
+std::vector<FixedSurface> sphere(const ColorGrid& grid) {
+  const auto rows =
+      static_cast<int>(std::ldexp(1.2 / kTriangleCells, static_cast<int>(grid.color_levels)));
   std::vector<FixedSurface> surfaces;
-  std::vector<std::vector<uint32_t>> near;  // of each cell: indices of surfaces
-};
-
-Neighborhood find_surfaces(TriangleSource& scene, const Grid& grid, const SampledCells& cells) {
-  Neighborhood found;
-  found.near.resize(cells.positions().size());
-  std::vector<uint32_t> touched;
-  const auto cursor = scene.open(1);
-  cursor->read_surfaces(0, scene.declared_triangles(), [&](std::span<const SurfaceTriangle> batch) {
-    for (const SurfaceTriangle& triangle : batch) {
-      FixedSurface surface;
-      if (snap_triangle(grid, triangle.position, surface.position) != SnapResult::kInside) continue;
-      surface.corners = triangle.corners;
-      surface.material = triangle.material;
-      touched.clear();
-      cells.find_near(surface.position, touched);
-      if (touched.empty()) continue;
-      for (const uint32_t cell : touched)
-        found.near[cell].push_back(static_cast<uint32_t>(found.surfaces.size()));
-      found.surfaces.push_back(surface);
-    }
-  });
-  return found;
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < 2 * rows; ++j)
+      for (int half = 0; half < 2; ++half) {
+        FixedSurface surface;
+        for (int k = 0; k < 3; ++k) {
+          const int corner = half == 0 ? k : 3 - k;
+          const double along = (j + corner % 2) / (2.0 * rows),
+                       up = (i + corner / 2) / (1.0 * rows);
+          const auto point = point_at(grid, along, up);
+          std::copy(point.begin(), point.end(), surface.position.v[k]);
+          surface.corners[static_cast<size_t>(k)].texture = {
+              static_cast<int64_t>(6 * along * (1 << kTextureBits)),
+              static_cast<int64_t>(3 * up * (1 << kTextureBits))};
+        }
+        surfaces.push_back(surface);
+      }
+  return surfaces;
 }
 
-// The rule's color of one cell.
-class RuleColors {
- public:
-  RuleColors(const ColorGrid& grid, const TextureSet& textures, TextureReader& reader)
-      : grid_(grid), baker_(grid, textures.materials(), reader) {}
-  std::array<uint8_t, 3> color(const CellPosition& cell, std::span<const FixedSurface> near) {
-    baker_.bake({grid_.color_levels, {cell[0], cell[1], cell[2]}}, near, baked_);
-    if (baked_.size() != 1)
-      throw Error(ErrorCode::kInvalidInput, "nothing of the scene touches a cell of the file");
-    return color_of(baked_[0].sum).rgb;
+// The surfaces by the regions that their boxes reach.
+std::vector<std::vector<FixedSurface>> by_region(const ColorGrid& grid) {
+  const uint32_t level = grid.region_level();
+  std::vector<std::vector<FixedSurface>> regions(size_t{1} << 3 * level);
+  for (const FixedSurface& surface : sphere(grid)) {
+    const CellBox box(surface.position, grid.levels, level);
+    for (int64_t x = box.low[0]; x <= box.high[0]; ++x)
+      for (int64_t y = box.low[1]; y <= box.high[1]; ++y)
+        for (int64_t z = box.low[2]; z <= box.high[2]; ++z)
+          regions[morton_encode(static_cast<uint32_t>(x), static_cast<uint32_t>(y),
+                                static_cast<uint32_t>(z))]
+              .push_back(surface);
   }
-
- private:
-  const ColorGrid grid_;
-  RegionBaker<TextureReader> baker_;
-  std::vector<ColoredCell> baked_;
-};
-
-void print(const char* what, const oracle::ColorError& error) {
-  std::printf("  %-28s %6.2f dB   more than 48 off: %.3f %%\n", what, error.psnr(),
-              100 * error.part_above(48));
+  return regions;
 }
 
-double bits_per_cell(const voxdag_reader::File& file, uint64_t cells) {
-  uint64_t bytes = 0;
-  for (uint32_t t = 0; t < file.colors().tier_count(); ++t)
-    bytes += 16 * file.colors().tier(t).units + 32 * file.colors().tier(t).region_count;
-  return 8 * static_cast<double>(bytes) / static_cast<double>(cells);
-}
-
-void compare(const Arguments& arguments) {
-  const auto file = open_global_file(arguments.files[1]);
-  if (!file->has_colors())
-    throw Error(ErrorCode::kInvalidInput, arguments.files[1] + " has no colors");
-  MemoryBudget budget(kMemoryBytes);
-  NoProgress progress;
-  const CancelToken cancel;
-  const auto scene = open_scene(system_files(), {arguments.files[0]}, {}, budget, cancel);
-  const SceneMaterials materials = scene->materials();
-  const SampledCells cells(*file, arguments.cells);
-  const auto origin = file->origin();
-  const Grid grid =
-      Grid::given({origin[0], origin[1], origin[2]}, file->edge(), file->grid_levels());
-  const Neighborhood found = find_surfaces(*scene, grid, cells);
-  const SceneLooks looks(materials, budget);
-  std::vector<oracle::Surface> surfaces;
-  for (const FixedSurface& surface : found.surfaces) surfaces.push_back(looks.surface(surface));
-
-  const auto textures = TextureSet::prepare(
-      system_files(), materials, arguments.files[1] + ".images", 1, budget, progress, cancel);
-  const auto reader = textures->open(uint64_t{256} << 20);
-  RuleColors rule({file->grid_levels(), file->color_levels()}, *textures, *reader);
-  voxdag_reader::ColorCursor stored(*file);
-  oracle::ColorError of_rule, of_file, of_blocks;
-  uint64_t without_area = 0;
-  std::vector<const oracle::Surface*> near;
-  std::vector<FixedSurface> near_fixed;
-  const int64_t edge = int64_t{1} << cells.cell_bits();
-  for (size_t i = 0; i < cells.positions().size(); ++i) {
-    const CellPosition& cell = cells.positions()[i];
-    near.clear();
-    near_fixed.clear();
-    for (const uint32_t s : found.near[i]) {
-      near.push_back(&surfaces[s]);
-      near_fixed.push_back(found.surfaces[s]);
+void run(uint32_t color_levels) {
+  const ColorGrid grid{color_levels, color_levels};
+  const Image image;
+  Material material;
+  material.image = 0;
+  const auto regions = by_region(grid);
+  TextureReader textures(image.layout, image.pages.data());
+  RegionBaker<TextureReader> baker(grid, {&material, 1}, textures);
+  std::vector<ColoredCell> cells;
+  double rule = 1e9, encoding = 1e9;
+  uint64_t count = 0, bytes = 0;
+  for (int i = 0; i < kRuns; ++i) {
+    double baked = 0, encoded = 0;
+    count = bytes = 0;
+    for (uint64_t morton = 0; morton < regions.size(); ++morton) {
+      if (regions[morton].empty()) continue;
+      Cube region{grid.region_level(), {}};
+      morton_decode(morton, region.position[0], region.position[1], region.position[2]);
+      const double start = cpu_seconds();
+      baker.bake(region, regions[morton], cells);
+      const double middle = cpu_seconds();
+      baked += middle - start;
+      if (cells.empty()) continue;
+      count += cells.size();
+      bytes += encode_region(color_levels - grid.region_level(), morton, cells).blocks.size();
+      encoded += cpu_seconds() - middle;
     }
-    const auto mean = oracle::mean_color(near, {cell[0] * edge, cell[1] * edge, cell[2] * edge},
-                                         edge, arguments.points);
-    const auto by_rule = rule.color(cell, near_fixed);
-    const auto in_file = stored.color(cell[0], cell[1], cell[2], file->color_levels());
-    if (!in_file) file->broken_colors("a cell has none");
-    of_blocks.add(by_rule, {in_file->r, in_file->g, in_file->b});
-    if (!mean) {
-      ++without_area;
-      continue;
-    }
-    of_rule.add(*mean, by_rule);
-    of_file.add(*mean, {in_file->r, in_file->g, in_file->b});
+    rule = std::min(rule, baked);
+    encoding = std::min(encoding, encoded);
   }
-  std::printf("%s: %" PRIu64 "^3, %" PRIu64 " cells, %zu compared, %" PRIu64
-              " without area; %.1f M texels; %.2f bits per cell\n",
-              arguments.files[1].c_str(), uint64_t{1} << file->color_levels(), cells.file_cells(),
-              cells.positions().size(), without_area, static_cast<double>(looks.texels()) / 1e6,
-              bits_per_cell(*file, cells.file_cells()));
-  print("rule, against the oracle", of_rule);
-  print("file, against the oracle", of_file);
-  print("file, against the rule", of_blocks);
+  const double each = 1e9 / static_cast<double>(count);
+  std::printf("%llu cells, %.2f bits each: rule %.1f ns, encoding %.1f ns, both %.1f ns per cell\n",
+              static_cast<unsigned long long>(count),
+              8 * static_cast<double>(bytes) / static_cast<double>(count), rule * each,
+              encoding * each, (rule + encoding) * each);
 }
 
 }  // namespace
 }  // namespace voxdag
 
 int main(int argc, char** argv) {
-  voxdag::Arguments arguments;
-  for (int i = 1; i < argc; ++i) {
-    const bool has_value = i + 1 < argc;
-    if (std::strcmp(argv[i], "--cells") == 0 && has_value)
-      arguments.cells = std::strtoull(argv[++i], nullptr, 10);
-    else if (std::strcmp(argv[i], "--points") == 0 && has_value)
-      arguments.points = std::atoi(argv[++i]);
-    else
-      arguments.files.emplace_back(argv[i]);
-  }
-  if (arguments.files.size() != 2 || arguments.points < 1) {
-    std::fprintf(stderr, "usage: %s [--cells N] [--points N] SCENE FILE.vdag\n", argv[0]);
+  const int resolution = argc > 1 ? std::atoi(argv[1]) : 1024;
+  if (resolution < 64 || resolution > 8192 || (resolution & (resolution - 1)) != 0) {
+    std::fprintf(stderr, "usage: bench_color [K], a power of two, 64 <= K <= 8192\n");
     return 2;
   }
-  try {
-    voxdag::compare(arguments);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  uint32_t levels = 0;
+  while (1 << levels < resolution) ++levels;
+  voxdag::run(levels);
   return 0;
 }

@@ -37,14 +37,14 @@ struct SrgbThresholds {
       54183, 54708, 55235, 55766, 56300, 56836, 57376, 57918, 58464, 59012, 59564, 60118, 60675,
       61236, 61799, 62366, 62935, 63508, 64083, 64662, 65244, 65535};
 };
-// Element k: what is stored for the intensity 64 k, or one less.
+// Element k: what is stored for the intensity 16 k, or one less.
 struct SrgbStarts {
-  uint8_t of[1024] = {};
+  uint8_t of[4096] = {};
   constexpr SrgbStarts() {
     constexpr SrgbThresholds kThresholds{};
     uint32_t stored = 0;
-    for (uint32_t k = 0; k < 1024; ++k) {
-      while (stored < 255 && kThresholds.of[stored] <= 64 * k) ++stored;
+    for (uint32_t k = 0; k < 4096; ++k) {
+      while (stored < 255 && kThresholds.of[stored] <= 16 * k) ++stored;
       of[k] = static_cast<uint8_t>(stored);
     }
   }
@@ -54,9 +54,9 @@ struct SrgbStarts {
 VOXDAG_HD inline uint8_t srgb_of(uint32_t intensity) {
   static constexpr SrgbThresholds kThresholds{};
   static constexpr SrgbStarts kStarts{};
-  uint32_t stored = kStarts.of[intensity >> 6];
-  while (stored < 255 && kThresholds.of[stored] <= intensity) ++stored;
-  return static_cast<uint8_t>(stored);
+  // Thresholds are more than 16 apart: at most one of them is between the start and the intensity.
+  const uint32_t stored = kStarts.of[intensity >> 4];
+  return static_cast<uint8_t>(stored + (stored < 255) * (kThresholds.of[stored] <= intensity));
 }
 
 VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denominator) {
@@ -64,20 +64,44 @@ VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denomina
   return quotient + (rest >= denominator - rest ? 1 : 0);
 }
 
+// Divides several numbers by one: rounded_quotient(), or `most` if that is less; with one division
+// in doubles, which is at most one off and corrected.
+class Divisor {
+ public:
+  VOXDAG_HD explicit Divisor(uint64_t divisor)
+      : divisor_(divisor), inverse_(1.0 / static_cast<double>(static_cast<int64_t>(divisor))) {}
+  VOXDAG_HD uint32_t divide(uint64_t numerator, uint32_t most) const {
+    if ((numerator | divisor_) >> 61 != 0) {
+      const uint64_t quotient = rounded_quotient(numerator, divisor_);
+      return quotient < most ? static_cast<uint32_t>(quotient) : most;
+    }
+    const double estimate = static_cast<double>(static_cast<int64_t>(numerator)) * inverse_ + 0.5;
+    if (!(estimate < most + 1.0)) return most;
+    auto quotient = static_cast<int64_t>(estimate);
+    const auto divisor = static_cast<int64_t>(divisor_);
+    const int64_t rest = 2 * (static_cast<int64_t>(numerator) - quotient * divisor);
+    quotient += rest >= divisor ? 1 : 0;
+    quotient -= rest < -divisor ? 1 : 0;
+    return quotient < most ? static_cast<uint32_t>(quotient) : most;
+  }
+
+ private:
+  uint64_t divisor_;
+  double inverse_;
+};
+
 }  // namespace color
 
 // Of a sum whose weight is above 0. Surfaces count by weight and alpha; where all of them are
 // transparent, by weight, and alpha is 0.
 VOXDAG_HD inline Color color_of(const ColorSum& sum) {
   const bool visible = sum.seen_weight != 0;
+  const color::Divisor divisor(visible ? sum.seen_weight : sum.weight);
   Color color;
-  for (size_t c = 0; c < 3; ++c) {
-    const uint64_t mean = visible ? color::rounded_quotient(sum.seen[c], sum.seen_weight)
-                                  : color::rounded_quotient(sum.plain[c], sum.weight);
-    color.rgb[c] = color::srgb_of(static_cast<uint32_t>(mean < 65535 ? mean : 65535));
-  }
-  const uint64_t alpha = color::rounded_quotient(sum.seen_weight, sum.weight);
-  color.alpha = static_cast<uint8_t>(alpha < 255 ? alpha : 255);
+  for (size_t c = 0; c < 3; ++c)
+    color.rgb[c] = color::srgb_of(divisor.divide(visible ? sum.seen[c] : sum.plain[c], 65535));
+  if (sum.seen_weight == 255 * sum.weight) return color;  // as initialized: 255
+  color.alpha = static_cast<uint8_t>(color::Divisor(sum.weight).divide(sum.seen_weight, 255));
   return color;
 }
 

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstring>
 
 #include "core/base/host_device.h"
 
@@ -18,12 +19,13 @@ struct ColorSum {
   uint64_t weight = 0;
 
   VOXDAG_HD void add(const ColorSum& other) {
-    for (int c = 0; c < 3; ++c) {
-      seen[static_cast<size_t>(c)] += other.seen[static_cast<size_t>(c)];
-      plain[static_cast<size_t>(c)] += other.plain[static_cast<size_t>(c)];
-    }
-    seen_weight += other.seen_weight;
-    weight += other.weight;
+    // As eight equal numbers, of which compilers add several at once.
+    uint64_t sums[8], more[8];
+    static_assert(sizeof sums == sizeof(ColorSum));
+    std::memcpy(sums, this, sizeof sums);
+    std::memcpy(more, &other, sizeof more);
+    for (int i = 0; i < 8; ++i) sums[i] += more[i];
+    std::memcpy(static_cast<void*>(this), sums, sizeof sums);
   }
   bool operator==(const ColorSum&) const = default;
 };

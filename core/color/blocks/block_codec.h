@@ -3,14 +3,13 @@
 //
 // A block has two ends and, for each cell, a weight between them. The ends come from the colors'
 // principal axis and one step of least squares, once for each of the two modes, of which the one
-// with the smaller squared error is taken. All of it is integer arithmetic, so that the same colors
-// are the same bytes on every machine. Blocks of one or two colors are exact.
+// with the smaller squared error is taken. All of it is exact, so that the same colors are the same
+// bytes on every machine. Blocks of one or two colors are exact.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "core/color/color_sum.h"
 
@@ -22,6 +21,10 @@ inline constexpr size_t kBlockBytes = 16;
 using ColorBlock = std::array<std::byte, kBlockBytes>;
 
 // 1 to 32 colors; their alpha is not stored. The weights of cells that are not there are 0.
-ColorBlock encode_block(std::span<const Color> colors);
+using EncodeBlock = ColorBlock (*)(const Color* colors, size_t count);
+ColorBlock encode_block_portable(const Color* colors, size_t count);
+// The same for AVX2, with the same results; null if it was not built or this machine cannot run it.
+EncodeBlock encode_block_avx2();
+EncodeBlock fastest_block_encoder();
 
 }  // namespace voxdag

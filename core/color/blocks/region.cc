@@ -7,19 +7,19 @@
 namespace voxdag {
 namespace {
 
-void add_colors(std::span<const ColoredCell> cells, std::vector<Color>& colors) {
-  for (const ColoredCell& cell : cells) colors.push_back(color_of(cell.sum));
-}
-
-// The cells' parents, in order.
-std::vector<ColoredCell> parents_of(std::span<const ColoredCell> cells) {
-  std::vector<ColoredCell> parents;
+// Appends the cells' colors; `parents` become their parents, in order.
+void add_colors(std::span<const ColoredCell> cells, std::vector<Color>& colors,
+                std::vector<ColoredCell>& parents) {
+  ColoredCell parent{cells.front().code >> 3, {}};
   for (const ColoredCell& cell : cells) {
-    const uint32_t code = cell.code >> 3;
-    if (parents.empty() || parents.back().code != code) parents.push_back({code, {}});
-    parents.back().sum.add(cell.sum);
+    colors.push_back(color_of(cell.sum));
+    if (cell.code >> 3 != parent.code) {
+      parents.push_back(parent);
+      parent = {cell.code >> 3, {}};
+    }
+    parent.sum.add(cell.sum);
   }
-  return parents;
+  parents.push_back(parent);
 }
 
 void add_prefix(std::span<const ColoredCell> cells, std::vector<uint32_t>& prefix) {
@@ -36,21 +36,22 @@ EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const Co
   region.morton = morton;
   std::vector<Color> colors;
   colors.reserve(cells.size() + cells.size() / 2);
-  std::vector<ColoredCell> coarser;
+  std::vector<ColoredCell> coarser, parents;
   for (uint32_t i = 0;; ++i) {
     region.counts[i] = static_cast<uint32_t>(cells.size());
-    add_colors(cells, colors);
+    add_colors(cells, colors, parents);
     if (i + kPrefixLevels < levels) add_prefix(cells, region.prefix);
     if (i == levels) break;
-    coarser = parents_of(cells);
+    coarser.swap(parents);
+    parents.clear();
     cells = coarser;
   }
   region.total = cells.front().sum;
-  region.blocks.reserve((colors.size() + kBlockCells - 1) / kBlockCells * kBlockBytes);
+  const EncodeBlock encode_block = fastest_block_encoder();
+  region.blocks.resize((colors.size() + kBlockCells - 1) / kBlockCells * kBlockBytes);
   for (size_t at = 0; at < colors.size(); at += kBlockCells) {
-    const ColorBlock block =
-        encode_block(std::span(colors).subspan(at, std::min(kBlockCells, colors.size() - at)));
-    region.blocks.insert(region.blocks.end(), block.begin(), block.end());
+    const ColorBlock block = encode_block(&colors[at], std::min(kBlockCells, colors.size() - at));
+    std::copy(block.begin(), block.end(), &region.blocks[at / kBlockCells * kBlockBytes]);
   }
   return region;
 }

@@ -5,8 +5,10 @@
 // `Textures` is a reader of images, linear and with 16 bits per channel, as pyramids of
 // box-filtered levels, the first one being the image:
 //     uint32_t levels(uint32_t image), width(uint32_t image, uint32_t level), height(...);
-//     uint64_t texel(uint32_t image, uint32_t level, uint32_t x, uint32_t y);  // r lowest, then g,
-//     b, a
+//     View view(uint32_t image, uint32_t level);
+// with the members of View, which refers to a level,
+//     uint32_t width(), height();
+//     uint64_t texel(uint32_t x, uint32_t y);  // r lowest, then g, b, a
 #pragma once
 
 #include <algorithm>
@@ -42,7 +44,9 @@ class RegionBaker {
   RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures)
       : grid_(grid), materials_(materials), textures_(textures) {
     waiting_.reserve(kMaxWaiting);
-    for (uint32_t k = 0; k < 64; ++k) spread_[k] = static_cast<uint32_t>(spread_bits3(k));
+    for (int a = 0; a < 3; ++a)
+      for (uint32_t k = 0; k < 64; ++k)
+        spread_[a][k] = static_cast<uint32_t>(spread_bits3(k) << (2 - a));
   }
 
   // `region`: a cube of at most 64^3 color cells. `triangles`: all that may touch it, and at most
@@ -113,20 +117,40 @@ class RegionBaker {
     }
     const color::CoveredSurface<Int> covered(triangle);
     std::optional<color::SurfaceLook<Textures>> look;
+    // Cells are collected, so that they are on their way from memory while others are found.
+    constexpr size_t kBatch = 32;
+    struct {
+      int64_t p, q;
+      uint32_t columns, cell;
+    } batch[kBatch];
+    size_t collected = 0;
+    const auto add_batch = [&] {
+      if (collected == 0) return;
+      if (!look)
+        look.emplace(surface, materials_[surface.material], textures_, triangle.cell_bits,
+                     triangle.area);
+      for (size_t i = 0; i < collected; ++i) batch[i].cell = cells_.cover(batch[i].cell);
+      for (size_t i = 0; i < collected; ++i) {
+        const auto& [p, q, columns, cell] = batch[i];
+        const color::ColumnTotals totals = color::totals_of(columns);
+        look->add(covered.mean_point(p, q, totals), covered.weight(totals), cells_.sum(cell));
+      }
+      collected = 0;
+    };
+    const uint32_t* spread[3];
+    for (int d = 0; d < 3; ++d) spread[d] = spread_[triangle.axis[d]];
+    const int64_t low[3] = {first_[triangle.axis[0]], first_[triangle.axis[1]],
+                            first_[triangle.axis[2]]};
     color::TouchedCells<Int>(triangle, range)
         .visit([&](int64_t p, int64_t q, int64_t r, uint32_t columns) {
-          int64_t position[3];
-          position[triangle.axis[0]] = p;
-          position[triangle.axis[1]] = q;
-          position[triangle.axis[2]] = r;
-          const uint32_t code = code_of(position);
+          const uint32_t code =
+              spread[0][p - low[0]] | spread[1][q - low[1]] | spread[2][r - low[2]];
           if (columns == 0) return wait(index, code);
-          if (!look)
-            look.emplace(surface, materials_[surface.material], textures_, triangle.cell_bits,
-                         triangle.area);
-          const color::ColumnTotals totals = color::totals_of(columns);
-          look->add(covered.mean_point(p, q, totals), covered.weight(totals), cells_.cover(code));
+          cells_.prefetch(code);
+          batch[collected++] = {p, q, columns, code};
+          if (collected == kBatch) add_batch();
         });
+    add_batch();
   }
 
   void wait(uint32_t index, uint32_t code) {
@@ -147,14 +171,14 @@ class RegionBaker {
                      color::area_of(surface.position));
       last = waiting.triangle;
       look->add(color::closest_point(surface.position, center_of(waiting.code)), 1,
-                cells_.touch(waiting.code));
+                cells_.sum(cells_.touch(waiting.code)));
     }
     waiting_.clear();
   }
 
   uint32_t code_of(const int64_t (&position)[3]) const {
-    return spread_[position[0] - first_[0]] << 2 | spread_[position[1] - first_[1]] << 1 |
-           spread_[position[2] - first_[2]];
+    return spread_[0][position[0] - first_[0]] | spread_[1][position[1] - first_[1]] |
+           spread_[2][position[2] - first_[2]];
   }
   // In lattice units.
   std::array<int64_t, 3> center_of(uint32_t code) const {
@@ -169,7 +193,7 @@ class RegionBaker {
   const ColorGrid grid_;
   const std::span<const Material> materials_;
   Textures& textures_;
-  uint32_t spread_[64];
+  uint32_t spread_[3][64];  // by axis: the bits of a coordinate in a code
   std::span<const FixedSurface> triangles_;
   int64_t first_[3] = {}, last_[3] = {};  // cells of the region
   color::RegionCells cells_;

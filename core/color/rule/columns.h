@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/base/host_device.h"
+#include "core/color/rule/exact.h"
 
 namespace voxdag::color {
 
@@ -14,18 +15,61 @@ struct ColumnTotals {
   int64_t count, sum_i, sum_j;
 };
 
-VOXDAG_HD inline ColumnTotals totals_of(uint32_t columns) {
-  ColumnTotals totals{0, 0, 0};
-  for (uint32_t j = 0; j < 4; ++j) {
-    const uint32_t row = columns >> (4 * j) & 15;
-    // Four bits for each of the 16 sets that a row can be: how many there are, and the sum of i.
-    const int64_t count = static_cast<int64_t>(0x4332322132212110u >> (4 * row) & 15);
-    const int64_t sum = static_cast<int64_t>(0x6655443333221100u >> (4 * row) & 15);
-    totals.count += count;
-    totals.sum_i += sum;
-    totals.sum_j += j * count;
+// The same for the 256 sets of columns of two rows: j is 0 or 1.
+struct ColumnTable {
+  uint8_t count[256] = {}, sum_i[256] = {}, sum_j[256] = {};
+  constexpr ColumnTable() {
+    for (uint32_t set = 0; set < 256; ++set)
+      for (uint32_t k = 0; k < 8; ++k) {
+        if ((set >> k & 1) == 0) continue;
+        ++count[set];
+        sum_i[set] = static_cast<uint8_t>(sum_i[set] + k % 4);
+        sum_j[set] = static_cast<uint8_t>(sum_j[set] + k / 4);
+      }
   }
-  return totals;
+};
+
+VOXDAG_HD inline ColumnTotals totals_of(uint32_t columns) {
+  static constexpr ColumnTable kTable{};
+  const uint32_t low = columns & 255, high = columns >> 8;
+  const int64_t high_count = kTable.count[high];
+  return {kTable.count[low] + high_count, int64_t{kTable.sum_i[low]} + kTable.sum_i[high],
+          kTable.sum_j[low] + kTable.sum_j[high] + 2 * high_count};
+}
+
+// The columns (i, j) where first + a i + b j < 0. The sums must fit, or be meant to wrap.
+template <class Int>
+VOXDAG_HD inline uint32_t negative_columns_one_by_one(Int first, Int a, Int b) {
+  uint32_t columns = 0;
+  for (uint32_t j = 0; j < 4; ++j, first = wrapping_sum(first, b)) {
+    Int at = first;
+    for (uint32_t i = 0; i < 4; ++i, at = wrapping_sum(at, a))
+      columns |= static_cast<uint32_t>(at < 0) << (4 * j + i);
+  }
+  return columns;
+}
+
+// The same, two columns at once where there is SSE2, which every x86-64 has.
+template <class Int>
+VOXDAG_HD inline uint32_t negative_columns(Int first, Int a, Int b) {
+#ifdef __SSE2__
+  if constexpr (sizeof(Int) == 8) {
+    const __m128i start = _mm_set_epi64x(wrapping_sum(first, a), first);
+    const __m128i two = _mm_set1_epi64x(wrapping_sum(a, a)), down = _mm_set1_epi64x(b);
+    __m128i left = start, right = _mm_add_epi64(start, two), rows[4];
+    for (int j = 0; j < 4; ++j) {
+      // The high halves have the signs.
+      rows[j] = _mm_castps_si128(
+          _mm_shuffle_ps(_mm_castsi128_ps(left), _mm_castsi128_ps(right), 0b11'01'11'01));
+      left = _mm_add_epi64(left, down);
+      right = _mm_add_epi64(right, down);
+    }
+    const __m128i signs =
+        _mm_packs_epi16(_mm_packs_epi32(rows[0], rows[1]), _mm_packs_epi32(rows[2], rows[3]));
+    return static_cast<uint32_t>(_mm_movemask_epi8(signs));
+  }
+#endif
+  return negative_columns_one_by_one(first, a, b);
 }
 
 }  // namespace voxdag::color

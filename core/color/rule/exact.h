@@ -8,6 +8,11 @@
 #include "core/base/host_device.h"
 #include "core/base/integers.h"
 
+// SSE2, which every x86-64 has; what is done with it is also there in plain code.
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 namespace voxdag::color {
 
 template <class Int>

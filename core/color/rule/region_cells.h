@@ -22,27 +22,31 @@ class RegionCells {
   static constexpr uint64_t kMaxBytes =
       uint64_t{kMaxCells} * (4 + 3 * sizeof(ColorSum)) + (64 << 10);
 
-  RegionCells() : places_(kMaxCells), touched_(kMaxCells / 64), covered_(kMaxCells / 64) {}
+  RegionCells() : places_(kMaxCells), touched_(kMaxCells / 64) {}
 
-  bool is_covered(uint32_t code) const { return covered_[code / 64] >> code % 64 & 1; }
-  // Makes the cell exist.
-  ColorSum& touch(uint32_t code) {
-    if (places_[code] == 0) {
+  bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
+  // To be called some time before the cell is touched or covered.
+  void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
+  // Makes the cell exist. The sums of cells are numbered.
+  uint32_t touch(uint32_t code) {
+    uint32_t& place = places_[code];
+    if (place == 0) {
       sums_.emplace_back();
-      places_[code] = static_cast<uint32_t>(sums_.size());
+      place = static_cast<uint32_t>(sums_.size());
       touched_[code / 64] |= uint64_t{1} << code % 64;
     }
-    return sums_[places_[code] - 1];
+    return (place & ~kCovered) - 1;
   }
   // The sum of surfaces that cover columns of the cell.
-  ColorSum& cover(uint32_t code) {
-    ColorSum& sum = touch(code);
+  uint32_t cover(uint32_t code) {
+    const uint32_t number = touch(code);
     if (!is_covered(code)) {
-      covered_[code / 64] |= uint64_t{1} << code % 64;
-      sum = {};
+      places_[code] |= kCovered;
+      sums_[number] = {};
     }
-    return sum;
+    return number;
   }
+  ColorSum& sum(uint32_t number) { return sums_[number]; }
 
   // Moves the cells into `cells`, in Morton order.
   void take(std::vector<ColoredCell>& cells) {
@@ -51,16 +55,17 @@ class RegionCells {
     for (uint32_t word = 0; word < touched_.size(); ++word) {
       for (uint64_t rest = std::exchange(touched_[word], 0); rest != 0; rest &= rest - 1) {
         const uint32_t code = word * 64 + static_cast<uint32_t>(lowest_bit(rest));
-        cells.push_back({code, sums_[std::exchange(places_[code], 0) - 1]});
+        cells.push_back({code, sums_[(std::exchange(places_[code], 0) & ~kCovered) - 1]});
       }
-      covered_[word] = 0;
     }
     sums_.clear();
   }
 
  private:
-  std::vector<uint32_t> places_;  // in sums_, from 1; 0: not touched
-  std::vector<uint64_t> touched_, covered_;
+  static constexpr uint32_t kCovered = 1u << 31;
+
+  std::vector<uint32_t> places_;  // in sums_, from 1, and kCovered if it is; 0: not touched
+  std::vector<uint64_t> touched_;
   std::vector<ColorSum> sums_;
 };
 

@@ -62,14 +62,12 @@ VOXDAG_HD inline Texel blended(const Texel (&texels)[4], uint32_t x_fraction, ui
   return (even >> 16 & kLanes) | (odd & ~kLanes);
 }
 
-template <class Textures>
-VOXDAG_HD inline Texel look_up(Textures& textures, uint32_t image, uint32_t level, uint32_t width,
-                               uint32_t height, const Wrap (&wrap)[2], int64_t u, int64_t v) {
-  const TexelPair x = texels_at(u, wrap[0], width), y = texels_at(v, wrap[1], height);
-  const Texel texels[4] = {textures.texel(image, level, x.first, y.first),
-                           textures.texel(image, level, x.second, y.first),
-                           textures.texel(image, level, x.first, y.second),
-                           textures.texel(image, level, x.second, y.second)};
+// `view`: of a level of an image.
+template <class View>
+VOXDAG_HD inline Texel look_up(const View& view, const Wrap (&wrap)[2], int64_t u, int64_t v) {
+  const TexelPair x = texels_at(u, wrap[0], view.width()), y = texels_at(v, wrap[1], view.height());
+  const Texel texels[4] = {view.texel(x.first, y.first), view.texel(x.second, y.first),
+                           view.texel(x.first, y.second), view.texel(x.second, y.second)};
   return blended(texels, x.fraction, y.fraction);
 }
 

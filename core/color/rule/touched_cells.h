@@ -26,6 +26,8 @@ class TouchedCells {
  public:
   VOXDAG_HD TouchedCells(const CellTriangle<Int>& triangle, const CellRange& range)
       : t_(triangle), range_(range) {
+    for (int i = 0; i < 3; ++i)
+      margin_[i] = magnitude(t_.edges[2][i].a) + magnitude(t_.edges[2][i].b);
     rise_ = positive_part(t_.normal[0]) + positive_part(t_.normal[1]);
     fall_ = negative_part(t_.normal[0]) + negative_part(t_.normal[1]);
   }
@@ -46,7 +48,7 @@ class TouchedCells {
     }
     bool following = false;
     for (int64_t q = range_.first[1]; q <= range_.last[1]; ++q) {
-      const bool touched = at[0] >= 0 && at[1] >= 0 && at[2] >= 0;
+      const bool touched = (at[0] | at[1] | at[2]) >= 0;
       if (touched) {
         following ? climb() : find_plane(p, q);
         visit_column(p, q, at, visit);
@@ -100,15 +102,30 @@ class TouchedCells {
     const int64_t first = first_ > range_.first[2] ? first_ : range_.first[2];
     const int64_t last = last_ < range_.last[2] ? last_ : range_.last[2];
     if (first > last) return;
-    bool inside = !t_.degenerate;
-    for (int i = 0; i < 3; ++i)
-      inside &= at[i] >= magnitude(t_.edges[2][i].a) + magnitude(t_.edges[2][i].b);
-    uint32_t columns = t_.degenerate ? 0 : inside ? kAllColumns : columns_in_shadow(p, q);
+    const bool inside =
+        !t_.degenerate && ((at[0] - margin_[0]) | (at[1] - margin_[1]) | (at[2] - margin_[2])) >= 0;
+    const uint32_t columns = t_.degenerate ? 0 : inside ? kAllColumns : columns_in_shadow(p, q);
+    // The plane in the column of cells is split by the planes between them.
+    const bool split = first_ != last_ && columns != 0;
+    const bool exact = t_.column_floor == t_.column_ceil;
+    Int at_bottom = 0;
+    uint32_t above_bottom = kAllColumns;
+    if (split) {
+      at_bottom = wrapping_sum(
+          wrapping_sum(wrapping_product<Int>(t_.normal[0], 4 * p),
+                       wrapping_product<Int>(t_.normal[1], 4 * q)),
+          wrapping_sum(wrapping_product<Int>(t_.normal[2], 4 * first), t_.column_floor));
+      if (first != first_) above_bottom = columns_above(at_bottom, exact);
+    }
     for (int64_t r = first; r <= last; ++r) {
-      if (!inside && !touches_from_sides(p, q, r)) continue;
-      // A column that touches one cell only has all of the plane in it.
-      visit(p, q, r,
-            first_ == last_ || columns == 0 ? columns : columns & columns_in_cell(p, q, r));
+      uint32_t covered = columns & above_bottom;
+      if (split && r != last_) {
+        at_bottom = wrapping_sum(at_bottom, wrapping_product<Int>(t_.normal[2], 4));
+        above_bottom = columns_above(at_bottom, false);
+        covered &= ~above_bottom;
+        if (exact) above_bottom = columns_above(at_bottom, true);
+      }
+      if (inside || touches_from_sides(p, q, r)) visit(p, q, r, covered);
     }
   }
 
@@ -122,36 +139,24 @@ class TouchedCells {
   }
 
   VOXDAG_HD uint32_t columns_in_shadow(int64_t p, int64_t q) const {
-    uint32_t columns = kAllColumns;
+    uint32_t outside = 0;
     for (int i = 0; i < 3; ++i) {
       const auto& e = t_.edges[2][i];
-      const Int first = e.a * (4 * p) + e.b * (4 * q) + t_.column[i];
-      uint32_t inside = 0;
-      for (int k = 0; k < 16; ++k)
-        inside |= static_cast<uint32_t>(first + e.a * (k & 3) + e.b * (k >> 2) >= 0) << k;
-      columns &= inside;
+      outside |= negative_columns<Int>(e.a * (4 * p) + e.b * (4 * q) + t_.column[i], e.a, e.b);
     }
-    return columns;
+    return ~outside & kAllColumns;
   }
 
-  // The columns in which the plane lies in the closed cell.
-  VOXDAG_HD uint32_t columns_in_cell(int64_t p, int64_t q, int64_t r) const {
-    const Int(&n)[3] = t_.normal;
-    const Int first = wrapping_sum(
-        wrapping_sum(wrapping_product<Int>(n[0], 4 * p), wrapping_product<Int>(n[1], 4 * q)),
-        wrapping_product<Int>(n[2], 4 * r));
-    const Int at_bottom = wrapping_sum(first, t_.column_ceil);
-    const Int at_top = wrapping_sum(wrapping_sum(first, t_.column_floor), 4 * n[2]);
-    uint32_t columns = 0;
-    for (int k = 0; k < 16; ++k) {
-      const Int climb = n[0] * (k & 3) + n[1] * (k >> 2);
-      columns |= static_cast<uint32_t>(at_bottom + climb <= 0 && at_top + climb >= 0) << k;
-    }
-    return columns;
+  // The columns in which the surface's plane is above a bottom of a cell, or, if that can be and is
+  // asked for, in it. `at_bottom`: the plane's value at the first column there, rounded down.
+  VOXDAG_HD uint32_t columns_above(Int at_bottom, bool or_in) const {
+    return negative_columns<Int>(wrapping_sum(at_bottom, Int{or_in ? -1 : 0}), t_.normal[0],
+                                 t_.normal[1]);
   }
 
   const CellTriangle<Int>& t_;
   const CellRange& range_;
+  Int margin_[3];    // an edge function's change over a cell
   Int rise_, fall_;  // of the plane over a cell, along axes 0 and 1
   // The cells of the column that the plane touches, and the plane over them.
   int64_t first_ = 0, last_ = 0;

@@ -55,17 +55,40 @@ class TextureReader {
   uint32_t width(uint32_t image, uint32_t level) const { return at(image, level).width; }
   uint32_t height(uint32_t image, uint32_t level) const { return at(image, level).height; }
 
-  // Four linear channels of 16 bits: red in the lowest, then green, blue and alpha.
-  // 0 <= x < width, 0 <= y < height, counted from the upper left. Throws Error{kIo}.
+  // A level, for lookups one after the other. The reader must outlive it.
+  class View {
+   public:
+    uint32_t width() const { return width_; }
+    uint32_t height() const { return height_; }
+    // Four linear channels of 16 bits: red in the lowest, then green, blue and alpha.
+    // 0 <= x < width, 0 <= y < height, counted from the upper left. Throws Error{kIo}.
+    uint64_t texel(uint32_t x, uint32_t y) const {
+      // Of the tile and in it, along y and along x.
+      const uint64_t row = (y >> kTileShift) * row_of_tiles_ + ((y % kTileEdge) << kTileShift);
+      const uint64_t column = (uint64_t{x >> kTileShift} << 2 * kTileShift) + x % kTileEdge;
+      return texels_ ? texels_[row + column] : reader_.cached_texel(first_ + row + column);
+    }
+
+   private:
+    friend class TextureReader;
+    View(TextureReader& reader, const TextureLevel& level)
+        : reader_(reader),
+          first_(level.first_page * kPageTexels),
+          texels_(reader.all_ ? reader.all_ + first_ : nullptr),
+          row_of_tiles_(level.tiles_per_row * uint64_t{kPageTexels}),
+          width_(level.width),
+          height_(level.height) {}
+
+    TextureReader& reader_;
+    uint64_t first_;          // texel of the level, in the file
+    const uint64_t* texels_;  // of the level; null: in the file
+    uint64_t row_of_tiles_;   // texels
+    uint32_t width_, height_;
+  };
+  View view(uint32_t image, uint32_t level) { return View(*this, at(image, level)); }
+
   uint64_t texel(uint32_t image, uint32_t level, uint32_t x, uint32_t y) {
-    const TextureLevel& l = at(image, level);
-    const uint64_t page =
-        l.first_page + uint64_t{y >> kTileShift} * l.tiles_per_row + (x >> kTileShift);
-    const size_t in_page = (size_t{y % kTileEdge} << kTileShift) | (x % kTileEdge);
-    if (all_) return all_[page * kPageTexels + in_page];
-    const size_t slot = static_cast<size_t>((page * kSpread) >> slot_shift_);
-    if (page_in_slot_[slot] != page) load(page, slot);
-    return cache_[slot * kPageTexels + in_page];
+    return view(image, level).texel(x, y);
   }
 
  private:
@@ -75,6 +98,12 @@ class TextureReader {
 
   const TextureLevel& at(uint32_t image, uint32_t level) const {
     return layout_.levels[layout_.first_level[image] + level];
+  }
+  uint64_t cached_texel(uint64_t number) {
+    const uint64_t page = number / kPageTexels;
+    const size_t slot = static_cast<size_t>((page * kSpread) >> slot_shift_);
+    if (page_in_slot_[slot] != page) load(page, slot);
+    return cache_[slot * kPageTexels + number % kPageTexels];
   }
   void load(uint64_t page, size_t slot);
 

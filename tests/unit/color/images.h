@@ -47,10 +47,16 @@ class TestImages {
   uint32_t levels(uint32_t image) const { return static_cast<uint32_t>(pyramids_[image].size()); }
   uint32_t width(uint32_t image, uint32_t level) const { return pyramids_[image][level].width; }
   uint32_t height(uint32_t image, uint32_t level) const { return pyramids_[image][level].height; }
-  uint64_t texel(uint32_t image, uint32_t level, uint32_t x, uint32_t y) const {
-    const auto& t = pyramids_[image][level].at(x, y);
-    return t[0] | uint64_t{t[1]} << 16 | uint64_t{t[2]} << 32 | uint64_t{t[3]} << 48;
-  }
+  struct View {
+    const TestLevel& level;
+    uint32_t width() const { return level.width; }
+    uint32_t height() const { return level.height; }
+    uint64_t texel(uint32_t x, uint32_t y) const {
+      const auto& t = level.at(x, y);
+      return t[0] | uint64_t{t[1]} << 16 | uint64_t{t[2]} << 32 | uint64_t{t[3]} << 48;
+    }
+  };
+  View view(uint32_t image, uint32_t level) const { return {pyramids_[image][level]}; }
   const TestLevel& image(uint32_t index) const { return pyramids_[index][0]; }
 
  private:

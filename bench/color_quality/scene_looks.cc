@@ -1,4 +1,4 @@
-#include "bench/color/scene_looks.h"
+#include "bench/color_quality/scene_looks.h"
 
 #include <cstdio>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "bench/color/sampled_cells.h"
+#include "bench/color_quality/sampled_cells.h"
 
 #include <algorithm>
 #include <cmath>
