@@ -59,36 +59,18 @@ VOXDAG_HD inline uint8_t srgb_of(uint32_t intensity) {
   return static_cast<uint8_t>(stored + (stored < 255) * (kThresholds.of[stored] <= intensity));
 }
 
+// Half up.
 VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denominator) {
   const uint64_t quotient = numerator / denominator, rest = numerator % denominator;
   return quotient + (rest >= denominator - rest ? 1 : 0);
 }
 
-// Divides several numbers by one: rounded_quotient(), or `most` if that is less; with one division
-// in doubles, which is at most one off and corrected.
-class Divisor {
- public:
-  VOXDAG_HD explicit Divisor(uint64_t divisor)
-      : divisor_(divisor), inverse_(1.0 / static_cast<double>(static_cast<int64_t>(divisor))) {}
-  VOXDAG_HD uint32_t divide(uint64_t numerator, uint32_t most) const {
-    if ((numerator | divisor_) >> 61 != 0) {
-      const uint64_t quotient = rounded_quotient(numerator, divisor_);
-      return quotient < most ? static_cast<uint32_t>(quotient) : most;
-    }
-    const double estimate = static_cast<double>(static_cast<int64_t>(numerator)) * inverse_ + 0.5;
-    if (!(estimate < most + 1.0)) return most;
-    auto quotient = static_cast<int64_t>(estimate);
-    const auto divisor = static_cast<int64_t>(divisor_);
-    const int64_t rest = 2 * (static_cast<int64_t>(numerator) - quotient * divisor);
-    quotient += rest >= divisor ? 1 : 0;
-    quotient -= rest < -divisor ? 1 : 0;
-    return quotient < most ? static_cast<uint32_t>(quotient) : most;
-  }
-
- private:
-  uint64_t divisor_;
-  double inverse_;
-};
+// For numerators below 2^52 and a denominator below 2^35, in doubles: quotients below k + 1/2, k <
+// 2^16 a whole number, are so by 2^-36 at least, and still are when they are rounded to 2^-37.
+VOXDAG_HD inline uint32_t rounded_quotient_in_doubles(uint64_t numerator, double denominator) {
+  const double quotient = static_cast<double>(static_cast<int64_t>(numerator)) / denominator;
+  return static_cast<uint32_t>(static_cast<int32_t>(quotient + 0.5));
+}
 
 }  // namespace color
 
@@ -96,12 +78,24 @@ class Divisor {
 // transparent, by weight, and alpha is 0.
 VOXDAG_HD inline Color color_of(const ColorSum& sum) {
   const bool visible = sum.seen_weight != 0;
-  const color::Divisor divisor(visible ? sum.seen_weight : sum.weight);
+  const std::array<uint64_t, 3>& channels = visible ? sum.seen : sum.plain;
+  const uint64_t weight = visible ? sum.seen_weight : sum.weight;
   Color color;
-  for (size_t c = 0; c < 3; ++c)
-    color.rgb[c] = color::srgb_of(divisor.divide(visible ? sum.seen[c] : sum.plain[c], 65535));
+  const bool is_small = ((channels[0] | channels[1] | channels[2]) >> 51 | weight >> 35) == 0;
+  if (is_small && channels[0] <= 65535 * weight && channels[1] <= 65535 * weight &&
+      channels[2] <= 65535 * weight) {
+    const auto denominator = static_cast<double>(static_cast<int64_t>(weight));
+    for (size_t c = 0; c < 3; ++c)
+      color.rgb[c] = color::srgb_of(color::rounded_quotient_in_doubles(channels[c], denominator));
+  } else {
+    for (size_t c = 0; c < 3; ++c) {
+      const uint64_t mean = color::rounded_quotient(channels[c], weight);
+      color.rgb[c] = color::srgb_of(static_cast<uint32_t>(mean < 65535 ? mean : 65535));
+    }
+  }
   if (sum.seen_weight == 255 * sum.weight) return color;  // as initialized: 255
-  color.alpha = static_cast<uint8_t>(color::Divisor(sum.weight).divide(sum.seen_weight, 255));
+  const uint64_t alpha = color::rounded_quotient(sum.seen_weight, sum.weight);
+  color.alpha = static_cast<uint8_t>(alpha < 255 ? alpha : 255);
   return color;
 }
 

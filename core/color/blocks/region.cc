@@ -10,16 +10,14 @@ namespace {
 // Appends the cells' colors; `parents` become their parents, in order.
 void add_colors(std::span<const ColoredCell> cells, std::vector<Color>& colors,
                 std::vector<ColoredCell>& parents) {
-  ColoredCell parent{cells.front().code >> 3, {}};
   for (const ColoredCell& cell : cells) {
     colors.push_back(color_of(cell.sum));
-    if (cell.code >> 3 != parent.code) {
-      parents.push_back(parent);
-      parent = {cell.code >> 3, {}};
-    }
-    parent.sum.add(cell.sum);
+    const uint32_t code = cell.code >> 3;
+    if (parents.empty() || parents.back().code != code)
+      parents.push_back({code, cell.sum});
+    else
+      parents.back().sum.add(cell.sum);
   }
-  parents.push_back(parent);
 }
 
 void add_prefix(std::span<const ColoredCell> cells, std::vector<uint32_t>& prefix) {

@@ -9,6 +9,7 @@
 // with the members of View, which refers to a level,
 //     uint32_t width(), height();
 //     uint64_t texel(uint32_t x, uint32_t y);  // r lowest, then g, b, a
+//     void prefetch(uint32_t x, uint32_t y);
 #pragma once
 
 #include <algorithm>
@@ -121,7 +122,8 @@ class RegionBaker {
     constexpr size_t kBatch = 32;
     struct {
       int64_t p, q;
-      uint32_t columns, cell;
+      uint32_t columns, cell, weight;
+      typename color::SurfaceLook<Textures>::Spot spot;
     } batch[kBatch];
     size_t collected = 0;
     const auto add_batch = [&] {
@@ -129,12 +131,15 @@ class RegionBaker {
       if (!look)
         look.emplace(surface, materials_[surface.material], textures_, triangle.cell_bits,
                      triangle.area);
-      for (size_t i = 0; i < collected; ++i) batch[i].cell = cells_.cover(batch[i].cell);
       for (size_t i = 0; i < collected; ++i) {
-        const auto& [p, q, columns, cell] = batch[i];
+        auto& [p, q, columns, cell, weight, spot] = batch[i];
         const color::ColumnTotals totals = color::totals_of(columns);
-        look->add(covered.mean_point(p, q, totals), covered.weight(totals), cells_.sum(cell));
+        weight = covered.weight(totals);
+        spot = look->spot_at(covered.mean_point(p, q, totals));
+        cell = cells_.cover(cell);
       }
+      for (size_t i = 0; i < collected; ++i)
+        look->add(batch[i].spot, batch[i].weight, cells_.sum(batch[i].cell));
       collected = 0;
     };
     const uint32_t* spread[3];
@@ -147,7 +152,11 @@ class RegionBaker {
               spread[0][p - low[0]] | spread[1][q - low[1]] | spread[2][r - low[2]];
           if (columns == 0) return wait(index, code);
           cells_.prefetch(code);
-          batch[collected++] = {p, q, columns, code};
+          auto& added = batch[collected++];
+          added.p = p;
+          added.q = q;
+          added.columns = columns;
+          added.cell = code;
           if (collected == kBatch) add_batch();
         });
     add_batch();
@@ -170,7 +179,7 @@ class RegionBaker {
         look.emplace(surface, materials_[surface.material], textures_, grid_.cell_bits(),
                      color::area_of(surface.position));
       last = waiting.triangle;
-      look->add(color::closest_point(surface.position, center_of(waiting.code)), 1,
+      look->add(look->spot_at(color::closest_point(surface.position, center_of(waiting.code))), 1,
                 cells_.sum(cells_.touch(waiting.code)));
     }
     waiting_.clear();

@@ -29,11 +29,11 @@ class CoveredSurface {
     if (t_.degenerate) return;
     const double normal = to_double(t_.normal[2]);
     scale_ = static_cast<double>(kPointOne) / normal;
-    column_weight_ = static_cast<uint64_t>(kColumnWeight * t_.area / normal + 0.5);
+    column_weight_ = static_cast<uint32_t>(kColumnWeight * t_.area / normal + 0.5);
   }
 
-  VOXDAG_HD uint64_t weight(const ColumnTotals& totals) const {
-    return column_weight_ * static_cast<uint64_t>(totals.count);
+  VOXDAG_HD uint32_t weight(const ColumnTotals& totals) const {
+    return column_weight_ * static_cast<uint32_t>(totals.count);
   }
 
   // The mean of the covered columns of a cell, at least one.
@@ -57,7 +57,7 @@ class CoveredSurface {
 
   const CellTriangle<Int>& t_;
   double scale_ = 0;
-  uint64_t column_weight_ = 0;
+  uint32_t column_weight_ = 0;
 };
 
 }  // namespace voxdag::color

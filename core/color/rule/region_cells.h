@@ -53,9 +53,15 @@ class RegionCells {
     cells.clear();
     cells.reserve(sums_.size());
     for (uint32_t word = 0; word < touched_.size(); ++word) {
-      for (uint64_t rest = std::exchange(touched_[word], 0); rest != 0; rest &= rest - 1) {
+      const uint64_t touched = std::exchange(touched_[word], 0);
+      for (uint64_t rest = touched; rest != 0; rest &= rest - 1) {
+        uint32_t& place = places_[word * 64 + static_cast<uint32_t>(lowest_bit(rest))];
+        place = (place & ~kCovered) - 1;
+        __builtin_prefetch(&sums_[place]);
+      }
+      for (uint64_t rest = touched; rest != 0; rest &= rest - 1) {
         const uint32_t code = word * 64 + static_cast<uint32_t>(lowest_bit(rest));
-        cells.push_back({code, sums_[(std::exchange(places_[code], 0) & ~kCovered) - 1]});
+        cells.push_back({code, sums_[std::exchange(places_[code], 0)]});
       }
     }
     sums_.clear();

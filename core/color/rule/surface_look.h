@@ -140,12 +140,27 @@ class SurfaceLook {
     for (const uint32_t t : tint_) no_tint_ = no_tint_ && t == kFullIntensity;
   }
 
-  // Adds the look at a point, which stands for `weight`, less than 2^24.
-  VOXDAG_HD void add(const SurfacePoint& point, uint64_t weight, ColorSum& sum) {
+  // Where to look for a point.
+  struct Spot {
+    SurfacePoint point;
+    TexelSquare texels;  // if there is an image
+  };
+  // Its texels are on their way from memory then.
+  VOXDAG_HD Spot spot_at(const SurfacePoint& point) const {
+    Spot spot{point, {}};
+    if (!view_) return spot;
+    spot.texels = texels_around(*view_, wrap_, coordinate(point, 0), coordinate(point, 1));
+    view_->prefetch(spot.texels.x.first, spot.texels.y.first);
+    view_->prefetch(spot.texels.x.first, spot.texels.y.second);
+    return spot;
+  }
+
+  // Adds the look at a spot, which stands for `weight`, less than 2^24.
+  VOXDAG_HD void add(const Spot& spot, uint64_t weight, ColorSum& sum) {
     Texel texel = ~Texel{0};
-    if (view_) texel = look_up(*view_, wrap_, coordinate(point, 0), coordinate(point, 1));
+    if (view_) texel = look_up(*view_, spot.texels);
     if (!no_tint_) {
-      if (!one_tint_) set_tint(point);
+      if (!one_tint_) set_tint(spot.point);
       texel = tinted(texel, tint_);
     }
     add_weighted(texel, weight, weight * alpha_of(channel(texel, 3)), sum);

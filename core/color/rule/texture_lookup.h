@@ -62,13 +62,24 @@ VOXDAG_HD inline Texel blended(const Texel (&texels)[4], uint32_t x_fraction, ui
   return (even >> 16 & kLanes) | (odd & ~kLanes);
 }
 
+// The four texels around a point.
+struct TexelSquare {
+  TexelPair x, y;
+};
+
 // `view`: of a level of an image.
 template <class View>
-VOXDAG_HD inline Texel look_up(const View& view, const Wrap (&wrap)[2], int64_t u, int64_t v) {
-  const TexelPair x = texels_at(u, wrap[0], view.width()), y = texels_at(v, wrap[1], view.height());
-  const Texel texels[4] = {view.texel(x.first, y.first), view.texel(x.second, y.first),
-                           view.texel(x.first, y.second), view.texel(x.second, y.second)};
-  return blended(texels, x.fraction, y.fraction);
+VOXDAG_HD inline TexelSquare texels_around(const View& view, const Wrap (&wrap)[2], int64_t u,
+                                           int64_t v) {
+  return {texels_at(u, wrap[0], view.width()), texels_at(v, wrap[1], view.height())};
+}
+
+template <class View>
+VOXDAG_HD inline Texel look_up(const View& view, const TexelSquare& at) {
+  const Texel texels[4] = {view.texel(at.x.first, at.y.first), view.texel(at.x.second, at.y.first),
+                           view.texel(at.x.first, at.y.second),
+                           view.texel(at.x.second, at.y.second)};
+  return blended(texels, at.x.fraction, at.y.fraction);
 }
 
 }  // namespace voxdag::color

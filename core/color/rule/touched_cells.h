@@ -83,9 +83,16 @@ class TouchedCells {
   // The same, from the column before.
   VOXDAG_HD void climb() {
     if (t_.degenerate) return;
+    // By at most a cell: one step without branches, which nobody could predict.
+    const Int n = t_.normal[2];
     highest_ += t_.normal[1];
     lowest_ += t_.normal[1];
-    correct();
+    const Int up = Int{highest_ >= n} - Int{highest_ < 0};
+    const Int down = Int{lowest_ > 0} - Int{lowest_ + n <= 0};
+    first_ -= static_cast<int64_t>(up);
+    highest_ -= n * up;
+    last_ -= static_cast<int64_t>(down);
+    lowest_ -= n * down;
   }
   // highest_ becomes the plane's highest value over cell first_, the first cell where it is >= 0;
   // lowest_ its lowest value over last_, the last where it is <= 0.

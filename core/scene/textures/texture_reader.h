@@ -63,10 +63,12 @@ class TextureReader {
     // Four linear channels of 16 bits: red in the lowest, then green, blue and alpha.
     // 0 <= x < width, 0 <= y < height, counted from the upper left. Throws Error{kIo}.
     uint64_t texel(uint32_t x, uint32_t y) const {
-      // Of the tile and in it, along y and along x.
-      const uint64_t row = (y >> kTileShift) * row_of_tiles_ + ((y % kTileEdge) << kTileShift);
-      const uint64_t column = (uint64_t{x >> kTileShift} << 2 * kTileShift) + x % kTileEdge;
-      return texels_ ? texels_[row + column] : reader_.cached_texel(first_ + row + column);
+      const uint64_t place = place_of(x, y);
+      return texels_ ? texels_[place] : reader_.cached_texel(first_ + place);
+    }
+    // To be called some time before texel().
+    void prefetch(uint32_t x, uint32_t y) const {
+      if (texels_) __builtin_prefetch(&texels_[place_of(x, y)]);
     }
 
    private:
@@ -78,6 +80,13 @@ class TextureReader {
           row_of_tiles_(level.tiles_per_row * uint64_t{kPageTexels}),
           width_(level.width),
           height_(level.height) {}
+
+    uint64_t place_of(uint32_t x, uint32_t y) const {
+      // Of the tile and in it, along y and along x.
+      const uint64_t row = (y >> kTileShift) * row_of_tiles_ + ((y % kTileEdge) << kTileShift);
+      const uint64_t column = (uint64_t{x >> kTileShift} << 2 * kTileShift) + x % kTileEdge;
+      return row + column;
+    }
 
     TextureReader& reader_;
     uint64_t first_;          // texel of the level, in the file

@@ -55,6 +55,7 @@ class TestImages {
       const auto& t = level.at(x, y);
       return t[0] | uint64_t{t[1]} << 16 | uint64_t{t[2]} << 32 | uint64_t{t[3]} << 48;
     }
+    void prefetch(uint32_t, uint32_t) const {}
   };
   View view(uint32_t image, uint32_t level) const { return {pyramids_[image][level]}; }
   const TestLevel& image(uint32_t index) const { return pyramids_[index][0]; }
