@@ -59,6 +59,13 @@ VOXDAG_HD inline uint8_t srgb_of(uint32_t intensity) {
   return static_cast<uint8_t>(stored + (stored < 255) * (kThresholds.of[stored] <= intensity));
 }
 
+// In the middle of the intensities that are stored as `stored`, or the end of all for 0 and 255.
+VOXDAG_HD inline uint32_t intensity_of(uint8_t stored) {
+  static constexpr SrgbThresholds kThresholds{};
+  if (stored == 0 || stored == 255) return stored == 0 ? 0 : 65535;
+  return (uint32_t{kThresholds.of[stored - 1]} + kThresholds.of[stored]) / 2;
+}
+
 // Half up.
 VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denominator) {
   const uint64_t quotient = numerator / denominator, rest = numerator % denominator;

@@ -14,10 +14,12 @@
 #include "core/format/artifact/artifact_writer.h"
 #include "core/format/artifact/segment_writer.h"
 #include "core/format/global/global_writer.h"
+#include "core/format/global/open_global.h"
 #include "core/geometry/octree_descent.h"
 #include "merge/merge.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_builder.h"
+#include "query/extract/part_colors.h"
 #include "query/output_lock.h"
 
 namespace voxdag::query {
@@ -83,7 +85,13 @@ class Extraction {
     report_.dag_nodes = merged.dag_nodes;
     report_.merge_passes = merged.passes;
     report_.work_bytes += merged.scratch_bytes;
-    if (merged.voxels == 0) progress_.warn("nothing is set there: the file will have no nodes");
+    if (merged.voxels == 0)
+      progress_.warn("nothing is set there: the file will have no nodes");
+    else if (file_.has_colors())
+      with_reader_errors([&] {
+        write_part_colors({file_, spec_.selection, crop_}, files_, out, budget_, spec_.threads,
+                          progress_, cancel_);
+      });
     progress_.begin_stage("write", 1, "files");
     const GlobalFileSummary summary =
         out.seal({.voxels = merged.voxels, .svo_nodes = merged.svo_nodes}, spec_.threads, cancel_);

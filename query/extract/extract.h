@@ -1,10 +1,11 @@
 // Writes a part of a global file as a global file: the grid of a coarser level, a region of it, or
-// both. The result is canonical: that of the same voxels, wherever they come from.
+// both. Its levels are canonical: those of the same voxels, wherever they come from.
 //
 // The grid is divided into octree-aligned cubes. For each cube the part of the DAG that it needs is
 // read and reduced in memory (part_builder.h), by several threads, and written as an artifact; a
 // cube that does not fit its share of the budget is divided into its children. The merge then makes
-// the file, as for a build. So memory is bounded by the budget, not by the file.
+// the file, as for a build. So memory is bounded by the budget, not by the file. Colors follow
+// (part_colors.h), if the file has some.
 #pragma once
 
 #include <cstdint>

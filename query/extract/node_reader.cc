@@ -47,11 +47,14 @@ void SourceFile::check_block(uint64_t block, std::span<std::byte> buffer) {
 void SourceFile::read(uint32_t level, uint64_t first, std::span<uint32_t> words,
                       std::span<std::byte> block) {
   const uint64_t begin = header_.level(level).file_offset + first * sizeof(uint32_t);
-  const uint64_t last = begin + words.size_bytes() - 1;
-  for (uint64_t b = (begin - global_layout::kPageBytes) / kBlockBytes;
-       b <= (last - global_layout::kPageBytes) / kBlockBytes; ++b)
-    check_block(b, block);
+  check(begin, words.size_bytes(), block);
   file_->read_at(begin, std::as_writable_bytes(words));
+}
+
+void SourceFile::check(uint64_t begin, uint64_t bytes, std::span<std::byte> block) {
+  const uint64_t end = begin + bytes - global_layout::kPageBytes;
+  for (uint64_t b = (begin - global_layout::kPageBytes) / kBlockBytes; b * kBlockBytes < end; ++b)
+    check_block(b, block);
 }
 
 void NodeReader::corrupt(uint32_t level, uint64_t offset) const {

@@ -27,6 +27,9 @@ class SourceFile {
   // kBlockBytes. Throws Error{kCorrupt} for a block that fails its checksum.
   void read(uint32_t level, uint64_t first, std::span<uint32_t> words, std::span<std::byte> block);
 
+  // Compares the checksum blocks that have these bytes of the file, as read() does.
+  void check(uint64_t begin, uint64_t bytes, std::span<std::byte> block);
+
   static constexpr uint64_t kBlockBytes = uint64_t{1} << 16;
 
  private:

@@ -7,11 +7,12 @@
 namespace voxdag {
 namespace {
 
-// Appends the cells' colors; `parents` become their parents, in order.
-void add_colors(std::span<const ColoredCell> cells, std::vector<Color>& colors,
-                std::vector<ColoredCell>& parents) {
+// Appends the cells' colors, color(cell) each; `parents` become their parents, in order.
+template <class ColorOf>
+void add_colors(std::span<const ColoredCell> cells, const ColorOf& color,
+                std::vector<Color>& colors, std::vector<ColoredCell>& parents) {
   for (const ColoredCell& cell : cells) {
-    colors.push_back(color_of(cell.sum));
+    colors.push_back(color(cell));
     const uint32_t code = cell.code >> 3;
     if (parents.empty() || parents.back().code != code)
       parents.push_back({code, cell.sum});
@@ -27,9 +28,10 @@ void add_prefix(std::span<const ColoredCell> cells, std::vector<uint32_t>& prefi
       prefix.push_back(static_cast<uint32_t>(i));
 }
 
-}  // namespace
-
-EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells) {
+// color(up, cell) is the stored color.
+template <class ColorOfCell>
+EncodedRegion encode(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
+                     const ColorOfCell& color) {
   EncodedRegion region;
   region.morton = morton;
   std::vector<Color> colors;
@@ -37,7 +39,8 @@ EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const Co
   std::vector<ColoredCell> coarser, parents;
   for (uint32_t i = 0;; ++i) {
     region.counts[i] = static_cast<uint32_t>(cells.size());
-    add_colors(cells, colors, parents);
+    add_colors(
+        cells, [&](const ColoredCell& cell) { return color(i, cell); }, colors, parents);
     if (i + kPrefixLevels < levels) add_prefix(cells, region.prefix);
     if (i == levels) break;
     coarser.swap(parents);
@@ -52,6 +55,18 @@ EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const Co
     std::copy(block.begin(), block.end(), &region.blocks[at / kBlockCells * kBlockBytes]);
   }
   return region;
+}
+
+}  // namespace
+
+EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells) {
+  return encode(levels, morton, cells,
+                [](uint32_t, const ColoredCell& cell) { return color_of(cell.sum); });
+}
+
+EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
+                            const CellColor& color) {
+  return encode(levels, morton, cells, color);
 }
 
 }  // namespace voxdag

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -33,6 +34,13 @@ struct EncodedRegion {
 // least 1 cell in increasing order, with codes below 8^levels. Thread-safe. Memory: up to 17 bytes
 // for each cell, and 72 for each cell of the next coarser level, aside from what is returned.
 EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells);
+
+// The stored color of a cell that is `up` levels above the finest one; its code is that of its
+// level.
+using CellColor = std::function<Color(uint32_t up, const ColoredCell& cell)>;
+// The same with other colors than those of the sums.
+EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
+                            const CellColor& color);
 
 // How many entries `prefix` has with these counts.
 inline size_t prefix_entries(uint32_t levels,

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
@@ -87,6 +88,7 @@ struct ColorSectionWriter::State {
   GlobalFileWriter& file;
   const uint32_t color_levels;
   MemoryBudget& budget;
+  const EncodeCoarse encode_coarse;
   std::vector<Tier> tiers;
 
   // `total`: of the region's cells. `write` gets the bytes of the region in order.
@@ -98,8 +100,8 @@ struct ColorSectionWriter::State {
 };
 
 ColorSectionWriter::ColorSectionWriter(GlobalFileWriter& file, uint32_t color_levels,
-                                       MemoryBudget& budget)
-    : state_(new State{file, color_levels, budget, {}}) {
+                                       MemoryBudget& budget, EncodeCoarse encode_coarse)
+    : state_(new State{file, color_levels, budget, std::move(encode_coarse), {}}) {
   state_->tiers.reserve(kMaxTiers);
   for (uint32_t tier = 0; tier < tier_count(color_levels); ++tier)
     state_->tiers.emplace_back(budget, finest_level(color_levels, tier));
@@ -190,7 +192,8 @@ void ColorSectionWriter::State::close_region(uint32_t tier_index) {
     std::vector<ColoredCell> cells;
     cells.reserve(wide.size());
     for (const WideCell& cell : wide) cells.push_back({cell.code, cell.sum.narrow(excess_bits)});
-    region = encode_region(tier.levels(), tier.open_morton, cells);
+    region = encode_coarse ? encode_coarse(tier_index, tier.open_morton, cells)
+                           : encode_region(tier.levels(), tier.open_morton, cells);
     tier.cells.clear();
   }
   add(tier_index, region, total,

@@ -8,7 +8,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <span>
 
 #include "core/base/memory_budget.h"
 #include "core/color/blocks/region.h"
@@ -18,9 +20,16 @@ namespace voxdag {
 
 class ColorSectionWriter {
  public:
+  // Encodes a region of a tier above the first; each cell has the sum of the totals of the regions
+  // in it.
+  using EncodeCoarse = std::function<EncodedRegion(uint32_t tier, uint64_t morton,
+                                                   std::span<const ColoredCell> cells)>;
+
   // The levels of `file` must be complete, and there must be some. The set cells of level
   // `color_levels` (2 to 20, at most the grid's) have colors, and those of all coarser levels.
-  ColorSectionWriter(GlobalFileWriter& file, uint32_t color_levels, MemoryBudget& budget);
+  // Without `encode_coarse` these are the colors of their sums.
+  ColorSectionWriter(GlobalFileWriter& file, uint32_t color_levels, MemoryBudget& budget,
+                     EncodeCoarse encode_coarse = nullptr);
   ~ColorSectionWriter();
 
   // Of tier 0: cubes of level max(color_levels - 6, 0), in increasing Morton order. Throws

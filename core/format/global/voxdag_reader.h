@@ -130,6 +130,10 @@ class Bytes {
     return static_cast<const unsigned char*>(map_ ? map_ : copy_.data());
   }
   uint64_t size() const { return size_; }
+  // The pages of a mapping leave memory until they are used again.
+  void release_pages() const {
+    if (map_) madvise(map_, size_, MADV_DONTNEED);
+  }
 
  private:
   // Does not wait for the writer of a pipe; for a regular file O_NONBLOCK means nothing.
@@ -171,6 +175,8 @@ class File {
   // The size of the file, and its bytes.
   uint64_t file_bytes() const { return bytes_.size(); }
   const unsigned char* data() const { return bytes_.data(); }
+  // For programs that must stay small: what was read of a mapped file is no longer resident.
+  void release_pages() const { bytes_.release_pages(); }
   // The low corner of the grid in world space.
   const double (&origin() const)[3] { return origin_; }
   // The edge length of the grid in world space; that of a voxel is edge() / resolution().

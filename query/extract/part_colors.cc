@@ -1,0 +1,309 @@
+#include "query/extract/part_colors.h"
+
+#include <algorithm>
+#include <bit>
+#include <vector>
+
+#include "core/base/page_buffer.h"
+#include "core/base/parallel_for.h"
+#include "core/color/blocks/region.h"
+#include "core/color/color_of.h"
+#include "core/format/color/color_layout.h"
+#include "core/format/color/color_section_writer.h"
+#include "core/geometry/morton.h"
+#include "query/dag_view.h"
+#include "query/extract/node_reader.h"
+
+namespace voxdag::query {
+namespace {
+
+using voxdag_reader::ColorRegion;
+using voxdag_reader::ColorSection;
+using voxdag_reader::ColorTier;
+
+constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
+// What a thread has while it encodes a region: its cells, the next coarser ones and all colors.
+constexpr uint64_t kWorkerBytes =
+    kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) + SourceFile::kBlockBytes;
+constexpr uint64_t kEncodedBytes = kMaxRegionCells * 3 / 4;
+// Regions that are encoded before the pages of the file are released.
+constexpr size_t kBatchRegions = 32;
+
+// A set cube of the file, by its Morton code among the cubes of its level.
+struct PlacedCube {
+  uint64_t code = 0;
+  uint64_t content = 0;  // see DagView
+};
+
+// The color n cells add up to that have this one.
+ColorSum sum_of(const voxdag_reader::Rgb& rgb, uint64_t n) {
+  ColorSum sum;
+  const uint8_t channels[3] = {rgb.r, rgb.g, rgb.b};
+  for (size_t c = 0; c < 3; ++c) sum.plain[c] = n * color::intensity_of(channels[c]);
+  sum.seen = sum.plain;
+  sum.weight = sum.seen_weight = n;
+  return sum;
+}
+
+class PartColors {
+ public:
+  PartColors(const ColoredPart& part, FileSystem& files, MemoryBudget& budget,
+             const CancelToken& cancel)
+      : part_(part),
+        file_(part.file),
+        dag_(part.file),
+        source_(files, part.file, budget),
+        cancel_(cancel),
+        levels_(part_color_levels(part)),
+        finest_(levels_ + part.crop.level) {
+    const auto& p = part.crop.position;
+    crop_code_ = morton_encode(p[0], p[1], p[2]);
+  }
+
+  uint32_t levels() const { return levels_; }
+  // The level of the file whose cubes are the regions of a tier of the part.
+  uint32_t region_level(uint32_t tier) const { return finest_of(tier) - depth_of(tier); }
+
+  // Compares what finds nodes and colors with its checksums.
+  void check_index() {
+    std::vector<std::byte> block(SourceFile::kBlockBytes);
+    for (uint32_t l = 0; l <= std::min(finest_, file_.brick_level()); ++l) {
+      const voxdag_reader::Level& level = file_.level(l);
+      source_.check(level.file_offset, level.word_count * sizeof(uint32_t), block);
+    }
+    for (uint32_t t = 0; t < file_.colors().tier_count(); ++t) {
+      const ColorTier& tier = file_.colors().tier(t);
+      source_.check(offset_of(tier.directory), tier.region_count * color_layout::kRegionEntryBytes,
+                    block);
+    }
+  }
+
+  // Calls visit(cube) for the regions of the finest tier, in Morton order.
+  template <class Visit>
+  void for_each_region(const Visit& visit) const {
+    const auto place = [&](const auto& self, uint32_t level, const PlacedCube& cube) -> void {
+      if (level >= part_.crop.level) return walk(level, cube, region_level(0), visit);
+      const uint64_t next = crop_code_ >> 3 * (part_.crop.level - level - 1);
+      const DagView::Children children = dag_.children(level, cube.content);
+      const int index = static_cast<int>(next & 7);
+      if (children.has(index)) self(self, level + 1, {next, dag_.content(level, children, index)});
+    };
+    place(place, 0, {0, dag_.root()});
+  }
+
+  EncodedRegion encode(const PlacedCube& cube) {
+    const uint32_t level = region_level(0);
+    if (is_copied(0, cube.code)) return copy(0, cube.code);
+    check_colors(finest_, level, cube.code);
+    voxdag_reader::ColorCursor colors(file_);
+    std::vector<ColoredCell> cells;
+    const uint64_t first = cube.code << 3 * depth_of(0);
+    walk(level, cube, finest_, [&](const PlacedCube& cell) {
+      cells.push_back({static_cast<uint32_t>(cell.code - first),
+                       sum_of(color_of_cell(colors, finest_, cell.code), 1)});
+    });
+    return encode_cells(0, cube.code, cells);
+  }
+
+  // Of a tier above the finest; `morton` is that of the part.
+  EncodedRegion encode_coarse(uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
+    const uint32_t level = region_level(tier);
+    const uint64_t code = crop_code_ << 3 * (level - part_.crop.level) | morton;
+    if (is_copied(tier, code)) return copy(tier, code);
+    check_colors(finest_of(tier), level, code);
+    return encode_cells(tier, code, cells);
+  }
+
+ private:
+  uint32_t finest_of(uint32_t tier) const { return finest_ - tier * color_layout::kTierLevels; }
+  uint32_t depth_of(uint32_t tier) const {
+    return color_layout::levels_in_region(color_layout::finest_level(levels_, tier));
+  }
+  uint64_t morton_in_part(uint32_t level, uint64_t code) const {
+    return code & ((uint64_t{1} << 3 * (level - part_.crop.level)) - 1);
+  }
+  uint64_t offset_of(const unsigned char* at) const {
+    return static_cast<uint64_t>(at - file_.data());
+  }
+
+  // The low corner of a cube in cells of the selected grid, and its edge.
+  int64_t edge(uint32_t level) const { return int64_t{1} << (part_.selection.grid_levels - level); }
+  std::array<int64_t, 3> corner(uint32_t level, uint64_t code) const {
+    uint32_t x, y, z;
+    morton_decode(code, x, y, z);
+    return {x * edge(level), y * edge(level), z * edge(level)};
+  }
+  bool is_whole(uint32_t level, uint64_t code) const {
+    return part_.selection.region.contains(corner(level, code), edge(level));
+  }
+  bool is_selected(uint32_t level, const PlacedCube& cube) const {
+    if (is_whole(level, cube.code)) return true;
+    if (!part_.selection.region.intersects(corner(level, cube.code), edge(level))) return false;
+    const DagView::Children children = dag_.children(level, cube.content);
+    for (int i = 0; i < 8; ++i)
+      if (children.has(i) && is_selected(level + 1, child(level, cube, children, i))) return true;
+    return false;
+  }
+  PlacedCube child(uint32_t level, const PlacedCube& cube, const DagView::Children& children,
+                   int index) const {
+    return {cube.code << 3 | static_cast<uint64_t>(index), dag_.content(level, children, index)};
+  }
+  // Calls visit(cube) for the cubes of a level in which anything is selected.
+  template <class Visit>
+  void walk(uint32_t level, const PlacedCube& cube, uint32_t target, const Visit& visit) const {
+    if (!is_selected(level, cube)) return;
+    if (level == target) return visit(cube);
+    const DagView::Children children = dag_.children(level, cube.content);
+    for (int i = 0; i < 8; ++i)
+      if (children.has(i)) walk(level + 1, child(level, cube, children, i), target, visit);
+  }
+
+  // Whether the bytes of a region are those of one of the file.
+  bool is_copied(uint32_t tier, uint64_t code) const {
+    const uint32_t finest = finest_of(tier);
+    if (finest > file_.color_levels()) return false;
+    const ColorTier& stored = file_.colors().tier_of(finest);
+    return stored.finest_level == finest && stored.region_level == region_level(tier) &&
+           is_whole(region_level(tier), code);
+  }
+  EncodedRegion copy(uint32_t tier, uint64_t code) {
+    check_colors(finest_of(tier), region_level(tier), code);
+    const ColorTier& stored = file_.colors().tier_of(finest_of(tier));
+    const uint64_t at = ColorSection::lower_bound(stored, code);
+    ColorRegion region;
+    if (at == stored.region_count || !ColorSection::region(stored, at, region) ||
+        region.morton != code)
+      file_.broken_colors("a region is missing or damaged");
+    EncodedRegion copied;
+    copied.morton = morton_in_part(region_level(tier), code);
+    std::copy(std::begin(region.counts), std::end(region.counts), copied.counts.begin());
+    const std::byte* const bytes = reinterpret_cast<const std::byte*>(region.blocks);
+    copied.blocks.assign(bytes, bytes + (region.cells + 31) / 32 * 16);
+    for (uint32_t table = 0; table < 2; ++table)
+      for (uint64_t i = 0; i < region.prefix_count(table); ++i)
+        copied.prefix.push_back(region.prefix(table, i));
+    copied.total = sum_of(region.color(region.cells - 1), region.counts[0]);
+    return copied;
+  }
+
+  // Compares the colors that the cells of a cube have, down to level `finest`, with their
+  // checksums.
+  void check_colors(uint32_t finest, uint32_t level, uint64_t code) {
+    std::vector<std::byte> block(SourceFile::kBlockBytes);
+    for (uint32_t t = 0; t < file_.colors().tier_count(); ++t) {
+      const ColorTier& tier = file_.colors().tier(t);
+      const bool is_coarser = t > 0 && tier.finest_level < level;
+      if (is_coarser || tier.region_level > finest) continue;
+      // The first region that has colors of the cube, and the first after it that has none.
+      const bool within = tier.region_level < level;
+      const uint32_t between = within ? level - tier.region_level : tier.region_level - level;
+      const uint64_t begin = within ? code >> 3 * between : code << 3 * between;
+      const uint64_t end = within ? begin + 1 : (code + 1) << 3 * between;
+      for (uint64_t i = ColorSection::lower_bound(tier, begin); i < tier.region_count; ++i) {
+        ColorRegion region;
+        if (!ColorSection::region(tier, i, region)) file_.broken_colors("a region is damaged");
+        if (region.morton >= end) break;
+        source_.check(offset_of(region.blocks), region.units() * color_layout::kUnitBytes, block);
+      }
+    }
+  }
+  voxdag_reader::Rgb color_of_cell(voxdag_reader::ColorCursor& colors, uint32_t level,
+                                   uint64_t code) const {
+    uint32_t x, y, z;
+    morton_decode(code, x, y, z);
+    const auto rgb = colors.color(x, y, z, level);
+    if (!rgb) file_.broken_colors("a cell of the DAG has none");
+    return *rgb;
+  }
+
+  EncodedRegion encode_cells(uint32_t tier, uint64_t code, std::span<const ColoredCell> cells) {
+    const uint32_t depth = depth_of(tier), level = region_level(tier);
+    voxdag_reader::ColorCursor colors(file_);
+    const auto color = [&](uint32_t up, const ColoredCell& cell) {
+      const uint32_t cell_level = level + depth - up;
+      const uint64_t cell_code = code << 3 * (depth - up) | cell.code;
+      // The sums of the finest cells are their colors.
+      if ((tier == 0 && up == 0) || !is_whole(cell_level, cell_code)) return color_of(cell.sum);
+      const voxdag_reader::Rgb rgb = color_of_cell(colors, cell_level, cell_code);
+      return Color{{rgb.r, rgb.g, rgb.b}, 255};
+    };
+    cancel_.check();
+    return encode_region(depth, morton_in_part(level, code), cells, color);
+  }
+
+  const ColoredPart& part_;
+  const voxdag_reader::File& file_;
+  const DagView dag_;
+  SourceFile source_;
+  const CancelToken& cancel_;
+  const uint32_t levels_;  // of the part's color grid
+  const uint32_t finest_;  // the level of the file that has its cells
+  uint64_t crop_code_ = 0;
+};
+
+// Encodes regions on all threads, and writes them in order.
+class RegionWriter {
+ public:
+  RegionWriter(PartColors& colors, ColorSectionWriter& section, const voxdag_reader::File& file,
+               unsigned workers, Progress& progress)
+      : colors_(colors), section_(section), file_(file), workers_(workers), progress_(progress) {
+    batch_.reserve(kBatchRegions);
+  }
+  void add(const PlacedCube& cube) {
+    batch_.push_back(cube);
+    if (batch_.size() == kBatchRegions) flush();
+  }
+  void flush() {
+    std::vector<EncodedRegion> regions(batch_.size());
+    parallel_for_in_order(
+        workers_, batch_.size(),
+        [&](unsigned, size_t i) { regions[i] = colors_.encode(batch_[i]); },
+        [&](unsigned, size_t i) {
+          section_.add_region(regions[i]);
+          regions[i] = {};
+        });
+    file_.release_pages();
+    progress_.advance(batch_.size());
+    batch_.clear();
+  }
+
+ private:
+  PartColors& colors_;
+  ColorSectionWriter& section_;
+  const voxdag_reader::File& file_;
+  const unsigned workers_;
+  Progress& progress_;
+  std::vector<PlacedCube> batch_;
+};
+
+}  // namespace
+
+uint32_t part_color_levels(const ColoredPart& part) {
+  const uint32_t finest = std::min(part.file.color_levels(), part.selection.grid_levels);
+  return std::max(finest, part.crop.level + kBrickLevels) - part.crop.level;
+}
+
+void write_part_colors(const ColoredPart& part, FileSystem& files, GlobalFileWriter& out,
+                       MemoryBudget& budget, unsigned threads, Progress& progress,
+                       const CancelToken& cancel) {
+  progress.begin_stage("color", 0, "regions");
+  PartColors colors(part, files, budget, cancel);
+  colors.check_index();
+  ColorSectionWriter section(
+      out, colors.levels(), budget,
+      [&](uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
+        return colors.encode_coarse(tier, morton, cells);
+      });
+  const MemoryCharge encoded(budget, kBatchRegions * kEncodedBytes, "encoded colors");
+  const auto workers = static_cast<unsigned>(
+      std::clamp<uint64_t>(budget.available() / (2 * kWorkerBytes), 1, std::max(threads, 1u)));
+  const MemoryCharge work(budget, workers * kWorkerBytes, "the cells of colored regions");
+  RegionWriter writer(colors, section, part.file, workers, progress);
+  colors.for_each_region([&](const PlacedCube& cube) { writer.add(cube); });
+  writer.flush();
+  section.finish();
+  part.file.release_pages();
+  progress.end_stage();
+}
+
+}  // namespace voxdag::query
