@@ -6,6 +6,7 @@
 
 #include "core/base/page_buffer.h"
 #include "core/base/parallel_for.h"
+#include "core/base/process_limits.h"
 #include "core/color/blocks/region.h"
 #include "core/color/color_of.h"
 #include "core/format/color/color_layout.h"
@@ -26,7 +27,7 @@ constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
 constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) + SourceFile::kBlockBytes;
 constexpr uint64_t kEncodedBytes = kMaxRegionCells * 3 / 4;
-// Regions that are encoded before the pages of the file are released.
+// Regions that are encoded at a time.
 constexpr size_t kBatchRegions = 32;
 
 // A set cube of the file, by its Morton code among the cubes of its level.
@@ -45,14 +46,37 @@ ColorSum sum_of(const voxdag_reader::Rgb& rgb, uint64_t n) {
   return sum;
 }
 
+// Releases the pages of a mapped file whenever the process is larger than its budget. A page that
+// is touched may bring others: up to 64 KiB become resident for a node that is read. Thread-safe.
+class ResidentPages {
+ public:
+  ResidentPages(const voxdag_reader::File& file, uint64_t limit_bytes, unsigned threads)
+      : file_(file), limit_bytes_(limit_bytes), interval_(std::max(1u, kVisits / threads)) {}
+  // To be called for each node that is read.
+  void visit() const {
+    thread_local uint32_t visits = 0;
+    if (++visits % interval_ == 0) check();
+  }
+  void check() const {
+    if (resident_bytes() > limit_bytes_) file_.release_pages();
+  }
+
+ private:
+  static constexpr uint32_t kVisits = 512;  // of all threads between two looks: 32 MiB
+  const voxdag_reader::File& file_;
+  const uint64_t limit_bytes_;
+  const uint32_t interval_;
+};
+
 class PartColors {
  public:
-  PartColors(const ColoredPart& part, FileSystem& files, MemoryBudget& budget,
+  PartColors(const ColoredPart& part, FileSystem& files, MemoryBudget& budget, unsigned threads,
              const CancelToken& cancel)
       : part_(part),
         file_(part.file),
         dag_(part.file),
         source_(files, part.file, budget),
+        pages_(part.file, budget.limit(), threads),
         cancel_(cancel),
         levels_(part_color_levels(part)),
         finest_(levels_ + part.crop.level) {
@@ -84,7 +108,7 @@ class PartColors {
     const auto place = [&](const auto& self, uint32_t level, const PlacedCube& cube) -> void {
       if (level >= part_.crop.level) return walk(level, cube, region_level(0), visit);
       const uint64_t next = crop_code_ >> 3 * (part_.crop.level - level - 1);
-      const DagView::Children children = dag_.children(level, cube.content);
+      const DagView::Children children = children_of(level, cube);
       const int index = static_cast<int>(next & 7);
       if (children.has(index)) self(self, level + 1, {next, dag_.content(level, children, index)});
     };
@@ -92,6 +116,7 @@ class PartColors {
   }
 
   EncodedRegion encode(const PlacedCube& cube) {
+    pages_.check();
     const uint32_t level = region_level(0);
     if (is_copied(0, cube.code)) return copy(0, cube.code);
     check_colors(finest_, level, cube.code);
@@ -139,10 +164,14 @@ class PartColors {
   bool is_selected(uint32_t level, const PlacedCube& cube) const {
     if (is_whole(level, cube.code)) return true;
     if (!part_.selection.region.intersects(corner(level, cube.code), edge(level))) return false;
-    const DagView::Children children = dag_.children(level, cube.content);
+    const DagView::Children children = children_of(level, cube);
     for (int i = 0; i < 8; ++i)
       if (children.has(i) && is_selected(level + 1, child(level, cube, children, i))) return true;
     return false;
+  }
+  DagView::Children children_of(uint32_t level, const PlacedCube& cube) const {
+    pages_.visit();
+    return dag_.children(level, cube.content);
   }
   PlacedCube child(uint32_t level, const PlacedCube& cube, const DagView::Children& children,
                    int index) const {
@@ -153,7 +182,7 @@ class PartColors {
   void walk(uint32_t level, const PlacedCube& cube, uint32_t target, const Visit& visit) const {
     if (!is_selected(level, cube)) return;
     if (level == target) return visit(cube);
-    const DagView::Children children = dag_.children(level, cube.content);
+    const DagView::Children children = children_of(level, cube);
     for (int i = 0; i < 8; ++i)
       if (children.has(i)) walk(level + 1, child(level, cube, children, i), target, visit);
   }
@@ -211,6 +240,7 @@ class PartColors {
                                    uint64_t code) const {
     uint32_t x, y, z;
     morton_decode(code, x, y, z);
+    pages_.visit();
     const auto rgb = colors.color(x, y, z, level);
     if (!rgb) file_.broken_colors("a cell of the DAG has none");
     return *rgb;
@@ -235,6 +265,7 @@ class PartColors {
   const voxdag_reader::File& file_;
   const DagView dag_;
   SourceFile source_;
+  const ResidentPages pages_;
   const CancelToken& cancel_;
   const uint32_t levels_;  // of the part's color grid
   const uint32_t finest_;  // the level of the file that has its cells
@@ -244,9 +275,9 @@ class PartColors {
 // Encodes regions on all threads, and writes them in order.
 class RegionWriter {
  public:
-  RegionWriter(PartColors& colors, ColorSectionWriter& section, const voxdag_reader::File& file,
-               unsigned workers, Progress& progress)
-      : colors_(colors), section_(section), file_(file), workers_(workers), progress_(progress) {
+  RegionWriter(PartColors& colors, ColorSectionWriter& section, unsigned workers,
+               Progress& progress)
+      : colors_(colors), section_(section), workers_(workers), progress_(progress) {
     batch_.reserve(kBatchRegions);
   }
   void add(const PlacedCube& cube) {
@@ -262,7 +293,6 @@ class RegionWriter {
           section_.add_region(regions[i]);
           regions[i] = {};
         });
-    file_.release_pages();
     progress_.advance(batch_.size());
     batch_.clear();
   }
@@ -270,7 +300,6 @@ class RegionWriter {
  private:
   PartColors& colors_;
   ColorSectionWriter& section_;
-  const voxdag_reader::File& file_;
   const unsigned workers_;
   Progress& progress_;
   std::vector<PlacedCube> batch_;
@@ -287,18 +316,18 @@ void write_part_colors(const ColoredPart& part, FileSystem& files, GlobalFileWri
                        MemoryBudget& budget, unsigned threads, Progress& progress,
                        const CancelToken& cancel) {
   progress.begin_stage("color", 0, "regions");
-  PartColors colors(part, files, budget, cancel);
+  const MemoryCharge encoded(budget, kBatchRegions * kEncodedBytes, "encoded colors");
+  const auto workers = static_cast<unsigned>(
+      std::clamp<uint64_t>(budget.available() / (2 * kWorkerBytes), 1, std::max(threads, 1u)));
+  const MemoryCharge work(budget, workers * kWorkerBytes, "the cells of colored regions");
+  PartColors colors(part, files, budget, workers, cancel);
   colors.check_index();
   ColorSectionWriter section(
       out, colors.levels(), budget,
       [&](uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
         return colors.encode_coarse(tier, morton, cells);
       });
-  const MemoryCharge encoded(budget, kBatchRegions * kEncodedBytes, "encoded colors");
-  const auto workers = static_cast<unsigned>(
-      std::clamp<uint64_t>(budget.available() / (2 * kWorkerBytes), 1, std::max(threads, 1u)));
-  const MemoryCharge work(budget, workers * kWorkerBytes, "the cells of colored regions");
-  RegionWriter writer(colors, section, part.file, workers, progress);
+  RegionWriter writer(colors, section, workers, progress);
   colors.for_each_region([&](const PlacedCube& cube) { writer.add(cube); });
   writer.flush();
   section.finish();

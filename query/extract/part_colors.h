@@ -15,7 +15,7 @@
 // but the file and the selection.
 //
 // The file is mapped here; of what is read every checksum block is compared with its checksum
-// first, and its pages are released after every few regions.
+// first, and its pages are released when the process is larger than the budget.
 #pragma once
 
 #include <cstdint>
