@@ -1,11 +1,14 @@
 #include "core/format/global/diff.h"
 
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/output.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag::cli {
@@ -14,21 +17,57 @@ namespace {
 struct DiffCommand {
   std::string a, b;
   unsigned threads = default_threads();
+  bool color = false;
   bool json = false;
 };
+
+nlohmann::ordered_json colors_json(const voxdag_reader::File& a, const voxdag_reader::File& b,
+                                   const ColorDiff& colors) {
+  return {{"resolution", int64_t{1} << colors.levels},
+          {"resolution_a", int64_t{1} << a.color_levels()},
+          {"resolution_b", int64_t{1} << b.color_levels()},
+          {"cells", colors.cells},
+          {"different", colors.different_cells},
+          {"largest_difference", colors.largest},
+          {"mean_difference", colors.mean()},
+          {"psnr_db", std::isfinite(colors.psnr()) ? nlohmann::ordered_json(colors.psnr())
+                                                   : nlohmann::ordered_json()}};
+}
+
+void print_colors(const voxdag_reader::File& a, const voxdag_reader::File& b,
+                  const ColorDiff& colors) {
+  if (a.color_levels() != b.color_levels())
+    std::printf("colors of %lld^3 cells in %s, of %lld^3 in %s\n", 1LL << a.color_levels(),
+                a.path().c_str(), 1LL << b.color_levels(), b.path().c_str());
+  std::printf("colors of %lld^3 cells: ", 1LL << colors.levels);
+  if (colors.different_cells == 0)
+    std::printf("identical in all %s cells of both\n", count_text(colors.cells).c_str());
+  else
+    std::printf("%s of %s cells differ, by %u at most in a channel, by %.3g in the mean; %.1f dB\n",
+                count_text(colors.different_cells).c_str(), count_text(colors.cells).c_str(),
+                colors.largest, colors.mean(), colors.psnr());
+}
 
 void run(const DiffCommand& command, CommandContext& context) {
   const auto a = open_global_file(command.a), b = open_global_file(command.b);
   MemoryBudget budget(~uint64_t{0});
   const DiffReport report = diff_global_files(*a, *b, command.threads, budget, context.cancel);
-  context.exit_status = report.same() ? 0 : 1;
+  std::optional<ColorDiff> colors;
+  if (command.color) colors = diff_colors(*a, *b, command.threads, context.cancel);
+  const bool same_colors =
+      !colors || (colors->different_cells == 0 && a->color_levels() == b->color_levels());
+  context.exit_status = report.same() && same_colors ? 0 : 1;
   if (command.json) {
-    print_json(nlohmann::ordered_json{{"same", report.same()},
-                                      {"voxels_a", a->voxels()},
-                                      {"voxels_b", b->voxels()},
-                                      {"only_a", report.only_a},
-                                      {"only_b", report.only_b}});
-  } else if (report.same()) {
+    nlohmann::ordered_json json{{"same", report.same() && same_colors},
+                                {"voxels_a", a->voxels()},
+                                {"voxels_b", b->voxels()},
+                                {"only_a", report.only_a},
+                                {"only_b", report.only_b}};
+    if (colors) json["colors"] = colors_json(*a, *b, *colors);
+    print_json(json);
+    return;
+  }
+  if (report.same()) {
     std::printf("identical: %s voxels\n", count_text(a->voxels()).c_str());
   } else {
     std::printf("%s of %s voxels only in %s\n%s of %s voxels only in %s\n",
@@ -36,11 +75,13 @@ void run(const DiffCommand& command, CommandContext& context) {
                 command.a.c_str(), count_text(report.only_b).c_str(),
                 count_text(b->voxels()).c_str(), command.b.c_str());
   }
+  if (colors) print_colors(*a, *b, *colors);
 }
 
 void declare(Command& command, DiffCommand& state) {
   command.option("a", state.a, "a .vdag file").required();
   command.option("b", state.b, "another .vdag file on the same grid").required();
+  command.flag("--color", state.color, "compare colors, too: of the cells that both have");
   command.threads_option(state.threads);
   command.json_flag(state.json);
 }

@@ -19,22 +19,6 @@ uint64_t level_bytes(const voxdag_reader::Level& level) {
   return level.word_count * sizeof(uint32_t);
 }
 
-// Stored colors, those of coarser levels included.
-uint64_t color_cells(const voxdag_reader::File& file) {
-  uint64_t cells = 0;
-  for (uint32_t t = 0; t < file.colors().tier_count(); ++t)
-    cells += file.colors().tier(t).cell_count;
-  return cells;
-}
-
-// Of the blocks and of what finds them.
-uint64_t color_bytes(const voxdag_reader::File& file) {
-  uint64_t bytes = 0;
-  for (uint32_t t = 0; t < file.colors().tier_count(); ++t)
-    bytes += 16 * file.colors().tier(t).units + 32 * file.colors().tier(t).region_count;
-  return bytes;
-}
-
 nlohmann::ordered_json info_json(const voxdag_reader::File& file, const std::string& sha256) {
   nlohmann::ordered_json levels = nlohmann::ordered_json::array();
   for (uint32_t l = 0; l <= file.brick_level(); ++l)
@@ -50,10 +34,7 @@ nlohmann::ordered_json info_json(const voxdag_reader::File& file, const std::str
       {"dag_nodes", file.dag_nodes()},
       {"bytes", file.file_bytes()},
       {"levels", levels}};
-  if (file.has_colors())
-    json["colors"] = {{"resolution", int64_t{1} << file.color_levels()},
-                      {"cells", color_cells(file)},
-                      {"bytes", color_bytes(file)}};
+  if (file.has_colors()) json["colors"] = color_facts(file);
   if (!sha256.empty()) json["sha256"] = sha256;
   return json;
 }
@@ -68,10 +49,13 @@ void print(const voxdag_reader::File& file, const std::string& sha256) {
   std::printf("  %s voxels, %s octree nodes, %s DAG nodes, hashes of %u bits\n",
               count_text(file.voxels()).c_str(), count_text(file.svo_nodes()).c_str(),
               count_text(file.dag_nodes()).c_str(), file.hash_bits());
-  if (file.has_colors())
+  if (file.has_colors()) {
+    const nlohmann::ordered_json colors = color_facts(file);
     std::printf("  colors of %lld^3 cells and coarser ones: %s, %s\n",
                 static_cast<long long>(int64_t{1} << file.color_levels()),
-                count_text(color_cells(file)).c_str(), size_text(color_bytes(file)).c_str());
+                count_text(colors["cells"].get<uint64_t>()).c_str(),
+                size_text(colors["bytes"].get<uint64_t>()).c_str());
+  }
   std::printf("  level  cube edge            nodes         size\n");
   for (uint32_t l = 0; l <= file.brick_level(); ++l)
     std::printf("  %5u  %9lld  %15s  %11s%s\n", l, static_cast<long long>(file.resolution() >> l),

@@ -19,6 +19,16 @@ void print_line(const Json& json) {
 void print_json(const nlohmann::ordered_json& json) { print_line(json); }
 void print_json(const nlohmann::json& json) { print_line(json); }
 
+nlohmann::ordered_json color_facts(const voxdag_reader::File& file) {
+  uint64_t cells = 0, bytes = 0;  // of all levels; of the blocks and of what finds them
+  for (uint32_t t = 0; t < file.colors().tier_count(); ++t) {
+    const voxdag_reader::ColorTier& tier = file.colors().tier(t);
+    cells += tier.cell_count;
+    bytes += 16 * tier.units + 32 * tier.region_count;
+  }
+  return {{"resolution", int64_t{1} << file.color_levels()}, {"cells", cells}, {"bytes", bytes}};
+}
+
 void OutputFile::declare_force(Command& command) {
   command.flag("--force", force, "replace a file that this command has not written");
 }

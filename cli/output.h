@@ -6,12 +6,16 @@
 #include <string>
 
 #include "cli/command.h"
+#include "core/format/global/voxdag_reader.h"
 
 namespace voxdag::cli {
 
 // Prints one line. Bytes that are not UTF-8, as a path may have, are printed as U+FFFD.
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
+
+// Resolution, cells and bytes of the colors of a file that has some.
+nlohmann::ordered_json color_facts(const voxdag_reader::File& file);
 
 // Whether voxdag wrote the file with a command of this kind.
 using IsOwnFile = std::function<bool(const ReadableFile& file)>;

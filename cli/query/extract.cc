@@ -51,22 +51,24 @@ nlohmann::ordered_json extract_json(const ExtractCommand& command, const query::
     levels.push_back({{"level", l},
                       {"nodes", written.level(l).node_count},
                       {"bytes", written.level(l).word_count * sizeof(uint32_t)}});
-  return {{"output", command.output.path},
-          {"sha256", r.sha256},
-          {"resolution", r.grid.resolution()},
-          {"bounds", {{"origin", r.grid.origin}, {"edge", r.grid.edge}}},
-          {"hash_bits", written.hash_bits()},
-          {"voxels", r.voxels},
-          {"svo_nodes", r.svo_nodes},
-          {"dag_nodes", r.dag_nodes},
-          {"bytes", r.bytes},
-          {"levels", levels},
-          {"cubes", {{"total", r.parts}, {"split", r.parts_split}}},
-          {"merge_passes", r.merge_passes},
-          {"work_bytes", r.work_bytes},
-          {"wall_s", times.wall_s},
-          {"cpu_s", times.cpu_s},
-          {"peak_rss_bytes", peak_resident_bytes()}};
+  nlohmann::ordered_json json{{"output", command.output.path},
+                              {"sha256", r.sha256},
+                              {"resolution", r.grid.resolution()},
+                              {"bounds", {{"origin", r.grid.origin}, {"edge", r.grid.edge}}},
+                              {"hash_bits", written.hash_bits()},
+                              {"voxels", r.voxels},
+                              {"svo_nodes", r.svo_nodes},
+                              {"dag_nodes", r.dag_nodes},
+                              {"bytes", r.bytes},
+                              {"levels", levels}};
+  if (written.has_colors()) json["colors"] = color_facts(written);
+  json.update(nlohmann::ordered_json{{"cubes", {{"total", r.parts}, {"split", r.parts_split}}},
+                                     {"merge_passes", r.merge_passes},
+                                     {"work_bytes", r.work_bytes},
+                                     {"wall_s", times.wall_s},
+                                     {"cpu_s", times.cpu_s},
+                                     {"peak_rss_bytes", peak_resident_bytes()}});
+  return json;
 }
 
 uint64_t memory_bytes(const std::string& text) {

@@ -1,4 +1,6 @@
 // info, verify, diff, render, plan, status and generate on small files.
+#include <cmath>
+
 #include "tests/cli/command_line.h"
 
 namespace command_line {
@@ -75,6 +77,46 @@ TEST_F(FileCommands, Diff) {
   EXPECT_EQ(json["same"], false);
   EXPECT_GT(json["only_a"].get<uint64_t>() + json["only_b"].get<uint64_t>(), 0u);
   expect_error(2, "", {"diff", "m.vdag", "a.vdag"});
+}
+
+// Of the same voxels with other colors, and of a part that keeps its colors.
+TEST_F(FileCommands, DiffOfColors) {
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  put("red.ply", head + "0 0 0 200 0 0\n1 0 0 200 0 0\n0 1 0 200 0 0\n3 0 1 2\n");
+  put("blue.ply", head + "0 0 0 0 0 90\n1 0 0 0 0 90\n0 1 0 0 0 90\n3 0 1 2\n");
+  for (const char* name : {"red", "blue"})
+    run_json({"build", std::string(name) + ".ply", "-r", "64", "--color", "-o",
+              std::string(name) + ".vdag"});
+  const Json voxels = run_json({"diff", "red.vdag", "blue.vdag"});
+  EXPECT_EQ(voxels["same"], true);
+  EXPECT_FALSE(voxels.contains("colors"));
+  const Answer different = run({"diff", "red.vdag", "blue.vdag", "--color", "--json"});
+  EXPECT_EQ(different.status, 1) << different.err;
+  const Json json = Json::parse(different.out);
+  EXPECT_EQ(json["same"], false);
+  EXPECT_EQ(json["only_a"], 0);
+  const Json& colors = json["colors"];
+  EXPECT_EQ(colors["resolution"], 64);
+  EXPECT_EQ(colors["cells"], voxels["voxels_a"]);
+  EXPECT_EQ(colors["different"], colors["cells"]);
+  EXPECT_EQ(colors["largest_difference"], 200);
+  EXPECT_NEAR(colors["mean_difference"].get<double>(), 290 / 3.0, 1e-9);
+  EXPECT_NEAR(colors["psnr_db"].get<double>(),
+              10 * std::log10(255 * 255 * 3 / (200.0 * 200 + 90 * 90)), 1e-9);
+  EXPECT_NE(run({"diff", "red.vdag", "blue.vdag", "--color"}).out.find("differ, by 200 at most"),
+            std::string::npos);
+
+  const Json extracted = run_json({"extract", "red.vdag", "-o", "whole.vdag"});
+  EXPECT_EQ(extracted["colors"]["resolution"], 64);
+  EXPECT_EQ(extracted["colors"], run_json({"info", "red.vdag"})["colors"]);
+  const Json same = run_json({"diff", "red.vdag", "whole.vdag", "--color"});
+  EXPECT_EQ(same["same"], true);
+  EXPECT_EQ(same["colors"]["different"], 0);
+  EXPECT_TRUE(same["colors"]["psnr_db"].is_null());
+  expect_error(2, "no colors", {"diff", "m.vdag", "m.vdag", "--color"});
 }
 
 // A missing file and a file of another format are different errors.

@@ -1,0 +1,31 @@
+// Compares the colors of two global files of the same grid, cell by cell: those of the cells that
+// are set in both, on the finest level that both have colors for. The result does not depend on
+// the number of threads.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/cancel_token.h"
+#include "core/format/global/voxdag_reader.h"
+
+namespace voxdag {
+
+// Differences are those of channels, in sRGB bytes.
+struct ColorDiff {
+  uint32_t levels = 0;            // cells of the grid of 2^levels per edge were compared
+  uint64_t cells = 0;             // that are set in both files
+  uint64_t different_cells = 0;   // whose colors differ
+  uint32_t largest = 0;           // difference
+  uint64_t sum = 0, squares = 0;  // of all differences
+  // Of a channel of a cell; 0 if there is none.
+  double mean() const;
+  // The peak signal-to-noise ratio in dB; infinite if nothing differs.
+  double psnr() const;
+};
+
+// Throws Error{kInvalidInput} if a file has no colors or the grids differ, Error{kCorrupt} for a
+// damaged file. Memory: a few MiB.
+ColorDiff diff_colors(const voxdag_reader::File& a, const voxdag_reader::File& b, unsigned threads,
+                      const CancelToken& cancel);
+
+}  // namespace voxdag
