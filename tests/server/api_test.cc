@@ -1,7 +1,10 @@
+#include <cstring>
 #include <filesystem>
+#include <span>
 
 #include "core/base/error.h"
 #include "core/format/checksum.h"
+#include "core/image/image_reader.h"
 #include "server/http/digest_field.h"
 #include "tests/server/running_service.h"
 
@@ -9,6 +12,44 @@ namespace voxdag::server {
 namespace {
 
 using Api = RunningService;
+
+// Two triangles with red corners.
+constexpr const char* kRedSquare =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+    "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+    "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0 230 0 0\n1 0 0 230 0 0\n1 0.2 1 230 0 0\n0 0.2 1 230 0 0\n3 0 1 2\n3 0 2 3\n";
+
+class BytesOfText : public ByteSource {
+ public:
+  explicit BytesOfText(const std::string& text) : text_(text) {}
+  size_t read(std::span<std::byte> out) override {
+    const size_t size = std::min(out.size(), text_.size() - at_);
+    std::memcpy(out.data(), text_.data() + at_, size);
+    at_ += size;
+    return size;
+  }
+
+ private:
+  const std::string& text_;
+  size_t at_ = 0;
+};
+
+// Pixels of a PNG picture that are clearly red.
+uint64_t red_pixels(const std::string& png) {
+  MemoryBudget budget(uint64_t{1} << 28);
+  BytesOfText bytes(png);
+  const auto image = open_image(bytes, budget);
+  EXPECT_EQ(image->bits(), 8);
+  std::vector<std::byte> row(4 * size_t{image->width()});
+  uint64_t red = 0;
+  for (uint32_t y = 0; y < image->height(); ++y) {
+    image->read_row(row);
+    for (size_t at = 0; at < row.size(); at += 4)
+      red += static_cast<int>(row[at]) > 80 + static_cast<int>(row[at + 1]);
+  }
+  return red;
+}
 
 // From the upload to the result, with the bytes of `voxdag build`.
 TEST_F(Api, TurnsASceneIntoADag) {
@@ -53,6 +94,21 @@ TEST_F(Api, RendersAPreview) {
   ASSERT_TRUE(until_state(id, "succeeded"));
   EXPECT_TRUE(until([&] { return job(id)["preview"] == true; }));
   EXPECT_TRUE(http_->get("/api/v1/jobs/" + id + "/preview.png").body.starts_with("\x89PNG"));
+}
+
+// The preview of a job with colors shows them, that of the same scene without colors does not.
+TEST_F(Api, RendersColorsInAPreview) {
+  start();
+  ASSERT_EQ(put_scene("red.ply", kRedSquare).status, 201);
+  for (const bool color : {true, false}) {
+    const std::string id =
+        post_job({{"scene", "red.ply"}, {"resolution", 64}, {"options", {{"color", color}}}});
+    ASSERT_TRUE(until_state(id, "succeeded"));
+    EXPECT_EQ(job(id)["options"]["color"], color);
+    ASSERT_TRUE(until([&] { return job(id)["preview"] == true; }));
+    const uint64_t red = red_pixels(http_->get("/api/v1/jobs/" + id + "/preview.png").body);
+    EXPECT_TRUE(color ? red > 10000 : red == 0) << red;
+  }
 }
 
 TEST_F(Api, ServesRanges) {

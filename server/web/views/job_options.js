@@ -25,6 +25,9 @@ export class JobOptions {
       h("span", {class: "label"}, "Low corner and edge"), h("div", {class: "four"}, this.bounds));
     this.size_row = field("Edge of a voxel", this.voxel_size, "In the scene's units.");
     this.skip_invalid = h("input", {type: "checkbox", id: "skip-invalid", ...watch});
+    this.color = h("input", {type: "checkbox", id: "color", ...watch});
+    this.color_resolution = choice(["", "Automatic"], ...powers(kMinLevel, kMaxLevel).map((k) => [k, grid_text(k)]));
+    this.color_row = field("Color grid", this.color_resolution, "At most the resolution; finer voxels have the color of their cell.");
     this.hash_bits = number({min: "4", max: "64", step: "1", placeholder: "64"});
     this.memory = h("input", {placeholder: "2GiB", autocomplete: "off", ...watch});
     this.threads = number({min: "1", step: "1", placeholder: "default"});
@@ -32,20 +35,23 @@ export class JobOptions {
     this.backend = choice(["", "Automatic"], ["cpu", "CPU"], ["cuda", "CUDA"], ["parallel-host", "GPU pipeline on the CPU"]);
     this.method = choice(["", "Automatic"], ["consing", "Consing"], ["pointers", "Pointers"], ["hashes", "Hashes"]);
     this.priority = number({min: "-100", max: "100", step: "1", placeholder: "0"});
-    this.cube.addEventListener("change", () => this.show_cube());
+    this.cube.addEventListener("change", () => this.show_rows());
+    this.color.addEventListener("change", () => this.show_rows());
     this.element = h("details", {class: "card"}, h("summary", {}, h("h2", {}, "Options")), h("div", {class: "options"},
       h("fieldset", {}, h("legend", {}, "Geometry: determines the result"),
         field("Cube", this.cube), this.bounds_row, this.size_row,
         h("div", {class: "check"}, this.skip_invalid, h("label", {for: "skip-invalid"}, "Skip invalid triangles")),
-        field("Hash bits", this.hash_bits)),
+        h("div", {class: "check"}, this.color, h("label", {for: "color"}, "Colors of the scene")),
+        this.color_row, field("Hash bits", this.hash_bits)),
       h("fieldset", {}, h("legend", {}, "Run: does not affect the result"),
         field("Memory", this.memory, "For example 512MiB or 8GiB."), field("Threads", this.threads),
         field("Subvolumes", this.subvolume), field("Backend", this.backend), field("Method", this.method),
         field("Priority", this.priority, "Higher runs earlier; -100 to 100."))));
-    this.show_cube();
+    this.show_rows();
   }
 
-  show_cube() {
+  show_rows() {
+    this.color_row.hidden = !this.color.checked;
     this.bounds_row.hidden = this.cube.value !== "bounds";
     this.size_row.hidden = this.cube.value !== "voxel_size";
   }
@@ -56,6 +62,9 @@ export class JobOptions {
     if (this.cube.value === "bounds") options.bounds = this.bounds.map((input) => number_of(input, "The bounds"));
     if (this.cube.value === "voxel_size") options.voxel_size = number_of(this.voxel_size, "The voxel size");
     if (this.skip_invalid.checked) options.skip_invalid = true;
+    if (this.color.checked) options.color = true;
+    if (this.color.checked && this.color_resolution.value)
+      options.color_resolution = Number(this.color_resolution.value);
     if (this.hash_bits.value) options.hash_bits = number_of(this.hash_bits, "The hash bits");
     if (this.memory.value.trim()) options.memory = this.memory.value.trim();
     if (this.threads.value) options.threads = number_of(this.threads, "The threads");
@@ -74,9 +83,10 @@ export class JobOptions {
     this.cube.value = options.bounds ? "bounds" : options.voxel_size ? "voxel_size" : "";
     options.bounds?.forEach((value, i) => { this.bounds[i].value = String(value); });
     this.skip_invalid.checked = Boolean(options.skip_invalid);
-    for (const name of ["voxel_size", "hash_bits", "memory", "threads", "subvolume", "backend", "method"])
+    this.color.checked = Boolean(options.color);
+    for (const name of ["voxel_size", "color_resolution", "hash_bits", "memory", "threads", "subvolume", "backend", "method"])
       if (options[name] !== undefined) this[name].value = String(options[name]);
-    this.show_cube();
+    this.show_rows();
     this.element.open = Object.keys(options).length > 0;
   }
 }
