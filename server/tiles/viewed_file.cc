@@ -22,6 +22,7 @@ constexpr double kAspect = 16.0 / 9;
 std::string digest_of(const voxdag_reader::File& file) {
   std::string text(reinterpret_cast<const char*>(file.data()), kHeaderBytes);
   text += "tiles 1 " + std::to_string(kTileLevels);
+  if (file.has_colors()) text += " colors 1";
   return sha256_hex(text).substr(0, kDigestDigits);
 }
 
@@ -44,6 +45,8 @@ Json describe(const voxdag_reader::File& file, const query::DagView& dag,
                {"edge", file.edge()},
                {"voxels", std::to_string(file.voxels())},
                {"root", nullptr}};
+  if (file.has_colors())
+    json["colors"] = {{"levels", file.color_levels()}, {"batch_max", kMaxColorPagesOfBatch}};
   if (dag.empty()) return json;
   json["root"] = {{"level", 0}, {"offset", 0}};
   if (file.brick_level() == 0) {

@@ -17,6 +17,8 @@ namespace voxdag::server {
 inline constexpr uint32_t kTileLevels = 3;
 // How many tiles a request may ask for.
 inline constexpr size_t kMaxTilesOfBatch = 64;
+// And how many color pages.
+inline constexpr size_t kMaxColorPagesOfBatch = 256;
 
 class ViewedFile {
  public:
@@ -24,6 +26,7 @@ class ViewedFile {
   ViewedFile(const std::string& path, const FileIdentity& identity);
 
   const query::DagView& dag() const { return dag_; }
+  const voxdag_reader::File& file() const { return *file_; }
   // Of the file when it was opened.
   const FileIdentity& identity() const { return identity_; }
   // 32 hex digits that stand for the contents of the file and for how its tiles are made.

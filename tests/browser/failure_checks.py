@@ -79,10 +79,10 @@ def check_late_sun(visitor, url, camera):
     visitor.context.add_init_script(TILES % "arrive")
     visitor.open(f"{url}/{PLAIN}")
     visitor.show(camera)
-    before = visitor.page.evaluate("voxdagViewer.renderer.sun")
+    before = visitor.page.evaluate("voxdagViewer.renderer.light.sun")
     assert visitor.page.evaluate(COMPLETE_WITH_SUN, 1500), "the view is never complete"
     assert visitor.page.evaluate("tiles.asked") > 0, "the sun needs no tile: the check sees nothing"
-    assert visitor.page.evaluate("voxdagViewer.renderer.sun") != before, "the sun has not moved"
+    assert visitor.page.evaluate("voxdagViewer.renderer.light.sun") != before, "the sun has not moved"
 
 
 # Draws and picks as soon as the context is back, when programs and tiles are not.

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/format/global/open_global.h"
+#include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
 #include "server/api/access/tokens.h"
 #include "server/view_service.h"
@@ -165,7 +166,8 @@ TEST_F(Tiles, OfWhatIsNotThereAreRefused) {
   EXPECT_EQ(error("/0/0" + version_ + "&depth=2", 400, "invalid_input"), "");
   EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/none/tiles"), 404, "not_found"), "");
   const std::string unfinished = post_job({{"scene", "m.glb"}, {"resolution", 16384}});
-  for (const char* path : {"/tiles", "/tiles/0/0?v=1", "/tiles/batch?v=1&nodes=0.0"}) {
+  for (const char* path : {"/tiles", "/tiles/0/0?v=1", "/tiles/batch?v=1&nodes=0.0",
+                           "/tiles/colors?v=1&pages=0.0.0.0"}) {
     const ClientResponse early = http_->get("/api/v1/jobs/" + unfinished + path);
     EXPECT_EQ(not_problem(early, 409, "conflict"), "") << path;
     EXPECT_TRUE(Json::parse(early.body).contains("state"));
@@ -189,7 +191,8 @@ TEST_F(Tiles, NeedTheRoleRead) {
   config_.token_file = folder_.file("tokens");
   start();
   HttpClient client({url(), reader.token, "", 60});
-  for (const char* path : {"/tiles", "/tiles/0/0?v=1", "/tiles/batch?v=1&nodes=0.0", "/partial"}) {
+  for (const char* path : {"/tiles", "/tiles/0/0?v=1", "/tiles/batch?v=1&nodes=0.0",
+                           "/tiles/colors?v=1&pages=0.0.0.0", "/partial"}) {
     const std::string url = std::string("/api/v1/jobs/none") + path;
     EXPECT_EQ(not_problem(http_->get(url), 401, "unauthorized"), "") << path;
     EXPECT_EQ(not_problem(client.get(url), 404, "not_found"), "") << path;
@@ -226,6 +229,10 @@ TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
   ASSERT_TRUE(until_state(done, "succeeded"));
   EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/" + done + "/partial"), 404, "not_found"), "");
 }
+
+struct Answers : RunningService {
+  using RunningService::not_problem;
+};
 
 // `voxdag view` of one file.
 class View : public testing::Test {
@@ -301,6 +308,58 @@ TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
     // Or the zeros make a tile.
   }
   EXPECT_THROW(file.expect_whole(), Error);
+}
+
+// The colors of a file, 8 x 8 x 8 cells at a time.
+TEST_F(View, SendsColorPages) {
+  build("64", "--color");
+  start();
+  const Json m = manifest();
+  EXPECT_EQ(m["colors"], (Json{{"levels", 6}, {"batch_max", 256}}));
+  const std::string version = "/api/v1/view/tiles/colors?v=" + m["digest"].get<std::string>();
+  const std::string batch = version + "&pages=";
+  const auto file = open_global_file(path_);
+  const query::DagView dag(*file);
+  query::ColorPages pages(*file, dag);
+  std::string expected;
+  for (const query::ColorPageAddress& address :
+       {query::ColorPageAddress{6, {0, 7, 1}}, {0, {0, 0, 0}}, {4, {1, 1, 0}}}) {
+    const std::vector<uint32_t> words = pages.encode(address);
+    EXPECT_GT(words.size(), 1u);
+    expected += with_length({reinterpret_cast<const char*>(words.data()), words.size() * 4});
+  }
+  const ClientResponse answer = http_->get(batch + "6.0.7.1,0.0.0.0,4.1.1.0");
+  EXPECT_TRUE(answer.body == expected);
+  EXPECT_EQ(answer.header("Cache-Control"), "private, max-age=31536000, immutable");
+  EXPECT_EQ(http_
+                ->get(batch + "6.0.7.1,0.0.0.0,4.1.1.0",
+                      {{"If-None-Match", answer.header("ETag")}, {"Connection", "close"}})
+                .status,
+            304);
+  std::string many = "6.0.0.0";
+  for (int i = 1; i < 256; ++i) many += ",6.0.0.0";
+  EXPECT_EQ(http_->get(batch + many).status, 200);
+  for (const std::string& list :
+       {many + ",6.0.0.0", std::string(), std::string("6.0.0.0,"), std::string(",6.0.0.0"),
+        std::string("6.0.0"), std::string("6.0.0.0.0"), std::string("6.0.-1.0"),
+        std::string("x.0.0.0"), std::string("21.0.0.0"), std::string("4294967302.0.0.0"),
+        std::string("6.131072.0.0"), std::string("6.0.0.18446744073709551616")})
+    EXPECT_EQ(Answers::not_problem(http_->get(batch + list), 400, "invalid_input"), "") << list;
+  for (const char* list : {"6.8.0.0", "7.0.0.0", "20.0.0.0", "2.0.0.1", "6.0.0.0,6.0.131071.0"})
+    EXPECT_EQ(Answers::not_problem(http_->get(batch + list), 404, "not_found"), "") << list;
+  EXPECT_EQ(Answers::not_problem(http_->get(version), 400, "invalid_input"), "");
+  EXPECT_EQ(Answers::not_problem(http_->get("/api/v1/view/tiles/colors?v=" + std::string(32, '0') +
+                                            "&pages=6.0.0.0"),
+                                 410, "gone"),
+            "");
+  build("64");
+  const Json gray = manifest();
+  EXPECT_FALSE(gray.contains("colors"));
+  EXPECT_NE(gray["digest"], m["digest"]);
+  const ClientResponse none = http_->get(
+      "/api/v1/view/tiles/colors?v=" + gray["digest"].get<std::string>() + "&pages=0.0.0.0");
+  EXPECT_EQ(Answers::not_problem(none, 404, "not_found"), "");
+  EXPECT_NE(none.body.find("no colors"), std::string::npos) << none.body;
 }
 
 TEST_F(View, ShowsASingleBrickAndAnEmptyScene) {

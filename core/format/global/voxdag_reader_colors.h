@@ -211,13 +211,21 @@ class BasicColorCursor {
 
   // See File::color().
   std::optional<Rgb> color(int64_t x, int64_t y, int64_t z, uint32_t level) {
-    if (!dag_->has_colors() || level > dag_->grid_levels()) return std::nullopt;
+    uint64_t i = 0;
+    const ColorRegion* const region = find(x, y, z, level, i);
+    return region ? std::optional(region->color(i)) : std::nullopt;
+  }
+  // The same color where it is stored: that of cell `i` of a region, which is valid until the next
+  // call. Null where there is none.
+  const ColorRegion* find(int64_t x, int64_t y, int64_t z, uint32_t level, uint64_t& i) {
+    if (!dag_->has_colors() || level > dag_->grid_levels()) return nullptr;
     const int64_t edge = int64_t{1} << level;
-    if (x < 0 || y < 0 || z < 0 || x >= edge || y >= edge || z >= edge) return std::nullopt;
+    if (x < 0 || y < 0 || z < 0 || x >= edge || y >= edge || z >= edge) return nullptr;
     const uint64_t code = morton_code(x, y, z);
-    if (!descend(level, code)) return std::nullopt;
+    if (!descend(level, code)) return nullptr;
     const uint32_t stored = std::min(level, dag_->color_levels());
-    return stored_color(stored, code >> 3 * (level - stored));
+    i = stored_index(stored, code >> 3 * (level - stored));
+    return &region_;
   }
 
  private:
@@ -278,8 +286,8 @@ class BasicColorCursor {
     return true;
   }
 
-  // Of a cell on the path.
-  Rgb stored_color(uint32_t level, uint64_t code) {
+  // Of a cell on the path, in region_.
+  uint64_t stored_index(uint32_t level, uint64_t code) {
     const ColorTier& tier = dag_->colors().tier_of(level);
     const uint32_t above = std::min<uint32_t>(3, level - tier.region_level);  // to the group
     if (group_level_ != level || group_code_ != code >> 3 * above) {
@@ -300,7 +308,7 @@ class BasicColorCursor {
     uint64_t before = 0;
     for (uint32_t finer = level + 1; finer <= tier.finest_level; ++finer)
       before += region_.counts[tier.finest_level - finer];
-    return region_.color(before + rank);
+    return before + rank;
   }
   void enter_region(const ColorTier& tier, uint64_t morton) {
     if (region_tier_ == &tier && region_.morton == morton) return;

@@ -1,11 +1,13 @@
 #include "server/api/routes/tile_routes.h"
 
+#include <algorithm>
 #include <bit>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "core/format/checksum.h"
+#include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
 #include "server/api/context.h"
 #include "server/api/gzip.h"
@@ -19,6 +21,8 @@ constexpr const char* kForEver = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
 // Of a node above the bricks in any file (docs/format.md).
 constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
+// Of the cells of a color page in any file, and of the page's place.
+constexpr uint64_t kMaxColorLevel = 20, kMaxPage = (uint64_t{1} << 17) - 1;
 
 static_assert(std::endian::native == std::endian::little, "tiles are sent as they lie in memory");
 
@@ -36,6 +40,15 @@ std::vector<uint32_t> make_tile(const ViewedFile& file, const query::TileAddress
   }
 }
 
+std::vector<uint32_t> make_page(query::ColorPages& pages, const query::ColorPageAddress& address) {
+  try {
+    return pages.encode(address);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound) throw;
+    throw not_found(error.message());
+  }
+}
+
 // LEVEL.OFFSET of a tile. Throws Problem with this status unless a file could have such a node.
 query::TileAddress parse_address(const std::string& text, int status) {
   const auto numbers = parse_numbers<uint64_t, 2>(text, '.');
@@ -45,13 +58,25 @@ query::TileAddress parse_address(const std::string& text, int status) {
   return {static_cast<uint32_t>((*numbers)[0]), (*numbers)[1]};
 }
 
-std::vector<query::TileAddress> parse_batch(std::string_view nodes) {
-  std::vector<query::TileAddress> addresses;
-  for (size_t comma;; nodes.remove_prefix(comma + 1)) {
-    if (addresses.size() == kMaxTilesOfBatch)
-      throw bad_request("'nodes': expected at most " + std::to_string(kMaxTilesOfBatch));
-    comma = nodes.find(',');
-    addresses.push_back(parse_address(std::string(nodes.substr(0, comma)), 400));
+// LEVEL.X.Y.Z of a color page.
+query::ColorPageAddress parse_page(const std::string& text) {
+  const auto numbers = parse_numbers<uint64_t, 4>(text, '.');
+  if (!numbers || (*numbers)[0] > kMaxColorLevel ||
+      std::any_of(numbers->begin() + 1, numbers->end(), [](uint64_t c) { return c > kMaxPage; }))
+    throw bad_request("'pages': expected the level and the place of each page, LEVEL.X.Y.Z");
+  const auto& [level, x, y, z] = *numbers;
+  return {static_cast<uint32_t>(level), {x, y, z}};
+}
+
+// The addresses of a list, of which `name` is the parameter.
+template <class Parse>
+auto parse_batch(const std::string& name, std::string_view list, size_t most, const Parse& parse) {
+  std::vector<decltype(parse(std::string()))> addresses;
+  for (size_t comma;; list.remove_prefix(comma + 1)) {
+    if (addresses.size() == most)
+      throw bad_request("'" + name + "': expected at most " + std::to_string(most));
+    comma = list.find(',');
+    addresses.push_back(parse(std::string(list.substr(0, comma))));
     if (comma == std::string_view::npos) return addresses;
   }
 }
@@ -113,17 +138,35 @@ Response get_tile(const Call& call, const ViewedFile& file) {
   });
 }
 
+// What `make` returns for each of the addresses, after its length in bytes.
+template <class Addresses, class Make>
+std::string batch_of(const Addresses& addresses, const Make& make) {
+  std::string bytes;
+  for (const auto& address : addresses) {
+    const std::vector<uint32_t> words = make(address);
+    append_words({static_cast<uint32_t>(words.size() * sizeof(uint32_t))}, bytes);
+    append_words(words, bytes);
+  }
+  return bytes;
+}
+
 Response get_batch(const Call& call, const ViewedFile& file) {
   const std::string nodes = call.query("nodes");
-  const std::vector<query::TileAddress> addresses = parse_batch(nodes);
+  const auto addresses = parse_batch("nodes", nodes, kMaxTilesOfBatch, [](const std::string& text) {
+    return parse_address(text, 400);
+  });
   return answer_for_ever(call, file, "batch " + nodes, [&] {
-    std::string bytes;
-    for (const query::TileAddress& address : addresses) {
-      const std::vector<uint32_t> words = make_tile(file, address);
-      append_words({static_cast<uint32_t>(words.size() * sizeof(uint32_t))}, bytes);
-      append_words(words, bytes);
-    }
-    return bytes;
+    return batch_of(addresses, [&](const auto& address) { return make_tile(file, address); });
+  });
+}
+
+Response get_colors(const Call& call, const ViewedFile& file) {
+  const std::string pages = call.query("pages");
+  const auto addresses = parse_batch("pages", pages, kMaxColorPagesOfBatch, parse_page);
+  return answer_for_ever(call, file, "colors " + pages, [&] {
+    query::ColorPages pages_of_file(file.file(), file.dag());
+    return batch_of(addresses,
+                    [&](const auto& address) { return make_page(pages_of_file, address); });
   });
 }
 
@@ -176,6 +219,7 @@ void add_tile_routes(Router& router, const std::string& base, Packing packing,
   };
   add("/tiles", get_manifest, {});
   add("/tiles/batch", get_batch, {"v", "nodes"});
+  add("/tiles/colors", get_colors, {"v", "pages"});
   add("/tiles/{level}/{offset}", get_tile, {"v"});
 }
 

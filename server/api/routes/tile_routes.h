@@ -22,7 +22,7 @@ using FindViewedFile = std::function<Viewed(const Call&)>;
 // of one core: a gain on a network, a loss on the loopback.
 enum class Packing { kNone, kGzip };
 
-// Adds BASE/tiles, BASE/tiles/batch and BASE/tiles/{level}/{offset}.
+// Adds BASE/tiles, BASE/tiles/batch, BASE/tiles/colors and BASE/tiles/{level}/{offset}.
 void add_tile_routes(Router& router, const std::string& base, Packing packing,
                      const FindViewedFile& find);
 

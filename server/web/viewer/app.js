@@ -56,7 +56,7 @@ export class Viewer {
   }
 
   default_options() {
-    return {level: this.manifest.levels, wire: null, clip: null, occlusion: true, shadows: true};
+    return {level: this.manifest.levels, wire: null, clip: null, occlusion: true, shadows: true, color: true};
   }
 
   first_camera() {
@@ -88,6 +88,11 @@ export class Viewer {
       },
       pick_center: () => this.pick(...center()),
       pivot_center: () => this.set_pivot(...center()),
+      toggle_color: () => {
+        if (!this.manifest.colors) return announce("The file has no colors.");
+        this.set_options({color: !this.options.color});
+        announce(this.options.color ? "Colors." : "Gray.");
+      },
       measure: () => this.panel.pick.toggle_measure(),
       screenshot: () => this.save_picture(),
       toggle_panel: () => this.toggle_panel(),
@@ -171,11 +176,11 @@ export class Viewer {
     this.seen.distance = Math.max(1, hit ? hit.distance : free);
   }
 
-  // What the picture shows: {level, wire, clip, occlusion, shadows}, any of them.
+  // What the picture shows: {level, wire, clip, occlusion, shadows, color}, any of them.
   set_options(changed) {
     Object.assign(this.options, changed);
-    const {level, wire, clip, occlusion, shadows} = this.options;
-    this.renderer.setOptions({maxLevel: level, wireLevel: wire, clip, ambientOcclusion: occlusion, sunShadows: shadows});
+    const {level, wire, clip, occlusion, shadows, color} = this.options;
+    this.renderer.setOptions({maxLevel: level, wireLevel: wire, clip, ambientOcclusion: occlusion, sunShadows: shadows, color});
     this.panel.show_options(this.options);
     this.bookmark();
     this.schedule();
@@ -222,11 +227,12 @@ export class Viewer {
   }
 
   bookmark_members() {
-    const {level, wire, clip, occlusion, shadows} = this.options;
+    const {level, wire, clip, occlusion, shadows, color} = this.options;
     return {...camera_fragment(this.space, this.camera),
             level: level < this.manifest.levels ? level : null, wire,
             clip: clip && [...clip.low, ...clip.high].join(","),
-            occlusion: occlusion ? null : 0, shadows: shadows ? null : 0};
+            occlusion: occlusion ? null : 0, shadows: shadows ? null : 0,
+            color: color ? null : 0};
   }
 
   // Takes camera and options from the address; a camera that cannot be used is left out.
@@ -250,7 +256,8 @@ export class Viewer {
     const is_box = box.length === 6 && box.every(Number.isFinite) && [0, 1, 2].every((axis) => box[axis] < box[axis + 3]);
     return {...options, level: level("level") ?? options.level, wire: level("wire"),
             clip: is_box ? {low: box.slice(0, 3), high: box.slice(3)} : null,
-            occlusion: members.get("occlusion") !== "0", shadows: members.get("shadows") !== "0"};
+            occlusion: members.get("occlusion") !== "0", shadows: members.get("shadows") !== "0",
+            color: members.get("color") !== "0"};
   }
 
   // The drawing buffer is only valid until the browser has shown it: draws and reads at once.

@@ -10,6 +10,7 @@ const kHeld = {
 const kHeldCharacters = {"+": "zoom_in", "=": "zoom_in", "-": "zoom_out", "_": "zoom_out"};
 const kActions = {
   f: "toggle_fly", r: "reset", home: "reset", enter: "pick_center", " ": "pick_center", c: "pivot_center",
+  g: "toggle_color",
   m: "measure", p: "screenshot", o: "toggle_panel", "?": "help", h: "help",
 };
 
@@ -23,6 +24,7 @@ const kHelp = [
   ["Click or tap; Enter", "pick a voxel; the one in the center of the picture"],
   ["M", "measure from the picked voxel"],
   ["R", "reset the camera"],
+  ["G", "colors of the file, or gray"],
   ["P", "save the picture"],
   ["O", "show or hide the panel"],
   ["H", "this help"],

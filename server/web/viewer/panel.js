@@ -82,7 +82,8 @@ export class Panel {
     this.switches = {};
     return [
       field("Finest level", this.level), this.level_note, field("Wireframe of octree cubes", this.wire),
-      ...[["occlusion", "Ambient occlusion"], ["shadows", "Shadows of the sun"]].map(([name, label]) => {
+      ...[["color", "Colors"], ["occlusion", "Ambient occlusion"], ["shadows", "Shadows of the sun"]].map(([name, label]) => {
+        if (name === "color" && !viewer.manifest.colors) return null;
         const box = this.switches[name] = h("input", {type: "checkbox", id: `switch-${name}`,
           on: {change: () => viewer.set_options({[name]: box.checked})}});
         return h("div", {class: "check"}, box, h("label", {for: `switch-${name}`}, label));
@@ -96,15 +97,14 @@ export class Panel {
     clear(this.copy_place, copy_button(text, "the camera"));
   }
 
-  show_options({level, wire, clip, occlusion, shadows}) {
+  show_options({level, wire, clip, ...switched}) {
     this.level.value = String(level);
     set_text(this.level_note, level === this.levels ? "single voxels"
       : `cubes of ${count_text(2 ** (this.levels - level))} voxels`);
     this.level.setAttribute("aria-valuetext", this.level_note.textContent);
     this.wire.value = wire === null ? "" : String(wire);
     this.clip.set(clip);
-    this.switches.occlusion.checked = occlusion;
-    this.switches.shadows.checked = shadows;
+    for (const [name, box] of Object.entries(this.switches)) box.checked = switched[name];
   }
 
   show_statistics(s) {
@@ -115,7 +115,8 @@ export class Panel {
       ["Rays per frame", count_text(s.rays)],
       ["Steps per ray", `${s.stepsMean.toFixed(1)}; 99 % within ${Math.round(s.steps99)}`],
       ["Tiles", `${count_text(s.tiles)}${s.loading ? `, ${count_text(s.loading)} loading` : ""}`],
-      ["Tile memory", `${size_text(s.poolBytes)} of ${size_text(s.budgetBytes)}`],
+      ...(this.viewer.manifest.colors ? [["Color pages", count_text(s.colorPages)]] : []),
+      ["Memory of the GPU", `${size_text(s.poolBytes + s.colorPoolBytes)} of ${size_text(s.budgetBytes)}`],
       ["Received", size_text(s.fetchedBytes)],
       ["Failed requests", count_text(s.failed)],
       ["Compiling the shaders", `${Math.round(s.compileMs)} ms`],

@@ -2,13 +2,15 @@
 // missing, and does so within a budget of GPU memory (docs/view.md).
 
 import {WebGLUnavailable} from "./gl/gl_objects.js";
+import {Colors, color_budget} from "./colors/colors.js";
 import {Passes} from "./gl/passes.js";
 import {read_feedback} from "./gl/feedback.js";
 import {View} from "./gl/view.js";
+import {Light} from "./light.js";
 import {TileLoader} from "./tiles/tile_loader.js";
 import {TilePool} from "./tiles/tile_pool.js";
 import {TileStore} from "./tiles/tile_store.js";
-import {add, scale, subtract} from "./vector.js";
+import {add, scale} from "./vector.js";
 
 export {WebGLUnavailable};
 
@@ -37,16 +39,13 @@ export class Renderer {
     this.budget_bytes = budgetBytes || (phone ? kPhoneBudgetBytes : kBudgetBytes);
     this.max_pixels = phone ? kPhoneMaxPixels : kMaxPixels;
     this.options = {minLevel: 0, maxLevel: null, clip: null, ambientOcclusion: true, sunShadows: true,
-                    pixelTolerance: 1, wireLevel: null};
+                    pixelTolerance: 1, wireLevel: null, color: true};
     this.view = null;
     this.first_picture_bytes = 0;
-    this.outside = true;
-    this.sun_turn = 0;
     this.sun_trials = 0;
-    this.set_sun(0);
+    this.colors = null;          // of a file that has some
     this.sample = null;          // {parts, fence, part_ms, busy_ms, ...}: drawn in parts
     this.part_pixels = kFirstPart;
-    this.light = {exposure: 1, sky_reach: 1, haze_start: 1, readings: 0};
     this.size = {width: canvas.width, height: canvas.height, css_width: canvas.width, css_height: canvas.height};
     this.times = {view_ms: -1e9, frame_ms: 0, call_ms: 0, interval_ms: 16, begin_ms: performance.now(), first_picture_ms: null, compile_ms: 0};
     this.scale_index = 4;
@@ -73,8 +72,7 @@ export class Renderer {
   // Resolves when the first picture can be drawn.
   async start() {
     this.info = await this.source.manifest();
-    const camera = this.info.camera;
-    if (camera) this.place_sun(camera.position, camera.target);
+    this.light = new Light(this.info);
     await new Promise((resolve, reject) => {
       this.started = {resolve, reject};
       if (this.disposed) resolve();
@@ -174,11 +172,15 @@ export class Renderer {
   }
 
   statistics() {
-    const {loader, store, passes, times} = this;
+    const {loader, store, passes, times, colors} = this, page_loader = colors?.loader;
+    const sum = (of) => [loader, page_loader].reduce((all, each) => all + (each ? of(each) : 0), 0);
     return {
       fps: times.frame_ms > 0 ? 1000 / times.frame_ms : 0, tiles: store?.tiles.size || 0, tileBytes: store?.tile_bytes || 0,
-      poolBytes: store?.pool.bytes || 0, budgetBytes: this.budget_bytes, requested: loader?.requested_total || 0,
-      failed: loader?.failed_total || 0, loading: loader ? loader.loading.size + loader.queue.length : 0, full: loader?.is_full || false,
+      poolBytes: store?.pool.bytes || 0, budgetBytes: this.budget_bytes, requested: sum((each) => each.requested_total),
+      failed: sum((each) => each.failed_total), loading: sum((each) => each.loading.size + each.queue.length),
+      full: loader?.is_full || page_loader?.is_full || false,
+      colorPages: colors?.store.pages.size || 0, colorBytes: (colors?.store.used_blocks || 0) * kBlockBytes,
+      colorPoolBytes: colors?.store.bytes || 0,
       evicted: store?.evicted || 0, rays: this.stats.rays, stepsMean: this.stats.steps_mean, steps99: this.stats.steps_99,
       internalWidth: passes?.targets?.width || 0, internalHeight: passes?.targets?.height || 0,
       samples: this.samples, compileMs: times.compile_ms, firstPictureMs: times.first_picture_ms,
@@ -189,7 +191,7 @@ export class Renderer {
 
   // null, or {code, message} of what stops tiles from arriving.
   get problem() {
-    return this.loader?.problem || null;
+    return this.loader?.problem || this.colors?.loader.problem || null;
   }
 
   dispose() {
@@ -200,6 +202,7 @@ export class Renderer {
     this.loader?.dispose();
     this.passes.dispose();
     this.store?.pool.dispose();
+    this.colors?.dispose();
     this.started?.resolve();
   }
 
@@ -237,7 +240,9 @@ export class Renderer {
   async load_root() {
     const {root, levels} = this.info;
     this.empty = !root && !this.info.root_brick;
-    this.store = new TileStore(new TilePool(this.gl, this.pool_bytes()));
+    const for_colors = color_budget(this.info, this.budget_bytes);
+    this.store = new TileStore(new TilePool(this.gl, this.pool_bytes(this.budget_bytes - for_colors)));
+    this.colors = for_colors > 0 ? new Colors(this.gl, this.source, for_colors, () => this.on_arrival()) : null;
     this.loader = new TileLoader(this.source, this.store, () => this.on_arrival());
     if (root && levels > 2) {
       await this.loader.load_root(root.level, root.offset);
@@ -248,9 +253,9 @@ export class Renderer {
   }
 
   // A small file needs less than the budget: at worst each voxel has a path of tiles of its own.
-  pool_bytes() {
+  pool_bytes(budget_bytes) {
     const {voxels, levels, tile_levels} = this.info;
-    return Math.min(this.budget_bytes, 4 * kMebibyte + Number(voxels) * kBlockBytes * Math.ceil(levels / tile_levels));
+    return Math.min(budget_bytes, 4 * kMebibyte + Number(voxels) * kBlockBytes * Math.ceil(levels / tile_levels));
   }
 
   // Begins the picture again. What is missing is found sooner by a small picture than by the rest of a large one.
@@ -269,6 +274,7 @@ export class Renderer {
     this.restart();
     this.store?.begin_epoch();
     this.loader?.begin_epoch();
+    this.colors?.begin_epoch();
     this.on_change();
   }
 
@@ -283,6 +289,7 @@ export class Renderer {
     this.lost = true;
     this.ready = false;
     this.loader?.dispose();
+    this.colors?.loader.dispose();
     this.reading = null;
     this.sample = null;
   };
@@ -293,28 +300,17 @@ export class Renderer {
     if (this.started) this.load();
   };
 
-  // The sun stands over the left shoulder of the first camera. If that is within the scene, the sun takes a
-  // better place as soon as the first view is complete.
-  place_sun(position, target) {
-    const {origin, edge} = this.info, back = subtract(position, target);
-    this.outside = position.some((x, i) => x < origin[i] || x > origin[i] + edge);
-    this.sun_turn = Math.atan2(back[2], back[0]) + 0.9;
-    this.set_sun(0);
-  }
-  set_sun(place) {
-    const turn = this.sun_turn - 2 * Math.PI * (place % 16) / 16, height = 0.65 + 0.25 * Math.floor(place / 16);
-    this.sun = [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
-  }
-  // Returns whether the picture is final as far as the sun is concerned.
+  // Within a scene the sun takes a better place as soon as the first view is complete. Returns whether the picture
+  // is final as far as the sun is concerned.
   improve_sun(now_ms) {
-    if (this.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows) return true;
+    if (this.light.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows) return true;
     const {passes} = this, {width, height} = passes.targets;
     if (!this.can_choose_sun) {
       passes.compile_later().then((usable) => this.can_choose_sun = usable && passes === this.passes,
                                   () => this.sun_trials = kSunTrials);
       return false;
     }
-    const values = {...this.uniforms(width, height, width, height), u_turn: this.sun_turn};
+    const values = {...this.uniforms(width, height, width, height), u_turn: this.light.turn};
     const {place, wanted} = this.passes.choose_sun(values, kLitShare);
     this.sun_trials++;
     if (wanted.size > 0 && this.sun_trials < kSunTrials && !this.loader.is_full) {
@@ -322,7 +318,7 @@ export class Renderer {
       return false;
     }
     this.sun_trials = kSunTrials;
-    this.set_sun(place);
+    this.light.set_sun(place);
     this.restart();
     this.light.readings = 0;
     return false;
@@ -334,18 +330,23 @@ export class Renderer {
 
   // Whether nobody waits for a complete view, and the sun has its place.
   get is_done() {
-    return this.waiting.length === 0 && (this.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows);
+    return this.waiting.length === 0 && (this.light.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows);
   }
 
   // Whether all that can be drawn is drawn until the service is asked again.
   rests(now) {
-    return this.full_drawn && this.loader.pauses(now);
+    return this.full_drawn && this.loaders.some((each) => each.pauses(now)) &&
+           this.loaders.every((each) => each.pauses(now) || each.is_idle);
+  }
+  get loaders() {
+    return this.colors ? [this.loader, this.colors.loader] : [this.loader];
   }
 
   // The internal resolution: lower while the camera moves and while tiles arrive, if frames take long.
   internal_size(moving) {
     const {width, height} = this.size;
-    const coarse = moving || (this.loader.outage.count === 0 && (this.quiet_rounds === 0 || (!this.is_complete && this.loader.requests > 0)));
+    const arrives = this.quiet_rounds === 0 || (!this.is_complete && this.loaders.some((each) => each.requests > 0));
+    const coarse = moving || (arrives && this.loaders.every((each) => each.outage.count === 0));
     const scale = coarse ? kScales[this.scale_index] : 1;
     return {width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)), full: scale === 1};
   }
@@ -354,7 +355,7 @@ export class Renderer {
     const {width, height, full} = this.internal_size(moving);
     const before = this.passes.targets;
     if (!before || before.width !== width || before.height !== height) this.samples = 0;
-    this.passes.resize(width, height);
+    this.passes.resize(width, height, this.colors !== null);
     // Cells are as fine as the still picture needs, unless the camera moves.
     const lod_height = moving ? height : this.size.height;
     const values = this.uniforms(width, height, this.size.width, lod_height);
@@ -412,12 +413,15 @@ export class Renderer {
     const coarsest = Math.max(finest, 2 ** (levels - Math.min(levels, options.minLevel || 0)));
     let boundaries = 0;
     for (let scale = 2; scale <= levels; scale += info.tile_levels) boundaries |= 1 << scale;
+    const colored = this.colors !== null && options.color;
+    const colors = colored ? this.colors.uniforms()
+      : {u_page_texels: store.pool.texels, u_page_table: store.pool.table, u_page_mask: 0, u_color_levels: -1};
     return {
-      ...view.uniforms(width, height), u_pool: store.pool.texels, u_table: store.pool.table, u_root: this.root_pointer, u_levels: levels,
+      ...view.uniforms(width, height), ...colors, u_pool: store.pool.texels, u_table: store.pool.table, u_root: this.root_pointer, u_levels: levels,
       u_boundaries: boundaries, u_clip_low: bound(clip.low), u_clip_high: bound(clip.high), u_cell_sizes: [finest, coarsest],
       u_cone: kConeShare * options.pixelTolerance * view.pixel(lod_height), u_seed: 0, u_jitter: [0, 0],
       u_wire_scale: options.wireLevel === null ? -1 : levels - options.wireLevel, u_wire_width: view.pixel(height),
-      u_sun: this.sun, u_sky_reach: light.sky_reach, u_haze: [light.haze_start, 1 / (Math.sqrt(3) * edge)],
+      u_sun: light.sun, u_sky_reach: light.sky_reach, u_haze: [light.haze_start, 1 / (Math.sqrt(3) * edge)],
       u_occlusion: options.ambientOcclusion, u_shadows: options.sunShadows, u_frame: 0,
     };
   }
@@ -433,12 +437,14 @@ export class Renderer {
     if (busy_ms === 0) this.part_pixels = Math.max(kMinPart, Math.round(2.25 * width * height * kPartMs / frame_ms));
     this.adapt(frame_ms, moving || !full);
     for (const slot of read.slots) this.store.mark(slot, epoch, now);
-    this.adjust_light(read, moving);
+    // Not while samples of a still picture are added up.
+    if (read.exposure !== null && this.samples <= kSamples / 4) this.light.adjust(read, moving);
     this.coarse_pixels = read.coarse_pixels;
     if (epoch === this.store.epoch) this.store.rounds++;
     if (this.loader.demand(read.wanted, now) > 0) this.on_arrival();
+    if (pass.colors) this.colors.take_reading(pass.colors.take(), epoch, now);
     if (epoch !== this.store.epoch) return;
-    const nothing_comes = this.loader.is_idle && !this.loader.awaits_retry;
+    const nothing_comes = this.loaders.every((each) => each.is_idle && !each.awaits_retry);
     if (this.times.first_picture_ms === null && read.coarse_pixels < 16) {
       this.times.first_picture_ms = now - this.times.begin_ms;
       this.first_picture_bytes = this.source.fetched_bytes;
@@ -461,22 +467,9 @@ export class Renderer {
     this.scale_index = index < 0 ? kScales.length - 1 : faster ? Math.max(index, this.scale_index - 1) : index;
   }
 
-  // Exposure and reach follow what is seen: smoothly while the camera moves, fast when it stands, and not
-  // at all while samples of a still picture are added up.
-  adjust_light(read, moving) {
-    if (read.exposure === null || this.samples > kSamples / 4) return;
-    const {light} = this, share = moving ? 0.15 : 0.5;
-    const toward = (from, to, known) => known ? from * (to / from) ** share : to;
-    light.sky_reach = toward(light.sky_reach, Math.max(1, (this.outside ? 0.35 : 1) * read.median_t), light.readings > 0);
-    light.haze_start = toward(light.haze_start, Math.max(1, read.nearest_t), light.readings > 0);
-    // The exposure that the first reading measures is that of light without a reach.
-    light.exposure = toward(light.exposure, read.exposure, light.readings > 1);
-    light.readings++;
-  }
-
   draw_empty() {
     const {passes, canvas} = this;
-    passes.resize(canvas.width, canvas.height);
+    passes.resize(canvas.width, canvas.height, false);
     passes.show(1, canvas.width, canvas.height);
     for (const resolve of this.waiting.splice(0)) resolve();
   }

@@ -1,4 +1,4 @@
-// Fetches the manifest and tiles of one file. Tiles are immutable for a digest, so the browser's cache
+// Fetches the manifest, tiles and color pages of one file. They are immutable for a digest, so the browser's cache
 // answers a request that was answered before.
 
 const kTimeoutMs = 30000;
@@ -49,6 +49,13 @@ export class TileSource {
     const list = nodes.map(({level, offset}) => `${level}.${offset}`).join(",");
     const bytes = await this.bytes(`/tiles/batch?v=${digest}&nodes=${list}`);
     return split_batch(bytes, nodes.length);
+  }
+
+  // Color pages [{level, position: [x, y, z]}], in the same way.
+  async fetchColors(pages) {
+    const list = pages.map(({level, position}) => [level, ...position].join(".")).join(",");
+    const bytes = await this.bytes(`/tiles/colors?v=${encodeURIComponent(this.info.digest)}&pages=${list}`);
+    return split_batch(bytes, pages.length);
   }
 
   get batch_max() {

@@ -1,14 +1,21 @@
 // Programs and targets of a picture, and the order in which its passes run.
 
 import {AsyncReading, Program, Target} from "./gl_objects.js";
+import {kColorFeedback} from "./color_shader.js";
 import {kCombine, kFeedback, kLight, kOcclusion, kPick, kPresent, kSun, kSunPlaces, kSunRows, kTrace} from "./picture_shaders.js";
 
 const kHalfRange = 1;        // brightest light of a target with half floats
 const kByteRange = 8;        // and of one with bytes
 const kFeedbackBlock = 4;
+const kColorTexels = 1 << 17;  // of the feedback of colors, about: each page that is seen needs one of its own
 
 function pause() {
   return new Promise((resolve) => setTimeout(resolve, 4));
+}
+
+// The pixels that a texel of a feedback is of, and which of them it says more about.
+function blocks_of(edge, seed) {
+  return {u_block: edge, u_sample: [seed % edge, Math.floor(seed / edge) % edge]};
 }
 
 export class Passes {
@@ -22,6 +29,7 @@ export class Passes {
     this.combine = new Program(gl, "combine", kCombine);
     this.present = new Program(gl, "present", kPresent);
     this.feedback = new Program(gl, "feedback", kFeedback);
+    this.color_feedback = new Program(gl, "color feedback", kColorFeedback);
     this.pick = null;
     this.sun = null;
     this.later = null;           // promise of these two
@@ -37,7 +45,7 @@ export class Passes {
   // Resolves when all programs are compiled; the page stays responsive where the browser can compile in
   // the background. Throws WebGLUnavailable if one cannot be; does nothing if the context is lost.
   async compile() {
-    await this.finish([this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback]);
+    await this.finish([this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback, this.color_feedback]);
     if (!this.gl.isContextLost() && !this.disposed) this.gl.bindVertexArray(this.vertex_array);
   }
 
@@ -58,33 +66,37 @@ export class Passes {
     return true;
   }
 
-  // Targets of the size; those of another size are released.
-  resize(width, height) {
+  // Targets of the size, those of another size are released; `colored`: of a file with colors.
+  resize(width, height, colored) {
     const {gl, targets} = this;
     if (targets && targets.width === width && targets.height === height) return;
     this.release_targets();
     const color = this.floats ? "RGBA16F" : "RGBA8";
+    const feedback = (block) => new Target(gl, Math.ceil(width / block), Math.ceil(height / block), ["RGBA32UI"]);
+    const color_block = 2 ** Math.max(0, Math.ceil(Math.log2(width * height / kColorTexels) / 2));
     this.targets = {
       width, height,
-      hits: new Target(gl, width, height, ["RGBA32UI"]),
+      hits: new Target(gl, width, height, colored ? ["RGBA32UI", "R32UI"] : ["RGBA32UI"]),
       light: new Target(gl, width, height, ["R8", "R32UI", "R32UI"]),
       sky: new Target(gl, Math.ceil(width / 2), Math.ceil(height / 2), ["RGBA8"]),
       colors: [new Target(gl, width, height, [color]), new Target(gl, width, height, [color])],
-      feedback: new Target(gl, Math.ceil(width / kFeedbackBlock), Math.ceil(height / kFeedbackBlock), ["RGBA32UI"]),
+      feedback: feedback(kFeedbackBlock),
+      color_feedback: colored ? feedback(color_block) : null, color_block,
       current: 0,
     };
   }
 
   // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Yields between parts of at
-  // most `part_pixels()` pixels. Returns the reading of the feedback.
+  // most `part_pixels()` pixels. Returns the reading of the feedback; its `colors` is that of the colors, ready as
+  // soon as the reading is, or null if none are shown.
   *draw(values, part_pixels) {
-    const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback} = targets;
+    const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback, color_feedback, color_block} = targets;
     const share = this.floats ? 1 / (values.u_frame + 1) : 1;
     const [before, after] = [colors[targets.current], colors[1 - targets.current]];
     const all = {...values, u_hits: hits.textures[0], u_light: light.textures[0], u_sky: sky.textures[0], u_normals: light.textures[1],
+                 u_colors: hits.textures[1] || hits.textures[0], u_colored: hits.textures.length > 1,
                  u_shadow_missing: light.textures[2], u_before: before.textures[0], u_share: share,
-                 u_range: this.color_range, u_block: kFeedbackBlock,
-                 u_sample: [values.u_seed % kFeedbackBlock, Math.floor(values.u_seed / kFeedbackBlock) % kFeedbackBlock]};
+                 u_range: this.color_range, ...blocks_of(kFeedbackBlock, values.u_seed)};
     let left = part_pixels();
     for (const [program, target] of [[this.trace, hits], [this.light, light], [this.occlusion, sky]])
       for (let row = 0, rows; row < target.height; row += rows) {
@@ -99,7 +111,13 @@ export class Passes {
     this.combine.draw(after, all, width, height);
     targets.current = 1 - targets.current;
     this.feedback.draw(feedback, all, feedback.width, feedback.height);
-    return new AsyncReading(gl, feedback);
+    let of_colors = null;
+    if (color_feedback && values.u_color_levels >= 0) {
+      this.color_feedback.draw(color_feedback, {...all, ...blocks_of(color_block, values.u_seed)},
+                               color_feedback.width, color_feedback.height);
+      of_colors = new AsyncReading(gl, color_feedback);
+    }
+    return Object.assign(new AsyncReading(gl, feedback), {colors: of_colors});
   }
 
   // Draws the accumulated picture to the canvas.
@@ -112,7 +130,7 @@ export class Passes {
   // The hits of a picture of any size, as words of pack_hit(), rows from the bottom.
   capture(values, width, height) {
     const {gl} = this, target = new Target(gl, width, height, ["RGBA32UI"]);
-    this.trace.draw(target, values, width, height);
+    this.trace.draw(target, {...values, u_color_levels: -1}, width, height);
     const words = new Uint32Array(width * height * 4);
     gl.readPixels(0, 0, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
     target.dispose();
@@ -162,15 +180,16 @@ export class Passes {
   dispose() {
     this.disposed = true;
     this.release_targets();
-    for (const program of [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback, this.pick, this.sun])
+    for (const program of [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback, this.color_feedback,
+                           this.pick, this.sun])
       program?.dispose();
     this.gl.deleteVertexArray(this.vertex_array);
   }
 
   release_targets() {
     if (!this.targets) return;
-    const {hits, light, sky, colors, feedback} = this.targets;
-    for (const target of [hits, light, sky, ...colors, feedback]) target.dispose();
+    const {hits, light, sky, colors, feedback, color_feedback} = this.targets;
+    for (const target of [hits, light, sky, ...colors, feedback, color_feedback]) target?.dispose();
     this.targets = null;
   }
 }

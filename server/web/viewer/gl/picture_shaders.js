@@ -1,6 +1,7 @@
 // GLSL of the passes of a picture: trace (G-buffer), light (normals and sun), occlusion (sky), combine (filter, accumulate),
-// present (tones), feedback (what is missing, what was used). Lighting as in query/render/lighting.cc.
+// present (tones), feedback (what is missing, what was used). Lighting as in query/render.
 
+import {kColorSource, kColorState} from "./color_shader.js";
 import {kCameraSource, kPrecision, kRaySource} from "./ray_shader.js";
 
 const kVersion = `#version 300 es\n${kPrecision}`;
@@ -16,6 +17,9 @@ uniform vec2 u_jitter;       // the ray's place in its pixel, from the pixel's c
 uniform float u_cone;        // width of the cone at distance 1
 uniform uint u_seed;
 layout(location = 0) out uvec4 o_hit;
+#ifdef WIRE
+layout(location = 1) out uint o_color;
+#endif
 
 uvec4 pack_hit(bool found, Hit hit, uint steps, bool wire, uint slot) {
   uint axis = hit.axis < 0 ? 3u : uint(hit.axis);
@@ -40,6 +44,7 @@ void main() {
   bool found = trace(0.0, 1e30, vec2(0.0, u_cone), hit);
 #ifdef WIRE
   o_hit = pack_hit(found, hit, uint(step_count), wire, entered_slot);
+  o_color = found && u_color_levels >= 0 ? color_of_cell(hit_cell, hit.scale, hit.missing == 0u) : 0u;
 #else
   o_hit = pack_hit(found, hit, uint(step_count), false, entered_slot);
 #endif
@@ -47,14 +52,14 @@ void main() {
   uint slot = 0u;
   for (int s = hit.scale + 1; s < u_levels && slot == 0u; ++s)
     if ((u_boundaries >> s & 1u) != 0u) slot = picked_slots[s];
-  if (gl_FragCoord.x > 1.0) o_hit = uvec4(uvec3(picked_cell), slot);
+  if (gl_FragCoord.x > 1.0) o_hit = uvec4(uvec3(hit_cell), slot);
 #endif
 }`;
 
 export const kTrace = `${kVersion}
-#define WIRE\n${kRaySource}${kCameraSource}${kTraceMain}`;
+#define WIRE\n#define CELL\n${kRaySource}${kCameraSource}${kColorSource}${kTraceMain}`;
 export const kPick = `${kVersion}
-#define PICK\n${kRaySource}${kCameraSource}${kTraceMain}`;
+#define PICK\n#define CELL\n${kRaySource}${kCameraSource}${kTraceMain}`;
 
 const kSky = `
 const float kPi = 3.14159265;
@@ -282,16 +287,17 @@ void main() {
 }`;
 
 const kReflected = `
-const vec3 kAlbedo = vec3(0.74, 0.70, 0.64), kSunlight = vec3(3.6, 3.2, 2.6);
-vec3 reflected(vec3 normal, vec3 sky, float sun) {
-  return kAlbedo * (sky * 1.1 + kSunlight * (sun * max(0.0, dot(normal, u_sun))));
+const vec3 kPlaster = vec3(0.74, 0.70, 0.64), kSunlight = vec3(3.6, 3.2, 2.6);
+vec3 reflected(vec3 albedo, vec3 normal, vec3 sky, float sun) {
+  return albedo * (sky * 1.1 + kSunlight * (sun * max(0.0, dot(normal, u_sun))));
 }
 `;
 
 // Light from the sky is averaged over 4 x 4 samples on the same plane. The result is multiplied by its
 // coverage, from which haze takes a share.
-export const kCombine = `${kVersion}${kCameraSource}${kSky}
-uniform usampler2D u_hits, u_normals;
+export const kCombine = `${kVersion}${kCameraSource}${kSky}${kColorState}
+uniform usampler2D u_hits, u_normals, u_colors;
+uniform bool u_colored;      // u_colors has colors
 uniform sampler2D u_light, u_sky, u_before;
 uniform vec2 u_jitter;
 uniform vec3 u_sun;
@@ -328,7 +334,9 @@ void main() {
     vec3 sky = weights > 0.0 ? sum / weights : 0.5 * sky_color(normal);
     float depth = max(0.0, t - u_haze.x) * u_haze.y;
     float coverage = 1.0 - 0.25 * (1.0 - exp(-depth * depth));
-    color = vec4(reflected(normal, sky, texelFetch(u_light, pixel, 0).x) * coverage / u_range, coverage);
+    uint own = u_colored ? texelFetch(u_colors, pixel, 0).x : 0u;
+    vec3 albedo = (own & kColored) != 0u ? linear_of(own) : kPlaster;
+    color = vec4(reflected(albedo, normal, sky, texelFetch(u_light, pixel, 0).x) * coverage / u_range, coverage);
   }
   if (wire_in(g)) color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, 0.7), max(color.a, 0.7));
   o_color = u_share < 1.0 ? mix(texelFetch(u_before, pixel, 0), color, u_share) : color;
@@ -401,7 +409,8 @@ void main() {
   if (found_in(g)) {
     vec3 normal = unpack_normal(texelFetch(u_normals, at, 0).x);
     vec3 sky = texelFetch(u_sky, at / 2, 0).rgb;
-    luminance = dot(reflected(normal, sky, texelFetch(u_light, at, 0).x), vec3(0.2126, 0.7152, 0.0722));
+    // The exposure is that of plaster, as in render: dark colors stay dark.
+    luminance = dot(reflected(kPlaster, normal, sky, texelFetch(u_light, at, 0).x), vec3(0.2126, 0.7152, 0.0722));
   }
   o_feedback = uvec4(missing, packHalf2x16(vec2(min(pixels, 60000.0), luminance)),
                      g.w | min(steps_in(g) >> 1, 1023u) << 22, g.x);

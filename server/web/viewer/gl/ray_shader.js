@@ -65,8 +65,10 @@ uniform int u_wire_scale;    // of the cubes that are drawn; -1: none
 uniform float u_wire_width;  // half of a line's, at distance 1
 bool wire = false;
 #endif
+#ifdef CELL
+ivec3 hit_cell = ivec3(0);   // low corner of the cell that was hit
+#endif
 #ifdef PICK
-ivec3 picked_cell;
 uint picked_slots[21];
 #endif
 
@@ -159,8 +161,8 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
       bool whole = float(1 << scale) <= clamp(cone.x + cone.y * t, u_cell_sizes.x, u_cell_sizes.y);
       if (whole || scale < brick_scale - 1) {
         hit = Hit(t, scale, axis, whole ? 0u : leaf);
-#ifdef PICK
-        picked_cell = position + mirrored * (edge - (1 << scale) - 2 * position);
+#ifdef CELL
+        hit_cell = position + mirrored * (edge - (1 << scale) - 2 * position);
 #endif
         return true;
       }

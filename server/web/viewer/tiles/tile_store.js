@@ -8,10 +8,10 @@
 // the camera moves. What was loaded for a view stays until the next one. Therefore the number of tiles
 // that are fetched for one view is bounded, however small the pool is.
 
+import {kRoundsToKnow} from "./loader.js";
 import {decode_tile, kBlockTexels, kTexelWords} from "./tile_format.js";
 
 const kRecentMs = 1500;
-export const kRoundsToKnow = 4;  // readings of the feedback after which unseen tiles are known to be so
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
 const kFreeShare = 1 / 64;    // of the pool, that leaves at once
 

@@ -1,0 +1,121 @@
+#include "query/tiles/color_page.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/format/global/open_global.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint32_t kPageLevels = 3;  // below its root, if the cells are so small
+constexpr size_t kMaskWords = 16, kHeadWords = 1 + kMaskWords;
+constexpr uint64_t kBlockCells = 32;
+constexpr size_t kBlockWords = 4;
+constexpr uint32_t kSkipShift = 16, kSingleColors = 1u << 24;
+
+void check_address(const voxdag_reader::File& file, const ColorPageAddress& page) {
+  if (!file.has_colors()) throw Error(ErrorCode::kNotFound, "the file has no colors");
+  const uint32_t levels = file.color_levels();
+  if (page.level > levels)
+    throw Error(ErrorCode::kNotFound, "colors of level " + std::to_string(page.level) +
+                                          ": expected 0 to " + std::to_string(levels));
+  const uint64_t edge = uint64_t{1} << (page.level - std::min(page.level, kPageLevels));
+  for (const uint64_t c : page.position)
+    if (c >= edge)
+      throw Error(ErrorCode::kNotFound, "page " + std::to_string(c) + " of level " +
+                                            std::to_string(page.level) + ": the grid has " +
+                                            std::to_string(edge) + " along each axis");
+}
+
+// Sets the bits of the cells `below` levels under a cell at `depth`, in Morton order from `code`.
+void set_bits(const DagView& dag, uint32_t depth, uint64_t content, uint32_t below, uint32_t code,
+              uint32_t* mask) {
+  if (below == 0) {
+    mask[code / 32] |= 1u << code % 32;
+    return;
+  }
+  const DagView::Children c = dag.children(depth, content);
+  for (int i = 0; i < 8; ++i)
+    if (c.has(i))
+      set_bits(dag, depth + 1, dag.content(depth, c, i), below - 1,
+               8 * code + static_cast<uint32_t>(i), mask);
+}
+
+void set_mask(const DagView& dag, const ColorPageAddress& page, uint32_t* mask) {
+  const uint32_t below = std::min(page.level, kPageLevels), root = page.level - below;
+  uint64_t content = dag.root();
+  for (uint32_t depth = 0; depth < root; ++depth) {
+    int child = 0;
+    for (const uint64_t c : page.position)
+      child = 2 * child + static_cast<int>(c >> (root - depth - 1) & 1);
+    const DagView::Children children = dag.children(depth, content);
+    if (!children.has(child)) return;
+    content = dag.content(depth, children, child);
+  }
+  set_bits(dag, root, content, below, 0, mask);
+}
+
+// A cell of the page by its Morton code within it.
+std::array<int64_t, 3> cell_of(const ColorPageAddress& page, uint32_t code) {
+  std::array<int64_t, 3> cell;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    uint32_t within = 0;
+    for (uint32_t bit = 0; bit < kPageLevels; ++bit)
+      within |= (code >> (3 * bit + 2 - axis) & 1) << bit;
+    cell[axis] = static_cast<int64_t>(page.position[axis] << kPageLevels | within);
+  }
+  return cell;
+}
+
+uint32_t first_bit(const uint32_t* mask) {
+  uint32_t word = 0;
+  while (mask[word] == 0) ++word;
+  return 32 * word + static_cast<uint32_t>(std::countr_zero(mask[word]));
+}
+
+}  // namespace
+
+std::vector<uint32_t> ColorPages::encode(const ColorPageAddress& address) {
+  check_address(*file_, address);
+  std::vector<uint32_t> words(kHeadWords);
+  set_mask(*dag_, address, words.data() + 1);
+  for (size_t i = 0; i < kMaskWords; ++i)
+    words[0] += static_cast<uint32_t>(std::popcount(words[1 + i]));
+  if (words[0] == 0) return {0};
+  with_reader_errors([&] { add_colors(address, words); });
+  return words;
+}
+
+// The cells follow each other in their region, unless the page is larger than that.
+void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_t>& words) {
+  const uint32_t level = address.level;
+  const uint64_t count = words[0];
+  const voxdag_reader::ColorTier& tier = file_->colors().tier_of(level);
+  if (level - std::min(level, kPageLevels) >= tier.region_level) {
+    const std::array<int64_t, 3> first = cell_of(address, first_bit(words.data() + 1));
+    uint64_t index = 0;
+    const auto* const region = cursor_.find(first[0], first[1], first[2], level, index);
+    if (!region || count > region->cells - index)
+      file_->broken_colors("a region has fewer colors than cells");
+    const uint64_t skip = index % kBlockCells,
+                   blocks = (skip + count + kBlockCells - 1) / kBlockCells;
+    words[0] |= static_cast<uint32_t>(skip) << kSkipShift;
+    words.resize(kHeadWords + blocks * kBlockWords);
+    std::memcpy(words.data() + kHeadWords, region->blocks + index / kBlockCells * 16, blocks * 16);
+    return;
+  }
+  words[0] |= kSingleColors;
+  for (uint32_t code = 0; code < 32 * kMaskWords; ++code) {
+    if (!(words[1 + code / 32] >> code % 32 & 1)) continue;
+    const std::array<int64_t, 3> cell = cell_of(address, code);
+    const auto rgb = cursor_.color(cell[0], cell[1], cell[2], level);
+    if (!rgb) file_->broken_colors("a cell has no color");
+    words.push_back(rgb->r | uint32_t{rgb->g} << 8 | uint32_t{rgb->b} << 16);
+  }
+}
+
+}  // namespace voxdag::query

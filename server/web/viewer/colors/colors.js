@@ -1,0 +1,58 @@
+// The colors of a file: what the shaders need to draw them, and what a reading of the feedback says of them.
+
+import {ColorLoader} from "./color_loader.js";
+import {ColorStore, page_key} from "./color_store.js";
+
+const kMebibyte = 1 << 20;
+const kBudgetShare = 1 / 4;      // of that of tiles and colors
+const kBytesPerVoxel = 1024;     // at worst: a page for each voxel, as many again on coarser levels
+const kWanted = 2;               // of the feedback's last word, the least: so many pixels want the page
+
+// How much of the budget the colors of a file take.
+export function color_budget(info, budget_bytes) {
+  if (!info.colors) return 0;
+  return Math.min(budget_bytes * kBudgetShare, kMebibyte + Number(info.voxels) * kBytesPerVoxel);
+}
+
+export class Colors {
+  constructor(gl, source, budget_bytes, on_arrival) {
+    this.levels = source.info.colors.levels;
+    this.store = new ColorStore(gl, budget_bytes);
+    this.loader = new ColorLoader(source, this.store, on_arrival);
+  }
+
+  begin_epoch() {
+    this.store.begin_epoch();
+    this.loader.begin_epoch();
+  }
+
+  uniforms() {
+    const {store} = this;
+    return {u_page_texels: store.pool.texels, u_page_table: store.table, u_page_mask: store.entries - 1, u_color_levels: this.levels};
+  }
+
+  // Takes the words that kColorFeedback wrote for a picture of an epoch.
+  take_reading(words, epoch, now_ms) {
+    const wanted = new Map();
+    for (let at = 0; at < words.length; at += 4) {
+      const head = words[at], y = words[at + 1], z = words[at + 2], state = words[at + 3];
+      if (state === 0) continue;
+      if (state < kWanted) {
+        // Neighbors mostly use one page.
+        if (at > 0 && head === words[at - 4] && y === words[at - 3] && z === words[at - 2] && words[at - 1] === state) continue;
+        this.store.mark(page_key(head >>> 20, head & 0xfffff, y, z), epoch, now_ms);
+        continue;
+      }
+      const level = head >>> 20, position = [head & 0xfffff, y, z], key = page_key(level, ...position), request = wanted.get(key);
+      if (request) request.priority += state;
+      else wanted.set(key, {key, level, position, priority: state});
+    }
+    if (epoch === this.store.epoch) this.store.rounds++;
+    this.loader.demand(wanted, now_ms);
+  }
+
+  dispose() {
+    this.loader.dispose();
+    this.store.dispose();
+  }
+}
