@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <deque>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/color/blocks/block_codec.h"
@@ -161,6 +163,73 @@ class ColorQuality : public testing::Test {
   }
   TestImages images_;
 };
+
+// The oracle itself, where the answer is known: on a cube of edge 256, at z = 100.
+class ColorOracle : public testing::Test {
+ protected:
+  void add(double from_x, double to_x, const oracle::SurfaceMaterial& material) {
+    const auto corner = [&](double x, double y) {
+      oracle::Surface::Corner out;
+      out.texture = {x / 256, y / 256};
+      return std::pair(oracle::Point{static_cast<int64_t>(x), static_cast<int64_t>(y), 100}, out);
+    };
+    const std::pair<oracle::Point, oracle::Surface::Corner> corners[] = {
+        corner(from_x, -900), corner(to_x, -900), corner(to_x, 700), corner(from_x, 700)};
+    for (const auto& [b, c] : {std::pair(1, 2), std::pair(2, 3)}) {
+      oracle::Surface& surface = surfaces_.emplace_back();
+      surface.material = &material;
+      for (size_t i = 0; const int k : {0, b, c}) {
+        surface.position[i] = corners[k].first;
+        surface.corners[i++] = corners[k].second;
+      }
+    }
+  }
+  std::optional<std::array<uint8_t, 3>> mean() const {
+    std::vector<const oracle::Surface*> all;
+    for (const oracle::Surface& surface : surfaces_) all.push_back(&surface);
+    return oracle::mean_color(all, {0, 0, 0}, 256);
+  }
+  std::deque<oracle::Surface> surfaces_;
+};
+using Bytes = std::array<uint8_t, 3>;
+
+TEST_F(ColorOracle, WeighsByAreaInLinearLight) {
+  oracle::SurfaceMaterial red, blue;
+  red.factor = {1, 0, 0, 1};
+  blue.factor = {0, 0, 1, 1};
+  add(-800, 64, red);
+  add(64, 5000, blue);
+  EXPECT_EQ(mean(), (Bytes{137, 0, 225}));  // of 1/4 and 3/4
+  blue.factor[3] = 1.0 / 3;
+  blue.transparency = oracle::Transparency::kBlend;
+  EXPECT_EQ(mean(), (Bytes{188, 0, 188}));
+  blue.transparency = oracle::Transparency::kCutoff;
+  EXPECT_EQ(mean(), (Bytes{255, 0, 0}));
+}
+
+TEST_F(ColorOracle, LooksAtTheTextureInTheCube) {
+  oracle::ColorImage ramp{64, 1, {}};
+  for (int i = 0; i < 64; ++i)
+    ramp.texels.push_back({(static_cast<float>(i) + 0.5F) / 64, i < 16 ? 1.0F : 0.0F, 0, 1});
+  oracle::SurfaceMaterial material;
+  material.image = &ramp;
+  material.borders = {oracle::Border::kClamp, oracle::Border::kClamp};
+  add(-256, 512, material);
+  const auto color = mean();
+  ASSERT_TRUE(color);
+  EXPECT_NEAR((*color)[0], 188, 1);
+  EXPECT_NEAR((*color)[1], 137, 2);
+  EXPECT_EQ((*color)[2], 0);
+}
+
+TEST_F(ColorOracle, HasNoColorWithoutArea) {
+  EXPECT_FALSE(mean());
+  const oracle::SurfaceMaterial white;
+  add(256, 900, white);
+  EXPECT_FALSE(mean());
+  add(255, 256, white);
+  EXPECT_EQ(mean(), (Bytes{255, 255, 255}));
+}
 
 constexpr ColorGrid kFine{5, 5}, kCoarse{11, 5};
 
