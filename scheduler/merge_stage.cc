@@ -107,14 +107,17 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
 
 bool MergeStage::run(const RunOptions& options, const Sections& sections, BuildReport& report) {
   if (is_published(sections, report)) return true;
+  bool reads_scene = false;  // what is missing or broken in it is no damage of the work folder
   try {
     GlobalFileWriter out(context_.files, report.output, report.grid, report.hash_bits);
     merge(options, out, report);
+    reads_scene = true;
     sections.add(out);
+    reads_scene = false;
     write(out, sections, report);
     return true;
   } catch (const Error& error) {
-    if (!error.is_corruption() || !heal(error)) throw;
+    if (reads_scene || !error.is_corruption() || !heal(error)) throw;
     return false;
   }
 }

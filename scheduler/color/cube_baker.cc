@@ -4,6 +4,7 @@
 #include <array>
 #include <numeric>
 
+#include "core/base/error.h"
 #include "core/geometry/morton.h"
 #include "core/geometry/octree_descent.h"
 #include "scheduler/color/region_record.h"
@@ -28,6 +29,7 @@ CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const Material> materials,
       budget_(budget),
       cancel_(cancel),
       charge_(budget, ColorMemory::kRegionBytes, "baking colors"),
+      records_charge_(budget, 0, "colors of a cube"),
       baker_(grid, materials, textures) {}
 
 void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, std::vector<std::byte>& records) {
@@ -120,7 +122,14 @@ void CubeBaker::append(const Cube& region, std::vector<std::byte>& records) {
   baker_.finish(cells_);
   if (cells_.empty()) return;
   const uint64_t morton = morton_encode(region.position[0], region.position[1], region.position[2]);
-  append_region(encode_region(grid_.color_levels - grid_.region_level(), morton, cells_), records);
+  const EncodedRegion encoded =
+      encode_region(grid_.color_levels - grid_.region_level(), morton, cells_);
+  // Twice the bytes are there while the vector grows.
+  const uint64_t bytes = 3 * (records.size() + encoded.blocks.size());
+  if (bytes > records_charge_.bytes() && !records_charge_.try_resize(bytes))
+    throw Error(ErrorCode::kOutOfMemory, "not enough memory for the colors of one cube: expected "
+                                         "more memory, fewer threads, or a coarser color grid");
+  append_region(encoded, records);
 }
 
 }  // namespace voxdag

@@ -41,6 +41,7 @@ class CubeBaker {
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const MemoryCharge charge_;
+  MemoryCharge records_charge_;  // for the largest records so far
   RegionBaker<TextureReader> baker_;
   std::vector<FixedSurface> surfaces_;  // of the cube
   std::vector<FixedSurface> touching_;  // of a region, or a part of them

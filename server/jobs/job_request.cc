@@ -190,6 +190,8 @@ JobRequest parse_job_request(std::string_view body) {
        {"options", [&](const auto& v) { read_options(v, request.spec); }}});
   if (request.scenes.empty()) fail("scene", "a scene");
   if (resolution == 0) fail("resolution", "voxels per edge");
+  if (request.spec.geometry.color_resolution > resolution)
+    fail("color_resolution", "at most the resolution");
   request.text =
       json_text(ordered_json{{"scene", request.scenes},
                              {"resolution", resolution},
