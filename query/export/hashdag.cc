@@ -176,13 +176,11 @@ ExportReport write_hashdag(const ExportJob& job) {
                     count_text(kMaxHashDagWords),
                 [&](uint32_t level) { return dag.size_at(level).words <= kMaxHashDagWords; });
   if (job.has_colors && dag.voxels() > kMaxHashDagColors)
-    refuse_size(job,
-                count_text(dag.voxels()) + " voxels are selected, but HashDAG numbers at most " +
-                    count_text(kMaxHashDagColors) + " for colors (--gray leaves them out)",
-                [&](uint32_t level) {
-                  return count_voxels(job, coarser(job.selection, level), kMaxHashDagColors) <=
-                         kMaxHashDagColors;
-                });
+    throw Error(ErrorCode::kLimit,
+                job.output + ": " + count_text(dag.voxels()) +
+                    " voxels are selected, but HashDAG numbers at most " +
+                    count_text(kMaxHashDagColors) +
+                    " for colors. Expected --gray, a coarser --level or a smaller --region");
   require_space(job, kHashDagHeaderBytes + 4 * words + (job.has_colors ? 4 * dag.voxels() : 0));
   ExportReport report;
   report.voxels = dag.voxels();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <set>
 
@@ -165,6 +166,35 @@ TEST_F(ExportColors, HashDagHasThemInTheOrderOfItsVoxels) {
     EXPECT_EQ(colors.count(), cells.size());
     for (const auto& [cell, color] : cells) ASSERT_EQ(colors.color(cell), color);
   });
+}
+
+// A full cube of 2^33 voxels: HashDAG has 32 bits for the number of a color.
+TEST_F(ExportColors, HashDagRefusesMoreThanItCanNumber) {
+  const uint32_t levels = 11;
+  const std::string path = folder_.file("full.vdag");
+  GlobalFileWriter writer(system_files(), path, Grid::given({0, 0, 0}, 1, levels), 64);
+  uint64_t svo_nodes = 0;
+  for (uint32_t level = levels - 1; level-- > 0;) {
+    const std::vector<uint32_t> words = level + 2 == levels
+                                            ? std::vector<uint32_t>{~0u, ~0u}
+                                            : std::vector<uint32_t>{255, 0, 0, 0, 0, 0, 0, 0, 0};
+    writer.begin_level(level);
+    writer.checksum_words(words);
+    writer.write_words(0, words);
+    writer.end_level({1, words.size()});
+    svo_nodes += uint64_t{1} << 3 * level;
+  }
+  Codes all(64);
+  std::iota(all.begin(), all.end(), 0);
+  write_colors(writer, {2, 2, all, smooth_colors(2, 0)});
+  writer.finish({uint64_t{1} << 3 * levels, svo_nodes});
+  file_ = open_global_file(path);
+  const Selection selection{levels, whole_grid(levels)};
+  const auto error = error_of([&] { bytes_of("hashdag", selection); });
+  EXPECT_EQ(error.code(), ErrorCode::kLimit);
+  EXPECT_NE(error.message().find("8 589 934 592 voxels"), std::string::npos) << error.message();
+  EXPECT_NE(error.message().find("--gray"), std::string::npos);
+  EXPECT_EQ(bytes_of("hashdag", selection, true).size(), 2u);
 }
 
 // Damage of the colors or of the levels is an Error, or a file; never a crash.
