@@ -46,26 +46,31 @@ ColorSum sum_of(const voxdag_reader::Rgb& rgb, uint64_t n) {
   return sum;
 }
 
-// Releases the pages of a mapped file whenever the process is larger than its budget. A page that
-// is touched may bring others: up to 64 KiB become resident for a node that is read. Thread-safe.
+// Releases the pages of a mapped file whenever the process is larger than its budget. Thread-safe.
 class ResidentPages {
  public:
   ResidentPages(const voxdag_reader::File& file, uint64_t limit_bytes, unsigned threads)
-      : file_(file), limit_bytes_(limit_bytes), interval_(std::max(1u, kVisits / threads)) {}
+      : file_(file), limit_bytes_(limit_bytes), threads_(threads) {}
   // To be called for each node that is read.
   void visit() const {
-    thread_local uint32_t visits = 0;
-    if (++visits % interval_ == 0) check();
+    thread_local uint64_t visits_left = 0;
+    if (visits_left-- == 0) visits_left = check();
   }
-  void check() const {
-    if (resident_bytes() > limit_bytes_) file_.release_pages();
+  // Returns how many nodes this thread can read before the process may have outgrown its budget.
+  uint64_t check() const {
+    const uint64_t bytes = resident_bytes();
+    if (bytes > limit_bytes_) file_.release_pages();
+    const uint64_t free_bytes = limit_bytes_ - std::min(bytes, limit_bytes_);
+    return std::max(kMinVisits, free_bytes / kVisitBytes) / threads_;
   }
 
  private:
-  static constexpr uint32_t kVisits = 512;  // of all threads between two looks: 32 MiB
+  // The system brings up to so much into memory for a page that is touched.
+  static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
+  static constexpr uint64_t kMinVisits = 512;  // 32 MiB
   const voxdag_reader::File& file_;
   const uint64_t limit_bytes_;
-  const uint32_t interval_;
+  const unsigned threads_;
 };
 
 class PartColors {
@@ -240,7 +245,6 @@ class PartColors {
                                    uint64_t code) const {
     uint32_t x, y, z;
     morton_decode(code, x, y, z);
-    pages_.visit();
     const auto rgb = colors.color(x, y, z, level);
     if (!rgb) file_.broken_colors("a cell of the DAG has none");
     return *rgb;
