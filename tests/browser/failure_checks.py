@@ -64,7 +64,7 @@ def check_restart(visitor, server, cameras, references):
 # Puts the first camera, which the sun follows, within the scene. Whether the view is complete within 20 s.
 COMPLETE_WITH_SUN = """async (pause_ms) => {
   const {viewer, renderer, camera, manifest} = voxdagViewer, {eye, target} = camera.get();
-  renderer.place_sun(viewer.space.to_scene(eye), viewer.space.to_scene(target));
+  renderer.light.place_sun(viewer.space.to_scene(eye), viewer.space.to_scene(target));
   renderer.sun_trials = 6;  // of 8 that may wait for tiles
   tiles.pause_ms = pause_ms;
   tiles.asked = 0;

@@ -4,16 +4,25 @@
 import {subtract} from "./vector.js";
 
 export class Light {
-  // `camera` {position, target} is the first one of the file `info`, if it has one. The sun stands over its left
-  // shoulder.
+  // Of a file with this manifest.
   constructor({origin, edge, camera}) {
     this.exposure = 1;
     this.sky_reach = 1;
     this.haze_start = 1;
     this.readings = 0;
-    const back = camera ? subtract(camera.position, camera.target) : null;
-    this.outside = !camera || camera.position.some((x, i) => x < origin[i] || x > origin[i] + edge);
-    this.turn = back ? Math.atan2(back[2], back[0]) + 0.9 : 0;
+    this.low = origin;
+    this.high = origin.map((x) => x + edge);
+    this.outside = true;         // of the grid: so is the first camera
+    this.turn = 0;
+    if (camera) this.place_sun(camera.position, camera.target);
+    else this.set_sun(0);
+  }
+
+  // Over the left shoulder of a camera, the first one.
+  place_sun(position, target) {
+    const back = subtract(position, target);
+    this.outside = position.some((x, i) => x < this.low[i] || x > this.high[i]);
+    this.turn = Math.atan2(back[2], back[0]) + 0.9;
     this.set_sun(0);
   }
 
