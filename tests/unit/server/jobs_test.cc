@@ -61,6 +61,9 @@ TEST(JobRequestBody, IsRefusedByName) {
        "}",
        "'voxel_size'"},
       {"{\"scene\":\"a.glb\",\"resolution\":64,\"options\":{\"backend\":\"gpu\"}}", "'backend'"},
+      {"{\"scene\":\"a.glb\",\"resolution\":64,\"options\":{\"color\":true,"
+       "\"color_resolution\":128}}",
+       "'color_resolution'"},
   };
   for (const auto& [body, part] : bodies) {
     SCOPED_TRACE(body);
