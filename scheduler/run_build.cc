@@ -435,7 +435,7 @@ class Build {
   }
 
   std::string advice(ErrorCode code) {
-    if (code == ErrorCode::kNoSpace) return full_disk_advice(jobs_->leaves());
+    if (code == ErrorCode::kNoSpace) return full_disk_advice(jobs_->leaves(), spec_.geometry.color);
     if (code == ErrorCode::kCanceled && spec_.run.cluster)
       return "; its tasks run on: run the same command again to follow them, or stop them with "
              "voxdag stop-tasks";
