@@ -15,7 +15,7 @@ namespace {
 constexpr double kFileBytesPerCell = 0.69;
 constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};
 // Its header, tables and padding.
-constexpr double kFixedFileBytes = 8192;
+constexpr EstimateRange kFixedFileBytes = {0, 4096, 12288};
 // Sums and lengths of regions.
 constexpr double kArtifactOverFile = 1.02;
 // A surface with an image and without vertex colors, in all its cubes.
@@ -47,7 +47,7 @@ ColorEstimate estimate_colors(const GeometryOptions& options, const EstimateRang
   estimate.file_bytes = {kFileBytesPerCell * kFileSpread.low * cells.low,
                          kFileBytesPerCell * kFileSpread.likely * cells.likely,
                          kFileBytesPerCell * kFileSpread.high * cells.high};
-  estimate.file_bytes = estimate.file_bytes + exactly(kFixedFileBytes);
+  estimate.file_bytes = estimate.file_bytes + kFixedFileBytes;
   estimate.artifact_bytes = kArtifactOverFile * estimate.file_bytes;
   estimate.spill_bytes = above(surfaces, share) + exactly(image_bytes > share ? image_bytes : 0.0);
   const double workers = static_cast<double>(context.threads * ColorMemory::kRegionBytes);
