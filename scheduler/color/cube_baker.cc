@@ -127,8 +127,9 @@ void CubeBaker::append(const Cube& region, std::vector<std::byte>& records) {
   // Twice the bytes are there while the vector grows.
   const uint64_t bytes = 3 * (records.size() + encoded.blocks.size());
   if (bytes > records_charge_.bytes() && !records_charge_.try_resize(bytes))
-    throw Error(ErrorCode::kOutOfMemory, "not enough memory for the colors of one cube: expected "
-                                         "more memory, fewer threads, or a coarser color grid");
+    throw Error(ErrorCode::kOutOfMemory,
+                "not enough memory for the colors of one cube: expected "
+                "more memory, fewer threads, or a coarser color grid");
   append_region(encoded, records);
 }
 
