@@ -20,7 +20,7 @@ constexpr const char* kRedSquare =
     "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
     "0 0 0 230 0 0\n1 0 0 230 0 0\n1 0.2 1 230 0 0\n0 0.2 1 230 0 0\n3 0 1 2\n3 0 2 3\n";
 
-class BytesOfText : public ByteSource {
+class BytesOfText : public EncodedBytes {
  public:
   explicit BytesOfText(const std::string& text) : text_(text) {}
   size_t read(std::span<std::byte> out) override {
