@@ -1,5 +1,6 @@
 #include "core/format/global/verify.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
+#include "query/color_sample.h"
 #include "query/surface_sample.h"
 
 namespace voxdag::cli {
@@ -31,29 +33,49 @@ Grid grid_of(const voxdag_reader::File& file) {
   return Grid::given({origin[0], origin[1], origin[2]}, file.edge(), file.grid_levels());
 }
 
-query::SampleReport check_against(const VerifyCommand& command, const voxdag_reader::File& file,
-                                  Progress& progress, CommandContext& context) {
+struct Sample {
+  query::SampleReport voxels;
+  std::optional<query::ColorSampleReport> colors;  // of a file that has some
+};
+
+Sample check_against(const VerifyCommand& command, const voxdag_reader::File& file,
+                     Progress& progress, CommandContext& context) {
   return_freed_memory_to_system();
-  MemoryBudget budget(kSceneMemory);
+  MemoryBudget budget(file.has_colors() ? std::max(default_memory(), kSceneMemory) : kSceneMemory);
   const auto scene =
       open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);
   const auto boxes =
       query::sample_surface(*scene, grid_of(file), command.seed, progress, context.cancel);
-  return with_reader_errors([&] { return query::compare_with_sample(file, boxes); });
+  Sample sample;
+  with_reader_errors([&] {
+    sample.voxels = query::compare_with_sample(file, boxes);
+    if (file.has_colors())
+      sample.colors = query::compare_sampled_colors(
+          file, context.files, *scene, command.seed, file.path() + ".images.vdspill",
+          command.threads, budget, progress, context.cancel);
+  });
+  return sample;
 }
 
-void print(const voxdag_reader::File& file, const std::optional<query::SampleReport>& sample) {
+void print(const voxdag_reader::File& file, const std::optional<Sample>& sample) {
   std::printf("%s: valid; %s voxels, %s octree nodes, %s DAG nodes\n", file.path().c_str(),
               count_text(file.voxels()).c_str(), count_text(file.svo_nodes()).c_str(),
               count_text(file.dag_nodes()).c_str());
   if (sample)
     std::printf("  equal to the scene: %s voxels compared in %s boxes near its surface, %s set\n",
-                count_text(sample->voxels).c_str(), count_text(sample->boxes).c_str(),
-                count_text(sample->set).c_str());
+                count_text(sample->voxels.voxels).c_str(), count_text(sample->voxels.boxes).c_str(),
+                count_text(sample->voxels.set).c_str());
+  if (sample && sample->colors)
+    std::printf(
+        "  colors like the scene's: %s cells compared in %llu regions, of which %llu are "
+        "equal byte for byte\n",
+        count_text(sample->colors->cells).c_str(),
+        static_cast<unsigned long long>(sample->colors->regions),
+        static_cast<unsigned long long>(sample->colors->equal));
 }
 
 nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_reader::File& file,
-                                   const std::optional<query::SampleReport>& sample) {
+                                   const std::optional<Sample>& sample) {
   nlohmann::ordered_json json{{"ok", true},
                               {"voxels", file.voxels()},
                               {"svo_nodes", file.svo_nodes()},
@@ -61,9 +83,13 @@ nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_re
                               {"bytes", file.file_bytes()}};
   if (sample)
     json["against"] = {{"seed", command.seed},
-                       {"boxes", sample->boxes},
-                       {"voxels", sample->voxels},
-                       {"set", sample->set}};
+                       {"boxes", sample->voxels.boxes},
+                       {"voxels", sample->voxels.voxels},
+                       {"set", sample->voxels.set}};
+  if (sample && sample->colors)
+    json["against"]["colors"] = {{"regions", sample->colors->regions},
+                                 {"equal", sample->colors->equal},
+                                 {"cells", sample->colors->cells}};
   return json;
 }
 
@@ -72,7 +98,7 @@ void run(const VerifyCommand& command, CommandContext& context) {
   const auto progress = make_progress_bar();
   MemoryBudget budget(~uint64_t{0});
   verify_global_file(*file, command.threads, budget, *progress, context.cancel);
-  std::optional<query::SampleReport> sample;
+  std::optional<Sample> sample;
   if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
   if (command.json)
     print_json(verify_json(command, *file, sample));
@@ -83,7 +109,7 @@ void run(const VerifyCommand& command, CommandContext& context) {
 void declare(Command& command, VerifyCommand& state) {
   command.option("file", state.path, "the .vdag file").required();
   command.option("--against", state.scenes,
-                 "compare a sample of voxels with the triangles of this scene");
+                 "compare a sample of voxels, and of colors, with the triangles of this scene");
   command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
   command.flag("--skip-invalid", state.scene_options.skip_invalid,
                "drop invalid triangles of the scene, as the build did");

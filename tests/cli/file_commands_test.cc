@@ -59,6 +59,22 @@ TEST_F(FileCommands, VerifyAgainstAnotherScene) {
   EXPECT_EQ(answer.status, 4) << answer.err;
 }
 
+// Colors are baked again, in some regions: those of the scene are equal, other ones are an error.
+TEST_F(FileCommands, VerifyComparesColors) {
+  for (const char* colors : {"--colors", "--json"}) {
+    const std::string name = colors == std::string("--json") ? "plain.glb" : "city.glb";
+    ASSERT_EQ(run({"generate", "city", name, "--triangles", "9000", colors}).status, 0);
+  }
+  run_json({"build", "city.glb", "-r", "256", "--color", "-o", "city.vdag"});
+  const Json colors =
+      run_json({"verify", "city.vdag", "--against", "city.glb"})["against"]["colors"];
+  EXPECT_GT(colors["cells"], 1000);
+  EXPECT_EQ(colors["equal"], colors["regions"]);
+  const Answer other = run({"verify", "city.vdag", "--against", "plain.glb"});
+  EXPECT_EQ(other.status, 4) << other.err;
+  EXPECT_NE(other.err.find("are not those of the scene"), std::string::npos) << other.err;
+}
+
 // Equal files are exit status 0, different ones 1, files on different grids an error.
 TEST_F(FileCommands, Diff) {
   run_json({"build", "m.glb", "-r", "128", "-o", "truncated.vdag", "--hash-bits", "4"});

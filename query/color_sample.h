@@ -1,0 +1,37 @@
+// A seeded sample of a file's colors against its scene: some regions of 64^3 color cells are baked
+// again from the triangles and the images.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/base/progress.h"
+#include "core/format/global/voxdag_reader.h"
+#include "core/io/file_system.h"
+#include "core/scene/triangle_source.h"
+
+namespace voxdag::query {
+
+inline constexpr size_t kSampleRegions = 16;
+// A region whose colors are further from the scene's, in dB, is wrong. Those of a built file are
+// equal; a part that `extract` had to encode again is near.
+inline constexpr double kMinSamplePsnr = 30;
+
+struct ColorSampleReport {
+  uint64_t regions = 0;  // compared
+  uint64_t equal = 0;    // of them, byte for byte
+  uint64_t cells = 0;    // in them
+};
+
+// The file has colors. One pass over the scene, which must be the one that was built. Images go to
+// a scratch file at `scratch_path` if they are large. Throws Error{kCorrupt} that names the first
+// region that is wrong, and as TextureSet::prepare().
+ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, FileSystem& files,
+                                         TriangleSource& scene, uint64_t seed,
+                                         const std::string& scratch_path, unsigned threads,
+                                         MemoryBudget& budget, Progress& progress,
+                                         const CancelToken& cancel);
+
+}  // namespace voxdag::query
