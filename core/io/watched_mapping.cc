@@ -28,7 +28,9 @@ void on_bus_error(int number, siginfo_t* info, void* context) {
   const auto address = reinterpret_cast<uintptr_t>(info->si_addr);
   if (info->si_code == BUS_ADRERR) {
     for (Slot& slot : g_slots) {
-      if (address < slot.begin || address >= slot.end) continue;
+      const uintptr_t begin = slot.begin, end = slot.end;
+      // Both are of one mapping, though the slot may go to another one now.
+      if (address < begin || address >= end || slot.begin != begin || slot.end != end) continue;
       slot.damaged = true;
       void* page = reinterpret_cast<void*>(address / g_page_bytes * g_page_bytes);
       if (mmap(page, g_page_bytes, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0) !=
@@ -39,7 +41,11 @@ void on_bus_error(int number, siginfo_t* info, void* context) {
   }
   // Somebody else's.
   if (g_before.sa_flags & SA_SIGINFO) return g_before.sa_sigaction(number, info, context);
-  signal(SIGBUS, SIG_DFL);  // the access is repeated, and ends the process
+  if (g_before.sa_handler != SIG_DFL && g_before.sa_handler != SIG_IGN)
+    return g_before.sa_handler(number);
+  signal(SIGBUS, SIG_DFL);  // an access is repeated, and ends the process
+  const bool was_sent = info->si_code <= 0 || info->si_code == BUS_MCEERR_AO;
+  if (was_sent) raise(number);
 }
 
 void install_handler() {
@@ -71,7 +77,6 @@ WatchedMapping::~WatchedMapping() {
   if (slot_ < 0) return;
   Slot& slot = g_slots[slot_];
   slot.end = 0;
-  slot.begin = 0;
   slot.taken = false;
 }
 

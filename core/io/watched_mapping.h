@@ -1,6 +1,7 @@
 // A mapped file that is truncated, or whose disk fails, ends the process that reads it by SIGBUS. A
 // process that has to live on watches its mappings: pages that are gone read as zeros, and the
-// mapping says so. Thread-safe.
+// mapping says so. (What a truncated file leaves of its last page reads as zeros without a fault.)
+// Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,7 @@ class WatchedMapping {
   ~WatchedMapping();
   WatchedMapping(const WatchedMapping&) = delete;
 
-  // Whether some of it was read as zeros. What was computed from the mapping since it began is to
+  // Whether pages of it were read as zeros. What was computed from the mapping since it began is to
   // be thrown away then.
   bool is_damaged() const;
 

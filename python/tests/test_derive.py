@@ -32,9 +32,14 @@ def test_export(path, dag, tmp_path):
     assert np.array_equal(arrays["cells"], dag.points(level=5))
     assert np.allclose(arrays["positions"], dag.to_world(dag.points(level=5) + 0.5, 5))
     assert "hashdag" in voxdag.export_formats()
-    # A file without colors is the same with gray=True.
-    voxdag.export(path, tmp_path / "gray.npz", to="npz", level=5, gray=True)
-    assert (tmp_path / "gray.npz").read_bytes() == (tmp_path / "voxels.npz").read_bytes()
+
+
+def test_export_in_gray(mesh, tmp_path):
+    colored = tmp_path / "colored.vdag"
+    voxdag.build(mesh, resolution=64, output=colored, memory="64MiB", color=True)
+    for gray in (False, True):
+        voxdag.export(colored, tmp_path / "c.npz", to="npz", level=5, gray=gray, force=True)
+        assert ("colors" in np.load(tmp_path / "c.npz")) == (not gray)
 
 
 @pytest.mark.parametrize("derive, code", [

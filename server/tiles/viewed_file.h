@@ -22,7 +22,8 @@ inline constexpr size_t kMaxColorPagesOfBatch = 256;
 
 class ViewedFile {
  public:
-  // Throws Error if the file is no valid DAG; only its header and checksum table are read.
+  // Throws Error if the file is no valid DAG; only its header and checksum table are read. Pages
+  // that cannot be read are survived from then on.
   ViewedFile(const std::string& path, const FileIdentity& identity);
 
   const query::DagView& dag() const { return dag_; }

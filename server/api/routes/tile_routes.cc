@@ -114,6 +114,7 @@ Response answer_for_ever(const Call& call, const ViewedFile& file, const std::st
 // An answer, or an error, that comes from zeros in place of what cannot be read is none.
 template <class Answer>
 Response answer_of_whole(const Call& call, const ViewedFile& file, const Answer& answer) {
+  file.expect_whole();  // what is damaged already is not read again
   try {
     Response response = answer(call, file);
     file.expect_whole();

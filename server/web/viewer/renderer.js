@@ -191,7 +191,7 @@ export class Renderer {
 
   // null, or {code, message} of what stops tiles from arriving.
   get problem() {
-    return this.loader?.problem || this.colors?.loader.problem || null;
+    return this.loader?.problem || (this.options.color && this.colors?.loader.problem) || null;
   }
 
   dispose() {
@@ -339,7 +339,7 @@ export class Renderer {
            this.loaders.every((each) => each.pauses(now) || each.is_idle);
   }
   get loaders() {
-    return this.colors ? [this.loader, this.colors.loader] : [this.loader];
+    return this.colors && this.options.color ? [this.loader, this.colors.loader] : [this.loader];
   }
 
   // The internal resolution: lower while the camera moves and while tiles arrive, if frames take long.
@@ -443,6 +443,7 @@ export class Renderer {
     if (epoch === this.store.epoch) this.store.rounds++;
     if (this.loader.demand(read.wanted, now) > 0) this.on_arrival();
     if (pass.colors) this.colors.take_reading(pass.colors.take(), epoch, now);
+    else this.colors?.loader.replace_queue([], 0, now);
     if (epoch !== this.store.epoch) return;
     const nothing_comes = this.loaders.every((each) => each.is_idle && !each.awaits_retry);
     if (this.times.first_picture_ms === null && read.coarse_pixels < 16) {

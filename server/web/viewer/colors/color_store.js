@@ -10,7 +10,8 @@ const kRecentMs = 1500;
 const kFreeShare = 1 / 64;       // of the pool, that leaves at once
 const kTableShare = 1 / 5;       // of the budget
 const kEntryBytes = 16, kTableWidth = 1024;  // the shaders know the width
-const kCoarseLevel = 5;          // pages of this level and coarser ones stay: they are 78 at most
+const kMaxEntries = 2 ** 21;     // the pool has 2^20 blocks at most, and half of the entries stay free
+const kCoarseLevel = 5;          // pages of this level and coarser ones stay: they are 76 at most
 
 // The number of the pages along an axis.
 function pages_of(level) {
@@ -27,7 +28,8 @@ export function page_key(level, x, y, z) {
 export class ColorStore {
   constructor(gl, budget_bytes) {
     this.gl = gl;
-    this.entries = 2 ** Math.floor(Math.log2(Math.max(kTableWidth, budget_bytes * kTableShare / kEntryBytes)));
+    const entries = Math.min(kMaxEntries, Math.max(kTableWidth, budget_bytes * kTableShare / kEntryBytes));
+    this.entries = 2 ** Math.floor(Math.log2(entries));
     this.pool = new TilePool(gl, budget_bytes - this.entries * kEntryBytes);
     this.max_pages = this.entries / 2;
     this.table = this.pool.create_texture(gl.RGBA32UI, kTableWidth, this.entries / kTableWidth);

@@ -46,9 +46,19 @@ export class Colors {
       const level = head >>> 20, position = [head & 0xfffff, y, z], key = page_key(level, ...position), request = wanted.get(key);
       if (request) request.priority += state;
       else wanted.set(key, {key, level, position, priority: state});
+      this.mark_coarser(level, position, epoch, now_ms);
     }
     if (epoch === this.store.epoch) this.store.rounds++;
     this.loader.demand(wanted, now_ms);
+  }
+
+  // The page whose color is on the screen while this one is missing is in use.
+  mark_coarser(level, position, epoch, now_ms) {
+    for (let coarser = level - 1; coarser >= 0; --coarser) {
+      position = position.map((at) => at >>> 1);
+      const key = page_key(coarser, ...position);
+      if (this.store.pages.has(key)) return this.store.mark(key, epoch, now_ms);
+    }
   }
 
   dispose() {

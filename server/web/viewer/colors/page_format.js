@@ -4,6 +4,7 @@
 export const kBlockWords = 64;   // of the pool: 16 texels of four words
 const kMaskAt = 1, kMaskWords = 16;
 const kSingle = 1 << 24;         // of a page's first word: colors follow one by one, not in blocks
+const kUsedBits = 0x011f03ff;    // of the same
 const kFirstColors = 8;          // texels of colors in the first block
 export const kMoreAt = 20;       // word of the first block where the addresses of the others begin
 
@@ -21,7 +22,7 @@ export function decode_page(page) {
   const count = page[0] & 1023, skip = page[0] >>> 16 & 31, single = (page[0] & kSingle) !== 0;
   if (page.length === 1 && page[0] === 0) return new Uint32Array(0);
   const colors = single ? count : Math.ceil((skip + count) / 32) * 4;
-  if (count < 1 || count > 512 || page.length !== kMaskAt + kMaskWords + colors)
+  if (count < 1 || count > 512 || (single && skip > 0) || (page[0] & ~kUsedBits) !== 0 || page.length !== kMaskAt + kMaskWords + colors)
     throw new Error(`A color page has ${page.length} words, and ${count} cells.`);
   const mask = page.subarray(kMaskAt, kMaskAt + kMaskWords), before = [0];
   for (const [i, word] of mask.entries()) before.push(before[i] + count_bits(word));

@@ -111,11 +111,14 @@ export class Loader {
 
   accept(batch, answer, now_ms) {
     this.end_outage();
+    let has_room = true;
     batch.forEach((request, i) => {
+      if (!has_room) return;
       try {
         if (this.keep(request, answer[i], now_ms)) {
           this.failures.delete(request.key);
         } else {
+          has_room = false;
           // When the store knows what the view does not need, all that is left is needed.
           this.full_until_ms = this.store.rounds >= kRoundsToKnow ? Infinity : now_ms + kFullPauseMs;
           this.queue = [];
