@@ -24,9 +24,14 @@ bool build_with(Backend& backend, const cuda_sim::Fault& fault, const oracle::Da
     const Built built = build(backend, kTask, scene());
     if (built.outcome == BuildOutcome::kBuilt) {
       expect_equals(built, truth, kTask);
+      EXPECT_FALSE(cuda_sim::fault_happened() && fault.call == cuda_sim::Call::kOther)
+          << "a failed call was ignored";
     } else {
       EXPECT_EQ(fault.status, cudaErrorMemoryAllocation);
       EXPECT_EQ(built.outcome, BuildOutcome::kNeedsSplit);
+    }
+    if (cuda_sim::fault_happened() && fault.call == cuda_sim::Call::kAllocation) {
+      EXPECT_EQ(built.outcome, fault.sticky ? BuildOutcome::kNeedsSplit : BuildOutcome::kBuilt);
     }
   } catch (const Error& error) {
     EXPECT_EQ(fault.status, cudaErrorLaunchFailure) << error.what();
@@ -66,6 +71,42 @@ TEST_P(Faults, EveryOtherCall) {
     if (HasFailure()) FAIL() << "when call " << n << " fails";
   EXPECT_GT(n, 50u);
   expect_equals(build(*backend, kTask, scene()), truth, kTask);
+}
+
+// A release that fails changes nothing of the result.
+TEST_P(Faults, EveryRelease) {
+  const auto backend = open();
+  const oracle::Dag truth = expected();
+  uint64_t n = 0;
+  for (; build_with(*backend, {cuda_sim::Call::kRelease, n}, truth); ++n)
+    if (HasFailure()) FAIL() << "when release " << n << " fails";
+  EXPECT_GT(n, 5u);
+}
+
+// A backend that cannot be opened says why, and the next one can.
+TEST_P(Faults, EveryCallOfOpening) {
+  const oracle::Dag truth = expected();
+  for (const cuda_sim::Fault& kind :
+       {cuda_sim::Fault{cuda_sim::Call::kAllocation, 0, cudaErrorMemoryAllocation, false},
+        cuda_sim::Fault{cuda_sim::Call::kOther, 0, cudaErrorLaunchFailure, false}}) {
+    uint64_t n = 0;
+    for (bool happened = true; happened; ++n) {
+      cuda_sim::Fault fault = kind;
+      fault.skipped = n;
+      cuda_sim::plan_fault(fault);
+      std::unique_ptr<Backend> opened;  // closed without a fault
+      try {
+        opened = open();
+        EXPECT_FALSE(cuda_sim::fault_happened()) << "call " << n << " was ignored";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kDevice) << error.what();
+      }
+      happened = cuda_sim::fault_happened();
+      cuda_sim::plan_no_fault();
+    }
+    EXPECT_GT(n, 3u);
+  }
+  expect_equals(build(*open(), kTask, scene()), truth, kTask);
 }
 
 TEST_P(Faults, ADeviceThatStaysBroken) {

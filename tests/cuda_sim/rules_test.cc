@@ -16,6 +16,12 @@ TEST(SimulatedDevice, EndsProgramsThatBreakARule) {
     EXPECT_DEATH(program.run(), std::string("cuda_sim: .*") + program.violation) << program.name;
 }
 
+// Also by code that is not compiled as the backend's sources are.
+TEST(SimulatedDevice, EndsAHostThatTouchesDeviceMemory) {
+  testing::GTEST_FLAG(death_test_style) = "fast";
+  EXPECT_DEATH(static_cast<void>(words_of_the_device()[0]), "the host touched device memory");
+}
+
 TEST(SimulatedDevice, LetsSoundProgramsPass) {
   for (uint64_t seed = 1; seed <= 20; ++seed) {
     set_schedule({seed % 2 == 0, seed});

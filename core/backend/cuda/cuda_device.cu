@@ -109,7 +109,8 @@ uint64_t CudaDevice::available(const std::string& where) const {
              "cudaMemPoolGetAttribute", where);
   check_call(cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemCurrent, &used),
              "cudaMemPoolGetAttribute", where);
-  return free_bytes + (reserved - used);
+  // Other workers allocate between the calls.
+  return free_bytes + (reserved > used ? reserved - used : 0);
 }
 
 void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {

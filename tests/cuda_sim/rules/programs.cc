@@ -1,9 +1,11 @@
 #include "tests/cuda_sim/rules/programs.h"
 
 #include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_select.cuh>
 #include <memory>
 
 #include "core/backend/cuda/cuda_space.h"
+#include "tests/cuda_sim/sim/device_memory.h"
 #include "tests/cuda_sim/sim/faults.h"
 #include "tests/cuda_sim/sim/shared_memory.h"
 
@@ -14,6 +16,10 @@ extern unsigned char block_memory[];  // the shared memory of the block that run
 }  // namespace voxdag::cuda
 
 namespace voxdag::cuda_sim {
+
+extern uint32_t g_word_of_the_host;
+uint32_t g_word_of_the_host = 0;
+
 namespace {
 
 constexpr uint32_t kWords = 1024, kBytes = kWords * sizeof(uint32_t);
@@ -219,6 +225,45 @@ void cubs_storage_is_in_use() {
   session.wait();
 }
 
+// The sort's second buffer begins at word 128.
+void cubs_storage_is_written() {
+  const Session session;
+  session.fill();
+  sort(session, session.words() + 130, 2048);
+  session.wait();
+}
+
+void selects_in_place() {
+  const Session session;
+  session.fill();
+  auto* flags = reinterpret_cast<uint8_t*>(session.words());
+  size_t bytes = 2048;
+  cub::DeviceSelect::Flagged(session.words() + 256, bytes, session.words(), flags, session.words(),
+                             session.words() + 1000, 64, session.stream());
+  session.wait();
+}
+
+void touches_a_word_off_its_alignment() {
+  const Session session;
+  session.fill();
+  session.launch(1, 1, 0, [words = session.words()](uint32_t, uint32_t) {
+    *reinterpret_cast<uint64_t*>(words + 1) = 1;
+  });
+  session.wait();
+}
+
+void writes_far_beyond_an_allocation() {
+  const Session session, neighbor;
+  session.launch(1, 1, 0, [words = session.words()](uint32_t, uint32_t) { words[5000] = 1; });
+  session.wait();
+}
+
+void a_kernel_writes_a_global_of_the_host() {
+  const Session session;
+  session.launch(1, 1, 0, [](uint32_t, uint32_t) { g_word_of_the_host = 1; });
+  session.wait();
+}
+
 }  // namespace
 
 std::vector<BrokenProgram> broken_programs() {
@@ -239,11 +284,16 @@ std::vector<BrokenProgram> broken_programs() {
       {VOXDAG_PROGRAM(pinned_memory_is_released_early), "pinned memory is released that a queued"},
       {VOXDAG_PROGRAM(another_stream_does_not_wait), "a kernel writes 4 bytes"},
       {VOXDAG_PROGRAM(a_copy_goes_another_way), "a copy goes another way"},
-      {VOXDAG_PROGRAM(a_copy_is_too_long), "the target of a copy is not within an allocation"},
+      {VOXDAG_PROGRAM(a_copy_is_too_long), "the target of a copy or memset is not within"},
       {VOXDAG_PROGRAM(memory_is_released_twice), "memory is released that is not allocated"},
       {VOXDAG_PROGRAM(a_stream_is_used_after_its_end), "a stream that does not exist"},
       {VOXDAG_PROGRAM(cub_has_too_little_storage), "less storage than it asked for"},
-      {VOXDAG_PROGRAM(cubs_storage_is_in_use), "CUB reads, never written"},
+      {VOXDAG_PROGRAM(cubs_storage_is_in_use), "CUB's storage overlaps its other arguments"},
+      {VOXDAG_PROGRAM(cubs_storage_is_written), "CUB's storage overlaps its other arguments"},
+      {VOXDAG_PROGRAM(selects_in_place), "CUB writes what it reads"},
+      {VOXDAG_PROGRAM(touches_a_word_off_its_alignment), "a misaligned access"},
+      {VOXDAG_PROGRAM(writes_far_beyond_an_allocation), "a kernel writes 4 bytes"},
+      {VOXDAG_PROGRAM(a_kernel_writes_a_global_of_the_host), "a kernel touches memory of the host"},
   };
 #undef VOXDAG_PROGRAM
 }
@@ -289,6 +339,14 @@ uint64_t upload_then_change(uint64_t value) {
   uint64_t back = 0;
   space.download(there.data(), &back, 1);
   return back;
+}
+
+const volatile uint32_t* words_of_the_device() {
+  static const Session session;  // for as long as the process runs
+  session.fill();
+  session.wait();
+  device_memory().close_now();
+  return session.words();
 }
 
 uint64_t forget_an_allocation() {

@@ -29,6 +29,9 @@ DownloadedWord download_word(uint32_t value);
 // Uploads a value by the backend's own CudaSpace, changes it at once, and returns what arrived.
 uint64_t upload_then_change(uint64_t value);
 
+// Device memory, which has no access rights when this returns.
+const volatile uint32_t* words_of_the_device();
+
 // Allocates without a release, and returns the bytes that remain in use.
 uint64_t forget_an_allocation();
 

@@ -3,6 +3,7 @@
 #include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "tests/cuda_sim/sim/device_memory.h"
 #include "tests/cuda_sim/sim/faults.h"
@@ -11,6 +12,25 @@
 #include "tests/cuda_sim/sim/violation.h"
 
 namespace voxdag::cuda_sim {
+namespace {
+
+struct Range {
+  const char* begin = nullptr;
+  size_t bytes = 0;
+  bool overlaps(const void* p, size_t other_bytes) const {
+    const char* at = static_cast<const char*>(p);
+    return begin < at + other_bytes && at < begin + bytes;
+  }
+};
+// Of the call that runs.
+Range g_storage;
+std::vector<Range> g_read;
+
+void expect_not_storage(const void* p, size_t bytes) {
+  if (g_storage.overlaps(p, bytes)) violation("CUB's storage overlaps its other arguments");
+}
+
+}  // namespace
 
 cudaError_t cub_call(const char* name, void* storage, size_t& bytes, size_t n, cudaStream_t stream,
                      std::function<void()> work) {
@@ -26,29 +46,36 @@ cudaError_t cub_call(const char* name, void* storage, size_t& bytes, size_t n, c
   queue(stream, {name, [=, work = std::move(work)] {
                    device_memory().expect_allocated(storage, needed, "CUB's storage,");
                    device_memory().spoil(storage, needed);
+                   g_storage = {static_cast<const char*>(storage), needed};
+                   g_read.clear();
                    work();
                  }});
   return cudaSuccess;
 }
 
 void cub_reads(const void* p, size_t bytes) {
+  expect_not_storage(p, bytes);
+  g_read.push_back({static_cast<const char*>(p), bytes});
   device_memory().expect_written(p, bytes, "CUB reads");
 }
 
-void cub_may_read(const void* p, size_t bytes) {
-  device_memory().expect_allocated(p, bytes, "CUB reads");
-}
-
-void cub_writes(void* p, size_t bytes) {
+void cub_writes(void* p, size_t bytes, bool is_in_place) {
+  expect_not_storage(p, bytes);
+  for (const Range& read : g_read)
+    if (!is_in_place && read.overlaps(p, bytes)) violation("CUB writes what it reads");
   device_memory().expect_allocated(p, bytes, "CUB writes");
   device_memory().mark_written(p, bytes);
 }
 
 void cub_spoils(void* p, size_t bytes) {
+  expect_not_storage(p, bytes);
   device_memory().expect_allocated(p, bytes, "CUB writes");
   device_memory().spoil(p, bytes);
 }
 
-bool cub_coin() { return random_below(2) != 0; }
+bool cub_coin() {
+  const std::lock_guard lock(device_lock());
+  return random_below(2) != 0;
+}
 
 }  // namespace voxdag::cuda_sim

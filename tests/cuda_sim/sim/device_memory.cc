@@ -47,7 +47,7 @@ void* DeviceMemory::take(uint64_t pages) {
 }
 
 void* DeviceMemory::reserve(uint64_t bytes) {
-  const uint64_t pages = bytes / kPage + 1;  // at least one byte between two allocations
+  const uint64_t pages = bytes / kPage + 1 + kGuardPages;
   if (void* memory = take(pages)) return memory;
   end_quarantine(0);
   return take(pages);
@@ -68,12 +68,13 @@ void DeviceMemory::begin_life(void* memory, uint64_t bytes, int device) {
 
 void DeviceMemory::end_life(void* memory) {
   const uint32_t life = page_life_[offset(memory) / kPage];
+  if (life == 0) violation("memory is released before its allocation ran");
   const auto [begin, end, device] = lives_[life - 1];
   spoil(memory, end - begin);
   const uint64_t pages = (end - begin) / kPage + 1;
   std::fill_n(page_life_.begin() + static_cast<std::ptrdiff_t>(begin / kPage), pages, 0);
   free_lives_.push_back(life);
-  quarantine_.emplace_back(begin / kPage, pages);
+  quarantine_.emplace_back(begin / kPage, pages + kGuardPages);
   end_quarantine(kQuarantineSize);
 }
 
@@ -109,7 +110,10 @@ void DeviceMemory::open(int device) {
 
 void DeviceMemory::close() {
   open_ = false;
-  if (random_below(kCloseOneOf) != 0) return;
+  if (random_below(kCloseOneOf) == 0) close_now();
+}
+
+void DeviceMemory::close_now() {
   mprotect(reinterpret_cast<void*>(base_), kBytes, PROT_NONE);
   closed_ = true;
 }

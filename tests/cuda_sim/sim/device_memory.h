@@ -36,11 +36,13 @@ class DeviceMemory {
   // Ends all lives.
   void reset();
 
-  // Gives access, for operations of a device, and takes it away: from the
-  // backend's sources every time, from all code one time of kCloseOneOf, since that is slow.
+  // Gives access, for operations of a device, and takes it away: from what the compiler instruments
+  // of the backend's sources every time, from all code one time of kCloseOneOf, since that is slow.
   void open(int device);
   void close();
   bool is_open() const { return open_; }
+  // Takes it away from all code.
+  void close_now();
 
   // For operations other than kernels: ranges that they read and write. `what` begins the message.
   void expect_allocated(const void* p, uint64_t bytes, const std::string& what) const;
@@ -64,7 +66,9 @@ class DeviceMemory {
     int device = 0;
   };
   static constexpr uint32_t kCloseOneOf = 2048;
-  static constexpr uint64_t kChunk = 16384;      // that is cleaned at once
+  static constexpr uint64_t kGuardPages =
+      16;                                    // behind each allocation, and what is left of its last
+  static constexpr uint64_t kChunk = 16384;  // that is cleaned at once
   static constexpr size_t kQuarantineSize = 64;  // released ranges that wait for their next use
   static constexpr uint8_t kJunk = 0xdb;
 

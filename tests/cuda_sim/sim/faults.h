@@ -7,7 +7,8 @@
 
 namespace voxdag::cuda_sim {
 
-enum class Call { kAllocation, kOther };
+// Releases are apart: nothing can be done about their failure.
+enum class Call { kAllocation, kRelease, kOther };
 
 struct Fault {
   Call call = Call::kOther;

@@ -1,32 +1,39 @@
 // The backend's sources are compiled with -fsanitize=thread, which calls a function before each
 // access to memory. These are those functions; the sanitizer's own are not linked. While a kernel
 // runs they check what its threads touch; otherwise that the host does not touch device memory.
+#include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <string>
 
 #include "tests/cuda_sim/sim/device_memory.h"
 #include "tests/cuda_sim/sim/shared_memory.h"
 #include "tests/cuda_sim/sim/thread_blocks.h"
 #include "tests/cuda_sim/sim/violation.h"
 
-extern "C" char __executable_start, _end;
+extern "C" char __executable_start, __data_start;
 
 namespace voxdag::cuda_sim {
 namespace {
 
-// A thread's own variables, the launch's arguments, and constants.
-bool is_private(const void* p) {
+// A thread's own variables, the launch's arguments, and constants to be read.
+bool is_private(const void* p, Access access) {
   const char* at = static_cast<const char*>(p);
   const char* arguments = static_cast<const char*>(g_running.launch->arguments);
   return on_fiber_stack(p) ||
          (at >= arguments && at < arguments + g_running.launch->argument_bytes) ||
-         (at >= &__executable_start && at < &_end);
+         (access == Access::kRead && at >= &__executable_start && at < &__data_start);
 }
 
-void check(void* p, size_t bytes, Access access) {
+void check(void* p, size_t bytes, Access access, bool is_range) {
   const RunningThread& now = g_running;
   DeviceMemory& memory = device_memory();
+  const size_t alignment = std::min(bytes, sizeof(uint64_t));
+  if ((memory.contains(p) || in_shared_memory(p)) && !is_range && std::has_single_bit(alignment) &&
+      reinterpret_cast<uintptr_t>(p) % alignment != 0)
+    violation("a misaligned access of " + std::to_string(bytes) + " bytes");
   if (memory.contains(p)) {
     if (access == Access::kRead)
       memory.kernel_read(p, bytes, now.first, now.number);
@@ -34,7 +41,7 @@ void check(void* p, size_t bytes, Access access) {
       memory.kernel_write(p, bytes, now.first, now.number);
   } else if (in_shared_memory(p)) {
     shared_access(p, bytes, access, now.thread);
-  } else if (!is_private(p)) {
+  } else if (!is_private(p, access)) {
     violation("a kernel touches memory of the host");
   }
 }
@@ -48,10 +55,10 @@ class Unwatched {
   Unwatched(const Unwatched&) = delete;
 };
 
-inline void on_access(void* p, size_t bytes, Access access) {
+inline void on_access(void* p, size_t bytes, Access access, bool is_range = false) {
   if (g_running.running) {
     const Unwatched unwatched;
-    check(p, bytes, access);
+    check(p, bytes, access, is_range);
   } else if (device_memory().contains(p) && !device_memory().is_open()) {
     violation("the host touches device memory outside of a copy");
   }
@@ -112,21 +119,21 @@ void __tsan_func_entry(void*) {}
 void __tsan_func_exit() {}
 void __tsan_vptr_read(void**) {}
 void __tsan_vptr_update(void**, void*) {}
-void __tsan_read_range(void* p, size_t bytes) { on_access(p, bytes, Access::kRead); }
-void __tsan_write_range(void* p, size_t bytes) { on_access(p, bytes, Access::kWrite); }
+void __tsan_read_range(void* p, size_t bytes) { on_access(p, bytes, Access::kRead, true); }
+void __tsan_write_range(void* p, size_t bytes) { on_access(p, bytes, Access::kWrite, true); }
 // Clang calls these for copies of structures.
 void* __tsan_memcpy(void* to, const void* from, size_t bytes) {
-  on_access(const_cast<void*>(from), bytes, Access::kRead);
-  on_access(to, bytes, Access::kWrite);
+  on_access(const_cast<void*>(from), bytes, Access::kRead, true);
+  on_access(to, bytes, Access::kWrite, true);
   return std::memcpy(to, from, bytes);
 }
 void* __tsan_memmove(void* to, const void* from, size_t bytes) {
-  on_access(const_cast<void*>(from), bytes, Access::kRead);
-  on_access(to, bytes, Access::kWrite);
+  on_access(const_cast<void*>(from), bytes, Access::kRead, true);
+  on_access(to, bytes, Access::kWrite, true);
   return std::memmove(to, from, bytes);
 }
 void* __tsan_memset(void* to, int value, size_t bytes) {
-  on_access(to, bytes, Access::kWrite);
+  on_access(to, bytes, Access::kWrite, true);
   return std::memset(to, value, bytes);
 }
 

@@ -46,7 +46,7 @@ void expect_known(const void* p, size_t bytes, const char* what) {
     const char* end = static_cast<const char*>(begin) + size;
     if (static_cast<const char*>(p) + bytes <= end) return;
   }
-  violation(std::string(what) + " of a copy is not within an allocation");
+  violation(std::string(what) + " of a copy or memset is not within an allocation");
 }
 
 CUstream_st::Operation upload(void* to, const void* from, size_t bytes) {
@@ -122,7 +122,7 @@ const char* cudaGetErrorString(cudaError_t status) {
 
 cudaError_t cudaGetDeviceCount(int* count) {
   *count = 1;
-  return begin_call(Call::kOther);
+  return Begin().status;
 }
 
 cudaError_t cudaDriverGetVersion(int* version) {
@@ -132,34 +132,36 @@ cudaError_t cudaDriverGetVersion(int* version) {
 
 cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr attribute, int) {
   *value = attribute == cudaDevAttrComputeCapabilityMajor ? 9 : 1;
-  return begin_call(Call::kOther);
+  return Begin().status;
 }
 
 cudaError_t cudaSetDevice(int device) {
-  return device == 0 ? begin_call(Call::kOther) : fail(cudaErrorInvalidValue);
+  return device == 0 ? Begin().status : fail(cudaErrorInvalidValue);
 }
 
 cudaError_t cudaDeviceGetDefaultMemPool(cudaMemPool_t* pool, int) {
   *pool = nullptr;
-  return begin_call(Call::kOther);
+  return Begin().status;
 }
 
 cudaError_t cudaMemPoolSetAttribute(cudaMemPool_t, cudaMemPoolAttr, void*) {
-  return begin_call(Call::kOther);
+  return Begin().status;
 }
 
 // The pool holds exactly what is in use.
 cudaError_t cudaMemPoolGetAttribute(cudaMemPool_t, cudaMemPoolAttr, void* value) {
+  const Begin call;
   *static_cast<uint64_t*>(value) = g_in_use;
-  return begin_call(Call::kOther);
+  return call.status;
 }
 
-cudaError_t cudaMemPoolTrimTo(cudaMemPool_t, size_t) { return begin_call(Call::kOther); }
+cudaError_t cudaMemPoolTrimTo(cudaMemPool_t, size_t) { return Begin().status; }
 
 cudaError_t cudaMemGetInfo(size_t* free_bytes, size_t* total_bytes) {
+  const Begin call;
   *total_bytes = kDeviceBytes;
   *free_bytes = kDeviceBytes - g_in_use;
-  return begin_call(Call::kOther);
+  return call.status;
 }
 
 cudaError_t cudaMallocAsync(void** memory, size_t bytes, cudaStream_t stream) {
@@ -180,7 +182,7 @@ cudaError_t cudaMallocAsync(void** memory, size_t bytes, cudaStream_t stream) {
 }
 
 cudaError_t cudaFreeAsync(void* memory, cudaStream_t stream) {
-  Begin call;
+  Begin call(Call::kRelease);
   const auto known = g_allocated.find(memory);
   if (known == g_allocated.end()) violation("memory is released that is not allocated");
   g_in_use -= known->second;
@@ -200,7 +202,7 @@ cudaError_t cudaMallocHost(void** memory, size_t bytes) {
 }
 
 cudaError_t cudaFreeHost(void* memory) {
-  Begin call;
+  Begin call(Call::kRelease);
   const auto known = g_pinned.find(memory);
   if (known == g_pinned.end()) violation("pinned memory is released that is not allocated");
   if (is_in_use(memory, known->second))
@@ -224,7 +226,7 @@ cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
 }
 
 cudaError_t cudaStreamDestroy(cudaStream_t stream) {
-  Begin call;
+  Begin call(Call::kRelease);
   destroy_stream(stream);
   return call.status;
 }
@@ -251,6 +253,18 @@ cudaError_t cudaEventSynchronize(cudaEvent_t event) {
 
 cudaError_t cudaEventDestroy(cudaEvent_t event) {
   delete event;
+  return cudaSuccess;
+}
+
+cudaError_t cudaMemsetAsync(void* memory, int value, size_t bytes, cudaStream_t stream) {
+  Begin call;
+  if (call.status) return call.status;
+  expect_known(memory, bytes, "the target");
+  queue(stream, {"a memset", [=] {
+                   device_memory().expect_allocated(memory, bytes, "a memset writes");
+                   std::memset(memory, value, bytes);
+                   device_memory().mark_written(memory, bytes);
+                 }});
   return cudaSuccess;
 }
 

@@ -14,9 +14,10 @@ cudaError_t cub_call(const char* name, void* storage, size_t& bytes, size_t n, c
                      std::function<void()> work);
 
 // What a call reads and writes; a violation where it may not.
+// Nothing may overlap the storage, and what is written nothing that is read, unless it
+// `is_in_place`.
 void cub_reads(const void* p, size_t bytes);
-void cub_may_read(const void* p, size_t bytes);
-void cub_writes(void* p, size_t bytes);
+void cub_writes(void* p, size_t bytes, bool is_in_place = false);
 void cub_spoils(void* p, size_t bytes);
 bool cub_coin();
 

@@ -76,7 +76,7 @@ struct DeviceRadixSort {
     voxdag::cuda_sim::cub_reads(plan.from, bytes);
     std::vector<T> result;
     for (const uint32_t i : sorted) result.push_back(plan.from[i]);
-    voxdag::cuda_sim::cub_writes(plan.to, bytes);
+    voxdag::cuda_sim::cub_writes(plan.to, bytes, true);
     std::copy(result.begin(), result.end(), plan.to);
     voxdag::cuda_sim::cub_spoils(plan.other, bytes);
   }
