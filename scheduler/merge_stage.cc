@@ -10,6 +10,7 @@
 #include "core/format/checksum.h"
 #include "core/geometry/octree_descent.h"
 #include "merge/merge.h"
+#include "scheduler/triangles/triangle_file.h"
 
 namespace voxdag {
 namespace {
@@ -117,7 +118,9 @@ bool MergeStage::run(const RunOptions& options, const Sections& sections, BuildR
     write(out, sections, report);
     return true;
   } catch (const Error& error) {
-    if (reads_scene || !error.is_corruption() || !heal(error)) throw;
+    // The scratch of the colors is made again, too.
+    const bool is_scratch = dynamic_cast<const DamagedTriangles*>(&error) != nullptr;
+    if ((reads_scene && !is_scratch) || !error.is_corruption() || !heal(error)) throw;
     return false;
   }
 }

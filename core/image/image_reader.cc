@@ -17,12 +17,12 @@ void ImageReader::check_size(uint64_t width, uint64_t height) {
   height_ = static_cast<uint32_t>(height);
 }
 
-std::unique_ptr<ImageReader> open_image(EncodedBytes& bytes, MemoryBudget& budget) {
+std::unique_ptr<ImageReader> open_image(EncodedBytes& bytes, MemoryBudget& budget, ImageUse use) {
   auto source = std::make_unique<PeekedSource>(bytes);
   const std::string_view head(reinterpret_cast<const char*>(source->head().data()),
                               source->head().size());
-  if (head.starts_with("\x89PNG\r\n\x1a\n")) return open_png(std::move(source), budget);
-  if (head.starts_with("\xff\xd8\xff")) return open_jpeg(std::move(source), budget);
+  if (head.starts_with("\x89PNG\r\n\x1a\n")) return open_png(std::move(source), budget, use);
+  if (head.starts_with("\xff\xd8\xff")) return open_jpeg(std::move(source), budget, use);
   const char* const name = head.starts_with("RIFF")         ? "a WebP image"
                            : head.starts_with("\xabKTX 20") ? "a KTX2 image"
                            : head.empty()                   ? "empty"

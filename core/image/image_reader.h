@@ -53,8 +53,12 @@ class ImageReader {
   int bits_ = 8;
 };
 
+// For kSize, rows are not read, and no memory is taken for them.
+enum class ImageUse { kPixels, kSize };
+
 // The source must outlive the reader. Throws BrokenImage, Error{kOutOfMemory} where decoding does
 // not fit the budget, and what the source throws.
-std::unique_ptr<ImageReader> open_image(EncodedBytes& source, MemoryBudget& budget);
+std::unique_ptr<ImageReader> open_image(EncodedBytes& source, MemoryBudget& budget,
+                                        ImageUse use = ImageUse::kPixels);
 
 }  // namespace voxdag

@@ -21,7 +21,7 @@ constexpr int kMaxScans = 500;
 
 class JpegReader : public ImageReader {
  public:
-  JpegReader(std::unique_ptr<PeekedSource> source, MemoryBudget& budget)
+  JpegReader(std::unique_ptr<PeekedSource> source, MemoryBudget& budget, ImageUse use)
       : source_(std::move(source)), charge_(budget, kJpegStateBytes, "a JPEG image") {
     jpeg_.err = jpeg_std_error(&errors_);
     errors_.error_exit = on_error;
@@ -43,6 +43,7 @@ class JpegReader : public ImageReader {
       // image, Ss is its predictor; that of others begins with the mean of each block.
       if (jpeg_.arith_code || jpeg_.data_precision != 8 || jpeg_.Ss != 0)
         throw BrokenImage{"is a JPEG image with arithmetic coding, lossless or not of 8 bits"};
+      if (use == ImageUse::kSize) return;
       charge_decoder(budget);
       if (!start()) fail();
     } catch (...) {
@@ -61,6 +62,9 @@ class JpegReader : public ImageReader {
     return *static_cast<JpegReader*>(jpeg->client_data);
   }
   static void on_error(j_common_ptr jpeg) {
+    const int code = jpeg->err->msg_code;
+    if (code == JERR_OUT_OF_MEMORY || code == JERR_NO_BACKING_STORE)
+      self(jpeg).lacks_memory_ = true;
     (*jpeg->err->format_message)(jpeg, self(jpeg).message_);
     std::longjmp(self(jpeg).jump_, 1);
   }
@@ -143,6 +147,8 @@ class JpegReader : public ImageReader {
   }
   [[noreturn]] void fail() {
     source_->rethrow();
+    if (lacks_memory_)
+      throw Error(ErrorCode::kOutOfMemory, "out of memory: the system has none left for a JPEG");
     throw BrokenImage{std::string("is a broken JPEG image (") +
                       (message_[0] ? message_ : "it ends early") + ")"};
   }
@@ -155,14 +161,15 @@ class JpegReader : public ImageReader {
   jpeg_progress_mgr progress_{};
   std::jmp_buf jump_;
   char message_[JMSG_LENGTH_MAX] = {};
-  bool has_ended_ = false, is_whole_ = false;
+  bool has_ended_ = false, is_whole_ = false, lacks_memory_ = false;
   std::byte buffer_[16384];
 };
 
 }  // namespace
 
-std::unique_ptr<ImageReader> open_jpeg(std::unique_ptr<PeekedSource> source, MemoryBudget& budget) {
-  return std::make_unique<JpegReader>(std::move(source), budget);
+std::unique_ptr<ImageReader> open_jpeg(std::unique_ptr<PeekedSource> source, MemoryBudget& budget,
+                                       ImageUse use) {
+  return std::make_unique<JpegReader>(std::move(source), budget, use);
 }
 
 }  // namespace voxdag

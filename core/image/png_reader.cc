@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <csetjmp>
+#include <cstdlib>
 #include <cstring>
 #include <new>
 #include <utility>
@@ -20,9 +21,10 @@ constexpr uint64_t kPngStateBytes = uint64_t{1} << 20;
 
 class PngReader : public ImageReader {
  public:
-  PngReader(std::unique_ptr<PeekedSource> source, MemoryBudget& budget)
+  PngReader(std::unique_ptr<PeekedSource> source, MemoryBudget& budget, ImageUse use)
       : source_(std::move(source)), state_charge_(budget, kPngStateBytes, "a PNG image") {
-    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, on_error, on_warning);
+    png_ = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, this, on_error, on_warning, this,
+                                    on_allocate, on_release);
     if (png_) info_ = png_create_info_struct(png_);
     if (!info_) {
       destroy();
@@ -37,7 +39,7 @@ class PngReader : public ImageReader {
       if (row != uint64_t{4} * width_ * static_cast<uint64_t>(bits_) / 8)
         throw BrokenImage{"has rows of an unexpected format"};
       row_charge_ = MemoryCharge(budget, 4 * row, "rows of a PNG image");
-      if (is_interlaced_) read_all(row, budget);
+      if (is_interlaced_ && use == ImageUse::kPixels) read_all(row, budget);
     } catch (...) {
       destroy();
       throw;
@@ -62,6 +64,12 @@ class PngReader : public ImageReader {
     png_longjmp(png, 1);
   }
   static void on_warning(png_structp, png_const_charp) {}
+  static png_voidp on_allocate(png_structp png, png_alloc_size_t size) {
+    void* const memory = std::malloc(size);
+    if (!memory) static_cast<PngReader*>(png_get_mem_ptr(png))->lacks_memory_ = true;
+    return memory;
+  }
+  static void on_release(png_structp, png_voidp memory) { std::free(memory); }
   static void on_read(png_structp png, png_bytep out, size_t size) {
     auto& self = *static_cast<PngReader*>(png_get_io_ptr(png));
     if (self.source_->read(reinterpret_cast<std::byte*>(out), size) < size)
@@ -109,6 +117,8 @@ class PngReader : public ImageReader {
   }
   [[noreturn]] void fail() {
     source_->rethrow();
+    if (lacks_memory_)
+      throw Error(ErrorCode::kOutOfMemory, "out of memory: the system has none left for a PNG");
     throw BrokenImage{std::string("is a broken PNG image (") + message_ + ")"};
   }
   void destroy() { png_destroy_read_struct(&png_, &info_, nullptr); }
@@ -117,7 +127,7 @@ class PngReader : public ImageReader {
   MemoryCharge state_charge_, row_charge_;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;
-  bool is_interlaced_ = false;
+  bool is_interlaced_ = false, lacks_memory_ = false;
   int passes_ = 1;
   PageBuffer<std::byte> all_;  // of an interlaced image
   uint64_t next_row_ = 0;
@@ -126,8 +136,9 @@ class PngReader : public ImageReader {
 
 }  // namespace
 
-std::unique_ptr<ImageReader> open_png(std::unique_ptr<PeekedSource> source, MemoryBudget& budget) {
-  return std::make_unique<PngReader>(std::move(source), budget);
+std::unique_ptr<ImageReader> open_png(std::unique_ptr<PeekedSource> source, MemoryBudget& budget,
+                                      ImageUse use) {
+  return std::make_unique<PngReader>(std::move(source), budget, use);
 }
 
 }  // namespace voxdag

@@ -41,7 +41,9 @@ class PeekedSource {
   std::exception_ptr failure_;
 };
 
-std::unique_ptr<ImageReader> open_png(std::unique_ptr<PeekedSource> source, MemoryBudget& budget);
-std::unique_ptr<ImageReader> open_jpeg(std::unique_ptr<PeekedSource> source, MemoryBudget& budget);
+std::unique_ptr<ImageReader> open_png(std::unique_ptr<PeekedSource> source, MemoryBudget& budget,
+                                      ImageUse use);
+std::unique_ptr<ImageReader> open_jpeg(std::unique_ptr<PeekedSource> source, MemoryBudget& budget,
+                                       ImageUse use);
 
 }  // namespace voxdag

@@ -43,6 +43,7 @@ struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
   std::vector<std::byte> records;
+  MemoryCharge stored;  // for the largest records that were read
 };
 
 }  // namespace
@@ -151,7 +152,14 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
         BakeWorker& worker = workers[number];
         worker.records.clear();
         if (surfaces.contents[item].surfaces == 0) return;
-        if (artifacts.has(keys[item])) return artifacts.read(keys[item], worker.records);
+        if (artifacts.has(keys[item])) {
+          const uint64_t bytes = artifacts.bytes_of(keys[item]);
+          if (bytes > worker.stored.bytes()) {
+            worker.stored = {};
+            worker.stored = MemoryCharge(context.budget, bytes, "stored colors of a cube");
+          }
+          return artifacts.read(keys[item], worker.records);
+        }
         if (!worker.baker) {
           worker.textures = textures.open(memory.texture_bytes);
           worker.baker.emplace(grid, textures.materials(), *worker.textures, *store,

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <exception>
+#include <set>
 
 #include "core/base/background.h"
 #include "core/base/clock.h"
@@ -51,7 +52,7 @@ ColorStore::ColorStore(FileSystem& files, std::string path, double sync_interval
   if (!files_.exists(path_)) return;
   reader_ = files_.open_read(path_);
   const uint64_t size = reader_->size();
-  uint64_t damaged = 0;
+  std::set<std::pair<uint64_t, uint64_t>> damaged;  // keys
   std::array<std::byte, kHeaderBytes> bytes;
   for (Header header; size - end_ >= kHeaderBytes;) {
     reader_->read_at(end_, bytes);
@@ -61,12 +62,13 @@ ColorStore::ColorStore(FileSystem& files, std::string path, double sync_interval
     if (is_sound(place, cancel))
       found_[{header.key.low, header.key.high}] = place;
     else
-      ++damaged;
+      damaged.insert({header.key.low, header.key.high});
     end_ = place.offset + place.bytes;
   }
-  if (damaged > 0)
-    progress.warn(path_ + ": the colors of " + std::to_string(damaged) +
-                  " cubes are damaged, and baked again");
+  std::erase_if(damaged, [&](const auto& key) { return found_.contains(key); });
+  if (!damaged.empty())
+    progress.warn(path_ +
+                  ": damaged colors are baked again, cubes: " + std::to_string(damaged.size()));
 }
 
 ColorStore::~ColorStore() {
@@ -96,7 +98,7 @@ void ColorStore::read(const Checksum128& key, std::vector<std::byte>& out) const
   if (checksum64(out) != place.checksum)
     throw Error(ErrorCode::kCorrupt, path_ + " at offset " + std::to_string(place.offset) +
                                          " fails its checksum: expected the colors that were read "
-                                         "there before");
+                                         "there before; run the same command again");
 }
 
 void ColorStore::add(const Checksum128& key, std::span<const std::byte> artifact) {

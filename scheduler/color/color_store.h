@@ -38,7 +38,9 @@ class ColorStore {
 
   // Whether the file had an artifact with this key when it was opened.
   bool has(const Checksum128& key) const { return found_.contains({key.low, key.high}); }
-  // Its bytes. Throws Error{kCorrupt} if they are damaged by now.
+  // How many bytes it has.
+  uint64_t bytes_of(const Checksum128& key) const { return found_.at({key.low, key.high}).bytes; }
+  // These. Throws Error{kCorrupt} if they are damaged by now.
   void read(const Checksum128& key, std::vector<std::byte>& out) const;
   // Throws what went wrong when an earlier one was synced, too.
   void add(const Checksum128& key, std::span<const std::byte> artifact);

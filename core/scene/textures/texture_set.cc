@@ -83,17 +83,28 @@ void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const
 std::string image_digest(FileSystem& files, const ImageSource& source, const CancelToken& cancel) {
   if (!source.problem.empty()) return "unreadable";
   Sha256 hash;
+  std::vector<std::byte> buffer(64 << 10);
   try {
     ImageBytes bytes(files, source);
-    std::vector<std::byte> buffer(64 << 10);
     while (const size_t size = bytes.read(buffer)) {
       cancel.check();
       hash.add(std::span(buffer).first(size));
     }
   } catch (const BrokenImage&) {
-    return "unreadable";
+    hash.add(buffer);  // a decoder may not need what is broken
+    return "broken " + hash.finish();
   }
   return hash.finish();
+}
+
+// Throws Error{kInvalidInput} unless the file of an image is still the one that the scene found.
+void expect_unchanged(FileSystem& files, const ImageSource& source) {
+  try {
+    const ImageBytes opened(files, source);
+  } catch (const BrokenImage& broken) {
+    throw Error(ErrorCode::kInvalidInput,
+                source.name + " changed during the build: " + broken.message);
+  }
 }
 
 }  // namespace
@@ -130,7 +141,7 @@ uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, Memor
     if (!source.problem.empty()) continue;
     try {
       ImageBytes bytes(files, source);
-      const auto image = open_image(bytes, budget);
+      const auto image = open_image(bytes, budget, ImageUse::kSize);
       for (const TextureLevel& level : pyramid_levels(image->width(), image->height(), 0))
         pages += level.pages();
     } catch (const BrokenImage&) {
@@ -207,8 +218,9 @@ std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMa
         TexelRow row(image, budget);
         PyramidBuilder builder(levels[i], budget, write);
         for (uint32_t y = 0; y < image.height(); ++y) builder.add_row(row.read(image));
+        expect_unchanged(files, materials.images[i]);
       });
-    progress.advance(1);
+    if (!user_of(materials, static_cast<uint32_t>(i)).empty()) progress.advance(1);
   });
   for (const std::string& warning : materials.warnings) progress.warn(warning);
   set->materials_ = materials.materials;

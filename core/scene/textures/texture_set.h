@@ -67,8 +67,9 @@ class TextureSet {
 uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
                        const CancelToken& cancel);
 
-// SHA-256 of what each image contains as it is stored, as lower-case hex digits; "unreadable" for
-// one that cannot be read. Reads all images, decodes none. Throws as TextureSet::prepare() does.
+// SHA-256 of what each image contains as it is stored, as lower-case hex digits; another text for
+// one that cannot be read to its end. Reads all images, decodes none. Throws as
+// TextureSet::prepare() does.
 std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
                                        unsigned threads, const CancelToken& cancel);
 

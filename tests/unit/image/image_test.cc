@@ -300,6 +300,20 @@ TEST(Images, MemoryIsRefused) {
   }
 }
 
+// To know the size takes no memory for rows, of images that are decoded whole too.
+TEST(Images, SizeAlone) {
+  const std::string pixels = noise(4 << 20);
+  for (const std::string& file : {png_file({1024, 1024, 8, 6, "", true}, pixels),
+                                  jpeg_file(1024, 1024, 1, gradient(1024, 1024, 1), true)}) {
+    StringSource bytes(file);
+    MemoryBudget budget(uint64_t{2} << 20);
+    const auto image = open_image(bytes, budget, ImageUse::kSize);
+    EXPECT_EQ(image->width(), 1024u);
+    EXPECT_EQ(image->height(), 1024u);
+    EXPECT_LT(budget.peak(), uint64_t{5} << 18);
+  }
+}
+
 TEST(Images, TruncatedAnywhere) {
   for (const std::string& file :
        {png_file({31, 17, 8, 6, ""}, noise(4 * 31 * 17)),
