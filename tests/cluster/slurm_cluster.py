@@ -142,7 +142,6 @@ class SlurmCluster:
         for node in self.nodes:
             self.kill_machine(node)
             self.start_node(node)
-        self.resume_nodes()
         self.wait_for_idle_nodes()
 
     def resume_nodes(self):
@@ -153,7 +152,12 @@ class SlurmCluster:
             self.command("scontrol", "update", f"nodename={','.join(drained)}", "state=resume")
 
     def wait_for_idle_nodes(self):
-        self.wait_for(lambda: self.count_idle() == len(self.nodes), "idle nodes")
+        def are_idle():
+            # A node is drained when a task of before its restart comes back to it.
+            self.resume_nodes()
+            return self.count_idle() == len(self.nodes)
+
+        self.wait_for(are_idle, "idle nodes")
 
     def kill(self, name, how=signal.SIGKILL):
         """Ends a daemon; what a node runs is left running (as on a machine that lost its network)."""
