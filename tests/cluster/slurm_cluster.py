@@ -147,9 +147,10 @@ class SlurmCluster:
     def resume_nodes(self):
         """Makes nodes that Slurm has ceased to trust work again."""
         drained = self.command("sinfo", "--noheader", "--Node", "--partition=all",
-                               "--states=drained,draining", "--format=%N").stdout.split()
+                               "--states=drained,draining", "--format=%N", check=False).stdout.split()
         if drained:
-            self.command("scontrol", "update", f"nodename={','.join(drained)}", "state=resume")
+            self.command("scontrol", "update", f"nodename={','.join(drained)}", "state=resume",
+                         check=False)
 
     def wait_for_idle_nodes(self):
         def are_idle():
