@@ -41,17 +41,17 @@ struct Sample {
 Sample check_against(const VerifyCommand& command, const voxdag_reader::File& file,
                      Progress& progress, CommandContext& context) {
   return_freed_memory_to_system();
+  const Grid grid = grid_of(file);
   MemoryBudget budget(file.has_colors() ? std::max(default_memory(), kSceneMemory) : kSceneMemory);
   const auto scene =
       open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);
-  const auto boxes =
-      query::sample_surface(*scene, grid_of(file), command.seed, progress, context.cancel);
+  const auto boxes = query::sample_surface(*scene, grid, command.seed, progress, context.cancel);
   Sample sample;
   with_reader_errors([&] {
     sample.voxels = query::compare_with_sample(file, boxes);
     if (file.has_colors())
       sample.colors = query::compare_sampled_colors(
-          file, context.files, *scene, command.seed, file.path() + ".images.vdspill",
+          file, grid, context.files, *scene, command.seed, file.path() + ".images.vdspill",
           command.threads, budget, progress, context.cancel);
   });
   return sample;

@@ -1,14 +1,13 @@
 #include "query/color_sample.h"
 
 #include <algorithm>
-#include <cmath>
 #include <random>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/color/blocks/region.h"
 #include "core/color/rule/bake_region.h"
-#include "core/geometry/grid.h"
+#include "core/format/global/diff_colors.h"
 #include "core/geometry/morton.h"
 #include "core/scene/textures/texture_set.h"
 
@@ -55,11 +54,9 @@ bool may_touch(const CellBox& box, const Cube& cube) {
   return true;
 }
 
-void find_surfaces(TriangleSource& scene, const voxdag_reader::File& file, const ColorGrid& grid,
+void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& grid,
                    std::vector<SampledRegion>& regions, MemoryCharge& charge, Progress& progress,
                    const CancelToken& cancel) {
-  const double(&origin)[3] = file.origin();
-  const Grid snap = Grid::given({origin[0], origin[1], origin[2]}, file.edge(), file.grid_levels());
   uint64_t bytes = 0;
   progress.begin_stage("surfaces", scene.declared_triangles(), "triangles");
   const auto add = [&](const SurfaceTriangle& triangle) {
@@ -91,16 +88,13 @@ bool is_equal(const EncodedRegion& baked, const ColorRegion& stored) {
          std::equal(bytes, bytes + baked.blocks.size(), stored.blocks);
 }
 
-// Of the colors of the finest cells, which are equally many, in dB.
-double psnr(const EncodedRegion& baked, const ColorRegion& stored) {
+// Of the colors of the finest cells, which are equally many.
+ColorDiff difference(const EncodedRegion& baked, const ColorRegion& stored) {
   ColorRegion again;
   again.blocks = reinterpret_cast<const unsigned char*>(baked.blocks.data());
-  double sum = 0;
-  for (uint32_t i = 0; i < stored.counts[0]; ++i) {
-    const voxdag_reader::Rgb a = again.color(i), b = stored.color(i);
-    for (const int difference : {a.r - b.r, a.g - b.g, a.b - b.b}) sum += difference * difference;
-  }
-  return sum == 0 ? INFINITY : 10 * std::log10(255.0 * 255 * 3 * stored.counts[0] / sum);
+  ColorDiff diff;
+  for (uint32_t i = 0; i < stored.counts[0]; ++i) diff.add(again.color(i), stored.color(i));
+  return diff;
 }
 
 std::string place_of(const Cube& cube, const ColorGrid& grid) {
@@ -113,15 +107,15 @@ std::string place_of(const Cube& cube, const ColorGrid& grid) {
 
 }  // namespace
 
-ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, FileSystem& files,
-                                         TriangleSource& scene, uint64_t seed,
+ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& snap,
+                                         FileSystem& files, TriangleSource& scene, uint64_t seed,
                                          const std::string& scratch_path, unsigned threads,
                                          MemoryBudget& budget, Progress& progress,
                                          const CancelToken& cancel) {
   const ColorGrid grid{file.grid_levels(), file.color_levels()};
   std::vector<SampledRegion> regions = draw_regions(file, grid, seed);
   MemoryCharge charge(budget, 0, "surfaces of sampled regions");
-  find_surfaces(scene, file, grid, regions, charge, progress, cancel);
+  find_surfaces(scene, snap, grid, regions, charge, progress, cancel);
   const SceneMaterials materials = scene.materials();
   progress.begin_stage("images", materials.images.size(), "images");
   const auto textures =
@@ -140,8 +134,8 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, FileSy
     if (!cells.empty())
       baked = encode_region(grid.color_levels - region.cube.level, region.stored.morton, cells);
     const bool is_same = is_equal(baked, region.stored);
-    if (!is_same &&
-        (baked.counts[0] != region.stored.counts[0] || psnr(baked, region.stored) < kMinSamplePsnr))
+    if (!is_same && (baked.counts[0] != region.stored.counts[0] ||
+                     difference(baked, region.stored).psnr() < kMinSamplePsnr))
       throw Error(ErrorCode::kCorrupt,
                   file.path() + ": the colors of the region at color cell " +
                       place_of(region.cube, grid) + " are not those of the scene (" +

@@ -9,6 +9,7 @@
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/format/global/voxdag_reader.h"
+#include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 #include "core/scene/triangle_source.h"
 
@@ -25,11 +26,11 @@ struct ColorSampleReport {
   uint64_t cells = 0;    // in them
 };
 
-// The file has colors. One pass over the scene, which must be the one that was built. Images go to
-// a scratch file at `scratch_path` if they are large. Throws Error{kCorrupt} that names the first
-// region that is wrong, and as TextureSet::prepare().
-ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, FileSystem& files,
-                                         TriangleSource& scene, uint64_t seed,
+// The file has colors, and `grid` is its own. One pass over the scene, which must be the one that
+// was built. Images go to a scratch file at `scratch_path` if they are large. Throws
+// Error{kCorrupt} that names the first region that is wrong, and as TextureSet::prepare().
+ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& grid,
+                                         FileSystem& files, TriangleSource& scene, uint64_t seed,
                                          const std::string& scratch_path, unsigned threads,
                                          MemoryBudget& budget, Progress& progress,
                                          const CancelToken& cancel);

@@ -25,39 +25,9 @@ class ColorCrashTest : public CrashTest {
   std::string scene_;
 };
 
-TEST_P(ColorCrashTest, KilledAtAnyOperation) {
-  const uint64_t operations = operations_of_a_build();
-  for (const Fault fault : {Fault::kKillBefore, Fault::kKillAfter, Fault::kPowerCut}) {
-    uint64_t kills = 0;
-    for (const uint64_t at : moments(operations)) {
-      SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(fault) << " at operation "
-                                      << at << " of " << operations);
-      kills += killed({fault, at});
-      expect_to_resume();
-    }
-    EXPECT_GT(kills, 0u);
-  }
-}
+TEST_P(ColorCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
-TEST_P(ColorCrashTest, DiskFullOrBroken) {
-  const uint64_t operations = operations_of_a_build();
-  for (const Fault fault : {Fault::kNoSpace, Fault::kIoError})
-    for (const uint64_t at : moments(operations)) {
-      SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(fault) << " from operation "
-                                      << at << " of " << operations);
-      FaultyFiles files({fault, at});
-      try {
-        run(files);
-        EXPECT_TRUE(std::filesystem::exists(output()));
-        std::filesystem::remove_all(output() + ".work");
-      } catch (const voxdag::Error& error) {
-        EXPECT_EQ(error.code(),
-                  fault == Fault::kNoSpace ? voxdag::ErrorCode::kNoSpace : voxdag::ErrorCode::kIo)
-            << error.what();
-      }
-      expect_to_resume();
-    }
-}
+TEST_P(ColorCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
 INSTANTIATE_TEST_SUITE_P(Ingested, ColorCrashTest, testing::Values(Ingested::kInMemory), name_of);
 

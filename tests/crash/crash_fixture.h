@@ -143,6 +143,49 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     return counting.operations();
   }
 
+  // SIGKILL and power cuts around every write, sync, rename and removal.
+  void kill_at_any_operation() {
+    const uint64_t operations = operations_of_a_build();
+    ASSERT_GT(operations, 20u);
+    for (const Fault fault : {Fault::kKillBefore, Fault::kKillAfter, Fault::kPowerCut}) {
+      uint64_t kills = 0;
+      for (const uint64_t at : moments(operations)) {
+        SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(fault) << " at operation "
+                                        << at << " of " << operations);
+        kills += killed({fault, at});
+        expect_to_resume();
+      }
+      EXPECT_GT(kills, 0u);
+    }
+  }
+
+  // A disk that is full, or fails, from any operation on says so, and nothing is lost when it has
+  // recovered.
+  void break_disk_at_any_operation() {
+    const uint64_t operations = operations_of_a_build();
+    struct Case {
+      Fault fault;
+      voxdag::ErrorCode code;
+    };
+    for (const Case& c : {Case{Fault::kNoSpace, voxdag::ErrorCode::kNoSpace},
+                          Case{Fault::kIoError, voxdag::ErrorCode::kIo}}) {
+      for (const uint64_t at : moments(operations)) {
+        SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(c.fault)
+                                        << " from operation " << at << " of " << operations);
+        FaultyFiles files({c.fault, at});
+        try {
+          run(files);
+          // Removing what is left over may fail in silence, nothing else.
+          EXPECT_TRUE(std::filesystem::exists(output()));
+          std::filesystem::remove_all(output() + ".work");
+        } catch (const voxdag::Error& error) {
+          EXPECT_EQ(error.code(), c.code) << error.what();
+        }
+        expect_to_resume();
+      }
+    }
+  }
+
   voxdag::TemporaryFolder folder_;
   std::string expected_;
 };

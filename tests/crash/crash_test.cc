@@ -9,21 +9,7 @@
 namespace crash {
 namespace {
 
-// SIGKILL and power cuts around every write, sync, rename and removal.
-TEST_P(CrashTest, KilledAtAnyOperation) {
-  const uint64_t operations = operations_of_a_build();
-  ASSERT_GT(operations, 20u);
-  for (const Fault fault : {Fault::kKillBefore, Fault::kKillAfter, Fault::kPowerCut}) {
-    uint64_t kills = 0;
-    for (const uint64_t at : moments(operations)) {
-      SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(fault) << " at operation "
-                                      << at << " of " << operations);
-      kills += killed({fault, at});
-      expect_to_resume();
-    }
-    EXPECT_GT(kills, 0u);
-  }
-}
+TEST_P(CrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 // The same scene finer, in larger subvolumes: about as long a build, most of it computing.
 class FineCrashTest : public CrashTest {
@@ -56,31 +42,7 @@ TEST_P(FineCrashTest, KilledAtRandomMoments) {
   }
 }
 
-// A disk that is full, or fails, says so, and nothing is lost when it has recovered.
-TEST_P(CrashTest, DiskFullOrBroken) {
-  const uint64_t operations = operations_of_a_build();
-  struct Case {
-    Fault fault;
-    voxdag::ErrorCode code;
-  };
-  for (const Case& c : {Case{Fault::kNoSpace, voxdag::ErrorCode::kNoSpace},
-                        Case{Fault::kIoError, voxdag::ErrorCode::kIo}}) {
-    for (const uint64_t at : moments(operations)) {
-      SCOPED_TRACE(testing::Message() << "fault " << static_cast<int>(c.fault) << " from operation "
-                                      << at << " of " << operations);
-      FaultyFiles files({c.fault, at});
-      try {
-        run(files);
-        // Removing what is left over may fail in silence, nothing else.
-        EXPECT_TRUE(std::filesystem::exists(output()));
-        std::filesystem::remove_all(output() + ".work");
-      } catch (const voxdag::Error& error) {
-        EXPECT_EQ(error.code(), c.code) << error.what();
-      }
-      expect_to_resume();
-    }
-  }
-}
+TEST_P(CrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
 // A disk that fills up while subvolumes are built loses nothing of what it could store.
 TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {

@@ -86,6 +86,17 @@ void add_artifacts(const Corpus& corpus) {
   }
 }
 
+// The first bytes of the header, and all between it and the checksum table.
+void add_global_file(const Corpus& corpus, const char* name, const std::string& path,
+                     size_t header_bytes) {
+  const std::string file = read_bytes(path);
+  uint64_t table_at = 0;
+  std::memcpy(&table_at, file.data() + global_layout::kTableOffsetAt, sizeof table_at);
+  const size_t page = global_layout::kPageBytes;
+  corpus.add("global_file", name,
+             file.substr(0, header_bytes) + file.substr(page, table_at - page));
+}
+
 // The used part of the header page and the levels, without the checksum table.
 void add_global_files(const Corpus& corpus) {
   TemporaryFolder folder;
@@ -101,12 +112,7 @@ void add_global_files(const Corpus& corpus) {
     const std::string path = folder.path() + "/" + name + ".vdag";
     write_global(path, oracle::build_dag(random_voxels(1, edge), 64), grid_of(edge), 64,
                  narrow_words);
-    const std::string file = read_bytes(path);
-    uint64_t table_at = 0;
-    std::memcpy(&table_at, file.data() + global_layout::kTableOffsetAt, sizeof table_at);
-    const size_t page = global_layout::kPageBytes;
-    corpus.add("global_file", name,
-               file.substr(0, global_layout::kAttributesAt) + file.substr(page, table_at - page));
+    add_global_file(corpus, name, path, global_layout::kAttributesAt);
   }
 }
 
@@ -129,12 +135,7 @@ void add_colored_files(const Corpus& corpus) {
                   {levels, color_levels, random_codes(levels, levels, lines * 10),
                    smooth_colors(color_levels, 9)},
                   true, narrow_words);
-    const std::string file = read_bytes(path);
-    uint64_t table_at = 0;
-    std::memcpy(&table_at, file.data() + global_layout::kTableOffsetAt, sizeof table_at);
-    const size_t page = global_layout::kPageBytes;
-    corpus.add("global_file", name,
-               file.substr(0, global_layout::kFeaturesAt) + file.substr(page, table_at - page));
+    add_global_file(corpus, name, path, global_layout::kFeaturesAt);
   }
 }
 

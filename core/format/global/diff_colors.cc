@@ -10,7 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
-#include "core/dag/brick.h"
+#include "core/format/global/cell_places.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
 
@@ -26,22 +26,11 @@ using voxdag_reader::File;
 // The threads share the cubes of this level: at most 2^18.
 constexpr uint32_t kSharedLevel = 6;
 
-// A cube that both files have. A place is a word offset; below the bricks it is the mask of the
-// cube's children.
+// A cube that both files have; its places as in cell_places.h.
 struct CommonCube {
   uint64_t code = 0;
   std::array<uint64_t, 2> places{};
 };
-
-uint32_t child_mask(const File& file, uint32_t level, uint64_t place) {
-  if (level < file.brick_level()) return file.node(level, place).child_mask;
-  return level == file.brick_level() ? octants(file.brick(place)) : static_cast<uint32_t>(place);
-}
-// The child must be there.
-uint64_t child_place(const File& file, uint32_t level, uint64_t place, int index) {
-  if (level < file.brick_level()) return File::child(file.node(level, place), index);
-  return level == file.brick_level() ? file.brick(place) >> 8 * index & 255 : 0;
-}
 
 class ColorComparison {
  public:
@@ -58,7 +47,7 @@ class ColorComparison {
       ColorDiff& diff = of_thread[thread];
       ColorCursor a(a_), b(b_);
       walk(shared, cubes[i], levels_,
-           [&](const CommonCube& cell) { add(color(a, cell), color(b, cell), diff); });
+           [&](const CommonCube& cell) { diff.add(color(a, cell), color(b, cell)); });
     });
     ColorDiff total{levels_};
     for (const ColorDiff& diff : of_thread) {
@@ -77,29 +66,18 @@ class ColorComparison {
   void walk(uint32_t level, const CommonCube& cube, uint32_t target, const Visit& visit) const {
     if (level == target) return visit(cube);
     const auto [a, b] = cube.places;
-    const uint32_t common = child_mask(a_, level, a) & child_mask(b_, level, b);
+    const uint32_t common = child_mask_at(a_, level, a) & child_mask_at(b_, level, b);
     for (int i = 0; i < 8; ++i)
       if (common >> i & 1)
         walk(level + 1,
              {cube.code << 3 | static_cast<uint64_t>(i),
-              {child_place(a_, level, a, i), child_place(b_, level, b, i)}},
+              {child_place_at(a_, level, a, i), child_place_at(b_, level, b, i)}},
              target, visit);
   }
   voxdag_reader::Rgb color(ColorCursor& cursor, const CommonCube& cell) const {
     uint32_t x, y, z;
     morton_decode(cell.code, x, y, z);
     return cursor.color(x, y, z, levels_).value();
-  }
-  static void add(const voxdag_reader::Rgb& a, const voxdag_reader::Rgb& b, ColorDiff& diff) {
-    ++diff.cells;
-    if (a == b) return;
-    ++diff.different_cells;
-    for (const int difference : {a.r - b.r, a.g - b.g, a.b - b.b}) {
-      const auto size = static_cast<uint32_t>(std::abs(difference));
-      diff.largest = std::max(diff.largest, size);
-      diff.sum += size;
-      diff.squares += size * size;
-    }
   }
 
   const File &a_, &b_;
@@ -140,6 +118,18 @@ uint64_t finest_cells(const File& file) {
 }
 
 }  // namespace
+
+void ColorDiff::add(const voxdag_reader::Rgb& a, const voxdag_reader::Rgb& b) {
+  ++cells;
+  if (a == b) return;
+  ++different_cells;
+  for (const int difference : {a.r - b.r, a.g - b.g, a.b - b.b}) {
+    const auto size = static_cast<uint32_t>(std::abs(difference));
+    largest = std::max(largest, size);
+    sum += size;
+    squares += size * size;
+  }
+}
 
 double ColorDiff::mean() const {
   return cells == 0 ? 0 : static_cast<double>(sum) / (3 * static_cast<double>(cells));

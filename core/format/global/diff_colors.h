@@ -17,6 +17,8 @@ struct ColorDiff {
   uint64_t different_cells = 0;   // whose colors differ
   uint32_t largest = 0;           // difference
   uint64_t sum = 0, squares = 0;  // of all differences
+  // Compares one more cell.
+  void add(const voxdag_reader::Rgb& a, const voxdag_reader::Rgb& b);
   // Of a channel of a cell; 0 if there is none.
   double mean() const;
   // The peak signal-to-noise ratio in dB; infinite if nothing differs.

@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/color/blocks/region.h"
-#include "core/dag/brick.h"
+#include "core/format/global/cell_places.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag {
@@ -30,45 +30,35 @@ class CellWalk {
   void walk(uint32_t level, uint64_t place, uint64_t code, uint32_t finest, Visit& visit) const {
     visit(level, code);
     if (level == finest) return;
-    const uint32_t mask = mask_of(level, place);
-    for (unsigned i = 0; i < 8; ++i)
-      if (mask >> i & 1) walk(level + 1, child_of(level, place, i), 8 * code + i, finest, visit);
+    const uint32_t mask = child_mask_at(file_, level, place);
+    for (int i = 0; i < 8; ++i)
+      if (mask >> i & 1)
+        walk(level + 1, child_place_at(file_, level, place, i), 8 * code + static_cast<uint64_t>(i),
+             finest, visit);
   }
   // How many cells of level `target` a cube has; counts to `limit` and not much further. A few
   // nodes that are shared a lot may have 8^20.
   uint64_t count(uint32_t level, uint64_t place, uint32_t target, uint64_t limit) const {
     if (level == target) return 1;
     uint64_t cells = 0;
-    const uint32_t mask = mask_of(level, place);
-    for (unsigned i = 0; i < 8 && cells <= limit; ++i)
+    const uint32_t mask = child_mask_at(file_, level, place);
+    for (int i = 0; i < 8 && cells <= limit; ++i)
       if (mask >> i & 1)
-        cells += count(level + 1, child_of(level, place, i), target, limit - cells);
+        cells += count(level + 1, child_place_at(file_, level, place, i), target, limit - cells);
     return cells;
   }
   // The place of a cube; false if it is not set.
   bool find(uint32_t level, uint64_t code, uint64_t& place) const {
     place = 0;
     for (uint32_t l = 0; l < level; ++l) {
-      const auto index = static_cast<unsigned>(code >> 3 * (level - l - 1) & 7);
-      if (!(mask_of(l, place) >> index & 1)) return false;
-      place = child_of(l, place, index);
+      const auto index = static_cast<int>(code >> 3 * (level - l - 1) & 7);
+      if (!(child_mask_at(file_, l, place) >> index & 1)) return false;
+      place = child_place_at(file_, l, place, index);
     }
     return true;
   }
 
  private:
-  // A place is a word offset; below the bricks it is the mask of the cell's children.
-  uint32_t mask_of(uint32_t level, uint64_t place) const {
-    if (level < file_.brick_level()) return file_.node(level, place).child_mask;
-    if (level > file_.brick_level()) return static_cast<uint32_t>(place);
-    return octants(file_.brick(place));
-  }
-  uint64_t child_of(uint32_t level, uint64_t place, unsigned index) const {
-    if (level < file_.brick_level())
-      return voxdag_reader::File::child(file_.node(level, place), static_cast<int>(index));
-    return level == file_.brick_level() ? file_.brick(place) >> 8 * index & 255 : 0;
-  }
-
   const voxdag_reader::File& file_;
 };
 

@@ -28,17 +28,7 @@ class ColorArtifacts : public testing::Test {
   }
   std::string output() const { return folder_.file("out.vdag"); }
   std::string artifacts() const { return output() + ".work/colors.vddurable"; }
-  BuildSpec spec() const {
-    BuildSpec spec;
-    spec.geometry.scenes = {scene_};
-    spec.geometry.resolution = 256;
-    spec.geometry.color = true;
-    spec.run.output = output();
-    spec.run.memory_bytes = uint64_t{256} << 20;
-    spec.run.threads = 2;
-    spec.run.force = true;
-    return spec;
-  }
+  BuildSpec spec() const { return painted_spec(scene_, output(), 256); }
   BuildReport build(const BuildSpec& spec) {
     CancelToken cancel;
     return run_build(spec, {system_files(), warnings_, cancel});

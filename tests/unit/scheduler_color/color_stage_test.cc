@@ -26,15 +26,8 @@ class ColorStage : public testing::Test {
   void SetUp() override { scene_ = PaintedScene::write(folder_.path()); }
   std::string output() const { return folder_.path() + "/out.vdag"; }
   BuildSpec spec(uint64_t resolution, uint64_t color_resolution = 0) const {
-    BuildSpec spec;
-    spec.geometry.scenes = {scene_};
-    spec.geometry.resolution = resolution;
-    spec.geometry.color = true;
+    BuildSpec spec = painted_spec(scene_, output(), resolution);
     spec.geometry.color_resolution = color_resolution;
-    spec.run.output = output();
-    spec.run.memory_bytes = uint64_t{256} << 20;
-    spec.run.threads = 2;
-    spec.run.force = true;
     return spec;
   }
   static BuildReport build(const BuildSpec& spec) {

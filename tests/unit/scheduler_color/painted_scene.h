@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "query/render/picture.h"
+#include "scheduler/build_spec.h"
 
 namespace voxdag {
 
@@ -114,5 +115,19 @@ class PaintedScene {
   Json json_;
   std::string buffer_;
 };
+
+// A build of it, that replaces what an earlier one has left.
+inline BuildSpec painted_spec(const std::string& scene, const std::string& output,
+                              uint64_t resolution) {
+  BuildSpec spec;
+  spec.geometry.scenes = {scene};
+  spec.geometry.resolution = resolution;
+  spec.geometry.color = true;
+  spec.run.output = output;
+  spec.run.memory_bytes = uint64_t{256} << 20;
+  spec.run.threads = 2;
+  spec.run.force = true;
+  return spec;
+}
 
 }  // namespace voxdag
