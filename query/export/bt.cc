@@ -12,7 +12,7 @@
 #include "core/base/text.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
-#include "query/export/selected_bricks.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
@@ -42,7 +42,7 @@ class BtWalk {
 
  private:
   // Whether a cube has selected cells.
-  bool has_cells(uint32_t depth, uint64_t content, const CellCorner& corner, int64_t edge) const {
+  bool has_cells(uint32_t depth, uint64_t content, const Position& corner, int64_t edge) const {
     const Region& region = job_.selection.region;
     if (!region.intersects(corner, edge)) return false;
     if (region.contains(corner, edge)) return true;
@@ -54,12 +54,12 @@ class BtWalk {
     return false;
   }
 
-  void below(uint32_t depth, uint64_t content, const CellCorner& corner) {
+  void below(uint32_t depth, uint64_t content, const Position& corner) {
     const int64_t half = int64_t{1} << (job_.selection.grid_levels - depth - 1);
     const DagView::Children children = job_.dag.children(depth, content);
     uint32_t bits = 0, inner = 0;
     for (int i = 0; i < 8; ++i) {
-      const CellCorner at = child_corner(corner, i, half);
+      const Position at = child_corner(corner, i, half);
       uint32_t state = job_.selection.region.contains(at, half) ? kFree : kUnknown;
       if (children.has(i) && has_cells(depth + 1, job_.dag.content(depth, children, i), at, half)) {
         state = half == 1 ? kOccupied : kInner;

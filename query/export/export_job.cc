@@ -6,7 +6,7 @@
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
-#include "query/export/selected_bricks.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 
@@ -44,9 +44,9 @@ uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t
   if (selection.grid_levels == levels && selection.region == whole_grid(levels))
     return job.file.voxels();
   uint64_t voxels = 0, bricks = 0;
-  for_each_selected_brick(job.dag, selection, [&](const CellCorner&, uint64_t mask) {
+  for_each_brick(job.dag, selection, [&](const Brick& brick) {
     if (++bricks % 65536 == 0) job.cancel.check();
-    voxels += static_cast<uint64_t>(std::popcount(mask));
+    voxels += static_cast<uint64_t>(std::popcount(brick.mask));
     return voxels <= limit;
   });
   return voxels;

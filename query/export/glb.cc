@@ -12,7 +12,7 @@
 #include "query/export/color/linear_colors.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
-#include "query/export/selected_bricks.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
@@ -45,21 +45,18 @@ class GlbSurface {
  public:
   explicit GlbSurface(const ExportJob& job) : job_(job), colors_(job.file) {
     uint64_t count = 0;
-    const auto count_brick = [&](const CellCorner&, uint64_t mask) {
+    for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
       if (++count % 65536 == 0) job.cancel.check();
-      voxels_ += static_cast<uint64_t>(std::popcount(mask));
-      return true;
-    };
-    for_each_selected_brick(job.dag, job.selection, count_brick);
+      voxels_ += static_cast<uint64_t>(std::popcount(brick.mask));
+    });
     if (count == 0) refuse_empty(job);
     bricks_charge_ = MemoryCharge(job.budget, count * sizeof(GlbBrick), kMemory);
     bricks_.reserve(count);
-    for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
-      bricks_.push_back({morton_encode(static_cast<uint32_t>(corner[0] / kBrickEdge),
-                                       static_cast<uint32_t>(corner[1] / kBrickEdge),
-                                       static_cast<uint32_t>(corner[2] / kBrickEdge)),
-                         mask});
-      return true;
+    for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
+      bricks_.push_back({morton_encode(static_cast<uint32_t>(brick.low[0] / kBrickEdge),
+                                       static_cast<uint32_t>(brick.low[1] / kBrickEdge),
+                                       static_cast<uint32_t>(brick.low[2] / kBrickEdge)),
+                         brick.mask});
     });
     ExportStage stage(job, "find faces", 6 * count, "bricks");
     for (uint8_t axis = 0; axis < 3; ++axis)
@@ -76,7 +73,7 @@ class GlbSurface {
   static constexpr int kCoordinateBits = 21;
   static constexpr uint64_t kCoordinateMask = (uint64_t{1} << kCoordinateBits) - 1;
 
-  uint64_t mask_at(const CellCorner& corner) const {
+  uint64_t mask_at(const Position& corner) const {
     for (const int64_t c : corner)
       if (c < 0 || c >= int64_t{1} << job_.selection.grid_levels) return 0;
     const uint64_t morton = morton_encode(static_cast<uint32_t>(corner[0] / kBrickEdge),
@@ -87,8 +84,8 @@ class GlbSurface {
   }
 
   // The faces of a brick that look into empty cells.
-  uint64_t exposed(const CellCorner& corner, uint64_t mask, uint8_t axis, bool upward) const {
-    CellCorner next_to = corner;
+  uint64_t exposed(const Position& corner, uint64_t mask, uint8_t axis, bool upward) const {
+    Position next_to = corner;
     next_to[axis] += upward ? kBrickEdge : -kBrickEdge;
     const uint64_t neighbor = mask_at(next_to);
     uint64_t faces = 0;
@@ -105,7 +102,7 @@ class GlbSurface {
     return faces;
   }
 
-  CellCorner corner_of(const GlbBrick& brick) const {
+  Position corner_of(const GlbBrick& brick) const {
     uint32_t x, y, z;
     morton_decode(brick.morton, x, y, z);
     return {int64_t{x} * kBrickEdge, int64_t{y} * kBrickEdge, int64_t{z} * kBrickEdge};
@@ -123,9 +120,9 @@ class GlbSurface {
     faces.reserve(count);
     const size_t u = (axis + 1u) % 3, v = (axis + 2u) % 3;
     for (const GlbBrick& brick : bricks_) {
-      const CellCorner corner = corner_of(brick);
+      const Position corner = corner_of(brick);
       for_each_cell_of(
-          corner, exposed(corner, brick.mask, axis, upward), [&](const CellCorner& cell) {
+          {corner, exposed(corner, brick.mask, axis, upward)}, [&](const Position& cell) {
             const auto part = [&](size_t a, int64_t more = 0) {
               return static_cast<uint64_t>(cell[a] - job_.selection.region.low[a] + more);
             };

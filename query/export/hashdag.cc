@@ -12,8 +12,8 @@
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "query/export/export_file.h"
-#include "query/export/selected_bricks.h"
 #include "query/export/selected_dag.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
@@ -83,16 +83,15 @@ class HashDagWriter {
     voxdag_reader::ColorCursor cursor(job_.file);
     ExportStage stage(job_, "export colors", dag_.voxels(), "voxels");
     uint64_t written = 0;
-    for_each_selected_brick(job_.dag, job_.selection, [&](const CellCorner& corner, uint64_t mask) {
-      for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+    for_each_brick(job_.dag, job_.selection, [&](const Brick& brick) {
+      for_each_cell_of(brick, [&](const Position& cell) {
         const voxdag_reader::Rgb color = color_of_cell(job_, cursor, cell);
         const std::array<uint8_t, 4> bytes = {color.r, color.g, color.b, 255};
         colors.write(std::as_bytes(std::span(bytes)));
       });
-      const auto voxels = static_cast<uint64_t>(std::popcount(mask));
+      const auto voxels = static_cast<uint64_t>(std::popcount(brick.mask));
       written += voxels;
       stage.advance(voxels);
-      return true;
     });
     require_written(job_, written, dag_.voxels());
   }

@@ -8,7 +8,7 @@
 #include "core/format/bytes.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
-#include "query/export/selected_bricks.h"
+#include "query/lookup/bricks.h"
 #include "query/npy_header.h"
 
 namespace voxdag::query {
@@ -177,10 +177,9 @@ class NpzWriter {
 
 template <class VisitCell>
 void visit_cells(const ExportJob& job, ExportStage& stage, const VisitCell& visit) {
-  for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
-    for_each_cell_of(corner, mask, visit);
-    stage.advance(static_cast<uint64_t>(std::popcount(mask)));
-    return true;
+  for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
+    for_each_cell_of(brick, visit);
+    stage.advance(static_cast<uint64_t>(std::popcount(brick.mask)));
   });
 }
 
@@ -197,12 +196,12 @@ ExportReport write_npz(const ExportJob& job) {
   ExportStage stage(job, "export", (has_colors ? 3 : 2) * voxels, "rows");
   const std::string shape = "(" + std::to_string(voxels) + ", 3)";
   writer.add<int32_t>("cells.npy", npy_header("<i4", shape), 3 * voxels, [&](const auto& put) {
-    visit_cells(job, stage, [&](const CellCorner& cell) {
+    visit_cells(job, stage, [&](const Position& cell) {
       for (size_t axis = 0; axis < 3; ++axis) put(static_cast<int32_t>(cell[axis]));
     });
   });
   writer.add<double>("positions.npy", npy_header("<f8", shape), 3 * voxels, [&](const auto& put) {
-    visit_cells(job, stage, [&](const CellCorner& cell) {
+    visit_cells(job, stage, [&](const Position& cell) {
       for (size_t axis = 0; axis < 3; ++axis)
         put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
     });
@@ -210,7 +209,7 @@ ExportReport write_npz(const ExportJob& job) {
   if (has_colors)
     writer.add<uint8_t>("colors.npy", npy_header("|u1", shape), 3 * voxels, [&](const auto& put) {
       voxdag_reader::ColorCursor colors(job.file);
-      visit_cells(job, stage, [&](const CellCorner& cell) {
+      visit_cells(job, stage, [&](const Position& cell) {
         const voxdag_reader::Rgb color = color_of_cell(job, colors, cell);
         for (const uint8_t channel : {color.r, color.g, color.b}) put(channel);
       });

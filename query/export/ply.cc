@@ -5,7 +5,7 @@
 
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
-#include "query/export/selected_bricks.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
@@ -33,16 +33,15 @@ ExportReport write_ply(const ExportJob& job) {
   file.write(header);
   ExportStage stage(job, "export", report.voxels, "voxels");
   uint64_t written_voxels = 0;
-  for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
-    for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+  for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
+    for_each_cell_of(brick, [&](const Position& cell) {
       for (size_t axis = 0; axis < 3; ++axis)
         file.put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
       if (has_colors) file.put(color_of_cell(job, colors, cell));
     });
-    const auto voxels = static_cast<uint64_t>(std::popcount(mask));
+    const auto voxels = static_cast<uint64_t>(std::popcount(brick.mask));
     written_voxels += voxels;
     stage.advance(voxels);
-    return true;
   });
   require_written(job, written_voxels, report.voxels);
   ExportFile* const written[] = {&file};

@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "core/base/error.h"
-#include "query/export/selected_bricks.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
@@ -131,7 +131,7 @@ class DagBuilder {
   std::vector<BuiltLevel>& levels() { return levels_; }
 
  private:
-  BuiltNode build(uint32_t depth, uint64_t content, const CellCorner& corner) {
+  BuiltNode build(uint32_t depth, uint64_t content, const Position& corner) {
     const int64_t edge = int64_t{1} << (job_.selection.grid_levels - depth);
     if (!job_.selection.region.intersects(corner, edge)) return {};
     // Only what lies in the region as a whole is the same everywhere. A brick of the file has no
@@ -149,10 +149,10 @@ class DagBuilder {
     return built;
   }
 
-  BuiltNode build_node(uint32_t depth, uint64_t content, const CellCorner& corner, int64_t edge) {
+  BuiltNode build_node(uint32_t depth, uint64_t content, const Position& corner, int64_t edge) {
     if (edge == kBrickEdge) {
       const uint64_t mask =
-          clipped_brick(brick_of_cells(job_.dag, depth, content), corner, job_.selection.region);
+          brick_of_cells(job_.dag, depth, content) & mask_within(job_.selection.region, corner);
       if (mask == 0) return {};
       const uint32_t words[] = {static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)};
       return {levels_[depth].offset_of(words), static_cast<uint64_t>(std::popcount(mask))};

@@ -12,8 +12,8 @@
 #include "core/format/bytes.h"
 #include "query/export/color/color_palette.h"
 #include "query/export/export_file.h"
-#include "query/export/selected_bricks.h"
 #include "query/export/selected_dag.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
@@ -87,12 +87,10 @@ class VoxColors {
     palette_.emplace(job.budget);
     voxdag_reader::ColorCursor cursor(job.file);
     ExportStage stage(job, "find colors", 0, "voxels");
-    for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
-      for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
-        palette_->add(color_of_cell(job, cursor, cell));
-      });
-      stage.advance(static_cast<uint64_t>(std::popcount(mask)));
-      return true;
+    for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
+      for_each_cell_of(
+          brick, [&](const Position& cell) { palette_->add(color_of_cell(job, cursor, cell)); });
+      stage.advance(static_cast<uint64_t>(std::popcount(brick.mask)));
     });
     palette_->make();
     cursor_.emplace(job.file);
@@ -103,7 +101,7 @@ class VoxColors {
     static constexpr voxdag_reader::Rgb kOneGray[] = {{0xb0, 0xb0, 0xb0}};
     return palette_ ? palette_chunk(palette_->colors()) : palette_chunk(kOneGray);
   }
-  uint8_t index_of(const CellCorner& cell) {
+  uint8_t index_of(const Position& cell) {
     if (!palette_) return 1;
     return static_cast<uint8_t>(palette_->index_of(color_of_cell(job_, *cursor_, cell)) + 1);
   }
@@ -139,12 +137,12 @@ class VoxWriter {
     file.write("MAIN");
     file.put<uint32_t>(0);
     file.put(static_cast<uint32_t>(total - 8 - kChunkHeaderBytes));
-    const auto write_next = [&](uint64_t content, const CellCorner& corner, uint64_t voxels) {
+    const auto write_next = [&](uint64_t content, const Position& corner, uint64_t voxels) {
       write_model(file, content, corner, voxels, colors);
       stage.advance(voxels);
     };
     if (job_.has_colors) {
-      visit_instances(0, view_.root(), {0, 0, 0}, [&](const CellCorner& corner, uint64_t content) {
+      visit_instances(0, view_.root(), {0, 0, 0}, [&](const Position& corner, uint64_t content) {
         write_next(content, corner, voxels_[model_of(content)]);
       });
     } else {
@@ -183,8 +181,8 @@ class VoxWriter {
       if (4 * total > kMaxVoxBytes) return;
       models_[offset] = static_cast<uint32_t>(voxels_.size());
       uint64_t voxels = 0;
-      visit_bricks(depth_, content_at(offset), {0, 0, 0}, [&](const CellCorner&, uint64_t mask) {
-        voxels += static_cast<uint64_t>(std::popcount(mask));
+      visit_bricks(depth_, content_at(offset), {0, 0, 0}, [&](const Brick& brick) {
+        voxels += static_cast<uint64_t>(std::popcount(brick.mask));
       });
       voxels_.push_back(voxels);
       total += voxels;
@@ -193,9 +191,9 @@ class VoxWriter {
   }
 
   template <class Visit>
-  void visit_bricks(uint32_t depth, uint64_t content, const CellCorner& corner,
+  void visit_bricks(uint32_t depth, uint64_t content, const Position& corner,
                     const Visit& visit) const {
-    if (depth + kBrickLevels == view_.grid_levels()) return visit(corner, content);
+    if (depth + kBrickLevels == view_.grid_levels()) return visit(Brick{corner, content});
     const DagView::Children children = view_.children(depth, content);
     const int64_t half = int64_t{1} << (view_.grid_levels() - depth - 1);
     for (int i = 0; i < 8; ++i)
@@ -211,7 +209,7 @@ class VoxWriter {
 
   // Calls visit(corner, content) for each place of a model.
   template <class Visit>
-  void visit_instances(uint32_t depth, uint64_t content, const CellCorner& corner,
+  void visit_instances(uint32_t depth, uint64_t content, const Position& corner,
                        const Visit& visit) {
     if (depth == depth_) {
       job_.cancel.check();
@@ -229,8 +227,8 @@ class VoxWriter {
                         visit);
   }
 
-  void find_instances(uint32_t depth, uint64_t content, const CellCorner& corner) {
-    visit_instances(depth, content, corner, [&](const CellCorner& at, uint64_t of_instance) {
+  void find_instances(uint32_t depth, uint64_t content, const Position& corner) {
+    visit_instances(depth, content, corner, [&](const Position& at, uint64_t of_instance) {
       instance_bytes_ += transform_node(0, 0, place_text(at)).size() + shape_node(0, 0).size();
       ++instances_;
       if (job_.has_colors) models_bytes_ += model_bytes(voxels_[model_of(of_instance)]);
@@ -241,7 +239,7 @@ class VoxWriter {
 
   // Where the center of an instance is. The grid's center is at the origin of MagicaVoxel's x and
   // y, its floor at that of z.
-  std::string place_text(const CellCorner& corner) const {
+  std::string place_text(const Position& corner) const {
     const int64_t half = edge_ / 2, middle = int64_t{1} << (view_.grid_levels() - 1);
     return std::to_string(corner[0] + half - middle) + " " +
            std::to_string(middle - corner[2] - half) + " " + std::to_string(corner[1] + half);
@@ -254,7 +252,7 @@ class VoxWriter {
            instance_bytes_ + palette_chunk({}).size();
   }
 
-  void write_model(ExportFile& file, uint64_t content, const CellCorner& place, uint64_t voxels,
+  void write_model(ExportFile& file, uint64_t content, const Position& place, uint64_t voxels,
                    VoxColors& colors) const {
     file.write("SIZE");
     file.put<uint32_t>(12);
@@ -264,8 +262,8 @@ class VoxWriter {
     file.put(static_cast<uint32_t>(4 + 4 * voxels));
     file.put<uint32_t>(0);
     file.put(static_cast<uint32_t>(voxels));
-    visit_bricks(depth_, content, {0, 0, 0}, [&](const CellCorner& corner, uint64_t mask) {
-      for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
+    visit_bricks(depth_, content, {0, 0, 0}, [&](const Brick& brick) {
+      for_each_cell_of(brick, [&](const Position& cell) {
         const uint8_t index =
             colors.index_of({place[0] + cell[0], place[1] + cell[1], place[2] + cell[2]});
         const std::array<uint8_t, 4> voxel = {static_cast<uint8_t>(cell[0]),
@@ -286,7 +284,7 @@ class VoxWriter {
     file.put(static_cast<int32_t>(instances_));
     for (size_t i = 0; i < instances_; ++i) file.put(static_cast<int32_t>(2 + 2 * i));
     int32_t id = 2;
-    visit_instances(0, view_.root(), {0, 0, 0}, [&](const CellCorner& corner, uint64_t content) {
+    visit_instances(0, view_.root(), {0, 0, 0}, [&](const Position& corner, uint64_t content) {
       const int32_t model = job_.has_colors ? id / 2 - 1 : static_cast<int32_t>(model_of(content));
       transform_node(id, id + 1, place_text(corner)).write(file);
       shape_node(id + 1, model).write(file);

@@ -1,10 +1,13 @@
 // Bricks of a part of a file, in the grid of any of its octree's levels: what boxes, lists of
-// positions and exporters are made from.
+// positions and exporters are made from. Memory does not grow with the part, time does with its
+// bricks.
 #pragma once
 
+#include <bit>
 #include <cstdint>
-#include <functional>
+#include <type_traits>
 
+#include "core/dag/brick.h"
 #include "query/dag_view.h"
 #include "query/lookup/position.h"
 #include "query/selection.h"
@@ -12,30 +15,95 @@
 namespace voxdag::query {
 
 // 4x4x4 cells of the selected grid. The bits of the mask are those of the file's bricks, see
-// brick_cell().
+// core/dag/brick.h.
 struct Brick {
   Position low;  // of its low corner, a multiple of 4, in cells
   uint64_t mask;
 };
 
-// The cell of a bit of a brick's mask: bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0.
+// The cell of a bit of a brick's mask.
 inline Position brick_cell(const Brick& brick, int bit) {
-  return {brick.low[0] + (bit >> 4 & 2) + (bit >> 2 & 1),
-          brick.low[1] + (bit >> 3 & 2) + (bit >> 1 & 1),
-          brick.low[2] + (bit >> 2 & 2) + (bit & 1)};
+  return {brick.low[0] + brick_coordinate(bit, 0), brick.low[1] + brick_coordinate(bit, 1),
+          brick.low[2] + brick_coordinate(bit, 2)};
 }
 
-// Calls `visit` for every brick that has set cells in the region, in Morton order; the mask is cut
-// to the region. What lies outside the region, or outside the grid, is not visited; no node above a
-// brick is read twice for it. Throws Error{kInvalidInput} unless the selection's grid has at most
-// the file's levels, and Error{kCorrupt} for a damaged DAG.
-void for_each_brick(const DagView& dag, const Selection& selection,
-                    const std::function<void(const Brick&)>& visit);
+// Calls visit(cell) for each cell of a brick, in Morton order.
+template <class Visit>
+void for_each_cell_of(Brick brick, const Visit& visit) {
+  for (; brick.mask != 0; brick.mask &= brick.mask - 1)
+    visit(brick_cell(brick, std::countr_zero(brick.mask)));
+}
+
+// The corner of child `index` of a cube, whose children have that edge.
+inline Position child_corner(const Position& corner, int index, int64_t edge) {
+  return {corner[0] + (index & 4 ? edge : 0), corner[1] + (index & 2 ? edge : 0),
+          corner[2] + (index & 1 ? edge : 0)};
+}
 
 // The cells of a brick at `low` that lie in the region.
 uint64_t mask_within(const Region& region, const Position& low);
 
 // Throws Error{kInvalidInput} unless 0 <= grid_levels <= those of the file.
 void check_grid_levels(const DagView& dag, uint32_t grid_levels);
+
+// The walk of for_each_brick().
+template <class Visit>
+class BrickWalk {
+ public:
+  BrickWalk(const DagView& dag, const Selection& selection, Visit& visit)
+      : dag_(dag), selection_(selection), visit_(visit) {}
+
+  void run() {
+    const Position origin = {0, 0, 0};
+    if (dag_.empty() || selection_.region.empty()) return;
+    if (selection_.grid_levels >= kBrickLevels)
+      enter(0, origin, dag_.root());
+    else  // a grid of one or two cells per edge is part of one brick
+      brick(origin, selection_.grid_levels == 0 ? 1 : dag_.children(0, dag_.root()).mask);
+  }
+
+ private:
+  // Whether to go on.
+  bool enter(uint32_t depth, const Position& low, uint64_t content) {
+    if (depth + kBrickLevels == selection_.grid_levels)
+      return brick(low, brick_of_cells(dag_, depth, content));
+    const DagView::Children children = dag_.children(depth, content);
+    const int64_t half = int64_t{1} << (selection_.grid_levels - depth - 1);
+    for (int i = 0; i < 8; ++i) {
+      if (!children.has(i)) continue;
+      const Position corner = child_corner(low, i, half);
+      if (selection_.region.intersects(corner, half) &&
+          !enter(depth + 1, corner, dag_.content(depth, children, i)))
+        return false;
+    }
+    return true;
+  }
+
+  bool brick(const Position& low, uint64_t mask) {
+    if (!selection_.region.contains(low, kBrickEdge)) mask &= mask_within(selection_.region, low);
+    if (mask == 0) return true;
+    if constexpr (std::is_void_v<std::invoke_result_t<Visit&, const Brick&>>) {
+      visit_(Brick{low, mask});
+      return true;
+    } else {
+      return visit_(Brick{low, mask});
+    }
+  }
+
+  const DagView& dag_;
+  const Selection& selection_;
+  Visit& visit_;
+};
+
+// Calls visit(const Brick&) for every brick that has set cells in the region, in Morton order,
+// until it returns false, if it returns anything; the mask is cut to the region. What lies outside
+// the region, or outside the grid, is not visited; no node above a brick is read twice for it.
+// Throws Error{kInvalidInput} unless the selection's grid has at most the file's levels, and
+// Error{kCorrupt} for a damaged DAG.
+template <class Visit>
+void for_each_brick(const DagView& dag, const Selection& selection, Visit&& visit) {
+  check_grid_levels(dag, selection.grid_levels);
+  BrickWalk<std::remove_reference_t<Visit>>(dag, selection, visit).run();
+}
 
 }  // namespace voxdag::query

@@ -132,13 +132,12 @@ void Dag::box(const Selection& selection, std::span<uint8_t> cells) const {
   require(cells.size() == size, "as many results as cells in the region");
   std::fill(cells.begin(), cells.end(), uint8_t{0});
   bricks(selection, [&](const Brick& brick) {
-    for (uint64_t left = brick.mask; left != 0; left &= left - 1) {
-      const Position p = brick_cell(brick, std::countr_zero(left));
+    for_each_cell_of(brick, [&](const Position& p) {
       const int64_t at =
           ((p[0] - low[0]) * (high[1] - low[1]) + p[1] - low[1]) * (high[2] - low[2]) + p[2] -
           low[2];
       cells[static_cast<size_t>(at)] = 1;
-    }
+    });
   });
 }
 

@@ -1,7 +1,6 @@
 #include "scheduler/cluster/run_batch.h"
 
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -13,6 +12,7 @@
 #include "core/base/process_limits.h"
 #include "core/format/artifact/artifact_reader.h"
 #include "core/format/artifact/segment_writer.h"
+#include "core/io/host_name.h"
 #include "core/io/random_id.h"
 #include "merge/merge.h"
 #include "scheduler/cluster/batch_file.h"
@@ -24,12 +24,6 @@
 
 namespace voxdag {
 namespace {
-
-std::string host_name() {
-  char name[256] = "";
-  gethostname(name, sizeof name - 1);
-  return name;
-}
 
 // Of this node: its own name for it, else the machine's.
 std::string node_name() {

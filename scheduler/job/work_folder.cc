@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/format/artifact/segment_writer.h"
+#include "core/io/host_name.h"
 #include "scheduler/job/build_locks.h"
 
 namespace voxdag {
@@ -85,9 +86,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
     throw Error(ErrorCode::kIo, "the work folder " + path_ + " is in use by " +
                                     read_small_file(files_, lock_path, 1 << 12) +
                                     ": expected to be the only build there");
-  char host[256] = "";
-  gethostname(host, sizeof host - 1);
-  const std::string holder = "process " + std::to_string(getpid()) + " on " + host;
+  const std::string holder = "process " + std::to_string(getpid()) + " on " + host_name();
   // create() empties the file: the last name may have been longer.
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
 }

@@ -21,7 +21,7 @@
 #include "query/export/color/linear_colors.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
-#include "query/export/selected_bricks.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
@@ -111,18 +111,18 @@ class FileBuffer : public std::streambuf {
 uint64_t vdb_bytes(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
                    uint64_t limit) {
   uint64_t bytes = 0, bricks = 0;
-  CellCorner leaf{-1, 0, 0}, lower{-1, 0, 0}, upper{-1, 0, 0};
-  const auto count = [&](const CellCorner& corner, int shift, CellCorner& last, uint64_t cost) {
-    const CellCorner cube = {corner[0] >> shift, corner[1] >> shift, corner[2] >> shift};
+  Position leaf{-1, 0, 0}, lower{-1, 0, 0}, upper{-1, 0, 0};
+  const auto count = [&](const Position& corner, int shift, Position& last, uint64_t cost) {
+    const Position cube = {corner[0] >> shift, corner[1] >> shift, corner[2] >> shift};
     if (cube == last) return;
     last = cube;
     bytes += cost;
   };
-  for_each_selected_brick(job.dag, selection, [&](const CellCorner& corner, uint64_t) {
+  for_each_brick(job.dag, selection, [&](const Brick& brick) {
     if (++bricks % 65536 == 0) job.cancel.check();
-    count(corner, 3, leaf, node.leaf);
-    count(corner, 7, lower, node.lower);
-    count(corner, 12, upper, node.upper);
+    count(brick.low, 3, leaf, node.leaf);
+    count(brick.low, 7, lower, node.lower);
+    count(brick.low, 12, upper, node.upper);
     return bytes <= limit;
   });
   return bytes;
@@ -142,7 +142,7 @@ MemoryCharge charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
   return MemoryCharge(job.budget, bytes, "the grid");
 }
 
-openvdb::Coord vdb_coord(const CellCorner& cell) {
+openvdb::Coord vdb_coord(const Position& cell) {
   return openvdb::Coord(static_cast<openvdb::Int32>(cell[0]), static_cast<openvdb::Int32>(cell[1]),
                         static_cast<openvdb::Int32>(cell[2]));
 }
@@ -165,22 +165,20 @@ typename GridType::Ptr make_vdb_grid(const ExportJob& job, const char* name, uin
   const auto grid = empty_vdb_grid<GridType>(job, name);
   ExportStage stage(job, "build grid", 0, "voxels");
   typename GridType::Accessor accessor = grid->getAccessor();
-  for_each_selected_brick(job.dag, job.selection, [&](const CellCorner& corner, uint64_t mask) {
-    auto* const leaf = accessor.touchLeaf(vdb_coord(corner));
-    for_each_cell_of(corner, mask, [&](const CellCorner& cell) {
-      leaf->setValueOn(vdb_coord(cell), value(cell));
-    });
-    const auto count = static_cast<uint64_t>(std::popcount(mask));
+  for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
+    auto* const leaf = accessor.touchLeaf(vdb_coord(brick.low));
+    for_each_cell_of(brick,
+                     [&](const Position& cell) { leaf->setValueOn(vdb_coord(cell), value(cell)); });
+    const auto count = static_cast<uint64_t>(std::popcount(brick.mask));
     voxels += count;
     stage.advance(count);
-    return true;
   });
   return grid;
 }
 
 template <class GridType>
 typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t& voxels) {
-  return make_vdb_grid<GridType>(job, kGridName, voxels, [](const CellCorner&) { return true; });
+  return make_vdb_grid<GridType>(job, kGridName, voxels, [](const Position&) { return true; });
 }
 
 openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job) {
@@ -188,11 +186,10 @@ openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job) {
   const auto& linear = linear_of_srgb();
   const auto light = [&](uint8_t channel) { return static_cast<float>(linear[channel]) / 65535; };
   uint64_t voxels = 0;
-  return make_vdb_grid<openvdb::Vec3SGrid>(
-      job, kColorGridName, voxels, [&](const CellCorner& cell) {
-        const voxdag_reader::Rgb color = color_of_cell(job, colors, cell);
-        return openvdb::Vec3f(light(color.r), light(color.g), light(color.b));
-      });
+  return make_vdb_grid<openvdb::Vec3SGrid>(job, kColorGridName, voxels, [&](const Position& cell) {
+    const voxdag_reader::Rgb color = color_of_cell(job, colors, cell);
+    return openvdb::Vec3f(light(color.r), light(color.g), light(color.b));
+  });
 }
 
 template <class Write>
