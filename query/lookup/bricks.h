@@ -63,7 +63,7 @@ class BrickWalk {
   }
 
  private:
-  // Whether to go on.
+  // False if a visitor has had enough.
   bool enter(uint32_t depth, const Position& low, uint64_t content) {
     if (depth + kBrickLevels == selection_.grid_levels)
       return brick(low, brick_of_cells(dag_, depth, content));
