@@ -60,15 +60,17 @@ class ClusterTest(unittest.TestCase):
         if self.work.exists():
             shutil.rmtree(self.work)
 
-    def sha256(self, resolution):
+    def sha256(self, resolution, *options):
         """Of the file that this machine builds alone."""
-        if resolution not in self.expected:
+        key = (self.scene, resolution, *options)
+        if key not in self.expected:
             out = self.folder / "local.vdag"
             done = subprocess.run([VOXDAG, "build", self.scene, "-r", str(resolution), "-o", out,
-                                   "--json", "--force"], check=True, capture_output=True, text=True)
-            self.expected[resolution] = json.loads(done.stdout)["sha256"]
+                                   "--json", "--force", *options], check=True, capture_output=True,
+                                  text=True)
+            self.expected[key] = json.loads(done.stdout)["sha256"]
             out.unlink()
-        return self.expected[resolution]
+        return self.expected[key]
 
     def start(self, resolution, tasks, *options):
         """The command that is followed: a wait for what its tasks do fails once it ends."""
@@ -89,11 +91,11 @@ class ClusterTest(unittest.TestCase):
             _, messages = build.communicate()
             self.fail(f"the build has not ended after {timeout} s\n{messages}\n{self.state()}")
 
-    def finish(self, build, resolution):
+    def finish(self, build, resolution, *options):
         out, messages = self.end(build)
         self.assertEqual(build.returncode, 0, messages + self.logs())
         report = json.loads(out)
-        self.assertEqual(report["sha256"], self.sha256(resolution))
+        self.assertEqual(report["sha256"], self.sha256(resolution, *options))
         self.assertFalse(self.work.exists(), f"{self.work} is left")
         return report, messages
 
@@ -147,6 +149,18 @@ class ClusterTest(unittest.TestCase):
                 self.assertEqual(report["cluster"]["batches"], tasks)
                 self.assertEqual(report["cluster"]["failed_attempts"], 0)
                 self.assertLess(report["cluster"]["rows_after"], report["cluster"]["rows_before"])
+
+    def test_same_colors_from_any_number_of_tasks(self):
+        self.scene = self.folder / "colored.glb"
+        subprocess.run([VOXDAG, "generate", "city", self.scene, "--triangles", "4000", "--colors"],
+                       check=True, capture_output=True)
+        # What merges adds the colors: this process, or a job of the cluster.
+        for tasks, options in [(3, []), (16, ["--cluster-merge"])]:
+            with self.subTest(tasks=tasks):
+                build = self.start(512, tasks, "--color", "--subvolume", "64", *options)
+                report, _ = self.finish(build, 512, "--color")
+                self.assertEqual(report["cluster"]["batches"], tasks)
+                self.assertGreater(report["colors"]["cells"], 100000)
 
     def test_more_batches_than_an_array_holds(self):
         report, _ = self.finish(self.start(2048, 120, "--subvolume", "128"), 2048)
