@@ -390,9 +390,15 @@ class Build {
     clock_.finish("color");
   }
 
-  // Of what the colors depend on: as they were baked, or as it is now.
+  // Of what the colors depend on: as they were baked, or, of an output that an earlier run has
+  // finished, as it is now.
   std::string color_digest() {
-    return spec_.geometry.color && color_digest_.empty() ? color_stage().digest() : color_digest_;
+    if (!spec_.geometry.color || !color_digest_.empty()) return color_digest_;
+    ColorStage stage = color_stage();
+    std::string digest = stage.digest();
+    // This is what counts if the colors of that output have the same one.
+    report_.colors = stage.report_of(*context_.files.open_read(spec_.run.output));
+    return digest;
   }
 
   ColorStage color_stage() {

@@ -1,6 +1,7 @@
 #include "scheduler/color/color_stage.h"
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -10,8 +11,10 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
+#include "core/format/bytes.h"
 #include "core/format/checksum.h"
 #include "core/format/color/color_section_writer.h"
+#include "core/format/global/global_layout.h"
 #include "core/geometry/morton.h"
 #include "core/scene/textures/texture_set.h"
 #include "scheduler/color/bin_surfaces.h"
@@ -36,6 +39,24 @@ std::vector<Cube> bins_of(const ColorGrid& grid) {
     morton_decode(i, cubes[i].position[0], cubes[i].position[1], cubes[i].position[2]);
   }
   return cubes;
+}
+
+template <class T>
+T number_at(const ReadableFile& file, uint64_t offset) {
+  std::array<std::byte, sizeof(T)> bytes;
+  file.read_at(offset, bytes);
+  return ByteSource(bytes).get<T>();
+}
+
+// The colored cells of a sound global file, those of the finest level.
+uint64_t count_finest_cells(const ReadableFile& file) {
+  namespace layout = global_layout;
+  // Colors come before attributes of other kinds.
+  const uint64_t entry = layout::kAttributesAt;
+  const bool has_colors =
+      number_at<uint64_t>(file, layout::kAttributeCountAt) > 0 &&
+      number_at<uint32_t>(file, entry + layout::kAttributeKindAt) == layout::kColorAttribute;
+  return has_colors ? number_at<uint64_t>(file, entry + layout::kAttributeFinestCellsAt) : 0;
 }
 
 // What bakes, and what one cube became.
@@ -194,6 +215,18 @@ std::string ColorStage::digest() {
   Sha256 hash;
   hash.add(std::as_bytes(std::span(state_->keys)));
   return hash.finish();
+}
+
+ColorReport ColorStage::report_of(const ReadableFile& result) {
+  ColorReport report;
+  report.cells = count_finest_cells(result);
+  if (report.cells == 0) return report;
+  state_->read_surfaces();
+  report.resolution = uint64_t{1} << state_->grid.color_levels;
+  report.images = state_->materials.images.size();
+  for (const BinContent& content : state_->surfaces.contents) report.cubes += content.surfaces > 0;
+  report.cubes_reused = report.cubes;
+  return report;
 }
 
 ColorReport ColorStage::add_to(GlobalFileWriter& out) {

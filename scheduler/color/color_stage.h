@@ -44,6 +44,9 @@ class ColorStage {
   // SHA-256 of the keys of all cubes: equal where the colors are equal. Reads the scene and its
   // images.
   std::string digest();
+  // What is to be reported of `result`, a sound file which an earlier run has finished with these
+  // colors.
+  ColorReport report_of(const ReadableFile& result);
   // `out` has all its levels, and is not sealed; it stays as it is if there are none. Once.
   ColorReport add_to(GlobalFileWriter& out);
 

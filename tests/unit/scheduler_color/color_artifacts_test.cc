@@ -96,8 +96,15 @@ TEST_F(ColorArtifacts, AChangedImageRepeatsTheCubesThatShowIt) {
 TEST_F(ColorArtifacts, AFinishedBuildIsOfItsImage) {
   BuildSpec s = spec();
   s.run.keep_work = true;
-  EXPECT_EQ(build(s).sha256, expected_);
-  EXPECT_EQ(build(s).sha256, expected_);
+  const ColorReport colors = *build(s).colors;
+  const BuildReport published = build(s);
+  EXPECT_EQ(published.sha256, expected_);
+  ASSERT_TRUE(published.colors);
+  EXPECT_EQ(published.colors->resolution, 256u);
+  EXPECT_EQ(published.colors->cells, colors.cells);
+  EXPECT_EQ(published.colors->images, 1u);
+  EXPECT_EQ(published.colors->cubes, colors.cubes);
+  EXPECT_EQ(published.colors->cubes_reused, colors.cubes);
   PaintedScene::write(folder_.path(), 128);
   const BuildReport changed = build(s);
   EXPECT_NE(changed.sha256, expected_);
