@@ -62,11 +62,27 @@ Json describe(const voxdag_reader::File& file, const query::DagView& dag,
 }  // namespace
 
 ViewedFile::ViewedFile(const std::string& path, const FileIdentity& identity)
+    : ViewedFile(path, identity, map_global_file(path)) {}
+
+ViewedFile::ViewedFile(const std::string& path, const FileIdentity& identity,
+                       std::shared_ptr<const voxdag_reader::Bytes> bytes)
     : identity_(identity),
-      file_(open_global_file(path)),
-      mapping_(file_->data(), file_->file_bytes()),
+      bytes_(std::move(bytes)),
+      mapping_(bytes_->data(), bytes_->size()),
+      file_(read_header(path)),
       dag_(*file_),
-      digest_(digest_of(*file_)) {}
+      digest_(digest_of(*file_)) {
+  expect_whole();
+}
+
+std::unique_ptr<voxdag_reader::File> ViewedFile::read_header(const std::string& path) const {
+  try {
+    return open_global_bytes(path, bytes_);
+  } catch (const Error&) {
+    expect_whole();  // what zeros look like says nothing about the file
+    throw;
+  }
+}
 
 const std::string& ViewedFile::manifest() const {
   std::call_once(manifest_once_, [&] { manifest_ = describe(*file_, dag_, digest_).dump(); });

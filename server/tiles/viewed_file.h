@@ -23,8 +23,11 @@ inline constexpr size_t kMaxColorPagesOfBatch = 256;
 class ViewedFile {
  public:
   // Throws Error if the file is no valid DAG; only its header and checksum table are read. Pages
-  // that cannot be read are survived from then on.
+  // that cannot be read are survived: while it is opened they are an Error{kIo}.
   ViewedFile(const std::string& path, const FileIdentity& identity);
+  // The same of a file that is mapped already.
+  ViewedFile(const std::string& path, const FileIdentity& identity,
+             std::shared_ptr<const voxdag_reader::Bytes> bytes);
 
   const query::DagView& dag() const { return dag_; }
   const voxdag_reader::File& file() const { return *file_; }
@@ -40,9 +43,12 @@ class ViewedFile {
   void expect_whole() const;
 
  private:
+  std::unique_ptr<voxdag_reader::File> read_header(const std::string& path) const;
+
   const FileIdentity identity_;
+  const std::shared_ptr<const voxdag_reader::Bytes> bytes_;
+  const WatchedMapping mapping_;  // from before the first byte is read
   const std::unique_ptr<voxdag_reader::File> file_;
-  const WatchedMapping mapping_;
   const query::DagView dag_;
   const std::string digest_;
   mutable std::once_flag manifest_once_;

@@ -310,6 +310,25 @@ TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   EXPECT_THROW(file.expect_whole(), Error);
 }
 
+// Somebody truncates the file after it is mapped, before or while its header and tables are read.
+TEST_F(View, AFileThatIsTruncatedWhileItIsOpenedIsAnErrorAndNoCrash) {
+  build("64");
+  const FileIdentity identity = system_files().open_read(path_)->identity();
+  const auto size = std::filesystem::file_size(path_);
+  for (const uint64_t left : {uint64_t{0}, uint64_t{4096}, size / 4096 * 4096 - 4096}) {
+    SCOPED_TRACE(left);
+    build("64");
+    const auto bytes = map_global_file(path_);
+    std::filesystem::resize_file(path_, left);
+    try {
+      const ViewedFile file(path_, identity, bytes);
+      FAIL() << "the file is opened";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kIo) << error.message();
+    }
+  }
+}
+
 // The colors of a file, 8 x 8 x 8 cells at a time.
 TEST_F(View, SendsColorPages) {
   build("64", "--color");

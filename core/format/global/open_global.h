@@ -34,9 +34,22 @@ auto with_reader_errors(Use use) {
   }
 }
 
-inline std::unique_ptr<voxdag_reader::File> open_global_file(const std::string& path) {
+// The bytes of a file, and the file of such bytes: whoever watches the mapping for pages that
+// cannot be read (WatchedMapping) does so between the two.
+inline std::shared_ptr<const voxdag_reader::Bytes> map_global_file(const std::string& path) {
   system_files().open_read(path);  // refuses a folder or a pipe as it does for every other input
-  return with_reader_errors([&] { return std::make_unique<voxdag_reader::File>(path); });
+  return with_reader_errors([&] {
+    return std::make_shared<const voxdag_reader::Bytes>(path, voxdag_reader::Access::kMap);
+  });
+}
+inline std::unique_ptr<voxdag_reader::File> open_global_bytes(
+    const std::string& path, std::shared_ptr<const voxdag_reader::Bytes> bytes) {
+  return with_reader_errors(
+      [&] { return std::make_unique<voxdag_reader::File>(path, std::move(bytes)); });
+}
+
+inline std::unique_ptr<voxdag_reader::File> open_global_file(const std::string& path) {
+  return open_global_bytes(path, map_global_file(path));
 }
 
 }  // namespace voxdag

@@ -33,8 +33,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "voxdag_reader_colors.h"
@@ -167,16 +169,20 @@ class File {
   // Throws Error if the file cannot be read, is no global file, has an unsupported version or a
   // damaged header.
   explicit File(const std::string& path, Access access = Access::kMap)
-      : path_(path), bytes_(path, access) {
+      : File(path, std::make_shared<const Bytes>(path, access)) {}
+  // The same of bytes that are there already, for programs that do something with the mapping
+  // before it is read. `path` is for messages.
+  File(const std::string& path, std::shared_ptr<const Bytes> bytes)
+      : path_(path), bytes_(std::move(bytes)) {
     read_header();
   }
 
   const std::string& path() const { return path_; }
   // The size of the file, and its bytes.
-  uint64_t file_bytes() const { return bytes_.size(); }
-  const unsigned char* data() const { return bytes_.data(); }
+  uint64_t file_bytes() const { return bytes_->size(); }
+  const unsigned char* data() const { return bytes_->data(); }
   // For programs that must stay small: what was read of a mapped file is no longer resident.
-  void release_pages() const { bytes_.release_pages(); }
+  void release_pages() const { bytes_->release_pages(); }
   // The low corner of the grid in world space.
   const double (&origin() const)[3] { return origin_; }
   // The edge length of the grid in world space; that of a voxel is edge() / resolution().
@@ -305,7 +311,7 @@ class File {
     for (; mask; mask &= mask - 1) ++count;
     return count;
   }
-  uint64_t block_count() const { return (bytes_.size() - table_offset_) / 8; }
+  uint64_t block_count() const { return (bytes_->size() - table_offset_) / 8; }
 
   [[noreturn]] void corrupt(const std::string& what) const {
     throw Error(Problem::kCorrupt, path_ + ": " + what);
@@ -335,9 +341,9 @@ class File {
   void read_header() {
     const unsigned char* const page = data();
     static const unsigned char kMagic[8] = {0x89, 'V', 'D', 'A', 'G', '\n', 0x1a, '\n'};
-    if (bytes_.size() < sizeof(kMagic) || std::memcmp(page, kMagic, sizeof(kMagic)) != 0)
+    if (bytes_->size() < sizeof(kMagic) || std::memcmp(page, kMagic, sizeof(kMagic)) != 0)
       corrupt("not a voxdag file");
-    if (bytes_.size() < kPageBytes) corrupt("the file ends within its header");
+    if (bytes_->size() < kPageBytes) corrupt("the file ends within its header");
     version_ = get<uint32_t>(page + 8);
     if (version_ != 1 && version_ != 2)
       throw Error(Problem::kUnsupportedVersion,
@@ -365,8 +371,8 @@ class File {
     voxels_ = get<uint64_t>(page + 64);
     svo_nodes_ = get<uint64_t>(page + 72);
     dag_nodes_ = get<uint64_t>(page + 80);
-    if (get<uint64_t>(page + 88) != bytes_.size())
-      corrupt("the file has " + std::to_string(bytes_.size()) + " bytes, expected " +
+    if (get<uint64_t>(page + 88) != bytes_->size())
+      corrupt("the file has " + std::to_string(bytes_->size()) + " bytes, expected " +
               std::to_string(get<uint64_t>(page + 88)));
     read_levels(page);
     if (features & kAttributes) read_attributes(page);
@@ -398,13 +404,13 @@ class File {
         corrupt("header: level " + std::to_string(l) + ": " + std::to_string(level.word_count) +
                 " words, more than pointers of " + std::to_string(bits) +
                 " bits into it can count" + (bits == 32 ? "" : ", or over 2^40"));
-      expect(4 * level.word_count <= bytes_.size() - end, "a level ends beyond the file");
+      expect(4 * level.word_count <= bytes_->size() - end, "a level ends beyond the file");
       expect(level.node_count > 0 && level.node_count <= level.word_count / 2,
              "a level has more nodes than its words hold");
       level.words = reinterpret_cast<const uint32_t*>(data() + level.file_offset);
       nodes += level.node_count;
       end = (end + 4 * level.word_count + kPageBytes - 1) / kPageBytes * kPageBytes;
-      expect(end <= bytes_.size(), "a level ends beyond the file");
+      expect(end <= bytes_->size(), "a level ends beyond the file");
     }
     expect(nodes == dag_nodes_, "the levels' nodes are not as many as counted");
     table_offset_ = end;
@@ -421,7 +427,7 @@ class File {
       const uint64_t bytes = get<uint64_t>(entry + 16);
       expect(kind > last_kind, "attribute sections are not in the order of their kinds");
       expect(get<uint64_t>(entry + 8) == table_offset_ && bytes > 0 &&
-                 bytes <= bytes_.size() - table_offset_,
+                 bytes <= bytes_->size() - table_offset_,
              "an attribute section does not follow what is before it, or ends beyond the file");
       expect(levels >= 2 && levels <= grid_levels_, "expected attributes of a level of the grid");
       if (kind == 1) {
@@ -430,7 +436,7 @@ class File {
         expect(!wrong, wrong);
       }
       table_offset_ = (table_offset_ + bytes + kPageBytes - 1) / kPageBytes * kPageBytes;
-      expect(table_offset_ <= bytes_.size(), "an attribute section ends beyond the file");
+      expect(table_offset_ <= bytes_->size(), "an attribute section ends beyond the file");
       last_kind = kind;
     }
   }
@@ -439,7 +445,7 @@ class File {
     const uint64_t blocks =
         (table_offset_ - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
     expect(get<uint64_t>(page + 96) == table_offset_ && get<uint64_t>(page + 104) == blocks &&
-               bytes_.size() - table_offset_ == 8 * blocks,
+               bytes_->size() - table_offset_ == 8 * blocks,
            "the checksum table is not where the levels end, or not as long as they need");
     expect(
         xxh64(data() + table_offset_, static_cast<size_t>(8 * blocks)) == get<uint64_t>(page + 112),
@@ -447,7 +453,7 @@ class File {
   }
 
   const std::string path_;
-  const Bytes bytes_;
+  const std::shared_ptr<const Bytes> bytes_;
   double origin_[3] = {};
   double edge_ = 0;
   uint32_t version_ = 0, max_pointer_bits_ = 32, grid_levels_ = 0, hash_bits_ = 0;
