@@ -58,7 +58,7 @@ THIRD_PARTY = {
     "png.h": ["core/image"],
     "jpeglib.h": ["core/image", "tests"],
     "zlib.h": ["server", "tests", "bench"],
-    "openvdb/openvdb.h": ["query", "bench"],
+    "openvdb/openvdb.h": ["query", "bench", "tests"],
     "nanovdb/util/OpenToNanoVDB.h": ["query"],
 }
 # Folders that build with a C++20 compiler (and CUDA) alone.

@@ -1,0 +1,51 @@
+// A set of cells as a count and two sums of 64-bit hashes of their positions. It does not depend on
+// the order of the cells, so that files of any size are compared one to one without being sorted or
+// held in memory: a cell that is missing, comes twice or lies elsewhere changes all three, or the
+// sums, but for a chance of 2^-128.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+namespace voxdag::test {
+
+// A file that does not hold what its format says.
+[[noreturn]] inline void fail(const std::string& message) {
+  std::fprintf(stderr, "%s\n", message.c_str());
+  std::exit(1);
+}
+inline void expect(bool right, const char* what) {
+  if (!right) fail(std::string("expected ") + what);
+}
+
+class Digest {
+ public:
+  // A cell, or one of its six faces, which are 1 to 6.
+  void add(int64_t x, int64_t y, int64_t z, uint64_t face = 0) {
+    if ((x | y | z) >> 20 != 0) fail("a cell outside the grid");
+    const uint64_t key = face << 60 | static_cast<uint64_t>(x) << 40 |
+                         static_cast<uint64_t>(y) << 20 | static_cast<uint64_t>(z);
+    ++count_;
+    sum_ += mix(key);
+    other_sum_ += mix(~key * 0x9e3779b97f4a7c15u);
+  }
+  uint64_t count() const { return count_; }
+  void print() const {
+    std::printf("%llu %016llx%016llx\n", static_cast<unsigned long long>(count_),
+                static_cast<unsigned long long>(sum_), static_cast<unsigned long long>(other_sum_));
+  }
+
+ private:
+  // The finalizer of SplitMix64.
+  static uint64_t mix(uint64_t bits) {
+    bits += 0x9e3779b97f4a7c15u;
+    bits = (bits ^ bits >> 30) * 0xbf58476d1ce4e5b9u;
+    bits = (bits ^ bits >> 27) * 0x94d049bb133111ebu;
+    return bits ^ bits >> 31;
+  }
+  uint64_t count_ = 0, sum_ = 0, other_sum_ = 0;
+};
+
+}  // namespace voxdag::test

@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+"""Whole files exported to every format, decoded by other code and compared voxel by voxel.
+
+    tests/long/exports_whole.py [--voxdag build/cpu/voxdag] [--digest build/cpu/tests/digest_voxels]
+                                [--folder DIR] [--memory 4GiB] [--formats bt,vdb,...] [--resolution 2048]
+                                [FILE.vdag[:X0,Y0,Z0,X1,Y1,Z1] ...]
+
+Without files a generated city is built at --resolution. Each file, or region of it, is exported to each format. An
+export that is refused must name what fits, and leave nothing. One that is written is decoded as a whole by
+tests/export/whole, which shares nothing with the exporter, and must have the count and the 128 bits of
+order-independent hashes of positions that the reader header finds in the .vdag file; a glb file, the faces between
+voxels and empty cells. Prints a row of a table for each; exit status 1 if anything differs. Takes 12 GB of disk for
+Sponza at 4096^3.
+"""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+FORMATS = ["hashdag", "svdag", "voxel", "vox", "bt", "vdb", "nvdb", "ply", "npz", "glb"]
+SUFFIXES = {"hashdag": ".basic_dag.dag.bin", "voxel": ".voxel.json"}
+DECODERS = {"vdb": "libopenvdb", "nvdb": "libnanovdb"}
+
+
+def run(args):
+    """Exit status, output, messages, CPU seconds and peak memory in MiB of a command."""
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        process = subprocess.Popen([str(arg) for arg in args], stdout=out, stderr=err)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        texts = []
+        for file in (out, err):
+            file.seek(0)
+            texts.append(file.read().decode())
+    return process.returncode, *texts, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+
+
+def digest(options, *args):
+    """What the decoder finds, as (voxels or faces, hashes), and its CPU seconds."""
+    status, out, err, seconds, _ = run([options.digest, *args])
+    assert status == 0, f"digest_voxels {' '.join(map(str, args))}: status {status}, {err.strip()}"
+    count, hashes = out.split()
+    return (int(count), hashes), seconds
+
+
+class Selection:
+    """A file or a region of it, and the digests that exports of it must have."""
+
+    def __init__(self, options, text):
+        self.path, _, region = text.partition(":")
+        self.region = region.split(",") if region else []
+        self.info = json.loads(run([options.voxdag, "info", self.path, "--json"])[1])
+        self.digests = {}
+        self.options = options
+
+    def expected(self, kind):
+        if kind not in self.digests:
+            self.digests[kind], _ = digest(self.options, kind, self.path, *self.region)
+        return self.digests[kind]
+
+    def grid(self):
+        bounds, resolution = self.info["bounds"], self.info["resolution"]
+        numbers = [*bounds["origin"], bounds["edge"] / resolution]
+        return [*map(repr, numbers), resolution.bit_length() - 1]
+
+
+def check(options, selection, name, folder):
+    """A row of the table; raises AssertionError if the export is not what it must be."""
+    output = folder / ("whole" + SUFFIXES.get(name, "." + name))
+    region = ["--region", ",".join(selection.region)] if selection.region else []
+    started = time.monotonic()
+    status, out, err, seconds, peak = run([options.voxdag, "export", selection.path, "--to", name, "-o", output,
+                                           "--memory", options.memory, "--json", *region])
+    wall = time.monotonic() - started
+    if status != 0:
+        message = err.strip().splitlines()[-1]
+        assert "fits" in message or "--region" in message, f"status {status}: {message}"
+        assert not list(folder.iterdir()), "a refused export leaves files"
+        return ["refused: " + message.split(": ", 2)[-1]]
+    report = json.loads(out)
+    kind = "faces" if name == "glb" else "vdag"
+    expected = selection.expected(kind)
+    found, decoding = digest(options, name, output, *selection.grid())
+    assert found == expected, f"{found} decoded, {expected} in the file"
+    assert report["voxels"] == selection.expected("vdag")[0], "another count of voxels is reported"
+    size = sum(path.stat().st_size for path in folder.iterdir())
+    assert report["bytes"] == size, "another size is reported"
+    for path in folder.iterdir():
+        path.unlink()
+    return [f"{size / 2**20:.1f} MiB", f"{wall:.1f} s", f"{seconds:.1f} s", f"{peak:.0f} MiB",
+            f"{DECODERS.get(name, 'own')}, {decoding:.0f} s", f"{found[0]:,}".replace(",", " ") +
+            (" faces" if kind == "faces" else " voxels")]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--voxdag", default="build/cpu/voxdag")
+    parser.add_argument("--digest", default="build/cpu/tests/digest_voxels")
+    parser.add_argument("--folder", help="where files are written; a temporary folder of the system")
+    parser.add_argument("--memory", default="4GiB", help="of each export")
+    parser.add_argument("--formats", help="all that this voxdag has")
+    parser.add_argument("--resolution", type=int, default=2048)
+    parser.add_argument("files", nargs="*")
+    options = parser.parse_args()
+    if not options.formats:
+        known = re.findall(r"^\s*(\w+): ", run([options.voxdag, "export", "--help"])[1], re.MULTILINE)
+        options.formats = ",".join(name for name in FORMATS if name in known)
+    failed = 0
+    with tempfile.TemporaryDirectory(dir=options.folder) as scratch:
+        scratch = Path(scratch)
+        if not options.files:
+            scene, built = scratch / "city.glb", scratch / "city.vdag"
+            for args in (["generate", "city", scene, "--triangles", str(options.resolution * 100)],
+                         ["build", scene, "-r", str(options.resolution), "-o", built]):
+                status, _, err, *_ = run([options.voxdag, *args])
+                assert status == 0, err
+            options.files = [str(built)]
+        folder = scratch / "out"
+        folder.mkdir()
+        print("| file | format | size | wall | CPU | peak memory | decoder, CPU | equal, one to one |", flush=True)
+        print("|---|---|---|---|---|---|---|---|")
+        for text in options.files:
+            selection = Selection(options, text)
+            for name in options.formats.split(","):
+                try:
+                    row = check(options, selection, name, folder)
+                except AssertionError as error:
+                    failed += 1
+                    row = [f"FAILED: {error}"]
+                    for path in folder.iterdir():
+                        path.unlink()
+                print(f"| {Path(text).name} | `{name}` | {' | '.join(row)} |", flush=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
