@@ -86,6 +86,37 @@ def check_pictures(visitor, cameras, references):
         assert mask < MIN_EQUAL_MASK or depth < MIN_EQUAL_DEPTH, f"{name} equals {other}: the check sees nothing"
 
 
+# No tile is had any more once those of the first view are there, which a mark says.
+ONLY_FIRST_VIEW = """
+const its_fetch = window.fetch, its_mark = performance.mark;
+window.its_tiles = false;
+performance.mark = function(name) {
+  its_tiles ||= name === "voxdag: tiles of the first view";
+  return its_mark.apply(this, arguments);
+};
+window.fetch = (url, options) =>
+  its_tiles && /\\/tiles\\/[^c]/.test(url) ? new Promise(() => {}) : its_fetch(url, options);
+"""
+COARSE_PIXELS = 16
+
+
+def check_first_view(visitor, url, dag, camera, reference):
+    """The tiles that are asked for before anything is drawn are enough for a picture without wide cells or holes."""
+    visitor.context.add_init_script(ONLY_FIRST_VIEW)
+    _, eye, target, fov = re.split(r" ?--\w+ ", camera)
+    visitor.open(f"{url}/{PLAIN}&camera={eye}&target={target}&fov={fov}")
+    visitor.wait_until("its_tiles")
+    depths, levels = visitor.capture(WIDTH, HEIGHT)
+    spread = math.tan(math.radians(float(fov)) / 2) / (HEIGHT / 2)
+    widest = max(2 ** (dag.levels - level) / (spread * depth) for depth, level in zip(depths, levels)
+                 if not math.isinf(depth) and level < dag.levels)
+    _, same, _ = compare(reference, depths, camera)
+    print(f"  first view: {visitor.statistics()['tiles']} tiles, the widest cell has {widest:.1f} pixels")
+    assert widest <= COARSE_PIXELS, "the first view is too coarse"
+    assert holes(reference, depths) < 0.005, "the first view has holes"
+    assert same < MIN_EQUAL_DEPTH, "all tiles are there: the check sees nothing"
+
+
 SKY_TOP, SKY_BOTTOM = (0.46, 0.54, 0.65), (0.86, 0.87, 0.88)  # light, before it is encoded
 
 

@@ -13,11 +13,12 @@ import {length, scale, subtract} from "./vector.js";
 const kDefaultFov = 35;
 const kPictureAspect = 16 / 9;   // of the views in the manifest
 const kSeenInterval_ms = 250;    // between two looks at how far away things are
+const kFirstSeen_ms = 2000;      // until the first: it needs a program of its own
 const kStatisticsInterval_ms = 500;
 const kBookmarkDelay_ms = 400;    // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
-  // `renderer` has started; `places` are the elements {panel, tools, status}. With `bookmarks` the
+  // `renderer` may start later; `places` are the elements {panel, tools, status}. With `bookmarks` the
   // fragment of the address is that of the camera. Ends when `signal` aborts.
   constructor({canvas, renderer, manifest, places, file_name, signal, bookmarks = true}) {
     Object.assign(this, {canvas, renderer, manifest, places, file_name, signal, bookmarks});
@@ -53,6 +54,8 @@ export class Viewer {
     this.show_mode();
     // What is seen first need not be waited for: until then the target is as good.
     this.seen.distance = this.camera.distance;
+    this.seen.time = performance.now() + kFirstSeen_ms;
+    this.apply_camera();
   }
 
   default_options() {

@@ -6,6 +6,7 @@ import {clear, h, set_text} from "../lib/dom.js";
 import {has_ended, state_text, title_text} from "../lib/format.js";
 import {problem_box} from "../views/parts.js";
 import {Viewer} from "./app.js";
+import {take_begun} from "./early.js";
 import {Renderer, WebGLUnavailable} from "./renderer.js";
 import {TileSource} from "./tile_source.js";
 import {fill_tools} from "./tools.js";
@@ -82,30 +83,44 @@ async function show_without_webgl(reason, job) {
 async function start() {
   const job = job_id ? await finished_job() : null;
   if (job_id && !job) return;
-  const source = new TileSource({base: job_id ? `/api/v1/jobs/${job_id}` : "/api/v1/view", headers: authorization()});
-  const manifest = await source.manifest();
-  if (!job) show_title(manifest.name ?? "voxdag view");
-  const canvas = place("scene");
+  const begun = take_begun();
+  const source = begun?.source ?? new TileSource({base: job_id ? `/api/v1/jobs/${job_id}` : "/api/v1/view", headers: authorization()});
+  const canvas = place("scene"), ended = new AbortController();
   let viewer = null;
   let renderer = null;
   hide_message();
   try {
-    renderer = new Renderer(canvas, source, {budgetBytes: budget_bytes(), onChange: () => viewer?.schedule()});
-    await renderer.start();
+    // The context and the programs take longer than the manifest.
+    const arrives = (begun?.manifest ?? source.manifest()).then((manifest) => {
+      if (!job) show_title(manifest.name ?? "voxdag view");
+      return manifest;
+    });
+    arrives.catch(() => {});
+    renderer = new Renderer(canvas, source, {budgetBytes: budget_bytes(), onChange: () => viewer?.schedule(), begun});
+    const manifest = await arrives;
+    const started = renderer.start();  // the first tile need not wait for the panel
+    started.catch(() => {});
+    show_tools();
+    viewer = new Viewer({canvas, renderer, manifest, signal: ended.signal,
+      file_name: (job ? title_text(job) : document.title).replace(/[^A-Za-z0-9._-]+/g, "-"),
+      places: {panel: place("panel"), tools: place("tools"), status: place("status")}});
+    await started;
   } catch (error) {
+    ended.abort();
     renderer?.dispose();
+    place("tools").hidden = true;
     if (!(error instanceof WebGLUnavailable)) throw error;
     return show_without_webgl(error.message, job);
   }
+  window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
+}
+
+function show_tools() {
   const narrow = matchMedia("(max-width: 700px)").matches;
   place("panel").hidden = narrow;
   place("tools").hidden = false;
   fill_tools(place("tools"), h("button", {type: "button", class: "small", "data-tool": "toggle_panel",
                                           "aria-expanded": String(!narrow), "aria-controls": "panel"}, "Panel"));
-  viewer = new Viewer({canvas, renderer, manifest, signal: lifetime.signal,
-    file_name: (job ? title_text(job) : document.title).replace(/[^A-Za-z0-9._-]+/g, "-"),
-    places: {panel: place("panel"), tools: place("tools"), status: place("status")}});
-  window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
 }
 
 function show_failure(error) {

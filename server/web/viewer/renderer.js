@@ -1,12 +1,15 @@
 // Draws a file of any size by casting rays through the tiles that are there, asks for those that are
 // missing, and does so within a budget of GPU memory (docs/view.md).
 
-import {WebGLUnavailable} from "./gl/gl_objects.js";
+import {create_context, WebGLUnavailable} from "./gl/gl_objects.js";
 import {Colors, color_budget} from "./colors/colors.js";
 import {Passes} from "./gl/passes.js";
-import {read_feedback} from "./gl/feedback.js";
+import {read_feedback, read_hits} from "./gl/feedback.js";
+import {picture_values} from "./gl/picture_values.js";
 import {View} from "./gl/view.js";
 import {Light} from "./light.js";
+import {Pace} from "./pace.js";
+import {FirstView} from "./tiles/first_view.js";
 import {TileLoader} from "./tiles/tile_loader.js";
 import {TilePool} from "./tiles/tile_pool.js";
 import {TileStore} from "./tiles/tile_store.js";
@@ -19,19 +22,16 @@ const kBudgetBytes = 256 * kMebibyte, kPhoneBudgetBytes = 64 * kMebibyte;
 const kBlockBytes = 256;         // of the pool: the least that a tile takes
 const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;  // of the canvas: its targets are not part of the budget
 const kMovingMs = 180;          // after the last change of the view
-const kTargetMs = 40;           // of a frame while the camera moves
-const kPartMs = 120;            // of what the GPU is given at once
 const kSamples = 16;            // per pixel of a still picture
-const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
-const kConeShare = 0.75;        // of a pixel: the width at which a cell is hit as a whole
-const kMinPart = 1 << 12, kFirstPart = 1 << 17;     // pixels of one part, until it is known how long one takes
 const kLitShare = 0.35;         // of what is seen within a scene
 const kSunTrials = 8;           // while tiles arrive that say more
 const kFinePixels = 3;          // wide is a cell whose tile may arrive late
+const kFirstWaitMs = 400;       // for the tiles of the first view
 const kQuietRounds = 2;         // readings without a missing tile until a view is complete
 
 export class Renderer {
-  constructor(canvas, source, {budgetBytes, onChange} = {}) {
+  // `begun`: what early.js has begun for this canvas, or null.
+  constructor(canvas, source, {budgetBytes, onChange, begun = null} = {}) {
     this.canvas = canvas;
     this.source = source;
     this.on_change = onChange || (() => {});
@@ -43,12 +43,12 @@ export class Renderer {
     this.view = null;
     this.first_picture_bytes = 0;
     this.sun_trials = 0;
+    this.has_drawn = false;
     this.colors = null;          // of a file that has some
     this.sample = null;          // {parts, fence, part_ms, busy_ms, ...}: drawn in parts
-    this.part_pixels = kFirstPart;
+    this.pace = new Pace();
     this.size = {width: canvas.width, height: canvas.height, css_width: canvas.width, css_height: canvas.height};
-    this.times = {view_ms: -1e9, frame_ms: 0, call_ms: 0, interval_ms: 16, begin_ms: performance.now(), first_picture_ms: null, compile_ms: 0};
-    this.scale_index = 4;
+    this.times = {view_ms: -1e9, begin_ms: begun?.begin_ms ?? performance.now(), first_picture_ms: null, compile_ms: 0};
     this.seed = 0;
     this.samples = 0;
     this.quiet_rounds = 0;
@@ -60,18 +60,18 @@ export class Renderer {
     this.disposed = false;
     this.ready = false;          // programs, pool and root are there
     this.started = null;         // {resolve, reject} of start()
-    this.gl = canvas.getContext("webgl2", {alpha: false, antialias: false, depth: false, powerPreference: "high-performance",
-                                           preserveDrawingBuffer: true});
+    this.gl = begun?.gl ?? create_context(canvas);
     if (!this.gl) throw new WebGLUnavailable("This browser or its graphics driver does not offer WebGL 2.");
     this.max_size = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE) || 4096;
     canvas.addEventListener("webglcontextlost", this.on_lost);
     canvas.addEventListener("webglcontextrestored", this.on_restored);
-    this.create_programs();
+    this.create_programs(begun?.passes);
   }
 
-  // Resolves when the first picture can be drawn.
+  // Resolves when the first picture can be drawn, of a source whose manifest is there. With a view that was set before,
+  // its tiles are fetched at once.
   async start() {
-    this.info = await this.source.manifest();
+    this.info = this.source.info;
     this.light = new Light(this.info);
     await new Promise((resolve, reject) => {
       this.started = {resolve, reject};
@@ -84,12 +84,14 @@ export class Renderer {
     const view = new View(placement);
     if (view.equals(this.view)) return;
     this.view = view;
+    this.end_first_view();
     this.times.view_ms = performance.now();
     this.begin_epoch();
   }
 
   setOptions(options) {
     Object.assign(this.options, options);
+    this.end_first_view();
     this.begin_epoch();
   }
 
@@ -110,13 +112,12 @@ export class Renderer {
   frame(now_ms) {
     const now = performance.now(), moving = now - this.times.view_ms < kMovingMs;
     if (!this.ready || !this.view) return {moving, complete: true};  // on_change() says when there is more
-    const interval = now - this.times.call_ms;
-    this.times.call_ms = now;
-    if (interval > 4) this.times.interval_ms = Math.min(interval, 1.05 * this.times.interval_ms, kTargetMs);
+    this.pace.tick(now);
     if (this.empty) {
       this.draw_empty();
       return {moving: false, complete: true};
     }
+    if (!this.has_drawn && this.waits_for_tiles) return {moving, complete: false};
     if (this.sample && !this.continue_sample(now)) return {moving, complete: false};
     if (this.reading) {
       if (!this.reading.pass.ready) return {moving, complete: false};
@@ -141,7 +142,7 @@ export class Renderer {
     if (!this.ready || this.empty) return null;
     const {width, height} = this.size;
     const x = css_x / this.size.css_width * width, y = css_y / this.size.css_height * height;
-    const values = this.uniforms(width, height, width, height);
+    const values = this.uniforms(width, height);
     values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
     const {view, passes} = this, words = await passes.pick_one(values);
     if (!words || !this.ready || (words[1] >>> 23 & 1) === 0) return null;
@@ -156,27 +157,17 @@ export class Renderer {
 
   // Hits of a picture of any size with the tiles that are there, rows from the top.
   async capture({width, height}) {
-    const depth = new Float32Array(width * height).fill(Infinity), level = new Uint8Array(width * height);
-    const steps = new Uint16Array(width * height);
-    if (!this.ready || this.empty) return {depth, level, steps};
-    const words = this.passes.capture(this.uniforms(width, height, width, height), width, height);
-    const floats = new Float32Array(words.buffer);
-    for (let i = 0; i < width * height; ++i) {
-      const from = 4 * ((height - 1 - Math.floor(i / width)) * width + i % width);
-      steps[i] = words[from + 1] & 0xffff;
-      if (!(words[from + 1] >>> 23 & 1)) continue;
-      depth[i] = floats[from];
-      level[i] = this.info.levels - (words[from + 1] >>> 16 & 31);
-    }
-    return {depth, level, steps};
+    const is_drawn = this.ready && !this.empty, words = is_drawn
+      ? this.passes.capture(this.uniforms(width, height), width, height) : new Uint32Array(4 * width * height);
+    return read_hits(words, width, height, this.info?.levels);
   }
 
   statistics() {
-    const {loader, store, passes, times, colors} = this, page_loader = colors?.loader;
+    const {loader, store, passes, times, colors, pace} = this, page_loader = colors?.loader;
     const sum = (of) => [loader, page_loader].reduce((all, each) => all + (each ? of(each) : 0), 0);
     return {
-      fps: times.frame_ms > 0 ? 1000 / times.frame_ms : 0, tiles: store?.tiles.size || 0, tileBytes: store?.tile_bytes || 0,
-      poolBytes: store?.pool.bytes || 0, budgetBytes: this.budget_bytes, requested: sum((each) => each.requested_total),
+      fps: pace.frame_ms > 0 ? 1000 / pace.frame_ms : 0, tiles: store?.tiles.size || 0, tileBytes: store?.tile_bytes || 0,
+      poolBytes: store?.pool.bytes || 0, targetBytes: passes?.target_bytes || 0, budgetBytes: this.budget_bytes, requested: sum((each) => each.requested_total),
       failed: sum((each) => each.failed_total), loading: sum((each) => each.loading.size + each.queue.length),
       full: loader?.is_full || page_loader?.is_full || false,
       colorPages: colors?.store.pages.size || 0, colorBytes: (colors?.store.used_blocks || 0) * kBlockBytes,
@@ -206,15 +197,12 @@ export class Renderer {
     this.started?.resolve();
   }
 
-  create_programs() {
-    const begin = performance.now();
+  create_programs(begun) {
+    const begin = begun ? this.times.begin_ms : performance.now();
     if (this.passes) this.passes.disposed = true;  // with its context
-    this.passes = new Passes(this.gl);
+    this.passes = begun ?? new Passes(this.gl);
+    this.times.compile_begin_ms = begin;
     this.can_choose_sun = false;
-    this.compiled = this.passes.compile().then(() => {
-      this.times.compile_ms = performance.now() - begin;
-    });
-    this.compiled.catch(() => {});  // load() reports it
     this.reading = null;
   }
 
@@ -222,9 +210,14 @@ export class Renderer {
   async load() {
     const {passes} = this, is_over = () => this.disposed || this.lost || passes !== this.passes || this.gl.isContextLost();
     try {
-      await this.compiled;
+      const root = this.load_root();
+      root.catch(() => {});  // reported below, unless the programs fail
+      this.wait_until_ms = performance.now() + kFirstWaitMs;
+      await passes.compile(Boolean(this.info.colors));
       if (is_over()) return;
-      await this.load_root();
+      this.times.compile_ms = performance.now() - this.times.compile_begin_ms;
+      mark("compiled");
+      await root;
       if (is_over()) return;
       this.ready = true;
       this.begin_epoch();
@@ -239,14 +232,17 @@ export class Renderer {
 
   async load_root() {
     const {root, levels} = this.info;
+    this.root_pointer = undefined;
     this.empty = !root && !this.info.root_brick;
     const for_colors = color_budget(this.info, this.budget_bytes);
     this.store = new TileStore(new TilePool(this.gl, this.pool_bytes(this.budget_bytes - for_colors)));
     this.colors = for_colors > 0 ? new Colors(this.gl, this.source, for_colors, () => this.on_arrival()) : null;
     this.loader = new TileLoader(this.source, this.store, () => this.on_arrival());
     if (root && levels > 2) {
-      await this.loader.load_root(root.level, root.offset);
+      const words = await this.loader.load_root(root.level, root.offset);
       this.root_pointer = this.store.root?.pointer;  // none if the loader was disposed
+      mark("root");
+      if (words) this.seek_first_view(words);
     } else if (!this.empty) {
       this.root_pointer = this.store.add_brick(this.info.root_brick);
     }
@@ -278,8 +274,34 @@ export class Renderer {
     this.on_change();
   }
 
+  // Before anything is drawn the tiles of a view are found without a reading of the feedback.
+  seek_first_view(root_words) {
+    if (!this.view || this.options.clip || this.times.first_picture_ms !== null) return;
+    const {loader, store, info} = this, finest = 2 ** (info.levels - Math.min(info.levels, this.options.maxLevel ?? info.levels));
+    loader.first_view = new FirstView(info, this.view, this.size, finest);
+    loader.first_view.begin(store, store.root, root_words);
+    this.follow_first_view();
+  }
+
+  follow_first_view() {
+    const {loader} = this, now = performance.now();
+    if (!loader.first_view.is_over) loader.demand(loader.first_view.wanted, now);
+    if (loader.is_idle || loader.awaits_retry) this.end_first_view();
+  }
+
+  // A first picture that has its tiles is soon there; one without them only takes its time.
+  get waits_for_tiles() {
+    return performance.now() < this.wait_until_ms && (this.loader.first_view !== null || this.root_pointer === undefined);
+  }
+
+  end_first_view() {
+    if (this.loader?.first_view) mark("tiles of the first view");
+    if (this.loader) this.loader.first_view = null;
+  }
+
   // A few fine tiles that arrive late do not begin the picture again: its other samples will have them.
   on_arrival() {
+    if (this.loader?.first_view) this.follow_first_view();
     if (!this.is_complete || this.coarse_pixels > kFinePixels) this.restart();
     this.on_change();
   }
@@ -310,7 +332,7 @@ export class Renderer {
                                   () => this.sun_trials = kSunTrials);
       return false;
     }
-    const values = {...this.uniforms(width, height, width, height), u_turn: this.light.turn};
+    const values = {...this.uniforms(width, height), u_turn: this.light.turn};
     const {place, wanted} = this.passes.choose_sun(values, kLitShare);
     this.sun_trials++;
     if (wanted.size > 0 && this.sun_trials < kSunTrials && !this.loader.is_full) {
@@ -339,7 +361,7 @@ export class Renderer {
            this.loaders.every((each) => each.pauses(now) || each.is_idle);
   }
   get loaders() {
-    return this.colors && this.options.color ? [this.loader, this.colors.loader] : [this.loader];
+    return [this.loader, ...(this.colors && this.options.color ? [this.colors.loader] : [])];
   }
 
   // The internal resolution: lower while the camera moves and while tiles arrive, if frames take long.
@@ -347,23 +369,24 @@ export class Renderer {
     const {width, height} = this.size;
     const arrives = this.quiet_rounds === 0 || (!this.is_complete && this.loaders.some((each) => each.requests > 0));
     const coarse = moving || (arrives && this.loaders.every((each) => each.outage.count === 0));
-    const scale = coarse ? kScales[this.scale_index] : 1;
+    const scale = coarse ? this.pace.scale : 1;
     return {width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)), full: scale === 1};
   }
 
   draw(now, moving) {
     const {width, height, full} = this.internal_size(moving);
     const before = this.passes.targets;
-    if (!before || before.width !== width || before.height !== height) this.samples = 0;
-    this.passes.resize(width, height, this.colors !== null);
+    if (before?.width !== width || before.height !== height || before.full.width !== this.size.width || before.full.height !== this.size.height)
+      this.samples = 0;
+    this.passes.resize(width, height, this.size, this.colors !== null);
     // Cells are as fine as the still picture needs, unless the camera moves.
     const lod_height = moving ? height : this.size.height;
-    const values = this.uniforms(width, height, this.size.width, lod_height);
+    const values = this.uniforms(width, height, lod_height);
     const frame = this.samples;
     this.seed++;
     Object.assign(values, {u_frame: frame, u_seed: this.seed, u_jitter: jitter_of(full ? frame : this.seed)});
-    this.sample = {parts: this.passes.draw(values, () => this.part_pixels), fence: null, part_ms: now, busy_ms: 0,
-                   epoch: this.store.epoch, moving, full, width, height, outdated: false};
+    this.sample = {parts: this.passes.draw(values, () => this.pace.part_pixels), fence: null, part_ms: now, busy_ms: 0,
+                   epoch: this.store.epoch, moving, full, width, height, outdated: false, pools: this.pools};
     this.draw_part(now);
   }
 
@@ -378,11 +401,17 @@ export class Renderer {
       return false;
     }
     this.show();
+    if (!this.has_drawn) mark("first frame");
+    this.has_drawn = true;
     this.samples = sample.outdated ? 0 : this.samples + 1;
     this.stats.rays = sample.width * sample.height;
     this.reading = {...sample, pass};
     this.sample = null;
     return true;
+  }
+
+  get pools() {
+    return [this.store.pool.texels, this.colors?.store.pool.texels];
   }
 
   show() {
@@ -394,36 +423,16 @@ export class Renderer {
     const {sample, gl} = this;
     if (gl.getSyncParameter(sample.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
     gl.deleteSync(sample.fence);
-    const part_ms = this.gpu_ms(now - sample.part_ms);
-    sample.busy_ms += part_ms;
-    this.part_pixels = Math.max(kMinPart, Math.round(this.part_pixels * Math.min(2, kPartMs / part_ms)));
+    if (sample.pools.some((texels, i) => texels !== this.pools[i])) {  // one has grown: the rest would see its old texture
+      this.sample = null;
+      return true;
+    }
+    sample.busy_ms += this.pace.part_done(now - sample.part_ms);
     return this.draw_part(now);
   }
 
-  // What is seen as done at a frame may have been done since the one before.
-  gpu_ms(seen_ms) {
-    return Math.max(1, seen_ms - this.times.interval_ms / 2);
-  }
-
-  uniforms(width, height, lod_width, lod_height) {
-    const {info, options, store, view, light} = this, levels = info.levels, edge = 2 ** levels;
-    const clip = options.clip || {low: [0, 0, 0], high: [edge, edge, edge]};
-    const bound = (p) => p.map((x) => Math.min(Math.max(Math.round(x), 0), edge));
-    const finest = 2 ** (levels - Math.min(levels, Math.max(1, options.maxLevel ?? levels)));
-    const coarsest = Math.max(finest, 2 ** (levels - Math.min(levels, options.minLevel || 0)));
-    let boundaries = 0;
-    for (let scale = 2; scale <= levels; scale += info.tile_levels) boundaries |= 1 << scale;
-    const colored = this.colors !== null && options.color;
-    const colors = colored ? this.colors.uniforms()
-      : {u_page_texels: store.pool.texels, u_page_table: store.pool.table, u_page_mask: 0, u_color_levels: -1};
-    return {
-      ...view.uniforms(width, height), ...colors, u_pool: store.pool.texels, u_table: store.pool.table, u_root: this.root_pointer, u_levels: levels,
-      u_boundaries: boundaries, u_clip_low: bound(clip.low), u_clip_high: bound(clip.high), u_cell_sizes: [finest, coarsest],
-      u_cone: kConeShare * options.pixelTolerance * view.pixel(lod_height), u_seed: 0, u_jitter: [0, 0],
-      u_wire_scale: options.wireLevel === null ? -1 : levels - options.wireLevel, u_wire_width: view.pixel(height),
-      u_sun: light.sun, u_sky_reach: light.sky_reach, u_haze: [light.haze_start, 1 / (Math.sqrt(3) * edge)],
-      u_occlusion: options.ambientOcclusion, u_shadows: options.sunShadows, u_frame: 0,
-    };
+  uniforms(width, height, lod_height = height) {
+    return picture_values(this, width, height, lod_height);
   }
 
   take_reading(now) {
@@ -433,15 +442,13 @@ export class Renderer {
     read.coarse_pixels *= this.size.height / height;  // pixels of the canvas
     this.stats.steps_mean = read.steps_mean;
     this.stats.steps_99 = read.steps_99;
-    const frame_ms = busy_ms + this.gpu_ms(now - part_ms);
-    if (busy_ms === 0) this.part_pixels = Math.max(kMinPart, Math.round(2.25 * width * height * kPartMs / frame_ms));
-    this.adapt(frame_ms, moving || !full);
+    this.pace.frame_done(now - part_ms, busy_ms, width * height, moving || !full);
     for (const slot of read.slots) this.store.mark(slot, epoch, now);
     // Not while samples of a still picture are added up.
     if (read.exposure !== null && this.samples <= kSamples / 4) this.light.adjust(read, moving);
     this.coarse_pixels = read.coarse_pixels;
     if (epoch === this.store.epoch) this.store.rounds++;
-    if (this.loader.demand(read.wanted, now) > 0) this.on_arrival();
+    if (!this.loader.first_view && this.loader.demand(read.wanted, now) > 0) this.on_arrival();
     if (pass.colors) this.colors.take_reading(pass.colors.take(), epoch, now);
     else this.colors?.loader.replace_queue([], 0, now);
     if (epoch !== this.store.epoch) return;
@@ -449,6 +456,7 @@ export class Renderer {
     if (this.times.first_picture_ms === null && read.coarse_pixels < 16) {
       this.times.first_picture_ms = now - this.times.begin_ms;
       this.first_picture_bytes = this.source.fetched_bytes;
+      mark("first picture");
     }
     // What arrived since the sample began may refer to more that is missing.
     if (!moving && nothing_comes && !outdated) this.quiet_rounds++;
@@ -457,25 +465,18 @@ export class Renderer {
     if (this.is_complete && full && nothing_comes && this.improve_sun(now)) for (const resolve of this.waiting.splice(0)) resolve();
   }
 
-  // Chooses the internal resolution by the time that a frame of the last one took.
-  adapt(frame_ms, counts) {
-    this.times.frame_ms = this.times.frame_ms > 0 ? 0.7 * this.times.frame_ms + 0.3 * frame_ms : frame_ms;
-    if (!counts) return;
-    const wanted = kScales[this.scale_index] * Math.sqrt(kTargetMs / Math.max(1, frame_ms));
-    const slower = frame_ms > 1.4 * kTargetMs, faster = this.scale_index > 0 && wanted >= kScales[this.scale_index - 1];
-    if (!slower && !faster) return;
-    const index = kScales.findIndex((scale) => scale <= wanted);
-    this.scale_index = index < 0 ? kScales.length - 1 : faster ? Math.max(index, this.scale_index - 1) : index;
-  }
-
   draw_empty() {
     const {passes, canvas} = this;
-    passes.resize(canvas.width, canvas.height, false);
+    passes.resize(canvas.width, canvas.height, canvas, false);
     passes.show(1, canvas.width, canvas.height);
     for (const resolve of this.waiting.splice(0)) resolve();
   }
 }
 
+// A named time, for the tools of the browser.
+function mark(name) {
+  performance.mark(`voxdag: ${name}`);
+}
 // Sample 0 is at the pixel's center.
 function jitter_of(sample) {
   const wrap = (x) => x - Math.floor(x);

@@ -118,7 +118,7 @@ ${kPrecision}${kCameraSource}${kColorState}
 uniform usampler2D u_hits, u_colors;
 uniform vec2 u_jitter;
 uniform int u_levels, u_color_levels, u_block;
-uniform ivec2 u_sample;
+uniform ivec2 u_size, u_sample;
 layout(location = 0) out uvec4 o_page;
 
 // The page that the color of a pixel is in. The hit is computed again: at worst it is a neighbor's.
@@ -133,7 +133,7 @@ uvec3 page_of(ivec2 pixel, uvec4 g) {
 }
 
 void main() {
-  ivec2 first = ivec2(gl_FragCoord.xy) * u_block, last = textureSize(u_hits, 0) - 1, chosen = min(first + u_sample, last);
+  ivec2 first = ivec2(gl_FragCoord.xy) * u_block, last = u_size - 1, chosen = min(first + u_sample, last);
   uint missing = 0u;
   for (int j = 0; j < u_block; ++j)
     for (int i = 0; i < u_block; ++i) {

@@ -48,3 +48,18 @@ export function read_feedback(words) {
           median_t: share_of(t, 0.5), nearest_t: t[0] || 0,
           exposure: seen === 0 ? null : Math.min(0.42 / share_of(bright, 0.5), 0.85 / share_of(bright, 0.9))};
 }
+
+// {depth, level, steps} of each pixel, rows from the top, of a picture's words as pack_hit() packs them, rows from
+// the bottom. The depth of the sky is infinite.
+export function read_hits(words, width, height, levels) {
+  const depth = new Float32Array(width * height).fill(Infinity), level = new Uint8Array(width * height);
+  const steps = new Uint16Array(width * height), floats = new Float32Array(words.buffer);
+  for (let i = 0; i < width * height; ++i) {
+    const from = 4 * ((height - 1 - Math.floor(i / width)) * width + i % width);
+    steps[i] = words[from + 1] & 0xffff;
+    if (!(words[from + 1] >>> 23 & 1)) continue;
+    depth[i] = floats[from];
+    level[i] = levels - (words[from + 1] >>> 16 & 31);
+  }
+  return {depth, level, steps};
+}

@@ -4,6 +4,12 @@ import {kQuad} from "./picture_shaders.js";
 
 export class WebGLUnavailable extends Error {}
 
+// The context of a canvas; null if there is none to be had.
+export function create_context(canvas) {
+  return canvas.getContext("webgl2", {alpha: false, antialias: false, depth: false, powerPreference: "high-performance",
+                                      preserveDrawingBuffer: true});
+}
+
 export class Program {
   // Compilation runs in the background until ready() or use().
   constructor(gl, name, fragment) {
@@ -45,6 +51,22 @@ export class Program {
       if (sampler) gl.uniform1i(location, entry.unit);
       this.uniforms.set(name, entry);
     }
+  }
+
+  // Runs it for one pixel of a target of these formats: most drivers compile the rest only then. Of `words` and
+  // `floats`, textures, it reads nothing that matters.
+  warm_up(formats, words, floats) {
+    const {gl} = this, target = new Target(gl, 1, 1, formats);
+    gl.useProgram(this.program);
+    for (const {type, unit} of this.uniforms.values()) {
+      if (unit < 0) continue;
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, type === gl.SAMPLER_2D ? floats : words);
+    }
+    gl.activeTexture(gl.TEXTURE0);
+    gl.viewport(0, 0, 1, 1);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    target.dispose();
   }
 
   dispose() {
@@ -89,12 +111,15 @@ function set_uniform(gl, location, type, value) {
   }
 }
 
+const kTexelBytes = {RGBA32UI: 16, RGBA16F: 8, RGBA8: 4, R32UI: 4, R8: 1};
+
 // A framebuffer with textures of the formats, "RGBA32UI" and so on.
 export class Target {
   constructor(gl, width, height, formats) {
     this.gl = gl;
     this.width = width;
     this.height = height;
+    this.bytes = width * height * formats.reduce((sum, format) => sum + kTexelBytes[format], 0);
     this.framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     this.textures = formats.map((format, i) => {
@@ -118,17 +143,31 @@ export class Target {
   }
 }
 
-// The pixels of an integer target, read without waiting for the GPU.
+// Resolves when the GPU is done with all that it was given; to false if `is_over()` before that.
+export async function gpu_done(gl, is_over) {
+  const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  gl.flush();
+  while (!is_over() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) await pause();
+  if (is_over()) return false;
+  gl.deleteSync(fence);
+  return true;
+}
+
+export function pause() {
+  return new Promise((resolve) => setTimeout(resolve, 4));
+}
+
+// The pixels in the lower left corner of an integer target, read without waiting for the GPU.
 export class AsyncReading {
-  constructor(gl, target) {
+  constructor(gl, target, width, height) {
     this.gl = gl;
-    this.length = target.width * target.height * 4;
+    this.length = width * height * 4;
     this.buffer = gl.createBuffer();
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.buffer);
     gl.bufferData(gl.PIXEL_PACK_BUFFER, this.length * 4, gl.STREAM_READ);
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
     gl.readBuffer(gl.COLOR_ATTACHMENT0);
-    gl.readPixels(0, 0, target.width, target.height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 0);
+    gl.readPixels(0, 0, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, 0);
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
     this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();

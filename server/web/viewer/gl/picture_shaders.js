@@ -17,7 +17,7 @@ uniform vec2 u_jitter;       // the ray's place in its pixel, from the pixel's c
 uniform float u_cone;        // width of the cone at distance 1
 uniform uint u_seed;
 layout(location = 0) out uvec4 o_hit;
-#ifdef WIRE
+#ifdef COLOR
 layout(location = 1) out uint o_color;
 #endif
 
@@ -44,11 +44,12 @@ void main() {
   bool found = trace(0.0, 1e30, vec2(0.0, u_cone), hit);
 #ifdef WIRE
   o_hit = pack_hit(found, hit, uint(step_count), wire, entered_slot);
+#endif
+#ifdef COLOR
   o_color = found && u_color_levels >= 0 ? color_of_cell(hit_cell, hit.scale, hit.missing == 0u) : 0u;
-#else
-  o_hit = pack_hit(found, hit, uint(step_count), false, entered_slot);
 #endif
 #ifdef PICK
+  o_hit = pack_hit(found, hit, uint(step_count), false, entered_slot);
   uint slot = 0u;
   for (int s = hit.scale + 1; s < u_levels && slot == 0u; ++s)
     if ((u_boundaries >> s & 1u) != 0u) slot = picked_slots[s];
@@ -57,7 +58,10 @@ void main() {
 }`;
 
 export const kTrace = `${kVersion}
-#define WIRE\n#define CELL\n${kRaySource}${kCameraSource}${kColorSource}${kTraceMain}`;
+#define WIRE\n${kRaySource}${kCameraSource}${kTraceMain}`;
+// Of files with colors.
+export const kColoredTrace = `${kVersion}
+#define WIRE\n#define CELL\n#define COLOR\n${kRaySource}${kCameraSource}${kColorSource}${kTraceMain}`;
 export const kPick = `${kVersion}
 #define PICK\n#define CELL\n${kRaySource}${kCameraSource}${kTraceMain}`;
 
@@ -91,6 +95,7 @@ vec3 unpack_normal(uint packed_normal) {
 // What the passes of light share: rays that begin at the surface of a pixel.
 const kSurface = `
 uniform usampler2D u_hits;
+uniform ivec2 u_size;        // of the picture, a corner of the targets
 uniform vec2 u_jitter;
 uniform int u_frame;         // number of the sample
 
@@ -151,7 +156,6 @@ vec3 offset_of(ivec2 pixel, float t) {
 // The normal of the plane that best fits the surface near the pixel: the eigenvector of the covariance's
 // smallest eigenvalue, by inverse iteration.
 vec3 plane_normal(ivec2 pixel, vec3 center, float size, vec3 face, vec3 direction) {
-  ivec2 extent = textureSize(u_hits, 0);
   float footprint = u_pixel * length(center), reach = (float(kReach) + 0.5) * max(size, footprint);
   int stride = int(clamp(size / footprint, 1.0, 5.0));
   float weight = 0.0;
@@ -159,7 +163,7 @@ vec3 plane_normal(ivec2 pixel, vec3 center, float size, vec3 face, vec3 directio
   for (int j = -kReach; j <= kReach; ++j)
     for (int i = -kReach; i <= kReach; ++i) {
       ivec2 at = pixel + ivec2(i, j) * stride;
-      if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, extent))) continue;
+      if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, u_size))) continue;
       uvec4 g = texelFetch(u_hits, at, 0);
       if (!found_in(g)) continue;
       vec3 d = (offset_of(at, t_in(g)) - center) / reach;
@@ -233,7 +237,7 @@ layout(location = 0) out vec4 o_sky;
 const float kBounce = 0.42, kSkyWidening = 0.1;
 
 void main() {
-  ivec2 place = ivec2(gl_FragCoord.xy), pixel = min(2 * place + chosen_of_four(u_frame), textureSize(u_hits, 0) - 1);
+  ivec2 place = ivec2(gl_FragCoord.xy), pixel = min(2 * place + chosen_of_four(u_frame), u_size - 1);
   uvec4 g = texelFetch(u_hits, pixel, 0);
   o_sky = vec4(0);
   if (!found_in(g)) return;
@@ -267,8 +271,8 @@ uniform float u_turn;
 layout(location = 0) out uvec4 o_lit;
 
 void main() {
-  ivec2 place = ivec2(gl_FragCoord.xy), extent = textureSize(u_hits, 0);
-  ivec2 pixel = ivec2(fract(0.5 + float(place.y) * vec2(0.7548776662, 0.5698402910)) * vec2(extent));
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  ivec2 pixel = ivec2(fract(0.5 + float(place.y) * vec2(0.7548776662, 0.5698402910)) * vec2(u_size));
   uvec4 g = texelFetch(u_hits, pixel, 0);
   o_lit = uvec4(0);
   if (!found_in(g)) return;
@@ -299,6 +303,7 @@ export const kCombine = `${kVersion}${kCameraSource}${kSky}${kColorState}
 uniform usampler2D u_hits, u_normals, u_colors;
 uniform bool u_colored;      // u_colors has colors
 uniform sampler2D u_light, u_sky, u_before;
+uniform ivec2 u_size;
 uniform vec2 u_jitter;
 uniform vec3 u_sun;
 uniform vec2 u_haze;         // where it begins, and 1 / the scene's diagonal
@@ -308,7 +313,7 @@ uniform int u_frame;
 layout(location = 0) out vec4 o_color;
 ${kReflected}
 void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy), extent = textureSize(u_hits, 0), sky_extent = textureSize(u_sky, 0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy), sky_size = (u_size + 1) / 2;
   uvec4 g = texelFetch(u_hits, pixel, 0);
   vec4 color = vec4(0);
   if (found_in(g)) {
@@ -321,8 +326,8 @@ void main() {
     for (int j = -2; j < 2; ++j)
       for (int i = -2; i < 2; ++i) {
         ivec2 place = (pixel + 1) / 2 + ivec2(i, j);
-        if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, sky_extent))) continue;
-        ivec2 at = min(2 * place + chosen, extent - 1);
+        if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, sky_size))) continue;
+        ivec2 at = min(2 * place + chosen, u_size - 1);
         uvec4 other = texelFetch(u_hits, at, 0);
         if (!found_in(other)) continue;
         float alike = max(0.0, dot(normal, unpack_normal(texelFetch(u_normals, at, 0).x)));
@@ -344,6 +349,7 @@ void main() {
 
 export const kPresent = `${kVersion}
 uniform sampler2D u_color;
+uniform ivec2 u_size;        // of the picture, a corner of u_color
 uniform vec2 u_extent;       // of the canvas, in pixels
 uniform float u_exposure;    // includes the range of the target
 out vec4 o_color;
@@ -359,7 +365,8 @@ vec3 srgb(vec3 v) {
 }
 void main() {
   vec2 place = gl_FragCoord.xy / u_extent;
-  vec4 color = texture(u_color, place);
+  vec2 at = clamp(place * vec2(u_size), vec2(0.5), vec2(u_size) - 0.5);
+  vec4 color = texture(u_color, at / vec2(textureSize(u_color, 0)));
   vec3 background = mix(kBottom, kTop, place.y);
   vec3 lit = tone_map(color.rgb / max(color.a, 1e-3) * u_exposure);
   // Ordered dither, so that gradients show no steps.
@@ -377,13 +384,13 @@ uniform usampler2D u_hits, u_normals, u_shadow_missing;
 uniform sampler2D u_light, u_sky;
 uniform vec3 u_sun;
 uniform int u_block;
-uniform ivec2 u_sample;
+uniform ivec2 u_size, u_sample;
 layout(location = 0) out uvec4 o_feedback;
 ${kReflected}
 const float kShadowPixels = 0.25;  // weight of tiles that only shadows need
 
 void main() {
-  ivec2 first = ivec2(gl_FragCoord.xy) * u_block, last = textureSize(u_hits, 0) - 1;
+  ivec2 first = ivec2(gl_FragCoord.xy) * u_block, last = u_size - 1;
   uint missing = 0u, shadow_missing = 0u;
   float pixels = 0.0;
   for (int j = 0; j < u_block; ++j)

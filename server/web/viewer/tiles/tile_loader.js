@@ -11,6 +11,7 @@ export class TileLoader extends Loader {
   constructor(source, store, on_arrival) {
     super(store, on_arrival, {max_requests: kMaxRequests, max_batch: Math.min(kMaxBatch, source.batch_max)});
     this.source = source;
+    this.first_view = null;      // the FirstView that the next tiles are shown to
   }
 
   // `wanted`: leaf address -> priority, of one reading of the feedback. Returns how many of the nodes
@@ -43,7 +44,7 @@ export class TileLoader extends Loader {
     return linked;
   }
 
-  // Loads one tile that no other refers to.
+  // Loads one tile that no other refers to. Resolves to its words, undefined after dispose().
   async load_root(level, offset) {
     for (let pause_ms = kFirstPauseMs; ; pause_ms = Math.min(2 * pause_ms, kMaxPauseMs)) {
       try {
@@ -52,7 +53,7 @@ export class TileLoader extends Loader {
         if (!this.store.add(level, offset, words, performance.now()))
           throw new Error("The budget is too small for a single tile.");
         this.store.set_root(level, offset);
-        return;
+        return words;
       } catch (error) {
         if (!(error instanceof TileError && error.is_transient)) throw error;
         await new Promise((resolve) => setTimeout(resolve, pause_ms));
@@ -71,6 +72,7 @@ export class TileLoader extends Loader {
       const node = this.store.cut_off_node(address);
       if (node?.key === request.key) this.store.link(node);
     }
+    this.first_view?.take(this.store, this.store.get(request.level, request.offset), words);
     return true;
   }
 }

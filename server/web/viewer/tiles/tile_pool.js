@@ -1,7 +1,7 @@
 // The GPU's memory for tiles: texels of four words in one unsigned integer texture, divided into blocks, and
 // the table that says for each slot where its tile begins. A tile takes any free blocks, so memory does not
-// fragment. Both textures have their final size from the start: together at most the budget, and less
-// for a small file.
+// fragment. Few views need much: a large pool begins small, and takes its final size at once when it is full.
+// Both textures, and while it grows the third, are together at most the budget.
 
 import {kBlockTexels, kTexelWords} from "./tile_format.js";
 
@@ -9,6 +9,7 @@ const kRowTexels = 4096, kTableWidth = 1024;  // texture widths; the shaders kno
 const kMaxRows = 4096;                        // addresses have 24 bits
 const kBlocksPerRow = kRowTexels / kBlockTexels;
 const kTexelBytes = kTexelWords * 4;
+const kFirstRows = 256;                       // of a pool that grows: 16 MiB
 
 export class TilePool {
   constructor(gl, budget_bytes) {
@@ -17,8 +18,10 @@ export class TilePool {
     const row_bytes = kRowTexels * kTexelBytes + kBlocksPerRow * 4;
     const rows = Math.floor((budget_bytes - kTableWidth * 4) / row_bytes);
     if (rows < 1) throw new Error(`A budget of ${budget_bytes} bytes is too small for the viewer.`);
-    this.rows = Math.min(rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
-    this.block_count = this.rows * kBlocksPerRow;
+    const grows = rows >= 4 * kFirstRows;
+    this.max_rows = Math.min(grows ? rows - kFirstRows : rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
+    this.rows = grows ? kFirstRows : this.max_rows;
+    this.block_count = this.max_rows * kBlocksPerRow;  // in the end
     this.table_rows = Math.ceil(this.block_count / kTableWidth);
     this.slot_count = this.table_rows * kTableWidth;
     this.texels = this.create_texture(gl.RGBA32UI, kRowTexels, this.rows);
@@ -41,8 +44,23 @@ export class TilePool {
     if (this.free_blocks < count) return null;
     const blocks = new Uint32Array(count);
     for (let i = 0; i < count; ++i) blocks[i] = this.free.length > 0 ? this.free.pop() : this.next_block++;
+    if (this.next_block > this.rows * kBlocksPerRow) this.grow();
     return blocks.sort();
   }
+
+  // The texture is another one afterwards.
+  grow() {
+    const {gl} = this, before = this.texels, framebuffer = gl.createFramebuffer();
+    this.texels = this.create_texture(gl.RGBA32UI, kRowTexels, this.max_rows);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, before, 0);
+    gl.readBuffer(gl.COLOR_ATTACHMENT0);
+    gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 0, 0, kRowTexels, this.rows);
+    gl.deleteFramebuffer(framebuffer);
+    gl.deleteTexture(before);
+    this.rows = this.max_rows;
+  }
+
   release(blocks) {
     for (let i = blocks.length - 1; i >= 0; --i) this.free.push(blocks[i]);
   }

@@ -55,6 +55,12 @@ export class TileStore {
     return {tile, index, level, offset, key: key_of(level, offset), texel};
   }
 
+  // The same by the node's place in its tile.
+  leaf(tile, index) {
+    const at = tile.leaf_begin + index;
+    return this.cut_off_node(tile.blocks[Math.floor(at / kBlockTexels)] * kBlockTexels + at % kBlockTexels);
+  }
+
   // Makes the cut-off node refer to its tile, which must be loaded.
   link(node) {
     const slot = this.slots.get(node.key);

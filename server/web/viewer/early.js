@@ -1,0 +1,28 @@
+// Begins what takes longest, the graphics context and its programs, while the other modules of the page still load.
+// A job may have nothing to look at yet, so its page does not.
+
+import {Passes} from "./gl/passes.js";
+import {create_context} from "./gl/gl_objects.js";
+import {TileSource} from "./tile_source.js";
+
+let begun = null;
+
+function begin(canvas) {
+  const source = new TileSource({base: "/api/v1/view"}), manifest = source.manifest();
+  const begin_ms = performance.now(), gl = create_context(canvas);
+  manifest.catch(() => {});  // reported by whoever waits for it
+  if (!gl) return;
+  const passes = new Passes(gl);
+  begun = {source, manifest, begin_ms, gl, passes};
+  // A program that fails is reported by the next compile().
+  manifest.then(({colors}) => passes.compile(Boolean(colors))).catch(() => {});
+}
+
+if (!new URLSearchParams(location.search).has("job")) begin(document.getElementById("scene"));
+
+// {source, manifest, begin_ms, gl, passes} for the canvas of the page; null if it was taken already, or cannot be had.
+export function take_begun() {
+  const taken = begun;
+  begun = null;
+  return taken;
+}

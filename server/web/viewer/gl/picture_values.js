@@ -1,0 +1,26 @@
+// The uniforms of all rays of a picture.
+
+const kConeShare = 0.75;        // of a pixel: the width at which a cell is hit as a whole
+
+// Of a Renderer whose tiles are there, for a picture of width x height pixels with the detail of one that is
+// lod_height pixels high.
+export function picture_values(renderer, width, height, lod_height) {
+  const {info, options, store, view, light, colors, root_pointer} = renderer, levels = info.levels, edge = 2 ** levels;
+  const clip = options.clip || {low: [0, 0, 0], high: [edge, edge, edge]};
+  const bound = (p) => p.map((x) => Math.min(Math.max(Math.round(x), 0), edge));
+  const finest = 2 ** (levels - Math.min(levels, Math.max(1, options.maxLevel ?? levels)));
+  const coarsest = Math.max(finest, 2 ** (levels - Math.min(levels, options.minLevel || 0)));
+  let boundaries = 0;
+  for (let scale = 2; scale <= levels; scale += info.tile_levels) boundaries |= 1 << scale;
+  const colored = colors !== null && options.color;
+  const pages = colored ? colors.uniforms()
+    : {u_page_texels: store.pool.texels, u_page_table: store.pool.table, u_page_mask: 0, u_color_levels: -1};
+  return {
+    ...view.uniforms(width, height), ...pages, u_pool: store.pool.texels, u_table: store.pool.table, u_root: root_pointer, u_levels: levels,
+    u_boundaries: boundaries, u_clip_low: bound(clip.low), u_clip_high: bound(clip.high), u_cell_sizes: [finest, coarsest],
+    u_cone: kConeShare * options.pixelTolerance * view.pixel(lod_height), u_seed: 0, u_jitter: [0, 0],
+    u_wire_scale: options.wireLevel === null ? -1 : levels - options.wireLevel, u_wire_width: view.pixel(height),
+    u_sun: light.sun, u_sky_reach: light.sky_reach, u_haze: [light.haze_start, 1 / (Math.sqrt(3) * edge)],
+    u_occlusion: options.ambientOcclusion, u_shadows: options.sunShadows, u_frame: 0,
+  };
+}

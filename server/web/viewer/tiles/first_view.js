@@ -1,0 +1,97 @@
+// Finds the tiles of the first view while the shaders are compiled: by walking through the tiles that are there, as
+// a reading of the feedback would say them a level at a time. What surfaces hide is not known here, so a few tiles
+// too many are fetched; therefore this stops at cells that are still wide, and after so many tiles.
+
+const kPixels = 15;            // wider cells are refined: of the canvas
+const kMaxTiles = 1500;
+const kHeadWords = 4, kCutWords = 4;  // of a tile (docs/format.md)
+
+export class FirstView {
+  // Of the `view` (gl/view.js) in a picture of this size; cells of `finest` voxels are not refined.
+  constructor({levels}, view, {width, height}, finest) {
+    Object.assign(this, {levels, view, finest});
+    this.pixel = view.pixel(height);
+    this.slopes = [view.tangent * width / height, view.tangent];  // of the sides of the picture
+    this.known = new Map();      // key -> words of a tile
+    this.places = new Map();     // key -> where the tile is needed, low corners
+    this.wanted = new Map();     // texel of a cut-off node -> pixels of its widest coarse cell
+  }
+
+  get is_over() {
+    return this.wanted.size === 0 || this.known.size > kMaxTiles;
+  }
+
+  begin(store, tile, words) {
+    this.places.set(tile.key, [[0, 0, 0]]);
+    this.take(store, tile, words);
+  }
+
+  // A tile of the store has these words.
+  take(store, tile, words) {
+    if (this.known.has(tile.key)) return;
+    this.known.set(tile.key, words);
+    for (const corner of this.places.get(tile.key) ?? []) this.walk(store, tile, words, corner);
+  }
+
+  // Adds what is missing below a tile at a place.
+  walk(store, tile, words, corner) {
+    if ((words[1] >>> 16 & 1) === 1) return;  // bricks
+    const leaf_edge = 2 ** (this.levels - tile.level - tile.levels), cell = leaf_edge / 4;
+    if (cell <= this.finest) return;
+    const leaves = kHeadWords + words[2];
+    const visit = (at, edge, x, y, z, is_leaf) => {
+      if (!this.needs(x, y, z, edge, cell)) return;
+      if (is_leaf) {
+        const from = leaves + at * kCutWords, pixels = this.coarse_pixels(words[from + 2], words[from + 3], x, y, z, cell);
+        if (pixels > kPixels) this.want(store, store.leaf(tile, at), pixels, [x, y, z]);
+        return;
+      }
+      const half = edge / 2;
+      for (let child = 0, next = kHeadWords + at + 1, mask = words[kHeadWords + at]; child < 8; ++child)
+        if (mask >>> child & 1)
+          visit(words[next++], half, x + half * (child >> 2), y + half * (child >> 1 & 1), z + half * (child & 1), half === leaf_edge);
+    };
+    visit(0, 2 ** (this.levels - tile.level), ...corner, false);
+  }
+
+  want(store, node, pixels, corner) {
+    this.wanted.set(node.texel, Math.max(pixels, this.wanted.get(node.texel) || 0));
+    const places = this.places.get(node.key);
+    if (places) places.push(corner);
+    else this.places.set(node.key, [corner]);
+    const words = this.known.get(node.key);
+    if (words) this.walk(store, store.get(node.level, node.offset), words, corner);
+  }
+
+  // Whether a cube is in the picture, with cells that are too wide.
+  needs(x, y, z, edge, cell) {
+    return this.pixels_of(x, y, z, edge, cell) > kPixels && this.is_seen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
+  }
+
+  // How many pixels wide a cell at the nearest point of a cube is.
+  pixels_of(x, y, z, edge, cell) {
+    const [ex, ey, ez] = this.view.eye;
+    const far = Math.hypot(Math.max(x - ex, 0, ex - x - edge), Math.max(y - ey, 0, ey - y - edge), Math.max(z - ez, 0, ez - z - edge));
+    return cell / Math.max(far * this.pixel, 1e-9);
+  }
+
+  // Whether a part of a ball may be in the picture.
+  is_seen(x, y, z, radius) {
+    const {eye, forward, right, up} = this.view, dx = x - eye[0], dy = y - eye[1], dz = z - eye[2];
+    const along = (axis) => axis[0] * dx + axis[1] * dy + axis[2] * dz;
+    const depth = along(forward);
+    return [right, up].every((axis, i) => Math.abs(along(axis)) <= depth * this.slopes[i] + radius * Math.hypot(1, this.slopes[i]));
+  }
+
+  // Of the widest cell of a coarse brick that is in the picture.
+  coarse_pixels(low, high, x, y, z, cell) {
+    let most = 0;
+    for (let bit = 0; bit < 64; ++bit) {
+      if (((bit < 32 ? low : high) >>> (bit & 31) & 1) === 0) continue;
+      const cx = x + cell * (bit >> 4 & 2 | bit >> 2 & 1), cy = y + cell * (bit >> 3 & 2 | bit >> 1 & 1), cz = z + cell * (bit >> 2 & 2 | bit & 1);
+      const pixels = this.pixels_of(cx, cy, cz, cell, cell);
+      if (pixels > most && pixels > kPixels && this.is_seen(cx + cell / 2, cy + cell / 2, cz + cell / 2, cell * 0.867)) most = pixels;
+    }
+    return most;
+  }
+}
