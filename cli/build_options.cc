@@ -28,7 +28,13 @@ void BuildOptions::declare(Command& command) {
       .group(geometry);
   command.option("--hash-bits", g.hash_bits, "truncate node hashes to this many bits, 4 to 64")
       .group(geometry);
-  command.flag("--color", g.color, "store the colors of the scene's materials").group(geometry);
+  command.flag("--color", g.attributes.color, "store the colors of the scene's materials")
+      .group(geometry);
+  command
+      .option("--attributes", attributes_,
+              "store these of the cells of the color grid, separated by commas: color, alpha, "
+              "normal, material")
+      .group(geometry);
   command
       .option("--color-resolution", g.color_resolution,
               "cells per edge of the color grid, a power of two, at most the resolution (default: "
@@ -59,6 +65,9 @@ BuildSpec BuildOptions::spec() const {
   if (!bounds_.empty())
     spec.geometry.bounds =
         parse_list<double, 4>("--bounds", bounds_, ',', "four numbers X,Y,Z,EDGE");
+  if (!attributes_.empty())
+    for (const Attribute attribute : parse_attributes(attributes_, "--attributes").list())
+      spec.geometry.attributes.add(attribute);
   if (!memory_.empty()) {
     spec.run.memory_bytes = parse_size(memory_, "--memory");
     if (spec.run.memory_bytes == 0)

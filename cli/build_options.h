@@ -21,6 +21,7 @@ class BuildOptions {
  private:
   BuildSpec spec_;
   std::string bounds_;
+  std::string attributes_;
   std::string memory_;
 };
 

@@ -34,7 +34,7 @@ nlohmann::ordered_json info_json(const voxdag_reader::File& file, const std::str
       {"dag_nodes", file.dag_nodes()},
       {"bytes", file.file_bytes()},
       {"levels", levels}};
-  if (file.has_colors()) json["colors"] = color_facts(file);
+  add_attribute_facts(file, json);
   if (!sha256.empty()) json["sha256"] = sha256;
   return json;
 }
@@ -49,13 +49,16 @@ void print(const voxdag_reader::File& file, const std::string& sha256) {
   std::printf("  %s voxels, %s octree nodes, %s DAG nodes, hashes of %u bits\n",
               count_text(file.voxels()).c_str(), count_text(file.svo_nodes()).c_str(),
               count_text(file.dag_nodes()).c_str(), file.hash_bits());
-  if (file.has_colors()) {
-    const nlohmann::ordered_json colors = color_facts(file);
-    std::printf("  colors of %lld^3 cells and coarser ones: %s, %s\n",
-                static_cast<long long>(int64_t{1} << file.color_levels()),
-                count_text(colors["cells"].get<uint64_t>()).c_str(),
-                size_text(colors["bytes"].get<uint64_t>()).c_str());
+  for (const Attribute attribute : attributes_of(file).list()) {
+    const nlohmann::ordered_json facts = section_facts(section_of(file, attribute));
+    std::printf("  %ss of %lld^3 cells and coarser ones: %s, %s\n", name_of(attribute),
+                static_cast<long long>(facts["resolution"].get<int64_t>()),
+                count_text(facts["cells"].get<uint64_t>()).c_str(),
+                size_text(facts["bytes"].get<uint64_t>()).c_str());
   }
+  // The last one has no name: it is that of triangles without material.
+  if (!file.material_names().empty())
+    std::printf("  %s materials\n", count_text(file.material_names().size() - 1).c_str());
   std::printf("  level  cube edge            nodes         size\n");
   for (uint32_t l = 0; l <= file.brick_level(); ++l)
     std::printf("  %5u  %9lld  %15s  %11s%s\n", l, static_cast<long long>(file.resolution() >> l),

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/format/global/open_global.h"
 #include "core/io/overwrite.h"
 
 namespace voxdag::cli {
@@ -19,14 +20,26 @@ void print_line(const Json& json) {
 void print_json(const nlohmann::ordered_json& json) { print_line(json); }
 void print_json(const nlohmann::json& json) { print_line(json); }
 
-nlohmann::ordered_json color_facts(const voxdag_reader::File& file) {
+nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section) {
   uint64_t cells = 0, bytes = 0;  // of all levels; of the blocks and of what finds them
-  for (uint32_t t = 0; t < file.colors().tier_count(); ++t) {
-    const voxdag_reader::ColorTier& tier = file.colors().tier(t);
+  for (uint32_t t = 0; t < section.tier_count(); ++t) {
+    const voxdag_reader::ColorTier& tier = section.tier(t);
     cells += tier.cell_count;
     bytes += 16 * tier.units + 32 * tier.region_count;
   }
-  return {{"resolution", int64_t{1} << file.color_levels()}, {"cells", cells}, {"bytes", bytes}};
+  return {{"resolution", int64_t{1} << section.color_levels()}, {"cells", cells}, {"bytes", bytes}};
+}
+
+void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json) {
+  for (const Attribute attribute : attributes_of(file).list()) {
+    const nlohmann::ordered_json facts = section_facts(section_of(file, attribute));
+    if (attribute == Attribute::kColor)
+      json["colors"] = facts;
+    else
+      json["attributes"][name_of(attribute)] = facts;
+  }
+  if (!file.material_names().empty())
+    json["attributes"]["material"]["names"] = file.material_names();
 }
 
 void OutputFile::declare_force(Command& command) {

@@ -14,8 +14,11 @@ namespace voxdag::cli {
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
 
-// Resolution, cells and bytes of the colors of a file that has some.
-nlohmann::ordered_json color_facts(const voxdag_reader::File& file);
+// Resolution, cells and bytes of a section that the file has.
+nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section);
+// Those of all that it has, as the members `colors` and `attributes`; the latter has the names of
+// materials, too.
+void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json);
 
 // Whether voxdag wrote the file with a command of this kind.
 using IsOwnFile = std::function<bool(const ReadableFile& file)>;

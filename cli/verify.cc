@@ -35,21 +35,22 @@ Grid grid_of(const voxdag_reader::File& file) {
 
 struct Sample {
   query::SampleReport voxels;
-  std::optional<query::ColorSampleReport> colors;  // of a file that has some
+  std::optional<query::ColorSampleReport> colors;  // of a file that has attributes
 };
 
 Sample check_against(const VerifyCommand& command, const voxdag_reader::File& file,
                      Progress& progress, CommandContext& context) {
   return_freed_memory_to_system();
   const Grid grid = grid_of(file);
-  MemoryBudget budget(file.has_colors() ? std::max(default_memory(), kSceneMemory) : kSceneMemory);
+  const bool has_attributes = attributes_of(file).any();
+  MemoryBudget budget(has_attributes ? std::max(default_memory(), kSceneMemory) : kSceneMemory);
   const auto scene =
       open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);
   const auto boxes = query::sample_surface(*scene, grid, command.seed, progress, context.cancel);
   Sample sample;
   with_reader_errors([&] {
     sample.voxels = query::compare_with_sample(file, boxes);
-    if (file.has_colors())
+    if (has_attributes)
       sample.colors = query::compare_sampled_colors(
           file, grid, context.files, *scene, command.seed, file.path() + ".images.vdspill",
           command.threads, budget, progress, context.cancel);
@@ -67,9 +68,9 @@ void print(const voxdag_reader::File& file, const std::optional<Sample>& sample)
                 count_text(sample->voxels.set).c_str());
   if (sample && sample->colors)
     std::printf(
-        "  colors like the scene's: %s cells compared in %llu regions, of which %llu are "
+        "  %ss like the scene's: %s cells compared in %llu regions, of which %llu are "
         "equal byte for byte\n",
-        count_text(sample->colors->cells).c_str(),
+        name_of(attributes_of(file).list().front()), count_text(sample->colors->cells).c_str(),
         static_cast<unsigned long long>(sample->colors->regions),
         static_cast<unsigned long long>(sample->colors->equal));
 }

@@ -1,5 +1,5 @@
-// A seeded sample of a file's colors against its scene: some regions of 64^3 color cells are baked
-// again from the triangles and the images.
+// A seeded sample of a file's colors, and its other attributes, against its scene: some regions of
+// 64^3 color cells are baked again from the triangles and the images.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@
 namespace voxdag::query {
 
 inline constexpr size_t kSampleRegions = 16;
-// A region whose colors are further from the scene's, in dB, is wrong. Those of a built file are
-// equal; a part that `extract` had to encode again is near.
+// A region whose colors are further from the scene's, in dB, is wrong. Those of a built file, and
+// other attributes, are equal; a part that `extract` had to encode again is near.
 inline constexpr double kMinSamplePsnr = 30;
 
 struct ColorSampleReport {
@@ -26,8 +26,8 @@ struct ColorSampleReport {
   uint64_t cells = 0;    // in them
 };
 
-// The file has colors, and `grid` is its own. One pass over the scene, which must be the one that
-// was built. Images go to a scratch file at `scratch_path` if they are large. Throws
+// The file has some attribute, and `grid` is its own. One pass over the scene, which must be the
+// one that was built. Images go to a scratch file at `scratch_path` if they are large. Throws
 // Error{kCorrupt} that names the first region that is wrong, and as TextureSet::prepare().
 ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& grid,
                                          FileSystem& files, TriangleSource& scene, uint64_t seed,

@@ -10,7 +10,9 @@ std::string geometry_json(const GeometryOptions& options) {
                                  {"skip_invalid", options.skip_invalid}};
   if (options.bounds) json["bounds"] = *options.bounds;
   if (options.voxel_size) json["voxel_size"] = *options.voxel_size;
-  if (options.color) json["color_resolution"] = options.color_resolution;
+  if (options.attributes.any()) json["color_resolution"] = options.color_resolution;
+  if (options.attributes.any() && options.attributes != AttributeSet{.color = true})
+    json["attributes"] = options.attributes.names();
   return json.dump();
 }
 

@@ -11,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
+#include "core/color/attribute_set.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 
@@ -26,7 +27,7 @@ struct GeometryOptions {
   std::optional<double> voxel_size;
   bool skip_invalid = false;
   uint32_t hash_bits = 64;
-  bool color = false;
+  AttributeSet attributes;  // of the cells of the color grid
   // K of the color grid, a power of two from 4 to the resolution; 0 for a choice by the build.
   uint64_t color_resolution = 0;
 };

@@ -26,6 +26,7 @@
 //                   those on their way there        1/8                          nobody
 //                 ColorMemory, for every worker     what is free / workers
 //                   a region                        12 MiB; solid ones 50        CubeBaker
+//                   its normals and materials       10 MiB, if any; or more      CubeBaker
 //                   surfaces of a cube              1/2 of the rest              CubeBaker
 //                   pages of textures               1/4 of the rest              TextureReader
 //                   regions of a cube, encoded      the rest                     nobody
@@ -45,6 +46,7 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/backend_memory.h"
+#include "core/color/attribute_set.h"
 #include "core/format/artifact/segment_writer.h"
 
 namespace voxdag {
@@ -78,17 +80,24 @@ struct MemoryPlan {
 // What the workers of the color stage get.
 struct ColorMemory {
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
+  // Of sums for normals and materials.
+  static constexpr uint64_t kValueBytes = uint64_t{10} << 20;
+
+  static constexpr uint64_t region_bytes(const AttributeSet& attributes) {
+    return kRegionBytes + (attributes.normal || attributes.material ? kValueBytes : 0);
+  }
 
   unsigned workers = 1;
   uint64_t surface_bytes = 0;  // of each
   uint64_t texture_bytes = 0;
 
   // An eighth is for the directories of the section.
-  static constexpr ColorMemory divide(uint64_t free_bytes, unsigned wanted) {
-    const uint64_t bytes = free_bytes - free_bytes / 8;
+  static constexpr ColorMemory divide(uint64_t free_bytes, unsigned wanted,
+                                      const AttributeSet& attributes) {
+    const uint64_t bytes = free_bytes - free_bytes / 8, region = region_bytes(attributes);
     const auto workers =
-        static_cast<unsigned>(std::clamp<uint64_t>(bytes / (2 * kRegionBytes), 1, wanted));
-    const uint64_t each = bytes / workers, rest = each - std::min(each, kRegionBytes);
+        static_cast<unsigned>(std::clamp<uint64_t>(bytes / (2 * region), 1, wanted));
+    const uint64_t each = bytes / workers, rest = each - std::min(each, region);
     return {workers, rest / 2, rest / 4};
   }
 };

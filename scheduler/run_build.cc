@@ -218,8 +218,7 @@ class Build {
     }
   }
 
-  // Before subvolumes are queued again: what is not recorded by now is built again, and its
-  // segment is removed, so that nothing may record it later.
+  // Before subvolumes are queued again: what is not recorded by now never will be.
   void close_segments() {
     commit_best_effort();
     commits_.clear();
@@ -381,8 +380,9 @@ class Build {
     }
   }
 
+  bool has_attributes() const { return spec_.geometry.attributes.any(); }
   void color(GlobalFileWriter& out) {
-    if (!spec_.geometry.color) return;
+    if (!has_attributes()) return;
     ColorStage stage = color_stage();
     report_.colors = stage.add_to(out);
     color_digest_ = stage.digest();
@@ -393,7 +393,7 @@ class Build {
   // Of what the colors depend on: as they were baked, or, of an output that an earlier run has
   // finished, as it is now.
   std::string color_digest() {
-    if (!spec_.geometry.color || !color_digest_.empty()) return color_digest_;
+    if (!has_attributes() || !color_digest_.empty()) return color_digest_;
     ColorStage stage = color_stage();
     std::string digest = stage.digest();
     // This is what counts if the colors of that output have the same one.
@@ -441,7 +441,7 @@ class Build {
   }
 
   std::string advice(ErrorCode code) {
-    if (code == ErrorCode::kNoSpace) return full_disk_advice(jobs_->leaves(), spec_.geometry.color);
+    if (code == ErrorCode::kNoSpace) return full_disk_advice(jobs_->leaves(), has_attributes());
     if (code == ErrorCode::kCanceled && spec_.run.cluster)
       return "; its tasks run on: run the same command again to follow them, or stop them with "
              "voxdag stop-tasks";

@@ -62,8 +62,8 @@ BuildSpec checked(const BuildSpec& spec) {
   const uint64_t edge = r.subvolume_edge;
   if (edge && ((edge & (edge - 1)) || edge < static_cast<uint64_t>(kSmallestEdge)))
     refuse("subvolume edge " + std::to_string(edge) + ": expected a power of two from 64 voxels");
-  if (g.color_resolution && !g.color)
-    refuse("a color resolution was given without colors: expected both (--color)");
+  if (g.color_resolution && !g.attributes.any())
+    refuse("a color resolution was given without colors: expected both (--color, or --attributes)");
   if (g.color_resolution && (!std::has_single_bit(g.color_resolution) || g.color_resolution < 4 ||
                              g.color_resolution > g.resolution))
     refuse("color resolution " + std::to_string(g.color_resolution) +
@@ -73,7 +73,7 @@ BuildSpec checked(const BuildSpec& spec) {
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();
-  if (g.color && !g.color_resolution)
+  if (g.attributes.any() && !g.color_resolution)
     out.geometry.color_resolution = std::min(g.resolution, kColorResolution);
   return out;
 }

@@ -61,7 +61,7 @@ nlohmann::ordered_json extract_json(const ExtractCommand& command, const query::
                               {"dag_nodes", r.dag_nodes},
                               {"bytes", r.bytes},
                               {"levels", levels}};
-  if (written.has_colors()) json["colors"] = color_facts(written);
+  add_attribute_facts(written, json);
   json.update(nlohmann::ordered_json{{"cubes", {{"total", r.parts}, {"split", r.parts_split}}},
                                      {"merge_passes", r.merge_passes},
                                      {"work_bytes", r.work_bytes},

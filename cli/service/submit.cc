@@ -31,7 +31,10 @@ Json options_json(const BuildSpec& spec) {
   if (g.voxel_size) options["voxel_size"] = *g.voxel_size;
   if (g.skip_invalid) options["skip_invalid"] = true;
   if (g.hash_bits != GeometryOptions{}.hash_bits) options["hash_bits"] = g.hash_bits;
-  if (g.color) options["color"] = true;
+  if (g.attributes.color) options["color"] = true;
+  AttributeSet others = g.attributes;
+  others.color = false;
+  if (others.any()) options["attributes"] = others.names();
   if (g.color_resolution != 0) options["color_resolution"] = g.color_resolution;
   if (r.memory_bytes != 0) options["memory"] = r.memory_bytes;
   if (r.threads != 0) options["threads"] = r.threads;

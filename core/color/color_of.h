@@ -81,6 +81,13 @@ VOXDAG_HD inline uint32_t rounded_quotient_in_doubles(uint64_t numerator, double
 
 }  // namespace color
 
+// The mean alpha of a sum whose weight is above 0.
+VOXDAG_HD inline uint8_t alpha_of(const ColorSum& sum) {
+  if (sum.seen_weight == 255 * sum.weight) return 255;
+  const uint64_t alpha = color::rounded_quotient(sum.seen_weight, sum.weight);
+  return static_cast<uint8_t>(alpha < 255 ? alpha : 255);
+}
+
 // Of a sum whose weight is above 0. Surfaces count by weight and alpha; where all of them are
 // transparent, by weight, and alpha is 0.
 VOXDAG_HD inline Color color_of(const ColorSum& sum) {
@@ -100,9 +107,7 @@ VOXDAG_HD inline Color color_of(const ColorSum& sum) {
       color.rgb[c] = color::srgb_of(static_cast<uint32_t>(mean < 65535 ? mean : 65535));
     }
   }
-  if (sum.seen_weight == 255 * sum.weight) return color;  // as initialized: 255
-  const uint64_t alpha = color::rounded_quotient(sum.seen_weight, sum.weight);
-  color.alpha = static_cast<uint8_t>(alpha < 255 ? alpha : 255);
+  color.alpha = alpha_of(sum);
   return color;
 }
 

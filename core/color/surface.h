@@ -30,6 +30,9 @@ struct SurfaceTriangle {
   WorldTriangle position;
   std::array<SurfaceCorner, 3> corners;
   uint32_t material = 0;  // index into SceneMaterials::materials
+  // Its front is where the corners run clockwise: in a mirrored instance, or every second time in
+  // a strip. Nothing but normals depends on it.
+  bool is_flipped = false;
 };
 
 // The same, snapped to the lattice of the grid.
@@ -37,6 +40,7 @@ struct FixedSurface {
   FixedTriangle position;
   std::array<SurfaceCorner, 3> corners;
   uint32_t material = 0;
+  bool is_flipped = false;
 };
 
 enum class AlphaMode : uint8_t { kOpaque, kMask, kBlend };
@@ -44,8 +48,11 @@ enum class Wrap : uint8_t { kRepeat, kMirroredRepeat, kClampToEdge };
 
 struct Material {
   static constexpr uint32_t kNoImage = UINT32_MAX;
+  static constexpr uint32_t kNoNumber = UINT32_MAX;
 
   std::string name;
+  // Index into SceneMaterials::names; none for triangles to which their file gives no material.
+  uint32_t number = kNoNumber;
   // Base color, linear, and alpha; kFullIntensity for 1.
   std::array<uint16_t, 4> factor{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
   AlphaMode alpha_mode = AlphaMode::kOpaque;

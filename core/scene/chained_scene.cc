@@ -122,9 +122,12 @@ void add_materials(SceneMaterials& all, SceneMaterials more) {
   for (Material& material : more.materials) {
     if (material.image != Material::kNoImage)
       material.image += static_cast<uint32_t>(all.images.size());
+    if (material.number != Material::kNoNumber)
+      material.number += static_cast<uint32_t>(all.names.size());
     all.materials.push_back(std::move(material));
   }
   std::ranges::move(more.images, std::back_inserter(all.images));
+  std::ranges::move(more.names, std::back_inserter(all.names));
   std::ranges::move(more.warnings, std::back_inserter(all.warnings));
 }
 

@@ -184,7 +184,9 @@ class GltfScene : public TriangleSource {
  private:
   SceneMaterials materials_of(const SceneFile& f) const {
     const gltf::Looks& looks = *f.document.looks;
-    SceneMaterials out{looks.materials, {}, looks.warnings};
+    SceneMaterials out{looks.materials, {}, looks.warnings, {}};
+    for (const Material& material : looks.materials)  // those that the file lists come first
+      if (material.number == out.names.size()) out.names.push_back(material.name);
     for (int image : looks.images)
       out.images.push_back(gltf::find_image(file_system_, *f.file, f.document, image));
     return out;

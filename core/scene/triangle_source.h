@@ -63,6 +63,20 @@ struct SceneMaterials {
   std::vector<Material> materials = {Material{}};  // at least one
   std::vector<ImageSource> images;                 // those that materials use
   std::vector<std::string> warnings;               // as those of the source, but about looks alone
+  std::vector<std::string> names;  // of the materials that the scene's files list, in their order
+
+  // Leaves the factors of materials alone.
+  void drop_images() {
+    for (Material& material : materials) material.image = Material::kNoImage;
+    images.clear();
+  }
+  // Appends a name, "", for the triangles without material, and gives them its number.
+  void name_unlisted() {
+    for (Material& material : materials)
+      if (material.number == Material::kNoNumber)
+        material.number = static_cast<uint32_t>(names.size());
+    names.emplace_back();
+  }
 };
 
 class TriangleSource {

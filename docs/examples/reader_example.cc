@@ -46,6 +46,14 @@ int main(int argc, char** argv) {
     if (visitor.highest >= 0)
       std::printf("the highest reaches y = %g\n",
                   dag.origin()[1] + static_cast<double>(visitor.highest + 1) * voxel_edge);
+    // What the whole scene looks like: the only cell of level 0.
+    if (const auto color = dag.color(0, 0, 0, 0))
+      std::printf("its mean color is #%02x%02x%02x\n", color->r, color->g, color->b);
+    if (const auto normal = dag.normal(0, 0, 0, 0))
+      std::printf("its mean normal is %g %g %g\n", static_cast<double>(normal->x),
+                  static_cast<double>(normal->y), static_cast<double>(normal->z));
+    if (const auto material = dag.material(0, 0, 0, 0))
+      std::printf("most of it is '%s'\n", dag.material_names().at(*material).c_str());
     return 0;
   } catch (const voxdag_reader::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -36,7 +36,11 @@ BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::dict
   take("voxel_size", spec.geometry.voxel_size);
   take("skip_invalid", spec.geometry.skip_invalid);
   take("hash_bits", spec.geometry.hash_bits);
-  take("color", spec.geometry.color);
+  std::vector<std::string> attributes;
+  take("color", spec.geometry.attributes.color);
+  take("attributes", attributes);
+  for (const std::string& name : attributes)
+    add_attribute(spec.geometry.attributes, name, "attributes");
   take("color_resolution", spec.geometry.color_resolution);
   take("work", spec.run.work_folder);
   take("memory", memory);

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "core/base/process_limits.h"
+#include "core/format/global/open_global.h"
 #include "python/native/bindings.h"
 
 namespace voxdag::python {
@@ -128,6 +129,75 @@ void nearest(const query::Dag& dag, const Rows<const int64_t>& points, double ma
   }
 }
 
+// The cells of `points` that have the attribute; set(i, region, number) for each.
+template <class Set>
+void for_each_cell(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+                   const voxdag_reader::ColorSection& section, const Set& set) {
+  const nb::gil_scoped_release released;
+  with_reader_errors([&] {
+    voxdag_reader::ColorCursor cursor(dag.file(), section);
+    const std::span<const Position> cells = positions_of(points);
+    for (size_t i = 0; i < cells.size(); ++i) {
+      uint64_t number;
+      const auto* const region =
+          cursor.find(cells[i][0], cells[i][1], cells[i][2], grid_levels, number);
+      if (region) set(i, *region, number);
+    }
+  });
+}
+
+void colors(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+            const Rows<uint8_t>& found) {
+  expect_length(found.shape(0), points.shape(0));
+  for_each_cell(dag, points, grid_levels, dag.file().colors(),
+                [&](size_t i, const auto& region, uint64_t number) {
+                  const voxdag_reader::Rgb rgb = region.color(number);
+                  uint8_t* const row = found.data() + 3 * i;
+                  row[0] = rgb.r;
+                  row[1] = rgb.g;
+                  row[2] = rgb.b;
+                });
+}
+
+void normals(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+             const Rows<float>& found) {
+  expect_length(found.shape(0), points.shape(0));
+  for_each_cell(dag, points, grid_levels, dag.file().normals(),
+                [&](size_t i, const auto& region, uint64_t number) {
+                  const voxdag_reader::Normal normal = region.normal(number);
+                  float* const row = found.data() + 3 * i;
+                  row[0] = normal.x;
+                  row[1] = normal.y;
+                  row[2] = normal.z;
+                });
+}
+
+void alphas(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+            const Column<uint8_t>& found) {
+  expect_length(found.shape(0), points.shape(0));
+  for_each_cell(dag, points, grid_levels, dag.file().alphas(),
+                [&](size_t i, const auto& region, uint64_t number) {
+                  found.data()[i] = static_cast<uint8_t>(region.value(number));
+                });
+}
+
+void materials(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+               const Column<int64_t>& found) {
+  expect_length(found.shape(0), points.shape(0));
+  for_each_cell(dag, points, grid_levels, dag.file().materials(),
+                [&](size_t i, const auto& region, uint64_t number) {
+                  found.data()[i] = region.value(number);
+                });
+}
+
+// Names are UTF-8, unless the scene had others.
+std::vector<nb::bytes> material_names(const query::Dag& dag) {
+  std::vector<nb::bytes> names;
+  for (const std::string& name : dag.file().material_names())
+    names.emplace_back(name.data(), name.size());
+  return names;
+}
+
 // Nodes and bytes of each level.
 std::vector<std::pair<uint64_t, uint64_t>> levels(const query::Dag& dag) {
   std::vector<std::pair<uint64_t, uint64_t>> all;
@@ -159,7 +229,14 @@ void bind_dag(nb::module_& module) {
       .def("points", &points)
       .def("point_count", &point_count)
       .def("count", &count)
-      .def("nearest", &nearest);
+      .def("nearest", &nearest)
+      .def_prop_ro("attributes",
+                   [](const query::Dag& dag) { return attributes_of(dag.file()).names(); })
+      .def_prop_ro("material_names", &material_names)
+      .def("colors", &colors)
+      .def("alphas", &alphas)
+      .def("normals", &normals)
+      .def("materials", &materials);
 }
 
 }  // namespace voxdag::python

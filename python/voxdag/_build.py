@@ -35,8 +35,8 @@ def build(scene: Scene, *, resolution: int, output: Path,
     progress    called now and then; what it raises cancels the build and is raised here
 
     The other options are those of the command line (docs/cli.md): bounds=(x, y, z, edge), voxel_size,
-    skip_invalid, hash_bits, color, color_resolution, work, threads, subvolume, backend, method, cache,
-    keep_work, restart, force. The report has the names of `voxdag build --json`. Raises Error.
+    skip_invalid, hash_bits, color, attributes=["alpha", ...], color_resolution, work, threads,
+    subvolume, backend, method, cache, keep_work, restart, force. The report has the names of `voxdag build --json`. Raises Error.
     """
     output = os.fsdecode(output)
     with _files_of(scene, output) as files:

@@ -143,15 +143,52 @@ class Dag:
         return cells
 
     def points(self, region: Optional[Region] = None, level: Optional[int] = None, *,
-               world: bool = False) -> np.ndarray:
+               world: bool = False, attributes: Optional[Sequence[str]] = None) -> Any:
         """The set cells of a region in Morton order, (N, 3) int64.
 
-        With world=True their centers in the units of the scene, float64."""
+        With world=True their centers in the units of the scene, float64. With `attributes`, such
+        as ["color", "normal"], a tuple of the cells and of a dict that has an array for each."""
         low, high = self._region(region, level, world)
         rows = self._dag.point_count(low, high, self._levels(level))
         found = np.empty((rows, 3), np.int64)
         self._dag.points(low, high, self._levels(level), found)
-        return self.to_world(found + 0.5, level) if world else found
+        cells = self.to_world(found + 0.5, level) if world else found
+        if attributes is None:
+            return cells
+        return cells, {name: self._values(name, found, level, False) for name in attributes}
+
+    @property
+    def attributes(self) -> List[str]:
+        """What the cells have: "color", "alpha", "normal" and "material", those of them that were
+        built."""
+        return self._dag.attributes
+
+    @property
+    def material_names(self) -> List[str]:
+        """The names that materials() counts from 0. The last, "", is that of triangles without."""
+        return [name.decode(errors="replace") for name in self._dag.material_names]
+
+    def colors(self, points: Any, level: Optional[int] = None, *, world: bool = False) -> np.ndarray:
+        """The color of each cell, (N, 3) uint8, sRGB; 0 where none is set.
+
+        As with the other attributes, cells that are finer than those of the color grid have what
+        the latter have. A file without the attribute is an Error."""
+        return self._values("color", points, level, world)
+
+    def alphas(self, points: Any, level: Optional[int] = None, *, world: bool = False) -> np.ndarray:
+        """The alpha of each cell, (N,) uint8; 0 where none is set."""
+        return self._values("alpha", points, level, world)
+
+    def normals(self, points: Any, level: Optional[int] = None, *,
+                world: bool = False) -> np.ndarray:
+        """The normal of each cell, (N, 3) float32, of length 1; 0 where none is set."""
+        return self._values("normal", points, level, world)
+
+    def materials(self, points: Any, level: Optional[int] = None, *,
+                  world: bool = False) -> np.ndarray:
+        """The material of each cell, (N,) int64, an index into material_names; -1 where none is
+        set."""
+        return self._values("material", points, level, world)
 
     def count(self, region: Optional[Region] = None, level: Optional[int] = None, *,
               world: bool = False) -> int:
@@ -169,6 +206,20 @@ class Dag:
         distances = np.empty(len(positions))
         self._dag.nearest(positions, float(max_distance), voxels, distances, threads)
         return voxels, distances
+
+    def _values(self, attribute: str, points: Any, level: Optional[int],
+                world: bool) -> np.ndarray:
+        if attribute not in self._dag.attributes:
+            raise Error(f"{self.path} has no {attribute!r}: expected one of its attributes, "
+                        f"{', '.join(self._dag.attributes) or 'none'}", "invalid_input")
+        positions = self._positions(points, level, world)
+        rows = len(positions)
+        get, found = {"color": (self._dag.colors, np.zeros((rows, 3), np.uint8)),
+                      "alpha": (self._dag.alphas, np.zeros(rows, np.uint8)),
+                      "normal": (self._dag.normals, np.zeros((rows, 3), np.float32)),
+                      "material": (self._dag.materials, np.full(rows, -1, np.int64))}[attribute]
+        get(positions, self._levels(level), found)
+        return found
 
     def _levels(self, level: Optional[int]) -> int:
         if level is None:

@@ -87,10 +87,11 @@ class Extraction {
     report_.work_bytes += merged.scratch_bytes;
     if (merged.voxels == 0)
       progress_.warn("nothing is set there: the file will have no nodes");
-    else if (file_.has_colors())
+    else
       with_reader_errors([&] {
-        write_part_colors({file_, spec_.selection, crop_}, files_, out, budget_, spec_.threads,
-                          progress_, cancel_);
+        for (const Attribute attribute : attributes_of(file_).list())
+          write_part_attribute({file_, spec_.selection, crop_}, attribute, files_, out, budget_,
+                               spec_.threads, progress_, cancel_);
       });
     progress_.begin_stage("write", 1, "files");
     const GlobalFileSummary summary =

@@ -4,8 +4,8 @@
 // The grid is divided into octree-aligned cubes. For each cube the part of the DAG that it needs is
 // read and reduced in memory (part_builder.h), by several threads, and written as an artifact; a
 // cube that does not fit its share of the budget is divided into its children. The merge then makes
-// the file, as for a build. So memory is bounded by the budget, not by the file. Colors follow
-// (part_colors.h), if the file has some.
+// the file, as for a build. So memory is bounded by the budget, not by the file. Colors and
+// other attributes follow (part_colors.h), if the file has some.
 #pragma once
 
 #include <cstdint>

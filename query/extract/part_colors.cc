@@ -2,15 +2,19 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
+#include <utility>
 #include <vector>
 
 #include "core/base/page_buffer.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
-#include "core/color/blocks/region.h"
+#include "core/color/blocks/value_region.h"
 #include "core/color/color_of.h"
 #include "core/format/color/color_layout.h"
 #include "core/format/color/color_section_writer.h"
+#include "core/format/color/value_section_writer.h"
+#include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
 #include "query/dag_view.h"
 #include "query/extract/node_reader.h"
@@ -26,7 +30,11 @@ constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
 // What a thread has while it encodes a region: its cells, the next coarser ones and all colors.
 constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) + SourceFile::kBlockBytes;
-constexpr uint64_t kEncodedBytes = kMaxRegionCells * 3 / 4;
+// Of a region: colors, or values and those of the coarser levels.
+uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
+  if (attribute == Attribute::kColor) return kMaxRegionCells * 3 / 4;
+  return kMaxRegionCells * 5 / 4 * value_bytes(attribute, file.material_names().size());
+}
 // Regions that are encoded at a time.
 constexpr size_t kBatchRegions = 32;
 
@@ -75,15 +83,17 @@ class ResidentPages {
 
 class PartColors {
  public:
-  PartColors(const ColoredPart& part, FileSystem& files, MemoryBudget& budget, unsigned threads,
-             const CancelToken& cancel)
+  PartColors(const ColoredPart& part, Attribute attribute, FileSystem& files, MemoryBudget& budget,
+             unsigned threads, const CancelToken& cancel)
       : part_(part),
         file_(part.file),
+        attribute_(attribute),
+        section_(section_of(part.file, attribute)),
         dag_(part.file),
         source_(files, part.file, budget),
         pages_(part.file, budget.limit(), threads),
         cancel_(cancel),
-        levels_(part_color_levels(part)),
+        levels_(part_color_levels(part, attribute)),
         finest_(levels_ + part.crop.level) {
     const auto& p = part.crop.position;
     crop_code_ = morton_encode(p[0], p[1], p[2]);
@@ -100,8 +110,8 @@ class PartColors {
       const voxdag_reader::Level& level = file_.level(l);
       source_.check(level.file_offset, level.word_count * sizeof(uint32_t), block);
     }
-    for (uint32_t t = 0; t < file_.colors().tier_count(); ++t) {
-      const ColorTier& tier = file_.colors().tier(t);
+    for (uint32_t t = 0; t < section_.tier_count(); ++t) {
+      const ColorTier& tier = section_.tier(t);
       source_.check(offset_of(tier.directory), tier.region_count * color_layout::kRegionEntryBytes,
                     block);
     }
@@ -123,8 +133,9 @@ class PartColors {
   EncodedRegion encode(const PlacedCube& cube) {
     pages_.check();
     const uint32_t level = region_level(0);
-    if (is_copied(0, cube.code)) return copy(0, cube.code);
+    if (attribute_ == Attribute::kColor && is_copied(0, cube.code)) return copy(0, cube.code);
     check_colors(finest_, level, cube.code);
+    if (attribute_ != Attribute::kColor) return encode_valued(cube);
     voxdag_reader::ColorCursor colors(file_);
     std::vector<ColoredCell> cells;
     const uint64_t first = cube.code << 3 * depth_of(0);
@@ -133,6 +144,27 @@ class PartColors {
                        sum_of(color_of_cell(colors, finest_, cell.code), 1)});
     });
     return encode_cells(0, cube.code, cells);
+  }
+
+  // Of another attribute: what coarser cells have follows from the finest ones, so that those that
+  // are not cut have what they have in the file.
+  EncodedRegion encode_valued(const PlacedCube& cube) const {
+    voxdag_reader::ColorCursor cursor(file_, section_);
+    std::vector<ValuedCell> cells;
+    const uint64_t first = cube.code << 3 * depth_of(0);
+    uint32_t bytes = 0;
+    walk(region_level(0), cube, finest_, [&](const PlacedCube& cell) {
+      uint32_t x, y, z;
+      uint64_t i;
+      morton_decode(cell.code, x, y, z);
+      const ColorRegion* const region = cursor.find(x, y, z, finest_, i);
+      if (!region) file_.broken_colors("a cell of the DAG has none");
+      bytes = region->block_bytes / 32;
+      cells.push_back({static_cast<uint32_t>(cell.code - first), region->value(i)});
+    });
+    cancel_.check();
+    return encode_values(attribute_, bytes, depth_of(0), morton_in_part(region_level(0), cube.code),
+                         cells);
   }
 
   // Of a tier above the finest; `morton` is that of the part.
@@ -195,14 +227,14 @@ class PartColors {
   // Whether the bytes of a region are those of one of the file.
   bool is_copied(uint32_t tier, uint64_t code) const {
     const uint32_t finest = finest_of(tier);
-    if (finest > file_.color_levels()) return false;
-    const ColorTier& stored = file_.colors().tier_of(finest);
+    if (finest > section_.color_levels()) return false;
+    const ColorTier& stored = section_.tier_of(finest);
     return stored.finest_level == finest && stored.region_level == region_level(tier) &&
            is_whole(region_level(tier), code);
   }
   EncodedRegion copy(uint32_t tier, uint64_t code) {
     check_colors(finest_of(tier), region_level(tier), code);
-    const ColorTier& stored = file_.colors().tier_of(finest_of(tier));
+    const ColorTier& stored = section_.tier_of(finest_of(tier));
     const uint64_t at = ColorSection::lower_bound(stored, code);
     ColorRegion region;
     if (at == stored.region_count || !ColorSection::region(stored, at, region) ||
@@ -224,8 +256,8 @@ class PartColors {
   // checksums.
   void check_colors(uint32_t finest, uint32_t level, uint64_t code) {
     std::vector<std::byte> block(SourceFile::kBlockBytes);
-    for (uint32_t t = 0; t < file_.colors().tier_count(); ++t) {
-      const ColorTier& tier = file_.colors().tier(t);
+    for (uint32_t t = 0; t < section_.tier_count(); ++t) {
+      const ColorTier& tier = section_.tier(t);
       const bool is_coarser = t > 0 && tier.finest_level < level;
       if (is_coarser || tier.region_level > finest) continue;
       // The first region that has colors of the cube, and the first after it that has none.
@@ -267,6 +299,8 @@ class PartColors {
 
   const ColoredPart& part_;
   const voxdag_reader::File& file_;
+  const Attribute attribute_;
+  const ColorSection& section_;
   const DagView dag_;
   SourceFile source_;
   const ResidentPages pages_;
@@ -279,9 +313,10 @@ class PartColors {
 // Encodes regions on all threads, and writes them in order.
 class RegionWriter {
  public:
-  RegionWriter(PartColors& colors, ColorSectionWriter& section, unsigned workers,
-               Progress& progress)
-      : colors_(colors), section_(section), workers_(workers), progress_(progress) {
+  using AddRegion = std::function<void(const EncodedRegion& region)>;
+
+  RegionWriter(PartColors& colors, AddRegion add, unsigned workers, Progress& progress)
+      : colors_(colors), add_(std::move(add)), workers_(workers), progress_(progress) {
     batch_.reserve(kBatchRegions);
   }
   void add(const PlacedCube& cube) {
@@ -294,7 +329,7 @@ class RegionWriter {
         workers_, batch_.size(),
         [&](unsigned, size_t i) { regions[i] = colors_.encode(batch_[i]); },
         [&](unsigned, size_t i) {
-          section_.add_region(regions[i]);
+          add_(regions[i]);
           regions[i] = {};
         });
     progress_.advance(batch_.size());
@@ -303,7 +338,7 @@ class RegionWriter {
 
  private:
   PartColors& colors_;
-  ColorSectionWriter& section_;
+  const AddRegion add_;
   const unsigned workers_;
   Progress& progress_;
   std::vector<PlacedCube> batch_;
@@ -311,30 +346,42 @@ class RegionWriter {
 
 }  // namespace
 
-uint32_t part_color_levels(const ColoredPart& part) {
-  const uint32_t finest = std::min(part.file.color_levels(), part.selection.grid_levels);
+uint32_t part_color_levels(const ColoredPart& part, Attribute attribute) {
+  const uint32_t finest =
+      std::min(section_of(part.file, attribute).color_levels(), part.selection.grid_levels);
   return std::max(finest, part.crop.level + kBrickLevels) - part.crop.level;
 }
 
-void write_part_colors(const ColoredPart& part, FileSystem& files, GlobalFileWriter& out,
-                       MemoryBudget& budget, unsigned threads, Progress& progress,
-                       const CancelToken& cancel) {
-  progress.begin_stage("color", 0, "regions");
-  const MemoryCharge encoded(budget, kBatchRegions * kEncodedBytes, "encoded colors");
+void write_part_attribute(const ColoredPart& part, Attribute attribute, FileSystem& files,
+                          GlobalFileWriter& out, MemoryBudget& budget, unsigned threads,
+                          Progress& progress, const CancelToken& cancel) {
+  progress.begin_stage(name_of(attribute), 0, "regions");
+  const MemoryCharge encoded(budget, kBatchRegions * encoded_bytes(part.file, attribute),
+                             "encoded colors");
   const auto workers = static_cast<unsigned>(
       std::clamp<uint64_t>(budget.available() / (2 * kWorkerBytes), 1, std::max(threads, 1u)));
   const MemoryCharge work(budget, workers * kWorkerBytes, "the cells of colored regions");
-  PartColors colors(part, files, budget, workers, cancel);
+  PartColors colors(part, attribute, files, budget, workers, cancel);
   colors.check_index();
-  ColorSectionWriter section(
-      out, colors.levels(), budget,
-      [&](uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
-        return colors.encode_coarse(tier, morton, cells);
-      });
-  RegionWriter writer(colors, section, workers, progress);
-  colors.for_each_region([&](const PlacedCube& cube) { writer.add(cube); });
-  writer.flush();
-  section.finish();
+  const auto add_regions = [&](auto& section) {
+    RegionWriter writer(
+        colors, [&](const EncodedRegion& region) { section.add_region(region); }, workers,
+        progress);
+    colors.for_each_region([&](const PlacedCube& cube) { writer.add(cube); });
+    writer.flush();
+    section.finish();
+  };
+  if (attribute == Attribute::kColor) {
+    ColorSectionWriter section(
+        out, colors.levels(), budget,
+        [&](uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
+          return colors.encode_coarse(tier, morton, cells);
+        });
+    add_regions(section);
+  } else {
+    ValueSectionWriter section(out, attribute, colors.levels(), part.file.material_names(), budget);
+    add_regions(section);
+  }
   part.file.release_pages();
   progress.end_stage();
 }

@@ -1,4 +1,5 @@
-// Writes the colors of a part of a global file behind the levels of the part's own file.
+// Writes the colors of a part of a global file, or another attribute of its cells, behind the
+// levels of the part's own file.
 //
 // The color grid of the part is the part of the file's, or that of the selected level if this is
 // coarser; a part that has fewer than 4 cells of it along an edge gets 4, with the colors of the
@@ -14,6 +15,9 @@
 // and encoded again, so that their colors are near those of the file. The bytes depend on nothing
 // but the file and the selection.
 //
+// Of other attributes the finest cells have what they have in the file, and coarser ones what the
+// rule makes of that: where the region does not cut them, what they have in the file.
+//
 // The file is mapped here; of what is read every checksum block is compared with its checksum
 // first, and its pages are released when the process is larger than the budget.
 #pragma once
@@ -23,6 +27,7 @@
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
+#include "core/color/attribute_set.h"
 #include "core/format/global/global_writer.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/cube.h"
@@ -32,18 +37,18 @@
 namespace voxdag::query {
 
 struct ColoredPart {
-  const voxdag_reader::File& file;  // with colors
+  const voxdag_reader::File& file;  // with the attribute
   const Selection& selection;       // of which something is set
   const Cube& crop;  // what becomes the new grid: all of it, or a cube around the region
 };
 
 // The levels of the color grid of the part, 2 to those of its grid.
-uint32_t part_color_levels(const ColoredPart& part);
+uint32_t part_color_levels(const ColoredPart& part, Attribute attribute);
 
 // The levels of `out` must be complete. Throws Error{kCorrupt} for a damaged file,
 // Error{kOutOfMemory}, Error{kCanceled}, and voxdag_reader::Error.
-void write_part_colors(const ColoredPart& part, FileSystem& files, GlobalFileWriter& out,
-                       MemoryBudget& budget, unsigned threads, Progress& progress,
-                       const CancelToken& cancel);
+void write_part_attribute(const ColoredPart& part, Attribute attribute, FileSystem& files,
+                          GlobalFileWriter& out, MemoryBudget& budget, unsigned threads,
+                          Progress& progress, const CancelToken& cancel);
 
 }  // namespace voxdag::query

@@ -78,6 +78,7 @@ class SurfacePiece {
       return;
     surface.corners = triangle.corners;
     surface.material = triangle.material;
+    surface.is_flipped = triangle.is_flipped;
     const size_t at = triangles_.size(), begin = bytes_.size(), record = records_.size();
     triangles_.resize(at + binning_.record_bytes);
     encode_triangle(surface.position, binning_.record_bytes, triangles_.data() + at);

@@ -12,7 +12,8 @@ constexpr uint32_t kColorVersion = 1;
 }  // namespace
 
 std::vector<Checksum128> look_digests(std::span<const Material> materials,
-                                      std::span<const std::string> images) {
+                                      std::span<const std::string> images,
+                                      const AttributeSet& attributes) {
   std::vector<Checksum128> digests;
   digests.reserve(materials.size());
   std::vector<std::byte> bytes;
@@ -24,6 +25,7 @@ std::vector<Checksum128> look_digests(std::span<const Material> materials,
     sink.put(static_cast<uint8_t>(m.alpha_mode));
     for (const Wrap wrap : m.wrap) sink.put(static_cast<uint8_t>(wrap));
     if (m.image != Material::kNoImage) sink.put_bytes(std::as_bytes(std::span(images[m.image])));
+    if (attributes.material) sink.put(m.number);
     digests.push_back(checksum128(bytes));
   }
   return digests;
@@ -35,7 +37,8 @@ Checksum128 surface_digest(std::span<const std::byte> record, const Checksum128&
   return checksum128(std::as_bytes(std::span(words)));
 }
 
-Checksum128 color_key(const ColorGrid& grid, const Cube& cube, const BinContent& content) {
+Checksum128 attribute_key(const StoredAttribute& attribute, const ColorGrid& grid, const Cube& cube,
+                          const BinContent& content) {
   std::vector<std::byte> bytes;
   ByteSink sink(bytes);
   for (const uint32_t number : {kColorVersion, grid.levels, grid.color_levels, cube.level,
@@ -43,6 +46,10 @@ Checksum128 color_key(const ColorGrid& grid, const Cube& cube, const BinContent&
     sink.put(number);
   for (const uint64_t number : {content.surfaces, content.sum.low, content.sum.high})
     sink.put(number);
+  if (attribute.kind != Attribute::kColor) {
+    sink.put(static_cast<uint32_t>(attribute.kind));
+    sink.put(attribute.value_bytes);
+  }
   return checksum128(bytes);
 }
 

@@ -1,5 +1,5 @@
-// What names the colors of a cube: a digest of all that they depend on. Equal keys mean equal
-// colors, whichever order the scene has its triangles in, and whatever else it has.
+// What names the colors of a cube, or another attribute: a digest of all that they depend on. Equal
+// keys mean equal colors, whichever order the scene has its triangles in, and whatever else it has.
 #pragma once
 
 #include <bitset>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/color/attribute_set.h"
 #include "core/color/rule/color_grid.h"
 #include "core/color/surface.h"
 #include "core/format/checksum.h"
@@ -25,15 +26,23 @@ struct BinContent {
   ImageClasses images;
 };
 
-// Digests of what each material adds to a color, its name left out. `images`: of the contents of
-// each image.
+// An attribute of the cells, and how it is stored.
+struct StoredAttribute {
+  Attribute kind = Attribute::kColor;
+  uint32_t value_bytes = 0;  // of a cell; 0 for colors
+};
+
+// Digests of what each material adds to the attributes, its name left out. `images`: of the
+// contents of each image.
 std::vector<Checksum128> look_digests(std::span<const Material> materials,
-                                      std::span<const std::string> images);
+                                      std::span<const std::string> images,
+                                      const AttributeSet& attributes);
 
 // Digest of a surface, of its record (surface_record.h) and the look of its material.
 Checksum128 surface_digest(std::span<const std::byte> record, const Checksum128& look);
 
-// Of the colors of a cube in which surfaces are `content`.
-Checksum128 color_key(const ColorGrid& grid, const Cube& cube, const BinContent& content);
+// Of the colors, or another attribute, of a cube in which surfaces are `content`.
+Checksum128 attribute_key(const StoredAttribute& attribute, const ColorGrid& grid, const Cube& cube,
+                          const BinContent& content);
 
 }  // namespace voxdag

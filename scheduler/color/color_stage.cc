@@ -15,6 +15,7 @@
 #include "core/format/checksum.h"
 #include "core/format/color/color_section_writer.h"
 #include "core/format/global/global_layout.h"
+#include "core/format/color/value_section_writer.h"
 #include "core/geometry/morton.h"
 #include "core/scene/textures/texture_set.h"
 #include "scheduler/color/bin_surfaces.h"
@@ -48,23 +49,66 @@ T number_at(const ReadableFile& file, uint64_t offset) {
   return ByteSource(bytes).get<T>();
 }
 
-// The colored cells of a sound global file, those of the finest level.
+// The cells with attributes of a sound global file, those of the finest level: all its sections
+// have the same ones.
 uint64_t count_finest_cells(const ReadableFile& file) {
   namespace layout = global_layout;
-  // Colors come before attributes of other kinds.
-  const uint64_t entry = layout::kAttributesAt;
-  const bool has_colors =
-      number_at<uint64_t>(file, layout::kAttributeCountAt) > 0 &&
-      number_at<uint32_t>(file, entry + layout::kAttributeKindAt) == layout::kColorAttribute;
-  return has_colors ? number_at<uint64_t>(file, entry + layout::kAttributeFinestCellsAt) : 0;
+  if (number_at<uint64_t>(file, layout::kAttributeCountAt) == 0) return 0;
+  return number_at<uint64_t>(file, layout::kAttributesAt + layout::kAttributeFinestCellsAt);
 }
+
+// The records of one attribute of a cube, as they were stored.
+struct StoredRecords {
+  std::vector<std::byte> records;
+  MemoryCharge charge;  // for the largest that were read
+
+  void read(const ColorStore& artifacts, const Checksum128& key, MemoryBudget& budget) {
+    const uint64_t bytes = artifacts.bytes_of(key);
+    if (bytes > charge.bytes()) {
+      charge = {};
+      charge = MemoryCharge(budget, bytes, "stored colors of a cube");
+    }
+    artifacts.read(key, records);
+  }
+};
 
 // What bakes, and what one cube became.
 struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
-  std::vector<std::byte> records;
-  MemoryCharge stored;  // for the largest records that were read
+  CubeBaker::Records baked;
+  StoredRecords stored;
+  bool is_stored = false;  // the cube's are in `stored`
+};
+
+// The section of an attribute.
+class OpenSection {
+ public:
+  OpenSection(GlobalFileWriter& out, Attribute attribute, uint32_t levels,
+              std::span<const std::string> materials, MemoryBudget& budget) {
+    if (attribute == Attribute::kColor)
+      colors_.emplace(out, levels, budget);
+    else
+      values_.emplace(out, attribute, levels, materials, budget);
+  }
+  // Returns how many cells of the color grid they have.
+  uint64_t add(std::span<const std::byte> records) {
+    RegionRecords regions(records);
+    uint64_t cells = 0;
+    while (const auto region = regions.next()) {
+      if (colors_)
+        colors_->add_region(*region);
+      else
+        values_->add_region(*region);
+      cells += region->counts[0];
+    }
+    return cells;
+  }
+  void finish() { colors_ ? colors_->finish() : values_->finish(); }
+
+ private:
+  std::optional<ColorSectionWriter> colors_;
+  std::optional<ValueSectionWriter> values_;
 };
 
 }  // namespace
@@ -76,12 +120,13 @@ struct ColorStage::State {
   const std::vector<Cube> cubes;
   std::unique_ptr<TriangleSource> scene;
   SceneMaterials materials;
+  std::vector<StoredAttribute> attributes;
   std::vector<std::string> images;  // their digests
   // Once the surfaces are read:
   std::optional<MemoryBudget> share;
   std::optional<SurfaceStore> store;
   BinnedSurfaces surfaces;
-  std::vector<Checksum128> keys;
+  std::vector<std::vector<Checksum128>> keys;  // by attribute and cube
 
   State(const ColorSource& s, const StageContext& c)
       : source(s),
@@ -92,9 +137,17 @@ struct ColorStage::State {
   void open();
   void read_surfaces();
   std::unique_ptr<TextureSet> decode_images(const ColorStore& artifacts);
+  bool is_stored(const ColorStore& artifacts, size_t cube) const;
   void bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
             ColorReport& report);
+  void add_stored(const ColorStore& artifacts, size_t attribute, GlobalFileWriter& out,
+                  const ColorReport& report);
 };
+
+bool ColorStage::State::is_stored(const ColorStore& artifacts, size_t cube) const {
+  return std::ranges::all_of(
+      keys, [&](const auto& of_attribute) { return artifacts.has(of_attribute[cube]); });
+}
 
 void ColorStage::State::open() {
   const BuildContext& build = context.build;
@@ -102,6 +155,13 @@ void ColorStage::State::open() {
                      {source.options.skip_invalid, source.work_folder + "/decoded.vdspill"},
                      context.budget, build.cancel);
   materials = scene->materials();
+  materials.name_unlisted();
+  const AttributeSet& wanted = source.options.attributes;
+  for (const Attribute attribute : wanted.list())
+    attributes.push_back({attribute, attribute == Attribute::kColor
+                                         ? 0
+                                         : value_bytes(attribute, materials.names.size())});
+  if (!wanted.shows_images()) materials.drop_images();
   for (const std::string& warning : std::exchange(materials.warnings, {}))
     build.progress.warn(warning);
   images = image_digests(build.files, materials.images, context.threads, build.cancel);
@@ -111,7 +171,8 @@ void ColorStage::State::read_surfaces() {
   if (store) return;
   share.emplace(context.budget.available() / 3, &context.budget);
   store.emplace(context.build.files, source.work_folder + "/surfaces.vdspill", *share);
-  const std::vector<Checksum128> looks = look_digests(materials.materials, images);
+  const std::vector<Checksum128> looks =
+      look_digests(materials.materials, images, source.options.attributes);
   const SurfaceBinning binning{
       .grid = source.grid,
       .materials = materials.materials,
@@ -123,15 +184,18 @@ void ColorStage::State::read_surfaces() {
   surfaces = bin_surfaces(*scene, binning, *store, context);
   scene.reset();
   trim_heap();
-  for (size_t i = 0; i < cubes.size(); ++i)
-    keys.push_back(color_key(grid, cubes[i], surfaces.contents[i]));
+  for (const StoredAttribute& attribute : attributes)
+    for (auto& of_attribute = keys.emplace_back(); of_attribute.size() < cubes.size();) {
+      const size_t i = of_attribute.size();
+      of_attribute.push_back(attribute_key(attribute, grid, cubes[i], surfaces.contents[i]));
+    }
 }
 
 // Those that cubes show which are to be baked.
 std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& artifacts) {
   ImageClasses needed;
   for (size_t i = 0; i < cubes.size(); ++i)
-    if (!artifacts.has(keys[i])) needed |= surfaces.contents[i].images;
+    if (!is_stored(artifacts, i)) needed |= surfaces.contents[i].images;
   uint64_t count = 0;
   for (size_t i = 0; i < materials.images.size(); ++i) count += needed.test(i % needed.size());
   SceneMaterials shown = materials;
@@ -159,48 +223,69 @@ std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& a
   return prepare();
 }
 
+// Bakes all attributes, and adds the first of them.
 void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
                              ColorReport& report) {
   const BuildContext& build = context.build;
-  const auto memory = ColorMemory::divide(context.budget.available(), context.threads);
+  const auto memory =
+      ColorMemory::divide(context.budget.available(), context.threads, source.options.attributes);
   std::vector<BakeWorker> workers(memory.workers);
-  ColorSectionWriter section(out, grid.color_levels, context.budget);
+  OpenSection section(out, attributes[0].kind, grid.color_levels, materials.names, context.budget);
   build.progress.begin_stage("color", report.cubes, "cubes");
   build.progress.resume_at(report.cubes_reused);
   parallel_for_in_order(
       memory.workers, cubes.size(),
       [&](unsigned number, size_t item) {
         BakeWorker& worker = workers[number];
-        worker.records.clear();
+        worker.baked.resize(attributes.size());
+        for (auto& records : worker.baked) records.clear();
+        worker.is_stored = is_stored(artifacts, item);
         if (surfaces.contents[item].surfaces == 0) return;
-        if (artifacts.has(keys[item])) {
-          const uint64_t bytes = artifacts.bytes_of(keys[item]);
-          if (bytes > worker.stored.bytes()) {
-            worker.stored = {};
-            worker.stored = MemoryCharge(context.budget, bytes, "stored colors of a cube");
-          }
-          return artifacts.read(keys[item], worker.records);
-        }
+        if (worker.is_stored) return worker.stored.read(artifacts, keys[0][item], context.budget);
         if (!worker.baker) {
           worker.textures = textures.open(memory.texture_bytes);
-          worker.baker.emplace(grid, textures.materials(), *worker.textures, *store,
+          worker.baker.emplace(grid, attributes, textures.materials(), *worker.textures, *store,
                                memory.surface_bytes, context.budget, build.cancel);
         }
-        worker.baker->bake(cubes[item], surfaces.bins[item], worker.records);
-        artifacts.add(keys[item], worker.records);
+        worker.baker->bake(cubes[item], surfaces.bins[item], worker.baked);
+        for (size_t i = 0; i < attributes.size(); ++i)
+          artifacts.add(keys[i][item], worker.baked[i]);
       },
       [&](unsigned number, size_t item) {
         build.cancel.check();
-        RegionRecords records(workers[number].records);
-        while (const auto region = records.next()) {
-          section.add_region(*region);
-          report.cells += region->counts[0];
-        }
-        if (surfaces.contents[item].surfaces > 0 && !artifacts.has(keys[item]))
-          build.progress.advance(1);
+        const BakeWorker& worker = workers[number];
+        if (surfaces.contents[item].surfaces == 0) return;
+        report.cells += section.add(worker.is_stored ? worker.stored.records : worker.baked[0]);
+        if (!worker.is_stored) build.progress.advance(1);
       });
   build.progress.end_stage();
   if (report.cells > 0) section.finish();
+}
+
+// Sections are written one after the other: what the others become is read from the work folder.
+void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute,
+                                   GlobalFileWriter& out, const ColorReport& report) {
+  const BuildContext& build = context.build;
+  // Half of the memory is for records on their way.
+  const auto memory = ColorMemory::divide(context.budget.available(), context.threads, {});
+  std::vector<StoredRecords> workers(memory.workers);
+  const Attribute kind = attributes[attribute].kind;
+  OpenSection section(out, kind, grid.color_levels, materials.names, context.budget);
+  build.progress.begin_stage(name_of(kind), report.cubes, "cubes");
+  parallel_for_in_order(
+      memory.workers, cubes.size(),
+      [&](unsigned number, size_t item) {
+        if (surfaces.contents[item].surfaces > 0)
+          workers[number].read(artifacts, keys[attribute][item], context.budget);
+      },
+      [&](unsigned number, size_t item) {
+        build.cancel.check();
+        if (surfaces.contents[item].surfaces == 0) return;
+        section.add(workers[number].records);
+        build.progress.advance(1);
+      });
+  build.progress.end_stage();
+  section.finish();
 }
 
 ColorStage::ColorStage(const ColorSource& source, const StageContext& context)
@@ -213,7 +298,10 @@ ColorStage::~ColorStage() = default;
 std::string ColorStage::digest() {
   state_->read_surfaces();
   Sha256 hash;
-  hash.add(std::as_bytes(std::span(state_->keys)));
+  for (const auto& keys : state_->keys) hash.add(std::as_bytes(std::span(keys)));
+  if (state_->source.options.attributes.material)
+    for (const std::string& name : state_->materials.names)
+      hash.add(std::as_bytes(std::span(name.c_str(), name.size() + 1)));
   return hash.finish();
 }
 
@@ -241,12 +329,14 @@ ColorReport ColorStage::add_to(GlobalFileWriter& out) {
   for (size_t i = 0; i < state_->cubes.size(); ++i) {
     if (state_->surfaces.contents[i].surfaces == 0) continue;
     ++report.cubes;
-    if (!artifacts.has(state_->keys[i])) continue;
+    if (!state_->is_stored(artifacts, i)) continue;
     ++report.cubes_reused;
     state_->store->clear(state_->surfaces.bins[i]);
   }
   const auto textures = state_->decode_images(artifacts);
   state_->bake(artifacts, *textures, out, report);
+  for (size_t i = 1; i < state_->attributes.size() && report.cells > 0; ++i)
+    state_->add_stored(artifacts, i, out, report);
   report.images = state_->materials.images.size();
   report.image_bytes = textures->bytes();
   report.spill_bytes = state_->store->file_bytes();

@@ -1,6 +1,6 @@
-// The colors of a scene (docs/color.md): its surfaces are read once more and binned by cubes of the
-// color grid; the cubes are baked on all threads, and written in Morton order behind the levels of
-// the global file.
+// The colors of a scene, and other attributes of its cells (docs/color.md): its surfaces are read
+// once more and binned by cubes of the color grid; the cubes are baked on all threads, and written
+// in Morton order behind the levels of the global file, a section for each attribute.
 //
 // A cube is a task: what it became is stored in the work folder (color_store.h) under a key of all
 // that it depends on (color_keys.h), and used again by a later run for which the key is the same.
@@ -19,7 +19,7 @@
 namespace voxdag {
 
 struct ColorSource {
-  const GeometryOptions& options;  // with a color resolution
+  const GeometryOptions& options;  // with attributes and a color resolution
   Grid grid;
   std::string digest;            // of the scene's triangles, as ingest read them
   std::string work_folder;       // for scratch files

@@ -91,10 +91,23 @@ bool ColorStore::is_sound(const Place& place, const CancelToken& cancel) const {
   return checksum.value() == place.checksum;
 }
 
+ColorStore::Place ColorStore::place_of(const Checksum128& key) const {
+  const auto found = found_.find({key.low, key.high});
+  if (found != found_.end()) return found->second;
+  const std::lock_guard lock(mutex_);
+  return added_.at({key.low, key.high});
+}
+
 void ColorStore::read(const Checksum128& key, std::vector<std::byte>& out) const {
-  const Place& place = found_.at({key.low, key.high});
+  const Place place = place_of(key);
   out.resize(static_cast<size_t>(place.bytes));
-  reader_->read_at(place.offset, out);
+  std::shared_ptr<ReadableFile> reader = reader_;
+  if (!has(key)) {
+    const std::lock_guard lock(mutex_);
+    if (!added_reader_) added_reader_ = files_.open_read(path_);
+    reader = added_reader_;
+  }
+  reader->read_at(place.offset, out);
   if (checksum64(out) != place.checksum)
     throw Error(ErrorCode::kCorrupt, path_ + " at offset " + std::to_string(place.offset) +
                                          " fails its checksum: expected the colors that were read "
@@ -103,12 +116,14 @@ void ColorStore::read(const Checksum128& key, std::vector<std::byte>& out) const
 
 void ColorStore::add(const Checksum128& key, std::span<const std::byte> artifact) {
   std::vector<std::byte> header;
-  append_header({key, artifact.size(), checksum64(artifact)}, header);
+  const uint64_t checksum = checksum64(artifact);
+  append_header({key, artifact.size(), checksum}, header);
   const std::lock_guard lock(mutex_);
   if (!writer_) writer_ = end_ > 0 ? files_.open_write(path_) : files_.create(path_);
   // The header last: what it names is there, unless the power is cut.
   writer_->write_at(end_ + kHeaderBytes, artifact);
   writer_->write_at(end_, header);
+  added_[{key.low, key.high}] = {end_ + kHeaderBytes, artifact.size(), checksum};
   end_ += kHeaderBytes + artifact.size();
   sync_if_due();
 }

@@ -36,10 +36,10 @@ class ColorStore {
   // Waits for the disk.
   ~ColorStore();
 
-  // Whether the file had an artifact with this key when it was opened.
+  // Whether the file had a sound artifact with this key when it was opened.
   bool has(const Checksum128& key) const { return found_.contains({key.low, key.high}); }
-  // How many bytes it has.
-  uint64_t bytes_of(const Checksum128& key) const { return found_.at({key.low, key.high}).bytes; }
+  // How many bytes it has, or one that was added.
+  uint64_t bytes_of(const Checksum128& key) const { return place_of(key).bytes; }
   // These. Throws Error{kCorrupt} if they are damaged by now.
   void read(const Checksum128& key, std::vector<std::byte>& out) const;
   // Throws what went wrong when an earlier one was synced, too.
@@ -52,6 +52,7 @@ class ColorStore {
     uint64_t offset = 0, bytes = 0, checksum = 0;
   };
 
+  Place place_of(const Checksum128& key) const;
   bool is_sound(const Place& place, const CancelToken& cancel) const;
   void sync_if_due();
 
@@ -61,6 +62,8 @@ class ColorStore {
   std::shared_ptr<ReadableFile> reader_;                  // null: there was no file
   std::map<std::pair<uint64_t, uint64_t>, Place> found_;  // by key
   mutable std::mutex mutex_;                              // guards all below
+  std::map<std::pair<uint64_t, uint64_t>, Place> added_;  // by key
+  mutable std::shared_ptr<ReadableFile> added_reader_;    // null before the first is read
   uint64_t end_ = 0;                                      // of the last artifact
   std::shared_ptr<WritableFile> writer_;                  // null before the first add()
   std::future<void> pending_;                             // a sync

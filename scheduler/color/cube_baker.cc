@@ -5,6 +5,8 @@
 #include <numeric>
 
 #include "core/base/error.h"
+#include "core/color/blocks/value_region.h"
+#include "core/color/color_of.h"
 #include "core/geometry/morton.h"
 #include "core/geometry/octree_descent.h"
 #include "scheduler/color/region_record.h"
@@ -18,21 +20,29 @@ constexpr uint64_t kSurfaceBytes = 2 * sizeof(FixedSurface) + 4 * sizeof(uint32_
 // Records for a child cube that are collected before they go to the store.
 constexpr size_t kPartBytes = 32 << 10;
 
+AttributeSet set_of(std::span<const StoredAttribute> attributes) {
+  AttributeSet set;
+  for (const StoredAttribute& attribute : attributes) set.add(attribute.kind);
+  return set;
+}
+
 }  // namespace
 
-CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const Material> materials,
-                     TextureReader& textures, SurfaceStore& store, uint64_t surface_bytes,
-                     MemoryBudget& budget, const CancelToken& cancel)
+CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
+                     std::span<const Material> materials, TextureReader& textures,
+                     SurfaceStore& store, uint64_t surface_bytes, MemoryBudget& budget,
+                     const CancelToken& cancel)
     : grid_(grid),
+      attributes_(attributes),
       store_(store),
       surface_bytes_(surface_bytes),
       budget_(budget),
       cancel_(cancel),
-      charge_(budget, ColorMemory::kRegionBytes, "baking colors"),
+      charge_(budget, ColorMemory::region_bytes(set_of(attributes)), "baking colors"),
       records_charge_(budget, 0, "colors of a cube"),
-      baker_(grid, materials, textures) {}
+      baker_(grid, materials, textures, set_of(attributes)) {}
 
-void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, std::vector<std::byte>& records) {
+void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, Records& records) {
   if (bin.surfaces == 0) return;
   const uint64_t bytes = bin.surfaces * kSurfaceBytes;
   if (bytes > surface_bytes_) return divide(cube, bin, records);
@@ -49,7 +59,7 @@ void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, std::vector<std::
 }
 
 // Too many surfaces for the memory: those of the eight children are stored apart.
-void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin, std::vector<std::byte>& records) {
+void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin, Records& records) {
   if (cube.level == grid_.region_level()) return bake_in_parts(cube, bin, records);
   std::array<SurfaceStore::Bin, 8> children;
   SurfaceWriter writer(store_, children, kPartBytes * children.size());
@@ -70,8 +80,7 @@ void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin, std::vector<std
   }
 }
 
-void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching,
-                        std::vector<std::byte>& records) {
+void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching, Records& records) {
   if (touching.empty()) return;
   if (cube.level == grid_.region_level()) return bake_region(cube, touching, records);
   std::array<std::vector<uint32_t>, 8> parts;
@@ -85,7 +94,7 @@ void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching,
 }
 
 void CubeBaker::bake_region(const Cube& region, std::span<const uint32_t> touching,
-                            std::vector<std::byte>& records) {
+                            Records& records) {
   cancel_.check();
   touching_.clear();
   for (const uint32_t i : touching) touching_.push_back(surfaces_[i]);
@@ -96,8 +105,7 @@ void CubeBaker::bake_region(const Cube& region, std::span<const uint32_t> touchi
 
 // A region is not divided: its sums take what they take, and the surfaces come one part after the
 // other.
-void CubeBaker::bake_in_parts(const Cube& region, SurfaceStore::Bin& bin,
-                              std::vector<std::byte>& records) {
+void CubeBaker::bake_in_parts(const Cube& region, SurfaceStore::Bin& bin, Records& records) {
   const size_t most = std::max<size_t>(surface_bytes_ / sizeof(FixedSurface), 1);
   const MemoryCharge charge(budget_, most * sizeof(FixedSurface), "surfaces to be baked");
   touching_.clear();
@@ -118,19 +126,38 @@ void CubeBaker::bake_in_parts(const Cube& region, SurfaceStore::Bin& bin,
   touching_ = {};
 }
 
-void CubeBaker::append(const Cube& region, std::vector<std::byte>& records) {
-  baker_.finish(cells_);
+void CubeBaker::append(const Cube& region, Records& records) {
+  // Before finish(), which frees the sums.
+  const uint64_t sums = baker_.attribute_bytes();
+  const MemoryCharge charge(budget_, sums - std::min<uint64_t>(sums, ColorMemory::kValueBytes),
+                            "normals and materials of a region");
+  baker_.finish(cells_, values_);
   if (cells_.empty()) return;
   const uint64_t morton = morton_encode(region.position[0], region.position[1], region.position[2]);
-  const EncodedRegion encoded =
-      encode_region(grid_.color_levels - grid_.region_level(), morton, cells_);
-  // Twice the bytes are there while the vector grows.
-  const uint64_t bytes = 3 * (records.size() + encoded.blocks.size());
-  if (bytes > records_charge_.bytes() && !records_charge_.try_resize(bytes))
-    throw Error(ErrorCode::kOutOfMemory,
-                "not enough memory for the colors of one cube: expected "
-                "more memory, fewer threads, or a coarser color grid");
-  append_region(encoded, records);
+  for (size_t i = 0; i < attributes_.size(); ++i) {
+    const EncodedRegion encoded = encode(attributes_[i], morton);
+    // Twice the bytes are there while the vector grows.
+    uint64_t bytes = encoded.blocks.size();
+    for (const auto& of_attribute : records) bytes += of_attribute.size();
+    if (3 * bytes > records_charge_.bytes() && !records_charge_.try_resize(3 * bytes))
+      throw Error(ErrorCode::kOutOfMemory,
+                  "not enough memory for the colors of one cube: expected "
+                  "more memory, fewer threads, or a coarser color grid");
+    append_region(encoded, records[i]);
+  }
+}
+
+EncodedRegion CubeBaker::encode(const StoredAttribute& attribute, uint64_t morton) {
+  const uint32_t levels = grid_.color_levels - grid_.region_level();
+  if (attribute.kind == Attribute::kColor) return encode_region(levels, morton, cells_);
+  valued_.clear();
+  for (size_t i = 0; i < cells_.size(); ++i) {
+    const uint32_t value = attribute.kind == Attribute::kAlpha
+                               ? alpha_of(cells_[i].sum)
+                               : value_of(values_[i], attribute.kind);
+    valued_.push_back({cells_[i].code, value});
+  }
+  return encode_values(attribute.kind, attribute.value_bytes, levels, morton, valued_);
 }
 
 }  // namespace voxdag

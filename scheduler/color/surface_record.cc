@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-constexpr uint8_t kWidePosition = 1, kTextured = 2, kWideTexture = 4, kColored = 8;
+constexpr uint8_t kWidePosition = 1, kTextured = 2, kWideTexture = 4, kColored = 8, kFlipped = 16;
 
 bool fits_narrow(int64_t value) {
   return value >= std::numeric_limits<int32_t>::min() &&
@@ -17,7 +17,7 @@ bool fits_narrow(int64_t value) {
 }
 
 uint8_t flags_of(const FixedSurface& surface, bool has_image) {
-  uint8_t flags = has_image ? kTextured : 0;
+  uint8_t flags = (has_image ? kTextured : 0) | (surface.is_flipped ? kFlipped : 0);
   for (const auto& vertex : surface.position.v)
     if (!std::ranges::all_of(vertex, fits_narrow)) flags |= kWidePosition;
   for (const SurfaceCorner& corner : surface.corners) {
@@ -59,6 +59,7 @@ std::optional<FixedSurface> SurfaceRecords::next() {
   if (in_.ok() && in_.left() == 0) return std::nullopt;
   const uint8_t flags = in_.get<uint8_t>();
   FixedSurface surface;
+  surface.is_flipped = (flags & kFlipped) != 0;
   surface.material = in_.get<uint32_t>();
   for (auto& vertex : surface.position.v)
     for (int64_t& value : vertex) value = get_coordinate(in_, flags & kWidePosition);
@@ -68,7 +69,7 @@ std::optional<FixedSurface> SurfaceRecords::next() {
   if (flags & kColored)
     for (SurfaceCorner& corner : surface.corners)
       for (uint16_t& value : corner.color) value = in_.get<uint16_t>();
-  if (!in_.ok() || flags >= 2 * kColored)
+  if (!in_.ok() || flags >= 2 * kFlipped)
     throw DamagedTriangles("stored surfaces have a record that ends too early or has flags " +
                            std::to_string(flags) + ": expected what was written there");
   return surface;

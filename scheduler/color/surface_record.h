@@ -2,7 +2,7 @@
 // 41 to 149 bytes, one after another. What the color does not depend on is left out: texture
 // coordinates of materials without an image, and COLOR_0 where all corners are white.
 //
-//     u8   flags: 1 wide positions, 2 textured, 4 wide texture coordinates, 8 colored
+//     u8   flags: 1 wide positions, 2 textured, 4 wide texture coordinates, 8 colored, 16 flipped
 //     u32  material
 //     9 x  i32, or i64 if wide: positions, [vertex][axis]
 //     6 x  i32, or i64 if wide: texture coordinates, [corner][axis], if textured

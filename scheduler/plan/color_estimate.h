@@ -1,4 +1,4 @@
-// What the colors of a build will take, its geometry not counted.
+// What the colors of a build, and other attributes, will take, its geometry not counted.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace voxdag {
 
 struct ColorEstimate {
   EstimateRange cells;           // of the color grid, that have a color
-  EstimateRange file_bytes;      // of the section in the global file
+  EstimateRange file_bytes;      // of the sections in the global file
   EstimateRange artifact_bytes;  // of colors in the work folder, until the file is done
   EstimateRange spill_bytes;     // of surfaces and pyramids of images that do not fit in memory
   EstimateRange memory_bytes;

@@ -204,7 +204,7 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
     *figure = std::min(*figure, static_cast<double>(budget.limit())) + kBaseMemoryBytes;
   const double growth = last.dag_nodes > 0 ? nodes / last.dag_nodes : 1;
   estimate.cpu_s = within(last.cpu_s * growth * kBuildOverPilotTime, 1.5 * spread);
-  if (options.color) {
+  if (options.attributes.any()) {
     const int color_doublings = static_cast<int>(levels_of_resolution(options.color_resolution)) -
                                 static_cast<int>(last.levels);
     const EstimateRange cells = within(grow_as_surface(before.voxels, last.voxels, color_doublings),
@@ -226,7 +226,7 @@ double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene
   const double triangles = static_cast<double>(scene.state.counts.triangles);
   const double octree_nodes = 2 * bricks + scene.state.grid.levels * triangles;
   const double geometry = kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
-  if (!options.color) return geometry;
+  if (!options.attributes.any()) return geometry;
   const uint32_t color_levels = levels_of_resolution(options.color_resolution);
   const double cells =
       kMaxCellsPerBrick * bricks * std::exp2(-2.0 * (scene.state.grid.levels - color_levels)) +

@@ -46,7 +46,7 @@ size_t characters_of(const std::string& text) {
 
 std::vector<std::string> texts_of(const ordered_json& value, const std::string& member) {
   if (!value.is_array()) return {text_of(value, member)};
-  if (value.empty() || value.size() > kMaxScenes) fail(member, "1 to 64 scenes");
+  if (value.empty() || value.size() > kMaxScenes) fail(member, "1 to 64 of them");
   std::vector<std::string> texts;
   for (const ordered_json& item : value) texts.push_back(text_of(item, member));
   return texts;
@@ -145,7 +145,15 @@ void read_options(const ordered_json& options, BuildSpec& spec) {
         [&](const auto& v) {
           g.hash_bits = static_cast<uint32_t>(count_of(v, "hash_bits", 4, 64));
         }},
-       {"color", [&](const auto& v) { g.color = flag_of(v, "color"); }},
+       {"color", [&](const auto& v) { g.attributes.color |= flag_of(v, "color"); }},
+       {"attributes",
+        [&](const auto& v) {
+          for (const std::string& name : texts_of(v, "attributes"))
+            add_attribute(
+                g.attributes,
+                one_of(ordered_json(name), "attributes", {"color", "alpha", "normal", "material"}),
+                "attributes");
+        }},
        {"color_resolution",
         [&](const auto& v) { g.color_resolution = power_of_two(v, "color_resolution", 4); }},
        {"memory", [&](const auto& v) { r.memory_bytes = memory_of(v); }},
@@ -161,7 +169,8 @@ void read_options(const ordered_json& options, BuildSpec& spec) {
           r.method = one_of(v, "method", {"consing", "pointers", "hashes"});
         }}});
   if (g.bounds && g.voxel_size) fail("voxel_size", "no bounds at the same time");
-  if (g.color_resolution && !g.color) fail("color_resolution", "color at the same time");
+  if (g.color_resolution && !g.attributes.any())
+    fail("color_resolution", "color or attributes at the same time");
   if (g.voxel_size && *g.voxel_size <= 0) fail("voxel_size", "a number above 0");
 }
 

@@ -65,11 +65,18 @@ TEST_F(FileCommands, VerifyComparesColors) {
     const std::string name = colors == std::string("--json") ? "plain.glb" : "city.glb";
     ASSERT_EQ(run({"generate", "city", name, "--triangles", "9000", colors}).status, 0);
   }
-  run_json({"build", "city.glb", "-r", "256", "--color", "-o", "city.vdag"});
+  run_json({"build", "city.glb", "-r", "256", "--color", "--attributes", "material,normal,alpha",
+            "-o", "city.vdag"});
   const Json colors =
       run_json({"verify", "city.vdag", "--against", "city.glb"})["against"]["colors"];
   EXPECT_GT(colors["cells"], 1000);
   EXPECT_EQ(colors["equal"], colors["regions"]);
+  const Json info = run_json({"info", "city.vdag"});
+  for (const char* name : {"alpha", "normal", "material"})
+    EXPECT_EQ(info["attributes"][name]["cells"], info["colors"]["cells"]) << name;
+  EXPECT_GT(info["attributes"]["material"]["names"].size(), 2u);
+  expect_error(2, "'shine' is no attribute",
+               {"build", "city.glb", "-r", "64", "--attributes", "alpha,shine", "-o", "x.vdag"});
   const Answer other = run({"verify", "city.vdag", "--against", "plain.glb"});
   EXPECT_EQ(other.status, 4) << other.err;
   EXPECT_NE(other.err.find("are not those of the scene"), std::string::npos) << other.err;

@@ -1,5 +1,5 @@
-// A build with colors that is killed, cut off from power, or has its disk fill up or fail, at any
-// operation on the disk, ends with the same bytes when it is run again.
+// A build with colors and all other attributes that is killed, cut off from power, or has its disk
+// fill up or fail, at any operation on the disk, ends with the same bytes when it is run again.
 #include "tests/crash/crash_fixture.h"
 #include "tests/unit/scheduler_color/painted_scene.h"
 
@@ -17,7 +17,7 @@ class ColorCrashTest : public CrashTest {
     BuildSpec spec = CrashTest::spec();
     spec.geometry.scenes = {scene_};
     spec.geometry.resolution = 128;
-    spec.geometry.color = true;
+    spec.geometry.attributes = {true, true, true, true};
     return spec;
   }
 

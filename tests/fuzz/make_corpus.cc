@@ -16,7 +16,7 @@
 #include "tests/fuzz/scene/rich_scene.h"
 #include "tests/unit/format/test_artifacts.h"
 #include "tests/unit/format/test_files.h"
-#include "tests/unit/format_color/colored_files.h"
+#include "tests/unit/format_color/valued_files.h"
 #include "tests/unit/image/image_files.h"
 
 namespace voxdag::test {
@@ -116,7 +116,7 @@ void add_global_files(const Corpus& corpus) {
   }
 }
 
-// The same with colors, and the header up to the end of the attribute table.
+// The same with colors and other attributes, and the header up to the end of the attribute table.
 void add_colored_files(const Corpus& corpus) {
   TemporaryFolder folder;
   struct Input {
@@ -136,6 +136,13 @@ void add_colored_files(const Corpus& corpus) {
                    smooth_colors(color_levels, 9)},
                   true, narrow_words);
     add_global_file(corpus, name, path, global_layout::kFeaturesAt);
+  }
+  for (const uint32_t levels : {3u, 7u}) {
+    const std::string name = "valued_" + std::to_string(1 << levels),
+                      path = folder.path() + "/" + name;
+    write_valued(path, {levels, levels, random_codes(levels, levels, 30), smooth_colors(levels, 9)},
+                 {levels == 3, true, true, true});
+    add_global_file(corpus, name.c_str(), path, global_layout::kFeaturesAt);
   }
 }
 

@@ -42,8 +42,11 @@ class RegionBaker {
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
 
   // The references must outlive it. Each triangle's material is an index into `materials`.
-  RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures)
-      : grid_(grid), materials_(materials), textures_(textures) {
+  // `wanted`: which values finish() is to find besides colors. Materials are then those of the
+  // materials' numbers.
+  RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures,
+              const AttributeSet& wanted = {})
+      : grid_(grid), materials_(materials), textures_(textures), cells_(wanted) {
     waiting_.reserve(kMaxWaiting);
     for (int a = 0; a < 3; ++a)
       for (uint32_t k = 0; k < 64; ++k)
@@ -72,7 +75,13 @@ class RegionBaker {
     for (uint32_t i = 0; i < triangles.size(); ++i) add_triangle(i);
     add_waiting();
   }
-  void finish(std::vector<ColoredCell>& cells) { cells_.take(cells); }
+  void finish(std::vector<ColoredCell>& cells) { finish(cells, values_); }
+  // `values`: one for each cell if normals or materials are wanted.
+  void finish(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
+    cells_.take(cells, values);
+  }
+  // What the sums for them take.
+  uint64_t attribute_bytes() { return cells_.attributes().bytes(); }
 
  private:
   static constexpr size_t kMaxWaiting = 1 << 16;
@@ -118,6 +127,7 @@ class RegionBaker {
     }
     const color::CoveredSurface<Int> covered(triangle);
     std::optional<color::SurfaceLook<Textures>> look;
+    std::optional<color::SurfaceFacing> facing;
     // Cells are collected, so that they are on their way from memory while others are found.
     constexpr size_t kBatch = 32;
     struct {
@@ -140,6 +150,13 @@ class RegionBaker {
       }
       for (size_t i = 0; i < collected; ++i)
         look->add(batch[i].spot, batch[i].weight, cells_.sum(batch[i].cell));
+      if (cells_.attributes().is_needed()) {
+        if (!facing) facing.emplace(facing_of(surface));
+        for (size_t i = 0; i < collected; ++i)
+          cells_.attributes().add(batch[i].cell, *facing,
+                                  static_cast<uint32_t>(popcount64(batch[i].columns)),
+                                  batch[i].weight);
+      }
       collected = 0;
     };
     const uint32_t* spread[3];
@@ -171,18 +188,27 @@ class RegionBaker {
   // Adds closest points to those cells that nothing covers so far.
   void add_waiting() {
     std::optional<color::SurfaceLook<Textures>> look;
+    color::SurfaceFacing facing;
     uint32_t last = 0;
     for (const Waiting& waiting : waiting_) {
       if (cells_.is_covered(waiting.code)) continue;
       const FixedSurface& surface = triangles_[waiting.triangle];
-      if (!look || last != waiting.triangle)
+      if (!look || last != waiting.triangle) {
         look.emplace(surface, materials_[surface.material], textures_, grid_.cell_bits(),
                      color::area_of(surface.position));
+        if (cells_.attributes().is_needed()) facing = facing_of(surface);
+      }
       last = waiting.triangle;
+      const uint32_t cell = cells_.touch(waiting.code);
       look->add(look->spot_at(color::closest_point(surface.position, center_of(waiting.code))), 1,
-                cells_.sum(cells_.touch(waiting.code)));
+                cells_.sum(cell));
+      if (cells_.attributes().is_needed()) cells_.attributes().add(cell, facing, 1, 1);
     }
     waiting_.clear();
+  }
+
+  color::SurfaceFacing facing_of(const FixedSurface& surface) const {
+    return color::facing_of(surface, materials_[surface.material].number);
   }
 
   uint32_t code_of(const int64_t (&position)[3]) const {
@@ -207,6 +233,7 @@ class RegionBaker {
   int64_t first_[3] = {}, last_[3] = {};  // cells of the region
   color::RegionCells cells_;
   std::vector<Waiting> waiting_;
+  std::vector<CellValues> values_;  // none
 };
 
 // RegionBaker::bake() for a single region.

@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "core/base/host_device.h"
+#include "core/color/cell_values.h"
 #include "core/color/color_sum.h"
+#include "core/color/rule/attribute_sums.h"
 #include "core/color/rule/color_grid.h"
 
 namespace voxdag::color {
@@ -18,11 +20,13 @@ namespace voxdag::color {
 class RegionCells {
  public:
   static constexpr uint32_t kMaxCells = 1u << (3 * kRegionLevels);
-  // At most, in all vectors together while they grow.
+  // At most, in all vectors together while they grow, those of AttributeSums not counted.
   static constexpr uint64_t kMaxBytes =
       uint64_t{kMaxCells} * (4 + 3 * sizeof(ColorSum)) + (64 << 10);
 
-  RegionCells() : places_(kMaxCells), touched_(kMaxCells / 64) {}
+  // `wanted`: for what else than the color there are sums.
+  explicit RegionCells(const AttributeSet& wanted = {})
+      : attributes_(wanted), places_(kMaxCells), touched_(kMaxCells / 64) {}
 
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
   // To be called some time before the cell is touched or covered.
@@ -43,15 +47,21 @@ class RegionCells {
     if (!is_covered(code)) {
       places_[code] |= kCovered;
       sums_[number] = {};
+      if (attributes_.is_needed()) attributes_.reset(number);
     }
     return number;
   }
   ColorSum& sum(uint32_t number) { return sums_[number]; }
 
-  // Moves the cells into `cells`, in Morton order.
-  void take(std::vector<ColoredCell>& cells) {
+  AttributeSums& attributes() { return attributes_; }
+
+  // Moves the cells into `cells`, in Morton order, and into `values` what they have besides colors
+  // and alpha; this stays empty if that is nothing.
+  void take(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
     cells.clear();
     cells.reserve(sums_.size());
+    values.clear();
+    if (attributes_.is_needed()) values.reserve(sums_.size());
     for (uint32_t word = 0; word < touched_.size(); ++word) {
       const uint64_t touched = std::exchange(touched_[word], 0);
       for (uint64_t rest = touched; rest != 0; rest &= rest - 1) {
@@ -61,15 +71,19 @@ class RegionCells {
       }
       for (uint64_t rest = touched; rest != 0; rest &= rest - 1) {
         const uint32_t code = word * 64 + static_cast<uint32_t>(lowest_bit(rest));
-        cells.push_back({code, sums_[std::exchange(places_[code], 0)]});
+        const uint32_t number = std::exchange(places_[code], 0);
+        cells.push_back({code, sums_[number]});
+        if (attributes_.is_needed()) attributes_.get(number, values.emplace_back());
       }
     }
     sums_.clear();
+    attributes_.clear();
   }
 
  private:
   static constexpr uint32_t kCovered = 1u << 31;
 
+  AttributeSums attributes_;
   std::vector<uint32_t> places_;  // in sums_, from 1, and kCovered if it is; 0: not touched
   std::vector<uint64_t> touched_;
   std::vector<ColorSum> sums_;

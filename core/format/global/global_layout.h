@@ -27,9 +27,6 @@ inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 40;
 #endif
 inline constexpr uint64_t kNarrowLevelWords = VOXDAG_NARROW_LEVEL_WORDS;
 
-// Kinds of attributes.
-inline constexpr uint32_t kColorAttribute = 1;
-
 // Offsets in an entry of the attribute table; what follows is reserved: 0.
 inline constexpr size_t kAttributeKindAt = 0;
 inline constexpr size_t kAttributeLevelsAt = 4;

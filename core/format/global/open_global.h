@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/color/attribute_set.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
 
@@ -32,6 +33,23 @@ auto with_reader_errors(Use use) {
   } catch (const voxdag_reader::Error& error) {
     throw as_error(error);
   }
+}
+
+// The section of an attribute; one without tiers if the file has none.
+inline const voxdag_reader::ColorSection& section_of(const voxdag_reader::File& file,
+                                                     Attribute attribute) {
+  return attribute == Attribute::kColor    ? file.colors()
+         : attribute == Attribute::kAlpha  ? file.alphas()
+         : attribute == Attribute::kNormal ? file.normals()
+                                           : file.materials();
+}
+
+// What the cells of a file have.
+inline AttributeSet attributes_of(const voxdag_reader::File& file) {
+  AttributeSet set;
+  for (const Attribute attribute : kAllAttributes)
+    if (section_of(file, attribute).tier_count() > 0) set.add(attribute);
+  return set;
 }
 
 // The bytes of a file, and the file of such bytes: whoever watches the mapping for pages that

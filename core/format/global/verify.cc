@@ -15,6 +15,7 @@
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/node_index.h"
+#include "core/format/global/open_global.h"
 #include "core/format/global/verify_colors.h"
 
 namespace voxdag {
@@ -74,6 +75,7 @@ class Verifier {
 
   void check_header() const;
   void check_attributes(bool has_attributes) const;
+  void check_section(size_t entry, Attribute attribute) const;
   void check_blocks();
   void check_block(uint64_t block, uint64_t table) const;
   void check_padding() const;
@@ -146,36 +148,53 @@ void Verifier::check_header() const {
   check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "reserved");
 }
 
-// The only kind of attribute is color.
+// Sections of other kinds than this program knows are not valid.
 void Verifier::check_attributes(bool has_attributes) const {
   if (!has_attributes) check_zeros(kAttributeCountAt, kLevelsAt, "attribute sections are reserved");
   uint64_t count;
   std::memcpy(&count, file_.data() + kAttributeCountAt, sizeof(count));
-  if (count != (has_attributes ? 1 : 0) || has_attributes != file_.has_colors())
+  const std::vector<Attribute> kinds = attributes_of(file_).list();
+  if (count != kinds.size() || has_attributes == kinds.empty())
     broken(file_.path() + ": header",
            std::to_string(count) +
-               " attribute sections, expected one of colors, or none and no "
-               "feature bit 2");
-  uint64_t entry[kAttributeEntryBytes / sizeof(uint64_t)];
-  std::memcpy(entry, file_.data() + kAttributesAt, sizeof(entry));
-  if (has_attributes) {
-    const voxdag_reader::ColorSection& colors = file_.colors();
-    uint64_t cells = 0, finest_cells = 0;
-    for (uint32_t t = 0; t < colors.tier_count(); ++t) cells += colors.tier(t).cell_count;
-    for (uint64_t i = 0; i < colors.tier(0).region_count; ++i) {
-      voxdag_reader::ColorRegion region;
-      if (!voxdag_reader::ColorSection::region(colors.tier(0), i, region))
-        broken(file_.path() + ": colors", "region " + std::to_string(i) + " is damaged");
-      finest_cells += region.counts[0];
-    }
-    if (entry[kAttributeCellsAt / 8] != cells || entry[kAttributeFinestCellsAt / 8] != finest_cells)
-      broken(file_.path() + ": header", std::to_string(entry[kAttributeCellsAt / 8]) +
-                                            " colors, the section has " + std::to_string(cells));
-    const uint64_t end = entry[kAttributeOffsetAt / 8] + entry[kAttributeBytesAt / 8];
-    check_zeros(end, round_up_to_page(end), "padding after the colors");
+               " attribute sections, expected those of colors, alpha, normals and materials that "
+               "there are, or none and no feature bit 2");
+  for (size_t i = 0; i < kinds.size(); ++i)
+    check_section(kAttributesAt + i * kAttributeEntryBytes, kinds[i]);
+  check_zeros(kAttributesAt + kinds.size() * kAttributeEntryBytes, kFeaturesAt, "reserved");
+}
+
+// `entry`: of the attribute table.
+void Verifier::check_section(size_t entry, Attribute attribute) const {
+  const auto field = [&](size_t at) {
+    uint64_t value;
+    std::memcpy(&value, file_.data() + entry + at, sizeof(value));
+    return value;
+  };
+  const std::string name = name_of(attribute);
+  const voxdag_reader::ColorSection& section = section_of(file_, attribute);
+  uint64_t cells = 0, finest_cells = 0;
+  for (uint32_t t = 0; t < section.tier_count(); ++t) cells += section.tier(t).cell_count;
+  for (uint64_t i = 0; i < section.tier(0).region_count; ++i) {
+    voxdag_reader::ColorRegion region;
+    if (!voxdag_reader::ColorSection::region(section.tier(0), i, region))
+      broken(file_.path() + ": " + name + "s", "region " + std::to_string(i) + " is damaged");
+    finest_cells += region.counts[0];
   }
-  const size_t first = has_attributes ? kAttributeReservedAt : 0;
-  check_zeros(kAttributesAt + first, kFeaturesAt, "reserved");
+  if (field(kAttributeCellsAt) != cells || field(kAttributeFinestCellsAt) != finest_cells)
+    broken(file_.path() + ": header", std::to_string(field(kAttributeCellsAt)) + " " + name +
+                                          "s, the section has " + std::to_string(cells));
+  // Behind the names, up to the tier table.
+  const uint64_t end = field(kAttributeOffsetAt) + field(kAttributeBytesAt);
+  if (attribute == Attribute::kMaterial) {
+    const voxdag_reader::ColorTier& last = section.tier(section.tier_count() - 1);
+    uint64_t names =
+        static_cast<uint64_t>(last.directory - file_.data()) + 32 * last.region_count + 4;
+    for (const std::string& material : section.names()) names += 4 + material.size();
+    check_zeros(names, end - 32 * section.tier_count(), "padding after the names of materials");
+  }
+  check_zeros(end, round_up_to_page(end), "padding after the " + name + "s");
+  check_zeros(entry + kAttributeReservedAt, entry + kAttributeEntryBytes, "reserved");
 }
 
 void Verifier::check_block(uint64_t block, uint64_t table) const {

@@ -7,7 +7,7 @@
 //      computed from the bricks up. So no two nodes of a level are equal.
 //   4. One root; every other node has a parent.
 //   5. The header's voxels and octree nodes are those of the DAG.
-//   6. Colors are as core/format/global/verify_colors.h has it.
+//   6. Colors and other attributes are as core/format/global/verify_colors.h has it.
 //
 // Memory: 2 bits per word of the file, and 9 bytes per node of two levels, charged to the budget.
 // All threads work on one level at a time; what is found does not depend on their number.

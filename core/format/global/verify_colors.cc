@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
-#include "core/color/blocks/region.h"
+#include "core/color/blocks/value_region.h"
 #include "core/format/global/cell_places.h"
 #include "core/format/global/open_global.h"
 
@@ -64,7 +64,8 @@ class CellWalk {
 
 class ColorVerifier {
  public:
-  explicit ColorVerifier(const voxdag_reader::File& file) : file_(file), cells_(file) {}
+  ColorVerifier(const voxdag_reader::File& file, Attribute attribute)
+      : file_(file), attribute_(attribute), section_(section_of(file, attribute)), cells_(file) {}
 
   bool is_number_of_regions(const ColorTier& tier) const {
     return cells_.count(0, 0, tier.region_level, tier.region_count) == tier.region_count;
@@ -83,11 +84,14 @@ class ColorVerifier {
       fail(tier, i, "the DAG has no cells there");
     std::array<uint32_t, kRegionLevels + 1> counts{};
     std::vector<uint32_t> prefix[2];
-    const auto visit = [&](uint32_t level, uint64_t) {
+    std::vector<ValuedCell> finest;  // not of colors
+    const auto visit = [&](uint32_t level, uint64_t code) {
       const uint32_t coarser = tier.finest_level - level;
       if (coarser >= kPrefixLevels && coarser - kPrefixLevels < 2 && level > tier.region_level)
         prefix[coarser - kPrefixLevels].push_back(counts[coarser - kPrefixLevels]);
       ++counts[coarser];
+      if (coarser == 0 && attribute_ != Attribute::kColor)
+        finest.push_back({static_cast<uint32_t>(code), 0});
     };
     cells_.walk(tier.region_level, place, 0, tier.finest_level, visit);
     if (!std::equal(counts.begin(), counts.end(), region.counts))
@@ -96,12 +100,16 @@ class ColorVerifier {
       for (uint64_t entry = 0; entry < region.prefix_count(table); ++entry)
         if (region.prefix(table, entry) != prefix[table][entry])
           fail(tier, i, "prefix " + std::to_string(entry) + " is not the number of cells before");
-    check_blocks(tier, i, region);
+    check_padding(tier, i, region);
+    if (attribute_ == Attribute::kColor)
+      check_blocks(tier, i, region);
+    else
+      check_values(tier, i, region, finest);
     return region;
   }
 
   [[noreturn]] void fail(const ColorTier& tier, uint64_t i, const std::string& what) const {
-    throw Error(ErrorCode::kCorrupt, file_.path() + ": colors of level " +
+    throw Error(ErrorCode::kCorrupt, file_.path() + ": " + name_of(attribute_) + "s of level " +
                                          std::to_string(tier.finest_level) + ", region " +
                                          std::to_string(i) + ": " + what);
   }
@@ -114,9 +122,58 @@ class ColorVerifier {
       if (!is_canonical(region.blocks + 16 * b, there))
         fail(tier, i, "block " + std::to_string(b) + " is not in the form of its mode");
     }
+  }
+  void check_padding(const ColorTier& tier, uint64_t i, const ColorRegion& region) const {
+    const uint64_t blocks = (region.cells + 31) / 32;
     const uint64_t prefix_bytes = 4 * (region.prefix_count(0) + region.prefix_count(1));
-    for (uint64_t at = 16 * blocks + prefix_bytes; at < 16 * region.units(); ++at)
+    for (uint64_t at = region.block_bytes * blocks + prefix_bytes; at < 16 * region.units(); ++at)
       if (region.blocks[at] != 0) fail(tier, i, "its padding is not 0");
+  }
+
+  // `cells`: of the finest level, without their values.
+  void check_values(const ColorTier& tier, uint64_t i, const ColorRegion& region,
+                    std::vector<ValuedCell>& cells) const {
+    const auto fail_at = [&](size_t at, const std::string& what) {
+      fail(tier, i,
+           "value " + std::to_string(region.value(at)) + " of cell " + std::to_string(at) + ": " +
+               what);
+    };
+    for (size_t at = 0; at < cells.size(); ++at) {
+      const uint32_t value = cells[at].value = region.value(at);
+      if (attribute_ == Attribute::kNormal && ((value & 255) == 255 || value >> 8 == 255))
+        fail_at(at, "expected bytes up to 254");
+      if (attribute_ == Attribute::kMaterial && value >= section_.names().size())
+        fail_at(at, "expected one of " + std::to_string(section_.names().size()) + " materials");
+      if (tier.finest_level != section_.color_levels() &&
+          value != value_from_below(tier,
+                                    region.morton << 3 * (region.level_count - 1) | cells[at].code))
+        fail_at(at, "expected that of its children");
+    }
+    const EncodedRegion expected = encode_values(attribute_, region.block_bytes / 32,
+                                                 region.level_count - 1, region.morton, cells);
+    const auto* const stored = reinterpret_cast<const std::byte*>(region.blocks);
+    const auto differing = std::mismatch(expected.blocks.begin(), expected.blocks.end(), stored);
+    if (differing.first != expected.blocks.end())
+      fail(tier, i,
+           "byte " + std::to_string(differing.first - expected.blocks.begin()) +
+               " is not that of the value that a cell has from its children, or 0 behind the last "
+               "one");
+  }
+
+  // The value of a cell of a tier's finest level, of the regions of the tier before that it has.
+  uint32_t value_from_below(const ColorTier& tier, uint64_t code) const {
+    const ColorTier& below = section_.tier_of(tier.finest_level + 1);
+    uint32_t children[8];
+    size_t count = 0;
+    for (uint64_t i = ColorSection::lower_bound(below, code << 3); i < below.region_count; ++i) {
+      ColorRegion region;
+      if (!ColorSection::region(below, i, region))
+        fail(below, i, "its counts or its place are wrong");
+      if (region.morton >> 3 != code || count == 8) break;
+      children[count++] = region.value(region.cells - 1);
+    }
+    if (count == 0) fail(tier, 0, "a cell has no regions below");
+    return value_of_parent(attribute_, std::span(children, count));
   }
 
   static bool is_canonical(const unsigned char* block, unsigned cells) {
@@ -138,41 +195,50 @@ class ColorVerifier {
   }
 
   const voxdag_reader::File& file_;
+  const Attribute attribute_;
+  const ColorSection& section_;
   const CellWalk cells_;
 };
+
+void verify_section(const voxdag_reader::File& file, Attribute attribute, unsigned threads,
+                    Progress& progress, const CancelToken& cancel) {
+  const ColorVerifier verifier(file, attribute);
+  const ColorSection& section = section_of(file, attribute);
+  for (uint32_t t = 0; t < section.tier_count(); ++t) {
+    const ColorTier& tier = section.tier(t);
+    if (!verifier.is_number_of_regions(tier))
+      verifier.fail(tier, tier.region_count, "the DAG has another number of regions");
+    progress.begin_stage("verify " + std::string(name_of(attribute)) + "s", tier.region_count,
+                         "regions");
+    std::atomic<uint64_t> cells = 0;
+    parallel_for(threads, tier.region_count, [&](unsigned, size_t i) {
+      cancel.check();
+      const ColorRegion region = verifier.check_region(tier, i);
+      uint64_t expected = 0;
+      ColorRegion before;
+      if (i > 0 && !ColorSection::region(tier, i - 1, before))
+        verifier.fail(tier, i - 1, "its counts or its place are wrong");
+      if (i > 0) expected = before.first_unit + before.units();
+      if (region.first_unit != expected || (i > 0 && region.morton <= before.morton))
+        verifier.fail(tier, i, "it does not follow the one before it");
+      if (i + 1 == tier.region_count && region.first_unit + region.units() != tier.units)
+        verifier.fail(tier, i, "the data of the tier do not end with it");
+      cells += region.cells;
+      progress.advance(1);
+    });
+    if (cells != tier.cell_count)
+      verifier.fail(tier, tier.region_count, "the tier names another number of cells");
+    progress.end_stage();
+  }
+}
 
 }  // namespace
 
 void verify_colors(const voxdag_reader::File& file, unsigned threads, Progress& progress,
                    const CancelToken& cancel) {
-  if (!file.has_colors()) return;
   with_reader_errors([&] {
-    const ColorVerifier verifier(file);
-    for (uint32_t t = 0; t < file.colors().tier_count(); ++t) {
-      const ColorTier& tier = file.colors().tier(t);
-      if (!verifier.is_number_of_regions(tier))
-        verifier.fail(tier, tier.region_count, "the DAG has another number of regions");
-      progress.begin_stage("verify colors", tier.region_count, "regions");
-      std::atomic<uint64_t> cells = 0;
-      parallel_for(threads, tier.region_count, [&](unsigned, size_t i) {
-        cancel.check();
-        const ColorRegion region = verifier.check_region(tier, i);
-        uint64_t expected = 0;
-        ColorRegion before;
-        if (i > 0 && !ColorSection::region(tier, i - 1, before))
-          verifier.fail(tier, i - 1, "its counts or its place are wrong");
-        if (i > 0) expected = before.first_unit + before.units();
-        if (region.first_unit != expected || (i > 0 && region.morton <= before.morton))
-          verifier.fail(tier, i, "it does not follow the one before it");
-        if (i + 1 == tier.region_count && region.first_unit + region.units() != tier.units)
-          verifier.fail(tier, i, "the data of the tier do not end with it");
-        cells += region.cells;
-        progress.advance(1);
-      });
-      if (cells != tier.cell_count)
-        verifier.fail(tier, tier.region_count, "the tier names another number of cells");
-      progress.end_stage();
-    }
+    for (const Attribute attribute : kAllAttributes)
+      verify_section(file, attribute, threads, progress, cancel);
   });
 }
 

@@ -6,6 +6,7 @@
 //     dag.walk(visitor);                                   // depth first, the visitor may prune
 //     if (auto rgb = dag.color(x, y, z, level)) ...        // of a cell of edge R/2^level
 //     voxdag_reader::ColorCursor colors(dag);              // the same, fast for cells nearby
+//     dag.alpha(x, y, z, level), dag.normal(...), dag.material(...), dag.material_names()
 //     const voxdag_reader::Level& level = dag.level(l);    // raw words, for an upload to the GPU
 //
 // Level l has cubes of edge R/2^l voxels, 0 is the root; bricks (4x4x4 voxels) are level
@@ -253,16 +254,44 @@ class File {
   }
 
   // Whether cells have colors: those of the levels 0 to color_levels(). An empty scene has none.
-  bool has_colors() const { return colors_.tier_count() > 0; }
-  uint32_t color_levels() const { return colors_.color_levels(); }
-  const ColorSection& colors() const { return colors_; }
+  bool has_colors() const { return colors().tier_count() > 0; }
+  uint32_t color_levels() const { return colors().color_levels(); }
+  const ColorSection& colors() const { return sections_[0]; }
   // The color of a cell of level `level`, 0 to grid_levels(), which has 2^level cells along each
   // axis; of its ancestor of level color_levels() if it is finer. None where the cell is not set or
   // the file has no colors. A ColorCursor is faster where many cells are near each other.
   std::optional<Rgb> color(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     return BasicColorCursor<File>(*this).color(x, y, z, level);
   }
-  // Throws Error: the colors do not fit the DAG.
+  // The other attributes that a file may have, by the same cells; a section that the file has not
+  // has no tiers.
+  const ColorSection& alphas() const { return sections_[1]; }
+  const ColorSection& normals() const { return sections_[2]; }
+  const ColorSection& materials() const { return sections_[3]; }
+  // 0 to 255, linear.
+  std::optional<unsigned char> alpha(int64_t x, int64_t y, int64_t z, uint32_t level) const {
+    uint64_t i = 0;
+    BasicColorCursor<File> cells(*this, alphas());
+    const ColorRegion* const region = cells.find(x, y, z, level, i);
+    return region ? std::optional(static_cast<unsigned char>(region->value(i))) : std::nullopt;
+  }
+  std::optional<Normal> normal(int64_t x, int64_t y, int64_t z, uint32_t level) const {
+    uint64_t i = 0;
+    BasicColorCursor<File> cells(*this, normals());
+    const ColorRegion* const region = cells.find(x, y, z, level, i);
+    return region ? std::optional(region->normal(i)) : std::nullopt;
+  }
+  // An index into material_names().
+  std::optional<uint32_t> material(int64_t x, int64_t y, int64_t z, uint32_t level) const {
+    uint64_t i = 0;
+    BasicColorCursor<File> cells(*this, materials());
+    const ColorRegion* const region = cells.find(x, y, z, level, i);
+    if (region && region->value(i) >= material_names().size())
+      broken_colors("a cell has a material that the list has not");
+    return region ? std::optional(region->value(i)) : std::nullopt;
+  }
+  const std::vector<std::string>& material_names() const { return materials().names(); }
+  // Throws Error: the colors, or other attributes, do not fit the DAG.
   [[noreturn]] void broken_colors(const char* what) const {
     corrupt(std::string("colors: ") + what);
   }
@@ -430,9 +459,9 @@ class File {
                  bytes <= bytes_->size() - table_offset_,
              "an attribute section does not follow what is before it, or ends beyond the file");
       expect(levels >= 2 && levels <= grid_levels_, "expected attributes of a level of the grid");
-      if (kind == 1) {
-        expect(get<uint32_t>(entry + 40) == 16, "expected colors in blocks of 16 bytes");
-        const char* const wrong = colors_.open(data() + table_offset_, bytes, levels);
+      if (kind <= 4) {
+        const char* const wrong = sections_[kind - 1].open(data() + table_offset_, bytes, levels,
+                                                           kind, get<uint32_t>(entry + 40));
         expect(!wrong, wrong);
       }
       table_offset_ = (table_offset_ + bytes + kPageBytes - 1) / kPageBytes * kPageBytes;
@@ -459,7 +488,7 @@ class File {
   uint32_t version_ = 0, max_pointer_bits_ = 32, grid_levels_ = 0, hash_bits_ = 0;
   uint64_t voxels_ = 0, svo_nodes_ = 0, dag_nodes_ = 0, table_offset_ = 0;
   Level levels_[kMaxBrickLevel + 1];
-  ColorSection colors_;
+  ColorSection sections_[4];  // by kind
 };
 
 // Looks up colors; see voxdag_reader_colors.h.

@@ -1,19 +1,23 @@
-// The part of voxdag_reader.h that reads colors; copy both into your engine, and include that one.
-// docs/format.md, "The color section", describes the bytes.
+// The part of voxdag_reader.h that reads colors and the other attributes of cells (alpha, normals,
+// materials); copy both into your engine, and include that one. docs/format.md, "The color
+// section" and "The sections of alpha, normals and materials", describes the bytes.
 //
-// The set cells of all levels from 0 to color_levels() have a color. They are stored by regions of
-// up to 64^3 cells of a tier's finest level: first the colors of the region's cells of that level
-// in Morton order, then those of the next coarser one, and so on. So the color of a cell is found
-// by its rank: how many set cells of its level are before it in the region, which the DAG tells.
+// The set cells of all levels from 0 to a section's finest one have a color, or another value. They
+// are stored by regions of up to 64^3 cells of a tier's finest level: first those of the region's
+// cells of that level in Morton order, then those of the next coarser one, and so on. So the color
+// of a cell is found by its rank: how many set cells of its level are before it in the region,
+// which the DAG tells.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace voxdag_reader {
 
@@ -39,6 +43,26 @@ struct Rgb {
   }
   friend bool operator!=(const Rgb& x, const Rgb& y) { return !(x == y); }
 };
+
+// A unit vector in world space.
+struct Normal {
+  float x = 0, y = 0, z = 0;
+};
+
+// The normal in two bytes, the octahedral projection; any bytes are normals.
+inline Normal octahedral_normal(const unsigned char* bytes) {
+  const double across = bytes[0] - 127.0, along = bytes[1] - 127.0;
+  const double width = across < 0 ? -across : across, height = along < 0 ? -along : along;
+  double x = across, y = along;
+  const double z = 127 - width - height;
+  if (z < 0) {
+    x = across < 0 ? height - 127 : 127 - height;
+    y = along < 0 ? width - 127 : 127 - width;
+  }
+  const double scale = 1 / std::sqrt(x * x + y * y + z * z);
+  return {static_cast<float>(x * scale), static_cast<float>(y * scale),
+          static_cast<float>(z * scale)};
+}
 
 // The color of cell `i`, 0 to 31, in a block of 16 bytes; any bytes are colors.
 inline Rgb block_color(const unsigned char* block, unsigned i) {
@@ -92,9 +116,10 @@ struct ColorTier {
   uint64_t region_count = 0;
   uint64_t cell_count = 0;  // of all levels
   uint32_t finest_level = 0, region_level = 0;
+  uint32_t block_bytes = 16;  // for 32 cells
 };
 
-// The colors of a region. They belong to the File.
+// The colors, or other values, of a region. They belong to the File.
 struct ColorRegion {
   uint64_t morton = 0;      // among the cubes of the tier's region level
   uint64_t first_unit = 0;  // of its data
@@ -102,7 +127,16 @@ struct ColorRegion {
   uint32_t counts[7] = {};  // cells, the finest level first
   uint64_t cells = 0;       // of all levels
   const unsigned char* blocks = nullptr;
+  uint32_t block_bytes = 16;
 
+  // Alpha, a material or the code of a normal, the `i`-th of all cells; not for colors.
+  uint32_t value(uint64_t i) const {
+    const uint32_t bytes = block_bytes / 32;
+    uint32_t value = 0;
+    for (uint32_t b = bytes; b-- > 0;) value = value << 8 | blocks[i * bytes + b];
+    return value;
+  }
+  Normal normal(uint64_t i) const { return octahedral_normal(blocks + 2 * i); }
   // The color of the `i`-th of all cells; below `cells`.
   Rgb color(uint64_t i) const { return block_color(blocks + i / 32 * 16, unsigned(i % 32)); }
   // Table 0 is for the cells of the finest level, 1 for the next one. Its entries are for their
@@ -113,18 +147,26 @@ struct ColorRegion {
   uint32_t prefix(uint32_t table, uint64_t entry) const {
     if (table == 1) entry += prefix_count(0);
     uint32_t value;
-    std::memcpy(&value, blocks + (cells + 31) / 32 * 16 + 4 * entry, sizeof value);
+    std::memcpy(&value, blocks + block_bytes * ((cells + 31) / 32) + 4 * entry, sizeof value);
     return value;
   }
   // Of its data: blocks and prefixes.
-  uint64_t units() const { return (cells + 31) / 32 + (prefix_count(0) + prefix_count(1) + 3) / 4; }
+  uint64_t units() const {
+    return (cells + 31) / 32 * (block_bytes / 16) + (prefix_count(0) + prefix_count(1) + 3) / 4;
+  }
 };
 
-// The colors of a file.
+// The colors of a file, or another attribute of its cells.
 class ColorSection {
  public:
-  // The tiers of a section; returns what is wrong with them, or null.
-  const char* open(const unsigned char* section, uint64_t bytes, uint32_t color_levels) {
+  // The section of an attribute: 1 colors, 2 alpha, 3 normals, 4 materials. Returns what is wrong
+  // with it, or null.
+  const char* open(const unsigned char* section, uint64_t bytes, uint32_t color_levels,
+                   uint32_t kind = 1, uint32_t block_bytes = 16) {
+    const bool is_material = kind == 4;
+    const bool is_width = is_material ? block_bytes == 32 || block_bytes == 64 || block_bytes == 128
+                                      : block_bytes == 8u << kind;
+    if (!is_width) return "expected blocks of 16 bytes for colors, or as many as values have";
     color_levels_ = color_levels;
     tier_count_ = color_levels / 7 + 1;
     if (bytes < 32 * tier_count_) return "the color section has no room for its tiers";
@@ -140,6 +182,7 @@ class ColorSection {
       tier.region_level = tier.finest_level - std::min<uint32_t>(tier.finest_level, 6);
       if (get<uint64_t>(entry) != end) return "a tier of colors does not follow the one before it";
       if (tier.units > (tables - end) / 16) return "colors end beyond their section";
+      tier.block_bytes = block_bytes;
       tier.data = section + end;
       end += 16 * tier.units;
       if (tier.region_count == 0 || tier.region_count > (tables - end) / 32)
@@ -147,8 +190,11 @@ class ColorSection {
       tier.directory = section + end;
       end += 32 * tier.region_count;
     }
+    if (is_material) return read_names(section + end, tables - end, block_bytes / 32);
     return end == tables ? nullptr : "the color section is longer than its tiers";
   }
+  // Of materials: those that values are indexes of. The last one, "", is that of triangles without.
+  const std::vector<std::string>& names() const { return names_; }
 
   uint32_t color_levels() const { return color_levels_; }
   uint32_t tier_count() const { return tier_count_; }
@@ -161,6 +207,7 @@ class ColorSection {
     const unsigned char* const entry = tier.directory + 32 * i;
     region.morton = get<uint64_t>(entry);
     region.first_unit = get<uint64_t>(entry + 8);
+    region.block_bytes = tier.block_bytes;
     region.level_count = tier.finest_level - tier.region_level + 1;
     region.cells = 0;
     for (uint32_t j = 0; j < 7; ++j) {
@@ -197,17 +244,38 @@ class ColorSection {
     std::memcpy(&value, at, sizeof(T));
     return value;
   }
+  const char* read_names(const unsigned char* at, uint64_t bytes, uint32_t value_bytes) {
+    const char* const kBroken = "the list of materials does not fit between tiers and tier table";
+    const uint64_t count = bytes < 4 ? 0 : get<uint32_t>(at);
+    if (count == 0 || 4 * count > bytes - 4) return kBroken;
+    if (value_bytes != (count <= 256 ? 1u : count <= 65536 ? 2u : 4u))
+      return "materials have values of another width than their number needs";
+    uint64_t end = 4;
+    names_.reserve(static_cast<size_t>(count));
+    for (uint64_t i = 0; i < count; ++i) {
+      if (bytes - end < 4 || get<uint32_t>(at + end) > bytes - end - 4) return kBroken;
+      const uint32_t size = get<uint32_t>(at + end);
+      names_.emplace_back(reinterpret_cast<const char*>(at + end + 4), size);
+      end += 4 + size;
+    }
+    return bytes - end < 16 ? nullptr : kBroken;
+  }
 
   uint32_t color_levels_ = 0, tier_count_ = 0;
   ColorTier tiers_[3];
+  std::vector<std::string> names_;
 };
 
-// Looks up colors, fast where a cell is near the one before. Refers to the File, which must outlive
-// it; each thread needs its own.
+// Looks up colors, or another attribute, fast where a cell is near the one before. Refers to the
+// File, which must outlive it; each thread needs its own.
 template <class Dag>
 class BasicColorCursor {
  public:
-  explicit BasicColorCursor(const Dag& dag) : dag_(&dag) { path_[0] = 0; }
+  explicit BasicColorCursor(const Dag& dag) : BasicColorCursor(dag, dag.colors()) {}
+  // For find() in another section, such as dag.normals().
+  BasicColorCursor(const Dag& dag, const ColorSection& section) : dag_(&dag), section_(&section) {
+    path_[0] = 0;
+  }
 
   // See File::color().
   std::optional<Rgb> color(int64_t x, int64_t y, int64_t z, uint32_t level) {
@@ -218,12 +286,12 @@ class BasicColorCursor {
   // The same color where it is stored: that of cell `i` of a region, which is valid until the next
   // call. Null where there is none.
   const ColorRegion* find(int64_t x, int64_t y, int64_t z, uint32_t level, uint64_t& i) {
-    if (!dag_->has_colors() || level > dag_->grid_levels()) return nullptr;
+    if (section_->tier_count() == 0 || level > dag_->grid_levels()) return nullptr;
     const int64_t edge = int64_t{1} << level;
     if (x < 0 || y < 0 || z < 0 || x >= edge || y >= edge || z >= edge) return nullptr;
     const uint64_t code = morton_code(x, y, z);
     if (!descend(level, code)) return nullptr;
-    const uint32_t stored = std::min(level, dag_->color_levels());
+    const uint32_t stored = std::min(level, section_->color_levels());
     i = stored_index(stored, code >> 3 * (level - stored));
     return &region_;
   }
@@ -288,7 +356,7 @@ class BasicColorCursor {
 
   // Of a cell on the path, in region_.
   uint64_t stored_index(uint32_t level, uint64_t code) {
-    const ColorTier& tier = dag_->colors().tier_of(level);
+    const ColorTier& tier = section_->tier_of(level);
     const uint32_t above = std::min<uint32_t>(3, level - tier.region_level);  // to the group
     if (group_level_ != level || group_code_ != code >> 3 * above) {
       group_level_ = kNone;
@@ -351,6 +419,7 @@ class BasicColorCursor {
 
   static constexpr uint32_t kNone = ~uint32_t{0};
   const Dag* dag_;
+  const ColorSection* section_;
   uint64_t path_[21] = {};  // places from the root to the cell looked up last
   uint64_t path_code_ = 0;  // of that cell
   uint32_t depth_ = 0;      // its level

@@ -24,6 +24,15 @@ inline Transform multiply(const Transform& outer, const Transform& inner) {
   return product;
 }
 
+// Whether it turns what is clockwise into what is counterclockwise.
+inline bool mirrors(const Transform& transform) {
+  const auto& m = transform.m;
+  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+             m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+             m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]) <
+         0;
+}
+
 inline void apply(const Transform& transform, const double* local, double* world) {
   for (int i = 0; i < 3; ++i) {
     const double* row = transform.m[i];

@@ -224,10 +224,16 @@ void TriangleReader::place_all(const uint32_t* corners, uint64_t count) {
 
 // The batch has room for them.
 void TriangleReader::place_all_surfaces(const uint32_t* corners, uint64_t count) {
+  const bool is_mirrored = mirrors(world_);
+  const bool is_strip =
+      document_.meshes[static_cast<size_t>(binding_.mesh)].primitives[binding_.primitive].mode ==
+      kTriangleStrip;
   for (; count > 0; --count, corners += 3) {
     SurfaceTriangle& surface = surfaces_[batch_size_];
     if (place(corners, surface.position)) {
       looks_->read(corners, surface);
+      const uint64_t number = window_first_ + static_cast<uint64_t>(corners - corners_.data()) / 3;
+      surface.is_flipped = is_mirrored != (is_strip && number % 2 == 1);
       ++batch_size_;
     } else if (!skip_invalid_) {
       report(corners);

@@ -55,7 +55,7 @@ std::string merge_request_of(const BuildSpec& spec, const BuildContext& context)
                  budget, context.cancel);
   std::string text = geometry_json(spec.geometry);
   std::vector<SourceFile> files = scene->files();
-  if (spec.geometry.color)
+  if (spec.geometry.attributes.any())
     for (const ImageSource& image : scene->materials().images) files.push_back(image.file);
   for (const auto& [path, identity] : files)
     text += '\0' + path + '\0' + std::to_string(identity.bytes) + '\0' +

@@ -26,6 +26,7 @@ export class JobOptions {
     this.size_row = field("Edge of a voxel", this.voxel_size, "In the scene's units.");
     this.skip_invalid = h("input", {type: "checkbox", id: "skip-invalid", ...watch});
     this.color = h("input", {type: "checkbox", id: "color", ...watch});
+    this.attributes = ["alpha", "normal", "material"].map((name) => h("input", {type: "checkbox", id: `attribute-${name}`, value: name, ...watch}));
     this.color_resolution = choice(["", "Automatic"], ...powers(kMinLevel, kMaxLevel).map((k) => [k, grid_text(k)]));
     this.color_row = field("Color grid", this.color_resolution, "At most the resolution; finer voxels have the color of their cell.");
     this.hash_bits = number({min: "4", max: "64", step: "1", placeholder: "64"});
@@ -36,12 +37,14 @@ export class JobOptions {
     this.method = choice(["", "Automatic"], ["consing", "Consing"], ["pointers", "Pointers"], ["hashes", "Hashes"]);
     this.priority = number({min: "-100", max: "100", step: "1", placeholder: "0"});
     this.cube.addEventListener("change", () => this.show_rows());
-    this.color.addEventListener("change", () => this.show_rows());
+    for (const input of [this.color, ...this.attributes]) input.addEventListener("change", () => this.show_rows());
     this.element = h("details", {class: "card"}, h("summary", {}, h("h2", {}, "Options")), h("div", {class: "options"},
       h("fieldset", {}, h("legend", {}, "Geometry: determines the result"),
         field("Cube", this.cube), this.bounds_row, this.size_row,
         h("div", {class: "check"}, this.skip_invalid, h("label", {for: "skip-invalid"}, "Skip invalid triangles")),
         h("div", {class: "check"}, this.color, h("label", {for: "color"}, "Colors of the scene")),
+        this.attributes.map((input, i) => h("div", {class: "check"}, input,
+          h("label", {for: input.id}, ["Alpha", "Normals", "Materials"][i]))),
         this.color_row, field("Hash bits", this.hash_bits)),
       h("fieldset", {}, h("legend", {}, "Run: does not affect the result"),
         field("Memory", this.memory, "For example 512MiB or 8GiB."), field("Threads", this.threads),
@@ -51,9 +54,14 @@ export class JobOptions {
   }
 
   show_rows() {
-    this.color_row.hidden = !this.color.checked;
+    this.color_row.hidden = !this.has_cells();
     this.bounds_row.hidden = this.cube.value !== "bounds";
     this.size_row.hidden = this.cube.value !== "voxel_size";
+  }
+
+  // Whether cells have colors or other attributes.
+  has_cells() {
+    return [this.color, ...this.attributes].some((input) => input.checked);
   }
 
   // {resolution, priority?, options?}
@@ -63,7 +71,9 @@ export class JobOptions {
     if (this.cube.value === "voxel_size") options.voxel_size = number_of(this.voxel_size, "The voxel size");
     if (this.skip_invalid.checked) options.skip_invalid = true;
     if (this.color.checked) options.color = true;
-    if (this.color.checked && this.color_resolution.value)
+    const attributes = this.attributes.filter((input) => input.checked).map((input) => input.value);
+    if (attributes.length) options.attributes = attributes;
+    if (this.has_cells() && this.color_resolution.value)
       options.color_resolution = Number(this.color_resolution.value);
     if (this.hash_bits.value) options.hash_bits = number_of(this.hash_bits, "The hash bits");
     if (this.memory.value.trim()) options.memory = this.memory.value.trim();
@@ -83,7 +93,9 @@ export class JobOptions {
     this.cube.value = options.bounds ? "bounds" : options.voxel_size ? "voxel_size" : "";
     options.bounds?.forEach((value, i) => { this.bounds[i].value = String(value); });
     this.skip_invalid.checked = Boolean(options.skip_invalid);
-    this.color.checked = Boolean(options.color);
+    const given = [options.attributes ?? []].flat();
+    this.color.checked = Boolean(options.color) || given.includes("color");
+    for (const input of this.attributes) input.checked = given.includes(input.value);
     for (const name of ["voxel_size", "color_resolution", "hash_bits", "memory", "threads", "subvolume", "backend", "method"])
       if (options[name] !== undefined) this[name].value = String(options[name]);
     this.show_rows();

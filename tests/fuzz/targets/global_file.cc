@@ -13,6 +13,7 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
+#include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
 #include "core/format/global/voxdag_reader.h"
 #include "query/ray_caster.h"
@@ -91,11 +92,14 @@ class NamelessFile {
   const int fd_;
 };
 
-// Visits a part of the octree, and looks at the color of each cube there.
+// Visits a part of the octree, and looks at the color and the other attributes of each cube there.
 struct BoundedVisitor {
   const voxdag_reader::File& file;
   uint64_t left = kMaxVisits;
-  voxdag_reader::ColorCursor colors{file};
+  voxdag_reader::ColorCursor cursors[4] = {{file, file.colors()},
+                                           {file, file.alphas()},
+                                           {file, file.normals()},
+                                           {file, file.materials()}};
 
   bool node(uint32_t level, int64_t x, int64_t y, int64_t z, uint64_t) {
     if (left == 0) return false;
@@ -112,8 +116,17 @@ struct BoundedVisitor {
   }
   void look_at(uint32_t level, int64_t x, int64_t y, int64_t z) {
     const uint32_t up = file.grid_levels() - level;
-    fuzz::require(colors.color(x >> up, y >> up, z >> up, level).has_value() == file.has_colors(),
-                  "what is set has a color if anything has");
+    const voxdag_reader::ColorSection* const sections[] = {&file.colors(), &file.alphas(),
+                                                           &file.normals(), &file.materials()};
+    for (size_t kind = 0; kind < 4; ++kind) {
+      uint64_t i;
+      const auto* const region = cursors[kind].find(x >> up, y >> up, z >> up, level, i);
+      fuzz::require((region != nullptr) == (sections[kind]->tier_count() > 0),
+                    "what is set has an attribute if anything has");
+      if (region && kind == 0) (void)region->color(i);
+      if (region && kind == 2) (void)region->normal(i);
+      if (region && kind > 0) (void)region->value(i);
+    }
   }
 };
 
@@ -165,7 +178,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       for (uint32_t l = 0; l <= file.brick_level(); ++l)
         is_wide |= file.level(l).pointer_bits == 64;
       const uint64_t narrow_words =
-          is_wide || (file.version() != layout::kVersion && !file.has_colors())
+          is_wide || (file.version() != layout::kVersion && !attributes_of(file).any())
               ? kNarrowWords
               : layout::kNarrowLevelWords;
       verify_global_file(file, 1, budget, progress, CancelToken(), narrow_words);

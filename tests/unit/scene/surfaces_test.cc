@@ -11,6 +11,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
+Json& only_primitive(SceneBuilder& scene) { return scene.root["meshes"][0]["primitives"][0]; }
+
 TEST(Surfaces, TextureCoordinatesAndColorsOfCorners) {
   SceneBuilder scene = textured("");
   scene.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = scene.add_accessor<uint8_t>(
@@ -24,6 +26,33 @@ TEST(Surfaces, TextureCoordinatesAndColorsOfCorners) {
   EXPECT_EQ(all[0].corners[0].color, (std::array<uint16_t, 4>{65535, 0, 128 * 257, 65535}));
   EXPECT_EQ(all[0].corners[2].color, (std::array<uint16_t, 4>{257, 514, 771, 65535}));
   EXPECT_EQ(all[0].position.v[1][0], 1);
+}
+
+// The front of every second triangle of a strip is where its corners run clockwise, and that of all
+// in a mirrored node.
+TEST(Surfaces, FlippedInStripsAndMirrors) {
+  const auto flips_of = [](int mode, Json node) {
+    SceneBuilder scene = one_triangle();
+    only_primitive(scene) = {{"attributes",
+                              {{"POSITION", scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0,
+                                                                 0, 2, 0, 1, 2, 0})}}},
+                             {"mode", mode}};
+    scene.root["nodes"][0].update(node);
+    OpenScene open(scene.glb());
+    std::vector<bool> flips;
+    for (const SurfaceTriangle& triangle : surfaces_of(*open.source))
+      flips.push_back(triangle.is_flipped);
+    return flips;
+  };
+  const std::vector<bool> none(4, false), second{false, true, false, true};
+  const std::vector<bool> first{true, false, true, false}, all(4, true);
+  const Json mirror = {{"scale", {1, -2, 1}}}, turned = {{"scale", {-1, -1, 1}}};
+  EXPECT_EQ(flips_of(5, {{"translation", {1, 2, 3}}}), second);
+  EXPECT_EQ(flips_of(5, mirror), first);
+  EXPECT_EQ(flips_of(5, turned), second);
+  EXPECT_EQ(flips_of(6, mirror), all);
+  EXPECT_EQ(flips_of(6, turned), none);
+  EXPECT_EQ(flips_of(4, mirror), std::vector<bool>(2, true));
 }
 
 // The example of the extension: the lower left quarter of the image.
@@ -40,8 +69,6 @@ TEST(Surfaces, TextureTransform) {
 
 constexpr int64_t kOneImage = int64_t{1} << kTextureBits;
 using Channels = std::array<uint16_t, 4>;
-
-Json& only_primitive(SceneBuilder& scene) { return scene.root["meshes"][0]["primitives"][0]; }
 
 SurfaceTriangle with_colors(SceneBuilder scene, int accessor) {
   only_primitive(scene)["attributes"]["COLOR_0"] = accessor;
@@ -199,6 +226,30 @@ TEST(Materials, OfSeveralFiles) {
   EXPECT_EQ(material(2).name, "floor");
   EXPECT_EQ(material(2).image, 1u);
   EXPECT_THAT(looks.images[1].name, HasSubstr("textured"));
+  // Materials are numbered as the files list them, whether triangles have them or not.
+  EXPECT_EQ(looks.names, (std::vector<std::string>{"floor", "first", "second", "floor"}));
+  EXPECT_EQ(material(0).number, 0u);
+  EXPECT_EQ(material(1).number, 2u);
+  EXPECT_EQ(material(2).number, 3u);
+}
+
+// Triangles without material have the number after the last, and so has a material that lost its
+// image that of the material.
+TEST(Materials, NumbersOfThoseThatAreNotListed) {
+  SceneBuilder scene = textured("");
+  const Json primitive = only_primitive(scene);
+  scene.root["meshes"][0]["primitives"] = {primitive, primitive, primitive};
+  scene.root["meshes"][0]["primitives"][1].erase("material");
+  scene.root["meshes"][0]["primitives"][2]["attributes"].erase("TEXCOORD_0");
+  OpenScene open(scene.glb());
+  SceneMaterials looks = open.source->materials();
+  EXPECT_EQ(looks.names, std::vector<std::string>{"floor"});
+  looks.name_unlisted();
+  EXPECT_EQ(looks.names, (std::vector<std::string>{"floor", ""}));
+  std::vector<uint32_t> numbers;
+  for (const SurfaceTriangle& triangle : surfaces_of(*open.source))
+    numbers.push_back(looks.materials.at(triangle.material).number);
+  EXPECT_EQ(numbers, (std::vector<uint32_t>{0, 1, 0}));
 }
 
 }  // namespace

@@ -196,7 +196,7 @@ TEST(ColorKeys, NameAllThatColorsDependOn) {
   const Material plain;
   const std::vector<std::string> images = {"image", "other"};
   const auto look = [&](const Material& material) {
-    return look_digests(std::span(&material, 1), images)[0];
+    return look_digests(std::span(&material, 1), images, {.color = true})[0];
   };
   std::vector<Material> materials(8, plain);
   materials[1].factor[2] = 7;
@@ -210,10 +210,18 @@ TEST(ColorKeys, NameAllThatColorsDependOn) {
     for (size_t k = 0; k < i; ++k) EXPECT_NE(look(materials[i]), look(materials[k])) << i << k;
   Material named = plain;
   named.name = "name";
+  named.number = 9;
   EXPECT_EQ(look(named), look(plain));
+  // That of a material counts where cells have it.
+  const AttributeSet with_materials{.material = true};
+  EXPECT_NE(look_digests(std::span(&named, 1), images, with_materials)[0],
+            look_digests(std::span(&plain, 1), images, with_materials)[0]);
 
   const Cube cube{1, {0, 1, 0}};
   const BinContent content{3, {4, 5}, {}};
+  const auto color_key = [](const ColorGrid& grid, const Cube& of, const BinContent& with) {
+    return attribute_key({}, grid, of, with);
+  };
   const Checksum128 key = color_key({9, 8}, cube, content);
   EXPECT_NE(color_key({9, 7}, cube, content), key);
   EXPECT_NE(color_key({10, 8}, cube, content), key);
@@ -221,6 +229,10 @@ TEST(ColorKeys, NameAllThatColorsDependOn) {
   EXPECT_NE(color_key({9, 8}, cube, {2, {4, 5}, {}}), key);
   EXPECT_NE(color_key({9, 8}, cube, {3, {4, 6}, {}}), key);
   EXPECT_EQ(color_key({9, 8}, cube, {3, {4, 5}, ImageClasses(1)}), key);
+  const auto alpha = attribute_key({Attribute::kAlpha, 1}, {9, 8}, cube, content);
+  const auto narrow = attribute_key({Attribute::kMaterial, 1}, {9, 8}, cube, content);
+  const auto wide = attribute_key({Attribute::kMaterial, 2}, {9, 8}, cube, content);
+  EXPECT_TRUE(alpha != key && narrow != key && narrow != alpha && wide != narrow);
 }
 
 TEST(RegionRecords, ComeBackAsTheyWere) {
@@ -259,7 +271,7 @@ class ColorsOnCluster : public Cluster {
   BuildSpec colored(BuildSpec spec) const {
     spec.geometry.scenes = {painted_};
     spec.geometry.resolution = 256;
-    spec.geometry.color = true;
+    spec.geometry.attributes.color = true;
     spec.run.threads = 2;
     return spec;
   }

@@ -170,7 +170,7 @@ TEST_F(ColorStage, FollowTheImage) {
   const auto file = open_global_file(output());
   // Without colors the image does not matter.
   BuildSpec plain = spec(64);
-  plain.geometry.color = false;
+  plain.geometry.attributes.color = false;
   const std::string gray = build(plain).sha256;
   PaintedScene::write(folder_.path(), 255);
   EXPECT_EQ(build(plain).sha256, gray);
@@ -203,7 +203,7 @@ TEST_F(ColorStage, RefusesOptionsThatDoNotFit) {
             std::string::npos);
   EXPECT_NE(refusal(spec(64, 48)).find("color resolution 48"), std::string::npos);
   BuildSpec s = spec(64, 32);
-  s.geometry.color = false;
+  s.geometry.attributes.color = false;
   EXPECT_NE(refusal(s).find("without colors"), std::string::npos);
 }
 
@@ -221,7 +221,7 @@ TEST_F(ColorStage, ArePlanned) {
     const auto file_bytes = static_cast<double>(report.bytes);
     EXPECT_LE(estimate.file_bytes.low, file_bytes);
     EXPECT_GE(estimate.file_bytes.high, file_bytes);
-    s.geometry.color = false;
+    s.geometry.attributes.color = false;
     s.geometry.color_resolution = 0;
     const Estimate plain = plan(s);
     const auto section_bytes = file_bytes - static_cast<double>(build(s).bytes);
@@ -267,15 +267,17 @@ TEST_F(ColorStage, AreTheSameWithLittleMemory) {
       append_surface(surface, false, record);
       store.add(bin, record, 1);
     }
-    CubeBaker baker(grid, textures->materials(), *reader, store, surface_bytes, budget, cancel);
-    std::vector<std::byte> records;
+    const StoredAttribute attributes[] = {{}, {Attribute::kNormal, 2}, {Attribute::kMaterial, 1}};
+    CubeBaker baker(grid, attributes, textures->materials(), *reader, store, surface_bytes, budget,
+                    cancel);
+    CubeBaker::Records records(std::size(attributes));
     baker.bake(Cube{}, bin, records);
     EXPECT_EQ(bin.surfaces, 0u);
     return records;
   };
   const auto all = bake(uint64_t{64} << 20);
   size_t regions = 0;
-  for (RegionRecords records(all); records.next();) ++regions;
+  for (RegionRecords records(all[0]); records.next();) ++regions;
   EXPECT_GT(regions, 100u);
   EXPECT_EQ(bake(60 << 10), all);
   // Not even those of a region fit: they come in parts.

@@ -43,7 +43,7 @@ TEST(DamagedColors, EndARender) {
   BuildSpec spec;
   spec.geometry.scenes = {PaintedScene::write(folder.path())};
   spec.geometry.resolution = 32;
-  spec.geometry.color = true;
+  spec.geometry.attributes.color = true;
   spec.run.output = folder.file("out.vdag");
   NoProgress progress;
   CancelToken cancel;

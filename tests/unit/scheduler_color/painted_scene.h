@@ -122,7 +122,7 @@ inline BuildSpec painted_spec(const std::string& scene, const std::string& outpu
   BuildSpec spec;
   spec.geometry.scenes = {scene};
   spec.geometry.resolution = resolution;
-  spec.geometry.color = true;
+  spec.geometry.attributes.color = true;
   spec.run.output = output;
   spec.run.memory_bytes = uint64_t{256} << 20;
   spec.run.threads = 2;

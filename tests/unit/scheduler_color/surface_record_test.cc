@@ -17,6 +17,7 @@ namespace {
 FixedSurface numbered_surface(int64_t position, int64_t texture, uint16_t color) {
   FixedSurface surface;
   surface.material = 70000;
+  surface.is_flipped = texture < 0;
   for (int64_t i = 0; i < 9; ++i)
     surface.position.v[i / 3][i % 3] = position + (i % 2 ? 2 * i : -2 * i);
   for (size_t i = 0; i < 3; ++i) {
@@ -38,6 +39,7 @@ FixedSurface without_look(FixedSurface surface, bool has_texture, bool has_color
 
 void expect_equal(const FixedSurface& a, const FixedSurface& b) {
   EXPECT_EQ(a.material, b.material);
+  EXPECT_EQ(a.is_flipped, b.is_flipped);
   for (size_t i = 0; i < 3; ++i) {
     for (size_t k = 0; k < 3; ++k) EXPECT_EQ(a.position.v[i][k], b.position.v[i][k]);
     EXPECT_EQ(a.corners[i].texture, b.corners[i].texture);
@@ -77,7 +79,7 @@ TEST(SurfaceRecord, RefusesWhatIsNoRecord) {
   append_surface(numbered_surface(1, 1, 60000), true, bytes);
   for (size_t size = 1; size < bytes.size(); ++size)
     EXPECT_THROW(SurfaceRecords(std::span(bytes).first(size)).next(), DamagedTriangles) << size;
-  bytes[0] = std::byte{16};
+  bytes[0] = std::byte{32};
   EXPECT_THROW(SurfaceRecords(bytes).next(), DamagedTriangles);
 }
 

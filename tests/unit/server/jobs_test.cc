@@ -19,6 +19,7 @@ TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   const JobRequest request = parse_job_request(R"({
       "scene": ["a.glb", "/srv/b.gltf"], "resolution": 4096, "name": "n", "priority": -3,
       "options": {"bounds": [0, -1.5, 2, 8], "skip_invalid": true, "hash_bits": 16,
+                  "attributes": ["normal", "material"], "color_resolution": 64,
                   "memory": "2GiB", "threads": 2, "subvolume": 512, "backend": "cpu",
                   "method": "consing"}})");
   EXPECT_EQ(request.scenes, (std::vector<std::string>{"a.glb", "/srv/b.gltf"}));
@@ -29,6 +30,8 @@ TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   EXPECT_EQ(g.bounds, (std::array<double, 4>{0, -1.5, 2, 8}));
   EXPECT_TRUE(g.skip_invalid);
   EXPECT_EQ(g.hash_bits, 16u);
+  EXPECT_EQ(g.attributes, (AttributeSet{.normal = true, .material = true}));
+  EXPECT_EQ(g.color_resolution, 64u);
   EXPECT_EQ(request.spec.run.memory_bytes, uint64_t{2} << 30);
   EXPECT_EQ(request.spec.run.threads, 2u);
   EXPECT_EQ(request.spec.run.subvolume_edge, 512u);
@@ -64,6 +67,11 @@ TEST(JobRequestBody, IsRefusedByName) {
       {"{\"scene\":\"a.glb\",\"resolution\":64,\"options\":{\"color\":true,"
        "\"color_resolution\":128}}",
        "'color_resolution'"},
+      {"{\"scene\":\"a.glb\",\"resolution\":64,\"options\":{\"color_resolution\":32}}",
+       "'color_resolution'"},
+      {"{\"scene\":\"a.glb\",\"resolution\":64,\"options\":{\"attributes\":[\"normals\"]}}",
+       "'attributes'"},
+      {"{\"scene\":\"a.glb\",\"resolution\":64,\"options\":{\"attributes\":[]}}", "'attributes'"},
   };
   for (const auto& [body, part] : bodies) {
     SCOPED_TRACE(body);

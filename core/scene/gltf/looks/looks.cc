@@ -43,6 +43,7 @@ class LookResolver {
  private:
   void add_material(int index) {
     MaterialSource source = read_material(*document_.model, index);
+    source.material.number = static_cast<uint32_t>(index);
     if (!source.problem.empty())
       warn("material " + numbered(index, source.material.name) + ": " + source.problem +
            "; its base color factor is used alone");

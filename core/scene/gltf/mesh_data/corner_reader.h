@@ -1,6 +1,6 @@
 // The vertex indices of the triangles of a primitive, three each, out of triangle lists, strips and
-// fans, indexed or not. The winding of strips is not corrected: voxels do not depend on it. Not
-// thread-safe.
+// fans, indexed or not. The winding of strips is not corrected: surfaces say where it is the other
+// way. Not thread-safe.
 #pragma once
 
 #include <cstddef>

@@ -1,0 +1,64 @@
+// Writes an attribute section behind the levels of a global file, whatever the attribute: tiers of
+// regions with their directories. docs/format.md, "The color section", is the byte layout.
+//
+// The regions of tier 0 go to the file as they come; those of the coarser tiers and the directories
+// stay in memory until finish(), charged to the budget. One thread uses a writer.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/color/attribute_set.h"
+#include "core/color/blocks/region.h"
+#include "core/format/color/color_layout.h"
+#include "core/format/color/growing_buffer.h"
+#include "core/format/global/global_writer.h"
+
+namespace voxdag {
+
+class SectionWriter {
+ public:
+  // The levels of `file` must be complete, and there must be some. The cells of the levels 0 to
+  // `cell_levels` (2 to 20, at most the grid's) have the attribute, 32 of them in `block_bytes`.
+  SectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
+                uint32_t block_bytes, MemoryBudget& budget);
+
+  uint32_t tier_count() const { return static_cast<uint32_t>(tiers_.size()); }
+  // Levels of a region of the tier, below that which is the region.
+  uint32_t region_levels(uint32_t tier) const { return tiers_[tier].levels(); }
+  uint64_t region_count(uint32_t tier) const { return tiers_[tier].regions; }
+  // Adds a region, those of a tier in increasing Morton order. Throws Error{kCorrupt} for one that
+  // is not in order or does not fit together, Error{kOutOfMemory}.
+  void add(uint32_t tier, const EncodedRegion& region);
+  // Ends the section, in which tier 0 must have a region. `list`: what stands before the tier
+  // table.
+  void finish(std::span<const std::byte> list = {});
+
+ private:
+  // What has been added of a tier.
+  struct Tier {
+    Tier(MemoryBudget& budget, uint32_t finest_level)
+        : finest(finest_level),
+          directory(budget, "directory of colors"),
+          data(budget, "colors of coarse levels") {}
+
+    uint32_t finest;
+    GrowingBuffer<std::byte> directory;
+    GrowingBuffer<std::byte> data;  // of its regions; tier 0 has none here
+    uint64_t last_morton = 0;       // of the last region
+    uint64_t regions = 0, units = 0, cell_count = 0, finest_cells = 0;
+
+    uint32_t levels() const { return color_layout::levels_in_region(finest); }
+  };
+
+  void check(const Tier& tier, const EncodedRegion& region) const;
+
+  GlobalFileWriter& file_;
+  const Attribute attribute_;
+  const uint32_t cell_levels_, block_bytes_;
+  std::vector<Tier> tiers_;
+};
+
+}  // namespace voxdag
