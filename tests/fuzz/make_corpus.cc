@@ -13,6 +13,7 @@
 #include "core/format/global/global_layout.h"
 #include "merge/checkpoint/merge_state.h"
 #include "scheduler/ingest/ingest_record.h"
+#include "tests/fuzz/scene/compressed_scenes.h"
 #include "tests/fuzz/scene/rich_scene.h"
 #include "tests/unit/format/test_artifacts.h"
 #include "tests/unit/format/test_files.h"
@@ -45,6 +46,7 @@ void add_scenes(const Corpus& corpus) {
   corpus.add("gltf_document", "rich.gltf",
              rich.gltf("data:application/octet-stream;base64," + base64(rich.bin)));
   corpus.add("gltf_document", "empty.gltf", R"({"asset":{"version":"2.0"}})");
+  for (const auto& [name, file] : compressed_scenes()) corpus.add("gltf_document", name, file);
 }
 
 // The index without its file, and the frames with the prefix that the target expects.

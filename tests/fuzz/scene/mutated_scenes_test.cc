@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/scene/textures/texture_set.h"
+#include "tests/fuzz/scene/compressed_scenes.h"
 #include "tests/fuzz/scene/rich_scene.h"
 
 namespace voxdag::test {
@@ -170,6 +171,21 @@ TEST(FuzzScene, MutatedNumbersOfLooks) {
   EXPECT_GT(outcomes.with_image, 100);
   EXPECT_GT(outcomes.refused, 100);
 }
+
+#if defined(VOXDAG_HAS_DRACO) && defined(VOXDAG_HAS_MESHOPT)
+// The decoders of compressed geometry: each file decodes as it is, and so do some mutations.
+TEST(FuzzScene, MutatedCompressedGeometry) {
+  uint32_t seed = 30;
+  for (const auto& [name, file] : compressed_scenes()) {
+    SCOPED_TRACE(name);
+    ASSERT_FALSE(triangles_of_file(file).empty());
+    Outcomes outcomes;
+    run(file, 150, seed++, outcomes);
+    EXPECT_GT(outcomes.worked, 3);
+    EXPECT_GT(outcomes.refused, 10);
+  }
+}
+#endif
 
 TEST(FuzzScene, MutatedSharedScenes) {
   const std::filesystem::path folder = std::filesystem::path(VOXDAG_SHARED_SCENES) / "conformance";

@@ -6,103 +6,16 @@
 #include <random>
 #include <thread>
 
-#include "tests/unit/scene/scene_files.h"
+#include "tests/unit/scene/draco_scenes.h"
 
 #ifdef VOXDAG_HAS_DRACO
-#include <draco/compression/decode.h>
-#include <draco/compression/expert_encode.h>
 #include <draco/metadata/geometry_metadata.h>
 #endif
 
 namespace voxdag::test {
 namespace {
 
-Json draco_extension(int view, Json attributes) {
-  return {{"KHR_draco_mesh_compression",
-           {{"bufferView", view}, {"attributes", std::move(attributes)}}}};
-}
-
-// A scene whose only primitive is compressed.
-SceneBuilder compressed_scene(const std::vector<char>& data, uint64_t vertices, uint64_t indices,
-                              Json attributes = {{"POSITION", 0}}) {
-  SceneBuilder scene;
-  const int view = scene.add_view(data);
-  const int positions =
-      scene.add("accessors", {{"componentType", kF32}, {"count", vertices}, {"type", "VEC3"}});
-  const int corners =
-      scene.add("accessors", {{"componentType", kU16}, {"count", indices}, {"type", "SCALAR"}});
-  const int mesh = scene.add_mesh({{"attributes", {{"POSITION", positions}}},
-                                   {"indices", corners},
-                                   {"extensions", draco_extension(view, std::move(attributes))}});
-  scene.add_root({{"mesh", mesh}});
-  scene.root["extensionsUsed"] = {"KHR_draco_mesh_compression"};
-  scene.root["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-  return scene;
-}
-
 #ifdef VOXDAG_HAS_DRACO
-
-// A bumpy grid of 2 * n * n triangles, with normals that differ from face to face if wanted.
-std::unique_ptr<draco::Mesh> bumpy_grid(uint32_t n, bool with_normals) {
-  auto mesh = std::make_unique<draco::Mesh>();
-  const uint32_t points = with_normals ? 6 * n * n : (n + 1) * (n + 1);
-  mesh->set_num_points(points);
-  draco::GeometryAttribute position, normal;
-  position.Init(draco::GeometryAttribute::POSITION, nullptr, 3, draco::DT_FLOAT32, false, 12, 0);
-  normal.Init(draco::GeometryAttribute::NORMAL, nullptr, 3, draco::DT_FLOAT32, false, 12, 0);
-  const int positions = mesh->AddAttribute(position, true, points);
-  const int normals = with_normals ? mesh->AddAttribute(normal, true, points) : -1;
-  std::mt19937 random(7);
-  std::vector<float> height((n + 1) * (n + 1));
-  for (float& h : height) h = static_cast<float>(random() % 1000) / 300;
-  const auto set = [&](uint32_t point, uint32_t x, uint32_t y, uint32_t face) {
-    const float at[3] = {static_cast<float>(x) * 1.37f, static_cast<float>(y),
-                         height[y * (n + 1) + x]};
-    mesh->attribute(positions)->SetAttributeValue(draco::AttributeValueIndex(point), at);
-    const float direction[3] = {face % 2 ? 1.f : 0.f, face % 3 ? 0.f : 1.f, 1.f};
-    if (with_normals)
-      mesh->attribute(normals)->SetAttributeValue(draco::AttributeValueIndex(point), direction);
-  };
-  uint32_t face = 0;
-  for (uint32_t y = 0; y < n; ++y) {
-    for (uint32_t x = 0; x < n; ++x) {
-      const uint32_t corners[2][3][2] = {{{x, y}, {x + 1, y}, {x, y + 1}},
-                                         {{x + 1, y}, {x + 1, y + 1}, {x, y + 1}}};
-      for (const auto& triangle : corners) {
-        draco::Mesh::Face indices;
-        for (uint32_t k = 0; k < 3; ++k) {
-          const auto [cx, cy] = std::pair(triangle[k][0], triangle[k][1]);
-          const uint32_t point = with_normals ? 3 * face + k : cy * (n + 1) + cx;
-          set(point, cx, cy, face);
-          indices[k] = point;
-        }
-        mesh->AddFace(indices);
-        ++face;
-      }
-    }
-  }
-  if (with_normals) {
-    mesh->DeduplicateAttributeValues();
-    mesh->DeduplicatePointIds();
-  }
-  return mesh;
-}
-
-std::vector<char> encode(const draco::Mesh& mesh, int method, int quantization_bits) {
-  draco::ExpertEncoder encoder(mesh);
-  encoder.SetEncodingMethod(method);
-  if (quantization_bits > 0) encoder.SetAttributeQuantization(0, quantization_bits);
-  draco::EncoderBuffer buffer;
-  EXPECT_TRUE(encoder.EncodeToBuffer(&buffer).ok());
-  return {buffer.data(), buffer.data() + buffer.size()};
-}
-
-std::unique_ptr<draco::Mesh> decode(const std::vector<char>& data) {
-  draco::DecoderBuffer buffer;
-  buffer.Init(data.data(), data.size());
-  draco::Decoder decoder;
-  return std::move(decoder.DecodeMeshFromBuffer(&buffer)).value();
-}
 
 template <class T>
 std::vector<T> values_of(const draco::Mesh& mesh, int unique_id) {
@@ -132,20 +45,15 @@ SceneBuilder plain_scene(const draco::Mesh& mesh) {
   return scene;
 }
 
-SceneBuilder compressed_scene_of(const std::vector<char>& data) {
-  const auto mesh = decode(data);
-  return compressed_scene(data, mesh->num_points(), 3 * mesh->num_faces());
-}
-
 TEST(GltfDraco, EqualsTheDecodedScene) {
   for (const bool with_normals : {false, true}) {
     for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
       for (const int bits : {0, 9, 14}) {
         SCOPED_TRACE(testing::Message() << with_normals << ' ' << method << ' ' << bits);
-        const auto data = encode(*bumpy_grid(40, with_normals), method, bits);
+        const auto data = encode_draco(*bumpy_grid(40, with_normals), method, bits);
         const auto triangles = triangles_of_file(compressed_scene_of(data).glb());
         ASSERT_EQ(triangles.size(), 3200u);
-        EXPECT_EQ(triangles, triangles_of_file(plain_scene(*decode(data)).glb()));
+        EXPECT_EQ(triangles, triangles_of_file(plain_scene(*decode_draco(data)).glb()));
       }
     }
   }
@@ -167,9 +75,9 @@ TEST(GltfDraco, MetadataArePassedOver) {
   of_attribute->AddEntryString("name", "position");
   mesh->AddMetadata(std::move(metadata));
   mesh->AddAttributeMetadata(0, std::move(of_attribute));
-  const auto data = encode(*mesh, draco::MESH_EDGEBREAKER_ENCODING, 11);
+  const auto data = encode_draco(*mesh, draco::MESH_EDGEBREAKER_ENCODING, 11);
   EXPECT_EQ(triangles_of_file(compressed_scene_of(data).glb()),
-            triangles_of_file(plain_scene(*decode(data)).glb()));
+            triangles_of_file(plain_scene(*decode_draco(data)).glb()));
 }
 
 // Texture coordinates and colors as Draco's own decoder gives them.
@@ -187,8 +95,8 @@ TEST(GltfDraco, LooksAreCompressedToo) {
     mesh->attribute(texture_id)->SetAttributeValue(draco::AttributeValueIndex(p), uv);
     mesh->attribute(color_id)->SetAttributeValue(draco::AttributeValueIndex(p), rgba);
   }
-  const auto data = encode(*mesh, draco::MESH_EDGEBREAKER_ENCODING, 12);
-  const auto decoded = decode(data);
+  const auto data = encode_draco(*mesh, draco::MESH_EDGEBREAKER_ENCODING, 12);
+  const auto decoded = decode_draco(data);
 
   const auto add_look = [](SceneBuilder& scene, int uv, int rgba) {
     scene.root["images"] = {{{"uri", "data:image/png;base64,"}}};
@@ -246,7 +154,7 @@ TEST(GltfDraco, SkinsAreCompressedToo) {
   draco::EncoderBuffer buffer;
   ASSERT_TRUE(encoder.EncodeToBuffer(&buffer).ok());
   const std::vector<char> data(buffer.data(), buffer.data() + buffer.size());
-  const auto decoded = decode(data);
+  const auto decoded = decode_draco(data);
 
   const auto add_skin = [](SceneBuilder& scene, int j, int w) {
     Json& attributes = scene.root["meshes"][0]["primitives"][0]["attributes"];
@@ -275,12 +183,12 @@ TEST(GltfDraco, SkinsAreCompressedToo) {
 
 // The triangles of a strip are faces in the Draco data; those that only join two strips are not.
 TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
-  const auto data = encode(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
+  const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);
   scene.root["meshes"][0]["primitives"][0]["mode"] = 5;
   auto strip = triangles_of_file(scene.glb());
   EXPECT_EQ(strip.size(), 44u);
-  auto faces = triangles_of_file(plain_scene(*decode(data)).glb());
+  auto faces = triangles_of_file(plain_scene(*decode_draco(data)).glb());
   for (auto* all : {&strip, &faces}) {
     std::ranges::sort(*all);
     all->erase(std::unique(all->begin(), all->end()), all->end());
@@ -290,9 +198,9 @@ TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
 
 // Any number of readers decode each primitive once, and can begin anywhere.
 TEST(GltfDraco, ReadersShareWhatIsDecoded) {
-  const auto data = encode(*bumpy_grid(60, false), draco::MESH_EDGEBREAKER_ENCODING, 12);
+  const auto data = encode_draco(*bumpy_grid(60, false), draco::MESH_EDGEBREAKER_ENCODING, 12);
   OpenScene scene(compressed_scene_of(data).glb());
-  const auto expected = triangles_of_file(plain_scene(*decode(data)).glb());
+  const auto expected = triangles_of_file(plain_scene(*decode_draco(data)).glb());
   std::vector<std::thread> threads;
   std::atomic<int> equal = 0;
   for (uint64_t first : {7000, 3, 6000, 100}) {
@@ -320,7 +228,7 @@ std::string message_of(const SceneBuilder& scene, ErrorCode code = ErrorCode::kI
 
 TEST(GltfDraco, WhatDoesNotFitIsRefusedByName) {
   using testing::HasSubstr;
-  const auto data = encode(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
+  const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   const std::string where = "folder/scene: mesh 0: primitive 0: ";
   EXPECT_THAT(message_of(compressed_scene(data, 24, 96)),
               HasSubstr(where + "its Draco data have 25 vertices, its accessors 24"));
@@ -356,8 +264,8 @@ TEST(GltfDraco, WhatDoesNotFitIsRefusedByName) {
 // Whatever is cut off or changed, the scene has triangles or an error, and no others than declared.
 TEST(GltfDraco, DamagedDataAreErrors) {
   for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
-    const auto data = encode(*bumpy_grid(6, true), method, 10);
-    const auto mesh = decode(data);
+    const auto data = encode_draco(*bumpy_grid(6, true), method, 10);
+    const auto mesh = decode_draco(data);
     const auto read = [&](const std::vector<char>& damaged) {
       return error_of_file(
           compressed_scene(damaged, mesh->num_points(), 3 * mesh->num_faces()).glb());
@@ -378,9 +286,36 @@ TEST(GltfDraco, DamagedDataAreErrors) {
   }
 }
 
+// A byte can declare 64 symbols of the entropy coder, of which each takes 12 bytes of tables: this
+// file of 400 KB would take 293 MiB.
+TEST(GltfDraco, TablesOfSymbolsArePartOfTheBudget) {
+  std::vector<char> data = {'D', 'R', 'A', 'C', 'O', 2, 2, 1, 0, 0, 0};
+  data.insert(data.end(), {1, 3, 0});  // faces, vertices, compressed indices
+  data.insert(data.end(), {1, 18});    // raw symbols of 18 bits
+  const size_t table_bytes = 400000;
+  for (size_t symbols = 64 * table_bytes; symbols > 0; symbols >>= 7)
+    data.push_back(static_cast<char>((symbols & 127) | (symbols > 127 ? 128 : 0)));
+  data.insert(data.end(), table_bytes, '\xff');  // 64 of them have probability 0
+  const std::string file = compressed_scene(data, 3, 3).glb();
+  const auto error_within = [&](uint64_t budget_bytes) {
+    try {
+      OpenScene(file, {}, budget_bytes).triangles();
+    } catch (const Error& error) {
+      return error;
+    }
+    return Error(ErrorCode::kInvalidInput, "");
+  };
+  const Error refused = error_within(uint64_t{256} << 20);
+  EXPECT_EQ(refused.code(), ErrorCode::kOutOfMemory);
+  EXPECT_THAT(refused.message(), testing::HasSubstr("decoding its Draco data takes 296 MiB"));
+  const Error damaged = error_within(uint64_t{512} << 20);
+  EXPECT_EQ(damaged.code(), ErrorCode::kInvalidInput);
+  EXPECT_THAT(damaged.message(), testing::HasSubstr("its Draco data are damaged"));
+}
+
 // What a file claims is compared with the budget before memory is allocated for it.
 TEST(GltfDraco, WhatDoesNotFitTheBudgetIsRefused) {
-  const auto data = encode(*bumpy_grid(150, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
+  const auto data = encode_draco(*bumpy_grid(150, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   try {
     OpenScene(compressed_scene_of(data).glb(), {}, uint64_t{6} << 20).triangles();
     FAIL() << "45000 faces decoded within 6 MiB";

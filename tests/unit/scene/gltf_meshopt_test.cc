@@ -6,67 +6,14 @@
 #include <cmath>
 #include <random>
 
-#include "tests/unit/scene/scene_files.h"
-
-#ifdef VOXDAG_HAS_MESHOPT
-#include <meshoptimizer.h>
-#endif
+#include "tests/unit/scene/meshopt_scenes.h"
 
 namespace voxdag::test {
 namespace {
 
-// A view that `bytes` are compressed to, whose own buffer, the second one, is not there.
-int add_compressed(SceneBuilder& scene, const std::vector<unsigned char>& bytes, size_t count,
-                   size_t stride, const char* mode, Json more = Json::object()) {
-  const int from = scene.add_view(bytes);
-  const Json source = scene.root["bufferViews"][static_cast<size_t>(from)];
-  Json extension = {{"buffer", 0},
-                    {"byteOffset", source["byteOffset"]},
-                    {"byteLength", bytes.size()},
-                    {"byteStride", stride},
-                    {"count", count},
-                    {"mode", mode}};
-  extension.update(more);
-  Json view = {{"buffer", 1},
-               {"byteLength", count * stride},
-               {"extensions", {{"EXT_meshopt_compression", extension}}}};
-  if (std::string(mode) == "ATTRIBUTES") view["byteStride"] = stride;
-  return scene.add("bufferViews", std::move(view));
-}
-
-std::string glb_of(const SceneBuilder& scene) {
-  Json whole = scene.root;
-  whole["buffers"] = {{{"byteLength", scene.bin.size()}},
-                      {{"byteLength", 1 << 30},
-                       {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}}};
-  whole["extensionsUsed"].push_back("EXT_meshopt_compression");
-  whole["extensionsRequired"] = {"EXT_meshopt_compression"};
-  return make_glb(whole.dump(), scene.bin);
-}
-
-int add_accessor_of(SceneBuilder& scene, int view, int type, size_t count, const char* shape) {
-  return scene.add(
-      "accessors",
-      {{"bufferView", view}, {"componentType", type}, {"count", count}, {"type", shape}});
-}
-
-void draw(SceneBuilder& scene, int positions, int indices, int mode = 4) {
-  scene.add_root({{"mesh", scene.add_mesh({{"attributes", {{"POSITION", positions}}},
-                                           {"indices", indices},
-                                           {"mode", mode}})}});
-}
-
 #ifdef VOXDAG_HAS_MESHOPT
 
 constexpr uint32_t kSide = 60;  // vertices along each side of the grid
-
-template <class T>
-std::vector<unsigned char> encode_vertices(const std::vector<T>& values, size_t stride) {
-  const size_t count = values.size() * sizeof(T) / stride;
-  std::vector<unsigned char> out(meshopt_encodeVertexBufferBound(count, stride));
-  out.resize(meshopt_encodeVertexBuffer(out.data(), out.size(), values.data(), count, stride));
-  return out;
-}
 
 std::vector<unsigned char> encode_triangles(const std::vector<uint32_t>& indices) {
   std::vector<unsigned char> out(meshopt_encodeIndexBufferBound(indices.size(), kSide * kSide));
@@ -136,7 +83,7 @@ TEST(GltfMeshopt, EqualsTheDecodedScene) {
   for (const size_t index_bytes : {2u, 4u}) {
     const auto scene =
         compressed_grid(encode_vertices(positions, 12), encode_triangles(triangles), index_bytes);
-    EXPECT_EQ(triangles_of_file(glb_of(scene)), expected) << index_bytes;
+    EXPECT_EQ(triangles_of_file(meshopt_glb(scene)), expected) << index_bytes;
   }
 }
 
@@ -156,7 +103,7 @@ TEST(GltfMeshopt, QuantizedPositionsAndStrips) {
        add_accessor_of(compressed, s, kU32, strip.size(), "SCALAR"), 5);
   for (SceneBuilder* scene : {&plain, &compressed})
     scene->root["extensionsUsed"] = {"KHR_mesh_quantization"};
-  const auto triangles = triangles_of_file(glb_of(compressed));
+  const auto triangles = triangles_of_file(meshopt_glb(compressed));
   EXPECT_EQ(triangles.size(), 2u * kSide - 2);
   EXPECT_EQ(triangles, triangles_of_file(plain.glb()));
 }
@@ -178,7 +125,7 @@ TEST(GltfMeshopt, ExponentialFilter) {
   draw(plain, plain.add_positions(decoded), plain.add_accessor("SCALAR", kU32, turned(triangles)));
   const auto compressed = compressed_grid(encode_vertices(encoded, 12), encode_triangles(triangles),
                                           4, {{"filter", "EXPONENTIAL"}});
-  EXPECT_EQ(triangles_of_file(glb_of(compressed)), triangles_of_file(plain.glb()));
+  EXPECT_EQ(triangles_of_file(meshopt_glb(compressed)), triangles_of_file(plain.glb()));
 }
 
 // Rotations of instances, which decode to quaternions of 16 bits.
@@ -199,7 +146,7 @@ TEST(GltfMeshopt, QuaternionFilterOfInstances) {
   instance(plain, plain.add_view(decoded));
   instance(compressed, add_compressed(compressed, encode_vertices(encoded, 8), 2, 8, "ATTRIBUTES",
                                       {{"filter", "QUATERNION"}}));
-  const auto triangles = triangles_of_file(glb_of(compressed));
+  const auto triangles = triangles_of_file(meshopt_glb(compressed));
   EXPECT_EQ(triangles.size(), 2u);
   EXPECT_EQ(triangles, triangles_of_file(plain.glb()));
 }
@@ -216,7 +163,7 @@ TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
   const auto triangles = encode_triangles(grid_triangles());
   const auto with = [&](const Json& of_positions, const Json& of_triangles) {
     return message_of_glb(
-        glb_of(compressed_grid(positions, triangles, 4, of_positions, of_triangles)));
+        meshopt_glb(compressed_grid(positions, triangles, 4, of_positions, of_triangles)));
   };
   const Json same = Json::object();
   EXPECT_THAT(with({{"mode", "POINTS"}}, same), HasSubstr("expected ATTRIBUTES, TRIANGLES or"));
@@ -242,7 +189,7 @@ TEST(GltfMeshopt, DamagedDataAreErrors) {
   const auto positions = encode_vertices(grid_positions<float>(0), 12);
   const auto triangles = encode_triangles(grid_triangles());
   const auto read = [&](const auto& p, const auto& t) {
-    return error_of_file(glb_of(compressed_grid(p, t, 2))).message();
+    return error_of_file(meshopt_glb(compressed_grid(p, t, 2))).message();
   };
   EXPECT_EQ(read(positions, triangles), "");
   for (size_t cut : {1u, 30u, 400u, 2000u}) {
@@ -273,7 +220,7 @@ TEST(GltfMeshopt, WhatDoesNotFitTheBudgetIsRefused) {
       add_compressed(scene, encode_vertices(std::vector<float>(30), 12), count, 12, "ATTRIBUTES");
   draw(scene, add_accessor_of(scene, p, kF32, count, "VEC3"),
        scene.add_accessor<uint16_t>("SCALAR", kU16, {0, 1, 2}));
-  const std::string message = message_of_glb(glb_of(scene), ErrorCode::kOutOfMemory);
+  const std::string message = message_of_glb(meshopt_glb(scene), ErrorCode::kOutOfMemory);
   EXPECT_THAT(message, testing::HasSubstr("folder/scene: EXT_meshopt_compression of 16777216"));
   EXPECT_THAT(message, testing::HasSubstr("201326592"));
   EXPECT_THAT(message, testing::HasSubstr("give it more memory, or decompress the file first"));
@@ -287,7 +234,7 @@ TEST(GltfMeshopt, IsRefusedWithoutTheLibrary) {
   const int p = add_compressed(scene, {1, 2, 3}, 3, 12, "ATTRIBUTES");
   draw(scene, add_accessor_of(scene, p, kF32, 3, "VEC3"),
        scene.add_accessor<uint16_t>("SCALAR", kU16, {0, 1, 2}));
-  const Error error = error_of_file(glb_of(scene));
+  const Error error = error_of_file(meshopt_glb(scene));
   EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
   for (const char* word : {"folder/scene", "mesh 0: primitive 0", "EXT_meshopt_compression",
                            "libmeshoptimizer-dev", "gltf-transform"})

@@ -1,5 +1,6 @@
-// The only place that calls Draco. Its decoders are used through a class of ours, which learns the
-// attributes of a mesh before memory is allocated for them.
+// The only place that calls Draco, but for its tables (draco_tables.h). Its decoders are used
+// through a class of ours, which learns the attributes of a mesh before memory is allocated for
+// them.
 #include "core/scene/gltf/compressed/codecs.h"
 
 #ifdef VOXDAG_HAS_DRACO
@@ -18,6 +19,7 @@
 
 #include "core/base/error.h"
 #include "core/scene/gltf/compressed/draco_header.h"
+#include "core/scene/gltf/compressed/draco_tables.h"
 #include "core/scene/gltf/document/document.h"
 #include "core/scene/gltf/messages.h"
 #endif
@@ -40,11 +42,14 @@ constexpr uint64_t kMaxStripTrianglesPerFace = 8;
 
 constexpr size_t kWriteElements = 16384;
 
+[[noreturn]] void refuse_memory(uint64_t bytes) {
+  throw Error(ErrorCode::kOutOfMemory, "decoding its Draco data takes " +
+                                           std::to_string(bytes >> 20) + " MiB, more than " +
+                                           "the memory budget leaves");
+}
+
 void charge_up_to(MemoryCharge& charge, uint64_t bytes) {
-  if (bytes > charge.bytes() && !charge.try_resize(bytes))
-    throw Error(ErrorCode::kOutOfMemory, "decoding its Draco data takes " +
-                                             std::to_string(bytes >> 20) + " MiB, more than " +
-                                             "the memory budget leaves");
+  if (bytes > charge.bytes() && !charge.try_resize(bytes)) refuse_memory(bytes);
 }
 
 // Throws nothing through Draco: what admit() found is thrown by whoever called Decode().
@@ -94,7 +99,9 @@ void decode_mesh(const DracoPart& part, std::span<const std::byte> data, MemoryC
   for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::GENERIC})
     options.SetAttributeBool(type, "skip_attribute_transform", true);
   BoundedDecoder<Decoder> decoder(part.vertices, charge);
+  const DracoTables tables(charge);
   const draco::Status status = decoder.Decode(options, &buffer, &mesh);
+  if (tables.refused_bytes() > 0) refuse_memory(tables.refused_bytes());
   if (decoder.refusal) std::rethrow_exception(decoder.refusal);
   if (!status.ok())
     throw BrokenData{"its Draco data are damaged" +
