@@ -8,5 +8,6 @@ namespace voxdag::python {
 void bind_build(nanobind::module_& module);   // build and plan
 void bind_dag(nanobind::module_& module);     // finished files
 void bind_derive(nanobind::module_& module);  // what is made of finished files
+void bind_render(nanobind::module_& module);  // pictures of them
 
 }  // namespace voxdag::python

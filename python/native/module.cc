@@ -31,4 +31,5 @@ NB_MODULE(_native, module) {
   voxdag::python::bind_build(module);
   voxdag::python::bind_dag(module);
   voxdag::python::bind_derive(module);
+  voxdag::python::bind_render(module);
 }

@@ -1,0 +1,72 @@
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "core/base/process_limits.h"
+#include "core/format/global/open_global.h"
+#include "python/native/bindings.h"
+#include "python/native/long_work.h"
+#include "query/render/renderer.h"
+#include "query/render/views.h"
+
+namespace voxdag::python {
+namespace {
+
+using Point = std::array<double, 3>;
+using Pixels = nb::ndarray<uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+
+query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
+  query::Vec voxels;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (!std::isfinite(point[axis]))
+      throw Error(ErrorCode::kInvalidInput,
+                  "the camera or its target is not finite: expected finite coordinates");
+    voxels[static_cast<int>(axis)] =
+        (point[axis] - file.origin()[axis]) * static_cast<double>(file.resolution()) / file.edge();
+  }
+  return voxels;
+}
+
+// Fills the pixels. Where there is no camera, the view decides where it is.
+void render(const std::string& path, const std::string& view, const std::optional<Point>& camera,
+            const Point& target, std::optional<double> fov_degrees, int samples, bool gray,
+            unsigned threads, nb::object progress, const Pixels& pixels) {
+  query::RenderOptions options;
+  options.height = static_cast<int>(pixels.shape(0));
+  options.width = static_cast<int>(pixels.shape(1));
+  options.samples = samples;
+  options.threads = threads ? threads : default_threads();
+  uint8_t* const to = pixels.data();
+  run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
+    const auto file = open_global_file(path);
+    const query::DagView dag(*file);
+    if (!gray) options.colors = file.get();
+    if (dag.empty()) relay.warn(path + " has no voxels");
+    query::Placement placement{{{0, 0, 1}}, {{0, 0, 0}}};
+    const double aspect = static_cast<double>(options.width) / options.height;
+    if (camera)
+      placement = {in_voxels(*camera, *file), in_voxels(target, *file), fov_degrees.value_or(50)};
+    else if (!dag.empty())
+      placement = query::named_view(view, dag, aspect, fov_degrees, cancel);
+    const query::Picture picture = query::render_picture(dag, placement, options, relay, cancel);
+    std::ranges::copy(picture.rgb, to);
+    return true;
+  });
+}
+
+}  // namespace
+
+void bind_render(nb::module_& module) {
+  module.def("render", &render, nb::arg("path"), nb::arg("view"), nb::arg("camera").none(),
+             nb::arg("target"), nb::arg("fov").none(), nb::arg("samples"), nb::arg("gray"),
+             nb::arg("threads"), nb::arg("progress").none(), nb::arg("pixels"));
+}
+
+}  // namespace voxdag::python
