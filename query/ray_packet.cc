@@ -62,10 +62,8 @@ void RayPacket::load(std::span<const Ray> rays) {
       one.inverse[axis] = job_.inverse[axis][i] = ray.inverse[axis];
     }
     one.origin[3] = one.inverse[3] = 0;
-    job_.t_end[i] = job_.t_max;
     mirrors_[i] = ray.mirror;
   }
-  for (PacketCells& cells : job_.waiting) cells.count = 0;  // An exception may have left some.
 }
 
 // One walk for all rays whose directions have the same signs.

@@ -2,7 +2,7 @@
 // to each other, as those of neighboring pixels do, visit the same large cells: a packet visits
 // each once, for all rays that may cross it. See query/rays/packet_walk.h.
 //
-// About 110 KiB; not thread-safe, each thread has its own.
+// About 30 KiB; not thread-safe, each thread has its own.
 #pragma once
 
 #include <cstdint>

@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
+#include "core/base/process_limits.h"
 #include "core/format/global/open_global.h"
 #include "query/lookup/points.h"
 #include "query/ray_packet.h"
@@ -79,7 +80,10 @@ uint64_t largest_square(double distance) {
 }  // namespace
 
 Dag::Dag(const std::string& path, uint64_t memory_bytes)
-    : file_(open_global_file(path)), view_(*file_), budget_(memory_bytes) {}
+    : file_(open_global_file(path)), view_(*file_), budget_(memory_bytes) {
+  // A file that memory cannot hold would be read in parts of 2 MiB for each node.
+  if (file_->file_bytes() <= default_memory()) file_->prefer_huge_pages();
+}
 
 void Dag::lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
                  unsigned threads) const {

@@ -1,4 +1,4 @@
-// The rays of a packet while they are cast, and the cells that wait for them: what RayPacket
+// The rays of a packet while they are cast, and the descents of each: what RayPacket
 // prepares and a walk works on. See packet_walk.h for how.
 #pragma once
 
@@ -11,18 +11,24 @@ namespace voxdag::query {
 
 inline constexpr int kPacketRays = 64;
 
-// One ray and a node or brick that it may cross.
-struct PacketCell {
-  int32_t low[4];   // its low corner in voxels, mirrored as the ray is; the number of the ray
+// A node or brick that a ray may cross, to be entered when the ray has left those before.
+struct WaitingCell {
+  int32_t low[4];   // its low corner in voxels, mirrored as the ray is; the fourth has no meaning
   uint64_t offset;  // in the words of its level
+  uint32_t depth;
+  int32_t next;  // of the same ray; -1 if there is none
 };
 
-// Cells of one depth.
-struct PacketCells {
-  // A round begins before more wait than there are rays and what is left of the last one.
-  static constexpr int kCapacity = 192;
-  int count = 0;
-  PacketCell cells[kCapacity];
+// The descent of one ray.
+struct RayDescent {
+  static constexpr int kMaxLevels = 20;
+  int32_t low[4];  // the cell that the ray enters next, as that of a WaitingCell
+  uint64_t offset;
+  uint32_t depth;
+  uint32_t open;                         // bit d: children of the path's node at depth d are left
+  uint8_t left[kMaxLevels];              // which, mirrored
+  const uint32_t* children[kMaxLevels];  // of the path's nodes: their words after the mask
+  int32_t first_waiting, last_waiting;   // -1 if no cell waits
 };
 
 // An origin and the inverse of a direction; the fourth number has no meaning.
@@ -31,7 +37,7 @@ struct alignas(32) PacketRay {
 };
 
 struct PacketJob {
-  static constexpr int kMaxLevels = 20;
+  static constexpr int kMaxLevels = RayDescent::kMaxLevels;
   struct Level {
     const uint32_t* words;
     uint64_t count;
@@ -47,14 +53,16 @@ struct PacketJob {
   int mirror = 0;
   double t_min = 0, t_max = 0;
   alignas(32) double origin[3][kPacketRays], inverse[3][kPacketRays];
-  // At this parameter a ray ends: its hit so far, or t_max; less than all if it has been given up.
-  alignas(32) double t_end[kPacketRays];
   PacketRay rays[kPacketRays];
   Hit* hits = nullptr;
-  uint64_t found = 0;   // rays that have a hit, hits[ray], the first of all cells seen so far
+  uint64_t found = 0;   // rays that have a hit, hits[ray], the first of its cells
   uint64_t single = 0;  // rays that have been given up: to be cast by themselves
 
-  PacketCells waiting[kMaxLevels];  // by depth
+  // So many cells that are under way or wait begin a round: as many as memory can load at a time
+  // (measured). One more packet may come before.
+  static constexpr int kRoundCells = 24, kMaxWaiting = kRoundCells + kPacketRays;
+  WaitingCell waiting[kMaxWaiting];
+  RayDescent descents[kPacketRays];
 };
 
 // Casts those of the job's rays that are in `rays`.

@@ -3,10 +3,10 @@
 //
 // Large cells are visited depth first, once for all rays that may cross them: bounds of all rays
 // together leave out most children, and each ray is tested with those that remain if there are
-// several. Below, where rays part and nodes are cache misses, each ray descends by itself, in
-// rounds: a round takes all waiting cells of one depth, and what they point to is under way from
-// memory when the next round takes it. A ray's cells need no order, since what lies behind its hit
-// so far is left out.
+// several. Where few rays are left, or cells are small and nodes are cache misses, each ray
+// descends by itself through its cells in their order, so that it loads nothing behind its hit.
+// Rays take turns, a step each: what a ray enters next is under way from memory while the others
+// step.
 //
 // A cell is crossed where a ray has an interval in it that is not empty. One of length 0 in an
 // occupied cell, or two planes passed at the parameter of a hit, mean that the path from the root
@@ -57,15 +57,13 @@ class PacketWalk {
       push(0, low, 0, rays);
     else
       visit(0, low, int32_t{1} << job_.grid_levels, 0, rays);
-    drain(first_waiting_);
+    finish_descents();
   }
 
  private:
-  // Measured. So few rays part in cells of at most kSmall voxels per edge, all do in those of
-  // kSmallest; as many waiting cells as memory can load at a time make a round.
+  // Measured: so few rays part in any cell, all do in those of kSmallest voxels per edge.
   static constexpr int kFewRays = 8;
-  static constexpr int32_t kSmall = 64, kSmallest = 8;
-  static constexpr int kRoundCells = 24;
+  static constexpr int32_t kSmallest = 8;
 
   struct Child {
     int32_t low[4];
@@ -158,7 +156,7 @@ class PacketWalk {
     const Four middle_plane = low_plane + h;
     const Four l = (low_plane - origin) * inverse, m = (middle_plane - origin) * inverse,
                u = (middle_plane + h - origin) * inverse;
-    return cross(l, m, m, u, Four::of(job_.t_min), Four::of(job_.t_end[ray]));
+    return cross(l, m, m, u, Four::of(job_.t_min), Four::of(job_.t_max));
   }
 
   // Which children of a cell some ray may cross or touch. Rounding is monotonic, so that bounds of
@@ -227,94 +225,124 @@ class PacketWalk {
       const Child& child = children[i];
       const uint64_t left = child.rays & ~(job_.found | job_.single);
       if (left == 0) continue;
-      if (last || (half <= kSmall && count_of(left) <= kFewRays))
+      if (last || count_of(left) <= kFewRays)
         push(depth + 1, child.low, child.offset, left);
       else
         visit(depth + 1, child.low, half, child.offset, left);
     }
   }
 
-  // Lets rays part in a cell.
+  // Lets rays part in a cell. Cells come in the order in which their rays cross them.
   void push(uint32_t depth, const int32_t* low, uint64_t offset, uint64_t rays) {
-    PacketCells& waiting = job_.waiting[depth];
     for (; rays != 0; rays &= rays - 1) {
-      waiting.cells[waiting.count++] = {{low[0], low[1], low[2], first_of(rays)}, offset};
-      ++pushed_;
+      const int ray = first_of(rays);
+      RayDescent& descent = job_.descents[ray];
+      const WaitingCell cell{{low[0], low[1], low[2], 0}, offset, depth, -1};
+      if (under_way_ >> ray & 1) {
+        const int at = waiting_++;
+        job_.waiting[at] = cell;
+        (descent.first_waiting < 0 ? descent.first_waiting
+                                   : job_.waiting[descent.last_waiting].next) = at;
+        descent.last_waiting = at;
+      } else {
+        under_way_ |= uint64_t{1} << ray;
+        list_[count_++] = static_cast<uint8_t>(ray);
+        begin(descent, cell);
+      }
     }
-    if (depth < first_waiting_) first_waiting_ = depth;
-    if (pushed_ < kRoundCells) return;
-    drain(first_waiting_);
-    pushed_ = 0;
-    first_waiting_ = brick_depth_;
+    if (count_ + waiting_ >= PacketJob::kRoundCells) finish_descents();
   }
 
-  // Takes all waiting cells from this depth on.
-  void drain(uint32_t depth) {
-    if (depth == brick_depth_) return cast_in_bricks();
-    if (depth + 1 == job_.leaf_depth) return cast_in_leaves(depth);
-    PacketCells &cells = job_.waiting[depth], &below = job_.waiting[depth + 1];
-    const int32_t half = int32_t{1} << (job_.grid_levels - depth - 1);
-    for (int i = 0; i < cells.count; ++i) {
-      const PacketCell cell = cells.cells[i];
-      const int ray = cell.low[3];
-      const Node n = node(depth, cell.offset);
-      const Crossed crossed = cross_one(cell.low, ray, half);
+  VOXDAG_INLINE static void begin(RayDescent& descent, const WaitingCell& cell) {
+    for (int axis = 0; axis < 3; ++axis) descent.low[axis] = cell.low[axis];
+    descent.offset = cell.offset;
+    descent.depth = cell.depth;
+    descent.open = 0;
+    descent.first_waiting = cell.next;
+  }
+
+  // One step of each ray after the other, until all have ended or left their cells.
+  void finish_descents() {
+    while (count_ > 0)
+      for (int i = 0; i < count_;)
+        if (step(list_[i]))
+          ++i;
+        else
+          list_[i] = list_[--count_];
+    under_way_ = 0;
+    waiting_ = 0;
+  }
+
+  // The ray enters a cell; whether it continues, with the cell that `descent` has then.
+  VOXDAG_INLINE bool step(int ray) {
+    RayDescent& descent = job_.descents[ray];
+    const uint32_t depth = descent.depth;
+    if (depth == brick_depth_) {
+      if (cast_in_brick(descent, ray)) return false;
+    } else {
+      const Node n = node(depth, descent.offset);
       const uint32_t occupied = mirrored_[n.mask];
-      if (crossed.touching & occupied) {
-        give_up(ray);
-        continue;
-      }
-      if (below.count > PacketCells::kCapacity - 4) drain(depth + 1);
-      for (uint32_t in = crossed.inside & occupied; in != 0; in &= in - 1) {
-        const int index = first_of(in);
-        PacketCell& next = below.cells[below.count++];
-        corner(cell.low, index, half, next.low);
-        next.low[3] = ray;
-        next.offset = n.child(index ^ job_.mirror);
-        prefetch(depth + 1, next.offset);
+      const int32_t half = int32_t{1} << (job_.grid_levels - depth - 1);
+      if (depth + 1 == job_.leaf_depth) {
+        if (cast_in(descent.low, half, ray, occupied, depth + 1)) return false;
+      } else {
+        const Crossed crossed = cross_one(descent.low, ray, half);
+        if (crossed.touching & occupied) return !give_up(ray);
+        if (const uint32_t in = crossed.inside & occupied) {
+          enter_first(descent, depth, in, n);
+          return true;
+        }
       }
     }
-    cells.count = 0;
-    drain(depth + 1);
+    return enter_next(descent);
   }
 
-  void cast_in_leaves(uint32_t depth) {
-    PacketCells& cells = job_.waiting[depth];
-    const int32_t half = int32_t{1} << (job_.grid_levels - depth - 1);
-    for (int i = 0; i < cells.count; ++i) {
-      const PacketCell& cell = cells.cells[i];
-      cast_in(cell.low, half, cell.low[3], mirrored_[node(depth, cell.offset).mask], depth + 1);
-    }
-    cells.count = 0;
+  // Goes to the first of these children of the path's node at `depth`; the others are left.
+  VOXDAG_INLINE void enter_first(RayDescent& descent, uint32_t depth, uint32_t in, const Node& n) {
+    const int index = first_of(in);
+    corner(descent.low, index, int32_t{1} << (job_.grid_levels - depth - 1), descent.low);
+    descent.offset = n.child(index ^ job_.mirror);
+    descent.depth = depth + 1;
+    descent.left[depth] = static_cast<uint8_t>(in & (in - 1));
+    descent.open &= ~(1u << depth);
+    descent.open |= (descent.left[depth] != 0 ? 1u : 0u) << depth;
+    descent.children[depth] = n.children;
+    prefetch(depth + 1, descent.offset);
   }
 
-  void cast_in_bricks() {
-    PacketCells& cells = job_.waiting[brick_depth_];
-    for (int i = 0; i < cells.count; ++i) {
-      const PacketCell& cell = cells.cells[i];
-      const int ray = cell.low[3];
-      const uint64_t mask = brick(cell.offset);
-      const uint32_t occupied = mirrored_[octants(mask)];
-      if (job_.leaf_depth == brick_depth_ + 1) {
-        cast_in(cell.low, 2, ray, occupied, job_.leaf_depth);
-        continue;
-      }
-      const Crossed crossed = cross_one(cell.low, ray, 2);
-      if (crossed.touching & occupied) {
-        give_up(ray);
-        continue;
-      }
-      for (uint32_t in = crossed.inside & occupied; in != 0; in &= in - 1) {
-        const int index = first_of(in);
-        int32_t low[4];
-        corner(cell.low, index, 2, low);
-        low[3] = 0;
-        if (cast_in(low, 1, ray, mirrored_[mask >> 8 * (index ^ job_.mirror) & 255],
-                    job_.grid_levels))
-          break;
-      }
+  // From a cell without a hit to the next one; whether there is one.
+  VOXDAG_INLINE bool enter_next(RayDescent& descent) {
+    if (descent.open == 0) {
+      if (descent.first_waiting < 0) return false;
+      begin(descent, job_.waiting[descent.first_waiting]);
+      return true;
     }
-    cells.count = 0;
+    const uint32_t depth = 31u - static_cast<uint32_t>(__builtin_clz(descent.open));
+    const int32_t edge = int32_t{1} << (job_.grid_levels - depth);
+    for (int axis = 0; axis < 3; ++axis) descent.low[axis] &= -edge;
+    const uint32_t* const children = descent.children[depth];
+    enter_first(descent, depth, descent.left[depth],
+                {children[-1], children, job_.levels[depth].wide_children});
+    return true;
+  }
+
+  // Whether the ray ends in this brick.
+  VOXDAG_INLINE bool cast_in_brick(const RayDescent& cell, int ray) {
+    const uint64_t mask = brick(cell.offset);
+    const uint32_t occupied = mirrored_[octants(mask)];
+    if (job_.leaf_depth == brick_depth_ + 1)
+      return cast_in(cell.low, 2, ray, occupied, job_.leaf_depth);
+    const Crossed crossed = cross_one(cell.low, ray, 2);
+    if (crossed.touching & occupied) return give_up(ray);
+    for (uint32_t in = crossed.inside & occupied; in != 0; in &= in - 1) {
+      const int index = first_of(in);
+      int32_t low[4] = {};
+      corner(cell.low, index, 2, low);
+      if (cast_in(low, 1, ray, mirrored_[mask >> 8 * (index ^ job_.mirror) & 255],
+                  job_.grid_levels))
+        return true;
+    }
+    return false;
   }
 
   // Whether the ray ends in a cell of these children.
@@ -332,7 +360,6 @@ class PacketWalk {
   // The ray ends here.
   bool give_up(int ray) {
     job_.single |= uint64_t{1} << ray;
-    job_.t_end[ray] = -std::numeric_limits<double>::infinity();
     return true;
   }
 
@@ -358,7 +385,6 @@ class PacketWalk {
     for (int axis = 0; axis < 3; ++axis)
       hit.cell[axis] =
           (job_.mirror & 4 >> axis ? last - low[axis] : low[axis]) >> (job_.grid_levels - depth);
-    job_.t_end[ray] = t;
     job_.found |= uint64_t{1} << ray;
     return true;
   }
@@ -366,8 +392,10 @@ class PacketWalk {
   PacketJob& job_;
   const uint8_t (&mirrored_)[256];
   const uint32_t brick_depth_;
-  uint32_t first_waiting_ = brick_depth_;
-  int pushed_ = 0;
+  // Rays that descend by themselves, as bits and as a list, and cells that wait for them.
+  uint64_t under_way_ = 0;
+  uint8_t list_[kPacketRays];
+  int count_ = 0, waiting_ = 0;
   alignas(32) double low_origin_[4], high_origin_[4], low_inverse_[4], high_inverse_[4];
 };
 
