@@ -214,12 +214,14 @@ class Dag:
                         f"{', '.join(self._dag.attributes) or 'none'}", "invalid_input")
         positions = self._positions(points, level, world)
         rows = len(positions)
-        get, found = {"color": (self._dag.colors, np.zeros((rows, 3), np.uint8)),
-                      "alpha": (self._dag.alphas, np.zeros(rows, np.uint8)),
-                      "normal": (self._dag.normals, np.zeros((rows, 3), np.float32)),
-                      "material": (self._dag.materials, np.full(rows, -1, np.int64))}[attribute]
-        get(positions, self._levels(level), found)
-        return found
+        kinds: Dict[str, Tuple[Tuple[int, ...], Any]] = {
+            "color": ((rows, 3), np.uint8), "alpha": ((rows,), np.uint8),
+            "normal": ((rows, 3), np.float32), "material": ((rows,), np.int64)}
+        shape, dtype = kinds[attribute]
+        values = np.full(shape, -1 if attribute == "material" else 0, dtype)
+        get: Any = getattr(self._dag, attribute + "s")
+        get(positions, self._levels(level), values)
+        return values
 
     def _levels(self, level: Optional[int]) -> int:
         if level is None:
