@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/format/bytes.h"
+#include "query/export/color/cell_values.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/lookup/bricks.h"
@@ -191,9 +192,12 @@ ExportReport write_npz(const ExportJob& job) {
   const uint64_t voxels = require_voxels(job, uint64_t{1} << 48, "an array takes");
   report.voxels = voxels;
   const bool has_colors = job.has_colors;
-  require_space(job, voxels * 3 * (sizeof(int32_t) + sizeof(double) + (has_colors ? 1 : 0)) + 4096);
+  const std::vector<Attribute> attributes = exported_values(job);
+  uint64_t bytes = 3 * (sizeof(int32_t) + sizeof(double) + (has_colors ? 1 : 0));  // of a voxel
+  for (const Attribute attribute : attributes) bytes += exported_bytes(attribute);
+  require_space(job, voxels * bytes + 4096);
   NpzWriter writer(job);
-  ExportStage stage(job, "export", (has_colors ? 3 : 2) * voxels, "rows");
+  ExportStage stage(job, "export", ((has_colors ? 3 : 2) + attributes.size()) * voxels, "rows");
   const std::string shape = "(" + std::to_string(voxels) + ", 3)";
   writer.add<int32_t>("cells.npy", npy_header("<i4", shape), 3 * voxels, [&](const auto& put) {
     visit_cells(job, stage, [&](const Position& cell) {
@@ -214,6 +218,24 @@ ExportReport write_npz(const ExportJob& job) {
         for (const uint8_t channel : {color.r, color.g, color.b}) put(channel);
       });
     });
+  const std::string column = "(" + std::to_string(voxels) + ",)";
+  const auto add_values = [&]<class Number>(Number, const char* name, const std::string& header,
+                                            Attribute attribute, uint64_t count) {
+    writer.add<Number>(name, header, count, [&](const auto& put) {
+      CellValueCursor values(job, attribute);
+      visit_cells(job, stage, [&](const std::array<int64_t, 3>& cell) {
+        values.put(cell, [&](auto number) { put(static_cast<Number>(number)); });
+      });
+    });
+  };
+  for (const Attribute attribute : attributes) {
+    if (attribute == Attribute::kAlpha)
+      add_values(uint8_t{}, "alphas.npy", npy_header("|u1", column), attribute, voxels);
+    else if (attribute == Attribute::kNormal)
+      add_values(float{}, "normals.npy", npy_header("<f4", shape), attribute, 3 * voxels);
+    else
+      add_values(uint32_t{}, "materials.npy", npy_header("<u4", column), attribute, voxels);
+  }
   writer.add<double>("grid.npy", npy_header("<f8", "(4,)"), 4, [&](const auto& put) {
     for (size_t axis = 0; axis < 3; ++axis) put(job.file.origin()[axis]);
     put(job.cell_edge());
@@ -223,6 +245,10 @@ ExportReport write_npz(const ExportJob& job) {
       "numpy.load() gives 'cells' (int32), 'positions' (their centers, float64) and 'grid' (low "
       "corner of the grid and edge of a voxel)" +
       std::string(has_colors ? ", and 'colors' (sRGB, uint8)" : ""));
+  if (!attributes.empty())
+    report.notes.push_back(
+        "what the file has of 'alphas' (uint8), 'normals' (float32) and 'materials' (uint32, "
+        "numbers in the list that voxdag info --json prints) is there, too");
   return report;
 }
 
