@@ -1,7 +1,7 @@
 """A finished file, and what can be asked of it."""
 
 import os
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, overload
 
 import numpy as np
 
@@ -141,6 +141,15 @@ class Dag:
         cells = np.empty([max(0, h - l) for l, h in zip(low, high)], np.bool_)
         self._dag.dense(low, high, self._levels(level), cells.view(np.uint8))
         return cells
+
+    @overload
+    def points(self, region: Optional[Region] = None, level: Optional[int] = None, *,
+               world: bool = False, attributes: None = None) -> np.ndarray: ...
+
+    @overload
+    def points(self, region: Optional[Region] = None, level: Optional[int] = None, *,
+               world: bool = False,
+               attributes: Sequence[str]) -> Tuple[np.ndarray, Dict[str, np.ndarray]]: ...
 
     def points(self, region: Optional[Region] = None, level: Optional[int] = None, *,
                world: bool = False, attributes: Optional[Sequence[str]] = None) -> Any:
