@@ -25,11 +25,11 @@
 //                 textures, if they take no more    up to 1/2 of the rest        TextureSet
 //                   those on their way there        1/8                          nobody
 //                 ColorMemory, for every worker     what is free / workers
-//                   a region                        12 MiB; solid ones 50        CubeBaker
-//                   its normals and materials       10 MiB, if any; or more      CubeBaker
-//                   surfaces of a cube              1/2 of the rest              CubeBaker
-//                   pages of textures               1/4 of the rest              TextureReader
-//                   regions of a cube, encoded      the rest                     nobody
+//                   a region, encoded ones of       1/2, 12 to 46 MiB            CubeBaker
+//                     a cube among it
+//                   its other attributes            10 MiB, if any; or more      CubeBaker
+//                   surfaces of a cube              2/3 of the rest              CubeBaker
+//                   pages of textures               1/3 of the rest              TextureReader
 //   merge         MergeMemory, of what is free
 //                   workers, together               1/4                          merge
 //                   positions of two levels         1/6 for each; then spilled   merge
@@ -79,26 +79,32 @@ struct MemoryPlan {
 
 // What the workers of the color stage get.
 struct ColorMemory {
+  // For the least cells of a region that are baked at once, and for all of them.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
-  // Of sums for normals and materials.
+  static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
+  // Of what is not color in the cells of kRegionBytes.
   static constexpr uint64_t kValueBytes = uint64_t{10} << 20;
 
-  static constexpr uint64_t region_bytes(const AttributeSet& attributes) {
-    return kRegionBytes + (attributes.normal || attributes.material ? kValueBytes : 0);
+  static constexpr uint64_t value_bytes(const AttributeSet& attributes) {
+    return attributes.alpha || attributes.normal || attributes.material ? kValueBytes : 0;
   }
 
   unsigned workers = 1;
-  uint64_t surface_bytes = 0;  // of each
+  uint64_t region_bytes = kRegionBytes;  // of each
+  uint64_t surface_bytes = 0;
   uint64_t texture_bytes = 0;
 
   // An eighth is for the directories of the section.
   static constexpr ColorMemory divide(uint64_t free_bytes, unsigned wanted,
                                       const AttributeSet& attributes) {
-    const uint64_t bytes = free_bytes - free_bytes / 8, region = region_bytes(attributes);
+    const uint64_t bytes = free_bytes - free_bytes / 8,
+                   least = kRegionBytes + value_bytes(attributes);
     const auto workers =
-        static_cast<unsigned>(std::clamp<uint64_t>(bytes / (2 * region), 1, wanted));
-    const uint64_t each = bytes / workers, rest = each - std::min(each, region);
-    return {workers, rest / 2, rest / 4};
+        static_cast<unsigned>(std::clamp<uint64_t>(bytes / (2 * least), 1, wanted));
+    const uint64_t each = bytes / workers;
+    const uint64_t region = std::clamp(each / 2, kRegionBytes, kSolidRegionBytes);
+    const uint64_t rest = each - std::min(each, region + value_bytes(attributes));
+    return {workers, region, rest / 3 * 2, rest / 3};
   }
 };
 

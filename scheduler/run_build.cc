@@ -28,10 +28,9 @@ namespace {
 
 // Version of artifacts, job store and digests of scenes; a job of another version is refused.
 constexpr int64_t kWorkFormatVersion = 4;
-// How often the scene is read before its stored triangles may not be damaged again.
-constexpr int kMaxReads = 3;
-// How often the merge is run before artifacts may not be damaged again.
-constexpr int kMaxMerges = 3;
+// How often the scene is read, and the merge is run, before triangles and artifacts may not be
+// damaged again.
+constexpr int kMaxReads = 3, kMaxMerges = 3;
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
 
@@ -390,15 +389,10 @@ class Build {
     clock_.finish("color");
   }
 
-  // Of what the colors depend on: as they were baked, or, of an output that an earlier run has
-  // finished, as it is now.
+  // Of what the colors depend on: as they were baked, or as they are in the output that is there.
   std::string color_digest() {
     if (!has_attributes() || !color_digest_.empty()) return color_digest_;
-    ColorStage stage = color_stage();
-    std::string digest = stage.digest();
-    // This is what counts if the colors of that output have the same one.
-    report_.colors = stage.report_of(*context_.files.open_read(spec_.run.output));
-    return digest;
+    return color_stage().digest_of(context_.files, spec_.run.output, report_.colors);
   }
 
   ColorStage color_stage() {

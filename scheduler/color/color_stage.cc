@@ -14,8 +14,8 @@
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
 #include "core/format/color/color_section_writer.h"
-#include "core/format/global/global_layout.h"
 #include "core/format/color/value_section_writer.h"
+#include "core/format/global/global_layout.h"
 #include "core/geometry/morton.h"
 #include "core/scene/textures/texture_set.h"
 #include "scheduler/color/bin_surfaces.h"
@@ -57,28 +57,12 @@ uint64_t count_finest_cells(const ReadableFile& file) {
   return number_at<uint64_t>(file, layout::kAttributesAt + layout::kAttributeFinestCellsAt);
 }
 
-// The records of one attribute of a cube, as they were stored.
-struct StoredRecords {
-  std::vector<std::byte> records;
-  MemoryCharge charge;  // for the largest that were read
-
-  void read(const ColorStore& artifacts, const Checksum128& key, MemoryBudget& budget) {
-    const uint64_t bytes = artifacts.bytes_of(key);
-    if (bytes > charge.bytes()) {
-      charge = {};
-      charge = MemoryCharge(budget, bytes, "stored colors of a cube");
-    }
-    artifacts.read(key, records);
-  }
-};
-
 // What bakes, and what one cube became.
 struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
-  CubeBaker::Records baked;
-  StoredRecords stored;
-  bool is_stored = false;  // the cube's are in `stored`
+  CubeBaker::Records records;  // of the last parts
+  bool is_baked = false;       // now; the others are stored
 };
 
 // The section of an attribute.
@@ -126,7 +110,11 @@ struct ColorStage::State {
   std::optional<MemoryBudget> share;
   std::optional<SurfaceStore> store;
   BinnedSurfaces surfaces;
-  std::vector<std::vector<Checksum128>> keys;  // by attribute and cube
+  template <class T>
+  using ByAttributeAndCube = std::vector<std::vector<T>>;
+  ByAttributeAndCube<Checksum128> keys;
+  // Where they are stored, once they are baked.
+  ByAttributeAndCube<std::vector<ColorStore::Place>> parts;
 
   State(const ColorSource& s, const StageContext& c)
       : source(s),
@@ -138,6 +126,8 @@ struct ColorStage::State {
   void read_surfaces();
   std::unique_ptr<TextureSet> decode_images(const ColorStore& artifacts);
   bool is_stored(const ColorStore& artifacts, size_t cube) const;
+  void store_parts(ColorStore& artifacts, size_t cube, const CubeBaker::Records& records,
+                   bool are_last);
   void bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
             ColorReport& report);
   void add_stored(const ColorStore& artifacts, size_t attribute, GlobalFileWriter& out,
@@ -189,6 +179,7 @@ void ColorStage::State::read_surfaces() {
       const size_t i = of_attribute.size();
       of_attribute.push_back(attribute_key(attribute, grid, cubes[i], surfaces.contents[i]));
     }
+  parts.resize(attributes.size(), std::vector<std::vector<ColorStore::Place>>(cubes.size()));
 }
 
 // Those that cubes show which are to be baked.
@@ -223,6 +214,14 @@ std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& a
   return prepare();
 }
 
+void ColorStage::State::store_parts(ColorStore& artifacts, size_t cube,
+                                    const CubeBaker::Records& records, bool are_last) {
+  for (size_t i = 0; i < attributes.size(); ++i) {
+    std::vector<ColorStore::Place>& stored = parts[i][cube];
+    stored.push_back(artifacts.add(keys[i][cube], stored.size(), are_last, records[i]));
+  }
+}
+
 // Bakes all attributes, and adds the first of them.
 void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
                              ColorReport& report) {
@@ -230,33 +229,49 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
   const auto memory =
       ColorMemory::divide(context.budget.available(), context.threads, source.options.attributes);
   std::vector<BakeWorker> workers(memory.workers);
+  for (BakeWorker& worker : workers) worker.records.resize(attributes.size());
   OpenSection section(out, attributes[0].kind, grid.color_levels, materials.names, context.budget);
   build.progress.begin_stage("color", report.cubes, "cubes");
   build.progress.resume_at(report.cubes_reused);
+  std::vector<std::byte> part;
   parallel_for_in_order(
       memory.workers, cubes.size(),
       [&](unsigned number, size_t item) {
         BakeWorker& worker = workers[number];
-        worker.baked.resize(attributes.size());
-        for (auto& records : worker.baked) records.clear();
-        worker.is_stored = is_stored(artifacts, item);
+        for (auto& records : worker.records) records.clear();
+        worker.is_baked = false;
         if (surfaces.contents[item].surfaces == 0) return;
-        if (worker.is_stored) return worker.stored.read(artifacts, keys[0][item], context.budget);
+        if (is_stored(artifacts, item)) {
+          for (size_t i = 0; i < attributes.size(); ++i)
+            parts[i][item] = artifacts.parts(keys[i][item]);
+          return;
+        }
         if (!worker.baker) {
           worker.textures = textures.open(memory.texture_bytes);
           worker.baker.emplace(grid, attributes, textures.materials(), *worker.textures, *store,
-                               memory.surface_bytes, context.budget, build.cancel);
+                               memory.region_bytes, memory.surface_bytes, context.budget,
+                               build.cancel);
         }
-        worker.baker->bake(cubes[item], surfaces.bins[item], worker.baked);
-        for (size_t i = 0; i < attributes.size(); ++i)
-          artifacts.add(keys[i][item], worker.baked[i]);
+        worker.baker->bake(cubes[item], surfaces.bins[item], worker.records,
+                           [&](CubeBaker::Records& records) {
+                             store_parts(artifacts, item, records, false);
+                             for (auto& of_attribute : records) of_attribute.clear();
+                           });
+        store_parts(artifacts, item, worker.records, true);
+        worker.is_baked = true;
       },
       [&](unsigned number, size_t item) {
         build.cancel.check();
         const BakeWorker& worker = workers[number];
-        if (surfaces.contents[item].surfaces == 0) return;
-        report.cells += section.add(worker.is_stored ? worker.stored.records : worker.baked[0]);
-        if (!worker.is_stored) build.progress.advance(1);
+        // The last part is still in memory if it was baked now.
+        std::span<const ColorStore::Place> stored = parts[0][item];
+        if (worker.is_baked) stored = stored.first(stored.size() - 1);
+        for (const ColorStore::Place& place : stored) {
+          artifacts.read(place, part);
+          report.cells += section.add(part);
+        }
+        report.cells += section.add(worker.records[0]);
+        if (worker.is_baked) build.progress.advance(1);
       });
   build.progress.end_stage();
   if (report.cells > 0) section.finish();
@@ -266,24 +281,19 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
 void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute,
                                    GlobalFileWriter& out, const ColorReport& report) {
   const BuildContext& build = context.build;
-  // Half of the memory is for records on their way.
-  const auto memory = ColorMemory::divide(context.budget.available(), context.threads, {});
-  std::vector<StoredRecords> workers(memory.workers);
   const Attribute kind = attributes[attribute].kind;
   OpenSection section(out, kind, grid.color_levels, materials.names, context.budget);
   build.progress.begin_stage(name_of(kind), report.cubes, "cubes");
-  parallel_for_in_order(
-      memory.workers, cubes.size(),
-      [&](unsigned number, size_t item) {
-        if (surfaces.contents[item].surfaces > 0)
-          workers[number].read(artifacts, keys[attribute][item], context.budget);
-      },
-      [&](unsigned number, size_t item) {
-        build.cancel.check();
-        if (surfaces.contents[item].surfaces == 0) return;
-        section.add(workers[number].records);
-        build.progress.advance(1);
-      });
+  std::vector<std::byte> part;
+  for (size_t item = 0; item < cubes.size(); ++item) {
+    if (surfaces.contents[item].surfaces == 0) continue;
+    for (const ColorStore::Place& place : parts[attribute][item]) {
+      build.cancel.check();
+      artifacts.read(place, part);
+      section.add(part);
+    }
+    build.progress.advance(1);
+  }
   build.progress.end_stage();
   section.finish();
 }
@@ -305,16 +315,17 @@ std::string ColorStage::digest() {
   return hash.finish();
 }
 
-ColorReport ColorStage::report_of(const ReadableFile& result) {
-  ColorReport report;
-  report.cells = count_finest_cells(result);
-  if (report.cells == 0) return report;
-  state_->read_surfaces();
-  report.resolution = uint64_t{1} << state_->grid.color_levels;
-  report.images = state_->materials.images.size();
-  for (const BinContent& content : state_->surfaces.contents) report.cubes += content.surfaces > 0;
-  report.cubes_reused = report.cubes;
-  return report;
+std::string ColorStage::digest_of(FileSystem& files, const std::string& output,
+                                  std::optional<ColorReport>& report) {
+  std::string of_keys = digest();
+  report.emplace();
+  report->cells = count_finest_cells(*files.open_read(output));
+  if (report->cells == 0) return of_keys;
+  report->resolution = uint64_t{1} << state_->grid.color_levels;
+  report->images = state_->materials.images.size();
+  for (const BinContent& content : state_->surfaces.contents) report->cubes += content.surfaces > 0;
+  report->cubes_reused = report->cubes;
+  return of_keys;
 }
 
 ColorReport ColorStage::add_to(GlobalFileWriter& out) {
@@ -324,6 +335,9 @@ ColorReport ColorStage::add_to(GlobalFileWriter& out) {
   ColorStore artifacts(context.build.files, state_->source.artifact_path,
                        state_->source.checkpoint_interval_s, context.build.progress,
                        context.build.cancel);
+  std::vector<Checksum128> all_keys;
+  for (const auto& keys : state_->keys) all_keys.insert(all_keys.end(), keys.begin(), keys.end());
+  artifacts.keep_only(all_keys, context.build.cancel);
   ColorReport report;
   report.resolution = uint64_t{1} << state_->grid.color_levels;
   for (size_t i = 0; i < state_->cubes.size(); ++i) {

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/format/global/global_writer.h"
@@ -44,9 +45,10 @@ class ColorStage {
   // SHA-256 of the keys of all cubes: equal where the colors are equal. Reads the scene and its
   // images.
   std::string digest();
-  // What is to be reported of `result`, a sound file which an earlier run has finished with these
-  // colors.
-  ColorReport report_of(const ReadableFile& result);
+  // The same, and what is to be reported if `output`, a sound file that an earlier run has
+  // finished, has the colors of that digest.
+  std::string digest_of(FileSystem& files, const std::string& output,
+                        std::optional<ColorReport>& report);
   // `out` has all its levels, and is not sealed; it stays as it is if there are none. Once.
   ColorReport add_to(GlobalFileWriter& out);
 

@@ -15,19 +15,25 @@ namespace voxdag {
 namespace {
 
 constexpr std::string_view kMagic = "VDAGCOL\n";
-constexpr size_t kHeaderBytes = 48;
+constexpr size_t kHeaderBytes = 56;
 constexpr size_t kReadBytes = 256 << 10;
+// Added to the number of the last part of an artifact.
+constexpr uint64_t kLastPart = uint64_t{1} << 63;
+// Garbage that is not worth the copy of the rest.
+constexpr uint64_t kTolerableBytes = 64 << 10;
 
 struct Header {
   Checksum128 key;
-  uint64_t bytes = 0, checksum = 0;  // of the artifact
+  uint64_t part = kLastPart;
+  uint64_t bytes = 0, checksum = 0;  // of the part
 };
 
 void append_header(const Header& header, std::vector<std::byte>& out) {
   const size_t at = out.size();
   ByteSink sink(out);
   sink.put_bytes(std::as_bytes(std::span(kMagic)));
-  for (const uint64_t field : {header.key.low, header.key.high, header.bytes, header.checksum})
+  for (const uint64_t field :
+       {header.key.low, header.key.high, header.part, header.bytes, header.checksum})
     sink.put(field);
   sink.put(checksum64(std::span(out).subspan(at)));
 }
@@ -36,7 +42,8 @@ void append_header(const Header& header, std::vector<std::byte>& out) {
 bool parse_header(std::span<const std::byte> bytes, Header& header) {
   ByteSource in(bytes);
   const bool is_ours = std::ranges::equal(in.take(kMagic.size()), std::as_bytes(std::span(kMagic)));
-  for (uint64_t* field : {&header.key.low, &header.key.high, &header.bytes, &header.checksum})
+  for (uint64_t* field :
+       {&header.key.low, &header.key.high, &header.part, &header.bytes, &header.checksum})
     *field = in.get<uint64_t>();
   return is_ours && in.get<uint64_t>() == checksum64(bytes.first(kHeaderBytes - sizeof(uint64_t)));
 }
@@ -51,21 +58,34 @@ ColorStore::ColorStore(FileSystem& files, std::string path, double sync_interval
       last_sync_s_(wall_seconds()) {
   if (!files_.exists(path_)) return;
   reader_ = files_.open_read(path_);
+  find_artifacts(progress, cancel);
+}
+
+void ColorStore::find_artifacts(Progress& progress, const CancelToken& cancel) {
   const uint64_t size = reader_->size();
-  std::set<std::pair<uint64_t, uint64_t>> damaged;  // keys
+  std::set<Key> damaged;
+  // Parts of an artifact follow each other in the file, with others between them.
+  Artifacts incomplete;
   std::array<std::byte, kHeaderBytes> bytes;
   for (Header header; size - end_ >= kHeaderBytes;) {
     reader_->read_at(end_, bytes);
-    // What follows the last whole artifact was being written when a run was stopped.
+    // What follows the last whole part was being written when a run was stopped.
     if (!parse_header(bytes, header) || header.bytes > size - end_ - kHeaderBytes) break;
+    const Key key(header.key.low, header.key.high);
     const Place place{end_ + kHeaderBytes, header.bytes, header.checksum};
-    if (is_sound(place, cancel))
-      found_[{header.key.low, header.key.high}] = place;
-    else
-      damaged.insert({header.key.low, header.key.high});
     end_ = place.offset + place.bytes;
+    const uint64_t number = header.part & ~kLastPart;
+    std::vector<Place>& parts = incomplete[key];
+    if (number == 0) parts.clear();
+    if (!is_sound(place, cancel))
+      damaged.insert(key);
+    else if (number == parts.size())
+      parts.push_back(place);
+    if (!(header.part & kLastPart)) continue;
+    if (parts.size() == number + 1) found_[key] = std::move(parts);
+    incomplete.erase(key);
   }
-  std::erase_if(damaged, [&](const auto& key) { return found_.contains(key); });
+  std::erase_if(damaged, [&](const Key& key) { return found_.contains(key); });
   if (!damaged.empty())
     progress.warn(path_ +
                   ": damaged colors are baked again, cubes: " + std::to_string(damaged.size()));
@@ -91,41 +111,85 @@ bool ColorStore::is_sound(const Place& place, const CancelToken& cancel) const {
   return checksum.value() == place.checksum;
 }
 
-ColorStore::Place ColorStore::place_of(const Checksum128& key) const {
-  const auto found = found_.find({key.low, key.high});
-  if (found != found_.end()) return found->second;
-  const std::lock_guard lock(mutex_);
-  return added_.at({key.low, key.high});
-}
-
-void ColorStore::read(const Checksum128& key, std::vector<std::byte>& out) const {
-  const Place place = place_of(key);
-  out.resize(static_cast<size_t>(place.bytes));
-  std::shared_ptr<ReadableFile> reader = reader_;
-  if (!has(key)) {
+void ColorStore::read(const Place& place, std::vector<std::byte>& out) const {
+  std::shared_ptr<ReadableFile> reader;
+  {
     const std::lock_guard lock(mutex_);
-    if (!added_reader_) added_reader_ = files_.open_read(path_);
-    reader = added_reader_;
+    reader = reader_;
   }
+  out.resize(static_cast<size_t>(place.bytes));
   reader->read_at(place.offset, out);
   if (checksum64(out) != place.checksum)
     throw Error(ErrorCode::kCorrupt, path_ + " at offset " + std::to_string(place.offset) +
-                                         " fails its checksum: expected the colors that were read "
+                                         " fails its checksum: expected the colors that were "
                                          "there before; run the same command again");
 }
 
-void ColorStore::add(const Checksum128& key, std::span<const std::byte> artifact) {
+ColorStore::Place ColorStore::add(const Checksum128& key, uint64_t number, bool is_last,
+                                  std::span<const std::byte> part) {
+  const uint64_t checksum = checksum64(part);
   std::vector<std::byte> header;
-  const uint64_t checksum = checksum64(artifact);
-  append_header({key, artifact.size(), checksum}, header);
+  append_header({key, number | (is_last ? kLastPart : 0), part.size(), checksum}, header);
   const std::lock_guard lock(mutex_);
-  if (!writer_) writer_ = end_ > 0 ? files_.open_write(path_) : files_.create(path_);
+  if (!writer_) {
+    writer_ = end_ > 0 ? files_.open_write(path_) : files_.create(path_);
+    reader_ = files_.open_read(path_);
+  }
+  const Place place{end_ + kHeaderBytes, part.size(), checksum};
   // The header last: what it names is there, unless the power is cut.
-  writer_->write_at(end_ + kHeaderBytes, artifact);
+  writer_->write_at(place.offset, part);
   writer_->write_at(end_, header);
-  added_[{key.low, key.high}] = {end_ + kHeaderBytes, artifact.size(), checksum};
-  end_ += kHeaderBytes + artifact.size();
+  end_ = place.offset + place.bytes;
   sync_if_due();
+  return place;
+}
+
+void ColorStore::keep_only(std::span<const Checksum128> keys, const CancelToken& cancel) {
+  Artifacts retained;
+  uint64_t retained_bytes = 0;
+  for (const Checksum128& key : keys) {
+    const auto found = found_.find({key.low, key.high});
+    if (found == found_.end() || !retained.insert(*found).second) continue;
+    for (const Place& place : found->second) retained_bytes += kHeaderBytes + place.bytes;
+  }
+  if (end_ <= 2 * retained_bytes + kTolerableBytes) return;
+  // A later run removes files of this kind.
+  const std::string copy_path = path_ + ".vdspill";
+  uint64_t end = 0;
+  try {
+    end = copy(retained, *files_.create(copy_path), cancel);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNoSpace) throw;
+    files_.remove(copy_path);
+    return;
+  }
+  files_.rename(copy_path, path_);
+  files_.sync_directory(parent_directory(path_));
+  found_ = std::move(retained);
+  reader_ = files_.open_read(path_);
+  end_ = end;
+}
+
+// Returns the bytes of the file; `artifacts` become what is in it.
+uint64_t ColorStore::copy(Artifacts& artifacts, WritableFile& file,
+                          const CancelToken& cancel) const {
+  uint64_t end = 0;
+  std::vector<std::byte> part, header;
+  for (auto& [key, places] : artifacts)
+    for (size_t i = 0; i < places.size(); ++i) {
+      cancel.check();
+      Place& place = places[i];
+      read(place, part);
+      const uint64_t last = i + 1 == places.size() ? kLastPart : 0;
+      header.clear();
+      append_header({{key.first, key.second}, i | last, place.bytes, place.checksum}, header);
+      file.write_at(end, header);
+      place.offset = end + kHeaderBytes;
+      file.write_at(place.offset, part);
+      end = place.offset + place.bytes;
+    }
+  file.sync();
+  return end;
 }
 
 void ColorStore::sync_if_due() {

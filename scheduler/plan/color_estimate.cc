@@ -70,8 +70,8 @@ ColorEstimate estimate_colors(const GeometryOptions& options, const EstimateRang
   estimate.file_bytes = estimate.file_bytes + sections * kFixedFileBytes;
   estimate.artifact_bytes = kArtifactOverFile * estimate.file_bytes;
   estimate.spill_bytes = above(surfaces, share) + exactly(image_bytes > share ? image_bytes : 0.0);
-  const double workers =
-      static_cast<double>(context.threads * ColorMemory::region_bytes(options.attributes));
+  const double workers = static_cast<double>(
+      context.threads * (ColorMemory::kRegionBytes + ColorMemory::value_bytes(options.attributes)));
   estimate.memory_bytes = surfaces + exactly(image_bytes + workers);
   for (double* figure :
        {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})

@@ -122,8 +122,10 @@ std::unique_ptr<voxdag::WritableFile> FaultyFiles::open_write(const std::string&
 
 void FaultyFiles::rename(const std::string& from, const std::string& to) {
   operate([&] {
-    ForwardingFiles::rename(from, to);
     std::lock_guard lock(mutex_);
+    if (exists(to) && !unsynced_names_.contains(to))
+      replaced_[to] = synced_.contains(to) ? synced_[to] : contents(to);
+    ForwardingFiles::rename(from, to);
     unsynced_names_.erase(from);
     unsynced_names_[to] = from;
     synced_[to] = synced_[from];
@@ -137,6 +139,7 @@ void FaultyFiles::remove(const std::string& path) {
     std::lock_guard lock(mutex_);
     synced_.erase(path);
     unsynced_names_.erase(path);
+    replaced_.erase(path);
   });
 }
 
@@ -144,8 +147,9 @@ void FaultyFiles::sync_directory(const std::string& path) {
   operate([&] {
     ForwardingFiles::sync_directory(path);
     std::lock_guard lock(mutex_);
-    std::erase_if(unsynced_names_,
-                  [&](const auto& name) { return voxdag::parent_directory(name.first) == path; });
+    for (auto* names : {&unsynced_names_, &replaced_})
+      std::erase_if(*names,
+                    [&](const auto& name) { return voxdag::parent_directory(name.first) == path; });
   });
 }
 
@@ -160,6 +164,8 @@ void FaultyFiles::cut_power() {
     else
       std::filesystem::rename(name, old);
   }
+  for (const auto& [name, bytes] : replaced_)
+    std::ofstream(name, std::ios::binary | std::ios::trunc) << bytes;
   raise(SIGKILL);
 }
 

@@ -71,6 +71,7 @@ class FaultyFiles : public voxdag::ForwardingFiles {
   std::mutex mutex_;                                   // guards what a power cut leaves
   std::map<std::string, std::string> synced_;          // contents, of files that were written here
   std::map<std::string, std::string> unsynced_names_;  // new name -> old name, "" for a new file
+  std::map<std::string, std::string> replaced_;        // contents of files whose names those took
 };
 
 }  // namespace crash

@@ -5,68 +5,71 @@
 #include "core/color/color_of.h"
 
 namespace voxdag {
-namespace {
 
-// Appends the cells' colors, color(cell) each; `parents` become their parents, in order.
+// The cells may continue their level.
 template <class ColorOf>
-void add_colors(std::span<const ColoredCell> cells, const ColorOf& color,
-                std::vector<Color>& colors, std::vector<ColoredCell>& parents) {
+void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells, uint32_t first_code,
+                              const ColorOf& color) {
+  constexpr uint32_t kPrefixBits = 3 * kPrefixLevels;
+  const bool has_prefix = up + kPrefixLevels < levels_;
+  uint32_t& count = region_.counts[up];
   for (const ColoredCell& cell : cells) {
-    colors.push_back(color(cell));
-    const uint32_t code = cell.code >> 3;
-    if (parents.empty() || parents.back().code != code)
-      parents.push_back({code, cell.sum});
+    const uint32_t code = first_code + cell.code;
+    if (has_prefix && (count == 0 || code >> kPrefixBits != last_code_ >> kPrefixBits))
+      region_.prefix.push_back(count);
+    last_code_ = code;
+    ++count;
+    colors_.push_back(color(cell, code));
+    if (parents_.empty() || parents_.back().code != code >> 3)
+      parents_.push_back({code >> 3, cell.sum});
     else
-      parents.back().sum.add(cell.sum);
+      parents_.back().sum.add(cell.sum);
   }
 }
 
-void add_prefix(std::span<const ColoredCell> cells, std::vector<uint32_t>& prefix) {
-  constexpr uint32_t kBits = 3 * kPrefixLevels;
-  for (size_t i = 0; i < cells.size(); ++i)
-    if (i == 0 || cells[i].code >> kBits != cells[i - 1].code >> kBits)
-      prefix.push_back(static_cast<uint32_t>(i));
+void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells,
+                              uint32_t first_code) {
+  if (!color_)
+    return add_level(up, cells, first_code,
+                     [](const ColoredCell& cell, uint32_t) { return color_of(cell.sum); });
+  add_level(up, cells, first_code, [&](const ColoredCell& cell, uint32_t code) {
+    return color_(up, {code, cell.sum});
+  });
 }
 
-// color(up, cell) is the stored color.
-template <class ColorOfCell>
-EncodedRegion encode(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
-                     const ColorOfCell& color) {
-  EncodedRegion region;
-  region.morton = morton;
-  std::vector<Color> colors;
-  colors.reserve(cells.size() + cells.size() / 2);
-  std::vector<ColoredCell> coarser, parents;
-  for (uint32_t i = 0;; ++i) {
-    region.counts[i] = static_cast<uint32_t>(cells.size());
-    add_colors(
-        cells, [&](const ColoredCell& cell) { return color(i, cell); }, colors, parents);
-    if (i + kPrefixLevels < levels) add_prefix(cells, region.prefix);
-    if (i == levels) break;
-    coarser.swap(parents);
-    parents.clear();
-    cells = coarser;
+void RegionEncoder::add(std::span<const ColoredCell> cells, uint32_t first_code) {
+  if (colors_.empty()) {
+    // Room for the coarser levels, too.
+    colors_.reserve(cells.size() + cells.size() / 2);
+    parents_.reserve(std::min(cells.size(), size_t{1} << 3 * levels_ >> 3));
   }
-  region.total = cells.front().sum;
+  add_level(0, cells, first_code);
+}
+
+EncodedRegion RegionEncoder::finish(uint64_t morton) {
+  std::vector<ColoredCell> cells;
+  for (uint32_t up = 1; up <= levels_; ++up) {
+    cells.swap(parents_);
+    parents_.clear();
+    add_level(up, cells, 0);
+  }
+  // The parent of the last cell has the same sum.
+  region_.total = parents_.front().sum;
+  region_.morton = morton;
   const EncodeBlock encode_block = fastest_block_encoder();
-  region.blocks.resize((colors.size() + kBlockCells - 1) / kBlockCells * kBlockBytes);
-  for (size_t at = 0; at < colors.size(); at += kBlockCells) {
-    const ColorBlock block = encode_block(&colors[at], std::min(kBlockCells, colors.size() - at));
-    std::copy(block.begin(), block.end(), &region.blocks[at / kBlockCells * kBlockBytes]);
+  region_.blocks.resize((colors_.size() + kBlockCells - 1) / kBlockCells * kBlockBytes);
+  for (size_t at = 0; at < colors_.size(); at += kBlockCells) {
+    const ColorBlock block = encode_block(&colors_[at], std::min(kBlockCells, colors_.size() - at));
+    std::copy(block.begin(), block.end(), &region_.blocks[at / kBlockCells * kBlockBytes]);
   }
-  return region;
-}
-
-}  // namespace
-
-EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells) {
-  return encode(levels, morton, cells,
-                [](uint32_t, const ColoredCell& cell) { return color_of(cell.sum); });
+  return std::move(region_);
 }
 
 EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
                             const CellColor& color) {
-  return encode(levels, morton, cells, color);
+  RegionEncoder encoder(levels, color);
+  encoder.add(cells);
+  return encoder.finish(morton);
 }
 
 }  // namespace voxdag

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/color/blocks/block_codec.h"
@@ -30,17 +31,43 @@ struct EncodedRegion {
   ColorSum total;
 };
 
-// `levels` is kRegionLevels, or less where a grid, or what is left of its levels, has less; at
-// least 1 cell in increasing order, with codes below 8^levels. Thread-safe. Memory: up to 17 bytes
-// for each cell, and 72 for each cell of the next coarser level, aside from what is returned.
-EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells);
-
 // The stored color of a cell that is `up` levels above the finest one; its code is that of its
 // level.
 using CellColor = std::function<Color(uint32_t up, const ColoredCell& cell)>;
-// The same with other colors than those of the sums.
+
+// Encodes a region whose finest cells come in parts, so that not all of their sums need be there
+// at once. Memory: up to 10 bytes for each cell, and 81 for each cell of the next coarser level,
+// aside from what is returned.
+class RegionEncoder {
+ public:
+  // `levels` is kRegionLevels, or less where a grid, or what is left of its levels, has less. With
+  // a `color` that is not null, cells have that, not the color of their sum.
+  explicit RegionEncoder(uint32_t levels, CellColor color = nullptr)
+      : levels_(levels), color_(std::move(color)) {}
+  // The next cells in increasing order, their codes counted from `first_code`; with that, they are
+  // below 8^levels.
+  void add(std::span<const ColoredCell> cells, uint32_t first_code = 0);
+  bool empty() const { return colors_.empty(); }
+  // There is at least 1 cell. Once, at last.
+  EncodedRegion finish(uint64_t morton);
+
+ private:
+  template <class ColorOf>
+  void add_level(uint32_t up, std::span<const ColoredCell> cells, uint32_t first_code,
+                 const ColorOf& color);
+  void add_level(uint32_t up, std::span<const ColoredCell> cells, uint32_t first_code);
+
+  const uint32_t levels_;
+  const CellColor color_;
+  EncodedRegion region_;
+  std::vector<Color> colors_;
+  std::vector<ColoredCell> parents_;  // of the level that was added last
+  uint32_t last_code_ = 0;            // of a cell of that level
+};
+
+// All cells at once. Thread-safe.
 EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
-                            const CellColor& color);
+                            const CellColor& color = nullptr);
 
 // How many entries `prefix` has with these counts.
 inline size_t prefix_entries(uint32_t levels,

@@ -40,6 +40,8 @@ class RegionBaker {
  public:
   // At most what it has allocated, `cells` not counted.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
+  // At most, of the cells of a region that a triangle touches: 4 where its shadow covers one.
+  static constexpr uint32_t kTriangleCells = 4u << (2 * kRegionLevels);
 
   // The references must outlive it. Each triangle's material is an index into `materials`.
   // `wanted`: which values finish() is to find besides colors. Materials are then those of the
@@ -62,18 +64,23 @@ class RegionBaker {
     finish(cells);
   }
 
-  // The same for triangles that come in any number of parts.
-  void begin(const Cube& region) {
+  // The same for triangles that come in any number of parts; `max_cells` may stop add().
+  void begin(const Cube& region, uint32_t max_cells = color::RegionCells::kMaxCells) {
+    max_cells_ = max_cells;
+    cells_.reserve(std::min(max_cells + kTriangleCells, color::RegionCells::kMaxCells));
     const uint32_t down = grid_.color_levels - region.level;
     for (int a = 0; a < 3; ++a) {
       first_[a] = static_cast<int64_t>(region.position[a]) << down;
       last_[a] = first_[a] + (int64_t{1} << down) - 1;
     }
   }
-  void add(std::span<const FixedSurface> triangles) {
+  // False: they touch more cells than they may, by up to kTriangleCells, and finish() gives no
+  // colors, but must be called.
+  bool add(std::span<const FixedSurface> triangles) {
     triangles_ = triangles;
-    for (uint32_t i = 0; i < triangles.size(); ++i) add_triangle(i);
+    for (uint32_t i = 0; i < triangles.size() && cells_.count() <= max_cells_; ++i) add_triangle(i);
     add_waiting();
+    return cells_.count() <= max_cells_;
   }
   void finish(std::vector<ColoredCell>& cells) { finish(cells, values_); }
   // `values`: one for each cell if normals or materials are wanted.
@@ -230,6 +237,7 @@ class RegionBaker {
   Textures& textures_;
   uint32_t spread_[3][64];  // by axis: the bits of a coordinate in a code
   std::span<const FixedSurface> triangles_;
+  uint32_t max_cells_ = 0;
   int64_t first_[3] = {}, last_[3] = {};  // cells of the region
   color::RegionCells cells_;
   std::vector<Waiting> waiting_;

@@ -28,6 +28,9 @@ class RegionCells {
   explicit RegionCells(const AttributeSet& wanted = {})
       : attributes_(wanted), places_(kMaxCells), touched_(kMaxCells / 64) {}
 
+  // Room for so many sums, which takes no memory before they are there.
+  void reserve(size_t cells) { sums_.reserve(cells); }
+
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
   // To be called some time before the cell is touched or covered.
   void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
@@ -52,6 +55,7 @@ class RegionCells {
     return number;
   }
   ColorSum& sum(uint32_t number) { return sums_[number]; }
+  size_t count() const { return sums_.size(); }
 
   AttributeSums& attributes() { return attributes_; }
 

@@ -7,7 +7,6 @@
 #include <iterator>
 
 #include "scheduler/color/color_keys.h"
-#include "scheduler/color/color_store.h"
 #include "scheduler/color/region_record.h"
 #include "scheduler/run_build.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -132,6 +131,21 @@ TEST_F(ColorArtifacts, WhatIsDamagedIsBakedAgain) {
   EXPECT_EQ(warnings_.text, "");
 }
 
+// What an earlier scene has baked goes when it is more than what this one needs.
+TEST_F(ColorArtifacts, DoNotGrowWithoutEnd) {
+  BuildSpec s = spec();
+  s.run.keep_work = true;
+  build(s);
+  const uint64_t one = std::filesystem::file_size(artifacts());
+  for (int red = 10; red <= 80; red += 10) {
+    PaintedScene::write(folder_.path(), static_cast<uint8_t>(red));
+    build(s);
+    EXPECT_LE(std::filesystem::file_size(artifacts()), 3 * one + (64 << 10)) << red;
+  }
+  EXPECT_GT(one, 64u << 10);
+  EXPECT_EQ(warnings_.text, "");
+}
+
 TEST_F(ColorArtifacts, ARestartBakesAll) {
   bake();
   BuildSpec s = spec();
@@ -139,57 +153,6 @@ TEST_F(ColorArtifacts, ARestartBakesAll) {
   const BuildReport report = build(s);
   EXPECT_EQ(report.sha256, expected_);
   EXPECT_EQ(report.colors->cubes_reused, 0u);
-}
-
-std::vector<std::byte> bytes_of(const std::string& text) {
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
-}
-
-TEST(ColorStore, HasWhatWasAdded) {
-  const TemporaryFolder folder;
-  const std::string path = folder.file("colors");
-  Warnings warnings;
-  const CancelToken cancel;
-  const auto open = [&] { return ColorStore(system_files(), path, 0, warnings, cancel); };
-  const Checksum128 a{1, 2}, b{1, 3}, c{2, 2};
-  {
-    ColorStore store = open();
-    EXPECT_FALSE(store.has(a));
-    store.add(a, bytes_of("first"));
-    store.add(b, {});
-  }
-  {
-    ColorStore store = open();
-    EXPECT_TRUE(store.has(a) && store.has(b) && !store.has(c));
-    store.add(c, bytes_of(std::string(300000, 'c')));
-  }
-  const uint64_t whole = std::filesystem::file_size(path);
-  const auto read = [](const ColorStore& store, const Checksum128& key) {
-    std::vector<std::byte> out;
-    store.read(key, out);
-    return out;
-  };
-  {
-    const ColorStore store = open();
-    EXPECT_EQ(read(store, a), bytes_of("first"));
-    EXPECT_EQ(read(store, b), bytes_of(""));
-    EXPECT_EQ(read(store, c), bytes_of(std::string(300000, 'c')));
-    EXPECT_EQ(store.file_bytes(), whole);
-  }
-  // What was not written to its end is written over.
-  std::filesystem::resize_file(path, whole - 1);
-  {
-    ColorStore store = open();
-    EXPECT_TRUE(store.has(a) && store.has(b) && !store.has(c));
-    store.add(c, bytes_of("short"));
-  }
-  const ColorStore store = open();
-  EXPECT_EQ(read(store, c), bytes_of("short"));
-  EXPECT_EQ(warnings.text, "");
-  // Damage since then.
-  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(48) << "worst";
-  EXPECT_THROW(read(store, a), Error);
 }
 
 TEST(ColorKeys, NameAllThatColorsDependOn) {
@@ -239,7 +202,7 @@ TEST(RegionRecords, ComeBackAsTheyWere) {
   EncodedRegion region;
   region.morton = uint64_t{1} << 40;
   region.counts = {700, 80, 9, 4, 3, 2, 1};
-  region.blocks = bytes_of("blocks of colors");
+  region.blocks.assign(17, std::byte{5});
   region.prefix = {5, uint32_t{1} << 31};
   region.total = {{1, 2, uint64_t{1} << 50}, 3, {4, 5, 6}, 7};
   std::vector<std::byte> bytes;

@@ -10,8 +10,6 @@
 #include "core/format/global/verify.h"
 #include "core/scene/generate/generate.h"
 #include "query/export/export.h"
-#include "scheduler/color/cube_baker.h"
-#include "scheduler/color/region_record.h"
 #include "scheduler/plan/estimate.h"
 #include "scheduler/run_build.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -233,55 +231,6 @@ TEST_F(ColorStage, ArePlanned) {
     EXPECT_GT(estimate.disk_bytes.likely, plain.disk_bytes.likely + 2 * section_bytes * 0.9);
     EXPECT_GT(estimate.cpu_s.likely, plain.cpu_s.likely);
   }
-}
-
-// Surfaces that do not fit the memory are divided among cubes, down to regions.
-TEST_F(ColorStage, AreTheSameWithLittleMemory) {
-  constexpr uint32_t kLevels = 9;
-  const ColorGrid grid{kLevels, kLevels};
-  MemoryBudget budget(uint64_t{1} << 30);
-  NoProgress progress;
-  CancelToken cancel;
-  const auto textures = TextureSet::prepare(
-      system_files(), SceneMaterials{}, folder_.path() + "/images", 1, budget, progress, cancel);
-  const auto reader = textures->open(1 << 20);
-  const auto bake = [&](uint64_t surface_bytes) {
-    MemoryBudget share(surface_bytes, &budget);
-    SurfaceStore store(system_files(), folder_.path() + "/surfaces", share);
-    SurfaceStore::Bin bin;
-    uint64_t state = 1;
-    std::vector<std::byte> record;
-    for (int i = 0; i < 3000; ++i) {
-      FixedSurface surface;
-      int64_t corner[3];
-      const auto random = [&](int64_t below) {
-        state = state * 6364136223846793005u + 1442695040888963407u;
-        return static_cast<int64_t>(state >> 33) % below;
-      };
-      for (int64_t& c : corner) c = random((int64_t{1} << (kLevels + kUnitBits)) - 8000);
-      for (auto& vertex : surface.position.v)
-        for (int a = 0; a < 3; ++a) vertex[a] = (corner[a] + random(8000)) | 1;
-      for (SurfaceCorner& c : surface.corners)
-        c.color = {static_cast<uint16_t>(random(65536)), 9, 40000, kFullIntensity};
-      record.clear();
-      append_surface(surface, false, record);
-      store.add(bin, record, 1);
-    }
-    const StoredAttribute attributes[] = {{}, {Attribute::kNormal, 2}, {Attribute::kMaterial, 1}};
-    CubeBaker baker(grid, attributes, textures->materials(), *reader, store, surface_bytes, budget,
-                    cancel);
-    CubeBaker::Records records(std::size(attributes));
-    baker.bake(Cube{}, bin, records);
-    EXPECT_EQ(bin.surfaces, 0u);
-    return records;
-  };
-  const auto all = bake(uint64_t{64} << 20);
-  size_t regions = 0;
-  for (RegionRecords records(all[0]); records.next();) ++regions;
-  EXPECT_GT(regions, 100u);
-  EXPECT_EQ(bake(60 << 10), all);
-  // Not even those of a region fit: they come in parts.
-  EXPECT_EQ(bake(1 << 10), all);
 }
 
 }  // namespace
