@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/memory_budget.h"
@@ -20,6 +21,9 @@ inline constexpr uint32_t kTileShift = 5;
 inline constexpr uint32_t kTileEdge = 1u << kTileShift;
 inline constexpr size_t kPageTexels = size_t{kTileEdge} * kTileEdge;
 inline constexpr size_t kPageBytes = kPageTexels * sizeof(uint64_t);
+
+// Of a page in the scratch file, so that a damaged one gives no colors.
+uint32_t page_checksum(std::span<const uint64_t> texels);
 
 // A level of a pyramid.
 struct TextureLevel {
@@ -43,9 +47,10 @@ class TextureReader {
   // Of pyramids in memory, which must outlive the reader, as the layout must.
   TextureReader(const TextureLayout& layout, const uint64_t* pages)
       : layout_(layout), all_(pages) {}
-  // Of pyramids in a file; caches pages of about `memory_bytes`, at least one.
-  TextureReader(const TextureLayout& layout, const ReadableFile& file, uint64_t memory_bytes,
-                MemoryBudget& budget);
+  // Of pyramids in a file; caches pages of about `memory_bytes`, at least one. `checksums`: of all
+  // pages, which must outlive the reader.
+  TextureReader(const TextureLayout& layout, const ReadableFile& file, const uint32_t* checksums,
+                uint64_t memory_bytes, MemoryBudget& budget);
 
   // An image has one level at least, and further ones of half the width and height, rounded down,
   // until both are 1. Images that no material refers to have none.
@@ -61,7 +66,8 @@ class TextureReader {
     uint32_t width() const { return width_; }
     uint32_t height() const { return height_; }
     // Four linear channels of 16 bits: red in the lowest, then green, blue and alpha.
-    // 0 <= x < width, 0 <= y < height, counted from the upper left. Throws Error{kIo}.
+    // 0 <= x < width, 0 <= y < height, counted from the upper left. Throws Error{kIo}, and
+    // Error{kCorrupt} for a page that is not what was written.
     uint64_t texel(uint32_t x, uint32_t y) const {
       const uint64_t place = place_of(x, y);
       return texels_ ? texels_[place] : reader_.cached_texel(first_ + place);
@@ -119,6 +125,7 @@ class TextureReader {
   const TextureLayout& layout_;
   const uint64_t* const all_ = nullptr;  // null: in the file
   const ReadableFile* file_ = nullptr;
+  const uint32_t* checksums_ = nullptr;
   int slot_shift_ = 63;
   std::vector<uint64_t> page_in_slot_;
   MemoryCharge slots_charge_;

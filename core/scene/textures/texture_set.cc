@@ -109,9 +109,13 @@ void expect_unchanged(FileSystem& files, const ImageSource& source) {
 
 }  // namespace
 
+uint32_t page_checksum(std::span<const uint64_t> texels) {
+  return static_cast<uint32_t>(checksum64(std::as_bytes(texels)));
+}
+
 TextureReader::TextureReader(const TextureLayout& layout, const ReadableFile& file,
-                             uint64_t memory_bytes, MemoryBudget& budget)
-    : layout_(layout), file_(&file) {
+                             const uint32_t* checksums, uint64_t memory_bytes, MemoryBudget& budget)
+    : layout_(layout), file_(&file), checksums_(checksums) {
   constexpr uint64_t kSlotBytes = kPageBytes + sizeof(uint64_t);
   const uint64_t slots = std::bit_floor(std::max<uint64_t>(memory_bytes / kSlotBytes, 2));
   slot_shift_ = 64 - std::countr_zero(slots);
@@ -123,14 +127,19 @@ TextureReader::TextureReader(const TextureLayout& layout, const ReadableFile& fi
 
 void TextureReader::load(uint64_t page, size_t slot) {
   page_in_slot_[slot] = kNoPage;
-  file_->read_at(page * kPageBytes,
-                 std::as_writable_bytes(std::span(&cache_[slot * kPageTexels], kPageTexels)));
+  const std::span texels(&cache_[slot * kPageTexels], kPageTexels);
+  file_->read_at(page * kPageBytes, std::as_writable_bytes(texels));
+  if (page_checksum(texels) != checksums_[page])
+    throw Error(ErrorCode::kCorrupt,
+                file_->path() + " at offset " + std::to_string(page * kPageBytes) +
+                    " fails its checksum: expected the texels that were written there; run the "
+                    "same command again");
   page_in_slot_[slot] = page;
 }
 
 std::unique_ptr<TextureReader> TextureSet::open(uint64_t memory_bytes) {
   if (!file_) return std::make_unique<TextureReader>(layout_, memory_.data());
-  return std::make_unique<TextureReader>(layout_, *file_, memory_bytes, budget_);
+  return std::make_unique<TextureReader>(layout_, *file_, checksums_.data(), memory_bytes, budget_);
 }
 
 uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
@@ -203,14 +212,20 @@ std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMa
   } else {
     writer = files.create(path);
     set->file_ = files.open_read(path);
+    set->checksums_ =
+        PageBuffer<uint32_t>(budget, static_cast<size_t>(set->pages_), "checksums of textures");
     files.remove(path);  // without a name it is gone when the process ends, however it ends
   }
   const PyramidBuilder::WritePages write = [&](uint64_t first, std::span<const uint64_t> texels) {
     cancel.check();
-    if (writer)
-      writer->write_at(first * kPageBytes, std::as_bytes(texels));
-    else
+    if (!writer) {
       std::ranges::copy(texels, &set->memory_[static_cast<size_t>(first) * kPageTexels]);
+      return;
+    }
+    for (size_t at = 0; at < texels.size(); at += kPageTexels)
+      set->checksums_[static_cast<size_t>(first) + at / kPageTexels] =
+          page_checksum(texels.subspan(at, kPageTexels));
+    writer->write_at(first * kPageBytes, std::as_bytes(texels));
   };
   parallel_for(threads, count, [&](unsigned, size_t i) {
     if (problems[i].empty())

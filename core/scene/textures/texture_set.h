@@ -61,6 +61,7 @@ class TextureSet {
   uint64_t pages_ = 0;
   PageBuffer<uint64_t> memory_;
   std::unique_ptr<ReadableFile> file_;
+  PageBuffer<uint32_t> checksums_;  // of the pages in it
 };
 
 // What TextureSet::bytes() would be. Reads the headers of the images.

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "core/scene/textures/texture_set.h"
+#include "tests/crash/faulty_files.h"
+#include "tests/unit/base/error_of.h"
 #include "tests/unit/image/image_files.h"
 #include "tests/unit/scene/scene_files.h"
 
@@ -31,18 +33,22 @@ struct Warnings : NoProgress {
 
 // Reads the scene from memory and writes the scratch file to the disk.
 struct ScratchFiles : MemoryFiles {
+  explicit ScratchFiles(crash::FaultPlan plan) : disk(plan) {}
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
     if (contents.contains(path)) return MemoryFiles::open_read(path);
-    return system_files().open_read(path);
+    return disk.open_read(path);
   }
   std::unique_ptr<WritableFile> create(const std::string& path) override {
-    return system_files().create(path);
+    return disk.create(path);
   }
   void remove(const std::string& path) override { system_files().remove(path); }
+  crash::FaultyFiles disk;
 };
 
 struct Textures {
-  explicit Textures(const std::string& glb, uint64_t bytes = uint64_t{64} << 20) : budget(bytes) {
+  explicit Textures(const std::string& glb, uint64_t bytes = uint64_t{64} << 20,
+                    crash::FaultPlan plan = {})
+      : files(plan), budget(bytes) {
     files.contents["scene"] = glb;
     MemoryBudget scene_budget(uint64_t{64} << 20);
     const auto source = open_scene(files, {"scene"}, {}, scene_budget, cancel);
@@ -91,6 +97,33 @@ TEST(Textures, PyramidOfOddSizes) {
   }
   for (uint32_t y = 0; y < height; ++y)
     for (uint32_t x = 0; x < width; ++x) ASSERT_EQ(a->texel(0, 0, x, y), b->texel(0, 0, x, y));
+}
+
+// A page of the scratch file that is not what was written gives no color.
+TEST(Textures, DamagedPages) {
+  const uint32_t width = 300, height = 200;
+  const std::string glb = textured(png_of(width, height, noise(4 * width * height))).glb();
+  // Calls use(texel) for all texels of all levels.
+  const auto read_all = [](Textures& textures, const auto& use) {
+    ASSERT_FALSE(textures.set->is_in_memory());
+    const auto reader = textures.set->open(4 * kPageBytes);
+    for (uint32_t level = 0; level < reader->levels(0); ++level)
+      for (uint32_t y = 0; y < reader->height(0, level); ++y)
+        for (uint32_t x = 0; x < reader->width(0, level); ++x) use(reader->texel(0, level, x, y));
+  };
+  Textures sound(glb, 5 << 18);
+  uint64_t texels = 0;
+  read_all(sound, [&](uint64_t) { ++texels; });
+  EXPECT_GT(texels, width * height);
+  // The first operation makes the file; each other one writes a row of tiles.
+  const uint64_t operations = sound.files.disk.operations();
+  EXPECT_GT(operations, 15u);
+  for (uint64_t at = 2; at <= operations; ++at) {
+    Textures damaged(glb, 5 << 18, {crash::Fault::kFlipBit, at});
+    const Error error = error_of([&] { read_all(damaged, [](uint64_t) {}); });
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt) << at;
+    EXPECT_NE(error.message().find("fails its checksum"), std::string::npos) << error.message();
+  }
 }
 
 // sRGB becomes linear light; alpha is linear.
