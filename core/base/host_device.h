@@ -10,6 +10,11 @@
 #define VOXDAG_HD
 #endif
 
+// SSE2, which every x86-64 has, may be used: not in what is compiled for a device.
+#if defined(__SSE2__) && !defined(__CUDA_ARCH__)
+#define VOXDAG_SSE2
+#endif
+
 namespace voxdag {
 
 VOXDAG_HD inline int popcount64(uint64_t x) {

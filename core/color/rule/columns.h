@@ -52,7 +52,7 @@ VOXDAG_HD inline uint32_t negative_columns_one_by_one(Int first, Int a, Int b) {
 // The same, two columns at once where there is SSE2, which every x86-64 has.
 template <class Int>
 VOXDAG_HD inline uint32_t negative_columns(Int first, Int a, Int b) {
-#ifdef __SSE2__
+#ifdef VOXDAG_SSE2
   if constexpr (sizeof(Int) == 8) {
     const __m128i start = _mm_set_epi64x(wrapping_sum(first, a), first);
     const __m128i two = _mm_set1_epi64x(wrapping_sum(a, a)), down = _mm_set1_epi64x(b);

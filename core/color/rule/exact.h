@@ -8,8 +8,8 @@
 #include "core/base/host_device.h"
 #include "core/base/integers.h"
 
-// SSE2, which every x86-64 has; what is done with it is also there in plain code.
-#ifdef __SSE2__
+// What is done with SSE2 is also there in plain code.
+#ifdef VOXDAG_SSE2
 #include <emmintrin.h>
 #endif
 

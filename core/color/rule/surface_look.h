@@ -94,7 +94,7 @@ VOXDAG_HD inline void add_weighted_one_by_one(Texel texel, uint64_t weight, uint
 }
 // The same with SSE2, where there is: two of the eight sums at once.
 VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, ColorSum& sum) {
-#ifdef __SSE2__
+#ifdef VOXDAG_SSE2
   static_assert(sizeof(ColorSum) == 4 * sizeof(__m128i));
   auto* const sums = reinterpret_cast<__m128i*>(&sum);
   const auto add = [](__m128i* to, __m128i more) {
