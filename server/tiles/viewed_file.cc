@@ -53,6 +53,8 @@ Json describe(const voxdag_reader::File& file, const query::DagView& dag,
     const uint64_t mask = dag.brick(0);
     json["root_brick"] = {static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)};
   }
+  const query::Box box = query::occupied_box(dag);
+  json["box"] = {{"low", box.low.v}, {"high", box.high.v}};
   json["camera"] = camera("auto", dag, file);
   for (const std::string& view : query::view_names())
     if (view != "auto" && view != "inside") json["views"][view] = camera(view, dag, file);

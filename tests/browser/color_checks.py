@@ -4,7 +4,8 @@ import base64
 import json
 import struct
 
-WIDTH, HEIGHT = 400, 180  # of the canvas in the visitor's window
+from picture_checks import HEIGHT, WIDTH, assert_light
+
 MIN_SHARE = 0.03          # of the picture that a box must have for the check to mean anything
 MAX_MEAN = 3              # difference of a channel's mean, of 255
 
@@ -95,7 +96,9 @@ def check_colors(visitor, voxdag, url, built, camera):
     gray = rendered(visitor, voxdag, built, camera, "--gray")
     visitor.show(camera)
     colored = pixels_of(visitor)
+    depths = voxdag.render(built, camera, WIDTH, HEIGHT)
     assert_colored(colored, reference, "colors")
+    assert_light(colored, reference, depths, "the colors", has_shadow=True)
     visitor.picture("colors")
     visitor.page.locator("#scene").focus()
     visitor.page.keyboard.press("g")
@@ -103,6 +106,7 @@ def check_colors(visitor, voxdag, url, built, camera):
     plain = pixels_of(visitor)
     off = [max(abs(a - b) for a, b in zip(means(plain), means(each))) for each in (gray, reference)]
     print(f"  gray: means within {off[0]:.1f} of render --gray, {off[1]:.1f} of its colors")
+    assert_light(plain, gray, depths, "gray", has_shadow=True)
     assert max(share(plain, channel) for channel in range(3)) == 0, "colors are shown though they are switched off"
     assert off[0] < MAX_MEAN < off[1], "the gray picture is not that of render --gray"
     visitor.wait_until("location.hash.includes('color=0')")

@@ -65,7 +65,8 @@ def check_restart(visitor, server, cameras, references):
 # two minutes: a busy machine draws slowly.
 COMPLETE_WITH_SUN = """async (pause_ms) => {
   const {viewer, renderer, camera, manifest} = voxdagViewer, {eye, target} = camera.get();
-  renderer.light.place_sun(viewer.space.to_scene(eye), viewer.space.to_scene(target));
+  renderer.light.place_sun(eye, target.map((c, axis) => c - eye[axis]));
+  renderer.light.outside = false;
   renderer.sun_trials = 6;  // of 8 that may wait for tiles
   tiles.pause_ms = pause_ms;
   tiles.asked = 0;

@@ -41,6 +41,12 @@ def fov_of(camera):
     return float(re.search(r"--fov (\S+)", camera)[1])
 
 
+def address(url, camera):
+    """Of a page that shows this camera first, so that the sun stands as `render` places it."""
+    _, eye, target, fov = re.split(r" ?--\w+ ", camera)
+    return f"{url}/{PLAIN}&camera={eye}&target={target}&fov={fov}"
+
+
 def compare(reference, depths, camera):
     """Shares of equal pixels: of the mask of hits, and of the distances where both hit."""
     spread = math.tan(math.radians(fov_of(camera)) / 2) / (HEIGHT / 2)
@@ -103,11 +109,10 @@ COARSE_PIXELS = 16
 def check_first_view(visitor, url, dag, camera, reference):
     """The tiles that are asked for before anything is drawn are enough for a picture without wide cells or holes."""
     visitor.context.add_init_script(ONLY_FIRST_VIEW)
-    _, eye, target, fov = re.split(r" ?--\w+ ", camera)
-    visitor.open(f"{url}/{PLAIN}&camera={eye}&target={target}&fov={fov}")
+    visitor.open(address(url, camera))
     visitor.wait_until("its_tiles")
     depths, levels = visitor.capture(WIDTH, HEIGHT)
-    spread = math.tan(math.radians(float(fov)) / 2) / (HEIGHT / 2)
+    spread = math.tan(math.radians(fov_of(camera)) / 2) / (HEIGHT / 2)
     widest = max(2 ** (dag.levels - level) / (spread * depth) for depth, level in zip(depths, levels)
                  if not math.isinf(depth) and level < dag.levels)
     _, same, _ = compare(reference, depths, camera)
@@ -117,6 +122,8 @@ def check_first_view(visitor, url, dag, camera, reference):
     assert same < MIN_EQUAL_DEPTH, "all tiles are there: the check sees nothing"
 
 
+MIN_REGION = 100   # pixels
+MIN_SHADOW = 8     # darker than the sky, of 255
 SKY_TOP, SKY_BOTTOM = (0.46, 0.54, 0.65), (0.86, 0.87, 0.88)  # light, before it is encoded
 
 
@@ -137,28 +144,46 @@ def inner_pixels(reference):
                 yield at, row, False in kinds
 
 
-def check_canvas(visitor, camera, reference):
-    """What the canvas shows with light: the sky's gradient where `render` sees sky, and surfaces in light and shadow."""
+def worst_region(differences):
+    """The mean of the region of 8 x 4 with the largest one, of {pixel: difference}; of regions that have enough."""
+    regions = {}
+    for at, off in differences.items():
+        regions.setdefault((at // WIDTH * 4 // HEIGHT, at % WIDTH * 8 // WIDTH), []).append(off)
+    return max((sum(each) / len(each) for each in regions.values() if len(each) >= MIN_REGION), key=abs)
+
+
+def assert_light(pixels, rendered, reference, what, has_shadow):
+    """The canvas, its pixels with their light, is what `render` shows: surfaces in light and shadow, and the sky's gradient
+    on which, if the scene does not fill its box, the scene's shadow lies. Returns the brightness of the hits, sorted."""
+    off, shadow, tones = ({}, {}), {}, []
+    for at, row, is_hit in inner_pixels(reference):
+        color, expected = pixels[4 * at:4 * at + 3], rendered[4 * at:4 * at + 3]
+        off[is_hit][at] = (sum(color) - sum(expected)) / 3
+        if is_hit:
+            tones.append(sum(color) / 3)
+        elif sum(sky_of_row(row, HEIGHT)) - sum(expected) > 3 * MIN_SHADOW:
+            shadow[at] = off[False][at]
+    means = [sum(each.values()) / max(1, len(each)) for each in (*off, shadow)]
+    worst = [worst_region(each) for each in off]
+    print(f"  light of {what}: hits are brighter than in render by {means[1]:.1f} (a region by {worst[1]:.1f}), sky by "
+          f"{means[0]:.1f} ({worst[0]:.1f}), of that {len(shadow)} pixels in shadow by {means[2]:.1f}")
+    assert min(map(len, off)) > 0.05 * WIDTH * HEIGHT, "too little of the sky or of the scene"
+    assert (len(shadow) > 0.01 * WIDTH * HEIGHT) == has_shadow, "a shadow on the floor, or none: the check sees nothing"
+    for which, max_mean, max_region in ((0, 2, 6), (1, 5, 12)):
+        assert abs(means[which]) <= max_mean and abs(worst[which]) <= max_region, "other light than that of render"
+    assert abs(means[2]) <= 5, "the floor's shadow is not that of render"
+    return sorted(tones)
+
+
+def check_canvas(visitor, camera, reference, rendered):
+    """What the canvas shows with light is `rendered`, and has light and shadow."""
     visitor.page.evaluate("voxdagViewer.viewer.set_options({shadows: true, occlusion: true})")
     visitor.show(camera)
     width, height, pixels = visitor.canvas()
     assert (width, height) == (WIDTH, HEIGHT), (width, height)
-    counts, wrong, tones = [0, 0], [0, 0], []
-    for at, row, is_hit in inner_pixels(reference):
-        color = pixels[4 * at:4 * at + 3]
-        is_sky = all(abs(a - b) <= 2 for a, b in zip(color, sky_of_row(row, HEIGHT)))
-        counts[is_hit] += 1
-        wrong[is_hit] += is_sky == is_hit
-        if is_hit:
-            tones.append(sum(color) / 3)
-    tones.sort()
+    tones = assert_light(pixels, rendered, reference, "the canvas", has_shadow=False)
     dark, bright = tones[len(tones) // 10], tones[len(tones) * 9 // 10]
-    print(f"  canvas: {wrong[0]} of {counts[0]} pixels of the sky are not its color, {wrong[1]} of {counts[1]} hits are; "
-          f"brightness of the hits {dark:.0f} to {bright:.0f}")
-    assert min(counts) > 0.05 * WIDTH * HEIGHT, "too little of the sky or of the scene"
-    assert wrong[0] <= 0.005 * counts[0], "the sky is not the gradient"
-    assert wrong[1] <= 0.01 * counts[1], "hits are not drawn"
-    assert dark > 20 and bright < 254 and bright - dark > 60, "the surfaces are not in light and shadow"
+    assert dark > 20 and bright < 254 and bright - dark > 60, f"no light and shadow: {dark} to {bright}"
     visitor.picture("light")
     visitor.page.evaluate("voxdagViewer.viewer.set_options({shadows: false, occlusion: false})")
 

@@ -86,6 +86,10 @@ TEST_F(Tiles, HaveAManifest) {
   for (const char* view : {"iso", "front", "top"})
     EXPECT_EQ(manifest_["views"][view]["position"].size(), 3u) << view;
   EXPECT_GT(manifest_["camera"]["fov_degrees"], 0);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double low = manifest_["box"]["low"][axis], high = manifest_["box"]["high"][axis];
+    EXPECT_TRUE(0 <= low && low < high && high <= 256) << low << ' ' << high;
+  }
   EXPECT_EQ(http_->get(base_).header("Cache-Control"), "no-store");
 }
 

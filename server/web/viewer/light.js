@@ -1,27 +1,42 @@
-// The light of a picture: where the sun stands, how bright the picture is, how far occluders reach. Exposure and
-// reach follow what is seen.
+// The light of a picture: where the sun stands, how bright the picture is, how far occluders reach, and where the floor
+// is. Exposure and reach follow what is seen. All in voxels.
 
-import {subtract} from "./vector.js";
+import {length, scale, subtract} from "./vector.js";
 
 export class Light {
   // Of a file with this manifest.
-  constructor({origin, edge, camera}) {
+  constructor({box, resolution}) {
     this.exposure = 1;
     this.sky_reach = 1;
     this.haze_start = 1;
     this.readings = 0;
-    this.low = origin;
-    this.high = origin.map((x) => x + edge);
-    this.outside = true;         // of the grid: so is the first camera
-    this.turn = 0;
-    if (camera) this.place_sun(camera.position, camera.target);
-    else this.set_sun(0);
+    this.low = box?.low ?? [0, 0, 0];
+    this.high = box?.high ?? [resolution, resolution, resolution];
+    this.outside = true;         // the first camera sees the floor
+    this.turn = null;            // until there is a camera
+    this.set_sun(0);
   }
 
-  // Over the left shoulder of a camera, the first one.
-  place_sun(position, target) {
-    const back = subtract(position, target);
-    this.outside = position.some((x, i) => x < this.low[i] || x > this.high[i]);
+  // Whether a camera there sees the floor that the scene stands on, and its shadow.
+  sees_floor(eye) {
+    return eye[1] > this.low[1] && eye.some((x, i) => x < this.low[i] || x > this.high[i]);
+  }
+
+  // What the shaders know of the floor for a camera there: how far it is below, or 0, and over which distance its shadow
+  // fades, from where.
+  floor(eye) {
+    const center = this.low.map((x, i) => (x + this.high[i]) / 2);
+    return {u_floor: [this.sees_floor(eye) ? eye[1] - this.low[1] : 0, Math.max(1, this.diagonal)],
+            u_floor_center: subtract(center, eye)};
+  }
+  get diagonal() {
+    return length(subtract(this.high, this.low));
+  }
+
+  // Over the left shoulder of a camera, the first one, that looks `forward`.
+  place_sun(eye, forward) {
+    const back = scale(forward, -1);
+    this.outside = this.sees_floor(eye);
     this.turn = Math.atan2(back[2], back[0]) + 0.9;
     this.set_sun(0);
   }
@@ -32,11 +47,11 @@ export class Light {
     this.sun = [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
   }
 
-  // Smoothly while the camera moves, fast when it stands.
-  adjust(read, moving) {
+  // By what a camera at `eye` sees: smoothly while it moves, fast when it stands.
+  adjust(read, eye, moving) {
     const share = moving ? 0.15 : 0.5;
     const toward = (from, to, known) => known ? from * (to / from) ** share : to;
-    this.sky_reach = toward(this.sky_reach, Math.max(1, (this.outside ? 0.35 : 1) * read.median_t), this.readings > 0);
+    this.sky_reach = toward(this.sky_reach, Math.max(1, (this.sees_floor(eye) ? 0.35 : 1) * read.median_t), this.readings > 0);
     this.haze_start = toward(this.haze_start, Math.max(1, read.nearest_t), this.readings > 0);
     // The exposure that the first reading measures is that of light without a reach.
     this.exposure = toward(this.exposure, read.exposure, this.readings > 1);

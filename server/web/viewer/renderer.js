@@ -73,6 +73,7 @@ export class Renderer {
   async start() {
     this.info = this.source.info;
     this.light = new Light(this.info);
+    if (this.view) this.light.place_sun(this.view.eye, this.view.forward);
     await new Promise((resolve, reject) => {
       this.started = {resolve, reject};
       if (this.disposed) resolve();
@@ -84,6 +85,7 @@ export class Renderer {
     const view = new View(placement);
     if (view.equals(this.view)) return;
     this.view = view;
+    if (this.light?.turn === null) this.light.place_sun(view.eye, view.forward);
     this.end_first_view();
     this.times.view_ms = performance.now();
     this.begin_epoch();
@@ -91,6 +93,7 @@ export class Renderer {
 
   setOptions(options) {
     Object.assign(this.options, options);
+    if (this.light) this.light.readings = 0;  // how bright it is may change at once
     this.end_first_view();
     this.begin_epoch();
   }
@@ -236,8 +239,8 @@ export class Renderer {
     this.empty = !root && !this.info.root_brick;
     const for_colors = color_budget(this.info, this.budget_bytes);
     this.store = new TileStore(new TilePool(this.gl, this.pool_bytes(this.budget_bytes - for_colors)));
-    this.colors = for_colors > 0 ? new Colors(this.gl, this.source, for_colors, () => this.on_arrival()) : null;
-    this.loader = new TileLoader(this.source, this.store, () => this.on_arrival());
+    this.colors = for_colors > 0 ? new Colors(this.gl, this.source, for_colors, (failed) => this.on_arrival(failed)) : null;
+    this.loader = new TileLoader(this.source, this.store, (failed) => this.on_arrival(failed));
     if (root && levels > 2) {
       const words = await this.loader.load_root(root.level, root.offset);
       this.root_pointer = this.store.root?.pointer;  // none if the loader was disposed
@@ -300,9 +303,9 @@ export class Renderer {
   }
 
   // A few fine tiles that arrive late do not begin the picture again: its other samples will have them.
-  on_arrival() {
+  on_arrival(failed = false) {
     if (this.loader?.first_view) this.follow_first_view();
-    if (!this.is_complete || this.coarse_pixels > kFinePixels) this.restart();
+    if (!failed && (!this.is_complete || this.coarse_pixels > kFinePixels)) this.restart();
     this.on_change();
   }
 
@@ -445,7 +448,7 @@ export class Renderer {
     this.pace.frame_done(now - part_ms, busy_ms, width * height, moving || !full);
     for (const slot of read.slots) this.store.mark(slot, epoch, now);
     // Not while samples of a still picture are added up.
-    if (read.exposure !== null && this.samples <= kSamples / 4) this.light.adjust(read, moving);
+    if (read.exposure !== null && this.samples <= kSamples / 4) this.light.adjust(read, this.view.eye, moving);
     this.coarse_pixels = read.coarse_pixels;
     if (epoch === this.store.epoch) this.store.rounds++;
     if (!this.loader.first_view && this.loader.demand(read.wanted, now) > 0) this.on_arrival();

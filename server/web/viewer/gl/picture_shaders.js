@@ -66,7 +66,7 @@ export const kPick = `${kVersion}
 #define PICK\n#define CELL\n${kRaySource}${kCameraSource}${kTraceMain}`;
 
 const kSky = `
-const float kPi = 3.14159265;
+const float kPi = 3.14159265, kOpenFloor = 0.82;  // green light of an open sky on a floor
 const vec3 kZenith = vec3(0.62, 0.78, 1.00), kHorizon = vec3(0.95, 0.98, 1.02), kGround = vec3(0.40, 0.36, 0.31);
 vec3 sky_color(vec3 direction) {
   return mix(kHorizon, direction.y >= 0.0 ? kZenith : kGround, sqrt(abs(direction.y)));
@@ -117,6 +117,20 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
 // The start of a ray clears the steps that the cells of a slope form.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
+}
+// Where a ray meets the floor that the scene stands on, if its shadow is seen there, from 0 to 1.
+uniform vec2 u_floor;        // how far it is below the eye, 0: there is none; the scene's diagonal
+uniform vec3 u_floor_center; // of the scene, from the eye
+float floor_at(ivec2 pixel, out Surface s) {
+  s.direction = direction_of(vec2(pixel) + 0.5 + u_jitter);
+  if (u_floor.x <= 0.0 || s.direction.y >= 0.0) return 0.0;
+  s.t = u_floor.x / -s.direction.y;
+  s.size = 0.5 * u_pixel * s.t;
+  s.center = s.direction * s.t;
+  s.face = vec3(0, 1, 0);
+  s.cube = 1.0;
+  float far = length(s.center - u_floor_center) / u_floor.y, fade = exp(-1.6 * far * far);
+  return fade < 0.01 ? 0.0 : fade;
 }
 void basis_around(vec3 n, out vec3 a, out vec3 b) {
   a = normalize(abs(n.x) > 0.7 ? cross(n, vec3(0, 1, 0)) : cross(n, vec3(1, 0, 0)));
@@ -197,8 +211,20 @@ void main() {
   o_sun = 0.0;
   o_normal = 0u;
   o_missing = 0u;
-  if (!found_in(g)) return;
-  Surface s = surface_at(pixel, g);
+  Surface s;
+  Hit hit;
+  if (!found_in(g)) {
+    if (floor_at(pixel, s) == 0.0) return;
+    o_sun = 1.0;
+    if (!u_shadows) return;
+    set_ray_from(s.center, u_sun);
+    if (trace(0.0, 1e30, vec2(s.size, kSunWidening), hit)) {
+      o_sun = 0.0;
+      o_missing = hit.missing;
+    }
+    return;
+  }
+  s = surface_at(pixel, g);
   vec3 normal = s.face;
   if (s.cube < 1.0)
     normal = normalize(mix(plane_normal(pixel, s.center, s.size, s.face, s.direction), s.face, s.cube));
@@ -212,8 +238,7 @@ void main() {
   // A single sample has sharp shadows; noise disappears only where there are more.
   float r = u_frame == 0 ? 0.0 : kSunRadius * sqrt(p.x), angle = 2.0 * kPi * p.y;
   vec3 toward = normalize(u_sun + a * (r * cos(angle)) + b * (r * sin(angle)));
-  vec2 cone = vec2(max(s.size, 1.5 * u_pixel * s.t), kSunWidening);
-  Hit hit;
+  vec2 cone = vec2(s.size, kSunWidening);
   bool blocked = false;
   // In a narrow place the start may be occupied; the way that the ray came is free.
   for (int attempt = 0; attempt < 2; ++attempt) {
@@ -240,9 +265,15 @@ void main() {
   ivec2 place = ivec2(gl_FragCoord.xy), pixel = min(2 * place + chosen_of_four(u_frame), u_size - 1);
   uvec4 g = texelFetch(u_hits, pixel, 0);
   o_sky = vec4(0);
-  if (!found_in(g)) return;
-  Surface s = surface_at(pixel, g);
-  vec3 normal = unpack_normal(texelFetch(u_normals, pixel, 0).x), sky = sky_color(normal);
+  Surface s;
+  vec3 normal = vec3(0, 1, 0), sky = vec3(kOpenFloor);
+  if (found_in(g)) {
+    s = surface_at(pixel, g);
+    normal = unpack_normal(texelFetch(u_normals, pixel, 0).x);
+    sky = sky_color(normal);
+  } else if (floor_at(pixel, s) == 0.0) {
+    return;
+  }
   if (u_occlusion) {
     vec3 a, b;
     basis_around(normal, a, b);
@@ -252,7 +283,7 @@ void main() {
     Hit hit;
     float open = 1.0;
     set_ray_from(start_of(s, normal), toward);
-    if (trace(0.0, u_sky_reach, vec2(max(s.size, 1.5 * u_pixel * s.t), kSkyWidening), hit)) {
+    if (trace(0.0, u_sky_reach, vec2(s.size, kSkyWidening), hit)) {
       float distance = hit.t / u_sky_reach;
       open = kBounce * sqrt(distance) * (1.0 - distance) + distance * distance * distance;
     }
@@ -261,10 +292,9 @@ void main() {
   o_sky = vec4(sky / 1.1, 1.0);
 }`;
 
-// For each of 48 places of the sun (columns) and some pixels (rows): 0 if the pixel sees no surface, 1 if
-// that is in shadow, 2 if it is lit; and the cut-off node whose tile would say more. The cones are wide:
-// few tiles are enough to choose.
-export const kSunPlaces = 48, kSunRows = 64;
+// For each of 48 places of the sun (columns) and the pixels that render probes, 40 x 24 (rows): 0 if the pixel sees no
+// surface, 1 if that is in shadow, 2 if it is lit; and the cut-off node whose tile would say more.
+export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}
 uniform usampler2D u_normals;
 uniform float u_turn;
@@ -272,7 +302,7 @@ layout(location = 0) out uvec4 o_lit;
 
 void main() {
   ivec2 place = ivec2(gl_FragCoord.xy);
-  ivec2 pixel = ivec2(fract(0.5 + float(place.y) * vec2(0.7548776662, 0.5698402910)) * vec2(u_size));
+  ivec2 pixel = ivec2((vec2(place.y % 40, place.y / 40) + 0.5) / vec2(40, 24) * vec2(u_size));
   uvec4 g = texelFetch(u_hits, pixel, 0);
   o_lit = uvec4(0);
   if (!found_in(g)) return;
@@ -286,62 +316,85 @@ void main() {
     o_lit = uvec4(1, 0, 0, 0);
     return;
   }
-  bool blocked = trace(0.0, 1e30, vec2(max(s.size, 4.0 * u_pixel * s.t), 0.02), hit);
+  bool blocked = trace(0.0, 1e30, vec2(s.size, 0.006), hit);
   o_lit = uvec4(blocked ? 1u : 2u, blocked ? hit.missing : 0u, 0, 0);
 }`;
 
 const kReflected = `
 const vec3 kPlaster = vec3(0.74, 0.70, 0.64), kSunlight = vec3(3.6, 3.2, 2.6);
 vec3 reflected(vec3 albedo, vec3 normal, vec3 sky, float sun) {
-  return albedo * (sky * 1.1 + kSunlight * (sun * max(0.0, dot(normal, u_sun))));
+  return albedo * (sky + kSunlight * (sun * max(0.0, dot(normal, u_sun))));
 }
 `;
 
-// Light from the sky is averaged over 4 x 4 samples on the same plane. The result is multiplied by its
-// coverage, from which haze takes a share.
-export const kCombine = `${kVersion}${kCameraSource}${kSky}${kColorState}
-uniform usampler2D u_hits, u_normals, u_colors;
-uniform bool u_colored;      // u_colors has colors
-uniform sampler2D u_light, u_sky, u_before;
+// Light from the sky is averaged over 4 x 4 samples on the same plane; that on the floor over those of the floor.
+const kSkyFilter = `
+uniform usampler2D u_hits, u_normals;
+uniform sampler2D u_light, u_sky;
 uniform ivec2 u_size;
 uniform vec2 u_jitter;
 uniform vec3 u_sun;
+uniform int u_frame;
+
+vec3 sky_around(ivec2 pixel, uvec4 g, vec3 normal) {
+  bool on_surface = found_in(g);
+  ivec2 sky_size = (u_size + 1) / 2, chosen = chosen_of_four(u_frame);
+  float t = t_in(g), slack = 3.0 * u_pixel * t + 0.5 * size_in(g), weights = 0.0;
+  vec3 center = direction_of(vec2(pixel) + 0.5 + u_jitter) * t, sum = vec3(0);
+  for (int j = -2; j < 2; ++j)
+    for (int i = -2; i < 2; ++i) {
+      ivec2 place = (pixel + 1) / 2 + ivec2(i, j);
+      if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, sky_size))) continue;
+      ivec2 at = min(2 * place + chosen, u_size - 1);
+      uvec4 other = texelFetch(u_hits, at, 0);
+      vec4 light = texelFetch(u_sky, place, 0);
+      if (found_in(other) != on_surface || light.a == 0.0) continue;
+      float w = 1.0;
+      if (on_surface) {
+        float alike = max(0.0, dot(normal, unpack_normal(texelFetch(u_normals, at, 0).x)));
+        vec3 offset = direction_of(vec2(at) + 0.5 + u_jitter) * t_in(other) - center;
+        w = alike * alike * alike * alike * max(0.0, 1.0 - abs(dot(normal, offset)) / slack) + 1e-4;
+      }
+      sum += w * light.rgb;
+      weights += w;
+    }
+  return weights > 0.0 ? sum * (1.1 / weights) : on_surface ? 0.5 * sky_color(normal) : vec3(kOpenFloor);
+}
+`;
+
+// The result is multiplied by its coverage, from which haze takes a share. A shadow on the floor is black that covers a
+// part of the background.
+export const kCombine = `${kVersion}${kCameraSource}${kSky}${kColorState}${kSkyFilter}
+uniform usampler2D u_colors;
+uniform bool u_colored;      // u_colors has colors
+uniform sampler2D u_before;
 uniform vec2 u_haze;         // where it begins, and 1 / the scene's diagonal
 uniform float u_share;       // of this sample among those so far
 uniform float u_range;       // the brightest light that the target can hold
-uniform int u_frame;
+uniform vec2 u_floor;
+uniform vec3 u_floor_center;
 layout(location = 0) out vec4 o_color;
 ${kReflected}
 void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy), sky_size = (u_size + 1) / 2;
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
   uvec4 g = texelFetch(u_hits, pixel, 0);
   vec4 color = vec4(0);
+  float sun = texelFetch(u_light, pixel, 0).x;
   if (found_in(g)) {
-    float t = t_in(g), slack = 3.0 * u_pixel * t + 0.5 * size_in(g);
-    vec3 center = direction_of(gl_FragCoord.xy + u_jitter) * t;
     vec3 normal = unpack_normal(texelFetch(u_normals, pixel, 0).x);
-    ivec2 chosen = chosen_of_four(u_frame);
-    vec3 sum = vec3(0);
-    float weights = 0.0;
-    for (int j = -2; j < 2; ++j)
-      for (int i = -2; i < 2; ++i) {
-        ivec2 place = (pixel + 1) / 2 + ivec2(i, j);
-        if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, sky_size))) continue;
-        ivec2 at = min(2 * place + chosen, u_size - 1);
-        uvec4 other = texelFetch(u_hits, at, 0);
-        if (!found_in(other)) continue;
-        float alike = max(0.0, dot(normal, unpack_normal(texelFetch(u_normals, at, 0).x)));
-        vec3 offset = direction_of(vec2(at) + 0.5 + u_jitter) * t_in(other) - center;
-        float w = alike * alike * alike * alike * max(0.0, 1.0 - abs(dot(normal, offset)) / slack) + 1e-4;
-        sum += w * texelFetch(u_sky, place, 0).rgb;
-        weights += w;
-      }
-    vec3 sky = weights > 0.0 ? sum / weights : 0.5 * sky_color(normal);
-    float depth = max(0.0, t - u_haze.x) * u_haze.y;
+    vec3 sky = sky_around(pixel, g, normal);
+    float depth = max(0.0, t_in(g) - u_haze.x) * u_haze.y;
     float coverage = 1.0 - 0.25 * (1.0 - exp(-depth * depth));
     uint own = u_colored ? texelFetch(u_colors, pixel, 0).x : 0u;
     vec3 albedo = (own & kColored) != 0u ? linear_of(own) : kPlaster;
-    color = vec4(reflected(albedo, normal, sky, texelFetch(u_light, pixel, 0).x) * coverage / u_range, coverage);
+    color = vec4(reflected(albedo, normal, sky, sun) * coverage / u_range, coverage);
+  } else {
+    vec3 direction = direction_of(gl_FragCoord.xy + u_jitter);
+    if (u_floor.x > 0.0 && direction.y < 0.0) {
+      vec3 offset = direction * (u_floor.x / -direction.y) - u_floor_center;
+      float fade = exp(-1.6 * dot(offset, offset) / (u_floor.y * u_floor.y));
+      if (fade >= 0.01) color.a = fade * (0.75 - 0.35 * sky_around(pixel, g, vec3(0, 1, 0)).g / kOpenFloor - 0.40 * sun);
+    }
   }
   if (wire_in(g)) color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, 0.7), max(color.a, 0.7));
   o_color = u_share < 1.0 ? mix(texelFetch(u_before, pixel, 0), color, u_share) : color;
@@ -379,12 +432,10 @@ void main() {
 // One texel for each block of u_block x u_block pixels: a cut-off node whose tile is missing (that of the
 // largest cell), how many pixels wide that cell is and how bright a sample, a tile that was used and the
 // steps of a sample, the sample's t. A sample is a pixel of the block that changes with each frame.
-export const kFeedback = `${kVersion}${kCameraSource}${kSky}
-uniform usampler2D u_hits, u_normals, u_shadow_missing;
-uniform sampler2D u_light, u_sky;
-uniform vec3 u_sun;
+export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
+uniform usampler2D u_shadow_missing;
 uniform int u_block;
-uniform ivec2 u_size, u_sample;
+uniform ivec2 u_sample;
 layout(location = 0) out uvec4 o_feedback;
 ${kReflected}
 const float kShadowPixels = 0.25;  // weight of tiles that only shadows need
@@ -396,6 +447,8 @@ void main() {
   for (int j = 0; j < u_block; ++j)
     for (int i = 0; i < u_block; ++i) {
       ivec2 at = min(first + ivec2(i, j), last);
+      uint other = texelFetch(u_shadow_missing, at, 0).x;
+      if (other != 0u) shadow_missing = other;
       uvec4 g = texelFetch(u_hits, at, 0);
       if (!found_in(g)) continue;
       float width = size_in(g) / max(t_in(g) * u_pixel, 1e-6);
@@ -403,8 +456,6 @@ void main() {
         pixels = width;
         missing = g.z;
       }
-      uint other = texelFetch(u_shadow_missing, at, 0).x;
-      if (other != 0u) shadow_missing = other;
     }
   if (missing == 0u && shadow_missing != 0u) {
     missing = shadow_missing;
@@ -415,7 +466,7 @@ void main() {
   float luminance = 0.0;
   if (found_in(g)) {
     vec3 normal = unpack_normal(texelFetch(u_normals, at, 0).x);
-    vec3 sky = texelFetch(u_sky, at / 2, 0).rgb;
+    vec3 sky = sky_around(at, g, normal);
     // The exposure is that of plaster, as in render: dark colors stay dark.
     luminance = dot(reflected(kPlaster, normal, sky, texelFetch(u_light, at, 0).x), vec3(0.2126, 0.7152, 0.0722));
   }

@@ -20,7 +20,8 @@ export function picture_values(renderer, width, height, lod_height) {
     u_boundaries: boundaries, u_clip_low: bound(clip.low), u_clip_high: bound(clip.high), u_cell_sizes: [finest, coarsest],
     u_cone: kConeShare * options.pixelTolerance * view.pixel(lod_height), u_seed: 0, u_jitter: [0, 0],
     u_wire_scale: options.wireLevel === null ? -1 : levels - options.wireLevel, u_wire_width: view.pixel(height),
-    u_sun: light.sun, u_sky_reach: light.sky_reach, u_haze: [light.haze_start, 1 / (Math.sqrt(3) * edge)],
+    u_sun: light.sun, u_sky_reach: light.sky_reach, u_haze: [light.haze_start, 1 / Math.max(1, light.diagonal)],
+    ...light.floor(view.eye),
     u_occlusion: options.ambientOcclusion, u_shadows: options.sunShadows, u_frame: 0,
   };
 }

@@ -13,7 +13,7 @@ const kFullPauseMs = 250;
 //     keep(request, answer, now_ms) false if there is no room; throws if the answer is damaged
 // and `store.rounds`, the readings since the view changed.
 export class Loader {
-  // on_arrival(): something arrived, or what fails changed.
+  // on_arrival(failed): something arrived, or, if `failed`, what fails changed.
   constructor(store, on_arrival, {max_requests, max_batch}) {
     this.store = store;
     this.on_arrival = on_arrival;
@@ -101,7 +101,7 @@ export class Loader {
     if (answer) this.accept(batch, answer, now_ms);
     else this.refuse(batch, error, now_ms);
     this.send(now_ms);
-    this.on_arrival();
+    this.on_arrival(answer === null);
   }
 
   end_outage() {
@@ -183,7 +183,7 @@ export class Loader {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => {
       this.send(performance.now());
-      this.on_arrival();
+      this.on_arrival(true);
     }, Math.max(0, time_ms - now_ms) + 1);
   }
 
