@@ -191,6 +191,7 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
   progress.end_stage();
 
   const MemoryCharge baking(budget, RegionBaker<TextureReader>::kMaxBytes, "baking colors");
+  MemoryCharge values_charge(budget, 0, "normals and materials of a sampled region");
   const auto reader = textures->open(budget.available() / 2);
   RegionBaker<TextureReader> baker(grid, textures->materials(), *reader, attributes);
   std::vector<ColoredCell> cells;
@@ -200,7 +201,12 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
   for (const SampledRegion& region : regions) {
     cancel.check();
     baker.begin(region.cube);
-    baker.add(region.surfaces);
+    baker.add(region.surfaces, [&](uint64_t bytes) {
+      if (bytes > values_charge.bytes() && !values_charge.try_resize(bytes))
+        throw Error(ErrorCode::kOutOfMemory,
+                    "not enough memory for the normals and materials of a sampled region");
+      return true;
+    });
     baker.finish(cells, values);
     bool is_equal = true;
     for (const Attribute attribute : attributes.list())

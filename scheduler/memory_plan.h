@@ -27,7 +27,7 @@
 //                 ColorMemory, for every worker     what is free / workers
 //                   a region, encoded ones of       1/2, 12 to 46 MiB            CubeBaker
 //                     a cube among it
-//                   its other attributes            10 MiB, if any; or more      CubeBaker
+//                   its other attributes            16 MiB, if any; or more      CubeBaker
 //                   surfaces of a cube              2/3 of the rest              CubeBaker
 //                   pages of textures               1/3 of the rest              TextureReader
 //   merge         MergeMemory, of what is free
@@ -82,8 +82,9 @@ struct ColorMemory {
   // For the least cells of a region that are baked at once, and for all of them.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
   static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
-  // Of what is not color in the cells of kRegionBytes.
-  static constexpr uint64_t kValueBytes = uint64_t{10} << 20;
+  // Of what is not color, and the share of the sums in it, which may take more.
+  static constexpr uint64_t kValueBytes = uint64_t{16} << 20;
+  static constexpr uint64_t kValueSumBytes = uint64_t{4} << 20;
 
   static constexpr uint64_t value_bytes(const AttributeSet& attributes) {
     return attributes.alpha || attributes.normal || attributes.material ? kValueBytes : 0;

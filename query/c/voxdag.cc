@@ -128,6 +128,7 @@ voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
     const voxdag_reader::File& f = file->dag.file();
     *facts = {};
     facts->grid_levels = f.grid_levels();
+    facts->color_levels = f.color_levels();
     std::copy_n(f.origin(), 3, facts->origin);
     facts->edge = f.edge();
     facts->voxels = f.voxels();
@@ -143,6 +144,16 @@ voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
     expect_pointer(file, "the file");
     if (count) expect_pointer(set, "the array of answers");
     file->dag.lookup(positions_of(cells, count), grid_levels, {set, count});
+  });
+}
+
+voxdag_status voxdag_colors(const voxdag_file* file, uint32_t grid_levels,
+                            const int64_t (*cells)[3], size_t count, uint8_t (*rgba)[4]) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) expect_pointer(rgba, "the array of colors");
+    file->dag.colors(positions_of(cells, count), grid_levels,
+                     {reinterpret_cast<voxdag::query::Rgba*>(rgba), count});
   });
 }
 

@@ -42,11 +42,11 @@ typedef enum voxdag_status {
 typedef struct voxdag_file voxdag_file;
 
 typedef struct voxdag_facts {
-  uint32_t grid_levels; /* the grid has 2^grid_levels voxels per edge */
-  uint32_t reserved;
-  double origin[3]; /* the low corner of the grid in the units of the scene */
-  double edge;      /* of the grid, in the units of the scene */
-  uint64_t voxels;  /* that are set */
+  uint32_t grid_levels;  /* the grid has 2^grid_levels voxels per edge */
+  uint32_t color_levels; /* the finest grid with colors has 2^color_levels cells; 0 for none */
+  double origin[3];      /* the low corner of the grid in the units of the scene */
+  double edge;           /* of the grid, in the units of the scene */
+  uint64_t voxels;       /* that are set */
   uint64_t svo_nodes;
   uint64_t dag_nodes;
   uint64_t bytes; /* of the file */
@@ -82,6 +82,12 @@ VOXDAG_API voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts*
 /* set[i] = 1 if cell i is set, else 0; cells outside the grid are not. */
 VOXDAG_API voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
                                        const int64_t (*cells)[3], size_t count, uint8_t* set);
+
+/* The color of each cell: red, green and blue in sRGB, and 255; all four are 0 for a cell that is
+ * not set. Cells finer than the color grid have the color of the cell that they lie in.
+ * VOXDAG_INVALID_INPUT for a file without colors: its facts say so. */
+VOXDAG_API voxdag_status voxdag_colors(const voxdag_file* file, uint32_t grid_levels,
+                                       const int64_t (*cells)[3], size_t count, uint8_t (*rgba)[4]);
 
 /* What each ray hits first, up to max_distance (INFINITY for no limit). Cells of an edge up to
  * stop_edge voxels are hit as a whole: 1 for voxels. */

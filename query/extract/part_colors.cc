@@ -115,6 +115,13 @@ class PartColors {
       source_.check(offset_of(tier.directory), tier.region_count * color_layout::kRegionEntryBytes,
                     block);
     }
+    // The list of materials follows the last directory.
+    uint64_t names_bytes = sizeof(uint32_t);
+    for (const std::string& name : section_.names()) names_bytes += sizeof(uint32_t) + name.size();
+    const ColorTier& last = section_.tier(section_.tier_count() - 1);
+    if (attribute_ == Attribute::kMaterial)
+      source_.check(offset_of(last.directory) + last.region_count * color_layout::kRegionEntryBytes,
+                    names_bytes, block);
   }
 
   // Calls visit(cube) for the regions of the finest tier, in Morton order.
@@ -160,7 +167,12 @@ class PartColors {
       const ColorRegion* const region = cursor.find(x, y, z, finest_, i);
       if (!region) file_.broken_colors("a cell of the DAG has none");
       bytes = region->block_bytes / 32;
-      cells.push_back({static_cast<uint32_t>(cell.code - first), region->value(i)});
+      const uint32_t value = region->value(i);
+      if (attribute_ == Attribute::kMaterial && value >= section_.names().size())
+        file_.broken_colors("a cell has a material that is not in the list");
+      if (attribute_ == Attribute::kNormal && ((value & 0xff) == 0xff || value >> 8 == 0xff))
+        file_.broken_colors("a normal has a byte of 255");
+      cells.push_back({static_cast<uint32_t>(cell.code - first), value});
     });
     cancel_.check();
     return encode_values(attribute_, bytes, depth_of(0), morton_in_part(region_level(0), cube.code),

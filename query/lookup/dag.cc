@@ -1,5 +1,7 @@
 #include "query/lookup/dag.h"
 
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -80,18 +82,47 @@ uint64_t largest_square(double distance) {
 }  // namespace
 
 Dag::Dag(const std::string& path, uint64_t memory_bytes)
-    : file_(open_global_file(path)), view_(*file_), budget_(memory_bytes) {
-  // A file that memory cannot hold would be read in parts of 2 MiB for each node.
-  if (file_->file_bytes() <= default_memory()) file_->prefer_huge_pages();
+    : file_(open_global_file(path)), view_(*file_), budget_(memory_bytes) {}
+
+// Of one call. Together they reach most of the nodes that later ones do.
+constexpr size_t kManyQuestions = size_t{1} << 14;
+
+// A few questions should not read parts of 2 MiB for each node, and neither should many about a
+// file that memory cannot hold.
+void Dag::expect_questions(size_t count) const {
+  if (count < kManyQuestions || file_->file_bytes() > default_memory()) return;
+  // What is in memory already stays in the pages that it has; not every system has others for
+  // files.
+  std::call_once(huge_pages_, [&] {
+    madvise(const_cast<unsigned char*>(file_->data()), file_->file_bytes(), MADV_HUGEPAGE);
+  });
 }
 
 void Dag::lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
                  unsigned threads) const {
   check_grid_levels(view_, grid_levels);
   require(points.size() == set.size(), "as many results as points");
+  expect_questions(points.size());
   naming_file(file_->path(), [&] {
     for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
       look_up(view_, grid_levels, points.subspan(first, count), set.subspan(first, count));
+    });
+  });
+}
+
+void Dag::colors(std::span<const Position> points, uint32_t grid_levels, std::span<Rgba> colors,
+                 unsigned threads) const {
+  check_grid_levels(view_, grid_levels);
+  require(points.size() == colors.size(), "as many results as points");
+  require(has_colors(), "a file with colors, as voxdag build --color makes it");
+  with_reader_errors([&] {
+    for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
+      voxdag_reader::ColorCursor cursor(*file_);
+      for (size_t i = first; i < first + count; ++i) {
+        const auto [x, y, z] = points[i];
+        const auto color = cursor.color(x, y, z, grid_levels);
+        colors[i] = color ? Rgba{color->r, color->g, color->b, 255} : Rgba{};
+      }
     });
   });
 }
@@ -101,6 +132,7 @@ void Dag::rays(std::span<const Coordinates> origins, std::span<const Coordinates
   require(origins.size() == directions.size() && origins.size() == hits.size(),
           "as many directions and results as origins");
   require(limits.max_distance >= 0 && limits.stop_size >= 0, "limits of rays that are at least 0");
+  expect_questions(origins.size());
   naming_file(file_->path(), [&] {
     for_each_batch(threads, origins.size(), [&](size_t batch, size_t count) {
       constexpr size_t kRays = RayPacket::kRays;

@@ -1,5 +1,5 @@
-// A finished file, to ask for points, rays, boxes, counts and neighbors: what bindings to other
-// languages are made on. docs/query.md describes conventions and units.
+// A finished file, to ask for points, colors, rays, boxes, counts and neighbors: what bindings to
+// other languages are made on. docs/query.md describes conventions and units.
 //
 // The file is mapped, not read. A batch function takes any number of items in one call, works on
 // them on up to `threads` threads, the caller's among them, and allocates nothing per item; the
@@ -36,6 +36,9 @@ namespace voxdag::query {
 // Three coordinates in voxels; the grid is the cube [0, R]^3.
 using Coordinates = std::array<double, 3>;
 
+// sRGB as it is shown, and alpha: 255 for a color, 0 where there is none.
+using Rgba = std::array<uint8_t, 4>;
+
 struct RayLimits {
   double max_distance = std::numeric_limits<double>::infinity();  // in voxels
   // Cells of at most so many voxels per edge are hit as a whole; below 2 only voxels are.
@@ -71,6 +74,16 @@ class Dag {
   void lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
               unsigned threads = 1) const;
 
+  // Whether the cells of a grid have colors: those of 2^color_levels() cells per edge and coarser
+  // ones their own, finer ones that of the cell that they lie in. An empty scene has none.
+  bool has_colors() const { return file_->has_colors(); }
+  uint32_t color_levels() const { return file_->color_levels(); }
+  // colors[i] becomes the color of cell points[i]; all four are 0 if it is not set or lies outside
+  // the grid. Cells near each other that follow each other are faster. Throws Error{kInvalidInput}
+  // for a file without colors.
+  void colors(std::span<const Position> points, uint32_t grid_levels, std::span<Rgba> colors,
+              unsigned threads = 1) const;
+
   // The first set cell on each ray. Directions have any length but 0; all numbers are finite, and
   // limits not negative. A cell includes its faces, so that no ray passes between two cells that
   // share one. Rays that follow each other closely, as those of neighboring pixels, are faster.
@@ -102,10 +115,12 @@ class Dag {
 
  private:
   const NodeCounts& counts(uint32_t grid_levels) const;
+  void expect_questions(size_t count) const;
 
   const std::unique_ptr<voxdag_reader::File> file_;
   const DagView view_;
   mutable MemoryBudget budget_;
+  mutable std::once_flag huge_pages_;
   mutable std::mutex mutex_;
   mutable std::array<std::unique_ptr<NodeCounts>, 21> counts_;  // by grid levels; under mutex_
 };

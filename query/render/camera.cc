@@ -1,6 +1,7 @@
 #include "query/render/camera.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/base/error.h"
 #include "query/render/sampling.h"
@@ -36,8 +37,11 @@ Camera::Camera(const Placement& p, int width, int height)
     : eye_(p.eye), half_width_(width / 2.0), half_height_(height / 2.0) {
   if (!(p.fov_degrees > 0 && p.fov_degrees < 180))
     throw Error(ErrorCode::kInvalidInput, "the field of view must lie between 0 and 180 degrees");
-  if (!(length(p.target - p.eye) > 0))
+  const double distance = length(p.target - p.eye);
+  if (!(distance > 0))
     throw Error(ErrorCode::kInvalidInput, "the camera must not be at its target");
+  if (!std::isfinite(distance))
+    throw Error(ErrorCode::kInvalidInput, "the camera is too far from its target");
   forward_ = normalized(p.target - p.eye);
   picture_axes(forward_, right_, up_);
   pixel_ = half_tangent(p.fov_degrees) / half_height_;

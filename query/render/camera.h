@@ -15,7 +15,8 @@ struct Placement {
 
 class Camera {
  public:
-  // Throws Error{kInvalidInput} if the eye is on the target or the field of view not in (0, 180).
+  // Throws Error{kInvalidInput} if the eye is on the target, or further away than a double holds,
+  // or the field of view not in (0, 180).
   Camera(const Placement& placement, int width, int height);
 
   // The ray through a point of the picture, in pixels from its upper left corner.

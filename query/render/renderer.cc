@@ -116,9 +116,10 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
 
   GBuffer buffer(width, height);
   progress.begin_stage("render", static_cast<uint64_t>(height), "rows");
-  std::vector<Albedo> albedos(std::max(options.threads, 1u), Albedo(options.colors));
+  const unsigned workers = std::clamp(options.threads, 1u, static_cast<unsigned>(height));
+  std::vector<Albedo> albedos(workers, Albedo(options.colors));
   const auto for_each_row = [&](const auto& work) {
-    parallel_for(options.threads, static_cast<size_t>(height),
+    parallel_for(workers, static_cast<size_t>(height),
                  [&](unsigned worker, size_t row) { work(worker, static_cast<int>(row)); });
   };
   for_each_row([&](unsigned worker, int y) {

@@ -13,6 +13,7 @@
 #include "core/base/process_limits.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
+#include "core/format/color/color_layout.h"
 #include "core/format/color/color_section_writer.h"
 #include "core/format/color/value_section_writer.h"
 #include "core/format/global/global_layout.h"
@@ -55,6 +56,19 @@ uint64_t count_finest_cells(const ReadableFile& file) {
   namespace layout = global_layout;
   if (number_at<uint64_t>(file, layout::kAttributeCountAt) == 0) return 0;
   return number_at<uint64_t>(file, layout::kAttributesAt + layout::kAttributeFinestCellsAt);
+}
+
+// Readers refuse a longer list.
+void check_list(std::span<const std::string> materials) {
+  uint64_t bytes = 2 * color_layout::kUnitBytes;
+  for (const std::string& name : materials) bytes += sizeof(uint32_t) + name.size();
+  if (materials.size() > color_layout::kMaxMaterials || bytes > color_layout::kMaxNamesBytes)
+    throw Error(ErrorCode::kLimit, "the scene has " + std::to_string(materials.size()) +
+                                       " materials, with names of " + std::to_string(bytes) +
+                                       " bytes: expected up to " +
+                                       std::to_string(color_layout::kMaxMaterials) + " and " +
+                                       std::to_string(color_layout::kMaxNamesBytes) +
+                                       " bytes; leave out --attributes material");
 }
 
 // What bakes, and what one cube became.
@@ -151,6 +165,7 @@ void ColorStage::State::open() {
     attributes.push_back({attribute, attribute == Attribute::kColor
                                          ? 0
                                          : value_bytes(attribute, materials.names.size())});
+  if (wanted.material) check_list(materials.names);
   if (!wanted.shows_images()) materials.drop_images();
   for (const std::string& warning : std::exchange(materials.warnings, {}))
     build.progress.warn(warning);
@@ -310,8 +325,11 @@ std::string ColorStage::digest() {
   Sha256 hash;
   for (const auto& keys : state_->keys) hash.add(std::as_bytes(std::span(keys)));
   if (state_->source.options.attributes.material)
-    for (const std::string& name : state_->materials.names)
-      hash.add(std::as_bytes(std::span(name.c_str(), name.size() + 1)));
+    for (const std::string& name : state_->materials.names) {
+      const uint64_t size = name.size();
+      hash.add(std::as_bytes(std::span(&size, 1)));
+      hash.add(std::as_bytes(std::span(name)));
+    }
   return hash.finish();
 }
 

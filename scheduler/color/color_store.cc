@@ -160,7 +160,7 @@ void ColorStore::keep_only(std::span<const Checksum128> keys, const CancelToken&
     end = copy(retained, *files_.create(copy_path), cancel);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kNoSpace) throw;
-    files_.remove(copy_path);
+    if (files_.exists(copy_path)) files_.remove(copy_path);
     return;
   }
   files_.rename(copy_path, path_);

@@ -4,6 +4,7 @@
 #include <array>
 #include <numeric>
 
+#include "core/base/error.h"
 #include "core/color/color_of.h"
 #include "core/geometry/morton.h"
 #include "core/geometry/octree_descent.h"
@@ -54,6 +55,7 @@ CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> att
       budget_(budget),
       cancel_(cancel),
       charge_(budget, region_bytes + ColorMemory::value_bytes(set_of(attributes)), "baking colors"),
+      sum_charge_(budget, 0, "normals and materials of a region"),
       baker_(grid, materials, textures, set_of(attributes)),
       valued_(attributes.size()) {}
 
@@ -158,7 +160,10 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
   } else {
     const uint32_t cells_of_child = 1u << (3 * levels - 3);
     for (uint32_t child = 0; child < 8; ++child) {
-      bake_cells(region.child(static_cast<int>(child)), cells_of_child, add_surfaces);
+      if (!bake_cells(region.child(static_cast<int>(child)), cells_of_child, add_surfaces))
+        throw Error(ErrorCode::kOutOfMemory,
+                    "not enough memory for the materials of a region: expected more memory, fewer "
+                    "threads, or a finer color grid");
       collect(child * cells_of_child, colors);
     }
   }
@@ -176,23 +181,26 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
   if (most >= kManyRecordBytes) sink.take(sink.records);
 }
 
-// False: they are more than `max_cells`.
+// False: they are more than `max_cells`, or their sums of other attributes do not fit the memory.
 template <class AddSurfaces>
 bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces) {
   bool are_all = true;
   baker_.begin(cube, max_cells);
   add_surfaces([&](std::span<const FixedSurface> surfaces) {
     cancel_.check();
-    are_all = are_all && baker_.add(surfaces);
+    are_all = are_all && baker_.add(surfaces, [&](uint64_t bytes) { return charge_sums(bytes); });
   });
-  const uint64_t bytes = baker_.attribute_bytes();
-  if (bytes > ColorMemory::kValueBytes + value_charge_.bytes()) {
-    value_charge_ = {};
-    value_charge_ = MemoryCharge(budget_, bytes - ColorMemory::kValueBytes,
-                                 "normals and materials of a region");
-  }
   baker_.finish(cells_, values_);
   return are_all;
+}
+
+// False if the sums of normals and materials do not fit. What was allocated stays for the next
+// region, but for large lists of materials.
+bool CubeBaker::charge_sums(uint64_t bytes) {
+  constexpr uint64_t kSlackBytes = uint64_t{4} << 20;
+  const uint64_t more = bytes - std::min(bytes, ColorMemory::kValueSumBytes);
+  if (more <= sum_charge_.bytes() && sum_charge_.bytes() <= more + kSlackBytes) return true;
+  return sum_charge_.try_resize(more);
 }
 
 // What the baked cells have, for the region that they are in.
@@ -205,9 +213,9 @@ void CubeBaker::collect(uint32_t first_code, RegionEncoder& colors) {
     }
     valued_[i].reserve(valued_[i].size() + cells_.size());
     for (size_t c = 0; c < cells_.size(); ++c)
-      valued_[i].push_back(
-          {first_code + cells_[c].code,
-           kind == Attribute::kAlpha ? alpha_of(cells_[c].sum) : value_of(values_[c], kind)});
+      valued_[i].push_back({first_code + cells_[c].code, kind == Attribute::kAlpha
+                                                             ? alpha_of(cells_[c].sum)
+                                                             : value_of(values_[c], kind)});
   }
 }
 

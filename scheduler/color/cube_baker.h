@@ -55,6 +55,7 @@ class CubeBaker {
   void bake_region(const Cube& region, const AddSurfaces& add_surfaces, const Sink& sink);
   template <class AddSurfaces>
   bool bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces);
+  bool charge_sums(uint64_t bytes);
   void collect(uint32_t first_code, RegionEncoder& colors);
 
   const ColorGrid grid_;
@@ -65,7 +66,7 @@ class CubeBaker {
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const MemoryCharge charge_;
-  MemoryCharge value_charge_;  // of what is more than ColorMemory::value_bytes()
+  MemoryCharge sum_charge_;  // of what is more than ColorMemory::kValueSumBytes
   RegionBaker<TextureReader> baker_;
   std::vector<FixedSurface> surfaces_;  // of the cube
   std::vector<FixedSurface> touching_;  // of a region, or a part of them

@@ -3,6 +3,7 @@
 // All sums are integers and commute.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -96,11 +97,16 @@ class AttributeSums {
     }
     if (has_materials_) add_material(cell, facing.material, weight);
   }
-  // The cell is covered from now on: what was added so far does not count.
+  // The cell is covered from now on: what was added so far does not count. Once for each cell.
   void reset(uint32_t cell) {
     if (cell < normals_.size()) normals_[cell] = {};
-    if (cell < materials_.size()) materials_[cell] = {};
+    if (!has_materials_) return;
+    if (cell >= materials_.size()) materials_.resize(cell + 1);
+    materials_[cell] = {};
+    materials_[cell].is_reset = 1;
   }
+  // Before get(), when all is added.
+  void finish() { add_up(); }
   // Sets the values of a cell that are asked for.
   void get(uint32_t cell, CellValues& values) const {
     if (cell < normals_.size()) values.normal = normal_of_sum(normals_[cell]);
@@ -109,49 +115,83 @@ class AttributeSums {
   void clear() {
     normals_.clear();
     materials_.clear();
-    further_.clear();
+    further_ = {};  // which may be large
+    max_further_ = kFewFurther;
   }
   // What is allocated.
   uint64_t bytes() const {
-    return normals_.capacity() * sizeof(NormalSum) +
-           (materials_.capacity() + further_.capacity()) * sizeof(MaterialWeight);
+    return normals_.capacity() * sizeof(NormalSum) + materials_.capacity() * sizeof(FirstMaterial) +
+           further_.capacity() * sizeof(FurtherMaterial);
   }
 
  private:
-  // Cells mostly have one material; the weights of others are in a list behind it.
-  struct MaterialWeight {
+  static constexpr size_t kFewFurther = size_t{1} << 14;
+
+  // Cells mostly have one material; the weights of others are in a list of all cells.
+  struct FirstMaterial {
     uint32_t material = 0;
-    uint32_t next = 0;    // in further_, from 1
+    uint32_t is_reset = 0;
     uint64_t weight = 0;  // 0: nothing was added yet
+  };
+  struct FurtherMaterial {
+    uint32_t cell = 0;
+    uint32_t material = 0;
+    uint64_t weight = 0;  // twice the weight, and whether it came after the reset
+
+    bool is_like(const FurtherMaterial& other) const {
+      return cell == other.cell && material == other.material && !((weight ^ other.weight) & 1);
+    }
+    bool operator<(const FurtherMaterial& other) const {
+      if (cell != other.cell) return cell < other.cell;
+      if (material != other.material) return material < other.material;
+      return (weight & 1) < (other.weight & 1);
+    }
   };
 
   void add_material(uint32_t cell, uint32_t material, uint32_t weight) {
     if (cell >= materials_.size()) materials_.resize(cell + 1);
-    MaterialWeight* entry = &materials_[cell];
-    if (entry->weight == 0) entry->material = material;
-    while (entry->material != material && entry->next != 0) entry = &further_[entry->next - 1];
-    if (entry->material == material) {
-      entry->weight += weight;
+    FirstMaterial& first = materials_[cell];
+    if (first.weight == 0) first.material = material;
+    if (first.material == material) {
+      first.weight += weight;
       return;
     }
-    entry->next = static_cast<uint32_t>(further_.size() + 1);
-    further_.push_back({material, 0, weight});
+    further_.push_back({cell, material, uint64_t{weight} << 1 | first.is_reset});
+    if (further_.size() < max_further_) return;
+    add_up();
+    max_further_ = std::max(2 * further_.size(), kFewFurther);
+  }
+  // The weights of a cell's material become one.
+  void add_up() {
+    std::sort(further_.begin(), further_.end());
+    size_t count = 0;
+    for (const FurtherMaterial& more : further_) {
+      if (count > 0 && further_[count - 1].is_like(more))
+        further_[count - 1].weight += more.weight & ~uint64_t{1};
+      else
+        further_[count++] = more;
+    }
+    further_.resize(count);
   }
   uint32_t heaviest(uint32_t cell) const {
-    const MaterialWeight* entry = &materials_[cell];
-    MaterialWeight best = *entry;
-    while (entry->next != 0) {
-      entry = &further_[entry->next - 1];
-      if (entry->weight > best.weight ||
-          (entry->weight == best.weight && entry->material < best.material))
-        best = *entry;
+    const FirstMaterial& first = materials_[cell];
+    uint32_t best = first.material;
+    uint64_t most = first.weight;
+    auto more = std::lower_bound(further_.begin(), further_.end(), FurtherMaterial{cell, 0, 0});
+    for (; more != further_.end() && more->cell == cell; ++more) {
+      const uint64_t weight = more->weight >> 1;
+      if ((more->weight & 1) != first.is_reset || weight < most) continue;
+      if (weight > most || more->material < best) best = more->material;
+      most = weight;
     }
-    return best.material;
+    return best;
   }
 
   const bool has_normals_, has_materials_;
   std::vector<NormalSum> normals_;
-  std::vector<MaterialWeight> materials_, further_;
+  std::vector<FirstMaterial> materials_;
+  std::vector<FurtherMaterial> further_;
+  size_t max_further_ = kFewFurther;  // before their weights are added up
 };
 
 }  // namespace voxdag::color

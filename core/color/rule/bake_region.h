@@ -82,13 +82,24 @@ class RegionBaker {
     add_waiting();
     return cells_.count() <= max_cells_;
   }
+  // The same in parts; after each, charge(bytes) gets what the sums for `wanted` have allocated,
+  // which is up to 16 MiB more than after the one before, and stops add() if it returns false.
+  template <class Charge>
+  bool add(std::span<const FixedSurface> triangles, const Charge& charge) {
+    constexpr size_t kAtOnce = 16;
+    if (!cells_.attributes().is_needed()) return add(triangles);
+    bool are_all = true;
+    for (size_t at = 0; are_all && at < triangles.size(); at += kAtOnce) {
+      are_all = add(triangles.subspan(at, std::min(kAtOnce, triangles.size() - at))) &&
+                charge(cells_.attributes().bytes());
+    }
+    return are_all;
+  }
   void finish(std::vector<ColoredCell>& cells) { finish(cells, values_); }
   // `values`: one for each cell if normals or materials are wanted.
   void finish(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
     cells_.take(cells, values);
   }
-  // What the sums for them take.
-  uint64_t attribute_bytes() { return cells_.attributes().bytes(); }
 
  private:
   static constexpr size_t kMaxWaiting = 1 << 16;

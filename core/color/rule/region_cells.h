@@ -66,6 +66,7 @@ class RegionCells {
     cells.reserve(sums_.size());
     values.clear();
     if (attributes_.is_needed()) values.reserve(sums_.size());
+    attributes_.finish();
     for (uint32_t word = 0; word < touched_.size(); ++word) {
       const uint64_t touched = std::exchange(touched_[word], 0);
       for (uint64_t rest = touched; rest != 0; rest &= rest - 1) {

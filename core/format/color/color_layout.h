@@ -31,6 +31,10 @@ inline constexpr size_t kTierRegionsAt = 16;
 inline constexpr size_t kTierCellsAt = 24;  // of all levels
 inline constexpr size_t kTierEntryBytes = 32;
 
+// Of the list of materials.
+inline constexpr uint64_t kMaxMaterials = uint64_t{1} << 20;
+inline constexpr uint64_t kMaxNamesBytes = uint64_t{64} << 20;
+
 // Tier t has the levels from finest_level(c, t) up to region_level(c, t).
 inline constexpr uint32_t kTierLevels = kRegionLevels + 1;
 inline constexpr uint32_t tier_count(uint32_t color_levels) {

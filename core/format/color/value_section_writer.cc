@@ -4,11 +4,15 @@
 
 namespace voxdag {
 
+// Of encode_values(), its result included.
+constexpr uint64_t kEncodeBytesPerValue = 10 + 3 * sizeof(uint32_t) / 2;
+
 ValueSectionWriter::ValueSectionWriter(GlobalFileWriter& file, Attribute attribute,
                                        uint32_t cell_levels, std::span<const std::string> materials,
                                        MemoryBudget& budget)
     : attribute_(attribute),
       bytes_(voxdag::value_bytes(attribute, materials.size())),
+      budget_(budget),
       materials_(materials.begin(), materials.end()),
       section_(file, attribute, cell_levels, bytes_ * static_cast<uint32_t>(kBlockCells), budget) {
   for (uint32_t tier = 0; tier < section_.tier_count(); ++tier) open_.emplace_back(budget);
@@ -39,8 +43,11 @@ void ValueSectionWriter::close_cell(uint32_t tier) {
 
 void ValueSectionWriter::close_region(uint32_t tier) {
   Open& open = open_[tier];
-  const EncodedRegion region = encode_values(attribute_, bytes_, section_.region_levels(tier),
-                                             open.morton, open.cells.values());
+  const std::span<const ValuedCell> cells = open.cells.values();
+  const MemoryCharge charge(budget_, cells.size() * kEncodeBytesPerValue,
+                            "values of coarse levels");
+  const EncodedRegion region =
+      encode_values(attribute_, bytes_, section_.region_levels(tier), open.morton, cells);
   open.cells.clear();
   add(tier, region);
 }

@@ -43,6 +43,7 @@ class ValueSectionWriter {
 
   const Attribute attribute_;
   const uint32_t bytes_;
+  MemoryBudget& budget_;
   const std::vector<std::string> materials_;
   SectionWriter section_;
   std::vector<Open> open_;  // by tier; tier 0 has none

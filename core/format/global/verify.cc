@@ -191,7 +191,11 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
     uint64_t names =
         static_cast<uint64_t>(last.directory - file_.data()) + 32 * last.region_count + 4;
     for (const std::string& material : section.names()) names += 4 + material.size();
-    check_zeros(names, end - 32 * section.tier_count(), "padding after the names of materials");
+    const uint64_t tiers = end - 32 * section.tier_count();
+    if (tiers != (names + 15) / 16 * 16 || !section.names().back().empty())
+      broken(file_.path() + ": materials",
+             "expected a list that ends with an empty name, up to the next multiple of 16 bytes");
+    check_zeros(names, tiers, "padding after the names of materials");
   }
   check_zeros(end, round_up_to_page(end), "padding after the " + name + "s");
   check_zeros(entry + kAttributeReservedAt, entry + kAttributeEntryBytes, "reserved");

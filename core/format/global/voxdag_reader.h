@@ -133,13 +133,6 @@ class Bytes {
     return static_cast<const unsigned char*>(map_ ? map_ : copy_.data());
   }
   uint64_t size() const { return size_; }
-  // Linux has huge pages for files of some file systems, for what is read from now on: what is in
-  // memory already stays in the pages that it has.
-  void prefer_huge_pages() const {
-#ifdef MADV_HUGEPAGE
-    if (map_) madvise(map_, size_, MADV_HUGEPAGE);
-#endif
-  }
   // The pages of a mapping leave memory until they are used again.
   void release_pages() const {
     if (map_) madvise(map_, size_, MADV_DONTNEED);
@@ -191,9 +184,6 @@ class File {
   const unsigned char* data() const { return bytes_->data(); }
   // For programs that must stay small: what was read of a mapped file is no longer resident.
   void release_pages() const { bytes_->release_pages(); }
-  // For programs that read all over a file which fits in memory: a mapped file takes fewer misses
-  // of the TLB then, where the system has huge pages for files. Before the first read.
-  void prefer_huge_pages() const { bytes_->prefer_huge_pages(); }
   // The low corner of the grid in world space.
   const double (&origin() const)[3] { return origin_; }
   // The edge length of the grid in world space; that of a voxel is edge() / resolution().

@@ -248,6 +248,7 @@ class ColorSection {
     const char* const kBroken = "the list of materials does not fit between tiers and tier table";
     const uint64_t count = bytes < 4 ? 0 : get<uint32_t>(at);
     if (count == 0 || 4 * count > bytes - 4) return kBroken;
+    if (count > kMaxMaterials || bytes > kMaxNamesBytes) return "there are too many materials";
     if (value_bytes != (count <= 256 ? 1u : count <= 65536 ? 2u : 4u))
       return "materials have values of another width than their number needs";
     uint64_t end = 4;
@@ -256,10 +257,13 @@ class ColorSection {
       if (bytes - end < 4 || get<uint32_t>(at + end) > bytes - end - 4) return kBroken;
       const uint32_t size = get<uint32_t>(at + end);
       names_.emplace_back(reinterpret_cast<const char*>(at + end + 4), size);
-      end += 4 + size;
+      end += uint64_t{4} + size;
     }
     return bytes - end < 16 ? nullptr : kBroken;
   }
+
+  // Of a list, which is read when the file is opened.
+  static constexpr uint64_t kMaxMaterials = uint64_t{1} << 20, kMaxNamesBytes = uint64_t{64} << 20;
 
   uint32_t color_levels_ = 0, tier_count_ = 0;
   ColorTier tiers_[3];

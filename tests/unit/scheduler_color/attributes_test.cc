@@ -171,7 +171,6 @@ TEST_F(Attributes, FollowTheNamesOfMaterials) {
   std::string json(std::istreambuf_iterator<char>(in), {});
   json.replace(json.find("plain"), 5, "other");
   std::ofstream(scene_) << json;
-  s.run.restart = true;
   EXPECT_NE(build(s).sha256, before);
   EXPECT_EQ(open_global_file(output())->material_names()[1], "other");
 }

@@ -74,8 +74,8 @@ class CubeBaking : public testing::Test {
     });
     append();
     EXPECT_EQ(bin.surfaces, 0u);
-    EXPECT_LE(budget.peak(), region_bytes + 2 * ColorMemory::kValueBytes + (2 << 20) +
-                                 2 * surface_bytes);
+    EXPECT_LE(budget.peak(),
+              region_bytes + 2 * ColorMemory::kValueBytes + (2 << 20) + 2 * surface_bytes);
     return baked;
   }
 

@@ -99,7 +99,7 @@ void decode_mesh(const DracoPart& part, std::span<const std::byte> data, MemoryC
   for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::GENERIC})
     options.SetAttributeBool(type, "skip_attribute_transform", true);
   BoundedDecoder<Decoder> decoder(part.vertices, charge);
-  const DracoTables tables(charge);
+  DracoTables tables(charge);
   const draco::Status status = decoder.Decode(options, &buffer, &mesh);
   if (tables.refused_bytes() > 0) refuse_memory(tables.refused_bytes());
   if (decoder.refusal) std::rethrow_exception(decoder.refusal);

@@ -1,0 +1,122 @@
+// Colors of many cells at once, from C++ and from C, against a decoder written from the document.
+#include <gtest/gtest.h>
+
+#include "query/c/voxdag.h"
+#include "query/lookup/dag.h"
+#include "tests/unit/format_color/colored_files.h"
+
+namespace voxdag::query {
+namespace {
+
+// The cells of the color grid are 4 voxels wide, and in two tiers.
+class Colors : public testing::Test {
+ protected:
+  void SetUp() override {
+    scene_ = {9, 7, random_codes(11, 9, 3000), smooth_colors(7, 20)};
+    write_colored(path_, scene_);
+  }
+  // The set cells of a level, in Morton order.
+  std::vector<Position> cells(uint32_t level) const {
+    std::vector<Position> cells;
+    for (const uint64_t code : scene_.cells(level)) {
+      uint32_t x, y, z;
+      morton_decode(code, x, y, z);
+      cells.push_back({x, y, z});
+    }
+    return cells;
+  }
+
+  TemporaryFolder folder_;
+  const std::string path_ = folder_.file("scene.vdag");
+  ColoredScene scene_;
+};
+
+TEST_F(Colors, OfEveryCell) {
+  const ByteString bytes = read_bytes(path_);
+  const SectionDecoder decoder(bytes, scene_);
+  const Dag dag(path_);
+  EXPECT_TRUE(dag.has_colors());
+  EXPECT_EQ(dag.color_levels(), 7u);
+  for (uint32_t level = 0; level <= scene_.levels; ++level) {
+    SCOPED_TRACE(level);
+    const Codes codes = scene_.cells(level);
+    const std::vector<Position> points = cells(level);
+    std::vector<Rgba> colors(points.size(), Rgba{1, 2, 3, 4}), by_three(colors);
+    dag.colors(points, level, colors);
+    dag.colors(points, level, by_three, 3);
+    EXPECT_EQ(colors, by_three);
+    for (size_t i = 0; i < codes.size(); ++i) {
+      const uint32_t stored = std::min(level, 7u);
+      const auto& expected = decoder.colors().at({stored, codes[i] >> 3 * (level - stored)});
+      for (size_t c = 0; c < 3; ++c) ASSERT_EQ(colors[i][c], expected[c]) << i;
+      ASSERT_EQ(colors[i][3], 255);
+    }
+  }
+}
+
+// In any order, with cells among them that are not set or lie outside the grid.
+TEST_F(Colors, InAnyOrder) {
+  const Dag dag(path_);
+  std::vector<Position> points = cells(9);
+  std::vector<Rgba> colors(points.size());
+  dag.colors(points, 9, colors);
+  std::map<Position, Rgba> of;
+  for (size_t i = 0; i < points.size(); ++i) of[points[i]] = colors[i];
+  oracle::Random random(5);
+  for (int i = 0; i < 5000; ++i)
+    points.push_back({random.between(-3, 515), random.between(-3, 515), random.between(-3, 515)});
+  points.insert(points.end(), {{INT64_MIN, 0, 0}, {0, INT64_MAX, 0}, {0, 0, int64_t{1} << 32}});
+  for (size_t i = points.size(); i-- > 1;)
+    std::swap(points[i], points[static_cast<size_t>(random.between(0, static_cast<int>(i)))]);
+  colors.assign(points.size(), Rgba{1, 2, 3, 4});
+  dag.colors(points, 9, colors, 2);
+  size_t unset = 0;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const auto found = of.find(points[i]);
+    unset += found == of.end();
+    ASSERT_EQ(colors[i], found == of.end() ? Rgba{} : found->second) << i;
+  }
+  EXPECT_GT(unset, 1000u);
+}
+
+TEST_F(Colors, FromC) {
+  const std::vector<Position> points = cells(8);
+  std::vector<Rgba> expected(points.size()), colors(points.size());
+  Dag(path_).colors(points, 8, expected);
+  voxdag_file* file = nullptr;
+  ASSERT_EQ(voxdag_open(path_.c_str(), &file), VOXDAG_OK);
+  voxdag_facts facts;
+  ASSERT_EQ(voxdag_get_facts(file, &facts), VOXDAG_OK);
+  EXPECT_EQ(facts.color_levels, 7u);
+  const auto cells = reinterpret_cast<const int64_t(*)[3]>(points.data());
+  const auto rgba = reinterpret_cast<uint8_t(*)[4]>(colors.data());
+  ASSERT_EQ(voxdag_colors(file, 8, cells, points.size(), rgba), VOXDAG_OK) << voxdag_error();
+  EXPECT_EQ(colors, expected);
+  EXPECT_EQ(voxdag_colors(file, 10, cells, 1, rgba), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_colors(file, 8, cells, 1, nullptr), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_colors(file, 8, nullptr, 1, rgba), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_colors(nullptr, 8, cells, 1, rgba), VOXDAG_INVALID_INPUT);
+  voxdag_close(file);
+}
+
+TEST_F(Colors, OfAFileWithoutColors) {
+  const std::string plain = folder_.file("plain.vdag");
+  write_colored(plain, scene_, false);
+  const Dag dag(plain);
+  EXPECT_FALSE(dag.has_colors());
+  const Position point{};
+  Rgba color;
+  try {
+    dag.colors({&point, 1}, 9, {&color, 1});
+    FAIL() << "it has found colors";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+    EXPECT_NE(error.message().find("with colors"), std::string::npos) << error.message();
+  }
+  std::vector<Rgba> too_many(2);
+  EXPECT_THROW(Dag(path_).colors({&point, 1}, 9, too_many), Error);
+  EXPECT_THROW(Dag(path_).colors({&point, 1}, 10, {&color, 1}), Error);
+}
+
+}  // namespace
+}  // namespace voxdag::query
