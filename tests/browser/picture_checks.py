@@ -239,6 +239,57 @@ def check_budget(visitor, url, cameras, references):
     assert statistics["evicted"] > 0 and statistics["tiles"] > 1, f"no tile has left: {statistics}"
 
 
+# A pool begins with 1 MiB, not 16: a small scene then needs more.
+FIRST_ROWS, SMALL_ROWS = "const kFirstRows = 256;", 16
+# There is no memory for textures of tiles beyond that.
+NO_MEMORY = """
+const {texStorage2D, getError} = WebGL2RenderingContext.prototype;
+window.refusals = 0;
+let refused = false;
+WebGL2RenderingContext.prototype.texStorage2D = function(target, levels, format, width, height) {
+  if (format !== this.RGBA32UI || width !== 4096 || height <= %d)
+    return texStorage2D.call(this, target, levels, format, width, height);
+  refused = true;
+  ++refusals;
+};
+WebGL2RenderingContext.prototype.getError = function() {
+  const was = refused;
+  refused = false;
+  return was ? this.OUT_OF_MEMORY : getError.call(this);
+};
+""" % SMALL_ROWS
+POOL_ROWS = "voxdagViewer.renderer.store.pool.rows"
+
+
+def check_growing_pool(visitor, url, cameras, references, can_grow):
+    """A pool that outgrows its first texture loses nothing; nor does one that cannot, which then does with what it has."""
+    def begin_small(route):
+        script = route.fetch().text()
+        assert FIRST_ROWS in script, "the pool's first size has another name"
+        route.fulfill(body=script.replace(FIRST_ROWS, f"const kFirstRows = {SMALL_ROWS};"), content_type="text/javascript")
+
+    visitor.page.route("**/tiles/tile_pool.js", begin_small)
+    if not can_grow:
+        visitor.context.add_init_script(NO_MEMORY)
+    visitor.open(f"{url}/?budget=32{PLAIN}")
+    for name in ("wide", "street"):
+        camera = cameras[name]
+        visitor.show(camera, complete=can_grow)
+        if not can_grow:
+            visitor.page.wait_for_timeout(500)
+        check_pool(visitor)
+        depths, _ = visitor.capture(WIDTH, HEIGHT)
+        if can_grow:
+            assert_equal(references[name], depths, camera, f"{name}, with a growing pool")
+        assert holes(references[name], depths) < 0.005, f"holes at {name} in a pool that {'grows' if can_grow else 'cannot grow'}"
+    rows = visitor.page.evaluate(POOL_ROWS)
+    if can_grow:
+        assert rows > SMALL_ROWS, "the pool did not grow: the check sees nothing"
+        return
+    assert visitor.page.evaluate("refusals") == 1, "the pool did not try to grow, or did again"
+    assert rows == SMALL_ROWS and visitor.statistics()["poolBytes"] <= 2 * MIB, visitor.statistics()
+
+
 FLY = """async ([cameras, seconds]) => {
   const {viewer} = window.voxdagViewer;
   const end = performance.now() + 1000 * seconds;

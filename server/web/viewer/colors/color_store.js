@@ -56,6 +56,7 @@ export class ColorStore {
     const words = decode_page(page_words), count = words.length / kBlockWords;
     if (!this.evict_for(count, now_ms)) return false;
     const [x, y, z] = position, blocks = this.pool.allocate(count);
+    if (!blocks) return false;
     const page = {key, level, place: [x | level << 20, y, z], blocks, used_ms: now_ms, epoch: this.epoch};
     for (let i = 1; i < count; ++i) words[kMoreAt + i - 1] = blocks[i] * kBlockWords / 4;
     blocks.forEach((block, i) => this.pool.write(block * kBlockWords / 4, words.subarray(i * kBlockWords, (i + 1) * kBlockWords)));

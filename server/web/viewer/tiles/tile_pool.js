@@ -1,7 +1,8 @@
 // The GPU's memory for tiles: texels of four words in one unsigned integer texture, divided into blocks, and
 // the table that says for each slot where its tile begins. A tile takes any free blocks, so memory does not
 // fragment. Few views need much: a large pool begins small, and takes its final size at once when it is full.
-// Both textures, and while it grows the third, are together at most the budget.
+// Both textures, and while it grows the third, are together at most the budget. Where there is no memory for
+// more, a pool stays as small as it is.
 
 import {kBlockTexels, kTexelWords} from "./tile_format.js";
 
@@ -10,6 +11,7 @@ const kMaxRows = 4096;                        // addresses have 24 bits
 const kBlocksPerRow = kRowTexels / kBlockTexels;
 const kTexelBytes = kTexelWords * 4;
 const kFirstRows = 256;                       // of a pool that grows: 16 MiB
+const kErrorFlags = 8;                        // more than WebGL has
 
 export class TilePool {
   constructor(gl, budget_bytes) {
@@ -39,19 +41,29 @@ export class TilePool {
     return this.free.length + this.block_count - this.next_block;
   }
 
-  // Block numbers, or null if there are not so many free ones.
+  // Block numbers, or null if there are not so many free ones: also if there seemed to be, but the pool cannot grow.
   allocate(count) {
     if (this.free_blocks < count) return null;
+    const end = this.next_block + Math.max(0, count - this.free.length);
+    if (end > this.rows * kBlocksPerRow && !this.grow()) return null;
     const blocks = new Uint32Array(count);
     for (let i = 0; i < count; ++i) blocks[i] = this.free.length > 0 ? this.free.pop() : this.next_block++;
-    if (this.next_block > this.rows * kBlocksPerRow) this.grow();
     return blocks.sort();
   }
 
-  // The texture is another one afterwards.
+  // The texture is another one afterwards. False if there is no memory for it: the pool then keeps its size.
   grow() {
-    const {gl} = this, before = this.texels, framebuffer = gl.createFramebuffer();
-    this.texels = this.create_texture(gl.RGBA32UI, kRowTexels, this.max_rows);
+    const {gl} = this, before = this.texels;
+    for (let flags = 0; flags < kErrorFlags && gl.getError() !== gl.NO_ERROR; ++flags);  // of other calls
+    const texels = this.create_texture(gl.RGBA32UI, kRowTexels, this.max_rows);
+    if (gl.getError() !== gl.NO_ERROR) {
+      gl.deleteTexture(texels);
+      this.max_rows = this.rows;
+      this.block_count = this.rows * kBlocksPerRow;
+      return false;
+    }
+    const framebuffer = gl.createFramebuffer();
+    this.texels = texels;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, before, 0);
     gl.readBuffer(gl.COLOR_ATTACHMENT0);
@@ -59,6 +71,7 @@ export class TilePool {
     gl.deleteFramebuffer(framebuffer);
     gl.deleteTexture(before);
     this.rows = this.max_rows;
+    return true;
   }
 
   release(blocks) {

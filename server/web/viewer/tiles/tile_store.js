@@ -80,9 +80,9 @@ export class TileStore {
     const decoded = decode_tile(words, level);
     const count = decoded.words.length * 4 / kBlockBytes;
     if (!this.evict_for(count, !this.slots.has(key), now_ms)) return false;
-    const slot = this.slots.get(key) ?? this.pool.allocate_slot();
-    const blocks = slot ? this.pool.allocate(count) : null;
+    const blocks = this.pool.allocate(count);
     if (!blocks) return false;
+    const slot = this.slots.get(key) ?? this.pool.allocate_slot();
     const tile = {key, level, offset, levels: decoded.levels, slot, blocks, leaf_begin: decoded.leaf_begin,
                   addresses: decoded.addresses, coarse: decoded.coarse, links: new Map(), used_ms: now_ms, epoch: this.epoch, pointer: 0};
     tile.pointer = this.pool.upload(blocks, decoded);
