@@ -288,7 +288,8 @@ export class Renderer {
 
   follow_first_view() {
     const {loader} = this, now = performance.now();
-    if (!loader.first_view.is_over) loader.demand(loader.first_view.wanted, now);
+    if (loader.first_view.is_over) return this.end_first_view();  // the next reading replaces the queue
+    loader.demand(loader.first_view.wanted, now);
     if (loader.is_idle || loader.awaits_retry) this.end_first_view();
   }
 
@@ -454,6 +455,7 @@ export class Renderer {
     if (!this.loader.first_view && this.loader.demand(read.wanted, now) > 0) this.on_arrival();
     if (pass.colors) this.colors.take_reading(pass.colors.take(), epoch, now);
     else this.colors?.loader.replace_queue([], 0, now);
+    if (this.loader.first_view?.stalls(now)) this.end_first_view();
     if (epoch !== this.store.epoch) return;
     const nothing_comes = this.loaders.every((each) => each.is_idle && !each.awaits_retry);
     if (this.times.first_picture_ms === null && read.coarse_pixels < 16) {

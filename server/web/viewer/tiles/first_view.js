@@ -1,9 +1,10 @@
 // Finds the tiles of the first view while the shaders are compiled: by walking through the tiles that are there, as
 // a reading of the feedback would say them a level at a time. What surfaces hide is not known here, so a few tiles
-// too many are fetched; therefore this stops at cells that are still wide, and after so many tiles.
+// too many are fetched; therefore this stops at cells that are still wide, after so many tiles, and when none come.
 
 const kPixels = 15;            // wider cells are refined: of the canvas
 const kMaxTiles = 1500;
+const kStallMs = 1500;
 const kHeadWords = 4, kCutWords = 4;  // of a tile (docs/format.md)
 
 export class FirstView {
@@ -15,10 +16,16 @@ export class FirstView {
     this.known = new Map();      // key -> words of a tile
     this.places = new Map();     // key -> where the tile is needed, low corners
     this.wanted = new Map();     // texel of a cut-off node -> pixels of its widest coarse cell
+    this.taken_ms = 0;           // when the last tile came
   }
 
   get is_over() {
     return this.wanted.size === 0 || this.known.size > kMaxTiles;
+  }
+
+  // Whether a request that is not answered holds up what others could say.
+  stalls(now_ms) {
+    return now_ms - this.taken_ms > kStallMs;
   }
 
   begin(store, tile, words) {
@@ -28,6 +35,7 @@ export class FirstView {
 
   // A tile of the store has these words.
   take(store, tile, words) {
+    this.taken_ms = performance.now();
     if (this.known.has(tile.key)) return;
     this.known.set(tile.key, words);
     for (const corner of this.places.get(tile.key) ?? []) this.walk(store, tile, words, corner);
@@ -59,8 +67,8 @@ export class FirstView {
     const places = this.places.get(node.key);
     if (places) places.push(corner);
     else this.places.set(node.key, [corner]);
-    const words = this.known.get(node.key);
-    if (words) this.walk(store, store.get(node.level, node.offset), words, corner);
+    const words = this.known.get(node.key), tile = store.get(node.level, node.offset);
+    if (words && tile) this.walk(store, tile, words, corner);  // it may have left again
   }
 
   // Whether a cube is in the picture, with cells that are too wide.
