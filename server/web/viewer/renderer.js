@@ -142,12 +142,14 @@ export class Renderer {
 
   // What is seen at a point of the canvas, null for the sky.
   async pick(css_x, css_y) {
-    if (!this.ready || this.empty) return null;
-    const {width, height} = this.size;
+    const {passes} = this;
+    if (!this.ready || this.empty || !await passes.compile_later()) return null;
+    if (!this.ready || passes !== this.passes) return null;
+    const {view} = this, {width, height} = this.size;
     const x = css_x / this.size.css_width * width, y = css_y / this.size.css_height * height;
     const values = this.uniforms(width, height);
     values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
-    const {view, passes} = this, words = await passes.pick_one(values);
+    const words = await passes.pick_one(values);
     if (!words || !this.ready || (words[1] >>> 23 & 1) === 0) return null;
     const distance = new Float32Array(words.buffer, 0, 1)[0], log2_edge = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
     const direction = view.direction(x, y, width, height);

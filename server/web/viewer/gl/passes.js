@@ -34,8 +34,9 @@ export class Passes {
     this.disposed = false;
     this.targets = null;
     this.vertex_array = gl.createVertexArray();
-    this.begun = this.begin();   // what does not depend on the file
-    this.begun.catch(() => {});  // compile() reports it
+    // What does not depend on the file. A compiler that cannot say when it is done is not waited for before it has all.
+    this.begun = this.parallel ? this.begin() : null;
+    this.begun?.catch(() => {});  // compile() reports it
     this.compiled = null;        // promise of compile()
   }
 
@@ -60,7 +61,7 @@ export class Passes {
     const {gl} = this;
     this.trace = new Program(gl, "trace", colored ? kColoredTrace : kTrace);
     if (colored) this.color_feedback = new Program(gl, "color feedback", kColorFeedback);
-    await this.begun;
+    await (this.begun ??= this.begin());
     if (!await this.finish([this.trace, ...(colored ? [this.color_feedback] : [])])) return;
     this.warm_up([[this.trace, colored ? kColoredHitFormats : kHitFormats],
                   ...(colored ? [[this.color_feedback, kFeedbackFormats]] : [])]);
@@ -187,11 +188,9 @@ export class Passes {
   }
 
   // The hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of the tile it is in. Null if
-  // the context is lost. The page does not wait for the GPU.
+  // the context is lost. The page does not wait for the GPU. After compile_later(): by then `values` may be out of date.
   async pick_one(values) {
-    const {gl} = this;
-    if (!await this.compile_later()) return null;
-    const target = new Target(gl, 2, 1, ["RGBA32UI"]);
+    const {gl} = this, target = new Target(gl, 2, 1, ["RGBA32UI"]);
     this.pick.draw(target, values, 2, 1);
     const reading = new AsyncReading(gl, target, 2, 1);
     target.dispose();
