@@ -42,6 +42,49 @@ def check_missing_tiles(visitor, url, way, cameras, references):
     assert_equal(references[name], depths, camera, f"{name}, after tiles: {way}")
 
 
+# The first request for several tiles is never answered.
+HANG = """
+const answering_fetch = window.fetch;
+window.hangs = 0;
+window.fetch = (url, options) =>
+  /\\/tiles\\/batch/.test(url) && !hangs++ ? new Promise(() => {}) : answering_fetch(url, options);
+"""
+
+
+def check_hanging_request(visitor, url):
+    """One request without an answer does not hold up what the pictures ask for."""
+    visitor.context.add_init_script(HANG)
+    visitor.open(f"{url}/{PLAIN}")
+    visitor.wait_until("hangs > 0")
+    visitor.wait_until("performance.getEntriesByName('voxdag: tiles of the first view').length > 0")
+
+
+# A browser that compiles when it is asked for the result; how many programs it was given before that.
+SERIAL_COMPILER = """
+const {getExtension, linkProgram, getProgramParameter} = WebGL2RenderingContext.prototype;
+const serial = window.serial = {linked: 0, before_result: 0};
+WebGL2RenderingContext.prototype.getExtension = function(name) {
+  return name === "KHR_parallel_shader_compile" ? null : getExtension.call(this, name);
+};
+WebGL2RenderingContext.prototype.linkProgram = function(program) {
+  ++serial.linked;
+  linkProgram.call(this, program);
+};
+WebGL2RenderingContext.prototype.getProgramParameter = function(program, name) {
+  serial.before_result ||= serial.linked;
+  return getProgramParameter.call(this, program, name);
+};
+"""
+
+
+def check_serial_compiler(visitor, url):
+    """All programs of the first picture are given to the compiler before one is waited for."""
+    visitor.context.add_init_script(SERIAL_COMPILER)
+    visitor.open(f"{url}/{PLAIN}")
+    visitor.wait_until("voxdagViewer.renderer.has_drawn")
+    assert visitor.page.evaluate("serial.before_result") == 6, visitor.page.evaluate("serial")
+
+
 def check_restart(visitor, server, cameras, references):
     """Asks for tiles while the server is gone; the picture is completed when it is there again."""
     visitor.open(f"{server.url}/{PLAIN}")
@@ -103,6 +146,41 @@ LOSE = """() => {
   });
   lost.context.loseContext();
 }"""
+
+
+# The first context is lost as soon as it is made.
+LOSE_AT_ONCE = """
+const its_context = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
+  const made = its_context.call(this, kind, ...more);
+  if (kind === "webgl2" && made && !window.early_loss) {
+    window.early_loss = made.getExtension("WEBGL_lose_context");
+    %s
+  }
+  return made;
+};
+"""
+LOSSES = {"at once": "early_loss.loseContext();",
+          "while programs compile": "setTimeout(() => early_loss.loseContext());"}
+
+
+def check_early_loss(visitor, url, when, camera, reference):
+    """A context that is lost before anything can be drawn is waited for, and the page then begins."""
+    page = visitor.page
+    visitor.context.add_init_script(LOSE_AT_ONCE % LOSSES[when])
+    with visitor.expecting("CONTEXT_LOST|Context lost"):
+        visitor.open(f"{url}/{PLAIN}", wait=False)
+        page.get_by_text("The graphics card is not available").wait_for()
+        assert not page.evaluate("Boolean(window.voxdagViewer)"), "it began before the context was lost: the check sees nothing"
+        assert page.locator('[data-tool="screenshot"]').is_disabled(), "a picture is to be saved that is not there"
+        page.locator("#scene").press("p")
+        page.get_by_text("There is no picture yet.").wait_for(state="attached")
+        page.evaluate("early_loss.restoreContext()")
+        visitor.wait_until("Boolean(window.voxdagViewer)")
+        visitor.show(camera)
+    depths, _ = visitor.capture(WIDTH, HEIGHT)
+    assert_equal(reference, depths, camera, f"after a context that was lost {when}")
+    assert page.locator('[data-tool="screenshot"]').is_enabled(), "the picture cannot be saved"
 
 
 def check_lost_context(visitor, url, camera, reference):

@@ -15,6 +15,7 @@ const kPictureAspect = 16 / 9;   // of the views in the manifest
 const kSeenInterval_ms = 250;    // between two looks at how far away things are
 const kFirstSeen_ms = 2000;      // until the first: it needs a program of its own
 const kStatisticsInterval_ms = 500;
+const kNoPicture = "There is no picture yet.";
 const kBookmarkDelay_ms = 400;    // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
@@ -39,6 +40,8 @@ export class Viewer {
     listen_to_keys(bookmarks ? window : canvas, canvas, this.motion, this.actions(), () => this.schedule(), signal);
     for (const button of places.tools.querySelectorAll("[data-tool]"))
       button.addEventListener("click", () => this.actions()[button.dataset.tool](), {signal});
+    this.save_button = places.tools.querySelector('[data-tool="screenshot"]');
+    this.save_button.disabled = true;  // until there is a picture
     const resizes = new ResizeObserver(() => this.resize());
     resizes.observe(canvas);
     if (bookmarks) window.addEventListener("hashchange", () => this.follow_bookmark(), {signal});
@@ -150,6 +153,7 @@ export class Viewer {
     const moving = this.motion.step(now);
     this.apply_camera();
     const drawn = this.renderer.frame(now);
+    this.save_button.disabled = !this.renderer.has_drawn;
     this.show_markers();
     if (now - this.seen.time > kSeenInterval_ms) this.look_ahead(now);
     if (moving || drawn.moving || !drawn.complete) this.schedule();
@@ -200,10 +204,12 @@ export class Viewer {
   }
 
   async pick(x, y) {
+    if (!this.renderer.ready) return announce(kNoPicture);
     this.panel.pick.set(await this.renderer.pick(x, y));
   }
 
   async set_pivot(x, y) {
+    if (!this.renderer.ready) return announce(kNoPicture);
     const hit = await this.renderer.pick(x, y);
     if (!hit) return announce("Nothing there to orbit around.");
     const {eye, fov_degrees} = this.camera.get();
@@ -265,6 +271,7 @@ export class Viewer {
 
   // The drawing buffer is only valid until the browser has shown it: draws and reads at once.
   save_picture() {
+    if (!this.renderer.has_drawn) return announce(kNoPicture);
     this.renderer.frame(performance.now());
     this.canvas.toBlob((blob) => {
       if (!blob) return announce("The picture could not be saved.");

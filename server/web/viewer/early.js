@@ -12,15 +12,22 @@ function begin(canvas) {
   const begin_ms = performance.now(), gl = create_context(canvas);
   manifest.catch(() => {});  // reported by whoever waits for it
   if (!gl) return;
-  const passes = new Passes(gl);
-  begun = {source, manifest, begin_ms, gl, passes};
+  const passes = gl.isContextLost() ? null : new Passes(gl), mine = {source, manifest, begin_ms, gl, passes};
+  begun = mine;
+  // A context that is lost now already comes back, too; its programs do not.
+  canvas.addEventListener("webglcontextlost", (event) => {
+    event.preventDefault();
+    mine.passes = null;
+    if (passes) passes.disposed = true;
+  });
   // A program that fails is reported by the next compile().
-  manifest.then(({colors}) => passes.compile(Boolean(colors))).catch(() => {});
+  manifest.then(({colors}) => mine.passes?.compile(Boolean(colors))).catch(() => {});
 }
 
 if (!new URLSearchParams(location.search).has("job")) begin(document.getElementById("scene"));
 
-// {source, manifest, begin_ms, gl, passes} for the canvas of the page; null if it was taken already, or cannot be had.
+// {source, manifest, begin_ms, gl, passes} for the canvas of the page, null if it was taken already, or cannot be had.
+// `passes` are null if the context was lost.
 export function take_begun() {
   const taken = begun;
   begun = null;

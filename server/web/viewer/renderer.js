@@ -43,7 +43,7 @@ export class Renderer {
     this.view = null;
     this.first_picture_bytes = 0;
     this.sun_trials = 0;
-    this.has_drawn = false;
+    this.has_drawn = false;      // since the context is there
     this.colors = null;          // of a file that has some
     this.sample = null;          // {parts, fence, part_ms, busy_ms, ...}: drawn in parts
     this.pace = new Pace();
@@ -56,16 +56,16 @@ export class Renderer {
     this.full_drawn = false;     // the last frame that was read had all pixels
     this.stats = {steps_mean: 0, steps_99: 0, rays: 0};
     this.waiting = [];
-    this.lost = false;
     this.disposed = false;
     this.ready = false;          // programs, pool and root are there
     this.started = null;         // {resolve, reject} of start()
     this.gl = begun?.gl ?? create_context(canvas);
     if (!this.gl) throw new WebGLUnavailable("This browser or its graphics driver does not offer WebGL 2.");
-    this.max_size = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE) || 4096;
+    this.lost = this.gl.isContextLost();  // then on_restored() continues
+    this.max_size = 4096;
     canvas.addEventListener("webglcontextlost", this.on_lost);
     canvas.addEventListener("webglcontextrestored", this.on_restored);
-    this.create_programs(begun?.passes);
+    if (!this.lost) this.create_programs(begun?.passes);
   }
 
   // Resolves when the first picture can be drawn, of a source whose manifest is there. With a view that was set before,
@@ -77,7 +77,7 @@ export class Renderer {
     await new Promise((resolve, reject) => {
       this.started = {resolve, reject};
       if (this.disposed) resolve();
-      else this.load();
+      else if (!this.lost) this.load();
     });
   }
 
@@ -196,13 +196,14 @@ export class Renderer {
     this.canvas.removeEventListener("webglcontextrestored", this.on_restored);
     this.ready = false;
     this.loader?.dispose();
-    this.passes.dispose();
+    this.passes?.dispose();
     this.store?.pool.dispose();
     this.colors?.dispose();
     this.started?.resolve();
   }
 
   create_programs(begun) {
+    this.max_size = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE) || 4096;
     const begin = begun ? this.times.begin_ms : performance.now();
     if (this.passes) this.passes.disposed = true;  // with its context
     this.passes = begun ?? new Passes(this.gl);
@@ -315,7 +316,7 @@ export class Renderer {
   on_lost = (event) => {
     event.preventDefault();
     this.lost = true;
-    this.ready = false;
+    this.ready = this.has_drawn = false;
     this.loader?.dispose();
     this.colors?.loader.dispose();
     this.reading = null;
@@ -454,10 +455,10 @@ export class Renderer {
     if (read.exposure !== null && this.samples <= kSamples / 4) this.light.adjust(read, this.view.eye, moving);
     this.coarse_pixels = read.coarse_pixels;
     if (epoch === this.store.epoch) this.store.rounds++;
+    if (this.loader.first_view?.stalls(now)) this.end_first_view();
     if (!this.loader.first_view && this.loader.demand(read.wanted, now) > 0) this.on_arrival();
     if (pass.colors) this.colors.take_reading(pass.colors.take(), epoch, now);
     else this.colors?.loader.replace_queue([], 0, now);
-    if (this.loader.first_view?.stalls(now)) this.end_first_view();
     if (epoch !== this.store.epoch) return;
     const nothing_comes = this.loaders.every((each) => each.is_idle && !each.awaits_retry);
     if (this.times.first_picture_ms === null && read.coarse_pixels < 16) {
@@ -476,6 +477,7 @@ export class Renderer {
     const {passes, canvas} = this;
     passes.resize(canvas.width, canvas.height, canvas, false);
     passes.show(1, canvas.width, canvas.height);
+    this.has_drawn = true;
     for (const resolve of this.waiting.splice(0)) resolve();
   }
 }
