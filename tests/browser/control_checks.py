@@ -285,7 +285,7 @@ def check_without_webgl(visitor, url, still, lack=NO_WEBGL):
 
 
 def check_expired_token(visitor, viewer, token):
-    """A token that expires is asked for again: before the manifest at once, while tiles load by a message."""
+    """A token that expires is asked for again: before the manifest or the first tile at once, while others load by a message."""
     page, expired = visitor.page, []
 
     def expire(route):
@@ -299,6 +299,13 @@ def check_expired_token(visitor, viewer, token):
         expired[:] = [re.compile(r"/tiles$")]
         visitor.open(viewer, wait=False)
         page.get_by_label("Token").wait_for()
+        expired[:] = [re.compile(r"/tiles/0/0")]
+        page.get_by_label("Token").fill(token)
+        with page.expect_response(expired[0]):
+            page.keyboard.press("Enter")
+        visitor.wait_until("document.querySelector('#message:not([hidden]) input')?.value === ''")
+        for part in ("panel", "tools", "scene"):
+            assert page.locator(f"#{part}").is_hidden(), f"#{part} is shown next to the form"
         expired[:] = [re.compile(r"/tiles/batch|/tiles/[1-9]")]
         page.get_by_label("Token").fill(token)
         page.keyboard.press("Enter")

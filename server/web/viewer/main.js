@@ -108,7 +108,7 @@ async function start() {
   } catch (error) {
     ended.abort();
     renderer?.dispose();
-    place("tools").hidden = true;
+    place("panel").hidden = place("tools").hidden = true;
     if (!(error instanceof WebGLUnavailable)) throw error;
     return show_without_webgl(error.message, job);
   }
