@@ -1,6 +1,7 @@
 """Tiles that fail or are late and lost servers leave no holes, and the picture is right afterwards."""
 
 import re
+import time
 
 from picture_checks import HEIGHT, MIN_EQUAL_DEPTH, PLAIN, WIDTH, assert_equal, compare, holes
 
@@ -160,14 +161,27 @@ HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
   return made;
 };
 """
-LOSSES = {"at once": "early_loss.loseContext();",
+LOSSES = {"before the page": "early_loss.loseContext();",
           "while programs compile": "setTimeout(() => early_loss.loseContext());"}
+LOSE_AND_RESTORE = """early_loss.loseContext();
+    addEventListener("webglcontextlost", () => setTimeout(() => early_loss.restoreContext()), true);"""
+
+
+def hold_page(visitor):
+    """The context is there, and what happens to it is said, before the page's main module runs."""
+    def hold(route):
+        time.sleep(0.5)
+        route.continue_()
+
+    visitor.page.route("**/viewer/main.js", hold)
 
 
 def check_early_loss(visitor, url, when, camera, reference):
     """A context that is lost before anything can be drawn is waited for, and the page then begins."""
     page = visitor.page
     visitor.context.add_init_script(LOSE_AT_ONCE % LOSSES[when])
+    if when == "before the page":
+        hold_page(visitor)
     with visitor.expecting("CONTEXT_LOST|Context lost"):
         visitor.open(f"{url}/{PLAIN}", wait=False)
         page.get_by_text("The graphics card is not available").wait_for()
@@ -181,6 +195,15 @@ def check_early_loss(visitor, url, when, camera, reference):
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(reference, depths, camera, f"after a context that was lost {when}")
     assert page.locator('[data-tool="screenshot"]').is_enabled(), "the picture cannot be saved"
+
+
+def check_brief_loss(visitor, url):
+    """A context that is lost and back before the page's main module runs is as good as another."""
+    visitor.context.add_init_script(LOSE_AT_ONCE % LOSE_AND_RESTORE)
+    hold_page(visitor)
+    with visitor.expecting("CONTEXT_LOST|Context lost"):
+        visitor.open(f"{url}/{PLAIN}")
+        visitor.wait_until("voxdagViewer.renderer.has_drawn")
 
 
 def check_lost_context(visitor, url, camera, reference):
