@@ -276,7 +276,8 @@ def check_growing_pool(visitor, url, cameras, references, can_grow):
         camera = cameras[name]
         visitor.show(camera, complete=can_grow)
         if not can_grow:
-            visitor.page.wait_for_timeout(500)
+            visitor.wait_until("refusals > 0 || voxdagViewer.renderer.is_complete")
+            visitor.page.wait_for_timeout(300)  # more tiles come
         check_pool(visitor)
         depths, _ = visitor.capture(WIDTH, HEIGHT)
         if can_grow:
