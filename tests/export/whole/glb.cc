@@ -44,6 +44,11 @@ void digest_glb(const std::string& path, const Grid& grid, Digest& digest) {
     const size_t axis = low[0] == high[0] ? 0 : low[1] == high[1] ? 1 : 2;
     const size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
     expect(low[axis] == high[axis] && low[u] < high[u] && low[v] < high[v], "a rectangle");
+    const bool is_first = c[1][u] == c[0][u] && c[1][v] == c[2][v];
+    expect(c[0][u] != c[2][u] && c[0][v] != c[2][v] &&
+               (is_first || (c[1][u] == c[2][u] && c[1][v] == c[0][v])) &&
+               c[5][u] == c[0][u] + c[2][u] - c[1][u] && c[5][v] == c[0][v] + c[2][v] - c[1][v],
+           "the two halves of a rectangle, turned alike");
     const int64_t normal =
         (c[1][u] - c[0][u]) * (c[2][v] - c[0][v]) - (c[1][v] - c[0][v]) * (c[2][u] - c[0][u]);
     const bool upward = normal > 0;
