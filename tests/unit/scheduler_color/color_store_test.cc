@@ -51,7 +51,7 @@ class ColorStoreTest : public testing::Test {
   const TemporaryFolder folder_;
   const std::string path_ = folder_.file("colors.vddurable");
   AllWarnings warnings_;
-  const CancelToken cancel_;
+  const CancelToken cancel_{};
   const Checksum128 a_{1, 2}, b_{1, 3}, c_{2, 2};
 };
 
