@@ -63,7 +63,9 @@ inline SumOf smooth_colors(uint32_t color_levels, int noise) {
       const auto value = static_cast<int64_t>(uint64_t{v} * 255 >> color_levels);
       return static_cast<int>(std::clamp<int64_t>(value + random.between(-noise, noise), 0, 255));
     };
-    return sum_of_color(channel(x), channel(y), channel(z), 1 + code % 7);
+    // In this order with every compiler.
+    const int r = channel(x), g = channel(y), b = channel(z);
+    return sum_of_color(r, g, b, 1 + code % 7);
   };
 }
 
