@@ -6,7 +6,6 @@
 
 #include "core/base/error.h"
 #include "core/color/blocks/value_region.h"
-#include "core/color/color_of.h"
 #include "core/color/rule/bake_region.h"
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
@@ -144,10 +143,7 @@ class RegionComparison {
     const uint32_t levels = grid_.color_levels - cube.level;
     if (attribute == Attribute::kColor) return encode_region(levels, stored.morton, cells_);
     std::vector<ValuedCell> valued;
-    for (size_t i = 0; i < cells_.size(); ++i)
-      valued.push_back({cells_[i].code, attribute == Attribute::kAlpha
-                                            ? alpha_of(cells_[i].sum)
-                                            : value_of(values_[i], attribute)});
+    append_values(attribute, cells_, values_, 0, valued);
     return encode_values(attribute, stored.block_bytes / 32, levels, stored.morton, valued);
   }
 

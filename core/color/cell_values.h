@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 
 #include "core/color/attribute_set.h"
 #include "core/color/normal_code.h"
@@ -30,9 +31,17 @@ inline constexpr uint32_t value_bytes(Attribute attribute, uint64_t materials) {
   return materials <= 256 ? 1 : materials <= 65536 ? 2 : 4;
 }
 
+// Bytes that the list of their names takes there, without the zeros that follow.
+inline uint64_t list_bytes(std::span<const std::string> materials) {
+  uint64_t bytes = sizeof(uint32_t);
+  for (const std::string& name : materials) bytes += sizeof(uint32_t) + name.size();
+  return bytes;
+}
+
 // The value of a cell from those of its 1 to 8 set children, in Morton order. `attribute` is not
-// color. Alpha: the mean, rounded to nearest (half up). Normal: that of the sum of the children's
-// directions, the first child's where the sum is zero. Material: the most frequent one, the
+// color. Alpha: the mean, rounded to nearest (half up). Normal: the children's if they have the
+// same one, otherwise that of the sum of their directions, the first child's where the sum is zero.
+// Material: the most frequent one, the
 // lowest of several.
 uint32_t value_of_parent(Attribute attribute, std::span<const uint32_t> children);
 

@@ -129,10 +129,12 @@ void nearest(const query::Dag& dag, const Rows<const int64_t>& points, double ma
   }
 }
 
-// The cells of `points` that have the attribute; set(i, region, number) for each.
-template <class Set>
-void for_each_cell(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
-                   const voxdag_reader::ColorSection& section, const Set& set) {
+// set(row, region, number) for each row of `found` whose cell has the attribute.
+template <class Array, class Set>
+void fill(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+          const voxdag_reader::ColorSection& section, const Array& found, const Set& set) {
+  expect_length(found.shape(0), points.shape(0));
+  const size_t columns = found.ndim() == 1 ? 1 : found.shape(1);
   const nb::gil_scoped_release released;
   with_reader_errors([&] {
     voxdag_reader::ColorCursor cursor(dag.file(), section);
@@ -141,53 +143,41 @@ void for_each_cell(const query::Dag& dag, const Rows<const int64_t>& points, uin
       uint64_t number;
       const auto* const region =
           cursor.find(cells[i][0], cells[i][1], cells[i][2], grid_levels, number);
-      if (region) set(i, *region, number);
+      if (region) set(found.data() + columns * i, *region, number);
     }
   });
 }
 
 void colors(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
             const Rows<uint8_t>& found) {
-  expect_length(found.shape(0), points.shape(0));
-  for_each_cell(dag, points, grid_levels, dag.file().colors(),
-                [&](size_t i, const auto& region, uint64_t number) {
-                  const voxdag_reader::Rgb rgb = region.color(number);
-                  uint8_t* const row = found.data() + 3 * i;
-                  row[0] = rgb.r;
-                  row[1] = rgb.g;
-                  row[2] = rgb.b;
-                });
+  fill(dag, points, grid_levels, dag.file().colors(), found,
+       [](uint8_t* row, const auto& region, uint64_t number) {
+         const voxdag_reader::Rgb rgb = region.color(number);
+         row[0] = rgb.r;
+         row[1] = rgb.g;
+         row[2] = rgb.b;
+       });
 }
 
 void normals(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
              const Rows<float>& found) {
-  expect_length(found.shape(0), points.shape(0));
-  for_each_cell(dag, points, grid_levels, dag.file().normals(),
-                [&](size_t i, const auto& region, uint64_t number) {
-                  const voxdag_reader::Normal normal = region.normal(number);
-                  float* const row = found.data() + 3 * i;
-                  row[0] = normal.x;
-                  row[1] = normal.y;
-                  row[2] = normal.z;
-                });
+  fill(dag, points, grid_levels, dag.file().normals(), found,
+       [](float* row, const auto& region, uint64_t number) {
+         const voxdag_reader::Normal normal = region.normal(number);
+         row[0] = normal.x;
+         row[1] = normal.y;
+         row[2] = normal.z;
+       });
 }
 
-void alphas(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
-            const Column<uint8_t>& found) {
-  expect_length(found.shape(0), points.shape(0));
-  for_each_cell(dag, points, grid_levels, dag.file().alphas(),
-                [&](size_t i, const auto& region, uint64_t number) {
-                  found.data()[i] = static_cast<uint8_t>(region.value(number));
-                });
-}
-
-void materials(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
-               const Column<int64_t>& found) {
-  expect_length(found.shape(0), points.shape(0));
-  for_each_cell(dag, points, grid_levels, dag.file().materials(),
-                [&](size_t i, const auto& region, uint64_t number) {
-                  found.data()[i] = region.value(number);
-                });
+// Alphas and materials.
+template <voxdag_reader::ColorSection const& (voxdag_reader::File::*kSection)() const, class Value>
+void values(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+            const Column<Value>& found) {
+  fill(dag, points, grid_levels, (dag.file().*kSection)(), found,
+       [](Value* row, const auto& region, uint64_t number) {
+         *row = static_cast<Value>(region.value(number));
+       });
 }
 
 // Names are UTF-8, unless the scene had others.
@@ -234,9 +224,9 @@ void bind_dag(nb::module_& module) {
                    [](const query::Dag& dag) { return attributes_of(dag.file()).names(); })
       .def_prop_ro("material_names", &material_names)
       .def("colors", &colors)
-      .def("alphas", &alphas)
+      .def("alphas", &values<&voxdag_reader::File::alphas, uint8_t>)
       .def("normals", &normals)
-      .def("materials", &materials);
+      .def("materials", &values<&voxdag_reader::File::materials, int64_t>);
 }
 
 }  // namespace voxdag::python

@@ -116,12 +116,10 @@ class PartColors {
                     block);
     }
     // The list of materials follows the last directory.
-    uint64_t names_bytes = sizeof(uint32_t);
-    for (const std::string& name : section_.names()) names_bytes += sizeof(uint32_t) + name.size();
     const ColorTier& last = section_.tier(section_.tier_count() - 1);
     if (attribute_ == Attribute::kMaterial)
       source_.check(offset_of(last.directory) + last.region_count * color_layout::kRegionEntryBytes,
-                    names_bytes, block);
+                    list_bytes(section_.names()), block);
   }
 
   // Calls visit(cube) for the regions of the finest tier, in Morton order.

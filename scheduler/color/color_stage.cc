@@ -60,8 +60,7 @@ uint64_t count_finest_cells(const ReadableFile& file) {
 
 // Readers refuse a longer list.
 void check_list(std::span<const std::string> materials) {
-  uint64_t bytes = 2 * color_layout::kUnitBytes;
-  for (const std::string& name : materials) bytes += sizeof(uint32_t) + name.size();
+  const uint64_t bytes = list_bytes(materials) + 2 * color_layout::kUnitBytes;
   if (materials.size() > color_layout::kMaxMaterials || bytes > color_layout::kMaxNamesBytes)
     throw Error(ErrorCode::kLimit, "the scene has " + std::to_string(materials.size()) +
                                        " materials, with names of " + std::to_string(bytes) +

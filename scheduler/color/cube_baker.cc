@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "core/base/error.h"
-#include "core/color/color_of.h"
 #include "core/geometry/morton.h"
 #include "core/geometry/octree_descent.h"
 #include "scheduler/color/region_record.h"
@@ -206,16 +205,10 @@ bool CubeBaker::charge_sums(uint64_t bytes) {
 // What the baked cells have, for the region that they are in.
 void CubeBaker::collect(uint32_t first_code, RegionEncoder& colors) {
   for (size_t i = 0; i < attributes_.size(); ++i) {
-    const Attribute kind = attributes_[i].kind;
-    if (kind == Attribute::kColor) {
+    if (attributes_[i].kind == Attribute::kColor)
       colors.add(cells_, first_code);
-      continue;
-    }
-    valued_[i].reserve(valued_[i].size() + cells_.size());
-    for (size_t c = 0; c < cells_.size(); ++c)
-      valued_[i].push_back({first_code + cells_[c].code, kind == Attribute::kAlpha
-                                                             ? alpha_of(cells_[c].sum)
-                                                             : value_of(values_[c], kind)});
+    else
+      append_values(attributes_[i].kind, cells_, values_, first_code, valued_[i]);
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/color/color_of.h"
+
 namespace voxdag {
 namespace {
 
@@ -57,6 +59,16 @@ void make_parents(Attribute attribute, std::span<const ValuedCell> cells,
 uint32_t value_of_parent(Attribute attribute, std::span<const uint32_t> children) {
   if (attribute == Attribute::kAlpha) return mean_alpha(children);
   return attribute == Attribute::kNormal ? sum_of_normals(children) : commonest(children);
+}
+
+void append_values(Attribute attribute, std::span<const ColoredCell> cells,
+                   std::span<const CellValues> values, uint32_t first_code,
+                   std::vector<ValuedCell>& out) {
+  out.reserve(out.size() + cells.size());
+  for (size_t i = 0; i < cells.size(); ++i)
+    out.push_back({first_code + cells[i].code, attribute == Attribute::kAlpha
+                                                   ? alpha_of(cells[i].sum)
+                                                   : value_of(values[i], attribute)});
 }
 
 EncodedRegion encode_values(Attribute attribute, uint32_t bytes, uint32_t levels, uint64_t morton,

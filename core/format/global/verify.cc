@@ -10,6 +10,7 @@
 #include "core/base/page_buffer.h"
 #include "core/base/parallel_for.h"
 #include "core/base/popcount8.h"
+#include "core/color/cell_values.h"
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
 #include "core/format/checksum.h"
@@ -188,9 +189,8 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
   const uint64_t end = field(kAttributeOffsetAt) + field(kAttributeBytesAt);
   if (attribute == Attribute::kMaterial) {
     const voxdag_reader::ColorTier& last = section.tier(section.tier_count() - 1);
-    uint64_t names =
-        static_cast<uint64_t>(last.directory - file_.data()) + 32 * last.region_count + 4;
-    for (const std::string& material : section.names()) names += 4 + material.size();
+    const uint64_t names = static_cast<uint64_t>(last.directory - file_.data()) +
+                           32 * last.region_count + list_bytes(section.names());
     const uint64_t tiers = end - 32 * section.tier_count();
     if (tiers != (names + 15) / 16 * 16 || !section.names().back().empty())
       broken(file_.path() + ": materials",

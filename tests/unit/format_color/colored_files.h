@@ -8,11 +8,13 @@
 #include <functional>
 #include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/color/blocks/region.h"
+#include "core/format/checksum.h"
 #include "core/format/color/color_section_writer.h"
 #include "core/geometry/morton.h"
 #include "tests/oracle/dag.h"
@@ -176,6 +178,25 @@ inline GlobalFileSummary write_colored(const std::string& path, const ColoredSce
   return writer.finish({dag.voxels, dag.svo_nodes});
 }
 
+// The number of `size` bytes at an offset.
+inline uint64_t number_at(const ByteString& bytes, uint64_t at, size_t size) {
+  uint64_t value = 0;
+  for (size_t i = size; i-- > 0;) value = value << 8 | static_cast<unsigned char>(bytes.at(at + i));
+  return value;
+}
+
+// Of a file that has one block of them and is otherwise damaged.
+inline void put_checksums_right(ByteString& file) {
+  const uint64_t table = number_at(file, 96, 8);
+  const auto data = std::as_bytes(std::span(file));
+  const uint64_t block = checksum64(data.subspan(4096, table - 4096));
+  std::memcpy(file.data() + table, &block, 8);
+  const uint64_t of_table = checksum64(data.subspan(table, 8));
+  std::memcpy(file.data() + 112, &of_table, 8);
+  const uint64_t header = checksum64(data.first(4088));
+  std::memcpy(file.data() + 4088, &header, 8);
+}
+
 // Decodes the color section of a file's bytes as the document says.
 class SectionDecoder {
  public:
@@ -213,12 +234,7 @@ class SectionDecoder {
   const std::map<std::pair<uint32_t, uint64_t>, Color3>& colors() const { return colors_; }
 
  private:
-  uint64_t u(uint64_t at, size_t size) const {
-    uint64_t value = 0;
-    for (size_t i = size; i-- > 0;)
-      value = value << 8 | static_cast<unsigned char>(bytes_.at(at + i));
-    return value;
-  }
+  uint64_t u(uint64_t at, size_t size) const { return number_at(bytes_, at, size); }
   // `count` bits from bit `bit` of the block.
   unsigned bits(uint64_t block, unsigned bit, unsigned count) const {
     unsigned value = 0;

@@ -175,12 +175,7 @@ TEST_F(ValueSectionTest, DamageIsAnError) {
   for (uint64_t at = section; at < table; at += at % 4096 < 700 ? 3 : 397) {
     ByteString bad = good;
     bad[at] = static_cast<char>(bad[at] ^ 1 << at % 8);
-    const uint64_t block = checksum64(std::as_bytes(std::span(bad)).subspan(4096, table - 4096));
-    std::memcpy(bad.data() + table, &block, 8);
-    const uint64_t of_table = checksum64(std::as_bytes(std::span(bad)).subspan(table, 8));
-    std::memcpy(bad.data() + 112, &of_table, 8);
-    const uint64_t header = checksum64(std::as_bytes(std::span(bad)).first(4088));
-    std::memcpy(bad.data() + 4088, &header, 8);
+    put_checksums_right(bad);
     write_bytes(changed, bad);
     try {
       verify(changed);

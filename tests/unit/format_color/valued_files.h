@@ -120,12 +120,7 @@ class ValueDecoder {
   const std::vector<std::string>& names() const { return names_; }
 
  private:
-  uint64_t u(uint64_t at, size_t size) const {
-    uint64_t value = 0;
-    for (size_t i = size; i-- > 0;)
-      value = value << 8 | static_cast<unsigned char>(file_.at(at + i));
-    return value;
-  }
+  uint64_t u(uint64_t at, size_t size) const { return number_at(file_, at, size); }
 
   const ByteString& file_;
   std::map<std::pair<uint32_t, uint64_t>, uint64_t> values_;

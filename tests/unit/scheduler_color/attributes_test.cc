@@ -30,11 +30,7 @@ class Attributes : public testing::Test {
     spec.geometry.attributes = set;
     return spec;
   }
-  static BuildReport build(const BuildSpec& spec) {
-    NoProgress progress;
-    CancelToken cancel;
-    return run_build(spec, {system_files(), progress, cancel});
-  }
+  static BuildReport build(const BuildSpec& spec) { return build_now(spec); }
   query::ColorSampleReport compare_with_scene() const {
     const auto file = open_global_file(output());
     NoProgress progress;

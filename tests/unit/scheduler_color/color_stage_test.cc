@@ -28,11 +28,7 @@ class ColorStage : public testing::Test {
     spec.geometry.color_resolution = color_resolution;
     return spec;
   }
-  static BuildReport build(const BuildSpec& spec) {
-    NoProgress progress;
-    CancelToken cancel;
-    return run_build(spec, {system_files(), progress, cancel});
-  }
+  static BuildReport build(const BuildSpec& spec) { return build_now(spec); }
   static std::string refusal(const BuildSpec& spec) {
     try {
       build(spec);

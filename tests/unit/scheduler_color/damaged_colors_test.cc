@@ -45,9 +45,7 @@ TEST(DamagedColors, EndARender) {
   spec.geometry.resolution = 32;
   spec.geometry.attributes.color = true;
   spec.run.output = folder.file("out.vdag");
-  NoProgress progress;
-  CancelToken cancel;
-  run_build(spec, {system_files(), progress, cancel});
+  build_now(spec);
   render(spec.run.output);
   std::string bytes;
   {

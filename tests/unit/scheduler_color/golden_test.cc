@@ -27,9 +27,7 @@ std::string digest_of(const std::string& image, uint64_t color_resolution) {
   spec.run.output = folder.path() + "/out.vdag";
   spec.run.memory_bytes = uint64_t{128} << 20;
   spec.run.threads = 2;
-  NoProgress progress;
-  CancelToken cancel;
-  return run_build(spec, {system_files(), progress, cancel}).sha256;
+  return build_now(spec).sha256;
 }
 
 TEST(GoldenColors, Png) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "query/render/picture.h"
-#include "scheduler/build_spec.h"
+#include "scheduler/run_build.h"
 
 namespace voxdag {
 
@@ -115,6 +115,12 @@ class PaintedScene {
   Json json_;
   std::string buffer_;
 };
+
+inline BuildReport build_now(const BuildSpec& spec) {
+  NoProgress progress;
+  CancelToken cancel;
+  return run_build(spec, {system_files(), progress, cancel});
+}
 
 // A build of it, that replaces what an earlier one has left.
 inline BuildSpec painted_spec(const std::string& scene, const std::string& output,
