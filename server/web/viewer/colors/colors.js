@@ -6,6 +6,7 @@ import {ColorStore, page_key} from "./color_store.js";
 const kMebibyte = 1 << 20;
 const kBudgetShare = 1 / 4;      // of that of tiles and colors
 const kBytesPerVoxel = 1024;     // at worst: a page for each voxel, as many again on coarser levels
+const kBaseBelow = 2;            // levels: of a wanted page a coarser one comes first, unless one as fine is there
 const kWanted = 2;               // of the feedback's last word, the least: so many pixels want the page
 
 // How much of the budget the colors of a file take.
@@ -43,22 +44,33 @@ export class Colors {
         this.store.mark(page_key(head >>> 20, head & 0xfffff, y, z), epoch, now_ms);
         continue;
       }
-      const level = head >>> 20, position = [head & 0xfffff, y, z], key = page_key(level, ...position), request = wanted.get(key);
-      if (request) request.priority += state;
-      else wanted.set(key, {key, level, position, priority: state});
-      this.mark_coarser(level, position, epoch, now_ms);
+      const level = head >>> 20, position = [head & 0xfffff, y, z];
+      this.want(wanted, level, position, state);
+      const drawn = this.mark_coarser(level, position, epoch, now_ms);
+      if (level - drawn > kBaseBelow && level >= kBaseBelow)
+        this.want(wanted, level - kBaseBelow, position.map((at) => at >>> kBaseBelow), state);
     }
     if (epoch === this.store.epoch) this.store.rounds++;
     this.loader.demand(wanted, now_ms);
   }
 
-  // The page whose color is on the screen while this one is missing is in use.
+  // Pages for more pixels come first: so coarser ones, and where memory ends, no part of the picture is without them.
+  want(wanted, level, position, pixels) {
+    const key = page_key(level, ...position), request = wanted.get(key);
+    if (request) request.priority += pixels;
+    else wanted.set(key, {key, level, position, priority: pixels});
+  }
+
+  // The page whose color is on the screen while this one is missing is in use. Returns its level, -1 if there is none.
   mark_coarser(level, position, epoch, now_ms) {
     for (let coarser = level - 1; coarser >= 0; --coarser) {
       position = position.map((at) => at >>> 1);
       const key = page_key(coarser, ...position);
-      if (this.store.pages.has(key)) return this.store.mark(key, epoch, now_ms);
+      if (!this.store.pages.has(key)) continue;
+      this.store.mark(key, epoch, now_ms);
+      return coarser;
     }
+    return -1;
   }
 
   dispose() {
