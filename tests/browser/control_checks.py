@@ -325,6 +325,9 @@ def check_job(visitor, server, voxdag, scene, token):
     page = visitor.page
     viewer = f"{server.url}/viewer.html?job={job['id']}"
     if token:
+        # A job that ends right after the viewer saw it run has nothing partial, which Chromium reports as an error.
+        while json.loads(server.get(f"/api/v1/jobs/{job['id']}", headers))["state"] != "succeeded":
+            page.wait_for_timeout(100)
         with visitor.expecting("status of 401"):
             visitor.open(viewer, wait=False)
             page.get_by_label("Token").fill(token)
