@@ -68,6 +68,8 @@ template <class T>
 Option Command::option(const char* names, T& value, const char* description) {
   CLI::Option* const option = app_->add_option(names, value, description);
   if constexpr (std::is_integral_v<T>) option->check(integer_problem<T>);
+  if constexpr (std::is_same_v<T, std::optional<uint64_t>>)
+    option->check(integer_problem<uint64_t>);
   return Option(option);
 }
 template Option Command::option(const char*, int&, const char*);
@@ -75,6 +77,7 @@ template Option Command::option(const char*, unsigned&, const char*);
 template Option Command::option(const char*, uint64_t&, const char*);
 template Option Command::option(const char*, double&, const char*);
 template Option Command::option(const char*, std::optional<double>&, const char*);
+template Option Command::option(const char*, std::optional<uint64_t>&, const char*);
 template Option Command::option(const char*, std::string&, const char*);
 template Option Command::option(const char*, std::vector<std::string>&, const char*);
 

@@ -1,7 +1,9 @@
 #include "cli/selection_options.h"
 
-#include <algorithm>
-#include <cmath>
+#include <bit>
+
+#include "core/base/process_limits.h"
+#include "core/base/text.h"
 
 namespace voxdag::cli {
 namespace {
@@ -9,54 +11,53 @@ namespace {
 constexpr uint32_t kMinGridLevels = 2;
 
 uint32_t grid_levels(const SelectionOptions& options, const voxdag_reader::File& file) {
-  if (!options.level && !options.resolution) return file.grid_levels();
-  const double levels = options.level ? *options.level : std::log2(*options.resolution);
-  if (levels != std::floor(levels) || levels < kMinGridLevels || levels > file.grid_levels()) {
-    const std::string most = std::to_string(file.grid_levels());
-    throw Error(ErrorCode::kInvalidInput,
-                options.level ? "--level: expected 2 to " + most + ", the file's own"
-                              : "--resolution: expected a power of two from 4 to " +
-                                    std::to_string(file.resolution()) + ", the file's own");
+  if (options.level) {
+    if (*options.level < kMinGridLevels || *options.level > file.grid_levels())
+      throw Error(ErrorCode::kInvalidInput,
+                  "--level " + std::to_string(*options.level) + ": expected 2 to " +
+                      std::to_string(file.grid_levels()) + ", the file's own");
+    return static_cast<uint32_t>(*options.level);
   }
-  return static_cast<uint32_t>(levels);
+  if (!options.resolution) return file.grid_levels();
+  const uint64_t cells = *options.resolution;
+  if (!std::has_single_bit(cells) || cells < uint64_t{1} << kMinGridLevels ||
+      cells > static_cast<uint64_t>(file.resolution()))
+    throw Error(ErrorCode::kInvalidInput,
+                "--resolution " + std::to_string(cells) + ": expected a power of two from 4 to " +
+                    std::to_string(file.resolution()) + ", the file's own");
+  return static_cast<uint32_t>(std::countr_zero(cells));
 }
 
-// The cells that a box in world space touches.
+[[noreturn]] void refuse_order(const std::string& text) {
+  throw Error(ErrorCode::kInvalidInput,
+              "--region '" + text + "': expected the low corner before the high one");
+}
+
 query::Region world_region(const std::string& text, const voxdag_reader::File& file,
                            uint32_t grid_levels) {
   const auto box = parse_list<double, 6>("--region", text, ',', "six numbers X0,Y0,Z0,X1,Y1,Z1");
-  const double cells = std::ldexp(1, static_cast<int>(grid_levels));
-  query::Region region;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const auto cell = [&](double world) {
-      return std::clamp((world - file.origin()[axis]) / file.edge() * cells, 0.0, cells);
-    };
-    // Not a number fails this, too.
-    if (!(box[axis] < box[axis + 3]))
-      throw Error(ErrorCode::kInvalidInput,
-                  "--region '" + text + "': expected the low corner before the high one");
-    region.low[axis] = static_cast<int64_t>(std::floor(cell(box[axis])));
-    region.high[axis] = static_cast<int64_t>(std::ceil(cell(box[axis + 3])));
-  }
-  return region;
+  // Not a number fails this, too.
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (!(box[axis] < box[axis + 3])) refuse_order(text);
+  return query::cut_to_grid(query::world_to_region(file, grid_levels, box), grid_levels);
 }
 
 query::Region cell_region(const std::string& text, uint32_t grid_levels) {
   const auto box =
       parse_list<int64_t, 6>("--region", text, ',', "six whole numbers X0,Y0,Z0,X1,Y1,Z1");
-  const int64_t edge = int64_t{1} << grid_levels;
-  query::Region region;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    if (box[axis] >= box[axis + 3])
-      throw Error(ErrorCode::kInvalidInput,
-                  "--region '" + text + "': expected the low corner before the high one");
-    region.low[axis] = std::clamp<int64_t>(box[axis], 0, edge);
-    region.high[axis] = std::clamp<int64_t>(box[axis + 3], 0, edge);
-  }
-  return region;
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (box[axis] >= box[axis + 3]) refuse_order(text);
+  return query::cut_to_grid({{box[0], box[1], box[2]}, {box[3], box[4], box[5]}}, grid_levels);
 }
 
 }  // namespace
+
+uint64_t memory_limit(const std::string& text) {
+  const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "--memory");
+  if (bytes < kMinMemory)
+    throw Error(ErrorCode::kInvalidInput, "--memory " + text + ": at least 64MiB is needed");
+  return bytes;
+}
 
 void SelectionOptions::declare(Command& command) {
   const Option region_option = command.option(

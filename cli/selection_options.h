@@ -15,12 +15,16 @@ namespace voxdag::cli {
 struct SelectionOptions {
   std::string region;  // as typed; "" for the whole grid
   bool world = false;
-  std::optional<double> level, resolution;
+  std::optional<uint64_t> level, resolution;
 
   void declare(Command& command);
   // What of `file` is selected. Throws Error{kInvalidInput} for a grid that is finer than the
   // file's or coarser than 4 cells per edge, and for a region that has no cell of the grid.
   query::Selection selection(const voxdag_reader::File& file) const;
 };
+
+// The option --memory, as typed; "" for half of what the machine has. Throws Error{kInvalidInput}
+// for less than 64 MiB.
+uint64_t memory_limit(const std::string& text);
 
 }  // namespace voxdag::cli

@@ -2,6 +2,7 @@
 // as that on one double does.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #ifdef __SSE2__
@@ -19,10 +20,14 @@ struct DoublePair {
   static DoublePair from(const int32_t* two) {
     return {_mm_cvtepi32_pd(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(two)))};
   }
+  void store(double* aligned) const { _mm_store_pd(aligned, v); }
 };
 inline DoublePair operator+(DoublePair a, DoublePair b) { return {_mm_add_pd(a.v, b.v)}; }
 inline DoublePair operator-(DoublePair a, DoublePair b) { return {_mm_sub_pd(a.v, b.v)}; }
 inline DoublePair operator*(DoublePair a, DoublePair b) { return {_mm_mul_pd(a.v, b.v)}; }
+inline DoublePair operator/(DoublePair a, DoublePair b) { return {_mm_div_pd(a.v, b.v)}; }
+inline DoublePair square_root(DoublePair a) { return {_mm_sqrt_pd(a.v)}; }
+inline DoublePair absolute(DoublePair a) { return {_mm_andnot_pd(_mm_set1_pd(-0.0), a.v)}; }
 inline DoublePair max(DoublePair a, DoublePair b) { return {_mm_max_pd(a.v, b.v)}; }
 inline DoublePair min(DoublePair a, DoublePair b) { return {_mm_min_pd(a.v, b.v)}; }
 // The first number of the pair twice, the second twice, and the first of one with the second of
@@ -47,6 +52,10 @@ struct DoublePair {
   static DoublePair from(const int32_t* two) {
     return {static_cast<double>(two[0]), static_cast<double>(two[1])};
   }
+  void store(double* to) const {
+    to[0] = a;
+    to[1] = b;
+  }
 };
 inline DoublePair firsts(DoublePair x) { return {x.a, x.a}; }
 inline DoublePair seconds(DoublePair x) { return {x.b, x.b}; }
@@ -54,6 +63,9 @@ inline DoublePair first_second(DoublePair x, DoublePair y) { return {x.a, y.b}; 
 inline DoublePair operator+(DoublePair x, DoublePair y) { return {x.a + y.a, x.b + y.b}; }
 inline DoublePair operator-(DoublePair x, DoublePair y) { return {x.a - y.a, x.b - y.b}; }
 inline DoublePair operator*(DoublePair x, DoublePair y) { return {x.a * y.a, x.b * y.b}; }
+inline DoublePair operator/(DoublePair x, DoublePair y) { return {x.a / y.a, x.b / y.b}; }
+inline DoublePair square_root(DoublePair x) { return {std::sqrt(x.a), std::sqrt(x.b)}; }
+inline DoublePair absolute(DoublePair x) { return {std::fabs(x.a), std::fabs(x.b)}; }
 inline DoublePair max(DoublePair x, DoublePair y) {
   return {x.a > y.a ? x.a : y.a, x.b > y.b ? x.b : y.b};
 }

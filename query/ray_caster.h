@@ -38,6 +38,10 @@ class RayCaster {
   // Finds the first occupied cell between t_min and t_max; false if there is none. Throws
   // Error{kCorrupt} for a damaged DAG.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) const;
+  // The same with at most `steps_left` nodes and bricks, which it lowers by as many as it read. If
+  // that becomes 0 the ray ends there, and false means nothing.
+  bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit,
+            uint64_t& steps_left) const;
 
  private:
   const DagView& dag_;

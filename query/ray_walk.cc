@@ -1,5 +1,7 @@
 #include "query/ray_walk.h"
 
+#include <limits>
+
 namespace voxdag::query {
 
 bool RayWalk::run(double t_min, Hit& hit) {
@@ -49,6 +51,11 @@ inline bool RayWalk::cross(const double (&low)[3], double half, const double (&o
 
 bool RayWalk::enter(uint32_t depth, const double (&low)[3], double half, uint64_t content,
                     const double (&out)[3], double t, Hit& hit) {
+  if (steps_left_ == 0) {
+    t_max_ = -std::numeric_limits<double>::infinity();  // ends the cells above as well
+    return false;
+  }
+  --steps_left_;
   if (depth + 2 == dag_.grid_levels()) return enter_brick(dag_.brick(content), low, out, t, hit);
   const DagView::Children children = dag_.children_of_node(depth, content);
   return cross(

@@ -21,11 +21,13 @@ struct MirroredRay {
   // A smaller component of a direction counts as 0; its inverse could be infinite.
   static constexpr double kMinComponent = 1e-18;
 
+  static double component(double d) { return std::max(std::fabs(d), kMinComponent); }
+
   MirroredRay() = default;
   MirroredRay(const Ray& ray, double resolution) {
     for (int axis = 0; axis < 3; ++axis) {
       const double d = ray.direction[axis];
-      inverse[axis] = 1 / std::max(std::fabs(d), kMinComponent);
+      inverse[axis] = 1 / component(d);
       origin[axis] = ray.origin[axis];
       if (d >= 0) continue;
       mirror |= 4 >> axis;
@@ -40,8 +42,12 @@ struct MirroredRay {
 
 class RayWalk {
  public:
-  RayWalk(const DagView& dag, const MirroredRay& ray, const Cone& cone, double t_max)
-      : dag_(dag), ray_(ray), cone_(cone), t_max_(t_max) {}
+  // A walk of more than `max_steps` nodes and bricks ends there, as if nothing came behind.
+  RayWalk(const DagView& dag, const MirroredRay& ray, const Cone& cone, double t_max,
+          uint64_t max_steps = ~uint64_t{0})
+      : dag_(dag), ray_(ray), cone_(cone), t_max_(t_max), steps_left_(max_steps) {}
+
+  uint64_t steps_left() const { return steps_left_; }
 
   // From the root on. The DAG must not be empty. Throws Error{kCorrupt} for a damaged one.
   bool run(double t_min, Hit& hit);
@@ -70,7 +76,8 @@ class RayWalk {
   const DagView& dag_;
   const MirroredRay ray_;
   const Cone cone_;
-  const double t_max_;
+  double t_max_;
+  uint64_t steps_left_;
   int axis_ = -1;
 };
 

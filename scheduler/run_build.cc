@@ -235,6 +235,7 @@ class Build {
     if (counts.triangles == 0)
       context_.progress.warn("the scene has no triangles in the grid: the file will have no nodes");
     start_or_resume_job(scene);
+    context_.progress.set_grid(report_.grid.origin, report_.grid.edge);
     report_subvolumes(jobs_->leaves(), scene.state.grid.levels, context_.progress);
     const std::vector<StoredSubvolume> planned = planned_leaves(*jobs_);
     report_.subvolumes_reused = jobs_->leaves().size() - planned.size();
@@ -328,7 +329,6 @@ class Build {
     const MemoryCharge lists(budget_, queue.size() * (sizeof queue[0] + sizeof planned[0]),
                              "lists of subvolumes");
     clock_.finish("partition");
-
     const BackendChoice backend = choose_backend(spec_.run, context_.progress);
     report_.backend = backend.name;
     ExecutorOptions options;

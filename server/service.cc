@@ -124,6 +124,7 @@ void Service::stop() {
     std::lock_guard lock(stop_mutex_);
     draining_ = true;
   }
+  context_.stopping.cancel();
   stop_wake_.notify_all();
   queue_.announce();  // wakes event streams
   http_.stop();
@@ -137,6 +138,8 @@ void Service::clean_up_periodically() {
     steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
     steps_.run("close files that nobody views",
                [this] { context_.viewed.close_stale(kMaxIdleOfViews_s); });
+    steps_.run("forget running jobs that nobody views",
+               [this] { context_.partial.close_stale(kMaxIdleOfViews_s); });
     steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });
     std::unique_lock lock(stop_mutex_);
     stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });
@@ -153,6 +156,8 @@ Response Service::answer(Request& request) {
     const Problem problem = public_problem(error);
     if (problem.detail != error.what())  // clients do not see this text
       log_("request " + request.id + " " + request.method + " failed: " + error.what());
+    if (!problem.log_text.empty())
+      log_("request " + request.id + " " + request.method + " failed: " + problem.log_text);
     response = problem_response(problem);
   } catch (...) {
     log_("request " + request.id + " " + request.method + " failed: an unknown exception");

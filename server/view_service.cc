@@ -28,9 +28,12 @@ ViewService::ViewService(const std::string& path, int port, FileSystem& files, L
       access_(ServerConfig{}, files),
       http_(options(port), [this](Request& request) { return answer(request); }) {
   viewed_.open(path_);
-  add_tile_routes(router_, "/api/v1/view", Packing::kNone, [this](const Call&) {
-    return Viewed{viewed_.open(path_), nullptr};
-  });
+  add_tile_routes(
+      router_, "/api/v1/view", Packing::kNone, Colors::kServed,
+      [this](const Call&) {
+        return Viewed{viewed_.open(path_), nullptr};
+      },
+      stopping_);
   add_asset_routes(router_, "viewer.html");
 }
 
@@ -40,9 +43,9 @@ std::string ViewService::url() const {
 
 void ViewService::run() {
   // The cameras are looked for while a browser starts. If that fails, so will the request for them.
-  const std::jthread cameras([file = viewed_.open(path_)] {
+  const std::jthread cameras([this, file = viewed_.open(path_)] {
     try {
-      file->manifest();
+      file->manifest(stopping_);
     } catch (const std::exception&) {
     }
   });
@@ -56,6 +59,7 @@ Response ViewService::answer(Request& request) {
     const Problem problem = public_problem(error);
     if (problem.detail != error.what())  // clients do not see this text
       log_(request.method + " failed: " + error.what());
+    if (!problem.log_text.empty()) log_(request.method + " failed: " + problem.log_text);
     return problem_response(problem);
   }
 }

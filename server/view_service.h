@@ -24,7 +24,10 @@ class ViewService {
   // Serves until stop().
   void run();
   // From any thread.
-  void stop() { http_.stop(); }
+  void stop() {
+    stopping_.cancel();
+    http_.stop();
+  }
 
  private:
   Response answer(Request& request);
@@ -32,6 +35,7 @@ class ViewService {
   const std::string path_;
   const Log log_;
   ViewedFiles viewed_;
+  CancelToken stopping_;
   AccessControl access_;
   Router router_;
   HttpServer http_;

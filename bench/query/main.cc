@@ -21,14 +21,16 @@ namespace {
 
 constexpr size_t kPoints = 2'000'000;
 constexpr size_t kNearestPoints = 2000;
-constexpr int64_t kBoxEdge = 64;
+constexpr size_t kReaderBoxes = 20;
 // OctoMap takes some 5 GB for Sponza on a grid of 2048^3.
 constexpr uint32_t kMaxOtherLevels = 11;
 
-void print(const char* who, const char* what, const Timing& timing) {
-  if (timing.per_second == 0) return;
-  std::printf("  %-22s %-22s %10.3f M/s   found %llu\n", who, what, timing.per_second / 1e6,
-              static_cast<unsigned long long>(timing.found));
+// `expected` is what the first library that was asked has found, if both should find the same.
+void print(const char* who, const char* what, const Timing& timing,
+           const Timing* expected = nullptr) {
+  std::printf("  %-22s %-22s %10.4f M/s   found %llu%s\n", who, what, timing.per_second / 1e6,
+              static_cast<unsigned long long>(timing.found),
+              expected && expected->found != timing.found ? ", which differs" : "");
   std::fflush(stdout);
 }
 
@@ -53,74 +55,95 @@ bool reader_has(const voxdag_reader::File& file, uint32_t grid_levels, const Pos
   return true;
 }
 
-void lookups(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
-  std::vector<uint8_t> set(kPoints);
-  for (const auto& [what, points] : {std::pair("uniform points", &queries.uniform),
-                                     std::pair("set cells", &queries.set_cells)}) {
-    print("voxdag", what, best_of_three(kPoints, [&, p = points] {
-            dag.lookup(*p, grid_levels, set);
-            return sum(set);
-          }));
-    if (grid_levels + 2 <= dag.grid_levels() || grid_levels == dag.grid_levels())
-      print("loop over the reader", what, best_of_three(kPoints, [&, p = points] {
-              uint64_t found = 0;
-              for (const Position& point : *p) found += reader_has(dag.file(), grid_levels, point);
-              return found;
-            }));
-  }
+// Of lookups that one library does alike.
+template <class LookUp>
+void lookups(const char* who, const QuerySet& queries, Timings& timings, const Timings* expected,
+             const LookUp& look_up) {
+  timings.uniform = best_of_three(kPoints, [&] { return look_up(queries.uniform); });
+  print(who, "uniform points", timings.uniform, expected ? &expected->uniform : nullptr);
+  timings.set_cells = best_of_three(kPoints, [&] { return look_up(queries.set_cells); });
+  print(who, "set cells", timings.set_cells, expected ? &expected->set_cells : nullptr);
 }
 
-void rays(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+void lookups(const Dag& dag, uint32_t grid_levels, const QuerySet& queries, Timings& timings) {
+  std::vector<uint8_t> set(kPoints);
+  lookups("voxdag", queries, timings, nullptr, [&](const std::vector<Position>& points) {
+    dag.lookup(points, grid_levels, set);
+    return sum(set);
+  });
+  if (grid_levels + 2 > dag.grid_levels() && grid_levels < dag.grid_levels()) return;
+  Timings reader;
+  lookups("loop over the reader", queries, reader, &timings,
+          [&](const std::vector<Position>& points) {
+            uint64_t found = 0;
+            for (const Position& p : points) found += reader_has(dag.file(), grid_levels, p);
+            return found;
+          });
+}
+
+Timing rays(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
   const double cell = static_cast<double>(int64_t{1} << (dag.grid_levels() - grid_levels));
   std::vector<Coordinates> origins = queries.origins;
   for (Coordinates& origin : origins)
     for (double& c : origin) c *= cell;
   const size_t count = origins.size();
   std::vector<RayHit> hits(count);
-  print("voxdag", "primary rays", best_of_three(count, [&] {
-          dag.rays(origins, queries.directions, {std::numeric_limits<double>::infinity(), cell},
-                   hits);
+  const Timing packets = best_of_three(count, [&] {
+    dag.rays(origins, queries.directions, {std::numeric_limits<double>::infinity(), cell}, hits);
+    uint64_t found = 0;
+    for (const RayHit& hit : hits) found += hit.hit;
+    return found;
+  });
+  print("voxdag", "primary rays", packets);
+  const Timing single = best_of_three(count, [&] {
+    const RayCaster caster(dag.view());
+    uint64_t found = 0;
+    for (size_t i = 0; i < count; ++i) {
+      const auto& [o, d] = std::pair(origins[i], queries.directions[i]);
+      Hit hit;
+      found += caster.cast({{{o[0], o[1], o[2]}}, {{d[0], d[1], d[2]}}}, {cell, 0}, 0, 1e30, hit);
+    }
+    return found;
+  });
+  print("one ray per call", "primary rays", single, &packets);
+  return packets;
+}
+
+// The cells of a few boxes one by one.
+void reader_boxes(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+  const int64_t edge = int64_t{1} << grid_levels;
+  std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);
+  print("loop over the reader", "boxes of 64^3, a few", best_of_three(kReaderBoxes, [&] {
           uint64_t found = 0;
-          for (const RayHit& hit : hits) found += hit.hit;
-          return found;
-        }));
-  print("one ray per call", "primary rays", best_of_three(count, [&] {
-          const RayCaster caster(dag.view());
-          uint64_t found = 0;
-          for (size_t i = 0; i < count; ++i) {
-            const auto& [o, d] = std::pair(origins[i], queries.directions[i]);
-            Hit hit;
-            found +=
-                caster.cast({{{o[0], o[1], o[2]}}, {{d[0], d[1], d[2]}}}, {cell, 0}, 0, 1e30, hit);
+          for (size_t i = 0; i < kReaderBoxes; ++i) {
+            const Region box = box_around(queries, i);
+            size_t at = 0;
+            for (int64_t x = box.low[0]; x < box.high[0]; ++x)
+              for (int64_t y = box.low[1]; y < box.high[1]; ++y)
+                for (int64_t z = box.low[2]; z < box.high[2]; ++z, ++at) {
+                  const bool inside = std::min({x, y, z}) >= 0 && std::max({x, y, z}) < edge;
+                  cells[at] = inside && reader_has(dag.file(), grid_levels, {x, y, z});
+                }
+            found += sum(cells);
           }
           return found;
         }));
 }
 
-void regions(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+void regions(const Dag& dag, uint32_t grid_levels, const QuerySet& queries, Timings& timings) {
   std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);
-  constexpr size_t kBoxes = 1000;
-  const auto around = [&](size_t i) {
-    Selection selection{grid_levels, {}};
-    for (size_t axis = 0; axis < 3; ++axis) {
-      selection.region.low[axis] = queries.set_cells[i][axis] - kBoxEdge / 2;
-      selection.region.high[axis] = selection.region.low[axis] + kBoxEdge;
-    }
-    return selection;
-  };
-  print("voxdag", "boxes of 64^3", best_of_three(kBoxes, [&] {
-          uint64_t found = 0;
-          for (size_t i = 0; i < kBoxes; ++i) {
-            dag.box(around(i), cells);
-            found += cells[cells.size() / 2];
-          }
-          return found;
-        }));
-  print("voxdag", "counts of 64^3", best_of_three(10 * kBoxes, [&] {
-          uint64_t found = 0;
-          for (size_t i = 0; i < 10 * kBoxes; ++i) found += dag.count(around(i));
-          return found;
-        }));
+  timings.boxes = measure_boxes(cells, [&](size_t i) {
+    dag.box({grid_levels, box_around(queries, i)}, cells);
+  });
+  print("voxdag", "boxes of 64^3", timings.boxes);
+  if (grid_levels + 2 <= dag.grid_levels() || grid_levels == dag.grid_levels())
+    reader_boxes(dag, grid_levels, queries);
+  timings.counts = best_of_three(kBoxes, [&] {
+    uint64_t found = 0;
+    for (size_t i = 0; i < kBoxes; ++i) found += dag.count({grid_levels, box_around(queries, i)});
+    return found;
+  });
+  print("voxdag", "counts of 64^3", timings.counts, &timings.boxes);
   std::vector<Nearest> nearest(kNearestPoints);
   print("voxdag", "nearest, uniform", best_of_three(kNearestPoints, [&] {
           dag.nearest(std::span(queries.uniform).first(kNearestPoints), grid_levels,
@@ -136,19 +159,25 @@ void measure(const std::string& path, uint32_t grid_levels, int picture) {
   const uint32_t levels = std::min(grid_levels, dag.grid_levels());
   std::printf("%s, grid of 2^%u\n", path.c_str(), levels);
   const QuerySet queries = make_queries(dag, levels, kPoints, picture);
-  lookups(dag, levels, queries);
-  rays(dag, levels, queries);
-  regions(dag, levels, queries);
+  Timings own;
+  lookups(dag, levels, queries, own);
+  own.rays = rays(dag, levels, queries);
+  regions(dag, levels, queries, own);
   for (const auto& [measure_other, who] : kOtherLibraries) {
     if (levels > kMaxOtherLevels) {
       std::printf("  %-22s its memory would not hold this grid\n", who);
       continue;
     }
-    const OtherTimings timings = measure_other(dag, levels, queries);
-    if (!timings.installed) std::printf("  %-22s not installed\n", who);
-    print(who, "uniform points", timings.uniform);
-    print(who, "set cells", timings.set_cells);
-    print(who, "primary rays", timings.rays);
+    const std::optional<Timings> timings = measure_other(dag, levels, queries);
+    if (!timings) {
+      std::printf("  %-22s not installed\n", who);
+      continue;
+    }
+    print(who, "uniform points", timings->uniform, &own.uniform);
+    print(who, "set cells", timings->set_cells, &own.set_cells);
+    print(who, "primary rays", timings->rays);
+    print(who, "boxes of 64^3", timings->boxes, &own.boxes);
+    print(who, "counts of 64^3", timings->counts, &own.counts);
   }
 }
 

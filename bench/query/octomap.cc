@@ -8,7 +8,8 @@
 
 namespace voxdag::query {
 
-OtherTimings measure_octomap(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+std::optional<Timings> measure_octomap(const Dag& dag, uint32_t grid_levels,
+                                       const QuerySet& queries) {
   octomap::OcTree tree(1.0);
   const auto half = static_cast<double>(int64_t{1} << (grid_levels - 1));
   // The grid around the origin, so that grids of up to 2^16 cells fit in the tree's keys.
@@ -24,7 +25,7 @@ OtherTimings measure_octomap(const Dag& dag, uint32_t grid_levels, const QuerySe
                         tree.getClampingThresMaxLog(), true);
   });
   tree.updateInnerOccupancy();
-  OtherTimings timings{true, {}, {}, {}};
+  Timings timings;
   const auto look_up = [&](const std::vector<Position>& points) {
     return best_of_three(points.size(), [&] {
       uint64_t found = 0;
@@ -51,6 +52,30 @@ OtherTimings measure_octomap(const Dag& dag, uint32_t grid_levels, const QuerySe
     }
     return found;
   });
+  // Leaves are cells: nothing was pruned.
+  const auto for_each_cell = [&](size_t i, const auto& visit) {
+    const Region box = box_around(queries, i);
+    const auto end = tree.end_leafs_bbx();
+    for (auto leaf = tree.begin_leafs_bbx(
+             key_of(box.low), key_of({box.high[0] - 1, box.high[1] - 1, box.high[2] - 1}));
+         leaf != end; ++leaf)
+      visit(leaf.getKey());
+  };
+  std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);
+  timings.boxes = measure_boxes(cells, [&](size_t i) {
+    std::fill(cells.begin(), cells.end(), uint8_t{0});
+    const octomap::OcTreeKey low = key_of(box_around(queries, i).low);
+    for_each_cell(i, [&](const octomap::OcTreeKey& key) {
+      cells[static_cast<size_t>(((key[0] - low[0]) * kBoxEdge + key[1] - low[1]) * kBoxEdge +
+                                key[2] - low[2])] = 1;
+    });
+  });
+  timings.counts = best_of_three(kBoxes, [&] {
+    uint64_t found = 0;
+    for (size_t i = 0; i < kBoxes; ++i)
+      for_each_cell(i, [&](const octomap::OcTreeKey&) { ++found; });
+    return found;
+  });
   return timings;
 }
 
@@ -60,7 +85,7 @@ OtherTimings measure_octomap(const Dag& dag, uint32_t grid_levels, const QuerySe
 
 namespace voxdag::query {
 
-OtherTimings measure_octomap(const Dag&, uint32_t, const QuerySet&) { return {}; }
+std::optional<Timings> measure_octomap(const Dag&, uint32_t, const QuerySet&) { return {}; }
 
 }  // namespace voxdag::query
 

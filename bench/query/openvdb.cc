@@ -3,13 +3,15 @@
 #ifdef VOXDAG_BENCH_OPENVDB
 
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/Dense.h>
 #include <openvdb/tools/RayIntersector.h>
 
 #include <bit>
 
 namespace voxdag::query {
 
-OtherTimings measure_openvdb(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+std::optional<Timings> measure_openvdb(const Dag& dag, uint32_t grid_levels,
+                                       const QuerySet& queries) {
   openvdb::initialize();
   const auto grid = openvdb::BoolGrid::create(false);
   {
@@ -24,7 +26,7 @@ OtherTimings measure_openvdb(const Dag& dag, uint32_t grid_levels, const QuerySe
     });
   }
   // Cells are centered at whole numbers in OpenVDB.
-  OtherTimings timings{true, {}, {}, {}};
+  Timings timings;
   const auto look_up = [&](const std::vector<Position>& points) {
     return best_of_three(points.size(), [&] {
       auto accessor = grid->getConstAccessor();
@@ -50,6 +52,38 @@ OtherTimings measure_openvdb(const Dag& dag, uint32_t grid_levels, const QuerySe
     }
     return found;
   });
+  const auto box_of = [&](size_t i) {
+    const Region box = box_around(queries, i);
+    return openvdb::CoordBBox(static_cast<int>(box.low[0]), static_cast<int>(box.low[1]),
+                              static_cast<int>(box.low[2]), static_cast<int>(box.high[0]) - 1,
+                              static_cast<int>(box.high[1]) - 1, static_cast<int>(box.high[2]) - 1);
+  };
+  std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);
+  timings.boxes = measure_boxes(cells, [&](size_t i) {
+    openvdb::tools::Dense<uint8_t, openvdb::tools::LayoutZYX> dense(box_of(i), cells.data());
+    openvdb::tools::copyToDense(*grid, dense, true);
+  });
+  timings.counts = best_of_three(kBoxes, [&] {
+    auto accessor = grid->getConstAccessor();
+    uint64_t found = 0;
+    for (size_t i = 0; i < kBoxes; ++i) {
+      const openvdb::CoordBBox box = box_of(i);
+      const openvdb::Coord low = box.min() & ~7, high = box.max();
+      for (int x = low.x(); x <= high.x(); x += 8)
+        for (int y = low.y(); y <= high.y(); y += 8)
+          for (int z = low.z(); z <= high.z(); z += 8) {
+            const auto* const leaf = accessor.probeConstLeaf(openvdb::Coord(x, y, z));
+            if (!leaf) continue;
+            if (box.isInside(leaf->getNodeBoundingBox())) {
+              found += leaf->onVoxelCount();
+              continue;
+            }
+            for (auto cell = leaf->cbeginValueOn(); cell; ++cell)
+              found += box.isInside(cell.getCoord());
+          }
+    }
+    return found;
+  });
   return timings;
 }
 
@@ -59,7 +93,7 @@ OtherTimings measure_openvdb(const Dag& dag, uint32_t grid_levels, const QuerySe
 
 namespace voxdag::query {
 
-OtherTimings measure_openvdb(const Dag&, uint32_t, const QuerySet&) { return {}; }
+std::optional<Timings> measure_openvdb(const Dag&, uint32_t, const QuerySet&) { return {}; }
 
 }  // namespace voxdag::query
 

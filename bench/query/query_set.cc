@@ -34,6 +34,15 @@ double thread_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
+Region box_around(const QuerySet& queries, size_t i) {
+  Region box;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    box.low[axis] = queries.set_cells[i][axis] - kBoxEdge / 2;
+    box.high[axis] = box.low[axis] + kBoxEdge;
+  }
+  return box;
+}
+
 QuerySet make_queries(const Dag& dag, uint32_t grid_levels, size_t points, int picture_edge) {
   QuerySet queries;
   std::mt19937_64 random(1);

@@ -15,6 +15,11 @@ struct QuerySet {
   std::vector<Coordinates> origins, directions;  // of a picture's pixels, in tiles of 8 x 8
 };
 
+// Boxes of 64^3 cells around the first set cells; those at the edge of the grid reach out of it.
+inline constexpr size_t kBoxes = 2000;
+inline constexpr int64_t kBoxEdge = 64;
+Region box_around(const QuerySet& queries, size_t i);
+
 // `points` of each kind in the grid of 2^grid_levels, and the rays through the pixels of a square
 // picture, in cells of that grid, for the placement that `voxdag render` would choose.
 QuerySet make_queries(const Dag& dag, uint32_t grid_levels, size_t points, int picture_edge);
@@ -23,6 +28,12 @@ QuerySet make_queries(const Dag& dag, uint32_t grid_levels, size_t points, int p
 struct Timing {
   double per_second = 0;
   uint64_t found = 0;
+};
+
+// What one library was measured to do. What `found` says: of lookups and rays those with a set
+// cell, of dense boxes and of counts all set cells.
+struct Timings {
+  Timing uniform, set_cells, rays, boxes, counts;
 };
 
 // CPU time of this thread.
@@ -39,6 +50,20 @@ Timing best_of_three(size_t items, const Run& run) {
         std::max(best.per_second, static_cast<double>(items) / (thread_seconds() - start));
   }
   return best;
+}
+
+// For kBoxes: make_box(i) fills `cells` with box i, z fastest.
+template <class MakeBox>
+Timing measure_boxes(const std::vector<uint8_t>& cells, const MakeBox& make_box) {
+  Timing timing = best_of_three(kBoxes, [&] {
+    for (size_t i = 0; i < kBoxes; ++i) make_box(i);
+    return uint64_t{0};
+  });
+  for (size_t i = 0; i < kBoxes; ++i) {
+    make_box(i);
+    for (const uint8_t cell : cells) timing.found += cell;
+  }
+  return timing;
 }
 
 }  // namespace voxdag::query

@@ -1,13 +1,15 @@
 // Tiles of different depths: how many and how many bytes five pictures need, and how fast one core
 // encodes them.
 //
-//     bench_tiles [--size WxH] FILE.vdag
+//     bench_tiles [--size WxH] [--pixels P --views VIEWS] FILE.vdag
 //
 // For each depth: the tiles and bytes (as they are, and with gzip, tile by tile) until no cell of
 // view `auto` is wider than 16 pixels; until none of each of five views is wider than one pixel;
 // and of all five together. Then the sizes and the speed over those tiles in random order, the
 // first time after the file was dropped from memory (if nothing else holds it there), then from
-// memory.
+// memory; then with checksum blocks compared at their first use, and when all of them are. With
+// VIEWS, a file with lines of a name and the camera options of `voxdag render`: only what those
+// need until no cell is wider than P pixels; the viewer's P is 0.75.
 #include <fcntl.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -16,6 +18,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <fstream>
 #include <random>
 #include <string>
 
@@ -80,6 +83,29 @@ std::vector<View> views_of(const DagView& dag, double aspect, int width, int hei
   return views;
 }
 
+std::vector<View> views_of_file(const DagView& dag, const voxdag_reader::File& file,
+                                const std::string& path) {
+  std::ifstream in(path);
+  std::vector<View> views;
+  const double scale = static_cast<double>(dag.resolution()) / file.edge();
+  for (std::string line; std::getline(in, line);) {
+    char name[64];
+    double eye[3], target[3];
+    View view;
+    if (std::sscanf(line.c_str(), "%63s --camera %lf,%lf,%lf --target %lf,%lf,%lf --fov %lf", name,
+                    &eye[0], &eye[1], &eye[2], &target[0], &target[1], &target[2],
+                    &view.placement.fov_degrees) != 8)
+      continue;
+    view.name = name;
+    for (int axis = 0; axis < 3; ++axis) {
+      view.placement.eye[axis] = (eye[axis] - file.origin()[axis]) * scale;
+      view.placement.target[axis] = (target[axis] - file.origin()[axis]) * scale;
+    }
+    views.push_back(view);
+  }
+  return views;
+}
+
 void print(uint32_t depth, const char* what, size_t tiles, const Bytes& bytes) {
   std::printf("depth %u  %-14s %7zu tiles  %8.2f MB  %8.2f MB packed\n", depth, what, tiles,
               static_cast<double>(bytes.plain) / 1e6, static_cast<double>(bytes.packed) / 1e6);
@@ -100,11 +126,14 @@ void time_tiles(const std::string& path, uint32_t depth, const Addresses& tiles)
   forget(path);
   const auto file = open_global_file(path);
   const DagView dag(*file);
-  for (const char* what : {"cold", "warm"}) {
+  const CheckedBlocks blocks(*file);
+  const std::pair<const char*, const CheckedBlocks*> passes[] = {
+      {"cold", nullptr}, {"warm", nullptr}, {"comparing", &blocks}, {"compared", &blocks}};
+  for (const auto& [what, checks] : passes) {
     std::vector<size_t> sizes;
     const double start_s = wall_seconds(), start_cpu_s = process_cpu_seconds();
     for (const TileAddress& address : order)
-      sizes.push_back(encode_tile(dag, depth, address).size() * 4);
+      sizes.push_back(encode_tile(dag, depth, address, checks).size() * 4);
     const double wall_s = wall_seconds() - start_s, cpu_s = process_cpu_seconds() - start_cpu_s;
     uint64_t sum = 0;
     for (const size_t size : sizes) sum += size;
@@ -120,6 +149,27 @@ void time_tiles(const std::string& path, uint32_t depth, const Addresses& tiles)
   }
 }
 
+void print_views(const DagView& dag, const std::vector<View>& views, double pixels, int width,
+                 int height, std::vector<Addresses>& all) {
+  for (const View& view : views) {
+    const auto tiles = NeededTiles(dag, pixels).find(view.placement, width, height);
+    for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) {
+      all[depth].insert(tiles[depth].begin(), tiles[depth].end());
+      print(depth, view.name.c_str(), tiles[depth].size(), bytes_of(dag, depth, tiles[depth]));
+    }
+  }
+  for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth)
+    print(depth, "all views", all[depth].size(), bytes_of(dag, depth, all[depth]));
+}
+
+void run_views(const std::string& path, const std::string& views, double pixels, int width,
+               int height) {
+  std::vector<Addresses> all(kMaxTileLevels + 1);
+  const auto file = open_global_file(path);
+  const DagView dag(*file);
+  print_views(dag, views_of_file(dag, *file, views), pixels, width, height, all);
+}
+
 void run(const std::string& path, int width, int height) {
   std::vector<Addresses> all(kMaxTileLevels + 1);
   {
@@ -129,15 +179,7 @@ void run(const std::string& path, int width, int height) {
     const auto first = NeededTiles(dag, kFirstPixels).find(views[0].placement, width, height);
     for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth)
       print(depth, "first picture", first[depth].size(), bytes_of(dag, depth, first[depth]));
-    for (const View& view : views) {
-      const auto tiles = NeededTiles(dag, kLastPixels).find(view.placement, width, height);
-      for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) {
-        all[depth].insert(tiles[depth].begin(), tiles[depth].end());
-        print(depth, view.name.c_str(), tiles[depth].size(), bytes_of(dag, depth, tiles[depth]));
-      }
-    }
-    for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth)
-      print(depth, "all views", all[depth].size(), bytes_of(dag, depth, all[depth]));
+    print_views(dag, views, kLastPixels, width, height, all);
   }
   for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) time_tiles(path, depth, all[depth]);
 }
@@ -147,19 +189,27 @@ void run(const std::string& path, int width, int height) {
 
 int main(int argc, char** argv) {
   int width = 1920, height = 1080;
-  const char* path = nullptr;
+  double pixels = 1;
+  const char *path = nullptr, *views = nullptr;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--size") == 0 && i + 1 < argc)
       std::sscanf(argv[++i], "%dx%d", &width, &height);
+    else if (std::strcmp(argv[i], "--pixels") == 0 && i + 1 < argc)
+      pixels = std::atof(argv[++i]);
+    else if (std::strcmp(argv[i], "--views") == 0 && i + 1 < argc)
+      views = argv[++i];
     else
       path = argv[i];
   }
   if (!path) {
-    std::fprintf(stderr, "usage: bench_tiles [--size WxH] FILE.vdag\n");
+    std::fprintf(stderr, "usage: bench_tiles [--size WxH] [--pixels P --views VIEWS] FILE.vdag\n");
     return 2;
   }
   try {
-    voxdag::query::run(path, width, height);
+    if (views)
+      voxdag::query::run_views(path, views, pixels, width, height);
+    else
+      voxdag::query::run(path, width, height);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_tiles: %s\n", error.what());
     return 1;

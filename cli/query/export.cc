@@ -15,20 +15,10 @@ namespace voxdag::cli {
 namespace {
 
 struct ExportCommand {
-  std::string input, format, memory;
-  OutputFile output;
+  std::string input, format, output, memory;
   SelectionOptions selection;
-  bool gray = false, json = false;
+  bool gray = false, force = false, json = false;
 };
-
-// The format does not show whether this command wrote a file.
-bool is_never_own(const ReadableFile&) { return false; }
-
-void check_outputs(const ExportCommand& command, const query::ExportFormat& format,
-                   FileSystem& files) {
-  for (const std::string& path : query::export_paths(format, command.output.path))
-    OutputFile{path, command.output.force}.check(files, command.input, is_never_own);
-}
 
 void print(const query::ExportReport& report, double wall_s) {
   for (const std::string& file : report.files)
@@ -41,11 +31,10 @@ void print(const query::ExportReport& report, double wall_s) {
 void run(const ExportCommand& command, CommandContext& context) {
   query::ExportRequest request;
   request.format = &query::export_format(command.format);
-  request.output = command.output.path;
-  request.memory_bytes =
-      command.memory.empty() ? default_memory() : parse_size(command.memory, "--memory");
+  request.output = command.output;
+  request.memory_bytes = memory_limit(command.memory);
   request.gray = command.gray;
-  check_outputs(command, *request.format, context.files);
+  request.replace = command.force;
   return_freed_memory_to_system();
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
@@ -74,12 +63,12 @@ std::string formats_text() {
 void declare(Command& command, ExportCommand& state) {
   command.option("input", state.input, "the .vdag file").required();
   command.option("--to", state.format, formats_text().c_str()).required();
-  command.option("-o,--output", state.output.path, "the file to write").required();
+  command.option("-o,--output", state.output, "the file to write").required();
   state.selection.declare(command);
   command.option("--memory", state.memory,
-                 "limit of the memory that is allocated (default: half the RAM)");
+                 "limit of the memory that is allocated (default: half the RAM; at least 64MiB)");
   command.flag("--gray", state.gray, "leave out the colors that the file may have");
-  command.flag("--force", state.output.force, "replace existing files");
+  command.flag("--force", state.force, "replace existing files");
   command.json_flag(state.json);
 }
 

@@ -9,20 +9,16 @@
 #include "core/base/clock.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
-#include "core/format/global/global_writer.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag::cli {
 namespace {
 
 struct ExtractCommand {
-  std::string input;
-  OutputFile output;
+  std::string input, output, memory;
   SelectionOptions selection;
-  bool crop = false;
-  std::string memory;
+  bool crop = false, force = false, json = false;
   unsigned threads = default_threads();
-  bool json = false;
 };
 
 struct Times {
@@ -31,7 +27,7 @@ struct Times {
 };
 
 void print(const ExtractCommand& command, const query::ExtractReport& r, const Times& times) {
-  std::printf("%s: %s, sha256 %s\n", command.output.path.c_str(), size_text(r.bytes).c_str(),
+  std::printf("%s: %s, sha256 %s\n", command.output.c_str(), size_text(r.bytes).c_str(),
               r.sha256.c_str());
   std::printf("  grid of %lld^3 voxels, low corner %.9g %.9g %.9g, edge %.9g\n",
               static_cast<long long>(r.grid.resolution()), r.grid.origin[0], r.grid.origin[1],
@@ -51,7 +47,7 @@ nlohmann::ordered_json extract_json(const ExtractCommand& command, const query::
     levels.push_back({{"level", l},
                       {"nodes", written.level(l).node_count},
                       {"bytes", written.level(l).word_count * sizeof(uint32_t)}});
-  nlohmann::ordered_json json{{"output", command.output.path},
+  nlohmann::ordered_json json{{"output", command.output},
                               {"sha256", r.sha256},
                               {"resolution", r.grid.resolution()},
                               {"bounds", {{"origin", r.grid.origin}, {"edge", r.grid.edge}}},
@@ -71,22 +67,14 @@ nlohmann::ordered_json extract_json(const ExtractCommand& command, const query::
   return json;
 }
 
-uint64_t memory_bytes(const std::string& text) {
-  const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "--memory");
-  if (bytes < kMinMemory)
-    throw Error(ErrorCode::kInvalidInput, "--memory " + text + ": at least 64MiB is needed");
-  return bytes;
-}
-
 void run(const ExtractCommand& command, CommandContext& context) {
   query::ExtractSpec spec;
-  spec.memory_bytes = memory_bytes(command.memory);
-  const auto is_own = [](const ReadableFile& file) { return is_partial_global_file(file); };
-  command.output.check(context.files, command.input, is_own);
+  spec.memory_bytes = memory_limit(command.memory);
   const auto file = open_global_file(command.input);
   spec.selection = command.selection.selection(*file);
   spec.crop = command.crop;
-  spec.output = command.output.path;
+  spec.output = command.output;
+  spec.replace = command.force;
   spec.threads = command.threads;
   return_freed_memory_to_system();
   const auto progress = make_progress_bar();
@@ -100,14 +88,14 @@ void run(const ExtractCommand& command, CommandContext& context) {
 
 void declare(Command& command, ExtractCommand& state) {
   command.option("input", state.input, "the .vdag file").required();
-  command.option("-o,--output", state.output.path, "the .vdag file to write").required();
+  command.option("-o,--output", state.output, "the .vdag file to write").required();
   state.selection.declare(command);
   command.flag("--crop", state.crop,
                "make the smallest octree cube around the region the new grid");
   command.option("--memory", state.memory,
                  "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
   command.threads_option(state.threads);
-  state.output.declare_force(command);
+  command.flag("--force", state.force, "replace an existing file");
   command.json_flag(state.json);
 }
 

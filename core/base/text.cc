@@ -74,6 +74,11 @@ std::string duration_text(double seconds) {
   return text;
 }
 
+std::string number_text(double number) {
+  char text[40];
+  return {text, std::to_chars(text, text + sizeof text, number).ptr};
+}
+
 std::string utc_text(time_t time, const char* format) {
   tm parts{};
   gmtime_r(&time, &parts);

@@ -25,6 +25,9 @@ std::string count_text(uint64_t count);
 // "1 m 04 s", "12.3 s"
 std::string duration_text(double seconds);
 
+// The shortest text that reads back as the same number, whatever the locale.
+std::string number_text(double number);
+
 // A Unix time in UTC, in a format of strftime().
 std::string utc_text(time_t time, const char* format);
 

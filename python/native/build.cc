@@ -8,6 +8,7 @@
 #include "core/io/file_system.h"
 #include "python/native/bindings.h"
 #include "python/native/long_work.h"
+#include "python/native/path_text.h"
 #include "scheduler/plan/estimate.h"
 #include "scheduler/run_build.h"
 
@@ -15,9 +16,9 @@ namespace voxdag::python {
 namespace {
 
 // What Python gives; the names are those of the command line.
-BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::dict options) {
+BuildSpec spec_of(std::vector<PathText> scenes, uint64_t resolution, nb::dict options) {
   BuildSpec spec;
-  spec.geometry.scenes = std::move(scenes);
+  for (PathText& scene : scenes) spec.geometry.scenes.push_back(std::move(scene.bytes));
   spec.geometry.resolution = resolution;
   // Takes the option out of `options`; None is as if it were not given.
   const auto take = [&](const char* name, auto& value) {
@@ -31,7 +32,9 @@ BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::dict
                   std::string(name) + "=" + nb::repr(given).c_str() + ": expected another type");
   };
   std::string memory;
-  take("output", spec.run.output);
+  PathText output, work, cache;
+  take("output", output);
+  spec.run.output = output.bytes;
   take("bounds", spec.geometry.bounds);
   take("voxel_size", spec.geometry.voxel_size);
   take("skip_invalid", spec.geometry.skip_invalid);
@@ -42,13 +45,15 @@ BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::dict
   for (const std::string& name : attributes)
     add_attribute(spec.geometry.attributes, name, "attributes");
   take("color_resolution", spec.geometry.color_resolution);
-  take("work", spec.run.work_folder);
+  take("work", work);
+  spec.run.work_folder = work.bytes;
   take("memory", memory);
   take("threads", spec.run.threads);
   take("subvolume", spec.run.subvolume_edge);
   take("backend", spec.run.backend);
   take("method", spec.run.method);
-  take("cache", spec.run.cache_folder);
+  take("cache", cache);
+  spec.run.cache_folder = cache.bytes;
   take("keep_work", spec.run.keep_work);
   take("restart", spec.run.restart);
   take("force", spec.run.force);
@@ -59,7 +64,7 @@ BuildSpec spec_of(std::vector<std::string> scenes, uint64_t resolution, nb::dict
   return spec;
 }
 
-std::string build(std::vector<std::string> scenes, uint64_t resolution, nb::object progress,
+std::string build(std::vector<PathText> scenes, uint64_t resolution, nb::object progress,
                   nb::dict options) {
   const BuildSpec spec = spec_of(std::move(scenes), resolution, std::move(options));
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
@@ -67,7 +72,7 @@ std::string build(std::vector<std::string> scenes, uint64_t resolution, nb::obje
   });
 }
 
-std::string plan(std::vector<std::string> scenes, uint64_t resolution, nb::object progress,
+std::string plan(std::vector<PathText> scenes, uint64_t resolution, nb::object progress,
                  nb::dict options) {
   const BuildSpec spec = spec_of(std::move(scenes), resolution, std::move(options));
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {

@@ -12,6 +12,7 @@
 #include "core/base/process_limits.h"
 #include "core/format/global/open_global.h"
 #include "python/native/bindings.h"
+#include "python/native/path_text.h"
 
 namespace voxdag::python {
 
@@ -99,6 +100,24 @@ void points(const query::Dag& dag, const Position& low, const Position& high, ui
             const Rows<int64_t>& found) {
   const nb::gil_scoped_release released;
   expect_length(found.shape(0), dag.positions({grid_levels, {low, high}}, positions_of(found)));
+}
+
+// The cell of each point of world space.
+void world_to_cells(const query::Dag& dag, const Rows<const double>& points, uint32_t grid_levels,
+                    const Rows<int64_t>& cells) {
+  expect_length(cells.shape(0), points.shape(0));
+  const nb::gil_scoped_release released;
+  for (size_t i = 0; i < points.shape(0); ++i)
+    for (size_t axis = 0; axis < 3; ++axis)
+      cells.data()[3 * i + axis] =
+          query::world_to_cell(dag.file(), grid_levels, axis, points.data()[3 * i + axis]);
+}
+
+std::pair<Position, Position> world_to_region(const query::Dag& dag,
+                                              const std::array<double, 6>& box,
+                                              uint32_t grid_levels) {
+  const query::Region region = query::world_to_region(dag.file(), grid_levels, box);
+  return {region.low, region.high};
 }
 
 // The number of rows that points() fills, found by a walk over the region alone.
@@ -203,9 +222,9 @@ std::vector<std::pair<uint64_t, uint64_t>> levels(const query::Dag& dag) {
 void bind_dag(nb::module_& module) {
   nb::class_<query::Dag>(module, "Dag")
       .def("__init__",
-           [](query::Dag* dag, const std::string& path) {
+           [](query::Dag* dag, const PathText& path) {
              const nb::gil_scoped_release released;
-             new (dag) query::Dag(path);
+             new (dag) query::Dag(path.bytes);
            })
       .def_prop_ro("grid_levels", &query::Dag::grid_levels)
       .def_prop_ro("voxels", [](const query::Dag& dag) { return dag.file().voxels(); })
@@ -213,6 +232,8 @@ void bind_dag(nb::module_& module) {
       .def_prop_ro("origin",
                    [](const query::Dag& dag) { return std::to_array(dag.file().origin()); })
       .def("levels", &levels)
+      .def("world_to_cells", &world_to_cells)
+      .def("world_to_region", &world_to_region)
       .def("lookup", &lookup)
       .def("rays", &rays)
       .def("dense", &dense)

@@ -6,12 +6,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/base/process_limits.h"
-#include "core/base/text.h"
 #include "core/format/global/open_global.h"
 #include "core/io/file_system.h"
 #include "python/native/bindings.h"
 #include "python/native/long_work.h"
+#include "python/native/memory.h"
+#include "python/native/path_text.h"
 #include "query/export/export.h"
 #include "query/extract/extract.h"
 
@@ -21,36 +21,25 @@ namespace {
 using Corner = std::array<int64_t, 3>;
 
 query::Selection selection_of(uint32_t grid_levels, const Corner& low, const Corner& high) {
-  const query::Region whole = query::whole_grid(grid_levels);
-  query::Selection selection{grid_levels, {low, high}};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    selection.region.low[axis] = std::clamp<int64_t>(low[axis], 0, whole.high[axis]);
-    selection.region.high[axis] = std::clamp<int64_t>(high[axis], 0, whole.high[axis]);
-  }
+  const query::Selection selection{grid_levels, query::cut_to_grid({low, high}, grid_levels)};
   if (selection.region.empty())
     throw Error(ErrorCode::kInvalidInput,
                 "the region lies outside the grid: expected one that has voxels of the grid");
   return selection;
 }
 
-uint64_t memory_of(const std::string& text) {
-  const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "memory");
-  if (bytes < kMinMemory)
-    throw Error(ErrorCode::kInvalidInput, "memory: " + text + ", expected at least 64MiB");
-  return bytes;
-}
-
-std::string extract(const std::string& path, const std::string& output, uint32_t grid_levels,
+std::string extract(const PathText& path, const PathText& output, uint32_t grid_levels,
                     const Corner& low, const Corner& high, bool crop, const std::string& memory,
-                    unsigned threads, nb::object progress) {
+                    unsigned threads, bool replace, nb::object progress) {
   query::ExtractSpec spec;
   spec.selection = selection_of(grid_levels, low, high);
   spec.crop = crop;
-  spec.output = output;
+  spec.output = output.bytes;
+  spec.replace = replace;
   spec.memory_bytes = memory_of(memory);
   spec.threads = threads ? threads : default_threads();
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
-    const auto file = open_global_file(path);
+    const auto file = open_global_file(path.bytes);
     const query::ExtractReport report = query::extract(*file, spec, system_files(), relay, cancel);
     return nlohmann::json{{"resolution", report.grid.resolution()},
                           {"bounds", {{"origin", report.grid.origin}, {"edge", report.grid.edge}}},
@@ -63,31 +52,32 @@ std::string extract(const std::string& path, const std::string& output, uint32_t
   });
 }
 
-std::string export_file(const std::string& path, const std::string& output,
-                        const std::string& format, uint32_t grid_levels, const Corner& low,
-                        const Corner& high, const std::string& memory, bool gray,
-                        nb::object progress) {
+std::string export_file(const PathText& path, const PathText& output, const std::string& format,
+                        uint32_t grid_levels, const Corner& low, const Corner& high,
+                        const std::string& memory, bool gray, bool replace, nb::object progress) {
   query::ExportRequest request;
   request.gray = gray;
+  request.replace = replace;
   request.format = &query::export_format(format);
   request.selection = selection_of(grid_levels, low, high);
-  request.output = output;
+  request.output = output.bytes;
   request.memory_bytes = memory_of(memory);
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
-    const auto file = open_global_file(path);
+    const auto file = open_global_file(path.bytes);
     const query::ExportReport report =
         query::export_dag(system_files(), *file, request, relay, cancel);
-    return nlohmann::json{{"files", report.files},
-                          {"bytes", report.bytes},
-                          {"voxels", report.voxels},
-                          {"notes", report.notes}}
+    return nlohmann::json{
+        {"bytes", report.bytes}, {"voxels", report.voxels}, {"notes", report.notes}}
         .dump();
   });
 }
 
 // The files that an export would write.
-std::vector<std::string> export_paths(const std::string& format, const std::string& output) {
-  return query::export_paths(query::export_format(format), output);
+std::vector<PathText> export_paths(const std::string& format, const PathText& output) {
+  std::vector<PathText> paths;
+  for (std::string& path : query::export_paths(query::export_format(format), output.bytes))
+    paths.push_back({std::move(path)});
+  return paths;
 }
 
 std::vector<std::pair<std::string, std::string>> export_formats() {
@@ -102,10 +92,10 @@ std::vector<std::pair<std::string, std::string>> export_formats() {
 void bind_derive(nb::module_& module) {
   module.def("extract", &extract, nb::arg("path"), nb::arg("output"), nb::arg("grid_levels"),
              nb::arg("low"), nb::arg("high"), nb::arg("crop"), nb::arg("memory"),
-             nb::arg("threads"), nb::arg("progress").none());
+             nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
   module.def("export", &export_file, nb::arg("path"), nb::arg("output"), nb::arg("format"),
              nb::arg("grid_levels"), nb::arg("low"), nb::arg("high"), nb::arg("memory"),
-             nb::arg("gray"), nb::arg("progress").none());
+             nb::arg("gray"), nb::arg("replace"), nb::arg("progress").none());
   module.def("export_paths", &export_paths, nb::arg("format"), nb::arg("output"));
   module.def("export_formats", &export_formats);
 }

@@ -4,6 +4,7 @@
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
 #include "python/native/bindings.h"
+#include "python/native/path_text.h"
 
 namespace nb = nanobind;
 
@@ -13,7 +14,7 @@ namespace {
 // voxdag.Error, which the Python half defines.
 void raise(const Error& error) {
   const nb::object type = nb::module_::import_("voxdag._error").attr("Error");
-  const nb::object raised = type(error.message(), error_name(error.code()));
+  const nb::object raised = type(message_text(error.message()), error_name(error.code()));
   PyErr_SetObject(type.ptr(), raised.ptr());
 }
 

@@ -13,6 +13,9 @@
 #include "core/format/global/open_global.h"
 #include "python/native/bindings.h"
 #include "python/native/long_work.h"
+#include "python/native/memory.h"
+#include "python/native/path_text.h"
+#include "query/render/g_buffer.h"
 #include "query/render/renderer.h"
 #include "query/render/views.h"
 
@@ -34,8 +37,21 @@ query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
   return voxels;
 }
 
+// What the renderer and the array of pixels take must fit, so that a size which is too large is an
+// error before it is tried.
+void check_memory(int width, int height, const std::string& memory) {
+  const uint64_t limit = memory_of(memory);
+  const uint64_t bytes = (sizeof(query::GBufferPixel) + 3 + 3) * static_cast<uint64_t>(width) *
+                         static_cast<uint64_t>(height);
+  if (bytes > limit)
+    throw Error(ErrorCode::kOutOfMemory,
+                "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+                    " pixels takes " + size_text(bytes) + " of memory, expected at most " +
+                    size_text(limit) + ": choose a smaller size, or more with memory=");
+}
+
 // Fills the pixels. Where there is no camera, the view decides where it is.
-void render(const std::string& path, const std::string& view, const std::optional<Point>& camera,
+void render(const PathText& path, const std::string& view, const std::optional<Point>& camera,
             const Point& target, std::optional<double> fov_degrees, int samples, bool gray,
             unsigned threads, nb::object progress, const Pixels& pixels) {
   query::RenderOptions options;
@@ -45,10 +61,10 @@ void render(const std::string& path, const std::string& view, const std::optiona
   options.threads = threads ? threads : default_threads();
   uint8_t* const to = pixels.data();
   run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
-    const auto file = open_global_file(path);
+    const auto file = open_global_file(path.bytes);
     const query::DagView dag(*file);
     if (!gray) options.colors = file.get();
-    if (dag.empty()) relay.warn(path + " has no voxels");
+    if (dag.empty()) relay.warn(path.bytes + " has no voxels");
     query::Placement placement{{{0, 0, 1}}, {{0, 0, 0}}};
     const double aspect = static_cast<double>(options.width) / options.height;
     if (camera)
@@ -64,6 +80,8 @@ void render(const std::string& path, const std::string& view, const std::optiona
 }  // namespace
 
 void bind_render(nb::module_& module) {
+  module.def("check_render_memory", &check_memory, nb::arg("width"), nb::arg("height"),
+             nb::arg("memory"));
   module.def("render", &render, nb::arg("path"), nb::arg("view"), nb::arg("camera").none(),
              nb::arg("target"), nb::arg("fov").none(), nb::arg("samples"), nb::arg("gray"),
              nb::arg("threads"), nb::arg("progress").none(), nb::arg("pixels"));

@@ -1,5 +1,10 @@
 """A small scene that all tests share."""
 
+import signal
+import subprocess
+import sys
+import textwrap
+
 import numpy as np
 import pytest
 
@@ -17,6 +22,24 @@ def torus(around=48, across=24, big=3.0, small=1.25):
     c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
     triangles = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
     return vertices.reshape(-1, 3), triangles
+
+
+def interrupted(lines):
+    """What a program of these lines prints after its first line of progress, when it gets Ctrl-C there, which must
+    end it. It has voxdag, and say() to show its progress."""
+    program = textwrap.dedent(f"""
+        import sys
+        sys.path[:0] = {sys.path!r}
+        import voxdag
+        say = lambda *status: print(*status, flush=True)
+    """) + textwrap.dedent(lines)
+    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    output, messages = process.communicate(timeout=60)
+    assert process.returncode != 0 and "KeyboardInterrupt" in messages, messages
+    return output
 
 
 @pytest.fixture(scope="session")

@@ -1,11 +1,13 @@
 """Extracts and exports from Python; what they write is tested in C++ and in tests/export."""
 
 import os
+import pickle
 
 import numpy as np
 import pytest
 
 import voxdag
+from conftest import interrupted
 
 
 def test_extract_a_level(path, dag, tmp_path):
@@ -58,6 +60,65 @@ def test_refuses(path, tmp_path, derive, code):
         derive(path, tmp_path / "out")
     assert refused.value.code == code, refused.value
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("derive", [
+    lambda path, out, **more: voxdag.extract(path, out, **more),
+    lambda path, out, **more: voxdag.export(path, out, to="ply", **more),
+])
+def test_outputs(path, tmp_path, derive):
+    """Outputs that cannot be written are refused before anything is done."""
+    for output, code in [(tmp_path / "none" / "out", "not_found"), (tmp_path, "invalid_input"),
+                         ("", "invalid_input"), (path, "invalid_input")]:
+        for force in (False, True):
+            started = []
+            with pytest.raises(voxdag.Error) as refused:
+                derive(path, output, force=force, progress=lambda *_: started.append(1))
+            assert (refused.value.code, started) == (code, []), refused.value
+    assert os.listdir(tmp_path) == []
+    for _ in range(2):
+        derive(path, tmp_path / "out", force=True)
+    with pytest.raises(voxdag.Error, match="force"):
+        derive(path, tmp_path / "out")
+
+
+def test_names_of_any_bytes(path, mesh, tmp_path):
+    """Paths need not be UTF-8, as they need not for Linux."""
+    folder = os.fsencode(tmp_path)
+    names = [os.path.join(folder, name) for name in (b"a\xff.vdag", b"b\xff.vdag", b"c\xff.npz")]
+    voxdag.build(mesh, resolution=64, output=names[0], memory="64MiB")
+    voxdag.extract(names[0], names[1], level=5)
+    report = voxdag.export(names[1], os.fsdecode(names[2]), to="npz")
+    assert report["files"] == [os.fsdecode(names[2])]
+    with voxdag.open(names[1]) as coarse, voxdag.open(path) as dag:
+        assert np.array_equal(coarse.dense(), dag.dense(level=5))
+    with pytest.raises(voxdag.Error, match="exists") as refused:
+        voxdag.extract(names[0], names[1])
+    copy = pickle.loads(pickle.dumps(refused.value))
+    assert (type(copy), str(copy), copy.code) == (voxdag.Error, str(refused.value), "invalid_input")
+    with pytest.raises(voxdag.Error, match="vdag") as missing:
+        voxdag.open(names[0] + b"x")
+    assert missing.value.code == "not_found"
+
+
+def test_ctrl_c(mesh, tmp_path):
+    """An export stops, and leaves nothing."""
+    fine, output = tmp_path / "fine.vdag", tmp_path / "fine.npz"
+    voxdag.build(mesh, resolution=1024, output=fine, memory="64MiB")
+    interrupted(f"voxdag.export({str(fine)!r}, {str(output)!r}, to='npz', level=10, progress=say)")
+    assert not [name for name in os.listdir(tmp_path) if name.startswith("fine.npz")]
+
+
+def test_threads(path, dag, tmp_path):
+    calls = [lambda n: voxdag.extract(path, tmp_path / "x.vdag", threads=n),
+             lambda n: dag.lookup([[1, 2, 3]], threads=n),
+             lambda n: dag.nearest([[1, 2, 3]], threads=n),
+             lambda n: dag.rays([[1, 2, 3]], [[1, 0, 0]], threads=n)]
+    for call in calls:
+        for threads in (-1, 1 << 40):
+            with pytest.raises(voxdag.Error, match="threads"):
+                call(threads)
+        call(np.int64(2))
 
 
 def test_nothing_is_overwritten(path, tmp_path):

@@ -4,12 +4,15 @@ import os
 import re
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import voxdag
+from conftest import interrupted
 
 
 def shown(picture):
@@ -42,11 +45,77 @@ def test_a_camera_is_placed_in_scene_units(path):
     ({"camera": (1, 2, 3), "target": (0, 0, 0), "view": "top"}, "invalid_input"),
     ({"fov": 171}, "invalid_input"),
     ({"samples": 9}, "invalid_input"),
+    ({"size": (-1, 10)}, "invalid_input"),
+    ({"size": (2**31, 2**31)}, "invalid_input"),
+    ({"size": (10**30, 1)}, "invalid_input"),
+    ({"size": 640}, "invalid_input"),
+    ({"size": (640, 480, 3)}, "invalid_input"),
+    ({"size": (64.0, 48)}, "invalid_input"),
+    ({"size": ("64", "48")}, "invalid_input"),
+    ({"size": None}, "invalid_input"),
+    ({"size": (16384, 16384), "memory": "1GiB"}, "out_of_memory"),
+    ({"size": (2048, 1024), "memory": 100 << 20}, "out_of_memory"),
+    ({"memory": "63MiB"}, "invalid_input"),
+    ({"memory": "much"}, "invalid_input"),
+    ({"memory": -1}, "invalid_input"),
+    ({"camera": (1, 2, 3), "target": (0, 0, float("inf"))}, "invalid_input"),
+    ({"camera": "above", "target": (0, 0, 0)}, "invalid_input"),
+    ({"camera": ((1, 2, 3),), "target": (0, 0, 0)}, "invalid_input"),
+    ({"view": 7}, "invalid_input"),
+    ({"view": None}, "invalid_input"),
+    ({"fov": float("nan")}, "invalid_input"),
+    ({"fov": "wide"}, "invalid_input"),
+    ({"samples": 2.5}, "invalid_input"),
+    ({"samples": 2**40}, "invalid_input"),
+    ({"gray": "no"}, "invalid_input"),
+    ({"threads": -1}, "invalid_input"),
+    ({"threads": "all"}, "invalid_input"),
 ])
 def test_refuses(path, options, code):
     with pytest.raises(voxdag.Error) as refused:
         voxdag.render(path, **{"size": (8, 8), **options})
     assert refused.value.code == code, refused.value
+
+
+def test_types_that_are_type_errors(path):
+    for options in ({"progress": 7}, {"progress": "loud"}):
+        with pytest.raises(TypeError, match="expected a function"):
+            voxdag.render(path, size=(8, 8), **options)
+    with pytest.raises(TypeError):
+        voxdag.render(7, size=(8, 8))
+
+
+def test_what_takes_too_much_memory_says_so(path):
+    with pytest.raises(voxdag.Error, match=r"16384 x 16384 pixels takes 16\.5.* GiB .* at most 1.* GiB: "
+                                           "choose a smaller size, or more with memory="):
+        voxdag.render(path, size=(16384, 16384), memory="1GiB")
+    assert voxdag.render(path, size=(np.int64(32), np.int32(16)), memory="64MiB", samples=1).shape == (16, 32, 3)
+
+
+def test_other_threads_run_meanwhile(path):
+    ended, ticks = threading.Event(), []
+
+    def tick():
+        while not ended.wait(0.002):
+            ticks.append(time.monotonic())
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begin = time.monotonic()
+    voxdag.render(path, size=(240, 160), threads=1)
+    end = time.monotonic()
+    ended.set()
+    thread.join()
+    # One tick may fall between the clock and the call.
+    assert len([tick for tick in ticks if begin < tick < end]) >= 3, (end - begin, len(ticks))
+
+
+def test_ctrl_c(path):
+    output = interrupted(f"""
+        voxdag.render({str(path)!r}, size=(1500, 1500), samples=8, threads=1, progress=say)
+        print("finished")
+    """)
+    assert "finished" not in output
 
 
 def test_a_file_that_is_not_there(path):

@@ -6,7 +6,7 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, overl
 import numpy as np
 
 from . import _native
-from ._error import Error, Path
+from ._error import Error, Path, thread_count
 
 # A half-open box: the low corner x, y, z and the high corner x, y, z.
 Region = Sequence[Any]
@@ -97,19 +97,27 @@ class Dag:
         return np.asarray(self._dag.origin) + np.asarray(positions, np.float64) * size
 
     def to_voxel(self, points: Any, level: Optional[int] = None) -> np.ndarray:
-        """The voxels (or cells) that points of the scene lie in, int64; they may lie outside."""
-        size = self._dag.edge / (1 << self._levels(level))
-        cells = (np.asarray(points, np.float64) - np.asarray(self._dag.origin)) / size
-        if not np.all(np.isfinite(cells)):
+        """The voxels (or cells) that points of the scene lie in, int64; they may lie outside.
+
+        A point that is the corner of a cell up to the rounding of doubles, as to_world() computes
+        it, lies in that cell."""
+        values = np.asarray(points, np.float64)
+        if not np.all(np.isfinite(values)):
             raise Error("a point is not finite: expected finite coordinates", "invalid_input")
-        return np.floor(np.clip(cells, -2.0**62, 2.0**62)).astype(np.int64)
+        if values.ndim == 0 or values.shape[-1] != 3:
+            raise Error(f"the points are an array {values.shape}: expected (N, 3)", "invalid_input")
+        cells = np.empty(values.shape, np.int64)
+        self._dag.world_to_cells(np.ascontiguousarray(values.reshape(-1, 3)), self._levels(level),
+                                 cells.reshape(-1, 3))
+        return cells
 
     def lookup(self, points: Any, level: Optional[int] = None, *, world: bool = False,
                threads: int = 1) -> np.ndarray:
         """Whether each voxel is set, (N,) bool. Those outside the grid are not."""
         positions = self._positions(points, level, world)
         found = np.empty(len(positions), np.bool_)
-        self._dag.lookup(positions, self._levels(level), found.view(np.uint8), threads)
+        self._dag.lookup(positions, self._levels(level), found.view(np.uint8),
+                         thread_count(threads))
         return found
 
     def rays(self, origins: Any, directions: Any, max_distance: float = np.inf,
@@ -130,7 +138,8 @@ class Dag:
                             for rows in (starts, ways))
         hits = Hits(np.empty(len(starts)), np.empty((len(starts), 3), np.int64),
                     np.empty((len(starts), 3), np.int8))
-        self._dag.rays(starts, ways, float(max_distance) / unit, float(stop_at), *hits, threads)
+        self._dag.rays(starts, ways, float(max_distance) / unit, float(stop_at), *hits,
+                       thread_count(threads))
         np.multiply(hits.distance, unit, out=hits.distance)
         return hits
 
@@ -213,7 +222,8 @@ class Dag:
         positions = self._positions(points, None, False)
         voxels = np.empty_like(positions)
         distances = np.empty(len(positions))
-        self._dag.nearest(positions, float(max_distance), voxels, distances, threads)
+        self._dag.nearest(positions, float(max_distance), voxels, distances,
+                          thread_count(threads))
         return voxels, distances
 
     def _values(self, attribute: str, points: Any, level: Optional[int],
@@ -255,12 +265,10 @@ class Dag:
             raise Error(f"the region {region!r}: expected x, y, z of its low and of its high corner",
                         "invalid_input")
         if world:
-            size = self._dag.edge / edge
-            corners = (corners.reshape(2, 3) - np.asarray(self._dag.origin)) / size
-            corners = np.concatenate([np.floor(corners[0]), np.ceil(corners[1])])
-            if not np.all(np.isfinite(corners)):
-                raise Error("the region is not finite: expected finite coordinates", "invalid_input")
-            corners = np.clip(corners, -2.0**62, 2.0**62).astype(np.int64)
+            if np.any(np.isnan(corners)):
+                raise Error(f"the region {region!r}: expected numbers", "invalid_input")
+            low, high = self._dag.world_to_region(corners.tolist(), self._levels(level))
+            corners = np.array([*low, *high])
         elif corners.dtype.kind not in "iu":
             raise Error(f"the region {region!r}: expected whole numbers, or world=True",
                         "invalid_input")

@@ -7,7 +7,7 @@ from typing import Any, Dict, Optional, Sequence, Union
 from . import _native
 from ._build import Progress
 from ._dag import Dag, Region
-from ._error import Error, Path
+from ._error import Error, Path, memory_text, thread_count
 
 
 def extract(path: Path, output: Path, *, region: Optional[Region] = None,
@@ -27,8 +27,8 @@ def extract(path: Path, output: Path, *, region: Optional[Region] = None,
     with Dag(path) as dag:
         low, high = dag._region(region, level, world)
         levels = dag._levels(level)
-    return json.loads(_native.extract(path, output, levels, low, high, crop, _memory(memory),
-                                      threads, progress))
+    return json.loads(_native.extract(path, output, levels, low, high, crop, memory_text(memory),
+                                      thread_count(threads), force, progress))
 
 
 def export(path: Path, output: Path, *, to: str, region: Optional[Region] = None,
@@ -42,12 +42,14 @@ def export(path: Path, output: Path, *, to: str, region: Optional[Region] = None
     and notes on how to open them. Raises Error.
     """
     path, output = os.fsdecode(path), os.fsdecode(output)
-    _check_output(path, _native.export_paths(to, output), force)
+    files = _native.export_paths(to, output)
+    _check_output(path, files, force)
     with Dag(path) as dag:
         low, high = dag._region(region, level, world)
         levels = dag._levels(level)
-    return json.loads(_native.export(path, output, to, levels, low, high, _memory(memory), gray,
-                                     progress))
+    report = json.loads(_native.export(path, output, to, levels, low, high, memory_text(memory), gray,
+                                       force, progress))
+    return {"files": files, **report}
 
 
 def export_formats() -> Dict[str, str]:
@@ -55,12 +57,8 @@ def export_formats() -> Dict[str, str]:
     return dict(_native.export_formats())
 
 
-def _memory(memory: Union[int, str, None]) -> str:
-    return "" if memory is None else str(memory)
-
-
 def _check_output(path: str, outputs: Sequence[str], force: bool) -> None:
-    for output in [name + end for name in outputs for end in ("", ".partial")]:
+    for output in outputs:
         if not os.path.lexists(output):
             continue
         if os.path.exists(output) and os.path.exists(path) and os.path.samefile(path, output):

@@ -1,9 +1,12 @@
 """The exception of this package, and the type of its paths."""
 
+import operator
 import os
-from typing import Union
+from typing import Any, Tuple, Union
 
 Path = Union[str, bytes, "os.PathLike[str]", "os.PathLike[bytes]"]
+
+_MAX_THREADS = 1024
 
 
 class Error(Exception):
@@ -15,3 +18,19 @@ class Error(Exception):
     def __init__(self, message: str, code: str) -> None:
         super().__init__(message)
         self.code = code
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """Of both, so that an error comes through from another process."""
+        return type(self), (str(self), self.code)
+
+
+def memory_text(memory: Union[int, str, None]) -> str:
+    """A limit of memory, "" for the default."""
+    return "" if memory is None else str(memory)
+
+
+def thread_count(threads: int) -> int:
+    """A number of threads, 0 for all."""
+    if not 0 <= operator.index(threads) <= _MAX_THREADS:
+        raise Error(f"threads={threads}: expected 0, for all, to {_MAX_THREADS}", "invalid_input")
+    return operator.index(threads)

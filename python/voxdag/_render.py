@@ -1,13 +1,15 @@
 """Pictures of finished files."""
 
+import math
+import operator
 import os
-from typing import Any, Optional, Tuple
+from typing import Any, Optional, Tuple, Union
 
 import numpy as np
 
 from . import _native
 from ._build import Progress
-from ._error import Error, Path
+from ._error import Error, Path, memory_text
 
 _MAX_EDGE = 16384  # pixels
 
@@ -15,7 +17,8 @@ _MAX_EDGE = 16384  # pixels
 def render(path: Path, *, view: str = "auto", camera: Optional[Any] = None,
            target: Optional[Any] = None, fov: Optional[float] = None,
            size: Tuple[int, int] = (1280, 720), samples: int = 2, gray: bool = False,
-           threads: int = 0, progress: Optional[Progress] = None) -> np.ndarray:
+           memory: Union[int, str, None] = None, threads: int = 0,
+           progress: Optional[Progress] = None) -> np.ndarray:
     """A picture of a .vdag file as voxdag render makes it: sRGB, (height, width, 3) uint8.
 
     view             auto, iso, front, back, left, right, top or inside
@@ -24,31 +27,69 @@ def render(path: Path, *, view: str = "auto", camera: Optional[Any] = None,
     size             width and height in pixels
     samples          N: N * N samples per pixel, 1 to 8
     gray             leave out the colors that the file may have
+    memory           bytes, or text such as "8GiB"; by default half of what the machine has. A picture
+                     that takes more, some 66 bytes a pixel, is an Error before it begins
 
     The pixels do not depend on threads. Raises Error.
     """
-    width, height = size
-    if not 1 <= width <= _MAX_EDGE or not 1 <= height <= _MAX_EDGE:
-        raise Error(f"size {size!r}: expected a width and a height of 1 to {_MAX_EDGE} pixels",
-                    "invalid_input")
+    width, height = _size(size)
     if (camera is None) != (target is None):
         raise Error("expected a camera and a target, or neither", "invalid_input")
+    if not isinstance(view, str):
+        raise Error(f"view {view!r}: expected its name", "invalid_input")
     if camera is not None and view != "auto":
         raise Error(f"a camera and the view {view!r}: expected one of them", "invalid_input")
-    if fov is not None and not 1 <= fov <= 170:
+    degrees = None if fov is None else _number(fov)
+    if degrees is not None and not 1 <= degrees <= 170:
         raise Error(f"fov {fov!r}: expected 1 to 170 degrees", "invalid_input")
-    if not 1 <= samples <= 8:
-        raise Error(f"samples {samples!r}: expected 1 to 8", "invalid_input")
+    if not isinstance(gray, (bool, np.bool_)):
+        raise Error(f"gray {gray!r}: expected True or False", "invalid_input")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress={progress!r}: expected a function or None")
+    samples = _whole(samples, 1, 8, f"samples {samples!r}: expected 1 to 8")
+    threads = _whole(threads, 0, 1 << 16, f"threads {threads!r}: expected a number of threads, 0 for all")
+    place = None if camera is None else _point(camera, "camera")
+    aim = (0.0, 0.0, 0.0) if target is None else _point(target, "target")
+    file = os.fsdecode(path)
+    _native.check_render_memory(width, height, memory_text(memory))
     pixels = np.empty((height, width, 3), np.uint8)
-    _native.render(os.fsdecode(path), view, None if camera is None else _point(camera, "camera"),
-                   (0.0, 0.0, 0.0) if target is None else _point(target, "target"),
-                   None if fov is None else float(fov), samples, gray, threads, progress, pixels)
+    _native.render(file, view, place, aim, degrees, samples, bool(gray), threads, progress, pixels)
     return pixels
 
 
+def _number(value: Any) -> float:
+    """NaN for what is no number."""
+    try:
+        return float(value) if np.ndim(value) == 0 and not isinstance(value, str) else math.nan
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def _whole(value: Any, least: int, most: int, expected: str) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise Error(expected, "invalid_input") from None
+    if not least <= number <= most:
+        raise Error(expected, "invalid_input")
+    return number
+
+
+def _size(size: Any) -> Tuple[int, int]:
+    expected = f"size {size!r}: expected a width and a height of 1 to {_MAX_EDGE} pixels"
+    try:
+        width, height = size
+    except (TypeError, ValueError):
+        raise Error(expected, "invalid_input") from None
+    return _whole(width, 1, _MAX_EDGE, expected), _whole(height, 1, _MAX_EDGE, expected)
+
+
 def _point(point: Any, what: str) -> Tuple[float, float, float]:
-    numbers = np.asarray(point, np.float64)
-    if numbers.shape != (3,):
-        raise Error(f"the {what} {point!r}: expected x, y, z", "invalid_input")
+    try:
+        numbers = np.asarray(point, np.float64)
+    except (TypeError, ValueError):
+        raise Error(f"the {what} {point!r}: expected x, y, z", "invalid_input") from None
+    if numbers.shape != (3,) or not np.all(np.isfinite(numbers)):
+        raise Error(f"the {what} {point!r}: expected x, y, z, finite", "invalid_input")
     x, y, z = numbers.tolist()
     return x, y, z

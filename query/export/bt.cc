@@ -7,6 +7,7 @@
 // there, or, of a grid of 2^16 cells, at the low corner of the octree.
 #include <array>
 #include <cstdio>
+#include <optional>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
@@ -110,11 +111,14 @@ ExportReport write_bt(const ExportJob& job) {
                                        " voxels per edge, but OctoMap has at most 65536. "
                                        "--level 16 fits");
   uint64_t inner_nodes = 0;
+  std::optional<ExportStage> counting(std::in_place, job, "count", 0, "nodes");
   const auto count = [&](uint32_t) {
-    if (++inner_nodes % 65536 == 0) job.cancel.check();
+    ++inner_nodes;
+    counting->advance(1);
   };
   BtWalk<const decltype(count)> counted(job, count);
   counted.run();
+  counting.reset();
   if (counted.voxels == 0) refuse_empty(job);
   const std::string header = bt_header(counted.nodes, job.cell_edge());
   require_space(job, header.size() + 2 * inner_nodes);
@@ -129,7 +133,7 @@ ExportReport write_bt(const ExportJob& job) {
   };
   BtWalk<const decltype(put)>(job, put).run();
   ExportFile* const written[] = {&file};
-  report.bytes = ExportFile::publish(written);
+  report.bytes = publish(job, written);
   report.notes.push_back(translation_note(job));
   report.notes.push_back("its readers need about " + size_text(counted.nodes * 16) +
                          " of memory for " + count_text(counted.nodes) + " nodes");

@@ -3,6 +3,8 @@
 #include <array>
 
 #include "core/base/error.h"
+#include "core/format/global/open_global.h"
+#include "core/format/global/watched_file.h"
 #include "query/export/export_job.h"
 #include "query/output_lock.h"
 
@@ -54,15 +56,20 @@ ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel) {
   check_grid(request.selection, file.grid_levels());
-  const OutputLock lock(files, request.output);
-  const DagView dag(file);
-  MemoryBudget budget(request.memory_bytes);
   const std::vector<std::string> paths = export_paths(*request.format, request.output);
+  const OutputLock lock(files, {paths, file.path(), request.replace});
+  const WatchedFile watched(file);
+  MemoryBudget budget(request.memory_bytes);
   const bool has_colors = file.has_colors() && !request.gray;
-  const ExportJob job{files,        file,       dag,    request.selection, request.output,
-                      paths.back(), has_colors, budget, progress,          cancel};
-  if (dag.empty()) refuse_empty(job);
-  ExportReport report = request.format->write(job);
+  const auto write = [&] {
+    const DagView dag(file);
+    const ExportJob job{files,          file,         dag,        watched, request.selection,
+                        request.output, paths.back(), has_colors, budget,  progress,
+                        cancel};
+    if (dag.empty()) refuse_empty(job);
+    return request.format->write(job);
+  };
+  ExportReport report = watched.run([&] { return naming_file(file.path(), write); });
   report.files = paths;
   return report;
 }

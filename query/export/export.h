@@ -49,12 +49,14 @@ struct ExportRequest {
   std::string output;
   uint64_t memory_bytes = 0;  // the limit of what is allocated; the mapped file is not counted
   bool gray = false;          // leaves out the colors that the file may have
+  bool replace = false;       // files that exist
 };
 
 // Writes the selected voxels. Each file appears under its name when all are whole; after an error
-// nothing is left, unless the disk refuses the second of two names. Throws Error{kLimit} if the
-// format cannot hold them, Error{kOutOfMemory} if the memory cannot; the message says what would
-// do.
+// nothing is left, unless the disk refuses the second of two names, and what a process that was
+// killed has left is removed by the next one. Throws Error{kLimit} if the format cannot hold them,
+// Error{kOutOfMemory} if the memory cannot, where the message says what would do, and what
+// OutputLock does.
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel);

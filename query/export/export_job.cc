@@ -7,6 +7,7 @@
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
 #include "query/lookup/bricks.h"
+#include "query/lookup/node_counts.h"
 
 namespace voxdag::query {
 
@@ -29,27 +30,50 @@ void require_space(const ExportJob& job, uint64_t bytes) {
 
 void refuse_size(const ExportJob& job, const std::string& problem,
                  const std::function<bool(uint32_t grid_levels)>& fits) {
-  uint32_t level = job.selection.grid_levels - 1;
-  while (level >= kBrickLevels && !fits(level)) --level;
-  const std::string grid = std::to_string(int64_t{1} << level);
+  // From the coarsest grid up: what does not fit is looked at once, and it may be very large.
+  uint32_t end = kBrickLevels;
+  {
+    ExportStage stage(job, "find a level that fits", job.selection.grid_levels - end, "levels");
+    for (; end < job.selection.grid_levels && fits(end); ++end) {
+      stage.advance(1);
+      stage.report();
+    }
+  }
+  const std::string level = std::to_string(end - 1);
+  const std::string grid = std::to_string(int64_t{1} << (end - 1));
   throw Error(ErrorCode::kLimit,
               job.output + ": " + problem +
-                  (level >= kBrickLevels ? ". --level " + std::to_string(level) + " (" + grid +
-                                               " voxels per edge) fits, or take a smaller --region"
-                                         : ". Expected a smaller --region"));
+                  (end > kBrickLevels ? ". --level " + level + " (" + grid +
+                                            " voxels per edge) fits, or take a smaller --region"
+                                      : ". Expected a smaller --region"));
 }
 
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit) {
-  const uint32_t levels = job.dag.grid_levels();
-  if (selection.grid_levels == levels && selection.region == whole_grid(levels))
+  if (selection.grid_levels == job.dag.grid_levels() &&
+      selection.region == whole_grid(selection.grid_levels))
     return job.file.voxels();
-  uint64_t voxels = 0, bricks = 0;
+  ExportStage stage(job, "count", 0, "voxels");
+  uint64_t voxels = 0;
   for_each_brick(job.dag, selection, [&](const Brick& brick) {
-    if (++bricks % 65536 == 0) job.cancel.check();
-    voxels += static_cast<uint64_t>(std::popcount(brick.mask));
-    return voxels <= limit;
+    const auto more = static_cast<uint64_t>(std::popcount(brick.mask));
+    stage.advance(more);
+    return (voxels += more) <= limit;
   });
   return voxels;
+}
+
+bool has_at_most(const ExportJob& job, uint32_t grid_levels, uint64_t limit) {
+  const Selection selection = coarser(job.selection, grid_levels);
+  job.cancel.check();
+  const NodeCounts counts(job.file, job.dag, grid_levels, job.budget);
+  if (counts.is_stored()) return counts.count(selection.region) <= limit;
+  CancelCheck check(job);
+  uint64_t voxels = 0;
+  for_each_brick(job.dag, selection, [&](const Brick& brick) {
+    check.advance(1);
+    return (voxels += static_cast<uint64_t>(std::popcount(brick.mask))) <= limit;
+  });
+  return voxels <= limit;
 }
 
 void refuse_empty(const ExportJob& job) {
@@ -75,11 +99,6 @@ voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCurso
   return *color;
 }
 
-std::string number_text(double number) {
-  char text[40];
-  return {text, std::to_chars(text, text + sizeof(text), number).ptr};
-}
-
 uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason) {
   const uint64_t voxels = count_voxels(job, job.selection, limit);
   if (voxels == 0) refuse_empty(job);
@@ -88,9 +107,7 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
   refuse_size(job,
               (exact ? "" : "over ") + count_text(exact ? voxels : limit) +
                   " voxels are selected, but " + reason + " at most " + count_text(limit),
-              [&](uint32_t level) {
-                return count_voxels(job, coarser(job.selection, level), limit) <= limit;
-              });
+              [&](uint32_t level) { return has_at_most(job, level, limit); });
 }
 
 }  // namespace voxdag::query

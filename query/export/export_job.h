@@ -8,8 +8,10 @@
 #include <string_view>
 
 #include "core/base/memory_budget.h"
+#include "core/format/global/watched_file.h"
 #include "query/dag_view.h"
 #include "query/export/export.h"
+#include "query/export/export_file.h"
 
 namespace voxdag::query {
 
@@ -17,6 +19,7 @@ struct ExportJob {
   FileSystem& files;
   const voxdag_reader::File& file;
   const DagView& dag;  // of the file; it has voxels
+  const WatchedFile& watched;
   Selection selection;
   std::string output;
   std::string second_output;  // of a format of two files
@@ -53,7 +56,10 @@ class ExportStage {
   }
   void advance(uint64_t count) {
     pending_ += count;
-    if (++calls_ % kCallsPerCheck != 0) return;
+    if (++calls_ % kCallsPerCheck == 0) report();
+  }
+  // Says at once how far it is.
+  void report() {
     job_.cancel.check();
     job_.progress.advance(pending_);
     pending_ = 0;
@@ -65,8 +71,28 @@ class ExportStage {
   uint64_t pending_ = 0, calls_ = 0;
 };
 
+// A long loop that is part of another stage: checks now and then whether it is to end.
+class CancelCheck {
+ public:
+  explicit CancelCheck(const ExportJob& job) : job_(job) {}
+  void advance(uint64_t) {
+    if (++calls_ % kCallsPerCheck == 0) job_.cancel.check();
+  }
+
+ private:
+  static constexpr uint64_t kCallsPerCheck = 65536;
+  const ExportJob& job_;
+  uint64_t calls_ = 0;
+};
+
 // The same part of the file on a coarser grid.
 Selection coarser(const Selection& selection, uint32_t grid_levels);
+
+// ExportFile::publish() of what was made from a file that was whole until then; else throws.
+inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> written) {
+  job.watched.expect_whole();
+  return ExportFile::publish(written);
+}
 
 // Throws Error{kNoSpace} if the disk of the output has less than `bytes` free.
 void require_space(const ExportJob& job, uint64_t bytes);
@@ -78,6 +104,9 @@ void require_space(const ExportJob& job, uint64_t bytes);
 
 // The number of selected voxels, or anything over `limit` if there are more.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
+// Whether the job's selection has at most so many cells on a coarser grid. Faster than counting
+// where there are many, since equal subtrees are counted once, if the memory holds their counts.
+bool has_at_most(const ExportJob& job, uint32_t grid_levels, uint64_t limit);
 
 // count_voxels() of the job's selection. Throws Error{kLimit} as above if there are more than
 // `limit`, which `reason` explains, Error{kInvalidInput} if there is none.
@@ -91,8 +120,6 @@ void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
 // The color of a selected cell. Throws Error{kCorrupt}.
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
                                  const std::array<int64_t, 3>& cell);
-// A number that reads back as the same double, whatever the locale.
-std::string number_text(double number);
 
 // One for each format; those of the libraries exist where the library was found.
 ExportReport write_ply(const ExportJob& job);

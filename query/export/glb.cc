@@ -44,20 +44,10 @@ static_assert(sizeof(GlbQuad) == 24);
 class GlbSurface {
  public:
   explicit GlbSurface(const ExportJob& job) : job_(job), colors_(job.file) {
-    uint64_t count = 0;
-    for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
-      if (++count % 65536 == 0) job.cancel.check();
-      voxels_ += static_cast<uint64_t>(std::popcount(brick.mask));
-    });
-    if (count == 0) refuse_empty(job);
+    const uint64_t count = count_bricks();
     bricks_charge_ = MemoryCharge(job.budget, count * sizeof(GlbBrick), kMemory);
     bricks_.reserve(count);
-    for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
-      bricks_.push_back({morton_encode(static_cast<uint32_t>(brick.low[0] / kBrickEdge),
-                                       static_cast<uint32_t>(brick.low[1] / kBrickEdge),
-                                       static_cast<uint32_t>(brick.low[2] / kBrickEdge)),
-                         brick.mask});
-    });
+    find_bricks(count);
     ExportStage stage(job, "find faces", 6 * count, "bricks");
     for (uint8_t axis = 0; axis < 3; ++axis)
       for (const bool upward : {false, true}) add_quads(axis, upward, stage);
@@ -72,6 +62,29 @@ class GlbSurface {
   // A face is sorted by plane, then v, then u: 21 bits each.
   static constexpr int kCoordinateBits = 21;
   static constexpr uint64_t kCoordinateMask = (uint64_t{1} << kCoordinateBits) - 1;
+
+  uint64_t count_bricks() {
+    ExportStage stage(job_, "count", 0, "bricks");
+    uint64_t count = 0;
+    for_each_brick(job_.dag, job_.selection, [&](const Brick& brick) {
+      ++count;
+      voxels_ += static_cast<uint64_t>(std::popcount(brick.mask));
+      stage.advance(1);
+    });
+    if (count == 0) refuse_empty(job_);
+    return count;
+  }
+
+  void find_bricks(uint64_t count) {
+    ExportStage stage(job_, "read", count, "bricks");
+    for_each_brick(job_.dag, job_.selection, [&](const Brick& brick) {
+      stage.advance(1);
+      bricks_.push_back({morton_encode(static_cast<uint32_t>(brick.low[0] / kBrickEdge),
+                                       static_cast<uint32_t>(brick.low[1] / kBrickEdge),
+                                       static_cast<uint32_t>(brick.low[2] / kBrickEdge)),
+                         brick.mask});
+    });
+  }
 
   uint64_t mask_at(const Position& corner) const {
     for (const int64_t c : corner)
@@ -315,17 +328,15 @@ ExportReport write_glb(const ExportJob& job) {
                 count_text(quads) + " rectangles (" + size_text(quads * quad_bytes(job)) +
                     ") are needed" + (job.has_colors ? " with colors (--gray merges more)" : "") +
                     ", but a .glb file has at most " + size_text(kMaxGlbBytes),
-                [&](uint32_t level) {
-                  // Even if no faces are merged.
-                  return count_voxels(job, coarser(job.selection, level), most / 6) <= most / 6;
-                });
+                // Even if no faces are merged.
+                [&](uint32_t level) { return has_at_most(job, level, most / 6); });
   require_space(job, quads * quad_bytes(job) + 4096);
   ExportReport report;
   report.voxels = surface.voxels();
   ExportFile file(job.files, job.output);
   put_glb(job, surface.quads(), file);
   ExportFile* const written[] = {&file};
-  report.bytes = ExportFile::publish(written);
+  report.bytes = publish(job, written);
   report.notes.push_back(count_text(quads) + " rectangles, " + count_text(2 * quads) +
                          " triangles");
   return report;

@@ -25,7 +25,7 @@ constexpr uint32_t kGray = 0xffb0b0b0;             // A, B, G, R
 constexpr uint64_t kHashDagHeaderBytes = 6 * sizeof(double) + sizeof(uint32_t) + sizeof(uint64_t);
 
 // A node of level L - 7 encloses 128^3 voxels at most, so that the count always fits; HashDAG takes
-// up to ten top levels.
+// up to ten top levels, which are enough for L = 17.
 uint32_t top_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels > 7 ? grid_levels - 7 : 1, 1, 10);
 }
@@ -138,7 +138,8 @@ class HashDagWriter {
                                            " encloses " + count_text(count) +
                                            " voxels, but HashDAG takes less than " +
                                            count_text(kMaxCount) +
-                                           ". Expected a coarser --level or a smaller --region");
+                                           ". --level 17 (131072 voxels per edge) fits, or take "
+                                           "a smaller --region");
       }
       file_.write(std::as_bytes(std::span(words).first(nodes.size() + 1)));
       stage.advance(1);
@@ -189,7 +190,7 @@ ExportReport write_hashdag(const ExportJob& job) {
   writer.write();
   writer.write_colors(colors);
   ExportFile* const written[] = {&file, &colors};
-  report.bytes = ExportFile::publish(written);
+  report.bytes = publish(job, written);
   report.notes.push_back(scene_depth_note(dag.grid_levels()));
   if (dag.voxels() >> 32)
     report.notes.push_back("HashDAG numbers voxels for colors with 32 bits: " +

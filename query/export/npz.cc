@@ -167,7 +167,7 @@ class NpzWriter {
   uint64_t finish() {
     file_.write(central_directory(members_, file_.size()));
     ExportFile* const written[] = {&file_};
-    return ExportFile::publish(written);
+    return publish(job_, written);
   }
 
  private:

@@ -63,7 +63,7 @@ ExportReport write_ply(const ExportJob& job) {
   });
   require_written(job, written_voxels, report.voxels);
   ExportFile* const written[] = {&file};
-  report.bytes = ExportFile::publish(written);
+  report.bytes = publish(job, written);
   return report;
 }
 

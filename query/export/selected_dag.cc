@@ -121,7 +121,7 @@ struct BuiltNode {
 // Builds the DAG from the leaves up, depth first.
 class DagBuilder {
  public:
-  explicit DagBuilder(const ExportJob& job) : job_(job) {
+  explicit DagBuilder(const ExportJob& job) : job_(job), stage_(job, "select", 0, "nodes") {
     for (uint32_t level = 0; level + 1 < job.selection.grid_levels; ++level) {
       levels_.emplace_back(job.budget);
       memo_.emplace_back(job.budget);
@@ -157,7 +157,7 @@ class DagBuilder {
       const uint32_t words[] = {static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)};
       return {levels_[depth].offset_of(words), static_cast<uint64_t>(std::popcount(mask))};
     }
-    if (++nodes_ % 4096 == 0) job_.cancel.check();
+    stage_.advance(1);
     const DagView::Children children = job_.dag.children(depth, content);
     std::array<uint32_t, 9> words{};
     size_t count = 1;
@@ -177,9 +177,9 @@ class DagBuilder {
   }
 
   const ExportJob& job_;
+  ExportStage stage_;
   std::vector<BuiltLevel> levels_;
   std::vector<SlotTable<MemoSlot>> memo_;
-  uint64_t nodes_ = 0;
 };
 
 bool has_wide_levels(const voxdag_reader::File& file) {
@@ -204,7 +204,6 @@ SelectedDag::SelectedDag(const ExportJob& job) : grid_levels_(job.selection.grid
     }
     return;
   }
-  const ExportStage stage(job, "select", 0, "nodes");
   DagBuilder builder(job);
   voxels_ = builder.run().voxels;
   if (voxels_ == 0) refuse_empty(job);

@@ -119,7 +119,7 @@ ExportReport write_svdag(const ExportJob& job) {
   put_svdag_nodes(dag, bricks, stage, file);
   put_svdag_bricks(dag, first_leaf, stage, file);
   ExportFile* const written[] = {&file};
-  report.bytes = ExportFile::publish(written);
+  report.bytes = publish(job, written);
   if (words > kMaxViewedWords)
     report.notes.push_back("viewers that index words with 31 bits cannot show " +
                            count_text(words) + " words");

@@ -3,6 +3,7 @@
 // place has a model of its own, since equal nodes have different colors.
 //     "VOX " | 150 | MAIN { (SIZE XYZI)... nTRN nGRP (nTRN nSHP)... RGBA }
 // MagicaVoxel's z is up: (x, y, z) of the file is (x, -z, y) of ours.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <optional>
@@ -122,12 +123,18 @@ class VoxWriter {
         level_words_(dag.words(depth_).size()),
         models_(job, dag, depth_),
         charge_(job.budget, dag.node_count(depth_) * sizeof(uint64_t), "the models") {
+    // What is too large already need not be looked at node by node.
+    min_bytes_ = 4 + transform_node(0, 0, "0 0 0").size() + shape_node(0, 0).size();
+    min_bytes_ *= count_instances(dag);
+    if (min_bytes_ > kMaxVoxBytes) return;
     number_models(dag);
     find_instances(0, view_.root(), {0, 0, 0});
   }
 
-  // What the file will have.
-  uint64_t bytes() const { return 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_; }
+  // What the file will have, or anything over the limit if that is more.
+  uint64_t bytes() const {
+    return std::max(min_bytes_, 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_);
+  }
   size_t instance_count() const { return instances_; }
 
   void write(ExportFile& file, ExportStage& stage, const SelectedDag& dag, VoxColors& colors) {
@@ -171,6 +178,21 @@ class VoxWriter {
   // What a view of the model's node calls its content.
   uint64_t content_at(uint64_t offset) const {
     return depth_ + kBrickLevels == view_.grid_levels() ? view_.root() : offset;
+  }
+
+  uint64_t count_instances(const SelectedDag& dag) const {
+    uint64_t count = 1;
+    NodeNumbers<uint64_t> below;
+    for (uint32_t level = depth_; level-- > 0;) {
+      NodeNumbers<uint64_t> counts(job_, dag, level);
+      dag.for_each_node(level, [&](uint64_t at, uint32_t, std::span<const uint32_t> children) {
+        count = 0;
+        for (const uint32_t child : children) count += level + 1 == depth_ ? 1 : below[child];
+        counts[at] = count;
+      });
+      below = std::move(counts);
+    }
+    return count;
   }
 
   void number_models(const SelectedDag& dag) {
@@ -300,7 +322,7 @@ class VoxWriter {
   NodeNumbers<uint32_t> models_;
   MemoryCharge charge_;
   std::vector<uint64_t> voxels_;  // of each model's node
-  uint64_t models_bytes_ = 0;
+  uint64_t min_bytes_ = 0, models_bytes_ = 0;
   size_t instances_ = 0;
   uint64_t instance_bytes_ = 0;
 };
@@ -319,7 +341,7 @@ ExportReport write_vox(const ExportJob& job) {
                 [&](uint32_t level) {
                   // Even if nothing is shared, and a fourth is left for models and instances.
                   const uint64_t voxels = kMaxVoxBytes / 16 * 3;
-                  return count_voxels(job, coarser(job.selection, level), voxels) <= voxels;
+                  return has_at_most(job, level, voxels);
                 });
   require_space(job, bytes);
   ExportReport report;
@@ -329,7 +351,7 @@ ExportReport write_vox(const ExportJob& job) {
   ExportStage stage(job, "export", 0, "voxels");
   writer.write(file, stage, dag, colors);
   ExportFile* const written[] = {&file};
-  report.bytes = ExportFile::publish(written);
+  report.bytes = publish(job, written);
   report.notes.push_back("z is up: a voxel (x, y, z) is at (x, -z, y); " +
                          count_text(writer.instance_count()) + " instances");
   if (job.has_colors)

@@ -141,7 +141,7 @@ ExportReport write_voxel(const ExportJob& job) {
   writer.write();
   writer.write_json(json);
   ExportFile* const written[] = {&bin, &json};
-  report.bytes = ExportFile::publish(written);
+  report.bytes = publish(job, written);
   return report;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -15,6 +16,7 @@
 #include "core/format/artifact/segment_writer.h"
 #include "core/format/global/global_writer.h"
 #include "core/format/global/open_global.h"
+#include "core/format/global/watched_file.h"
 #include "core/geometry/octree_descent.h"
 #include "merge/merge.h"
 #include "query/extract/node_reader.h"
@@ -75,7 +77,13 @@ class Extraction {
     shape_ = {.grid_levels = report_.grid.levels, .hash_bits = file.hash_bits()};
   }
 
-  ExtractReport run() {
+  // before_publish() may throw if the output is not to appear.
+  ExtractReport run(const std::function<void()>& before_publish) {
+    if (spec_.crop && crop_.level == 0 &&
+        spec_.selection.region != whole_grid(spec_.selection.grid_levels))
+      progress_.warn(
+          "the region has cells on both sides of a plane through the middle of the grid: the "
+          "smallest octree cube around it is the whole grid, which stays");
     const MergeInputs inputs = merge_inputs(build_parts());
     GlobalFileWriter out(files_, spec_.output, report_.grid, shape_.hash_bits, spec_.narrow_words);
     const MergeReport merged =
@@ -96,6 +104,7 @@ class Extraction {
     progress_.begin_stage("write", 1, "files");
     const GlobalFileSummary summary =
         out.seal({.voxels = merged.voxels, .svo_nodes = merged.svo_nodes}, spec_.threads, cancel_);
+    before_publish();
     out.publish();
     progress_.advance(1);
     progress_.end_stage();
@@ -282,8 +291,11 @@ Cube crop_cube(const Selection& selection) {
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel) {
   check_grid(spec.selection, file.grid_levels());
-  const OutputLock lock(files, spec.output);
-  return Extraction(file, spec, files, progress, cancel).run();
+  const OutputLock lock(files, {{spec.output}, file.path(), spec.replace});
+  const WatchedFile watched(file);  // colors are read in place
+  return watched.run([&] {
+    return Extraction(file, spec, files, progress, cancel).run([&] { watched.expect_whole(); });
+  });
 }
 
 }  // namespace voxdag::query

@@ -27,6 +27,7 @@ struct ExtractSpec {
   // The new grid is the smallest octree-aligned cube around the region, instead of the whole grid.
   bool crop = false;
   std::string output;
+  bool replace = false;  // a file that exists
   uint64_t memory_bytes = uint64_t{1} << 30;
   unsigned threads = 1;
   // Levels of over this many words are wide; tests choose fewer.
@@ -51,8 +52,8 @@ struct ExtractReport {
 Cube crop_cube(const Selection& selection);
 
 // Writes spec.output, which appears when it is complete; temporary files lie in a folder next to
-// it, which is removed whatever happens. Throws Error: kCorrupt for a damaged file, kNoSpace,
-// kOutOfMemory, kCanceled, kIo if another process is writing the output.
+// it, which is removed whatever happens, after a kill by the next extract of that output. Throws
+// Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and what OutputLock does.
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

@@ -10,6 +10,7 @@
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
 #include "core/format/global/open_global.h"
+#include "query/double_pair.h"
 #include "query/lookup/points.h"
 #include "query/ray_packet.h"
 
@@ -32,30 +33,36 @@ void for_each_batch(unsigned threads, size_t items, const Body& body) {
   });
 }
 
-// Errors of what is read of the file name it.
-template <class Use>
-auto naming_file(const std::string& path, const Use& use) {
-  try {
-    return use();
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kCorrupt) throw;
-    throw Error(ErrorCode::kCorrupt, path + ": " + error.message());
+// Rays with directions of length 1, two at a time: their divisions would take longer than their
+// walk through large cells.
+void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
+               Ray* rays) {
+  const DoublePair zero = DoublePair::of(0), one = DoublePair::of(1);
+  for (size_t first = 0; first < origins.size(); first += 2) {
+    const size_t second = std::min(first + 1, origins.size() - 1);
+    DoublePair d[3], largest = zero, nothing = zero;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      alignas(16) const double o[2] = {origins[first][axis], origins[second][axis]};
+      alignas(16) const double two[2] = {directions[first][axis], directions[second][axis]};
+      d[axis] = DoublePair::load(two);
+      // Infinity and NaN are not 0 after this.
+      nothing = nothing + DoublePair::load(o) * zero + d[axis] * zero;
+      largest = max(largest, absolute(d[axis]));
+    }
+    require(equal(nothing, zero) == 3 && less(zero, largest) == 3,
+            "rays of finite numbers with directions that are not 0");
+    // The largest component first, so that no square overflows or vanishes.
+    for (DoublePair& component : d) component = component / largest;
+    const DoublePair scale = one / square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      alignas(16) double two[2];
+      (d[axis] * scale).store(two);
+      for (const auto& [ray, i] : {std::pair(first, 0), std::pair(second, 1)}) {
+        rays[ray].origin[static_cast<int>(axis)] = origins[ray][axis];
+        rays[ray].direction[static_cast<int>(axis)] = two[i];
+      }
+    }
   }
-}
-
-Ray make_ray(const Coordinates& origin, const Coordinates& direction) {
-  Ray ray{{{origin[0], origin[1], origin[2]}}, {{direction[0], direction[1], direction[2]}}};
-  bool finite = true;
-  double largest = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    finite = finite && std::isfinite(ray.origin[axis]) && std::isfinite(ray.direction[axis]);
-    largest = std::max(largest, std::fabs(ray.direction[axis]));
-  }
-  require(finite && largest > 0, "rays of finite numbers with directions that are not 0");
-  // The largest component first, so that no square overflows or vanishes.
-  for (int axis = 0; axis < 3; ++axis) ray.direction[axis] /= largest;
-  ray.direction = normalized(ray.direction);
-  return ray;
 }
 
 RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
@@ -141,8 +148,7 @@ void Dag::rays(std::span<const Coordinates> origins, std::span<const Coordinates
       Hit found[kRays];
       for (size_t first = batch; first < batch + count; first += kRays) {
         const size_t n = std::min(kRays, batch + count - first);
-        for (size_t i = 0; i < n; ++i)
-          rays[i] = make_ray(origins[first + i], directions[first + i]);
+        make_rays(origins.subspan(first, n), directions.subspan(first, n), rays);
         const uint64_t have_hit = packet.cast({rays, n}, found);
         for (size_t i = 0; i < n; ++i)
           hits[first + i] = have_hit >> i & 1 ? as_ray_hit(found[i], rays[i]) : RayHit{};

@@ -11,9 +11,12 @@ namespace voxdag::query {
 
 inline constexpr int kPacketRays = 64;
 
+// A position in voxels, mirrored as the rays are; the fourth number has no meaning.
+using Int4 = int32_t __attribute__((vector_size(16)));
+
 // A node or brick that a ray may cross, to be entered when the ray has left those before.
 struct WaitingCell {
-  int32_t low[4];   // its low corner in voxels, mirrored as the ray is; the fourth has no meaning
+  Int4 low;         // its low corner
   uint64_t offset;  // in the words of its level
   uint32_t depth;
   int32_t next;  // of the same ray; -1 if there is none
@@ -22,17 +25,17 @@ struct WaitingCell {
 // The descent of one ray.
 struct RayDescent {
   static constexpr int kMaxLevels = 20;
-  int32_t low[4];  // the cell that the ray enters next, as that of a WaitingCell
+  Int4 low;  // the cell that the ray enters next, as that of a WaitingCell
   uint64_t offset;
   uint32_t depth;
-  uint32_t open;                         // bit d: children of the path's node at depth d are left
-  uint8_t left[kMaxLevels];              // which, mirrored
-  const uint32_t* children[kMaxLevels];  // of the path's nodes: their words after the mask
+  uint32_t open;  // bit d: children of the path's node at depth d are left; d is less than `depth`
   int32_t first_waiting, last_waiting;   // -1 if no cell waits
+  uint8_t left[kMaxLevels];              // which are left, mirrored
+  const uint32_t* children[kMaxLevels];  // of the path's nodes: their words after the mask
 };
 
 // An origin and the inverse of a direction; the fourth number has no meaning.
-struct alignas(32) PacketRay {
+struct alignas(64) PacketRay {
   double origin[4], inverse[4];
 };
 
@@ -41,6 +44,7 @@ struct PacketJob {
   struct Level {
     const uint32_t* words;
     uint64_t count;
+    uint64_t any_node;  // less than so many words before it, there is room for a node of any size
     bool wide_children;
   };
 
@@ -52,7 +56,7 @@ struct PacketJob {
   // Rays whose directions have the same signs, mirrored so that these are positive.
   int mirror = 0;
   double t_min = 0, t_max = 0;
-  alignas(32) double origin[3][kPacketRays], inverse[3][kPacketRays];
+  alignas(64) double origin[3][kPacketRays], inverse[3][kPacketRays];
   PacketRay rays[kPacketRays];
   Hit* hits = nullptr;
   uint64_t found = 0;   // rays that have a hit, hits[ray], the first of its cells

@@ -17,9 +17,8 @@
 
 #include "core/base/popcount8.h"
 #include "core/dag/brick.h"
+#include "query/rays/four_planes.h"
 #include "query/rays/packet_job.h"
-
-#define VOXDAG_INLINE __attribute__((always_inline)) inline
 
 namespace voxdag::query {
 namespace {
@@ -36,10 +35,9 @@ struct MirroredMasks {
 };
 constexpr MirroredMasks kMirroredMasks;
 
-// Of the children of a cell, mirrored: those in which a ray has an interval, and one of length 0.
-struct Crossed {
-  uint32_t inside, touching;
-};
+// Which bits of a child's index say that it is the upper one on an axis: all ones there.
+constexpr Int4 kUpperOn[8] = {{0, 0, 0, 0},  {0, 0, -1, 0},  {0, -1, 0, 0},  {0, -1, -1, 0},
+                              {-1, 0, 0, 0}, {-1, 0, -1, 0}, {-1, -1, 0, 0}, {-1, -1, -1, 0}};
 
 template <class Four>
 class PacketWalk {
@@ -52,7 +50,7 @@ class PacketWalk {
   }
 
   void run(uint64_t rays) {
-    const int32_t low[4] = {0, 0, 0, 0};
+    const Int4 low = {0, 0, 0, 0};
     if (job_.leaf_depth == 1 || brick_depth_ == 0)
       push(0, low, 0, rays);
     else
@@ -65,38 +63,63 @@ class PacketWalk {
   static constexpr int kFewRays = 8;
   static constexpr int32_t kSmallest = 8;
 
+  using Planes = FourPlanes<Four>;
   struct Child {
-    int32_t low[4];
+    Int4 low;
     uint64_t offset, rays;
   };
 
   VOXDAG_INLINE static int first_of(uint64_t bits) { return __builtin_ctzll(bits); }
+#ifdef __POPCNT__
+  VOXDAG_INLINE static int count_of(uint64_t bits) { return __builtin_popcountll(bits); }
+  VOXDAG_INLINE static uint32_t count_of_8(uint32_t bits) {
+    return static_cast<uint32_t>(__builtin_popcount(bits));
+  }
+#else
   VOXDAG_INLINE static int count_of(uint64_t bits) {
     int count = 0;
     for (; bits != 0; bits >>= 8) count += kPopcount8[bits & 255];
     return count;
   }
+  VOXDAG_INLINE static uint32_t count_of_8(uint32_t bits) { return kPopcount8[bits]; }
+#endif
+  VOXDAG_INLINE static Int4 all(int32_t number) { return Int4{number, number, number, number}; }
 
   // Bounds of the origins and inverse directions of all rays.
   void bound(uint64_t rays) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
-      constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      double o0 = kInfinity, o1 = -kInfinity, i0 = kInfinity, i1 = 0;
-      for (uint64_t m = rays; m != 0; m &= m - 1) {
-        const int r = first_of(m);
-        const double o = job_.origin[axis][r], i = job_.inverse[axis][r];
-        o0 = o < o0 ? o : o0;
-        o1 = o > o1 ? o : o1;
-        i0 = i < i0 ? i : i0;
-        i1 = i > i1 ? i : i1;
-      }
-      low_origin_[axis] = o0;
-      high_origin_[axis] = o1;
-      low_inverse_[axis] = i0;
-      high_inverse_[axis] = i1;
+      bound(rays, job_.origin[axis], -kInfinity, low_origin_[axis], high_origin_[axis]);
+      bound(rays, job_.inverse[axis], 0, low_inverse_[axis], high_inverse_[axis]);
     }
     low_origin_[3] = high_origin_[3] = 0;
     low_inverse_[3] = high_inverse_[3] = 1;
+  }
+  static void bound(uint64_t rays, const double* numbers, double least, double& low, double& high) {
+    Four lows = Four::of(std::numeric_limits<double>::infinity()), highs = Four::of(least);
+    for (int i = 0; i < kPacketRays; i += 4) {
+      const uint64_t group = rays >> i & 15;
+      if (group == 15) {
+        const Four x = Four::load(numbers + i);
+        lows = min(lows, x);
+        highs = max(highs, x);
+        continue;
+      }
+      for (uint64_t left = group; left != 0; left &= left - 1) {
+        const Four x = Four::of(numbers[i + first_of(left)]);
+        lows = min(lows, x);
+        highs = max(highs, x);
+      }
+    }
+    alignas(64) double l[4], h[4];
+    lows.store(l);
+    highs.store(h);
+    low = l[0];
+    high = h[0];
+    for (int i = 1; i < 4; ++i) {
+      low = l[i] < low ? l[i] : low;
+      high = h[i] > high ? h[i] : high;
+    }
   }
 
   // As DagView::Children; its functions are not for this instruction set.
@@ -105,20 +128,26 @@ class PacketWalk {
     const uint32_t* children;
     bool wide;
     VOXDAG_INLINE uint64_t child(int index) const {
-      const int n = kPopcount8[mask & ((1u << index) - 1)];
+      const uint32_t n = count_of_8(mask & ((1u << index) - 1));
       return wide ? children[2 * n] | static_cast<uint64_t>(children[2 * n + 1]) << 32
                   : children[n];
     }
   };
   VOXDAG_INLINE Node node(uint32_t depth, uint64_t offset) const {
     const PacketJob::Level& level = job_.levels[depth];
-    if (offset >= level.count) job_.dag->corrupt(depth, offset);
+    if (offset >= level.any_node) check_node(depth, offset);
     const uint32_t* const words = level.words + offset;
     const uint32_t mask = words[0];
-    if (mask == 0 || mask > 255 ||
-        uint64_t{kPopcount8[mask]} << level.wide_children >= level.count - offset)
-      job_.dag->corrupt(depth, offset);
+    if (mask - 1 >= 255) job_.dag->corrupt(depth, offset);
     return {mask, words + 1, level.wide_children};
+  }
+  // A node near the end of its level.
+  __attribute__((noinline)) void check_node(uint32_t depth, uint64_t offset) const {
+    const PacketJob::Level& level = job_.levels[depth];
+    if (offset >= level.count || uint64_t{kPopcount8[level.words[offset] & 255]}
+                                         << level.wide_children >=
+                                     level.count - offset)
+      job_.dag->corrupt(depth, offset);
   }
   VOXDAG_INLINE uint64_t brick(uint64_t offset) const {
     const PacketJob::Level& level = job_.levels[brick_depth_];
@@ -128,53 +157,34 @@ class PacketWalk {
     if (mask == 0) job_.dag->corrupt(brick_depth_, offset);
     return mask;
   }
+  // Where there is no such word, nothing happens.
   VOXDAG_INLINE void prefetch(uint32_t depth, uint64_t offset) const {
-    const PacketJob::Level& level = job_.levels[depth];
-    if (offset < level.count) __builtin_prefetch(level.words + offset);
+    __builtin_prefetch(reinterpret_cast<const void*>(
+        reinterpret_cast<uintptr_t>(job_.levels[depth].words) + 4 * offset));
   }
 
-  // From the parameters of a cell's low, middle and high planes, x, y and z; those by which rays
-  // enter may be lower bounds, those by which they leave upper ones.
-  VOXDAG_INLINE static Crossed cross(Four low_in, Four middle_in, Four middle_out, Four high_out,
-                                     Four t_min, Four t_end) {
-    const Four in = max(blend_high(middle_lane(low_in), middle_lane(middle_in)),
-                        blend_odd(last_lane(low_in), last_lane(middle_in)));
-    const Four out = min(blend_high(middle_lane(middle_out), middle_lane(high_out)),
-                         blend_odd(last_lane(middle_out), last_lane(high_out)));
-    const Four in0 = max(in, max(first_lane(low_in), t_min));
-    const Four in1 = max(in, max(first_lane(middle_in), t_min));
-    const Four out0 = min(out, min(first_lane(middle_out), t_end));
-    const Four out1 = min(out, min(first_lane(high_out), t_end));
-    return {less(in0, out0) | less(in1, out1) << 4, equal(in0, out0) | equal(in1, out1) << 4};
-  }
-
-  // `low` has four numbers, of which the last does not matter.
-  VOXDAG_INLINE Crossed cross_one(const int32_t* low, int ray, double half) const {
+  VOXDAG_INLINE Crossed cross_one(Int4 low, int ray, double half) const {
     const PacketRay& r = job_.rays[ray];
-    const Four origin = Four::load(r.origin), inverse = Four::load(r.inverse), h = Four::of(half);
-    const Four low_plane = Four::from(low);
-    const Four middle_plane = low_plane + h;
-    const Four l = (low_plane - origin) * inverse, m = (middle_plane - origin) * inverse,
-               u = (middle_plane + h - origin) * inverse;
-    return cross(l, m, m, u, Four::of(job_.t_min), Four::of(job_.t_max));
+    const Planes origin = Planes::twice(r.origin), inverse = Planes::twice(r.inverse);
+    const Planes planes = Planes::of_cell(low, half);
+    return cross((planes - origin) * inverse, (planes + Planes::of(half) - origin) * inverse,
+                 job_.t_min, job_.t_max);
   }
 
   // Which children of a cell some ray may cross or touch. Rounding is monotonic, so that bounds of
   // parameters come from those of origins and inverse directions.
-  VOXDAG_INLINE uint32_t cross_any(const int32_t* low, double half) const {
-    const Four o0 = Four::load(low_origin_), o1 = Four::load(high_origin_),
-               i0 = Four::load(low_inverse_), i1 = Four::load(high_inverse_), h = Four::of(half);
-    const Four low_plane = Four::from(low);
-    const Four middle_plane = low_plane + h, high_plane = middle_plane + h;
-    const Four l = low_plane - o1, m = middle_plane - o1, n = middle_plane - o0,
-               u = high_plane - o0;
-    const Crossed crossed = cross(min(l * i0, l * i1), min(m * i0, m * i1), max(n * i0, n * i1),
-                                  max(u * i0, u * i1), Four::of(job_.t_min), Four::of(job_.t_max));
+  VOXDAG_INLINE uint32_t cross_any(Int4 low, double half) const {
+    const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
+    const Planes planes = Planes::of_cell(low, half);
+    const Planes in = planes - Planes::twice(high_origin_),
+                 out = planes + Planes::of(half) - Planes::twice(low_origin_);
+    const Crossed crossed =
+        cross(min(in * i0, in * i1), max(out * i0, out * i1), job_.t_min, job_.t_max);
     return crossed.inside | crossed.touching;
   }
 
   // Which of the rays cross a cell or touch it.
-  VOXDAG_INLINE uint64_t crossing(const int32_t* low, double edge, uint64_t rays) const {
+  VOXDAG_INLINE uint64_t crossing(Int4 low, double edge, uint64_t rays) const {
     Four low_plane[3], high_plane[3];
     for (int axis = 0; axis < 3; ++axis) {
       low_plane[axis] = Four::of(low[axis]);
@@ -182,8 +192,8 @@ class PacketWalk {
     }
     const Four t_min = Four::of(job_.t_min), t_max = Four::of(job_.t_max);
     uint64_t crossing = 0;
-    for (int i = 0; i < kPacketRays; i += 4) {
-      if ((rays >> i & 15) == 0) continue;
+    for (uint64_t groups = groups_of(rays); groups != 0; groups &= groups - 1) {
+      const int i = first_of(groups);
       Four in = t_min, out = t_max;
       for (int axis = 0; axis < 3; ++axis) {
         const Four o = Four::load(job_.origin[axis] + i), v = Four::load(job_.inverse[axis] + i);
@@ -194,15 +204,18 @@ class PacketWalk {
     }
     return crossing & rays;
   }
+  // The first bit of each group of lanes in which there is a ray.
+  VOXDAG_INLINE static uint64_t groups_of(uint64_t rays) {
+    rays |= rays >> 1;
+    return (rays | rays >> 2) & 0x1111111111111111;
+  }
 
-  VOXDAG_INLINE static void corner(const int32_t* low, int index, int32_t half, int32_t* out) {
-    out[0] = low[0] + (index & 4 ? half : 0);
-    out[1] = low[1] + (index & 2 ? half : 0);
-    out[2] = low[2] + (index & 1 ? half : 0);
+  VOXDAG_INLINE static Int4 corner(Int4 low, int index, int32_t half) {
+    return low + (kUpperOn[index] & all(half));
   }
 
   // Visits a node that all of `rays` may cross.
-  void visit(uint32_t depth, const int32_t* low, int32_t edge, uint64_t offset, uint64_t rays) {
+  void visit(uint32_t depth, Int4 low, int32_t edge, uint64_t offset, uint64_t rays) {
     const Node n = node(depth, offset);
     const int32_t half = edge / 2;
     uint32_t candidates = mirrored_[n.mask] & cross_any(low, half);
@@ -212,7 +225,7 @@ class PacketWalk {
     for (; candidates != 0; candidates &= candidates - 1) {
       const int index = first_of(candidates);
       Child& child = children[count];
-      corner(low, index, half, child.low);
+      child.low = corner(low, index, half);
       child.rays = only ? rays : crossing(child.low, half, rays);
       if (child.rays == 0) continue;
       child.offset = n.child(index ^ job_.mirror);
@@ -233,11 +246,11 @@ class PacketWalk {
   }
 
   // Lets rays part in a cell. Cells come in the order in which their rays cross them.
-  void push(uint32_t depth, const int32_t* low, uint64_t offset, uint64_t rays) {
+  void push(uint32_t depth, Int4 low, uint64_t offset, uint64_t rays) {
     for (; rays != 0; rays &= rays - 1) {
       const int ray = first_of(rays);
       RayDescent& descent = job_.descents[ray];
-      const WaitingCell cell{{low[0], low[1], low[2], 0}, offset, depth, -1};
+      const WaitingCell cell{low, offset, depth, -1};
       if (under_way_ >> ray & 1) {
         const int at = waiting_++;
         job_.waiting[at] = cell;
@@ -254,7 +267,7 @@ class PacketWalk {
   }
 
   VOXDAG_INLINE static void begin(RayDescent& descent, const WaitingCell& cell) {
-    for (int axis = 0; axis < 3; ++axis) descent.low[axis] = cell.low[axis];
+    descent.low = cell.low;
     descent.offset = cell.offset;
     descent.depth = cell.depth;
     descent.open = 0;
@@ -300,12 +313,12 @@ class PacketWalk {
   // Goes to the first of these children of the path's node at `depth`; the others are left.
   VOXDAG_INLINE void enter_first(RayDescent& descent, uint32_t depth, uint32_t in, const Node& n) {
     const int index = first_of(in);
-    corner(descent.low, index, int32_t{1} << (job_.grid_levels - depth - 1), descent.low);
+    descent.low = corner(descent.low, index, int32_t{1} << (job_.grid_levels - depth - 1));
     descent.offset = n.child(index ^ job_.mirror);
     descent.depth = depth + 1;
-    descent.left[depth] = static_cast<uint8_t>(in & (in - 1));
-    descent.open &= ~(1u << depth);
-    descent.open |= (descent.left[depth] != 0 ? 1u : 0u) << depth;
+    const uint32_t left = in & (in - 1);
+    descent.left[depth] = static_cast<uint8_t>(left);
+    descent.open |= (left != 0 ? 1u : 0u) << depth;
     descent.children[depth] = n.children;
     prefetch(depth + 1, descent.offset);
   }
@@ -318,8 +331,8 @@ class PacketWalk {
       return true;
     }
     const uint32_t depth = 31u - static_cast<uint32_t>(__builtin_clz(descent.open));
-    const int32_t edge = int32_t{1} << (job_.grid_levels - depth);
-    for (int axis = 0; axis < 3; ++axis) descent.low[axis] &= -edge;
+    descent.open ^= 1u << depth;
+    descent.low &= all(-(int32_t{1} << (job_.grid_levels - depth)));
     const uint32_t* const children = descent.children[depth];
     enter_first(descent, depth, descent.left[depth],
                 {children[-1], children, job_.levels[depth].wide_children});
@@ -336,25 +349,20 @@ class PacketWalk {
     if (crossed.touching & occupied) return give_up(ray);
     for (uint32_t in = crossed.inside & occupied; in != 0; in &= in - 1) {
       const int index = first_of(in);
-      int32_t low[4] = {};
-      corner(cell.low, index, 2, low);
-      if (cast_in(low, 1, ray, mirrored_[mask >> 8 * (index ^ job_.mirror) & 255],
-                  job_.grid_levels))
+      if (cast_in(corner(cell.low, index, 2), 1, ray,
+                  mirrored_[mask >> 8 * (index ^ job_.mirror) & 255], job_.grid_levels))
         return true;
     }
     return false;
   }
 
   // Whether the ray ends in a cell of these children.
-  VOXDAG_INLINE bool cast_in(const int32_t* low, int32_t half, int ray, uint32_t occupied,
-                             uint32_t depth) {
+  VOXDAG_INLINE bool cast_in(Int4 low, int32_t half, int ray, uint32_t occupied, uint32_t depth) {
     const Crossed crossed = cross_one(low, ray, half);
     if (crossed.touching & occupied) return give_up(ray);
     const uint32_t in = crossed.inside & occupied;
     if (in == 0) return false;
-    int32_t leaf[4];
-    corner(low, first_of(in), half, leaf);
-    return report(leaf, half, ray, depth);
+    return report(corner(low, first_of(in), half), half, ray, depth);
   }
 
   // The ray ends here.
@@ -364,7 +372,7 @@ class PacketWalk {
   }
 
   // The ray's hit is this cell, unless a tie decides about the face.
-  VOXDAG_INLINE bool report(const int32_t* low, int32_t edge, int ray, uint32_t depth) {
+  VOXDAG_INLINE bool report(Int4 low, int32_t edge, int ray, uint32_t depth) {
     const PacketRay& r = job_.rays[ray];
     double t = job_.t_min;
     int entered_by = -1;
@@ -396,7 +404,7 @@ class PacketWalk {
   uint64_t under_way_ = 0;
   uint8_t list_[kPacketRays];
   int count_ = 0, waiting_ = 0;
-  alignas(32) double low_origin_[4], high_origin_[4], low_inverse_[4], high_inverse_[4];
+  alignas(64) double low_origin_[4], high_origin_[4], low_inverse_[4], high_inverse_[4];
 };
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include <cstring>
+
 #include "query/double_pair.h"
 #include "query/rays/packet_walk.h"
 
@@ -8,7 +10,15 @@ struct PlainFour {
   DoublePair a, b;
   static PlainFour load(const double* p) { return {DoublePair::load(p), DoublePair::load(p + 2)}; }
   static PlainFour of(double all) { return {DoublePair::of(all), DoublePair::of(all)}; }
-  static PlainFour from(const int32_t* p) { return {DoublePair::from(p), DoublePair::from(p + 2)}; }
+  static PlainFour from(Int4 p) {
+    int32_t four[4];
+    std::memcpy(four, &p, sizeof four);
+    return {DoublePair::from(four), DoublePair::from(four + 2)};
+  }
+  void store(double* p) const {
+    a.store(p);
+    b.store(p + 2);
+  }
 };
 VOXDAG_INLINE PlainFour operator-(PlainFour x, PlainFour y) { return {x.a - y.a, x.b - y.b}; }
 VOXDAG_INLINE PlainFour operator+(PlainFour x, PlainFour y) { return {x.a + y.a, x.b + y.b}; }

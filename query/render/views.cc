@@ -30,38 +30,67 @@ double finest_width(const DagView& dag) {
   return dag.resolution() > kCells ? static_cast<double>(dag.resolution() / kCells) : 0;
 }
 
+// Work that views may cost, in nodes and bricks read: a scene of dust, whose rays pass through
+// thousands of cells, or a damaged one must not keep a service busy for minutes. Sponza at 4096^3
+// takes 0.4, 3.6 and 1.4 million of them.
+constexpr uint64_t kMaxEnclosureSteps = uint64_t{1} << 22;
+constexpr uint64_t kMaxSearchSteps = uint64_t{1} << 25;  // of each of its two passes
+constexpr uint64_t kMaxBoxCells = uint64_t{1} << 25;
+
+// Rays that together take a limited number of steps. What was computed with a ray after the last
+// one is to be thrown away.
+class LimitedRays {
+ public:
+  LimitedRays(const DagView& dag, uint64_t max_steps, const CancelToken& cancel)
+      : caster_(dag), cancel_(cancel), steps_left_(max_steps) {}
+
+  bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) {
+    if (++count_ % 16 == 0) cancel_.check();
+    return caster_.cast(ray, cone, t_min, t_max, hit, steps_left_);
+  }
+  bool used_up() const { return steps_left_ == 0; }
+
+ private:
+  const RayCaster caster_;
+  const CancelToken& cancel_;
+  uint64_t steps_left_, count_ = 0;
+};
+
 // How far one sees from places on the surface, as a share of the scene's diagonal; a place from
 // which one can see out of the scene counts as 0. Near 0 for an object, or for caves; more for
 // interiors.
-double enclosure(const RayCaster& caster, const DagView& dag, const Box& box,
+double enclosure(const DagView& dag, const std::vector<Vec>& points, const Box& box,
                  const CancelToken& cancel) {
   constexpr size_t kPlaces = 1000;
-  const std::vector<Vec> points = occupied_points(dag);
+  // Prime to kPlaces: the first places are all over the scene, if the steps are used up early.
+  constexpr size_t kStride = 381;
+  LimitedRays rays(dag, kMaxEnclosureSteps, cancel);
   std::vector<Vec> directions;  // toward the 26 neighbors of a cell
   for (int i = 0; i < 27; ++i)
     if (i != 13) directions.push_back(normalized({{i / 9 - 1.0, i / 3 % 3 - 1.0, i % 3 - 1.0}}));
   const double start = 3 * static_cast<double>(dag.resolution()) / 64;
   const double width = std::max(1.0, finest_width(dag));
   double sum = 0;
-  for (size_t i = 0; i < kPlaces; ++i) {
-    cancel.check();
-    const Vec& place = points[i * points.size() / kPlaces];
+  size_t places = 0;
+  for (; places < kPlaces; ++places) {
+    const Vec& place = points[places * kStride % kPlaces * points.size() / kPlaces];
     double longest = 0;
     for (const Vec& direction : directions) {
       Hit hit;
-      const bool escaped = !caster.cast({place, direction}, {width, 0}, start, box.diagonal(), hit);
+      const bool escaped = !rays.cast({place, direction}, {width, 0}, start, box.diagonal(), hit);
       longest = escaped ? 0 : std::max(longest, hit.t);
       if (escaped) break;
     }
+    if (rays.used_up()) break;
     sum += longest;
   }
-  return sum / (kPlaces * box.diagonal());
+  return places == 0 ? 0 : sum / (static_cast<double>(places) * box.diagonal());
 }
 
 // How much there is to see, by a few rays: higher for long views with much detail, lower close to a
 // wall or where the camera looks out of the scene. A distance below `near` is too close.
 template <int kColumns, int kRows>
-double score(const RayCaster& caster, const Placement& placement, double width, double near) {
+double score(LimitedRays& rays, const Placement& placement, double width, double near) {
   constexpr double kRays = kColumns * kRows;
   const Camera camera(placement, kColumns, kRows);
   double depth[kRows][kColumns], sum = 0;
@@ -74,7 +103,7 @@ double score(const RayCaster& caster, const Placement& placement, double width, 
     for (int x = 0; x < kColumns; ++x) {
       Hit hit;
       const bool seen =
-          caster.cast(camera.ray(x + 0.5, y + 0.5), {width, camera.pixel_spread()}, 0, kFar, hit);
+          rays.cast(camera.ray(x + 0.5, y + 0.5), {width, camera.pixel_spread()}, 0, kFar, hit);
       const double d = depth[y][x] = seen ? std::max(hit.t, 1.0) : kFar;
       close += d < near;
       out += !seen;
@@ -86,43 +115,59 @@ double score(const RayCaster& caster, const Placement& placement, double width, 
   return breaks / kRays * std::sqrt(sum / kRays) * free * free * free * within;
 }
 
-// The best-scoring of some hundreds of random places in the lower half of the scene. A quarter of
-// the rays tells which of them could be that.
-Placement inside_view(const RayCaster& caster, const Box& box, double width, double fov_degrees,
-                      const CancelToken& cancel) {
+struct Trials {
+  std::vector<Placement> placements;
+  std::vector<double> scores;
+};
+// Some hundreds of random places in the lower half of the scene, with rough scores, until the steps
+// are used up.
+Trials rough_trials(const DagView& dag, const Box& box, double fov_degrees,
+                    const CancelToken& cancel) {
   constexpr uint64_t kPlaces = 400;
   constexpr int kYaws = 8;
-  constexpr double kRoughShare = 0.6;  // of the best rough score; lower could not be the best
   const Sampler sampler(2);
   const Vec extent = box.high - box.low;
-  const double near = 0.04 * box.diagonal();
-  std::vector<Placement> trials;
-  std::vector<double> rough;
+  LimitedRays rays(dag, kMaxSearchSteps, cancel);
+  Trials trials;
   for (uint64_t i = 0; i < kPlaces; ++i) {
     const Sampler::Pair across = sampler.pair(2 * i), up = sampler.pair(2 * i + 1);
     const Vec eye =
         box.low + Vec{{extent[0] * (0.05 + 0.9 * across.u), extent[1] * (0.05 + 0.35 * up.u),
                        extent[2] * (0.05 + 0.9 * across.v)}};
-    cancel.check();
     for (int yaw = 0; yaw < kYaws; ++yaw) {
       const double angle = 2 * kPi * (yaw + up.v) / kYaws;
       const Vec forward{{std::cos(angle), 0.08, std::sin(angle)}};
-      trials.push_back({eye, eye + forward * (0.25 * box.diagonal()), fov_degrees});
-      rough.push_back(score<12, 7>(caster, trials.back(), width, near));
+      const Placement trial{eye, eye + forward * (0.25 * box.diagonal()), fov_degrees};
+      const double rough = score<12, 7>(rays, trial, finest_width(dag), 0.04 * box.diagonal());
+      if (rays.used_up()) return trials;
+      trials.placements.push_back(trial);
+      trials.scores.push_back(rough);
     }
   }
-  const double least = kRoughShare * *std::max_element(rough.begin(), rough.end());
+  return trials;
+}
+
+// The best-scoring of random places. A quarter of the rays tells which of them could be that.
+// Nothing if the steps were used up before any was found.
+std::optional<Placement> inside_view(const DagView& dag, const Box& box, double fov_degrees,
+                                     const CancelToken& cancel) {
+  constexpr double kRoughShare = 0.6;  // of the best rough score; lower could not be the best
+  const auto [trials, rough] = rough_trials(dag, box, fov_degrees, cancel);
+  if (trials.empty()) return std::nullopt;
+  const size_t first =
+      static_cast<size_t>(std::max_element(rough.begin(), rough.end()) - rough.begin());
+  LimitedRays rays(dag, kMaxSearchSteps, cancel);
   Placement best{box.center(), box.center() + Vec{{1, 0, 0}}, fov_degrees};
   double best_score = 0;
-  for (size_t i = 0; i < trials.size(); ++i) {
-    if (rough[i] < least) continue;
-    cancel.check();
-    const double trial_score = score<24, 14>(caster, trials[i], width, near);
-    if (trial_score <= best_score) continue;
+  for (size_t i = 0; i < trials.size() && !rays.used_up(); ++i) {
+    if (rough[i] < kRoughShare * rough[first]) continue;
+    const double trial_score =
+        score<24, 14>(rays, trials[i], finest_width(dag), 0.04 * box.diagonal());
+    if (trial_score <= best_score || rays.used_up()) continue;
     best_score = trial_score;
     best = trials[i];
   }
-  return best;
+  return rays.used_up() && best_score == 0 ? trials[first] : best;
 }
 
 }  // namespace
@@ -135,20 +180,26 @@ std::array<double, 3> world_point(const Vec& point, const voxdag_reader::File& f
   return world;
 }
 
-Box occupied_box(const DagView& dag) {
+Box occupied_box(const DagView& dag, const CancelToken& cancel) {
   Box box{{{1e30, 1e30, 1e30}}, {}};
-  const auto reaches_out = [&](const DagView::Cell& cell) {
-    for (int axis = 0; axis < 3; ++axis)
-      if (cell.low[axis] < box.low[axis] || cell.low[axis] + cell.edge > box.high[axis])
-        return 0xffu;
-    return 0u;
-  };
-  dag.for_each_cell(std::min(dag.grid_levels(), 11u), reaches_out, [&](const DagView::Cell& cell) {
+  uint64_t cells = 0;
+  const auto add = [&](const DagView::Cell& cell) {
     for (int axis = 0; axis < 3; ++axis) {
       box.low[axis] = std::min(box.low[axis], cell.low[axis]);
       box.high[axis] = std::max(box.high[axis], cell.low[axis] + cell.edge);
     }
-  });
+  };
+  const auto reaches_out = [&](const DagView::Cell& cell) {
+    if (++cells % 4096 == 0) cancel.check();
+    for (int axis = 0; axis < 3; ++axis) {
+      if (cell.low[axis] >= box.low[axis] && cell.low[axis] + cell.edge <= box.high[axis]) continue;
+      if (cells < kMaxBoxCells) return 0xffu;
+      add(cell);  // as a whole
+      break;
+    }
+    return 0u;
+  };
+  dag.for_each_cell(std::min(dag.grid_levels(), 11u), reaches_out, add);
   return box;
 }
 
@@ -168,20 +219,36 @@ const std::vector<std::string>& view_names() {
   return names;
 }
 
-Placement named_view(const std::string& name, const DagView& dag, double aspect,
-                     std::optional<double> fov_degrees, const CancelToken& cancel) {
+const Box& NamedViews::box() {
+  if (!box_) box_ = occupied_box(dag_, cancel_);
+  return *box_;
+}
+
+const std::vector<Vec>& NamedViews::points() {
+  if (points_.empty()) points_ = occupied_points(dag_);
+  return points_;
+}
+
+Placement NamedViews::find(const std::string& name, double aspect,
+                           std::optional<double> fov_degrees) {
   const bool automatic = name == "auto";
+  std::string direction = name;
   if (name == "inside" || automatic) {
-    const RayCaster caster(dag);
-    const Box box = occupied_box(dag);
-    if (!automatic || enclosure(caster, dag, box, cancel) > kMinEnclosureOfRooms)
-      return inside_view(caster, box, finest_width(dag), fov_degrees.value_or(kInsideFov), cancel);
+    if (!automatic || enclosure(dag_, points(), box(), cancel_) > kMinEnclosureOfRooms) {
+      const auto found = inside_view(dag_, box(), fov_degrees.value_or(kInsideFov), cancel_);
+      if (found) return *found;
+    }
+    direction = "iso";
   }
   for (const NamedDirection& d : kDirections)
-    if ((automatic ? "iso" : name) == d.name)
-      return fit_camera(occupied_points(dag), d.toward_eye, fov_degrees.value_or(kOutsideFov),
-                        aspect);
+    if (direction == d.name)
+      return fit_camera(points(), d.toward_eye, fov_degrees.value_or(kOutsideFov), aspect);
   throw Error(ErrorCode::kInvalidInput, "view '" + name + "': expected one of view_names()");
+}
+
+Placement named_view(const std::string& name, const DagView& dag, double aspect,
+                     std::optional<double> fov_degrees, const CancelToken& cancel) {
+  return NamedViews(dag, cancel).find(name, aspect, fov_degrees);
 }
 
 }  // namespace voxdag::query

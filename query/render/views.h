@@ -22,8 +22,9 @@ struct Box {
   double diagonal() const { return length(high - low); }
 };
 
-// The box around the occupied cells of 1/2048 of the grid's edge.
-Box occupied_box(const DagView& dag);
+// The box around the occupied cells of 1/2048 of the grid's edge; a larger one if that would take
+// more than some tens of millions of cells. Throws as `cancel` does.
+Box occupied_box(const DagView& dag, const CancelToken& cancel = {});
 // The centers of the occupied cells of 1/64 of the grid's edge.
 std::vector<Vec> occupied_points(const DagView& dag);
 
@@ -34,8 +35,28 @@ const std::vector<std::string>& view_names();
 // around and a floor below; "auto" is "inside" for a scene most of which cannot be seen from
 // outside, and "iso" for any other. `aspect` is the picture's width divided by its height; without
 // `fov_degrees`, the view decides on the field of view. Throws Error{kInvalidInput} for another
-// name, and as `cancel` does: "inside" and "auto" cast rays for up to half a second.
+// name, and as `cancel` does: "inside" and "auto" cast rays for up to half a second. For a
+// second or two if the scene is dust: their number of steps is limited, and the view is the best of
+// those tried until then, or "iso".
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees, const CancelToken& cancel = {});
+
+// The same for several views of a DAG, with what they have in common computed once. Refers to the
+// DAG and the token.
+class NamedViews {
+ public:
+  NamedViews(const DagView& dag, const CancelToken& cancel) : dag_(dag), cancel_(cancel) {}
+  // occupied_box()
+  const Box& box();
+  Placement find(const std::string& name, double aspect, std::optional<double> fov_degrees);
+
+ private:
+  const std::vector<Vec>& points();
+
+  const DagView& dag_;
+  const CancelToken& cancel_;
+  std::optional<Box> box_;
+  std::vector<Vec> points_;
+};
 
 }  // namespace voxdag::query

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/format/color/color_layout.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag::query {
@@ -31,34 +32,6 @@ void check_address(const voxdag_reader::File& file, const ColorPageAddress& page
                                             std::to_string(edge) + " along each axis");
 }
 
-// Sets the bits of the cells `below` levels under a cell at `depth`, in Morton order from `code`.
-void set_bits(const DagView& dag, uint32_t depth, uint64_t content, uint32_t below, uint32_t code,
-              uint32_t* mask) {
-  if (below == 0) {
-    mask[code / 32] |= 1u << code % 32;
-    return;
-  }
-  const DagView::Children c = dag.children(depth, content);
-  for (int i = 0; i < 8; ++i)
-    if (c.has(i))
-      set_bits(dag, depth + 1, dag.content(depth, c, i), below - 1,
-               8 * code + static_cast<uint32_t>(i), mask);
-}
-
-void set_mask(const DagView& dag, const ColorPageAddress& page, uint32_t* mask) {
-  const uint32_t below = std::min(page.level, kPageLevels), root = page.level - below;
-  uint64_t content = dag.root();
-  for (uint32_t depth = 0; depth < root; ++depth) {
-    int child = 0;
-    for (const uint64_t c : page.position)
-      child = 2 * child + static_cast<int>(c >> (root - depth - 1) & 1);
-    const DagView::Children children = dag.children(depth, content);
-    if (!children.has(child)) return;
-    content = dag.content(depth, children, child);
-  }
-  set_bits(dag, root, content, below, 0, mask);
-}
-
 // A cell of the page by its Morton code within it.
 std::array<int64_t, 3> cell_of(const ColorPageAddress& page, uint32_t code) {
   std::array<int64_t, 3> cell;
@@ -79,10 +52,79 @@ uint32_t first_bit(const uint32_t* mask) {
 
 }  // namespace
 
+// What a node has is read when it is asked for its children, a brick when it is the content.
+DagView::Children ColorPages::children(uint32_t depth, uint64_t content) const {
+  if (depth < file_->brick_level()) checked_file_.expect_intact(depth, content);
+  return dag_->children(depth, content);
+}
+
+uint64_t ColorPages::content(uint32_t depth, const DagView::Children& children, int index) const {
+  if (depth + 1 == file_->brick_level())
+    checked_file_.expect_intact(depth + 1, dag_->offset(children, index));
+  return dag_->content(depth, children, index);
+}
+
+// Sets the bits of the cells `below` levels under a cell at `depth`, in Morton order from `code`.
+void ColorPages::set_bits(uint32_t depth, uint64_t content, uint32_t below, uint32_t code,
+                          uint32_t* mask) const {
+  if (below == 0) {
+    mask[code / 32] |= 1u << code % 32;
+    return;
+  }
+  const DagView::Children c = children(depth, content);
+  for (int i = 0; i < 8; ++i)
+    if (c.has(i))
+      set_bits(depth + 1, this->content(depth, c, i), below - 1,
+               8 * code + static_cast<uint32_t>(i), mask);
+}
+
+void ColorPages::set_mask(const ColorPageAddress& page, uint32_t* mask) const {
+  const uint32_t below = std::min(page.level, kPageLevels), root = page.level - below;
+  if (file_->brick_level() == 0) checked_file_.expect_intact(0, 0);
+  uint64_t content = dag_->root();
+  for (uint32_t depth = 0; depth < root; ++depth) {
+    int child = 0;
+    for (const uint64_t c : page.position)
+      child = 2 * child + static_cast<int>(c >> (root - depth - 1) & 1);
+    const DagView::Children c = children(depth, content);
+    if (!c.has(child)) return;
+    content = this->content(depth, c, child);
+  }
+  set_bits(root, content, below, 0, mask);
+}
+
+// The entries of the directory that a search for the region of a cell reads, and all bytes of the
+// region.
+void ColorPages::check_region(const voxdag_reader::ColorTier& tier, uint32_t level,
+                              const std::array<int64_t, 3>& cell) const {
+  if (!blocks_) return;
+  const uint64_t morton =
+      voxdag_reader::morton_code(cell[0], cell[1], cell[2]) >> 3 * (level - tier.region_level);
+  uint64_t low = 0;
+  for (uint64_t high = tier.region_count; low < high;) {
+    const uint64_t middle = low + (high - low) / 2;
+    const unsigned char* const entry = tier.directory + color_layout::kRegionEntryBytes * middle;
+    blocks_->expect_intact(entry, color_layout::kRegionEntryBytes);
+    uint64_t there;
+    std::memcpy(&there, entry, sizeof there);
+    if (there < morton)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  voxdag_reader::ColorRegion region;
+  if (low < tier.region_count) {
+    blocks_->expect_intact(tier.directory + color_layout::kRegionEntryBytes * low,
+                           color_layout::kRegionEntryBytes);
+    if (voxdag_reader::ColorSection::region(tier, low, region))
+      blocks_->expect_intact(region.blocks, color_layout::kUnitBytes * region.units());
+  }
+}
+
 std::vector<uint32_t> ColorPages::encode(const ColorPageAddress& address) {
   check_address(*file_, address);
   std::vector<uint32_t> words(kHeadWords);
-  set_mask(*dag_, address, words.data() + 1);
+  set_mask(address, words.data() + 1);
   for (size_t i = 0; i < kMaskWords; ++i)
     words[0] += static_cast<uint32_t>(std::popcount(words[1 + i]));
   if (words[0] == 0) return {0};
@@ -98,6 +140,7 @@ void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_
   if (level - std::min(level, kPageLevels) >= tier.region_level) {
     const std::array<int64_t, 3> first = cell_of(address, first_bit(words.data() + 1));
     uint64_t index = 0;
+    check_region(tier, level, first);
     const auto* const region = cursor_.find(first[0], first[1], first[2], level, index);
     if (!region || count > region->cells - index)
       file_->broken_colors("a region has fewer colors than cells");
@@ -112,6 +155,7 @@ void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_
   for (uint32_t code = 0; code < 32 * kMaskWords; ++code) {
     if (!(words[1 + code / 32] >> code % 32 & 1)) continue;
     const std::array<int64_t, 3> cell = cell_of(address, code);
+    check_region(tier, level, cell);
     const auto rgb = cursor_.color(cell[0], cell[1], cell[2], level);
     if (!rgb) file_->broken_colors("a cell has no color");
     words.push_back(rgb->r | uint32_t{rgb->g} << 8 | uint32_t{rgb->b} << 16);

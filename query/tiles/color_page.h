@@ -11,6 +11,7 @@
 
 #include "core/format/global/voxdag_reader.h"
 #include "query/dag_view.h"
+#include "query/tiles/node_checks.h"
 
 namespace voxdag::query {
 
@@ -22,20 +23,64 @@ struct ColorPageAddress {
 // Pages of one file. Refers to it; each thread needs its own.
 class ColorPages {
  public:
-  // `dag` must be that of the file.
-  ColorPages(const voxdag_reader::File& file, const DagView& dag)
-      : file_(&file), dag_(&dag), cursor_(file) {}
+  // `dag` must be that of the file, and so must `blocks`, if it is given.
+  ColorPages(const voxdag_reader::File& file, const DagView& dag,
+             const CheckedBlocks* blocks = nullptr)
+      : file_(&file),
+        blocks_(blocks),
+        dag_(&dag),
+        checked_file_{file, dag, blocks},
+        cursor_(checked_file_) {}
+  ColorPages(const ColorPages&) = delete;  // the cursor refers to a member
 
   // The words of the page: one if none of its cells is set. Throws Error{kNotFound} if the file has
-  // no colors of that level or the grid no such cells, and Error{kCorrupt}.
+  // no colors of that level or the grid no such cells, and Error{kCorrupt}; DamagedBlock if a block
+  // that it needs is damaged.
   std::vector<uint32_t> encode(const ColorPageAddress& address);
 
  private:
+  // The file, as a cursor uses it.
+  struct CheckedFile {
+    const voxdag_reader::File& file;
+    const DagView& dag;
+    const CheckedBlocks* blocks;
+
+    void expect_intact(uint32_t level, uint64_t offset) const {
+      if (blocks) NodeChecks(dag, level, blocks).expect_intact(offset);
+    }
+
+    bool empty() const { return file.empty(); }
+    uint32_t grid_levels() const { return file.grid_levels(); }
+    uint32_t brick_level() const { return file.brick_level(); }
+    const voxdag_reader::ColorSection& colors() const { return file.colors(); }
+    uint64_t brick(uint64_t offset) const {
+      expect_intact(brick_level(), offset);
+      return file.brick(offset);
+    }
+    voxdag_reader::Node node(uint32_t level, uint64_t offset) const {
+      expect_intact(level, offset);
+      return file.node(level, offset);
+    }
+    static uint64_t child(const voxdag_reader::Node& node, int index) {
+      return voxdag_reader::File::child(node, index);
+    }
+    [[noreturn]] void broken_colors(const char* what) const { file.broken_colors(what); }
+  };
+
+  void set_mask(const ColorPageAddress& page, uint32_t* mask) const;
+  void set_bits(uint32_t depth, uint64_t content, uint32_t below, uint32_t code,
+                uint32_t* mask) const;
+  DagView::Children children(uint32_t depth, uint64_t content) const;
+  uint64_t content(uint32_t depth, const DagView::Children& children, int index) const;
+  void check_region(const voxdag_reader::ColorTier& tier, uint32_t level,
+                    const std::array<int64_t, 3>& cell) const;
   void add_colors(const ColorPageAddress& address, std::vector<uint32_t>& words);
 
   const voxdag_reader::File* file_;
+  const CheckedBlocks* blocks_;
   const DagView* dag_;
-  voxdag_reader::ColorCursor cursor_;
+  const CheckedFile checked_file_;
+  voxdag_reader::BasicColorCursor<CheckedFile> cursor_;
 };
 
 }  // namespace voxdag::query

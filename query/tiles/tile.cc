@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/dag/brick.h"
+#include "query/tiles/node_checks.h"
 #include "query/tiles/offset_table.h"
 
 namespace voxdag::query {
@@ -13,9 +14,10 @@ namespace {
 constexpr size_t kHeaderWords = 4;
 constexpr uint32_t kLeavesAreBricks = 1u << 16;
 
-void check_address(const DagView& dag, const TileAddress& root) {
+void check_address(const DagView& dag, const TileAddress& root, const CheckedBlocks* blocks) {
   const bool has_level = !dag.empty() && root.level < dag.grid_levels() - kBrickLevels;
   const auto is_node = [&] {
+    NodeChecks(dag, root.level, blocks).expect_intact(root.offset);
     const auto& [words, wide] = dag.level(root.level);
     return root.offset < words.size() && words[root.offset] - 1 < 255;
   };
@@ -26,13 +28,15 @@ void check_address(const DagView& dag, const TileAddress& root) {
 
 // Appends the nodes of a level, with the numbers of their children in place of words, and numbers
 // the children. Returns the word of each node.
-std::vector<uint32_t> add_nodes(const DagView& dag, uint32_t level,
+std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                                 const std::vector<uint64_t>& offsets, OffsetTable& children,
                                 std::vector<uint32_t>& words) {
+  const NodeChecks checks(dag, level, blocks);
   std::vector<uint32_t> starts;
   starts.reserve(offsets.size());
   for (const uint64_t offset : offsets) dag.prefetch(level, offset);
   for (const uint64_t offset : offsets) {
+    checks.expect_intact(offset);
     const DagView::Children c = dag.children_of_node(level, offset);
     starts.push_back(static_cast<uint32_t>(words.size() - kHeaderWords));
     words.push_back(c.mask);
@@ -56,26 +60,34 @@ void add_64(uint64_t value, std::vector<uint32_t>& words) {
   words.push_back(static_cast<uint32_t>(value >> 32));
 }
 
-void add_bricks(const DagView& dag, const std::vector<uint64_t>& offsets,
-                std::vector<uint32_t>& words) {
+void add_bricks(const DagView& dag, const CheckedBlocks* blocks,
+                const std::vector<uint64_t>& offsets, std::vector<uint32_t>& words) {
   const uint32_t level = dag.grid_levels() - kBrickLevels;
+  const NodeChecks checks(dag, level, blocks);
   for (const uint64_t offset : offsets) dag.prefetch(level, offset);
   for (const uint64_t offset : offsets) {
+    checks.expect_intact(offset);
     if (offset % 2 != 0) dag.corrupt(level, offset);
     add_64(dag.brick(offset), words);
   }
 }
 
 // What a coarse brick needs is all over the file: each loop begins to load what the next one reads.
-void add_cut_off(const DagView& dag, uint32_t level, const std::vector<uint64_t>& offsets,
-                 std::vector<uint32_t>& words) {
+void add_cut_off(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
+                 const std::vector<uint64_t>& offsets, std::vector<uint32_t>& words) {
+  const NodeChecks checks(dag, level, blocks), child_checks(dag, level + 1, blocks);
   std::vector<DagView::Children> nodes;
   nodes.reserve(offsets.size());
   for (const uint64_t offset : offsets) dag.prefetch(level, offset);
   for (const uint64_t offset : offsets) {
+    checks.expect_intact(offset);
     nodes.push_back(dag.children_of_node(level, offset));
     for (int i = 0; i < 8; ++i)
-      if (nodes.back().has(i)) dag.prefetch(level + 1, dag.offset(nodes.back(), i));
+      if (nodes.back().has(i)) {
+        const uint64_t child = dag.offset(nodes.back(), i);
+        dag.prefetch(level + 1, child);
+        child_checks.expect_intact(child);
+      }
   }
   for (size_t i = 0; i < offsets.size(); ++i) {
     add_64(offsets[i], words);
@@ -90,13 +102,13 @@ uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level) {
   return level + (below - 1) % tile_levels + 1;
 }
 
-std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels,
-                                  const TileAddress& root) {
+std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels, const TileAddress& root,
+                                  const CheckedBlocks* blocks) {
   if (tile_levels < 1 || tile_levels > kMaxTileLevels)
     throw Error(ErrorCode::kInvalidInput, std::to_string(tile_levels) +
                                               " levels in a tile: expected 1 to " +
                                               std::to_string(kMaxTileLevels));
-  check_address(dag, root);
+  check_address(dag, root, blocks);
   const uint32_t end = tile_end(dag.grid_levels(), tile_levels, root.level);
   const bool has_bricks = end + kBrickLevels == dag.grid_levels();
   std::vector<uint32_t> words(kHeaderWords);
@@ -106,7 +118,7 @@ std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels,
   for (uint32_t level = root.level; level < end; ++level) {
     OffsetTable children;
     const size_t begin = words.size();
-    const auto starts = add_nodes(dag, level, nodes.offsets(), children, words);
+    const auto starts = add_nodes(dag, blocks, level, nodes.offsets(), children, words);
     if (level > root.level) point_to(starts, parents, begin, words);
     parents = begin;
     nodes = std::move(children);
@@ -116,9 +128,9 @@ std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels,
   words[2] = static_cast<uint32_t>(words.size() - kHeaderWords);
   words[3] = static_cast<uint32_t>(nodes.offsets().size());
   if (has_bricks)
-    add_bricks(dag, nodes.offsets(), words);
+    add_bricks(dag, blocks, nodes.offsets(), words);
   else
-    add_cut_off(dag, end, nodes.offsets(), words);
+    add_cut_off(dag, blocks, end, nodes.offsets(), words);
   return words;
 }
 

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/format/global/checked_blocks.h"
 #include "query/dag_view.h"
 
 namespace voxdag::query {
@@ -30,8 +31,9 @@ uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level);
 
 // The words of the tile. `tile_levels` is 1 to kMaxTileLevels. Throws Error{kNotFound} if no node
 // can lie at the address, and Error{kCorrupt} if what lies there leads to no node or brick: the
-// address is that of a word within a node, or the file is damaged.
-std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels,
-                                  const TileAddress& root);
+// address is that of a word within a node, or the file is damaged. With the blocks of its file, the
+// latter is DamagedBlock, and found even if what lies there looks like nodes.
+std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels, const TileAddress& root,
+                                  const CheckedBlocks* blocks = nullptr);
 
 }  // namespace voxdag::query

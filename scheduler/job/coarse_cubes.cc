@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/popcount8.h"
 #include "core/dag/brick.h"
@@ -79,7 +80,7 @@ class ArtifactRows {
 
 }  // namespace
 
-void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder) {
+void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, double max_read_s) {
   const std::string store_path = WorkFolder::store_path(work_folder);
   if (!files.exists(store_path))
     throw Error(ErrorCode::kNotFound, work_folder + " has no job store");
@@ -88,16 +89,26 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder) {
   std::erase_if(leaves, [](const StoredSubvolume& s) { return s.state != SubvolumeState::kBuilt; });
   built_ = leaves.size();
   std::map<SubvolumeId, CoarseCube> cubes;
-  std::unique_ptr<ArtifactRows> rows;
-  for (const StoredSubvolume& leaf : leaves) {
-    if (leaf.summary.empty()) continue;
+  std::erase_if(leaves, [&](const StoredSubvolume& leaf) {
+    if (leaf.summary.empty()) return true;
     // The job may have begun again: only the same artifact has the same cells.
     const auto known = cubes_.find(leaf.id);
-    if (known != cubes_.end() && known->second.cube == leaf.cube &&
-        known->second.artifact == leaf.artifact) {
-      cubes.insert(*known);
-      continue;
-    }
+    if (known == cubes_.end() || known->second.cube != leaf.cube ||
+        known->second.artifact != leaf.artifact)
+      return false;
+    cubes.insert(*known);
+    return true;
+  });
+  // Those that cannot be read are tried each time: the others must have their turn, too.
+  std::rotate(leaves.begin(),
+              std::find_if(leaves.begin(), leaves.end(),
+                           [&](const StoredSubvolume& leaf) { return leaf.id >= next_; }),
+              leaves.end());
+  const double end_s = wall_seconds() + max_read_s;
+  std::unique_ptr<ArtifactRows> rows;
+  for (const StoredSubvolume& leaf : leaves) {
+    next_ = leaf.id;
+    if (&leaf != &leaves[0] && wall_seconds() > end_s) break;
     try {
       if (!rows || rows->ref() != leaf.artifact)
         rows = std::make_unique<ArtifactRows>(

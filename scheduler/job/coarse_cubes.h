@@ -3,6 +3,7 @@
 // process builds there. Used by one thread at a time.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -23,9 +24,10 @@ struct CoarseCube {
 class CoarseCubes {
  public:
   // Looks at the folder again, and reads the artifacts that are new since the last time. One that
-  // cannot be read is left out: it may be merged already and its bytes freed. Throws
-  // Error{kNotFound} if the folder has no job store, and as JobStore does.
-  void refresh(FileSystem& files, const std::string& work_folder);
+  // cannot be read is left out: it may be merged already and its bytes freed. After `max_read_s`
+  // the rest is left for the next times, but for one. Throws Error{kNotFound} if the folder has no
+  // job store, and as JobStore does.
+  void refresh(FileSystem& files, const std::string& work_folder, double max_read_s = HUGE_VAL);
 
   uint64_t total() const { return total_; }
   // Built subvolumes, empty ones and those that are left out among them.
@@ -36,6 +38,7 @@ class CoarseCubes {
  private:
   uint64_t total_ = 0, built_ = 0;
   std::map<SubvolumeId, CoarseCube> cubes_;
+  SubvolumeId next_ = 0;  // that is read first
 };
 
 }  // namespace voxdag

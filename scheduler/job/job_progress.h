@@ -28,6 +28,10 @@ class JobProgress : public Progress {
   void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override {
     shown_.set_subvolumes(resolution, all);
   }
+  void set_grid(const std::array<double, 3>& origin, double edge) override {
+    shown_.set_grid(origin, edge);
+  }
+  void subvolume_begun(int64_t id) override { shown_.subvolume_begun(id); }
   void subvolume_built(const SubvolumeStatus& built) override { shown_.subvolume_built(built); }
   void subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) override {
     shown_.subvolume_split(id, parts);

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "core/base/cancel_token.h"
 #include "server/api/access/concurrency_limiter.h"
 #include "server/api/metrics.h"
 #include "server/config.h"
@@ -39,6 +40,8 @@ struct Context {
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
   ViewedFiles viewed{files, 16};
   PartialViews partial{files, 16};
+  // Canceled when the service stops.
+  CancelToken stopping = {};
   // Held while a job that uses scenes is added or tried again, and while a scene that no job uses
   // is replaced or removed: neither may happen between the other's check and its change.
   std::mutex scene_mutex = {};

@@ -81,6 +81,7 @@ bool Exchange::answer(Response response, bool last) {
   add("Date", http_date());
   add("X-Content-Type-Options", "nosniff");
   add("Referrer-Policy", "no-referrer");
+  add("Cross-Origin-Resource-Policy", "same-origin");
   if (!response.headers.contains("Content-Security-Policy"))
     add("Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'");
   if (!keep_alive) add("Connection", "close");

@@ -20,8 +20,9 @@ struct Problem : std::exception {
   int status;
   std::string code;
   std::string detail;
-  std::string state;  // of the job that is in the wrong one; "" elsewhere
-  HeaderMap headers;  // fields of the answer: Retry-After, Allow, Content-Range, ...
+  std::string state;     // of the job that is in the wrong one; "" elsewhere
+  std::string log_text;  // what the log gets, clients do not; "" for nothing
+  HeaderMap headers;     // fields of the answer: Retry-After, Allow, Content-Range, ...
 };
 
 // The problem of an error code, with the status of docs/errors.md.

@@ -1,22 +1,18 @@
 #include "server/tiles/viewed_file.h"
 
-#include <array>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
 #include "query/render/views.h"
+#include "server/tiles/manifest.h"
 
 namespace voxdag::server {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr size_t kHeaderBytes = 4096;
 constexpr size_t kDigestDigits = 32;
-// Of the pictures that the named views are made for.
-constexpr double kAspect = 16.0 / 9;
 
 // The header page has the checksum of the table of the checksums of all other bytes.
 std::string digest_of(const voxdag_reader::File& file) {
@@ -26,54 +22,42 @@ std::string digest_of(const voxdag_reader::File& file) {
   return sha256_hex(text).substr(0, kDigestDigits);
 }
 
-Json camera(const std::string& view, const query::DagView& dag, const voxdag_reader::File& file) {
-  const query::Placement p = query::named_view(view, dag, kAspect, {});
-  return {{"position", query::world_point(p.eye, file)},
-          {"target", query::world_point(p.target, file)},
-          {"fov_degrees", p.fov_degrees}};
-}
-
-Json describe(const voxdag_reader::File& file, const query::DagView& dag,
-              const std::string& digest) {
-  const uint32_t levels = file.grid_levels();
-  Json json = {{"digest", digest},
-               {"resolution", file.resolution()},
-               {"levels", levels},
-               {"tile_levels", kTileLevels},
-               {"batch_max", kMaxTilesOfBatch},
-               {"origin", file.origin()},
-               {"edge", file.edge()},
-               {"voxels", std::to_string(file.voxels())},
-               {"root", nullptr}};
+std::string describe(const voxdag_reader::File& file, const query::DagView& dag,
+                     const std::string& digest, const CancelToken& cancel) {
+  const GridPlace place{{file.origin()[0], file.origin()[1], file.origin()[2]}, file.edge()};
+  auto json =
+      manifest_of(dag, digest, place, dag.empty() ? std::nullopt : std::optional<uint64_t>(0));
+  json["voxels"] = std::to_string(file.voxels());
   if (file.has_colors())
     json["colors"] = {{"levels", file.color_levels()}, {"batch_max", kMaxColorPagesOfBatch}};
-  if (dag.empty()) return json;
-  json["root"] = {{"level", 0}, {"offset", 0}};
-  if (file.brick_level() == 0) {
-    const uint64_t mask = dag.brick(0);
-    json["root_brick"] = {static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)};
-  }
-  const query::Box box = query::occupied_box(dag);
+  if (dag.empty()) return json.dump();
+  query::NamedViews views(dag, cancel);
+  const query::Box& box = views.box();
   json["box"] = {{"low", box.low.v}, {"high", box.high.v}};
-  json["camera"] = camera("auto", dag, file);
+  json["camera"] = camera_of("auto", views, dag, place);
   for (const std::string& view : query::view_names())
-    if (view != "auto" && view != "inside") json["views"][view] = camera(view, dag, file);
-  return json;
+    if (view != "auto" && view != "inside")
+      json["views"][view] = camera_of(view, views, dag, place);
+  return json.dump();
 }
 
 }  // namespace
 
-ViewedFile::ViewedFile(const std::string& path, const FileIdentity& identity)
-    : ViewedFile(path, identity, map_global_file(path)) {}
+ViewedFile::ViewedFile(const std::string& path, const FileIdentity& identity,
+                       std::shared_ptr<ManifestCache> manifests)
+    : ViewedFile(path, identity, map_global_file(path), std::move(manifests)) {}
 
 ViewedFile::ViewedFile(const std::string& path, const FileIdentity& identity,
-                       std::shared_ptr<const voxdag_reader::Bytes> bytes)
+                       std::shared_ptr<const voxdag_reader::Bytes> bytes,
+                       std::shared_ptr<ManifestCache> manifests)
     : identity_(identity),
       bytes_(std::move(bytes)),
       mapping_(bytes_->data(), bytes_->size()),
       file_(read_header(path)),
+      blocks_(*file_),
       dag_(*file_),
-      digest_(digest_of(*file_)) {
+      digest_(digest_of(*file_)),
+      manifests_(std::move(manifests)) {
   expect_whole();
 }
 
@@ -86,8 +70,16 @@ std::unique_ptr<voxdag_reader::File> ViewedFile::read_header(const std::string& 
   }
 }
 
-const std::string& ViewedFile::manifest() const {
-  std::call_once(manifest_once_, [&] { manifest_ = describe(*file_, dag_, digest_).dump(); });
+const std::string& ViewedFile::manifest(const CancelToken& cancel) const {
+  if (has_manifest_) return manifest_;
+  const std::lock_guard lock(manifest_mutex_);
+  if (has_manifest_) return manifest_;
+  const auto known = manifests_ ? manifests_->find(digest_) : std::nullopt;
+  if (!known && !dag_.empty()) blocks_.expect_intact(dag_.level(0).words.data(), 8);  // the root
+  manifest_ = known ? *known : describe(*file_, dag_, digest_, cancel);
+  expect_whole();
+  if (manifests_ && !known) manifests_->keep(digest_, manifest_);
+  has_manifest_ = true;
   return manifest_;
 }
 
@@ -95,6 +87,15 @@ void ViewedFile::expect_whole() const {
   if (mapping_.is_damaged())
     throw Error(ErrorCode::kIo,
                 "the DAG became shorter, or its disk failed, while it was looked at");
+}
+
+bool ViewedFile::was_overwritten() const {
+  try {
+    return system_files().open_read(file_->path())->identity() != identity_;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound) throw;
+    return false;
+  }
 }
 
 }  // namespace voxdag::server

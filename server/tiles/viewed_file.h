@@ -1,46 +1,46 @@
-// A finished DAG that viewers look at: its file, open, and what each of their requests needs of it.
-// Thread-safe.
+// A finished DAG that viewers look at: its file, open. Thread-safe.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <string>
 
-#include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
 #include "core/io/watched_mapping.h"
-#include "query/dag_view.h"
+#include "server/tiles/manifest_cache.h"
+#include "server/tiles/viewed_dag.h"
 
 namespace voxdag::server {
 
-// How many levels of nodes a tile has; docs/api.md says why.
-inline constexpr uint32_t kTileLevels = 3;
-// How many tiles a request may ask for.
-inline constexpr size_t kMaxTilesOfBatch = 64;
-// And how many color pages.
-inline constexpr size_t kMaxColorPagesOfBatch = 256;
-
-class ViewedFile {
+class ViewedFile : public ViewedDag {
  public:
   // Throws Error if the file is no valid DAG; only its header and checksum table are read. Pages
   // that cannot be read are survived: while it is opened they are an Error{kIo}.
-  ViewedFile(const std::string& path, const FileIdentity& identity);
+  // Manifests are looked for and stored in `manifests`, if it is given.
+  ViewedFile(const std::string& path, const FileIdentity& identity,
+             std::shared_ptr<ManifestCache> manifests = nullptr);
   // The same of a file that is mapped already.
   ViewedFile(const std::string& path, const FileIdentity& identity,
-             std::shared_ptr<const voxdag_reader::Bytes> bytes);
+             std::shared_ptr<const voxdag_reader::Bytes> bytes,
+             std::shared_ptr<ManifestCache> manifests = nullptr);
 
-  const query::DagView& dag() const { return dag_; }
-  const voxdag_reader::File& file() const { return *file_; }
+  const query::DagView& dag() const override { return dag_; }
+  const CheckedBlocks* blocks() const override { return &blocks_; }
+  const voxdag_reader::File* colored_file() const override { return file_.get(); }
   // Of the file when it was opened.
   const FileIdentity& identity() const { return identity_; }
-  // 32 hex digits that stand for the contents of the file and for how its tiles are made.
-  const std::string& digest() const { return digest_; }
-  // What a viewer needs to begin, as JSON. The first call looks for the cameras, which may take a
-  // second, or longer if the file is not in memory; others wait for it.
-  const std::string& manifest() const;
-  // Throws Error{kIo} if a part of the file could not be read since it was opened, because it
-  // became shorter or its disk failed: what was made from it then is wrong.
-  void expect_whole() const;
+  // Of the contents of the file and of how its tiles are made.
+  const std::string& digest() const override { return digest_; }
+  // The first call looks for the cameras, which may take a second, or longer if the file is not in
+  // memory; others wait for it. If it is canceled, the next one begins again.
+  const std::string& manifest(const CancelToken& cancel) const override;
+  void expect_whole() const override;
+  // Whether expect_whole() throws: the file is to be opened again.
+  bool is_broken() const { return mapping_.is_damaged(); }
+  // A file that was removed still has its contents.
+  bool was_overwritten() const override;
+  bool is_first_damage() const override { return !has_damage_.exchange(true); }
 
  private:
   std::unique_ptr<voxdag_reader::File> read_header(const std::string& path) const;
@@ -49,10 +49,14 @@ class ViewedFile {
   const std::shared_ptr<const voxdag_reader::Bytes> bytes_;
   const WatchedMapping mapping_;  // from before the first byte is read
   const std::unique_ptr<voxdag_reader::File> file_;
+  const CheckedBlocks blocks_;
   const query::DagView dag_;
   const std::string digest_;
-  mutable std::once_flag manifest_once_;
+  const std::shared_ptr<ManifestCache> manifests_;  // or null
+  mutable std::atomic<bool> has_damage_{false};
+  mutable std::mutex manifest_mutex_;  // guards the next while it is made
   mutable std::string manifest_;
+  mutable std::atomic<bool> has_manifest_{false};  // manifest_ does not change any more
 };
 
 }  // namespace voxdag::server

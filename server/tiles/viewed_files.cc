@@ -11,21 +11,28 @@ std::shared_ptr<const ViewedFile> ViewedFiles::open(const std::string& path) {
   const FileIdentity identity = files_.open_read(path)->identity();
   {
     const std::lock_guard lock(mutex_);
-    const auto found = std::find_if(entries_.begin(), entries_.end(),
-                                    [&](const Entry& e) { return e.path == path; });
-    if (found != entries_.end() && found->file->identity() == identity) {
-      found->used_s = wall_seconds();
-      entries_.splice(entries_.begin(), entries_, found);
-      return found->file;
-    }
+    if (const auto found = find(path, identity); found != entries_.end()) return found->file;
   }
   // Outside of the lock: other files need not wait for this one's disk.
-  auto file = std::make_shared<const ViewedFile>(path, identity);
+  auto file = std::make_shared<const ViewedFile>(path, identity, manifests_);
   const std::lock_guard lock(mutex_);
+  // Another request was faster: one file has one manifest, and its blocks are compared once.
+  if (const auto found = find(path, identity); found != entries_.end()) return found->file;
   entries_.remove_if([&](const Entry& e) { return e.path == path; });
   entries_.push_front({path, file, wall_seconds()});
   if (entries_.size() > max_open_) entries_.pop_back();
   return file;
+}
+
+ViewedFiles::Entries::iterator ViewedFiles::find(const std::string& path,
+                                                 const FileIdentity& identity) {
+  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) {
+    return e.path == path && e.file->identity() == identity && !e.file->is_broken();
+  });
+  if (found == entries_.end()) return found;
+  found->used_s = wall_seconds();
+  entries_.splice(entries_.begin(), entries_, found);
+  return found;
 }
 
 void ViewedFiles::close(const std::string& path) {
@@ -46,7 +53,8 @@ size_t ViewedFiles::size() const {
 
 bool ViewedFiles::is_current(const Entry& entry) const {
   try {
-    return files_.open_read(entry.path)->identity() == entry.file->identity();
+    return !entry.file->is_broken() &&
+           files_.open_read(entry.path)->identity() == entry.file->identity();
   } catch (const Error&) {
     return false;
   }

@@ -1,6 +1,7 @@
 // The files that viewers look at now, so that a request need not open and check its file again: a
 // few, those asked for last. A file that was removed or replaced is closed when it is asked for, by
-// close(), or by close_stale(), which is to be called now and then. Thread-safe.
+// close(), or by close_stale(), which is to be called now and then. One of which a part could not
+// be read is opened again. Manifests outlive their files here. Thread-safe.
 #pragma once
 
 #include <list>
@@ -31,12 +32,18 @@ class ViewedFiles {
     std::shared_ptr<const ViewedFile> file;
     double used_s;
   };
+  using Entries = std::list<Entry>;
+  // The entry of a file with this identity, moved to the front, or end().
+  Entries::iterator find(const std::string& path, const FileIdentity& identity);
   bool is_current(const Entry& entry) const;
+
+  static constexpr size_t kMaxManifests = 256;
 
   FileSystem& files_;
   const size_t max_open_;
   mutable std::mutex mutex_;  // guards the next
-  std::list<Entry> entries_;  // used last first
+  Entries entries_;           // used last first
+  const std::shared_ptr<ManifestCache> manifests_ = std::make_shared<ManifestCache>(kMaxManifests);
 };
 
 }  // namespace voxdag::server

@@ -1,6 +1,8 @@
 """Headless Chromium, driven by Playwright, and windows of it that record every error."""
 
 import contextlib
+import copy
+import importlib.util
 import os
 import re
 import shutil
@@ -17,23 +19,31 @@ delete window.showSaveFilePicker;  // it would open a dialog that nobody answers
 """
 
 
+def missing():
+    """What a test in a browser needs and this machine lacks, or None."""
+    if importlib.util.find_spec("playwright") is None:
+        return "no Playwright here (pip install playwright)"
+    if not chromium_path():
+        return "no Chromium here (apt-get install chromium)"
+    return None
+
+
+def chromium_path():
+    return shutil.which("chromium") or shutil.which("chromium-browser")
+
+
 def in_chromium(name, screenshots, check, options=()):
     """Calls check(browser, folder, screenshots folder) and returns the exit status of the test."""
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        print("skipped: no Playwright here (pip install playwright)")
+    if lack := missing():
+        print(f"skipped: {lack}")
         return SKIPPED
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if not chromium:
-        print("skipped: no Chromium here (apt-get install chromium)")
-        return SKIPPED
+    from playwright.sync_api import sync_playwright
     # Chromium's sandbox does not work for root.
     options = [*options, *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with tempfile.TemporaryDirectory(prefix=f"check-{name}-") as scratch, sync_playwright() as play:
         pictures = Path(screenshots or Path(scratch) / "screenshots").resolve()
         pictures.mkdir(parents=True, exist_ok=True)
-        browser = play.chromium.launch(executable_path=chromium, args=options)
+        browser = play.chromium.launch(executable_path=chromium_path(), args=options)
         check(browser, Path(scratch), pictures)
         browser.close()
     print(f"the {name} passes")
@@ -43,14 +53,25 @@ def in_chromium(name, screenshots, check, options=()):
 class Window:
     """Records every error that the browser reports; leave() fails if there were any."""
 
-    timeout_ms = 60_000  # for each step
+    timeout_ms = 120_000  # for each step, on a slow machine
 
     def __init__(self, browser, pictures, name, **options):
-        self.name, self.pictures = name, pictures
         self.context = browser.new_context(accept_downloads=True, **options)
         self.context.set_default_timeout(self.timeout_ms)
-        self.context.add_init_script(WATCH_POLICY)
+        self.owns_context = True
+        self.begin(pictures, name)
+
+    def another(self, name):
+        """A window with the cache and the options of this one, which opens sooner than one of its own."""
+        other = copy.copy(self)
+        other.owns_context = False
+        other.begin(self.pictures, name)
+        return other
+
+    def begin(self, pictures, name):
+        self.name, self.pictures = name, pictures
         self.page = self.context.new_page()
+        self.page.add_init_script(WATCH_POLICY)
         self.errors = []
         self.expected = None  # pattern of console errors that the current step causes
         self.page.on("console", self.on_console)
@@ -76,4 +97,4 @@ class Window:
         violations = self.page.evaluate("window.violations")
         assert not violations, f"{self.name}: policy violated: {violations}"
         assert not self.errors, f"{self.name}: {self.errors}"
-        self.context.close()
+        (self.context if self.owns_context else self.page).close()

@@ -72,9 +72,9 @@ def means(pixels):
     return [sum(pixels[channel::4]) / (len(pixels) / 4) for channel in range(3)]
 
 
-def rendered(visitor, voxdag, built, camera, *options):
+def rendered(visitor, voxdag, built, camera, *options, size=(WIDTH, HEIGHT)):
     path = voxdag.folder / "colors.png"
-    voxdag.run("render", built, "-o", path, *camera.split(), "--force", "--size", f"{WIDTH}x{HEIGHT}", "--samples", 2,
+    voxdag.run("render", built, "-o", path, *camera.split(), "--force", "--size", "x".join(map(str, size)), "--samples", 2,
                *options)
     return base64.b64decode(visitor.page.evaluate(DECODE, base64.b64encode(path.read_bytes()).decode()))
 

@@ -4,11 +4,11 @@ import json
 import math
 import re
 
+from picture_checks import HEIGHT, WIDTH, numbers
+from visitor import PIXEL_RATIO
+
+PICK = "async ([x, y]) => (await voxdagViewer.renderer.pick(x, y)).position"
 CAMERA_DIGITS = 5  # that `render` prints agree with what it was given
-
-
-def numbers(text):
-    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", text)]
 
 
 def distance(a, b):
@@ -71,7 +71,20 @@ def check_measure(visitor):
     assert page.evaluate("voxdagViewer.viewer.options.clip") is None
 
 
-def check_mouse(visitor, camera):
+def steady_place(reference, radius=3):
+    """In pixels of the page's canvas: where the distances around differ least, none being that of the sky."""
+    def spread(place):
+        x, y = place
+        around = [reference[row * WIDTH + column] for row in range(y - radius, y + radius + 1)
+                  for column in range(x - radius, x + radius + 1)]
+        return max(around) / min(around)
+
+    places = [(x, y) for x in range(radius, WIDTH - radius, 2) for y in range(radius, HEIGHT - radius, 2)]
+    x, y = min((place for place in places if math.isfinite(spread(place))), key=spread)
+    return (x + 0.5) / PIXEL_RATIO, (y + 0.5) / PIXEL_RATIO
+
+
+def check_mouse(visitor, camera, reference):
     """Drags orbit and pan, the wheel zooms to the cursor, a double click sets the pivot."""
     page = visitor.page
     visitor.show(camera)
@@ -94,22 +107,24 @@ def check_mouse(visitor, camera):
     assert distance(shift, [b - a for a, b in zip(orbited["target"], panned["target"])]) < 1e-6 * math.hypot(*shift)
 
     visitor.show(camera)
-    point = page.evaluate("async () => (await voxdagViewer.renderer.pick(250, 100)).position")
+    cursor = steady_place(reference)
+    point = page.evaluate(PICK, cursor)
     box = page.locator("#scene").bounding_box()
-    page.mouse.move(box["x"] + 250, box["y"] + 100)
+    on_page = box["x"] + cursor[0], box["y"] + cursor[1]
+    page.mouse.move(*on_page)
     for _ in range(3):
+        eye = visitor.camera()["eye"]
         page.mouse.wheel(0, -200)
-        page.wait_for_timeout(120)
+        visitor.wait_until("(eye) => voxdagViewer.camera.eye[0] !== eye[0] && voxdagViewer.viewer.controls.anchor.point", eye)
     zoomed = visitor.camera()
     assert distance(zoomed["eye"], point) < 0.8 * distance(before["eye"], point)
-    again = page.evaluate("async () => (await voxdagViewer.renderer.pick(250, 100)).position")
+    again = page.evaluate(PICK, cursor)
     assert distance(point, again) < 0.1 * distance(zoomed["eye"], point), "the cursor's place has moved"
-    page.mouse.dblclick(box["x"] + 250, box["y"] + 100)
+    page.mouse.dblclick(*on_page)
     visitor.wait_until("([x]) => Math.abs(voxdagViewer.camera.target[0] - x) < 1e-6 + Math.abs(x) / 50", again)
     assert visitor.camera()["eye"] == zoomed["eye"]
     page.get_by_role("button", name="Reset").click()
-    page.wait_for_timeout(100)
-    assert distance(visitor.camera()["eye"], zoomed["eye"]) > 1
+    visitor.wait_until("(eye) => Math.hypot(...voxdagViewer.camera.eye.map((c, axis) => c - eye[axis])) > 1", zoomed["eye"])
 
 
 def check_camera_text(visitor, voxdag, built, camera):
@@ -150,6 +165,9 @@ def tab_to(page, wanted, max_steps=60):
     raise AssertionError(f"the Tab key does not reach {wanted}; it is at {focused(page)}")
 
 
+OPPOSITE = {"ArrowLeft": "ArrowRight", "ArrowUp": "ArrowDown", "w": "s", "e": "q", "a": "d", "+": "-"}
+
+
 def check_keyboard(visitor, url, camera):
     """All of it without a mouse, from the top of the page."""
     visitor.open(url)
@@ -158,10 +176,20 @@ def check_keyboard(visitor, url, camera):
     page.evaluate("document.activeElement.blur()")
     tab_to(page, "#home")
     tab_to(page, "#scene")
-    for key, what in (("ArrowLeft", "orbit"), ("w", "fly"), ("e", "rise"), ("+", "zoom in"), ("-", "zoom out")):
+    for key, what in (("ArrowLeft", "orbit"), ("ArrowUp", "orbit"), ("w", "fly"), ("e", "rise"), ("a", "fly left"), ("+", "zoom in")):
         before = visitor.camera()["eye"]
         page.keyboard.press(key)
-        assert visitor.camera()["eye"] != before, f"{key} does not {what}"
+        moved = visitor.camera()["eye"]
+        assert moved != before, f"{key} does not {what}"
+        page.keyboard.press(OPPOSITE[key])
+        # How far depends on how long a key is down, but not where to.
+        back = visitor.camera()["eye"]
+        along = sum((m - b) * (k - m) for b, m, k in zip(before, moved, back))
+        assert along < 0, f"{OPPOSITE[key]} is not the opposite of {key}"
+    before = visitor.camera()["eye"]
+    page.keyboard.press("r")
+    visitor.wait_until("(eye) => voxdagViewer.camera.eye.some((c, axis) => Math.abs(c - eye[axis]) > 1)", before)
+    visitor.show(camera, complete=False)
     page.keyboard.press("f")
     before = visitor.camera()
     page.keyboard.press("ArrowRight")
@@ -186,6 +214,10 @@ def check_keyboard(visitor, url, camera):
     with open(download.value.path(), "rb") as file:
         head = file.read(24)
     assert head[:8] == b"\x89PNG\r\n\x1a\n" and int.from_bytes(head[16:20], "big") > 100
+    page.keyboard.press("o")
+    assert page.locator("#panel").is_hidden()
+    page.keyboard.press("o")
+    assert page.locator("#panel").is_visible() and focused(page) == "scene"
     check_keyboard_in_panel(visitor)
 
 
@@ -251,6 +283,10 @@ def check_phone(visitor, url, camera):
     page.touchscreen.tap(x, y)
     page.get_by_role("button", name="Panel").tap()
     wait_for_pick(page)
+    for button in page.locator("#tools button:visible").all():
+        size = button.bounding_box()
+        assert size["width"] >= 24 and size["height"] >= 24, f"too small for a finger: {button.inner_text()} {size}"
+        assert 0 <= size["x"] and size["x"] + size["width"] <= 390, f"out of reach: {button.inner_text()} {size}"
     box = page.locator("#scene").bounding_box()
     assert box["height"] >= 844 * 0.4, "the panel leaves too little of the picture"
     visitor.picture("panel")
@@ -273,7 +309,7 @@ WebGL2RenderingContext.prototype.getProgramParameter = function(program, name) {
 
 def check_without_webgl(visitor, url, still, lack=NO_WEBGL):
     """A message, with the command for a picture; for a job its still picture."""
-    visitor.context.add_init_script(lack)
+    visitor.page.add_init_script(lack)
     visitor.open(f"{url}#camera=1,2.5,-3e2&target=0,0,0&fov=$(id)", wait=False)
     page = visitor.page
     page.get_by_text("needs WebGL2").wait_for()
@@ -359,40 +395,3 @@ def check_job(visitor, server, voxdag, scene, token):
     if token:
         check_expired_token(visitor, viewer, token)
     return viewer
-
-
-# Pixels in the color of the upper faces of built cubes.
-PAINTED = """() => {
-  const canvas = document.querySelector("canvas.cubes");
-  const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-  let count = 0;
-  for (let i = 0; i < data.length; i += 4)
-    count += data[i + 3] === 255 && data[i + 2] - data[i] > 50;
-  return count;
-}"""
-
-
-def check_running_jobs(visitor, server, voxdag, folder):
-    """A running job shows its subvolumes; a queued one is viewed as soon as it has a result."""
-    def submit(scene, resolution):
-        return json.loads(voxdag.run("submit", folder / scene, "-r", resolution, "--server", server.url, "--json"))["id"]
-
-    visitor.expected = "status of 404"  # nothing to show before the subvolumes are planned, and after the end
-    running, queued = submit("soup.glb", 16384), submit("menger.glb", 128)
-    page = visitor.page
-    visitor.open(f"{server.url}/viewer.html?job={running}", wait=False)
-    page.get_by_role("heading", name="This job is running.").wait_for()
-    page.get_by_text(re.compile(r"^[1-9].* of .* occupied subvolumes are built")).wait_for()
-    page.locator("canvas.cubes").wait_for()
-    partial = json.loads(server.get(f"/api/v1/jobs/{running}/partial"))
-    assert partial["built"] > 0 and partial["total"] > partial["built"], partial
-    painted = page.evaluate(PAINTED)
-    assert painted > 20, f"{painted} pixels of what is built are painted"
-    visitor.picture("running")
-    visitor.open(f"{server.url}/viewer.html?job={queued}", wait=False)
-    page.get_by_role("heading", name="This job is queued.").wait_for()
-    voxdag.run("cancel", running, "--server", server.url)
-    visitor.wait_until("Boolean(window.voxdagViewer)")
-    assert any(math.isfinite(d) for d in visitor.capture(64, 36)[0])
-    visitor.open(f"{server.url}/viewer.html?job={running}", wait=False)
-    page.get_by_text("It has no result to look at.").wait_for()

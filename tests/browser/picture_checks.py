@@ -6,11 +6,15 @@ import time
 
 from visitor import resident_bytes_of_descendants
 
-WIDTH, HEIGHT = 400, 180  # of the canvas in the visitor's window
+WIDTH, HEIGHT = 200, 90  # of the canvas in the visitor's window, in pixels of its own
 MIN_EQUAL_MASK = 0.995
 MIN_EQUAL_DEPTH = 0.99
 MIB = 1 << 20
 PLAIN = "#occlusion=0&shadows=0"  # where the light does not matter: a CPU draws here
+
+
+def numbers(text):
+    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", text)]
 
 
 def camera_text(eye, target, fov):
@@ -29,8 +33,8 @@ def near_camera(dag, eye, target):
     place = list(eye)
     while not dag.is_set([int((c - low) / size) for c, low in zip(place, dag.origin)]):
         place = [c + 0.5 * size * f for c, f in zip(place, forward)]
-    back = [c - 40 * size * f for c, f in zip(place, forward)]
-    return camera_text([back[0], back[1] + 12 * size, back[2]], place, 45)
+    back = [c - 20 * size * f for c, f in zip(place, forward)]
+    return camera_text([back[0], back[1] + 6 * size, back[2]], place, 45)
 
 
 def share_of_sky(depths):
@@ -108,7 +112,7 @@ COARSE_PIXELS = 16
 
 def check_first_view(visitor, url, dag, camera, reference):
     """The tiles that are asked for before anything is drawn are enough for a picture without wide cells or holes."""
-    visitor.context.add_init_script(ONLY_FIRST_VIEW)
+    visitor.page.add_init_script(ONLY_FIRST_VIEW)
     visitor.open(address(url, camera))
     visitor.wait_until("its_tiles")
     depths, levels = visitor.capture(WIDTH, HEIGHT)
@@ -134,45 +138,49 @@ def sky_of_row(row, height):
     return [255 * (1.055 * c ** (1 / 2.4) - 0.055) for c in linear]
 
 
-def inner_pixels(reference):
+def inner_pixels(reference, width, height):
     """The pixels whose neighbors all are of their kind, sky or hit, as (index, row, whether it is a hit)."""
-    for row in range(1, HEIGHT - 1):
-        for column in range(1, WIDTH - 1):
-            at = row * WIDTH + column
-            kinds = {math.isinf(reference[at + WIDTH * y + x]) for y in (-1, 0, 1) for x in (-1, 0, 1)}
+    for row in range(1, height - 1):
+        for column in range(1, width - 1):
+            at = row * width + column
+            kinds = {math.isinf(reference[at + width * y + x]) for y in (-1, 0, 1) for x in (-1, 0, 1)}
             if len(kinds) == 1:
                 yield at, row, False in kinds
 
 
-def worst_region(differences):
+def worst_region(differences, width, height):
     """The mean of the region of 8 x 4 with the largest one, of {pixel: difference}; of regions that have enough."""
     regions = {}
     for at, off in differences.items():
-        regions.setdefault((at // WIDTH * 4 // HEIGHT, at % WIDTH * 8 // WIDTH), []).append(off)
+        regions.setdefault((at // width * 4 // height, at % width * 8 // width), []).append(off)
     return max((sum(each) / len(each) for each in regions.values() if len(each) >= MIN_REGION), key=abs)
 
 
-def assert_light(pixels, rendered, reference, what, has_shadow):
+def assert_light(pixels, rendered, reference, what, has_shadow, size=(WIDTH, HEIGHT)):
     """The canvas, its pixels with their light, is what `render` shows: surfaces in light and shadow, and the sky's gradient
     on which, if the scene does not fill its box, the scene's shadow lies. Returns the brightness of the hits, sorted."""
+    width, height = size
     off, shadow, tones = ({}, {}), {}, []
-    for at, row, is_hit in inner_pixels(reference):
+    for at, row, is_hit in inner_pixels(reference, width, height):
         color, expected = pixels[4 * at:4 * at + 3], rendered[4 * at:4 * at + 3]
         off[is_hit][at] = (sum(color) - sum(expected)) / 3
         if is_hit:
             tones.append(sum(color) / 3)
-        elif sum(sky_of_row(row, HEIGHT)) - sum(expected) > 3 * MIN_SHADOW:
+        elif sum(sky_of_row(row, height)) - sum(expected) > 3 * MIN_SHADOW:
             shadow[at] = off[False][at]
     means = [sum(each.values()) / max(1, len(each)) for each in (*off, shadow)]
-    worst = [worst_region(each) for each in off]
+    worst = [worst_region(each, width, height) for each in off]
     print(f"  light of {what}: hits are brighter than in render by {means[1]:.1f} (a region by {worst[1]:.1f}), sky by "
           f"{means[0]:.1f} ({worst[0]:.1f}), of that {len(shadow)} pixels in shadow by {means[2]:.1f}")
-    assert min(map(len, off)) > 0.05 * WIDTH * HEIGHT, "too little of the sky or of the scene"
-    assert (len(shadow) > 0.01 * WIDTH * HEIGHT) == has_shadow, "a shadow on the floor, or none: the check sees nothing"
+    assert min(map(len, off)) > 0.05 * width * height, "too little of the sky or of the scene"
+    assert (len(shadow) > 0.005 * width * height) == has_shadow, "a shadow on the floor, or none: the check sees nothing"
     for which, max_mean, max_region in ((0, 2, 6), (1, 5, 12)):
         assert abs(means[which]) <= max_mean and abs(worst[which]) <= max_region, "other light than that of render"
     assert abs(means[2]) <= 5, "the floor's shadow is not that of render"
     return sorted(tones)
+
+
+LIGHT_SIZE = 2 * WIDTH, 2 * HEIGHT  # a smaller picture measures its brightness by too few pixels
 
 
 def check_canvas(visitor, camera, reference, rendered):
@@ -180,12 +188,11 @@ def check_canvas(visitor, camera, reference, rendered):
     visitor.page.evaluate("voxdagViewer.viewer.set_options({shadows: true, occlusion: true})")
     visitor.show(camera)
     width, height, pixels = visitor.canvas()
-    assert (width, height) == (WIDTH, HEIGHT), (width, height)
-    tones = assert_light(pixels, rendered, reference, "the canvas", has_shadow=False)
+    assert (width, height) == LIGHT_SIZE, (width, height)
+    tones = assert_light(pixels, rendered, reference, "the canvas", has_shadow=False, size=LIGHT_SIZE)
     dark, bright = tones[len(tones) // 10], tones[len(tones) * 9 // 10]
     assert dark > 20 and bright < 254 and bright - dark > 60, f"no light and shadow: {dark} to {bright}"
     visitor.picture("light")
-    visitor.page.evaluate("voxdagViewer.viewer.set_options({shadows: false, occlusion: false})")
 
 
 # The blocks of the pool: those of the loaded tiles, those that a tile has twice, and those that are in use;
@@ -221,8 +228,8 @@ def check_still(visitor, wait_ms):
 
 def check_budget(visitor, url, cameras, references):
     """Tiles leave a small pool; it never has more than its budget; the picture is right nevertheless."""
-    visitor.open(f"{url}/?budget=1{PLAIN}")
-    assert visitor.statistics()["budgetBytes"] <= MIB
+    visitor.open(f"{url}/?budget=0.25{PLAIN}")
+    assert visitor.statistics()["budgetBytes"] <= MIB / 4
     for camera in cameras.values():
         visitor.show(camera, complete=False)
         until = time.monotonic() + 0.3
@@ -239,8 +246,8 @@ def check_budget(visitor, url, cameras, references):
     assert statistics["evicted"] > 0 and statistics["tiles"] > 1, f"no tile has left: {statistics}"
 
 
-# A pool begins with 1 MiB, not 16: a small scene then needs more.
-FIRST_ROWS, SMALL_ROWS = "const kFirstRows = 256;", 16
+# A pool begins with 256 KiB, not 16 MiB: a small scene then needs more.
+FIRST_ROWS, SMALL_ROWS = "const kFirstRows = 256;", 4
 # There is no memory for textures of tiles beyond that.
 NO_MEMORY = """
 const {texStorage2D, getError} = WebGL2RenderingContext.prototype;
@@ -270,7 +277,7 @@ def check_growing_pool(visitor, url, cameras, references, can_grow):
 
     visitor.page.route("**/tiles/tile_pool.js", begin_small)
     if not can_grow:
-        visitor.context.add_init_script(NO_MEMORY)
+        visitor.page.add_init_script(NO_MEMORY)
     visitor.open(f"{url}/?budget=32{PLAIN}")
     for name in ("wide", "street"):
         camera = cameras[name]
@@ -301,32 +308,35 @@ FLY = """async ([cameras, seconds]) => {
       viewer.camera.turn(0.03, 0);
       viewer.camera.move(0, 0, viewer.camera.distance / 200);
       viewer.schedule();
+      await new Promise((resolve) => setTimeout(resolve, 120));  // leaves the CPU to other checks
       await new Promise((resolve) => requestAnimationFrame(resolve));
       const {tileBytes, poolBytes} = viewer.renderer.statistics();
       if (tileBytes > poolBytes) throw new Error(`${tileBytes} bytes of tiles are in a pool of ${poolBytes}`);
       most = Math.max(most, poolBytes);
     }
   }
-  return [frames, most];
+  return [frames, most, viewer.renderer.statistics().evicted];
 }"""
 
 
 def check_memory(visitor, url, cameras, seconds):
     """After a first flight over all cameras, more flying needs no more memory."""
-    visitor.open(f"{url}/?budget=2{PLAIN}")
+    visitor.open(f"{url}/?budget=0.25{PLAIN}")
     session = visitor.context.new_cdp_session(visitor.page)
 
     def fly(part):
-        frames, most = visitor.page.evaluate(FLY, [list(cameras.values()), part])
+        frames, most, evicted = visitor.page.evaluate(FLY, [list(cameras.values()), part])
         assert frames >= 8, f"{frames} frames in {part} s"
-        assert most <= 2 * MIB
+        assert most <= MIB / 4
         session.send("HeapProfiler.collectGarbage")
-        return session.send("Runtime.getHeapUsage")["usedSize"], resident_bytes_of_descendants()
+        return session.send("Runtime.getHeapUsage")["usedSize"], resident_bytes_of_descendants(), evicted
 
-    heap, resident = fly(max(3, seconds / 4))
-    heap_after, resident_after = fly(seconds)
+    heap, resident, evicted = fly(max(3, seconds / 6))
+    heap_after, resident_after, evicted_after = fly(seconds)
     check_pool(visitor)
+    assert evicted_after > evicted > 0, "no tile has left: the check sees nothing"
     print(f"  flight of {seconds} s: heap {heap / MIB:.1f} to {heap_after / MIB:.1f} MiB, "
-          f"all processes {resident / MIB:.0f} to {resident_after / MIB:.0f} MiB")
+          f"all processes {resident / MIB:.0f} to {resident_after / MIB:.0f} MiB, "
+          f"{evicted} to {evicted_after} tiles have left")
     assert heap_after < heap + 2 * MIB, "the heap grows"
     assert resident_after < resident + 64 * MIB, "the memory of the browser grows"

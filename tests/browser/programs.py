@@ -31,9 +31,9 @@ class Voxdag:
         self.run("build", scene, "-r", resolution, "-o", built)
         return built
 
-    def render(self, built, camera, width, height):
+    def render(self, built, camera, width, height, path=None):
         """Distances along the rays, row by row from the top; what is infinite is sky."""
-        path = self.folder / "depth.npy"
+        path = path or self.folder / "depth.npy"
         self.run("render", built, "-o", self.folder / "picture.png", *camera.split(), "--force",
                  "--size", f"{width}x{height}", "--samples", 1, "--depth", path)
         return read_npy(path, width, height)
@@ -103,6 +103,10 @@ class Server:
                                          headers={"Content-Type": "application/json", **(headers or {})})
         with urllib.request.urlopen(request) as answer:
             return json.load(answer)
+
+    def send(self, method, path, data=None):
+        with urllib.request.urlopen(urllib.request.Request(self.url + path, data, method=method)) as answer:
+            return answer.read()
 
     def __enter__(self):
         return self

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from chromium import Window
 
+# Pixels of the canvas per pixel of the page: a CPU draws here.
+PIXEL_RATIO = 0.5
+
 # After two animation frames the picture has the new camera.
 TWO_FRAMES = """async () => {
   for (let i = 0; i < 2; ++i) await new Promise((resolve) => requestAnimationFrame(resolve));
@@ -53,7 +56,7 @@ READ_CANVAS = """async () => {
 
 class Visitor(Window):
     def __init__(self, browser, pictures, name, width=720, height=230, **options):
-        options.setdefault("reduced_motion", "reduce")
+        options = {"reduced_motion": "reduce", "device_scale_factor": PIXEL_RATIO, **options}
         super().__init__(browser, pictures, name, viewport={"width": width, "height": height}, **options)
 
     def open(self, url, wait=True):

@@ -55,8 +55,17 @@ TEST_F(Extract, Refusals) {
   expect_error(2, "mine.txt", {"extract", "s.vdag", "-o", "mine.txt"});
   EXPECT_EQ(contents("mine.txt"), "not a DAG");
   expect_error(2, "s.vdag", {"extract", "s.vdag", "-o", "s.vdag", "--force"});
+  run_json({"extract", "s.vdag", "-o", "other.vdag", "--level", "4"});
+  const std::string other = contents("other.vdag");
+  expect_error(2, "--force", {"extract", "s.vdag", "-o", "other.vdag"});
+  EXPECT_TRUE(contents("other.vdag") == other);
   expect_error(2, "64MiB", {"extract", "s.vdag", "-o", "x.vdag", "--memory", "63MiB"});
-  expect_error(2, "--level", {"extract", "s.vdag", "-o", "x.vdag", "--level", "9"});
+  expect_error(2, "--level 9: expected 2 to 8",
+               {"extract", "s.vdag", "-o", "x.vdag", "--level", "9"});
+  for (const char* wrong : {"3.5", "-3", "a"})
+    expect_error(2, "--level", {"extract", "s.vdag", "-o", "x.vdag", "--level", wrong});
+  expect_error(2, "--resolution 100: expected a power of two from 4 to 256",
+               {"extract", "s.vdag", "-o", "x.vdag", "--resolution", "100"});
   expect_error(3, "none", {"extract", "none.vdag", "-o", "x.vdag"});
   expect_error(4, "mine.txt", {"extract", "mine.txt", "-o", "x.vdag"});
   run_json({"extract", "s.vdag", "-o", "mine.txt", "--force"});
@@ -66,6 +75,48 @@ TEST_F(Extract, Refusals) {
     others += entry.path().string().find("x.vdag") != std::string::npos ||
               entry.path().string().find(".work") != std::string::npos;
   EXPECT_EQ(others, 0u);
+}
+
+// The options that extract and export share mean the same.
+TEST_F(Extract, SelectionsOfExports) {
+  const std::vector<std::vector<std::string>> selections = {
+      {"--resolution", "32"},
+      {"--region", "40,0,64,128,64,200"},
+      {"--region", "-5,-5,-5,999,70,999"},
+      {"--region", "-256,-512,0,0,-256,256", "--world"},
+      {"--region", "-inf,-512,0,0,inf,256", "--world", "--level", "7"}};
+  for (std::vector<std::string> selection : selections) {
+    SCOPED_TRACE(selection[1]);
+    selection.push_back("--force");
+    std::vector<std::string> extract = {"extract", "s.vdag", "-o", "part.vdag"};
+    std::vector<std::string> to_npz = {"export", "s.vdag", "--to", "npz", "-o", "part.npz"};
+    extract.insert(extract.end(), selection.begin(), selection.end());
+    to_npz.insert(to_npz.end(), selection.begin(), selection.end());
+    const Json extracted = run_json(extract), exported = run_json(to_npz);
+    EXPECT_GT(exported["voxels"], 0);
+    EXPECT_EQ(exported["voxels"], extracted["voxels"]);
+  }
+}
+
+TEST_F(Extract, RefusalsOfExports) {
+  const auto refused = [&](const std::string& why, const std::vector<std::string>& options) {
+    std::vector<std::string> args = {"export", "s.vdag", "--to", "ply"};
+    args.insert(args.end(), options.begin(), options.end());
+    expect_error(2, why, args);
+  };
+  refused("s.vdag is read and would be overwritten", {"-o", "s.vdag", "--force"});
+  refused("expected the name of a file", {"-o", ""});
+  refused("64MiB", {"-o", "x.ply", "--memory", "1"});
+  refused("low corner before", {"-o", "x.ply", "--region", "nan,0,0,1,1,1", "--world"});
+  refused("low corner before", {"-o", "x.ply", "--region", "3,0,0,1,1,1"});
+  refused("outside the grid", {"-o", "x.ply", "--region", "300,0,0,400,1,1"});
+  put("x.ply", "mine");
+  refused("x.ply exists", {"-o", "x.ply"});
+  std::filesystem::create_directory(folder_.file("folder"));
+  refused("folder is not a regular file", {"-o", "folder", "--force"});
+  expect_error(3, "no folder none", {"export", "s.vdag", "--to", "ply", "-o", "none/x.ply"});
+  EXPECT_EQ(contents("x.ply"), "mine");
+  EXPECT_FALSE(exists("x.ply.partial") || exists("x.ply.lock") || exists(".ply.partial"));
 }
 
 }  // namespace

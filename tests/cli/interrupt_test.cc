@@ -2,6 +2,7 @@
 #include <signal.h>
 #include <time.h>
 
+#include <csignal>
 #include <filesystem>
 
 #include "tests/cli/command_line.h"
@@ -58,6 +59,60 @@ TEST_F(Interrupt, StopsAndResumes) {
     }
     EXPECT_GT(caught, 0);
   }
+}
+
+// Extracts and exports, stopped when they have made their first file. A run may end before its
+// signal comes, but not every time.
+class InterruptExport : public Interrupt {
+ protected:
+  void SetUp() override {
+    Interrupt::SetUp();
+    ASSERT_EQ(run({"build", "s.glb", "-r", "1024", "-o", "s.vdag"}).status, 0);
+    std::signal(SIGHUP, SIG_DFL);  // whatever runs the tests
+  }
+  // The answer of a run that is sent the signal when the file `first` is there.
+  Answer interrupt_at(const std::string& first, int signal, const std::vector<std::string>& args) {
+    Answer answer;
+    for (int attempt = 0; attempt < 10; ++attempt) {
+      const pid_t pid = start(args);
+      for (int i = 0; i < 10000 && !exists(first); ++i) sleep_ms(1);
+      kill(pid, signal);
+      answer = wait_for(pid);
+      if (answer.status != 0) break;
+      std::filesystem::remove(folder_.file("out"));
+    }
+    return answer;
+  }
+  size_t outputs() const {
+    size_t count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+      count += entry.path().filename().string().starts_with("out");
+    return count;
+  }
+};
+
+TEST_F(InterruptExport, LeavesNothing) {
+  const std::vector<std::string> extract = {"extract", "s.vdag", "-o", "out", "--threads", "1"};
+  const std::vector<std::string> bt = {"export", "s.vdag", "--to", "bt", "-o", "out"};
+  const std::vector<std::string> ply = {"export", "s.vdag", "--to", "ply", "-o", "out"};
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGKILL})
+    for (const auto& args : {extract, bt, ply}) {
+      SCOPED_TRACE(testing::Message()
+                   << "signal " << signal << " to " << args[0] << " " << args[3]);
+      const Answer answer =
+          interrupt_at(args[0] == "extract" ? "out.lock" : "out.partial", signal, args);
+      ASSERT_EQ(answer.status, signal == SIGKILL ? 128 + SIGKILL : 130) << answer.err;
+      if (signal != SIGKILL) {
+        EXPECT_EQ(outputs(), 0u);
+      } else {
+        EXPECT_GT(outputs(), 0u);
+        // The same command has to succeed, and removes what the killed one has left.
+        const Answer again = run(args);
+        EXPECT_EQ(again.status, 0) << again.err;
+        EXPECT_EQ(outputs(), 1u);
+        std::filesystem::remove(folder_.file("out"));
+      }
+    }
 }
 
 }  // namespace

@@ -40,6 +40,18 @@ TEST_F(View, ServesUntilItIsInterrupted) {
   }
 }
 
+// The cameras of a larger file are still looked for then.
+TEST_F(View, EndsWhileItStarts) {
+  ASSERT_EQ(run({"build", "m.glb", "-r", "2048", "-o", "large.vdag"}).status, 0);
+  put(".stdout", "");
+  const pid_t pid = start({"view", "large.vdag", "--json"});
+  first_line();
+  kill(pid, SIGINT);
+  const Answer answer = wait_for(pid);
+  EXPECT_EQ(answer.status, 0);
+  EXPECT_EQ(answer.err, "");
+}
+
 TEST_F(View, RefusesWhatItCannotShow) {
   put("text.vdag", std::string(10000, 'x'));
   expect_error(3, "none.vdag", {"view", "none.vdag"});

@@ -4,6 +4,7 @@
 #include "core/base/error.h"
 #include "scheduler/job/job_store.h"
 #include "tests/crash/crash_fixture.h"
+#include "tests/unit/io/flip_bits.h"
 
 namespace crash {
 namespace {
@@ -20,11 +21,7 @@ class DamageTest : public CrashTest {
   static void flip(const std::string& path, std::mt19937_64& random) {
     const uint64_t bit = random() % (8 * std::filesystem::file_size(path));
     SCOPED_TRACE(testing::Message() << path << ", bit " << bit);
-    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
-    file.seekg(static_cast<std::streamoff>(bit / 8));
-    const char byte = static_cast<char>(file.get() ^ (1 << bit % 8));
-    file.seekp(static_cast<std::streamoff>(bit / 8));
-    file.put(byte);
+    voxdag::flip_bits(path, bit / 8, 1 << bit % 8);
   }
 
   // Whatever the disk holds: the build ends with the right bytes, or is refused and starts over

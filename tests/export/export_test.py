@@ -4,8 +4,9 @@
     export_test.py VOXDAG LIST_VOXELS FORMAT [TOOLS...]
 
 At three resolutions, at a coarser level, for one region, and for a region of a coarser level; and
-the colors of a scene, for formats whose libraries unit tests do not have. TOOLS are programs of this folder that the decoder of the format starts. Exits with 77, which ctest counts
-as skipped, where the library that decodes is missing.
+the colors of a scene, for formats whose libraries unit tests do not have. TOOLS are programs of this
+folder that the decoder of the format starts. Exits with 77, which ctest counts as skipped, where the
+library that decodes is missing, and with 1 if VOXDAG_SKIP_NOTHING is set.
 """
 
 import json
@@ -18,6 +19,12 @@ import tempfile
 # The libraries are packages of the system, which another interpreter does not see.
 SYSTEM_PYTHON = "/usr/bin/python3"
 
+
+def skip(what):
+    print("skipped: there is no " + what)
+    sys.exit(1 if os.environ.get("VOXDAG_SKIP_NOTHING") else 77)
+
+
 try:
     import numpy
 except ImportError:
@@ -25,8 +32,7 @@ except ImportError:
         os.execve(
             SYSTEM_PYTHON, [SYSTEM_PYTHON, *sys.argv], os.environ | {"VOXDAG_SYSTEM_PYTHON": "1"}
         )
-    print("skipped: there is no numpy here (python3-numpy)")
-    sys.exit(77)
+    skip("numpy here (python3-numpy)")
 
 import decoders
 
@@ -191,8 +197,7 @@ def main():
     ):
         missing = f"{name} in this build of voxdag: its library was not found"
     if missing:
-        print("skipped: there is no " + missing)
-        return 77
+        skip(missing)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         test = Test(voxdag, list_voxels, name, tools)

@@ -51,6 +51,12 @@ def digest(options, *args):
     return (int(count), hashes), seconds
 
 
+def mebibytes(size):
+    """Of a size such as 512MiB or 4GiB."""
+    number, unit = re.fullmatch(r"(\d+)(MiB|GiB)", size).groups()
+    return int(number) * (1024 if unit == "GiB" else 1)
+
+
 class Selection:
     """A file or a region of it, and the digests that exports of it must have."""
 
@@ -94,6 +100,8 @@ def check(options, selection, name, folder):
     assert report["voxels"] == selection.expected("vdag")[0], "another count of voxels is reported"
     size = sum(path.stat().st_size for path in folder.iterdir())
     assert report["bytes"] == size, "another size is reported"
+    most = mebibytes(options.memory) + os.path.getsize(selection.path) / 2**20 + 64
+    assert peak <= most, f"peak memory {peak:.0f} MiB, expected {most:.0f} MiB at most"
     for path in folder.iterdir():
         path.unlink()
     return [f"{size / 2**20:.1f} MiB", f"{wall:.1f} s", f"{seconds:.1f} s", f"{peak:.0f} MiB",
@@ -106,7 +114,7 @@ def main():
     parser.add_argument("--voxdag", default="build/cpu/voxdag")
     parser.add_argument("--digest", default="build/cpu/tests/digest_voxels")
     parser.add_argument("--folder", help="where files are written; a temporary folder of the system")
-    parser.add_argument("--memory", default="4GiB", help="of each export")
+    parser.add_argument("--memory", default="4GiB", help="of each export, in MiB or GiB; its peak is checked")
     parser.add_argument("--formats", help="all that this voxdag has")
     parser.add_argument("--resolution", type=int, default=2048)
     parser.add_argument("--may-refuse", help="formats")

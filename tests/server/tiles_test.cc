@@ -228,10 +228,33 @@ TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
     for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(cube[axis].get<int>() % 2048, 0);
     EXPECT_GT(cube[4].get<uint64_t>() + cube[5].get<uint64_t>(), 0u);
   }
+  // The same as a DAG in tiles.
+  const std::string base = path + "/tiles";
+  Json m;
+  ASSERT_TRUE(until([&] {
+    m = Json::parse(http_->get(base).body);
+    return m.contains("root") && m["root"].is_object();
+  })) << m;
+  EXPECT_EQ(m["resolution"], 65536);
+  EXPECT_LT(m["built"], m["total"]);
+  EXPECT_EQ(m["camera"]["position"].size(), 3u);
+  const std::string version = "?v=" + m["digest"].get<std::string>();
+  const std::string root = std::to_string(m["root"]["offset"].get<uint64_t>());
+  const ClientResponse tile = http_->get(base + "/0/" + root + version);
+  EXPECT_EQ(tile.body.substr(0, 4), "VDT1");
+  EXPECT_EQ(tile.header("Cache-Control"), "private, max-age=31536000, immutable");
+  EXPECT_EQ(http_->get(base + "/batch" + version + "&nodes=0." + root).body,
+            with_length(tile.body));
+  EXPECT_EQ(not_problem(http_->get(base + "/0/0?v=" + std::string(32, '0')), 410, "gone"), "");
+  const ClientResponse colors = http_->get(base + "/colors" + version + "&pages=0.0.0.0");
+  EXPECT_EQ(not_problem(colors, 404, "not_found"), "");
   post("/api/v1/jobs/" + id + "/cancel");
   const std::string done = post_job({{"scene", "m.glb"}, {"resolution", 64}});
   ASSERT_TRUE(until_state(done, "succeeded"));
-  EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/" + done + "/partial"), 404, "not_found"), "");
+  for (const char* more : {"", "/tiles", "/tiles/0/0?v=1"}) {
+    const std::string url = "/api/v1/jobs/" + done + "/partial" + more;
+    EXPECT_EQ(not_problem(http_->get(url), 404, "not_found"), "") << url;
+  }
 }
 
 struct Answers : RunningService {

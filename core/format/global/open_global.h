@@ -35,6 +35,17 @@ auto with_reader_errors(Use use) {
   }
 }
 
+// Returns what `use()` returns. Errors of damage that do not name the file yet do so then.
+template <class Use>
+auto naming_file(const std::string& path, const Use& use) {
+  try {
+    return use();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCorrupt || error.message().starts_with(path)) throw;
+    throw Error(ErrorCode::kCorrupt, path + ": " + error.message());
+  }
+}
+
 // The section of an attribute; one without tiers if the file has none.
 inline const voxdag_reader::ColorSection& section_of(const voxdag_reader::File& file,
                                                      Attribute attribute) {

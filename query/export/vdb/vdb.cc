@@ -35,6 +35,8 @@ constexpr VdbNodeBytes kOpenVdbBytes = {192, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kNanoVdbBytes = {96, 34 << 10, 272 << 10};
 // A color is three floats; a node has one, padded, or a pointer for each child.
 constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
+// Of a leaf in a .vdb file, at least: its mask, which is there twice.
+constexpr uint64_t kVdbLeafBytes = 128;
 constexpr const char* kGridName = "voxels";
 constexpr const char* kColorGridName = "Cd";
 
@@ -56,19 +58,28 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
   }
 }
 
-// A stream into a file of ours. Its errors are rethrown after the library is done with it: streams
-// swallow exceptions.
+// A stream into a file of ours. Streams swallow exceptions, and what the libraries make of that
+// says nothing about the reason: check() throws the first one again.
 class FileBuffer : public std::streambuf {
  public:
-  explicit FileBuffer(ExportFile& file) : file_(file) {}
+  FileBuffer(ExportFile& file, ExportStage& stage) : file_(file), stage_(stage) {}
   void check() const {
     if (failure_) std::rethrow_exception(failure_);
   }
 
  protected:
   std::streamsize xsputn(const char* bytes, std::streamsize count) override {
+    // A whole grid may come at once.
+    constexpr size_t kPieceBytes = 1 << 20;
     const bool done = attempt([&] {
-      file_.write(std::string_view(bytes, static_cast<size_t>(count)));
+      std::string_view rest(bytes, static_cast<size_t>(count));
+      while (!rest.empty()) {
+        const std::string_view piece = rest.substr(0, kPieceBytes);
+        file_.write(piece);
+        stage_.advance(piece.size());
+        if (piece.size() == kPieceBytes) stage_.report();
+        rest.remove_prefix(piece.size());
+      }
       at_ += count;
     });
     return done ? count : 0;
@@ -102,15 +113,17 @@ class FileBuffer : public std::streambuf {
   }
 
   ExportFile& file_;
+  ExportStage& stage_;
   off_type at_ = 0;
   std::exception_ptr failure_;
 };
 
 // The bytes that the trees of a selection take in memory, as far as `limit`: cubes follow one
-// another in Morton order, so that each is counted once.
+// another in Morton order, so that each is counted once. `steps` advances by bricks.
+template <class Steps>
 uint64_t vdb_bytes(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
-                   uint64_t limit) {
-  uint64_t bytes = 0, bricks = 0;
+                   uint64_t limit, Steps steps) {
+  uint64_t bytes = 0;
   Position leaf{-1, 0, 0}, lower{-1, 0, 0}, upper{-1, 0, 0};
   const auto count = [&](const Position& corner, int shift, Position& last, uint64_t cost) {
     const Position cube = {corner[0] >> shift, corner[1] >> shift, corner[2] >> shift};
@@ -119,7 +132,7 @@ uint64_t vdb_bytes(const ExportJob& job, const Selection& selection, const VdbNo
     bytes += cost;
   };
   for_each_brick(job.dag, selection, [&](const Brick& brick) {
-    if (++bricks % 65536 == 0) job.cancel.check();
+    steps.advance(1);
     count(brick.low, 3, leaf, node.leaf);
     count(brick.low, 7, lower, node.lower);
     count(brick.low, 12, upper, node.upper);
@@ -130,14 +143,16 @@ uint64_t vdb_bytes(const ExportJob& job, const Selection& selection, const VdbNo
 
 MemoryCharge charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
   const uint64_t limit = job.budget.available();
-  const uint64_t bytes = vdb_bytes(job, job.selection, node, limit);
+  const uint64_t bytes =
+      vdb_bytes(job, job.selection, node, limit, ExportStage(job, "count", 0, "bricks"));
   if (bytes == 0) refuse_empty(job);
   if (bytes > limit)
     refuse_size(job,
                 "the grid would take over " + size_text(limit) + " of memory, which is --memory" +
                     (job.has_colors ? " (without colors, --gray, it takes less)" : ""),
                 [&](uint32_t level) {
-                  return vdb_bytes(job, coarser(job.selection, level), node, limit) <= limit;
+                  return vdb_bytes(job, coarser(job.selection, level), node, limit,
+                                   CancelCheck(job)) <= limit;
                 });
   return MemoryCharge(job.budget, bytes, "the grid");
 }
@@ -192,21 +207,29 @@ openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job) {
   });
 }
 
+// A file of `min_bytes` or more.
 template <class Write>
-ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, const Write& write) {
+ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, uint64_t min_bytes,
+                             const Write& write) {
+  require_space(job, min_bytes);
   ExportReport report;
   report.voxels = voxels;
   ExportFile file(job.files, job.output);
-  FileBuffer buffer(file);
-  std::ostream stream(&buffer);
   {
-    const ExportStage stage(job, "export", 0, "bytes");
-    write(stream);
+    ExportStage stage(job, "export", min_bytes, "bytes");
+    FileBuffer buffer(file, stage);
+    std::ostream stream(&buffer);
+    try {
+      write(stream);
+    } catch (const std::exception&) {
+      buffer.check();
+      throw;
+    }
+    buffer.check();
   }
-  buffer.check();
   job.cancel.check();
   ExportFile* const written[] = {&file};
-  report.bytes = ExportFile::publish(written);
+  report.bytes = publish(job, written);
   return report;
 }
 
@@ -218,13 +241,15 @@ ExportReport write_vdb(const ExportJob& job) {
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
     uint64_t voxels = 0;
-    openvdb::GridPtrVec grids = {make_voxel_grid<openvdb::BoolGrid>(job, voxels)};
+    const auto grid = make_voxel_grid<openvdb::BoolGrid>(job, voxels);
+    openvdb::GridPtrVec grids = {grid};
     if (job.has_colors) {
       grids.push_back(make_color_grid(job));
       // Half floats tell all bytes of sRGB apart.
       grids.back()->setSaveFloatAsHalf(true);
     }
-    return write_grid_file(job, voxels, [&](std::ostream& stream) {
+    const uint64_t min_bytes = grid->tree().leafCount() * kVdbLeafBytes;
+    return write_grid_file(job, voxels, min_bytes, [&](std::ostream& stream) {
       // Without a codec that some readers may lack: leaves are bits anyway.
       openvdb::io::Stream out(stream);
       out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
@@ -245,7 +270,9 @@ ExportReport write_nvdb(const ExportJob& job) {
         *make_voxel_grid<openvdb::MaskGrid>(job, voxels)));
     if (job.has_colors)
       grids.push_back(nanovdb::openToNanoVDB<nanovdb::HostBuffer>(*make_color_grid(job)));
-    return write_grid_file(job, voxels, [&](std::ostream& stream) {
+    uint64_t bytes = 0;
+    for (const auto& grid : grids) bytes += grid.size();
+    return write_grid_file(job, voxels, bytes, [&](std::ostream& stream) {
       nanovdb::io::writeGrids<nanovdb::HostBuffer, std::vector>(stream, grids,
                                                                 nanovdb::io::Codec::NONE);
     });

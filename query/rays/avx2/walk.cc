@@ -10,9 +10,8 @@ struct Avx2Four {
   __m256d v;
   static Avx2Four load(const double* p) { return {_mm256_load_pd(p)}; }
   static Avx2Four of(double all) { return {_mm256_set1_pd(all)}; }
-  static Avx2Four from(const int32_t* p) {
-    return {_mm256_cvtepi32_pd(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))};
-  }
+  static Avx2Four from(Int4 p) { return {_mm256_cvtepi32_pd((__m128i)p)}; }
+  void store(double* p) const { _mm256_store_pd(p, v); }
 };
 VOXDAG_INLINE Avx2Four operator-(Avx2Four x, Avx2Four y) { return {_mm256_sub_pd(x.v, y.v)}; }
 VOXDAG_INLINE Avx2Four operator+(Avx2Four x, Avx2Four y) { return {_mm256_add_pd(x.v, y.v)}; }
@@ -39,6 +38,10 @@ void walk(PacketJob& job, uint64_t rays) { PacketWalk<Avx2Four>(job, rays).run(r
 
 }  // namespace
 
-WalkPacket walk_packet_avx2() { return __builtin_cpu_supports("avx2") ? walk : nullptr; }
+WalkPacket walk_packet_avx2() {
+  const bool supported = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
+                         __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt");
+  return supported ? walk : nullptr;
+}
 
 }  // namespace voxdag::query

@@ -53,6 +53,11 @@ void AccessControl::check_site(const Request& request) const {
   const std::string host = request.header("Host");
   if (!host.empty() && !is_ours(without_port(host)))
     throw Problem(403, "forbidden", "the Host header does not name this service");
+  // A page cannot read such an answer, but it could make the service work for nothing, and tell
+  // from the time what there is.
+  const auto& segments = request.target.segments;
+  if (!segments.empty() && segments[0] == "api" && request.header("Sec-Fetch-Site") == "cross-site")
+    throw Problem(403, "forbidden", "cross-site request: expected one of this service's pages");
   if (!is_write(request.method)) return;
   const std::string origin = request.header("Origin");
   const size_t scheme = origin.find("://");

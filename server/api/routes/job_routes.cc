@@ -214,6 +214,7 @@ Response delete_job(Context& context, Call& call) {
   context.dispatcher.remove(call.names[0]);
   // Somebody may have asked for a tile in between.
   context.viewed.close(result);
+  context.partial.close(call.names[0]);
   return no_content();
 }
 
@@ -224,7 +225,10 @@ Response retry_job(Context& context, Call& call) {
   const Job job = find_job(context.queue, call.names[0]);
   if (job.state == JobState::kFailed || job.state == JobState::kCanceled)
     context.tasks.make(parse_job_request(job.request), Task::Kind::kBuild);
-  return json_response(202, to_json(context, context.dispatcher.retry(job.id)));
+  const Job queued = context.dispatcher.retry(job.id);
+  // What it builds now may be another scene.
+  if (has_ended(job.state)) context.partial.close(job.id);
+  return json_response(202, to_json(context, queued));
 }
 
 // A handler that applies the action to a job.

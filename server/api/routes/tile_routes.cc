@@ -21,6 +21,10 @@ constexpr const char* kForEver = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
 // Of a node above the bricks in any file (docs/format.md).
 constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
+// From how many bytes on an answer holds its permit until it is sent. Permits bound the work for
+// tiles, and the memory of large answers; that of small ones is bounded by the number of
+// connections. So a client with a slow link does not keep others of the same token waiting.
+constexpr size_t kLargeAnswer = 512 << 10;
 // Of the cells of a color page in any file, and of the page's place.
 constexpr uint64_t kMaxColorLevel = 20, kMaxPage = (uint64_t{1} << 17) - 1;
 
@@ -30,12 +34,14 @@ void append_words(const std::vector<uint32_t>& words, std::string& bytes) {
   bytes.append(reinterpret_cast<const char*>(words.data()), words.size() * sizeof(uint32_t));
 }
 
-std::vector<uint32_t> make_tile(const ViewedFile& file, const query::TileAddress& address) {
+std::vector<uint32_t> make_tile(const ViewedDag& dag, const query::TileAddress& address) {
   try {
-    return query::encode_tile(file.dag(), kTileLevels, address);
+    return query::encode_tile(dag.dag(), kTileLevels, address, dag.blocks());
+  } catch (const DamagedBlock&) {
+    throw;
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::kNotFound && !error.is_corruption()) throw;
-    // Whether the file is damaged, or the offset that of no node, looks the same from here.
+    if (!error.is_corruption()) throw;
+    // The file is as it was written, so the offset is that of no node.
     throw not_found(error.message());
   }
 }
@@ -81,12 +87,12 @@ auto parse_batch(const std::string& name, std::string_view list, size_t most, co
   }
 }
 
-void check_digest(const Call& call, const ViewedFile& file) {
+void check_digest(const Call& call, const ViewedDag& dag) {
   const std::string digest = call.query("v");
-  if (digest.size() != file.digest().size() ||
+  if (digest.size() != dag.digest().size() ||
       digest.find_first_not_of("0123456789abcdef") != std::string::npos)
     throw bad_request("'v': expected the digest of the manifest, 32 hex digits");
-  if (digest != file.digest())
+  if (digest != dag.digest())
     throw Problem(410, "gone",
                   "the file was replaced, or its tiles are made otherwise now: get the manifest");
 }
@@ -94,11 +100,11 @@ void check_digest(const Call& call, const ViewedFile& file) {
 // `make` returns the bytes of the answer. They depend on nothing but the digest and what the
 // request names, which are the entity tag.
 template <class Make>
-Response answer_for_ever(const Call& call, const ViewedFile& file, const std::string& name,
+Response answer_for_ever(const Call& call, const ViewedDag& dag, const std::string& name,
                          const Make& make) {
-  check_digest(call, file);
+  check_digest(call, dag);
   Response response = make_response(200, "application/octet-stream", kForEver);
-  const std::string tag = sha256_hex(file.digest() + ' ' + name).substr(0, kTagDigits);
+  const std::string tag = sha256_hex(dag.digest() + ' ' + name).substr(0, kTagDigits);
   response.headers.emplace("ETag", "W/\"" + tag + '"');
   response.headers.emplace("Vary", "Accept-Encoding, Authorization");
   const std::string known = call.request.header("If-None-Match");
@@ -111,39 +117,66 @@ Response answer_for_ever(const Call& call, const ViewedFile& file, const std::st
   return response;
 }
 
-// An answer, or an error, that comes from zeros in place of what cannot be read is none.
+// The message names the file, which clients do not see.
+Problem damaged(const ViewedDag& dag, const Error& error) {
+  Problem result = problem(ErrorCode::kCorrupt,
+                           "the part of the DAG, or of its colors, that was asked for is damaged: "
+                           "run 'voxdag verify' on the file, and build it again");
+  if (dag.is_first_damage()) result.log_text = error.message();
+  return result;
+}
+
+void expect_unchanged(const ViewedDag& dag) {
+  dag.expect_whole();
+  if (dag.was_overwritten())
+    throw Problem(410, "gone", "the file was replaced while it was read: get the manifest");
+}
+
+// An answer, or an error, that comes from zeros in place of what cannot be read, or from a file
+// that is being written, is none.
 template <class Answer>
-Response answer_of_whole(const Call& call, const ViewedFile& file, const Answer& answer) {
-  file.expect_whole();  // what is damaged already is not read again
+Response answer_of_whole(const Call& call, const ViewedDag& dag, const Answer& answer) {
+  dag.expect_whole();  // what is damaged already is not read again
   try {
-    Response response = answer(call, file);
-    file.expect_whole();
+    Response response = answer(call, dag);
+    expect_unchanged(dag);
     return response;
+  } catch (const Error& error) {
+    expect_unchanged(dag);
+    if (error.code() == ErrorCode::kCorrupt) throw damaged(dag, error);
+    throw;
   } catch (...) {
-    file.expect_whole();
+    expect_unchanged(dag);
     throw;
   }
 }
 
-Response get_manifest(const Call&, const ViewedFile& file) {
-  return json_response(200, file.manifest());
+Response get_manifest(const ViewedDag& dag, const CancelToken& stopping) {
+  try {
+    return json_response(200, dag.manifest(stopping));
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCanceled) throw;
+    throw busy("the service is stopping");
+  }
 }
 
-Response get_tile(const Call& call, const ViewedFile& file) {
+Response get_tile(const Call& call, const ViewedDag& dag) {
   const std::string name = *(call.names.end() - 2) + '.' + call.names.back();
   const query::TileAddress address = parse_address(name, 404);
-  return answer_for_ever(call, file, name, [&] {
+  return answer_for_ever(call, dag, name, [&] {
     std::string bytes;
-    append_words(make_tile(file, address), bytes);
+    append_words(make_tile(dag, address), bytes);
     return bytes;
   });
 }
 
-// What `make` returns for each of the addresses, after its length in bytes.
+// What `make` returns for each of the addresses, after its length in bytes. Its disk may be slow:
+// nobody works for a client that has left, and when a service stops, all are made to leave.
 template <class Addresses, class Make>
-std::string batch_of(const Addresses& addresses, const Make& make) {
+std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {
   std::string bytes;
   for (const auto& address : addresses) {
+    if (call.request.client_has_left()) throw bad_request("the client has left");
     const std::vector<uint32_t> words = make(address);
     append_words({static_cast<uint32_t>(words.size() * sizeof(uint32_t))}, bytes);
     append_words(words, bytes);
@@ -151,24 +184,35 @@ std::string batch_of(const Addresses& addresses, const Make& make) {
   return bytes;
 }
 
-Response get_batch(const Call& call, const ViewedFile& file) {
+Response get_batch(const Call& call, const ViewedDag& dag) {
   const std::string nodes = call.query("nodes");
   const auto addresses = parse_batch("nodes", nodes, kMaxTilesOfBatch, [](const std::string& text) {
     return parse_address(text, 400);
   });
-  return answer_for_ever(call, file, "batch " + nodes, [&] {
-    return batch_of(addresses, [&](const auto& address) { return make_tile(file, address); });
+  return answer_for_ever(call, dag, "batch " + nodes, [&] {
+    return batch_of(call, addresses, [&](const auto& address) { return make_tile(dag, address); });
   });
 }
 
-Response get_colors(const Call& call, const ViewedFile& file) {
+Response get_colors(const Call& call, const ViewedDag& dag) {
   const std::string pages = call.query("pages");
   const auto addresses = parse_batch("pages", pages, kMaxColorPagesOfBatch, parse_page);
-  return answer_for_ever(call, file, "colors " + pages, [&] {
-    query::ColorPages pages_of_file(file.file(), file.dag());
-    return batch_of(addresses,
+  return answer_for_ever(call, dag, "colors " + pages, [&] {
+    if (!dag.colored_file()) throw not_found("the DAG has no colors");
+    query::ColorPages pages_of_file(*dag.colored_file(), dag.dag(), dag.blocks());
+    return batch_of(call, addresses,
                     [&](const auto& address) { return make_page(pages_of_file, address); });
   });
+}
+
+std::shared_ptr<void> tile_permit(Context& context, const Call& call) {
+  auto permit = context.tiles.acquire(call.caller.client);
+  if (!permit) throw busy("too many requests for tiles at a time, of this client or of all", 1);
+  return permit;
+}
+
+void hold_permit(std::shared_ptr<void> permit, Response& response) {
+  if (response.body.size() >= kLargeAnswer) response.permit = std::move(permit);
 }
 
 Viewed result_of_job(Context& context, const Call& call) {
@@ -178,58 +222,84 @@ Viewed result_of_job(Context& context, const Call& call) {
     problem.state = state_name(job.state);
     throw problem;
   }
-  auto permit = context.tiles.acquire(call.caller.client);
-  if (!permit) throw busy("too many requests for tiles at a time, of this client or of all", 1);
+  auto permit = tile_permit(context, call);
   return {context.viewed.open(context.dispatcher.folder(job.id).result()), std::move(permit)};
 }
 
-// What a job that has not succeeded has built so far.
-Response get_partial(Context& context, Call& call) {
+// What `make` returns of what a job that has not succeeded has built so far, given the job, its
+// folder and its resolution.
+template <class Make>
+auto of_unfinished_job(Context& context, const Call& call, const Make& make) {
   const Job job = find_job(context.queue, call.names[0]);
   if (job.state == JobState::kSucceeded)
     throw not_found("the job has its result: expected one that has not succeeded");
-  auto permit = context.tiles.acquire(call.caller.client);
-  if (!permit) throw busy("too many requests for tiles at a time, of this client or of all", 1);
   const uint64_t resolution = nlohmann::json::parse(job.request).at("resolution");
   try {
-    Response response = json_response(
-        200, context.partial.json(job.id, context.dispatcher.folder(job.id).work(), resolution));
-    pack(call.request, response);
-    response.permit = std::move(permit);
-    return response;
+    return make(job.id, context.dispatcher.folder(job.id), resolution);
   } catch (const Error& error) {
-    // A store that is just being made has no tables yet.
-    if (!error.is_corruption() && error.code() != ErrorCode::kInvalidInput) throw;
+    // A store that is just being made has no tables yet, and that of a job that ends is removed
+    // while it is read.
+    const bool is_read = find_job(context.queue, call.names[0]).state != JobState::kSucceeded;
+    if (is_read && !error.is_corruption() && error.code() != ErrorCode::kInvalidInput) throw;
     throw not_found("nothing is known of what the job has built");
   }
 }
 
+Response get_partial(Context& context, Call& call) {
+  auto permit = tile_permit(context, call);
+  Response response = json_response(
+      200, of_unfinished_job(context, call, [&](const auto& id, const auto& folder, uint64_t r) {
+        return context.partial.json(id, folder, r);
+      }));
+  pack(call.request, response);
+  hold_permit(std::move(permit), response);
+  return response;
+}
+
+Viewed part_of_job(Context& context, const Call& call) {
+  auto permit = tile_permit(context, call);
+  // Whoever looks at the part when the job ends need not be refused at once.
+  auto dag = context.partial.known(find_job(context.queue, call.names[0]).id, call.query("v"));
+  if (!dag)
+    dag = of_unfinished_job(context, call, [&](const auto& id, const auto& folder, uint64_t r) {
+      return context.partial.dag(id, folder, r);
+    });
+  return {std::move(dag), std::move(permit)};
+}
+
 }  // namespace
 
-void add_tile_routes(Router& router, const std::string& base, Packing packing,
-                     const FindViewedFile& find) {
+void add_tile_routes(Router& router, const std::string& base, Packing packing, Colors colors,
+                     const FindViewed& find, const CancelToken& stopping) {
   const auto add = [&](const std::string& path, auto answer, const QueryNames& query) {
     const auto handler = [find, answer, packing](Call& call) {
       Viewed viewed = find(call);
-      Response response = answer_of_whole(call, *viewed.file, answer);
+      Response response = answer_of_whole(call, *viewed.dag, answer);
       if (packing == Packing::kGzip) pack(call.request, response);
-      response.permit = std::move(viewed.permit);
+      hold_permit(std::move(viewed.permit), response);
       return response;
     };
     router.add("GET", base + path, Role::kRead, handler, query);
   };
-  add("/tiles", get_manifest, {});
+  const auto manifest = [&stopping](const Call&, const ViewedDag& dag) {
+    return get_manifest(dag, stopping);
+  };
+  add("/tiles", manifest, {});
   add("/tiles/batch", get_batch, {"v", "nodes"});
-  add("/tiles/colors", get_colors, {"v", "pages"});
+  if (colors == Colors::kServed) add("/tiles/colors", get_colors, {"v", "pages"});
   add("/tiles/{level}/{offset}", get_tile, {"v"});
 }
 
 void add_job_tile_routes(Router& router) {
-  const auto find = [&context = router.context()](const Call& call) {
-    return result_of_job(context, call);
+  const auto finder = [&context = router.context()](auto find) {
+    return [&context, find](const Call& call) { return find(context, call); };
   };
-  add_tile_routes(router, "/api/v1/jobs/{id}", Packing::kGzip, find);
-  router.add("GET", "/api/v1/jobs/{id}/partial", Role::kRead, get_partial);
+  const std::string job = "/api/v1/jobs/{id}";
+  const CancelToken& stopping = router.context().stopping;
+  add_tile_routes(router, job, Packing::kGzip, Colors::kServed, finder(result_of_job), stopping);
+  add_tile_routes(router, job + "/partial", Packing::kGzip, Colors::kNone, finder(part_of_job),
+                  stopping);
+  router.add("GET", job + "/partial", Role::kRead, get_partial);
 }
 
 }  // namespace voxdag::server

@@ -111,8 +111,12 @@ std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progre
   ConfinedFiles readable = confined(files, task, folder);
   const BuildContext context{readable, progress, cancel};
   const BuildSpec spec = spec_of(task, folder);
-  return task.kind == Task::Kind::kPlan ? estimate_json(plan_build(spec, context))
-                                        : build(spec, folder, context);
+  if (task.kind == Task::Kind::kPlan) return estimate_json(plan_build(spec, context));
+  // What an earlier run has listed is of no use to this one, whose scene may be another.
+  if (!files.exists(WorkFolder::store_path(folder.work())) && !files.exists(folder.report()) &&
+      files.exists(folder.subvolumes()))
+    files.remove(folder.subvolumes());
+  return build(spec, folder, context);
 }
 
 }  // namespace

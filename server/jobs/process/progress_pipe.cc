@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
+#include <exception>
 
 #include "core/base/clock.h"
-#include "core/base/error.h"
 #include "core/base/text.h"
 
 namespace voxdag::server {
@@ -78,6 +79,21 @@ void ProgressPipe::set_subvolumes(uint64_t resolution, std::span<const Subvolume
   subvolumes_.set(resolution, all);
   subvolumes_changed_ = !all.empty();
   report_subvolumes(true);
+  next_subvolumes_s_ = 0;  // the first of them that is begun is seen at once
+  if (!ticker_.joinable())
+    ticker_ = std::jthread([this](const std::stop_token& end) { tick(end); });
+}
+
+void ProgressPipe::set_grid(const std::array<double, 3>& origin, double edge) {
+  std::lock_guard lock(mutex_);
+  subvolumes_.set_grid(origin, edge);
+}
+
+void ProgressPipe::subvolume_begun(int64_t id) {
+  std::lock_guard lock(mutex_);
+  subvolumes_.begun(id);
+  subvolumes_changed_ = true;
+  report_subvolumes(false);
 }
 
 void ProgressPipe::subvolume_built(const SubvolumeStatus& built) {
@@ -106,6 +122,8 @@ void ProgressPipe::set_cluster_tasks(const ClusterTasks& tasks) {
 
 void ProgressPipe::fail(const std::string& code, const std::string& text) {
   std::lock_guard lock(mutex_);
+  subvolumes_.stop();
+  subvolumes_changed_ = subvolumes_.totals().total > 0;
   report_subvolumes(true);
   send(Failure{code, text});
   log((code == "canceled" ? "stopped: " : "error: ") + text);
@@ -138,6 +156,15 @@ void ProgressPipe::report_subvolumes(bool now) {
   next_subvolumes_s_ = wall_seconds() + std::max(kSubvolumesInterval_s, pause_s);
 }
 
+void ProgressPipe::tick(const std::stop_token& end) {
+  std::unique_lock lock(mutex_);
+  while (!end.stop_requested()) {
+    ticks_.wait_for(lock, end, std::chrono::duration<double>(kSubvolumesInterval_s),
+                    [] { return false; });
+    report_subvolumes(false);
+  }
+}
+
 void ProgressPipe::write_subvolumes() {
   const std::string temporary = subvolumes_path_ + ".new";
   try {
@@ -146,8 +173,8 @@ void ProgressPipe::write_subvolumes() {
     file->write_at(0, std::as_bytes(std::span(text)));
     file->close();
     files_.rename(temporary, subvolumes_path_);
-  } catch (const Error&) {
-    // The next attempt may succeed.
+  } catch (const std::exception&) {
+    // The next attempt may succeed, also if memory ran out: nobody catches what tick() throws.
   }
 }
 

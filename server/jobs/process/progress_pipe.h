@@ -2,8 +2,11 @@
 // on standard error, and the file subvolumes.json, about once per second. Thread-safe.
 #pragma once
 
+#include <condition_variable>
 #include <mutex>
+#include <stop_token>
 #include <string>
+#include <thread>
 
 #include "core/base/progress.h"
 #include "core/io/file_system.h"
@@ -24,6 +27,8 @@ class ProgressPipe : public Progress {
   void end_stage() override;
   void warn(std::string_view message) override;
   void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override;
+  void set_grid(const std::array<double, 3>& origin, double edge) override;
+  void subvolume_begun(int64_t id) override;
   void subvolume_built(const SubvolumeStatus& built) override;
   void subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) override;
   void set_usage(uint64_t memory_bytes, uint64_t disk_bytes) override;
@@ -37,6 +42,8 @@ class ProgressPipe : public Progress {
   void send(const Message& message);
   void send_advance(bool now);
   void report_subvolumes(bool now);
+  // Reports what was too early to be reported when it changed: the next change may be minutes away.
+  void tick(const std::stop_token& end);
   void log(const std::string& text);
   // Writes subvolumes.json, under its name at once. It is not synced, since it can be made again;
   // failures are ignored, since they must not make a build fail.
@@ -51,6 +58,9 @@ class ProgressPipe : public Progress {
   SubvolumeMap subvolumes_;
   bool subvolumes_changed_ = false;
   double next_subvolumes_s_ = 0;
+
+  std::condition_variable_any ticks_;
+  std::jthread ticker_;  // runs tick()
 };
 
 }  // namespace voxdag::server

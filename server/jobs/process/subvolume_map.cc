@@ -1,5 +1,7 @@
 #include "server/jobs/process/subvolume_map.h"
 
+#include "core/base/text.h"
+
 namespace voxdag::server {
 
 void SubvolumeMap::set(uint64_t resolution, std::span<const SubvolumeStatus> all) {
@@ -7,6 +9,20 @@ void SubvolumeMap::set(uint64_t resolution, std::span<const SubvolumeStatus> all
   entries_.clear();
   totals_ = {};
   for (const SubvolumeStatus& subvolume : all) add(subvolume);
+}
+
+void SubvolumeMap::set_grid(const std::array<double, 3>& origin, double edge) {
+  origin_ = origin;
+  edge_ = edge;
+}
+
+void SubvolumeMap::begun(int64_t id) {
+  const auto entry = entries_.find(id);
+  if (entry != entries_.end()) entry->second.begun = true;
+}
+
+void SubvolumeMap::stop() {
+  for (auto& [id, entry] : entries_) entry.begun = false;
 }
 
 void SubvolumeMap::built(const SubvolumeStatus& subvolume) {
@@ -36,15 +52,17 @@ std::string SubvolumeMap::json() const {
   std::string text = "{\"resolution\":" + std::to_string(resolution_) +
                      ",\"built\":" + std::to_string(totals_.built) +
                      ",\"total\":" + std::to_string(totals_.total) + ",\"cubes\":[";
-  const char* separator = "";
+  std::string working;
   for (const auto& [id, entry] : entries_) {
-    text += separator;
-    separator = ",";
-    text += '[';
-    for (const uint32_t position : entry.corner) text += std::to_string(position) + ',';
-    text += std::to_string(entry.edge) + (entry.built ? ",1]" : ",0]");
+    std::string cube = "[";
+    for (const uint32_t position : entry.corner) cube += std::to_string(position) + ',';
+    cube += std::to_string(entry.edge);
+    if (entry.begun && !entry.built) working += (working.empty() ? "" : ",") + cube + ']';
+    text += (text.back() == '[' ? "" : ",") + cube + (entry.built ? ",1]" : ",0]");
   }
-  return text + "]}";
+  text += "],\"working\":[" + working + "],\"origin\":[";
+  for (const double c : origin_) text += (text.back() == '[' ? "" : ",") + number_text(c);
+  return text + "],\"edge\":" + number_text(edge_) + "}";
 }
 
 }  // namespace voxdag::server

@@ -15,22 +15,29 @@ namespace voxdag::server {
 class SubvolumeMap {
  public:
   void set(uint64_t resolution, std::span<const SubvolumeStatus> all);
+  void set_grid(const std::array<double, 3>& origin, double edge);
+  void begun(int64_t id);
+  // What was begun and is not built is no longer worked on.
+  void stop();
   void built(const SubvolumeStatus& subvolume);
   void split(int64_t id, std::span<const SubvolumeStatus> parts);
 
   const SubvolumeTotals& totals() const { return totals_; }
-  // {"resolution": R, "built": n, "total": n, "cubes": [[x, y, z, edge, built], ...]}
+  // {"resolution": R, "built": n, "total": n, "cubes": [[x, y, z, edge, built], ...],
+  //  "working": [[x, y, z, edge], ...], "origin": [x, y, z], "edge": e}
   std::string json() const;
 
  private:
   struct Entry {
     std::array<uint32_t, 3> corner{};
     uint32_t edge = 0;
-    bool built = false;
+    bool begun = false, built = false;
   };
   void add(const SubvolumeStatus& subvolume);
 
   uint64_t resolution_ = 0;
+  std::array<double, 3> origin_{};
+  double edge_ = 1;
   std::map<int64_t, Entry> entries_;  // by id
   SubvolumeTotals totals_;
 };

@@ -1,6 +1,6 @@
 // The viewer: the picture, what moves it, and the panel.
 
-import {announce, h, set_text} from "../lib/dom.js";
+import {announce, h} from "../lib/dom.js";
 import {Camera} from "./camera.js";
 import {camera_fragment, camera_text, fragment_text, GridSpace, parse_camera_fragment, parse_camera_text} from "./camera_text.js";
 import {Controls} from "./controls.js";
@@ -49,6 +49,7 @@ export class Viewer {
     signal.addEventListener("abort", () => {
       clearInterval(timer);
       resizes.disconnect();
+      this.markers.dispose();
       renderer.dispose();
     }, {once: true});
     this.resize();
@@ -160,6 +161,7 @@ export class Viewer {
   }
 
   show_markers() {
+    this.overlay?.draw(this.camera);
     const {pick, start} = this.panel.pick;
     this.markers.show([pick?.position, start?.position], this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
   }
@@ -291,15 +293,21 @@ export class Viewer {
     this.panel.show_statistics(statistics);
     const {problem} = this.renderer;
     const {loading} = statistics;
-    set_text(this.places.status, this.renderer.lost ? "The graphics card is not available: waiting for it."
+    this.show_status(this.renderer.lost ? "The graphics card is not available: waiting for it."
       : problem ? problem_text(problem)
-      : loading > 0 ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"}…` : "");
+      : loading > 0 ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"}…` : "", problem?.code === "replaced");
     this.places.status.classList.toggle("bad", Boolean(problem));
+  }
+
+  show_status(text, can_reload) {
+    if (text === this.status_text) return;
+    this.status_text = text;
+    this.places.status.replaceChildren(text, ...(can_reload
+      ? [" ", h("button", {type: "button", class: "small", on: {click: () => location.reload()}}, "Reload")] : []));
   }
 }
 
 function problem_text({code, message}) {
-  if (code === "replaced") return "The file was replaced by another one: reload the page.";
   if (code === "unauthorized") return "The service no longer accepts the token: reload the page.";
-  return `${message} What is missing is drawn coarse and asked for again.`;
+  return code === "unreachable" ? `${message} What is missing is drawn coarse and asked for again.` : message;
 }

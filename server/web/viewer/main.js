@@ -28,7 +28,7 @@ function budget_bytes() {
 
 // Instead of the picture; nothing hides it again but a new message.
 function show_message(...content) {
-  place("scene").hidden = place("panel").hidden = true;
+  place("scene").hidden = place("panel").hidden = place("tools").hidden = true;
   place("message").hidden = false;
   clear(place("message"), h("div", {class: "card stack narrow"}, ...content));
 }
@@ -44,11 +44,22 @@ function show_title(title) {
 
 // Waits until the job has a result; returns it, or null when it will have none.
 async function finished_job() {
-  let cubes = null;
+  let cubes = null, draws = true;
   for (;;) {
     const job = await get_json(`/api/v1/jobs/${job_id}`, lifetime.signal);
     show_title(title_text(job));
     if (job.state === "succeeded") return job;
+    if (draws && !has_ended(job.state)) {
+      // The same page as that of a result; what it shows grows.
+      const {watch_job} = await import("./running/running_job.js");
+      try {
+        if (await watch_job({job, place, budget_bytes: budget_bytes(), show_picture: hide_message, show_tools, signal: lifetime.signal}))
+          continue;
+      } catch (error) {
+        if (!(error instanceof WebGLUnavailable)) throw error;
+        draws = false;
+      }
+    }
     cubes ??= new (await import("../views/partial_view.js")).PartialView(`/api/v1/jobs/${job_id}/partial`, lifetime.signal);
     show_message(h("h1", {}, `This job is ${state_text(job.state)}.`),
       h("p", {}, has_ended(job.state) ? "It has no result to look at." : "Its result is shown here when it is done."),
@@ -115,12 +126,14 @@ async function start() {
   window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
 }
 
+// The panel stays open or closed when another picture of the job follows.
 function show_tools() {
-  const narrow = matchMedia("(max-width: 700px)").matches;
-  place("panel").hidden = narrow;
+  const before = place("tools").querySelector('[data-tool="toggle_panel"]')?.getAttribute("aria-expanded");
+  const open = before ? before === "true" : !matchMedia("(max-width: 700px)").matches;
+  place("panel").hidden = !open;
   place("tools").hidden = false;
   fill_tools(place("tools"), h("button", {type: "button", class: "small", "data-tool": "toggle_panel",
-                                          "aria-expanded": String(!narrow), "aria-controls": "panel"}, "Panel"));
+                                          "aria-expanded": String(open), "aria-controls": "panel"}, "Panel"));
 }
 
 function show_failure(error) {

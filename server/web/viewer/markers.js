@@ -9,6 +9,10 @@ export class Markers {
     stage.append(...this.marks);
   }
 
+  dispose() {
+    for (const mark of this.marks) mark.remove();
+  }
+
   // `positions` are those of the pick and of the start in voxels, or null.
   show(positions, camera, width, height) {
     const {forward, right, up} = camera.axes();

@@ -3,6 +3,7 @@
 const kTargetMs = 40;           // of a frame while the camera moves
 const kPartMs = 120;            // of what the GPU is given at once
 const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
+const kFewTiles = 64, kCoarsePixels = 16;  // that a picture lacks, and the width of its cells for want of them
 const kMinPart = 1 << 12, kFirstPart = 1 << 17;     // pixels of one part, until it is known how long one takes
 
 export class Pace {
@@ -12,10 +13,22 @@ export class Pace {
     this.call_ms = 0;
     this.interval_ms = 16;       // between two frames of the browser
     this.scale_index = kScales.length - 1;
+    this.lacks_few = false;
   }
 
   get scale() {
     return kScales[this.scale_index];
+  }
+  // The same while tiles arrive. Small pictures find soonest what most of a view needs, but upon the rest their rays hit
+  // by chance: when one lacks few tiles, the pixels of the final picture say what is still missing.
+  get seeking_scale() {
+    return this.lacks_few ? 1 : this.scale;
+  }
+  begin_view() {
+    this.lacks_few = false;
+  }
+  note_lacking(tiles, coarse_pixels) {
+    this.lacks_few ||= tiles < kFewTiles && coarse_pixels < kCoarsePixels;
   }
 
   // The browser offers to draw a frame.

@@ -5,10 +5,11 @@ import {create_context, WebGLUnavailable} from "./gl/gl_objects.js";
 import {Colors, color_budget} from "./colors/colors.js";
 import {Passes} from "./gl/passes.js";
 import {read_feedback, read_hits} from "./gl/feedback.js";
-import {picture_values} from "./gl/picture_values.js";
+import {jitter_of, picture_values} from "./gl/picture_values.js";
 import {View} from "./gl/view.js";
 import {Light} from "./light.js";
 import {Pace} from "./pace.js";
+import {kBlockBytes, statistics_of} from "./statistics.js";
 import {FirstView} from "./tiles/first_view.js";
 import {TileLoader} from "./tiles/tile_loader.js";
 import {TilePool} from "./tiles/tile_pool.js";
@@ -19,12 +20,11 @@ export {WebGLUnavailable};
 
 const kMebibyte = 1 << 20;
 const kBudgetBytes = 256 * kMebibyte, kPhoneBudgetBytes = 64 * kMebibyte;
-const kBlockBytes = 256;         // of the pool: the least that a tile takes
 const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;  // of the canvas: its targets are not part of the budget
 const kMovingMs = 180;          // after the last change of the view
 const kSamples = 16;            // per pixel of a still picture
 const kLitShare = 0.35;         // of what is seen within a scene
-const kSunTrials = 8;           // while tiles arrive that say more
+const kSunTrials = 8;           // in which no fewer tiles are wanted that would say more
 const kFinePixels = 3;          // wide is a cell whose tile may arrive late
 const kFirstWaitMs = 400;       // for the tiles of the first view
 const kQuietRounds = 2;         // readings without a missing tile until a view is complete
@@ -43,6 +43,7 @@ export class Renderer {
     this.view = null;
     this.first_picture_bytes = 0;
     this.sun_trials = 0;
+    this.sun_wanted = Infinity;  // tiles, at the least so far
     this.has_drawn = false;      // since the context is there
     this.colors = null;          // of a file that has some
     this.sample = null;          // {parts, fence, part_ms, busy_ms, ...}: drawn in parts
@@ -79,6 +80,18 @@ export class Renderer {
       if (this.disposed) resolve();
       else if (!this.lost) this.load();
     });
+  }
+
+  // Another root of the same DAG, which has grown: the tiles that are there stay. Resolves to whether it is shown.
+  async show_root(info) {
+    const {loader, store} = this;
+    if (!this.ready || !this.info.root || info.levels <= 2) return false;
+    await loader.load_root(info.root.level, info.root.offset);
+    if (store !== this.store || !this.ready) return false;
+    this.info = info;
+    this.root_pointer = store.root.pointer;
+    this.begin_epoch();
+    return true;
   }
 
   setView(placement) {
@@ -145,17 +158,18 @@ export class Renderer {
     const {passes} = this;
     if (!this.ready || this.empty || !await passes.compile_later()) return null;
     if (!this.ready || passes !== this.passes) return null;
-    const {view} = this, {width, height} = this.size;
+    const {view, store} = this, {width, height} = this.size, {evicted} = store;
     const x = css_x / this.size.css_width * width, y = css_y / this.size.css_height * height;
     const values = this.uniforms(width, height);
     values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
     const words = await passes.pick_one(values);
     if (!words || !this.ready || (words[1] >>> 23 & 1) === 0) return null;
+    if (store.evicted !== evicted) return this.pick(css_x, css_y);  // what it refers to may have left
     const distance = new Float32Array(words.buffer, 0, 1)[0], log2_edge = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
     const direction = view.direction(x, y, width, height);
     const normal = axis === 3 ? direction.map((d) => -d) : [0, 0, 0];
     if (axis < 3) normal[axis] = direction[axis] > 0 ? -1 : 1;
-    const node = words[2] !== 0 ? this.store.cut_off_node(words[2]) : this.store.by_slot[words[7]]?.tile || this.info.root;
+    const node = words[2] !== 0 ? store.cut_off_node(words[2]) : store.by_slot[words[7]]?.tile || this.info.root;
     return {voxel: [...words.slice(4, 7)], level: this.info.levels - log2_edge, position: add(view.eye, scale(direction, distance)),
             distance, normal, nodeLevel: node.level, nodeOffset: String(node.offset)};
   }
@@ -168,24 +182,10 @@ export class Renderer {
   }
 
   statistics() {
-    const {loader, store, passes, times, colors, pace} = this, page_loader = colors?.loader;
-    const sum = (of) => [loader, page_loader].reduce((all, each) => all + (each ? of(each) : 0), 0);
-    return {
-      fps: pace.frame_ms > 0 ? 1000 / pace.frame_ms : 0, tiles: store?.tiles.size || 0, tileBytes: store?.tile_bytes || 0,
-      poolBytes: store?.pool.bytes || 0, targetBytes: passes?.target_bytes || 0, budgetBytes: this.budget_bytes, requested: sum((each) => each.requested_total),
-      failed: sum((each) => each.failed_total), loading: sum((each) => each.loading.size + each.queue.length),
-      full: loader?.is_full || page_loader?.is_full || false,
-      colorPages: colors?.store.pages.size || 0, colorBytes: (colors?.store.used_blocks || 0) * kBlockBytes,
-      colorPoolBytes: colors?.store.bytes || 0,
-      evicted: store?.evicted || 0, rays: this.stats.rays, stepsMean: this.stats.steps_mean, steps99: this.stats.steps_99,
-      internalWidth: passes?.targets?.width || 0, internalHeight: passes?.targets?.height || 0,
-      samples: this.samples, compileMs: times.compile_ms, firstPictureMs: times.first_picture_ms,
-      firstPictureBytes: this.first_picture_bytes,
-      fetchedBytes: this.source.fetched_bytes,
-    };
+    return statistics_of(this);
   }
 
-  // null, or {code, message} of what stops tiles from arriving.
+  // null, or {code, message} of what does not arrive, and why.
   get problem() {
     return this.loader?.problem || (this.options.color && this.colors?.loader.problem) || null;
   }
@@ -231,8 +231,10 @@ export class Renderer {
       this.started.resolve();
     } catch (error) {
       if (is_over()) return;
-      if (this.started.done) console.error(error);
-      this.started.reject(error);
+      if (!this.started.done) return this.started.reject(error);
+      console.error(error);
+      this.loader?.fail(error);
+      this.on_change();
     }
   }
 
@@ -241,7 +243,7 @@ export class Renderer {
     this.root_pointer = undefined;
     this.empty = !root && !this.info.root_brick;
     const for_colors = color_budget(this.info, this.budget_bytes);
-    this.store = new TileStore(new TilePool(this.gl, this.pool_bytes(this.budget_bytes - for_colors)));
+    this.store = new TileStore(new TilePool(this.gl, this.pool_bytes(this.budget_bytes - for_colors)), this.info);
     this.colors = for_colors > 0 ? new Colors(this.gl, this.source, for_colors, (failed) => this.on_arrival(failed)) : null;
     this.loader = new TileLoader(this.source, this.store, (failed) => this.on_arrival(failed));
     if (root && levels > 2) {
@@ -254,10 +256,10 @@ export class Renderer {
     }
   }
 
-  // A small file needs less than the budget: at worst each voxel has a path of tiles of its own.
+  // A small file needs less than the budget: at worst each voxel has a path of tiles. A growing DAG has no number yet.
   pool_bytes(budget_bytes) {
     const {voxels, levels, tile_levels} = this.info;
-    return Math.min(budget_bytes, 4 * kMebibyte + Number(voxels) * kBlockBytes * Math.ceil(levels / tile_levels));
+    return Math.min(budget_bytes, 4 * kMebibyte + Number(voxels ?? Infinity) * kBlockBytes * Math.ceil(levels / tile_levels));
   }
 
   // Begins the picture again. What is missing is found sooner by a small picture than by the rest of a large one.
@@ -274,6 +276,7 @@ export class Renderer {
 
   begin_epoch() {
     this.restart();
+    this.pace.begin_view();
     this.store?.begin_epoch();
     this.loader?.begin_epoch();
     this.colors?.begin_epoch();
@@ -341,7 +344,8 @@ export class Renderer {
     }
     const values = {...this.uniforms(width, height), u_turn: this.light.turn};
     const {place, wanted} = this.passes.choose_sun(values, kLitShare);
-    this.sun_trials++;
+    this.sun_trials = wanted.size < this.sun_wanted ? 0 : this.sun_trials + 1;
+    this.sun_wanted = Math.min(this.sun_wanted, wanted.size);
     if (wanted.size > 0 && this.sun_trials < kSunTrials && !this.loader.is_full) {
       this.loader.demand(wanted, now_ms);
       return false;
@@ -376,7 +380,7 @@ export class Renderer {
     const {width, height} = this.size;
     const arrives = this.quiet_rounds === 0 || (!this.is_complete && this.loaders.some((each) => each.requests > 0));
     const coarse = moving || (arrives && this.loaders.every((each) => each.outage.count === 0));
-    const scale = coarse ? this.pace.scale : 1;
+    const scale = moving ? this.pace.scale : coarse ? this.pace.seeking_scale : 1;
     return {width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)), full: scale === 1};
   }
 
@@ -460,6 +464,8 @@ export class Renderer {
     if (pass.colors) this.colors.take_reading(pass.colors.take(), epoch, now);
     else this.colors?.loader.replace_queue([], 0, now);
     if (epoch !== this.store.epoch) return;
+    const lacking = this.loaders.reduce((sum, each) => sum + each.unmet, 0);
+    if (!moving && !this.loader.first_view) this.pace.note_lacking(lacking, read.coarse_pixels);
     const nothing_comes = this.loaders.every((each) => each.is_idle && !each.awaits_retry);
     if (this.times.first_picture_ms === null && read.coarse_pixels < 16) {
       this.times.first_picture_ms = now - this.times.begin_ms;
@@ -485,9 +491,4 @@ export class Renderer {
 // A named time, for the tools of the browser.
 function mark(name) {
   performance.mark(`voxdag: ${name}`);
-}
-// Sample 0 is at the pixel's center.
-function jitter_of(sample) {
-  const wrap = (x) => x - Math.floor(x);
-  return [wrap(0.5 + 0.7548776662466927 * sample) - 0.5, wrap(0.5 + 0.5698402909980532 * sample) - 0.5];
 }

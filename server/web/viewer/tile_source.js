@@ -1,21 +1,41 @@
-// Fetches the manifest, tiles and color pages of one file. They are immutable for a digest, so the browser's cache
-// answers a request that was answered before.
+// Fetches the manifest, tiles and color pages of one file. They never change for a digest, so the browser's cache
+// has a tile that is asked for alone again, and what a page asks for first when it is loaded again. Other batches
+// follow the view and are seldom asked for twice.
 
-const kTimeoutMs = 30000;
-const kBatchDefault = 64;
+const kTimeoutMs = 30000;       // without a byte: all of an answer may take longer on a slow link
+const kMaxBytes = 2 ** 26;      // of an answer; the largest batch that there can be has 44 MB
+const kLookAgainMs = 5000;      // between two looks at whether the file is still there
+const kMaxTileLevels = 5, kMaxBatch = 4096;
 
-// `status` is the HTTP status, 0 when there was no answer. `replaced`: the file is another one now.
+const kReplaced = {code: "replaced", message: "The file was replaced by another one: reload the page."};
+const kRemoved = {code: "removed", message: "The file is not there any more: what is missing of it does not come."};
+
+// `status` is the HTTP status, 0 when there was no answer, 200 when it makes no sense; `code` is that of the service.
 export class TileError extends Error {
-  constructor(status, detail) {
+  constructor(status, detail, {code = "", retry_after_ms = 0, timed_out = false} = {}) {
     super(detail);
-    this.status = status;
-  }
-  get replaced() {
-    return this.status === 410;
+    Object.assign(this, {status, code, retry_after_ms, timed_out});
   }
   // Whether the same request may succeed later.
   get is_transient() {
+    if (this.code === "corrupt" || this.code === "unsupported_version") return false;
     return this.status === 0 || this.status === 408 || this.status === 429 || this.status >= 500;
+  }
+  // Whether it is the token that is refused.
+  get is_denied() {
+    return this.status === 401 || this.status === 403;
+  }
+  // Whether the service lives and has too much to do.
+  get is_busy() {
+    return (this.status === 503 || this.status === 429) && (this.code === "busy" || this.retry_after_ms > 0);
+  }
+  // Whether all of the file may be missing.
+  get is_missing() {
+    return this.status === 404 || this.status === 409;
+  }
+  // Whether what was asked for may be the reason, though nothing says so.
+  get is_suspicious() {
+    return this.status === 200 || (this.status === 500 && this.is_transient);
   }
 }
 
@@ -25,67 +45,163 @@ export class TileSource {
     this.base = base;
     this.headers = headers;
     this.info = null;
+    this.ended = null;           // {code, message} when there is nothing to be had any more
+    this.timeout_ms = kTimeoutMs;
+    this.looking = null;
+    this.looked_ms = -Infinity;
     this.fetched_bytes = 0;
     this.request_count = 0;
   }
 
   async manifest() {
-    const response = await this.request("/tiles", {cache: "no-store"});
-    const info = await response.json();
-    if (!Number.isInteger(info.levels) || info.levels < 2 || info.levels > 20)
-      throw new TileError(200, `The manifest's levels are ${info.levels}; expected 2 to 20.`);
+    const info = await this.fetch_manifest();
+    check_manifest(info);
     this.info = info;
     return info;
   }
 
-  // The tiles of the nodes [{level, offset}], as words, in the same order. All or a TileError.
-  async fetchTiles(nodes) {
+  // The tiles of the nodes [{level, offset}], as words, in the same order. All or a TileError. `options`: {signal, cache}.
+  async fetchTiles(nodes, options) {
     const digest = encodeURIComponent(this.info.digest);
     if (nodes.length === 1) {
       const {level, offset} = nodes[0];
-      const bytes = await this.bytes(`/tiles/${level}/${offset}?v=${digest}`);
+      const bytes = await this.request(`/tiles/${level}/${offset}?v=${digest}`, options);
       return [words_of(bytes, 0, bytes.byteLength)];
     }
     const list = nodes.map(({level, offset}) => `${level}.${offset}`).join(",");
-    const bytes = await this.bytes(`/tiles/batch?v=${digest}&nodes=${list}`);
+    const bytes = await this.request(`/tiles/batch?v=${digest}&nodes=${list}`, options);
     return split_batch(bytes, nodes.length);
   }
 
   // Color pages [{level, position: [x, y, z]}], in the same way.
-  async fetchColors(pages) {
+  async fetchColors(pages, options) {
     const list = pages.map(({level, position}) => [level, ...position].join(".")).join(",");
-    const bytes = await this.bytes(`/tiles/colors?v=${encodeURIComponent(this.info.digest)}&pages=${list}`);
+    const bytes = await this.request(`/tiles/colors?v=${encodeURIComponent(this.info.digest)}&pages=${list}`, options);
     return split_batch(bytes, pages.length);
   }
 
   get batch_max() {
-    return this.info?.batch_max || kBatchDefault;
+    return this.info.batch_max;
   }
 
-  async bytes(path) {
-    const response = await this.request(path, {});
+  // After a tile was not found: whether all of the file is gone, which `ended` then says.
+  async look_again(signal) {
+    if (this.ended || performance.now() < this.looked_ms + kLookAgainMs) return;
+    this.looking ??= this.look(signal).finally(() => this.looking = null);
+    await this.looking;
+  }
+
+  async look(signal) {
     try {
-      const bytes = await response.arrayBuffer();
+      const info = await this.fetch_manifest(signal);
+      if (info.digest !== this.info.digest) this.ended = kReplaced;
+      this.looked_ms = performance.now();
+    } catch (error) {
+      // What only stands between here and the service has no such codes.
+      if (error.code === "not_found" || error.code === "conflict") this.ended = kRemoved;
+    }
+  }
+
+  async fetch_manifest(signal) {
+    const text = new TextDecoder().decode(await this.request("/tiles", {cache: "no-store", signal}));
+    try {
+      return JSON.parse(text);
+    } catch {
+      throw new TileError(200, "The manifest is not JSON.");
+    }
+  }
+
+  // The bytes of an answer, or a TileError.
+  async request(path, {cache, signal} = {}) {
+    this.request_count++;
+    const ending = new AbortController(), end = () => ending.abort();
+    let timer = 0, timed_out = false, response = null;
+    const heard = () => {
+      clearTimeout(timer);
+      timer = setTimeout(() => {
+        timed_out = true;
+        end();
+      }, this.timeout_ms);
+    };
+    heard();
+    signal?.addEventListener("abort", end);
+    if (signal?.aborted) end();
+    try {
+      response = await fetch(this.base + path, {cache, headers: this.headers, signal: ending.signal});
+      heard();
+      const bytes = await body_of(response, heard);
       // Of the body as sent, which may be compressed.
       this.fetched_bytes += Number(response.headers.get("Content-Length")) || bytes.byteLength;
-      return bytes;
-    } catch {
-      throw new TileError(0, "The service stopped in the middle of an answer.");
+      if (response.ok) return bytes;
+      throw problem_of(response, bytes);
+    } catch (error) {
+      if (error instanceof TileError) {
+        if (error.status === 410) this.ended = kReplaced;
+        throw error;
+      }
+      const detail = response ? "The service stopped in the middle of an answer." : "The service does not answer.";
+      throw new TileError(0, detail, {timed_out});
+    } finally {
+      clearTimeout(timer);
+      signal?.removeEventListener("abort", end);
     }
   }
+}
 
-  async request(path, options) {
-    this.request_count++;
-    let response;
-    try {
-      response = await fetch(this.base + path, {...options, headers: this.headers, signal: AbortSignal.timeout(kTimeoutMs)});
-    } catch {
-      throw new TileError(0, "The service does not answer.");
-    }
-    if (response.ok) return response;
-    const problem = await response.json().catch(() => ({}));
-    throw new TileError(response.status, problem.detail || `The service answered ${response.status}.`);
+// All bytes of an answer; `heard` is called as they come.
+async function body_of(response, heard) {
+  const reader = response.body?.getReader(), parts = [];
+  let length = 0;
+  while (reader) {
+    const {done, value} = await reader.read();
+    if (done) break;
+    heard();
+    parts.push(value);
+    length += value.length;
+    if (length <= kMaxBytes) continue;
+    reader.cancel().catch(() => {});
+    throw new TileError(200, `An answer has more than ${kMaxBytes} bytes.`);
   }
+  const bytes = new Uint8Array(length);
+  length = 0;
+  for (const part of parts) {
+    bytes.set(part, length);
+    length += part.length;
+  }
+  return bytes.buffer;
+}
+
+function problem_of({status, headers}, bytes) {
+  let problem = null;
+  try {
+    problem = JSON.parse(new TextDecoder().decode(bytes));
+  } catch {
+    // Not from the service: its status is all that it says.
+  }
+  const retry_after_ms = 1000 * Math.max(0, Number(headers.get("Retry-After")) || 0);
+  return new TileError(status, String(problem?.detail || `The service answered ${status}.`),
+                       {code: String(problem?.code ?? ""), retry_after_ms});
+}
+
+// Sizes of the GPU's memory and ends of loops depend on these.
+function check_manifest(info) {
+  const expect = (is_true, name) => {
+    if (!is_true) throw new TileError(200, `The manifest's ${name} cannot be used: ${JSON.stringify(info?.[name])}.`);
+  };
+  const is_count = (value, least, most) => Number.isInteger(value) && value >= least && value <= most;
+  const is_word = (value) => is_count(value, 0, 2 ** 32 - 1);
+  expect(is_count(info?.levels, 2, 20), "levels");
+  expect(info.resolution === 2 ** info.levels, "resolution");
+  expect(is_count(info.tile_levels, 1, kMaxTileLevels), "tile_levels");
+  expect(is_count(info.batch_max, 1, kMaxBatch), "batch_max");
+  expect(typeof info.digest === "string" && info.digest !== "", "digest");
+  // What a running job has built has no number yet, and no colors.
+  const is_growing = info.voxels === undefined && !info.colors;
+  expect(is_growing || (typeof info.voxels === "string" && /^\d+$/.test(info.voxels)), "voxels");
+  expect(!info.root || (info.root.level === 0 && is_count(info.root.offset, 0, 2 ** 40 - 1)), "root");
+  const {root_brick, colors} = info, needs_brick = Boolean(info.root) && info.levels === 2;
+  expect(root_brick ? Array.isArray(root_brick) && root_brick.length === 2 && root_brick.every(is_word) : !needs_brick, "root_brick");
+  expect(!colors || (is_count(colors.levels, 0, info.levels) && is_count(colors.batch_max, 1, kMaxBatch)), "colors");
 }
 
 function words_of(bytes, begin, length) {
@@ -94,7 +210,8 @@ function words_of(bytes, begin, length) {
   return new Uint32Array(bytes, begin, length / 4);
 }
 
-function split_batch(bytes, count) {
+// The parts of an answer that has `count` of them.
+export function split_batch(bytes, count) {
   const view = new DataView(bytes);
   const tiles = [];
   let at = 0;

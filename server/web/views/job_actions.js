@@ -32,12 +32,14 @@ export function actions(job, reload) {
     return element;
   };
   const may = (...states) => states.includes(job.state);
+  const view = () => h("a", {class: "button", href: `/viewer.html?job=${job.id}`}, "View");
   const buttons = [
     may("succeeded") && button("Download", () => download(job), "primary"),
-    may("succeeded") && h("a", {class: "button", href: `/viewer.html?job=${job.id}`}, "View"),
+    may("succeeded") && view(),
     may("suspended") && button("Resume", post("resume"), "primary"),
     may("failed", "canceled") && button("Retry", post("retry"), "primary"),
     may("queued", "running") && button("Suspend", post("suspend")),
+    may("running", "suspended") && view(),
     may("queued", "running", "suspended") && button("Cancel", async () => {
       if (await confirm_action("Cancel this job?", "Its partial result will be deleted.", "Cancel the job"))
         await post("cancel")();

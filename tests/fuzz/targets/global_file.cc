@@ -12,11 +12,14 @@
 
 #include "core/base/error.h"
 #include "core/format/checksum.h"
+#include "core/format/global/checked_blocks.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
 #include "core/format/global/voxdag_reader.h"
 #include "query/ray_caster.h"
+#include "query/render/views.h"
+#include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
 #include "tests/fuzz/targets/fuzz_target.h"
 
@@ -161,6 +164,32 @@ void encode_tiles(const voxdag_reader::File& file) {
   }
 }
 
+// What somebody asks for who knows nothing of the file: words of it are addresses. A file may be
+// sound where no node lies at an address.
+void answer_strangers(const voxdag_reader::File& file) {
+  const query::DagView view(file);
+  const CheckedBlocks blocks(file);
+  query::ColorPages pages(file, view, &blocks);
+  const auto try_to = [](auto make) {
+    try {
+      make();
+    } catch (const Error& error) {
+      fuzz::require(error.is_corruption(), "what is not there is an error that says so");
+    }
+  };
+  const uint32_t* const words = reinterpret_cast<const uint32_t*>(file.data());
+  const uint64_t count = std::min<uint64_t>(file.checksum_table_offset() / 4, 4096);
+  for (uint64_t at = count / 2; at + 4 < count; at += 97) {
+    try_to([&] {
+      query::encode_tile(view, 1 + words[at] % 5, {words[at] % 20, words[at + 1]}, &blocks);
+    });
+    try_to([&] {
+      pages.encode({words[at] % 21, {words[at + 1], words[at + 2] % 64, words[at + 3] % 64}});
+    });
+  }
+  if (!view.empty()) try_to([&] { query::occupied_box(view); });
+}
+
 }  // namespace
 }  // namespace voxdag
 
@@ -189,6 +218,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       read_all(file);
       cast_rays(file);
       encode_tiles(file);
+      answer_strangers(file);
     } catch (const std::exception&) {
       fuzz::require(!is_sound, "a file that verifies can be read");
       throw;

@@ -1,10 +1,12 @@
 // Damaged files, full disks and interruptions: an error, no output, and nothing left behind.
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 
 #include "tests/crash/faulty_files.h"
 #include "tests/unit/base/error_of.h"
 #include "tests/unit/extract/extract_fixture.h"
+#include "tests/unit/io/killed.h"
 
 namespace voxdag::query {
 namespace {
@@ -17,7 +19,9 @@ class ExtractErrors : public Extract {
                                       const CancelToken& cancel) {
     try {
       const auto file = open_global_file(path("in.vdag"));
-      extract(*file, spec("out.vdag", {6, whole_grid(6)}), files, progress, cancel);
+      ExtractSpec whole = spec("out.vdag", {6, whole_grid(6)});
+      whole.replace = false;
+      extract(*file, whole, files, progress, cancel);
     } catch (const Error& error) {
       return error.code();
     }
@@ -101,6 +105,62 @@ TEST_F(ExtractErrors, FailingReads) {
     ++failed;
   }
   EXPECT_GT(failed, 5u);
+}
+
+// Whatever operation a process is killed at, the same extraction succeeds afterwards, unless it was
+// at its end, and removes what was left: temporary files and folders, but none of other names.
+TEST_F(ExtractErrors, Killed) {
+  std::filesystem::create_directory(path("out.vdag.work-"));
+  std::filesystem::create_directory(path("out.vdag.work-1234567"));
+  error_with(system_files(), warnings_, never_);
+  const std::string clean = bytes("out.vdag");
+  std::filesystem::remove(path("out.vdag"));
+  uint64_t kills = 0, repeated = 0;
+  for (;; ++kills) {
+    SCOPED_TRACE(kills);
+    if (!is_killed([&] {
+          crash::FaultyFiles files({crash::Fault::kKillAfter, kills + 1});
+          error_with(files, warnings_, never_);
+        }))
+      break;
+    const auto error = error_with(system_files(), warnings_, never_);
+    const bool was_written = error == ErrorCode::kInvalidInput;
+    EXPECT_TRUE(!error || was_written);
+    repeated += !was_written;
+    EXPECT_TRUE(bytes("out.vdag") == clean);
+    expect_files({"in.vdag", "out.vdag", "out.vdag.work-", "out.vdag.work-1234567"});
+    std::filesystem::remove(path("out.vdag"));
+  }
+  EXPECT_GT(repeated, 5u);
+}
+
+// A region around the middle of the grid cannot be cropped, and one on a side of it can.
+TEST_F(ExtractErrors, CropOfNothingIsSaid) {
+  const auto is_said = [&](const Region& region, bool crop) {
+    warnings_.texts.clear();
+    extract_file("in.vdag", spec("out.vdag", {6, region}, crop));
+    return std::ranges::any_of(warnings_.texts, [](const std::string& text) {
+      return text.ends_with("is the whole grid, which stays");
+    });
+  };
+  EXPECT_TRUE(is_said({{31, 0, 0}, {33, 64, 64}}, true));
+  EXPECT_FALSE(is_said({{0, 0, 0}, {32, 32, 32}}, true));
+  EXPECT_FALSE(is_said(whole_grid(6), true));
+  EXPECT_FALSE(is_said({{31, 0, 0}, {33, 64, 64}}, false));
+}
+
+// An existing file is replaced only if that is asked for, whoever has made it.
+TEST_F(ExtractErrors, ExistingOutput) {
+  ExtractSpec part = spec("out.vdag", {5, whole_grid(5)});
+  const auto file = open_global_file(path("in.vdag"));
+  extract(*file, part, system_files(), warnings_, never_);
+  const std::string before = bytes("out.vdag");
+  EXPECT_EQ(error_with(system_files(), warnings_, never_), ErrorCode::kInvalidInput);
+  EXPECT_TRUE(bytes("out.vdag") == before);
+  part.selection = {6, whole_grid(6)};
+  extract(*file, part, system_files(), warnings_, never_);
+  EXPECT_TRUE(bytes("out.vdag") == bytes("in.vdag"));
+  expect_files({"in.vdag", "out.vdag"});
 }
 
 // Cancels when a stage begins.

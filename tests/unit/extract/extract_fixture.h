@@ -60,6 +60,7 @@ class Extract : public testing::Test {
     spec.output = path(output);
     spec.memory_bytes = uint64_t{64} << 20;
     spec.threads = 2;
+    spec.replace = true;
     return spec;
   }
 

@@ -47,8 +47,9 @@ class ExportColors : public testing::Test {
     const std::string output = folder_.file(std::string("out") + (to.suffix ? to.suffix : ".x"));
     NoProgress progress;
     std::vector<std::string> bytes;
-    const ExportReport report = export_dag(
-        system_files(), *file_, {&to, selection, output, kMemory, gray}, progress, CancelToken{});
+    const ExportReport report =
+        export_dag(system_files(), *file_, {&to, selection, output, kMemory, gray, true}, progress,
+                   CancelToken{});
     for (const std::string& written : report.files) bytes.push_back(read_bytes(written));
     return bytes;
   }

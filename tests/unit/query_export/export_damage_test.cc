@@ -5,32 +5,16 @@
 #include <random>
 
 #include "core/base/error.h"
-#include "core/format/global/global_writer.h"
 #include "core/format/global/open_global.h"
 #include "query/export/export.h"
 #include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/query_export/corners.h"
 
 namespace voxdag::query {
 namespace {
 
 constexpr uint32_t kLevels = 10;
 constexpr uint64_t kMemory = 64 << 20;
-
-// Two voxels in opposite corners of a grid of 2^10.
-void write_corners(const std::string& path) {
-  GlobalFileWriter writer(system_files(), path, Grid::given({0, 0, 0}, 1, kLevels), 64);
-  for (uint32_t level = kLevels - 1; level-- > 0;) {
-    const bool is_brick = level + 2 == kLevels, is_root = level == 0;
-    const std::vector<uint32_t> words = is_brick  ? std::vector<uint32_t>{1, 0, 0, 1u << 31}
-                                        : is_root ? std::vector<uint32_t>{0x81, 0, 2}
-                                                  : std::vector<uint32_t>{1, 0, 0x80, 2};
-    writer.begin_level(level);
-    writer.checksum_words(words);
-    writer.write_words(0, words);
-    writer.end_level({is_root ? 1u : 2u, words.size()});
-  }
-  writer.finish({2, 2 * (kLevels - 2) + 1});
-}
 
 class ExportDamage : public testing::TestWithParam<const char*> {
  protected:
@@ -47,8 +31,11 @@ class ExportDamage : public testing::TestWithParam<const char*> {
                  {&to, {kLevels, {{0, 0, 0}, {1024, 1024, 1024}}}, output, kMemory}, progress,
                  CancelToken{});
       for (const std::string& written : export_paths(to, output)) system_files().remove(written);
-    } catch (const Error&) {
+    } catch (const Error& error) {
       refused = true;
+      EXPECT_EQ(error.code(), ErrorCode::kCorrupt) << error.message();
+      EXPECT_TRUE(error.message().starts_with(path + ": ")) << error.message();
+      EXPECT_EQ(error.message().find(path, 1), std::string::npos) << error.message();
     }
     EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
     return refused;
@@ -58,7 +45,7 @@ class ExportDamage : public testing::TestWithParam<const char*> {
 
 TEST_P(ExportDamage, IsAnErrorOrHarmless) {
   const std::string path = folder_.file("a.vdag");
-  write_corners(path);
+  write_corners(path, kLevels);
   EXPECT_FALSE(is_refused(path));
   std::ifstream input(path, std::ios::binary);
   const std::string intact((std::istreambuf_iterator<char>(input)), {});

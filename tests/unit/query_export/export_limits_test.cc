@@ -2,6 +2,9 @@
 // leaves nothing behind. The scenes are full cubes: their files are small whatever the grid.
 #include <gtest/gtest.h>
 
+#include <map>
+
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/global/global_writer.h"
 #include "core/format/global/open_global.h"
@@ -68,6 +71,48 @@ TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
   EXPECT_NE(message.find("--level 10 (1024 voxels per edge) fits"), std::string::npos) << message;
 }
 
+// The search for a level that fits begins with the coarsest: of a grid that is full it would take
+// hours to count what does not fit.
+TEST_F(ExportLimits, AreFoundAtOnce) {
+  const auto file = full_grid(20);
+  const double start_s = process_cpu_seconds();
+  for (const char* format : {"ply", "vox"}) {
+    const std::string message = refusal(*file, format, "a.x", ErrorCode::kLimit, kMemory);
+    EXPECT_NE(message.find(" fits, or take a smaller --region"), std::string::npos) << message;
+  }
+  EXPECT_LT(process_cpu_seconds() - start_s, 4);
+}
+
+// What each stage has done.
+class Stages : public NoProgress {
+ public:
+  void begin_stage(std::string_view stage, uint64_t, std::string_view) override { stage_ = stage; }
+  void advance(uint64_t count) override { done[stage_] += count; }
+  std::map<std::string, uint64_t> done;
+
+ private:
+  std::string stage_;
+};
+
+// No stage is silent.
+TEST_F(ExportLimits, ProgressIsReported) {
+  const auto file = full_grid(6);
+  const Selection part{6, {{1, 1, 1}, {62, 63, 64}}};
+  for (const ExportFormat& format : export_formats()) {
+    SCOPED_TRACE(format.name);
+    const std::string output =
+        folder_.file(std::string("a") + (format.suffix ? format.suffix : ""));
+    Stages stages;
+    export_dag(system_files(), *file, {&format, part, output, kMemory, false, true}, stages,
+               CancelToken{});
+    EXPECT_GT(stages.done["export"], 0u);
+    for (const auto& [stage, done] : stages.done) EXPECT_GT(done, 0u) << stage;
+    const bool is_counted =
+        std::string_view("bt vdb nvdb ply npz glb").find(format.name) != std::string::npos;
+    EXPECT_EQ(stages.done.contains("count"), is_counted);
+  }
+}
+
 TEST_F(ExportLimits, OctoMapHas16Levels) {
   const std::string message = refusal(*full_grid(17), "bt", "a.bt", ErrorCode::kLimit, kMemory);
   EXPECT_NE(message.find("--level 16 fits"), std::string::npos) << message;
@@ -78,6 +123,33 @@ TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
   const std::string message =
       refusal(*full_grid(18), "hashdag", "a.basic_dag.dag.bin", ErrorCode::kLimit, kMemory);
   EXPECT_NE(message.find("encloses 16 777 216 voxels"), std::string::npos) << message;
+  EXPECT_NE(message.find("--level 17 (131072 voxels per edge) fits"), std::string::npos) << message;
+}
+
+// The formats that are made in memory as a whole.
+TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
+  const auto file = full_grid(9);
+  for (const ExportFormat& format : export_formats()) {
+    const std::string name = format.name;
+    if (name == "vdb" || name == "nvdb") {
+      const std::string message = refusal(*file, name, "a.x", ErrorCode::kLimit, 20 << 20);
+      EXPECT_NE(message.find("would take over 20.00 MiB of memory"), std::string::npos) << message;
+      EXPECT_NE(message.find("--level 8 (256 voxels per edge) fits"), std::string::npos) << message;
+    }
+  }
+  const std::string message =
+      refusal(*file, "glb", "a.glb", ErrorCode::kOutOfMemory, uint64_t{20} << 20);
+  EXPECT_NE(message.find("a smaller --region or a coarser --level"), std::string::npos) << message;
+}
+
+// A chunk of MagicaVoxel has 2 GiB at most.
+TEST_F(ExportLimits, VoxNamesTheLevelThatFits) {
+  const auto file = full_grid(17);
+  const std::string message = refusal(*file, "vox", "a.vox", ErrorCode::kLimit, kMemory);
+  EXPECT_NE(message.find("or more are needed, but the chunks of a .vox file have at most 2.00 GiB"),
+            std::string::npos)
+      << message;
+  EXPECT_NE(message.find("--level 9 (512 voxels per edge) fits"), std::string::npos) << message;
 }
 
 TEST_F(ExportLimits, MemoryThatDoesNotFitIsRefused) {

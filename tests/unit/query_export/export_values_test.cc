@@ -21,7 +21,12 @@ class ExportValues : public testing::Test {
     const std::string output = folder_.file("out");
     NoProgress progress;
     export_dag(system_files(), *file_,
-               {&export_format(format), {level, whole_grid(level)}, output, uint64_t{64} << 20},
+               {&export_format(format),
+                {level, whole_grid(level)},
+                output,
+                uint64_t{64} << 20,
+                false,
+                true},
                progress, CancelToken{});
     return read_bytes(output);
   }

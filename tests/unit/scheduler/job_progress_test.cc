@@ -174,6 +174,21 @@ TEST_F(CoarseCubesTest, GrowWithTheBuild) {
   EXPECT_GT(cubes.cubes().size(), early);
 }
 
+TEST_F(CoarseCubesTest, AreReadStepByStep) {
+  CancelToken cancel;
+  NoProgress progress;
+  build(cancel, progress);
+  CoarseCubes all, some;
+  all.refresh(system_files(), work_);
+  for (size_t i = 1; i <= 5; ++i) {
+    some.refresh(system_files(), work_, -1);
+    EXPECT_EQ(some.cubes().size(), i);
+    EXPECT_EQ(some.built(), all.built());
+  }
+  some.refresh(system_files(), work_);
+  EXPECT_EQ(some.cubes().size(), all.cubes().size());
+}
+
 TEST_F(CoarseCubesTest, OfNoWorkFolderAreNotFound) {
   CoarseCubes cubes;
   EXPECT_EQ(error_of([&] { cubes.refresh(system_files(), work_); }).code(), ErrorCode::kNotFound);

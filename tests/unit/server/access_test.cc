@@ -61,6 +61,7 @@ class AccessControlTest : public testing::Test {
     r.method = method;
     r.headers = std::move(headers);
     r.peer = peer;
+    r.target = parse_target("/api/v1/jobs");
     return r;
   }
   int status(AccessControl& access, Request r, Role role) {
@@ -84,6 +85,11 @@ TEST_F(AccessControlTest, RejectsOtherSitesWithoutTokens) {
   EXPECT_EQ(post("http://evil.example"), 403);
   EXPECT_EQ(post("http://127.0.0.1:9999"), 403);
   EXPECT_EQ(post("null"), 403);
+  const auto read = [&](const char* site) {
+    return status(access, request("GET", {{"Sec-Fetch-Site", site}}), Role::kRead);
+  };
+  EXPECT_EQ(read("cross-site"), 403);
+  EXPECT_EQ(read("same-origin"), 0);
 }
 
 TEST_F(AccessControlTest, RequiresATokenWithTheRole) {

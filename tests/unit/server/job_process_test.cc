@@ -11,6 +11,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "scheduler/job/work_folder.h"
 #include "server/data_folder.h"
 #include "server/jobs/process/job_folder.h"
 #include "server/jobs/process/job_messages.h"
@@ -119,6 +120,20 @@ TEST_F(JobProcess, BuildsAndReportsItsResult) {
   EXPECT_EQ(again.exit_status, 0) << again.log;
   EXPECT_EQ(again.output.substr(again.output.rfind("{\"json\"")),
             first.output.substr(first.output.rfind("{\"json\"")));
+}
+
+// The list of subvolumes of an earlier run stays as long as its work does.
+TEST_F(JobProcess, ListsNothingOfAnEarlierRunBeforeItsOwnPlan) {
+  put_scene("no scene at all");
+  write_file_atomically(system_files(), job_.subvolumes(), "the list");
+  std::filesystem::create_directories(job_.work());
+  const std::string store = WorkFolder::store_path(job_.work());
+  write_file_atomically(system_files(), store, "");
+  EXPECT_GT(run().exit_status, 0);
+  EXPECT_EQ(contents(job_.subvolumes()), "the list");
+  remove_tree(system_files(), job_.work());
+  EXPECT_GT(run().exit_status, 0);
+  EXPECT_FALSE(std::filesystem::exists(job_.subvolumes()));
 }
 
 TEST_F(JobProcess, NamesTheSceneAsTheClientDid) {

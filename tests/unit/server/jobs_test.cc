@@ -3,11 +3,14 @@
 #include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <thread>
 
+#include "core/io/file_system.h"
 #include "server/jobs/job_outcome.h"
 #include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
 #include "server/jobs/process/job_task.h"
+#include "server/jobs/process/progress_pipe.h"
 #include "server/jobs/process/subvolume_map.h"
 #include "server/request_error.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -225,6 +228,7 @@ TEST(Subvolumes, AreCountedAndListed) {
   SubvolumeMap map;
   const SubvolumeStatus built{1, {0, 0, 0}, 512, true, 10, 5, 100};
   const SubvolumeStatus planned{2, {512, 0, 0}, 512, false, 0, 0, 0};
+  map.set_grid({-1.5, 0, 0.1}, 2);
   map.set(1024, std::vector{built, planned});
   EXPECT_EQ(map.totals().built, 1u);
   EXPECT_EQ(map.totals().total, 2u);
@@ -237,6 +241,8 @@ TEST(Subvolumes, AreCountedAndListed) {
   done.voxels = 7;
   done.nodes = 3;
   done.bytes = 50;
+  map.begun(3);
+  map.begun(4);
   map.built(done);
   EXPECT_EQ(map.totals().built, 2u);
   EXPECT_EQ(map.totals().total, 3u);
@@ -244,10 +250,28 @@ TEST(Subvolumes, AreCountedAndListed) {
   EXPECT_EQ(map.totals().nodes, 8u);
   EXPECT_EQ(map.totals().bytes, 150u);
   EXPECT_EQ(map.json(), R"({"resolution":1024,"built":2,"total":3,)"
-                        R"("cubes":[[0,0,0,512,1],[512,256,0,256,1],[768,0,0,256,0]]})");
+                        R"("cubes":[[0,0,0,512,1],[512,256,0,256,1],[768,0,0,256,0]],)"
+                        R"("working":[[768,0,0,256]],"origin":[-1.5,0,0.1],"edge":2})");
+  map.stop();
+  EXPECT_NE(map.json().find(R"("working":[])"), std::string::npos);
   map.set(1024, std::vector{planned});
   EXPECT_EQ(map.totals().built, 0u) << "a damaged one is planned again";
   EXPECT_EQ(map.totals().bytes, 0u);
+}
+
+// Though nothing happens after it.
+TEST(Subvolumes, AreListedWhileOneIsBuilt) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("subvolumes.json");
+  ProgressPipe pipe(system_files(), path);
+  pipe.set_subvolumes(1024, std::vector<SubvolumeStatus>{{7, {512, 0, 0}, 512, false, 0, 0, 0}});
+  pipe.subvolume_begun(7);
+  std::string text;
+  for (int i = 0; i < 1000 && text.find("\"working\":[[512,0,0,512]]") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    text = read_small_file(system_files(), path, 1 << 20);
+  }
+  EXPECT_NE(text.find("\"working\":[[512,0,0,512]]"), std::string::npos) << text;
 }
 
 // Neither dots nor symbolic links lead out of what a scene may read.

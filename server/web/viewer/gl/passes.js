@@ -6,7 +6,7 @@ import {kColoredTrace, kCombine, kFeedback, kLight, kOcclusion, kPick, kPresent,
 
 const kHalfRange = 1;        // brightest light of a target with half floats
 const kByteRange = 8;        // and of one with bytes
-const kFeedbackBlock = 4;
+const kFeedbackBlock = 4;     // pixels of the canvas that a texel of the feedback is of
 const kHitFormats = ["RGBA32UI"], kColoredHitFormats = ["RGBA32UI", "R32UI"], kLightFormats = ["R8", "R32UI", "R32UI"];
 const kSkyFormats = ["RGBA8"], kFeedbackFormats = ["RGBA32UI"];
 const kColorTexels = 1 << 17;  // of the feedback of colors, about: each page that is seen needs one of its own
@@ -104,7 +104,9 @@ export class Passes {
     const {targets} = this, is_for_canvas = targets?.full.width === full.width && targets.full.height === full.height;
     if (!is_for_canvas) this.allocate(width, height, full, colored);
     else if (width > targets.hits.width || height > targets.hits.height) this.allocate(full.width, full.height, full, colored);
-    Object.assign(this.targets, {width, height,
+    // A small picture says as much as a large one of what is missing: then a texel is of fewer pixels.
+    const share = Math.max(width / full.width, height / full.height);
+    Object.assign(this.targets, {width, height, feedback_block: Math.ceil(Math.min(1, share) * kFeedbackBlock),
                                  color_block: 2 ** Math.max(0, Math.ceil(Math.log2(width * height / kColorTexels) / 2))});
   }
 
@@ -117,11 +119,11 @@ export class Passes {
       light: new Target(gl, width, height, kLightFormats),
       sky: new Target(gl, Math.ceil(width / 2), Math.ceil(height / 2), kSkyFormats),
       colors: [new Target(gl, width, height, [color]), new Target(gl, width, height, [color])],
-      feedback: new Target(gl, Math.ceil(width / kFeedbackBlock), Math.ceil(height / kFeedbackBlock), kFeedbackFormats),
+      feedback: new Target(gl, Math.ceil(full.width / kFeedbackBlock), Math.ceil(full.height / kFeedbackBlock), kFeedbackFormats),
       // For any size, with the block of that.
       color_feedback: colored ? new Target(gl, Math.ceil(Math.min(width, across + 4)),
                                            Math.ceil(Math.min(height, kColorTexels / across + 4)), kFeedbackFormats) : null,
-      color_block: 1, current: 0,
+      feedback_block: kFeedbackBlock, color_block: 1, current: 0,
     };
   }
 
@@ -138,13 +140,13 @@ export class Passes {
   // most `part_pixels()` pixels. Returns the reading of the feedback; its `colors` is that of the colors, ready as
   // soon as the reading is, or null if none are shown.
   *draw(values, part_pixels) {
-    const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback, color_feedback, color_block} = targets;
+    const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback, color_feedback, feedback_block, color_block} = targets;
     const share = this.floats ? 1 / (values.u_frame + 1) : 1;
     const [before, after] = [colors[targets.current], colors[1 - targets.current]];
     const all = {...values, u_size: [width, height], u_hits: hits.textures[0], u_light: light.textures[0], u_sky: sky.textures[0], u_normals: light.textures[1],
                  u_colors: hits.textures[1] || hits.textures[0], u_colored: hits.textures.length > 1,
                  u_shadow_missing: light.textures[2], u_before: before.textures[0], u_share: share,
-                 u_range: this.color_range, ...blocks_of(kFeedbackBlock, values.u_seed)};
+                 u_range: this.color_range, ...blocks_of(feedback_block, values.u_seed)};
     const parts_of = (edge) => [Math.ceil(width / edge), Math.ceil(height / edge)];
     let left = part_pixels();
     const [sky_width, sky_height] = parts_of(2);
@@ -161,13 +163,13 @@ export class Passes {
       }
     this.combine.draw(after, all, width, height);
     targets.current = 1 - targets.current;
-    this.feedback.draw(feedback, all, ...parts_of(kFeedbackBlock));
+    this.feedback.draw(feedback, all, ...parts_of(feedback_block));
     let of_colors = null;
     if (color_feedback && values.u_color_levels >= 0) {
       this.color_feedback.draw(color_feedback, {...all, ...blocks_of(color_block, values.u_seed)}, ...parts_of(color_block));
       of_colors = new AsyncReading(gl, color_feedback, ...parts_of(color_block));
     }
-    return Object.assign(new AsyncReading(gl, feedback, ...parts_of(kFeedbackBlock)), {colors: of_colors});
+    return Object.assign(new AsyncReading(gl, feedback, ...parts_of(feedback_block)), {colors: of_colors});
   }
 
   // Draws the accumulated picture to the canvas.

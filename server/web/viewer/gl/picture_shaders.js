@@ -152,8 +152,22 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 }
 `;
 
+const kBlocked = `
+// Whether something lies between the surface and a light that far away.
+bool is_blocked(Surface s, vec3 normal, vec3 toward, vec2 cone, out Hit hit) {
+  bool blocked = false;
+  // In a narrow place the start may be occupied; the way that the ray came is free.
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    set_ray_from(attempt == 0 ? start_of(s, normal) : s.direction * (s.t - 1.5 * s.size), toward);
+    blocked = trace(0.0, 1e30, cone, hit);
+    if (!blocked || hit.t > 0.0) break;
+  }
+  return blocked;
+}
+`;
+
 // The normal of each pixel, and whether it sees the sun.
-export const kLight = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}
+export const kLight = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform vec3 u_sun;          // unit vector toward the sun
 uniform bool u_shadows;
 layout(location = 0) out float o_sun;
@@ -238,15 +252,7 @@ void main() {
   // A single sample has sharp shadows; noise disappears only where there are more.
   float r = u_frame == 0 ? 0.0 : kSunRadius * sqrt(p.x), angle = 2.0 * kPi * p.y;
   vec3 toward = normalize(u_sun + a * (r * cos(angle)) + b * (r * sin(angle)));
-  vec2 cone = vec2(s.size, kSunWidening);
-  bool blocked = false;
-  // In a narrow place the start may be occupied; the way that the ray came is free.
-  for (int attempt = 0; attempt < 2; ++attempt) {
-    set_ray_from(attempt == 0 ? start_of(s, normal) : s.direction * (s.t - 1.5 * s.size), toward);
-    blocked = trace(0.0, 1e30, cone, hit);
-    if (!blocked || hit.t > 0.0) break;
-  }
-  if (blocked) {
+  if (is_blocked(s, normal, toward, vec2(s.size, kSunWidening), hit)) {
     o_sun = 0.0;
     o_missing = hit.missing;
   }
@@ -295,7 +301,7 @@ void main() {
 // For each of 48 places of the sun (columns) and the pixels that render probes, 40 x 24 (rows): 0 if the pixel sees no
 // surface, 1 if that is in shadow, 2 if it is lit; and the cut-off node whose tile would say more.
 export const kSunPlaces = 48, kSunRows = 960;
-export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}
+export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
 uniform float u_turn;
 layout(location = 0) out uvec4 o_lit;
@@ -311,12 +317,12 @@ void main() {
   float turn = u_turn - 2.0 * kPi * float(place.x % 16) / 16.0, height = 0.65 + 0.25 * float(place.x / 16);
   vec3 sun = vec3(cos(turn) * cos(height), sin(height), sin(turn) * cos(height));
   Hit hit;
-  set_ray_from(start_of(s, normal), sun);
   if (dot(normal, sun) <= 0.0) {
     o_lit = uvec4(1, 0, 0, 0);
     return;
   }
-  bool blocked = trace(0.0, 1e30, vec2(s.size, 0.006), hit);
+  // As detailed as the rays of render, which chooses among the same places.
+  bool blocked = is_blocked(s, normal, sun, vec2(s.size, 0.004), hit);
   o_lit = uvec4(blocked ? 1u : 2u, blocked ? hit.missing : 0u, 0, 0);
 }`;
 

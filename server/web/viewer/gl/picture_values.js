@@ -25,3 +25,9 @@ export function picture_values(renderer, width, height, lod_height) {
     u_occlusion: options.ambientOcclusion, u_shadows: options.sunShadows, u_frame: 0,
   };
 }
+
+// Where in its pixel a sample lies; sample 0 is at the pixel's center.
+export function jitter_of(sample) {
+  const wrap = (x) => x - Math.floor(x);
+  return [wrap(0.5 + 0.7548776662466927 * sample) - 0.5, wrap(0.5 + 0.5698402909980532 * sample) - 0.5];
+}

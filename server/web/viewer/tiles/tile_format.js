@@ -6,6 +6,7 @@ export const kBlockTexels = 16;  // of the pool; a node or leaf never crosses th
 const kMagic = 0x31544456;
 const kHeadWords = 4;
 const kCutWords = 4;             // of a cut-off node in a tile
+const kMaxOffset = 2 ** 40 - 1;
 
 const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
   let bits = 0;
@@ -18,15 +19,15 @@ const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
 // one pointer per child, in one or two texels. A cut-off node is one texel: the slot of its tile (0: none),
 // its coarse brick's two words, 0. Two bricks share a texel; the pointer's lowest bit says which.
 //
+// `shape` is that of tiles of this level (tile_shape).
 // Returns {level, levels, words, pointers, root, leaf_begin, addresses, coarse}: `words` are the pool's
 // words at virtual addresses from 0 on, whole blocks; `pointers` are the positions in `words` of pointers
 // with virtual addresses, which the pool makes absolute; `root` is such a pointer; `leaf_begin` is the first
 // leaf's texel. `addresses` are the word offsets of the cut-off nodes in the file, and `coarse` their coarse
 // bricks; both are null for a tile with bricks.
-export function decode_tile(tile, expected_level) {
-  const node_words = check_head(tile, expected_level);
-  const levels = (tile[1] >>> 8) & 255, bricks = (tile[1] >>> 16 & 1) === 1;
-  const leaf_count = tile[3];
+export function decode_tile(tile, level, shape) {
+  check_head(tile, level, shape);
+  const {levels, bricks} = shape, node_words = tile[2], leaf_count = tile[3];
   const nodes = tile.subarray(kHeadWords, kHeadWords + node_words);
   const place = new Uint32Array(node_words);  // pointer to the node that begins here
   const depth = new Uint8Array(node_words);
@@ -47,19 +48,24 @@ export function decode_tile(tile, expected_level) {
     at += 1 + count;
   }
   const leaves = copy_leaves(tile.subarray(kHeadWords + node_words), bricks, leaf_count, words, leaf_begin);
-  return {level: tile[1] & 255, levels, words, pointers: pointers.subarray(0, pointer_count), root: place[0], leaf_begin,
+  return {level, levels, words, pointers: pointers.subarray(0, pointer_count), root: place[0], leaf_begin,
           ...leaves};
 }
 
-function check_head(tile, expected_level) {
+// How many levels the tiles of a level have in a file with this manifest, and whether bricks are below them.
+export function tile_shape({levels, tile_levels}, level) {
+  const below = levels - 2 - level, own = (below - 1) % tile_levels + 1;
+  return {levels: own, bricks: own === below};
+}
+
+function check_head(tile, level, {levels, bricks}) {
   if (tile.length < kHeadWords + 2 || tile[0] !== kMagic) throw new Error("A tile does not begin as tiles do.");
-  const levels = (tile[1] >>> 8) & 255, bricks = tile[1] >>> 16 & 1;
-  if ((tile[1] & 255) !== expected_level || levels < 1)
-    throw new Error(`A tile is of level ${tile[1] & 255}; expected ${expected_level}.`);
+  const shape = level | levels << 8 | bricks << 16;
+  if (tile[1] !== shape) throw new Error(`A tile has the shape ${tile[1].toString(16)}; expected ${shape.toString(16)}.`);
   const length = kHeadWords + tile[2] + tile[3] * (bricks ? 2 : kCutWords);
   if (tile[2] < 2 || length !== tile.length)
     throw new Error(`A tile has ${tile.length} words; its head says ${length}.`);
-  return tile[2];
+  if (tile[3] > 8 ** levels) throw new Error(`A tile has ${tile[3]} leaves; expected ${8 ** levels} at most.`);
 }
 
 // Packs the nodes in their order, none across the end of a block. Returns the texel after the last.
@@ -78,10 +84,13 @@ function place_nodes(nodes, levels, place, depth) {
   // Children follow their parents, so one sweep finds every node's level.
   for (let at = 0; at < nodes.length;) {
     const count = kPopcount[nodes[at]];
+    if (at > 0 && depth[at] === 0) throw new Error(`A tile's node word ${at} begins a node that no other names.`);
     for (let child = 1; child <= count && depth[at] < levels - 1; ++child) {
       const index = nodes[at + child];
       if (index <= at || index >= nodes.length || place[index] === 0)
         throw new Error(`A tile's node word ${at + child} is not the index of a node after it.`);
+      if (depth[index] !== 0 && depth[index] !== depth[at] + 1)
+        throw new Error(`A tile's node word ${at + child} names a node of another level.`);
       depth[index] = depth[at] + 1;
     }
     at += 1 + count;
@@ -90,17 +99,23 @@ function place_nodes(nodes, levels, place, depth) {
 }
 
 function copy_leaves(leaves, bricks, count, words, begin) {
+  const expect_some = (low, high, leaf) => {
+    if (low === 0 && high === 0) throw new Error(`A tile's leaf ${leaf} has nothing to draw.`);
+  };
   if (bricks) {
+    for (let i = 0; i < count; ++i) expect_some(leaves[2 * i], leaves[2 * i + 1], i);
     words.set(leaves, begin * kTexelWords);
     return {addresses: null, coarse: null};
   }
-  const addresses = new Float64Array(count);  // exact: offsets are below 2^40
+  const addresses = new Float64Array(count);  // exact: they are below 2^40
   const coarse = new Uint32Array(2 * count);
   for (let i = 0; i < count; ++i) {
     const from = i * kCutWords, to = (begin + i) * kTexelWords;
     addresses[i] = leaves[from] + leaves[from + 1] * 2 ** 32;
     words[to + 1] = coarse[2 * i] = leaves[from + 2];
     words[to + 2] = coarse[2 * i + 1] = leaves[from + 3];
+    if (addresses[i] > kMaxOffset) throw new Error(`A tile's leaf ${i} lies at word ${addresses[i]} of its level.`);
+    expect_some(coarse[2 * i], coarse[2 * i + 1], i);
   }
   return {addresses, coarse};
 }

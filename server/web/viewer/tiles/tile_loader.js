@@ -1,16 +1,15 @@
 // Fetches the tiles that a picture lacks.
 
 import {TileError} from "../tile_source.js";
-import {Loader} from "./loader.js";
+import {Loader, pause_after} from "./loader.js";
 
 const kMaxRequests = 4, kMaxBatch = 48;
-const kFirstPauseMs = 300, kMaxPauseMs = 10000;
+const kMaxRootTries = 3;       // while the root's answers make no sense
 
 // Its requests are {key, level, offset, priority, leaves}: leaves are the texels of cut-off nodes to be linked.
 export class TileLoader extends Loader {
   constructor(source, store, on_arrival) {
-    super(store, on_arrival, {max_requests: kMaxRequests, max_batch: Math.min(kMaxBatch, source.batch_max)});
-    this.source = source;
+    super(source, store, on_arrival, {max_requests: kMaxRequests, max_batch: Math.min(kMaxBatch, source.batch_max)});
     this.first_view = null;      // the FirstView that the next tiles are shown to
   }
 
@@ -31,7 +30,7 @@ export class TileLoader extends Loader {
         unmet++;
         request.leaves.add(address);
         request.priority += priority;
-      } else if (this.is_refused(node.key)) {
+      } else if (this.is_refused(node.key, now_ms)) {
         continue;
       } else if (!this.may_ask(node.key, now_ms)) {
         unmet++;
@@ -46,24 +45,46 @@ export class TileLoader extends Loader {
 
   // Loads one tile that no other refers to. Resolves to its words, undefined after dispose().
   async load_root(level, offset) {
-    for (let pause_ms = kFirstPauseMs; ; pause_ms = Math.min(2 * pause_ms, kMaxPauseMs)) {
+    const {signal} = this.ending;
+    for (let tries = 1; ; ++tries) {
+      let words = null;
       try {
-        const [words] = await this.source.fetchTiles([{level, offset}]);
+        [words] = await this.source.fetchTiles([{level, offset}], {signal, cache: tries > 1 ? "reload" : undefined});
         if (this.disposed) return;
-        if (!this.store.add(level, offset, words, performance.now()))
-          throw new Error("The budget is too small for a single tile.");
-        this.store.set_root(level, offset);
-        return words;
+        if (!this.store.add(level, offset, words, performance.now())) words = null;
       } catch (error) {
-        if (!(error instanceof TileError && error.is_transient)) throw error;
-        await new Promise((resolve) => setTimeout(resolve, pause_ms));
+        if (error.is_missing && !this.disposed) await this.source.look_again(signal);
         if (this.disposed) return;
+        const is_known = error instanceof TileError && error.status !== 200;
+        if (is_known ? !error.is_transient : tries >= kMaxRootTries) throw error;
+        if (!error.is_busy) this.trouble = {code: "unreachable", message: error.message};
+        await new Promise((resolve) => setTimeout(resolve, pause_after(tries) + (error.retry_after_ms || 0)));
+        if (this.disposed) return;
+        continue;
       }
+      if (!words) throw new Error("The budget is too small for a single tile.");
+      this.end_outage();
+      this.store.set_root(level, offset);
+      this.link_root();
+      return words;
     }
   }
 
-  fetch_all(batch) {
-    return this.source.fetchTiles(batch);
+  // What lies below another root already is seen at once, not only when a reading has asked for it.
+  link_root() {
+    const {store} = this, {root} = store;
+    for (let i = 0; i < (root.addresses?.length ?? 0); ++i) {
+      const node = store.leaf(root, i);
+      if (store.tiles.has(node.key)) store.link(node);
+    }
+  }
+
+  name_of({level, offset}) {
+    return `tile ${level}/${offset}`;
+  }
+
+  fetch_all(batch, options) {
+    return this.source.fetchTiles(batch, options);
   }
 
   keep(request, words, now_ms) {

@@ -9,7 +9,7 @@
 // that are fetched for one view is bounded, however small the pool is.
 
 import {kRoundsToKnow} from "./loader.js";
-import {decode_tile, kBlockTexels, kTexelWords} from "./tile_format.js";
+import {decode_tile, kBlockTexels, kTexelWords, tile_shape} from "./tile_format.js";
 
 const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
@@ -21,8 +21,10 @@ export function key_of(level, offset) {
 }
 
 export class TileStore {
-  constructor(pool) {
+  // `info`: the manifest of the file.
+  constructor(pool, info) {
     this.pool = pool;
+    this.info = info;
     this.tiles = new Map();     // key -> tile
     this.slots = new Map();     // key -> slot
     this.owner = [];            // block -> tile
@@ -77,7 +79,7 @@ export class TileStore {
   add(level, offset, words, now_ms) {
     const key = key_of(level, offset);
     if (this.tiles.has(key)) return true;
-    const decoded = decode_tile(words, level);
+    const decoded = decode_tile(words, level, tile_shape(this.info, level));
     const count = decoded.words.length * 4 / kBlockBytes;
     if (!this.evict_for(count, !this.slots.has(key), now_ms)) return false;
     const blocks = this.pool.allocate(count);
@@ -107,7 +109,9 @@ export class TileStore {
   add_brick(brick) {
     const words = new Uint32Array(kBlockTexels * kTexelWords);
     words.set(brick);
-    return this.pool.upload(this.pool.allocate(1), {words, pointers: [], root: 0});
+    const blocks = this.pool.allocate(1);
+    if (!blocks) throw new Error("The GPU has no memory for a single brick.");
+    return this.pool.upload(blocks, {words, pointers: [], root: 0});
   }
 
   // The tile in a slot was seen in a picture of epoch `epoch`.

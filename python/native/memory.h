@@ -1,0 +1,20 @@
+// The argument `memory` of calls that work within a budget.
+#pragma once
+
+#include <string>
+
+#include "core/base/error.h"
+#include "core/base/process_limits.h"
+#include "core/base/text.h"
+
+namespace voxdag::python {
+
+// "" is half of what the machine has. Throws Error{kInvalidInput}.
+inline uint64_t memory_of(const std::string& text) {
+  const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "memory");
+  if (bytes < kMinMemory)
+    throw Error(ErrorCode::kInvalidInput, "memory: " + text + ", expected at least 64MiB");
+  return bytes;
+}
+
+}  // namespace voxdag::python

@@ -1,0 +1,70 @@
+// The planes of a cell as two times four doubles, and the children that they bound. Each source
+// that includes this is compiled for its own instructions, so everything here has internal linkage.
+#pragma once
+
+#include <cstdint>
+
+#include "query/rays/packet_job.h"
+
+#define VOXDAG_INLINE __attribute__((always_inline)) inline
+
+namespace voxdag::query {
+namespace {
+
+// Of the children of a cell, mirrored: those in which a ray has an interval, and one of length 0.
+struct Crossed {
+  uint32_t inside, touching;
+};
+
+// Two planes of each axis, x, y and z, and a fourth of no meaning: by which rays enter the lower
+// and the upper children of a cell, or by which they leave them; and the rays' parameters at them.
+template <class Four>
+struct FourPlanes {
+  Four lower, upper;
+  static FourPlanes of(double all) { return {Four::of(all), Four::of(all)}; }
+  // Four numbers for the planes of the lower children and the same for the upper ones.
+  static FourPlanes twice(const double* four) { return {Four::load(four), Four::load(four)}; }
+  // By which rays enter the children of the cell at `low`, whose edges are `half`.
+  static FourPlanes of_cell(Int4 low, double half) {
+    const Four l = Four::from(low);
+    return {l, l + Four::of(half)};
+  }
+};
+template <class Four>
+VOXDAG_INLINE FourPlanes<Four> operator+(FourPlanes<Four> x, FourPlanes<Four> y) {
+  return {x.lower + y.lower, x.upper + y.upper};
+}
+template <class Four>
+VOXDAG_INLINE FourPlanes<Four> operator-(FourPlanes<Four> x, FourPlanes<Four> y) {
+  return {x.lower - y.lower, x.upper - y.upper};
+}
+template <class Four>
+VOXDAG_INLINE FourPlanes<Four> operator*(FourPlanes<Four> x, FourPlanes<Four> y) {
+  return {x.lower * y.lower, x.upper * y.upper};
+}
+template <class Four>
+VOXDAG_INLINE FourPlanes<Four> max(FourPlanes<Four> x, FourPlanes<Four> y) {
+  return {max(x.lower, y.lower), max(x.upper, y.upper)};
+}
+template <class Four>
+VOXDAG_INLINE FourPlanes<Four> min(FourPlanes<Four> x, FourPlanes<Four> y) {
+  return {min(x.lower, y.lower), min(x.upper, y.upper)};
+}
+
+// The parameters `in` may be lower bounds, those of `out` upper ones.
+template <class Four>
+VOXDAG_INLINE Crossed cross(FourPlanes<Four> in, FourPlanes<Four> out, double t_min, double t_max) {
+  const Four first = Four::of(t_min), last = Four::of(t_max);
+  const Four in_yz = max(blend_high(middle_lane(in.lower), middle_lane(in.upper)),
+                         blend_odd(last_lane(in.lower), last_lane(in.upper)));
+  const Four out_yz = min(blend_high(middle_lane(out.lower), middle_lane(out.upper)),
+                          blend_odd(last_lane(out.lower), last_lane(out.upper)));
+  const Four in0 = max(in_yz, max(first_lane(in.lower), first));
+  const Four in1 = max(in_yz, max(first_lane(in.upper), first));
+  const Four out0 = min(out_yz, min(first_lane(out.lower), last));
+  const Four out1 = min(out_yz, min(first_lane(out.upper), last));
+  return {less(in0, out0) | less(in1, out1) << 4, equal(in0, out0) | equal(in1, out1) << 4};
+}
+
+}  // namespace
+}  // namespace voxdag::query

@@ -1,0 +1,34 @@
+// Whether the checksum blocks are intact in which nodes and bricks of a level lie that are about to
+// be read. Without a file to ask, everything counts as intact.
+#pragma once
+
+#include <cstdint>
+
+#include "core/format/global/checked_blocks.h"
+#include "query/dag_view.h"
+
+namespace voxdag::query {
+
+class NodeChecks {
+ public:
+  NodeChecks(const DagView& dag, uint32_t level, const CheckedBlocks* blocks) : blocks_(blocks) {
+    if (!blocks) return;
+    const bool is_brick = level + kBrickLevels == dag.grid_levels();
+    words_ = dag.level(level).words.size();
+    place_ = blocks->place_of(dag.level(level).words.data());
+    bytes_ = 4 * (is_brick ? 2 : dag.level(level + 1).wide ? 17 : 9);
+  }
+
+  // The node or brick at this word offset, which may be any; throws DamagedBlock. As many words
+  // behind its first one as the largest node has are looked at, because the first one, which has
+  // the number, may be damaged.
+  void expect_intact(uint64_t offset) const {
+    if (blocks_ && offset < words_) blocks_->expect_intact_at(place_ + 4 * offset, bytes_);
+  }
+
+ private:
+  const CheckedBlocks* blocks_;
+  uint64_t words_ = 0, place_ = 0, bytes_ = 0;
+};
+
+}  // namespace voxdag::query

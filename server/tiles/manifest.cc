@@ -1,0 +1,51 @@
+#include "server/tiles/manifest.h"
+
+#include "server/tiles/viewed_dag.h"
+
+namespace voxdag::server {
+namespace {
+
+using ManifestJson = nlohmann::ordered_json;
+
+// Of the pictures that the named views are made for.
+constexpr double kAspect = 16.0 / 9;
+
+ManifestJson point(const query::Vec& voxels, const query::DagView& dag, const GridPlace& place) {
+  ManifestJson json = ManifestJson::array();
+  for (int axis = 0; axis < 3; ++axis)
+    json.push_back(place.origin[static_cast<size_t>(axis)] +
+                   voxels[axis] * (place.edge / static_cast<double>(dag.resolution())));
+  return json;
+}
+
+}  // namespace
+
+nlohmann::ordered_json manifest_of(const query::DagView& dag, const std::string& digest,
+                                   const GridPlace& place, std::optional<uint64_t> root) {
+  const uint32_t levels = dag.grid_levels();
+  ManifestJson json = {{"digest", digest},
+                       {"resolution", dag.resolution()},
+                       {"levels", levels},
+                       {"tile_levels", kTileLevels},
+                       {"batch_max", kMaxTilesOfBatch},
+                       {"origin", place.origin},
+                       {"edge", place.edge},
+                       {"root", nullptr}};
+  if (!root) return json;
+  json["root"] = {{"level", 0}, {"offset", *root}};
+  if (levels == kBrickLevels) {
+    const uint64_t mask = dag.brick(*root);
+    json["root_brick"] = {static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)};
+  }
+  return json;
+}
+
+nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& views,
+                                 const query::DagView& dag, const GridPlace& place) {
+  const query::Placement p = views.find(view, kAspect, {});
+  return {{"position", point(p.eye, dag, place)},
+          {"target", point(p.target, dag, place)},
+          {"fov_degrees", p.fov_degrees}};
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,39 @@
+// The manifests made last, by their digests, because to look for the cameras takes longer than to
+// open a file again. Thread-safe.
+#pragma once
+
+#include <list>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace voxdag::server {
+
+class ManifestCache {
+ public:
+  explicit ManifestCache(size_t max) : max_(max) {}
+
+  std::optional<std::string> find(const std::string& digest) {
+    const std::lock_guard lock(mutex_);
+    for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
+      if (entry->first != digest) continue;
+      entries_.splice(entries_.begin(), entries_, entry);
+      return entry->second;
+    }
+    return std::nullopt;
+  }
+  void keep(const std::string& digest, const std::string& manifest) {
+    const std::lock_guard lock(mutex_);
+    entries_.remove_if([&](const auto& entry) { return entry.first == digest; });
+    entries_.emplace_front(digest, manifest);
+    if (entries_.size() > max_) entries_.pop_back();
+  }
+
+ private:
+  const size_t max_;
+  std::mutex mutex_;                                        // guards the next
+  std::list<std::pair<std::string, std::string>> entries_;  // used last first
+};
+
+}  // namespace voxdag::server

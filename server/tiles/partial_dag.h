@@ -1,0 +1,69 @@
+// The subvolumes that a job has built so far as a DAG of the job's grid, for viewers: each is the
+// 4x4x4 cells of a coarse brick, and a cell with voxels is solid. Equal subtrees are one node, so
+// solid cells cost next to nothing at any resolution.
+//
+// It only grows: add() adds the nodes that are new, and a new root. So what lies at an address
+// stays the same, and a viewer keeps all of its tiles when the root changes. Used by one thread.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "core/geometry/cube.h"
+#include "query/dag_view.h"
+
+namespace voxdag::server {
+
+class PartialDag {
+ public:
+  struct Part {
+    Cube cube;
+    uint64_t brick = 0;  // its cells, bits as the voxels of a brick
+  };
+
+  explicit PartialDag(uint32_t grid_levels);
+
+  // Returns the word offset of the root of a DAG of these parts, which must not overlap; nothing if
+  // there are none. Throws Error{kCorrupt} if two overlap, or one lies outside of the grid.
+  std::optional<uint64_t> add(const std::vector<Part>& parts);
+
+  // The words of each level, from the root's down to the bricks'.
+  const std::vector<std::vector<uint32_t>>& levels() const { return levels_; }
+  uint64_t word_count() const { return word_count_; }
+
+ private:
+  using Parts = std::vector<const Part*>;
+  uint64_t add_parts(const Cube& cube, const Parts& parts);
+  // A cell with the cells of a coarse brick, of which level `level` has one; all solid.
+  uint64_t add_coarse(uint32_t level, uint64_t brick);
+  uint64_t add_solid(uint32_t level);
+  // One whose octants of the mask are solid.
+  uint64_t add_octants(uint32_t level, uint32_t mask);
+  uint64_t add_node(uint32_t level, uint32_t mask, const std::vector<uint64_t>& children);
+  uint64_t add_brick(uint64_t brick);
+  uint64_t add_words(uint32_t level, std::vector<uint32_t> words);
+
+  const uint32_t brick_level_;
+  std::vector<std::vector<uint32_t>> levels_;
+  std::vector<std::map<std::vector<uint32_t>, uint64_t>> known_;  // by level: offsets of nodes
+  // The offsets of coarse bricks by level, and of solid cells, so that each is looked for once.
+  std::vector<std::map<uint64_t, uint64_t>> coarse_;
+  std::vector<std::optional<uint64_t>> solid_;
+  uint64_t word_count_ = 0;
+};
+
+// The DAG as it is now, for any thread; it does not change.
+class PartialDagCopy {
+ public:
+  explicit PartialDagCopy(const PartialDag& dag, uint32_t grid_levels);
+  PartialDagCopy(const PartialDagCopy&) = delete;
+  const query::DagView& view() const { return view_; }
+
+ private:
+  const std::vector<std::vector<uint32_t>> levels_;
+  const query::DagView view_;
+};
+
+}  // namespace voxdag::server

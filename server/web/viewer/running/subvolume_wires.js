@@ -1,0 +1,133 @@
+// The wireframe of a job's subvolumes over the picture. What is built, in work and waiting differs by the
+// kind of line, not by its color alone. Drawn without the GPU's depth: what is behind the voxels shows through.
+
+import {dot, subtract} from "../vector.js";
+
+const kMaxEdges = 24000;   // of more, only those of what is in work are drawn
+const kOpaque = 10;        // the square root of how many cubes of a kind are drawn opaque
+const kNear = 1e-3;        // of the grid: nearer than this nothing is drawn
+
+// Later ones are drawn over earlier ones.
+export const kStyles = {
+  waiting: {name: "waiting", color: "#5d6873", width: 1, dash: [3, 5]},
+  built: {name: "built", color: "#15609b", width: 1, dash: []},
+  working: {name: "being built", color: "#c25700", width: 3, dash: []},
+};
+const kOrder = Object.keys(kStyles);
+
+export class SubvolumeWires {
+  constructor(scene, on_change) {
+    this.on_change = on_change;
+    this.canvas = document.createElement("canvas");
+    this.canvas.className = "wires";
+    this.canvas.setAttribute("aria-hidden", "true");
+    scene.after(this.canvas);
+    this.edges = Object.fromEntries(kOrder.map((state) => [state, new Float64Array(0)]));
+    this.counts = Object.fromEntries(kOrder.map((state) => [state, 0]));
+    this.visible = true;
+    this.draws_all = true;       // not only what is in work
+    this.drawn = null;           // for which camera and size
+  }
+
+  // {resolution, cubes: [[x, y, z, edge, built]...], working: [[x, y, z, edge]...]} in voxels; nothing is in work
+  // unless the job `runs`.
+  show({resolution, cubes, working = []}, runs) {
+    this.resolution = resolution;
+    const at_work = new Set(runs ? working.map((cube) => cube.join()) : []);
+    const found = new Map();
+    this.draws_all = true;
+    this.counts = Object.fromEntries(kOrder.map((state) => [state, 0]));
+    for (const [x, y, z, edge, built] of cubes) {
+      const rank = at_work.has([x, y, z, edge].join()) ? 2 : built ? 1 : 0;
+      this.counts[kOrder[rank]]++;
+      if (rank < 2 && !this.draws_all) continue;
+      add_edges(x, y, z, edge, rank, found);
+      if (!this.draws_all || found.size <= kMaxEdges) continue;
+      this.draws_all = false;
+      for (const [key, known] of found) if (known.rank < 2) found.delete(key);
+    }
+    const lists = kOrder.map(() => []);
+    for (const {rank, points} of found.values()) lists[rank].push(...points);
+    kOrder.forEach((state, rank) => this.edges[state] = Float64Array.from(lists[rank]));
+    this.drawn = null;
+    this.on_change();
+  }
+
+  set_visible(visible) {
+    this.visible = visible;
+    this.canvas.hidden = !visible;
+    this.on_change();
+  }
+
+  draw(camera) {
+    if (!this.visible || !this.resolution) return;
+    const {canvas} = this, width = canvas.clientWidth, height = canvas.clientHeight, ratio = window.devicePixelRatio || 1;
+    if (!width || !height) return;
+    // Thousands of lines take longer than a part of a sample: they are drawn when they change, and not with each frame.
+    const {forward, up} = camera.axes(), drawn = [...camera.eye, ...forward, ...up, camera.fov_degrees, width, height, ratio].join();
+    if (drawn === this.drawn) return;
+    this.drawn = drawn;
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    const pen = canvas.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    const project = this.projection(camera, width, height);
+    for (const state of kOrder) {
+      const {color, width: line, dash} = kStyles[state];
+      pen.strokeStyle = color;
+      pen.lineWidth = line;
+      pen.setLineDash(dash);
+      // Thousands of lines would hide the voxels.
+      pen.globalAlpha = Math.min(1, Math.max(0.25, kOpaque / Math.sqrt(this.counts[state])));
+      pen.beginPath();
+      const points = this.edges[state];
+      for (let i = 0; i < points.length; i += 6) project(pen, points, i);
+      pen.stroke();
+    }
+  }
+
+  // Adds the visible part of an edge to the path.
+  projection(camera, width, height) {
+    const {forward, right, up} = camera.axes(), eye = camera.eye, pixel = camera.pixel_spread(height);
+    const near = kNear * this.resolution / 16;
+    const place = (points, at) => {
+      const offset = subtract([points[at], points[at + 1], points[at + 2]], eye);
+      return [dot(offset, right), dot(offset, up), dot(offset, forward)];
+    };
+    const cut = (from, to) => {
+      const share = (near - from[2]) / (to[2] - from[2]);
+      return from.map((c, i) => c + share * (to[i] - c));
+    };
+    const to_pixels = ([x, y, depth]) => [width / 2 + x / depth / pixel, height / 2 - y / depth / pixel];
+    return (pen, points, i) => {
+      let a = place(points, i), b = place(points, i + 3);
+      if (a[2] < near && b[2] < near) return;
+      if (a[2] < near) a = cut(a, b);
+      if (b[2] < near) b = cut(b, a);
+      pen.moveTo(...to_pixels(a));
+      pen.lineTo(...to_pixels(b));
+    };
+  }
+
+  dispose() {
+    this.canvas.remove();
+  }
+}
+
+// The twelve edges of a cube; one that several cubes of the same size share is drawn once.
+function add_edges(x, y, z, edge, rank, found) {
+  for (let axis = 0; axis < 3; ++axis)
+    for (let corner = 0; corner < 4; ++corner) {
+      const from = [x, y, z];
+      from[(axis + 1) % 3] += (corner & 1) * edge;
+      from[(axis + 2) % 3] += (corner >> 1) * edge;
+      const key = `${from} ${axis} ${edge}`, known = found.get(key);
+      if (known && known.rank >= rank) continue;
+      const to = [...from];
+      to[axis] += edge;
+      found.set(key, {rank, points: [...from, ...to]});
+    }
+}

@@ -1,0 +1,189 @@
+"""Picks and tiles that come and go at the same time, the end of the first view, and what moves by itself."""
+
+import math
+
+from control_checks import steady_place
+from failure_checks import TILES
+from picture_checks import HEIGHT, PLAIN, WIDTH, address, assert_equal
+from visitor import PIXEL_RATIO
+
+# A pick, and the distance that a picture of the same moment has at its place.
+PICK_AND_DEPTH = """async ([x, y, width, height, ratio]) => {
+  const {renderer} = voxdagViewer, picking = renderer.pick(x, y);
+  const {depth} = await renderer.capture({width, height});
+  return [await picking, depth[Math.floor(y * ratio) * width + Math.floor(x * ratio)], renderer.statistics().loading];
+}"""
+
+
+def check_one_pick(pick, dag):
+    """The cell is one of the file's, and so is the node."""
+    assert pick is not None, "nothing is picked"
+    offset = dag.find(pick["voxel"], pick["nodeLevel"])
+    assert str(offset) == pick["nodeOffset"], f"not the node around the voxel, {offset}: {pick}"
+    in_file = dag.is_set(pick["voxel"]) if pick["level"] == dag.levels else dag.find(pick["voxel"], min(pick["level"], dag.levels - 2))
+    assert in_file is not None and in_file is not False, f"the file has no such cell: {pick}"
+
+
+def check_picks_while_loading(visitor, url, dag, camera, reference):
+    """What is picked is what the picture shows at that time: without tiles, while they arrive, and with all of them."""
+    visitor.page.add_init_script(TILES % "late")
+    visitor.open(f"{url}/{PLAIN}")
+    visitor.show(camera, complete=False)
+    visitor.wait_until("tiles.asked > 0")
+    x, y = steady_place(reference)
+
+    def pick():
+        found, depth, loading = visitor.page.evaluate(PICK_AND_DEPTH, [x, y, WIDTH, HEIGHT, PIXEL_RATIO])
+        check_one_pick(found, dag)
+        assert math.isclose(found["distance"], depth, rel_tol=1e-4), f"picked at {found['distance']}, shown at {depth}"
+        return found, loading
+
+    coarse, _ = pick()
+    # Tiles that come one after the other, while all of them are waited for.
+    visitor.page.evaluate("""() => {
+      window.whole = false;
+      voxdagViewer.renderer.complete().then(() => whole = true);
+      const next = () => {
+        tiles.held.shift()?.();
+        if (!whole) setTimeout(next, 20);
+      };
+      next();
+    }""")
+    levels, busy = {coarse["level"]}, 0
+    while not visitor.page.evaluate("whole"):
+        found, loading = pick()
+        levels.add(found["level"])
+        busy += loading > 0
+    fine, _ = pick()
+    assert fine["level"] > coarse["level"] and busy > 0, f"no pick while tiles came: {sorted(levels)}, {busy}"
+
+
+# All tiles but the root's leave between a pick's ray and its reading.
+PICK_WITHOUT_TILES = """async ([x, y]) => {
+  const {renderer} = voxdagViewer, {passes, store} = renderer, its_pick = passes.pick_one;
+  let left = 0, evicted = 0;
+  passes.pick_one = function(values) {
+    const reading = its_pick.call(passes, values);
+    evicted = store.evicted;
+    for (const tile of left === 0 ? [...store.tiles.values()] : []) {
+      if (tile === store.root) continue;
+      store.evict(tile);
+      ++left;
+    }
+    return reading;
+  };
+  const pick = await renderer.pick(x, y);
+  passes.pick_one = its_pick;
+  return [pick, left, store.evicted - evicted];
+}"""
+
+
+# Of the tiles that were first loaded for the view, those that the view is known to use now.
+SEEN = """() => {
+  const {store} = voxdagViewer.renderer, tiles = [...store.tiles.values()].slice(0, 30);
+  return [tiles.filter(({epoch}) => epoch === store.epoch).length, tiles.length];
+}"""
+
+
+def check_tiles_that_left(visitor, url, dag, cameras, references):
+    """A tile that has left is fetched again when it is needed; a pick that it leaves under is that of the new picture."""
+    visitor.open(f"{url}/?budget=0.25{PLAIN}")
+    visitor.page.evaluate("""() => {
+      const {source} = voxdagViewer, its_fetch = source.fetchTiles;
+      window.fetched = {};
+      source.fetchTiles = function(nodes) {
+        for (const {level, offset} of nodes) fetched[`${level}.${offset}`] = (fetched[`${level}.${offset}`] ?? 0) + 1;
+        return its_fetch.call(source, nodes);
+      };
+    }""")
+    visitor.show(cameras["top"])
+    visitor.show(cameras["wide"], complete=False)
+    visitor.show(cameras["top"])
+    seen, tiles = visitor.page.evaluate(SEEN)
+    assert seen > tiles / 4, f"only {seen} of {tiles} tiles are known to be seen: others would leave first"
+    visitor.page.evaluate("window.of_top = [...voxdagViewer.renderer.store.tiles.keys()]")
+    for _ in range(10):
+        for name in ("near", "inside", "street"):
+            visitor.show(cameras[name], complete=False)
+            visitor.page.wait_for_timeout(100)
+        if visitor.page.evaluate("of_top.some((key) => !voxdagViewer.renderer.store.tiles.has(key))"):
+            break
+    assert visitor.page.evaluate("of_top.some((key) => !voxdagViewer.renderer.store.tiles.has(key))"), "no tile of the first view has left"
+    visitor.show(cameras["top"])
+    depths, _ = visitor.capture(WIDTH, HEIGHT)
+    assert_equal(references["top"], depths, cameras["top"], "top, after its tiles have left")
+    assert visitor.page.evaluate("Object.values(fetched).some((times) => times > 1)"), "no tile was fetched twice"
+    pick, left, left_since = visitor.page.evaluate(PICK_WITHOUT_TILES, steady_place(references["top"]))
+    assert left > 0, "no tile has left: the check sees nothing"
+    assert left_since == 0, f"{left_since} tiles have left since the ray of the pick"
+    check_one_pick(pick, dag)
+
+
+MAX_TILES, FEW_TILES = "const kMaxTiles = 1500;", 40
+FIRST_PIXELS, FINE_PIXELS = "const kPixels = 15;", 1
+MOST_UNDER_WAY = 5 * 48  # four requests, and the one that arrives
+# How many tiles were asked for until those of the first view were there.
+COUNT_TILES = """
+window.asked = {tiles: 0, at_mark: null};
+const counted_fetch = window.fetch, counted_mark = performance.mark;
+performance.mark = function(name) {
+  if (name === "voxdag: tiles of the first view") asked.at_mark ??= asked.tiles;
+  return counted_mark.apply(this, arguments);
+};
+window.fetch = (url, options) => {
+  if (/\\/tiles\\/[0-9b]/.test(url)) asked.tiles += /nodes=/.test(url) ? url.split("nodes=")[1].split(",").length : 1;
+  return counted_fetch(url, options);
+};
+"""
+
+
+def check_end_of_first_view(visitor, url, camera, reference):
+    """The walk before the first frame ends after so many tiles; the picture then gets the others as ever."""
+    def make_small(route):
+        script = route.fetch().text()
+        for old, new in ((MAX_TILES, f"const kMaxTiles = {FEW_TILES};"), (FIRST_PIXELS, f"const kPixels = {FINE_PIXELS};")):
+            assert old in script, f"{old} is not there any more"
+            script = script.replace(old, new)
+        route.fulfill(body=script, content_type="text/javascript")
+
+    visitor.page.route("**/tiles/first_view.js", make_small)
+    visitor.page.add_init_script(COUNT_TILES)
+    visitor.open(address(url, camera))
+    visitor.wait_until("asked.at_mark !== null")
+    at_mark = visitor.page.evaluate("asked.at_mark")
+    visitor.show(camera)
+    depths, _ = visitor.capture(WIDTH, HEIGHT)
+    assert_equal(reference, depths, camera, f"after {at_mark} tiles of the first view")
+    asked = visitor.page.evaluate("asked.tiles")
+    assert FEW_TILES < at_mark <= FEW_TILES + MOST_UNDER_WAY < asked, f"{at_mark} tiles in the first view, {asked} in all"
+
+
+# The places where the camera is seen on its way, and whether a drag has inertia.
+GLIDE = """async (camera) => {
+  const {viewer} = voxdagViewer, places = new Set(), end = performance.now() + 120000;
+  viewer.motion.start_coasting([1, 0], () => {});
+  const coasts = viewer.motion.coast !== null;
+  viewer.motion.stop();
+  viewer.fly_to_text(camera);
+  for (;;) {
+    places.add(viewer.camera.eye.join());
+    if (viewer.motion.flight === null || performance.now() > end) return [places.size, coasts, [...viewer.camera.eye]];
+    await new Promise((resolve) => requestAnimationFrame(resolve));
+  }
+}"""
+
+
+def check_reduced_motion(visitor, cameras):
+    """The camera jumps where the system asks for less motion, and glides elsewhere."""
+    for motion in ("no-preference", "reduce"):
+        visitor.page.emulate_media(reduced_motion="reduce")
+        visitor.show(cameras["top"], complete=False)
+        visitor.page.emulate_media(reduced_motion=motion)
+        places, coasts, eye = visitor.page.evaluate(GLIDE, cameras["wide"])
+        visitor.page.emulate_media(reduced_motion="reduce")
+        visitor.show(cameras["wide"], complete=False)
+        assert math.dist(eye, visitor.camera()["eye"]) < 1, "the camera has not arrived"
+        if motion == "reduce":
+            assert places == 1 and not coasts, f"the camera glides though motion is reduced: {places} places, {coasts}"
+        else:
+            assert places > 1 and coasts, "the camera never glides: the check sees nothing"

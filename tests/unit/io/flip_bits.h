@@ -1,0 +1,19 @@
+// Damages a file.
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <string>
+
+namespace voxdag {
+
+// Flips these bits of one byte of the file; done once more, the file is as it was.
+inline void flip_bits(const std::string& path, uint64_t at, int bits) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(at));
+  const char byte = static_cast<char>(file.get() ^ bits);
+  file.seekp(static_cast<std::streamoff>(at));
+  file.put(byte);
+}
+
+}  // namespace voxdag
