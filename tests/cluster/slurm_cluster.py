@@ -141,6 +141,10 @@ class SlurmCluster:
     def restart_nodes(self):
         for node in self.nodes:
             self.kill_machine(node)
+        # Otherwise a job that is completing keeps its node until Slurm asks it again, a minute later.
+        self.command("scontrol", "update", f"nodename={','.join(self.nodes)}", "state=down",
+                     "reason=restart")
+        for node in self.nodes:
             self.start_node(node)
         self.wait_for_idle_nodes()
 
@@ -158,7 +162,7 @@ class SlurmCluster:
             self.resume_nodes()
             return self.count_idle() == len(self.nodes)
 
-        self.wait_for(are_idle, "idle nodes")
+        self.wait_for(are_idle, "idle nodes", 150)
 
     def kill(self, name, how=signal.SIGKILL):
         """Ends a daemon; what a node runs is left running (as on a machine that lost its network)."""
@@ -198,8 +202,13 @@ class SlurmCluster:
             time.sleep(0.1)
 
     def logs(self):
-        return "\n".join(f"--- {log.name}\n{log.read_text(errors='replace')[-1500:]}"
-                         for log in sorted((self.folder / "log").iterdir()))
+        parts = [f"--- {log.name}\n{log.read_text(errors='replace')[-1500:]}"
+                 for log in sorted((self.folder / "log").iterdir())]
+        # What the nodes and the jobs are doing says most, so it comes last.
+        for command in (["sinfo", "--Node", "--long"], ["squeue"]):
+            shown = self.command(*command, check=False)
+            parts.append(f"--- {command[0]}\n{shown.stdout}{shown.stderr}")
+        return "\n".join(parts)
 
     def stop(self):
         if "slurmctld" in self.processes:
