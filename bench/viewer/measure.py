@@ -67,7 +67,8 @@ class Measurement:
     def visitor(self, width=None, height=None):
         """A browser of its own, with a canvas of this size."""
         browser = self.play.chromium.launch(executable_path="/usr/bin/chromium", args=OPTIONS)
-        visitor = Visitor(browser, self.folder, "measured", (width or self.width) + WINDOW[0], (height or self.height) + WINDOW[1])
+        visitor = Visitor(browser, self.folder, "measured", (width or self.width) + WINDOW[0], (height or self.height) + WINDOW[1],
+                          device_scale_factor=1)
         visitor.timeout_ms = STEP_MS
         visitor.context.set_default_timeout(STEP_MS)
         visitor.context.add_init_script(KEEP_ENTRIES)
@@ -91,7 +92,7 @@ class Measurement:
                 before_s = cpu_s(server.process.pid)
                 visitor.open(self.address(server.url, camera))
                 visitor.page.evaluate(IN_LARGE_PARTS)
-                done = visitor.page.evaluate(UNTIL_COMPLETE, [None, False])
+                done = visitor.page.evaluate(UNTIL_COMPLETE, [None, True])
                 spent_s = cpu_s(server.process.pid) - before_s
                 asked[name], bytes_of = sums(visitor.page.evaluate(REQUESTS, 0))
                 hits = visitor.page.evaluate(HITS)
@@ -118,7 +119,7 @@ class Measurement:
                 if i == 0:
                     visitor.open(self.address(server.url, camera))
                 visitor.page.evaluate(IN_LARGE_PARTS)
-                done = visitor.page.evaluate(UNTIL_COMPLETE, [None if i == 0 else camera, False])
+                done = visitor.page.evaluate(UNTIL_COMPLETE, [None if i == 0 else camera, True])
                 requests = visitor.page.evaluate(REQUESTS, 0)
                 tiles, bytes_of = sums(requests[seen:])
                 seen = len(requests)

@@ -21,7 +21,9 @@ SHOW = """async ([camera, complete]) => {
   const {viewer, renderer} = window.voxdagViewer;
   viewer.fly_to_text(camera);
   await (%s)();
-  if (complete) await renderer.complete();
+  if (!complete) return;
+  await renderer.complete();
+  if (!renderer.full_drawn || !renderer.sun_is_placed) throw new Error("complete() came before the final picture");
 }""" % TWO_FRAMES
 
 CAPTURE = """async ([width, height]) => {

@@ -144,9 +144,9 @@ export class Renderer {
     return {moving, complete: false};
   }
 
-  // Resolves when all tiles of the view have arrived.
+  // Resolves when all tiles that the pixels of the canvas need have arrived, and the sun has its place.
   complete() {
-    if (this.ready && this.is_complete && !this.reading) return Promise.resolve();
+    if (this.ready && this.is_complete && this.full_drawn && this.sun_is_placed && !this.reading) return Promise.resolve();
     return new Promise((resolve) => {
       this.waiting.push(resolve);
       this.on_change();
@@ -335,7 +335,7 @@ export class Renderer {
   // Within a scene the sun takes a better place as soon as the first view is complete. Returns whether the picture
   // is final as far as the sun is concerned.
   improve_sun(now_ms) {
-    if (this.light.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows) return true;
+    if (this.sun_is_placed) return true;
     const {passes} = this, {width, height} = passes.targets;
     if (!this.can_choose_sun) {
       passes.compile_later().then((usable) => this.can_choose_sun = usable && passes === this.passes,
@@ -361,9 +361,13 @@ export class Renderer {
     return this.quiet_rounds >= kQuietRounds;
   }
 
+  get sun_is_placed() {
+    return this.light.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows;
+  }
+
   // Whether nobody waits for a complete view, and the sun has its place.
   get is_done() {
-    return this.waiting.length === 0 && (this.light.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows);
+    return this.waiting.length === 0 && this.sun_is_placed;
   }
 
   // Whether all that can be drawn is drawn until the service is asked again.
