@@ -102,6 +102,7 @@ void Dispatcher::dispatch() {
     if (stopping()) return;
     steps_.run("start jobs", [this] {
       std::lock_guard lock(mutex_);
+      if (stops_) return;  // nobody would stop what starts now
       if (!recovered_) recover();
       recovered_ = true;
       start_ready_jobs();

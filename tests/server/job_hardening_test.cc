@@ -1,5 +1,6 @@
 // What once lost the results of jobs, or left jobs in a state that nothing ended.
 #include <condition_variable>
+#include <csignal>
 #include <filesystem>
 
 #include "core/db/sqlite.h"
@@ -36,15 +37,20 @@ class JobHardening : public RunningService {
     return http_->send("DELETE", "/api/v1/jobs/" + id, "");
   }
 
-  // The first step of this name waits until release().
-  void hold_step(const std::string& beginning) {
+  // The first step of this name waits until release(); with `when_armed`, the first after arm().
+  void hold_step(const std::string& beginning, bool when_armed = false) {
+    armed_ = !when_armed;
     config_.before_step = [this, beginning](const std::string& step) {
       std::unique_lock lock(mutex_);
-      if (held_ || !step.starts_with(beginning)) return;
+      if (held_ || !armed_ || !step.starts_with(beginning)) return;
       held_ = true;
       changed_.notify_all();
       changed_.wait(lock, [this] { return free_; });
     };
+  }
+  void arm() {
+    std::lock_guard lock(mutex_);
+    armed_ = true;
   }
   void until_held() {
     std::unique_lock lock(mutex_);
@@ -59,7 +65,7 @@ class JobHardening : public RunningService {
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  bool held_ = false, free_ = false;
+  bool armed_ = true, held_ = false, free_ = false;
 };
 
 // What a failed deletion left is finished later: until then the job is not run again, or its new
@@ -189,6 +195,41 @@ TEST_F(JobHardening, R4_AJobThatWaitsForAnotherAttemptIsCanceledToo) {
   EXPECT_EQ(Json::parse(answer.body)["state"], "canceled") << answer.body;
   EXPECT_EQ(delete_job(id).status, 204);
   release();
+}
+
+// A process that was made, but has not begun the job's program, inherits the service's handler.
+TEST_F(JobHardening, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
+  use_program(R"(echo '{"json":"{}","message":"result"}'; exec sleep 1)");
+  hold_step("run ");
+  const auto before = std::signal(SIGTERM, [](int) {});  // as `voxdag serve` has one
+  start();
+  const std::string id = posted_job();
+  until_held();
+  EXPECT_EQ(act(id, "suspend").status, 202);
+  release();
+  const std::string line = "job " + id + " s";
+  EXPECT_TRUE(until([&] { return log().find(line) != std::string::npos; }));
+  EXPECT_EQ(job(id)["state"], "suspended");
+  std::signal(SIGTERM, before);
+}
+
+// What would start after all others were asked to stop would run to its end, and the service with
+// it.
+TEST_F(JobHardening, AServiceThatStopsStartsNoOtherJob) {
+  use_program("exec sleep 10");
+  config_.jobs.max_concurrent = 2;
+  hold_step("start jobs", true);
+  start();
+  const std::string running = posted_job();
+  ASSERT_TRUE(until_state(running, "running"));
+  arm();
+  until_held();
+  const std::string next = posted_job();
+  begin_stop();
+  EXPECT_TRUE(until([&] { return log().find("job " + running + " queued") != std::string::npos; }));
+  release();
+  stop();
+  EXPECT_EQ(log().find("job " + next + " running"), std::string::npos);
 }
 
 }  // namespace

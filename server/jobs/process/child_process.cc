@@ -19,6 +19,34 @@ namespace {
 constexpr int kTick_ms = 100;
 constexpr size_t kMaxLineBytes = 4 << 20;
 
+// Blocks all signals of this thread while it exists. A child that is forked then keeps what it
+// is sent until it unblocks them.
+class BlockedSignals {
+ public:
+  BlockedSignals() {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~BlockedSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  BlockedSignals(const BlockedSignals&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+// The handlers of the parent belong to its program: here they would take the request to stop, and
+// the program that is run next would never learn of it.
+void drop_signal_handlers() {
+  for (int signal = 1; signal < NSIG; ++signal) {
+    struct sigaction action {};
+    if (sigaction(signal, nullptr, &action) != 0 || action.sa_handler == SIG_IGN) continue;
+    action = {};
+    action.sa_handler = SIG_DFL;
+    sigaction(signal, &action, nullptr);
+  }
+}
+
 // Runs in the child, between fork and exec: only async-signal-safe calls are allowed.
 [[noreturn]] void run_program(char* const* arguments, int output, const char* log_file, int nice,
                               pid_t parent) {
@@ -26,6 +54,7 @@ constexpr size_t kMaxLineBytes = 4 << 20;
   if (getppid() != parent) _exit(127);  // the parent died before the line above
   setpgid(0, 0);                        // Ctrl-C on a terminal is for the service
   if (nice != 0) setpriority(PRIO_PROCESS, 0, nice);
+  drop_signal_handlers();
   sigset_t none;
   sigemptyset(&none);
   sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -49,9 +78,14 @@ ChildProcess::ChildProcess(const Start& start) {
   if (pipe2(ends, O_CLOEXEC) != 0)
     throw Error(ErrorCode::kIo, "pipe: " + std::string(std::strerror(errno)));
   const pid_t parent = getpid();
-  pid_ = fork();
-  if (pid_ == 0) run_program(arguments.data(), ends[1], start.log_file.c_str(), start.nice, parent);
-  const int reason = errno;
+  int reason = 0;
+  {
+    const BlockedSignals blocked;
+    pid_ = fork();
+    if (pid_ == 0)
+      run_program(arguments.data(), ends[1], start.log_file.c_str(), start.nice, parent);
+    reason = errno;
+  }
   close(ends[1]);
   output_ = ends[0];
   if (pid_ < 0) {

@@ -28,7 +28,8 @@ class ChildProcess {
   // every tenth of a second; when `tick` returns true the child is killed.
   void read_lines(const std::function<void(std::string_view line)>& use,
                   const std::function<bool()>& tick);
-  // Sends SIGTERM, upon which a build stops at a checkpoint. From any thread.
+  // Sends SIGTERM, upon which a build stops at a checkpoint; a program that has not begun yet ends.
+  // From any thread.
   void ask_to_stop();
   void kill();
 
