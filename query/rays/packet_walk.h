@@ -86,31 +86,33 @@ class PacketWalk {
   VOXDAG_INLINE static Int4 all(int32_t number) { return Int4{number, number, number, number}; }
 
   // Bounds of the origins and inverse directions of all rays.
-  void bound(uint64_t rays) {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  VOXDAG_INLINE void bound(uint64_t rays) {
+    Four lows[6], highs[6];
+    for (Four& low : lows) low = Four::of(std::numeric_limits<double>::infinity());
+    for (Four& high : highs) high = Four::of(-std::numeric_limits<double>::infinity());
+    const auto extend = [&](const auto& numbers_of) {
+      for (int j = 0; j < 6; ++j) {
+        const Four x = numbers_of(j < 3 ? job_.origin[j] : job_.inverse[j - 3]);
+        lows[j] = min(lows[j], x);
+        highs[j] = max(highs[j], x);
+      }
+    };
+    for (int i = 0; i < kPacketRays; i += 4) {
+      if ((rays >> i & 15) == 15) {
+        extend([&](const double* numbers) { return Four::load(numbers + i); });
+        continue;
+      }
+      for (uint64_t left = rays >> i & 15; left != 0; left &= left - 1)
+        extend([&](const double* numbers) { return Four::of(numbers[i + first_of(left)]); });
+    }
     for (int axis = 0; axis < 3; ++axis) {
-      bound(rays, job_.origin[axis], -kInfinity, low_origin_[axis], high_origin_[axis]);
-      bound(rays, job_.inverse[axis], 0, low_inverse_[axis], high_inverse_[axis]);
+      reduce(lows[axis], highs[axis], low_origin_[axis], high_origin_[axis]);
+      reduce(lows[3 + axis], highs[3 + axis], low_inverse_[axis], high_inverse_[axis]);
     }
     low_origin_[3] = high_origin_[3] = 0;
     low_inverse_[3] = high_inverse_[3] = 1;
   }
-  static void bound(uint64_t rays, const double* numbers, double least, double& low, double& high) {
-    Four lows = Four::of(std::numeric_limits<double>::infinity()), highs = Four::of(least);
-    for (int i = 0; i < kPacketRays; i += 4) {
-      const uint64_t group = rays >> i & 15;
-      if (group == 15) {
-        const Four x = Four::load(numbers + i);
-        lows = min(lows, x);
-        highs = max(highs, x);
-        continue;
-      }
-      for (uint64_t left = group; left != 0; left &= left - 1) {
-        const Four x = Four::of(numbers[i + first_of(left)]);
-        lows = min(lows, x);
-        highs = max(highs, x);
-      }
-    }
+  static void reduce(const Four& lows, const Four& highs, double& low, double& high) {
     alignas(64) double l[4], h[4];
     lows.store(l);
     highs.store(h);
@@ -182,6 +184,14 @@ class PacketWalk {
         cross(min(in * i0, in * i1), max(out * i0, out * i1), job_.t_min, job_.t_max);
     return crossed.inside | crossed.touching;
   }
+  // Which children of a cell all rays cross for certain.
+  VOXDAG_INLINE uint32_t cross_all(Int4 low, double half) const {
+    const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
+    const Planes planes = Planes::of_cell(low, half);
+    const Planes in = planes - Planes::twice(low_origin_),
+                 out = planes + Planes::of(half) - Planes::twice(high_origin_);
+    return cross(max(in * i0, in * i1), min(out * i0, out * i1), job_.t_min, job_.t_max).inside;
+  }
 
   // Which of the rays cross a cell or touch it.
   VOXDAG_INLINE uint64_t crossing(Int4 low, double edge, uint64_t rays) const {
@@ -220,13 +230,15 @@ class PacketWalk {
     const int32_t half = edge / 2;
     uint32_t candidates = mirrored_[n.mask] & cross_any(low, half);
     const bool only = (candidates & (candidates - 1)) == 0;
+    // For these, rays need no test of their own.
+    const uint32_t by_all = only ? candidates : cross_all(low, half);
     Child children[8];
     int count = 0;
     for (; candidates != 0; candidates &= candidates - 1) {
       const int index = first_of(candidates);
       Child& child = children[count];
       child.low = corner(low, index, half);
-      child.rays = only ? rays : crossing(child.low, half, rays);
+      child.rays = by_all >> index & 1 ? rays : crossing(child.low, half, rays);
       if (child.rays == 0) continue;
       child.offset = n.child(index ^ job_.mirror);
       prefetch(depth + 1, child.offset);
