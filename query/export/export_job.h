@@ -130,6 +130,8 @@ ExportReport write_voxel(const ExportJob& job);
 ExportReport write_vox(const ExportJob& job);
 ExportReport write_bt(const ExportJob& job);
 ExportReport write_glb(const ExportJob& job);
+// With a smaller limit than that of the format, for tests: files of 4 GiB take too long.
+ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes);
 ExportReport write_vdb(const ExportJob& job);
 ExportReport write_nvdb(const ExportJob& job);
 

@@ -18,6 +18,7 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxGlbBytes = (uint64_t{1} << 32) - 1;  // its length is a u32
+constexpr uint64_t kMaxGlbJsonBytes = 4096;                 // and chunk headers
 constexpr uint64_t kQuadBytes = 4 * 3 * sizeof(float) + 6 * sizeof(uint32_t);
 constexpr uint64_t kQuadColorBytes = 4 * 4 * sizeof(uint16_t);
 
@@ -25,7 +26,9 @@ constexpr uint64_t kQuadColorBytes = 4 * 4 * sizeof(uint16_t);
 uint64_t quad_bytes(const ExportJob& job) {
   return kQuadBytes + (job.has_colors ? kQuadColorBytes : 0);
 }
-uint64_t max_quads(const ExportJob& job) { return (kMaxGlbBytes - 4096) / quad_bytes(job); }
+uint64_t max_quads(const ExportJob& job, uint64_t max_bytes) {
+  return (max_bytes - kMaxGlbJsonBytes) / quad_bytes(job);
+}
 
 struct GlbBrick {
   uint64_t morton = 0;  // of its corner, in bricks
@@ -43,14 +46,17 @@ static_assert(sizeof(GlbQuad) == 24);
 
 class GlbSurface {
  public:
-  explicit GlbSurface(const ExportJob& job) : job_(job), colors_(job.file) {
+  // Ends early, with more rectangles than `max_quads`, if there are more.
+  GlbSurface(const ExportJob& job, uint64_t max_quads)
+      : job_(job), max_quads_(max_quads), colors_(job.file) {
     const uint64_t count = count_bricks();
     bricks_charge_ = MemoryCharge(job.budget, count * sizeof(GlbBrick), kMemory);
     bricks_.reserve(count);
     find_bricks(count);
     ExportStage stage(job, "find faces", 6 * count, "bricks");
     for (uint8_t axis = 0; axis < 3; ++axis)
-      for (const bool upward : {false, true}) add_quads(axis, upward, stage);
+      for (const bool upward : {false, true})
+        if (quads_.size() <= max_quads_) add_quads(axis, upward, stage);
   }
 
   uint64_t voxels() const { return voxels_; }
@@ -166,7 +172,7 @@ class GlbSurface {
     GlbQuad last{};
     voxdag_reader::Rgb next;  // color of the face that the next run begins with
     if (!faces.empty()) next = color_of(faces[0], axis, upward);
-    for (size_t i = 0; i < faces.size();) {
+    for (size_t i = 0; i < faces.size() && quads_.size() <= max_quads_;) {
       GlbQuad run;
       run.color = next;
       size_t end = i;
@@ -214,6 +220,7 @@ class GlbSurface {
   }
 
   const ExportJob& job_;
+  const uint64_t max_quads_;
   voxdag_reader::ColorCursor colors_;
   MemoryCharge bricks_charge_, quads_charge_;
   std::vector<GlbBrick> bricks_;
@@ -320,17 +327,20 @@ void put_glb(const ExportJob& job, const std::vector<GlbQuad>& quads, ExportFile
 
 }  // namespace
 
-ExportReport write_glb(const ExportJob& job) {
-  const GlbSurface surface(job);
-  const uint64_t quads = surface.quads().size(), most = max_quads(job);
-  if (quads > most)
+ExportReport write_glb(const ExportJob& job) { return write_glb_within(job, kMaxGlbBytes); }
+
+ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
+  const uint64_t limit = max_quads(job, max_bytes);
+  const GlbSurface surface(job, limit);
+  const uint64_t quads = surface.quads().size();
+  if (quads > limit)
     refuse_size(job,
-                count_text(quads) + " rectangles (" + size_text(quads * quad_bytes(job)) +
-                    ") are needed" + (job.has_colors ? " with colors (--gray merges more)" : "") +
-                    ", but a .glb file has at most " + size_text(kMaxGlbBytes),
+                "over " + count_text(limit) + " rectangles are needed" +
+                    (job.has_colors ? " with colors (--gray merges more)" : "") +
+                    ", but a .glb file has at most " + size_text(max_bytes),
                 // Even if no faces are merged.
-                [&](uint32_t level) { return has_at_most(job, level, most / 6); });
-  require_space(job, quads * quad_bytes(job) + 4096);
+                [&](uint32_t level) { return has_at_most(job, level, limit / 6); });
+  require_space(job, quads * quad_bytes(job) + kMaxGlbJsonBytes);
   ExportReport report;
   report.voxels = surface.voxels();
   ExportFile file(job.files, job.output);
