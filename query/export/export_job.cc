@@ -62,18 +62,29 @@ uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t
   return voxels;
 }
 
-bool has_at_most(const ExportJob& job, uint32_t grid_levels, uint64_t limit) {
-  const Selection selection = coarser(job.selection, grid_levels);
-  job.cancel.check();
-  const NodeCounts counts(job.file, job.dag, grid_levels, job.budget);
-  if (counts.is_stored()) return counts.count(selection.region) <= limit;
-  CancelCheck check(job);
+CellLimit::CellLimit(const ExportJob& job, uint64_t limit) : job_(job), limit_(limit) {
+  if (job.selection.region == whole_grid(job.selection.grid_levels))
+    cells_.emplace(job.file, job.dag, job.budget, job.cancel);
+}
+
+bool CellLimit::fits(uint32_t grid_levels) {
+  job_.cancel.check();
+  try {
+    if (cells_) return cells_->count(grid_levels, limit_) <= limit_;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kOutOfMemory) throw;
+    cells_.reset();
+  }
+  const Selection selection = coarser(job_.selection, grid_levels);
+  const NodeCounts counts(job_.file, job_.dag, grid_levels, job_.budget);
+  if (counts.is_stored()) return counts.count(selection.region) <= limit_;
+  CancelCheck check(job_);
   uint64_t voxels = 0;
-  for_each_brick(job.dag, selection, [&](const Brick& brick) {
+  for_each_brick(job_.dag, selection, [&](const Brick& brick) {
     check.advance(1);
-    return (voxels += static_cast<uint64_t>(std::popcount(brick.mask))) <= limit;
+    return (voxels += static_cast<uint64_t>(std::popcount(brick.mask))) <= limit_;
   });
-  return voxels <= limit;
+  return voxels <= limit_;
 }
 
 void refuse_empty(const ExportJob& job) {
@@ -104,10 +115,11 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
   if (voxels == 0) refuse_empty(job);
   if (voxels <= limit) return voxels;
   const bool exact = job.selects_all_of(job.dag.grid_levels());
+  CellLimit cells(job, limit);
   refuse_size(job,
               (exact ? "" : "over ") + count_text(exact ? voxels : limit) +
                   " voxels are selected, but " + reason + " at most " + count_text(limit),
-              [&](uint32_t level) { return has_at_most(job, level, limit); });
+              [&](uint32_t level) { return cells.fits(level); });
 }
 
 }  // namespace voxdag::query

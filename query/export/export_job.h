@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -12,6 +13,7 @@
 #include "query/dag_view.h"
 #include "query/export/export.h"
 #include "query/export/export_file.h"
+#include "query/export/level_cells.h"
 
 namespace voxdag::query {
 
@@ -104,9 +106,19 @@ void require_space(const ExportJob& job, uint64_t bytes);
 
 // The number of selected voxels, or anything over `limit` if there are more.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
-// Whether the job's selection has at most so many cells on a coarser grid. Faster than counting
-// where there are many, since equal subtrees are counted once, if the memory holds their counts.
-bool has_at_most(const ExportJob& job, uint32_t grid_levels, uint64_t limit);
+// On which coarser grids the job's selection has at most so many cells; asked from the coarsest one
+// on. Equal subtrees are counted once if the memory holds their counts: of a whole file each level
+// is read once for all grids, of a region once for each.
+class CellLimit {
+ public:
+  CellLimit(const ExportJob& job, uint64_t limit);
+  bool fits(uint32_t grid_levels);
+
+ private:
+  const ExportJob& job_;
+  const uint64_t limit_;
+  std::optional<LevelCells> cells_;  // of a whole file, as long as the memory holds them
+};
 
 // count_voxels() of the job's selection. Throws Error{kLimit} as above if there are more than
 // `limit`, which `reason` explains, Error{kInvalidInput} if there is none.

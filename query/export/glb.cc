@@ -333,13 +333,15 @@ ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
   const uint64_t limit = max_quads(job, max_bytes);
   const GlbSurface surface(job, limit);
   const uint64_t quads = surface.quads().size();
-  if (quads > limit)
+  if (quads > limit) {
+    // Even if no faces are merged.
+    CellLimit cells(job, limit / 6);
     refuse_size(job,
                 "over " + count_text(limit) + " rectangles are needed" +
                     (job.has_colors ? " with colors (--gray merges more)" : "") +
                     ", but a .glb file has at most " + size_text(max_bytes),
-                // Even if no faces are merged.
-                [&](uint32_t level) { return has_at_most(job, level, limit / 6); });
+                [&](uint32_t level) { return cells.fits(level); });
+  }
   require_space(job, quads * quad_bytes(job) + kMaxGlbJsonBytes);
   ExportReport report;
   report.voxels = surface.voxels();

@@ -333,16 +333,15 @@ ExportReport write_vox(const ExportJob& job) {
   const SelectedDag dag(job);
   VoxWriter writer(job, dag);
   const uint64_t bytes = writer.bytes();
-  if (bytes > kMaxVoxBytes || writer.instance_count() > kMaxVoxModels)
+  if (bytes > kMaxVoxBytes || writer.instance_count() > kMaxVoxModels) {
+    // Even if nothing is shared, and a fourth is left for models and instances.
+    CellLimit cells(job, kMaxVoxBytes / 16 * 3);
     refuse_size(job,
                 size_text(bytes) + " or more are needed" +
                     (job.has_colors ? " with colors (--gray leaves them out)" : "") +
                     ", but the chunks of a .vox file have at most " + size_text(kMaxVoxBytes),
-                [&](uint32_t level) {
-                  // Even if nothing is shared, and a fourth is left for models and instances.
-                  const uint64_t voxels = kMaxVoxBytes / 16 * 3;
-                  return has_at_most(job, level, voxels);
-                });
+                [&](uint32_t level) { return cells.fits(level); });
+  }
   require_space(job, bytes);
   ExportReport report;
   report.voxels = dag.voxels();

@@ -64,11 +64,15 @@ class ExportLimits : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
+// However little memory there is for the search.
 TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
-  const std::string message = refusal(*full_grid(11), "ply", "a.ply", ErrorCode::kLimit, kMemory);
-  EXPECT_NE(message.find("8 589 934 592 voxels"), std::string::npos) << message;
-  EXPECT_NE(message.find("at most 2 147 483 647"), std::string::npos) << message;
-  EXPECT_NE(message.find("--level 10 (1024 voxels per edge) fits"), std::string::npos) << message;
+  const auto file = full_grid(11);
+  for (const uint64_t memory_bytes : {kMemory, uint64_t{8}}) {
+    const std::string message = refusal(*file, "ply", "a.ply", ErrorCode::kLimit, memory_bytes);
+    EXPECT_NE(message.find("8 589 934 592 voxels"), std::string::npos) << message;
+    EXPECT_NE(message.find("at most 2 147 483 647"), std::string::npos) << message;
+    EXPECT_NE(message.find("--level 10 (1024 voxels per edge) fits"), std::string::npos) << message;
+  }
 }
 
 // The search for a level that fits begins with the coarsest: of a grid that is full it would take

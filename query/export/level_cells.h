@@ -1,0 +1,52 @@
+// How many cells are set in the grid of each level of a file, counted from the coarsest one on: how
+// often a node occurs in the octree is passed on to its children, so that the levels above the one
+// that is asked for are read once for all, and none below it.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/format/global/node_index.h"
+#include "core/format/global/voxdag_reader.h"
+#include "query/dag_view.h"
+
+namespace voxdag::query {
+
+// One thread uses it.
+class LevelCells {
+ public:
+  // `dag` is the view of `file`, which has voxels; all must outlive this.
+  LevelCells(const voxdag_reader::File& file, const DagView& dag, MemoryBudget& budget,
+             const CancelToken& cancel)
+      : file_(file), dag_(dag), budget_(budget), cancel_(cancel) {}
+
+  // The set cells of the grid of 2^grid_levels cells per edge, or anything over `limit` if there
+  // are more. The grid is a brick or larger, coarser than the file's, and no coarser than the one
+  // before. Takes 8 bytes for each node two and three levels above the cells, and 2 bits for each
+  // word of theirs. Throws Error{kOutOfMemory} if the budget has less, Error{kCorrupt}.
+  uint64_t count(uint32_t grid_levels, uint64_t limit);
+
+ private:
+  // The nodes of a level, and how often each occurs.
+  struct Level {
+    NodeIndex index;
+    PageBuffer<uint64_t> places;
+  };
+
+  Level level(uint32_t depth) const;
+  // Calls visit(children, places) for each node of level_ that begins in the span.
+  template <class Visit>
+  void visit_span(uint64_t span, const Visit& visit) const;
+  void descend();
+
+  const voxdag_reader::File& file_;
+  const DagView& dag_;
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+  uint32_t depth_ = 0;  // of level_
+  Level level_;         // without nodes before the first count
+};
+
+}  // namespace voxdag::query

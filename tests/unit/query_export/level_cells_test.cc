@@ -1,0 +1,76 @@
+// The counts of cells by which exports find a level that fits.
+#include "query/export/level_cells.h"
+
+#include "core/format/global/open_global.h"
+#include "query/lookup/bricks.h"
+#include "tests/unit/format/test_files.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint32_t kLevels = 6;
+constexpr uint64_t kNoLimit = ~uint64_t{0};
+
+class LevelCellsTest : public testing::TestWithParam<uint64_t> {
+ protected:
+  // Levels of over `narrow_words` words are wide.
+  void write(uint64_t seed) {
+    const oracle::Voxels voxels = random_voxels(seed, 1 << kLevels);
+    write_global(path_, oracle::build_dag(voxels, 64), grid_of(1 << kLevels), 64, GetParam());
+  }
+  uint64_t cells(const DagView& dag, uint32_t grid_levels) const {
+    uint64_t cells = 0;
+    for_each_brick(dag, {grid_levels, whole_grid(grid_levels)}, [&](const Brick& brick) {
+      cells += static_cast<uint64_t>(std::popcount(brick.mask));
+    });
+    return cells;
+  }
+  TemporaryFolder folder_;
+  const std::string path_ = folder_.file("a.vdag");
+  MemoryBudget budget_{1 << 20};
+  CancelToken cancel_;
+};
+
+TEST_P(LevelCellsTest, AreThoseOfTheOctree) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    write(seed);
+    const auto file = open_global_file(path_);
+    const DagView dag(*file);
+    LevelCells counts(*file, dag, budget_, cancel_);
+    for (uint32_t level = 2; level < kLevels; ++level)
+      EXPECT_EQ(counts.count(level, kNoLimit), cells(dag, level)) << level;
+    EXPECT_EQ(LevelCells(*file, dag, budget_, cancel_).count(kLevels - 1, kNoLimit),
+              cells(dag, kLevels - 1));
+  }
+  EXPECT_EQ(budget_.used(), 0u);
+}
+
+TEST_P(LevelCellsTest, NeedMemory) {
+  write(1);
+  const auto file = open_global_file(path_);
+  const DagView dag(*file);
+  MemoryBudget little(100);
+  LevelCells counts(*file, dag, little, cancel_);
+  EXPECT_EQ(error_of([&] { counts.count(kLevels - 1, kNoLimit); }).code(), ErrorCode::kOutOfMemory);
+}
+
+TEST_P(LevelCellsTest, PointersToNoNodeAreDamage) {
+  write(1);
+  ByteString bytes = read_bytes(path_);
+  const uint64_t root = open_global_file(path_)->level(0).file_offset;
+  ++bytes[root + 4];  // its first pointer, into the middle of a node
+  write_bytes(path_, bytes);
+  const auto file = open_global_file(path_);
+  const DagView dag(*file);
+  EXPECT_EQ(error_of([&] { LevelCells(*file, dag, budget_, cancel_).count(3, kNoLimit); }).code(),
+            ErrorCode::kCorrupt);
+}
+
+INSTANTIATE_TEST_SUITE_P(Pointers, LevelCellsTest, testing::Values(uint64_t{1} << 32, uint64_t{50}),
+                         [](const auto& pointers) {
+                           return pointers.param == 50 ? "Wide" : "Narrow";
+                         });
+
+}  // namespace
+}  // namespace voxdag::query
