@@ -30,6 +30,15 @@ uint32_t top_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels > 7 ? grid_levels - 7 : 1, 1, 10);
 }
 
+// The nodes of the top levels of a coarser grid or of the DAG's own, at most.
+uint64_t top_nodes(const SelectedDag& dag, uint32_t grid_levels) {
+  uint64_t nodes = 0;
+  for (uint32_t level = 0; level < std::min(top_levels(grid_levels), grid_levels - kBrickLevels);
+       ++level)
+    nodes += dag.node_count(level);
+  return nodes;
+}
+
 class HashDagWriter {
  public:
   HashDagWriter(const ExportJob& job, const SelectedDag& dag, ExportFile& file)
@@ -37,18 +46,13 @@ class HashDagWriter {
     bases_.push_back(0);
     for (uint32_t level = 0; level < dag.brick_level(); ++level)
       bases_.push_back(bases_.back() + dag.words(level).size());
-    uint64_t top_nodes = 0;
+    uint64_t nodes = 0;
     for (uint32_t level = 0; level < std::min(top_levels_, dag.brick_level()); ++level) {
-      first_top_.push_back(top_nodes);
-      top_nodes += dag.node_count(level);
+      first_top_.push_back(nodes);
+      nodes += dag.node_count(level);
     }
-    if (top_nodes >= kMaxCount)
-      throw Error(ErrorCode::kLimit,
-                  job.output + ": the top " + std::to_string(top_levels_) + " levels have " +
-                      count_text(top_nodes) + " nodes, but HashDAG takes less than " +
-                      count_text(kMaxCount) + ". Expected a coarser --level or a smaller --region");
-    charge_ = MemoryCharge(job.budget, (top_nodes + 1) * sizeof(uint64_t), "counts of top nodes");
-    enclosed_.resize(std::max<uint64_t>(top_nodes, 1));
+    charge_ = MemoryCharge(job.budget, (nodes + 1) * sizeof(uint64_t), "counts of top nodes");
+    enclosed_.resize(std::max<uint64_t>(nodes, 1));
   }
 
   void write() {
@@ -164,23 +168,32 @@ std::string scene_depth_note(uint32_t levels) {
                        : "");
 }
 
+void require_hashdag_limits(const ExportJob& job, const SelectedDag& dag) {
+  CellLimit colored(job, kMaxHashDagColors);
+  const auto refuse = [&](const std::string& problem) {
+    refuse_size(job, problem, [&](uint32_t level) {
+      return dag.size_at(level).words <= kMaxHashDagWords && top_nodes(dag, level) < kMaxCount &&
+             (!job.has_colors || colored.fits(level));
+    });
+  };
+  const uint64_t words = dag.word_count(), nodes = top_nodes(dag, dag.grid_levels());
+  if (words > kMaxHashDagWords)
+    refuse(count_text(words) + " words (" + size_text(4 * words) +
+           ") are needed, but the indices of HashDAG reach " + count_text(kMaxHashDagWords));
+  if (nodes >= kMaxCount)
+    refuse("the top " + std::to_string(top_levels(dag.grid_levels())) + " levels have " +
+           count_text(nodes) + " nodes, but HashDAG takes less than " + count_text(kMaxCount));
+  if (job.has_colors && dag.voxels() > kMaxHashDagColors)
+    refuse(count_text(dag.voxels()) + " voxels are selected, but HashDAG numbers at most " +
+           count_text(kMaxHashDagColors) + " for colors (--gray leaves them out)");
+}
+
 }  // namespace
 
 ExportReport write_hashdag(const ExportJob& job) {
   const SelectedDag dag(job);
+  require_hashdag_limits(job, dag);
   const uint64_t words = dag.word_count();
-  if (words > kMaxHashDagWords)
-    refuse_size(job,
-                count_text(words) + " words (" + size_text(4 * words) +
-                    ") are needed, but the indices of HashDAG reach " +
-                    count_text(kMaxHashDagWords),
-                [&](uint32_t level) { return dag.size_at(level).words <= kMaxHashDagWords; });
-  if (job.has_colors && dag.voxels() > kMaxHashDagColors)
-    throw Error(ErrorCode::kLimit,
-                job.output + ": " + count_text(dag.voxels()) +
-                    " voxels are selected, but HashDAG numbers at most " +
-                    count_text(kMaxHashDagColors) +
-                    " for colors. Expected --gray, a coarser --level or a smaller --region");
   require_space(job, kHashDagHeaderBytes + 4 * words + (job.has_colors ? 4 * dag.voxels() : 0));
   ExportReport report;
   report.voxels = dag.voxels();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <numeric>
 #include <optional>
 
 #include "core/base/error.h"
@@ -83,11 +84,12 @@ VoxChunk palette_chunk(std::span<const voxdag_reader::Rgb> colors) {
 // The voxels' colors, two passes: which there are, and what becomes of each.
 class VoxColors {
  public:
-  explicit VoxColors(const ExportJob& job) : job_(job) {
+  // Of so many voxels.
+  VoxColors(const ExportJob& job, uint64_t voxels) : job_(job) {
     if (!job.has_colors) return;
     palette_.emplace(job.budget);
     voxdag_reader::ColorCursor cursor(job.file);
-    ExportStage stage(job, "find colors", 0, "voxels");
+    ExportStage stage(job, "find colors", voxels, "voxels");
     for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
       for_each_cell_of(
           brick, [&](const Position& cell) { palette_->add(color_of_cell(job, cursor, cell)); });
@@ -136,6 +138,10 @@ class VoxWriter {
     return std::max(min_bytes_, 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_);
   }
   size_t instance_count() const { return instances_; }
+  // Of all models together, each of which has its place once.
+  uint64_t model_voxels() const {
+    return std::accumulate(voxels_.begin(), voxels_.end(), uint64_t{0});
+  }
 
   void write(ExportFile& file, ExportStage& stage, const SelectedDag& dag, VoxColors& colors) {
     const uint64_t total = bytes();
@@ -345,9 +351,10 @@ ExportReport write_vox(const ExportJob& job) {
   require_space(job, bytes);
   ExportReport report;
   report.voxels = dag.voxels();
-  VoxColors colors(job);
+  VoxColors colors(job, dag.voxels());
   ExportFile file(job.files, job.output);
-  ExportStage stage(job, "export", 0, "voxels");
+  const uint64_t voxels = job.has_colors ? dag.voxels() : writer.model_voxels();
+  ExportStage stage(job, "export", voxels, "voxels");
   writer.write(file, stage, dag, colors);
   ExportFile* const written[] = {&file};
   report.bytes = publish(job, written);

@@ -118,43 +118,51 @@ class FileBuffer : public std::streambuf {
   std::exception_ptr failure_;
 };
 
-// The bytes that the trees of a selection take in memory, as far as `limit`: cubes follow one
-// another in Morton order, so that each is counted once. `steps` advances by bricks.
+// What the trees of a selection have and take in memory, or more bytes than `limit`: cubes follow
+// one another in Morton order, so that each is counted once. `steps` advances by bricks.
+struct VdbSize {
+  uint64_t voxels = 0, bytes = 0;
+};
 template <class Steps>
-uint64_t vdb_bytes(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
-                   uint64_t limit, Steps steps) {
-  uint64_t bytes = 0;
+VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
+                 uint64_t limit, Steps steps) {
+  VdbSize size;
   Position leaf{-1, 0, 0}, lower{-1, 0, 0}, upper{-1, 0, 0};
   const auto count = [&](const Position& corner, int shift, Position& last, uint64_t cost) {
     const Position cube = {corner[0] >> shift, corner[1] >> shift, corner[2] >> shift};
     if (cube == last) return;
     last = cube;
-    bytes += cost;
+    size.bytes += cost;
   };
   for_each_brick(job.dag, selection, [&](const Brick& brick) {
     steps.advance(1);
+    size.voxels += static_cast<uint64_t>(std::popcount(brick.mask));
     count(brick.low, 3, leaf, node.leaf);
     count(brick.low, 7, lower, node.lower);
     count(brick.low, 12, upper, node.upper);
-    return bytes <= limit;
+    return size.bytes <= limit;
   });
-  return bytes;
+  return size;
 }
 
-MemoryCharge charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
+struct ChargedVdb {
+  uint64_t voxels = 0;
+  MemoryCharge charge;
+};
+ChargedVdb charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
   const uint64_t limit = job.budget.available();
-  const uint64_t bytes =
-      vdb_bytes(job, job.selection, node, limit, ExportStage(job, "count", 0, "bricks"));
-  if (bytes == 0) refuse_empty(job);
-  if (bytes > limit)
+  const VdbSize size =
+      vdb_size(job, job.selection, node, limit, ExportStage(job, "count", 0, "bricks"));
+  if (size.voxels == 0) refuse_empty(job);
+  if (size.bytes > limit)
     refuse_size(job,
                 "the grid would take over " + size_text(limit) + " of memory, which is --memory" +
                     (job.has_colors ? " (without colors, --gray, it takes less)" : ""),
                 [&](uint32_t level) {
-                  return vdb_bytes(job, coarser(job.selection, level), node, limit,
-                                   CancelCheck(job)) <= limit;
+                  return vdb_size(job, coarser(job.selection, level), node, limit, CancelCheck(job))
+                             .bytes <= limit;
                 });
-  return MemoryCharge(job.budget, bytes, "the grid");
+  return {size.voxels, MemoryCharge(job.budget, size.bytes, "the grid")};
 }
 
 openvdb::Coord vdb_coord(const Position& cell) {
@@ -175,32 +183,29 @@ typename GridType::Ptr empty_vdb_grid(const ExportJob& job, const char* name) {
 
 // The selected voxels in a grid, where value(cell) is what a voxel has.
 template <class GridType, class Value>
-typename GridType::Ptr make_vdb_grid(const ExportJob& job, const char* name, uint64_t& voxels,
+typename GridType::Ptr make_vdb_grid(const ExportJob& job, const char* name, uint64_t voxels,
                                      const Value& value) {
   const auto grid = empty_vdb_grid<GridType>(job, name);
-  ExportStage stage(job, "build grid", 0, "voxels");
+  ExportStage stage(job, "build grid", voxels, "voxels");
   typename GridType::Accessor accessor = grid->getAccessor();
   for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
     auto* const leaf = accessor.touchLeaf(vdb_coord(brick.low));
     for_each_cell_of(brick,
                      [&](const Position& cell) { leaf->setValueOn(vdb_coord(cell), value(cell)); });
-    const auto count = static_cast<uint64_t>(std::popcount(brick.mask));
-    voxels += count;
-    stage.advance(count);
+    stage.advance(static_cast<uint64_t>(std::popcount(brick.mask)));
   });
   return grid;
 }
 
 template <class GridType>
-typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t& voxels) {
+typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t voxels) {
   return make_vdb_grid<GridType>(job, kGridName, voxels, [](const Position&) { return true; });
 }
 
-openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job) {
+openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job, uint64_t voxels) {
   voxdag_reader::ColorCursor colors(job.file);
   const auto& linear = linear_of_srgb();
   const auto light = [&](uint8_t channel) { return static_cast<float>(linear[channel]) / 65535; };
-  uint64_t voxels = 0;
   return make_vdb_grid<openvdb::Vec3SGrid>(job, kColorGridName, voxels, [&](const Position& cell) {
     const voxdag_reader::Rgb color = color_of_cell(job, colors, cell);
     return openvdb::Vec3f(light(color.r), light(color.g), light(color.b));
@@ -236,15 +241,15 @@ ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, uint64_t min
 }  // namespace
 
 ExportReport write_vdb(const ExportJob& job) {
-  const MemoryCharge charge =
+  const ChargedVdb charged =
       charge_vdb(job, job.has_colors ? kOpenVdbBytes + kColorBytes : kOpenVdbBytes);
+  const uint64_t voxels = charged.voxels;
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
-    uint64_t voxels = 0;
     const auto grid = make_voxel_grid<openvdb::BoolGrid>(job, voxels);
     openvdb::GridPtrVec grids = {grid};
     if (job.has_colors) {
-      grids.push_back(make_color_grid(job));
+      grids.push_back(make_color_grid(job, voxels));
       // Half floats tell all bytes of sRGB apart.
       grids.back()->setSaveFloatAsHalf(true);
     }
@@ -261,15 +266,15 @@ ExportReport write_vdb(const ExportJob& job) {
 ExportReport write_nvdb(const ExportJob& job) {
   VdbNodeBytes both = kOpenVdbBytes + kNanoVdbBytes;
   if (job.has_colors) both = both + kColorBytes + kColorBytes;
-  const MemoryCharge charge = charge_vdb(job, both);
+  const ChargedVdb charged = charge_vdb(job, both);
+  const uint64_t voxels = charged.voxels;
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
-    uint64_t voxels = 0;
     std::vector<nanovdb::GridHandle<nanovdb::HostBuffer>> grids;
     grids.push_back(nanovdb::openToNanoVDB<nanovdb::HostBuffer>(
         *make_voxel_grid<openvdb::MaskGrid>(job, voxels)));
     if (job.has_colors)
-      grids.push_back(nanovdb::openToNanoVDB<nanovdb::HostBuffer>(*make_color_grid(job)));
+      grids.push_back(nanovdb::openToNanoVDB<nanovdb::HostBuffer>(*make_color_grid(job, voxels)));
     uint64_t bytes = 0;
     for (const auto& grid : grids) bytes += grid.size();
     return write_grid_file(job, voxels, bytes, [&](std::ostream& stream) {

@@ -11,6 +11,8 @@
 #include "query/export/export.h"
 #include "tests/unit/format_color/colored_files.h"
 #include "tests/unit/query_export/color_decoders.h"
+#include "tests/unit/query_export/corners.h"
+#include "tests/unit/query_export/stages.h"
 
 namespace voxdag::query {
 namespace {
@@ -111,6 +113,43 @@ TEST_F(ExportColors, VoxHasAPaletteOfManyColors) {
     const double mean = squares / static_cast<double>(3 * cells.size());
     EXPECT_GT(10 * std::log10(255 * 255 / mean), 26);
   });
+}
+
+// It numbers colored voxels with 32 bits: here all of a grid, whose colors are coarser.
+TEST_F(ExportColors, HashDagNamesTheLevelThatFits) {
+  constexpr uint32_t kLevels = 12;
+  ColoredScene colors{2, 2, Codes(64), patches(2)};
+  std::iota(colors.voxels.begin(), colors.voxels.end(), 0);
+  GlobalFileWriter writer(system_files(), folder_.file("a.vdag"),
+                          Grid::given({0, 0, 0}, 1, kLevels), 64);
+  write_level(writer, kLevels - 2, 1, {~0u, ~0u});
+  for (uint32_t level = kLevels - 2; level-- > 0;)
+    write_level(writer, level, 1, {0xff, 0, 0, 0, 0, 0, 0, 0, 0});
+  write_colors(writer, colors);
+  writer.finish({uint64_t{1} << 3 * kLevels, 0});
+  file_ = open_global_file(folder_.file("a.vdag"));
+  const Error refused = error_of([&] { bytes_of("hashdag", {kLevels, whole_grid(kLevels)}); });
+  EXPECT_EQ(refused.code(), ErrorCode::kLimit);
+  EXPECT_TRUE(refused.message().ends_with(
+      ": 68 719 476 736 voxels are selected, but HashDAG numbers at most 4 294 967 295 for colors "
+      "(--gray leaves them out). --level 10 (1024 voxels per edge) fits, or take a smaller "
+      "--region"))
+      << refused.message();
+  EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
+}
+
+// The colors are part of the work that is reported.
+TEST_F(ExportColors, ProgressIsReported) {
+  open(6, 6, patches(6), 1);
+  for (const ExportFormat& format : export_formats()) {
+    SCOPED_TRACE(format.name);
+    const std::string output =
+        folder_.file(std::string("out") + (format.suffix ? format.suffix : ".x"));
+    Stages stages;
+    export_dag(system_files(), *file_, {&format, {6, whole_grid(6)}, output, kMemory, false, true},
+               stages, CancelToken{});
+    stages.expect_complete();
+  }
 }
 
 // Grids of over 256 voxels have several models, one for each place.

@@ -136,6 +136,18 @@ TEST_F(ExportHuge, HashDagCountsWordsWith32Bits) {
                  "9 (512");
 }
 
+// Below the top levels counts have 24 bits, so that nodes of the top levels have indices there.
+TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
+  std::vector<GlobalLevel> levels = chain(17);
+  const uint64_t others = 9;
+  levels[9] = {k24Bits - 1 - others, 2 * k24Bits};
+  expect_not_refused(levels, "hashdag");
+  ++levels[9].nodes;
+  expect_refused(levels, "hashdag",
+                 "the top 10 levels have 16 777 216 nodes, but HashDAG takes less than 16 777 216",
+                 "16 (65536");
+}
+
 // A brick has one word, and one for each of its octants: here there are none.
 TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
   const uint64_t others = 2 * 5 + 1 + 255;

@@ -2,14 +2,13 @@
 // leaves nothing behind. The scenes are full cubes: their files are small whatever the grid.
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/global/global_writer.h"
 #include "core/format/global/open_global.h"
 #include "query/export/export.h"
 #include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/query_export/stages.h"
 
 using namespace voxdag;
 using namespace voxdag::query;
@@ -87,18 +86,6 @@ TEST_F(ExportLimits, AreFoundAtOnce) {
   EXPECT_LT(process_cpu_seconds() - start_s, 4);
 }
 
-// What each stage has done.
-class Stages : public NoProgress {
- public:
-  void begin_stage(std::string_view stage, uint64_t, std::string_view) override { stage_ = stage; }
-  void advance(uint64_t count) override { done[stage_] += count; }
-  std::map<std::string, uint64_t> done;
-
- private:
-  std::string stage_;
-};
-
-// No stage is silent.
 TEST_F(ExportLimits, ProgressIsReported) {
   const auto file = full_grid(6);
   const Selection part{6, {{1, 1, 1}, {62, 63, 64}}};
@@ -109,11 +96,11 @@ TEST_F(ExportLimits, ProgressIsReported) {
     Stages stages;
     export_dag(system_files(), *file, {&format, part, output, kMemory, false, true}, stages,
                CancelToken{});
-    EXPECT_GT(stages.done["export"], 0u);
-    for (const auto& [stage, done] : stages.done) EXPECT_GT(done, 0u) << stage;
+    stages.expect_complete();
+    EXPECT_TRUE(stages.stages.contains("export"));
     const bool is_counted =
         std::string_view("bt vdb nvdb ply npz glb").find(format.name) != std::string::npos;
-    EXPECT_EQ(stages.done.contains("count"), is_counted);
+    EXPECT_EQ(stages.stages.contains("count"), is_counted);
   }
 }
 
