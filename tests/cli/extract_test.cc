@@ -32,6 +32,17 @@ TEST_F(Extract, EqualsBuilds) {
   EXPECT_EQ(world["sha256"], cube["sha256"]);
 }
 
+// The promise of --memory, for a result that is larger than what is given and what it allows above.
+TEST_F(Extract, LargeResultsWithinLittleMemory) {
+  constexpr uint64_t kMemory = 64 << 20, kAllowed = kMemory + (64 << 20);
+  ASSERT_EQ(run({"generate", "soup", "large.glb", "--triangles", "45000"}).status, 0);
+  run_json({"build", "large.glb", "-r", "8192", "-o", "large.vdag"});
+  const Json part = run_json({"extract", "large.vdag", "-o", "part.vdag", "--region",
+                              "1,1,1,8192,8192,8192", "--memory", "64MiB", "--threads", "2"});
+  EXPECT_GT(part["bytes"], kAllowed);
+  EXPECT_LE(part["peak_rss_bytes"], kAllowed);
+}
+
 // The report has what info and verify find.
 TEST_F(Extract, Report) {
   const Json report = run_json({"extract", "s.vdag", "-o", "c.vdag", "--resolution", "32"});
