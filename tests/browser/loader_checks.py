@@ -5,6 +5,7 @@ import re
 import struct
 from urllib.parse import parse_qs, urlsplit
 
+from memory_checks import check_many_tiles
 from picture_checks import HEIGHT, PLAIN, WIDTH, camera_text, holes
 
 BAD_PAGE = 77  # of the trials
@@ -393,6 +394,8 @@ def check_all(walk, server, built):
     check_bad_input(visitor)
     check_trials(visitor)
     walk.say("bad input, trials of the loader")
+    check_many_tiles(visitor)
+    walk.say("many tiles")
     faults = Faults(visitor.page)
     check_damaged_parts(visitor, faults, server.url, wide, reference)
     check_file_that_goes(visitor, faults, server.url, near, wide)

@@ -7,6 +7,7 @@ export const kRoundsToKnow = 4;  // readings of the feedback after which what wa
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
 const kMaxTries = 3;           // of one item whose answers are of no use
 const kRefusedMs = 300000;     // until an item that was refused is asked for again
+const kMaxFailures = 16384;    // that are remembered
 const kMaxWarnings = 20;
 const kFullPauseMs = 250;
 
@@ -35,7 +36,8 @@ export class Loader {
     this.batch_size = max_batch;       // smaller where it is silent for long
     this.queue = [];
     this.loading = new Map();    // key -> request
-    this.failures = new Map();   // key -> {count, retry_ms, batch: the largest that it may be in, last}
+    this.failures = new Map();   // key -> {count, retry_ms, batch: the largest that it may be in, last}, the oldest first
+    this.max_failures = kMaxFailures;
     this.requests = 0;
     this.failed_total = 0;
     this.requested_total = 0;
@@ -192,7 +194,7 @@ export class Loader {
     if (batch.length === 1) return this.note_failure(batch[0], error, now_ms);
     const half = Math.ceil(batch.length / 2);
     const last = error.is_suspicious === true;
-    for (const {key} of batch) this.failures.set(key, {count: 0, retry_ms: 0, ...this.failures.get(key), batch: half, last});
+    for (const {key} of batch) this.remember(key, {count: 0, retry_ms: 0, ...this.failures.get(key), batch: half, last});
     if (last) this.queue.unshift(...batch.reverse());
     else this.ask_again(batch);
   }
@@ -202,13 +204,20 @@ export class Loader {
     this.queue.push(...batch.reverse());
   }
 
+  // What failed longest ago is forgotten, and asked for like anything else if it is wanted again.
+  remember(key, failure) {
+    this.failures.delete(key);
+    this.failures.set(key, failure);
+    if (this.failures.size > this.max_failures) this.failures.delete(this.failures.keys().next().value);
+  }
+
   note_failure(request, error, now_ms) {
     const {key} = request, is_answer = error instanceof TileError && error.status !== 200;
     const tries = 1 + (this.failures.get(key)?.count ?? 0);
     // An answer that says that there is nothing needs no second try.
     const count = is_answer && !error.is_transient ? Math.max(kMaxTries, tries) : tries;
     const retry_ms = now_ms + (count < kMaxTries ? kFirstPauseMs * 2 ** count : kRefusedMs);
-    this.failures.set(key, {count, retry_ms, batch: 1, last: true});
+    this.remember(key, {count, retry_ms, batch: 1, last: true});
     this.failed_total++;
     if (count < kMaxTries) this.wake_at(retry_ms, now_ms);
     else this.refusal = is_answer && !error.is_missing && error.code !== "corrupt" ? this.refusal ?? kRefused : kDamaged;
