@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "cli/output.h"
+#include "cli/selection_options.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
 #include "core/base/process_limits.h"
@@ -26,7 +27,7 @@ struct RenderCommand {
   std::string view = "auto";
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
-  std::string size = "1280x720";
+  std::string size = "1280x720", memory;
   query::RenderOptions options{.threads = default_threads()};
   bool gray = false;
   bool json = false;
@@ -97,6 +98,20 @@ void check_outputs(const RenderCommand& command, FileSystem& files) {
   depth.check(files, command.input, [](const ReadableFile&) { return false; });
 }
 
+// A size that is too large is an error before anything is done.
+void check_memory(const RenderCommand& command) {
+  const uint64_t limit = memory_limit(command.memory);
+  // The picture is written before the distances are measured.
+  const uint64_t of_pixel =
+      command.output.path.empty() ? query::kDepthBytesPerPixel : query::kRenderBytesPerPixel;
+  const uint64_t bytes = of_pixel * static_cast<uint64_t>(command.options.width) *
+                         static_cast<uint64_t>(command.options.height);
+  if (bytes > limit)
+    throw Error(ErrorCode::kOutOfMemory, "--size " + command.size + " takes " + size_text(bytes) +
+                                             " of memory, expected at most " + size_text(limit) +
+                                             ": choose a smaller size, or a higher --memory");
+}
+
 void run(RenderCommand& command, CommandContext& context) {
   const auto [width, height] = parse_list<int, 2>("--size", command.size, 'x', "WIDTHxHEIGHT");
   if (width < 1 || height < 1 || width > kMaxPictureEdge || height > kMaxPictureEdge)
@@ -106,6 +121,7 @@ void run(RenderCommand& command, CommandContext& context) {
   command.options.width = width;
   command.options.height = height;
   check_outputs(command, context.files);
+  check_memory(command);
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
@@ -143,6 +159,8 @@ void declare(Command& command, RenderCommand& state) {
       .range(1, 8)
       .show_default();
   command.flag("--gray", state.gray, "leave out the colors that the file may have");
+  command.option("--memory", state.memory,
+                 "limit of the memory that is allocated (default: half the RAM; at least 64MiB)");
   command.threads_option(state.options.threads);
   state.output.declare_force(command);
   command.json_flag(state.json);

@@ -15,7 +15,6 @@
 #include "python/native/long_work.h"
 #include "python/native/memory.h"
 #include "python/native/path_text.h"
-#include "query/render/g_buffer.h"
 #include "query/render/renderer.h"
 #include "query/render/views.h"
 
@@ -41,7 +40,7 @@ query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
 // error before it is tried.
 void check_memory(int width, int height, const std::string& memory) {
   const uint64_t limit = memory_of(memory);
-  const uint64_t bytes = (sizeof(query::GBufferPixel) + 3 + 3) * static_cast<uint64_t>(width) *
+  const uint64_t bytes = (query::kRenderBytesPerPixel + 3) * static_cast<uint64_t>(width) *
                          static_cast<uint64_t>(height);
   if (bytes > limit)
     throw Error(ErrorCode::kOutOfMemory,

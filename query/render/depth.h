@@ -22,6 +22,9 @@ struct DepthMap {
 DepthMap render_depth(const DagView& dag, const Placement& placement, int width, int height,
                       unsigned threads, const CancelToken& cancel);
 
+// The bytes that a map and its file take for each pixel.
+inline constexpr uint64_t kDepthBytesPerPixel = 2 * sizeof(float);
+
 // The bytes of a file that numpy.load() reads: an array (height, width) of float32.
 std::string encode_npy(const DepthMap& map);
 

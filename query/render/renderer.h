@@ -5,6 +5,7 @@
 #include "core/base/progress.h"
 #include "query/dag_view.h"
 #include "query/render/camera.h"
+#include "query/render/g_buffer.h"
 #include "query/render/picture.h"
 
 namespace voxdag::query {
@@ -16,6 +17,9 @@ struct RenderOptions {
   // The file of the DAG, to show its colors if it has some; null for gray.
   const voxdag_reader::File* colors = nullptr;
 };
+
+// The bytes that render_picture() allocates for each pixel, those of the picture included.
+inline constexpr uint64_t kRenderBytesPerPixel = sizeof(GBufferPixel) + 3;
 
 // Shows a plain background if the DAG is empty. Throws Error{kCorrupt} for a damaged DAG, and
 // Error{kCanceled}.

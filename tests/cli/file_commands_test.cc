@@ -164,6 +164,28 @@ TEST_F(FileCommands, RenderMakesAPicture) {
   EXPECT_FALSE(exists("x.png"));
 }
 
+// A size that takes too much memory is refused before anything is read or written.
+TEST_F(FileCommands, RenderRefusesWhatTakesTooMuchMemory) {
+  const auto expect = [&](int status, const std::string& part, const std::string& size,
+                          const std::string& memory, const std::string& option = "-o") {
+    const std::string input = status == 3 ? "none.vdag" : "m.vdag";
+    expect_error(status, part, {"render", input, "--size", size, "--memory", memory, option, "x"});
+  };
+  expect(8, "--size 16384x16384 takes 15.75 GiB of memory, expected at most 1.00 GiB",
+         "16384x16384", "1GiB");
+  expect(8, "or a higher --memory", "1100x1000", "64MiB");
+  expect(3, "none.vdag", "1000x1000", "64MiB");
+  // Distances take less.
+  expect(8, "2900x2900 takes 64.", "2900x2900", "64MiB", "--depth");
+  expect(3, "none.vdag", "2800x2900", "64MiB", "--depth");
+  expect(2, "at least 64MiB", "64x64", "63MiB");
+  expect(2, "--memory", "64x64", "much");
+  EXPECT_FALSE(exists("x"));
+  EXPECT_EQ(
+      run_json({"render", "m.vdag", "-o", "x", "--size", "64x48", "--memory", "64MiB"})["width"],
+      64);
+}
+
 // Distances need no picture; both are of the same camera.
 TEST_F(FileCommands, RenderMeasuresDistances) {
   const Json depth = run_json({"render", "m.vdag", "--depth", "d.npy", "--size", "64x48"});
