@@ -105,14 +105,29 @@ void Dag::expect_questions(size_t count) const {
   });
 }
 
+// Null while few points were asked for, or where the top is damaged: then each descent finds out by
+// itself what it meets.
+const TopCells* Dag::top_cells(size_t points) const {
+  if ((points_asked_ += points) < kManyQuestions || !TopCells::serve(view_, grid_levels()))
+    return nullptr;
+  std::call_once(make_top_, [&] {
+    try {
+      top_.emplace(view_);
+    } catch (const Error&) {
+    }
+  });
+  return top_ ? &*top_ : nullptr;
+}
+
 void Dag::lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
                  unsigned threads) const {
   check_grid_levels(view_, grid_levels);
   require(points.size() == set.size(), "as many results as points");
   expect_questions(points.size());
+  const TopCells* const top = top_cells(points.size());
   naming_file(file_->path(), [&] {
     for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
-      look_up(view_, grid_levels, points.subspan(first, count), set.subspan(first, count));
+      look_up(view_, top, grid_levels, points.subspan(first, count), set.subspan(first, count));
     });
   });
 }

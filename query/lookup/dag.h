@@ -14,11 +14,13 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -29,6 +31,7 @@
 #include "query/lookup/nearest.h"
 #include "query/lookup/node_counts.h"
 #include "query/lookup/position.h"
+#include "query/lookup/top_cells.h"
 #include "query/selection.h"
 
 namespace voxdag::query {
@@ -116,11 +119,14 @@ class Dag {
  private:
   const NodeCounts& counts(uint32_t grid_levels) const;
   void expect_questions(size_t count) const;
+  const TopCells* top_cells(size_t points) const;
 
   const std::unique_ptr<voxdag_reader::File> file_;
   const DagView view_;
   mutable MemoryBudget budget_;
-  mutable std::once_flag huge_pages_;
+  mutable std::once_flag huge_pages_, make_top_;
+  mutable std::atomic<uint64_t> points_asked_ = 0;
+  mutable std::optional<TopCells> top_;  // as soon as there were many points
   mutable std::mutex mutex_;
   mutable std::array<std::unique_ptr<NodeCounts>, 21> counts_;  // by grid levels; under mutex_
 };

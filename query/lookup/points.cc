@@ -10,26 +10,29 @@ namespace {
 // So many descents hide the latency of memory; more gain nothing. Measured.
 constexpr size_t kGroup = 32;
 
-// The descents of up to kGroup points.
+// Descents, kGroup at a time.
 class Descents {
  public:
-  Descents(const DagView& dag, uint32_t grid_levels) : dag_(dag), grid_levels_(grid_levels) {}
+  Descents(const DagView& dag, const TopCells* top, uint32_t grid_levels)
+      : dag_(dag),
+        top_(top && TopCells::serve(dag, grid_levels) ? top : nullptr),
+        grid_levels_(grid_levels) {}
 
   void run(std::span<const Position> points, uint8_t* set) {
     const uint64_t edge = uint64_t{1} << grid_levels_;
-    count_ = 0;
     for (size_t i = 0; i < points.size(); ++i) {
       const auto [x, y, z] = points[i];
       set[i] = 0;
       // A negative coordinate is a large one without its sign.
       if ((static_cast<uint64_t>(x) | static_cast<uint64_t>(y) | static_cast<uint64_t>(z)) >= edge)
         continue;
-      descents_[count_++] = {dag_.root(), static_cast<uint32_t>(x), static_cast<uint32_t>(y),
-                             static_cast<uint32_t>(z), static_cast<uint32_t>(i)};
+      Descent d = {dag_.root(), static_cast<uint32_t>(x), static_cast<uint32_t>(y),
+                   static_cast<uint32_t>(z), static_cast<uint32_t>(i)};
+      if (top_ && !begin_at_top(d)) continue;
+      descents_[count_++] = d;
+      if (count_ == kGroup) finish(set);
     }
-    const uint32_t brick_depth = dag_.grid_levels() - 2;
-    for (uint32_t depth = 0; depth < std::min(grid_levels_, brick_depth); ++depth) descend(depth);
-    for (size_t i = 0; i < count_; ++i) set[descents_[i].point] = ends_set(descents_[i]);
+    finish(set);
   }
 
  private:
@@ -40,6 +43,26 @@ class Descents {
       return static_cast<int>((x >> shift & 1) << 2 | (y >> shift & 1) << 1 | (z >> shift & 1));
     }
   };
+
+  // Whether the descent's cell of the top has a child that it continues in.
+  bool begin_at_top(Descent& d) const {
+    const uint32_t shift = grid_levels_ - TopCells::kLevels;
+    const TopCells::Cell cell = top_->at(d.x >> shift, d.y >> shift, d.z >> shift);
+    if (!(cell.mask() >> d.child_index(shift - 1) & 1)) return false;
+    d.content = cell.offset();
+    dag_.prefetch(TopCells::kLevels, d.content);
+    return true;
+  }
+
+  // Leads all descents to their ends.
+  void finish(uint8_t* set) {
+    const uint32_t brick_depth = dag_.grid_levels() - 2;
+    for (uint32_t depth = top_ ? TopCells::kLevels : 0; depth < std::min(grid_levels_, brick_depth);
+         ++depth)
+      descend(depth);
+    for (size_t i = 0; i < count_; ++i) set[descents_[i].point] = ends_set(descents_[i]);
+    count_ = 0;
+  }
 
   // Leads the descents from the nodes at `depth` to their children, and ends those without.
   void descend(uint32_t depth) {
@@ -79,6 +102,7 @@ class Descents {
   }
 
   const DagView& dag_;
+  const TopCells* const top_;  // null if descents begin at the root
   const uint32_t grid_levels_;
   size_t count_ = 0;
   Descent descents_[kGroup];
@@ -86,17 +110,13 @@ class Descents {
 
 }  // namespace
 
-void look_up(const DagView& dag, uint32_t grid_levels, std::span<const Position> points,
-             std::span<uint8_t> set) {
+void look_up(const DagView& dag, const TopCells* top, uint32_t grid_levels,
+             std::span<const Position> points, std::span<uint8_t> set) {
   if (dag.empty()) {
     std::fill(set.begin(), set.end(), uint8_t{0});
     return;
   }
-  Descents descents(dag, grid_levels);
-  for (size_t first = 0; first < points.size(); first += kGroup) {
-    const size_t count = std::min(kGroup, points.size() - first);
-    descents.run(points.subspan(first, count), set.data() + first);
-  }
+  Descents(dag, top, grid_levels).run(points, set.data());
 }
 
 }  // namespace voxdag::query

@@ -6,14 +6,15 @@
 
 #include "query/dag_view.h"
 #include "query/lookup/position.h"
+#include "query/lookup/top_cells.h"
 
 namespace voxdag::query {
 
 // set[i] becomes 1 if cell points[i] of the grid of 2^grid_levels per edge has a set voxel, 0 if it
 // has none or lies outside the grid. Many descents take turns, since each waits for memory at every
-// level. The spans have equal lengths, and grid_levels is at most the file's. Throws
-// Error{kCorrupt} for a damaged DAG.
-void look_up(const DagView& dag, uint32_t grid_levels, std::span<const Position> points,
-             std::span<uint8_t> set);
+// level; they begin at the top cells if there are some. The spans have equal lengths, less than
+// 2^32, and grid_levels is at most the file's. Throws Error{kCorrupt} for a damaged DAG.
+void look_up(const DagView& dag, const TopCells* top, uint32_t grid_levels,
+             std::span<const Position> points, std::span<uint8_t> set);
 
 }  // namespace voxdag::query

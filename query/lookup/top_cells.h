@@ -1,0 +1,58 @@
+// The nodes of the grid of 32^3 cells, in a dense array of 256 KiB: descents of many points begin
+// there instead of at the root, and most points of a surface's grid end there.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/dag/brick.h"
+#include "query/dag_view.h"
+
+namespace voxdag::query {
+
+class TopCells {
+ public:
+  static constexpr uint32_t kLevels = 5;
+
+  // Whether these cells are nodes, which have children in the grid of `grid_levels`.
+  static bool serve(const DagView& dag, uint32_t grid_levels) {
+    return !dag.empty() && dag.grid_levels() > kLevels + kBrickLevels && grid_levels > kLevels;
+  }
+
+  // Of a DAG that they serve. Reads the levels above them; throws Error{kCorrupt} for a damaged
+  // one.
+  explicit TopCells(const DagView& dag) : cells_(size_t{1} << (3 * kLevels)) {
+    fill(dag, 0, dag.root(), 0);
+  }
+
+  struct Cell {
+    uint64_t word;
+    uint32_t mask() const { return word & 255; }  // 0 if no node is there
+    uint64_t offset() const { return word >> 8; }
+  };
+  // Coordinates are less than 2^kLevels.
+  Cell at(uint32_t x, uint32_t y, uint32_t z) const {
+    return {cells_[(x << kLevels | y) << kLevels | z]};
+  }
+
+ private:
+  // `place` is that of the cell's low corner in the array.
+  void fill(const DagView& dag, uint32_t depth, uint64_t offset, size_t place) {
+    const DagView::Children children = dag.children_of_node(depth, offset);
+    if (depth == kLevels) {
+      cells_[place] = offset << 8 | children.mask;
+      return;
+    }
+    const uint32_t shift = kLevels - 1 - depth;
+    for (int i = 0; i < 8; ++i) {
+      if (!children.has(i)) continue;
+      const auto bits = static_cast<size_t>(i);
+      const size_t step = (bits >> 2) << (2 * kLevels) | (bits >> 1 & 1) << kLevels | (bits & 1);
+      fill(dag, depth + 1, dag.offset(children, i), place + (step << shift));
+    }
+  }
+
+  std::vector<uint64_t> cells_;
+};
+
+}  // namespace voxdag::query
