@@ -1,5 +1,6 @@
 """Builds from files, and from meshes in memory."""
 
+import errno
 import json
 import operator
 import os
@@ -79,17 +80,33 @@ def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
         yield [os.fsdecode(scene)]
     elif _is_mesh(scene):
         _check_mesh(*scene)
-        folder = os.path.dirname(os.path.abspath(output))
-        handle, path = tempfile.mkstemp(suffix=".ply", prefix=os.path.basename(output) + ".scene-",
-                                        dir=folder if os.path.isdir(folder) else None)
+        path = _mesh_file(scene, output)
         try:
-            with os.fdopen(handle, "wb") as file:
-                _write_ply(file, *(np.asarray(part) for part in scene))
             yield [path]
         finally:
             os.remove(path)
     else:
         yield [os.fsdecode(file) for file in scene]
+
+
+def _mesh_file(mesh: Mesh, output: str) -> str:
+    """Writes a mesh to a new file next to the output, and returns its path."""
+    folder, name = os.path.split(os.path.abspath(output))
+    path = None
+    try:
+        os.makedirs(folder, exist_ok=True)
+        handle, path = tempfile.mkstemp(suffix=".ply", prefix=name + ".scene-", dir=folder)
+        with os.fdopen(handle, "wb") as file:
+            _write_ply(file, *(np.asarray(part) for part in mesh))
+        return path
+    except BaseException as error:
+        if path is not None:
+            os.remove(path)
+        if isinstance(error, OSError):
+            full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+            raise Error(f"the mesh cannot be written next to {output}: {error}",
+                        "no_space" if full else "io") from error
+        raise
 
 
 def _is_mesh(scene: Scene) -> bool:

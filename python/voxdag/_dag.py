@@ -173,6 +173,8 @@ class Dag:
         cells = self.to_world(found + 0.5, level) if world else found
         if attributes is None:
             return cells
+        if isinstance(attributes, str):
+            raise Error(f"attributes={attributes!r}: expected a list of names", "invalid_input")
         return cells, {name: self._values(name, found, level, False) for name in attributes}
 
     @property
@@ -289,4 +291,8 @@ def _rows(values: Any, dtype: Any, what: str) -> np.ndarray:
     if dtype == np.int64 and array.dtype.kind not in "iu":
         raise Error(f"the {what} are {array.dtype}: expected integers, or world=True",
                     "invalid_input")
+    if array.dtype.kind not in "fiu":
+        raise Error(f"the {what} are {array.dtype}: expected numbers", "invalid_input")
+    if dtype == np.int64 and array.dtype == np.uint64 and (array >> np.uint64(63)).any():
+        raise Error(f"the {what} are over 2^63: expected cells", "invalid_input")
     return np.ascontiguousarray(array, dtype=dtype)

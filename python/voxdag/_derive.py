@@ -63,5 +63,5 @@ def _check_output(path: str, outputs: Sequence[str], force: bool) -> None:
             continue
         if os.path.exists(output) and os.path.exists(path) and os.path.samefile(path, output):
             raise Error(f"{output} is the input: expected another file", "invalid_input")
-        if not force:
+        if not force and not (os.path.isfile(output) and os.path.getsize(output) == 0):
             raise Error(f"{output} exists: expected another file, or force=True", "invalid_input")

@@ -192,7 +192,7 @@ voxdag_status voxdag_dense(const voxdag_file* file, uint32_t grid_levels,
   return answer([&] {
     expect_pointer(file, "the file");
     const voxdag::query::Selection selection = selection_of(grid_levels, region);
-    unsigned __int128 size = 1;
+    unsigned __int128 size = selection.region.empty() ? 0 : 1;
     for (size_t axis = 0; axis < 3; ++axis) {
       const auto length = static_cast<__int128>(region->high[axis]) - region->low[axis];
       size *= length > 0 ? static_cast<unsigned __int128>(length) : 0;

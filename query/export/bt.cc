@@ -108,8 +108,8 @@ ExportReport write_bt(const ExportJob& job) {
   if (job.selection.grid_levels > kOctoMapLevels)
     throw Error(ErrorCode::kLimit, job.output + ": the grid has " +
                                        std::to_string(int64_t{1} << job.selection.grid_levels) +
-                                       " voxels per edge, but OctoMap has at most 65536. "
-                                       "--level 16 fits");
+                                       " voxels per edge, but OctoMap has at most 65536. " +
+                                       coarser_options(job, kOctoMapLevels) + " fits");
   uint64_t inner_nodes = 0;
   std::optional<ExportStage> counting(std::in_place, job, "count", 0, "nodes");
   const auto count = [&](uint32_t) {

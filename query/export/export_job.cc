@@ -25,11 +25,25 @@ void require_space(const ExportJob& job, uint64_t bytes) {
   const uint64_t free = job.files.free_space(parent_directory(job.output));
   if (bytes > free)
     throw Error(ErrorCode::kNoSpace, job.output + " will have " + size_text(bytes) +
-                                         ", but the disk has only " + size_text(free) + " free");
+                                         ", but the disk has only " + size_text(free) +
+                                         " free: a smaller --region or a coarser --level needs less");
+}
+
+std::string coarser_options(const ExportJob& job, uint32_t grid_levels) {
+  std::string text = "--level " + std::to_string(grid_levels);
+  if (job.selection.region == whole_grid(job.selection.grid_levels)) return text;
+  const Region region = coarser(job.selection, grid_levels).region;
+  std::string separator = " --region ";
+  for (const auto& corner : {region.low, region.high})
+    for (const int64_t coordinate : corner) {
+      text += separator + std::to_string(coordinate);
+      separator = ",";
+    }
+  return text;
 }
 
 void refuse_size(const ExportJob& job, const std::string& problem,
-                 const std::function<bool(uint32_t grid_levels)>& fits) {
+                 const std::function<bool(uint32_t grid_levels)>& fits, ErrorCode code) {
   // From the coarsest grid up: what does not fit is looked at once, and it may be very large.
   uint32_t end = kBrickLevels;
   {
@@ -39,13 +53,13 @@ void refuse_size(const ExportJob& job, const std::string& problem,
       stage.report();
     }
   }
-  const std::string level = std::to_string(end - 1);
+  job.cancel.check();
   const std::string grid = std::to_string(int64_t{1} << (end - 1));
-  throw Error(ErrorCode::kLimit,
-              job.output + ": " + problem +
-                  (end > kBrickLevels ? ". --level " + level + " (" + grid +
-                                            " voxels per edge) fits, or take a smaller --region"
-                                      : ". Expected a smaller --region"));
+  throw Error(code, job.output + ": " + problem +
+                        (end > kBrickLevels
+                             ? ". " + coarser_options(job, end - 1) + " (" + grid +
+                                   " voxels per edge) fits, or take a smaller --region"
+                             : ". Expected a smaller --region"));
 }
 
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit) {
@@ -76,7 +90,7 @@ bool CellLimit::fits(uint32_t grid_levels) {
     cells_.reset();
   }
   const Selection selection = coarser(job_.selection, grid_levels);
-  const NodeCounts counts(job_.file, job_.dag, grid_levels, job_.budget);
+  const NodeCounts counts(job_.file, job_.dag, grid_levels, job_.budget, job_.cancel);
   if (counts.is_stored()) return counts.count(selection.region) <= limit_;
   CancelCheck check(job_);
   uint64_t voxels = 0;

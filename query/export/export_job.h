@@ -89,6 +89,8 @@ class CancelCheck {
 
 // The same part of the file on a coarser grid.
 Selection coarser(const Selection& selection, uint32_t grid_levels);
+// The options that select it: "--level 11", and "--region" with cells of that grid if it is a part.
+std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
 // ExportFile::publish() of what was made from a file that was whole until then; else throws.
 inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> written) {
@@ -99,10 +101,11 @@ inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> writt
 // Throws Error{kNoSpace} if the disk of the output has less than `bytes` free.
 void require_space(const ExportJob& job, uint64_t bytes);
 
-// Throws Error{kLimit}: "FORMAT: PROBLEM. --level 11 fits", or "a smaller --region is needed"
-// where no coarser level does; `fits` says whether a level would.
+// Throws Error{code}: "OUTPUT: PROBLEM. --level 11 fits", or "Expected a smaller --region" where no
+// coarser level does; `fits` says whether a level would.
 [[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
-                              const std::function<bool(uint32_t grid_levels)>& fits);
+                              const std::function<bool(uint32_t grid_levels)>& fits,
+                              ErrorCode code = ErrorCode::kLimit);
 
 // The number of selected voxels, or anything over `limit` if there are more.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);

@@ -142,8 +142,9 @@ class HashDagWriter {
                                            " encloses " + count_text(count) +
                                            " voxels, but HashDAG takes less than " +
                                            count_text(kMaxCount) +
-                                           ". --level 17 (131072 voxels per edge) fits, or take "
-                                           "a smaller --region");
+                                           ". " + coarser_options(job_, 17) +
+                                           " (131072 voxels per edge) fits, or take a smaller "
+                                           "--region");
       }
       file_.write(std::as_bytes(std::span(words).first(nodes.size() + 1)));
       stage.advance(1);

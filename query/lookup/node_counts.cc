@@ -10,11 +10,11 @@
 namespace voxdag::query {
 
 NodeCounts::NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint32_t grid_levels,
-                       MemoryBudget& budget)
+                       MemoryBudget& budget, const CancelToken& cancel)
     : dag_(dag), grid_levels_(grid_levels) {
   if (dag.empty()) return;
   try {
-    store(file, budget);
+    store(file, budget, cancel);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kOutOfMemory) throw;
     levels_.clear();
@@ -22,19 +22,22 @@ NodeCounts::NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint
 }
 
 // The nodes just above the cells need no number, nor do bricks: their masks have it.
-void NodeCounts::store(const voxdag_reader::File& file, MemoryBudget& budget) {
+void NodeCounts::store(const voxdag_reader::File& file, MemoryBudget& budget,
+                       const CancelToken& cancel) {
   if (grid_levels_ < 2 || dag_.grid_levels() < 3) return;
   const uint32_t lowest = std::min(grid_levels_ - 2, dag_.grid_levels() - 3);
   levels_.resize(lowest + 1);
   for (uint32_t depth = lowest + 1; depth-- > 0;) {
     const voxdag_reader::Level& level = file.level(depth);
     const bool wide = file.level(depth + 1).pointer_bits == 64;
-    NodeIndex index(level, wide ? Pointers::kWide : Pointers::kNarrow, 1, budget, {},
+    NodeIndex index(level, wide ? Pointers::kWide : Pointers::kNarrow, 1, budget, cancel,
                     "level " + std::to_string(depth));
     PageBuffer<uint64_t> counts(budget, level.node_count, "the counts of nodes");
-    for (uint64_t span = 0; span < index.span_count(); ++span)
+    for (uint64_t span = 0; span < index.span_count(); ++span) {
+      cancel.check();
       index.visit_span(
           span, [&](uint64_t i, uint64_t offset) { counts[i] = sum_children(depth, offset); });
+    }
     levels_[depth] = {std::move(index), std::move(counts)};
   }
 }

@@ -20,9 +20,9 @@ class NodeCounts {
  public:
   // Takes 8 bytes per node above the bricks and 2 bits per word of theirs. If that does not fit in
   // the budget, no number is stored, and every count walks the octree below its region. `dag` is
-  // the view of `file`; both must outlive this. Throws Error{kCorrupt}.
+  // the view of `file`; both must outlive this. Throws Error{kCorrupt}, Error{kCanceled}.
   NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint32_t grid_levels,
-             MemoryBudget& budget);
+             MemoryBudget& budget, const CancelToken& cancel = {});
 
   bool is_stored() const { return !levels_.empty(); }
   // Set cells in the region. Throws Error{kCorrupt}.
@@ -34,7 +34,7 @@ class NodeCounts {
     PageBuffer<uint64_t> counts;
   };
 
-  void store(const voxdag_reader::File& file, MemoryBudget& budget);
+  void store(const voxdag_reader::File& file, MemoryBudget& budget, const CancelToken& cancel);
   uint64_t count_below(uint32_t depth, uint64_t content) const;
   uint64_t sum_children(uint32_t depth, uint64_t content) const;
   uint64_t count_within(const Region& region, uint32_t depth, const Position& low,

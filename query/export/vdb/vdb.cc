@@ -161,7 +161,8 @@ ChargedVdb charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
                 [&](uint32_t level) {
                   return vdb_size(job, coarser(job.selection, level), node, limit, CancelCheck(job))
                              .bytes <= limit;
-                });
+                },
+                ErrorCode::kOutOfMemory);
   return {size.voxels, MemoryCharge(job.budget, size.bytes, "the grid")};
 }
 

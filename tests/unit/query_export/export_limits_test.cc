@@ -63,6 +63,16 @@ class ExportLimits : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
+// With its cells in the grid that fits, where they have other numbers.
+TEST_F(ExportLimits, TheRegionThatFitsIsNamed) {
+  const Selection part{11, {{3, 4, 5}, {2047, 1025, 2000}}};
+  const std::string message =
+      refusal(*full_grid(11), part, "ply", "a.ply", ErrorCode::kLimit, kMemory);
+  EXPECT_NE(message.find("--level 10 --region 1,2,2,1024,513,1000 (1024 voxels per edge) fits"),
+            std::string::npos)
+      << message;
+}
+
 // However little memory there is for the search.
 TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
   const auto file = full_grid(11);
@@ -123,7 +133,7 @@ TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
   for (const ExportFormat& format : export_formats()) {
     const std::string name = format.name;
     if (name == "vdb" || name == "nvdb") {
-      const std::string message = refusal(*file, name, "a.x", ErrorCode::kLimit, 20 << 20);
+      const std::string message = refusal(*file, name, "a.x", ErrorCode::kOutOfMemory, 20 << 20);
       EXPECT_NE(message.find("would take over 20.00 MiB of memory"), std::string::npos) << message;
       EXPECT_NE(message.find("--level 8 (256 voxels per edge) fits"), std::string::npos) << message;
     }
