@@ -2,6 +2,8 @@
 
 import hashlib
 import os
+import resource
+import signal
 
 import numpy as np
 import pytest
@@ -89,6 +91,28 @@ def test_paths_of_bytes(tmp_path, mesh):
         assert dag.path == os.fsdecode(output)
     with pytest.raises(voxdag.Error, match="nowhere.glb"):
         voxdag.build([b"nowhere.glb", b"there.glb"], resolution=64, output=output, force=True)
+
+
+def test_a_mesh_that_cannot_be_written(tmp_path, mesh):
+    with pytest.raises(voxdag.Error, match="cannot be written next to") as refused:
+        voxdag.build(mesh, resolution=64, output=tmp_path / ("n" * 250 + ".vdag"))
+    assert refused.value.code == "io"
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 12, limit[1]))
+    try:
+        with pytest.raises(voxdag.Error, match="cannot be written next to") as refused:
+            voxdag.build(mesh, resolution=64, output=tmp_path / "x.vdag")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+        signal.signal(signal.SIGXFSZ, before)
+    assert refused.value.code == "no_space"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_not_there_is_made(tmp_path, mesh):
+    voxdag.build(mesh, resolution=64, output=tmp_path / "new" / "x.vdag")
+    assert not list((tmp_path / "new").glob("*.ply"))
 
 
 def test_what_progress_raises_ends_the_build(mesh, tmp_path):

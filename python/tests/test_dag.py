@@ -152,6 +152,12 @@ def test_threads(dag, cells):
     (lambda dag: dag.count((0, 0, 0, 1)), "invalid_input"),
     (lambda dag: dag.count((5, 0, 0, 1, 9, 9)), "invalid_input"),
     (lambda dag: dag.count((0.5, 0, 0, 1, 9, 9)), "invalid_input"),
+    (lambda dag: dag.nearest(np.array([[2**64 - 1, 0, 0]], np.uint64)), "invalid_input"),
+    (lambda dag: dag.rays(np.array([[1j, 0, 0]]), [[1, 0, 0]]), "invalid_input"),
+    (lambda dag: dag.points(attributes="color"), "invalid_input"),
+    (lambda dag: voxdag.open(dag.path + "\0"), "invalid_input"),
+    (lambda dag: voxdag.open("\ud800.vdag"), "invalid_input"),
+    (lambda dag: voxdag.render(dag.path, view="below"), "invalid_input"),
 ])
 def test_refuses(dag, ask, code):
     with pytest.raises(voxdag.Error) as refused:

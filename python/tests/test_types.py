@@ -22,6 +22,7 @@ def test_types(tmp_path):
         import voxdag
         dag = voxdag.open(b"scene.vdag")
         reveal_type(dag.count())
+        dag.count(dag.bounds, world=True)
         voxdag.open(7)
         voxdag.build("scene.glb", resolution="64", output="scene.vdag")
     """))
@@ -30,5 +31,5 @@ def test_types(tmp_path):
     shutil.rmtree(tmp_path / "voxdag")
     user = mypy(tmp_path, "user.py").stdout
     assert 'user.py:4: note: Revealed type is "int"' in user.replace("builtins.", ""), user
-    assert "user.py:5: error: Argument 1" in user and "user.py:6: error: Argument" in user, user
+    assert "user.py:6: error: Argument 1" in user and "user.py:7: error: Argument" in user, user
     assert "Found 2 errors" in user, user

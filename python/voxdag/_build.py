@@ -6,12 +6,13 @@ import operator
 import os
 import tempfile
 from contextlib import contextmanager
-from typing import Any, BinaryIO, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import (Any, BinaryIO, Callable, Dict, Iterator, List, Optional, Sequence, SupportsIndex,
+                    Tuple, Union)
 
 import numpy as np
 
 from . import _native
-from ._error import Error, Path
+from ._error import Error, Path, path_text
 
 # vertices (N, 3) of float, triangles (M, 3) of integers
 Mesh = Tuple[Any, Any]
@@ -23,7 +24,7 @@ Progress = Callable[[str, int, int, str], None]
 _ROWS = 1 << 18
 
 
-def build(scene: Scene, *, resolution: int, output: Path,
+def build(scene: Scene, *, resolution: SupportsIndex, output: Path,
           memory: Union[int, str, None] = None, progress: Optional[Progress] = None,
           **options: Any) -> Dict[str, Any]:
     """Builds the DAG of a scene, or resumes a build that was interrupted, and returns its report.
@@ -39,23 +40,23 @@ def build(scene: Scene, *, resolution: int, output: Path,
     skip_invalid, hash_bits, color, attributes=["alpha", ...], color_resolution, work, threads,
     subvolume, backend, method, cache, keep_work, restart, force. The report has the names of `voxdag build --json`. Raises Error.
     """
-    output = os.fsdecode(output)
+    output = path_text(output)
     with _files_of(scene, output) as files:
         return _call(_native.build, files, resolution, progress, output=output, memory=memory,
                      **options)
 
 
-def plan(scene: Scene, *, resolution: int, memory: Union[int, str, None] = None,
+def plan(scene: Scene, *, resolution: SupportsIndex, memory: Union[int, str, None] = None,
          output: Optional[Path] = None, progress: Optional[Progress] = None,
          **options: Any) -> Dict[str, Any]:
     """What build() would need; builds nothing. The names are those of `voxdag plan --json`."""
-    output = "voxdag-plan" if output is None else os.fsdecode(output)
+    output = "voxdag-plan" if output is None else path_text(output)
     with _files_of(scene, output) as files:
         return _call(_native.plan, files, resolution, progress, output=output, memory=memory,
                      **options)
 
 
-def _call(function: Callable[..., str], files: List[str], resolution: int,
+def _call(function: Callable[..., str], files: List[str], resolution: SupportsIndex,
           progress: Optional[Progress], memory: Union[int, str, None], **options: Any) -> Any:
     resolution = operator.index(resolution)
     if not 0 < resolution < 1 << 63:
@@ -69,7 +70,7 @@ def _call(function: Callable[..., str], files: List[str], resolution: int,
         options["bounds"] = [float(number) for number in options["bounds"]]
     for name in ("work", "cache"):
         if options.get(name) is not None:
-            options[name] = os.fsdecode(options[name])
+            options[name] = path_text(options[name])
     return json.loads(function(files, resolution, progress, options))
 
 
@@ -77,7 +78,7 @@ def _call(function: Callable[..., str], files: List[str], resolution: int,
 def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
     """The files of a scene. A mesh becomes a PLY file next to the output, which is removed."""
     if isinstance(scene, (str, bytes, os.PathLike)):
-        yield [os.fsdecode(scene)]
+        yield [path_text(scene)]
     elif _is_mesh(scene):
         _check_mesh(*scene)
         path = _mesh_file(scene, output)
@@ -86,10 +87,10 @@ def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
         finally:
             os.remove(path)
     else:
-        yield [os.fsdecode(file) for file in scene]
+        yield [path_text(file) for file in scene]
 
 
-def _mesh_file(mesh: Mesh, output: str) -> str:
+def _mesh_file(mesh: Sequence[Any], output: str) -> str:
     """Writes a mesh to a new file next to the output, and returns its path."""
     folder, name = os.path.split(os.path.abspath(output))
     path = None

@@ -1,15 +1,14 @@
 """A finished file, and what can be asked of it."""
 
-import os
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, overload
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union, overload
 
 import numpy as np
 
 from . import _native
-from ._error import Error, Path, thread_count
+from ._error import Error, Path, path_text, thread_count
 
 # A half-open box: the low corner x, y, z and the high corner x, y, z.
-Region = Sequence[Any]
+Region = Union[Sequence[Any], np.ndarray]
 
 
 class Hits(NamedTuple):
@@ -40,7 +39,7 @@ class Dag:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = os.fsdecode(path)
+        self.path = path_text(path)
         self._file: Optional[_native.Dag] = _native.Dag(self.path)
 
     def close(self) -> None:

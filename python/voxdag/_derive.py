@@ -7,7 +7,7 @@ from typing import Any, Dict, Optional, Sequence, Union
 from . import _native
 from ._build import Progress
 from ._dag import Dag, Region
-from ._error import Error, Path, memory_text, thread_count
+from ._error import Error, Path, memory_text, path_text, thread_count
 
 
 def extract(path: Path, output: Path, *, region: Optional[Region] = None,
@@ -22,7 +22,7 @@ def extract(path: Path, output: Path, *, region: Optional[Region] = None,
 
     Returns counts, bounds and the SHA-256 of the new file. Raises Error.
     """
-    path, output = os.fsdecode(path), os.fsdecode(output)
+    path, output = path_text(path), path_text(output)
     _check_output(path, [output], force)
     with Dag(path) as dag:
         low, high = dag._region(region, level, world)
@@ -41,7 +41,7 @@ def export(path: Path, output: Path, *, to: str, region: Optional[Region] = None
     `to` is one of export_formats(). Returns the files that were written, their bytes, the voxels,
     and notes on how to open them. Raises Error.
     """
-    path, output = os.fsdecode(path), os.fsdecode(output)
+    path, output = path_text(path), path_text(output)
     files = _native.export_paths(to, output)
     _check_output(path, files, force)
     with Dag(path) as dag:

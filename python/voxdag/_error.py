@@ -24,6 +24,19 @@ class Error(Exception):
         return type(self), (str(self), self.code)
 
 
+def path_text(path: Path) -> str:
+    """A path that a file can have."""
+    text = os.fsdecode(path)
+    try:
+        os.fsencode(text)
+        usable = "\0" not in text
+    except UnicodeEncodeError:
+        usable = False
+    if not usable:
+        raise Error(f"the path {text!r}: expected one that a file can have", "invalid_input")
+    return text
+
+
 def memory_text(memory: Union[int, str, None]) -> str:
     """A limit of memory, "" for the default."""
     return "" if memory is None else str(memory)

@@ -2,14 +2,13 @@
 
 import math
 import operator
-import os
 from typing import Any, Optional, Tuple, Union
 
 import numpy as np
 
 from . import _native
 from ._build import Progress
-from ._error import Error, Path, memory_text
+from ._error import Error, Path, memory_text, path_text
 
 _MAX_EDGE = 16384  # pixels
 
@@ -50,7 +49,7 @@ def render(path: Path, *, view: str = "auto", camera: Optional[Any] = None,
     threads = _whole(threads, 0, 1 << 16, f"threads {threads!r}: expected a number of threads, 0 for all")
     place = None if camera is None else _point(camera, "camera")
     aim = (0.0, 0.0, 0.0) if target is None else _point(target, "target")
-    file = os.fsdecode(path)
+    file = path_text(path)
     _native.check_render_memory(width, height, memory_text(memory))
     pixels = np.empty((height, width, 3), np.uint8)
     _native.render(file, view, place, aim, degrees, samples, bool(gray), threads, progress, pixels)

@@ -24,9 +24,9 @@ Selection coarser(const Selection& selection, uint32_t grid_levels) {
 void require_space(const ExportJob& job, uint64_t bytes) {
   const uint64_t free = job.files.free_space(parent_directory(job.output));
   if (bytes > free)
-    throw Error(ErrorCode::kNoSpace, job.output + " will have " + size_text(bytes) +
-                                         ", but the disk has only " + size_text(free) +
-                                         " free: a smaller --region or a coarser --level needs less");
+    throw Error(ErrorCode::kNoSpace,
+                job.output + " will have " + size_text(bytes) + ", but the disk has only " +
+                    size_text(free) + " free: a smaller --region or a coarser --level needs less");
 }
 
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels) {
@@ -55,11 +55,11 @@ void refuse_size(const ExportJob& job, const std::string& problem,
   }
   job.cancel.check();
   const std::string grid = std::to_string(int64_t{1} << (end - 1));
-  throw Error(code, job.output + ": " + problem +
-                        (end > kBrickLevels
-                             ? ". " + coarser_options(job, end - 1) + " (" + grid +
-                                   " voxels per edge) fits, or take a smaller --region"
-                             : ". Expected a smaller --region"));
+  throw Error(code,
+              job.output + ": " + problem +
+                  (end > kBrickLevels ? ". " + coarser_options(job, end - 1) + " (" + grid +
+                                            " voxels per edge) fits, or take a smaller --region"
+                                      : ". Expected a smaller --region"));
 }
 
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit) {

@@ -138,13 +138,12 @@ class HashDagWriter {
       } else if (count < kMaxCount) {
         words[0] = mask | static_cast<uint32_t>(count) << 8;
       } else {
-        throw Error(ErrorCode::kLimit, job_.output + ": a node of level " + std::to_string(level) +
-                                           " encloses " + count_text(count) +
-                                           " voxels, but HashDAG takes less than " +
-                                           count_text(kMaxCount) +
-                                           ". " + coarser_options(job_, 17) +
-                                           " (131072 voxels per edge) fits, or take a smaller "
-                                           "--region");
+        throw Error(ErrorCode::kLimit,
+                    job_.output + ": a node of level " + std::to_string(level) + " encloses " +
+                        count_text(count) + " voxels, but HashDAG takes less than " +
+                        count_text(kMaxCount) + ". " + coarser_options(job_, 17) +
+                        " (131072 voxels per edge) fits, or take a smaller "
+                        "--region");
       }
       file_.write(std::as_bytes(std::span(words).first(nodes.size() + 1)));
       stage.advance(1);

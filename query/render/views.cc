@@ -12,6 +12,7 @@ namespace {
 constexpr double kFar = 1e30;
 constexpr double kOutsideFov = 32, kInsideFov = 62;
 constexpr double kMinEnclosureOfRooms = 0.1;
+constexpr size_t kFewCells = 256;  // do not outline a scene
 
 struct NamedDirection {
   const char* name;
@@ -59,7 +60,7 @@ class LimitedRays {
 // How far one sees from places on the surface, as a share of the scene's diagonal; a place from
 // which one can see out of the scene counts as 0. Near 0 for an object, or for caves; more for
 // interiors.
-double enclosure(const DagView& dag, const std::vector<Vec>& points, const Box& box,
+double enclosure(const DagView& dag, const OccupiedCells& cells, const Box& box,
                  const CancelToken& cancel) {
   constexpr size_t kPlaces = 1000;
   // Prime to kPlaces: the first places are all over the scene, if the steps are used up early.
@@ -68,7 +69,8 @@ double enclosure(const DagView& dag, const std::vector<Vec>& points, const Box& 
   std::vector<Vec> directions;  // toward the 26 neighbors of a cell
   for (int i = 0; i < 27; ++i)
     if (i != 13) directions.push_back(normalized({{i / 9 - 1.0, i / 3 % 3 - 1.0, i % 3 - 1.0}}));
-  const double start = 3 * static_cast<double>(dag.resolution()) / 64;
+  const std::vector<Vec>& points = cells.centers;
+  const double start = 3 * cells.edge;
   const double width = std::max(1.0, finest_width(dag));
   double sum = 0;
   size_t places = 0;
@@ -203,14 +205,28 @@ Box occupied_box(const DagView& dag, const CancelToken& cancel) {
   return box;
 }
 
-std::vector<Vec> occupied_points(const DagView& dag) {
-  std::vector<Vec> points;
+std::vector<Vec> OccupiedCells::outline() const {
+  if (centers.size() >= kFewCells) return centers;
+  std::vector<Vec> corners;
+  for (const Vec& center : centers)
+    for (int corner = 0; corner < 8; ++corner) {
+      Vec offset;
+      for (int axis = 0; axis < 3; ++axis) offset[axis] = corner >> axis & 1 ? 0.5 : -0.5;
+      corners.push_back(center + offset * edge);
+    }
+  return corners;
+}
+
+OccupiedCells occupied_cells(const DagView& dag) {
   const auto everywhere = [](const DagView::Cell&) { return 0xffu; };
-  dag.for_each_cell(std::min(dag.grid_levels(), 6u), everywhere, [&](const DagView::Cell& cell) {
-    const double half = cell.edge / 2;
-    points.push_back(cell.low + Vec{{half, half, half}});
-  });
-  return points;
+  OccupiedCells cells;
+  for (uint32_t level = std::min(dag.grid_levels(), 6u);; ++level) {
+    cells = {{}, static_cast<double>(dag.resolution() >> level)};
+    const Vec half{{cells.edge / 2, cells.edge / 2, cells.edge / 2}};
+    dag.for_each_cell(level, everywhere,
+                      [&](const DagView::Cell& cell) { cells.centers.push_back(cell.low + half); });
+    if (cells.centers.size() >= kFewCells || level == dag.grid_levels()) return cells;
+  }
 }
 
 const std::vector<std::string>& view_names() {
@@ -224,9 +240,9 @@ const Box& NamedViews::box() {
   return *box_;
 }
 
-const std::vector<Vec>& NamedViews::points() {
-  if (points_.empty()) points_ = occupied_points(dag_);
-  return points_;
+const OccupiedCells& NamedViews::cells() {
+  if (!cells_) cells_ = occupied_cells(dag_);
+  return *cells_;
 }
 
 Placement NamedViews::find(const std::string& name, double aspect,
@@ -234,7 +250,7 @@ Placement NamedViews::find(const std::string& name, double aspect,
   const bool automatic = name == "auto";
   std::string direction = name;
   if (name == "inside" || automatic) {
-    if (!automatic || enclosure(dag_, points(), box(), cancel_) > kMinEnclosureOfRooms) {
+    if (!automatic || enclosure(dag_, cells(), box(), cancel_) > kMinEnclosureOfRooms) {
       const auto found = inside_view(dag_, box(), fov_degrees.value_or(kInsideFov), cancel_);
       if (found) return *found;
     }
@@ -242,8 +258,10 @@ Placement NamedViews::find(const std::string& name, double aspect,
   }
   for (const NamedDirection& d : kDirections)
     if (direction == d.name)
-      return fit_camera(points(), d.toward_eye, fov_degrees.value_or(kOutsideFov), aspect);
-  throw Error(ErrorCode::kInvalidInput, "view '" + name + "': expected one of view_names()");
+      return fit_camera(cells().outline(), d.toward_eye, fov_degrees.value_or(kOutsideFov), aspect);
+  std::string names;
+  for (const std::string& known : view_names()) names += (names.empty() ? "" : ", ") + known;
+  throw Error(ErrorCode::kInvalidInput, "view '" + name + "': expected one of " + names);
 }
 
 Placement named_view(const std::string& name, const DagView& dag, double aspect,

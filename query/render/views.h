@@ -25,8 +25,18 @@ struct Box {
 // The box around the occupied cells of 1/2048 of the grid's edge; a larger one if that would take
 // more than some tens of millions of cells. Throws as `cancel` does.
 Box occupied_box(const DagView& dag, const CancelToken& cancel = {});
-// The centers of the occupied cells of 1/64 of the grid's edge.
-std::vector<Vec> occupied_points(const DagView& dag);
+
+// Occupied cells of one size.
+struct OccupiedCells {
+  std::vector<Vec> centers;
+  double edge;
+  // Points that a view must have in its picture to show the cells: their centers, or their corners
+  // where there are so few that it matters.
+  std::vector<Vec> outline() const;
+};
+// Those of 1/64 of the grid's edge; finer ones where there are few of them, since the scene is
+// small in its grid.
+OccupiedCells occupied_cells(const DagView& dag);
 
 // "auto", "iso", "front", "back", "left", "right", "top", "inside".
 const std::vector<std::string>& view_names();
@@ -51,12 +61,12 @@ class NamedViews {
   Placement find(const std::string& name, double aspect, std::optional<double> fov_degrees);
 
  private:
-  const std::vector<Vec>& points();
+  const OccupiedCells& cells();
 
   const DagView& dag_;
   const CancelToken& cancel_;
   std::optional<Box> box_;
-  std::vector<Vec> points_;
+  std::optional<OccupiedCells> cells_;
 };
 
 }  // namespace voxdag::query

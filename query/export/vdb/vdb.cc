@@ -155,14 +155,15 @@ ChargedVdb charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
       vdb_size(job, job.selection, node, limit, ExportStage(job, "count", 0, "bricks"));
   if (size.voxels == 0) refuse_empty(job);
   if (size.bytes > limit)
-    refuse_size(job,
-                "the grid would take over " + size_text(limit) + " of memory, which is --memory" +
-                    (job.has_colors ? " (without colors, --gray, it takes less)" : ""),
-                [&](uint32_t level) {
-                  return vdb_size(job, coarser(job.selection, level), node, limit, CancelCheck(job))
-                             .bytes <= limit;
-                },
-                ErrorCode::kOutOfMemory);
+    refuse_size(
+        job,
+        "the grid would take over " + size_text(limit) + " of memory, which is --memory" +
+            (job.has_colors ? " (without colors, --gray, it takes less)" : ""),
+        [&](uint32_t level) {
+          return vdb_size(job, coarser(job.selection, level), node, limit, CancelCheck(job))
+                     .bytes <= limit;
+        },
+        ErrorCode::kOutOfMemory);
   return {size.voxels, MemoryCharge(job.budget, size.bytes, "the grid")};
 }
 

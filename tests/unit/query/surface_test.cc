@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "query/ray_caster.h"
 #include "query/render/views.h"
 #include "tests/unit/query/voxel_scene.h"
 
@@ -76,7 +77,32 @@ TEST(Bounds, AreTheOccupiedVoxels) {
   EXPECT_EQ(box.high[1], 11);
   EXPECT_EQ(box.low[2], 1);
   EXPECT_EQ(box.high[2], 31);
-  EXPECT_EQ(occupied_points(scene.view()).size(), 3u);
+  EXPECT_EQ(occupied_cells(scene.view()).centers.size(), 3u);
+}
+
+// A view of a scene that is small in its grid has all of it in the picture, and little else.
+TEST(Views, OfASmallSceneShowIt) {
+  for (const uint32_t grid_levels : {3u, 10u})
+    for (const int edge : {1, 4}) {
+      const VoxelScene scene(grid_levels, shell({1, 2, 3}, {edge, 1 + edge, 2 + edge}));
+      const DagView dag = scene.view();
+      for (const std::string& name : view_names()) {
+        if (name == "inside") continue;
+        constexpr int kPixels = 64;
+        const Camera camera(named_view(name, dag, 1, {}), kPixels, kPixels);
+        const RayCaster caster(dag);
+        int hits = 0, hits_of_border = 0;
+        for (int i = 0; i < kPixels * kPixels; ++i) {
+          const int x = i % kPixels, y = i / kPixels;
+          Hit hit;
+          if (!caster.cast(camera.ray(x + 0.5, y + 0.5), {0, 0}, 0, 1e30, hit)) continue;
+          ++hits;
+          hits_of_border += x == 0 || y == 0 || x == kPixels - 1 || y == kPixels - 1;
+        }
+        EXPECT_GT(hits, kPixels * kPixels / 4) << name << ", " << grid_levels << ", " << edge;
+        EXPECT_EQ(hits_of_border, 0) << name << ", " << grid_levels << ", " << edge;
+      }
+    }
 }
 
 // The automatic view of an object is from outside, that of a furnished room with outer walls from
