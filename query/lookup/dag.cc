@@ -20,8 +20,11 @@ namespace {
 // Items that one thread takes at once: a multiple of a packet of rays.
 constexpr size_t kBatch = 4096;
 
-void require(bool right, const char* expected) {
-  if (!right) throw Error(ErrorCode::kInvalidInput, std::string("query: expected ") + expected);
+[[noreturn]] void refuse(const char* expected) {
+  throw Error(ErrorCode::kInvalidInput, std::string("query: expected ") + expected);
+}
+inline void require(bool right, const char* expected) {
+  if (!right) refuse(expected);
 }
 
 // Calls body(first, count) for batches of `items`.

@@ -3,10 +3,9 @@
 //
 // Large cells are visited depth first, once for all rays that may cross them: bounds of all rays
 // together leave out most children, and each ray is tested with those that remain if there are
-// several. Where few rays are left, or cells are small and nodes are cache misses, each ray
-// descends by itself through its cells in their order, so that it loads nothing behind its hit.
-// Rays take turns, a step each: what a ray enters next is under way from memory while the others
-// step.
+// several. Where few rays are left, each descends by itself through its cells in their order, so
+// that it loads nothing behind its hit. Rays take turns, a step each: what a ray enters next is
+// under way from memory while the others step.
 //
 // A cell is crossed where a ray has an interval in it that is not empty. One of length 0 in an
 // occupied cell, or two planes passed at the parameter of a hit, mean that the path from the root
@@ -59,9 +58,8 @@ class PacketWalk {
   }
 
  private:
-  // Measured: so few rays part in any cell, all do in those of kSmallest voxels per edge.
+  // So few rays part in any cell; all do in bricks. Measured.
   static constexpr int kFewRays = 8;
-  static constexpr int32_t kSmallest = 8;
 
   using Planes = FourPlanes<Four>;
   struct Child {
@@ -244,8 +242,7 @@ class PacketWalk {
       prefetch(depth + 1, child.offset);
       ++count;
     }
-    const bool last =
-        half <= kSmallest || depth + 2 == job_.leaf_depth || depth + 1 == brick_depth_;
+    const bool last = depth + 2 == job_.leaf_depth || depth + 1 == brick_depth_;
     for (int i = 0; i < count; ++i) {
       const Child& child = children[i];
       const uint64_t left = child.rays & ~(job_.found | job_.single);
