@@ -195,6 +195,22 @@ def check_canvas(visitor, camera, reference, rendered):
     visitor.picture("light")
 
 
+MAX_BLACK = 0.02   # of the canvas
+
+
+def check_inside_cell(visitor, camera):
+    """A picture from within a cell that is drawn as a whole is not black, though no ray from there is free."""
+    visitor.page.evaluate("voxdagViewer.viewer.set_options({level: 2, shadows: true, occlusion: true})")
+    visitor.show(camera)
+    depths, _ = visitor.capture(WIDTH, HEIGHT)
+    assert max(depths) == 0, "the eye is not in a cell: the check sees nothing"
+    width, height, pixels = visitor.canvas()
+    black = sum(max(pixels[at:at + 3]) < 16 for at in range(0, len(pixels), 4)) / (width * height)
+    print(f"  within a cell: {100 * black:.1f} % of the picture are black")
+    assert black < MAX_BLACK, "black within a cell"
+    visitor.picture("within-cell")
+
+
 # The blocks of the pool: those of the loaded tiles, those that a tile has twice, and those that are in use;
 # and the statistics of the same moment.
 COUNT_BLOCKS = """() => {

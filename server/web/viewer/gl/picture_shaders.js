@@ -153,16 +153,15 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 `;
 
 const kBlocked = `
-// Whether something lies between the surface and a light that far away.
-bool is_blocked(Surface s, vec3 normal, vec3 toward, vec2 cone, out Hit hit) {
-  bool blocked = false;
-  // In a narrow place the start may be occupied; the way that the ray came is free.
+// Whether something lies within that distance between the surface and a light.
+bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out Hit hit) {
+  // In a narrow place the start may be occupied; the way that the ray came is free, unless the eye is in an occupied cell.
   for (int attempt = 0; attempt < 2; ++attempt) {
-    set_ray_from(attempt == 0 ? start_of(s, normal) : s.direction * (s.t - 1.5 * s.size), toward);
-    blocked = trace(0.0, 1e30, cone, hit);
-    if (!blocked || hit.t > 0.0) break;
+    set_ray_from(attempt == 0 ? start_of(s, normal) : s.direction * max(0.0, s.t - 1.5 * s.size), toward);
+    if (!trace(0.0, reach, cone, hit)) return false;
+    if (hit.t > 0.0) return true;
   }
-  return blocked;
+  return false;
 }
 `;
 
@@ -252,14 +251,14 @@ void main() {
   // A single sample has sharp shadows; noise disappears only where there are more.
   float r = u_frame == 0 ? 0.0 : kSunRadius * sqrt(p.x), angle = 2.0 * kPi * p.y;
   vec3 toward = normalize(u_sun + a * (r * cos(angle)) + b * (r * sin(angle)));
-  if (is_blocked(s, normal, toward, vec2(s.size, kSunWidening), hit)) {
+  if (is_blocked(s, normal, toward, 1e30, vec2(s.size, kSunWidening), hit)) {
     o_sun = 0.0;
     o_missing = hit.missing;
   }
 }`;
 
 // Light from the sky, for one of every 2 x 2 pixels.
-export const kOcclusion = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}
+export const kOcclusion = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
 uniform float u_sky_reach;   // distance beyond which nothing occludes the sky
 uniform bool u_occlusion;
@@ -288,8 +287,7 @@ void main() {
     vec3 toward = a * (r * cos(angle)) + b * (r * sin(angle)) + normal * sqrt(1.0 - p.x);
     Hit hit;
     float open = 1.0;
-    set_ray_from(start_of(s, normal), toward);
-    if (trace(0.0, u_sky_reach, vec2(s.size, kSkyWidening), hit)) {
+    if (is_blocked(s, normal, toward, u_sky_reach, vec2(s.size, kSkyWidening), hit)) {
       float distance = hit.t / u_sky_reach;
       open = kBounce * sqrt(distance) * (1.0 - distance) + distance * distance * distance;
     }
@@ -322,7 +320,7 @@ void main() {
     return;
   }
   // As detailed as the rays of render, which chooses among the same places.
-  bool blocked = is_blocked(s, normal, sun, vec2(s.size, 0.004), hit);
+  bool blocked = is_blocked(s, normal, sun, 1e30, vec2(s.size, 0.004), hit);
   o_lit = uvec4(blocked ? 1u : 2u, blocked ? hit.missing : 0u, 0, 0);
 }`;
 
