@@ -119,7 +119,11 @@ def check_colors(visitor, voxdag, url, built, camera):
 
 
 def check_small_pool(visitor, url, camera, reference):
-    """Pages leave a pool that is too small for all views, and what is seen last is right."""
+    """Pages leave a pool that is too small for all views, and what is seen last is right. One for nothing at all is enlarged."""
+    visitor.open(f"{url}/?budget=0.0001")
+    visitor.show(camera)
+    seen = visitor.statistics()
+    assert 0 < seen["poolBytes"] + seen["colorPoolBytes"] <= seen["budgetBytes"] <= 1 << 18 and seen["colorPages"] > 0, seen
     visitor.open(f"{url}/?budget=1")
     for _ in range(2):
         for turn in range(4):

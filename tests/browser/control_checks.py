@@ -4,7 +4,7 @@ import json
 import math
 import re
 
-from picture_checks import HEIGHT, WIDTH, numbers
+from picture_checks import HEIGHT, WIDTH, address, numbers
 from visitor import PIXEL_RATIO
 
 PICK = "async ([x, y]) => (await voxdagViewer.renderer.pick(x, y)).position"
@@ -69,6 +69,14 @@ def check_measure(visitor):
     assert all(a < b for a, b in zip(low, high))
     page.get_by_label("Show only what is in a box").uncheck()
     assert page.evaluate("voxdagViewer.viewer.options.clip") is None
+    # A click into the sky: what is measured from stays, and so do its buttons.
+    page.evaluate("voxdagViewer.viewer.panel.pick.set(null)")
+    page.get_by_role("button", name="Measure from here", pressed=True).wait_for()
+    page.get_by_role("button", name="Clear").click()
+    page.locator("#scene").focus()
+    page.keyboard.press("m")
+    page.get_by_text("Pick a voxel first").wait_for(state="attached")
+    assert page.get_by_role("button", name="Measure from here").count() == 0
 
 
 def steady_place(reference, radius=3):
@@ -149,6 +157,50 @@ def check_camera_text(visitor, voxdag, built, camera):
     page.get_by_label("Take the camera of").fill("--camera 1,2")
     page.keyboard.press("Enter")
     page.get_by_text("Expected --camera X,Y,Z.").wait_for()
+
+
+# Goes to an address while the camera glides elsewhere; resolves when nothing moves.
+FOLLOW = """async ([elsewhere, hash]) => {
+  const {viewer} = voxdagViewer;
+  if (elsewhere) viewer.fly_to_text(elsewhere);
+  const glides = viewer.motion.flight !== null;
+  await new Promise((resolve) => {
+    addEventListener("hashchange", resolve, {once: true});
+    location.hash = hash;
+  });
+  while (viewer.motion.flight) await new Promise((resolve) => requestAnimationFrame(resolve));
+  return glides;
+}"""
+# Parts of addresses with the numbers that are taken for them, in a grid of that resolution.
+BOXES = [("-5,1.6,0,9e99,10.2,1e300", lambda edge: {"low": [0, 2, 0], "high": [edge, 10, edge]}),
+         ("1e9,0,0,2e9,9,9", lambda edge: None), ("1.1,0,0,1.4,9,9", lambda edge: None)]
+
+
+def check_addresses(visitor, resolution, cameras):
+    """An address is followed in a glide, too; what it has that cannot be used is said or brought to what can be."""
+    page = visitor.page
+    visitor.show(cameras["street"], complete=False)
+    wanted = visitor.camera()
+    visitor.show(cameras["top"], complete=False)
+    page.emulate_media(reduced_motion="no-preference")
+    assert page.evaluate(FOLLOW, [cameras["wide"], address("", cameras["street"])[1:]]), "no glide: the check sees nothing"
+    page.emulate_media(reduced_motion="reduce")
+    off = distance(visitor.camera()["eye"], wanted["eye"])
+    assert off < 1e-3 * resolution, f"an address that came in a glide was lost: {off} voxels from its place"
+    for refused in ("#camera=1,2,x&target=0,0,0", "#camera=1,2,NaN&target=0,0,0", "#camera=1,2,3&target=0,0,0&fov=1e9"):
+        page.evaluate(FOLLOW, [None, refused])
+        page.locator("#status.bad", has_text="The camera of the address cannot be used.").wait_for()
+        page.locator("#scene").focus()
+        page.keyboard.press("w")
+        page.locator("#status:not(.bad)").wait_for(state="attached")
+    page.evaluate(FOLLOW, [None, "#occlusion=0&shadows=0&level=0"])
+    assert page.evaluate("voxdagViewer.viewer.options.level") == 1
+    note = page.locator("output", has_text="cubes of").inner_text()
+    assert re.sub(r"\D", "", note) == str(resolution // 2), note
+    for text, expected in BOXES:
+        page.evaluate(FOLLOW, [None, f"#occlusion=0&shadows=0&clip={text}"])
+        assert page.evaluate("voxdagViewer.viewer.options.clip") == expected(resolution), text
+    page.evaluate(FOLLOW, [None, "#occlusion=0&shadows=0"])
 
 
 def focused(page):

@@ -44,7 +44,7 @@ export class Viewer {
     this.save_button.disabled = true;  // until there is a picture
     const resizes = new ResizeObserver(() => this.resize());
     resizes.observe(canvas);
-    if (bookmarks) window.addEventListener("hashchange", () => this.follow_bookmark(), {signal});
+    if (bookmarks) window.addEventListener("hashchange", (event) => this.follow_bookmark(new URL(event.newURL).hash), {signal});
     const timer = setInterval(() => this.show_statistics(), kStatisticsInterval_ms);
     signal.addEventListener("abort", () => {
       clearInterval(timer);
@@ -54,7 +54,7 @@ export class Viewer {
     }, {once: true});
     this.resize();
     this.camera.set(this.first_camera());
-    this.follow_bookmark();
+    this.follow_bookmark(location.hash);
     this.show_mode();
     // What is seen first need not be waited for: until then the target is as good.
     this.seen.distance = this.camera.distance;
@@ -170,6 +170,7 @@ export class Viewer {
     const {eye, target, fov_degrees} = this.camera;
     const key = [...eye, ...target, fov_degrees].join();
     if (key === this.camera_key) return;
+    if (this.camera_key) this.refusal = "";
     this.camera_key = key;
     this.renderer.setView({eye: [...eye], target: [...target], up: this.camera.axes().up, fovDegrees: fov_degrees});
     this.bookmark();
@@ -246,26 +247,32 @@ export class Viewer {
             color: color ? null : 0};
   }
 
-  // Takes camera and options from the address; a camera that cannot be used is left out.
-  follow_bookmark() {
-    if (location.hash === this.fragment) return;
-    const members = new URLSearchParams(this.bookmarks ? location.hash.slice(1) : "");
+  // Takes camera and options from the fragment of an address, which may have changed since. A camera that cannot be used
+  // is left out, which the page says until the camera moves.
+  follow_bookmark(fragment) {
+    if (fragment === this.fragment) return;
+    const members = new URLSearchParams(this.bookmarks ? fragment.slice(1) : "");
+    this.motion.stop();
+    this.refusal = "";
     try {
       const placement = parse_camera_fragment(this.space, members, kDefaultFov);
       if (placement) this.camera.set(placement);
     } catch (error) {
-      announce(error.message);
+      this.refusal = `The camera of the address cannot be used. ${error.message}`;
+      announce(this.refusal);
     }
     this.set_options(this.options_of(members));
   }
 
   options_of(members) {
     const options = this.default_options();
-    const level = (name) => /^\d+$/.test(members.get(name) ?? "")
-      ? Math.min(Number(members.get(name)), this.manifest.levels) : null;
-    const box = (members.get("clip") ?? "").split(",").map(Number);
-    const is_box = box.length === 6 && box.every(Number.isFinite) && [0, 1, 2].every((axis) => box[axis] < box[axis + 3]);
-    return {...options, level: level("level") ?? options.level, wire: level("wire"),
+    const {levels, resolution} = this.manifest;
+    const level = (name, coarsest) => /^\d+$/.test(members.get(name) ?? "")
+      ? Math.min(Math.max(Number(members.get(name)), coarsest), levels) : null;
+    const corners = (members.get("clip") ?? "").split(",").map(Number);
+    const box = corners.map((c) => Math.min(Math.max(Math.round(c), 0), resolution));
+    const is_box = box.length === 6 && corners.every(Number.isFinite) && [0, 1, 2].every((axis) => box[axis] < box[axis + 3]);
+    return {...options, level: level("level", 1) ?? options.level, wire: level("wire", 0),
             clip: is_box ? {low: box.slice(0, 3), high: box.slice(3)} : null,
             occlusion: members.get("occlusion") !== "0", shadows: members.get("shadows") !== "0",
             color: members.get("color") !== "0"};
@@ -291,12 +298,13 @@ export class Viewer {
     if (this.signal.aborted) return;
     const statistics = this.renderer.statistics();
     this.panel.show_statistics(statistics);
-    const {problem} = this.renderer;
+    const {problem} = this.renderer, {refusal} = this;
     const {loading} = statistics;
     this.show_status(this.renderer.lost ? "The graphics card is not available: waiting for it."
       : problem ? problem_text(problem)
+      : refusal ? refusal
       : loading > 0 ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"}…` : "", problem?.code === "replaced");
-    this.places.status.classList.toggle("bad", Boolean(problem));
+    this.places.status.classList.toggle("bad", Boolean(problem || refusal));
   }
 
   show_status(text, can_reload) {

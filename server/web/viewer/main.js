@@ -13,6 +13,7 @@ import {fill_tools} from "./tools.js";
 
 const kBudgetMiB = 256;
 const kPhoneBudgetMiB = 64;
+const kMinBudgetMiB = 0.25;  // that tiles and colors can do with
 const kPause_ms = 3000;
 
 const place = (id) => document.getElementById(id);
@@ -23,7 +24,7 @@ const lifetime = new AbortController();
 function budget_bytes() {
   const asked = Number(parameters.get("budget"));
   const small = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
-  return (asked > 0 ? asked : small ? kPhoneBudgetMiB : kBudgetMiB) * 2 ** 20;
+  return (asked > 0 ? Math.max(asked, kMinBudgetMiB) : small ? kPhoneBudgetMiB : kBudgetMiB) * 2 ** 20;
 }
 
 // Instead of the picture; nothing hides it again but a new message.

@@ -23,6 +23,7 @@ export class PickView {
 
   // Measures from the current pick, or no longer.
   toggle_measure() {
+    if (!this.start && !this.pick) return announce("Pick a voxel first: distances are measured from it.");
     this.start = this.start ? null : this.pick;
     announce(this.start ? "Measuring from this voxel: pick another one." : "Not measuring.");
     this.show();
@@ -57,12 +58,12 @@ export class PickView {
         fact("Level", h("span", {"data-fact": "level"}, String(pick.level)), this.edge_note(pick)),
         fact("Node of the tile: level / word offset", h("code", {"data-fact": "node"}, `${pick.nodeLevel} / ${pick.nodeOffset}`)),
         fact("Distance from the camera", `${length_text(pick.distance)} voxels`)),
-      start && pick && h("dl", {class: "facts measure"},
+      start && h("dl", {class: "facts measure"},
         fact("From voxel", h("code", {}, start.voxel.join(", "))),
-        fact("Distance", h("span", {"data-fact": "measure"}, this.measure_text())),
-        fact("Along the axes, in voxels",
+        pick && fact("Distance", h("span", {"data-fact": "measure"}, this.measure_text())),
+        pick && fact("Along the axes, in voxels",
           h("code", {}, subtract(pick.position, start.position).map((c) => Number(c.toFixed(2))).join(", ")))),
-      pick && h("div", {class: "buttons"},
+      (pick || start) && h("div", {class: "buttons"},
         h("button", {type: "button", class: "small", "aria-pressed": String(Boolean(start)), "data-action": "measure",
                      on: {click: () => this.toggle_measure_and_focus()}}, "Measure from here"),
         h("button", {type: "button", class: "small quiet", on: {click: () => this.forget()}}, "Clear")));

@@ -5,6 +5,7 @@ import {ColorStore, page_key} from "./color_store.js";
 
 const kMebibyte = 1 << 20;
 const kBudgetShare = 1 / 4;      // of that of tiles and colors
+const kMinBytes = 96 * 1024;   // a pool and a hash table take no less
 const kBytesPerVoxel = 1024;     // at worst: a page for each voxel, as many again on coarser levels
 const kBaseBelow = 2;            // levels: of a wanted page a coarser one comes first, unless one as fine is there
 const kWanted = 2;               // of the feedback's last word, the least: so many pixels want the page
@@ -12,7 +13,7 @@ const kWanted = 2;               // of the feedback's last word, the least: so m
 // How much of the budget the colors of a file take.
 export function color_budget(info, budget_bytes) {
   if (!info.colors) return 0;
-  return Math.min(budget_bytes * kBudgetShare, kMebibyte + Number(info.voxels) * kBytesPerVoxel);
+  return Math.min(Math.max(budget_bytes * kBudgetShare, kMinBytes), kMebibyte + Number(info.voxels) * kBytesPerVoxel);
 }
 
 export class Colors {
