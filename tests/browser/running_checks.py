@@ -188,7 +188,7 @@ def check_ends(visitor, server):
     assert page.evaluate(WIRES)["all"] > 200, "the wireframe of a canceled job is gone"
     job.until("it is canceled", lambda: job.state() == "canceled")
     server.send("DELETE", job.path)
-    page.get_by_role("button", name="Try again").wait_for()
+    page.get_by_text("no such job").wait_for()
     for part in ("#scene", "#tools", "#panel", ".running", "canvas.wires"):
         assert page.locator(part).is_hidden(), f"{part} is shown next to the message"
 

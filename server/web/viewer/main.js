@@ -2,7 +2,7 @@
 // `voxdag view`. ?budget=MiB limits the memory of the tiles.
 
 import {authorization, get_json, Problem, sleep, token} from "../lib/api.js";
-import {clear, h, set_text} from "../lib/dom.js";
+import {announce, clear, h, set_text} from "../lib/dom.js";
 import {has_ended, state_text, title_text} from "../lib/format.js";
 import {problem_box} from "../views/parts.js";
 import {Viewer} from "./app.js";
@@ -14,11 +14,12 @@ import {fill_tools} from "./tools.js";
 const kBudgetMiB = 256;
 const kPhoneBudgetMiB = 64;
 const kMinBudgetMiB = 0.25;  // that tiles and colors can do with
-const kPause_ms = 3000;
+const kPause_ms = 3000, kMaxPause_ms = 15000;
 
 const place = (id) => document.getElementById(id);
 const parameters = new URLSearchParams(location.search);
-const job_id = /^[0-9a-f]{1,32}$/.exec(parameters.get("job") ?? "")?.[0] ?? null;
+const asked_job = parameters.get("job");
+const job_id = /^[0-9a-f]{1,32}$/.exec(asked_job ?? "")?.[0] ?? null;
 const lifetime = new AbortController();
 
 function budget_bytes() {
@@ -43,31 +44,66 @@ function show_title(title) {
   set_text(place("title"), title);
 }
 
-// Waits until the job has a result; returns it, or null when it will have none.
+// Waits until the job has a result, and returns it. One that has failed or was canceled may be tried again.
 async function finished_job() {
-  let cubes = null, draws = true;
+  let known = null, waits = null, draws = true, pause_ms = kPause_ms;
   for (;;) {
-    const job = await get_json(`/api/v1/jobs/${job_id}`, lifetime.signal);
-    show_title(title_text(job));
-    if (job.state === "succeeded") return job;
-    if (draws && !has_ended(job.state)) {
+    const job = await job_now(known !== null);
+    if (job) show_title(title_text(job));
+    if (job?.state === "succeeded") return job;
+    const is_live = job !== null && !has_ended(job.state);
+    if (draws && is_live) {
       // The same page as that of a result; what it shows grows.
       const {watch_job} = await import("./running/running_job.js");
       try {
-        if (await watch_job({job, place, budget_bytes: budget_bytes(), show_picture: hide_message, show_tools, signal: lifetime.signal}))
+        if (await watch_job({job, place, budget_bytes: budget_bytes(), show_picture: hide_message, show_tools, signal: lifetime.signal})) {
+          known = job;
           continue;
+        }
       } catch (error) {
         if (!(error instanceof WebGLUnavailable)) throw error;
         draws = false;
       }
     }
-    cubes ??= new (await import("../views/partial_view.js")).PartialView(`/api/v1/jobs/${job_id}/partial`, lifetime.signal);
-    show_message(h("h1", {}, `This job is ${state_text(job.state)}.`),
-      h("p", {}, has_ended(job.state) ? "It has no result to look at." : "Its result is shown here when it is done."),
-      cubes.element, h("div", {class: "buttons"}, h("a", {class: "button", href: `/#/jobs/${job_id}`}, "The job's page")));
-    cubes.update(job);
-    if (has_ended(job.state)) return null;
-    await sleep(kPause_ms, lifetime.signal, true);
+    waits ??= new WaitingMessage(await import("../views/partial_view.js"));
+    waits.show(job, known);
+    known = job ?? known;
+    pause_ms = is_live ? kPause_ms : Math.min(kMaxPause_ms, 1.5 * pause_ms);
+    await sleep(pause_ms, lifetime.signal, true);
+  }
+}
+
+// null while the service does not answer, if that `may_be` so.
+async function job_now(may_be) {
+  try {
+    return await get_json(`/api/v1/jobs/${job_id}`, lifetime.signal);
+  } catch (problem) {
+    if (!may_be || !problem.is_transient) throw problem;
+    return null;
+  }
+}
+
+// What is said of a job that has nothing to draw.
+class WaitingMessage {
+  constructor({PartialView}) {
+    this.heading = h("h1", {});
+    this.text = h("p", {});
+    this.cubes = new PartialView(`/api/v1/jobs/${job_id}/partial`, lifetime.signal);
+    this.buttons = h("div", {class: "buttons"}, h("a", {class: "button", href: `/#/jobs/${job_id}`}, "The job's page"));
+  }
+
+  // `job` is null while the service does not answer; `before` is what was known of the job, if anything.
+  show(job, before) {
+    const said = `${job ? "This job is" : "This job was"} ${state_text((job ?? before).state)}.`;
+    if (before && said !== this.heading.textContent) announce(job ? said : "The service does not answer.");
+    set_text(this.heading, said);
+    set_text(this.text, !job ? "The service does not answer. It is asked again."
+      : has_ended(job.state) ? "It has no result to look at. If it is tried again, it is shown here."
+      : "Its result is shown here when it is done.");
+    // What has the focus keeps it.
+    if (place("message").hidden || !this.heading.isConnected)
+      show_message(this.heading, this.text, this.cubes.element, this.buttons);
+    if (job) this.cubes.update(job);
   }
 }
 
@@ -93,8 +129,9 @@ async function show_without_webgl(reason, job) {
 }
 
 async function start() {
+  if (asked_job !== null && !job_id)
+    return show_failure(new Problem(404, "not_found", "no such job: its id in the address of this page is malformed"));
   const job = job_id ? await finished_job() : null;
-  if (job_id && !job) return;
   const begun = take_begun();
   const source = begun?.source ?? new TileSource({base: job_id ? `/api/v1/jobs/${job_id}` : "/api/v1/view", headers: authorization()});
   const canvas = place("scene"), ended = new AbortController();
@@ -142,10 +179,15 @@ function show_failure(error) {
     show_message(h("h1", {}, "The viewer failed."), h("p", {}, error.message));
     throw error;
   }
-  const problem = error instanceof Problem ? error
-    : new Problem(error.status, error.status ? `http_${error.status}` : "unreachable", error.message);
-  show_message(problem_box(problem), h("div", {class: "buttons"},
-    h("button", {type: "button", on: {click: () => location.reload()}}, "Try again")));
+  const code = error.code || (error.status ? `http_${error.status}` : "unreachable");
+  const is_missing = code === "not_found" && asked_job === null;
+  // The id of a job that is not there is never given to another.
+  const is_final = code === "not_found" && error instanceof Problem;
+  show_message(is_missing && [h("h1", {}, "The file is not there."),
+      h("p", {}, "This page shows the file of ", h("code", {}, "voxdag view"), ". A job of a service is viewed from its page.")],
+    problem_box({code, status: error.status, message: error.message}),
+    h("div", {class: "buttons"}, is_final ? h("a", {class: "button", href: "/"}, "Start page")
+      : h("button", {type: "button", on: {click: () => location.reload()}}, "Try again")));
 }
 
 // The service asks for a token: the page of the dashboard that does so is loaded only then.

@@ -21,11 +21,12 @@ export class CubesView {
     this.turn = 0;  // quarter turns about the vertical axis
     this.next_fetch_ms = 0;
     this.canvas = h("canvas", {class: "cubes", role: "img"});
-    this.note = h("p", {class: "faint"}, "Shown when the subvolumes are planned.");
+    this.note = h("p", {class: "faint"});
     this.turner = h("div", {class: "buttons"}, ...[[-1, "Turn left"], [1, "Turn right"]].map(([by, text]) =>
       h("button", {type: "button", class: "quiet small", on: {click: () => this.turn_by(by)}}, text)));
     this.element = h("div", {class: "cubes-view"}, this.canvas, h("div", {class: "split"}, this.note, this.turner));
     this.set_empty(true);
+    this.say_why_empty(false, false);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
     scheme.addEventListener("change", () => this.draw(), {signal});
     new ResizeObserver(() => this.draw()).observe(this.canvas);
@@ -35,6 +36,10 @@ export class CubesView {
   async update(job) {
     const {built, total} = job.progress?.subvolumes ?? {total: 0};
     const key = `${job.attempts} ${built} ${total} ${has_ended(job.state)}`;
+    const say_if_empty = () => {
+      if (!this.cubes.length) this.say_why_empty(has_ended(job.state), !total || key === this.key);
+    };
+    say_if_empty();
     if (!total || key === this.key || this.fetching) return;
     const wait_ms = this.next_fetch_ms - performance.now();
     if (wait_ms > 0) {
@@ -54,6 +59,7 @@ export class CubesView {
       if (problem.status === 404) this.key = key;  // not planned yet, or the job failed before planning
     } finally {
       this.fetching = false;
+      say_if_empty();
       const now = performance.now();
       this.next_fetch_ms = now + Math.max(kMinInterval_ms, 10 * (now - begin));
     }
@@ -79,6 +85,12 @@ export class CubesView {
 
   set_empty(empty) {
     this.canvas.hidden = this.turner.hidden = empty;
+  }
+
+  // Cubes of a job that has ended come only if it is tried again. `known`: the service has said that there are none.
+  say_why_empty(ended, known) {
+    if (this.resolution === undefined)
+      set_text(this.note, !ended ? "Shown when the subvolumes are planned." : known ? "There are none." : "");
   }
 
   turn_by(by) {

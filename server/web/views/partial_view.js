@@ -5,6 +5,16 @@ import {CubesView} from "./cubes_view.js";
 const kMaxDetailed = 1500;  // more subvolumes are drawn as the cubes they are
 
 export class PartialView extends CubesView {
+  set_empty(empty) {
+    super.set_empty(empty);
+    if (!empty) this.element.hidden = false;
+  }
+
+  say_why_empty(ended, known) {
+    super.say_why_empty(ended, known);
+    this.element.hidden = ended;
+  }
+
   // `cubes` of the service are [x, y, z, edge, low, high]: the halves of a brick.
   show({resolution, built, total, cubes}) {
     const parts = cubes.length <= kMaxDetailed ? cubes.flatMap(cells_of) : cubes.map(([x, y, z, edge]) => [x, y, z, edge, 1]);
