@@ -94,14 +94,14 @@ def test_paths_of_bytes(tmp_path, mesh):
 
 
 def test_a_mesh_that_cannot_be_written(tmp_path, mesh):
-    with pytest.raises(voxdag.Error, match="cannot be written next to") as refused:
+    with pytest.raises(voxdag.Error, match="cannot be written as a file") as refused:
         voxdag.build(mesh, resolution=64, output=tmp_path / ("n" * 250 + ".vdag"))
     assert refused.value.code == "io"
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 12, limit[1]))
     try:
-        with pytest.raises(voxdag.Error, match="cannot be written next to") as refused:
+        with pytest.raises(voxdag.Error, match="cannot be written as a file") as refused:
             voxdag.build(mesh, resolution=64, output=tmp_path / "x.vdag")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limit)
@@ -111,6 +111,8 @@ def test_a_mesh_that_cannot_be_written(tmp_path, mesh):
 
 
 def test_a_folder_that_is_not_there_is_made(tmp_path, mesh):
+    voxdag.plan(mesh, resolution=64, output=tmp_path / "new" / "x.vdag")
+    assert not (tmp_path / "new").exists()
     voxdag.build(mesh, resolution=64, output=tmp_path / "new" / "x.vdag")
     assert not list((tmp_path / "new").glob("*.ply"))
 

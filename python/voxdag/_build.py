@@ -91,12 +91,13 @@ def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
 
 
 def _mesh_file(mesh: Sequence[Any], output: str) -> str:
-    """Writes a mesh to a new file next to the output, and returns its path."""
+    """Writes a mesh to a new file next to the output, or to a temporary one while that has no
+    folder, and returns its path."""
     folder, name = os.path.split(os.path.abspath(output))
     path = None
     try:
-        os.makedirs(folder, exist_ok=True)
-        handle, path = tempfile.mkstemp(suffix=".ply", prefix=name + ".scene-", dir=folder)
+        handle, path = tempfile.mkstemp(suffix=".ply", prefix=name + ".scene-",
+                                        dir=folder if os.path.isdir(folder) else None)
         with os.fdopen(handle, "wb") as file:
             _write_ply(file, *(np.asarray(part) for part in mesh))
         return path
@@ -105,7 +106,7 @@ def _mesh_file(mesh: Sequence[Any], output: str) -> str:
             os.remove(path)
         if isinstance(error, OSError):
             full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-            raise Error(f"the mesh cannot be written next to {output}: {error}",
+            raise Error(f"the mesh cannot be written as a file: {error}",
                         "no_space" if full else "io") from error
         raise
 

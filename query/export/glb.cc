@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cstdio>
+#include <optional>
 
 #include "core/base/text.h"
 #include "core/geometry/morton.h"
@@ -331,9 +332,10 @@ ExportReport write_glb(const ExportJob& job) { return write_glb_within(job, kMax
 
 ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
   const uint64_t limit = max_quads(job, max_bytes);
-  const GlbSurface surface(job, limit);
-  const uint64_t quads = surface.quads().size();
+  std::optional<GlbSurface> made(std::in_place, job, limit);
+  const uint64_t quads = made->quads().size();
   if (quads > limit) {
+    made.reset();  // the search below needs memory, too
     // Even if no faces are merged.
     CellLimit cells(job, limit / 6);
     refuse_size(job,
@@ -342,6 +344,7 @@ ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
                     ", but a .glb file has at most " + size_text(max_bytes),
                 [&](uint32_t level) { return cells.fits(level); });
   }
+  const GlbSurface& surface = *made;
   require_space(job, quads * quad_bytes(job) + kMaxGlbJsonBytes);
   ExportReport report;
   report.voxels = surface.voxels();

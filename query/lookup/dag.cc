@@ -94,7 +94,8 @@ uint64_t largest_square(double distance) {
 Dag::Dag(const std::string& path, uint64_t memory_bytes)
     : file_(open_global_file(path)), view_(*file_), budget_(memory_bytes) {}
 
-// Of one call. Together they reach most of the nodes that later ones do.
+// Of one call for large pages, of all calls for the top. Together they reach most of the nodes that
+// later ones do.
 constexpr size_t kManyQuestions = size_t{1} << 14;
 
 // A few questions should not read parts of 2 MiB for each node, and neither should many about a
@@ -182,7 +183,7 @@ void Dag::bricks(const Selection& selection, const std::function<void(const Bric
 void Dag::box(const Selection& selection, std::span<uint8_t> cells) const {
   const Position &low = selection.region.low, &high = selection.region.high;
   check_grid_levels(view_, selection.grid_levels);
-  uint64_t size = 1;
+  uint64_t size = selection.region.empty() ? 0 : 1;
   for (size_t axis = 0; axis < 3; ++axis) {
     const uint64_t edge = high[axis] <= low[axis] ? 0
                                                   : static_cast<uint64_t>(high[axis]) -

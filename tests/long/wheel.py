@@ -12,6 +12,7 @@ docs/python.md in an empty folder, which makes a picture of something, and mypy 
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -125,6 +126,8 @@ def main():
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(arguments.folder or temporary).resolve()
         folder.mkdir(parents=True, exist_ok=True)
+        for name in ("wheels", "program", "types"):
+            shutil.rmtree(folder / name, ignore_errors=True)
         run([sys.executable, "-m", "venv", "--clear", folder / "venv"], folder)
         python = folder / "venv" / "bin" / "python"
         start = time.monotonic()

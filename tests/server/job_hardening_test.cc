@@ -199,7 +199,7 @@ TEST_F(JobHardening, R4_AJobThatWaitsForAnotherAttemptIsCanceledToo) {
 
 // A process that was made, but has not begun the job's program, inherits the service's handler.
 TEST_F(JobHardening, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
-  use_program(R"(echo '{"json":"{}","message":"result"}'; exec sleep 1)");
+  use_program(R"(sleep 1; echo '{"json":"{}","message":"result"}')");
   hold_step("run ");
   const auto before = std::signal(SIGTERM, [](int) {});  // as `voxdag serve` has one
   start();

@@ -144,7 +144,8 @@ export class Renderer {
     return {moving, complete: false};
   }
 
-  // Resolves when all tiles that the pixels of the canvas need have arrived, and the sun has its place.
+  // Resolves when all tiles that the pixels of the canvas need have arrived, and the sun has its place: within a scene
+  // not while the service is away, if that lacks tiles.
   complete() {
     if (this.ready && this.is_complete && this.full_drawn && this.sun_is_placed && !this.reading) return Promise.resolve();
     return new Promise((resolve) => {

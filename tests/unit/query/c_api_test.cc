@@ -130,6 +130,8 @@ TEST_F(CApiTest, Refuses) {
   const voxdag_region endless{{INT64_MIN, INT64_MIN, 0}, {INT64_MAX, INT64_MAX, INT64_MAX}};
   uint8_t cell;
   EXPECT_EQ(voxdag_dense(file_, levels_, &endless, &cell), VOXDAG_INVALID_INPUT);
+  const voxdag_region flat{{0, 0, 0}, {INT64_MAX, INT64_MAX, 0}};
+  EXPECT_EQ(voxdag_dense(file_, levels_, &flat, nullptr), VOXDAG_OK) << voxdag_error();
   const voxdag_ray still{{0, 0, 0}, {0, 0, 0}}, nowhere{{0, 0, 0}, {0, NAN, 1}};
   voxdag_hit hit;
   EXPECT_EQ(voxdag_cast_rays(file_, &still, 1, INFINITY, 1, &hit), VOXDAG_INVALID_INPUT);

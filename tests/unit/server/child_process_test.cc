@@ -27,7 +27,7 @@ TEST(ChildProcesses, AreStoppedBeforeTheirProgramBegins) {
   const TemporaryFolder folder;
   const HandlesTerm handler;
   for (int i = 0; i < 20; ++i) {
-    ChildProcess child({{"/bin/sleep", "0.5"}, folder.file("log"), 0});
+    ChildProcess child({{"/bin/sleep", "10"}, folder.file("log"), 0});
     child.ask_to_stop();
     child.read_lines([](std::string_view) {}, [] { return false; });
     const ChildProcess::End end = child.wait();

@@ -7,7 +7,7 @@ export const kRoundsToKnow = 4;  // readings of the feedback after which what wa
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
 const kMaxTries = 3;           // of one item whose answers are of no use
 const kRefusedMs = 300000;     // until an item that was refused is asked for again
-const kMaxFailures = 16384;    // that are remembered
+const kMaxFailures = 65536;    // that are remembered
 const kMaxWarnings = 20;
 const kFullPauseMs = 250;
 
