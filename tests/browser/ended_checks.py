@@ -25,11 +25,6 @@ window.fetch = (url, options) => {
 WAKE = "document.dispatchEvent(new Event('visibilitychange'))"
 
 
-def hold(job):
-    job.until("its process runs", job.processes)
-    job.signal(signal.SIGSTOP)
-
-
 def heading(visitor, text):
     visitor.page.get_by_role("heading", name=text).wait_for()
 
@@ -62,8 +57,9 @@ def check_retry_of_canceled(visitor, server):
     heading(visitor, "This job was canceled.")
     page.get_by_text("The service does not answer. It is asked again.").wait_for()
     server.send("POST", f"{job.path}/retry")
-    job.until("the subvolumes are planned", job.subvolumes)
-    job.signal(signal.SIGSTOP)
+    # The plan of the first attempt is known all the time.
+    job.hold_at_work()
+    assert job.known("partial/tiles").get("camera"), "a job at work cannot be drawn"
     page.evaluate(f"asked.way = 'answer', {WAKE}")
     visitor.wait_until("Boolean(window.voxdagViewer?.running)")
     job.signal(signal.SIGCONT)
@@ -75,7 +71,7 @@ def check_never_planned(visitor, server):
     """A job that was canceled before its plan has no cubes; it is deleted while it is viewed."""
     page = visitor.page
     holder = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
-    hold(holder)
+    holder.hold_at_work()
     job = Job(server, 64)
     server.send("POST", f"{job.path}/cancel")
     visitor.open(job.page, wait=False)
@@ -91,8 +87,8 @@ def check_never_planned(visitor, server):
     server.send("DELETE", job.path)
     page.evaluate(WAKE)
     expect_no_such_job(visitor)
+    server.send("POST", f"{holder.path}/cancel")  # before it can succeed
     holder.signal(signal.SIGCONT)
-    server.send("POST", f"{holder.path}/cancel")
 
 
 def expect_no_such_job(visitor):
