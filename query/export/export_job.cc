@@ -31,7 +31,7 @@ void require_space(const ExportJob& job, uint64_t bytes) {
 
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels) {
   std::string text = "--level " + std::to_string(grid_levels);
-  if (job.selection.region == whole_grid(job.selection.grid_levels)) return text;
+  if (job.selects_all_of(job.selection.grid_levels)) return text;
   const Region region = coarser(job.selection, grid_levels).region;
   std::string separator = " --region ";
   for (const auto& corner : {region.low, region.high})
@@ -77,7 +77,7 @@ uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t
 }
 
 CellLimit::CellLimit(const ExportJob& job, uint64_t limit) : job_(job), limit_(limit) {
-  if (job.selection.region == whole_grid(job.selection.grid_levels))
+  if (job.selects_all_of(job.selection.grid_levels))
     cells_.emplace(job.file, job.dag, job.budget, job.cancel);
 }
 

@@ -74,12 +74,7 @@ TEST_P(DagFile, LooksUpEveryCell) {
       for (int64_t y = -1; y <= edge; ++y)
         for (int64_t z = -1; z <= edge; ++z) points.push_back({x, y, z});
     points.insert(points.end(), {{INT64_MIN, 0, 0}, {0, INT64_MAX, 0}, {0, 0, int64_t{1} << 32}});
-    std::vector<uint8_t> set(points.size(), 7), set_by_four(points.size(), 7);
-    dag_.lookup(points, levels, set);
-    dag_.lookup(points, levels, set_by_four, 4);
-    EXPECT_EQ(set, set_by_four);
-    for (size_t i = 0; i < points.size(); ++i)
-      ASSERT_EQ(set[i], cells.contains(points[i]) ? 1 : 0) << "point " << i;
+    expect_lookups(dag_, levels, points, cells);
   }
 }
 

@@ -1,8 +1,11 @@
 // Files of a few thousand voxels with shared nodes, and their voxels, for tests of query/lookup.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <set>
 #include <string>
+#include <vector>
 
 #include "query/lookup/dag.h"
 #include "tests/unit/format/test_files.h"
@@ -39,3 +42,15 @@ class QueryFile {
   uint32_t levels_;
   Cells voxels_;
 };
+
+// A lookup finds these cells, those of the grid of 2^grid_levels, with one thread and with four.
+inline void expect_lookups(const voxdag::query::Dag& dag, uint32_t grid_levels,
+                           const std::vector<voxdag::query::Position>& points,
+                           const QueryFile::Cells& cells) {
+  std::vector<uint8_t> set(points.size(), 7), set_by_four(points.size(), 7);
+  dag.lookup(points, grid_levels, set);
+  dag.lookup(points, grid_levels, set_by_four, 4);
+  EXPECT_EQ(set, set_by_four);
+  for (size_t i = 0; i < points.size(); ++i)
+    ASSERT_EQ(set[i], cells.contains(points[i]) ? 1 : 0) << "point " << i;
+}
