@@ -1,4 +1,4 @@
-#include "core/scene/generate/generate.h"
+#include "scene/generate/generate.h"
 
 #include <cstdio>
 #include <nlohmann/json.hpp>

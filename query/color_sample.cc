@@ -10,7 +10,7 @@
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
-#include "core/scene/textures/texture_set.h"
+#include "scene/textures/texture_set.h"
 
 namespace voxdag::query {
 namespace {

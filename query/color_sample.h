@@ -11,7 +11,7 @@
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 
 namespace voxdag::query {
 

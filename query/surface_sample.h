@@ -13,7 +13,7 @@
 #include "core/base/progress.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/grid.h"
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 
 namespace voxdag::query {
 

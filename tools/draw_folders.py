@@ -31,7 +31,7 @@ BOXES = {
     "merge": (2.8, 3, "sub-DAGs to one DAG"),
     "query": (4.4, 3, "lookups, rays, exports"),
     "core/format": (2.9, 4, "artifacts, global file"),
-    "core/scene": (4.2, 4, "glTF, PLY, generators"),
+    "scene": (4.2, 4, "glTF, PLY, generators"),
     "core/dag": (2.2, 5, "brick, node, hash"),
     "core/geometry": (2.6, 6, "grid, overlap test"),
     "core/color": (3.2, 5, "color rule, blocks"),

@@ -17,7 +17,7 @@
 
 #include "core/color/blocks/region.h"
 #include "core/color/rule/bake_region.h"
-#include "core/scene/textures/pyramid.h"
+#include "scene/textures/pyramid.h"
 
 namespace voxdag {
 namespace {

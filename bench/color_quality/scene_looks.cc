@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "core/image/image_reader.h"
-#include "core/scene/textures/image_bytes.h"
+#include "scene/textures/image_bytes.h"
 
 namespace voxdag {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/memory_budget.h"
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 #include "tests/oracle/surface_color.h"
 
 namespace voxdag {

@@ -10,7 +10,7 @@
 #include "core/color/surface.h"
 #include "core/geometry/cube.h"
 #include "core/geometry/grid.h"
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/color/color_keys.h"
 #include "scheduler/color/surface_store.h"

@@ -18,7 +18,7 @@
 #include "core/format/color/value_section_writer.h"
 #include "core/format/global/global_layout.h"
 #include "core/geometry/morton.h"
-#include "core/scene/textures/texture_set.h"
+#include "scene/textures/texture_set.h"
 #include "scheduler/color/bin_surfaces.h"
 #include "scheduler/color/color_keys.h"
 #include "scheduler/color/color_store.h"

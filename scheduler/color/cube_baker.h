@@ -12,7 +12,7 @@
 #include "core/color/blocks/region.h"
 #include "core/color/blocks/value_region.h"
 #include "core/color/rule/bake_region.h"
-#include "core/scene/textures/texture_set.h"
+#include "scene/textures/texture_set.h"
 #include "scheduler/color/color_keys.h"
 #include "scheduler/color/surface_store.h"
 

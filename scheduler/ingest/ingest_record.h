@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/geometry/grid.h"
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 #include "scheduler/ingest/content_digest.h"
 #include "scheduler/triangles/durable_store.h"
 

@@ -9,7 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 #include "scheduler/build_spec.h"
 #include "scheduler/memory_plan.h"
 

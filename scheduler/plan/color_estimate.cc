@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "core/color/cell_values.h"
-#include "core/scene/textures/texture_set.h"
-#include "core/scene/triangle_source.h"
+#include "scene/textures/texture_set.h"
+#include "scene/triangle_source.h"
 #include "scheduler/memory_plan.h"
 
 namespace voxdag {

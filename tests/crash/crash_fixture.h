@@ -18,7 +18,7 @@
 
 #include "core/format/global/verify.h"
 #include "core/format/global/voxdag_reader.h"
-#include "core/scene/generate/generate.h"
+#include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
 #include "tests/crash/faulty_files.h"
 #include "tests/unit/io/temporary_folder.h"

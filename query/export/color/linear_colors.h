@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/scene/textures/linear_light.h"
+#include "scene/textures/linear_light.h"
 
 namespace voxdag::query {
 

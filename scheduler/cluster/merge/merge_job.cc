@@ -8,7 +8,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/checksum.h"
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 #include "scheduler/cluster/cluster_state.h"
 #include "scheduler/job/work_folder.h"
 

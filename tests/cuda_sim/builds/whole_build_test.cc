@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/backend/backend.h"
-#include "core/scene/generate/generate.h"
+#include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
 #include "tests/crash/faulty_files.h"
 #include "tests/cuda_sim/sim/faults.h"

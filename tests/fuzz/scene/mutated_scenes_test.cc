@@ -7,7 +7,7 @@
 #include <iterator>
 #include <random>
 
-#include "core/scene/textures/texture_set.h"
+#include "scene/textures/texture_set.h"
 #include "tests/fuzz/scene/compressed_scenes.h"
 #include "tests/fuzz/scene/rich_scene.h"
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 #include "tests/fuzz/targets/fuzz_target.h"
 #include "tests/unit/io/memory_files.h"
 

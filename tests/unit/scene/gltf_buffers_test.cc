@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/scene/gltf/mesh_data/base64.h"
+#include "scene/gltf/mesh_data/base64.h"
 #include "tests/unit/base/error_of.h"
 #include "tests/unit/io/temporary_folder.h"
 #include "tests/unit/scene/scene_files.h"

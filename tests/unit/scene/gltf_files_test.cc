@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "core/scene/gltf/document/read_document.h"
+#include "scene/gltf/document/read_document.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {

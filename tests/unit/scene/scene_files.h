@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/scene/triangle_source.h"
+#include "scene/triangle_source.h"
 #include "tests/unit/io/memory_files.h"
 
 namespace voxdag::test {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/scene/textures/texture_set.h"
+#include "scene/textures/texture_set.h"
 #include "tests/crash/faulty_files.h"
 #include "tests/unit/base/error_of.h"
 #include "tests/unit/image/image_files.h"

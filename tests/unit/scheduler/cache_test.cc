@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/scene/generate/generate.h"
+#include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
 #include "tests/unit/io/temporary_folder.h"
 

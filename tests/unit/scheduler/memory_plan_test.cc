@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/scene/gltf/mesh_data/vertex_cache.h"
 #include "merge/plan/merge_memory.h"
+#include "scene/gltf/mesh_data/vertex_cache.h"
 
 namespace voxdag {
 namespace {

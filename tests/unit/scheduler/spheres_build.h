@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/scene/generate/generate.h"
+#include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
 
 namespace voxdag {

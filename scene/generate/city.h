@@ -1,0 +1,36 @@
+// The pieces of a generated city, in meters, y up. Sizes are small multiples of 1/64, so that a
+// window stored as triangles and the same window as an instance have exactly the same corners.
+#pragma once
+
+#include <cstdint>
+
+#include "scene/generate/random.h"
+#include "scene/generate/scene_builder.h"
+
+namespace voxdag {
+
+// Positions in kCityMaterials.
+enum CityMaterial : uint32_t { kGround, kBuildings, kPlants, kCars };
+
+// Parts stored once: a stretch of wall with a window in it for each of four directions, a tree, a
+// car along x and one along z.
+struct CityParts {
+  explicit CityParts(SceneBuilder& scene);
+  uint32_t window[4];  // facing +z, +x, -z, -x; unit size, the pane set back by 1
+  uint32_t tree;       // unit height, standing on the origin
+  uint32_t car[2];
+};
+
+// The box that a building may fill.
+struct Lot {
+  Vec3 center;  // on the ground
+  double width = 0;
+  uint32_t floors = 0;
+  Rgba8 wall = kWhite, roof = kWhite;  // in a city with colors
+};
+
+void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, Random& random);
+// A small house at any angle, without windows.
+void add_turned_house(SceneBuilder& scene, const Lot& lot, Random& random);
+
+}  // namespace voxdag

@@ -1,0 +1,116 @@
+#include "scene/generate/generate.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+#include "scene/generate/glb_layout.h"
+#include "scene/generate/glb_writer.h"
+#include "scene/generate/scene_builder.h"
+
+namespace voxdag {
+namespace {
+
+constexpr SceneKindInfo kKinds[] = {
+    {SceneKind::kCity, "city", "streets, houses with rotated roofs, windows, trees", 400'000,
+     make_city, kCityMaterials},
+    {SceneKind::kMenger, "menger", "Menger's sponge on the integer lattice", 0, make_menger, {}},
+    {SceneKind::kTerrain, "terrain", "a fractal heightfield", 1'000'000, make_terrain, {}},
+    {SceneKind::kSoup,
+     "soup",
+     "random triangles, slivers and degenerate ones among them",
+     100'000,
+     make_soup,
+     {}},
+    {SceneKind::kSpheres, "spheres", "spheres of many sizes", 500'000, make_spheres, {}},
+};
+
+constexpr const char* kGenerator = "voxdag generate ";
+constexpr uint32_t kMaxMengerLevel = 5;
+// Bytes of a triangle of terrain, the kind that stores triangles most compactly.
+constexpr uint64_t kMinBytesPerTriangle = 12;
+
+// Refuses what is too large without counting; GlbLayout finds the rest.
+void check_size(const GenerateOptions& options) {
+  const bool is_menger = options.kind == SceneKind::kMenger;
+  const bool fits =
+      is_menger ? options.level <= kMaxMengerLevel
+                : options.instances || options.triangles <= kMaxGlbBytes / kMinBytesPerTriangle;
+  if (!fits)
+    throw Error(ErrorCode::kLimit,
+                "the limit of a .glb is 4 294 967 295 bytes: ask for " +
+                    (is_menger ? "a level of at most " + std::to_string(kMaxMengerLevel)
+                               : std::string("fewer triangles")));
+}
+
+void check(const GenerateOptions& options) {
+  const std::string name = scene_kind(options.kind).name;
+  const bool has_parts = options.kind == SceneKind::kCity || options.kind == SceneKind::kSpheres;
+  if (options.instances && !has_parts)
+    throw Error(ErrorCode::kInvalidInput, name + " has no repeated parts to write as instances");
+  if (options.colors && scene_kind(options.kind).materials.empty())
+    throw Error(ErrorCode::kInvalidInput, name + " has no colors; expected city");
+  if (options.colors && options.instances)
+    throw Error(ErrorCode::kInvalidInput,
+                "instances of a part have the same color, those of a city with colors have not: "
+                "expected colors or instances");
+  if (options.kind == SceneKind::kMenger && options.triangles != 0)
+    throw Error(ErrorCode::kInvalidInput, "menger is sized by its level, not by triangles");
+  check_size(options);
+}
+
+void make(const GenerateOptions& options, BlockSink& sink) {
+  SceneBuilder scene(sink, options.instances, options.colors);
+  scene_kind(options.kind).make(options, scene);
+  scene.finish();
+}
+
+}  // namespace
+
+std::span<const SceneKindInfo> scene_kinds() { return kKinds; }
+
+const SceneKindInfo& scene_kind(std::string_view name) {
+  std::string names;
+  for (const SceneKindInfo& info : kKinds) {
+    if (info.name == name) return info;
+    names += (names.empty() ? "" : ", ") + std::string(info.name);
+  }
+  throw Error(ErrorCode::kInvalidInput, "no generated scene is called \"" + std::string(name) +
+                                            "\": expected one of " + names);
+}
+
+const SceneKindInfo& scene_kind(SceneKind kind) { return kKinds[static_cast<size_t>(kind)]; }
+
+GenerateReport generate_scene(FileSystem& files, const std::string& path,
+                              const GenerateOptions& given, Progress& progress,
+                              const CancelToken& cancel) {
+  check(given);
+  GenerateOptions options = given;
+  const SceneKindInfo& info = scene_kind(options.kind);
+  if (options.triangles == 0) options.triangles = info.default_triangles;
+
+  GlbLayout layout(progress, cancel);
+  progress.begin_stage("count", options.triangles, "triangles");
+  make(options, layout);
+  progress.end_stage();
+
+  progress.begin_stage("write", layout.stored_triangles(), "triangles");
+  const std::string generator = std::string(kGenerator) + info.name;
+  GlbWriter writer(files, path,
+                   layout.json_text(generator, options.colors ? info.materials
+                                                              : std::span<const SceneMaterial>()),
+                   layout.bin_bytes(), progress, cancel);
+  make(options, writer);
+  const uint64_t bytes = writer.finish();
+  progress.end_stage();
+  return {layout.triangles(), layout.stored_triangles(), layout.instance_count(), bytes};
+}
+
+bool is_generated_scene(const ReadableFile& file) {
+  // The description of the largest scenes takes a few megabytes.
+  constexpr uint64_t kMaxDescriptionBytes = 16 << 20;
+  std::string start(std::min(file.size(), kMaxDescriptionBytes), '\0');
+  file.read_at(0, std::as_writable_bytes(std::span(start)));
+  return start.starts_with("glTF") && start.find(kGenerator) != std::string::npos;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,162 @@
+#include "scene/generate/glb_layout.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kFloat = 5126, kUint16 = 5123, kUint8 = 5121;  // componentType
+constexpr int kVertexTarget = 34962, kIndexTarget = 34963;   // target of a bufferView
+
+// The bufferViews and accessors of all arrays, in the order of the file.
+struct Arrays {
+  json views = json::array(), accessors = json::array();
+  uint64_t offset = 0;
+
+  void add(uint64_t bytes, uint64_t padded_bytes, int target, json accessor) {
+    json view = {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", bytes}};
+    if (target) view["target"] = target;
+    accessor["bufferView"] = views.size();
+    views.push_back(std::move(view));
+    accessors.push_back(std::move(accessor));
+    offset += padded_bytes;
+  }
+};
+
+json vectors(uint64_t count) {
+  return {{"componentType", kFloat}, {"type", "VEC3"}, {"count", count}};
+}
+
+// Of arrays that follow each other.
+json primitive(uint64_t positions, bool has_colors, uint32_t material) {
+  if (!has_colors) return {{"attributes", {{"POSITION", positions}}}, {"indices", positions + 1}};
+  return {{"attributes", {{"POSITION", positions}, {"COLOR_0", positions + 1}}},
+          {"indices", positions + 2},
+          {"material", material}};
+}
+
+json material_json(const SceneMaterial& material) {
+  const auto [red, green, blue] = material.base_color;
+  return {{"name", material.name},
+          {"pbrMetallicRoughness",
+           {{"baseColorFactor", {red, green, blue, 1}},
+            {"metallicFactor", 0},
+            {"roughnessFactor", 1}}}};
+}
+
+json instancing_node(uint64_t part, uint64_t translations) {
+  const json attributes = {{"TRANSLATION", translations}, {"SCALE", translations + 1}};
+  return {{"mesh", part},
+          {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", attributes}}}}}};
+}
+
+}  // namespace
+
+void GlbLayout::mesh(const Mesh& mesh) {
+  cancel_.check();
+  add_geometry(Kind::kMesh, mesh);
+  triangles_ += mesh.triangles();
+  progress_.advance(mesh.triangles());
+}
+
+void GlbLayout::part(const Mesh& mesh) {
+  add_geometry(Kind::kPart, mesh);
+  part_triangles_.push_back(mesh.triangles());
+}
+
+void GlbLayout::instances(uint32_t part, std::span<const Float3> translations,
+                          std::span<const Float3>) {
+  const auto count = static_cast<uint32_t>(translations.size());
+  blocks_.push_back({Kind::kInstances, part, count, 0, {}, {}, 0, false});
+  instance_count_ += count;
+  triangles_ += count * part_triangles_[part];
+  add_bytes(2 * sizeof(Float3) * uint64_t{count});
+}
+
+void GlbLayout::add_geometry(Kind kind, const Mesh& mesh) {
+  Block block{kind,
+              0,
+              mesh.vertices(),
+              3 * mesh.triangles(),
+              mesh.positions[0],
+              mesh.positions[0],
+              mesh.material,
+              !mesh.colors.empty()};
+  for (const Float3& p : mesh.positions)
+    for (size_t axis = 0; axis < 3; ++axis) {
+      block.low[axis] = std::min(block.low[axis], p[axis]);
+      block.high[axis] = std::max(block.high[axis], p[axis]);
+    }
+  blocks_.push_back(block);
+  stored_triangles_ += mesh.triangles();
+  add_bytes((sizeof(Float3) + (block.has_colors ? sizeof(Rgba8) : 0)) * uint64_t{block.first} +
+            padded_index_bytes(block.second));
+}
+
+void GlbLayout::add_bytes(uint64_t bytes) {
+  bin_bytes_ += bytes;
+  if (bin_bytes_ > kMaxGlbBytes)
+    throw Error(ErrorCode::kLimit,
+                "the limit of a .glb is 4 294 967 295 bytes, which this scene exceeds after " +
+                    std::to_string(stored_triangles_) + " triangles; ask for fewer");
+}
+
+// The parts first, so that part p is mesh p; then one mesh of everything that is not instanced. One
+// node for that mesh, and one for each block of instances.
+std::string GlbLayout::json_text(const std::string& generator,
+                                 std::span<const SceneMaterial> materials) const {
+  Arrays arrays;
+  json meshes = json::array(), nodes = json::array(), primitives = json::array();
+  for (const Block& b : blocks_) {
+    const uint64_t array = arrays.views.size();
+    const uint64_t bytes = sizeof(Float3) * uint64_t{b.first};
+    if (b.kind == Kind::kInstances) {
+      nodes.push_back(instancing_node(b.part, array));
+      for (int i = 0; i < 2; ++i) arrays.add(bytes, bytes, 0, vectors(b.first));
+      continue;
+    }
+    if (b.kind == Kind::kPart)
+      meshes.push_back({{"primitives", json::array({primitive(array, b.has_colors, b.material)})}});
+    else
+      primitives.push_back(primitive(array, b.has_colors, b.material));
+    json positions = vectors(b.first);
+    positions["min"] = b.low;
+    positions["max"] = b.high;
+    arrays.add(bytes, bytes, kVertexTarget, std::move(positions));
+    if (b.has_colors)
+      arrays.add(
+          sizeof(Rgba8) * uint64_t{b.first}, sizeof(Rgba8) * uint64_t{b.first}, kVertexTarget,
+          {{"componentType", kUint8}, {"normalized", true}, {"type", "VEC4"}, {"count", b.first}});
+    arrays.add(sizeof(uint16_t) * uint64_t{b.second}, padded_index_bytes(b.second), kIndexTarget,
+               {{"componentType", kUint16}, {"type", "SCALAR"}, {"count", b.second}});
+  }
+  if (!primitives.empty()) {
+    nodes.push_back({{"mesh", meshes.size()}});
+    meshes.push_back({{"primitives", std::move(primitives)}});
+  }
+  std::vector<size_t> roots(nodes.size());
+  for (size_t i = 0; i < roots.size(); ++i) roots[i] = i;
+
+  json root = {{"asset", {{"version", "2.0"}, {"generator", generator}}},
+               {"scene", 0},
+               {"scenes", json::array({{{"nodes", roots}}})},
+               {"nodes", std::move(nodes)},
+               {"meshes", std::move(meshes)},
+               {"accessors", std::move(arrays.accessors)},
+               {"bufferViews", std::move(arrays.views)},
+               {"buffers", json::array({{{"byteLength", bin_bytes_}}})}};
+  for (const SceneMaterial& material : materials)
+    root["materials"].push_back(material_json(material));
+  if (instance_count_ > 0)
+    root["extensionsUsed"] = root["extensionsRequired"] = json::array({"EXT_mesh_gpu_instancing"});
+  std::string text = root.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  return text;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,82 @@
+// Collects the pieces of a scene from its generator into blocks of bounded size: meshes with 16-bit
+// indices, parts that are stored once, and instances of parts. Not thread-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "scene/generate/generate.h"
+#include "scene/generate/mesh.h"
+
+namespace voxdag {
+
+// Receives blocks in the order of the file.
+class BlockSink {
+ public:
+  virtual ~BlockSink() = default;
+  // 1 to Mesh::kMaxTriangles triangles in world space.
+  virtual void mesh(const Mesh& mesh) = 0;
+  // The next part, numbered from 0; precedes its instances.
+  virtual void part(const Mesh& mesh) = 0;
+  // Instances of one part, each of which maps p to p * scale + translation.
+  virtual void instances(uint32_t part, std::span<const Float3> translations,
+                         std::span<const Float3> scales) = 0;
+};
+
+class SceneBuilder {
+ public:
+  // Without `instances`, parts are copied triangle by triangle to each place. With `colors`, each
+  // material has meshes of its own.
+  SceneBuilder(BlockSink& sink, bool instances, bool colors);
+  bool has_colors() const { return colors_; }
+
+  // What is added from now on looks like; of no effect without colors.
+  void paint(uint32_t material, const Rgba8& color) { paint_ = {material, color}; }
+
+  // A mesh of the current paint that `vertices` and `triangles` more fit into: the current one, or
+  // an empty one after it was passed to the sink. At most Mesh::kMaxVertices and
+  // Mesh::kMaxTriangles.
+  Mesh& mesh_for(uint32_t vertices, uint32_t triangles);
+  uint32_t add_part(Mesh mesh);
+  // The part's colors are multiplied with the current paint's.
+  void place(uint32_t part, const Vec3& translation, const Vec3& scale);
+  // Passes the incomplete blocks to the sink.
+  void finish();
+
+ private:
+  struct Part {
+    Mesh mesh;
+    std::vector<Float3> translations, scales;
+  };
+  struct Paint {
+    uint32_t material = 0;
+    Rgba8 color = kWhite;
+  };
+  static constexpr size_t kInstancesPerBlock = 32768;
+  static constexpr uint32_t kMaxMaterials = 4;
+
+  void place_triangles(const Mesh& part, const Vec3& translation, const Vec3& scale);
+  void flush_mesh(Mesh& mesh);
+  void flush_instances(uint32_t part);
+
+  BlockSink& sink_;
+  const bool instances_, colors_;
+  Paint paint_;
+  std::array<Mesh, kMaxMaterials> meshes_;  // by material; only the first one without colors
+  std::vector<Part> parts_;
+};
+
+// city.cc
+extern const std::array<SceneMaterial, 4> kCityMaterials;
+
+// The generators, one file each. A generator that runs again with the same options makes the same
+// calls: generate_scene() runs it twice.
+void make_city(const GenerateOptions& options, SceneBuilder& scene);
+void make_menger(const GenerateOptions& options, SceneBuilder& scene);
+void make_terrain(const GenerateOptions& options, SceneBuilder& scene);
+void make_soup(const GenerateOptions& options, SceneBuilder& scene);
+void make_spheres(const GenerateOptions& options, SceneBuilder& scene);
+
+}  // namespace voxdag

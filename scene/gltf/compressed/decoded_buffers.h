@@ -1,0 +1,68 @@
+// What the compressed buffers of a document decode to. Each is decoded once, when some reader first
+// needs it, into one temporary file that has no name, and read from there by windows: so memory
+// holds one primitive or view of each reader while it is decoded, and nothing afterwards.
+// Thread-safe.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <shared_mutex>
+#include <span>
+#include <string>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scene/gltf/document/document.h"
+#include "scene/gltf/growing_charge.h"
+
+namespace voxdag::gltf {
+
+class DecodedBuffers {
+ public:
+  // Reads bytes [offset, offset + out.size()) of one of the file's own buffers.
+  using ReadFile = std::function<void(int buffer, uint64_t offset, std::span<std::byte> out)>;
+
+  // `scratch_path` is where the file is made, in a folder that exists; "": in a folder of its own
+  // in temporary_parent(). The references must outlive this.
+  DecodedBuffers(FileSystem& files, std::string scratch_path, const Document& document,
+                 MemoryBudget& budget);
+
+  // Bytes [offset, offset + out.size()) of what buffer `buffer` decodes to, inside it. Throws
+  // Error{kInvalidInput} for data that do not hold it, {kOutOfMemory} where decoding does not fit
+  // the budget, {kNoSpace} where the decoded bytes do not fit the disk.
+  void read(int buffer, uint64_t offset, std::span<std::byte> out, const ReadFile& read_file);
+
+ private:
+  struct Decoded {
+    std::mutex mutex;
+    std::atomic<bool> is_there = false;
+    uint64_t begin = 0;  // in the file
+  };
+
+  void decode(const BufferSource& buffer, uint64_t begin, const ReadFile& read_file);
+  void decode_within_budget(const BufferSource& buffer, uint64_t begin, const ReadFile& read_file);
+  uint64_t reserve(uint64_t bytes);
+  void open_scratch();
+
+  FileSystem& files_;
+  const std::string scratch_path_;
+  const Document& document_;
+  MemoryBudget& budget_;
+  GrowingCharge charge_;
+  size_t first_ = 0;  // the document's first buffer that is not the file's own
+  std::deque<Decoded> decoded_;
+
+  // Held shared by all that decode; alone by one that did not fit next to others.
+  std::shared_mutex decoding_;
+  std::mutex mutex_;  // of what follows
+  std::unique_ptr<WritableFile> writer_;
+  std::unique_ptr<ReadableFile> reader_;
+  uint64_t end_ = 0;
+};
+
+}  // namespace voxdag::gltf

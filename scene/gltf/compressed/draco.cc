@@ -1,0 +1,271 @@
+// The only place that calls Draco, but for its tables (draco_tables.h). Its decoders are used
+// through a class of ours, which learns the attributes of a mesh before memory is allocated for
+// them.
+#include "scene/gltf/compressed/codecs.h"
+
+#ifdef VOXDAG_HAS_DRACO
+#include <draco/attributes/attribute_quantization_transform.h>
+#include <draco/compression/config/decoder_options.h>
+#include <draco/compression/mesh/mesh_edgebreaker_decoder.h>
+#include <draco/compression/mesh/mesh_sequential_decoder.h>
+#include <draco/mesh/mesh.h>
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include "core/base/error.h"
+#include "scene/gltf/compressed/draco_header.h"
+#include "scene/gltf/compressed/draco_tables.h"
+#include "scene/gltf/document/document.h"
+#include "scene/gltf/messages.h"
+#endif
+
+namespace voxdag::gltf {
+
+#ifdef VOXDAG_HAS_DRACO
+
+namespace {
+
+// Upper bounds of what Draco 1.5 allocates, from its code and from measurements (which are about
+// half of them): tables of corners and vertices, smaller ones for each attribute that has its own,
+// and per vertex of an attribute its value, as integers and finally, and its places in two maps.
+constexpr uint64_t kBytesPerFace = 128;
+constexpr uint64_t kBytesPerFaceOfTable = 64;
+constexpr uint64_t kMapBytesPerValue = 16;
+
+// A strip of n triangles has n + 2 indices; those that join its pieces repeat, but not more often.
+constexpr uint64_t kMaxStripTrianglesPerFace = 8;
+
+constexpr size_t kWriteElements = 16384;
+
+[[noreturn]] void refuse_memory(uint64_t bytes) {
+  throw Error(ErrorCode::kOutOfMemory, "decoding its Draco data takes " +
+                                           std::to_string(bytes >> 20) + " MiB, more than " +
+                                           "the memory budget leaves");
+}
+
+void charge_up_to(MemoryCharge& charge, uint64_t bytes) {
+  if (bytes > charge.bytes() && !charge.try_resize(bytes)) refuse_memory(bytes);
+}
+
+// Throws nothing through Draco: what admit() found is thrown by whoever called Decode().
+template <class Decoder>
+class BoundedDecoder : public Decoder {
+ public:
+  BoundedDecoder(uint64_t vertices, MemoryCharge& charge) : vertices_(vertices), charge_(charge) {}
+
+  std::exception_ptr refusal;
+
+ protected:
+  bool DecodeAllAttributes() override { return admit() && Decoder::DecodeAllAttributes(); }
+
+ private:
+  bool admit() {
+    try {
+      const draco::PointCloud& mesh = *this->point_cloud();
+      if (mesh.num_points() != vertices_)
+        throw BrokenData{"its Draco data have " + std::to_string(mesh.num_points()) +
+                         " vertices, its accessors " + std::to_string(vertices_)};
+      uint64_t bytes_per_vertex = 0;
+      for (int i = 0; i < mesh.num_attributes(); ++i) {
+        const draco::PointAttribute& a = *mesh.attribute(i);
+        bytes_per_vertex += 2 * static_cast<uint64_t>(a.byte_stride()) + kMapBytesPerValue +
+                            sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
+      }
+      charge_up_to(charge_, charge_.bytes() + vertices_ * bytes_per_vertex);
+      return true;
+    } catch (...) {
+      refusal = std::current_exception();
+      return false;
+    }
+  }
+
+  const uint64_t vertices_;
+  MemoryCharge& charge_;
+};
+
+template <class Decoder>
+void decode_mesh(const DracoPart& part, std::span<const std::byte> data, MemoryCharge& charge,
+                 draco::Mesh& mesh) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(reinterpret_cast<const char*>(data.data()), data.size());
+  // Quantized values stay integers; they become positions here, by operations that are the same on
+  // every machine.
+  draco::DecoderOptions options;
+  for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::GENERIC})
+    options.SetAttributeBool(type, "skip_attribute_transform", true);
+  BoundedDecoder<Decoder> decoder(part.vertices, charge);
+  DracoTables tables(charge);
+  const draco::Status status = decoder.Decode(options, &buffer, &mesh);
+  if (tables.refused_bytes() > 0) refuse_memory(tables.refused_bytes());
+  if (decoder.refusal) std::rethrow_exception(decoder.refusal);
+  if (!status.ok())
+    throw BrokenData{"its Draco data are damaged" +
+                     (status.error_msg_string().empty()
+                          ? ""
+                          : " (" + printable(status.error_msg_string()) + ")")};
+}
+
+// Collects elements and writes them in pieces.
+template <class T>
+class Writer {
+ public:
+  using Write = std::function<void(std::span<const std::byte>)>;
+  explicit Writer(const Write& write) : write_(write) { values_.reserve(kWriteElements + 4); }
+
+  void add(T value) { values_.push_back(value); }
+  void flush_if_full() {
+    if (values_.size() >= kWriteElements) flush();
+  }
+  void flush() {
+    if (!values_.empty()) write_(std::as_bytes(std::span(values_)));
+    values_.clear();
+  }
+
+ private:
+  const Write& write_;
+  std::vector<T> values_;
+};
+
+void write_faces(const DracoPart& part, const draco::Mesh& mesh,
+                 const Writer<uint32_t>::Write& write) {
+  Writer<uint32_t> out(write);
+  const uint64_t faces = mesh.num_faces(), triangles = part.corners / 3;
+  // A strip is padded by its last face: its degenerate triangles lie on faces too.
+  for (uint64_t i = 0; i < triangles; ++i) {
+    const draco::Mesh::Face& face =
+        mesh.face(draco::FaceIndex(static_cast<uint32_t>(std::min(i, faces - 1))));
+    for (const draco::PointIndex& corner : face) {
+      if (corner.value() >= part.vertices)
+        throw BrokenData{"its Draco data have the index " + std::to_string(corner.value()) +
+                         ", there are " + std::to_string(part.vertices) + " vertices"};
+      out.add(corner.value());
+    }
+    out.flush_if_full();
+  }
+  out.flush();
+}
+
+// The values of all vertices, each of `components` numbers of type T.
+template <class T>
+void write_values(const DracoPart& part, const DracoPart::Attribute& wanted,
+                  const draco::PointAttribute& found, const typename Writer<T>::Write& write) {
+  Writer<T> out(write);
+  std::array<T, 16> value{};
+  for (uint32_t v = 0; v < part.vertices; ++v) {
+    const draco::AttributeValueIndex index = found.mapped_index(draco::PointIndex(v));
+    if (index.value() >= found.size() ||
+        !found.ConvertValue<T>(index, static_cast<int8_t>(wanted.components), value.data()))
+      throw BrokenData{"its Draco attribute " + wanted.name + " cannot be read as " +
+                       component_name(wanted.component_type)};
+    for (int c = 0; c < wanted.components; ++c) out.add(value[static_cast<size_t>(c)]);
+    out.flush_if_full();
+  }
+  out.flush();
+}
+
+// value = integer * (range / largest integer) + minimum, in floats, as Draco's own decoders do it.
+void write_dequantized(const DracoPart& part, const DracoPart::Attribute& wanted,
+                       const draco::PointAttribute& found,
+                       const draco::AttributeQuantizationTransform& transform,
+                       const Writer<float>::Write& write) {
+  const float largest = static_cast<float>((uint64_t{1} << transform.quantization_bits()) - 1);
+  const float step = transform.range() / largest;
+  Writer<float> out(write);
+  std::array<int32_t, 16> value{};
+  for (uint32_t v = 0; v < part.vertices; ++v) {
+    const draco::AttributeValueIndex index = found.mapped_index(draco::PointIndex(v));
+    if (index.value() >= found.size() ||
+        !found.ConvertValue<int32_t>(index, static_cast<int8_t>(wanted.components), value.data()))
+      throw BrokenData{"its Draco attribute " + wanted.name + " cannot be read"};
+    for (int c = 0; c < wanted.components; ++c)
+      out.add(static_cast<float>(value[static_cast<size_t>(c)]) * step + transform.min_value(c));
+    out.flush_if_full();
+  }
+  out.flush();
+}
+
+void write_attribute(const DracoPart& part, const DracoPart::Attribute& wanted,
+                     const draco::Mesh& mesh, const Writer<float>::Write& write) {
+  const int id = mesh.GetAttributeIdByUniqueId(static_cast<uint32_t>(wanted.id));
+  if (id < 0)
+    throw BrokenData{"its Draco data have no attribute " + std::to_string(wanted.id) +
+                     ", which is " + wanted.name};
+  const draco::PointAttribute& found = *mesh.attribute(id);
+  if (found.num_components() != wanted.components)
+    throw BrokenData{"its Draco attribute " + wanted.name + " has " +
+                     std::to_string(found.num_components()) + " components, its accessor " +
+                     std::to_string(wanted.components)};
+  draco::AttributeQuantizationTransform transform;
+  if (transform.InitFromAttribute(found)) {
+    if (wanted.component_type != kFloat)
+      throw BrokenData{"its Draco attribute " + wanted.name + " is of floats, its accessor of " +
+                       component_name(wanted.component_type)};
+    return write_dequantized(part, wanted, found, transform, write);
+  }
+  switch (wanted.component_type) {
+    case kByte:
+      return write_values<int8_t>(part, wanted, found, write);
+    case kUnsignedByte:
+      return write_values<uint8_t>(part, wanted, found, write);
+    case kShort:
+      return write_values<int16_t>(part, wanted, found, write);
+    case kUnsignedShort:
+      return write_values<uint16_t>(part, wanted, found, write);
+    case kUnsignedInt:
+      return write_values<uint32_t>(part, wanted, found, write);
+    default:
+      return write_values<float>(part, wanted, found, write);
+  }
+}
+
+void check_faces(const DracoPart& part, uint64_t faces) {
+  const uint64_t triangles = part.corners / 3;
+  const bool fits = part.is_strip
+                        ? faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces
+                        : faces == triangles;
+  if (!fits)
+    throw BrokenData{"its Draco data have " + std::to_string(faces) + " faces, its indices " +
+                     std::to_string(triangles) + " triangles"};
+}
+
+}  // namespace
+
+void decode_draco(const DracoPart& part, std::span<std::byte> compressed, MemoryCharge& charge,
+                  const std::function<void(std::span<const std::byte>)>& write) {
+  const DracoHeader header = read_draco_header(compressed);
+  check_faces(part, header.faces);
+  charge_up_to(charge,
+               header.faces * (kBytesPerFace + kBytesPerFaceOfTable * header.attribute_tables));
+  try {
+    draco::Mesh mesh;
+    const std::span<const std::byte> data = compressed.subspan(header.begin);
+    if (header.is_edgebreaker)
+      decode_mesh<draco::MeshEdgebreakerDecoder>(part, data, charge, mesh);
+    else
+      decode_mesh<draco::MeshSequentialDecoder>(part, data, charge, mesh);
+    check_faces(part, mesh.num_faces());
+    if (part.has_indices) write_faces(part, mesh, write);
+    for (const DracoPart::Attribute& attribute : part.attributes)
+      write_attribute(part, attribute, mesh, write);
+  } catch (const std::bad_alloc&) {
+    throw BrokenData{"its Draco data claim more memory than there is"};
+  } catch (const std::length_error&) {
+    throw BrokenData{"its Draco data claim more memory than there is"};
+  }
+}
+
+#else
+
+void decode_draco(const DracoPart&, std::span<std::byte>, MemoryCharge&,
+                  const std::function<void(std::span<const std::byte>)>&) {
+  throw BrokenData{"voxdag was built without libdraco"};
+}
+
+#endif
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,48 @@
+// The only place that calls meshoptimizer, whose decoders allocate nothing and check what they
+// read.
+#include "scene/gltf/compressed/codecs.h"
+
+#ifdef VOXDAG_HAS_MESHOPT
+#include <meshoptimizer.h>
+#endif
+
+namespace voxdag::gltf {
+
+#ifdef VOXDAG_HAS_MESHOPT
+
+void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compressed,
+                    std::span<std::byte> out) {
+  const auto* const from = reinterpret_cast<const unsigned char*>(compressed.data());
+  const auto count = static_cast<size_t>(view.count);
+  const auto stride = static_cast<size_t>(view.stride);
+  int failure = 0;
+  if (view.mode == MeshoptView::Mode::kAttributes)
+    failure = meshopt_decodeVertexBuffer(out.data(), count, stride, from, compressed.size());
+  else if (view.mode == MeshoptView::Mode::kTriangles)
+    failure = meshopt_decodeIndexBuffer(out.data(), count, stride, from, compressed.size());
+  else
+    failure = meshopt_decodeIndexSequence(out.data(), count, stride, from, compressed.size());
+  if (failure != 0)
+    throw BrokenData{"its compressed bytes do not hold " + std::to_string(view.count) +
+                     " elements: they are damaged, cut off, or of a later version"};
+  switch (view.filter) {
+    case MeshoptView::Filter::kNone:
+      return;
+    case MeshoptView::Filter::kOctahedral:
+      return meshopt_decodeFilterOct(out.data(), count, stride);
+    case MeshoptView::Filter::kQuaternion:
+      return meshopt_decodeFilterQuat(out.data(), count, stride);
+    case MeshoptView::Filter::kExponential:
+      return meshopt_decodeFilterExp(out.data(), count, stride);
+  }
+}
+
+#else
+
+void decode_meshopt(const MeshoptView&, std::span<const std::byte>, std::span<std::byte>) {
+  throw BrokenData{"voxdag was built without libmeshoptimizer"};
+}
+
+#endif
+
+}  // namespace voxdag::gltf

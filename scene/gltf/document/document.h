@@ -1,0 +1,205 @@
+// A glTF 2.0 file without its geometry. The arrays that can have an element per node or mesh of a
+// large scene are compact structs, each charged to the memory budget; tinygltf's model holds what
+// else is used. Filled by read_document() and then checked once by check_document(); after that:
+//   1. every index is in range, or -1 if the file gives none;
+//   2. every accessor that is read has the type its use requires, and its bytes lie inside its
+//      buffer view, its view inside its buffer, and its buffer inside the existing bytes;
+//   3. nodes form trees, and `roots` have no parents.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "scene/gltf/document/compression.h"
+#include "scene/gltf/growing_charge.h"
+#include "scene/gltf/json/file_range.h"
+#include "scene/gltf/transform.h"
+
+namespace tinygltf {
+class Model;
+}
+
+namespace voxdag::gltf {
+
+struct Looks;
+
+// Where the bytes of a buffer come from.
+struct BufferSource {
+  enum class Kind {
+    kNone,      // no uri, and not the BIN chunk: only extensions can use it
+    kBinChunk,  // the bytes `range` of the scene file
+    kExternal,  // the file `uri`, percent-encoded and relative to the scene file
+    kBase64,    // the base64 characters `range` of the scene file
+    kMemory,    // the base64 in `characters`, with JSON escapes in the file: the URI at `range`
+    kDecoded,   // what `meshopt` or `draco` decodes to; no buffer of the file
+  };
+  Kind kind = Kind::kNone;
+  uint64_t byte_length = 0;
+  bool is_read = false;      // triangles use some of it; set by check_document()
+  bool is_fallback = false;  // for readers without EXT_meshopt_compression; never the BIN chunk
+  FileRange range;
+  std::string uri;
+  std::string characters;
+  std::shared_ptr<const MeshoptView> meshopt;
+  std::shared_ptr<const DracoPart> draco;
+};
+
+struct BufferView {
+  int buffer = -1;
+  uint64_t byte_offset = 0;
+  uint64_t byte_length = 0;
+  uint64_t byte_stride = 0;                    // 0: elements are packed
+  std::shared_ptr<const MeshoptView> meshopt;  // null: not compressed
+};
+
+enum ComponentType : int {
+  kByte = 5120,
+  kUnsignedByte = 5121,
+  kShort = 5122,
+  kUnsignedShort = 5123,
+  kUnsignedInt = 5125,
+  kFloat = 5126
+};
+
+// Replacements of some elements of an accessor, at strictly increasing indices.
+struct Sparse {
+  uint64_t count = 0;
+  int index_view = -1;
+  uint64_t index_offset = 0;
+  int index_type = 0;
+  int value_view = -1;
+  uint64_t value_offset = 0;
+};
+
+struct Accessor {
+  std::string name;
+  int view = -1;  // -1: all zeros
+  uint64_t byte_offset = 0;
+  uint64_t count = 0;
+  int component_type = 0;
+  int components = 0;  // 1 for SCALAR, 3 for VEC3, 16 for MAT4
+  bool normalized = false;
+  bool is_sparse = false;
+  Sparse sparse;
+  int same_as = -1;  // the accessor of the file that this is a copy of
+};
+
+// The accessors JOINTS_n and WEIGHTS_n of one n: four influences per vertex.
+struct JointSet {
+  int joints = -1;
+  int weights = -1;
+};
+
+// Primitive modes that make triangles; smaller ones are points and lines.
+enum Mode : int { kTriangleList = 4, kTriangleStrip = 5, kTriangleFan = 6 };
+
+// How the triangles of a primitive look. Set by resolve_looks().
+struct PrimitiveLook {
+  uint32_t material = 0;         // of Looks
+  int texture_coordinates = -1;  // accessor; -1: not needed
+  int color = -1;                // accessor; -1: white
+};
+
+struct Primitive {
+  int mode = kTriangleList;
+  int position = -1;
+  int indices = -1;
+  std::vector<int> targets;  // POSITION of each morph target, -1 if it has none
+  std::vector<JointSet> joint_sets;
+  int material = -1;                     // as the file has it, unchecked like the next two
+  int color = -1;                        // COLOR_0
+  std::vector<int> texture_coordinates;  // TEXCOORD_n
+  PrimitiveLook look;
+  std::shared_ptr<const DracoExtension> draco;  // null: not compressed
+
+  bool makes_triangles() const { return mode >= kTriangleList; }
+};
+
+struct Mesh {
+  std::string name;
+  std::vector<Primitive> primitives;
+  std::vector<double> weights;
+};
+
+// Accessors of EXT_mesh_gpu_instancing, -1 where one is absent.
+struct Instancing {
+  bool present = false;
+  int translation = -1;
+  int rotation = -1;
+  int scale = -1;
+};
+
+struct Node {
+  std::string name;
+  Transform local;
+  std::vector<int> children;
+  std::vector<double> weights;  // empty: the mesh's
+  int parent = -1;
+  int mesh = -1;
+  int skin = -1;
+  Instancing instancing;
+};
+
+struct Skin {
+  std::string name;
+  std::vector<int> joints;
+  int inverse_bind = -1;  // -1: identities
+};
+
+struct Document {
+  Document(std::string scene_path, MemoryBudget& budget)
+      : path(std::move(scene_path)), charge(budget, "the structure of " + path) {}
+
+  std::string path;
+  GrowingCharge charge;        // for the arrays
+  GrowingCharge model_charge;  // for the model
+
+  // tinygltf's reading of the asset, the extensions, materials, textures, samplers and images. Its
+  // other arrays are empty. Nothing of an image is loaded: a data: URI ends at its comma.
+  std::shared_ptr<tinygltf::Model> model;
+  std::vector<RawString> image_uris;  // for each image of the model; size 0 for one without uri
+
+  bool quantized = false;  // KHR_mesh_quantization is used
+  // Deques, because a growing vector would need its memory twice.
+  std::deque<BufferSource> buffers;
+  std::deque<BufferView> views;
+  std::deque<Accessor> accessors;
+  std::deque<Mesh> meshes;
+  std::deque<Skin> skins;
+  std::deque<Node> nodes;
+  std::deque<std::vector<int>> scenes;  // the root nodes of each
+  std::shared_ptr<const Looks> looks;   // set by resolve_looks()
+  int scene = -1;                       // the default scene
+  std::vector<int> roots;               // of the scene to draw, set by check_document()
+  std::vector<std::string> warnings;    // the first few
+  uint64_t further_warnings = 0;
+
+  // Adds "<path>: <what>" to the warnings.
+  void warn(const std::string& what);
+
+  // "node 3 \"wheel\"", for messages.
+  std::string name_node(int node) const;
+  std::string name_mesh(int mesh) const;
+  std::string name_accessor(int accessor) const;
+  std::string name_skin(int skin) const;
+};
+
+// Bytes of one component; 0 if glTF 2.0 has no such component type.
+int component_bytes(int component_type);
+const char* component_name(int component_type);
+
+inline uint64_t element_bytes(const Accessor& accessor) {
+  return static_cast<uint64_t>(component_bytes(accessor.component_type) * accessor.components);
+}
+
+// Whole triangles of a primitive.
+uint64_t triangle_count(const Document& document, const Primitive& primitive);
+// How often the mesh of the node is drawn.
+uint64_t instance_count(const Document& document, const Node& node);
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,39 @@
+// The part of a scene file that tinygltf reads: asset, extensions, materials, textures and
+// samplers. Their elements are collected as text, which tinygltf parses once. Images are put into
+// its model here, because tinygltf would load them.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "scene/gltf/document/document.h"
+#include "scene/gltf/json/json_element.h"
+
+namespace voxdag::gltf {
+
+class ModelReader {
+ public:
+  ModelReader(const std::string& scene_path, MemoryBudget& budget);
+
+  // Adds an element of a section to the text. Throws Violation unless the members of the asset and
+  // the names of extensions that voxdag uses are strings, Error{kOutOfMemory} if the model would
+  // not fit the budget.
+  void add(const JsonElement& element);
+  void add_image(const JsonElement& element);
+
+  // Sets the model of the document and its image_uris. Materials, textures and samplers that
+  // tinygltf refuses are left out with a warning. Call once, after all elements were added.
+  void parse(Document& document);
+
+ private:
+  std::string text_ = "{";
+  std::string section_;           // the last one in text_
+  bool section_is_open_ = false;  // its array needs a closing bracket
+  std::shared_ptr<tinygltf::Model> model_;
+  std::vector<RawString> image_uris_;
+  GrowingCharge model_charge_;
+  GrowingCharge parse_charge_;
+};
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,139 @@
+#include "scene/gltf/document/read_document.h"
+
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "core/base/process_limits.h"
+#include "scene/gltf/document/model_reader.h"
+#include "scene/gltf/document/read_elements.h"
+#include "scene/gltf/json/container.h"
+#include "scene/gltf/json/json_sections.h"
+#include "scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+// The extensions that voxdag reads.
+constexpr std::string_view kRead[] = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
+                                      "KHR_draco_mesh_compression", "KHR_mesh_quantization"};
+
+// Beginnings of the names of extensions for looks, lights, motion and metadata, which no vertex
+// depends on.
+constexpr std::string_view kHarmless[] = {
+    "KHR_materials_",      "KHR_texture_",          "EXT_texture_", "MSFT_texture_",
+    "KHR_lights_punctual", "EXT_lights_",           "KHR_xmp",      "KHR_animation_pointer",
+    "ADOBE_materials_",    "MSFT_packing_",         "AGI_stk_",     "EXT_structural_metadata",
+    "EXT_mesh_features",   "EXT_instance_features", "KHR_audio",    "KHR_techniques_webgl",
+    "FB_geometry_metadata"};
+
+// Whether the geometry could be different if voxdag read the extension.
+bool may_change_geometry(const std::string& extension) {
+  return std::ranges::find(kRead, extension) == std::end(kRead) &&
+         std::ranges::none_of(kHarmless, [&](auto p) { return extension.starts_with(p); });
+}
+
+void check_required_extensions(const std::string& path, const std::vector<std::string>& required) {
+  for (const std::string& name : required)
+    if (may_change_geometry(name))
+      refuse(path, "requires the extension " + printable(name) + ", which voxdag does not read");
+}
+
+void check_version(const std::string& path, const tinygltf::Asset& asset) {
+  if (asset.version != "2" && !asset.version.starts_with("2."))
+    refuse(path, "is glTF version " + printable(asset.version) + ", expected 2.0");
+  if (!asset.minVersion.empty() && asset.minVersion != "2.0")
+    refuse(path, "needs glTF version " + printable(asset.minVersion) + ", voxdag reads 2.0");
+}
+
+// The BIN chunk is the first buffer, if that has no uri.
+void place_bin_chunk(const Container& container, Document& d) {
+  if (!container.has_bin || d.buffers.empty()) return;
+  BufferSource& first = d.buffers[0];
+  if (first.kind != BufferSource::Kind::kNone || first.is_fallback) return;
+  first.kind = BufferSource::Kind::kBinChunk;
+  first.range = container.bin;
+}
+
+// Memory of check_document(), which follows the parents of all nodes.
+constexpr uint64_t kCheckBytesPerNode = 2 * sizeof(int);
+
+// Charges the elements of an array of the document and stores them.
+template <class T>
+auto store(Document& document, std::deque<T>& array, T (*read)(const JsonElement&)) {
+  return [&, read](const JsonElement& element) {
+    T value = read(element);
+    document.charge.add(sizeof(T) + heap_bytes(value));
+    array.push_back(std::move(value));
+  };
+}
+
+// Reads all sections; returns the message of the first violation, or "".
+std::string read_structure(const ReadableFile& file, FileRange json, Document& d,
+                           ModelReader& model, MemoryBudget& budget, const CancelToken& cancel) {
+  const auto add_to_model = [&](const JsonElement& element) { model.add(element); };
+  bool has_asset = false;
+  constexpr bool kArray = true, kWhole = false, kChecked = true, kUnchecked = false;
+  const std::string violation = read_sections(
+      file, json,
+      {{"asset", kWhole, kChecked,
+        [&](const JsonElement& element) {
+          has_asset = true;
+          model.add(element);
+        }},
+       {"extensionsUsed", kArray, kChecked, add_to_model},
+       {"extensionsRequired", kArray, kChecked, add_to_model},
+       {"materials", kArray, kUnchecked, add_to_model},
+       {"textures", kArray, kUnchecked, add_to_model},
+       {"samplers", kArray, kUnchecked, add_to_model},
+       {"images", kArray, kUnchecked,
+        [&](const JsonElement& element) { model.add_image(element); }},
+       {"buffers", kArray, kChecked,
+        [&](const JsonElement& element) {
+          BufferSource buffer = read_buffer(element, file, budget);
+          d.charge.add(sizeof(buffer) + buffer.uri.capacity() + buffer.characters.capacity());
+          d.buffers.push_back(std::move(buffer));
+        }},
+       {"bufferViews", kArray, kChecked, store(d, d.views, read_view)},
+       {"accessors", kArray, kChecked, store(d, d.accessors, read_accessor)},
+       {"meshes", kArray, kChecked, store(d, d.meshes, read_mesh)},
+       {"skins", kArray, kChecked, store(d, d.skins, read_skin)},
+       {"nodes", kArray, kChecked,
+        [&](const JsonElement& element) {
+          const int index = static_cast<int>(d.nodes.size());
+          Node node = read_node(element, index, d);
+          d.charge.add(sizeof(node) + heap_bytes(node) + kCheckBytesPerNode);
+          d.nodes.push_back(std::move(node));
+        }},
+       {"scenes", kArray, kChecked, store(d, d.scenes, read_scene)},
+       {"scene", kWhole, kChecked,
+        [&](const JsonElement& element) { d.scene = element.as_index(); }}},
+      budget, cancel);
+  return violation.empty() && !has_asset ? "asset is missing" : violation;
+}
+
+}  // namespace
+
+Document read_document(const ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel) {
+  const Container container = read_container(file);
+  Document d(file.path(), budget);
+  ModelReader model(file.path(), budget);
+  const std::string violation = read_structure(file, container.json, d, model, budget, cancel);
+  model.parse(d);
+  check_version(d.path, d.model->asset);
+  check_required_extensions(d.path, d.model->extensionsRequired);
+  if (!violation.empty()) refuse(d.path, violation);
+  place_bin_chunk(container, d);
+
+  for (const auto* names : {&d.model->extensionsUsed, &d.model->extensionsRequired})
+    for (const std::string& name : *names)
+      d.quantized = d.quantized || name == "KHR_mesh_quantization";
+  for (const std::string& name : d.model->extensionsUsed)
+    if (may_change_geometry(name))
+      d.warn("the optional extension " + printable(name) + " is ignored");
+  trim_heap();  // the parse freed many small blocks
+  return d;
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,17 @@
+// From the bytes of a scene file to its Document.
+#pragma once
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scene/gltf/document/document.h"
+
+namespace voxdag::gltf {
+
+// The document of an open scene file, not yet checked by check_document(). Throws
+// Error{kInvalidInput} for JSON that is broken or has a member of a wrong type, for another glTF
+// version, or a required extension that voxdag does not read; Error{kOutOfMemory} for a structure
+// that does not fit the budget.
+Document read_document(const ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel);
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,38 @@
+// The structs of a Document, each read from its element of the JSON. Members that voxdag does not
+// use are ignored. Throws Violation for a member that is missing or of a wrong type.
+#pragma once
+
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scene/gltf/document/document.h"
+#include "scene/gltf/json/json_element.h"
+
+namespace voxdag::gltf {
+
+// A data: URI with JSON escapes is read from the scene file into memory; Error{kOutOfMemory} if it
+// does not fit the budget.
+BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_file,
+                         MemoryBudget& budget);
+BufferView read_view(const JsonElement& element);
+Accessor read_accessor(const JsonElement& element);
+Mesh read_mesh(const JsonElement& element);
+Skin read_skin(const JsonElement& element);
+// Node `index` of the document, which gets a warning if the node is rotated by a quaternion far
+// from unit length. Throws Violation for a transform that is not affine or not finite.
+Node read_node(const JsonElement& element, int index, Document& document);
+// The root nodes of a scene.
+std::vector<int> read_scene(const JsonElement& element);
+
+// Bytes that a struct owns outside of itself.
+inline uint64_t heap_bytes(const BufferView& view) {
+  return view.meshopt ? sizeof(MeshoptView) : 0;
+}
+uint64_t heap_bytes(const Accessor& accessor);
+uint64_t heap_bytes(const Mesh& mesh);
+uint64_t heap_bytes(const Skin& skin);
+uint64_t heap_bytes(const Node& node);
+uint64_t heap_bytes(const std::vector<int>& nodes);
+
+}  // namespace voxdag::gltf

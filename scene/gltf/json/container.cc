@@ -1,0 +1,93 @@
+#include "scene/gltf/json/container.h"
+
+#include <algorithm>
+#include <span>
+#include <string_view>
+
+#include "core/base/error.h"
+#include "scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+constexpr uint32_t kMagic = 0x46546C67;      // "glTF"
+constexpr uint32_t kJsonChunk = 0x4E4F534A;  // "JSON"
+constexpr uint32_t kBinChunk = 0x004E4942;   // "BIN"
+constexpr uint64_t kHeaderBytes = 12;
+constexpr uint64_t kChunkHeaderBytes = 8;
+constexpr uint64_t kMaxJsonBytes = uint64_t{1} << 30;
+
+uint32_t read_u32(const ReadableFile& file, uint64_t offset) {
+  std::array<std::byte, 4> b;
+  file.read_at(offset, b);
+  uint32_t value = 0;
+  for (size_t i = 4; i-- > 0;) value = value << 8 | std::to_integer<uint32_t>(b[i]);
+  return value;
+}
+
+struct Chunk {
+  uint32_t type = 0;
+  FileRange content;
+};
+
+// The chunk whose header lies at `offset`; `end` is where the GLB ends.
+Chunk read_chunk(const ReadableFile& file, uint64_t offset, uint64_t end) {
+  if (end - offset < kChunkHeaderBytes)
+    refuse(file.path(), "the GLB ends inside the header of a chunk");
+  const uint64_t length = read_u32(file, offset);
+  const uint64_t begin = offset + kChunkHeaderBytes;
+  if (length > end - begin)
+    refuse(file.path(), "a GLB chunk claims " + std::to_string(length) + " bytes, " +
+                            std::to_string(end - begin) + " are left");
+  return {read_u32(file, offset + 4), {begin, length}};
+}
+
+Container read_glb(const ReadableFile& file) {
+  if (file.size() < kHeaderBytes) refuse(file.path(), "the GLB ends inside its header");
+  const uint32_t version = read_u32(file, 4);
+  if (version != 2)
+    refuse(file.path(), "is GLB version " + std::to_string(version) + ", expected version 2");
+  const uint64_t end = read_u32(file, 8);
+  if (end > file.size())
+    refuse(file.path(), "is cut off: the GLB has " + std::to_string(end) + " bytes, the file " +
+                            std::to_string(file.size()));
+  if (end < kHeaderBytes) refuse(file.path(), "claims a GLB length shorter than its header");
+  const Chunk json = read_chunk(file, kHeaderBytes, end);
+  if (json.type != kJsonChunk) refuse(file.path(), "the first chunk of the GLB is not JSON");
+  Container container{json.content, false, {}};
+  const uint64_t next = json.content.begin + json.content.size;
+  if (next < end) {
+    const Chunk bin = read_chunk(file, next, end);
+    container.has_bin = bin.type == kBinChunk;
+    container.bin = bin.content;
+  }
+  return container;
+}
+
+// White space, an opening brace or bracket, or a byte order mark and then one of these.
+bool may_be_json(const ReadableFile& file) {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  char text[4] = {};
+  const size_t size = std::min<uint64_t>(sizeof text, file.size());
+  file.read_at(0, std::as_writable_bytes(std::span(text).first(size)));
+  std::string_view begin(text, size);
+  if (begin.starts_with(kMark)) begin.remove_prefix(kMark.size());
+  return begin.find_first_of(" \t\r\n{[") == 0;
+}
+
+}  // namespace
+
+Container read_container(const ReadableFile& file) {
+  if (file.size() == 0) refuse(file.path(), "is empty, expected a .glb or .gltf scene");
+  const bool is_glb = file.size() >= 4 && read_u32(file, 0) == kMagic;
+  if (!is_glb && !may_be_json(file))
+    refuse(file.path(), "is neither a GLB, which begins with \"glTF\", nor JSON");
+  const Container container = is_glb ? read_glb(file) : Container{{0, file.size()}, false, {}};
+  if (container.json.size > kMaxJsonBytes)
+    throw Error(ErrorCode::kLimit, file.path() + ": its JSON has " +
+                                       std::to_string(container.json.size) +
+                                       " bytes, the limit is 1 GiB");
+  return container;
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,71 @@
+#include "scene/gltf/json/json_element.h"
+
+#include "scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+std::string describe(const nlohmann::json& value) {
+  if (value.is_object()) return "an object";
+  if (value.is_array()) return "an array";
+  if (value.is_string()) return "a string";
+  return value.dump();
+}
+
+}  // namespace
+
+std::string JsonElement::path() const {
+  std::string path = parent_ ? parent_->path() : "";
+  if (!key_.empty()) path.append(path.empty() ? "" : ".").append(printable(key_));
+  if (index_ != kNoIndex) path += '[' + std::to_string(index_) + ']';
+  return path;
+}
+
+std::optional<JsonElement> JsonElement::find(const char* key) const {
+  expect_object();
+  const auto found = value_.find(key);
+  if (found == value_.end()) return {};
+  return JsonElement(*found, key, kNoIndex, this);
+}
+
+JsonElement JsonElement::at(const char* key) const {
+  if (const auto member = find(key)) return *member;
+  throw Violation{path() + "." + key + " is missing"};
+}
+
+void JsonElement::expect_object() const {
+  if (!value_.is_object()) violate("an object");
+}
+
+int JsonElement::as_index() const {
+  if (!value_.is_number_unsigned() || value_.get<uint64_t>() > INT32_MAX)
+    violate("a whole number from 0 to 2147483647");
+  return value_.get<int>();
+}
+
+uint64_t JsonElement::as_size() const {
+  if (!value_.is_number_unsigned() || value_.get<uint64_t>() > INT64_MAX)
+    violate("a whole number that is not negative");
+  return value_.get<uint64_t>();
+}
+
+double JsonElement::as_number() const {
+  if (!value_.is_number()) violate("a number");
+  return value_.get<double>();
+}
+
+bool JsonElement::as_boolean() const {
+  if (!value_.is_boolean()) violate("true or false");
+  return value_.get<bool>();
+}
+
+const std::string& JsonElement::as_string() const {
+  if (!value_.is_string()) violate("a string");
+  return value_.get_ref<const std::string&>();
+}
+
+void JsonElement::violate(const char* expected) const {
+  throw Violation{path() + " is " + describe(value_) + ", expected " + expected};
+}
+
+}  // namespace voxdag::gltf

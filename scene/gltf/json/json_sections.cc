@@ -1,0 +1,208 @@
+#include "scene/gltf/json/json_sections.h"
+
+#include <algorithm>
+#include <istream>
+#include <set>
+#include <utility>
+
+#include "core/base/error.h"
+#include "scene/gltf/growing_charge.h"
+#include "scene/gltf/json/json_window.h"
+#include "scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr size_t kMaxParserReasonBytes = 300;
+// Values nested deeper inside an element are skipped; glTF nests about eight deep.
+constexpr size_t kMaxNesting = 32;
+
+// Memory of a value: its place in a growing array or in a map, and its own allocations.
+constexpr uint64_t kBytesPerArrayElement = 3 * sizeof(Json);
+constexpr uint64_t kBytesPerObjectMember = 112;
+constexpr uint64_t kBytesPerContainer = 64;
+
+// Receives the parser's events and makes a Json value of each element of a section.
+class SectionParser : public nlohmann::json_sax<Json> {
+ public:
+  SectionParser(const std::string& path, const JsonWindow& window,
+                const std::vector<JsonSection>& sections, MemoryBudget& budget)
+      : path_(path),
+        window_(window),
+        sections_(sections),
+        charge_(budget, "an element in the JSON of " + path) {}
+
+  const std::string& violation() const { return violation_; }
+
+  bool null() override { return scalar(nullptr); }
+  bool boolean(bool v) override { return scalar(v); }
+  bool number_integer(number_integer_t v) override { return scalar(v); }
+  bool number_unsigned(number_unsigned_t v) override { return scalar(v); }
+  bool number_float(number_float_t v, const string_t&) override { return scalar(v); }
+  bool string(string_t& v) override {
+    if (open_.size() == 1 && key_ == "uri") uri_ = window_.last_string();
+    if (skipped_depth_ == 0 && !skips_next_) element_bytes_ += v.size() + sizeof(string_t);
+    return scalar(std::move(v));
+  }
+  bool binary(binary_t&) override { return true; }  // never occurs in a text
+
+  bool start_object(size_t) override { return start(Json::object()); }
+  bool end_object() override { return end(); }
+  bool start_array(size_t) override { return start(Json::array()); }
+  bool end_array() override { return end(); }
+
+  bool key(string_t& name) override {
+    if (skipped_depth_ > 0) return true;
+    if (!open_.empty()) {
+      key_ = std::move(name);
+      skips_next_ = key_ == "extras";
+      return true;
+    }
+    const auto found = std::ranges::find(sections_, name, &JsonSection::name);
+    skips_next_ = found == sections_.end();
+    if (skips_next_) return true;
+    section_ = &*found;
+    index_ = 0;
+    if (!seen_.insert(name).second) violate(name + " is given twice");
+    return true;
+  }
+
+  bool parse_error(size_t, const std::string&, const Json::exception& e) override {
+    refuse(path_, "its JSON is broken at byte " + std::to_string(window_.position()) + ": " +
+                      printable(without_prefix(e.what()), kMaxParserReasonBytes));
+  }
+
+ private:
+  // Where the next value stands.
+  enum class Place { kSkipped, kRoot, kSection, kElement, kInElement };
+
+  Place next_place() {
+    if (skipped_depth_ > 0 || std::exchange(skips_next_, false)) return Place::kSkipped;
+    if (!open_.empty()) return Place::kInElement;
+    if (!in_root_) return Place::kRoot;
+    return section_->is_array && !in_section_ ? Place::kSection : Place::kElement;
+  }
+
+  bool scalar(Json value) {
+    const Place place = next_place();
+    if (place == Place::kRoot || place == Place::kSection) {
+      violate_type(value);
+    } else if (place != Place::kSkipped) {
+      insert(place, std::move(value));
+      if (open_.empty()) finish_element();
+    }
+    return true;
+  }
+
+  bool start(Json value) {
+    const Place place = next_place();
+    const bool is_nested_too_deep = open_.size() == kMaxNesting;
+    if (place == Place::kSkipped || is_nested_too_deep) {
+      ++skipped_depth_;
+    } else if (place == Place::kRoot || place == Place::kSection) {
+      if (value.is_object() == (place == Place::kRoot)) {
+        (place == Place::kRoot ? in_root_ : in_section_) = true;
+      } else {
+        violate_type(value);
+        ++skipped_depth_;
+      }
+    } else {
+      element_bytes_ += kBytesPerContainer;
+      open_.push_back(insert(place, std::move(value)));
+    }
+    return true;
+  }
+
+  bool end() {
+    if (skipped_depth_ > 0) {
+      --skipped_depth_;
+    } else if (!open_.empty()) {
+      open_.pop_back();
+      if (open_.empty()) finish_element();
+    } else {
+      in_section_ = false;
+    }
+    return true;
+  }
+
+  // Where the value went.
+  Json* insert(Place place, Json value) {
+    if (place == Place::kElement) return &(element_ = std::move(value));
+    Json& parent = *open_.back();
+    if (parent.is_array()) {
+      charge(kBytesPerArrayElement);
+      return &parent.emplace_back(std::move(value));
+    }
+    charge(kBytesPerObjectMember + key_.size());
+    if (parent.contains(key_))
+      violate(element().path() + "." + printable(key_) + " is given twice");
+    Json& member = parent[key_];
+    member = std::move(value);
+    return &member;
+  }
+  void charge(uint64_t bytes) { charge_.grow_to(element_bytes_ += bytes); }
+
+  JsonElement element() const {
+    return {element_, section_->name, section_->is_array ? index_ : JsonElement::kNoIndex, uri_};
+  }
+  void finish_element() {
+    try {
+      section_->read(element());
+    } catch (const Violation& v) {
+      violate(v.message);
+    }
+    element_ = nullptr;
+    element_bytes_ = 0;
+    uri_ = {};
+    ++index_;
+  }
+
+  void violate_type(const Json& value) {
+    const std::string_view name = in_root_ ? std::string_view(section_->name) : "the root";
+    const JsonElement found(value, name, JsonElement::kNoIndex, uri_);
+    try {
+      found.violate(in_root_ ? "an array" : "an object");
+    } catch (const Violation& v) {
+      violate(v.message);
+    }
+  }
+  void violate(const std::string& message) {
+    if (violation_.empty() && (!in_root_ || section_->is_checked)) violation_ = message;
+  }
+
+  const std::string& path_;
+  const JsonWindow& window_;
+  const std::vector<JsonSection>& sections_;
+  GrowingCharge charge_;  // for the largest element so far: the allocator may retain its memory
+  std::set<std::string> seen_;
+  std::string violation_;
+
+  bool in_root_ = false;
+  const JsonSection* section_ = nullptr;
+  bool in_section_ = false;  // inside the array of *section_
+  int64_t index_ = 0;        // of the element within its section
+
+  Json element_;
+  std::vector<Json*> open_;  // the objects and arrays around the next value, within element_
+  uint64_t element_bytes_ = 0;
+  RawString uri_;
+  std::string key_;  // of the next value, if that is a member
+  bool skips_next_ = false;
+  uint64_t skipped_depth_ = 0;  // open brackets of a value that is being skipped
+};
+
+}  // namespace
+
+std::string read_sections(const ReadableFile& file, FileRange json,
+                          const std::vector<JsonSection>& sections, MemoryBudget& budget,
+                          const CancelToken& cancel) {
+  JsonWindow window(file, json, budget, cancel);
+  SectionParser parser(file.path(), window, sections, budget);
+  std::istream text(&window);
+  Json::sax_parse(text, &parser);
+  return parser.violation();
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,35 @@
+// Reads the JSON of a scene file once, from beginning to end. The root's members ("nodes",
+// "asset", ...) are its sections. Whoever reads the file names the sections that it wants; their
+// elements are passed on one at a time, so that only one of them is in memory. Other sections and
+// all members "extras" are skipped.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scene/gltf/json/json_element.h"
+
+namespace voxdag::gltf {
+
+struct JsonSection {
+  std::string name;
+  bool is_array;    // each element is read on its own; else the section is one element
+  bool is_checked;  // a Violation in it is reported; else it is ignored
+  // May throw Violation. The element is valid during the call.
+  std::function<void(const JsonElement&)> read;
+};
+
+// Passes the elements of `sections` to their readers in the order of the file. Returns the message
+// of the first Violation in a checked section, or "": reading continues after one, because a file
+// of another glTF version may violate anything before it names its version. Throws
+// Error{kInvalidInput} for a text that is no JSON, Error{kOutOfMemory} for an element that does not
+// fit the budget.
+std::string read_sections(const ReadableFile& file, FileRange json,
+                          const std::vector<JsonSection>& sections, MemoryBudget& budget,
+                          const CancelToken& cancel);
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,121 @@
+#include "scene/gltf/json/json_window.h"
+
+#include <algorithm>
+#include <string>
+
+#include "scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+constexpr size_t kWindowBytes = size_t{64} << 10;
+// Enough for every name and every path of a file.
+constexpr uint64_t kMaxShownCharacters = 4096;
+// The parser stores a string raw and decoded, in buffers that grow by doubling, and passes a copy.
+constexpr uint64_t kCopies = 6;
+constexpr uint64_t kMaxWordCharacters = 1024;  // of a number or literal
+
+// ASCII that JSON does not escape within a string.
+bool is_plain(char c) { return c >= ' ' && c <= '~'; }
+
+}  // namespace
+
+JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, MemoryBudget& budget,
+                       const CancelToken& cancel)
+    : file_(file),
+      json_(json),
+      cancel_(cancel),
+      charge_(budget, "a string in the JSON of " + file.path()),
+      window_begin_(json.begin),
+      position_(json.begin) {}
+
+JsonWindow::int_type JsonWindow::uflow() {
+  char c;
+  do {
+    if (!next(c)) return traits_type::eof();
+    track(c);
+  } while (is_withheld(c));
+  charge_.grow_to(kCopies * ++collected_);
+  return traits_type::to_int_type(c);
+}
+
+bool JsonWindow::next(char& c) {
+  if (position_ == window_begin_ + window_.size()) {
+    const uint64_t left = json_.begin + json_.size - position_;
+    if (left == 0) return false;
+    cancel_.check();
+    window_begin_ = position_;
+    window_.resize(static_cast<size_t>(std::min<uint64_t>(left, kWindowBytes)));
+    file_.read_at(window_begin_, std::as_writable_bytes(std::span(window_)));
+  }
+  c = window_[static_cast<size_t>(position_ - window_begin_)];
+  ++position_;
+  return true;
+}
+
+// Follows where strings begin and end.
+void JsonWindow::track(char c) {
+  if (in_string_) return track_in_string(c);
+  track_outside_strings(c);
+  if (c != '"') return;
+  in_string_ = true;
+  after_backslash_ = in_escape_ = false;
+  hex_digits_left_ = 0;
+  collected_ = 0;
+  string_ = {.characters = {position_, 0}};
+}
+
+void JsonWindow::track_outside_strings(char c) {
+  switch (c) {
+    case ' ':
+    case '\t':
+    case '\n':
+    case '\r':
+      is_second_blank_ = after_blank_;
+      after_blank_ = true;
+      word_ = 0;
+      return;
+    case '[':
+    case ']':
+    case '{':
+    case '}':
+    case ',':
+    case ':':
+    case '"':
+      word_ = 0;
+      break;
+    default:
+      ++word_;
+      if (word_ == 1 && (c == '-' || (c >= '0' && c <= '9'))) collected_ = 0;
+  }
+  is_second_blank_ = after_blank_ = false;
+  if (word_ > kMaxWordCharacters)
+    refuse(file_.path(), "its JSON has a number of over " + std::to_string(kMaxWordCharacters) +
+                             " characters at byte " + std::to_string(position_));
+}
+
+void JsonWindow::track_in_string(char c) {
+  in_escape_ = true;
+  if (after_backslash_) {
+    after_backslash_ = false;
+    hex_digits_left_ = c == 'u' ? 4 : 0;
+  } else if (hex_digits_left_ > 0) {
+    --hex_digits_left_;
+  } else if (c == '\\') {
+    after_backslash_ = string_.is_escaped = true;
+  } else {
+    in_escape_ = false;
+    in_string_ = c != '"';
+  }
+  string_.characters.size += in_string_;
+}
+
+// Neither an escape nor a character of several bytes is withheld in part.
+bool JsonWindow::is_withheld(char c) {
+  if (!in_string_) return is_second_blank_;
+  if (string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c)) return false;
+  string_.is_clipped = true;
+  return true;
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,63 @@
+// The JSON of a scene file, read through a small window: a stream buffer for the parser, which
+// takes one character at a time.
+//
+// Strings can be long: a data: URI, of geometry or of an image, may be most of the file. The plain
+// characters of a string past the first few thousand are withheld from the parser, which would
+// collect them in memory. The place of the string in the file is recorded instead, so that a buffer
+// can be decoded from there by windows. Of several blanks between values the parser sees one, and a
+// number of more digits than any needs is refused. The characters that the parser collects are
+// charged to the budget. Not thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <streambuf>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/io/file_system.h"
+#include "scene/gltf/growing_charge.h"
+#include "scene/gltf/json/file_range.h"
+
+namespace voxdag::gltf {
+
+class JsonWindow : public std::streambuf {
+ public:
+  // Both references must outlive the window.
+  JsonWindow(const ReadableFile& file, FileRange json, MemoryBudget& budget,
+             const CancelToken& cancel);
+
+  // The place in the file of the character that the parser sees next.
+  uint64_t position() const { return position_; }
+  // The string that ended last.
+  const RawString& last_string() const { return string_; }
+
+ private:
+  // The next character that the parser sees.
+  int_type uflow() override;
+  bool next(char& c);
+  void track(char c);
+  void track_outside_strings(char c);
+  void track_in_string(char c);
+  bool is_withheld(char c);
+
+  const ReadableFile& file_;
+  const FileRange json_;
+  const CancelToken& cancel_;
+  GrowingCharge charge_;
+  std::vector<char> window_;
+  uint64_t window_begin_ = 0;  // position in the file of window_[0]
+  uint64_t position_ = 0;      // of the next character
+
+  bool in_string_ = false;
+  bool after_backslash_ = false;
+  int hex_digits_left_ = 0;       // of an escape \uXXXX
+  bool in_escape_ = false;        // the last character is part of an escape
+  bool after_blank_ = false;      // the last character outside of strings is blank,
+  bool is_second_blank_ = false;  // and so is the one before it
+  uint64_t word_ = 0;             // characters of the number or literal so far
+  uint64_t collected_ = 0;  // characters that the parser has, which begins again with each string
+                            // or number
+  RawString string_;
+};
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,66 @@
+// What the corners of a primitive's triangles look like, within a fixed amount of memory: blocks of
+// consecutive vertices, each cached in the one slot that its number maps to, as VertexCache does
+// with positions. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/base/page_buffer.h"
+#include "core/color/surface.h"
+#include "scene/gltf/looks/looks.h"
+#include "scene/gltf/mesh_data/accessor_reader.h"
+
+namespace voxdag::gltf {
+
+class LookReader {
+ public:
+  // All readers of a scene together take at most one part in so many of what the budget has free.
+  static constexpr uint64_t kShareOfFree = 8;
+
+  // One of `readers`. Room for `vertices`, or for as many as fit its part of that share. The
+  // document has looks; the references must outlive the reader.
+  LookReader(const Document& document, BufferReader& buffers, uint64_t vertices, unsigned readers);
+
+  // Serves a primitive of the document from now on. Throws Error{kInvalidInput} if a buffer of its
+  // look is shorter than it claims.
+  void bind(const Primitive& primitive);
+  // Sets material and corners of a triangle of that primitive. Its vertices exist.
+  void read(const uint32_t* vertices, SurfaceTriangle& out) {
+    out.material = material_;
+    for (size_t k = 0; k < 3; ++k) out.corners[k] = is_plain_ ? SurfaceCorner{} : at(vertices[k]);
+  }
+
+ private:
+  static constexpr uint64_t kBlockVertices = 1024;
+  static constexpr uint64_t kNoBlock = ~uint64_t{0};
+
+  const SurfaceCorner& at(uint32_t vertex) {
+    const uint64_t block = vertex / kBlockVertices;
+    const size_t slot = static_cast<size_t>(block) & slot_mask_;
+    if (block_in_slot_[slot] != block) load(block, slot);
+    return corners_[slot * kBlockVertices + vertex % kBlockVertices];
+  }
+  void open(int accessor, std::optional<AccessorReader>& out);
+  void load(uint64_t block, size_t slot);
+  void load_texture_coordinates(uint64_t first, size_t count, SurfaceCorner* out);
+  void load_colors(uint64_t first, size_t count, SurfaceCorner* out);
+
+  const Document& document_;
+  BufferReader& buffers_;
+  uint32_t material_ = 0;
+  bool is_plain_ = true;  // no texture coordinates, no colors
+  TextureTransform transform_;
+  std::optional<AccessorReader> texture_coordinates_, colors_;
+  size_t color_components_ = 4;
+  double color_scale_ = 1;  // of integers that are not normalized, as they should be
+  uint64_t vertices_ = 0;
+
+  PageBuffer<SurfaceCorner> corners_;
+  std::vector<uint64_t> block_in_slot_;
+  size_t slot_mask_ = 0;
+  std::vector<double> numbers_;
+};
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,167 @@
+#include "scene/gltf/looks/looks.h"
+
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "core/base/error.h"
+#include "scene/gltf/document/check_document.h"
+#include "scene/gltf/looks/material_reader.h"
+#include "scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+constexpr size_t kMaxLookWarnings = 20;
+
+class LookResolver {
+ public:
+  explicit LookResolver(Document& document) : document_(document) {
+    const auto count = static_cast<int>(document.model->materials.size());
+    for (int i = 0; i < count; ++i) add_material(i);
+  }
+
+  void resolve() {
+    for (size_t m = 0; m < document_.meshes.size(); ++m) {
+      std::vector<Primitive>& primitives = document_.meshes[m].primitives;
+      for (size_t p = 0; p < primitives.size(); ++p) {
+        if (!primitives[p].makes_triangles()) continue;
+        where_ = document_.name_mesh(static_cast<int>(m)) + ": primitive " + std::to_string(p);
+        resolve(primitives[p]);
+      }
+    }
+    if (looks_.materials.empty()) plain_material();
+    if (further_warnings_ > 0)
+      looks_.warnings.push_back(document_.path + ": " + std::to_string(further_warnings_) +
+                                " further warnings about materials");
+    document_.looks = std::make_shared<Looks>(std::move(looks_));
+  }
+
+ private:
+  void add_material(int index) {
+    MaterialSource source = read_material(*document_.model, index);
+    source.material.number = static_cast<uint32_t>(index);
+    if (!source.problem.empty())
+      warn("material " + numbered(index, source.material.name) + ": " + source.problem +
+           "; its base color factor is used alone");
+    if (source.image >= 0) {
+      const auto found = std::ranges::find(looks_.images, source.image);
+      source.material.image = static_cast<uint32_t>(found - looks_.images.begin());
+      if (found == looks_.images.end()) looks_.images.push_back(source.image);
+    }
+    append(source.material, source.transform);
+    texcoords_.push_back(source.texcoord);
+  }
+
+  uint32_t append(const Material& material, const TextureTransform& transform) {
+    document_.charge.add(2 * (sizeof(Material) + sizeof(TextureTransform)) + material.name.size());
+    looks_.materials.push_back(material);
+    looks_.transforms.push_back(transform);
+    return static_cast<uint32_t>(looks_.materials.size()) - 1;
+  }
+
+  void resolve(Primitive& primitive) {
+    PrimitiveLook& look = primitive.look;
+    look.color = primitive.color;
+    int set = 0;
+    if (primitive.material >= 0 && static_cast<size_t>(primitive.material) < texcoords_.size()) {
+      look.material = static_cast<uint32_t>(primitive.material);
+      if (looks_.materials[look.material].image != Material::kNoImage) {
+        set = texcoords_[look.material];
+        look.texture_coordinates = texture_coordinates(primitive, set);
+      }
+    } else {
+      if (primitive.material >= 0)
+        warn(where_ + ": material " + std::to_string(primitive.material) +
+             " does not exist, it is white");
+      look.material = plain_material();
+    }
+    place_draco_look(document_, primitive, set);
+    const uint64_t vertices = accessor(primitive.position).count;
+    check(look.color, color_use(look.color), vertices);
+    check(look.texture_coordinates, texture_coordinate_use(set), vertices);
+    if (look.texture_coordinates < 0 && looks_.materials[look.material].image != Material::kNoImage)
+      look.material = without_image(look.material);
+  }
+
+  int texture_coordinates(const Primitive& primitive, int set) {
+    const std::vector<int>& sets = primitive.texture_coordinates;
+    if (static_cast<size_t>(set) < sets.size()) return sets[static_cast<size_t>(set)];
+    warn(where_ + ": has no TEXCOORD_" + std::to_string(set) + ", which material " +
+         numbered(primitive.material,
+                  looks_.materials[static_cast<size_t>(primitive.material)].name) +
+         " needs; its base color factor is used alone");
+    return -1;
+  }
+
+  const Accessor& accessor(int index) const {
+    return document_.accessors[static_cast<size_t>(index)];
+  }
+
+  // Of three or four components; the accessor may not exist.
+  AccessorUse color_use(int index) const {
+    const bool exists = index >= 0 && static_cast<size_t>(index) < document_.accessors.size();
+    return {where_ + ": COLOR_0",
+            exists && accessor(index).components == 3 ? 3 : 4,
+            {kFloat, kUnsignedByte, kUnsignedShort},
+            {kUnsignedByte, kUnsignedShort}};
+  }
+  // Signed ones are of KHR_mesh_quantization.
+  AccessorUse texture_coordinate_use(int set) const {
+    return {where_ + ": TEXCOORD_" + std::to_string(set),
+            2,
+            {kFloat, kByte, kUnsignedByte, kShort, kUnsignedShort},
+            {kByte, kUnsignedByte, kShort, kUnsignedShort}};
+  }
+
+  // Leaves out an accessor that cannot be read.
+  void check(int& index, const AccessorUse& use, uint64_t vertices) {
+    try {
+      check_accessor(document_, index, use);
+      check_count(document_, index, vertices, use.where);
+    } catch (const Error& error) {
+      index = -1;
+      warn_as_is(error.message() + "; it is left out");
+    }
+  }
+
+  uint32_t plain_material() {
+    if (!plain_) plain_ = append(Material{}, {});
+    return *plain_;
+  }
+
+  uint32_t without_image(uint32_t material) {
+    const auto [place, is_new] = without_image_.try_emplace(material, 0);
+    if (is_new) {
+      Material factor_alone = looks_.materials[material];
+      factor_alone.image = Material::kNoImage;
+      place->second = append(factor_alone, {});
+    }
+    return place->second;
+  }
+
+  void warn(const std::string& what) { warn_as_is(document_.path + ": " + what); }
+  void warn_as_is(std::string what) {
+    if (looks_.warnings.size() < kMaxLookWarnings)
+      looks_.warnings.push_back(std::move(what));
+    else
+      ++further_warnings_;
+  }
+
+  Document& document_;
+  Looks looks_;
+  std::vector<int> texcoords_;  // of the file's materials
+  std::optional<uint32_t> plain_;
+  std::map<uint32_t, uint32_t> without_image_;
+  std::string where_;
+  uint64_t further_warnings_ = 0;
+};
+
+}  // namespace
+
+void resolve_looks(Document& document) { LookResolver(document).resolve(); }
+
+}  // namespace voxdag::gltf

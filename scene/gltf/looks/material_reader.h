@@ -1,0 +1,27 @@
+// A material of a glTF file as a Material, and where its base color texture lies.
+#pragma once
+
+#include <string>
+
+#include "core/color/surface.h"
+#include "scene/gltf/looks/texture_transform.h"
+
+namespace tinygltf {
+class Model;
+}
+
+namespace voxdag::gltf {
+
+struct MaterialSource {
+  Material material;  // without image
+  int image = -1;     // of the model
+  int texcoord = 0;   // the n of TEXCOORD_n
+  TextureTransform transform;
+  std::string problem;  // why its texture cannot be read, if it has one; "" otherwise
+};
+
+// Material `index` of the model. KHR_materials_pbrSpecularGlossiness, where there is one, is used
+// instead of metallic-roughness. What is not of the type that it should be is ignored.
+MaterialSource read_material(const tinygltf::Model& model, int index);
+
+}  // namespace voxdag::gltf

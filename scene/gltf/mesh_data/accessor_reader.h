@@ -1,0 +1,47 @@
+// Elements of one accessor, decoded by windows: interleaved or packed, integers normalized or not,
+// sparse replacements applied. Of a sparse accessor, every 1024th index is in memory, to find the
+// replacements of a range. Not thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "scene/gltf/document/document.h"
+#include "scene/gltf/mesh_data/buffer_reader.h"
+
+namespace voxdag::gltf {
+
+class AccessorReader {
+ public:
+  // Throws Error{kInvalidInput} if sparse indices do not increase strictly or are out of range,
+  // Error{kOutOfMemory} if there are too many for the budget of `buffers`. Both references must
+  // outlive the reader.
+  AccessorReader(const Document& document, BufferReader& buffers, int accessor);
+
+  uint64_t count() const { return accessor_.count; }
+
+  // Reads elements [first, first + count), as many numbers each as the accessor has components. A
+  // normalized integer c becomes max(c / the largest of its type, -1). T is double, or uint32_t for
+  // an accessor of unsigned integers.
+  template <class T>
+  void read(uint64_t first, size_t count, T* out);
+
+ private:
+  template <class T>
+  void replace_sparse(uint64_t first, size_t count, T* out);
+  // Reads sparse indices [first, first + count) into sparse_indices_.
+  void read_sparse_indices(uint64_t first, size_t count);
+  void check_sparse_indices();
+
+  const Document& document_;
+  BufferReader& buffers_;
+  const Accessor& accessor_;
+  const int index_;
+  std::vector<uint32_t> sparse_indices_;    // a window of the sparse indices
+  std::vector<uint32_t> sparse_directory_;  // every kSparseWindow-th sparse index
+  MemoryCharge directory_charge_;
+};
+
+}  // namespace voxdag::gltf

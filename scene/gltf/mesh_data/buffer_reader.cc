@@ -1,0 +1,179 @@
+#include "scene/gltf/mesh_data/buffer_reader.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+#include "scene/gltf/mesh_data/base64.h"
+#include "scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+// Of all readers of a scene together, unless these are more.
+constexpr unsigned kMaxOpenFiles = 32;
+constexpr uint64_t kMapNodeBytes = 48;
+// A window that begins inside a group of three bytes and ends inside another.
+constexpr size_t kMaxGroups = BufferReader::kWindowBytes / 3 + 2;
+
+// Base64 characters [begin, begin + out.size()) of a buffer.
+void read_characters(const ReadableFile& scene_file, const BufferSource& buffer, uint64_t begin,
+                     std::span<std::byte> out) {
+  if (buffer.kind == BufferSource::Kind::kBase64)
+    return scene_file.read_at(buffer.range.begin + begin, out);
+  const auto from = buffer.characters.begin() + static_cast<ptrdiff_t>(begin);
+  std::transform(from, from + static_cast<ptrdiff_t>(out.size()), out.begin(),
+                 [](char c) { return static_cast<std::byte>(c); });
+}
+
+uint64_t character_count(const BufferSource& buffer) {
+  return buffer.kind == BufferSource::Kind::kBase64 ? buffer.range.size : buffer.characters.size();
+}
+
+// A colon before the first slash: "http://...", "file:...", "C:\...".
+bool has_scheme(const std::string& uri) {
+  const size_t end = uri.find_first_of(":/");
+  return end != std::string::npos && uri[end] == ':';
+}
+
+[[noreturn]] void refuse_uri(const std::string& where, const char* what) {
+  throw Error(ErrorCode::kInvalidInput, where + ": its uri " + what);
+}
+
+}  // namespace
+
+std::string resolve_uri(const std::string& scene_path, const std::string& uri,
+                        const std::string& where) {
+  if (uri.empty()) refuse_uri(where, "is empty");
+  if (has_scheme(uri) || uri[0] == '/') refuse_uri(where, "is not a relative path");
+  const auto path = percent_decoded(uri);
+  if (!path) refuse_uri(where, "has a broken percent escape");
+  if (path->find('\0') != std::string::npos) refuse_uri(where, "has a zero byte");
+  return parent_directory(scene_path) + "/" + *path;
+}
+
+void ExternalFiles::add(int buffer, const SourceFile& file) {
+  const std::lock_guard lock(mutex_);
+  const auto [known, is_new] = by_buffer_.try_emplace(buffer, file);
+  if (is_new) charge_.add(sizeof(*known) + kMapNodeBytes + file.path.size());
+  const FileIdentity &before = known->second.identity, &now = file.identity;
+  if (before.inode != now.inode || before.bytes != now.bytes ||
+      before.modified_ns != now.modified_ns)
+    throw Error(ErrorCode::kInvalidInput,
+                printable(file.path) +
+                    " changed while the scene was read: expected files that stay as they are");
+}
+
+std::vector<SourceFile> ExternalFiles::all() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<SourceFile> files;
+  for (const auto& [buffer, file] : by_buffer_) files.push_back(file);
+  return files;
+}
+
+BufferReader::BufferReader(FileSystem& files, const ReadableFile& scene_file,
+                           const Document& document, ExternalFiles& external_files,
+                           DecodedBuffers& decoded, MemoryBudget& budget, unsigned readers)
+    : files_(files),
+      scene_file_(scene_file),
+      document_(document),
+      external_files_(external_files),
+      decoded_(decoded),
+      budget_(budget),
+      max_open_(std::max(kMaxOpenFiles / readers, 1u)),
+      window_(budget, 3 * kMaxGroups, "the window over " + scene_file.path()) {}
+
+void BufferReader::check_lengths() {
+  for (size_t i = 0; i < document_.buffers.size(); ++i)
+    if (document_.buffers[i].is_read) check_length(static_cast<int>(i));
+}
+
+std::span<const std::byte> BufferReader::window(int index, uint64_t offset, size_t size) {
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
+  if (buffer.kind == BufferSource::Kind::kBase64 || buffer.kind == BufferSource::Kind::kMemory)
+    return decode_base64(index, offset, size);
+  const std::span<std::byte> bytes(window_.data(), size);
+  if (buffer.kind == BufferSource::Kind::kDecoded)
+    decoded_.read(index, offset, bytes, [this](int from, uint64_t begin, std::span<std::byte> out) {
+      read(from, begin, out);
+    });
+  else if (buffer.kind == BufferSource::Kind::kBinChunk)
+    scene_file_.read_at(buffer.range.begin + offset, bytes);
+  else
+    external(index).read_at(offset, bytes);
+  return bytes;
+}
+
+void BufferReader::read(int buffer, uint64_t offset, std::span<std::byte> out) {
+  while (!out.empty()) {
+    const auto bytes = window(buffer, offset, std::min(kWindowBytes, out.size()));
+    std::ranges::copy(bytes, out.begin());
+    out = out.subspan(bytes.size());
+    offset += bytes.size();
+  }
+}
+
+void BufferReader::check_length(int index) {
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
+  uint64_t there = 0;
+  switch (buffer.kind) {
+    case BufferSource::Kind::kNone:
+    case BufferSource::Kind::kDecoded:
+      return;
+    case BufferSource::Kind::kBinChunk:
+      there = buffer.range.size;
+      break;
+    case BufferSource::Kind::kExternal:
+      there = external(index).size();
+      break;
+    case BufferSource::Kind::kBase64:
+    case BufferSource::Kind::kMemory: {
+      std::array<std::byte, 2> tail{};
+      const uint64_t characters = character_count(buffer);
+      const size_t n = static_cast<size_t>(std::min<uint64_t>(2, characters));
+      read_characters(scene_file_, buffer, characters - n, std::span(tail).first(n));
+      there = base64_bytes(characters, std::span(tail).first(n));
+      break;
+    }
+  }
+  if (there < buffer.byte_length)
+    refuse(document_.path, "buffer " + std::to_string(index) + " claims " +
+                               std::to_string(buffer.byte_length) + " bytes, " +
+                               std::to_string(there) + " are there" +
+                               (buffer.uri.empty() ? "" : " in " + printable(buffer.uri)));
+}
+
+const ReadableFile& BufferReader::external(int index) {
+  const auto found = std::ranges::find(open_, index, &OpenFile::buffer);
+  if (found != open_.end()) return *found->file;
+  const std::string where = document_.path + ": buffer " + std::to_string(index);
+  const std::string& uri = document_.buffers[static_cast<size_t>(index)].uri;
+  const std::string path = resolve_uri(document_.path, uri, where);
+  if (open_.size() == max_open_) open_.erase(open_.begin());
+  try {
+    open_.push_back({index, files_.open_read(path)});
+  } catch (const Error& e) {
+    throw Error(e.code(), where + ": " + e.message());
+  }
+  external_files_.add(index, {path, open_.back().file->identity()});
+  return *open_.back().file;
+}
+
+std::span<const std::byte> BufferReader::decode_base64(int index, uint64_t offset, size_t size) {
+  if (characters_.size() == 0)
+    characters_ = PageBuffer<std::byte>(budget_, 4 * kMaxGroups, "base64 of " + document_.path);
+  const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
+  const uint64_t first_group = offset / 3;
+  const uint64_t group_count = (offset + size + 2) / 3 - first_group;
+  const uint64_t begin = 4 * first_group;
+  const uint64_t end = std::min(begin + 4 * group_count, character_count(buffer));
+  const std::span<std::byte> characters(characters_.data(), static_cast<size_t>(end - begin));
+  read_characters(scene_file_, buffer, begin, characters);
+  if (!gltf::decode_base64(characters, window_.data()))
+    refuse(document_.path,
+           "buffer " + std::to_string(index) + ": a character of its data: URI is not base64");
+  return {window_.data() + offset % 3, size};
+}
+
+}  // namespace voxdag::gltf

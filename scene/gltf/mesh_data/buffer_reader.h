@@ -1,0 +1,90 @@
+// The bytes of the buffers of a scene, read by windows: from the scene file, from an external file,
+// out of base64 characters, or decoded from one of these. Not thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/io/file_system.h"
+#include "scene/gltf/compressed/decoded_buffers.h"
+#include "scene/gltf/document/document.h"
+#include "scene/gltf/growing_charge.h"
+#include "scene/triangle_source.h"
+
+namespace voxdag::gltf {
+
+// The external files of a document that were opened so far. Thread-safe.
+class ExternalFiles {
+ public:
+  ExternalFiles(const std::string& scene_path, MemoryBudget& budget)
+      : charge_(budget, "the list of external files of " + scene_path) {}
+  // The buffer's file was opened. Throws Error{kInvalidInput} if it is another one than before.
+  void add(int buffer, const SourceFile& file);
+  std::vector<SourceFile> all() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<int, SourceFile> by_buffer_;
+  GrowingCharge charge_;
+};
+
+// The path of the file that `uri`, percent-encoded (RFC 3986), names relative to the folder of the
+// scene file. Throws Error{kInvalidInput}, which begins with `where`, for anything but a relative
+// path.
+std::string resolve_uri(const std::string& scene_path, const std::string& uri,
+                        const std::string& where);
+
+class BufferReader {
+ public:
+  static constexpr size_t kWindowBytes = size_t{256} << 10;
+
+  // One of `readers` of the document. Adds the files that it opens to `external_files`. The
+  // references must outlive the reader.
+  BufferReader(FileSystem& files, const ReadableFile& scene_file, const Document& document,
+               ExternalFiles& external_files, DecodedBuffers& decoded, MemoryBudget& budget,
+               unsigned readers);
+
+  // Checks every buffer that is read: throws Error{kInvalidInput} if it has fewer bytes than it
+  // claims, Error{kNotFound} if an external file does not exist.
+  void check_lengths();
+
+  // Bytes [offset, offset + size) of a buffer, at most kWindowBytes of them, inside it. Valid until
+  // the next call.
+  std::span<const std::byte> window(int buffer, uint64_t offset, size_t size);
+
+  // Does so with one buffer.
+  void check_length(int buffer);
+
+  // What readers of the scene charge their own memory to.
+  MemoryBudget& budget() { return budget_; }
+
+ private:
+  // Fills `out`, of any size, from `offset` of a buffer.
+  void read(int buffer, uint64_t offset, std::span<std::byte> out);
+  const ReadableFile& external(int buffer);
+  std::span<const std::byte> decode_base64(int buffer, uint64_t offset, size_t size);
+
+  FileSystem& files_;
+  const ReadableFile& scene_file_;
+  const Document& document_;
+  ExternalFiles& external_files_;
+  DecodedBuffers& decoded_;
+  MemoryBudget& budget_;
+  const size_t max_open_;
+  PageBuffer<std::byte> window_;
+  PageBuffer<std::byte> characters_;  // base64 of a window; empty until a buffer needs it
+  struct OpenFile {
+    int buffer;
+    std::unique_ptr<ReadableFile> file;
+  };
+  std::vector<OpenFile> open_;  // a few external files; the oldest is closed for another one
+};
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,33 @@
+// The transforms of a node's instances (EXT_mesh_gpu_instancing), read by windows; a single
+// identity for a node without the extension. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "scene/gltf/mesh_data/accessor_reader.h"
+
+namespace voxdag::gltf {
+
+class InstanceReader {
+ public:
+  InstanceReader(const Document& document, BufferReader& buffers, const Node& node);
+
+  uint64_t count() const { return count_; }
+  // T * R * S of an instance, relative to the node. Fast if called in the order of the instances.
+  Transform at(uint64_t instance);
+
+ private:
+  void read_window(uint64_t first);
+
+  std::optional<AccessorReader> translation_;
+  std::optional<AccessorReader> rotation_;
+  std::optional<AccessorReader> scale_;
+  const bool present_;
+  const uint64_t count_;
+  uint64_t first_ = 0;
+  std::vector<Transform> window_;
+};
+
+}  // namespace voxdag::gltf

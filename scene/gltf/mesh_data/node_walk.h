@@ -1,0 +1,37 @@
+// The nodes of the scene that draw a mesh, parents before children, in the order of the file, with
+// their global transforms. Its memory grows with the depth of the hierarchy; it never recurses.
+#pragma once
+
+#include <vector>
+
+#include "scene/gltf/document/document.h"
+
+namespace voxdag::gltf {
+
+class NodeWalk {
+ public:
+  NodeWalk(const Document& document, MemoryBudget& budget);
+
+  // Moves to the next node with a mesh; false if there is none.
+  bool next();
+  int node() const { return path_.back().node; }
+  const Transform& global() const { return path_.back().global; }
+
+ private:
+  struct Step {
+    int node;
+    size_t next_child;
+    Transform global;
+  };
+
+  bool descend();
+  void enter(int node, const Transform& global);
+  const Node& node_at(int i) const { return document_.nodes[static_cast<size_t>(i)]; }
+
+  const Document& document_;
+  std::vector<Step> path_;  // from a root to the current node
+  GrowingCharge charge_;
+  size_t next_root_ = 0;
+};
+
+}  // namespace voxdag::gltf

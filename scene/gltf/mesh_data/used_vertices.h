@@ -1,0 +1,34 @@
+// The vertices that some triangles use, each once if they lie near each other, as those of a mesh
+// mostly do: what bounds are found from. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/geometry/grid.h"
+#include "scene/gltf/mesh_data/vertex_cache.h"
+
+namespace voxdag::gltf {
+
+class UsedVertices {
+ public:
+  // Of at least one corner.
+  void find(std::span<const uint32_t> corners);
+  void clear() { vertices_.clear(); }
+  bool is_empty() const { return vertices_.empty(); }
+
+  // Adds the positions of the vertices, of which there are `count` in all, to the bounds; false,
+  // and nothing added, if one may not exist or is not finite.
+  bool add_to(WorldBounds& bounds, VertexCache& positions, uint64_t count) const;
+
+ private:
+  // Of vertices whose indices differ by less, duplicates are found.
+  static constexpr uint32_t kMaxRange = 65536;
+
+  std::vector<uint32_t> vertices_;
+  std::vector<uint8_t> is_used_;
+  uint32_t highest_ = 0;
+};
+
+}  // namespace voxdag::gltf

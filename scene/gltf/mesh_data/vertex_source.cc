@@ -1,0 +1,129 @@
+#include "scene/gltf/mesh_data/vertex_source.h"
+
+#include <array>
+#include <limits>
+#include <unordered_map>
+
+#include "scene/gltf/growing_charge.h"
+#include "scene/gltf/messages.h"
+
+namespace voxdag::gltf {
+namespace {
+
+constexpr size_t kInfluencesOfSet = 4;
+
+// Products of transforms from the root to a node. Joints share most of their ancestors, so each
+// node is multiplied once.
+class GlobalTransforms {
+ public:
+  GlobalTransforms(const Document& document, MemoryBudget& budget, const std::string& what)
+      : document_(document), charge_(budget, what) {}
+
+  const Transform& of(int node) {
+    std::vector<int> chain;  // from the node up to an ancestor whose product is known
+    for (int i = node; i >= 0 && !known_.contains(i); i = parent_of(i)) {
+      charge_.add(kBytesPerNode);
+      chain.push_back(i);
+    }
+    for (size_t k = chain.size(); k-- > 0;) {
+      const int parent = parent_of(chain[k]);
+      const Transform& local = document_.nodes[static_cast<size_t>(chain[k])].local;
+      known_[chain[k]] = parent >= 0 ? multiply(known_.at(parent), local) : local;
+    }
+    return known_.at(node);
+  }
+
+ private:
+  // In the map, whose table of buckets is copied when it grows, and in the chain.
+  static constexpr uint64_t kBytesPerNode = sizeof(Transform) + 72;
+
+  int parent_of(int node) const { return document_.nodes[static_cast<size_t>(node)].parent; }
+
+  const Document& document_;
+  GrowingCharge charge_;
+  std::unordered_map<int, Transform> known_;
+};
+
+}  // namespace
+
+PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buffers, int index) {
+  const Skin& skin = document.skins[static_cast<size_t>(index)];
+  const std::string what = document.path + ": " + document.name_skin(index);
+  PageBuffer<Transform> matrices(buffers.budget(), skin.joints.size(), what);
+  GlobalTransforms globals(document, buffers.budget(), what);
+  for (size_t i = 0; i < matrices.size(); ++i) matrices[i] = globals.of(skin.joints[i]);
+  if (skin.inverse_bind < 0) return matrices;
+  AccessorReader reader(document, buffers, skin.inverse_bind);
+  for (size_t i = 0; i < matrices.size(); ++i) {
+    std::array<double, 16> columns;
+    reader.read(i, 1, columns.data());
+    Transform inverse_bind;
+    if (!from_columns(columns.data(), inverse_bind))
+      refuse(document.path, document.name_skin(index) + ": " +
+                                document.name_accessor(skin.inverse_bind) + ": matrix " +
+                                std::to_string(i) + " is not affine");
+    matrices[i] = multiply(matrices[i], inverse_bind);
+  }
+  return matrices;
+}
+
+VertexSource::VertexSource(const Document& document, BufferReader& buffers,
+                           const Primitive& primitive, std::span<const double> weights,
+                           std::span<const Transform> joints)
+    : charge_(buffers.budget(),
+              sizeof(Target) * weights.size() + sizeof(Influences) * primitive.joint_sets.size(),
+              document.path + ": a primitive with its morph targets and joints"),
+      positions_(document, buffers, primitive.position),
+      joints_(joints) {
+  targets_.reserve(weights.size());
+  influences_.reserve(joints.empty() ? 0 : primitive.joint_sets.size());
+  for (size_t t = 0; t < weights.size(); ++t)
+    if (weights[t] != 0 && primitive.targets[t] >= 0)
+      targets_.push_back({AccessorReader(document, buffers, primitive.targets[t]), weights[t]});
+  if (joints.empty()) return;
+  for (const JointSet& set : primitive.joint_sets)
+    influences_.push_back({AccessorReader(document, buffers, set.joints),
+                           AccessorReader(document, buffers, set.weights)});
+}
+
+void VertexSource::read(uint64_t first, size_t count, double* out) {
+  positions_.read(first, count, out);
+  for (Target& target : targets_) add_target(target, first, count, out);
+  if (!influences_.empty()) skin(first, count, out);
+}
+
+void VertexSource::add_target(Target& target, uint64_t first, size_t count, double* positions) {
+  displacements_.resize(3 * count);
+  target.displacements.read(first, count, displacements_.data());
+  for (size_t i = 0; i < 3 * count; ++i) positions[i] += target.weight * displacements_[i];
+}
+
+void VertexSource::skin(uint64_t first, size_t count, double* positions) {
+  blended_.assign(count, Transform{{{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}}});
+  indices_.resize(kInfluencesOfSet * count);
+  weights_.resize(kInfluencesOfSet * count);
+  for (Influences& set : influences_) {
+    set.joints.read(first, count, indices_.data());
+    set.weights.read(first, count, weights_.data());
+    for (size_t i = 0; i < count; ++i)
+      blend(&indices_[kInfluencesOfSet * i], &weights_[kInfluencesOfSet * i], blended_[i]);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    double skinned[3];
+    apply(blended_[i], positions + 3 * i, skinned);
+    for (size_t axis = 0; axis < 3; ++axis) positions[3 * i + axis] = skinned[axis];
+  }
+}
+
+void VertexSource::blend(const uint32_t* joints, const double* weights, Transform& sum) const {
+  for (size_t k = 0; k < kInfluencesOfSet; ++k) {
+    if (weights[k] == 0) continue;
+    const bool exists = joints[k] < joints_.size();
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 4; ++column)
+        sum.m[row][column] += exists ? weights[k] * joints_[joints[k]].m[row][column]
+                                     : std::numeric_limits<double>::quiet_NaN();
+  }
+}
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,63 @@
+// The vertex positions of one primitive as a node draws it: base positions, morphed by the weights,
+// skinned at rest. Not thread-safe.
+//
+//   morph   p = (p0 + w0 * d0) + w1 * d1 ...   targets of weight 0 are not read
+//   skin    M = (w0 * M0 + w1 * M1) + ...      entry by entry; p' = M p
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/page_buffer.h"
+#include "scene/gltf/mesh_data/accessor_reader.h"
+#include "scene/gltf/mesh_data/position_source.h"
+
+namespace voxdag::gltf {
+
+// The matrices of a skin's joints at rest: global transform of the joint times inverse bind matrix.
+// The transform of the skinned node itself is not used (glTF 2.0, section 3.7.3.3). Throws
+// Error{kInvalidInput} for an inverse bind matrix that is not affine, Error{kOutOfMemory} naming
+// the skin for more joints than fit the budget of `buffers`.
+PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buffers, int skin);
+
+class VertexSource : public PositionSource {
+ public:
+  // `weights` are the node's, else the mesh's; `joints` are empty for a node without a skin. All
+  // arguments must outlive the source. Throws Error{kOutOfMemory} for more targets and joint sets
+  // than fit the budget of `buffers`.
+  VertexSource(const Document& document, BufferReader& buffers, const Primitive& primitive,
+               std::span<const double> weights, std::span<const Transform> joints);
+
+  uint64_t count() const override { return positions_.count(); }
+
+  // Reads the positions of vertices [first, first + count), three doubles each. A vertex whose
+  // joints do not exist becomes NaN, so that it is refused only if a triangle uses it.
+  void read(uint64_t first, size_t count, double* out) override;
+
+ private:
+  struct Target {
+    AccessorReader displacements;
+    double weight;
+  };
+  struct Influences {
+    AccessorReader joints;
+    AccessorReader weights;
+  };
+
+  void add_target(Target& target, uint64_t first, size_t count, double* positions);
+  void skin(uint64_t first, size_t count, double* positions);
+  void blend(const uint32_t* joints, const double* weights, Transform& sum) const;
+
+  MemoryCharge charge_;  // for targets_ and influences_
+  AccessorReader positions_;
+  std::vector<Target> targets_;
+  std::vector<Influences> influences_;
+  std::span<const Transform> joints_;
+  std::vector<double> displacements_;
+  std::vector<Transform> blended_;
+  std::vector<double> weights_;
+  std::vector<uint32_t> indices_;
+};
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,117 @@
+// Reads the triangles of one document in world space: node by node, primitive by primitive,
+// instance by instance. What was decoded of a primitive is used again by the next node or instance
+// that draws it. Not thread-safe.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/page_buffer.h"
+#include "core/geometry/grid.h"
+#include "scene/gltf/looks/look_reader.h"
+#include "scene/gltf/mesh_data/corner_reader.h"
+#include "scene/gltf/mesh_data/instance_reader.h"
+#include "scene/gltf/mesh_data/node_walk.h"
+#include "scene/gltf/mesh_data/used_vertices.h"
+#include "scene/gltf/mesh_data/vertex_cache.h"
+#include "scene/gltf/mesh_data/vertex_source.h"
+
+namespace voxdag::gltf {
+
+struct ReaderOptions {
+  bool skip_invalid = false;  // drops invalid triangles
+  unsigned readers = 1;       // that share the memory
+};
+
+class TriangleReader {
+ public:
+  using Visitor = std::function<void(std::span<const RealTriangle>)>;
+  using SurfaceVisitor = std::function<void(std::span<const SurfaceTriangle>)>;
+
+  TriangleReader(const Document& document, BufferReader& buffers, const ReaderOptions& options,
+                 MemoryBudget& budget, const CancelToken& cancel);
+
+  // Visits the triangles of [first, first + count), numbered in the order in which the document
+  // declares them, in batches of up to 1024, in world space or snapped to the grid if there is one.
+  // Throws Error{kInvalidInput} naming node, mesh and primitive of an invalid triangle, unless
+  // `skip_invalid` drops it.
+  void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
+  // Visits the same triangles in world space with what they look like, in such batches.
+  void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
+  // The bounds of those triangles in world space.
+  WorldBounds read_bounds(uint64_t first, uint64_t count);
+
+ private:
+  static constexpr size_t kBatchTriangles = 1024;
+  static constexpr uint64_t kWindowTriangles = 4096;
+
+  // All instances of a primitive that a node draws.
+  struct Draw {
+    uint64_t first = 0, end = 0;  // numbers of its triangles
+    int node = -1;
+    size_t primitive = 0;
+    uint64_t triangles = 0;  // of one instance
+    bool is_bound = false;
+  };
+  // What the readers are set up for.
+  struct Binding {
+    int mesh = -1;
+    size_t primitive = 0;
+    const double* weights = nullptr;
+    int skin = -1;
+    bool operator==(const Binding&) const = default;
+  };
+
+  template <class Body>
+  void for_each_instance(uint64_t first, uint64_t count, const Grid* grid, const Body& body);
+  void seek(uint64_t triangle);
+  void next_draw();
+  void bind_draw();
+  void bind(const Node& node, size_t primitive_index);
+  template <class Body>
+  void for_each_window(uint64_t first, uint64_t count, const Body& body);
+  bool add_bounds_of_window(WorldBounds& bounds);
+  const uint32_t* load_corners(uint64_t first, uint64_t count);
+  void place_all(const uint32_t* corners, uint64_t count);
+  void place_all_surfaces(const uint32_t* corners, uint64_t count);
+  bool place(const uint32_t* corners, RealTriangle& out);
+  void flush();
+  void report(const uint32_t* corners) const;
+
+  const Document& document_;
+  BufferReader& buffers_;
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+  const bool skip_invalid_;
+  const unsigned readers_;
+
+  std::optional<NodeWalk> walk_;
+  Draw draw_;
+  std::optional<InstanceReader> instances_;  // of the draw
+  uint64_t instance_ = 0;
+  Transform world_;  // of the instance
+
+  Binding binding_;
+  PageBuffer<Transform> joints_;  // of the skin in binding_; empty without one
+  std::optional<VertexSource> vertices_;
+  std::optional<CornerReader> corner_reader_;
+  VertexCache cache_;
+  uint64_t vertex_count_ = 0;
+
+  std::vector<uint32_t>
+      corners_;  // vertex indices of window_count_ triangles from window_first_ on
+  uint64_t window_first_ = 0, window_count_ = 0;
+  UsedVertices used_vertices_;  // by the window's triangles; empty if not known
+
+  PageBuffer<RealTriangle> batch_;
+  size_t batch_size_ = 0;
+  const Visitor* visit_ = nullptr;
+
+  std::optional<LookReader> looks_;       // once surfaces were asked for
+  PageBuffer<SurfaceTriangle> surfaces_;  // a batch of them
+};
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,52 @@
+#include "scene/ply/ascii_text.h"
+
+namespace voxdag::ply {
+namespace {
+
+// Longer words are no numbers that a program writes. They are cut, and so refused.
+constexpr size_t kMaxWord = 64;
+
+bool is_line_end(char c) { return c == '\n' || c == '\r'; }
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
+
+}  // namespace
+
+void AsciiText::begin_row(uint64_t offset) {
+  offset_ = offset;
+  skip_blanks();
+  while (is_line_end(peek())) {
+    ++offset_;
+    skip_blanks();
+  }
+}
+
+std::string_view AsciiText::word() {
+  skip_blanks();
+  const auto bytes = window_.at(offset_, kMaxWord);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()),
+                              std::min(bytes.size(), kMaxWord));
+  size_t size = 0;
+  while (size < text.size() && !is_blank(text[size]) && !is_line_end(text[size])) ++size;
+  offset_ += size;
+  return text.substr(0, size);
+}
+
+bool AsciiText::end_row() {
+  skip_blanks();
+  const char c = peek();
+  if (c != '\0' && !is_line_end(c)) return false;
+  if (offset_ < window_.file().size()) ++offset_;
+  return true;
+}
+
+// 0 at the end of the file; a byte that is 0 is no blank and no digit, so it is refused as a word.
+char AsciiText::peek() {
+  const auto bytes = window_.at(offset_, 1);
+  return bytes.empty() ? '\0' : static_cast<char>(bytes[0]);
+}
+
+void AsciiText::skip_blanks() {
+  while (is_blank(peek())) ++offset_;
+}
+
+}  // namespace voxdag::ply

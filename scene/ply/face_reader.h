@@ -1,0 +1,35 @@
+// The vertex indices of the triangles of a PLY file, three each, from any triangle on. Not
+// thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "scene/ply/mesh.h"
+
+namespace voxdag::ply {
+
+class FaceReader {
+ public:
+  // The mesh must outlive the reader.
+  FaceReader(const Mesh& mesh, MemoryBudget& budget)
+      : mesh_(mesh), rows_(mesh.open_faces(budget)) {}
+
+  // Reads the indices of triangles [first, first + count), which exist. They may be out of range.
+  void read(uint64_t first, uint64_t count, uint32_t* corners);
+  // The face that a triangle is of.
+  uint64_t face_of(uint64_t triangle);
+
+ private:
+  void seek(uint64_t triangle);
+  void load();
+  uint64_t face_end() const;
+
+  const Mesh& mesh_;
+  const std::unique_ptr<Rows> rows_;
+  // The face that rows_ has read last, its first triangle, and the offset behind it.
+  bool is_loaded_ = false;
+  uint64_t face_ = 0, first_triangle_ = 0, next_offset_ = 0;
+};
+
+}  // namespace voxdag::ply

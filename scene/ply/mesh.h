@@ -1,0 +1,78 @@
+// An open PLY file: where its vertices and faces lie, and how many triangles these make. A polygon
+// of n corners is the fan of n - 2 triangles around its first one; fewer than three make none.
+//
+// Rows of faces, and those of ASCII files, have no fixed size. So the file is passed over once to
+// find every 1024th of them, which any other is found from.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scene/gltf/growing_charge.h"
+#include "scene/ply/header.h"
+#include "scene/ply/rows.h"
+
+namespace voxdag::ply {
+
+class Mesh {
+ public:
+  static constexpr uint64_t kBlockRows = 1024;
+
+  // Throws Error{kInvalidInput} naming line, element or row of what is broken, Error{kLimit} for
+  // 2^32 vertices and more, Error{kOutOfMemory}.
+  Mesh(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
+
+  // The first row of so many, and the number of its first triangle.
+  struct FaceBlock {
+    uint64_t offset;
+    uint64_t first_triangle;
+  };
+
+  const ReadableFile& file() const { return *file_; }
+  Format format() const { return header_.format; }
+  uint64_t triangles() const { return triangles_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+  const Element& vertex_element() const { return header_.elements[vertex_]; }
+  uint64_t vertices_begin() const { return vertices_begin_; }
+  // Of an ASCII file: the offset of every kBlockRows-th vertex.
+  const std::deque<uint64_t>& vertex_blocks() const { return vertex_blocks_; }
+  // The properties x, y and z.
+  const std::array<size_t, 3>& axes() const { return axes_; }
+  // The properties red, green, blue and, if it is there, alpha; none if one of the three lacks.
+  const std::vector<size_t>& colors() const { return colors_; }
+
+  const std::deque<FaceBlock>& face_blocks() const { return face_blocks_; }
+  std::unique_ptr<Rows> open_faces(MemoryBudget& budget) const;
+
+ private:
+  void find_vertex_properties();
+  void find_face_list();
+  uint64_t pass_over(size_t element, uint64_t begin, MemoryBudget& budget,
+                     const CancelToken& cancel);
+  uint64_t end_of_fixed_rows(const Element& element, uint64_t begin) const;
+  void note_row(size_t element, uint64_t offset);
+  [[noreturn]] void refuse(const std::string& what) const;
+
+  const std::unique_ptr<ReadableFile> file_;
+  Header header_;
+  size_t vertex_, face_;  // elements; one that is not there is the number of elements
+  std::array<size_t, 3> axes_{};
+  std::vector<size_t> colors_;
+  size_t face_list_ = Rows::kNoList;
+  uint64_t vertices_begin_ = 0;
+  uint64_t triangles_ = 0;
+  std::deque<uint64_t> vertex_blocks_;
+  std::deque<FaceBlock> face_blocks_;
+  gltf::GrowingCharge charge_;  // for the blocks
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace voxdag::ply

@@ -1,0 +1,63 @@
+// Numbers as PLY files store them: bytes in either order, or text.
+#pragma once
+
+#include <bit>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "scene/ply/header.h"
+
+namespace voxdag::ply {
+
+// An index that no vertex has: what a negative one, or one beyond 32 bits, is read as.
+constexpr uint32_t kNoVertex = std::numeric_limits<uint32_t>::max();
+
+// Calls body(T{}) with the C++ type of that name.
+template <class Body>
+decltype(auto) with_type(Type type, const Body& body) {
+  switch (type) {
+    case Type::kInt8:
+      return body(int8_t{});
+    case Type::kUint8:
+      return body(uint8_t{});
+    case Type::kInt16:
+      return body(int16_t{});
+    case Type::kUint16:
+      return body(uint16_t{});
+    case Type::kInt32:
+      return body(int32_t{});
+    case Type::kUint32:
+      return body(uint32_t{});
+    case Type::kFloat:
+      return body(float{});
+    default:
+      return body(double{});
+  }
+}
+
+// The number at `bytes`, which need not be aligned.
+template <class T>
+T load(const std::byte* bytes, bool is_big_endian) {
+  std::byte own[sizeof(T)];
+  std::memcpy(own, bytes, sizeof(T));
+  if (is_big_endian != (std::endian::native == std::endian::big))
+    for (size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(own[i], own[sizeof(T) - 1 - i]);
+  return std::bit_cast<T>(own);
+}
+
+template <std::integral T>
+uint32_t as_index(T value) {
+  return value < 0 ? kNoVertex : static_cast<uint32_t>(value);
+}
+
+// All of the text as an integer, or as a number of a real type: to the nearest, "nan" and "inf" as
+// such, too large ones as infinity.
+std::optional<int64_t> parse_integer(std::string_view text);
+std::optional<double> parse_real(std::string_view text, Type type);
+
+}  // namespace voxdag::ply

@@ -1,0 +1,48 @@
+// The rows of one element of a PLY file, passed over one by one, with the entries of one of its
+// lists: the corners of faces. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/io/file_system.h"
+#include "scene/ply/header.h"
+
+namespace voxdag::ply {
+
+class Rows {
+ public:
+  // Of the wanted list.
+  static constexpr uint64_t kMaxEntries = 32768;
+  static constexpr size_t kNoList = ~size_t{0};
+
+  virtual ~Rows() = default;
+  // Reads the row at `offset` and returns the offset behind it. Throws Error{kInvalidInput} naming
+  // element and row if the row is broken or ends past the file, Error{kLimit} for more than
+  // kMaxEntries.
+  virtual uint64_t read(uint64_t row, uint64_t offset) = 0;
+  // The wanted list of the row that was read last; kNoVertex for an index that is negative.
+  std::span<const uint32_t> entries() const { return {entries_.data(), entry_count_}; }
+
+ protected:
+  Rows(const ReadableFile& file, const Element& element, MemoryBudget& budget);
+  // The number of entries, checked.
+  uint64_t checked_count(int64_t count, uint64_t row, bool is_wanted) const;
+  [[noreturn]] void refuse(uint64_t row, const std::string& what) const;
+
+  const ReadableFile& file_;
+  const Element& element_;
+  PageBuffer<uint32_t> entries_;
+  size_t entry_count_ = 0;
+};
+
+// `list` is the index of the wanted property, of integers, or kNoList. File and element must
+// outlive the rows.
+std::unique_ptr<Rows> open_rows(const ReadableFile& file, Format format, const Element& element,
+                                size_t list, MemoryBudget& budget);
+
+}  // namespace voxdag::ply

@@ -1,0 +1,51 @@
+// The colors of the vertices of a PLY file, within a fixed amount of memory: blocks of consecutive
+// vertices, each cached in the one slot that its number maps to. Not thread-safe.
+//
+// Red, green and blue are sRGB and become linear light; alpha is linear. Reals are from 0 to 1,
+// ushort numbers from 0 to 65535 and all other integers from 0 to 255; what lies outside is
+// clamped.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/page_buffer.h"
+#include "scene/ply/vertex_reader.h"
+
+namespace voxdag::ply {
+
+class VertexColors {
+ public:
+  using Color = std::array<uint16_t, 4>;
+
+  // All of `readers` together take at most one part in so many of what the budget has free.
+  static constexpr uint64_t kShareOfFree = 8;
+
+  // The mesh has colors; it and the budget must outlive this.
+  VertexColors(const Mesh& mesh, unsigned readers, MemoryBudget& budget);
+
+  // In the terms of SurfaceCorner, valid until the next call; the vertex exists.
+  const Color& at(uint32_t vertex) {
+    const uint64_t block = vertex / kBlockVertices;
+    const size_t slot = static_cast<size_t>(block) & slot_mask_;
+    if (block_in_slot_[slot] != block) load(block, slot);
+    return colors_[slot * kBlockVertices + vertex % kBlockVertices];
+  }
+
+ private:
+  static constexpr uint64_t kBlockVertices = 1024;
+  static constexpr uint64_t kNoBlock = ~uint64_t{0};
+
+  void load(uint64_t block, size_t slot);
+
+  VertexReader reader_;
+  std::vector<double> full_;  // what each channel calls 1
+  std::array<uint16_t, 256> light_of_byte_;
+  std::vector<double> numbers_;
+  PageBuffer<Color> colors_;
+  std::vector<uint64_t> block_in_slot_;
+  size_t slot_mask_ = 0;
+};
+
+}  // namespace voxdag::ply

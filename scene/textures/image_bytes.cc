@@ -1,0 +1,115 @@
+#include "scene/textures/image_bytes.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+namespace {
+
+constexpr size_t kImageWindow = 64 << 10;
+
+int base64_value(char c) {
+  if (c >= 'A' && c <= 'Z') return c - 'A';
+  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+  if (c >= '0' && c <= '9') return c - '0' + 52;
+  return c == '+' ? 62 : c == '/' ? 63 : -1;
+}
+
+}  // namespace
+
+ImageBytes::ImageBytes(FileSystem& files, const ImageSource& source)
+    : file_(files.open_read(source.file.path)),
+      at_(source.offset),
+      end_(source.offset + source.size),
+      is_base64_(source.is_base64),
+      left_(source.bytes) {
+  const FileIdentity &before = source.file.identity, now = file_->identity();
+  if (before.inode != now.inode || before.bytes != now.bytes ||
+      before.modified_ns != now.modified_ns)
+    throw Error(ErrorCode::kInvalidInput, source.name +
+                                              ": its file changed while the scene was read: "
+                                              "expected files that stay as they are");
+  end_ = std::min(end_, file_->size());
+  if (!is_base64_) {
+    at_ = std::min(end_, at_ + std::min(source.skip, end_ - std::min(at_, end_)));
+    return;
+  }
+  char c = source.is_data_uri ? '\0' : ',';
+  while (c != ',' && next_character(c)) {
+  }
+  for (uint64_t i = 0; i < source.skip; ++i) {
+    if (group_at_ == group_size_ && !next_group()) break;
+    ++group_at_;
+  }
+}
+
+size_t ImageBytes::read(std::span<std::byte> out) {
+  out = out.first(static_cast<size_t>(std::min<uint64_t>(out.size(), left_)));
+  size_t size = 0;
+  if (!is_base64_) {
+    size = read_plain(out);
+  } else {
+    while (size < out.size() && (group_at_ < group_size_ || next_group()))
+      out[size++] = static_cast<std::byte>(group_[group_at_++]);
+  }
+  left_ -= size;
+  return size;
+}
+
+size_t ImageBytes::read_plain(std::span<std::byte> out) {
+  const auto size =
+      static_cast<size_t>(std::min<uint64_t>(out.size(), at_ < end_ ? end_ - at_ : 0));
+  if (size > 0) file_->read_at(at_, out.first(size));
+  at_ += size;
+  return size;
+}
+
+// The next one of the text, its JSON escapes \/ and \u00xx undone.
+bool ImageBytes::next_character(char& c) {
+  const auto raw = [&](char& out) {
+    if (window_at_ == window_.size()) {
+      window_.resize(kImageWindow);
+      window_.resize(read_plain(window_));
+      window_at_ = 0;
+      if (window_.empty()) return false;
+    }
+    out = static_cast<char>(window_[window_at_++]);
+    return true;
+  };
+  if (!raw(c)) return false;
+  if (c != '\\') return true;
+  if (!raw(c)) return false;
+  if (c != 'u') return true;
+  int code = 0;
+  for (int i = 0; i < 4; ++i) {
+    char digit = 0;
+    if (!raw(digit)) return false;
+    const bool is_digit = digit >= '0' && digit <= '9';
+    code = code * 16 + (is_digit ? digit - '0' : ((digit | 0x20) - 'a' + 10));
+  }
+  c = code > 0 && code < 128 ? static_cast<char>(code) : '!';
+  return true;
+}
+
+bool ImageBytes::next_group() {
+  group_at_ = group_size_ = 0;
+  uint32_t bits = 0;
+  int count = 0;
+  char c = 0;
+  while (!has_ended_ && count < 4 && next_character(c)) {
+    has_ended_ = c == '=' || c == '"';
+    if (has_ended_) break;
+    const int value = base64_value(c);
+    if (value < 0) throw BrokenImage{"has a data: URI that is not base64"};
+    bits = bits << 6 | static_cast<uint32_t>(value);
+    ++count;
+  }
+  if (count < 2) return false;
+  bits <<= 6 * (4 - count);
+  for (int i = 0; i < 3; ++i) group_[i] = static_cast<uint8_t>(bits >> (16 - 8 * i));
+  group_size_ = static_cast<size_t>(count) - 1;
+  return true;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,37 @@
+// The bytes of an image where it lies in a scene file or a file of its own, read by windows.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/image/image_reader.h"
+#include "core/io/file_system.h"
+#include "scene/triangle_source.h"
+
+namespace voxdag {
+
+class ImageBytes : public EncodedBytes {
+ public:
+  // Throws Error{kInvalidInput} if the file is another one than when the scene was opened.
+  ImageBytes(FileSystem& files, const ImageSource& source);
+  // Throws BrokenImage for what is not base64.
+  size_t read(std::span<std::byte> out) override;
+
+ private:
+  size_t read_plain(std::span<std::byte> out);
+  bool next_character(char& c);
+  bool next_group();
+
+  const std::unique_ptr<ReadableFile> file_;
+  uint64_t at_, end_;  // in the file
+  const bool is_base64_;
+  uint64_t left_;  // bytes of the image
+  std::vector<std::byte> window_;
+  size_t window_at_ = 0;
+  bool has_ended_ = false;
+  uint8_t group_[3] = {};
+  size_t group_at_ = 0, group_size_ = 0;
+};
+
+}  // namespace voxdag

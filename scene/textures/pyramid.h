@@ -1,0 +1,45 @@
+// Builds the levels of one image from its rows. A texel of a coarser level is the mean of what it
+// covers of the level below: two texels along an even edge; along one of 2n + 1, three of them,
+// weighted (n - i), n and (i + 1) of 2n + 1, so that no column or row is dropped.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "scene/textures/texture_reader.h"
+
+namespace voxdag {
+
+// The levels of an image of this size, the first page of the first being `first_page`.
+std::vector<TextureLevel> pyramid_levels(uint32_t width, uint32_t height, uint64_t first_page);
+
+class PyramidBuilder {
+ public:
+  // Writes whole pages, from `first` on.
+  using WritePages = std::function<void(uint64_t first, std::span<const uint64_t> texels)>;
+
+  PyramidBuilder(std::span<const TextureLevel> levels, MemoryBudget& budget, WritePages write);
+  // Rows of the finest level, from the top; all of them must be added.
+  void add_row(std::span<const uint64_t> row) { add_row(0, row); }
+
+ private:
+  struct Stage {
+    PageBuffer<uint64_t> tiles;  // a row of them
+    PageBuffer<uint64_t> rows;   // the last three of the level, for the next one
+    uint32_t added = 0;
+  };
+
+  void add_row(size_t level, std::span<const uint64_t> row);
+  void reduce(size_t level, uint32_t y);
+
+  const std::span<const TextureLevel> levels_;
+  std::vector<Stage> stages_;
+  PageBuffer<uint64_t> reduced_;
+  const WritePages write_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,256 @@
+#include "scene/textures/texture_set.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <iterator>
+#include <mutex>
+#include <shared_mutex>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/format/checksum.h"
+#include "core/image/image_reader.h"
+#include "scene/gltf/messages.h"
+#include "scene/textures/image_bytes.h"
+#include "scene/textures/linear_light.h"
+#include "scene/textures/pyramid.h"
+
+namespace voxdag {
+namespace {
+
+// Rows of pixels to texels: linear light by a table, alpha as it is.
+class TexelRow {
+ public:
+  TexelRow(const ImageReader& image, MemoryBudget& budget)
+      : is_wide_(image.bits() == 16),
+        bytes_(budget, size_t{image.width()} * (is_wide_ ? 8 : 4), "a row of an image"),
+        texels_(budget, image.width(), "a row of an image"),
+        table_(is_wide_ ? 65536 : 256) {
+    for (size_t i = 0; i < table_.size(); ++i)
+      table_[i] = linear_light(static_cast<double>(i) / static_cast<double>(table_.size() - 1));
+  }
+  std::span<const uint64_t> read(ImageReader& image) {
+    image.read_row({bytes_.data(), bytes_.size()});
+    for (size_t x = 0; x < texels_.size(); ++x)
+      texels_[x] = linear(channel(4 * x)) | linear(channel(4 * x + 1)) << 16 |
+                   linear(channel(4 * x + 2)) << 32 |
+                   (is_wide_ ? channel(4 * x + 3) : channel(4 * x + 3) * 257) << 48;
+    return {texels_.data(), texels_.size()};
+  }
+
+ private:
+  uint64_t linear(uint64_t value) const { return table_[value]; }
+  uint64_t channel(size_t i) const {
+    if (!is_wide_) return static_cast<uint8_t>(bytes_[i]);
+    uint16_t value;
+    std::memcpy(&value, &bytes_[2 * i], sizeof value);
+    return value;
+  }
+
+  const bool is_wide_;
+  PageBuffer<std::byte> bytes_;
+  PageBuffer<uint64_t> texels_;
+  std::vector<uint16_t> table_;
+};
+
+std::string user_of(const SceneMaterials& materials, uint32_t image) {
+  const auto found = std::ranges::find(materials.materials, image, &Material::image);
+  if (found == materials.materials.end()) return "";
+  const auto index = static_cast<int>(found - materials.materials.begin());
+  return ", the base color of material " + gltf::numbered(index, found->name) + ",";
+}
+
+// What fails for want of memory while others decode may fit alone.
+template <class Body>
+void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
+  try {
+    const std::shared_lock lock(mutex);
+    return body();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kOutOfMemory) throw;
+  }
+  const std::unique_lock lock(mutex);
+  try {
+    body();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kOutOfMemory) throw;
+    throw Error(error.code(), name + ": " + error.message() + "; give it more memory");
+  }
+}
+
+std::string image_digest(FileSystem& files, const ImageSource& source, const CancelToken& cancel) {
+  if (!source.problem.empty()) return "unreadable";
+  Sha256 hash;
+  std::vector<std::byte> buffer(64 << 10);
+  try {
+    ImageBytes bytes(files, source);
+    while (const size_t size = bytes.read(buffer)) {
+      cancel.check();
+      hash.add(std::span(buffer).first(size));
+    }
+  } catch (const BrokenImage&) {
+    hash.add(buffer);  // a decoder may not need what is broken
+    return "broken " + hash.finish();
+  }
+  return hash.finish();
+}
+
+// Throws Error{kInvalidInput} unless the file of an image is still the one that the scene found.
+void expect_unchanged(FileSystem& files, const ImageSource& source) {
+  try {
+    const ImageBytes opened(files, source);
+  } catch (const BrokenImage& broken) {
+    throw Error(ErrorCode::kInvalidInput,
+                source.name + " changed during the build: " + broken.message);
+  }
+}
+
+}  // namespace
+
+uint32_t page_checksum(std::span<const uint64_t> texels) {
+  return static_cast<uint32_t>(checksum64(std::as_bytes(texels)));
+}
+
+TextureReader::TextureReader(const TextureLayout& layout, const ReadableFile& file,
+                             const uint32_t* checksums, uint64_t memory_bytes, MemoryBudget& budget)
+    : layout_(layout), file_(&file), checksums_(checksums) {
+  constexpr uint64_t kSlotBytes = kPageBytes + sizeof(uint64_t);
+  const uint64_t slots = std::bit_floor(std::max<uint64_t>(memory_bytes / kSlotBytes, 2));
+  slot_shift_ = 64 - std::countr_zero(slots);
+  slots_charge_ = MemoryCharge(budget, slots * sizeof(uint64_t), "pages of textures");
+  page_in_slot_.assign(static_cast<size_t>(slots), kNoPage);
+  cache_ =
+      PageBuffer<uint64_t>(budget, static_cast<size_t>(slots) * kPageTexels, "pages of textures");
+}
+
+void TextureReader::load(uint64_t page, size_t slot) {
+  page_in_slot_[slot] = kNoPage;
+  const std::span texels(&cache_[slot * kPageTexels], kPageTexels);
+  file_->read_at(page * kPageBytes, std::as_writable_bytes(texels));
+  if (page_checksum(texels) != checksums_[page])
+    throw Error(ErrorCode::kCorrupt,
+                file_->path() + " at offset " + std::to_string(page * kPageBytes) +
+                    " fails its checksum: expected the texels that were written there; run the "
+                    "same command again");
+  page_in_slot_[slot] = page;
+}
+
+std::unique_ptr<TextureReader> TextureSet::open(uint64_t memory_bytes) {
+  if (!file_) return std::make_unique<TextureReader>(layout_, memory_.data());
+  return std::make_unique<TextureReader>(layout_, *file_, checksums_.data(), memory_bytes, budget_);
+}
+
+uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
+                       const CancelToken& cancel) {
+  uint64_t pages = 0;
+  for (const ImageSource& source : materials.images) {
+    cancel.check();
+    if (!source.problem.empty()) continue;
+    try {
+      ImageBytes bytes(files, source);
+      const auto image = open_image(bytes, budget, ImageUse::kSize);
+      for (const TextureLevel& level : pyramid_levels(image->width(), image->height(), 0))
+        pages += level.pages();
+    } catch (const BrokenImage&) {
+      // It has no pyramid.
+    }
+  }
+  return pages * kPageBytes;
+}
+
+std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
+                                       unsigned threads, const CancelToken& cancel) {
+  std::vector<std::string> digests(images.size());
+  parallel_for(threads, images.size(),
+               [&](unsigned, size_t i) { digests[i] = image_digest(files, images[i], cancel); });
+  return digests;
+}
+
+std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMaterials& materials,
+                                                const std::string& path, unsigned threads,
+                                                MemoryBudget& budget, Progress& progress,
+                                                const CancelToken& cancel) {
+  std::unique_ptr<TextureSet> set(new TextureSet(budget));
+  const size_t count = materials.images.size();
+  std::vector<std::string> problems(count);
+  std::vector<std::vector<TextureLevel>> levels(count);
+  std::shared_mutex mutex;
+  // Calls body(image reader) unless the image is broken.
+  const auto with_image = [&](size_t i, const auto& body) {
+    const ImageSource& source = materials.images[i];
+    const std::string user = user_of(materials, static_cast<uint32_t>(i));
+    if (user.empty()) return;
+    problems[i] = source.problem;
+    if (!problems[i].empty()) return;
+    const std::string name = source.name + user;
+    alone_if_necessary(mutex, name, [&] {
+      try {
+        ImageBytes bytes(files, source);
+        body(*open_image(bytes, budget));
+      } catch (const BrokenImage& broken) {
+        problems[i] = broken.message;
+      }
+    });
+  };
+  parallel_for(threads, count, [&](unsigned, size_t i) {
+    cancel.check();
+    with_image(i, [&](const ImageReader& image) {
+      levels[i] = pyramid_levels(image.width(), image.height(), 0);
+    });
+  });
+  for (auto& image : levels)
+    for (TextureLevel& level : image) {
+      level.first_page = set->pages_;
+      set->pages_ += level.pages();
+    }
+  std::unique_ptr<WritableFile> writer;
+  if (set->bytes() <= budget.available() / 2) {
+    set->memory_ =
+        PageBuffer<uint64_t>(budget, static_cast<size_t>(set->pages_) * kPageTexels, "textures");
+  } else {
+    writer = files.create(path);
+    set->file_ = files.open_read(path);
+    set->checksums_ =
+        PageBuffer<uint32_t>(budget, static_cast<size_t>(set->pages_), "checksums of textures");
+    files.remove(path);  // without a name it is gone when the process ends, however it ends
+  }
+  const PyramidBuilder::WritePages write = [&](uint64_t first, std::span<const uint64_t> texels) {
+    cancel.check();
+    if (!writer) {
+      std::ranges::copy(texels, &set->memory_[static_cast<size_t>(first) * kPageTexels]);
+      return;
+    }
+    for (size_t at = 0; at < texels.size(); at += kPageTexels)
+      set->checksums_[static_cast<size_t>(first) + at / kPageTexels] =
+          page_checksum(texels.subspan(at, kPageTexels));
+    writer->write_at(first * kPageBytes, std::as_bytes(texels));
+  };
+  parallel_for(threads, count, [&](unsigned, size_t i) {
+    if (problems[i].empty())
+      with_image(i, [&](ImageReader& image) {
+        TexelRow row(image, budget);
+        PyramidBuilder builder(levels[i], budget, write);
+        for (uint32_t y = 0; y < image.height(); ++y) builder.add_row(row.read(image));
+        expect_unchanged(files, materials.images[i]);
+      });
+    if (!user_of(materials, static_cast<uint32_t>(i)).empty()) progress.advance(1);
+  });
+  for (const std::string& warning : materials.warnings) progress.warn(warning);
+  set->materials_ = materials.materials;
+  for (size_t i = 0; i < count; ++i) {
+    set->layout_.first_level.push_back(static_cast<uint32_t>(set->layout_.levels.size()));
+    std::ranges::copy(levels[i], std::back_inserter(set->layout_.levels));
+    if (problems[i].empty()) continue;
+    const auto image = static_cast<uint32_t>(i);
+    progress.warn(materials.images[i].name + user_of(materials, image) + " " + problems[i] +
+                  "; its base color factor is used alone");
+    for (Material& material : set->materials_)
+      if (material.image == image) material.image = Material::kNoImage;
+  }
+  set->layout_.first_level.push_back(static_cast<uint32_t>(set->layout_.levels.size()));
+  return set;
+}
+
+}  // namespace voxdag
