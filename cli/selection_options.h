@@ -8,7 +8,7 @@
 
 #include "cli/command.h"
 #include "core/format/global/voxdag_reader.h"
-#include "query/selection.h"
+#include "query/dag/selection.h"
 
 namespace voxdag::cli {
 

@@ -11,8 +11,8 @@
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
-#include "query/color_sample.h"
-#include "query/surface_sample.h"
+#include "query/verify/color_sample.h"
+#include "query/verify/surface_sample.h"
 
 namespace voxdag::cli {
 namespace {

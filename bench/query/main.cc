@@ -14,7 +14,7 @@
 
 #include "bench/query/others.h"
 #include "bench/query/query_set.h"
-#include "query/ray_caster.h"
+#include "query/rays/ray_caster.h"
 
 namespace voxdag::query {
 namespace {

@@ -25,7 +25,7 @@
 #include "bench/tiles/needed_tiles.h"
 #include "core/base/clock.h"
 #include "core/format/global/open_global.h"
-#include "query/ray_caster.h"
+#include "query/rays/ray_caster.h"
 #include "query/render/views.h"
 
 namespace voxdag::query {

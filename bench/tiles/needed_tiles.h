@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/render/camera.h"
 #include "query/tiles/tile.h"
 

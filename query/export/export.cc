@@ -5,8 +5,8 @@
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
+#include "query/dag/output_lock.h"
 #include "query/export/export_job.h"
-#include "query/output_lock.h"
 
 namespace voxdag::query {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/base/progress.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
-#include "query/selection.h"
+#include "query/dag/selection.h"
 
 namespace voxdag::query {
 

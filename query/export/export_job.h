@@ -10,7 +10,7 @@
 
 #include "core/base/memory_budget.h"
 #include "core/format/global/watched_file.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/export/export.h"
 #include "query/export/export_file.h"
 #include "query/export/level_cells.h"

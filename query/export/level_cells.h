@@ -10,7 +10,7 @@
 #include "core/base/page_buffer.h"
 #include "core/format/global/node_index.h"
 #include "core/format/global/voxdag_reader.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 
 namespace voxdag::query {
 

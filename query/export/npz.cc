@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "core/format/bytes.h"
+#include "core/image/npy_header.h"
 #include "query/export/color/cell_values.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/lookup/bricks.h"
-#include "query/npy_header.h"
 
 namespace voxdag::query {
 namespace {

@@ -19,10 +19,10 @@
 #include "core/format/global/watched_file.h"
 #include "core/geometry/octree_descent.h"
 #include "merge/merge.h"
+#include "query/dag/output_lock.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_builder.h"
 #include "query/extract/part_colors.h"
-#include "query/output_lock.h"
 
 namespace voxdag::query {
 namespace {

@@ -18,7 +18,7 @@
 #include "core/geometry/cube.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
-#include "query/selection.h"
+#include "query/dag/selection.h"
 
 namespace voxdag::query {
 

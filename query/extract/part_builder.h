@@ -20,9 +20,9 @@
 #include "core/base/cancel_token.h"
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
+#include "query/dag/selection.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_level.h"
-#include "query/selection.h"
 
 namespace voxdag::query {
 

@@ -16,7 +16,7 @@
 #include "core/format/color/value_section_writer.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/extract/node_reader.h"
 
 namespace voxdag::query {

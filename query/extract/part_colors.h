@@ -32,7 +32,7 @@
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/cube.h"
 #include "core/io/file_system.h"
-#include "query/selection.h"
+#include "query/dag/selection.h"
 
 namespace voxdag::query {
 

@@ -8,9 +8,9 @@
 #include <type_traits>
 
 #include "core/dag/brick.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
+#include "query/dag/selection.h"
 #include "query/lookup/position.h"
-#include "query/selection.h"
 
 namespace voxdag::query {
 

@@ -10,9 +10,9 @@
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
 #include "core/format/global/open_global.h"
-#include "query/double_pair.h"
 #include "query/lookup/points.h"
-#include "query/ray_packet.h"
+#include "query/rays/double_pair.h"
+#include "query/rays/ray_packet.h"
 
 namespace voxdag::query {
 namespace {

@@ -26,13 +26,13 @@
 
 #include "core/base/memory_budget.h"
 #include "core/format/global/voxdag_reader.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
+#include "query/dag/selection.h"
 #include "query/lookup/bricks.h"
 #include "query/lookup/nearest.h"
 #include "query/lookup/node_counts.h"
 #include "query/lookup/position.h"
 #include "query/lookup/top_cells.h"
-#include "query/selection.h"
 
 namespace voxdag::query {
 

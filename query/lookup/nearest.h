@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/lookup/position.h"
 
 namespace voxdag::query {

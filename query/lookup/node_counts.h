@@ -9,9 +9,9 @@
 #include "core/base/page_buffer.h"
 #include "core/format/global/node_index.h"
 #include "core/format/global/voxdag_reader.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
+#include "query/dag/selection.h"
 #include "query/lookup/position.h"
-#include "query/selection.h"
 
 namespace voxdag::query {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/lookup/position.h"
 #include "query/lookup/top_cells.h"
 

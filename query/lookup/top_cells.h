@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/dag/brick.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 
 namespace voxdag::query {
 

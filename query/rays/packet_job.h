@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "query/dag_view.h"
-#include "query/ray_caster.h"
+#include "query/dag/dag_view.h"
+#include "query/rays/ray_caster.h"
 
 namespace voxdag::query {
 

@@ -1,6 +1,6 @@
 #include <cstring>
 
-#include "query/double_pair.h"
+#include "query/rays/double_pair.h"
 #include "query/rays/packet_walk.h"
 
 namespace voxdag::query {

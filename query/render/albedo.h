@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "core/format/global/voxdag_reader.h"
+#include "query/dag/vec.h"
 #include "query/render/surface.h"
-#include "query/vec.h"
 
 namespace voxdag::query {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "query/vec.h"
+#include "query/dag/vec.h"
 
 namespace voxdag::query {
 

@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "core/base/parallel_for.h"
-#include "query/npy_header.h"
-#include "query/ray_caster.h"
+#include "core/image/npy_header.h"
+#include "query/rays/ray_caster.h"
 #include "query/render/surface.h"
 
 namespace voxdag::query {

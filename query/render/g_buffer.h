@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "query/vec.h"
+#include "query/dag/vec.h"
 
 namespace voxdag::query {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "query/ray_caster.h"
+#include "query/rays/ray_caster.h"
 #include "query/render/camera.h"
 #include "query/render/sampling.h"
 #include "query/render/surface.h"

@@ -3,7 +3,7 @@
 
 #include "core/base/cancel_token.h"
 #include "core/base/progress.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/render/camera.h"
 #include "query/render/g_buffer.h"
 #include "query/render/picture.h"

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "core/base/integers.h"
-#include "query/vec.h"
+#include "query/dag/vec.h"
 
 namespace voxdag::query {
 

@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "query/dag_view.h"
-#include "query/ray_caster.h"
-#include "query/vec.h"
+#include "query/dag/dag_view.h"
+#include "query/dag/vec.h"
+#include "query/rays/ray_caster.h"
 
 namespace voxdag::query {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.h"
-#include "query/ray_caster.h"
+#include "query/rays/ray_caster.h"
 #include "query/render/sampling.h"
 
 namespace voxdag::query {

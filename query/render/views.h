@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/cancel_token.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/render/camera.h"
 
 namespace voxdag::query {

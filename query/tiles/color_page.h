@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/format/global/voxdag_reader.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/tiles/node_checks.h"
 
 namespace voxdag::query {

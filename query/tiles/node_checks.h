@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/format/global/checked_blocks.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 
 namespace voxdag::query {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/format/global/checked_blocks.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 
 namespace voxdag::query {
 

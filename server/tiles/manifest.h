@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/render/views.h"
 
 namespace voxdag::server {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/geometry/cube.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 
 namespace voxdag::server {
 

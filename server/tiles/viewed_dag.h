@@ -9,7 +9,7 @@
 #include "core/base/cancel_token.h"
 #include "core/format/global/checked_blocks.h"
 #include "core/format/global/voxdag_reader.h"
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 
 namespace voxdag::server {
 

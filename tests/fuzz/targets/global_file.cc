@@ -17,7 +17,7 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
 #include "core/format/global/voxdag_reader.h"
-#include "query/ray_caster.h"
+#include "query/rays/ray_caster.h"
 #include "query/render/views.h"
 #include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"

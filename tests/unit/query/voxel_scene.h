@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "query/dag_view.h"
+#include "query/dag/dag_view.h"
 #include "query/render/camera.h"
 
 // An octree, without shared nodes, of a set of voxels.

@@ -7,7 +7,7 @@
 
 #include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
-#include "query/color_sample.h"
+#include "query/verify/color_sample.h"
 #include "scheduler/plan/estimate.h"
 #include "scheduler/run_build.h"
 #include "tests/unit/base/error_of.h"

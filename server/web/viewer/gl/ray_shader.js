@@ -1,4 +1,4 @@
-// GLSL: the pool's words, and the descent of one ray through the DAG (as query/ray_walk.h does it).
+// GLSL: the pool's words, and the descent of one ray through the DAG (as query/rays/ray_walk.h does it).
 //
 // The ray is mirrored so that its direction is positive on every axis. Voxel coordinates are integers.
 // A ray begins at an integer voxel plus a fraction, and the parameter of a plane is computed from the

@@ -1,0 +1,22 @@
+// The header of numpy's .npy files, version 1.0 (numpy.lib.format). Stateless; thread-safe.
+#pragma once
+
+#include <string>
+
+namespace voxdag {
+
+// Returns the header of an array in C order, padded so that its numbers begin at a multiple of 64
+// bytes. `type` is like
+// "<f4", `shape` like "(7, 3)". At most 64 KiB.
+inline std::string npy_header(const std::string& type, const std::string& shape) {
+  std::string text = "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + shape + ", }";
+  // Ten bytes come before this text, and an end of line after it.
+  text.append(63 - (10 + text.size()) % 64, ' ');
+  text += '\n';
+  std::string header("\x93NUMPY\x01\x00", 8);
+  header += static_cast<char>(text.size() & 255);
+  header += static_cast<char>(text.size() >> 8);
+  return header + text;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,21 @@
+#include "query/dag/dag_view.h"
+
+#include <string>
+
+#include "core/base/error.h"
+
+namespace voxdag::query {
+
+DagView::DagView(const voxdag_reader::File& file) : grid_levels_(file.grid_levels()) {
+  if (file.empty()) return;
+  for (uint32_t l = 0; l <= file.brick_level(); ++l)
+    levels_.push_back({{file.level(l).words, static_cast<size_t>(file.level(l).word_count)},
+                       file.level(l).pointer_bits == 64});
+}
+
+void DagView::corrupt(uint32_t level, uint64_t offset) const {
+  throw Error(ErrorCode::kCorrupt, "level " + std::to_string(level) + ", word " +
+                                       std::to_string(offset) + ": expected a node here");
+}
+
+}  // namespace voxdag::query

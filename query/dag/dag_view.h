@@ -1,0 +1,161 @@
+// A finished DAG as cells of any size, from the whole grid down to a voxel. It reads the words of
+// each level in place, as the global file holds them. What lies below a cell is its `content`:
+//     a node        its word offset in its level
+//     a brick       its 64-bit mask                  (edge 4)
+//     half a brick  the 8 bits of its 2x2x2 voxels   (edge 2)
+//     a voxel       1                                (edge 1)
+// Offsets come from a file that may be damaged: each is checked, a bad one is Error{kCorrupt}.
+// Immutable; any number of threads may read.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/popcount8.h"
+#include "core/dag/brick.h"
+#include "core/format/global/voxdag_reader.h"
+#include "query/dag/vec.h"
+
+namespace voxdag::query {
+
+class DagView {
+ public:
+  // The words of a level, and whether pointers into it take two words, low half first.
+  struct Level {
+    std::span<const uint32_t> words;
+    bool wide = false;
+  };
+  // Levels 0 to L - 2, or nothing for a scene without voxels.
+  explicit DagView(std::vector<Level> levels, uint32_t grid_levels)
+      : grid_levels_(grid_levels), levels_(std::move(levels)) {}
+  explicit DagView(const voxdag_reader::File& file);
+
+  bool empty() const { return levels_.empty(); }
+  uint32_t grid_levels() const { return grid_levels_; }
+  // The level at `depth`, 0 to L - 2, as it lies in memory; the DAG must not be empty.
+  const Level& level(uint32_t depth) const { return levels_[depth]; }
+  // Begins to load the node or brick at this word offset, if there is such a word.
+  void prefetch(uint32_t depth, uint64_t offset) const {
+    const std::span<const uint32_t> words = levels_[depth].words;
+    if (offset < words.size()) __builtin_prefetch(words.data() + offset);
+  }
+  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
+  int64_t resolution() const { return int64_t{1} << grid_levels_; }
+
+  // The occupied children of a cell larger than a voxel, at `depth` below the root (0 to L - 1).
+  class Children {
+   public:
+    uint32_t mask = 0;
+    bool has(int index) const { return mask >> index & 1; }
+
+   private:
+    friend class DagView;
+    voxdag_reader::Node node_;
+    uint64_t bits_ = 0;
+  };
+  // The mask of the brick at this word offset.
+  uint64_t brick(uint64_t offset) const;
+  uint64_t root() const { return grid_levels_ == kBrickLevels ? brick(0) : 0; }
+  Children children(uint32_t depth, uint64_t content) const;
+  // Those of a node at a depth above the bricks.
+  Children children_of_node(uint32_t depth, uint64_t offset) const;
+  // The word offset of child `index`, which must be occupied, of a node.
+  uint64_t offset(const Children& children, int index) const {
+    return children.node_.child(kPopcount8[children.mask & ((1u << index) - 1)]);
+  }
+  // The content of child `index`, which must be occupied, of a parent at `depth`.
+  uint64_t content(uint32_t depth, const Children& children, int index) const {
+    if (depth + kBrickLevels < grid_levels_) {
+      const uint64_t offset = this->offset(children, index);
+      return depth + kBrickLevels + 1 == grid_levels_ ? brick(offset) : offset;
+    }
+    return depth + kBrickLevels == grid_levels_ ? children.bits_ >> (8 * index) & 255 : 1;
+  }
+
+  struct Cell {
+    uint32_t depth = 0;  // below the root
+    double edge = 0;     // R / 2^depth voxels
+    Vec low;             // its low corner, in voxels
+  };
+  // Calls `visit` with each occupied cell at `depth` (0 to L), and on the way down
+  // `select` with each cell above: it returns the mask of the children to descend into. The DAG
+  // must not be empty.
+  template <class Select, class Visit>
+  void for_each_cell(uint32_t depth, const Select& select, const Visit& visit) const {
+    visit_below({0, static_cast<double>(resolution()), {}}, root(), depth, select, visit);
+  }
+
+ private:
+  template <class Select, class Visit>
+  void visit_below(const Cell& cell, uint64_t content, uint32_t depth, const Select& select,
+                   const Visit& visit) const;
+
+  uint32_t grid_levels_;
+  std::vector<Level> levels_;
+};
+
+inline DagView::Children DagView::children_of_node(uint32_t depth, uint64_t offset) const {
+  Children c;
+  const std::span<const uint32_t> words = levels_[depth].words;
+  const bool wide = levels_[depth + 1].wide;
+  if (offset >= words.size()) corrupt(depth, offset);
+  c.mask = words[offset];
+  c.node_ = {c.mask, words.data() + offset + 1, wide};
+  if (c.mask == 0 || c.mask > 255 || uint64_t{kPopcount8[c.mask]} << wide >= words.size() - offset)
+    corrupt(depth, offset);
+  return c;
+}
+
+inline DagView::Children DagView::children(uint32_t depth, uint64_t content) const {
+  if (depth + kBrickLevels < grid_levels_) return children_of_node(depth, content);
+  Children c;
+  if (depth + kBrickLevels > grid_levels_) {
+    c.mask = static_cast<uint32_t>(content);
+    return c;
+  }
+  c.bits_ = content;
+  c.mask = octants(content);
+  return c;
+}
+
+// The cells two levels below a node or brick at `depth`, as the mask of a brick.
+inline uint64_t brick_of_cells(const DagView& dag, uint32_t depth,
+                               const DagView::Children& children) {
+  uint64_t mask = 0;
+  for (int i = 0; i < 8; ++i)
+    if (children.has(i))
+      mask |= uint64_t{dag.children(depth + 1, dag.content(depth, children, i)).mask} << (8 * i);
+  return mask;
+}
+inline uint64_t brick_of_cells(const DagView& dag, uint32_t depth, uint64_t content) {
+  if (depth + kBrickLevels == dag.grid_levels()) return content;
+  return brick_of_cells(dag, depth, dag.children(depth, content));
+}
+
+template <class Select, class Visit>
+void DagView::visit_below(const Cell& cell, uint64_t content, uint32_t depth, const Select& select,
+                          const Visit& visit) const {
+  if (cell.depth == depth) return visit(cell);
+  const uint32_t selected = select(cell);
+  if (selected == 0) return;
+  const Children c = children(cell.depth, content);
+  const double half = cell.edge / 2;
+  // Opposite corners first: a search for a bounding box can then skip most of the rest.
+  for (const int i : {0, 7, 3, 4, 5, 2, 1, 6}) {
+    if (!(selected & c.mask & 1u << i)) continue;
+    const Vec low = cell.low + Vec{{i & 4 ? half : 0, i & 2 ? half : 0, i & 1 ? half : 0}};
+    visit_below({cell.depth + 1, half, low}, this->content(cell.depth, c, i), depth, select, visit);
+  }
+}
+
+inline uint64_t DagView::brick(uint64_t offset) const {
+  const std::span<const uint32_t> words = levels_[grid_levels_ - kBrickLevels].words;
+  const uint32_t level = grid_levels_ - kBrickLevels;
+  if (words.size() < 2 || offset > words.size() - 2) corrupt(level, offset);
+  const uint64_t mask = words[offset] | static_cast<uint64_t>(words[offset + 1]) << 32;
+  if (mask == 0) corrupt(level, offset);
+  return mask;
+}
+
+}  // namespace voxdag::query

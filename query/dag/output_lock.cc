@@ -1,0 +1,97 @@
+#include "query/dag/output_lock.h"
+
+#include <array>
+
+#include "core/base/error.h"
+#include "core/io/overwrite.h"
+
+namespace voxdag::query {
+namespace {
+
+std::string lock_path(const std::string& output) { return output + ".lock"; }
+std::string partial_path(const std::string& output) { return output + ".partial"; }
+
+void refuse_impossible(FileSystem& files, const Outputs& outputs) {
+  for (const std::string& path : outputs.paths) {
+    if (path.empty() || path.ends_with('/'))
+      throw Error(ErrorCode::kInvalidInput,
+                  "the output '" + path + "': expected the name of a file to write");
+    const std::array<std::string, 2> names = {path, partial_path(path)};
+    refuse_inputs(files, names, {&outputs.input, 1});
+    const std::string folder = parent_directory(path);
+    if (!files.exists(folder))
+      throw Error(ErrorCode::kNotFound,
+                  path + ": there is no folder " + folder + ": expected an existing one");
+  }
+}
+
+void refuse_replacing(FileSystem& files, const Outputs& outputs) {
+  if (outputs.replace) return;
+  for (const std::string& path : outputs.paths)
+    for (const std::string& name : {path, partial_path(path)}) {
+      const auto file = open_if_there(files, name);
+      if (file && file->size() > 0)
+        throw Error(ErrorCode::kInvalidInput,
+                    name + " exists: expected another output, or --force to replace it");
+    }
+}
+
+// Whether the last one that wrote there was killed. A file of that name that is not empty is
+// somebody else's, and what a build leaves is of use to it.
+bool is_left_behind(FileSystem& files, const std::string& output) {
+  const auto lock = open_if_there(files, lock_path(output));
+  return lock && lock->size() == 0 && !files.exists(output + ".work");
+}
+
+void remove_leftovers(FileSystem& files, const Outputs& outputs) {
+  for (const std::string& path : outputs.paths)
+    if (open_if_there(files, partial_path(path))) files.remove(partial_path(path));
+  // Folders of make_temporary_folder().
+  constexpr size_t kRandomCharacters = 6;
+  const std::string& output = outputs.paths[0];
+  const std::string folder = parent_directory(output);
+  const std::string prefix = output.substr(output.rfind('/') + 1) + ".work-";
+  for (const DirectoryEntry& entry : files.list(folder))
+    if (entry.is_directory && entry.name.starts_with(prefix) &&
+        entry.name.size() == prefix.size() + kRandomCharacters)
+      remove_tree(files, folder + "/" + entry.name);
+}
+
+// What is refused is refused before the lock is made: a process that is killed in between must not
+// leave one next to a temporary file that is not its own.
+const std::string& checked_output(FileSystem& files, const Outputs& outputs) {
+  refuse_impossible(files, outputs);
+  if (!is_left_behind(files, outputs.paths[0])) refuse_replacing(files, outputs);
+  return outputs.paths[0];
+}
+
+}  // namespace
+
+OutputLock::OutputLock(FileSystem& files, const std::string& output)
+    : files_(files),
+      path_(lock_path(output)),
+      is_left_behind_(is_left_behind(files, output)),
+      lock_(files.try_lock(path_)) {
+  if (!lock_)
+    throw Error(ErrorCode::kIo,
+                output +
+                    " is being written by another process: expected another file (-o), or to wait "
+                    "for that process");
+}
+
+OutputLock::OutputLock(FileSystem& files, const Outputs& outputs)
+    : OutputLock(files, checked_output(files, outputs)) {
+  if (is_left_behind_) remove_leftovers(files, outputs);
+  refuse_replacing(files, outputs);
+}
+
+OutputLock::~OutputLock() {
+  try {
+    // A file of that name that is not empty is somebody else's.
+    if (files_.open_read(path_)->size() == 0) files_.remove(path_);
+  } catch (const Error&) {
+    // An empty file is left, which the next one that writes there locks again.
+  }
+}
+
+}  // namespace voxdag::query

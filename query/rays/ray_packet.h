@@ -1,0 +1,43 @@
+// Casts up to 64 rays at once, with the results of RayCaster to the last bit. Rays that lie close
+// to each other, as those of neighboring pixels do, visit the same large cells: a packet visits
+// each once, for all rays that may cross it. See query/rays/packet_walk.h.
+//
+// About 30 KiB; not thread-safe, each thread has its own.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "query/dag/dag_view.h"
+#include "query/rays/packet_job.h"
+#include "query/rays/ray_caster.h"
+
+namespace voxdag::query {
+
+// The fastest walk that this machine can run; all have the same results.
+WalkPacket fastest_packet_walk();
+
+class RayPacket {
+ public:
+  static constexpr size_t kRays = kPacketRays;
+
+  // Cells no larger than `stop_size` voxels are hit as a whole. The DAG must outlive the packet.
+  RayPacket(const DagView& dag, double stop_size, double t_min, double t_max,
+            WalkPacket walk = fastest_packet_walk());
+
+  // Casts up to kRays rays; bit i of the result says whether ray i has a hit, hits[i]. Throws
+  // Error{kCorrupt} for a damaged DAG.
+  uint64_t cast(std::span<const Ray> rays, Hit* hits);
+
+ private:
+  void load(std::span<const Ray> rays);
+  void cast_packet(uint64_t rays);
+
+  const DagView& dag_;
+  const double stop_size_;
+  const WalkPacket walk_;
+  int mirrors_[kRays];
+  PacketJob job_;
+};
+
+}  // namespace voxdag::query

@@ -1,0 +1,84 @@
+// The descent of one ray through the DAG.
+//
+// The ray is mirrored so that its direction is positive on every axis. A cell that it enters at `t`
+// is left at the least of `out`, the parameters of its three far planes. A plane's parameter is
+// computed from its integer coordinate by one formula, so a descent can begin in any cell that the
+// ray enters, and finds what it would find from the root on.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "query/dag/dag_view.h"
+#include "query/dag/vec.h"
+#include "query/rays/ray_caster.h"
+
+namespace voxdag::query {
+
+// A ray whose direction is positive on every axis.
+struct MirroredRay {
+  // A smaller component of a direction counts as 0; its inverse could be infinite.
+  static constexpr double kMinComponent = 1e-18;
+
+  static double component(double d) { return std::max(std::fabs(d), kMinComponent); }
+
+  MirroredRay() = default;
+  MirroredRay(const Ray& ray, double resolution) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double d = ray.direction[axis];
+      inverse[axis] = 1 / component(d);
+      origin[axis] = ray.origin[axis];
+      if (d >= 0) continue;
+      mirror |= 4 >> axis;
+      origin[axis] = resolution - ray.origin[axis];
+    }
+  }
+  double time_of(int axis, double plane) const { return (plane - origin[axis]) * inverse[axis]; }
+
+  double origin[3], inverse[3];
+  int mirror = 0;  // child index bits of the axes on which the ray was mirrored
+};
+
+class RayWalk {
+ public:
+  // A walk of more than `max_steps` nodes and bricks ends there, as if nothing came behind.
+  RayWalk(const DagView& dag, const MirroredRay& ray, const Cone& cone, double t_max,
+          uint64_t max_steps = ~uint64_t{0})
+      : dag_(dag), ray_(ray), cone_(cone), t_max_(t_max), steps_left_(max_steps) {}
+
+  uint64_t steps_left() const { return steps_left_; }
+
+  // From the root on. The DAG must not be empty. Throws Error{kCorrupt} for a damaged one.
+  bool run(double t_min, Hit& hit);
+  // From a cell on that has children: `low` is its low corner, mirrored as the ray is, `size` its
+  // edge, both in voxels; `axis` that of the face by which the ray enters it at `t`, -1 if it
+  // begins there.
+  bool run_below(uint32_t depth, const double (&low)[3], double size, uint64_t content,
+                 const double (&out)[3], double t, int axis, Hit& hit) {
+    axis_ = axis;
+    if (size <= cone_.at(t)) return report(depth, low, size, t, hit);
+    return enter(depth, low, size / 2, content, out, t, hit);
+  }
+
+ private:
+  // Visits the children of a cell, the nearest first: those that has(index) calls
+  // enter_child(index, low corner, out, t), which returns whether there is a hit.
+  template <class Has, class EnterChild>
+  bool cross(const double (&low)[3], double half, const double (&out)[3], double t, const Has& has,
+             const EnterChild& enter_child);
+  bool enter(uint32_t depth, const double (&low)[3], double half, uint64_t content,
+             const double (&out)[3], double t, Hit& hit);
+  bool enter_brick(uint64_t mask, const double (&low)[3], const double (&out)[3], double t,
+                   Hit& hit);
+  bool report(uint32_t depth, const double (&low)[3], double size, double t, Hit& hit) const;
+
+  const DagView& dag_;
+  const MirroredRay ray_;
+  const Cone cone_;
+  double t_max_;
+  uint64_t steps_left_;
+  int axis_ = -1;
+};
+
+}  // namespace voxdag::query

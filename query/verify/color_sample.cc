@@ -1,0 +1,217 @@
+#include "query/verify/color_sample.h"
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/color/blocks/value_region.h"
+#include "core/color/rule/bake_region.h"
+#include "core/format/global/diff_colors.h"
+#include "core/format/global/open_global.h"
+#include "core/geometry/morton.h"
+#include "scene/textures/texture_set.h"
+
+namespace voxdag::query {
+namespace {
+
+using voxdag_reader::ColorRegion;
+using voxdag_reader::ColorSection;
+using voxdag_reader::ColorTier;
+
+struct SampledRegion {
+  // By attribute, in the order of their numbers; those that the file has.
+  std::array<ColorRegion, std::size(kAllAttributes)> stored;
+  Cube cube;
+  std::vector<FixedSurface> surfaces;  // that may touch it
+};
+
+size_t index_of(Attribute attribute) { return static_cast<size_t>(attribute) - 1; }
+
+std::vector<SampledRegion> draw_regions(const voxdag_reader::File& file, const ColorGrid& grid,
+                                        uint64_t seed) {
+  const std::vector<Attribute> attributes = attributes_of(file).list();
+  const ColorTier& tier = section_of(file, attributes.front()).tier(0);
+  std::vector<uint64_t> drawn;
+  std::mt19937_64 random(seed);
+  for (size_t i = 0; i < kSampleRegions; ++i)
+    drawn.push_back(tier.region_count <= kSampleRegions ? i % tier.region_count
+                                                        : random() % tier.region_count);
+  std::sort(drawn.begin(), drawn.end());
+  drawn.erase(std::unique(drawn.begin(), drawn.end()), drawn.end());
+  std::vector<SampledRegion> regions(drawn.size());
+  for (size_t i = 0; i < drawn.size(); ++i) {
+    SampledRegion& region = regions[i];
+    // All have the same regions.
+    for (const Attribute attribute : attributes)
+      if (!ColorSection::region(section_of(file, attribute).tier(0), drawn[i],
+                                region.stored[index_of(attribute)]))
+        file.broken_colors("a region is damaged");
+    region.cube.level = grid.region_level();
+    auto& [x, y, z] = region.cube.position;
+    morton_decode(region.stored[index_of(attributes.front())].morton, x, y, z);
+  }
+  return regions;
+}
+
+bool may_touch(const CellBox& box, const Cube& cube) {
+  for (int a = 0; a < 3; ++a) {
+    const int64_t at = cube.position[a];
+    if (at < box.low[a] || at > box.high[a]) return false;
+  }
+  return true;
+}
+
+void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& grid,
+                   std::vector<SampledRegion>& regions, MemoryCharge& charge, Progress& progress,
+                   const CancelToken& cancel) {
+  uint64_t bytes = 0;
+  progress.begin_stage("surfaces", scene.declared_triangles(), "triangles");
+  const auto add = [&](const SurfaceTriangle& triangle) {
+    FixedSurface surface;
+    if (snap_triangle(snap, triangle.position, surface.position) != SnapResult::kInside) return;
+    surface.corners = triangle.corners;
+    surface.material = triangle.material;
+    surface.is_flipped = triangle.is_flipped;
+    const CellBox box(surface.position, grid.levels, grid.region_level());
+    for (SampledRegion& region : regions) {
+      if (!may_touch(box, region.cube)) continue;
+      bytes += 2 * sizeof(FixedSurface);  // vectors grow by halves
+      if (bytes > charge.bytes() && !charge.try_resize(2 * bytes))
+        throw Error(ErrorCode::kOutOfMemory,
+                    "not enough memory for the triangles of the sampled color regions");
+      region.surfaces.push_back(surface);
+    }
+  };
+  scene.open(1)->read_surfaces(0, scene.declared_triangles(), [&](auto batch) {
+    cancel.check();
+    for (const SurfaceTriangle& triangle : batch) add(triangle);
+    progress.advance(batch.size());
+  });
+  progress.end_stage();
+}
+
+bool is_same(const EncodedRegion& baked, const ColorRegion& stored) {
+  const auto* bytes = reinterpret_cast<const unsigned char*>(baked.blocks.data());
+  return std::equal(baked.counts.begin(), baked.counts.end(), stored.counts) &&
+         std::equal(bytes, bytes + baked.blocks.size(), stored.blocks);
+}
+
+// Of the colors of the finest cells, which are equally many.
+ColorDiff difference(const EncodedRegion& baked, const ColorRegion& stored) {
+  ColorRegion again;
+  again.blocks = reinterpret_cast<const unsigned char*>(baked.blocks.data());
+  ColorDiff diff;
+  for (uint32_t i = 0; i < stored.counts[0]; ++i) diff.add(again.color(i), stored.color(i));
+  return diff;
+}
+
+std::string place_of(const Cube& cube, const ColorGrid& grid) {
+  const uint32_t down = grid.color_levels - cube.level;
+  std::string text;
+  for (const uint32_t at : cube.position)
+    text += (text.empty() ? "" : " ") + std::to_string(uint64_t{at} << down);
+  return text;
+}
+
+// Compares what a region becomes now with what the file has of one attribute.
+class RegionComparison {
+ public:
+  RegionComparison(const voxdag_reader::File& file, const ColorGrid& grid,
+                   const std::vector<ColoredCell>& cells, const std::vector<CellValues>& values)
+      : file_(file), grid_(grid), cells_(cells), values_(values) {}
+
+  // Whether all bytes are the same. Throws Error{kCorrupt} if they are not near each other.
+  bool compare(const SampledRegion& region, Attribute attribute) const {
+    const ColorRegion& stored = region.stored[index_of(attribute)];
+    const EncodedRegion baked = encode(region.cube, attribute, stored);
+    if (is_same(baked, stored)) return true;
+    const bool is_near = attribute == Attribute::kColor && baked.counts[0] == stored.counts[0] &&
+                         difference(baked, stored).psnr() >= kMinSamplePsnr;
+    if (!is_near)
+      throw Error(ErrorCode::kCorrupt,
+                  file_.path() + ": the " + name_of(attribute) + "s of the region at color cell " +
+                      place_of(region.cube, grid_) + " are not those of the scene (" +
+                      std::to_string(stored.counts[0]) + " cells in the file, " +
+                      std::to_string(baked.counts[0]) + " in the scene)");
+    return false;
+  }
+
+ private:
+  EncodedRegion encode(const Cube& cube, Attribute attribute, const ColorRegion& stored) const {
+    if (cells_.empty()) return {};
+    const uint32_t levels = grid_.color_levels - cube.level;
+    if (attribute == Attribute::kColor) return encode_region(levels, stored.morton, cells_);
+    std::vector<ValuedCell> valued;
+    append_values(attribute, cells_, values_, 0, valued);
+    return encode_values(attribute, stored.block_bytes / 32, levels, stored.morton, valued);
+  }
+
+  const voxdag_reader::File& file_;
+  const ColorGrid grid_;
+  const std::vector<ColoredCell>& cells_;
+  const std::vector<CellValues>& values_;
+};
+
+ColorGrid sampled_grid(const voxdag_reader::File& file) {
+  const std::vector<Attribute> attributes = attributes_of(file).list();
+  const uint32_t levels = section_of(file, attributes.front()).color_levels();
+  for (const Attribute attribute : attributes)
+    if (section_of(file, attribute).color_levels() != levels ||
+        section_of(file, attribute).tier(0).region_count !=
+            section_of(file, attributes.front()).tier(0).region_count)
+      file.broken_colors("attributes are those of different cells");
+  return {file.grid_levels(), levels};
+}
+
+}  // namespace
+
+ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& snap,
+                                         FileSystem& files, TriangleSource& scene, uint64_t seed,
+                                         const std::string& scratch_path, unsigned threads,
+                                         MemoryBudget& budget, Progress& progress,
+                                         const CancelToken& cancel) {
+  const AttributeSet attributes = attributes_of(file);
+  const ColorGrid grid = sampled_grid(file);
+  std::vector<SampledRegion> regions = draw_regions(file, grid, seed);
+  MemoryCharge charge(budget, 0, "surfaces of sampled regions");
+  find_surfaces(scene, snap, grid, regions, charge, progress, cancel);
+  SceneMaterials materials = scene.materials();
+  materials.name_unlisted();
+  if (attributes.material && file.material_names() != materials.names)
+    throw Error(ErrorCode::kCorrupt, file.path() + ": its materials are not those of the scene");
+  if (!attributes.shows_images()) materials.drop_images();
+  progress.begin_stage("images", materials.images.size(), "images");
+  const auto textures =
+      TextureSet::prepare(files, materials, scratch_path, threads, budget, progress, cancel);
+  progress.end_stage();
+
+  const MemoryCharge baking(budget, RegionBaker<TextureReader>::kMaxBytes, "baking colors");
+  MemoryCharge values_charge(budget, 0, "normals and materials of a sampled region");
+  const auto reader = textures->open(budget.available() / 2);
+  RegionBaker<TextureReader> baker(grid, textures->materials(), *reader, attributes);
+  std::vector<ColoredCell> cells;
+  std::vector<CellValues> values;
+  ColorSampleReport report;
+  const RegionComparison comparison(file, grid, cells, values);
+  for (const SampledRegion& region : regions) {
+    cancel.check();
+    baker.begin(region.cube);
+    baker.add(region.surfaces, [&](uint64_t bytes) {
+      if (bytes > values_charge.bytes() && !values_charge.try_resize(bytes))
+        throw Error(ErrorCode::kOutOfMemory,
+                    "not enough memory for the normals and materials of a sampled region");
+      return true;
+    });
+    baker.finish(cells, values);
+    bool is_equal = true;
+    for (const Attribute attribute : attributes.list())
+      is_equal &= comparison.compare(region, attribute);
+    ++report.regions;
+    report.equal += is_equal;
+    report.cells += cells.size();
+  }
+  return report;
+}
+
+}  // namespace voxdag::query

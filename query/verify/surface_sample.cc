@@ -1,0 +1,205 @@
+#include "query/verify/surface_sample.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <queue>
+#include <random>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/geometry/overlap.h"
+
+namespace voxdag::query {
+namespace {
+
+class Random {
+ public:
+  explicit Random(uint64_t seed) : engine_(seed) {}
+  // From (0, 1).
+  double unit() { return (static_cast<double>(engine_() >> 11) + 0.5) * 0x1p-53; }
+  // From [0, count).
+  int64_t below(int64_t count) {
+    return static_cast<int64_t>(engine_() % static_cast<uint64_t>(count));
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+// Samples `size` items of a stream without replacement, with probability proportional to weight:
+// those with the smallest keys, which are exponentially distributed with the weight as rate
+// (Efraimidis & Spirakis 2006).
+class Reservoir {
+ public:
+  explicit Reservoir(size_t size) : size_(size) {}
+  void offer(const FixedTriangle& triangle, double weight, Random& random) {
+    if (!(weight > 0)) return;
+    const double key = -std::log(random.unit()) / weight;
+    if (sampled_.size() == size_ && key >= sampled_.top().key) return;
+    if (sampled_.size() == size_) sampled_.pop();
+    sampled_.push({key, triangle});
+  }
+  void drain_to(std::vector<FixedTriangle>& out) {
+    for (; !sampled_.empty(); sampled_.pop()) out.push_back(sampled_.top().triangle);
+  }
+
+ private:
+  struct Item {
+    double key;
+    FixedTriangle triangle;
+    bool operator<(const Item& o) const { return key < o.key; }
+  };
+  const size_t size_;
+  std::priority_queue<Item> sampled_;
+};
+
+double area(const FixedTriangle& t) {
+  double e[2][3], sum = 0;
+  for (int i = 0; i < 2; ++i)
+    for (int a = 0; a < 3; ++a) e[i][a] = static_cast<double>(t.v[i + 1][a] - t.v[0][a]);
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    const double n = e[0][b] * e[1][c] - e[0][c] * e[1][b];
+    sum += n * n;
+  }
+  return std::sqrt(sum);
+}
+
+// Calls `visit` with every triangle that may touch the grid.
+template <class Visit>
+void for_each_snapped(TriangleSource& scene, const Grid& grid, Progress& progress,
+                      const CancelToken& cancel, Visit visit) {
+  scene.for_each_batch([&](std::span<const WorldTriangle> batch) {
+    cancel.check();
+    progress.advance(batch.size());
+    for (const WorldTriangle& world : batch) {
+      FixedTriangle triangle;
+      const SnapResult result = snap_triangle(grid, world, triangle);
+      if (result == SnapResult::kTooFar)
+        throw Error(
+            ErrorCode::kLimit,
+            "a triangle of the scene reaches 2^40 units beyond the file's grid; builds refuse "
+            "such a scene");
+      if (result == SnapResult::kInside) visit(triangle);
+    }
+  });
+}
+
+std::vector<FixedTriangle> draw_triangles(TriangleSource& scene, const Grid& grid, Random& random,
+                                          Progress& progress, const CancelToken& cancel) {
+  Reservoir uniform(kSampleBoxes / 2), by_area(kSampleBoxes / 2);
+  for_each_snapped(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
+    uniform.offer(triangle, 1.0, random);
+    by_area.offer(triangle, area(triangle), random);
+  });
+  std::vector<FixedTriangle> drawn;
+  uniform.drain_to(drawn);
+  by_area.drain_to(drawn);
+  return drawn;
+}
+
+// The voxel under a random point of the triangle; none if the point is outside the grid.
+std::optional<std::array<int64_t, 3>> random_voxel(const FixedTriangle& t, const Grid& grid,
+                                                   Random& random) {
+  double p = random.unit(), q = random.unit();
+  if (p + q > 1) p = 1 - p, q = 1 - q;
+  std::array<int64_t, 3> voxel;
+  for (int a = 0; a < 3; ++a) {
+    const double u = static_cast<double>(t.v[0][a]) +
+                     p * static_cast<double>(t.v[1][a] - t.v[0][a]) +
+                     q * static_cast<double>(t.v[2][a] - t.v[0][a]);
+    voxel[a] = static_cast<int64_t>(std::floor(u / static_cast<double>(kUnitsPerVoxel)));
+    if (voxel[a] < 0 || voxel[a] >= grid.resolution()) return std::nullopt;
+  }
+  return voxel;
+}
+
+SampleBox box_around(const std::array<int64_t, 3>& voxel, const Grid& grid, Random& random) {
+  SampleBox box;
+  box.edge = std::min(kBoxEdge, grid.resolution());
+  for (int a = 0; a < 3; ++a)
+    box.low[a] =
+        std::clamp<int64_t>(voxel[a] - random.below(box.edge), 0, grid.resolution() - box.edge);
+  return box;
+}
+
+// Sets the voxels of the box that the triangle touches.
+void mark(const FixedTriangle& t, SampleBox& box) {
+  int64_t first[3], last[3], corner[3];
+  for (int a = 0; a < 3; ++a) {
+    first[a] = std::max(box.low[a], t.low(a) >> kUnitBits);
+    last[a] = std::min(box.low[a] + box.edge - 1, t.high(a) >> kUnitBits);
+    if (first[a] > last[a]) return;
+    corner[a] = box.low[a] * kUnitsPerVoxel;
+  }
+  if (!triangle_touches_cube(t, corner, box.edge * kUnitsPerVoxel)) return;
+  for (int64_t x = first[0]; x <= last[0]; ++x)
+    for (int64_t y = first[1]; y <= last[1]; ++y)
+      for (int64_t z = first[2]; z <= last[2]; ++z) {
+        const int64_t low[3] = {x * kUnitsPerVoxel, y * kUnitsPerVoxel, z * kUnitsPerVoxel};
+        const size_t bit = static_cast<size_t>(
+            ((x - box.low[0]) * kBoxEdge + (y - box.low[1])) * kBoxEdge + (z - box.low[2]));
+        if (!box.set[bit] && triangle_touches_cube(t, low, kUnitsPerVoxel)) box.set.set(bit);
+      }
+}
+
+}  // namespace
+
+std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
+                                      Progress& progress, const CancelToken& cancel) {
+  progress.begin_stage("sample", 2 * scene.declared_triangles(), "triangles");
+  Random random(seed);
+  std::vector<SampleBox> boxes;
+  for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, progress, cancel)) {
+    constexpr int kTries = 16;  // a triangle may lie mostly outside the grid
+    std::optional<std::array<int64_t, 3>> voxel;
+    for (int i = 0; i < kTries && !voxel; ++i) voxel = random_voxel(triangle, grid, random);
+    if (voxel) boxes.push_back(box_around(*voxel, grid, random));
+  }
+  std::sort(boxes.begin(), boxes.end(),
+            [](const SampleBox& a, const SampleBox& b) { return a.low[0] < b.low[0]; });
+  for_each_snapped(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
+    const int64_t first = (triangle.low(0) >> kUnitBits) - kBoxEdge + 1;
+    const int64_t last = triangle.high(0) >> kUnitBits;
+    auto box = std::lower_bound(boxes.begin(), boxes.end(), first,
+                                [](const SampleBox& b, int64_t x) { return b.low[0] < x; });
+    for (; box != boxes.end() && box->low[0] <= last; ++box) mark(triangle, *box);
+  });
+  progress.end_stage();
+  return boxes;
+}
+
+SampleReport compare_with_sample(const voxdag_reader::File& file,
+                                 const std::vector<SampleBox>& boxes) {
+  SampleReport report;
+  report.boxes = boxes.size();
+  uint64_t wrong = 0;
+  std::string first_wrong;
+  for (const SampleBox& box : boxes)
+    for (int64_t x = 0; x < box.edge; ++x)
+      for (int64_t y = 0; y < box.edge; ++y)
+        for (int64_t z = 0; z < box.edge; ++z) {
+          const bool expected = box.set[static_cast<size_t>((x * kBoxEdge + y) * kBoxEdge + z)];
+          ++report.voxels;
+          report.set += expected;
+          if (file.voxel(box.low[0] + x, box.low[1] + y, box.low[2] + z) == expected) continue;
+          if (wrong++ == 0)
+            first_wrong = std::to_string(box.low[0] + x) + " " + std::to_string(box.low[1] + y) +
+                          " " + std::to_string(box.low[2] + z) +
+                          (expected ? " is not set, but a triangle touches it"
+                                    : " is set, but no triangle touches it");
+        }
+  if (wrong > 0)
+    throw Error(ErrorCode::kCorrupt, file.path() + ": " + std::to_string(wrong) + " of " +
+                                         std::to_string(report.voxels) +
+                                         " sampled voxels differ from the scene; voxel " +
+                                         first_wrong);
+  if (boxes.empty() && file.voxels() != 0)
+    throw Error(ErrorCode::kCorrupt, file.path() + ": the file has " +
+                                         std::to_string(file.voxels()) +
+                                         " voxels, but the scene has no triangle in its grid");
+  return report;
+}
+
+}  // namespace voxdag::query

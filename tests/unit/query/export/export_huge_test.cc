@@ -1,0 +1,197 @@
+// Limits that only files of many gigabytes reach: the input is a header that says so, and a hole in
+// place of the levels' words, or the limit is a smaller one. Each is refused at one more than the
+// limit and not at the limit, with a level that fits, and leaves nothing behind.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+
+#include "core/format/checksum.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/open_global.h"
+#include "query/export/export_job.h"
+#include "tests/unit/format/test_files.h"
+#include "tests/unit/query/export/corners.h"
+
+namespace voxdag::query {
+namespace {
+
+using namespace global_layout;
+
+// Writes a file with these levels, the root's first, whose words are zeros that take no disk.
+void write_hole(const std::string& path, const std::vector<GlobalLevel>& levels) {
+  ByteString page(kPageBytes, '\0');
+  const auto put = [&](size_t at, auto value) { std::memcpy(&page[at], &value, sizeof(value)); };
+  put(kMagicAt, kMagic);
+  put(kVersionAt, kVersion);
+  put(kHeaderBytesAt, static_cast<uint32_t>(kPageBytes));
+  put(kGridLevelsAt, static_cast<uint32_t>(levels.size() + 1));
+  put(kHashBitsAt, uint32_t{64});
+  put(kNodeOrderAt, kNodeOrderByHash);
+  put(kChecksumBlockBytesAt, static_cast<uint32_t>(kChecksumBlockBytes));
+  put(kEdgeAt, 1.0);
+  put(kVoxelsAt, uint64_t{1000});
+  uint64_t end = kPageBytes, nodes = 0;
+  for (size_t level = levels.size(); level-- > 0;) {
+    const size_t entry = kLevelsAt + level * kLevelEntryBytes;
+    put(entry, end);
+    put(entry + 8, levels[level].nodes);
+    put(entry + 16, levels[level].words);
+    nodes += levels[level].nodes;
+    end = round_up_to_page(end + 4 * levels[level].words);
+  }
+  put(kDagNodesAt, nodes);
+  const uint64_t blocks = (end - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
+  const std::vector<std::byte> table(8 * blocks);
+  put(kFileBytesAt, end + table.size());
+  put(kTableOffsetAt, end);
+  put(kTableCountAt, blocks);
+  put(kTableChecksumAt, checksum64(table));
+  put(kHeaderChecksumAt, checksum64(std::as_bytes(std::span(page)).first(kHeaderChecksumAt)));
+  write_bytes(path, page);
+  std::filesystem::resize_file(path, end + table.size());
+}
+
+class ExportHuge : public testing::Test {
+ protected:
+  // The error of an export of all of a file, which leaves nothing.
+  Error error(const std::vector<GlobalLevel>& levels, const ExportFormat& format) {
+    write_hole(folder_.file("a.vdag"), levels);
+    return error_of([&] { run(format, static_cast<uint32_t>(levels.size() + 1)); });
+  }
+  ExportReport run(const ExportFormat& format, uint32_t grid_levels) {
+    const auto file = open_global_file(folder_.file("a.vdag"));
+    const std::string output =
+        folder_.file(std::string("out") + (format.suffix ? format.suffix : ".x"));
+    const ExportRequest request{&format, {grid_levels, whole_grid(grid_levels)}, output, kMemory};
+    NoProgress progress;
+    return export_dag(system_files(), *file, request, progress, CancelToken{});
+  }
+
+  // `problem` is what the message says after the name of the output.
+  void expect_refused(const std::vector<GlobalLevel>& levels, const std::string& format,
+                      const std::string& problem, const std::string& fitting) {
+    const Error refused = error(levels, export_format(format));
+    EXPECT_EQ(refused.code(), ErrorCode::kLimit);
+    EXPECT_TRUE(refused.message().ends_with(": " + problem + ". --level " + fitting +
+                                            " voxels per edge) fits, or take a smaller --region"))
+        << refused.message();
+    EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
+  }
+  // What is missing is the words, the disk or the memory.
+  void expect_not_refused(const std::vector<GlobalLevel>& levels, const std::string& format) {
+    const Error error = this->error(levels, export_format(format));
+    EXPECT_NE(error.code(), ErrorCode::kLimit) << error.message();
+    EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
+  }
+
+  // One node of one child per level of a grid of 2^grid_levels.
+  static std::vector<GlobalLevel> chain(uint32_t grid_levels) {
+    return std::vector<GlobalLevel>(grid_levels - 1, {1, 2});
+  }
+
+  static constexpr uint64_t kMemory = 64 << 20;
+  TemporaryFolder folder_;
+};
+
+constexpr uint64_t k24Bits = uint64_t{1} << 24, k32Bits = uint64_t{1} << 32;
+
+// A word for the root and one for each child pointer.
+TEST_F(ExportHuge, PlayCanvasVoxelsCountWordsWith24Bits) {
+  std::vector<GlobalLevel> levels = chain(8);
+  const uint64_t others = 1 + 5;  // the root's word, and the pointers of the other levels
+  levels[4] = {2'000'000, 2'000'000 + k24Bits - others};
+  expect_not_refused(levels, "voxel");
+  ++levels[4].words;
+  expect_refused(levels, "voxel",
+                 "16 777 217 node words and 1 leaves are needed, but the indices of PlayCanvas "
+                 "voxels reach 16 777 216",
+                 "7 (128");
+}
+
+TEST_F(ExportHuge, PlayCanvasVoxelsCountLeavesWith24Bits) {
+  std::vector<GlobalLevel> levels = chain(8);
+  levels[6] = {k24Bits, 2 * k24Bits};
+  expect_not_refused(levels, "voxel");
+  levels[6] = {k24Bits + 1, 2 * k24Bits + 2};
+  expect_refused(levels, "voxel",
+                 "7 node words and 16 777 217 leaves are needed, but the indices of PlayCanvas "
+                 "voxels reach 16 777 216",
+                 "7 (128");
+}
+
+// Three levels of words, none of which is over the format's limit.
+std::vector<GlobalLevel> many_words(std::vector<GlobalLevel> levels, uint64_t words) {
+  for (const size_t level : {4, 5, 6}) levels[level] = {k32Bits / 64, words / 3};
+  levels[4].words += words - words / 3 * 3;
+  return levels;
+}
+
+TEST_F(ExportHuge, HashDagCountsWordsWith32Bits) {
+  const uint64_t others = 2 * 6;
+  expect_not_refused(many_words(chain(10), k32Bits - others), "hashdag");
+  expect_refused(many_words(chain(10), k32Bits - others + 1), "hashdag",
+                 "4 294 967 297 words (16.00 GiB) are needed, but the indices of HashDAG reach "
+                 "4 294 967 296",
+                 "9 (512");
+}
+
+// Below the top levels counts have 24 bits, so that nodes of the top levels have indices there.
+TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
+  std::vector<GlobalLevel> levels = chain(17);
+  const uint64_t others = 9;
+  levels[9] = {k24Bits - 1 - others, 2 * k24Bits};
+  expect_not_refused(levels, "hashdag");
+  ++levels[9].nodes;
+  expect_refused(levels, "hashdag",
+                 "the top 10 levels have 16 777 216 nodes, but HashDAG takes less than 16 777 216",
+                 "16 (65536");
+}
+
+// A brick has one word, and one for each of its octants: here there are none.
+TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
+  const uint64_t others = 2 * 5 + 1 + 255;
+  expect_not_refused(many_words(chain(10), k32Bits - 1 - others), "svdag");
+  expect_refused(many_words(chain(10), k32Bits - others), "svdag",
+                 "4 294 967 296 words (16.00 GiB) are needed, but the file counts at most "
+                 "4 294 967 295",
+                 "8 (256");
+}
+
+// All voxels of a checkerboard have six faces, and none of them can be merged.
+TEST_F(ExportHuge, GlbCountsBytesWith32Bits) {
+  constexpr uint32_t kLevels = 6;
+  GlobalFileWriter writer(system_files(), folder_.file("a.vdag"),
+                          Grid::given({0, 0, 0}, 1, kLevels), 64);
+  write_level(writer, kLevels - 2, 1, {0x69696969, 0x69696969});
+  uint64_t svo_nodes = uint64_t{1} << 3 * (kLevels - 2);
+  for (uint32_t level = kLevels - 2; level-- > 0;) {
+    write_level(writer, level, 1, {0xff, 0, 0, 0, 0, 0, 0, 0, 0});
+    svo_nodes += uint64_t{1} << 3 * level;
+  }
+  constexpr uint64_t kVoxels = uint64_t{1} << (3 * kLevels - 1), kQuadBytes = 72;
+  writer.finish({kVoxels, svo_nodes});
+
+  // The largest file that is too small for the faces, and the smallest that is not.
+  ExportFormat format = export_format("glb");
+  format.write = [](const ExportJob& job) {
+    return write_glb_within(job, 4096 + 6 * kVoxels * kQuadBytes - 1);
+  };
+  const Error refused = error_of([&] { run(format, kLevels); });
+  EXPECT_EQ(refused.code(), ErrorCode::kLimit);
+  EXPECT_TRUE(refused.message().ends_with(
+      ": over 786 431 rectangles are needed, but a .glb file has at most 54.00 MiB. --level 5 (32 "
+      "voxels per edge) fits, or take a smaller --region"))
+      << refused.message();
+  EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
+  EXPECT_EQ(run(format, kLevels - 1).notes[0], "6 rectangles, 12 triangles");
+  system_files().remove(folder_.file("out.x"));
+
+  format.write = [](const ExportJob& job) {
+    return write_glb_within(job, 4096 + 6 * kVoxels * kQuadBytes);
+  };
+  EXPECT_EQ(run(format, kLevels).notes[0], "786 432 rectangles, 1 572 864 triangles");
+}
+
+}  // namespace
+}  // namespace voxdag::query

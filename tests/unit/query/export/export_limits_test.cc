@@ -1,0 +1,183 @@
+// What a format or the memory cannot hold is refused with its size and with what would fit, and
+// leaves nothing behind. The scenes are full cubes: their files are small whatever the grid.
+#include <gtest/gtest.h>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/format/global/global_writer.h"
+#include "core/format/global/open_global.h"
+#include "query/export/export.h"
+#include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/query/export/stages.h"
+
+using namespace voxdag;
+using namespace voxdag::query;
+
+namespace {
+
+class ExportLimits : public ::testing::Test {
+ protected:
+  // A grid in which every voxel is set.
+  std::unique_ptr<voxdag_reader::File> full_grid(uint32_t levels) {
+    const std::string path = folder_.file("full.vdag");
+    GlobalFileWriter writer(system_files(), path, Grid::given({0, 0, 0}, 1, levels), 64);
+    const std::vector<uint32_t> brick = {~0u, ~0u}, node = {0xff, 0, 0, 0, 0, 0, 0, 0, 0};
+    uint64_t svo_nodes = 0;
+    for (uint32_t level = levels - 1; level-- > 0;) {
+      const std::vector<uint32_t>& words = level + 2 == levels ? brick : node;
+      writer.begin_level(level);
+      writer.checksum_words(words);
+      writer.write_words(0, words);
+      writer.end_level({1, words.size()});
+      svo_nodes += uint64_t{1} << 3 * level;
+    }
+    writer.finish({uint64_t{1} << 3 * levels, svo_nodes});
+    return open_global_file(path);
+  }
+
+  // The message with which an export of all of the file is refused.
+  std::string refusal(const voxdag_reader::File& file, const std::string& format,
+                      const std::string& output, ErrorCode code, uint64_t memory_bytes) {
+    const Selection all{file.grid_levels(), whole_grid(file.grid_levels())};
+    return refusal(file, all, format, output, code, memory_bytes);
+  }
+  std::string refusal(const voxdag_reader::File& file, const Selection& selection,
+                      const std::string& format, const std::string& output, ErrorCode code,
+                      uint64_t memory_bytes) {
+    NoProgress progress;
+    const CancelToken cancel;
+    const ExportRequest request{&export_format(format), selection, folder_.file(output),
+                                memory_bytes};
+    try {
+      export_dag(system_files(), file, request, progress, cancel);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), code) << error.message();
+      EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
+      return error.message();
+    }
+    ADD_FAILURE() << format << " took what it cannot hold";
+    return "";
+  }
+
+  static constexpr uint64_t kMemory = 64 << 20;
+  TemporaryFolder folder_;
+};
+
+// With its cells in the grid that fits, where they have other numbers.
+TEST_F(ExportLimits, TheRegionThatFitsIsNamed) {
+  const Selection part{11, {{3, 4, 5}, {2047, 1025, 2000}}};
+  const std::string message =
+      refusal(*full_grid(11), part, "ply", "a.ply", ErrorCode::kLimit, kMemory);
+  EXPECT_NE(message.find("--level 10 --region 1,2,2,1024,513,1000 (1024 voxels per edge) fits"),
+            std::string::npos)
+      << message;
+}
+
+// However little memory there is for the search.
+TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
+  const auto file = full_grid(11);
+  for (const uint64_t memory_bytes : {kMemory, uint64_t{8}}) {
+    const std::string message = refusal(*file, "ply", "a.ply", ErrorCode::kLimit, memory_bytes);
+    EXPECT_NE(message.find("8 589 934 592 voxels"), std::string::npos) << message;
+    EXPECT_NE(message.find("at most 2 147 483 647"), std::string::npos) << message;
+    EXPECT_NE(message.find("--level 10 (1024 voxels per edge) fits"), std::string::npos) << message;
+  }
+}
+
+// The search for a level that fits begins with the coarsest: of a grid that is full it would take
+// hours to count what does not fit.
+TEST_F(ExportLimits, AreFoundAtOnce) {
+  const auto file = full_grid(20);
+  const double start_s = process_cpu_seconds();
+  for (const char* format : {"ply", "vox"}) {
+    const std::string message = refusal(*file, format, "a.x", ErrorCode::kLimit, kMemory);
+    EXPECT_NE(message.find(" fits, or take a smaller --region"), std::string::npos) << message;
+  }
+  EXPECT_LT(process_cpu_seconds() - start_s, 4);
+}
+
+TEST_F(ExportLimits, ProgressIsReported) {
+  const auto file = full_grid(6);
+  const Selection part{6, {{1, 1, 1}, {62, 63, 64}}};
+  for (const ExportFormat& format : export_formats()) {
+    SCOPED_TRACE(format.name);
+    const std::string output =
+        folder_.file(std::string("a") + (format.suffix ? format.suffix : ""));
+    Stages stages;
+    export_dag(system_files(), *file, {&format, part, output, kMemory, false, true}, stages,
+               CancelToken{});
+    stages.expect_complete();
+    EXPECT_TRUE(stages.stages.contains("export"));
+    const bool is_counted =
+        std::string_view("bt vdb nvdb ply npz glb").find(format.name) != std::string::npos;
+    EXPECT_EQ(stages.stages.contains("count"), is_counted);
+  }
+}
+
+TEST_F(ExportLimits, OctoMapHas16Levels) {
+  const std::string message = refusal(*full_grid(17), "bt", "a.bt", ErrorCode::kLimit, kMemory);
+  EXPECT_NE(message.find("--level 16 fits"), std::string::npos) << message;
+}
+
+// Below its top levels HashDAG counts voxels with 24 bits: at 2^18 a full cube of 2^8 has more.
+TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
+  const std::string message =
+      refusal(*full_grid(18), "hashdag", "a.basic_dag.dag.bin", ErrorCode::kLimit, kMemory);
+  EXPECT_NE(message.find("encloses 16 777 216 voxels"), std::string::npos) << message;
+  EXPECT_NE(message.find("--level 17 (131072 voxels per edge) fits"), std::string::npos) << message;
+}
+
+// The formats that are made in memory as a whole.
+TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
+  const auto file = full_grid(9);
+  for (const ExportFormat& format : export_formats()) {
+    const std::string name = format.name;
+    if (name == "vdb" || name == "nvdb") {
+      const std::string message = refusal(*file, name, "a.x", ErrorCode::kOutOfMemory, 20 << 20);
+      EXPECT_NE(message.find("would take over 20.00 MiB of memory"), std::string::npos) << message;
+      EXPECT_NE(message.find("--level 8 (256 voxels per edge) fits"), std::string::npos) << message;
+    }
+  }
+  const std::string message =
+      refusal(*file, "glb", "a.glb", ErrorCode::kOutOfMemory, uint64_t{20} << 20);
+  EXPECT_NE(message.find("a smaller --region or a coarser --level"), std::string::npos) << message;
+}
+
+// A chunk of MagicaVoxel has 2 GiB at most.
+TEST_F(ExportLimits, VoxNamesTheLevelThatFits) {
+  const auto file = full_grid(17);
+  const std::string message = refusal(*file, "vox", "a.vox", ErrorCode::kLimit, kMemory);
+  EXPECT_NE(message.find("or more are needed, but the chunks of a .vox file have at most 2.00 GiB"),
+            std::string::npos)
+      << message;
+  EXPECT_NE(message.find("--level 9 (512 voxels per edge) fits"), std::string::npos) << message;
+}
+
+TEST_F(ExportLimits, MemoryThatDoesNotFitIsRefused) {
+  const auto file = full_grid(10);
+  const Selection part{10, {{1, 2, 3}, {1000, 900, 800}}};
+  const std::string message =
+      refusal(*file, part, "svdag", "a.svdag", ErrorCode::kOutOfMemory, 1000);
+  EXPECT_NE(message.find("--region"), std::string::npos) << message;
+}
+
+TEST_F(ExportLimits, FilesOfTwoNamesNeedTheSuffixThatViewersLookFor) {
+  EXPECT_THROW(export_paths(export_format("voxel"), "scene.json"), Error);
+  EXPECT_EQ(export_paths(export_format("voxel"), "scene.voxel.json"),
+            (std::vector<std::string>{"scene.voxel.json", "scene.voxel.bin"}));
+  EXPECT_THROW(export_format("stl"), Error);
+}
+
+// A request to stop ends an export, and removes what it has written.
+TEST_F(ExportLimits, NothingIsLeftAfterACancellation) {
+  const auto file = full_grid(9);
+  CancelToken cancel;
+  cancel.cancel();
+  NoProgress progress;
+  const ExportRequest request{
+      &export_format("ply"), {9, whole_grid(9)}, folder_.file("a.ply"), kMemory};
+  EXPECT_THROW(export_dag(system_files(), *file, request, progress, cancel), Error);
+  EXPECT_EQ(system_files().list(folder_.path()).size(), 1u);
+}
+
+}  // namespace

@@ -1,0 +1,197 @@
+// Damaged files, full disks and interruptions: an error, no output, and nothing left behind.
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+
+#include "tests/crash/faulty_files.h"
+#include "tests/unit/base/error_of.h"
+#include "tests/unit/io/killed.h"
+#include "tests/unit/query/extract/extract_fixture.h"
+
+namespace voxdag::query {
+namespace {
+
+class ExtractErrors : public Extract {
+ protected:
+  ExtractErrors() { write_global(path("in.vdag"), random_voxels(7, 64)); }
+  // The error of an extraction of the whole grid; nullopt if there was none.
+  std::optional<ErrorCode> error_with(FileSystem& files, Progress& progress,
+                                      const CancelToken& cancel) {
+    try {
+      const auto file = open_global_file(path("in.vdag"));
+      ExtractSpec whole = spec("out.vdag", {6, whole_grid(6)});
+      whole.replace = false;
+      extract(*file, whole, files, progress, cancel);
+    } catch (const Error& error) {
+      return error.code();
+    }
+    return std::nullopt;
+  }
+};
+
+// Any damaged byte of the levels or of the checksum table is found where it is read.
+TEST_F(ExtractErrors, DamagedInput) {
+  const std::string intact = bytes("in.vdag");
+  const auto file = open_global_file(path("in.vdag"));
+  for (uint32_t l = 0; l <= file->brick_level(); ++l) {
+    SCOPED_TRACE(l);
+    std::string damaged = intact;
+    const size_t at = file->level(l).file_offset + 4 * (file->level(l).word_count / 2);
+    damaged[at] = static_cast<char>(damaged[at] ^ 4);
+    write_bytes(path("in.vdag"), damaged);
+    EXPECT_EQ(error_with(system_files(), warnings_, never_), ErrorCode::kCorrupt);
+    expect_files({"in.vdag"});
+  }
+  std::string damaged = intact;
+  damaged.back() = static_cast<char>(damaged.back() ^ 1);
+  write_bytes(path("in.vdag"), damaged);
+  EXPECT_EQ(error_with(system_files(), warnings_, never_), ErrorCode::kCorrupt);
+  expect_files({"in.vdag"});
+}
+
+// Offsets that lead nowhere are refused, though every checksum is right.
+TEST_F(ExtractErrors, OffsetsThatLeadNowhere) {
+  oracle::Voxels voxels(16);
+  voxels.set(1, 2, 3);
+  const oracle::Dag dag = oracle::build_dag(voxels, 64);
+  for (const uint32_t wrong : {1u, 2u, 40u}) {
+    auto levels = level_words(dag);
+    levels[1][1] = wrong;  // from the node above the only brick
+    GlobalFileWriter writer(system_files(), path("in.vdag"), grid_of(16), 64);
+    for (uint32_t i = 0; i < levels.size(); ++i) {
+      writer.begin_level(2 - i);
+      writer.checksum_words(levels[i]);
+      writer.write_words(0, levels[i]);
+      writer.end_level({1, levels[i].size()});
+    }
+    writer.finish({dag.voxels, dag.svo_nodes});
+    const auto file = open_global_file(path("in.vdag"));
+    for (const uint32_t grid_levels : {3u, 4u})
+      EXPECT_EQ(error_of([&] {
+                  extract(*file, spec("out.vdag", {grid_levels, whole_grid(grid_levels)}),
+                          system_files(), warnings_, never_);
+                }).code(),
+                ErrorCode::kCorrupt)
+          << wrong;
+    expect_files({"in.vdag"});
+  }
+}
+
+// A disk that is full from any write on.
+TEST_F(ExtractErrors, FullDisk) {
+  uint64_t failed = 0;
+  for (uint64_t at = 1;; ++at) {
+    SCOPED_TRACE(at);
+    crash::FaultyFiles files({crash::Fault::kNoSpace, at});
+    const auto error = error_with(files, warnings_, never_);
+    if (!error) break;
+    EXPECT_EQ(error, ErrorCode::kNoSpace);
+    expect_files({"in.vdag"});
+    ++failed;
+  }
+  EXPECT_GT(failed, 5u);
+}
+
+// Reads that fail, of the input or of temporary files.
+TEST_F(ExtractErrors, FailingReads) {
+  uint64_t failed = 0;
+  for (uint64_t at = 1;; at += 1 + at / 8) {
+    SCOPED_TRACE(at);
+    crash::FaultyFiles files({crash::Fault::kReadError, at});
+    const auto error = error_with(files, warnings_, never_);
+    if (!error) break;
+    EXPECT_EQ(error, ErrorCode::kIo);
+    expect_files({"in.vdag"});
+    ++failed;
+  }
+  EXPECT_GT(failed, 5u);
+}
+
+// Whatever operation a process is killed at, the same extraction succeeds afterwards, unless it was
+// at its end, and removes what was left: temporary files and folders, but none of other names.
+TEST_F(ExtractErrors, Killed) {
+  std::filesystem::create_directory(path("out.vdag.work-"));
+  std::filesystem::create_directory(path("out.vdag.work-1234567"));
+  error_with(system_files(), warnings_, never_);
+  const std::string clean = bytes("out.vdag");
+  std::filesystem::remove(path("out.vdag"));
+  uint64_t kills = 0, repeated = 0;
+  for (;; ++kills) {
+    SCOPED_TRACE(kills);
+    if (!is_killed([&] {
+          crash::FaultyFiles files({crash::Fault::kKillAfter, kills + 1});
+          error_with(files, warnings_, never_);
+        }))
+      break;
+    const auto error = error_with(system_files(), warnings_, never_);
+    const bool was_written = error == ErrorCode::kInvalidInput;
+    EXPECT_TRUE(!error || was_written);
+    repeated += !was_written;
+    EXPECT_TRUE(bytes("out.vdag") == clean);
+    expect_files({"in.vdag", "out.vdag", "out.vdag.work-", "out.vdag.work-1234567"});
+    std::filesystem::remove(path("out.vdag"));
+  }
+  EXPECT_GT(repeated, 5u);
+}
+
+// A region around the middle of the grid cannot be cropped, and one on a side of it can.
+TEST_F(ExtractErrors, CropOfNothingIsSaid) {
+  const auto is_said = [&](const Region& region, bool crop) {
+    warnings_.texts.clear();
+    extract_file("in.vdag", spec("out.vdag", {6, region}, crop));
+    return std::ranges::any_of(warnings_.texts, [](const std::string& text) {
+      return text.ends_with("is the whole grid, which stays");
+    });
+  };
+  EXPECT_TRUE(is_said({{31, 0, 0}, {33, 64, 64}}, true));
+  EXPECT_FALSE(is_said({{0, 0, 0}, {32, 32, 32}}, true));
+  EXPECT_FALSE(is_said(whole_grid(6), true));
+  EXPECT_FALSE(is_said({{31, 0, 0}, {33, 64, 64}}, false));
+}
+
+// An existing file is replaced only if that is asked for, whoever has made it.
+TEST_F(ExtractErrors, ExistingOutput) {
+  ExtractSpec part = spec("out.vdag", {5, whole_grid(5)});
+  const auto file = open_global_file(path("in.vdag"));
+  extract(*file, part, system_files(), warnings_, never_);
+  const std::string before = bytes("out.vdag");
+  EXPECT_EQ(error_with(system_files(), warnings_, never_), ErrorCode::kInvalidInput);
+  EXPECT_TRUE(bytes("out.vdag") == before);
+  part.selection = {6, whole_grid(6)};
+  extract(*file, part, system_files(), warnings_, never_);
+  EXPECT_TRUE(bytes("out.vdag") == bytes("in.vdag"));
+  expect_files({"in.vdag", "out.vdag"});
+}
+
+// Cancels when a stage begins.
+class CancelAt : public NoProgress {
+ public:
+  CancelAt(std::string stage, CancelToken& cancel) : stage_(std::move(stage)), cancel_(cancel) {}
+  void begin_stage(std::string_view stage, uint64_t, std::string_view) override {
+    if (stage == stage_) cancel_.cancel();
+  }
+
+ private:
+  const std::string stage_;
+  CancelToken& cancel_;
+};
+
+TEST_F(ExtractErrors, Canceled) {
+  for (const char* stage : {"extract", "merge", "write"}) {
+    SCOPED_TRACE(stage);
+    CancelToken cancel;
+    CancelAt progress(stage, cancel);
+    EXPECT_EQ(error_with(system_files(), progress, cancel), ErrorCode::kCanceled);
+    expect_files({"in.vdag"});
+  }
+}
+
+// Two at a time do not write to the same file.
+TEST_F(ExtractErrors, OutputInUse) {
+  const auto lock = system_files().try_lock(path("out.vdag.lock"));
+  EXPECT_EQ(error_with(system_files(), warnings_, never_), ErrorCode::kIo);
+  expect_files({"in.vdag", "out.vdag.lock"});
+}
+
+}  // namespace
+}  // namespace voxdag::query
