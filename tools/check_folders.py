@@ -14,6 +14,7 @@ import sys
 # Which folders a folder may include, itself aside. Nothing comes along: each edge is named.
 CORE_INCLUDES = {
     "core/base": [],
+    "core/fields": ["core/base"],
     "core/io": ["core/base"],
     "core/db": ["core/base", "core/io"],
     "core/geometry": ["core/base"],

@@ -37,6 +37,7 @@ BOXES = {
     "core/color": (3.2, 5, "color rule, blocks"),
     "core/image": (4.4, 5, "PNG, JPEG"),
     "core/io": (3.9, 6, "file access"),
+    "core/fields": (1.3, 6, "struct descriptions"),
     "core/base": (1.6, 7, "errors, budget, text"),
 }
 

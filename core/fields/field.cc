@@ -1,0 +1,54 @@
+#include "core/fields/field.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace voxdag {
+
+std::string joined(const std::vector<std::string>& words, const char* separator) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
+  return text;
+}
+
+std::string exact_size_text(uint64_t bytes) {
+  constexpr const char* kUnits[] = {"", "KiB", "MiB", "GiB", "TiB"};
+  size_t unit = 0;
+  for (; bytes > 0 && bytes % 1024 == 0 && unit + 1 < std::size(kUnits); ++unit) bytes /= 1024;
+  return std::to_string(bytes) + kUnits[unit];
+}
+
+size_t character_count(std::string_view text) {
+  return static_cast<size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+}
+
+std::string option_name(const char* field_name) {
+  std::string option = std::string("--") + field_name;
+  std::ranges::replace(option, '_', '-');
+  return option;
+}
+
+std::string expected_integer(const Field& field, const std::string& low, const std::string& high) {
+  if (field.is_bytes)
+    return field.min ? "a size of at least " + exact_size_text(static_cast<uint64_t>(*field.min)) +
+                           ", such as 8GiB"
+                     : "a size such as 512MiB or 8GiB";
+  if (field.min && !field.max) return "a whole number, " + low + " or more";
+  return (field.is_power_of_two ? "a power of two from " : "a whole number from ") + low + " to " +
+         high;
+}
+
+bool fits_integer_limits(const Field& field, int64_t value) {
+  if (field.min && value < *field.min) return false;
+  if (field.max && value > *field.max) return false;
+  return !field.is_power_of_two || std::has_single_bit(static_cast<uint64_t>(value));
+}
+
+bool is_valid_line(const Field& field, std::string_view text) {
+  const bool has_control = std::ranges::any_of(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
+  return !has_control && fits_integer_limits(field, static_cast<int64_t>(character_count(text)));
+}
+
+}  // namespace voxdag

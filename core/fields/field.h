@@ -1,0 +1,312 @@
+// One description per struct. A function `fields(visitor, value)` next to a struct visits its
+// members in order and names each of them:
+//
+//   template <class Visitor>
+//   void fields(Visitor& visit, Trip& trip) {
+//     visit("city", trip.city);
+//     visit(Field("days", "length of the trip").range(1, 30), trip.days);
+//     visit.object("cost", [&](auto& cost) { cost("total", trip.total); });
+//     visit.derived("daily_cost", trip.total / trip.days);
+//   }
+//
+// JSON, JSON schemas, command-line options, Python keywords and checks are visitors. A member's
+// type decides its form: an enumeration has enum_names(E), a set of names has NameSetTraits.
+// Visitors that write are given a copy of the struct, so `fields` takes it by reference in both
+// directions.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+
+namespace voxdag {
+
+// The first command of submit, plan, build that offers an option; later ones offer it as well.
+enum class Scope { kSubmit, kPlan, kBuild };
+
+// A member's name and everything that interfaces tell about it. The same name is the JSON member,
+// the Python keyword and, with dashes, the command-line option.
+struct Field {
+  const char* name;
+  const char* help = "";
+  const char* heading = "";       // of the group that --help lists it in
+  const char* shorthand = "";     // on the command line: "-r"
+  const char* default_text = "";  // of a default that is not a value: "half the RAM"
+  const char* parts = "";         // names of an array's numbers: "X,Y,Z,EDGE"
+  const char* excluded = "";      // another field that cannot be given at the same time
+  const char* needed = "";        // another field that has to be given at the same time
+  Scope scope = Scope::kSubmit;
+  std::optional<int64_t> min, max;  // of an integer, of bytes, of a line's characters
+  size_t max_items = 0;             // of a list of at least one item; 0 for any list
+  bool is_power_of_two = false;
+  bool is_above_zero = false;  // of a number; of the last number of an array
+  bool is_bytes = false;       // an integer that people write as 8GiB
+  bool is_line = false;        // a text without control characters
+  bool is_path = false;
+  bool is_required = false;
+  bool is_positional = false;     // on the command line
+  bool is_left_if_empty = false;  // JSON leaves the member out if it is empty
+  // Whether geometry_json() has it; without a value, if it differs from its default.
+  std::optional<bool> in_key;
+
+  constexpr Field(const char* its_name, const char* its_help = "")
+      : name(its_name), help(its_help) {}
+
+  constexpr Field with(auto Field::*member, auto value) const {
+    Field copy = *this;
+    copy.*member = value;
+    return copy;
+  }
+  constexpr Field group(const char* text) const { return with(&Field::heading, text); }
+  constexpr Field range(int64_t low, int64_t high) const {
+    return with(&Field::min, low).with(&Field::max, high);
+  }
+  constexpr Field at_least(int64_t low) const { return with(&Field::min, low); }
+  constexpr Field power_of_two(int64_t low, int64_t high) const {
+    return range(low, high).with(&Field::is_power_of_two, true);
+  }
+  constexpr Field above_zero() const { return with(&Field::is_above_zero, true); }
+  constexpr Field bytes() const { return with(&Field::is_bytes, true); }
+  constexpr Field line(int64_t characters) const {
+    return range(1, characters).with(&Field::is_line, true);
+  }
+  constexpr Field items(size_t limit) const { return with(&Field::max_items, limit); }
+  constexpr Field path() const { return with(&Field::is_path, true); }
+  constexpr Field required() const { return with(&Field::is_required, true); }
+  constexpr Field positional() const { return with(&Field::is_positional, true); }
+  constexpr Field omit_empty() const { return with(&Field::is_left_if_empty, true); }
+  constexpr Field from(Scope first) const { return with(&Field::scope, first); }
+  constexpr Field key(bool present) const { return with(&Field::in_key, std::optional(present)); }
+  constexpr Field unset_means(const char* text) const { return with(&Field::default_text, text); }
+  constexpr Field excludes(const char* other) const { return with(&Field::excluded, other); }
+  constexpr Field needs(const char* other) const { return with(&Field::needed, other); }
+};
+
+// A value that a decoder refuses. The message names the field, the value and the expectation.
+struct FieldError : Error {
+  explicit FieldError(std::string message) : Error(ErrorCode::kInvalidInput, std::move(message)) {}
+};
+
+template <class E>
+concept NamedEnum = std::is_enum_v<E> && requires(E e) {
+  enum_names(e);
+};
+
+// Of a set of names, such as AttributeSet: `names(set)`, `add(set, name)`, which returns whether
+// there is such a name, and the list `all()`.
+template <class T>
+struct NameSetTraits;
+template <class T>
+concept NameSet = requires(const T& set) {
+  NameSetTraits<T>::names(set);
+};
+
+template <class T>
+struct IsOptional : std::false_type {};
+template <class T>
+struct IsOptional<std::optional<T>> : std::true_type {};
+template <class T>
+struct OptionalValue {
+  using type = T;
+};
+template <class T>
+struct OptionalValue<std::optional<T>> {
+  using type = T;
+};
+template <class T>
+struct IsVector : std::false_type {};
+template <class T>
+struct IsVector<std::vector<T>> : std::true_type {};
+template <class T>
+struct IsNumbers : std::false_type {};
+template <size_t kCount>
+struct IsNumbers<std::array<double, kCount>> : std::true_type {};
+
+// Visits nothing. Its members are all that `fields` may use of a visitor.
+struct NoVisitor {
+  template <class T>
+  void operator()(const Field&, T&) {}
+  void object(const char*, const auto&) {}
+  void derived(const char*, const auto&) {}
+};
+
+// A struct with a description.
+template <class T>
+concept Described = requires(T& value, NoVisitor& visitor) {
+  fields(visitor, value);
+};
+
+// The names of an enumeration's values, but for the empty name of "not given".
+template <NamedEnum E>
+std::vector<std::string> choices_of(E e = {}) {
+  std::vector<std::string> choices;
+  for (const std::string_view name : enum_names(e))
+    if (!name.empty()) choices.emplace_back(name);
+  return choices;
+}
+
+template <NamedEnum E>
+constexpr const char* name_of(E e) {
+  return enum_names(e)[static_cast<size_t>(e)];
+}
+
+template <NamedEnum E>
+std::optional<E> enum_of(std::string_view text) {
+  const auto names = enum_names(E{});
+  for (size_t i = 0; i < names.size(); ++i)
+    if (text == names[i] && !text.empty()) return static_cast<E>(i);
+  return std::nullopt;
+}
+
+// "a, b, c"
+std::string joined(const std::vector<std::string>& words, const char* separator = ", ");
+// "64MiB": a size that parse_size() reads, in the largest unit that is exact.
+std::string exact_size_text(uint64_t bytes);
+// UTF-8 characters.
+size_t character_count(std::string_view text);
+// The spelling of a field on the command line: "--hash-bits".
+std::string option_name(const char* field_name);
+
+// What a value of type T has to be, for messages: "a power of two from 4 to 1048576".
+template <class T>
+std::string expectation(const Field& field);
+std::string expected_integer(const Field& field, const std::string& low, const std::string& high);
+bool fits_integer_limits(const Field& field, int64_t value);
+bool is_valid_line(const Field& field, std::string_view text);
+
+template <class T>
+std::string expectation(const Field& field) {
+  if constexpr (IsOptional<T>::value) {
+    return expectation<typename T::value_type>(field);
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return "true or false";
+  } else if constexpr (std::is_integral_v<T>) {
+    using Limits = std::numeric_limits<T>;
+    return expected_integer(field,
+                            field.min ? std::to_string(*field.min) : std::to_string(Limits::min()),
+                            field.max ? std::to_string(*field.max) : std::to_string(Limits::max()));
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return field.is_above_zero ? "a finite number above 0" : "a finite number";
+  } else if constexpr (IsNumbers<T>::value) {
+    return std::to_string(std::tuple_size_v<T>) + " finite numbers " + field.parts +
+           (field.is_above_zero ? ", the last one above 0" : "");
+  } else if constexpr (NamedEnum<T>) {
+    return "one of " + joined(choices_of<T>());
+  } else if constexpr (NameSet<T>) {
+    return "names out of " + joined(NameSetTraits<T>::all());
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    return field.is_line
+               ? "1 to " + std::to_string(*field.max) + " characters without control characters"
+               : "a text";
+  } else if constexpr (IsVector<T>::value) {
+    const std::string item = expectation<typename T::value_type>(field);
+    return field.max_items ? "1 to " + std::to_string(field.max_items) + " items, each " + item
+                           : "a list, each item " + item;
+  } else {
+    return "an object";
+  }
+}
+
+// Whether a value respects the limits that its field states.
+template <class T>
+bool fits(const Field& field, const T& value) {
+  if constexpr (IsOptional<T>::value) {
+    return !value || fits(field, *value);
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return true;
+  } else if constexpr (std::is_integral_v<T>) {
+    if (!field.min && !field.max) return true;
+    return std::in_range<int64_t>(value) && fits_integer_limits(field, static_cast<int64_t>(value));
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return std::isfinite(value) && (!field.is_above_zero || value > 0);
+  } else if constexpr (IsNumbers<T>::value) {
+    for (const double number : value)
+      if (!std::isfinite(number)) return false;
+    return !field.is_above_zero || value.back() > 0;
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    return !field.is_line || is_valid_line(field, value);
+  } else if constexpr (IsVector<T>::value) {
+    return !field.max_items || (!value.empty() && value.size() <= field.max_items);
+  } else {
+    return true;
+  }
+}
+
+// What a field's value is by default; "" if there is nothing to tell.
+template <class T>
+std::string default_text(const Field& field, const T& value) {
+  if (*field.default_text) return field.default_text;
+  if constexpr (std::is_same_v<T, bool>) {
+    return "";
+  } else if constexpr (std::is_integral_v<T>) {
+    if (value == 0) return "";
+    return field.is_bytes ? exact_size_text(static_cast<uint64_t>(value)) : std::to_string(value);
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return value == 0 ? "" : number_text(value);
+  } else if constexpr (NamedEnum<T>) {
+    return name_of(value);
+  } else {
+    return "";
+  }
+}
+
+// The help of a field with its default, and with its limits if `has_limits`.
+template <class T>
+std::string documentation(const Field& field, const T& value, bool has_limits) {
+  using Inner = typename OptionalValue<T>::type;
+  const bool is_limited =
+      field.min || field.max || NamedEnum<Inner> || NameSet<Inner> || IsNumbers<Inner>::value;
+  std::string text = field.help;
+  if (has_limits && is_limited) text += ": " + expectation<T>(field);
+  const std::string standard = default_text(field, value);
+  return standard.empty() ? text : text + " (default: " + standard + ")";
+}
+
+// Reads a value as people write it on a command line. Returns whether the text is a valid value.
+template <class T>
+bool parse_text(const Field& field, const std::string& text, T& value) {
+  if constexpr (IsOptional<T>::value) {
+    typename T::value_type inner{};
+    if (!parse_text(field, text, inner)) return false;
+    value = inner;
+  } else if constexpr (std::is_arithmetic_v<T>) {
+    if (field.is_bytes) {
+      value = static_cast<T>(parse_size(text, option_name(field.name)));
+    } else {
+      const auto number = parse_numbers<T, 1>(text, ',');
+      if (!number) return false;
+      value = number->front();
+    }
+  } else if constexpr (IsNumbers<T>::value) {
+    const auto numbers = parse_numbers<double, std::tuple_size_v<T>>(text, ',');
+    if (!numbers) return false;
+    value = *numbers;
+  } else if constexpr (NamedEnum<T>) {
+    const auto found = enum_of<T>(text);
+    if (!found) return false;
+    value = *found;
+  } else if constexpr (NameSet<T>) {
+    for (size_t at = 0; at <= text.size();) {
+      const size_t end = std::min(text.find(',', at), text.size());
+      if (!NameSetTraits<T>::add(value, text.substr(at, end - at))) return false;
+      at = end + 1;
+    }
+  } else {
+    value = text;
+  }
+  return fits(field, value);
+}
+
+}  // namespace voxdag

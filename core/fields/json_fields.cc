@@ -1,0 +1,43 @@
+#include "core/fields/json_fields.h"
+
+#include <cmath>
+
+namespace voxdag::json_fields {
+
+void refuse(const std::string& name, const std::string& expected) {
+  throw FieldError("'" + name + "': expected " + expected);
+}
+
+bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,
+                  const std::function<bool(int64_t)>& take_signed) {
+  constexpr double kExact = 0x1p53;
+  if (json.is_number_unsigned()) return take_unsigned(json.get<uint64_t>());
+  if (json.is_number_integer()) return take_signed(json.get<int64_t>());
+  if (!json.is_number_float()) return false;
+  const double number = json.get<double>();
+  if (std::abs(number) > kExact || number != std::floor(number)) return false;
+  return take_signed(static_cast<int64_t>(number));
+}
+
+FieldJson difference(const FieldJson& options, const FieldJson& defaults) {
+  FieldJson given = FieldJson::object();
+  for (const auto& [name, value] : options.items()) {
+    if (!defaults.contains(name)) {
+      given[name] = value;
+    } else if (value.is_object()) {
+      if (FieldJson inner = difference(value, defaults.at(name)); !inner.empty())
+        given[name] = std::move(inner);
+    } else if (value != defaults.at(name)) {
+      given[name] = value;
+    }
+  }
+  return given;
+}
+
+void Decoder::refuse_unknown_members(const std::string& where) const {
+  for (const auto& [name, value] : object_.items())
+    if (std::ranges::find(known_, name) == known_.end())
+      refuse(name.substr(0, 64), "a member of " + where + " (docs/api.md)");
+}
+
+}  // namespace voxdag::json_fields

@@ -1,0 +1,236 @@
+// Structs with a description (field.h) as JSON, in both directions. A *record* has all of its
+// members in JSON; a decoder ignores others. *Options* have the members that differ from their
+// defaults; a decoder refuses others.
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "core/fields/field.h"
+
+namespace voxdag {
+
+using FieldJson = nlohmann::ordered_json;
+
+namespace json_fields {
+
+[[noreturn]] void refuse(const std::string& name, const std::string& expected);
+// A whole number, for which 64.0 is accepted. Calls `take` with an int64_t or uint64_t; returns
+// whether that was possible.
+bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,
+                  const std::function<bool(int64_t)>& take_signed);
+
+template <class T>
+FieldJson encode(T value);
+
+template <class T>
+FieldJson encode_value(T& value) {
+  if constexpr (IsOptional<T>::value) {
+    return value ? encode_value(*value) : FieldJson();
+  } else if constexpr (Described<T>) {
+    return encode(value);
+  } else if constexpr (NamedEnum<T>) {
+    return name_of(value);
+  } else if constexpr (NameSet<T>) {
+    return NameSetTraits<T>::names(value);
+  } else if constexpr (IsVector<T>::value) {
+    FieldJson array = FieldJson::array();
+    for (auto& item : value) array.push_back(encode_value(item));
+    return array;
+  } else {
+    return value;
+  }
+}
+
+// Adds members to an object.
+class Encoder {
+ public:
+  explicit Encoder(FieldJson& object) : object_(object) {}
+
+  template <class T>
+  void operator()(const Field& field, T& value) {
+    if constexpr (IsOptional<T>::value)
+      if (!value) return;
+    if constexpr (requires { value.empty(); })
+      if (field.is_left_if_empty && value.empty()) return;
+    object_[field.name] = encode_value(value);
+  }
+  void object(const char* name, const auto& visit_members) {
+    FieldJson members = FieldJson::object();
+    Encoder encoder(members);
+    visit_members(encoder);
+    object_[name] = std::move(members);
+  }
+  void derived(const char* name, const auto& value) { object_[name] = value; }
+
+ private:
+  FieldJson& object_;
+};
+
+template <class T>
+FieldJson encode(T value) {
+  FieldJson object = FieldJson::object();
+  Encoder encoder(object);
+  fields(encoder, value);
+  return object;
+}
+
+// The members of `options` that differ from those of `defaults`.
+FieldJson difference(const FieldJson& options, const FieldJson& defaults);
+
+// Records have all members, options the given ones.
+enum class Members { kAll, kGiven };
+
+template <class T>
+void decode(const FieldJson& json, const std::string& name, Members members, T& value);
+
+template <class T>
+void decode_integer(const Field& field, const FieldJson& json, T& value) {
+  const auto take = [&](auto number) {
+    if (!std::in_range<T>(number)) return false;
+    value = static_cast<T>(number);
+    return true;
+  };
+  if (field.is_bytes && json.is_string()) {
+    try {
+      if (take(parse_size(json.get<std::string>(), field.name))) return;
+    } catch (const Error&) {
+    }
+  } else if (whole_number(json, take, take)) {
+    return;
+  }
+  refuse(field.name, expectation<T>(field));
+}
+
+template <class T>
+void decode_value(const Field& field, const FieldJson& json, Members members, T& value) {
+  const auto expect = [&](bool is_valid) {
+    if (!is_valid) refuse(field.name, expectation<T>(field));
+  };
+  if constexpr (IsOptional<T>::value) {
+    decode_value(field, json, members, value.emplace());
+  } else if constexpr (std::is_same_v<T, bool>) {
+    expect(json.is_boolean());
+    value = json.get<bool>();
+  } else if constexpr (std::is_integral_v<T>) {
+    decode_integer(field, json, value);
+  } else if constexpr (std::is_floating_point_v<T>) {
+    expect(json.is_number());
+    value = json.get<T>();
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    expect(json.is_string());
+    value = json.get<std::string>();
+  } else if constexpr (NamedEnum<T>) {
+    const auto found = json.is_string() ? enum_of<T>(json.get<std::string>()) : std::nullopt;
+    expect(found.has_value());
+    value = *found;
+  } else if constexpr (IsNumbers<T>::value) {
+    expect(json.is_array() && json.size() == value.size());
+    for (size_t i = 0; i < value.size(); ++i)
+      decode_value(Field(field.name), json[i], members, value[i]);
+  } else if constexpr (NameSet<T>) {
+    std::vector<std::string> names;
+    decode_value(Field(field.name), json, members, names);
+    expect(members == Members::kAll || !names.empty());
+    for (const std::string& name : names) expect(NameSetTraits<T>::add(value, name));
+  } else if constexpr (IsVector<T>::value) {
+    // A list of options may be a single item.
+    const bool is_item = members == Members::kGiven && !json.is_array();
+    expect(is_item || json.is_array());
+    value.clear();
+    for (const FieldJson& item : is_item ? FieldJson::array({json}) : json)
+      decode_value(field, item, members, value.emplace_back());
+  } else if constexpr (Described<T>) {
+    decode(json, field.name, members, value);
+  } else {
+    expect(json.is_object());
+    value = json.get<T>();
+  }
+  expect(fits(field, value));
+}
+
+// Takes members out of an object.
+class Decoder {
+ public:
+  Decoder(const FieldJson& object, const std::string& name, Members members)
+      : object_(object), members_(members) {
+    if (!object.is_object()) refuse(name, "an object");
+  }
+
+  template <class T>
+  void operator()(const Field& field, T& value) {
+    known_.emplace_back(field.name);
+    const auto found = object_.find(field.name);
+    if (found != object_.end()) return decode_value(field, *found, members_, value);
+    const bool may_lack = members_ == Members::kGiven
+                              ? !field.is_required
+                              : IsOptional<T>::value || field.is_left_if_empty;
+    if (!may_lack) refuse(field.name, expectation<T>(field));
+  }
+  void object(const char* name, const auto& visit_members) {
+    known_.emplace_back(name);
+    static const FieldJson kNothing;
+    const auto found = object_.find(name);
+    if (found == object_.end() && members_ == Members::kGiven) return;
+    Decoder decoder(found == object_.end() ? kNothing : *found, name, members_);
+    visit_members(decoder);
+    if (members_ == Members::kGiven) decoder.refuse_unknown_members(name);
+  }
+  void derived(const char* name, const auto&) { known_.emplace_back(name); }
+
+  // Throws FieldError if the object has a member that no field names.
+  void refuse_unknown_members(const std::string& where) const;
+
+ private:
+  const FieldJson& object_;
+  const Members members_;
+  std::vector<std::string> known_;
+};
+
+template <class T>
+void decode(const FieldJson& json, const std::string& name, Members members, T& value) {
+  Decoder decoder(json, name, members);
+  fields(decoder, value);
+  if (members == Members::kGiven) decoder.refuse_unknown_members(name);
+}
+
+}  // namespace json_fields
+
+template <class T>
+FieldJson record_json(const T& record) {
+  return json_fields::encode(record);
+}
+
+// Throws FieldError that names the member.
+template <class T>
+T record_from_json(const FieldJson& json) {
+  T record;
+  json_fields::decode(json, "the record", json_fields::Members::kAll, record);
+  return record;
+}
+
+// Throws Error{kCorrupt}, which begins with `what`, for a text that is no such record.
+template <class T>
+T record_from_text(std::string_view text, const std::string& what) {
+  try {
+    return record_from_json<T>(FieldJson::parse(text));
+  } catch (const FieldError& error) {
+    throw Error(ErrorCode::kCorrupt, what + ": " + error.message());
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(ErrorCode::kCorrupt, what + " is not JSON (" + error.what() + ")");
+  }
+}
+
+template <class T>
+FieldJson options_json(const T& options) {
+  return json_fields::difference(json_fields::encode(options), json_fields::encode(T{}));
+}
+
+// Sets the options that are given. Throws FieldError that names the member.
+template <class T>
+void set_options(const FieldJson& json, const std::string& name, T& options) {
+  json_fields::decode(json, name, json_fields::Members::kGiven, options);
+}
+
+}  // namespace voxdag
