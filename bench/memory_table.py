@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Peak memory under a small budget, and the same bytes as with a large one.
 
-`--memory` promises that the resident set stays within the budget plus 64 MiB. Each case is built
+`--memory` guarantees that the resident set never exceeds the budget plus 64 MiB. Each case is built
 under its small budget and under 8 GiB; both peaks (VmHWM from the build's report and the system's
 own measurement) and both digests are shown. Exits 1 if a peak exceeds its limit or the bytes
 differ.

@@ -68,6 +68,6 @@ class Study:
 
 
 def same_work(study, report):
-    """Whether the counts of the reference are close enough to those of the build."""
+    """True if the counts of the reference and of the build are close enough."""
     return (abs(study["voxels"] / report["voxels"] - 1) <= VOXELS_WITHIN
             and abs(study["dag_nodes"] / report["dag_nodes"] - 1) <= NODES_WITHIN)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Checks the structure of the tree (docs/architecture.md) over all tracked files.
 
-Who may include whom, for every folder; no cycle between folders; third-party headers in their one
-place; the size of files and folders. Prints one line per finding, as "file:line: what is wrong";
+The permitted includes of every folder; no cycle between folders; third-party headers in their one
+place; the size of files and folders. Prints one line per finding, as "file:line: problem";
 exits 1 if there is any.
 """
 
@@ -36,7 +36,7 @@ PRODUCT_INCLUDES = CORE_INCLUDES | {
     "cli": CORE + ["scene", "scheduler", "query", "client", "server"],
     "python": CORE + ["scene", "scheduler", "query"],
 }
-# Tests mirror the folders, so they include what they test; nothing of the product includes them.
+# Tests mirror the folders and include the code under test; the product never includes tests.
 ANYTHING = list(PRODUCT_INCLUDES)
 INCLUDES = PRODUCT_INCLUDES | {
     "tests": ANYTHING,
@@ -45,7 +45,7 @@ INCLUDES = PRODUCT_INCLUDES | {
 }
 # Folders that others include through one header only.
 PUBLIC_HEADERS = {"merge": ["merge/merge.h"]}
-# Tests and benchmarks look behind the public header of what they test.
+# Tests and benchmarks may include more than the public header.
 BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 
 # Third-party headers, and the folders where each may be included.

@@ -69,7 +69,7 @@ SampledCells::SampledCells(const voxdag_reader::File& file, uint64_t wanted)
   file.walk(CellVisitor<decltype(visit)>{color_levels_, file.grid_levels() - color_levels_, visit});
 }
 
-// Of a triangle: normal . x = offset.
+// The plane of a triangle: normal . x = offset.
 struct SampledCells::Plane {
   explicit Plane(const FixedTriangle& t) {
     double u[3], v[3];

@@ -21,7 +21,7 @@ class SampledCells {
 
   // In Morton order.
   const std::vector<CellPosition>& positions() const { return positions_; }
-  // Of all cells that the file has colors of, the finest level alone.
+  // Number of colored cells on the file's finest color level.
   uint64_t file_cells() const { return file_cells_; }
   // log2 of a cell's edge in lattice units.
   int cell_bits() const { return cell_bits_; }

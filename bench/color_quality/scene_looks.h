@@ -1,5 +1,5 @@
-// What a scene looks like, for the oracle: decoded images and materials, and its surfaces. Scene
-// readers and image decoders are those of the product, all the rest is not.
+// The scene's appearance for the oracle: decoded images, materials and surfaces. Only the scene
+// readers and the image decoders are shared with the product.
 #pragma once
 
 #include <memory>

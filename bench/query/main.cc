@@ -4,7 +4,7 @@
 //     bench_query [--levels N] [--picture EDGE] FILE.vdag...
 //
 // --levels: on the grid of 2^N cells per edge (default: the file's); rays stop at its cells.
-// --picture: rays are those of the pixels of a square picture of that edge (default: 1024).
+// --picture: rays through the pixels of a square picture of that edge (default: 1024).
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -25,7 +25,7 @@ constexpr size_t kReaderBoxes = 20;
 // OctoMap takes some 5 GB for Sponza on a grid of 2048^3.
 constexpr uint32_t kMaxOtherLevels = 11;
 
-// `expected` is what the first library that was asked has found, if both should find the same.
+// `expected` is the first library's result, if both should find the same.
 void print(const char* who, const char* what, const Timing& timing,
            const Timing* expected = nullptr) {
   std::printf("  %-22s %-22s %10.4f M/s   found %llu%s\n", who, what, timing.per_second / 1e6,
@@ -55,7 +55,7 @@ bool reader_has(const voxdag_reader::File& file, uint32_t grid_levels, const Pos
   return true;
 }
 
-// Of lookups that one library does alike.
+// Measures all kinds of lookups of one library.
 template <class LookUp>
 void lookups(const char* who, const QuerySet& queries, Timings& timings, const Timings* expected,
              const LookUp& look_up) {

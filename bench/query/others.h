@@ -1,4 +1,4 @@
-// The same queries by other libraries. One that is not installed says so.
+// The same queries with other libraries. A library that is not installed is reported as missing.
 #pragma once
 
 #include <optional>

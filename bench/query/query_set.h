@@ -1,4 +1,4 @@
-// What is asked of a file in the benchmarks: the same points and rays for every library.
+// The queries of the benchmarks: the same points and rays for every library.
 #pragma once
 
 #include <algorithm>
@@ -39,7 +39,7 @@ struct Timings {
 // CPU time of this thread.
 double thread_seconds();
 
-// The best of three runs by CPU time of this thread; run() returns what it found.
+// The best of three runs by CPU time of this thread; run() returns its result.
 template <class Run>
 Timing best_of_three(size_t items, const Run& run) {
   Timing best;

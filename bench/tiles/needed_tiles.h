@@ -1,6 +1,6 @@
-// Which tiles a picture needs: those without which some ray's first cell would be known only
-// coarser than asked for. A tile's own cells are known with it, and those down to two levels below
-// its root with the tile above, which has its coarse brick.
+// The tiles needed for a picture. A tile is needed if without it some ray's first cell would be
+// coarser than requested. A tile has its cells; the tile above has the coarse brick, with the cells
+// down to two levels below the tile's root.
 #pragma once
 
 #include <algorithm>
@@ -62,7 +62,7 @@ class NeededTiles {
     if (level < 2) return;  // known with the first tile
     const uint32_t bricks = dag_.grid_levels() - 2;
     for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) {
-      // Down to two levels below its root, what a tile has is known without it.
+      // Cells down to two levels below the root are in the tile above.
       uint32_t root = std::min(level - 2, bricks);
       while (root > 0 && (bricks - root) % depth != 0) --root;
       if (root == 0 || root == bricks) continue;

@@ -11,7 +11,7 @@ IN_LARGE_PARTS = """() => {
 }"""
 
 # Seconds from the beginning of the view until it is complete: two pictures in a row lack no tile. Within a scene the sun
-# then takes its place, which `done` waits for. `camera`: null for that of the address.
+# then moves to its final position; `done` waits for that. `camera`: null for the camera in the address.
 UNTIL_COMPLETE = """async ([camera, done]) => {
   const {viewer, renderer} = window.voxdagViewer, frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
   const begin = camera === null ? 0 : performance.now();
@@ -32,7 +32,7 @@ UNTIL_COMPLETE = """async ([camera, done]) => {
 REQUESTS = """(from) => [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")].slice(from)
   .map((e) => [e.name, e.startTime, e.responseEnd, e.transferSize > 0 ? e.encodedBodySize : 0])"""
 
-# Of the rays of the whole picture: a histogram of steps, the share that hits, the widest cell in pixels, and the
+# Statistics of all rays of the picture: a histogram of steps, the share that hits, the widest cell in pixels, and the
 # places of the finest tiles that they end in, as level and position.
 HITS = """async () => {
   const {renderer} = window.voxdagViewer, {info, view, passes} = renderer, {width, height} = renderer.size;
@@ -142,7 +142,7 @@ FLIGHT = """([cameras, leg_s]) => {
   step();
 }"""
 
-# Milliseconds since the page was asked for; null before the first picture.
+# Milliseconds since the request for the page; null before the first picture.
 FIRST = """() => {
   const {renderer} = window.voxdagViewer ?? {};
   if (renderer?.times.first_picture_ms == null) return null;

@@ -2,14 +2,14 @@
 """What the viewer costs, in headless Chromium with WebGL on the CPU.
 
     bench/viewer/measure.py views FILE.vdag [--budget MIB]   bytes, tiles, seconds, steps of the cameras, each in a
-                                                             browser of its own; then all in one
-    bench/viewer/measure.py pictures FILE.vdag               next to those of `voxdag render`
-    bench/viewer/measure.py frames FILE.vdag --other WEB     CPU time of a frame, and that of another version's server/web
+                                                             separate browser; then all in one
+    bench/viewer/measure.py pictures FILE.vdag               compared with `voxdag render`
+    bench/viewer/measure.py frames FILE.vdag --other WEB     CPU time of a frame, also of another version's server/web
     bench/viewer/measure.py first FILE.vdag                  the times of the first picture
     bench/viewer/measure.py flight FILE.vdag --seconds 600   memory, sampled every ten seconds
 
 --cameras takes a file with lines of a name and the camera options of `voxdag render`, as sponza.txt here; without it, named views. Bytes,
-tiles and steps do not depend on what else the machine does, the rest does: the load is printed. Needs Playwright,
+tiles and steps do not depend on the load of the machine; the other figures do, so the load is printed. Needs Playwright,
 numpy and Pillow.
 """
 
@@ -65,7 +65,7 @@ class Measurement:
 
     @contextlib.contextmanager
     def visitor(self, width=None, height=None):
-        """A browser of its own, with a canvas of this size."""
+        """A separate browser with a canvas of this size."""
         browser = self.play.chromium.launch(executable_path="/usr/bin/chromium", args=OPTIONS)
         visitor = Visitor(browser, self.folder, "measured", (width or self.width) + WINDOW[0], (height or self.height) + WINDOW[1],
                           device_scale_factor=1)
@@ -151,8 +151,8 @@ class Measurement:
                      light={key: light[key] for key in ("sun", "exposure", "sky_reach", "haze_start")})
 
     def frames(self):
-        """Both versions by turns, from files in a folder, with the tiles of one server. A frame costs CPU time of the
-        browser's process for graphics, whatever else the machine does."""
+        """Measures both versions alternating, from files in a folder, with the tiles of one server. The cost of a frame is the
+        CPU time of the browser's graphics process, which does not depend on the load."""
         own = Path(__file__).resolve().parent.parent.parent / "server" / "web"
         with contextlib.ExitStack() as stack:
             server, visitors, known = stack.enter_context(self.server()), {}, set()
@@ -238,7 +238,7 @@ def cpu_s(pid):
 
 
 def resident(pid, which="VmRSS"):
-    """In MiB; 0 of a process that is gone."""
+    """Resident memory in MiB; 0 if the process has ended."""
     with contextlib.suppress(OSError):
         found = re.search(rf"{which}:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text(encoding="utf-8"))
         return int(found[1]) / 1024 if found else 0
@@ -266,7 +266,7 @@ def row(done):
 
 
 def sums(requests):
-    """The nodes of the tiles that were asked for, as text, and the bytes of the page, the manifest and the tiles."""
+    """The nodes of the requested tiles, as text, and the bytes of the page, the manifest and the tiles."""
     tiles, bytes_of = set(), {"page": 0, "manifest": 0, "tiles": 0}
     for address, _, _, size in requests:
         if single := re.search(r"/tiles/(\d+)/(\d+)\?", address):
@@ -302,7 +302,7 @@ def describe(histogram):
 
 
 def compared(depths, reference, ours, its):
-    """Of the pixels that hit: how much brighter the first picture is, in all and in the regions of 8 x 8."""
+    """Brightness difference of the pixels that hit, in total and in regions of 8 x 8."""
     ours_hit, its_hit = np.isfinite(depths), np.isfinite(reference)
     both, off = ours_hit & its_hit, (ours - its).mean(axis=2)
     regions = []
