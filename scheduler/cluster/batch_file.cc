@@ -65,7 +65,7 @@ Batch from_json(const Json& json) {
 // Collects bytes and writes them by large blocks.
 class BlockWriter {
  public:
-  explicit BlockWriter(WritableFile& file) : file_(file) {}
+  explicit BlockWriter(WritableFile& file) : file_(file) { block_.reserve(kBlockBytes); }
   void add(std::span<const std::byte> bytes) {
     block_.insert(block_.end(), bytes.begin(), bytes.end());
     if (block_.size() >= kBlockBytes) flush();
