@@ -6,8 +6,8 @@ KEEP_ENTRIES = "performance.setResourceTimingBufferSize(200000);"
 # A slow and busy machine would draw a large picture in very many small parts. Ambient occlusion needs no tiles.
 IN_LARGE_PARTS = """() => {
   const {viewer, renderer} = window.voxdagViewer;
-  Object.defineProperty(renderer.pace, "part_pixels", {get: () => 1 << 19, set() {}});
-  viewer.set_options({occlusion: false});
+  Object.defineProperty(renderer.pace, "partPixels", {get: () => 1 << 19, set() {}});
+  viewer.setOptions({occlusion: false});
 }"""
 
 # Seconds from the beginning of the view until it is complete: two pictures in a row lack no tile. Within a scene the sun
@@ -16,15 +16,15 @@ UNTIL_COMPLETE = """async ([camera, done]) => {
   const {viewer, renderer} = window.voxdagViewer, frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
   const begin = camera === null ? 0 : performance.now();
   if (camera !== null) {
-    viewer.fly_to_text(camera);
+    viewer.flyToText(camera);
     await frame();
     await frame();
   }
-  while (!renderer.is_complete) await frame();
-  const complete_s = (performance.now() - begin) / 1000;
+  while (!renderer.isComplete) await frame();
+  const completeS = (performance.now() - begin) / 1000;
   if (done) await renderer.complete();
-  return {complete_s, done_s: (performance.now() - begin) / 1000, first_picture_s: renderer.times.first_picture_ms / 1000, compile_s: renderer.times.compile_ms / 1000,
-          coarse_pixels: renderer.coarse_pixels, full: renderer.loader.is_full, width: renderer.canvas.width,
+  return {completeS, doneS: (performance.now() - begin) / 1000, firstPictureS: renderer.times.firstPictureMs / 1000, compileS: renderer.times.compileMs / 1000,
+          coarsePixels: renderer.coarsePixels, full: renderer.loader.isFull, width: renderer.canvas.width,
           height: renderer.canvas.height, ...renderer.statistics()};
 }"""
 
@@ -65,20 +65,20 @@ LIGHT_STEPS = """async () => {
   passes.resize(width, height, renderer.size, renderer.colors !== null);
   const values = {...renderer.uniforms(width, height), u_frame: 1, u_seed: 1, u_jitter: [0, 0],
                   u_occlusion: true};
-  const names = ["trace", "light", "occlusion", "combine", "feedback"], pass_ms = {}, pixel = new Uint8Array(4);
+  const names = ["trace", "light", "occlusion", "combine", "feedback"], passMs = {}, pixel = new Uint8Array(4);
   const wait = () => {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
   };
   let all = null;
   for (const name of names)
-    passes[name].draw = function(target, its_values, ...rest) {
-      if (name === "light") all = its_values;
+    passes[name].draw = function(target, itsValues, ...rest) {
+      if (name === "light") all = itsValues;
       wait();
       const begin = performance.now();
-      Program.prototype.draw.call(this, target, its_values, ...rest);
+      Program.prototype.draw.call(this, target, itsValues, ...rest);
       wait();
-      pass_ms[name] = Math.round(performance.now() - begin);
+      passMs[name] = Math.round(performance.now() - begin);
     };
   for (const part of passes.draw(values, () => 1e9));
   for (const name of names) delete passes[name].draw;
@@ -103,18 +103,18 @@ LIGHT_STEPS = """async () => {
     return out;
   };
   const {light, sky} = passes.targets;
-  const sun_rays = run("steps of light", counted(kLight, "o_missing = uint(step_count);"), light, width, height,
+  const sunRays = run("steps of light", counted(kLight, "o_missing = uint(step_count);"), light, width, height,
                        new Uint32Array(4 * width * height));
-  const sky_rays = run("steps of occlusion",
+  const skyRays = run("steps of occlusion",
     counted(kOcclusion, "o_sky = vec4(float(step_count & 255), float(step_count >> 8), 0.0, 255.0) / 255.0;"), sky,
     Math.ceil(width / 2), Math.ceil(height / 2), null);
-  return {sun: histogram(sun_rays), sky: histogram(sky_rays), pass_ms};
+  return {sun: histogram(sunRays), sky: histogram(skyRays), passMs};
 }"""
 
 # Draws `count` frames with all pixels of the canvas while the camera turns there and back. Returns how long that took.
 FRAMES = """async ([count, width, height]) => {
   const {viewer, renderer} = window.voxdagViewer, frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
-  renderer.internal_size = () => ({width, height, full: true});
+  renderer.internalSize = () => ({width, height, full: true});
   const begin = performance.now(), end = renderer.seed + count;
   for (let i = 0; renderer.seed < end; ++i) {
     viewer.camera.turn(i % 24 < 12 ? 0.004 : -0.004, 0);
@@ -122,20 +122,20 @@ FRAMES = """async ([count, width, height]) => {
     await frame();
   }
   const wall_s = (performance.now() - begin) / 1000, {stepsMean, internalWidth, internalHeight, loading} = renderer.statistics();
-  delete renderer.internal_size;
+  delete renderer.internalSize;
   return {wall_s, stepsMean, internalWidth, internalHeight, loading};
 }"""
 
 # A way through all cameras and back: each leg takes `leg_s`, a quarter of it at rest at its end.
-FLIGHT = """([cameras, leg_s]) => {
+FLIGHT = """([cameras, legS]) => {
   const {viewer} = window.voxdagViewer, numbers = cameras.map((text) => text.match(/-?[0-9.]+(?:e-?[0-9]+)?/g).map(Number));
-  const begin = performance.now(), out = window.its_flight = {frames: 0, stopped: false};
+  const begin = performance.now(), out = window.itsFlight = {frames: 0, stopped: false};
   const step = () => {
     if (out.stopped) return;
-    const legs = (performance.now() - begin) / 1000 / leg_s, leg = Math.floor(legs), share = Math.min(1, (legs - leg) / 0.75);
+    const legs = (performance.now() - begin) / 1000 / legS, leg = Math.floor(legs), share = Math.min(1, (legs - leg) / 0.75);
     const of = (i) => numbers[i % numbers.length], smooth = share * share * (3 - 2 * share);
     const [ex, ey, ez, tx, ty, tz, fov] = of(leg).map((x, i) => x + smooth * (of(leg + 1)[i] - x));
-    viewer.fly_to_text(`--camera ${ex},${ey},${ez} --target ${tx},${ty},${tz} --fov ${fov}`);
+    viewer.flyToText(`--camera ${ex},${ey},${ez} --target ${tx},${ty},${tz} --fov ${fov}`);
     ++out.frames;
     requestAnimationFrame(step);
   };
@@ -145,9 +145,9 @@ FLIGHT = """([cameras, leg_s]) => {
 # Milliseconds since the request for the page; null before the first picture.
 FIRST = """() => {
   const {renderer} = window.voxdagViewer ?? {};
-  if (renderer?.times.first_picture_ms == null) return null;
+  if (renderer?.times.firstPictureMs == null) return null;
   const {times} = renderer, statistics = renderer.statistics();
-  return {begin: times.begin_ms, compile: times.compile_ms, first: times.begin_ms + times.first_picture_ms,
+  return {begin: times.beginMs, compile: times.compileMs, first: times.beginMs + times.firstPictureMs,
           tiles: statistics.tiles, width: renderer.canvas.width, height: renderer.canvas.height,
           marks: performance.getEntriesByType("mark").map((e) => [e.name, Math.round(e.startTime)])};
 }"""

@@ -102,7 +102,7 @@ class Measurement:
                 if self.arguments.light:
                     light = visitor.page.evaluate(LIGHT_STEPS)
                     self.say(view=name, sun=describe(light["sun"]), sky=describe(light["sky"]),
-                             pass_ms=light["pass_ms"])
+                             pass_ms=light["passMs"])
         counts = {}
         for tiles in asked.values():
             for tile in tiles:
@@ -148,7 +148,7 @@ class Measurement:
             Image.fromarray(ours).save(out / f"{name}_viewer.png")
             self.say(view=name, **compared(np.array(depths).reshape(height, width), reference.reshape(height, width),
                                            ours.astype(float), its.astype(float)),
-                     light={key: light[key] for key in ("sun", "exposure", "sky_reach", "haze_start")})
+                     light={key: light[key] for key in ("sun", "exposure", "skyReach", "hazeStart")})
 
     def frames(self):
         """Measures both versions alternating, from files in a folder, with the tiles of one server. The cost of a frame is the
@@ -167,7 +167,7 @@ class Measurement:
                 costs = {version: [] for version in visitors}
                 for visitor, _ in visitors.values():
                     visitor.show(camera, complete=False)
-                    visitor.wait_until("voxdagViewer.renderer.is_complete")
+                    visitor.wait_until("voxdagViewer.renderer.isComplete")
                 for _ in range(self.arguments.rounds):
                     for version, (visitor, pid) in visitors.items():
                         before_s = cpu_s(pid)
@@ -211,7 +211,7 @@ class Measurement:
                 visitor.page.wait_for_timeout(10_000)
                 session.send("HeapProfiler.collectGarbage")
                 state = visitor.statistics()
-                requests = visitor.page.evaluate("[its_flight.frames, performance.getEntriesByType('resource').length]")
+                requests = visitor.page.evaluate("[itsFlight.frames, performance.getEntriesByType('resource').length]")
                 rows.append({"s": round(time.monotonic() - begin), "heap": session.send("Runtime.getHeapUsage")["usedSize"] / MIB,
                              "gpu_process": sum(resident(pid) for pid in descendants("gpu-process")),
                              "page_process": sum(resident(pid) for pid in descendants("renderer")),
@@ -220,7 +220,7 @@ class Measurement:
                              "requested": state["requested"], "evicted": state["evicted"],
                              "fetched": state["fetchedBytes"] / MIB, "frames": requests[0]})
                 self.say(**{key: round(value, 1) for key, value in rows[-1].items()})
-            visitor.page.evaluate("its_flight.stopped = true")
+            visitor.page.evaluate("itsFlight.stopped = true")
         for minute in range(int(seconds // 60)):
             of = [each for each in rows if 60 * minute < each["s"] <= 60 * (minute + 1)]
             self.say(minute=minute + 1, **{key: [round(f([each[key] for each in of]), 1) for f in (min, statistics.median, max)]
@@ -261,7 +261,7 @@ def descendants(kind):
 
 
 def row(done):
-    return {key: round(done[key], 3) for key in ("complete_s", "done_s", "first_picture_s", "compile_s", "coarse_pixels")} | {
+    return {key: round(done[key], 3) for key in ("completeS", "doneS", "firstPictureS", "compileS", "coarsePixels")} | {
         key: done[key] for key in ("full", "width", "height", "tiles", "tileBytes", "poolBytes", "evicted", "fetchedBytes")}
 
 

@@ -141,7 +141,7 @@ def check_small_pool(visitor, url, camera, reference):
       let wrong = 0, used = 0;
       for (const page of store.pages.values()) {
         if (page.blocks.length === 0) continue;
-        let at = store.home_of(page.place);
+        let at = store.homeOf(page.place);
         while (store.words[4 * at + 3] !== 0 && page.place.some((word, i) => store.words[4 * at + i] !== word))
           at = at + 1 & store.entries - 1;
         wrong += store.words[4 * at + 3] !== page.blocks[0] + 1;
@@ -159,8 +159,8 @@ def check_without_pages(visitor, url, camera, gray):
     with visitor.expecting("Failed to load resource"):
         visitor.open(url)
         visitor.show(camera, complete=False)
-        visitor.wait_until("voxdagViewer.renderer.problem && voxdagViewer.renderer.loader.is_idle")
-        visitor.wait_until("voxdagViewer.renderer.full_drawn")
+        visitor.wait_until("voxdagViewer.renderer.problem && voxdagViewer.renderer.loader.isIdle")
+        visitor.wait_until("voxdagViewer.renderer.fullDrawn")
         plain = pixels_of(visitor)
         visitor.picture("no-pages")
     visitor.page.unroute("**/tiles/colors*")

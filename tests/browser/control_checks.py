@@ -162,7 +162,7 @@ def check_camera_text(visitor, voxdag, built, camera):
 # Goes to an address while the camera glides elsewhere; resolves when nothing moves.
 FOLLOW = """async ([elsewhere, hash]) => {
   const {viewer} = voxdagViewer;
-  if (elsewhere) viewer.fly_to_text(elsewhere);
+  if (elsewhere) viewer.flyToText(elsewhere);
   const glides = viewer.motion.flight !== null;
   await new Promise((resolve) => {
     addEventListener("hashchange", resolve, {once: true});

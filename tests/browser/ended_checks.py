@@ -10,13 +10,13 @@ IS_RESULT = "Boolean(window.voxdagViewer) && !voxdagViewer.running"
 # When the page has asked for its job, and what is passed on of it: "answer" or "lose".
 ASKED = """
 window.asked = {times: [], way: "answer"};
-const plain_fetch = window.fetch;
+const plainFetch = window.fetch;
 window.fetch = (url, options) => {
   if (/\\/jobs\\/[0-9a-f]+$/.test(url)) {
     asked.times.push(performance.now());
     if (asked.way === "lose") return Promise.reject(new TypeError("lost"));
   }
-  return plain_fetch(url, options);
+  return plainFetch(url, options);
 };
 """
 
@@ -46,7 +46,7 @@ def check_retry_of_canceled(visitor, server):
     visitor.open(job.page, wait=False)
     heading(visitor, "This job is canceled.")
     page.get_by_text("It has no result to look at.").wait_for()
-    page.evaluate("window.same_page = true")
+    page.evaluate("window.isSamePage = true")
     link = page.get_by_role("link", name="The job's page")
     link.focus()
     visitor.wait_until("asked.times.length >= 3")
@@ -64,7 +64,7 @@ def check_retry_of_canceled(visitor, server):
     visitor.wait_until("Boolean(window.voxdagViewer?.running)")
     job.signal(signal.SIGCONT)
     visitor.wait_until(IS_RESULT)
-    assert page.evaluate("window.same_page === true"), "the page was loaded again"
+    assert page.evaluate("window.isSamePage === true"), "the page was loaded again"
 
 
 def check_never_planned(visitor, server):

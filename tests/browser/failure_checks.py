@@ -10,16 +10,16 @@ CONNECTION_LOST = "ERR_CONNECTION_REFUSED|ERR_FAILED|ERR_CONNECTION_RESET|ERR_EM
 
 # Requests for all tiles but the root's "arrive", "fail", or are "late" until their turn comes.
 TILES = """
-window.tiles = {way: "%s", pause_ms: 0, asked: 0, held: []};
-const plain_fetch = window.fetch;
+window.tiles = {way: "%s", pauseMs: 0, asked: 0, held: []};
+const plainFetch = window.fetch;
 window.fetch = async (url, options) => {
   if (/\\/tiles\\/(?!0\\/0\\?)/.test(url)) {
     ++tiles.asked;
     if (tiles.way === "fail") throw new TypeError("failed");
-    if (tiles.pause_ms) await new Promise((resolve) => setTimeout(resolve, tiles.pause_ms));
+    if (tiles.pauseMs) await new Promise((resolve) => setTimeout(resolve, tiles.pauseMs));
     if (tiles.way === "late") await new Promise((resolve) => tiles.held.push(resolve));
   }
-  return plain_fetch(url, options);
+  return plainFetch(url, options);
 };
 """
 
@@ -45,10 +45,10 @@ def check_missing_tiles(visitor, url, way, cameras, references):
 
 # The first request for several tiles is never answered.
 HANG = """
-const answering_fetch = window.fetch;
+const answeringFetch = window.fetch;
 window.hangs = 0;
 window.fetch = (url, options) =>
-  /\\/tiles\\/batch/.test(url) && !hangs++ ? new Promise(() => {}) : answering_fetch(url, options);
+  /\\/tiles\\/batch/.test(url) && !hangs++ ? new Promise(() => {}) : answeringFetch(url, options);
 """
 
 
@@ -63,7 +63,7 @@ def check_hanging_request(visitor, url):
 # A browser that compiles when it is asked for the result; how many programs it was given before that.
 SERIAL_COMPILER = """
 const {getExtension, linkProgram, getProgramParameter} = WebGL2RenderingContext.prototype;
-const serial = window.serial = {linked: 0, before_result: 0};
+const serial = window.serial = {linked: 0, beforeResult: 0};
 WebGL2RenderingContext.prototype.getExtension = function(name) {
   return name === "KHR_parallel_shader_compile" ? null : getExtension.call(this, name);
 };
@@ -72,7 +72,7 @@ WebGL2RenderingContext.prototype.linkProgram = function(program) {
   linkProgram.call(this, program);
 };
 WebGL2RenderingContext.prototype.getProgramParameter = function(program, name) {
-  serial.before_result ||= serial.linked;
+  serial.beforeResult ||= serial.linked;
   return getProgramParameter.call(this, program, name);
 };
 """
@@ -82,8 +82,8 @@ def check_serial_compiler(visitor, url):
     """All programs of the first picture are given to the compiler before one is waited for."""
     visitor.page.add_init_script(SERIAL_COMPILER)
     visitor.open(f"{url}/{PLAIN}")
-    visitor.wait_until("voxdagViewer.renderer.has_drawn")
-    assert visitor.page.evaluate("serial.before_result") == 6, visitor.page.evaluate("serial")
+    visitor.wait_until("voxdagViewer.renderer.hasDrawn")
+    assert visitor.page.evaluate("serial.beforeResult") == 6, visitor.page.evaluate("serial")
 
 
 def check_restart(visitor, server, cameras, references):
@@ -106,14 +106,14 @@ def check_restart(visitor, server, cameras, references):
 
 # Puts the first camera, which the sun follows, within the scene. Whether the view is complete within
 # two minutes: a busy machine draws slowly.
-COMPLETE_WITH_SUN = """async (pause_ms) => {
+COMPLETE_WITH_SUN = """async (pauseMs) => {
   const {viewer, renderer, camera, manifest} = voxdagViewer, {eye, target} = camera.get();
-  renderer.light.place_sun(eye, target.map((c, axis) => c - eye[axis]));
+  renderer.light.placeSun(eye, target.map((c, axis) => c - eye[axis]));
   renderer.light.outside = false;
-  renderer.sun_trials = 6, renderer.sun_wanted = 0;  // of 8 that may wait for tiles in vain
-  tiles.pause_ms = pause_ms;
+  renderer.sunTrials = 6, renderer.sunWanted = 0;  // of 8 that may wait for tiles in vain
+  tiles.pauseMs = pauseMs;
   tiles.asked = 0;
-  viewer.set_options({shadows: true});
+  viewer.setOptions({shadows: true});
   return Promise.race([renderer.complete().then(() => true),
                        new Promise((resolve) => setTimeout(() => resolve(false), 120000))]);
 }"""
@@ -150,20 +150,20 @@ LOSE = """() => {
 
 # The first context is lost as soon as it is made.
 LOSE_AT_ONCE = """
-const its_context = HTMLCanvasElement.prototype.getContext;
+const itsContext = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
-  const made = its_context.call(this, kind, ...more);
-  if (kind === "webgl2" && made && !window.early_loss) {
-    window.early_loss = made.getExtension("WEBGL_lose_context");
+  const made = itsContext.call(this, kind, ...more);
+  if (kind === "webgl2" && made && !window.earlyLoss) {
+    window.earlyLoss = made.getExtension("WEBGL_lose_context");
     %s
   }
   return made;
 };
 """
-LOSSES = {"before the page": "early_loss.loseContext();",
-          "while programs compile": "setTimeout(() => early_loss.loseContext());"}
-LOSE_AND_RESTORE = """early_loss.loseContext();
-    addEventListener("webglcontextlost", () => setTimeout(() => early_loss.restoreContext()), true);"""
+LOSSES = {"before the page": "earlyLoss.loseContext();",
+          "while programs compile": "setTimeout(() => earlyLoss.loseContext());"}
+LOSE_AND_RESTORE = """earlyLoss.loseContext();
+    addEventListener("webglcontextlost", () => setTimeout(() => earlyLoss.restoreContext()), true);"""
 
 
 def hold_page(visitor):
@@ -188,7 +188,7 @@ def check_early_loss(visitor, url, when, camera, reference):
         assert page.locator('[data-tool="screenshot"]').is_disabled(), "a picture is to be saved that is not there"
         page.locator("#scene").press("p")
         page.get_by_text("There is no picture yet.").wait_for(state="attached")
-        page.evaluate("early_loss.restoreContext()")
+        page.evaluate("earlyLoss.restoreContext()")
         visitor.wait_until("Boolean(window.voxdagViewer)")
         visitor.show(camera)
     depths, _ = visitor.capture(WIDTH, HEIGHT)
@@ -202,7 +202,7 @@ def check_brief_loss(visitor, url):
     hold_page(visitor)
     with visitor.expecting("CONTEXT_LOST|Context lost"):
         visitor.open(f"{url}/{PLAIN}")
-        visitor.wait_until("voxdagViewer.renderer.has_drawn")
+        visitor.wait_until("voxdagViewer.renderer.hasDrawn")
 
 
 def check_lost_context(visitor, url, camera, reference):

@@ -3,7 +3,7 @@
 # A loader and a store without a picture, on a GPU that keeps nothing: so many tiles that most of them leave again. Of every
 # 29th the service says that it is damaged. Each tile has a root, two nodes and eight cut-off nodes, whose tiles are others.
 # Returns, after the first part of the tiles and at the end, how many things stay.
-MANY_TILES = """async ([budget_bytes, max_failures, first, all]) => {
+MANY_TILES = """async ([budgetBytes, maxFailures, first, all]) => {
   const {TileLoader} = await import("/viewer/tiles/tile_loader.js");
   const {TilePool} = await import("/viewer/tiles/tile_pool.js");
   const {TileStore} = await import("/viewer/tiles/tile_store.js");
@@ -17,7 +17,7 @@ MANY_TILES = """async ([budget_bytes, max_failures, first, all]) => {
     for (let i = 0; i < 8; ++i) leaves.push(next++, 0, 1, 0);
     return Uint32Array.of(0x31544456, level | 3 << 8, 13, 8, 1, 2, 1, 4, 255, 0, 1, 2, 3, 4, 5, 6, 7, ...leaves);
   };
-  const source = {info, batch_max: 64, ended: null, timeout_ms: 1000, fetchTiles: async (nodes) => {
+  const source = {info, batchMax: 64, ended: null, timeoutMs: 1000, fetchTiles: async (nodes) => {
     if (nodes.some(({offset}) => offset % bad === 0)) throw new TileError(500, "it is damaged", {code: "corrupt"});
     return nodes.map(({level}) => tile(level));
   }};
@@ -42,19 +42,19 @@ MANY_TILES = """async ([budget_bytes, max_failures, first, all]) => {
     return things;
   };
 
-  const plain_warn = console.warn;
+  const plainWarn = console.warn;
   console.warn = () => {};
-  const store = new TileStore(new TilePool(gl, budget_bytes), info), loader = new TileLoader(source, store, () => {});
-  loader.max_failures = max_failures;
+  const store = new TileStore(new TilePool(gl, budgetBytes), info), loader = new TileLoader(source, store, () => {});
+  loader.maxFailures = maxFailures;
   store.add(0, 0, tile(0), 0);
-  store.set_root(0, 0);
+  store.setRoot(0, 0);
   let came = 0, random = 1;
   const look = () => ({came, evicted: store.evicted, tiles: store.tiles.size, things: count([store, loader]),
-                       failures: loader.failures.size, failed: loader.failed_total});
-  const looks = [], is_done = () => loader.is_idle && loader.loading.size === 0;
+                       failures: loader.failures.size, failed: loader.failedTotal});
+  const looks = [], isDone = () => loader.isIdle && loader.loading.size === 0;
   for (let view = 1; came < all; ++view) {
-    store.begin_epoch();
-    loader.begin_epoch();
+    store.beginEpoch();
+    loader.beginEpoch();
     // What a view needs: some tiles that are there, and what lies below them.
     for (let round = 0; round < 6; ++round) {
       const wanted = new Map(), level = view % 4 * 3;
@@ -70,14 +70,14 @@ MANY_TILES = """async ([budget_bytes, max_failures, first, all]) => {
       store.rounds = 4;  // it is known what the view does not need
       const before = store.tiles.size + store.evicted;
       loader.demand(wanted, performance.now());
-      while (!is_done()) await new Promise((resolve) => setTimeout(resolve));
+      while (!isDone()) await new Promise((resolve) => setTimeout(resolve));
       came += store.tiles.size + store.evicted - before;
     }
     if (looks.length === 0 && came >= first) looks.push(look());
   }
   looks.push(look());
   loader.dispose();
-  console.warn = plain_warn;
+  console.warn = plainWarn;
   return looks;
 }"""
 

@@ -98,14 +98,14 @@ def check_pictures(visitor, cameras, references):
 
 # No tile is had any more once those of the first view are there, which a mark says.
 ONLY_FIRST_VIEW = """
-const its_fetch = window.fetch, its_mark = performance.mark;
-window.its_tiles = false;
+const itsFetch = window.fetch, itsMark = performance.mark;
+window.itsTiles = false;
 performance.mark = function(name) {
-  its_tiles ||= name === "voxdag: tiles of the first view";
-  return its_mark.apply(this, arguments);
+  itsTiles ||= name === "voxdag: tiles of the first view";
+  return itsMark.apply(this, arguments);
 };
 window.fetch = (url, options) =>
-  its_tiles && /\\/tiles\\/[^c]/.test(url) ? new Promise(() => {}) : its_fetch(url, options);
+  itsTiles && /\\/tiles\\/[^c]/.test(url) ? new Promise(() => {}) : itsFetch(url, options);
 """
 COARSE_PIXELS = 16
 
@@ -114,7 +114,7 @@ def check_first_view(visitor, url, dag, camera, reference):
     """The tiles that are asked for before anything is drawn are enough for a picture without wide cells or holes."""
     visitor.page.add_init_script(ONLY_FIRST_VIEW)
     visitor.open(address(url, camera))
-    visitor.wait_until("its_tiles")
+    visitor.wait_until("itsTiles")
     depths, levels = visitor.capture(WIDTH, HEIGHT)
     spread = math.tan(math.radians(fov_of(camera)) / 2) / (HEIGHT / 2)
     widest = max(2 ** (dag.levels - level) / (spread * depth) for depth, level in zip(depths, levels)
@@ -185,7 +185,7 @@ LIGHT_SIZE = 2 * WIDTH, 2 * HEIGHT  # a smaller picture measures its brightness 
 
 def check_canvas(visitor, camera, reference, rendered):
     """What the canvas shows with light is `rendered`, and has light and shadow."""
-    visitor.page.evaluate("voxdagViewer.viewer.set_options({shadows: true, occlusion: true})")
+    visitor.page.evaluate("voxdagViewer.viewer.setOptions({shadows: true, occlusion: true})")
     visitor.show(camera)
     width, height, pixels = visitor.canvas()
     assert (width, height) == LIGHT_SIZE, (width, height)
@@ -200,7 +200,7 @@ MAX_BLACK = 0.02   # of the canvas
 
 def check_inside_cell(visitor, camera):
     """A picture from within a cell that is drawn as a whole is not black, though no ray from there is free."""
-    visitor.page.evaluate("voxdagViewer.viewer.set_options({level: 2, shadows: true, occlusion: true})")
+    visitor.page.evaluate("voxdagViewer.viewer.setOptions({level: 2, shadows: true, occlusion: true})")
     visitor.show(camera)
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert max(depths) == 0, "the eye is not in a cell: the check sees nothing"
@@ -221,7 +221,7 @@ COUNT_BLOCKS = """() => {
       ++count;
       seen.add(block);
     }
-  return [count, count - seen.size, store.pool.block_count - store.pool.free_blocks, renderer.statistics()];
+  return [count, count - seen.size, store.pool.blockCount - store.pool.freeBlocks, renderer.statistics()];
 }"""
 
 
@@ -299,7 +299,7 @@ def check_growing_pool(visitor, url, cameras, references, can_grow):
         camera = cameras[name]
         visitor.show(camera, complete=can_grow)
         if not can_grow:
-            visitor.wait_until("refusals > 0 || voxdagViewer.renderer.is_complete")
+            visitor.wait_until("refusals > 0 || voxdagViewer.renderer.isComplete")
             visitor.page.wait_for_timeout(300)  # more tiles come
         check_pool(visitor)
         depths, _ = visitor.capture(WIDTH, HEIGHT)
@@ -319,7 +319,7 @@ FLY = """async ([cameras, seconds]) => {
   const end = performance.now() + 1000 * seconds;
   let frames = 0, most = 0;
   for (let i = 0; performance.now() < end; ++i) {
-    viewer.fly_to_text(cameras[i % cameras.length]);
+    viewer.flyToText(cameras[i % cameras.length]);
     for (let turn = 0; turn < 12 && performance.now() < end; ++turn, ++frames) {
       viewer.camera.turn(0.03, 0);
       viewer.camera.move(0, 0, viewer.camera.distance / 200);

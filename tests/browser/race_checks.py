@@ -60,10 +60,10 @@ def check_picks_while_loading(visitor, url, dag, camera, reference):
 
 # All tiles but the root's leave between a pick's ray and its reading.
 PICK_WITHOUT_TILES = """async ([x, y]) => {
-  const {renderer} = voxdagViewer, {passes, store} = renderer, its_pick = passes.pick_one;
+  const {renderer} = voxdagViewer, {passes, store} = renderer, itsPick = passes.pickOne;
   let left = 0, evicted = 0;
-  passes.pick_one = function(values) {
-    const reading = its_pick.call(passes, values);
+  passes.pickOne = function(values) {
+    const reading = itsPick.call(passes, values);
     evicted = store.evicted;
     for (const tile of left === 0 ? [...store.tiles.values()] : []) {
       if (tile === store.root) continue;
@@ -73,7 +73,7 @@ PICK_WITHOUT_TILES = """async ([x, y]) => {
     return reading;
   };
   const pick = await renderer.pick(x, y);
-  passes.pick_one = its_pick;
+  passes.pickOne = itsPick;
   return [pick, left, store.evicted - evicted];
 }"""
 
@@ -89,11 +89,11 @@ def check_tiles_that_left(visitor, url, dag, cameras, references):
     """A tile that has left is fetched again when it is needed; a pick that it leaves under is that of the new picture."""
     visitor.open(f"{url}/?budget=0.25{PLAIN}")
     visitor.page.evaluate("""() => {
-      const {source} = voxdagViewer, its_fetch = source.fetchTiles;
+      const {source} = voxdagViewer, itsFetch = source.fetchTiles;
       window.fetched = {};
       source.fetchTiles = function(nodes) {
         for (const {level, offset} of nodes) fetched[`${level}.${offset}`] = (fetched[`${level}.${offset}`] ?? 0) + 1;
-        return its_fetch.call(source, nodes);
+        return itsFetch.call(source, nodes);
       };
     }""")
     visitor.show(cameras["top"])
@@ -101,14 +101,14 @@ def check_tiles_that_left(visitor, url, dag, cameras, references):
     visitor.show(cameras["top"])
     seen, tiles = visitor.page.evaluate(SEEN)
     assert seen > tiles / 4, f"only {seen} of {tiles} tiles are known to be seen: others would leave first"
-    visitor.page.evaluate("window.of_top = [...voxdagViewer.renderer.store.tiles.keys()]")
+    visitor.page.evaluate("window.tilesOfTop = [...voxdagViewer.renderer.store.tiles.keys()]")
     for _ in range(10):
         for name in ("near", "inside", "street"):
             visitor.show(cameras[name], complete=False)
             visitor.page.wait_for_timeout(100)
-        if visitor.page.evaluate("of_top.some((key) => !voxdagViewer.renderer.store.tiles.has(key))"):
+        if visitor.page.evaluate("tilesOfTop.some((key) => !voxdagViewer.renderer.store.tiles.has(key))"):
             break
-    assert visitor.page.evaluate("of_top.some((key) => !voxdagViewer.renderer.store.tiles.has(key))"), "no tile of the first view has left"
+    assert visitor.page.evaluate("tilesOfTop.some((key) => !voxdagViewer.renderer.store.tiles.has(key))"), "no tile of the first view has left"
     visitor.show(cameras["top"])
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(references["top"], depths, cameras["top"], "top, after its tiles have left")
@@ -124,15 +124,15 @@ FIRST_PIXELS, FINE_PIXELS = "const kPixels = 15;", 1
 MOST_UNDER_WAY = 5 * 48  # four requests, and the one that arrives
 # How many tiles were asked for until those of the first view were there.
 COUNT_TILES = """
-window.asked = {tiles: 0, at_mark: null};
-const counted_fetch = window.fetch, counted_mark = performance.mark;
+window.asked = {tiles: 0, atMark: null};
+const countedFetch = window.fetch, countedMark = performance.mark;
 performance.mark = function(name) {
-  if (name === "voxdag: tiles of the first view") asked.at_mark ??= asked.tiles;
-  return counted_mark.apply(this, arguments);
+  if (name === "voxdag: tiles of the first view") asked.atMark ??= asked.tiles;
+  return countedMark.apply(this, arguments);
 };
 window.fetch = (url, options) => {
   if (/\\/tiles\\/[0-9b]/.test(url)) asked.tiles += /nodes=/.test(url) ? url.split("nodes=")[1].split(",").length : 1;
-  return counted_fetch(url, options);
+  return countedFetch(url, options);
 };
 """
 
@@ -161,10 +161,10 @@ def check_end_of_first_view(visitor, url, camera, reference):
 # The places where the camera is seen on its way, and whether a drag has inertia.
 GLIDE = """async (camera) => {
   const {viewer} = voxdagViewer, places = new Set(), end = performance.now() + 120000;
-  viewer.motion.start_coasting([1, 0], () => {});
+  viewer.motion.startCoasting([1, 0], () => {});
   const coasts = viewer.motion.coast !== null;
   viewer.motion.stop();
-  viewer.fly_to_text(camera);
+  viewer.flyToText(camera);
   for (;;) {
     places.add(viewer.camera.eye.join());
     if (viewer.motion.flight === null || performance.now() > end) return [places.size, coasts, [...viewer.camera.eye]];

@@ -125,7 +125,7 @@ def check_growing(visitor, server):
     visitor.open(job.page)
     visitor.wait_until("voxdagViewer.running && Boolean(voxdagViewer.renderer.info.root)")
     visitor.wait_until("voxdagViewer.wires.counts.built > 0")
-    page.evaluate("window.same_page = true")
+    page.evaluate("window.isSamePage = true")
     page.keyboard.press("ArrowLeft")
     early, camera = capture(visitor), visitor.camera()
     counts = page.evaluate("voxdagViewer.wires.counts")
@@ -162,7 +162,7 @@ def check_growing(visitor, server):
     assert page.locator("#panel").is_hidden(), "the panel was opened again"
     away = math.dist(camera["eye"], visitor.camera()["eye"])
     assert away < 0.01, f"the camera is {away} voxels away"
-    page.evaluate("(level) => voxdagViewer.viewer.set_options({level})", CELL_LEVEL)
+    page.evaluate("(level) => voxdagViewer.viewer.setOptions({level})", CELL_LEVEL)
     result = capture(visitor)
     assert uncovered(late, result) <= 0.01 * hits(late), "something was shown that is not in the result"
 

@@ -19,11 +19,11 @@ TWO_FRAMES = """async () => {
 
 SHOW = """async ([camera, complete]) => {
   const {viewer, renderer} = window.voxdagViewer;
-  viewer.fly_to_text(camera);
+  viewer.flyToText(camera);
   await (%s)();
   if (!complete) return;
   await renderer.complete();
-  if (!renderer.full_drawn || !renderer.sun_is_placed) throw new Error("complete() came before the final picture");
+  if (!renderer.fullDrawn || !renderer.sunIsPlaced) throw new Error("complete() came before the final picture");
 }""" % TWO_FRAMES
 
 CAPTURE = """async ([width, height]) => {
@@ -101,7 +101,7 @@ class Visitor(Window):
     def camera_text(self):
         """The string in the panel, which follows the camera after a moment."""
         self.page.evaluate(TWO_FRAMES)
-        self.wait_until("!voxdagViewer.viewer.bookmark_timer")
+        self.wait_until("!voxdagViewer.viewer.bookmarkTimer")
         return self.page.locator("#camera-text").inner_text()
 
 

@@ -22,7 +22,7 @@ def hold(job):
 
 
 def expect_same_view(visitor, camera):
-    assert visitor.page.evaluate("window.same_page === true"), "the page was loaded again"
+    assert visitor.page.evaluate("window.isSamePage === true"), "the page was loaded again"
     away = max(abs(a - b) for a, b in zip(camera["eye"], visitor.camera()["eye"]))
     assert away < 0.01, f"the camera is {away} voxels away"
 
@@ -31,7 +31,7 @@ def check_restart(visitor, server, job):
     """While the service is away the picture stays; afterwards the viewer continues with what was built."""
     visitor.open(job.page)
     visitor.wait_until("voxdagViewer.running && Boolean(voxdagViewer.renderer.info.root)")
-    visitor.page.evaluate("window.same_page = true")
+    visitor.page.evaluate("window.isSamePage = true")
     visitor.page.keyboard.press("ArrowLeft")
     before, camera = hits(capture(visitor)), visitor.camera()
     digest = visitor.page.evaluate("voxdagViewer.renderer.info.digest")
@@ -69,7 +69,7 @@ def check_retries(visitor, server, job, camera, other_scene):
     visitor.wait_until("Boolean(window.voxdagViewer) && !voxdagViewer.running")
     result = json.loads(server.get(job.path))["result"]
     assert visitor.page.evaluate("voxdagViewer.renderer.info.voxels") == str(result["voxels"]), "it is not the last result"
-    assert visitor.page.evaluate("window.same_page === true"), "the page was loaded again"
+    assert visitor.page.evaluate("window.isSamePage === true"), "the page was loaded again"
 
 
 def check_many(visitor, server, data):

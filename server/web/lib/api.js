@@ -11,11 +11,11 @@ export class Problem extends Error {
     this.headers = headers;
   }
   // Whether the same request may succeed later.
-  get is_transient() {
+  get isTransient() {
     return this.code === "unreachable" || [408, 429, 502, 503, 504].includes(this.status);
   }
   // Seconds that the service asks to wait for.
-  get retry_after_s() {
+  get retryAfterS() {
     return Number(this.headers?.get("Retry-After")) || 0;
   }
 }
@@ -42,10 +42,10 @@ export async function request(method, path, {headers = {}, body, signal} = {}) {
     throw new Problem(0, "unreachable", "The service does not answer.");
   }
   if (response.ok) return response;
-  throw await problem_of(response);
+  throw await problemOf(response);
 }
 
-async function problem_of(response) {
+async function problemOf(response) {
   const members = await response.json().catch(() => ({}));
   const problem = new Problem(response.status, members.code || `http_${response.status}`,
                               members.detail || response.statusText, members, response.headers);
@@ -53,11 +53,11 @@ async function problem_of(response) {
   return problem;
 }
 
-export async function get_json(path, signal) {
+export async function getJson(path, signal) {
   return (await request("GET", path, {signal})).json();
 }
 
-export async function send_json(method, path, body, {headers = {}, signal} = {}) {
+export async function sendJson(method, path, body, {headers = {}, signal} = {}) {
   const options = {signal, headers};
   if (body !== undefined) {
     options.body = JSON.stringify(body);
@@ -68,14 +68,14 @@ export async function send_json(method, path, body, {headers = {}, signal} = {})
 }
 
 // A value for Idempotency-Key. crypto.randomUUID() is not available on plain http.
-export function random_key() {
+export function randomKey() {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)),
                     (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-// Resolves after `ms`, or immediately when `signal` aborts; with `until_visible` not before the page
+// Resolves after `ms`, or immediately when `signal` aborts; with `untilVisible` not before the page
 // is visible.
-export function sleep(ms, signal, until_visible = false) {
+export function sleep(ms, signal, untilVisible = false) {
   return new Promise((resolve) => {
     const listening = new AbortController();
     const done = () => {
@@ -83,30 +83,30 @@ export function sleep(ms, signal, until_visible = false) {
       listening.abort();
       resolve();
     };
-    const done_if_visible = () => {
-      if (!until_visible || !document.hidden) done();
+    const doneIfVisible = () => {
+      if (!untilVisible || !document.hidden) done();
     };
-    const timer = setTimeout(done_if_visible, ms);
-    if (until_visible) document.addEventListener("visibilitychange", done_if_visible, {signal: listening.signal});
+    const timer = setTimeout(doneIfVisible, ms);
+    if (untilVisible) document.addEventListener("visibilitychange", doneIfVisible, {signal: listening.signal});
     signal.addEventListener("abort", done, {signal: listening.signal});
     if (signal.aborted) done();
   });
 }
 
 // Calls `update` repeatedly until `signal` aborts. `update` returns the pause in ms until the next
-// call; while the page is hidden, the next call waits until it is visible. on_failure(problem) is
+// call; while the page is hidden, the next call waits until it is visible. onFailure(problem) is
 // called when `update` throws.
-export async function poll(update, on_failure, signal) {
+export async function poll(update, onFailure, signal) {
   while (!signal.aborted) {
-    let pause_ms = 5000;
+    let pauseMs = 5000;
     try {
-      pause_ms = await update();
+      pauseMs = await update();
     } catch (error) {
       if (signal.aborted) return;
       if (!(error instanceof Problem)) throw error;
-      on_failure(error);
+      onFailure(error);
       if (error.status === 401) return;
     }
-    await sleep(pause_ms, signal, true);
+    await sleep(pauseMs, signal, true);
   }
 }

@@ -26,7 +26,7 @@ function fill(element, attributes, children) {
 }
 
 // Sets the text only if it changed, to preserve selections and not disturb screen readers.
-export function set_text(element, text) {
+export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
@@ -56,7 +56,7 @@ export function fact(name, ...value) {
 }
 
 // Asks in a modal dialog; resolves to true if the user confirms the action.
-export function confirm_action(title, text, action) {
+export function confirmAction(title, text, action) {
   const dialog = h("dialog", {class: "ask", "aria-labelledby": "ask-title"},
     h("form", {method: "dialog"},
       h("h2", {id: "ask-title"}, title), h("p", {}, text),

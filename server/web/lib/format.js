@@ -3,47 +3,47 @@
 const kThinSpace = "\u2009";
 
 // 2567687158 -> "2 567 687 158"
-export function count_text(count) {
+export function countText(count) {
   return String(Math.round(count)).replace(/\B(?=(\d{3})+$)/g, kThinSpace);
 }
 
 // 1234567 -> "1.23 M"
-export function short_count(count) {
+export function shortCount(count) {
   let suffix = "";
   for (const larger of ["k", "M", "G", "T"]) {
     if (count < 999.5) break;
     count /= 1000;
     suffix = larger;
   }
-  if (suffix) return `${three_digits(count)} ${suffix}`;
+  if (suffix) return `${threeDigits(count)} ${suffix}`;
   return count >= 100 || Number.isInteger(count) ? count.toFixed(0) : count.toPrecision(2);
 }
 
-function three_digits(number) {
+function threeDigits(number) {
   return number.toFixed(number < 9.995 ? 2 : number < 99.95 ? 1 : 0);
 }
 
 // 12, "subvolumes" -> "12 subvolumes"; 1, "files" -> "1 file"
-export function unit_text(text, unit) {
+export function unitText(text, unit) {
   return `${text} ${text === "1" ? unit.replace(/s$/, "") : unit}`;
 }
 
 // "1.40 MiB", "3.20 MiB" -> "1.40 – 3.20 MiB"
-export function range_text(low, high) {
+export function rangeText(low, high) {
   const unit = / [A-Za-z]+$/.exec(high)?.[0];
   return `${unit && low.endsWith(unit) ? low.slice(0, -unit.length) : low} – ${high}`;
 }
 
 // 1342177280 -> "1.25 GiB"
-export function size_text(bytes) {
+export function sizeText(bytes) {
   const units = ["B", "KiB", "MiB", "GiB", "TiB", "PiB"];
   let unit = 0;
   for (; bytes >= 1000 && unit < 5; ++unit) bytes /= 1024;
-  return unit === 0 ? `${Math.round(bytes)} B` : `${three_digits(bytes)} ${units[unit]}`;
+  return unit === 0 ? `${Math.round(bytes)} B` : `${threeDigits(bytes)} ${units[unit]}`;
 }
 
 // 64 -> "1 m 04 s", 0.046 -> "46 ms"
-export function duration_text(seconds) {
+export function durationText(seconds) {
   if (seconds > 0 && seconds < 0.9995) return `${Math.max(1, Math.round(1000 * seconds))} ms`;
   const whole = Math.round(seconds);
   const two = (n) => String(n).padStart(2, "0");
@@ -54,7 +54,7 @@ export function duration_text(seconds) {
 }
 
 // "just now", "5 min ago", "in 3 min"
-export function ago_text(time) {
+export function agoText(time) {
   const seconds = (Date.now() - Date.parse(time)) / 1000;
   const away = Math.abs(seconds);
   if (away < 45) return seconds >= 0 ? "just now" : "in a moment";
@@ -64,35 +64,35 @@ export function ago_text(time) {
 }
 
 // "2026-11-21 07:00:00", in the local time zone
-export function time_text(time) {
+export function timeText(time) {
   const date = new Date(time);
   const two = (n) => String(n).padStart(2, "0");
   return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ` +
          `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}`;
 }
 
-export function grid_text(resolution) {
+export function gridText(resolution) {
   return `${resolution}³`;
 }
 
-export function scene_text(job) {
+export function sceneText(job) {
   const scenes = Array.isArray(job.scene) ? job.scene : [job.scene];
   return scenes.map((scene) => scene.split("/").pop()).join(", ");
 }
 
-export function title_text(job) {
-  return job.name || scene_text(job);
+export function titleText(job) {
+  return job.name || sceneText(job);
 }
 
-export function state_text(state) {
+export function stateText(state) {
   return state === "canceling" ? "canceling…" : state;
 }
 
-export function has_ended(state) {
+export function hasEnded(state) {
   return ["canceled", "failed", "succeeded"].includes(state);
 }
 
 // The completed fraction of the current stage, 0 to 1, or null while it is unknown.
-export function done_fraction(progress) {
+export function doneFraction(progress) {
   return progress && progress.total > 0 ? Math.min(1, progress.done / progress.total) : null;
 }

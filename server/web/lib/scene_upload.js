@@ -3,30 +3,30 @@
 
 import {authorization, Problem, request, sleep} from "./api.js";
 
-const kPart_bytes = 8 << 20;
+const kPartBytes = 8 << 20;
 const kMaxFailures = 6;  // in a row, each after a longer pause
 
 export const kSceneName = /^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\.(glb|gltf|ply)$/;
 
 // "My scene (2).glb" -> "My-scene-2.glb"
-export function scene_name(file_name) {
-  return file_name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "").replace(/-+\./g, ".");
+export function sceneName(fileName) {
+  return fileName.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "").replace(/-+\./g, ".");
 }
 
-// Resolves to the SCENE. Calls on_progress(bytes received) often. Throws Problem, or AbortError when
+// Resolves to the SCENE. Calls onProgress(bytes received) often. Throws Problem, or AbortError when
 // `signal` aborts; the same call resumes the upload later.
-export async function upload(file, name, on_progress, signal) {
+export async function upload(file, name, onProgress, signal) {
   const path = `/api/v1/scenes/${name}`;
   if (file.size === 0) throw new Problem(0, "invalid_input", `${file.name} is empty.`);
-  let offset = await resume_offset(path, file, name, signal);
+  let offset = await resumeOffset(path, file, name, signal);
   let failures = 0;
   for (;;) {
-    on_progress(offset);
+    onProgress(offset);
     try {
       remember(name, file);
-      const scene = await put_part(path, file, offset, on_progress, signal);
+      const scene = await putPart(path, file, offset, onProgress, signal);
       failures = 0;
-      offset += kPart_bytes;
+      offset += kPartBytes;
       if (offset >= file.size) {
         forget(name);
         return scene;
@@ -36,10 +36,10 @@ export async function upload(file, name, on_progress, signal) {
       const expected = Number(problem.headers?.get("Upload-Offset") ?? NaN);
       if (problem.status === 409 && expected >= 0 && expected !== offset) {
         offset = expected;
-      } else if (problem.is_transient && ++failures <= kMaxFailures) {
-        await sleep(Math.max(1000 * problem.retry_after_s, 500 * 2 ** failures), signal);
+      } else if (problem.isTransient && ++failures <= kMaxFailures) {
+        await sleep(Math.max(1000 * problem.retryAfterS, 500 * 2 ** failures), signal);
         if (signal.aborted) throw problem;
-        offset = await resume_offset(path, file, name, signal).catch(() => offset);
+        offset = await resumeOffset(path, file, name, signal).catch(() => offset);
       } else {
         throw problem;
       }
@@ -48,8 +48,8 @@ export async function upload(file, name, on_progress, signal) {
 }
 
 // The offset to resume at: bytes the service has of this file, if this browser sent them; else 0.
-async function resume_offset(path, file, name, signal) {
-  if (localStorage.getItem(key_of(name)) !== fingerprint_of(file)) return 0;
+async function resumeOffset(path, file, name, signal) {
+  if (localStorage.getItem(keyOf(name)) !== fingerprintOf(file)) return 0;
   try {
     const {headers} = await request("HEAD", path, {signal});
     const length = headers.get("Upload-Length");
@@ -63,36 +63,36 @@ async function resume_offset(path, file, name, signal) {
 }
 
 // Uses XMLHttpRequest, because fetch() does not report the progress of an upload.
-async function put_part(path, file, offset, on_progress, signal) {
-  const end = Math.min(file.size, offset + kPart_bytes);
+async function putPart(path, file, offset, onProgress, signal) {
+  const end = Math.min(file.size, offset + kPartBytes);
   const part = await file.slice(offset, end).arrayBuffer();
   const range = end > offset ? `${offset}-${end - 1}` : "*";  // an empty part finishes what has all its bytes
   const headers = {...authorization(), "Content-Type": "application/octet-stream",
-                   "Content-Range": `bytes ${range}/${file.size}`, ...await digest_header(part)};
+                   "Content-Range": `bytes ${range}/${file.size}`, ...await digestHeader(part)};
   return new Promise((resolve, reject) => {
     const put = new XMLHttpRequest();
     const cancel = () => put.abort();
     signal.addEventListener("abort", cancel, {once: true});
     put.open("PUT", path);
     for (const [name, value] of Object.entries(headers)) put.setRequestHeader(name, value);
-    put.upload.addEventListener("progress", (event) => on_progress(offset + Math.min(event.loaded, end - offset)));
+    put.upload.addEventListener("progress", (event) => onProgress(offset + Math.min(event.loaded, end - offset)));
     put.addEventListener("loadend", () => {
       signal.removeEventListener("abort", cancel);
       if (put.status >= 200 && put.status < 300) resolve(parse(put.responseText));
-      else reject(problem_of(put));
+      else reject(problemOf(put));
     });
     put.send(part);
   });
 }
 
 // crypto.subtle is available on https and localhost only; the digest is optional.
-async function digest_header(part) {
+async function digestHeader(part) {
   if (!crypto.subtle) return {};
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", part));
   return {"Content-Digest": `sha-256=:${btoa(String.fromCharCode(...digest))}:`};
 }
 
-function problem_of(put) {
+function problemOf(put) {
   if (put.status === 0) return new Problem(0, "unreachable", "The connection was lost.");
   if (put.status === 401) window.dispatchEvent(new Event("voxdag-login"));
   const members = parse(put.responseText);
@@ -108,7 +108,7 @@ function parse(text) {
   }
 }
 
-const key_of = (name) => `voxdag-upload ${name}`;
-const fingerprint_of = (file) => `${file.name} ${file.size} ${file.lastModified}`;
-const remember = (name, file) => localStorage.setItem(key_of(name), fingerprint_of(file));
-const forget = (name) => localStorage.removeItem(key_of(name));
+const keyOf = (name) => `voxdag-upload ${name}`;
+const fingerprintOf = (file) => `${file.name} ${file.size} ${file.lastModified}`;
+const remember = (name, file) => localStorage.setItem(keyOf(name), fingerprintOf(file));
+const forget = (name) => localStorage.removeItem(keyOf(name));

@@ -2,12 +2,12 @@
 
 import {request, token} from "../lib/api.js";
 import {field, h} from "../lib/dom.js";
-import {problem_box} from "../views/parts.js";
+import {problemBox} from "../views/parts.js";
 
-export function login_page(token_rejected, signed_in) {
+export function loginPage(tokenRejected, signedIn) {
   const input = h("input", {type: "password", autocomplete: "off", required: true, spellcheck: "false"});
   const error = h("div", {role: "alert"},
-                    token_rejected && h("p", {class: "bad"}, "The service does not know this token."));
+                    tokenRejected && h("p", {class: "bad"}, "The service does not know this token."));
   const form = h("form", {class: "card narrow stack"},
     h("h1", {}, "Sign in"),
     h("p", {}, "This service requires an access token."),
@@ -18,9 +18,9 @@ export function login_page(token_rejected, signed_in) {
     token.set(input.value.trim());
     try {
       await request("GET", "/api/v1/jobs?limit=1");
-      signed_in();
+      signedIn();
     } catch (problem) {
-      if (problem.status !== 401) error.replaceChildren(problem_box(problem));
+      if (problem.status !== 401) error.replaceChildren(problemBox(problem));
     }
   });
   queueMicrotask(() => input.focus());

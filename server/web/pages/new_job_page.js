@@ -1,13 +1,13 @@
 // The form for a new job: scene, grid, options, and an estimate of the build.
 
-import {get_json, random_key, send_json} from "../lib/api.js";
+import {getJson, randomKey, sendJson} from "../lib/api.js";
 import {clear, field, h} from "../lib/dom.js";
 import {EstimateView} from "../views/estimate_view.js";
 import {JobOptions} from "../views/job_options.js";
-import {problem_box} from "../views/parts.js";
+import {problemBox} from "../views/parts.js";
 import {SceneChoice} from "../views/scene_choice.js";
 
-export function new_job_page(_, query, signal) {
+export function newJobPage(_, query, signal) {
   const form = new NewJob(signal);
   form.begin(query.get("like"));
   return {title: "New job", content: form.element};
@@ -20,9 +20,9 @@ class NewJob {
     this.options = new JobOptions(() => this.changed());
     this.estimate = new EstimateView(signal);
     this.name = h("input", {maxlength: "200", autocomplete: "off",
-                            on: {change: () => { this.key = random_key(); }}});
+                            on: {change: () => { this.key = randomKey(); }}});
     this.error = h("div", {role: "alert"});
-    this.key = random_key();  // one per state of the form: a double click creates one job
+    this.key = randomKey();  // one per state of the form: a double click creates one job
     this.submit = h("button", {class: "primary"}, "Submit");
     this.element = h("form", {class: "stack", novalidate: true},
       h("p", {class: "crumb"}, h("a", {href: "#/"}, "Jobs")), h("h1", {}, "New job"),
@@ -30,28 +30,28 @@ class NewJob {
         h("div", {class: "stack"},
           this.scene.element,
           h("section", {class: "card stack", "aria-labelledby": "grid-title"},
-            h("h2", {id: "grid-title"}, "Grid"), this.options.resolution_field,
+            h("h2", {id: "grid-title"}, "Grid"), this.options.resolutionField,
             field("Name of the job", this.name, "Optional.")),
           this.options.element),
         h("div", {class: "stack sticky"}, this.estimate.element, this.error,
           h("div", {class: "buttons"}, this.submit))));
     this.element.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.submit_job();
+      this.submitJob();
     });
   }
 
   // `like`: the id of a job whose scene and options are copied.
   async begin(like) {
     try {
-      const model = like ? await get_json(`/api/v1/jobs/${encodeURIComponent(like)}`, this.signal) : null;
+      const model = like ? await getJson(`/api/v1/jobs/${encodeURIComponent(like)}`, this.signal) : null;
       await this.scene.load(model ? [model.scene].flat() : null);
       if (model) this.options.set(model);
       this.changed();
     } catch (problem) {
       if (this.signal.aborted) return;
       if (problem.code === undefined) throw problem;
-      clear(this.error, problem_box(problem));
+      clear(this.error, problemBox(problem));
     }
   }
 
@@ -65,7 +65,7 @@ class NewJob {
 
   changed() {
     clear(this.error);
-    this.key = random_key();
+    this.key = randomKey();
     let question = null;
     try {
       const body = this.body();
@@ -76,7 +76,7 @@ class NewJob {
     this.estimate.update(question);
   }
 
-  async submit_job() {
+  async submitJob() {
     clear(this.error);
     this.submit.disabled = true;
     try {
@@ -85,13 +85,13 @@ class NewJob {
         clear(this.error, h("p", {class: "bad"}, "Choose a scene, or upload one."));
         return;
       }
-      const job = await send_json("POST", "/api/v1/jobs", body,
+      const job = await sendJson("POST", "/api/v1/jobs", body,
                                   {headers: {"Idempotency-Key": this.key}, signal: this.signal});
       location.hash = `#/jobs/${job.id}`;
     } catch (problem) {
       if (this.signal.aborted) return;
       if (problem.code === undefined) throw problem;
-      clear(this.error, problem_box(problem));
+      clear(this.error, problemBox(problem));
     } finally {
       this.submit.disabled = false;
     }

@@ -3,7 +3,7 @@
 // Invariants: the eye is not on the target; after a motion the view is at most kMaxPitch from the
 // horizontal, so that up stays up. Only a camera that was set may look straight up or down.
 
-import {add, distance, dot, length, mix, picture_axes, picture_direction, scale, subtract} from "./vector.js";
+import {add, distance, dot, length, mix, pictureAxes, pictureDirection, scale, subtract} from "./vector.js";
 
 const kMaxPitch = 89.9 * Math.PI / 180;
 const kMinDistance = 1 / 64;  // voxels from the eye to the target
@@ -12,18 +12,18 @@ const kFarthest = 32;         // edges of the grid from its center to the eye
 export class Camera {
   constructor(resolution) {
     this.resolution = resolution;
-    this.set({eye: [0.5, 0.6, 2.5].map((c) => c * resolution), target: Array(3).fill(resolution / 2), fov_degrees: 35});
+    this.set({eye: [0.5, 0.6, 2.5].map((c) => c * resolution), target: Array(3).fill(resolution / 2), fovDegrees: 35});
   }
 
   // Throws an Error with a message for people if no picture can be taken from there.
-  set({eye, target, fov_degrees}) {
+  set({eye, target, fovDegrees}) {
     if (![...eye, ...target].every(Number.isFinite)) throw new Error("A camera has finite coordinates.");
-    if (!(fov_degrees >= 1 && fov_degrees <= 170)) throw new Error("The field of view must lie between 1 and 170 degrees.");
+    if (!(fovDegrees >= 1 && fovDegrees <= 170)) throw new Error("The field of view must lie between 1 and 170 degrees.");
     if (!(distance(eye, target) > 0)) throw new Error("The camera must not be at its target.");
-    Object.assign(this, {eye: [...eye], target: [...target], fov_degrees});
+    Object.assign(this, {eye: [...eye], target: [...target], fovDegrees});
   }
   get() {
-    return {eye: [...this.eye], target: [...this.target], fov_degrees: this.fov_degrees};
+    return {eye: [...this.eye], target: [...this.target], fovDegrees: this.fovDegrees};
   }
 
   get distance() {
@@ -32,38 +32,38 @@ export class Camera {
 
   // Looking straight down, up is -z.
   axes() {
-    return picture_axes(subtract(this.target, this.eye));
+    return pictureAxes(subtract(this.target, this.eye));
   }
 
   // The width of a pixel at distance 1 in a picture of this height.
-  pixel_spread(height) {
-    return Math.tan(this.fov_degrees * Math.PI / 360) / (height / 2);
+  pixelSpread(height) {
+    return Math.tan(this.fovDegrees * Math.PI / 360) / (height / 2);
   }
 
   // The unit direction through a point of the picture, in pixels from its upper left corner.
   direction(x, y, width, height) {
-    const pixel = this.pixel_spread(height);
-    return picture_direction(this.axes(), (x - width / 2) * pixel, (height / 2 - y) * pixel);
+    const pixel = this.pixelSpread(height);
+    return pictureDirection(this.axes(), (x - width / 2) * pixel, (height / 2 - y) * pixel);
   }
 
   // Around the target: positive angles (radians) move the eye to the right and up.
   orbit(yaw, pitch) {
     const at = spherical(subtract(this.eye, this.target));
-    this.eye = add(this.target, from_spherical({...at, yaw: at.yaw + yaw, pitch: limit_pitch(at.pitch + pitch)}));
+    this.eye = add(this.target, fromSpherical({...at, yaw: at.yaw + yaw, pitch: limitPitch(at.pitch + pitch)}));
   }
 
   // Around the eye: positive angles look to the right and up.
   turn(yaw, pitch) {
     const at = spherical(subtract(this.eye, this.target));
-    this.target = subtract(this.eye, from_spherical({...at, yaw: at.yaw - yaw, pitch: limit_pitch(at.pitch - pitch)}));
+    this.target = subtract(this.eye, fromSpherical({...at, yaw: at.yaw - yaw, pitch: limitPitch(at.pitch - pitch)}));
   }
 
   // Moves eye and target by voxels along the axes of the picture.
-  move(to_right, to_top, forward) {
+  move(toRight, toTop, forward) {
     const axes = this.axes();
-    this.move_by(add(add(scale(axes.right, to_right), scale(axes.up, to_top)), scale(axes.forward, forward)));
+    this.moveBy(add(add(scale(axes.right, toRight), scale(axes.up, toTop)), scale(axes.forward, forward)));
   }
-  move_by(offset) {
+  moveBy(offset) {
     const eye = add(this.eye, offset);
     const limit = kFarthest * this.resolution;
     const center = Array(3).fill(this.resolution / 2);
@@ -73,7 +73,7 @@ export class Camera {
   }
 
   // Scales all distances from `point`, which stays where it is in the picture.
-  zoom_about(point, factor) {
+  zoomAbout(point, factor) {
     const least = kMinDistance / Math.min(this.distance, Math.max(distance(this.eye, point), kMinDistance));
     const far = Math.max(1, kFarthest * this.resolution / Math.max(this.distance, distance(this.eye, point)));
     const by = Math.min(Math.max(factor, Math.min(1, least)), far);
@@ -83,14 +83,14 @@ export class Camera {
   }
 
   // The same picture, with the target as far away as `point`: what is looked at is orbited.
-  move_target_to_depth_of(point) {
+  moveTargetToDepthOf(point) {
     const {forward} = this.axes();
     const depth = dot(subtract(point, this.eye), forward);
     if (depth > kMinDistance) this.target = add(this.eye, scale(forward, depth));
   }
 
   // The point of the ray through a pixel that is as far away, along the view, as the target.
-  point_at_target(x, y, width, height) {
+  pointAtTarget(x, y, width, height) {
     const direction = this.direction(x, y, width, height);
     return add(this.eye, scale(direction, this.distance / dot(direction, this.axes().forward)));
   }
@@ -102,13 +102,13 @@ export function between(from, to, share) {
   const a = spherical(subtract(from.eye, from.target)), b = spherical(subtract(to.eye, to.target));
   const arc = Math.atan2(Math.sin(b.yaw - a.yaw), Math.cos(b.yaw - a.yaw));
   const target = mix(from.target, to.target, share);
-  const offset = from_spherical({
+  const offset = fromSpherical({
     radius: Math.exp(Math.log(a.radius) * (1 - share) + Math.log(b.radius) * share),
     yaw: a.yaw + arc * share,
     pitch: a.pitch + (b.pitch - a.pitch) * share,
   });
   return {eye: add(target, offset), target,
-          fov_degrees: from.fov_degrees + (to.fov_degrees - from.fov_degrees) * share};
+          fovDegrees: from.fovDegrees + (to.fovDegrees - from.fovDegrees) * share};
 }
 
 function spherical(offset) {
@@ -118,9 +118,9 @@ function spherical(offset) {
   return {radius, yaw: level > 1e-9 * radius ? Math.atan2(x, z) : 0, pitch: Math.atan2(y, level)};
 }
 
-function from_spherical({radius, yaw, pitch}) {
+function fromSpherical({radius, yaw, pitch}) {
   const level = radius * Math.cos(pitch);
   return [level * Math.sin(yaw), radius * Math.sin(pitch), level * Math.cos(yaw)];
 }
 
-const limit_pitch = (pitch) => Math.min(Math.max(pitch, -kMaxPitch), kMaxPitch);
+const limitPitch = (pitch) => Math.min(Math.max(pitch, -kMaxPitch), kMaxPitch);

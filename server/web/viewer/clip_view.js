@@ -1,15 +1,15 @@
 // The clipping box: two sliders for each axis.
 
-import {h, set_text} from "../lib/dom.js";
-import {count_text} from "../lib/format.js";
+import {h, setText} from "../lib/dom.js";
+import {countText} from "../lib/format.js";
 
 const kSteps = 1024;
 
 export class ClipView {
-  // on_change(clip) gets {low, high} in voxels, or null.
-  constructor(resolution, on_change) {
+  // onChange(clip) gets {low, high} in voxels, or null.
+  constructor(resolution, onChange) {
     this.resolution = resolution;
-    this.on_change = on_change;
+    this.onChange = onChange;
     this.box = {low: [0, 0, 0], high: Array(3).fill(resolution)};
     this.enabled = h("input", {type: "checkbox", id: "clip-on", on: {change: () => this.changed()}});
     this.sliders = ["low", "high"].map((end) => [0, 1, 2].map((axis) => this.slider(end, axis)));
@@ -46,10 +46,10 @@ export class ClipView {
 
   changed() {
     this.show();
-    this.on_change(this.enabled.checked ? {low: [...this.box.low], high: [...this.box.high]} : null);
+    this.onChange(this.enabled.checked ? {low: [...this.box.low], high: [...this.box.high]} : null);
   }
 
-  // The box as others see it; does not call on_change.
+  // The box as others see it; does not call onChange.
   set(clip) {
     this.enabled.checked = clip !== null;
     if (clip) this.box = {low: [...clip.low], high: [...clip.high]};
@@ -62,7 +62,7 @@ export class ClipView {
     for (let axis = 0; axis < 3; ++axis) {
       this.sliders[0][axis].value = String(low[axis]);
       this.sliders[1][axis].value = String(high[axis]);
-      set_text(this.outputs[axis], `${count_text(low[axis])} – ${count_text(high[axis])}`);
+      setText(this.outputs[axis], `${countText(low[axis])} – ${countText(high[axis])}`);
     }
   }
 }

@@ -5,32 +5,32 @@
 import {add, distance, dot, scale, subtract} from "./vector.js";
 
 const kOrbitAngle = Math.PI;       // radians per height of the canvas
-const kClickMove_px = 5;
-const kClickTime_ms = 600;
-const kDoubleTime_ms = 350;
-const kDoubleMove_px = 24;
+const kClickMovePx = 5;
+const kClickTimeMs = 600;
+const kDoubleTimeMs = 350;
+const kDoubleMovePx = 24;
 const kWheelZoom = 0.0016;         // per pixel of the wheel
-const kAnchorTime_ms = 400;        // one turn of the wheel zooms to one point
-const kLine_px = 20;
-const kRecent_ms = 80;             // of a drag: its speed is that of the inertia
+const kAnchorTimeMs = 400;        // one turn of the wheel zooms to one point
+const kLinePx = 20;
+const kRecentMs = 80;             // of a drag: its speed is that of the inertia
 
 export class Controls {
-  // handlers: pick(x, y) -> Promise of a position or null; on_click(x, y); on_double_click(x, y);
-  // on_change().
+  // handlers: pick(x, y) -> Promise of a position or null; onClick(x, y); onDoubleClick(x, y);
+  // onChange().
   constructor(canvas, camera, motion, handlers, signal) {
     Object.assign(this, {canvas, camera, motion, handlers});
     this.pointers = new Map();
     this.recent = [];
     this.press = null;         // since the first pointer went down
-    this.last_click = null;
+    this.lastClick = null;
     this.anchor = null;        // of the wheel
     const listen = (name, listener, options = {}) =>
       canvas.addEventListener(name, (event) => listener.call(this, event), {signal, ...options});
-    listen("pointerdown", this.handle_down);
-    listen("pointermove", this.handle_move);
-    listen("pointerup", this.handle_up);
-    listen("pointercancel", this.handle_cancel);
-    listen("wheel", this.handle_wheel, {passive: false});
+    listen("pointerdown", this.handleDown);
+    listen("pointermove", this.handleMove);
+    listen("pointerup", this.handleUp);
+    listen("pointercancel", this.handleCancel);
+    listen("wheel", this.handleWheel, {passive: false});
     listen("contextmenu", (event) => event.preventDefault());
   }
 
@@ -42,7 +42,7 @@ export class Controls {
     return [this.canvas.clientWidth, this.canvas.clientHeight];
   }
 
-  handle_down(event) {
+  handleDown(event) {
     this.canvas.focus({preventScroll: true});
     event.preventDefault();  // no selection, no scrolling by the middle button
     try {
@@ -57,115 +57,115 @@ export class Controls {
     if (this.pointers.size === 1) {
       const pans = event.button !== 0 || event.shiftKey;
       this.press = {at, time: event.timeStamp, moved: false, pans, clicks: event.button === 0 && !event.shiftKey};
-      if (pans) this.find_pan_depth(at);
+      if (pans) this.findPanDepth(at);
     } else if (this.press) {
       this.press.moved = true;  // two fingers are no click
-      this.find_pan_depth(this.center_of_fingers().at);
+      this.findPanDepth(this.centerOfFingers().at);
     }
   }
 
   // What was grabbed follows the pointer. Until it is known, that is the target.
-  async find_pan_depth(at) {
+  async findPanDepth(at) {
     const press = this.press;
     const point = await this.handlers.pick(...at);
     if (point) press.depth = Math.max(dot(subtract(point, this.camera.eye), this.camera.axes().forward), 0);
   }
 
-  handle_move(event) {
+  handleMove(event) {
     const before = this.pointers.get(event.pointerId);
     if (!before || !this.press) return;
     const at = this.position(event);
     const {press} = this;
-    if (Math.hypot(at[0] - press.at[0], at[1] - press.at[1]) > kClickMove_px) press.moved = true;
+    if (Math.hypot(at[0] - press.at[0], at[1] - press.at[1]) > kClickMovePx) press.moved = true;
     if (!press.moved) return;
-    const old = this.pointers.size > 1 ? this.center_of_fingers() : null;
+    const old = this.pointers.size > 1 ? this.centerOfFingers() : null;
     this.pointers.set(event.pointerId, at);
     const move = [at[0] - before[0], at[1] - before[1]];
-    if (old) this.move_fingers(old, this.center_of_fingers());
+    if (old) this.moveFingers(old, this.centerOfFingers());
     else if (press.pans) this.pan(...move);
     else this.rotate(move, event.timeStamp);
-    this.handlers.on_change();
+    this.handlers.onChange();
   }
 
-  center_of_fingers() {
+  centerOfFingers() {
     const [a, b] = [...this.pointers.values()];
     return {at: [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], apart: Math.max(1, Math.hypot(a[0] - b[0], a[1] - b[1]))};
   }
 
-  move_fingers(old, now) {
+  moveFingers(old, now) {
     const {camera} = this;
     this.pan(now.at[0] - old.at[0], now.at[1] - old.at[1]);
-    const toward = subtract(camera.point_at_target(...now.at, ...this.size), camera.eye);
-    const point = add(camera.eye, scale(toward, this.pan_depth() / camera.distance));
-    camera.zoom_about(point, old.apart / now.apart);
+    const toward = subtract(camera.pointAtTarget(...now.at, ...this.size), camera.eye);
+    const point = add(camera.eye, scale(toward, this.panDepth() / camera.distance));
+    camera.zoomAbout(point, old.apart / now.apart);
     if (this.press.depth !== undefined) this.press.depth *= old.apart / now.apart;
   }
 
-  pan_depth() {
+  panDepth() {
     return this.press?.depth ?? this.camera.distance;
   }
   pan(dx, dy) {
-    const by = this.camera.pixel_spread(this.size[1]) * this.pan_depth();
+    const by = this.camera.pixelSpread(this.size[1]) * this.panDepth();
     this.camera.move(-dx * by, dy * by, 0);
   }
 
   rotate([dx, dy], time) {
     const angle = kOrbitAngle / this.size[1];
-    this.rotate_by(-dx * angle, dy * angle);
-    this.recent = this.recent.filter((move) => time - move.time < kRecent_ms);
+    this.rotateBy(-dx * angle, dy * angle);
+    this.recent = this.recent.filter((move) => time - move.time < kRecentMs);
     this.recent.push({time, yaw: -dx * angle, pitch: dy * angle});
   }
-  rotate_by(yaw, pitch) {
+  rotateBy(yaw, pitch) {
     if (this.motion.flying) this.camera.turn(yaw * 0.6, pitch * 0.6);
     else this.camera.orbit(yaw, pitch);
   }
 
-  handle_up(event) {
+  handleUp(event) {
     if (!this.pointers.delete(event.pointerId) || !this.press || this.pointers.size > 0) return;
     const {press} = this;
     this.press = null;
-    if (press.moved) return this.start_coasting(event.timeStamp);
-    if (press.clicks && event.timeStamp - press.time < kClickTime_ms) this.click(press.at, event.timeStamp);
+    if (press.moved) return this.startCoasting(event.timeStamp);
+    if (press.clicks && event.timeStamp - press.time < kClickTimeMs) this.click(press.at, event.timeStamp);
   }
 
-  handle_cancel(event) {
+  handleCancel(event) {
     this.pointers.delete(event.pointerId);
     if (this.pointers.size === 0) this.press = null;
   }
 
-  start_coasting(time) {
-    const recent = this.recent.filter((move) => time - move.time < kRecent_ms);
-    const sum = (name) => recent.reduce((total, move) => total + move[name], 0) / (kRecent_ms / 1000);
-    if (recent.length > 1) this.motion.start_coasting([sum("yaw"), sum("pitch")], (...by) => this.rotate_by(...by));
-    this.handlers.on_change();
+  startCoasting(time) {
+    const recent = this.recent.filter((move) => time - move.time < kRecentMs);
+    const sum = (name) => recent.reduce((total, move) => total + move[name], 0) / (kRecentMs / 1000);
+    if (recent.length > 1) this.motion.startCoasting([sum("yaw"), sum("pitch")], (...by) => this.rotateBy(...by));
+    this.handlers.onChange();
   }
 
   click(at, time) {
-    const last = this.last_click;
-    const is_double = last && time - last.time < kDoubleTime_ms &&
-                      Math.hypot(at[0] - last.at[0], at[1] - last.at[1]) < kDoubleMove_px;
-    this.last_click = is_double ? null : {at, time};
-    if (is_double) this.handlers.on_double_click(...at);
-    else this.handlers.on_click(...at);
+    const last = this.lastClick;
+    const isDouble = last && time - last.time < kDoubleTimeMs &&
+                      Math.hypot(at[0] - last.at[0], at[1] - last.at[1]) < kDoubleMovePx;
+    this.lastClick = isDouble ? null : {at, time};
+    if (isDouble) this.handlers.onDoubleClick(...at);
+    else this.handlers.onClick(...at);
   }
 
   // Zooms to what is under the cursor; in the sky to a point as far away as the target.
-  handle_wheel(event) {
+  handleWheel(event) {
     event.preventDefault();
     const at = this.position(event);
-    const pixels = event.deltaY * [1, kLine_px, this.size[1]][event.deltaMode];
+    const pixels = event.deltaY * [1, kLinePx, this.size[1]][event.deltaMode];
     this.motion.stop();
-    this.find_anchor(at, event.timeStamp);
+    this.findAnchor(at, event.timeStamp);
     const factor = Math.exp(Math.min(Math.max(pixels, -600), 600) * kWheelZoom * (event.ctrlKey ? 4 : 1));
     const {camera, anchor} = this;
-    if (anchor.point) camera.move_target_to_depth_of(anchor.point);
-    camera.zoom_about(anchor.point ?? camera.point_at_target(...at, ...this.size), factor);
-    this.handlers.on_change();
+    if (anchor.point) camera.moveTargetToDepthOf(anchor.point);
+    camera.zoomAbout(anchor.point ?? camera.pointAtTarget(...at, ...this.size), factor);
+    this.handlers.onChange();
   }
 
-  find_anchor(at, time) {
+  findAnchor(at, time) {
     const old = this.anchor;
-    if (old && time - old.time < kAnchorTime_ms && distance([...old.at, 0], [...at, 0]) < kClickMove_px) {
+    if (old && time - old.time < kAnchorTimeMs && distance([...old.at, 0], [...at, 0]) < kClickMovePx) {
       old.time = time;
       return;
     }

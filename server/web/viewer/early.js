@@ -2,17 +2,17 @@
 // A job may have nothing to look at yet, so its page does not.
 
 import {Passes} from "./gl/passes.js";
-import {create_context} from "./gl/gl_objects.js";
+import {createContext} from "./gl/gl_objects.js";
 import {TileSource} from "./tile_source.js";
 
 let begun = null;
 
 function begin(canvas) {
   const source = new TileSource({base: "/api/v1/view"}), manifest = source.manifest();
-  const begin_ms = performance.now(), gl = create_context(canvas);
+  const beginMs = performance.now(), gl = createContext(canvas);
   manifest.catch(() => {});  // reported by whoever waits for it
   if (!gl) return;
-  const passes = gl.isContextLost() ? null : new Passes(gl), mine = {source, manifest, begin_ms, gl, passes};
+  const passes = gl.isContextLost() ? null : new Passes(gl), mine = {source, manifest, beginMs, gl, passes};
   begun = mine;
   // A context that is lost now already comes back, too; its programs do not.
   canvas.addEventListener("webglcontextlost", (event) => {
@@ -26,9 +26,9 @@ function begin(canvas) {
 
 if (!new URLSearchParams(location.search).has("job")) begin(document.getElementById("scene"));
 
-// {source, manifest, begin_ms, gl, passes} for the canvas of the page, null if it was taken already, or cannot be had.
+// {source, manifest, beginMs, gl, passes} for the canvas of the page, null if it was taken already, or cannot be had.
 // `passes` are null if the context was lost.
-export function take_begun() {
+export function takeBegun() {
   const taken = begun;
   begun = null;
   return taken;

@@ -2,21 +2,21 @@
 
 import {authorization} from "../lib/api.js";
 import {h} from "../lib/dom.js";
-import {title_text} from "../lib/format.js";
+import {titleText} from "../lib/format.js";
 import {Viewer} from "./app.js";
 import {Renderer} from "./renderer.js";
 import {TileSource} from "./tile_source.js";
-import {fill_tools} from "./tools.js";
+import {fillTools} from "./tools.js";
 
 const kBudgetBytes = 64 * 2 ** 20;
 
 // Fills `place`; throws an Error, with `place` as it was, if that is not possible. Ends with `signal`.
-export async function embed_viewer(place, job, signal) {
+export async function embedViewer(place, job, signal) {
   const canvas = h("canvas", {class: "scene", tabindex: "0", role: "application",
-    "aria-label": `The voxels of ${title_text(job)}. Arrow keys orbit, H lists all keys.`});
+    "aria-label": `The voxels of ${titleText(job)}. Arrow keys orbit, H lists all keys.`});
   const stage = h("div", {class: "stage"}, canvas);
   const tools = h("div", {class: "tools embedded", role: "toolbar", "aria-label": "View"});
-  fill_tools(tools);
+  fillTools(tools);
   const status = h("p", {class: "status"});
   stage.append(tools, status);
   const source = new TileSource({base: job.links.self, headers: authorization()});
@@ -32,7 +32,7 @@ export async function embed_viewer(place, job, signal) {
     await renderer.start();
     if (signal.aborted) return release();
     place.replaceChildren(stage);
-    viewer = new Viewer({canvas, renderer, manifest, signal, bookmarks: false, file_name: `job-${job.id}`,
+    viewer = new Viewer({canvas, renderer, manifest, signal, bookmarks: false, fileName: `job-${job.id}`,
                          places: {panel: h("div"), tools, status}});
   } catch (error) {
     release();

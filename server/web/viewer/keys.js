@@ -4,14 +4,14 @@ import {h} from "../lib/dom.js";
 
 const kHeld = {
   ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down",
-  KeyW: "forward", KeyS: "back", KeyA: "strafe_left", KeyD: "strafe_right", KeyE: "rise", KeyQ: "sink",
+  KeyW: "forward", KeyS: "back", KeyA: "strafeLeft", KeyD: "strafeRight", KeyE: "rise", KeyQ: "sink",
 };
 // By the character, since these keys are elsewhere on other keyboards.
-const kHeldCharacters = {"+": "zoom_in", "=": "zoom_in", "-": "zoom_out", "_": "zoom_out"};
+const kHeldCharacters = {"+": "zoomIn", "=": "zoomIn", "-": "zoomOut", "_": "zoomOut"};
 const kActions = {
-  f: "toggle_fly", r: "reset", home: "reset", enter: "pick_center", " ": "pick_center", c: "pivot_center",
-  g: "toggle_color",
-  m: "measure", p: "screenshot", o: "toggle_panel", "?": "help", h: "help",
+  f: "toggleFly", r: "reset", home: "reset", enter: "pickCenter", " ": "pickCenter", c: "pivotCenter",
+  g: "toggleColor",
+  m: "measure", p: "screenshot", o: "togglePanel", "?": "help", h: "help",
 };
 
 const kHelp = [
@@ -32,19 +32,19 @@ const kHelp = [
 
 // Calls actions by their names. `root` is the canvas, or the window: then the keys also act while nothing
 // has the focus.
-export function listen_to_keys(root, canvas, motion, actions, on_change, signal) {
+export function listenToKeys(root, canvas, motion, actions, onChange, signal) {
   const held = new Map();  // by event.code: a character may change while its key is down
   root.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.target !== canvas && event.target !== document.body) return;
     const action = kActions[event.key.toLowerCase()];
-    const motion_key = kHeld[event.code] ?? kHeldCharacters[event.key];
-    if (!action && !motion_key) return;
+    const motionKey = kHeld[event.code] ?? kHeldCharacters[event.key];
+    if (!action && !motionKey) return;
     event.preventDefault();
-    if (motion_key) {
-      held.set(event.code, motion_key);
-      motion.press(motion_key, event.shiftKey);
-      on_change();
+    if (motionKey) {
+      held.set(event.code, motionKey);
+      motion.press(motionKey, event.shiftKey);
+      onChange();
     } else if (!event.repeat) {
       actions[action]();
     }
@@ -54,15 +54,15 @@ export function listen_to_keys(root, canvas, motion, actions, on_change, signal)
     if (held.has(event.code)) motion.release(held.get(event.code));
     held.delete(event.code);
   };
-  const release_all = () => {
+  const releaseAll = () => {
     held.clear();
-    motion.release_all();
+    motion.releaseAll();
   };
   root.addEventListener("keyup", release, {signal});
-  canvas.addEventListener("blur", release_all, {signal});
-  window.addEventListener("blur", release_all, {signal});
+  canvas.addEventListener("blur", releaseAll, {signal});
+  window.addEventListener("blur", releaseAll, {signal});
 }
 
-export function keys_help() {
+export function keysHelp() {
   return h("dl", {class: "keys"}, kHelp.map(([keys, what]) => h("div", {}, h("dt", {}, keys), h("dd", {}, what))));
 }

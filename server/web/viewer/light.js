@@ -7,18 +7,18 @@ export class Light {
   // Of a file with this manifest.
   constructor({box, resolution}) {
     this.exposure = 1;
-    this.sky_reach = 1;
-    this.haze_start = 1;
+    this.skyReach = 1;
+    this.hazeStart = 1;
     this.readings = 0;
     this.low = box?.low ?? [0, 0, 0];
     this.high = box?.high ?? [resolution, resolution, resolution];
     this.outside = true;         // the first camera sees the floor
     this.turn = null;            // until there is a camera
-    this.set_sun(0);
+    this.setSun(0);
   }
 
   // Whether a camera there sees the floor that the scene stands on, and its shadow.
-  sees_floor(eye) {
+  seesFloor(eye) {
     return eye[1] > this.low[1] && eye.some((x, i) => x < this.low[i] || x > this.high[i]);
   }
 
@@ -26,7 +26,7 @@ export class Light {
   // fades, from where.
   floor(eye) {
     const center = this.low.map((x, i) => (x + this.high[i]) / 2);
-    return {u_floor: [this.sees_floor(eye) ? eye[1] - this.low[1] : 0, Math.max(1, this.diagonal)],
+    return {u_floor: [this.seesFloor(eye) ? eye[1] - this.low[1] : 0, Math.max(1, this.diagonal)],
             u_floor_center: subtract(center, eye)};
   }
   get diagonal() {
@@ -34,15 +34,15 @@ export class Light {
   }
 
   // Over the left shoulder of a camera, the first one, that looks `forward`.
-  place_sun(eye, forward) {
+  placeSun(eye, forward) {
     const back = scale(forward, -1);
-    this.outside = this.sees_floor(eye);
+    this.outside = this.seesFloor(eye);
     this.turn = Math.atan2(back[2], back[0]) + 0.9;
-    this.set_sun(0);
+    this.setSun(0);
   }
 
   // `place` is one of 48: 16 around, at three heights.
-  set_sun(place) {
+  setSun(place) {
     const turn = this.turn - 2 * Math.PI * (place % 16) / 16, height = 0.65 + 0.25 * Math.floor(place / 16);
     this.sun = [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
   }
@@ -51,8 +51,8 @@ export class Light {
   adjust(read, eye, moving) {
     const share = moving ? 0.15 : 0.5;
     const toward = (from, to, known) => known ? from * (to / from) ** share : to;
-    this.sky_reach = toward(this.sky_reach, Math.max(1, (this.sees_floor(eye) ? 0.35 : 1) * read.median_t), this.readings > 0);
-    this.haze_start = toward(this.haze_start, Math.max(1, read.nearest_t), this.readings > 0);
+    this.skyReach = toward(this.skyReach, Math.max(1, (this.seesFloor(eye) ? 0.35 : 1) * read.medianT), this.readings > 0);
+    this.hazeStart = toward(this.hazeStart, Math.max(1, read.nearestT), this.readings > 0);
     // The exposure that the first reading measures is that of light without a reach.
     this.exposure = toward(this.exposure, read.exposure, this.readings > 1);
     this.readings++;

@@ -16,7 +16,7 @@ export class Markers {
   // `positions` are those of the pick and of the start in voxels, or null.
   show(positions, camera, width, height) {
     const {forward, right, up} = camera.axes();
-    const pixel = camera.pixel_spread(height);
+    const pixel = camera.pixelSpread(height);
     this.marks.forEach((mark, i) => {
       const offset = positions[i] ? subtract(positions[i], camera.eye) : null;
       const depth = offset ? dot(offset, forward) : 0;

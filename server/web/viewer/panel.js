@@ -1,10 +1,10 @@
 // The panel: camera, pick, box, detail, light, statistics, keys.
 
-import {clear, fact, field, h, set_text} from "../lib/dom.js";
-import {count_text, size_text} from "../lib/format.js";
-import {copy_button} from "../views/parts.js";
+import {clear, fact, field, h, setText} from "../lib/dom.js";
+import {countText, sizeText} from "../lib/format.js";
+import {copyButton} from "../views/parts.js";
 import {ClipView} from "./clip_view.js";
-import {keys_help} from "./keys.js";
+import {keysHelp} from "./keys.js";
 import {PickView} from "./pick_view.js";
 
 export class Panel {
@@ -14,112 +14,112 @@ export class Panel {
     const {manifest, space} = viewer;
     this.levels = manifest.levels;
     this.pick = new PickView(space, () => {
-      this.show_box_button();
+      this.showBoxButton();
       viewer.schedule();
     });
-    this.clip = new ClipView(manifest.resolution, (clip) => viewer.set_options({clip}));
+    this.clip = new ClipView(manifest.resolution, (clip) => viewer.setOptions({clip}));
     this.element = h("div", {class: "panel-parts"},
-      part("Camera", this.camera_part(), true),
+      part("Camera", this.cameraPart(), true),
       part("Picked voxel", this.pick.element, true),
-      part("Clipping box", [this.clip.element, this.box_button = this.make_box_button()]),
-      part("Detail and light", this.detail_part(), true),
+      part("Clipping box", [this.clip.element, this.boxButton = this.makeBoxButton()]),
+      part("Detail and light", this.detailPart(), true),
       part("Statistics", this.statistics = h("dl", {class: "facts statistics"})),
-      part("Keys", keys_help()));
-    this.show_box_button();
+      part("Keys", keysHelp()));
+    this.showBoxButton();
   }
 
-  camera_part() {
+  cameraPart() {
     const {viewer} = this;
-    this.camera_text = h("code", {class: "camera-text", id: "camera-text"});
-    this.copy_place = h("span", {});
+    this.cameraText = h("code", {class: "camera-text", id: "camera-text"});
+    this.copyPlace = h("span", {});
     this.paste = h("input", {type: "text", spellcheck: "false", autocomplete: "off",
                              placeholder: "--camera X,Y,Z --target X,Y,Z"});
-    this.paste_error = h("p", {class: "bad", role: "alert"});
+    this.pasteError = h("p", {class: "bad", role: "alert"});
     const form = h("form", {class: "stack paste"},
-      field("Take the camera of", this.paste, "Options of voxdag render, such as the ones above."), this.paste_error,
-      h("div", {class: "buttons"}, h("button", {class: "small"}, "Show"), this.views_choice()));
+      field("Take the camera of", this.paste, "Options of voxdag render, such as the ones above."), this.pasteError,
+      h("div", {class: "buttons"}, h("button", {class: "small"}, "Show"), this.viewsChoice()));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       try {
-        viewer.fly_to_text(this.paste.value);
-        set_text(this.paste_error, "");
+        viewer.flyToText(this.paste.value);
+        setText(this.pasteError, "");
       } catch (error) {
-        set_text(this.paste_error, error.message);
+        setText(this.pasteError, error.message);
       }
     });
-    return [h("div", {class: "camera-row"}, this.camera_text, this.copy_place), form];
+    return [h("div", {class: "camera-row"}, this.cameraText, this.copyPlace), form];
   }
 
-  views_choice() {
+  viewsChoice() {
     const views = this.viewer.manifest.views ?? {};
     if (Object.keys(views).length === 0) return null;
     const choice = h("select", {class: "small", "aria-label": "Named view"}, h("option", {value: ""}, "Named view…"),
       Object.keys(views).map((name) => h("option", {value: name}, name)));
     choice.addEventListener("change", () => {
-      if (choice.value) this.viewer.fly_to(this.viewer.fit(this.viewer.space.placement(views[choice.value])));
+      if (choice.value) this.viewer.flyTo(this.viewer.fit(this.viewer.space.placement(views[choice.value])));
       choice.value = "";
     });
     return choice;
   }
 
-  make_box_button() {
-    return h("button", {type: "button", class: "small", on: {click: () => this.viewer.set_options({clip: this.pick.box()})}},
+  makeBoxButton() {
+    return h("button", {type: "button", class: "small", on: {click: () => this.viewer.setOptions({clip: this.pick.box()})}},
              "Box of the two picks");
   }
-  show_box_button() {
-    if (this.box_button) this.box_button.hidden = this.pick.box() === null;
+  showBoxButton() {
+    if (this.boxButton) this.boxButton.hidden = this.pick.box() === null;
   }
 
-  detail_part() {
+  detailPart() {
     const {viewer, levels} = this;
     this.level = h("input", {type: "range", min: "1", max: String(levels), step: "1",
-                             on: {input: () => viewer.set_options({level: Number(this.level.value)})}});
-    this.level_note = h("output", {class: "faint"});
-    this.wire = h("select", {on: {change: () => viewer.set_options({wire: this.wire.value === "" ? null : Number(this.wire.value)})}},
+                             on: {input: () => viewer.setOptions({level: Number(this.level.value)})}});
+    this.levelNote = h("output", {class: "faint"});
+    this.wire = h("select", {on: {change: () => viewer.setOptions({wire: this.wire.value === "" ? null : Number(this.wire.value)})}},
       h("option", {value: ""}, "none"),
       Array.from({length: levels + 1}, (_, level) => h("option", {value: String(level)},
-        `level ${level}: edge ${count_text(2 ** (levels - level))}`)));
+        `level ${level}: edge ${countText(2 ** (levels - level))}`)));
     this.switches = {};
     return [
-      field("Finest level", this.level), this.level_note, field("Wireframe of octree cubes", this.wire),
+      field("Finest level", this.level), this.levelNote, field("Wireframe of octree cubes", this.wire),
       ...[["color", "Colors"], ["occlusion", "Ambient occlusion"], ["shadows", "Shadows of the sun"]].map(([name, label]) => {
         if (name === "color" && !viewer.manifest.colors) return null;
         const box = this.switches[name] = h("input", {type: "checkbox", id: `switch-${name}`,
-          on: {change: () => viewer.set_options({[name]: box.checked})}});
+          on: {change: () => viewer.setOptions({[name]: box.checked})}});
         return h("div", {class: "check"}, box, h("label", {for: `switch-${name}`}, label));
       }),
     ];
   }
 
-  show_camera(text) {
-    if (this.camera_text.textContent === text) return;
-    set_text(this.camera_text, text);
-    clear(this.copy_place, copy_button(text, "the camera"));
+  showCamera(text) {
+    if (this.cameraText.textContent === text) return;
+    setText(this.cameraText, text);
+    clear(this.copyPlace, copyButton(text, "the camera"));
   }
 
-  show_options({level, wire, clip, ...switched}) {
+  showOptions({level, wire, clip, ...switched}) {
     this.level.value = String(level);
-    set_text(this.level_note, level === this.levels ? "single voxels"
-      : `cubes of ${count_text(2 ** (this.levels - level))} voxels`);
-    this.level.setAttribute("aria-valuetext", this.level_note.textContent);
+    setText(this.levelNote, level === this.levels ? "single voxels"
+      : `cubes of ${countText(2 ** (this.levels - level))} voxels`);
+    this.level.setAttribute("aria-valuetext", this.levelNote.textContent);
     this.wire.value = wire === null ? "" : String(wire);
     this.clip.set(clip);
     for (const [name, box] of Object.entries(this.switches)) box.checked = switched[name];
   }
 
-  show_statistics(s) {
+  showStatistics(s) {
     if (!this.statistics.closest("details").open) return;
     const rows = [
       ["Frames per second", s.fps >= 10 ? s.fps.toFixed(0) : s.fps.toFixed(1)],
       ["Picture", `${s.internalWidth} × ${s.internalHeight}`],
-      ["Rays per frame", count_text(s.rays)],
+      ["Rays per frame", countText(s.rays)],
       ["Steps per ray", `${s.stepsMean.toFixed(1)}; 99 % within ${Math.round(s.steps99)}`],
-      ["Tiles", `${count_text(s.tiles)}${s.loading ? `, ${count_text(s.loading)} loading` : ""}`],
-      ...(this.viewer.manifest.colors ? [["Color pages", count_text(s.colorPages)]] : []),
-      ["Memory for tiles", `${size_text(s.poolBytes + s.colorPoolBytes)} of ${size_text(s.budgetBytes)}`],
-      ["Memory for pictures", size_text(s.targetBytes)],
-      ["Received", size_text(s.fetchedBytes)],
-      ["Failed requests", count_text(s.failed)],
+      ["Tiles", `${countText(s.tiles)}${s.loading ? `, ${countText(s.loading)} loading` : ""}`],
+      ...(this.viewer.manifest.colors ? [["Color pages", countText(s.colorPages)]] : []),
+      ["Memory for tiles", `${sizeText(s.poolBytes + s.colorPoolBytes)} of ${sizeText(s.budgetBytes)}`],
+      ["Memory for pictures", sizeText(s.targetBytes)],
+      ["Received", sizeText(s.fetchedBytes)],
+      ["Failed requests", countText(s.failed)],
       ["Compiling the shaders", `${Math.round(s.compileMs)} ms`],
       ["First picture", s.firstPictureMs === null ? "–" : `${Math.round(s.firstPictureMs)} ms`],
     ];

@@ -1,14 +1,14 @@
 // What was picked, and the distance between two picks.
 
 import {announce, clear, fact, h} from "../lib/dom.js";
-import {count_text} from "../lib/format.js";
+import {countText} from "../lib/format.js";
 import {distance, subtract} from "./vector.js";
 
 export class PickView {
-  // on_change() is called when there is one more or one less to show.
-  constructor(space, on_change) {
+  // onChange() is called when there is one more or one less to show.
+  constructor(space, onChange) {
     this.space = space;
-    this.on_change = on_change;
+    this.onChange = onChange;
     this.pick = this.start = null;
     this.element = h("div", {class: "stack"});
     this.show();
@@ -18,11 +18,11 @@ export class PickView {
     this.pick = pick;
     this.show();
     if (!pick) announce("No voxel there.");
-    else announce(`Picked voxel ${pick.voxel.join(", ")}.${this.start ? ` Distance ${this.measure_text()}.` : ""}`);
+    else announce(`Picked voxel ${pick.voxel.join(", ")}.${this.start ? ` Distance ${this.measureText()}.` : ""}`);
   }
 
   // Measures from the current pick, or no longer.
-  toggle_measure() {
+  toggleMeasure() {
     if (!this.start && !this.pick) return announce("Pick a voxel first: distances are measured from it.");
     this.start = this.start ? null : this.pick;
     announce(this.start ? "Measuring from this voxel: pick another one." : "Not measuring.");
@@ -32,19 +32,19 @@ export class PickView {
   // {low, high} of the two picks in voxels, or null.
   box() {
     if (!this.start || !this.pick) return null;
-    const edge = (pick) => this.cell_edge(pick);
+    const edge = (pick) => this.cellEdge(pick);
     return {low: this.pick.voxel.map((c, axis) => Math.min(c, this.start.voxel[axis])),
             high: this.pick.voxel.map((c, axis) =>
               Math.max(c + edge(this.pick), this.start.voxel[axis] + edge(this.start)))};
   }
 
-  cell_edge({level}) {
+  cellEdge({level}) {
     return this.space.resolution / 2 ** level;
   }
 
-  measure_text() {
+  measureText() {
     const voxels = distance(this.pick.position, this.start.position);
-    return `${length_text(voxels)} voxels, ${length_text(voxels * this.space.edge / this.space.resolution)} in scene units`;
+    return `${lengthText(voxels)} voxels, ${lengthText(voxels * this.space.edge / this.space.resolution)} in scene units`;
   }
 
   show() {
@@ -55,24 +55,24 @@ export class PickView {
         fact("Voxel", h("code", {"data-fact": "voxel"}, pick.voxel.join(", "))),
         fact("In scene units", h("code", {"data-fact": "scene"},
           this.space.text(pick.position).replaceAll(",", ", "))),
-        fact("Level", h("span", {"data-fact": "level"}, String(pick.level)), this.edge_note(pick)),
+        fact("Level", h("span", {"data-fact": "level"}, String(pick.level)), this.edgeNote(pick)),
         fact("Node of the tile: level / word offset", h("code", {"data-fact": "node"}, `${pick.nodeLevel} / ${pick.nodeOffset}`)),
-        fact("Distance from the camera", `${length_text(pick.distance)} voxels`)),
+        fact("Distance from the camera", `${lengthText(pick.distance)} voxels`)),
       start && h("dl", {class: "facts measure"},
         fact("From voxel", h("code", {}, start.voxel.join(", "))),
-        pick && fact("Distance", h("span", {"data-fact": "measure"}, this.measure_text())),
+        pick && fact("Distance", h("span", {"data-fact": "measure"}, this.measureText())),
         pick && fact("Along the axes, in voxels",
           h("code", {}, subtract(pick.position, start.position).map((c) => Number(c.toFixed(2))).join(", ")))),
       (pick || start) && h("div", {class: "buttons"},
         h("button", {type: "button", class: "small", "aria-pressed": String(Boolean(start)), "data-action": "measure",
-                     on: {click: () => this.toggle_measure_and_focus()}}, "Measure from here"),
+                     on: {click: () => this.toggleMeasureAndFocus()}}, "Measure from here"),
         h("button", {type: "button", class: "small quiet", on: {click: () => this.forget()}}, "Clear")));
-    this.on_change();
+    this.onChange();
   }
 
   // The buttons are replaced: the focus stays on the new one.
-  toggle_measure_and_focus() {
-    this.toggle_measure();
+  toggleMeasureAndFocus() {
+    this.toggleMeasure();
     this.element.querySelector('[data-action="measure"]')?.focus();
   }
 
@@ -81,12 +81,12 @@ export class PickView {
     this.show();
   }
 
-  edge_note(pick) {
-    const edge = this.cell_edge(pick);
-    return h("span", {class: "faint"}, edge === 1 ? " (a voxel)" : ` (a cube of ${count_text(edge)} voxels; more detail is not loaded or not visible)`);
+  edgeNote(pick) {
+    const edge = this.cellEdge(pick);
+    return h("span", {class: "faint"}, edge === 1 ? " (a voxel)" : ` (a cube of ${countText(edge)} voxels; more detail is not loaded or not visible)`);
   }
 }
 
-function length_text(value) {
+function lengthText(value) {
   return String(Number(value.toPrecision(6)));
 }

@@ -1,15 +1,15 @@
 // Draws a file of any size by casting rays through the tiles that are there, asks for those that are
 // missing, and does so within a budget of GPU memory (docs/view.md).
 
-import {create_context, WebGLUnavailable} from "./gl/gl_objects.js";
-import {Colors, color_budget} from "./colors/colors.js";
+import {createContext, WebGLUnavailable} from "./gl/gl_objects.js";
+import {Colors, colorBudget} from "./colors/colors.js";
 import {Passes} from "./gl/passes.js";
-import {read_feedback, read_hits} from "./gl/feedback.js";
-import {jitter_of, picture_values} from "./gl/picture_values.js";
+import {readFeedback, readHits} from "./gl/feedback.js";
+import {jitterOf, pictureValues} from "./gl/picture_values.js";
 import {View} from "./gl/view.js";
 import {Light} from "./light.js";
 import {Pace} from "./pace.js";
-import {kBlockBytes, statistics_of} from "./statistics.js";
+import {kBlockBytes, statisticsOf} from "./statistics.js";
 import {FirstView} from "./tiles/first_view.js";
 import {TileLoader} from "./tiles/tile_loader.js";
 import {TilePool} from "./tiles/tile_pool.js";
@@ -34,39 +34,39 @@ export class Renderer {
   constructor(canvas, source, {budgetBytes, onChange, begun = null} = {}) {
     this.canvas = canvas;
     this.source = source;
-    this.on_change = onChange || (() => {});
+    this.onChange = onChange || (() => {});
     const phone = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
-    this.budget_bytes = budgetBytes || (phone ? kPhoneBudgetBytes : kBudgetBytes);
-    this.max_pixels = phone ? kPhoneMaxPixels : kMaxPixels;
+    this.budgetBytes = budgetBytes || (phone ? kPhoneBudgetBytes : kBudgetBytes);
+    this.maxPixels = phone ? kPhoneMaxPixels : kMaxPixels;
     this.options = {minLevel: 0, maxLevel: null, clip: null, ambientOcclusion: true, sunShadows: true,
                     pixelTolerance: 1, wireLevel: null, color: true};
     this.view = null;
-    this.first_picture_bytes = 0;
-    this.sun_trials = 0;
-    this.sun_wanted = Infinity;  // tiles, at the least so far
-    this.has_drawn = false;      // since the context is there
+    this.firstPictureBytes = 0;
+    this.sunTrials = 0;
+    this.sunWanted = Infinity;  // tiles, at the least so far
+    this.hasDrawn = false;      // since the context is there
     this.colors = null;          // of a file that has some
-    this.sample = null;          // {parts, fence, part_ms, busy_ms, ...}: drawn in parts
+    this.sample = null;          // {parts, fence, partMs, busyMs, ...}: drawn in parts
     this.pace = new Pace();
-    this.size = {width: canvas.width, height: canvas.height, css_width: canvas.width, css_height: canvas.height};
-    this.times = {view_ms: -1e9, begin_ms: begun?.begin_ms ?? performance.now(), first_picture_ms: null, compile_ms: 0};
+    this.size = {width: canvas.width, height: canvas.height, cssWidth: canvas.width, cssHeight: canvas.height};
+    this.times = {viewMs: -1e9, beginMs: begun?.beginMs ?? performance.now(), firstPictureMs: null, compileMs: 0};
     this.seed = 0;
     this.samples = 0;
-    this.quiet_rounds = 0;
-    this.coarse_pixels = 0;
-    this.full_drawn = false;     // the last frame that was read had all pixels
-    this.stats = {steps_mean: 0, steps_99: 0, rays: 0};
+    this.quietRounds = 0;
+    this.coarsePixels = 0;
+    this.fullDrawn = false;     // the last frame that was read had all pixels
+    this.stats = {stepsMean: 0, steps99: 0, rays: 0};
     this.waiting = [];
     this.disposed = false;
     this.ready = false;          // programs, pool and root are there
     this.started = null;         // {resolve, reject} of start()
-    this.gl = begun?.gl ?? create_context(canvas);
+    this.gl = begun?.gl ?? createContext(canvas);
     if (!this.gl) throw new WebGLUnavailable("This browser or its graphics driver does not offer WebGL 2.");
-    this.lost = this.gl.isContextLost();  // then on_restored() continues
-    this.max_size = 4096;
-    canvas.addEventListener("webglcontextlost", this.on_lost);
-    canvas.addEventListener("webglcontextrestored", this.on_restored);
-    if (!this.lost) this.create_programs(begun?.passes);
+    this.lost = this.gl.isContextLost();  // then onRestored() continues
+    this.maxSize = 4096;
+    canvas.addEventListener("webglcontextlost", this.onLost);
+    canvas.addEventListener("webglcontextrestored", this.onRestored);
+    if (!this.lost) this.createPrograms(begun?.passes);
   }
 
   // Resolves when the first picture can be drawn, of a source whose manifest is there. With a view that was set before,
@@ -74,7 +74,7 @@ export class Renderer {
   async start() {
     this.info = this.source.info;
     this.light = new Light(this.info);
-    if (this.view) this.light.place_sun(this.view.eye, this.view.forward);
+    if (this.view) this.light.placeSun(this.view.eye, this.view.forward);
     await new Promise((resolve, reject) => {
       this.started = {resolve, reject};
       if (this.disposed) resolve();
@@ -83,14 +83,14 @@ export class Renderer {
   }
 
   // Another root of the same DAG, which has grown: the tiles that are there stay. Resolves to whether it is shown.
-  async show_root(info) {
+  async showRoot(info) {
     const {loader, store} = this;
     if (!this.ready || !this.info.root || info.levels <= 2) return false;
-    await loader.load_root(info.root.level, info.root.offset);
+    await loader.loadRoot(info.root.level, info.root.offset);
     if (store !== this.store || !this.ready) return false;
     this.info = info;
-    this.root_pointer = store.root.pointer;
-    this.begin_epoch();
+    this.rootPointer = store.root.pointer;
+    this.beginEpoch();
     return true;
   }
 
@@ -98,48 +98,48 @@ export class Renderer {
     const view = new View(placement);
     if (view.equals(this.view)) return;
     this.view = view;
-    if (this.light?.turn === null) this.light.place_sun(view.eye, view.forward);
-    this.end_first_view();
-    this.times.view_ms = performance.now();
-    this.begin_epoch();
+    if (this.light?.turn === null) this.light.placeSun(view.eye, view.forward);
+    this.endFirstView();
+    this.times.viewMs = performance.now();
+    this.beginEpoch();
   }
 
   setOptions(options) {
     Object.assign(this.options, options);
     if (this.light) this.light.readings = 0;  // how bright it is may change at once
-    this.end_first_view();
-    this.begin_epoch();
+    this.endFirstView();
+    this.beginEpoch();
   }
 
-  resize(css_width, css_height, device_ratio) {
-    const pixel_ratio = Math.min(device_ratio, Math.sqrt(this.max_pixels / Math.max(1, css_width * css_height)));
-    const limit = this.max_size, width = Math.min(limit, Math.max(1, Math.round(css_width * pixel_ratio)));
-    const height = Math.min(limit, Math.max(1, Math.round(css_height * pixel_ratio)));
+  resize(cssWidth, cssHeight, deviceRatio) {
+    const pixelRatio = Math.min(deviceRatio, Math.sqrt(this.maxPixels / Math.max(1, cssWidth * cssHeight)));
+    const limit = this.maxSize, width = Math.min(limit, Math.max(1, Math.round(cssWidth * pixelRatio)));
+    const height = Math.min(limit, Math.max(1, Math.round(cssHeight * pixelRatio)));
     const same = width === this.canvas.width && height === this.canvas.height && width === this.size.width;
-    this.size = {width, height, css_width, css_height};
+    this.size = {width, height, cssWidth, cssHeight};
     if (same) return;
     this.canvas.width = width;
     this.canvas.height = height;
     if (this.ready && this.passes.targets) this.show();  // the old picture, until there is a new one
-    this.begin_epoch();
+    this.beginEpoch();
   }
 
   // Draws a frame if there is something new to draw and the GPU is done with the last one.
-  frame(now_ms) {
-    const now = performance.now(), moving = now - this.times.view_ms < kMovingMs;
-    if (!this.ready || !this.view) return {moving, complete: true};  // on_change() says when there is more
+  frame(nowMs) {
+    const now = performance.now(), moving = now - this.times.viewMs < kMovingMs;
+    if (!this.ready || !this.view) return {moving, complete: true};  // onChange() says when there is more
     this.pace.tick(now);
     if (this.empty) {
-      this.draw_empty();
+      this.drawEmpty();
       return {moving: false, complete: true};
     }
-    if (!this.has_drawn && this.waits_for_tiles) return {moving, complete: false};
-    if (this.sample && !this.continue_sample(now)) return {moving, complete: false};
+    if (!this.hasDrawn && this.waitsForTiles) return {moving, complete: false};
+    if (this.sample && !this.continueSample(now)) return {moving, complete: false};
     if (this.reading) {
       if (!this.reading.pass.ready) return {moving, complete: false};
-      this.take_reading(now);
+      this.takeReading(now);
     }
-    if (!moving && this.samples >= kSamples && ((this.is_complete && this.is_done) || this.rests(now))) return {moving, complete: true};
+    if (!moving && this.samples >= kSamples && ((this.isComplete && this.isDone) || this.rests(now))) return {moving, complete: true};
     this.draw(now, moving);
     return {moving, complete: false};
   }
@@ -147,43 +147,43 @@ export class Renderer {
   // Resolves when all tiles that the pixels of the canvas need have arrived, and the sun has its place: within a scene
   // not while the service is away, if that lacks tiles.
   complete() {
-    if (this.ready && this.is_complete && this.full_drawn && this.sun_is_placed && !this.reading) return Promise.resolve();
+    if (this.ready && this.isComplete && this.fullDrawn && this.sunIsPlaced && !this.reading) return Promise.resolve();
     return new Promise((resolve) => {
       this.waiting.push(resolve);
-      this.on_change();
+      this.onChange();
     });
   }
 
   // What is seen at a point of the canvas, null for the sky.
-  async pick(css_x, css_y) {
+  async pick(cssX, cssY) {
     const {passes} = this;
-    if (!this.ready || this.empty || !await passes.compile_later()) return null;
+    if (!this.ready || this.empty || !await passes.compileLater()) return null;
     if (!this.ready || passes !== this.passes) return null;
     const {view, store} = this, {width, height} = this.size, {evicted} = store;
-    const x = css_x / this.size.css_width * width, y = css_y / this.size.css_height * height;
+    const x = cssX / this.size.cssWidth * width, y = cssY / this.size.cssHeight * height;
     const values = this.uniforms(width, height);
     values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
-    const words = await passes.pick_one(values);
+    const words = await passes.pickOne(values);
     if (!words || !this.ready || (words[1] >>> 23 & 1) === 0) return null;
-    if (store.evicted !== evicted) return this.pick(css_x, css_y);  // what it refers to may have left
-    const distance = new Float32Array(words.buffer, 0, 1)[0], log2_edge = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
+    if (store.evicted !== evicted) return this.pick(cssX, cssY);  // what it refers to may have left
+    const distance = new Float32Array(words.buffer, 0, 1)[0], log2Edge = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
     const direction = view.direction(x, y, width, height);
     const normal = axis === 3 ? direction.map((d) => -d) : [0, 0, 0];
     if (axis < 3) normal[axis] = direction[axis] > 0 ? -1 : 1;
-    const node = words[2] !== 0 ? store.cut_off_node(words[2]) : store.by_slot[words[7]]?.tile || this.info.root;
-    return {voxel: [...words.slice(4, 7)], level: this.info.levels - log2_edge, position: add(view.eye, scale(direction, distance)),
+    const node = words[2] !== 0 ? store.cutOffNode(words[2]) : store.bySlot[words[7]]?.tile || this.info.root;
+    return {voxel: [...words.slice(4, 7)], level: this.info.levels - log2Edge, position: add(view.eye, scale(direction, distance)),
             distance, normal, nodeLevel: node.level, nodeOffset: String(node.offset)};
   }
 
   // Hits of a picture of any size with the tiles that are there, rows from the top.
   async capture({width, height}) {
-    const is_drawn = this.ready && !this.empty, words = is_drawn
+    const isDrawn = this.ready && !this.empty, words = isDrawn
       ? this.passes.capture(this.uniforms(width, height), width, height) : new Uint32Array(4 * width * height);
-    return read_hits(words, width, height, this.info?.levels);
+    return readHits(words, width, height, this.info?.levels);
   }
 
   statistics() {
-    return statistics_of(this);
+    return statisticsOf(this);
   }
 
   // null, or {code, message} of what does not arrive, and why.
@@ -193,8 +193,8 @@ export class Renderer {
 
   dispose() {
     this.disposed = true;
-    this.canvas.removeEventListener("webglcontextlost", this.on_lost);
-    this.canvas.removeEventListener("webglcontextrestored", this.on_restored);
+    this.canvas.removeEventListener("webglcontextlost", this.onLost);
+    this.canvas.removeEventListener("webglcontextrestored", this.onRestored);
     this.ready = false;
     this.loader?.dispose();
     this.passes?.dispose();
@@ -203,70 +203,70 @@ export class Renderer {
     this.started?.resolve();
   }
 
-  create_programs(begun) {
-    this.max_size = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE) || 4096;
-    const begin = begun ? this.times.begin_ms : performance.now();
+  createPrograms(begun) {
+    this.maxSize = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE) || 4096;
+    const begin = begun ? this.times.beginMs : performance.now();
     if (this.passes) this.passes.disposed = true;  // with its context
     this.passes = begun ?? new Passes(this.gl);
-    this.times.compile_begin_ms = begin;
-    this.can_choose_sun = false;
+    this.times.compileBeginMs = begin;
+    this.canChooseSun = false;
     this.reading = null;
   }
 
   // Makes the renderer ready, from the beginning if the context was lost in between.
   async load() {
-    const {passes} = this, is_over = () => this.disposed || this.lost || passes !== this.passes || this.gl.isContextLost();
+    const {passes} = this, isOver = () => this.disposed || this.lost || passes !== this.passes || this.gl.isContextLost();
     try {
-      const root = this.load_root();
+      const root = this.loadRoot();
       root.catch(() => {});  // reported below, unless the programs fail
-      this.wait_until_ms = performance.now() + kFirstWaitMs;
+      this.waitUntilMs = performance.now() + kFirstWaitMs;
       await passes.compile(Boolean(this.info.colors));
-      if (is_over()) return;
-      this.times.compile_ms = performance.now() - this.times.compile_begin_ms;
+      if (isOver()) return;
+      this.times.compileMs = performance.now() - this.times.compileBeginMs;
       mark("compiled");
       await root;
-      if (is_over()) return;
+      if (isOver()) return;
       this.ready = true;
-      this.begin_epoch();
+      this.beginEpoch();
       this.started.done = true;
       this.started.resolve();
     } catch (error) {
-      if (is_over()) return;
+      if (isOver()) return;
       if (!this.started.done) return this.started.reject(error);
       console.error(error);
       this.loader?.fail(error);
-      this.on_change();
+      this.onChange();
     }
   }
 
-  async load_root() {
+  async loadRoot() {
     const {root, levels} = this.info;
-    this.root_pointer = undefined;
+    this.rootPointer = undefined;
     this.empty = !root && !this.info.root_brick;
-    const for_colors = color_budget(this.info, this.budget_bytes);
-    this.store = new TileStore(new TilePool(this.gl, this.pool_bytes(this.budget_bytes - for_colors)), this.info);
-    this.colors = for_colors > 0 ? new Colors(this.gl, this.source, for_colors, (failed) => this.on_arrival(failed)) : null;
-    this.loader = new TileLoader(this.source, this.store, (failed) => this.on_arrival(failed));
+    const forColors = colorBudget(this.info, this.budgetBytes);
+    this.store = new TileStore(new TilePool(this.gl, this.poolBytes(this.budgetBytes - forColors)), this.info);
+    this.colors = forColors > 0 ? new Colors(this.gl, this.source, forColors, (failed) => this.onArrival(failed)) : null;
+    this.loader = new TileLoader(this.source, this.store, (failed) => this.onArrival(failed));
     if (root && levels > 2) {
-      const words = await this.loader.load_root(root.level, root.offset);
-      this.root_pointer = this.store.root?.pointer;  // none if the loader was disposed
+      const words = await this.loader.loadRoot(root.level, root.offset);
+      this.rootPointer = this.store.root?.pointer;  // none if the loader was disposed
       mark("root");
-      if (words) this.seek_first_view(words);
+      if (words) this.seekFirstView(words);
     } else if (!this.empty) {
-      this.root_pointer = this.store.add_brick(this.info.root_brick);
+      this.rootPointer = this.store.addBrick(this.info.root_brick);
     }
   }
 
   // A small file needs less than the budget: at worst each voxel has a path of tiles. A growing DAG has no number yet.
-  pool_bytes(budget_bytes) {
+  poolBytes(budgetBytes) {
     const {voxels, levels, tile_levels} = this.info;
-    return Math.min(budget_bytes, 4 * kMebibyte + Number(voxels ?? Infinity) * kBlockBytes * Math.ceil(levels / tile_levels));
+    return Math.min(budgetBytes, 4 * kMebibyte + Number(voxels ?? Infinity) * kBlockBytes * Math.ceil(levels / tile_levels));
   }
 
   // Begins the picture again. What is missing is found sooner by a small picture than by the rest of a large one.
   restart() {
     this.samples = 0;
-    this.quiet_rounds = 0;
+    this.quietRounds = 0;
     if (this.reading) this.reading.outdated = true;
     if (!this.sample) return;
     this.sample.outdated = true;
@@ -275,150 +275,150 @@ export class Renderer {
     this.sample = null;
   }
 
-  begin_epoch() {
+  beginEpoch() {
     this.restart();
-    this.pace.begin_view();
-    this.store?.begin_epoch();
-    this.loader?.begin_epoch();
-    this.colors?.begin_epoch();
-    this.on_change();
+    this.pace.beginView();
+    this.store?.beginEpoch();
+    this.loader?.beginEpoch();
+    this.colors?.beginEpoch();
+    this.onChange();
   }
 
   // Before anything is drawn the tiles of a view are found without a reading of the feedback.
-  seek_first_view(root_words) {
-    if (!this.view || this.options.clip || this.times.first_picture_ms !== null) return;
+  seekFirstView(rootWords) {
+    if (!this.view || this.options.clip || this.times.firstPictureMs !== null) return;
     const {loader, store, info} = this, finest = 2 ** (info.levels - Math.min(info.levels, this.options.maxLevel ?? info.levels));
-    loader.first_view = new FirstView(info, this.view, this.size, finest);
-    loader.first_view.begin(store, store.root, root_words);
-    this.follow_first_view();
+    loader.firstView = new FirstView(info, this.view, this.size, finest);
+    loader.firstView.begin(store, store.root, rootWords);
+    this.followFirstView();
   }
 
-  follow_first_view() {
+  followFirstView() {
     const {loader} = this, now = performance.now();
-    if (loader.first_view.is_over) return this.end_first_view();  // the next reading replaces the queue
-    loader.demand(loader.first_view.wanted, now);
-    if (loader.is_idle || loader.awaits_retry) this.end_first_view();
+    if (loader.firstView.isOver) return this.endFirstView();  // the next reading replaces the queue
+    loader.demand(loader.firstView.wanted, now);
+    if (loader.isIdle || loader.awaitsRetry) this.endFirstView();
   }
 
   // A first picture that has its tiles is soon there; one without them only takes its time.
-  get waits_for_tiles() {
-    return performance.now() < this.wait_until_ms && (this.loader.first_view !== null || this.root_pointer === undefined);
+  get waitsForTiles() {
+    return performance.now() < this.waitUntilMs && (this.loader.firstView !== null || this.rootPointer === undefined);
   }
 
-  end_first_view() {
-    if (this.loader?.first_view) mark("tiles of the first view");
-    if (this.loader) this.loader.first_view = null;
+  endFirstView() {
+    if (this.loader?.firstView) mark("tiles of the first view");
+    if (this.loader) this.loader.firstView = null;
   }
 
   // A few fine tiles that arrive late do not begin the picture again: its other samples will have them.
-  on_arrival(failed = false) {
-    if (this.loader?.first_view) this.follow_first_view();
-    if (!failed && (!this.is_complete || this.coarse_pixels > kFinePixels)) this.restart();
-    this.on_change();
+  onArrival(failed = false) {
+    if (this.loader?.firstView) this.followFirstView();
+    if (!failed && (!this.isComplete || this.coarsePixels > kFinePixels)) this.restart();
+    this.onChange();
   }
 
-  on_lost = (event) => {
+  onLost = (event) => {
     event.preventDefault();
     this.lost = true;
-    this.ready = this.has_drawn = false;
+    this.ready = this.hasDrawn = false;
     this.loader?.dispose();
     this.colors?.loader.dispose();
     this.reading = null;
     this.sample = null;
   };
 
-  on_restored = () => {
+  onRestored = () => {
     this.lost = false;
-    this.create_programs();
+    this.createPrograms();
     if (this.started) this.load();
   };
 
   // Within a scene the sun takes a better place as soon as the first view is complete. Returns whether the picture
   // is final as far as the sun is concerned.
-  improve_sun(now_ms) {
-    if (this.sun_is_placed) return true;
+  improveSun(nowMs) {
+    if (this.sunIsPlaced) return true;
     const {passes} = this, {width, height} = passes.targets;
-    if (!this.can_choose_sun) {
-      passes.compile_later().then((usable) => this.can_choose_sun = usable && passes === this.passes,
-                                  () => this.sun_trials = kSunTrials);
+    if (!this.canChooseSun) {
+      passes.compileLater().then((usable) => this.canChooseSun = usable && passes === this.passes,
+                                  () => this.sunTrials = kSunTrials);
       return false;
     }
     const values = {...this.uniforms(width, height), u_turn: this.light.turn};
-    const {place, wanted} = this.passes.choose_sun(values, kLitShare);
-    this.sun_trials = wanted.size < this.sun_wanted ? 0 : this.sun_trials + 1;
-    this.sun_wanted = Math.min(this.sun_wanted, wanted.size);
-    if (wanted.size > 0 && this.sun_trials < kSunTrials && !this.loader.is_full) {
-      this.loader.demand(wanted, now_ms);
+    const {place, wanted} = this.passes.chooseSun(values, kLitShare);
+    this.sunTrials = wanted.size < this.sunWanted ? 0 : this.sunTrials + 1;
+    this.sunWanted = Math.min(this.sunWanted, wanted.size);
+    if (wanted.size > 0 && this.sunTrials < kSunTrials && !this.loader.isFull) {
+      this.loader.demand(wanted, nowMs);
       return false;
     }
-    this.sun_trials = kSunTrials;
-    this.light.set_sun(place);
+    this.sunTrials = kSunTrials;
+    this.light.setSun(place);
     this.restart();
     this.light.readings = 0;
     return false;
   }
 
-  get is_complete() {
-    return this.quiet_rounds >= kQuietRounds;
+  get isComplete() {
+    return this.quietRounds >= kQuietRounds;
   }
 
-  get sun_is_placed() {
-    return this.light.outside || this.sun_trials >= kSunTrials || !this.options.sunShadows;
+  get sunIsPlaced() {
+    return this.light.outside || this.sunTrials >= kSunTrials || !this.options.sunShadows;
   }
 
   // Whether nobody waits for a complete view, and the sun has its place.
-  get is_done() {
-    return this.waiting.length === 0 && this.sun_is_placed;
+  get isDone() {
+    return this.waiting.length === 0 && this.sunIsPlaced;
   }
 
   // Whether all that can be drawn is drawn until the service is asked again.
   rests(now) {
-    return this.full_drawn && this.loaders.some((each) => each.pauses(now)) &&
-           this.loaders.every((each) => each.pauses(now) || each.is_idle);
+    return this.fullDrawn && this.loaders.some((each) => each.pauses(now)) &&
+           this.loaders.every((each) => each.pauses(now) || each.isIdle);
   }
   get loaders() {
     return [this.loader, ...(this.colors && this.options.color ? [this.colors.loader] : [])];
   }
 
   // The internal resolution: lower while the camera moves and while tiles arrive, if frames take long.
-  internal_size(moving) {
+  internalSize(moving) {
     const {width, height} = this.size;
-    const arrives = this.quiet_rounds === 0 || (!this.is_complete && this.loaders.some((each) => each.requests > 0));
+    const arrives = this.quietRounds === 0 || (!this.isComplete && this.loaders.some((each) => each.requests > 0));
     const coarse = moving || (arrives && this.loaders.every((each) => each.outage.count === 0));
-    const scale = moving ? this.pace.scale : coarse ? this.pace.seeking_scale : 1;
+    const scale = moving ? this.pace.scale : coarse ? this.pace.seekingScale : 1;
     return {width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)), full: scale === 1};
   }
 
   draw(now, moving) {
-    const {width, height, full} = this.internal_size(moving);
+    const {width, height, full} = this.internalSize(moving);
     const before = this.passes.targets;
     if (before?.width !== width || before.height !== height || before.full.width !== this.size.width || before.full.height !== this.size.height)
       this.samples = 0;
     this.passes.resize(width, height, this.size, this.colors !== null);
     // Cells are as fine as the still picture needs, unless the camera moves.
-    const lod_height = moving ? height : this.size.height;
-    const values = this.uniforms(width, height, lod_height);
+    const lodHeight = moving ? height : this.size.height;
+    const values = this.uniforms(width, height, lodHeight);
     const frame = this.samples;
     this.seed++;
-    Object.assign(values, {u_frame: frame, u_seed: this.seed, u_jitter: jitter_of(full ? frame : this.seed)});
-    this.sample = {parts: this.passes.draw(values, () => this.pace.part_pixels), fence: null, part_ms: now, busy_ms: 0,
+    Object.assign(values, {u_frame: frame, u_seed: this.seed, u_jitter: jitterOf(full ? frame : this.seed)});
+    this.sample = {parts: this.passes.draw(values, () => this.pace.partPixels), fence: null, partMs: now, busyMs: 0,
                    epoch: this.store.epoch, moving, full, width, height, outdated: false, pools: this.pools};
-    this.draw_part(now);
+    this.drawPart(now);
   }
 
   // Gives the GPU as much of the sample as it can draw soon. More would stop the whole system, and some
   // end a context that keeps them busy for seconds.
-  draw_part(now) {
+  drawPart(now) {
     const {sample, gl} = this, {value: pass, done} = sample.parts.next();
-    sample.part_ms = now;
+    sample.partMs = now;
     if (!done) {
       sample.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
       gl.flush();
       return false;
     }
     this.show();
-    if (!this.has_drawn) mark("first frame");
-    this.has_drawn = true;
+    if (!this.hasDrawn) mark("first frame");
+    this.hasDrawn = true;
     this.samples = sample.outdated ? 0 : this.samples + 1;
     this.stats.rays = sample.width * sample.height;
     this.reading = {...sample, pass};
@@ -435,7 +435,7 @@ export class Renderer {
   }
 
   // Whether the sample is drawn.
-  continue_sample(now) {
+  continueSample(now) {
     const {sample, gl} = this;
     if (gl.getSyncParameter(sample.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
     gl.deleteSync(sample.fence);
@@ -443,52 +443,52 @@ export class Renderer {
       this.sample = null;
       return true;
     }
-    sample.busy_ms += this.pace.part_done(now - sample.part_ms);
-    return this.draw_part(now);
+    sample.busyMs += this.pace.partDone(now - sample.partMs);
+    return this.drawPart(now);
   }
 
-  uniforms(width, height, lod_height = height) {
-    return picture_values(this, width, height, lod_height);
+  uniforms(width, height, lodHeight = height) {
+    return pictureValues(this, width, height, lodHeight);
   }
 
-  take_reading(now) {
-    const {pass, part_ms, busy_ms, epoch, moving, full, width, height, outdated} = this.reading;
+  takeReading(now) {
+    const {pass, partMs, busyMs, epoch, moving, full, width, height, outdated} = this.reading;
     this.reading = null;
-    const read = read_feedback(pass.take());
-    read.coarse_pixels *= this.size.height / height;  // pixels of the canvas
-    this.stats.steps_mean = read.steps_mean;
-    this.stats.steps_99 = read.steps_99;
-    this.pace.frame_done(now - part_ms, busy_ms, width * height, moving || !full);
+    const read = readFeedback(pass.take());
+    read.coarsePixels *= this.size.height / height;  // pixels of the canvas
+    this.stats.stepsMean = read.stepsMean;
+    this.stats.steps99 = read.steps99;
+    this.pace.frameDone(now - partMs, busyMs, width * height, moving || !full);
     for (const slot of read.slots) this.store.mark(slot, epoch, now);
     // Not while samples of a still picture are added up.
     if (read.exposure !== null && this.samples <= kSamples / 4) this.light.adjust(read, this.view.eye, moving);
-    this.coarse_pixels = read.coarse_pixels;
+    this.coarsePixels = read.coarsePixels;
     if (epoch === this.store.epoch) this.store.rounds++;
-    if (this.loader.first_view?.stalls(now)) this.end_first_view();
-    if (!this.loader.first_view && this.loader.demand(read.wanted, now) > 0) this.on_arrival();
-    if (pass.colors) this.colors.take_reading(pass.colors.take(), epoch, now);
-    else this.colors?.loader.replace_queue([], 0, now);
+    if (this.loader.firstView?.stalls(now)) this.endFirstView();
+    if (!this.loader.firstView && this.loader.demand(read.wanted, now) > 0) this.onArrival();
+    if (pass.colors) this.colors.takeReading(pass.colors.take(), epoch, now);
+    else this.colors?.loader.replaceQueue([], 0, now);
     if (epoch !== this.store.epoch) return;
     const lacking = this.loaders.reduce((sum, each) => sum + each.unmet, 0);
-    if (!moving && !this.loader.first_view) this.pace.note_lacking(lacking, read.coarse_pixels);
-    const nothing_comes = this.loaders.every((each) => each.is_idle && !each.awaits_retry);
-    if (this.times.first_picture_ms === null && read.coarse_pixels < 16) {
-      this.times.first_picture_ms = now - this.times.begin_ms;
-      this.first_picture_bytes = this.source.fetched_bytes;
+    if (!moving && !this.loader.firstView) this.pace.noteLacking(lacking, read.coarsePixels);
+    const nothingComes = this.loaders.every((each) => each.isIdle && !each.awaitsRetry);
+    if (this.times.firstPictureMs === null && read.coarsePixels < 16) {
+      this.times.firstPictureMs = now - this.times.beginMs;
+      this.firstPictureBytes = this.source.fetchedBytes;
       mark("first picture");
     }
     // What arrived since the sample began may refer to more that is missing.
-    if (!moving && nothing_comes && !outdated) this.quiet_rounds++;
-    else if (!this.is_complete || read.coarse_pixels > kFinePixels) this.quiet_rounds = 0;
-    this.full_drawn = full;
-    if (this.is_complete && full && nothing_comes && this.improve_sun(now)) for (const resolve of this.waiting.splice(0)) resolve();
+    if (!moving && nothingComes && !outdated) this.quietRounds++;
+    else if (!this.isComplete || read.coarsePixels > kFinePixels) this.quietRounds = 0;
+    this.fullDrawn = full;
+    if (this.isComplete && full && nothingComes && this.improveSun(now)) for (const resolve of this.waiting.splice(0)) resolve();
   }
 
-  draw_empty() {
+  drawEmpty() {
     const {passes, canvas} = this;
     passes.resize(canvas.width, canvas.height, canvas, false);
     passes.show(1, canvas.width, canvas.height);
-    this.has_drawn = true;
+    this.hasDrawn = true;
     for (const resolve of this.waiting.splice(0)) resolve();
   }
 }

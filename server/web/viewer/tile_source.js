@@ -12,30 +12,30 @@ const kRemoved = {code: "removed", message: "The file is not there any more: wha
 
 // `status` is the HTTP status, 0 when there was no answer, 200 when it makes no sense; `code` is that of the service.
 export class TileError extends Error {
-  constructor(status, detail, {code = "", retry_after_ms = 0, timed_out = false} = {}) {
+  constructor(status, detail, {code = "", retryAfterMs = 0, timedOut = false} = {}) {
     super(detail);
-    Object.assign(this, {status, code, retry_after_ms, timed_out});
+    Object.assign(this, {status, code, retryAfterMs, timedOut});
   }
   // Whether the same request may succeed later.
-  get is_transient() {
+  get isTransient() {
     if (this.code === "corrupt" || this.code === "unsupported_version") return false;
     return this.status === 0 || this.status === 408 || this.status === 429 || this.status >= 500;
   }
   // Whether it is the token that is refused.
-  get is_denied() {
+  get isDenied() {
     return this.status === 401 || this.status === 403;
   }
   // Whether the service lives and has too much to do.
-  get is_busy() {
-    return (this.status === 503 || this.status === 429) && (this.code === "busy" || this.retry_after_ms > 0);
+  get isBusy() {
+    return (this.status === 503 || this.status === 429) && (this.code === "busy" || this.retryAfterMs > 0);
   }
   // Whether all of the file may be missing.
-  get is_missing() {
+  get isMissing() {
     return this.status === 404 || this.status === 409;
   }
   // Whether what was asked for may be the reason, though nothing says so.
-  get is_suspicious() {
-    return this.status === 200 || (this.status === 500 && this.is_transient);
+  get isSuspicious() {
+    return this.status === 200 || (this.status === 500 && this.isTransient);
   }
 }
 
@@ -46,16 +46,16 @@ export class TileSource {
     this.headers = headers;
     this.info = null;
     this.ended = null;           // {code, message} when there is nothing to be had any more
-    this.timeout_ms = kTimeoutMs;
+    this.timeoutMs = kTimeoutMs;
     this.looking = null;
-    this.looked_ms = -Infinity;
-    this.fetched_bytes = 0;
-    this.request_count = 0;
+    this.lookedMs = -Infinity;
+    this.fetchedBytes = 0;
+    this.requestCount = 0;
   }
 
   async manifest() {
-    const info = await this.fetch_manifest();
-    check_manifest(info);
+    const info = await this.fetchManifest();
+    checkManifest(info);
     this.info = info;
     return info;
   }
@@ -66,43 +66,43 @@ export class TileSource {
     if (nodes.length === 1) {
       const {level, offset} = nodes[0];
       const bytes = await this.request(`/tiles/${level}/${offset}?v=${digest}`, options);
-      return [words_of(bytes, 0, bytes.byteLength)];
+      return [wordsOf(bytes, 0, bytes.byteLength)];
     }
     const list = nodes.map(({level, offset}) => `${level}.${offset}`).join(",");
     const bytes = await this.request(`/tiles/batch?v=${digest}&nodes=${list}`, options);
-    return split_batch(bytes, nodes.length);
+    return splitBatch(bytes, nodes.length);
   }
 
   // Color pages [{level, position: [x, y, z]}], in the same way.
   async fetchColors(pages, options) {
     const list = pages.map(({level, position}) => [level, ...position].join(".")).join(",");
     const bytes = await this.request(`/tiles/colors?v=${encodeURIComponent(this.info.digest)}&pages=${list}`, options);
-    return split_batch(bytes, pages.length);
+    return splitBatch(bytes, pages.length);
   }
 
-  get batch_max() {
+  get batchMax() {
     return this.info.batch_max;
   }
 
   // After a tile was not found: whether all of the file is gone, which `ended` then says.
-  async look_again(signal) {
-    if (this.ended || performance.now() < this.looked_ms + kLookAgainMs) return;
+  async lookAgain(signal) {
+    if (this.ended || performance.now() < this.lookedMs + kLookAgainMs) return;
     this.looking ??= this.look(signal).finally(() => this.looking = null);
     await this.looking;
   }
 
   async look(signal) {
     try {
-      const info = await this.fetch_manifest(signal);
+      const info = await this.fetchManifest(signal);
       if (info.digest !== this.info.digest) this.ended = kReplaced;
-      this.looked_ms = performance.now();
+      this.lookedMs = performance.now();
     } catch (error) {
       // What only stands between here and the service has no such codes.
       if (error.code === "not_found" || error.code === "conflict") this.ended = kRemoved;
     }
   }
 
-  async fetch_manifest(signal) {
+  async fetchManifest(signal) {
     const text = new TextDecoder().decode(await this.request("/tiles", {cache: "no-store", signal}));
     try {
       return JSON.parse(text);
@@ -113,15 +113,15 @@ export class TileSource {
 
   // The bytes of an answer, or a TileError.
   async request(path, {cache, signal} = {}) {
-    this.request_count++;
+    this.requestCount++;
     const ending = new AbortController(), end = () => ending.abort();
-    let timer = 0, timed_out = false, response = null;
+    let timer = 0, timedOut = false, response = null;
     const heard = () => {
       clearTimeout(timer);
       timer = setTimeout(() => {
-        timed_out = true;
+        timedOut = true;
         end();
-      }, this.timeout_ms);
+      }, this.timeoutMs);
     };
     heard();
     signal?.addEventListener("abort", end);
@@ -129,18 +129,18 @@ export class TileSource {
     try {
       response = await fetch(this.base + path, {cache, headers: this.headers, signal: ending.signal});
       heard();
-      const bytes = await body_of(response, heard);
+      const bytes = await bodyOf(response, heard);
       // Of the body as sent, which may be compressed.
-      this.fetched_bytes += Number(response.headers.get("Content-Length")) || bytes.byteLength;
+      this.fetchedBytes += Number(response.headers.get("Content-Length")) || bytes.byteLength;
       if (response.ok) return bytes;
-      throw problem_of(response, bytes);
+      throw problemOf(response, bytes);
     } catch (error) {
       if (error instanceof TileError) {
         if (error.status === 410) this.ended = kReplaced;
         throw error;
       }
       const detail = response ? "The service stopped in the middle of an answer." : "The service does not answer.";
-      throw new TileError(0, detail, {timed_out});
+      throw new TileError(0, detail, {timedOut});
     } finally {
       clearTimeout(timer);
       signal?.removeEventListener("abort", end);
@@ -149,7 +149,7 @@ export class TileSource {
 }
 
 // All bytes of an answer; `heard` is called as they come.
-async function body_of(response, heard) {
+async function bodyOf(response, heard) {
   const reader = response.body?.getReader(), parts = [];
   let length = 0;
   while (reader) {
@@ -171,54 +171,54 @@ async function body_of(response, heard) {
   return bytes.buffer;
 }
 
-function problem_of({status, headers}, bytes) {
+function problemOf({status, headers}, bytes) {
   let problem = null;
   try {
     problem = JSON.parse(new TextDecoder().decode(bytes));
   } catch {
     // Not from the service: its status is all that it says.
   }
-  const retry_after_ms = 1000 * Math.max(0, Number(headers.get("Retry-After")) || 0);
+  const retryAfterMs = 1000 * Math.max(0, Number(headers.get("Retry-After")) || 0);
   return new TileError(status, String(problem?.detail || `The service answered ${status}.`),
-                       {code: String(problem?.code ?? ""), retry_after_ms});
+                       {code: String(problem?.code ?? ""), retryAfterMs});
 }
 
 // Sizes of the GPU's memory and ends of loops depend on these.
-function check_manifest(info) {
-  const expect = (is_true, name) => {
-    if (!is_true) throw new TileError(200, `The manifest's ${name} cannot be used: ${JSON.stringify(info?.[name])}.`);
+function checkManifest(info) {
+  const expect = (isTrue, name) => {
+    if (!isTrue) throw new TileError(200, `The manifest's ${name} cannot be used: ${JSON.stringify(info?.[name])}.`);
   };
-  const is_count = (value, least, most) => Number.isInteger(value) && value >= least && value <= most;
-  const is_word = (value) => is_count(value, 0, 2 ** 32 - 1);
-  expect(is_count(info?.levels, 2, 20), "levels");
+  const isCount = (value, least, most) => Number.isInteger(value) && value >= least && value <= most;
+  const isWord = (value) => isCount(value, 0, 2 ** 32 - 1);
+  expect(isCount(info?.levels, 2, 20), "levels");
   expect(info.resolution === 2 ** info.levels, "resolution");
-  expect(is_count(info.tile_levels, 1, kMaxTileLevels), "tile_levels");
-  expect(is_count(info.batch_max, 1, kMaxBatch), "batch_max");
+  expect(isCount(info.tile_levels, 1, kMaxTileLevels), "tile_levels");
+  expect(isCount(info.batch_max, 1, kMaxBatch), "batch_max");
   expect(typeof info.digest === "string" && info.digest !== "", "digest");
   // What a running job has built has no number yet, and no colors.
-  const is_growing = info.voxels === undefined && !info.colors;
-  expect(is_growing || (typeof info.voxels === "string" && /^\d+$/.test(info.voxels)), "voxels");
-  expect(!info.root || (info.root.level === 0 && is_count(info.root.offset, 0, 2 ** 40 - 1)), "root");
-  const {root_brick, colors} = info, needs_brick = Boolean(info.root) && info.levels === 2;
-  expect(root_brick ? Array.isArray(root_brick) && root_brick.length === 2 && root_brick.every(is_word) : !needs_brick, "root_brick");
-  expect(!colors || (is_count(colors.levels, 0, info.levels) && is_count(colors.batch_max, 1, kMaxBatch)), "colors");
+  const isGrowing = info.voxels === undefined && !info.colors;
+  expect(isGrowing || (typeof info.voxels === "string" && /^\d+$/.test(info.voxels)), "voxels");
+  expect(!info.root || (info.root.level === 0 && isCount(info.root.offset, 0, 2 ** 40 - 1)), "root");
+  const {root_brick, colors} = info, needsBrick = Boolean(info.root) && info.levels === 2;
+  expect(root_brick ? Array.isArray(root_brick) && root_brick.length === 2 && root_brick.every(isWord) : !needsBrick, "root_brick");
+  expect(!colors || (isCount(colors.levels, 0, info.levels) && isCount(colors.batch_max, 1, kMaxBatch)), "colors");
 }
 
-function words_of(bytes, begin, length) {
+function wordsOf(bytes, begin, length) {
   if (length % 4 !== 0 || begin + length > bytes.byteLength)
     throw new TileError(200, "A tile's length is wrong.");
   return new Uint32Array(bytes, begin, length / 4);
 }
 
 // The parts of an answer that has `count` of them.
-export function split_batch(bytes, count) {
+export function splitBatch(bytes, count) {
   const view = new DataView(bytes);
   const tiles = [];
   let at = 0;
   for (let i = 0; i < count; ++i) {
     if (at + 4 > bytes.byteLength) throw new TileError(200, "A batch ends before its last tile.");
     const length = view.getUint32(at, true);
-    tiles.push(words_of(bytes, at + 4, length));
+    tiles.push(wordsOf(bytes, at + 4, length));
     at += 4 + length;
   }
   if (at !== bytes.byteLength) throw new TileError(200, "A batch has bytes after its last tile.");

@@ -12,13 +12,13 @@ export const cross = (a, b) =>
 export const mix = (a, b, share) => add(scale(a, 1 - share), scale(b, share));
 
 // The unit vectors of a picture taken in a direction; looking straight up or down, up is -z or z.
-export function picture_axes(direction, above = [0, 1, 0]) {
+export function pictureAxes(direction, above = [0, 1, 0]) {
   const forward = normalize(direction), vertical = Math.abs(dot(forward, normalize(above))) > 1 - 1e-9;
   const right = normalize(cross(forward, vertical ? [0, 0, forward[1] < 0 ? -1 : 1] : above));
   return {forward, right, up: cross(right, forward)};
 }
 
 // The unit direction through a point of the picture, in units to the right of its center and above it.
-export function picture_direction({forward, right, up}, x, y) {
+export function pictureDirection({forward, right, up}, x, y) {
   return normalize(add(forward, add(scale(right, x), scale(up, y))));
 }

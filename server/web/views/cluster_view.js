@@ -1,7 +1,7 @@
 // The nodes of a cluster and what they do for a job.
 
-import {clear, h, set_text} from "../lib/dom.js";
-import {count_text} from "../lib/format.js";
+import {clear, h, setText} from "../lib/dom.js";
+import {countText} from "../lib/format.js";
 
 export class ClusterView {
   constructor() {
@@ -22,10 +22,10 @@ export class ClusterView {
     // What is known of tasks is of the last attempt.
     const runs = job.state === "running";
     const running = cluster.nodes.reduce((sum, node) => sum + node.running, 0);
-    set_text(this.summary, `${count_text(cluster.built)} of ${count_text(cluster.batches)} batches built` +
-      (runs ? ` · ${count_text(running)} running, ${count_text(cluster.waiting)} waiting` : "") +
-      (cluster.failed_attempts ? ` · ${count_text(cluster.failed_attempts)} failed and submitted again` : ""));
+    setText(this.summary, `${countText(cluster.built)} of ${countText(cluster.batches)} batches built` +
+      (runs ? ` · ${countText(running)} running, ${countText(cluster.waiting)} waiting` : "") +
+      (cluster.failed_attempts ? ` · ${countText(cluster.failed_attempts)} failed and submitted again` : ""));
     clear(this.rows, cluster.nodes.map((node) =>
-      h("tr", {}, h("td", {}, node.name), h("td", {}, runs ? count_text(node.running) : "–"), h("td", {}, count_text(node.built)))));
+      h("tr", {}, h("td", {}, node.name), h("td", {}, runs ? countText(node.running) : "–"), h("td", {}, countText(node.built)))));
   }
 }

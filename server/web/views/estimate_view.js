@@ -1,21 +1,21 @@
 // An estimate of the build, requested from the service while the user fills in the form.
 
-import {send_json, sleep} from "../lib/api.js";
-import {clear, h, set_text} from "../lib/dom.js";
-import {count_text, duration_text, range_text, short_count, size_text} from "../lib/format.js";
-import {problem_box} from "./parts.js";
+import {sendJson, sleep} from "../lib/api.js";
+import {clear, h, setText} from "../lib/dom.js";
+import {countText, durationText, rangeText, shortCount, sizeText} from "../lib/format.js";
+import {problemBox} from "./parts.js";
 
-const kDebounce_ms = 700;  // after the last change
+const kDebounceMs = 700;  // after the last change
 const kMaxAttempts = 5;    // while the service is busy with other plans
 
 const kFigures = [
-  ["voxels", "Voxels", short_count],
-  ["dag_nodes", "DAG nodes", short_count],
-  ["file_bytes", "File", size_text],
-  ["disk_bytes", "Disk (peak)", size_text],
-  ["memory_bytes", "Memory (peak)", size_text],
-  ["cpu_s", "CPU time", duration_text],
-  ["wall_s", "Wall time", duration_text],
+  ["voxels", "Voxels", shortCount],
+  ["dag_nodes", "DAG nodes", shortCount],
+  ["file_bytes", "File", sizeText],
+  ["disk_bytes", "Disk (peak)", sizeText],
+  ["memory_bytes", "Memory (peak)", sizeText],
+  ["cpu_s", "CPU time", durationText],
+  ["wall_s", "Wall time", durationText],
 ];
 
 export class EstimateView {
@@ -33,24 +33,24 @@ export class EstimateView {
     const question = JSON.stringify(body);
     if (question === this.question) return;
     this.question = question;
-    this.request_abort?.abort();
+    this.requestAbort?.abort();
     this.table.classList.add("old");
     if (!body) {
-      set_text(this.status, "Choose a scene to see the estimate.");
+      setText(this.status, "Choose a scene to see the estimate.");
       clear(this.table);
       return;
     }
-    const request_abort = this.request_abort = new AbortController();
-    this.signal.addEventListener("abort", () => request_abort.abort(), {once: true, signal: request_abort.signal});
-    set_text(this.status, "Estimating from small builds…");
+    const requestAbort = this.requestAbort = new AbortController();
+    this.signal.addEventListener("abort", () => requestAbort.abort(), {once: true, signal: requestAbort.signal});
+    setText(this.status, "Estimating from small builds…");
     try {
-      await sleep(kDebounce_ms, request_abort.signal);
-      if (!request_abort.signal.aborted) this.show(await this.request(body, request_abort.signal));
+      await sleep(kDebounceMs, requestAbort.signal);
+      if (!requestAbort.signal.aborted) this.show(await this.request(body, requestAbort.signal));
     } catch (problem) {
-      if (request_abort.signal.aborted) return;
+      if (requestAbort.signal.aborted) return;
       if (problem.code === undefined) throw problem;
-      set_text(this.status, "");
-      clear(this.table, problem_box(problem));
+      setText(this.status, "");
+      clear(this.table, problemBox(problem));
       this.table.classList.remove("old");
     }
   }
@@ -58,16 +58,16 @@ export class EstimateView {
   async request(body, signal) {
     for (let attempt = 1;; ++attempt) {
       try {
-        return await send_json("POST", "/api/v1/jobs?dry_run=true", body, {signal});
+        return await sendJson("POST", "/api/v1/jobs?dry_run=true", body, {signal});
       } catch (problem) {
-        if (signal.aborted || !problem.is_transient || attempt === kMaxAttempts) throw problem;
-        await sleep(1000 * Math.max(1, problem.retry_after_s), signal);
+        if (signal.aborted || !problem.isTransient || attempt === kMaxAttempts) throw problem;
+        await sleep(1000 * Math.max(1, problem.retryAfterS), signal);
       }
     }
   }
 
   show(estimate) {
-    set_text(this.status, `${count_text(estimate.triangles)} triangles in ${count_text(estimate.subvolumes)} ` +
+    setText(this.status, `${countText(estimate.triangles)} triangles in ${countText(estimate.subvolumes)} ` +
                           `occupied subvolume${estimate.subvolumes === 1 ? "" : "s"}`);
     this.table.classList.remove("old");
     clear(this.table, h("table", {},
@@ -76,7 +76,7 @@ export class EstimateView {
       h("tbody", {}, kFigures.filter(([key]) => estimate[key]).map(([key, name, text]) => {
         const {low, likely, high} = estimate[key];
         return h("tr", {}, h("th", {scope: "row"}, name), h("td", {class: "number likely"}, text(likely)),
-                 h("td", {class: "number faint"}, range_text(text(low), text(high))));
+                 h("td", {class: "number faint"}, rangeText(text(low), text(high))));
       }))));
   }
 }

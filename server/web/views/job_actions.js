@@ -1,9 +1,9 @@
 // The actions that the state of a job allows.
 
-import {request, send_json, token} from "../lib/api.js";
-import {clear, confirm_action, h} from "../lib/dom.js";
-import {has_ended, size_text, title_text} from "../lib/format.js";
-import {copy_button, problem_box} from "./parts.js";
+import {request, sendJson, token} from "../lib/api.js";
+import {clear, confirmAction, h} from "../lib/dom.js";
+import {hasEnded, sizeText, titleText} from "../lib/format.js";
+import {copyButton, problemBox} from "./parts.js";
 
 const kMaxInMemoryBytes = 2 ** 30;
 
@@ -11,7 +11,7 @@ const kMaxInMemoryBytes = 2 ** 30;
 export function actions(job, reload) {
   const error = h("div", {role: "alert"});
   const post = (name) => async () => {
-    await send_json("POST", `${job.links.self}/${name}`);
+    await sendJson("POST", `${job.links.self}/${name}`);
     await reload();
   };
   const button = (text, action, kind = "") => {
@@ -24,7 +24,7 @@ export function actions(job, reload) {
         await action();
       } catch (problem) {
         if (problem.code === undefined) throw problem;
-        clear(error, problem_box(problem));
+        clear(error, problemBox(problem));
       } finally {
         element.removeAttribute("aria-busy");
       }
@@ -41,13 +41,13 @@ export function actions(job, reload) {
     may("queued", "running") && button("Suspend", post("suspend")),
     may("running", "suspended") && view(),
     may("queued", "running", "suspended") && button("Cancel", async () => {
-      if (await confirm_action("Cancel this job?", "Its partial result will be deleted.", "Cancel the job"))
+      if (await confirmAction("Cancel this job?", "Its partial result will be deleted.", "Cancel the job"))
         await post("cancel")();
     }, "danger"),
-    has_ended(job.state) && button("Delete", async () => {
+    hasEnded(job.state) && button("Delete", async () => {
       const what = job.state === "succeeded" ? "Its result, report and log will be deleted." : "Its log will be deleted.";
-      if (!await confirm_action("Delete this job?", what, "Delete the job")) return;
-      await send_json("DELETE", job.links.self);
+      if (!await confirmAction("Delete this job?", what, "Delete the job")) return;
+      await sendJson("DELETE", job.links.self);
       location.hash = "#/";
     }, "danger"),
     may("succeeded") && h("a", {class: "button quiet", href: `#/new?like=${job.id}`}, "Copy to new job"),
@@ -55,15 +55,15 @@ export function actions(job, reload) {
   return [h("div", {class: "buttons"}, buttons), error];
 }
 
-function file_name(job) {
-  return `${title_text(job).replace(/\.(glb|gltf|ply)$/, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
+function fileName(job) {
+  return `${titleText(job).replace(/\.(glb|gltf|ply)$/, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
 }
 
 // Without a token the browser downloads the link itself, which is resumable. A link cannot carry a
 // token: then the bytes are streamed to a file where the browser supports that, else held in memory.
 async function download(job) {
-  const name = file_name(job);
-  if (!token.get()) return click_link(job.links.dag, name);
+  const name = fileName(job);
+  if (!token.get()) return clickLink(job.links.dag, name);
   if (window.showSaveFilePicker) {
     const handle = await window.showSaveFilePicker({suggestedName: name}).catch(() => null);
     if (!handle) return;
@@ -72,13 +72,13 @@ async function download(job) {
     return;
   }
   if (job.result.bytes > kMaxInMemoryBytes) throw {code: "too_large", detail:
-    `This browser cannot save ${size_text(job.result.bytes)} with a token: use the command under "Result".`};
+    `This browser cannot save ${sizeText(job.result.bytes)} with a token: use the command under "Result".`};
   const url = URL.createObjectURL(await (await request("GET", job.links.dag)).blob());
-  click_link(url, name);
+  clickLink(url, name);
   setTimeout(() => URL.revokeObjectURL(url), 60000);
 }
 
-function click_link(href, name) {
+function clickLink(href, name) {
   const link = h("a", {href, download: name});
   document.body.append(link);
   link.click();
@@ -86,8 +86,8 @@ function click_link(href, name) {
 }
 
 // The same download as a shell command, which resumes after a lost connection.
-export function download_command(job) {
-  const text = `voxdag download ${job.id} -o ${file_name(job)} --server ${location.origin}` +
+export function downloadCommand(job) {
+  const text = `voxdag download ${job.id} -o ${fileName(job)} --server ${location.origin}` +
                (token.get() ? " --token-file FILE" : "");
-  return h("div", {class: "command"}, h("code", {}, text), copy_button(text, "the command"));
+  return h("div", {class: "command"}, h("code", {}, text), copyButton(text, "the command"));
 }

@@ -2,7 +2,7 @@
 
 import {Problem} from "../lib/api.js";
 import {field, h} from "../lib/dom.js";
-import {grid_text} from "../lib/format.js";
+import {gridText} from "../lib/format.js";
 
 const kMinLevel = 2, kMaxLevel = 20;
 const kDefaultLevel = 11;
@@ -14,75 +14,75 @@ export class JobOptions {
     const choice = (...options) => h("select", watch,
       options.map(([value, text]) => h("option", {value}, text)));
     const powers = (from, to) => Array.from({length: to - from + 1}, (_, i) => 2 ** (from + i));
-    this.resolution = choice(...powers(kMinLevel, kMaxLevel).map((r) => [r, grid_text(r)]));
+    this.resolution = choice(...powers(kMinLevel, kMaxLevel).map((r) => [r, gridText(r)]));
     this.resolution.value = String(2 ** kDefaultLevel);
-    this.resolution_field = field("Resolution", this.resolution, "Voxels along each edge of the cube.");
+    this.resolutionField = field("Resolution", this.resolution, "Voxels along each edge of the cube.");
 
     this.cube = choice(["", "Bounds of the scene"], ["bounds", "Corner and edge"], ["voxel_size", "Voxel size"]);
     this.bounds = ["X", "Y", "Z", "Edge"].map((name) => number({step: "any", "aria-label": `Bounds: ${name}`, placeholder: name}));
     this.voxel_size = number({step: "any", min: "0"});
-    this.bounds_row = h("div", {class: "field", role: "group", "aria-label": "Bounds"},
+    this.boundsRow = h("div", {class: "field", role: "group", "aria-label": "Bounds"},
       h("span", {class: "label"}, "Low corner and edge"), h("div", {class: "four"}, this.bounds));
-    this.size_row = field("Edge of a voxel", this.voxel_size, "In the scene's units.");
+    this.sizeRow = field("Edge of a voxel", this.voxel_size, "In the scene's units.");
     this.skip_invalid = h("input", {type: "checkbox", id: "skip-invalid", ...watch});
     this.color = h("input", {type: "checkbox", id: "color", ...watch});
     this.attributes = ["alpha", "normal", "material"].map((name) => h("input", {type: "checkbox", id: `attribute-${name}`, value: name, ...watch}));
-    this.color_resolution = choice(["", "Automatic"], ...powers(kMinLevel, kMaxLevel).map((k) => [k, grid_text(k)]));
-    this.color_row = field("Color grid", this.color_resolution, "At most the resolution; finer voxels have the color of their cell.");
+    this.color_resolution = choice(["", "Automatic"], ...powers(kMinLevel, kMaxLevel).map((k) => [k, gridText(k)]));
+    this.colorRow = field("Color grid", this.color_resolution, "At most the resolution; finer voxels have the color of their cell.");
     this.hash_bits = number({min: "4", max: "64", step: "1", placeholder: "64"});
     this.memory = h("input", {placeholder: "2GiB", autocomplete: "off", ...watch});
     this.threads = number({min: "1", step: "1", placeholder: "default"});
-    this.subvolume = choice(["", "Automatic"], ...powers(6, 14).map((edge) => [edge, grid_text(edge)]));
+    this.subvolume = choice(["", "Automatic"], ...powers(6, 14).map((edge) => [edge, gridText(edge)]));
     this.backend = choice(["", "Automatic"], ["cpu", "CPU"], ["cuda", "CUDA"], ["parallel-host", "GPU pipeline on the CPU"]);
     this.method = choice(["", "Automatic"], ["consing", "Consing"], ["pointers", "Pointers"], ["hashes", "Hashes"]);
     this.priority = number({min: "-100", max: "100", step: "1", placeholder: "0"});
-    this.cube.addEventListener("change", () => this.show_rows());
-    for (const input of [this.color, ...this.attributes]) input.addEventListener("change", () => this.show_rows());
+    this.cube.addEventListener("change", () => this.showRows());
+    for (const input of [this.color, ...this.attributes]) input.addEventListener("change", () => this.showRows());
     this.element = h("details", {class: "card"}, h("summary", {}, h("h2", {}, "Options")), h("div", {class: "options"},
       h("fieldset", {}, h("legend", {}, "Geometry: determines the result"),
-        field("Cube", this.cube), this.bounds_row, this.size_row,
+        field("Cube", this.cube), this.boundsRow, this.sizeRow,
         h("div", {class: "check"}, this.skip_invalid, h("label", {for: "skip-invalid"}, "Skip invalid triangles")),
         h("div", {class: "check"}, this.color, h("label", {for: "color"}, "Colors of the scene")),
         this.attributes.map((input, i) => h("div", {class: "check"}, input,
           h("label", {for: input.id}, ["Alpha", "Normals", "Materials"][i]))),
-        this.color_row, field("Hash bits", this.hash_bits)),
+        this.colorRow, field("Hash bits", this.hash_bits)),
       h("fieldset", {}, h("legend", {}, "Run: does not affect the result"),
         field("Memory", this.memory, "For example 512MiB or 8GiB."), field("Threads", this.threads),
         field("Subvolumes", this.subvolume), field("Backend", this.backend), field("Method", this.method),
         field("Priority", this.priority, "Higher runs earlier; -100 to 100."))));
-    this.show_rows();
+    this.showRows();
   }
 
-  show_rows() {
-    this.color_row.hidden = !this.has_cells();
-    this.bounds_row.hidden = this.cube.value !== "bounds";
-    this.size_row.hidden = this.cube.value !== "voxel_size";
+  showRows() {
+    this.colorRow.hidden = !this.hasCells();
+    this.boundsRow.hidden = this.cube.value !== "bounds";
+    this.sizeRow.hidden = this.cube.value !== "voxel_size";
   }
 
   // Whether cells have colors or other attributes.
-  has_cells() {
+  hasCells() {
     return [this.color, ...this.attributes].some((input) => input.checked);
   }
 
   // {resolution, priority?, options?}
   values() {
     const options = {};
-    if (this.cube.value === "bounds") options.bounds = this.bounds.map((input) => number_of(input, "The bounds"));
-    if (this.cube.value === "voxel_size") options.voxel_size = number_of(this.voxel_size, "The voxel size");
+    if (this.cube.value === "bounds") options.bounds = this.bounds.map((input) => numberOf(input, "The bounds"));
+    if (this.cube.value === "voxel_size") options.voxel_size = numberOf(this.voxel_size, "The voxel size");
     if (this.skip_invalid.checked) options.skip_invalid = true;
     if (this.color.checked) options.color = true;
     const attributes = this.attributes.filter((input) => input.checked).map((input) => input.value);
     if (attributes.length) options.attributes = attributes;
-    if (this.has_cells() && this.color_resolution.value)
+    if (this.hasCells() && this.color_resolution.value)
       options.color_resolution = Number(this.color_resolution.value);
-    if (this.hash_bits.value) options.hash_bits = number_of(this.hash_bits, "The hash bits");
+    if (this.hash_bits.value) options.hash_bits = numberOf(this.hash_bits, "The hash bits");
     if (this.memory.value.trim()) options.memory = this.memory.value.trim();
-    if (this.threads.value) options.threads = number_of(this.threads, "The threads");
+    if (this.threads.value) options.threads = numberOf(this.threads, "The threads");
     if (this.subvolume.value) options.subvolume = Number(this.subvolume.value);
     if (this.backend.value) options.backend = this.backend.value;
     if (this.method.value) options.method = this.method.value;
     return {resolution: Number(this.resolution.value),
-            ...(this.priority.value && {priority: number_of(this.priority, "The priority")}),
+            ...(this.priority.value && {priority: numberOf(this.priority, "The priority")}),
             ...(Object.keys(options).length && {options})};
   }
 
@@ -98,12 +98,12 @@ export class JobOptions {
     for (const input of this.attributes) input.checked = given.includes(input.value);
     for (const name of ["voxel_size", "color_resolution", "hash_bits", "memory", "threads", "subvolume", "backend", "method"])
       if (options[name] !== undefined) this[name].value = String(options[name]);
-    this.show_rows();
+    this.showRows();
     this.element.open = Object.keys(options).length > 0;
   }
 }
 
-function number_of(input, what) {
+function numberOf(input, what) {
   if (input.value.trim() === "" || !input.validity.valid)
     throw new Problem(0, "invalid_input", `${what}: ${input.validationMessage || "a number is missing"}`);
   return Number(input.value);

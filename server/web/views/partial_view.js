@@ -5,25 +5,25 @@ import {CubesView} from "./cubes_view.js";
 const kMaxDetailed = 1500;  // more subvolumes are drawn as the cubes they are
 
 export class PartialView extends CubesView {
-  set_empty(empty) {
-    super.set_empty(empty);
+  setEmpty(empty) {
+    super.setEmpty(empty);
     if (!empty) this.element.hidden = false;
   }
 
-  say_why_empty(ended, known) {
-    super.say_why_empty(ended, known);
+  sayWhyEmpty(ended, known) {
+    super.sayWhyEmpty(ended, known);
     this.element.hidden = ended;
   }
 
   // `cubes` of the service are [x, y, z, edge, low, high]: the halves of a brick.
   show({resolution, built, total, cubes}) {
-    const parts = cubes.length <= kMaxDetailed ? cubes.flatMap(cells_of) : cubes.map(([x, y, z, edge]) => [x, y, z, edge, 1]);
+    const parts = cubes.length <= kMaxDetailed ? cubes.flatMap(cellsOf) : cubes.map(([x, y, z, edge]) => [x, y, z, edge, 1]);
     super.show({resolution, built, total, cubes: parts});
   }
 }
 
 // The occupied 64ths of a cube; the bits are in the order of a brick (docs/format.md).
-function cells_of([x, y, z, edge, ...halves]) {
+function cellsOf([x, y, z, edge, ...halves]) {
   const cells = [];
   for (let bit = 0; bit < 64; ++bit) {
     if (!(halves[bit >> 5] >>> (bit & 31) & 1)) continue;

@@ -1,14 +1,14 @@
 // Small elements used by several pages.
 
-import {h, set_text} from "../lib/dom.js";
-import {done_fraction, state_text} from "../lib/format.js";
+import {h, setText} from "../lib/dom.js";
+import {doneFraction, stateText} from "../lib/format.js";
 
-export function state_badge(state) {
-  return h("span", {class: `state ${state}`}, state_text(state));
+export function stateBadge(state) {
+  return h("span", {class: `state ${state}`}, stateText(state));
 }
 
 // A Problem, or a job's error, with its code.
-export function problem_box(problem, title = null) {
+export function problemBox(problem, title = null) {
   return h("div", {class: "problem"},
     title && h("strong", {}, title),
     h("p", {}, problem.detail || problem.message),
@@ -30,20 +30,20 @@ export function meter(label) {
 }
 
 // Shows the current stage of a job, or a full bar once it succeeded.
-export function update_job_meter(bar, job) {
-  const fraction = job.state === "succeeded" ? 1 : done_fraction(job.progress);
+export function updateJobMeter(bar, job) {
+  const fraction = job.state === "succeeded" ? 1 : doneFraction(job.progress);
   const idle = ["queued", "suspended", "canceled", "failed"].includes(job.state);
   bar.update(idle && fraction === null ? 0 : fraction);
   bar.element.dataset.state = job.state;
 }
 
 // A button that copies `text` to the clipboard.
-export function copy_button(text, what) {
+export function copyButton(text, what) {
   const button = h("button", {type: "button", class: "quiet small", "aria-label": `Copy ${what}`}, "Copy");
   button.addEventListener("click", async () => {
     const copied = await copy(text);
-    set_text(button, copied ? "Copied" : "Select and press Ctrl-C");
-    setTimeout(() => set_text(button, "Copy"), 2000);
+    setText(button, copied ? "Copied" : "Select and press Ctrl-C");
+    setTimeout(() => setText(button, "Copy"), 2000);
   });
   return button;
 }

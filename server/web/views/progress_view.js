@@ -1,16 +1,16 @@
 // The current stage of a job, and the numbers of the attempt.
 
-import {h, set_text} from "../lib/dom.js";
-import {count_text, done_fraction, duration_text, has_ended, short_count, size_text, unit_text} from "../lib/format.js";
-import {meter, update_job_meter} from "./parts.js";
+import {h, setText} from "../lib/dom.js";
+import {countText, doneFraction, durationText, hasEnded, shortCount, sizeText, unitText} from "../lib/format.js";
+import {meter, updateJobMeter} from "./parts.js";
 
 const kFigures = [
-  ["elapsed", "Elapsed", (p) => duration_text(p.elapsed_s)],
-  ["voxels", "Voxels", (p) => short_count(p.voxels)],
-  ["nodes", "Nodes", (p) => short_count(p.nodes)],
-  ["bytes", "Artifacts", (p) => size_text(p.bytes)],
-  ["memory", "Memory", (p) => size_text(p.memory_bytes)],
-  ["disk", "Disk", (p) => size_text(p.disk_bytes)],
+  ["elapsed", "Elapsed", (p) => durationText(p.elapsed_s)],
+  ["voxels", "Voxels", (p) => shortCount(p.voxels)],
+  ["nodes", "Nodes", (p) => shortCount(p.nodes)],
+  ["bytes", "Artifacts", (p) => sizeText(p.bytes)],
+  ["memory", "Memory", (p) => sizeText(p.memory_bytes)],
+  ["disk", "Disk", (p) => sizeText(p.disk_bytes)],
 ];
 
 export class ProgressView {
@@ -30,17 +30,17 @@ export class ProgressView {
   show(job) {
     const p = job.progress;
     this.element.hidden = job.state === "succeeded";
-    update_job_meter(this.bar, job);
-    set_text(this.stage, headline(job));
-    const fraction = done_fraction(p);
-    set_text(this.percent, fraction === null || job.state === "queued" ? "" : percent_text(fraction));
-    set_text(this.detail, detail_text(job));
+    updateJobMeter(this.bar, job);
+    setText(this.stage, headline(job));
+    const fraction = doneFraction(p);
+    setText(this.percent, fraction === null || job.state === "queued" ? "" : percentText(fraction));
+    setText(this.detail, detailText(job));
     this.figures.hidden = !p;
-    if (p) for (const [key, , text] of kFigures) set_text(this.values[key], text(p));
+    if (p) for (const [key, , text] of kFigures) setText(this.values[key], text(p));
   }
 }
 
-function percent_text(fraction) {
+function percentText(fraction) {
   return fraction > 0 && fraction < 0.1 ? `${(Math.floor(1000 * fraction) / 10).toFixed(1)} %` : `${Math.floor(100 * fraction)} %`;
 }
 
@@ -56,12 +56,12 @@ function headline(job) {
   }
 }
 
-function detail_text(job) {
+function detailText(job) {
   const p = job.progress;
   if (!p || !p.stage) return "";
-  const far = p.total ? `${count_text(p.done)} of ${unit_text(count_text(p.total), p.unit)}`
-                      : unit_text(count_text(p.done), p.unit);
-  if (has_ended(job.state) || job.state !== "running") return far;
-  return [far, p.rate > 0 && `${short_count(p.rate)} ${p.unit} per second`,
-          p.eta_s > 0 && `${duration_text(p.eta_s)} left in this stage`].filter(Boolean).join(" · ");
+  const far = p.total ? `${countText(p.done)} of ${unitText(countText(p.total), p.unit)}`
+                      : unitText(countText(p.done), p.unit);
+  if (hasEnded(job.state) || job.state !== "running") return far;
+  return [far, p.rate > 0 && `${shortCount(p.rate)} ${p.unit} per second`,
+          p.eta_s > 0 && `${durationText(p.eta_s)} left in this stage`].filter(Boolean).join(" · ");
 }

@@ -1,20 +1,20 @@
 // Plots the rate of each stage over time, from the updates this page has received.
 
-import {clear, h, set_text, svg} from "../lib/dom.js";
-import {duration_text, short_count} from "../lib/format.js";
+import {clear, h, setText, svg} from "../lib/dom.js";
+import {durationText, shortCount} from "../lib/format.js";
 
 const kWidth = 520, kHeight = 170;
 const kLeft = 52, kRight = 8, kTop = 10, kBottom = 24;
-const kWindow_s = 2;      // minimum duration that a rate is averaged over
+const kWindowS = 2;      // minimum duration that a rate is averaged over
 const kMaxSamples = 600;  // above it every other sample is dropped
 
 // Job id -> series by stage: shown again when the user returns to a job.
-const series_by_job = new Map();
+const seriesByJob = new Map();
 
 export class RatePlot {
   constructor(id) {
-    if (!series_by_job.has(id)) series_by_job.set(id, new Map());
-    this.series = series_by_job.get(id);
+    if (!seriesByJob.has(id)) seriesByJob.set(id, new Map());
+    this.series = seriesByJob.get(id);
     this.chosen = null;  // a stage, or null for the current one
     this.tabs = h("div", {class: "tabs", role: "group", "aria-label": "Stage"});
     this.note = h("p", {class: "faint"});
@@ -36,7 +36,7 @@ export class RatePlot {
     if (!series || time < series.marks.at(-1).time)  // a new attempt
       this.series.set(p.stage, series = {unit: p.unit, marks: [], samples: []});
     series.marks.push({time, done: p.done});
-    while (series.marks.length > 2 && time - series.marks[1].time >= kWindow_s) series.marks.shift();
+    while (series.marks.length > 2 && time - series.marks[1].time >= kWindowS) series.marks.shift();
     const from = series.marks[0];
     if (time - from.time < 0.4) return;
     series.samples.push([time, (p.done - from.done) / (time - from.time)]);
@@ -48,21 +48,21 @@ export class RatePlot {
     const names = [...this.series.keys()].filter((name) => this.series.get(name).samples.length > 1);
     const name = names.includes(this.chosen) ? this.chosen
                : names.includes(this.current) ? this.current : longest(this.series, names);
-    this.show_tabs(names, name);
+    this.showTabs(names, name);
     this.picture.toggleAttribute("hidden", !name);
     this.empty = !name;
     if (!name) {
-      set_text(this.note, "Recorded while the job runs and this page is open.");
+      setText(this.note, "Recorded while the job runs and this page is open.");
       return;
     }
     const {samples, unit} = this.series.get(name);
-    set_text(this.note, `${unit} per second during ${name}`);
+    setText(this.note, `${unit} per second during ${name}`);
     this.picture.setAttribute("aria-label",
-      `Rate of ${name}: now ${short_count(samples.at(-1)[1])} ${unit} per second`);
+      `Rate of ${name}: now ${shortCount(samples.at(-1)[1])} ${unit} per second`);
     clear(this.picture, plot(samples));
   }
 
-  show_tabs(names, shown) {
+  showTabs(names, shown) {
     const key = names.join();
     if (this.tabs.dataset.key !== key) {
       this.tabs.dataset.key = key;
@@ -85,24 +85,24 @@ function longest(series, names) {
 // Axes with few, round ticks; a line over a filled area.
 function plot(samples) {
   const begin = samples[0][0], end = Math.max(samples.at(-1)[0], begin + 1);
-  const ticks = round_ticks(Math.max(...samples.map(([, rate]) => rate), 1e-9));
+  const ticks = roundTicks(Math.max(...samples.map(([, rate]) => rate), 1e-9));
   const x = (time) => kLeft + (time - begin) / (end - begin) * (kWidth - kLeft - kRight);
   const y = (rate) => kHeight - kBottom - rate / ticks.at(-1) * (kHeight - kTop - kBottom);
   const points = samples.map(([time, rate]) => `${x(time).toFixed(1)},${y(rate).toFixed(1)}`).join(" ");
-  const label = (at_x, at_y, anchor, text) => svg("text", {x: at_x, y: at_y, "text-anchor": anchor}, text);
+  const label = (atX, atY, anchor, text) => svg("text", {x: atX, y: atY, "text-anchor": anchor}, text);
   return [
     ...ticks.flatMap((tick) => [
       svg("line", {class: "grid", x1: kLeft, x2: kWidth - kRight, y1: y(tick), y2: y(tick)}),
-      label(kLeft - 8, y(tick) + 4, "end", short_count(tick))]),
+      label(kLeft - 8, y(tick) + 4, "end", shortCount(tick))]),
     svg("polygon", {class: "area", points: `${x(samples[0][0])},${y(0)} ${points} ${x(samples.at(-1)[0])},${y(0)}`}),
     svg("polyline", {class: "line", points}),
-    label(kLeft, kHeight - 6, "start", duration_text(begin)),
-    label(kWidth - kRight, kHeight - 6, "end", duration_text(end)),
+    label(kLeft, kHeight - 6, "start", durationText(begin)),
+    label(kWidth - kRight, kHeight - 6, "end", durationText(end)),
   ];
 }
 
 // 0 and two to five round steps that reach `max`.
-function round_ticks(max) {
+function roundTicks(max) {
   const power = 10 ** Math.floor(Math.log10(max));
   const step = [0.25, 0.5, 1, 2, 5].map((factor) => factor * power).find((size) => max / size <= 4);
   return Array.from({length: Math.ceil(max / step) + 1}, (_, i) => i * step);

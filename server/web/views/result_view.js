@@ -1,13 +1,13 @@
 // The result of a job: preview, numbers and levels.
 
 import {request} from "../lib/api.js";
-import {clear, fact, h, set_text} from "../lib/dom.js";
-import {count_text, duration_text, grid_text, size_text, title_text} from "../lib/format.js";
-import {download_command} from "./job_actions.js";
-import {copy_button} from "./parts.js";
+import {clear, fact, h, setText} from "../lib/dom.js";
+import {countText, durationText, gridText, sizeText, titleText} from "../lib/format.js";
+import {downloadCommand} from "./job_actions.js";
+import {copyButton} from "./parts.js";
 
 // Fills `place`, unless it already shows this result.
-export function result_view(place, job, signal) {
+export function resultView(place, job, signal) {
   const key = `${job.result.sha256} ${job.preview}`;
   if (place.dataset.key === key && place.firstChild) return;
   if (place.querySelector("canvas.scene") && place.dataset.key?.startsWith(job.result.sha256)) return;  // in use
@@ -18,21 +18,21 @@ export function result_view(place, job, signal) {
     h("section", {class: "card result-card", "aria-labelledby": "result-title"},
       h("h2", {id: "result-title"}, "Result"),
       h("div", {class: "seen"}, picture(job, signal), h("dl", {class: "figures"}, [
-        ["Voxels", count_text(r.voxels)], ["Octree nodes", count_text(r.svo_nodes)],
-        ["DAG nodes", count_text(r.dag_nodes)], ["Nodes saved", `${saved.toFixed(1)} %`],
-        ["File", size_text(r.bytes)], ["Triangles", count_text(r.triangles)],
-        ["Wall time", duration_text(r.wall_s)], ["CPU time", duration_text(r.cpu_s)],
-        ["Peak memory", size_text(r.peak_rss_bytes)],
+        ["Voxels", countText(r.voxels)], ["Octree nodes", countText(r.svo_nodes)],
+        ["DAG nodes", countText(r.dag_nodes)], ["Nodes saved", `${saved.toFixed(1)} %`],
+        ["File", sizeText(r.bytes)], ["Triangles", countText(r.triangles)],
+        ["Wall time", durationText(r.wall_s)], ["CPU time", durationText(r.cpu_s)],
+        ["Peak memory", sizeText(r.peak_rss_bytes)],
       ].map(([name, value]) => h("div", {class: "figure"}, h("dt", {}, name), h("dd", {}, value))))),
       h("dl", {class: "facts"},
-        fact("SHA-256", h("code", {class: "long"}, r.sha256), " ", copy_button(r.sha256, "the SHA-256")),
-        fact("Cube", cube_text(r.bounds)),
-        fact("Command", download_command(job)))),
+        fact("SHA-256", h("code", {class: "long"}, r.sha256), " ", copyButton(r.sha256, "the SHA-256")),
+        fact("Cube", cubeText(r.bounds)),
+        fact("Command", downloadCommand(job)))),
     h("section", {class: "card", "aria-labelledby": "levels-title"},
-      h("h2", {id: "levels-title"}, "Levels"), levels_table(job)));
+      h("h2", {id: "levels-title"}, "Levels"), levelsTable(job)));
 }
 
-function cube_text({origin, edge}) {
+function cubeText({origin, edge}) {
   const short = (x) => Number(x.toPrecision(6));
   return `from ${origin.map(short).join(", ")}, edge ${short(edge)}`;
 }
@@ -46,11 +46,11 @@ function picture(job, signal) {
     if (button.hasAttribute("aria-busy")) return;
     button.setAttribute("aria-busy", "true");
     try {
-      const {embed_viewer} = await import("../viewer/embedded.js");
-      await embed_viewer(place, job, signal);
+      const {embedViewer} = await import("../viewer/embedded.js");
+      await embedViewer(place, job, signal);
       button.hidden = true;
     } catch (problem) {
-      set_text(error, problem.message);
+      setText(error, problem.message);
     } finally {
       button.removeAttribute("aria-busy");
     }
@@ -69,7 +69,7 @@ function preview(job, signal) {
     const url = URL.createObjectURL(blob);
     signal.addEventListener("abort", () => URL.revokeObjectURL(url), {once: true});
     if (place.querySelector("canvas")) return;
-    clear(place, h("img", {src: url, width: "960", height: "540", alt: `Rendering of the voxels of ${title_text(job)}`}));
+    clear(place, h("img", {src: url, width: "960", height: "540", alt: `Rendering of the voxels of ${titleText(job)}`}));
   }).catch(() => {
     if (!signal.aborted) clear(place, h("p", {class: "empty"}, "The preview could not be loaded."));
   });
@@ -77,19 +77,19 @@ function preview(job, signal) {
 }
 
 // Level 0 is the root, the last level has the bricks of 4³ voxels.
-function levels_table(job) {
+function levelsTable(job) {
   const levels = job.result.levels;
-  const max_nodes = Math.max(1, ...levels.map((level) => level.nodes));
+  const maxNodes = Math.max(1, ...levels.map((level) => level.nodes));
   const rows = levels.map(({level, nodes, bytes}) => {
     const bar = h("span", {class: "bar"});
-    bar.style.width = `${(100 * nodes / max_nodes).toFixed(2)}%`;
+    bar.style.width = `${(100 * nodes / maxNodes).toFixed(2)}%`;
     const name = level === levels.length - 1 ? "bricks" : level === 0 ? "root" : "";
     return h("tr", {},
       h("th", {scope: "row"}, String(level), name && h("span", {class: "faint"}, ` ${name}`)),
-      h("td", {class: "number"}, grid_text(job.resolution / 2 ** level)),
-      h("td", {class: "number"}, count_text(nodes)),
+      h("td", {class: "number"}, gridText(job.resolution / 2 ** level)),
+      h("td", {class: "number"}, countText(nodes)),
       h("td", {class: "bar-cell", "aria-hidden": "true"}, bar),
-      h("td", {class: "number"}, size_text(bytes)));
+      h("td", {class: "number"}, sizeText(bytes)));
   });
   return h("div", {class: "scroll", tabindex: "0", role: "region", "aria-labelledby": "levels-title"}, h("table", {},
     h("thead", {}, h("tr", {}, h("th", {scope: "col"}, "Level"), h("th", {scope: "col", class: "number"}, "Cube edge"),

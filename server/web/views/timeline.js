@@ -1,7 +1,7 @@
 // The stages of an attempt as bars in proportion to their duration.
 
-import {clear, h, set_text} from "../lib/dom.js";
-import {duration_text, short_count, unit_text} from "../lib/format.js";
+import {clear, h, setText} from "../lib/dom.js";
+import {durationText, shortCount, unitText} from "../lib/format.js";
 
 export class Timeline {
   constructor() {
@@ -18,16 +18,16 @@ export class Timeline {
       clear(this.list);
       this.rows = [];
     }
-    const total_s = Math.max(1e-3, stages.reduce((sum, stage) => sum + stage.wall_s, 0));
-    let begin_s = 0;
+    const totalS = Math.max(1e-3, stages.reduce((sum, stage) => sum + stage.wall_s, 0));
+    let beginS = 0;
     stages.forEach((stage, i) => {
-      if (!this.rows[i]) this.rows.push(this.add_row(stage));
-      this.rows[i].update(stage, begin_s / total_s, stage.wall_s / total_s, job.state === "running");
-      begin_s += stage.wall_s;
+      if (!this.rows[i]) this.rows.push(this.addRow(stage));
+      this.rows[i].update(stage, beginS / totalS, stage.wall_s / totalS, job.state === "running");
+      beginS += stage.wall_s;
     });
   }
 
-  add_row({name}) {
+  addRow({name}) {
     const span = h("span", {class: "span"});
     const done = h("span", {class: "far"});
     const time = h("span", {class: "time"});
@@ -37,13 +37,13 @@ export class Timeline {
     const update = (stage, from, part, running) => {
       const now = !stage.ended && running;
       element.className = stage.ended ? "ended" : now ? "now" : "stopped";
-      set_text(state, stage.ended ? ", ended" : now ? ", running" : ", stopped");
+      setText(state, stage.ended ? ", ended" : now ? ", running" : ", stopped");
       span.style.left = `${(100 * from).toFixed(2)}%`;
       span.style.width = `${(100 * part).toFixed(2)}%`;
-      const count = short_count(stage.done);
-      set_text(done, stage.ended || !stage.total ? unit_text(count, stage.unit)
-                                                : `${count} of ${unit_text(short_count(stage.total), stage.unit)}`);
-      set_text(time, duration_text(stage.wall_s));
+      const count = shortCount(stage.done);
+      setText(done, stage.ended || !stage.total ? unitText(count, stage.unit)
+                                                : `${count} of ${unitText(shortCount(stage.total), stage.unit)}`);
+      setText(time, durationText(stage.wall_s));
     };
     return {name, update};
   }

@@ -6,32 +6,32 @@ const kMaxRequests = 2, kMaxBatch = 128;
 
 // Its requests are {key, level, position, priority}.
 export class ColorLoader extends Loader {
-  constructor(source, store, on_arrival) {
-    super(source, store, on_arrival, {max_requests: kMaxRequests, max_batch: Math.min(kMaxBatch, source.info.colors.batch_max)});
+  constructor(source, store, onArrival) {
+    super(source, store, onArrival, {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.info.colors.batch_max)});
   }
 
   // `wanted`: key -> request, of one reading of the feedback.
-  demand(wanted, now_ms) {
+  demand(wanted, nowMs) {
     const requests = [];
     let unmet = 0;
     for (const request of wanted.values()) {
       const {key} = request;
-      if (this.store.pages.has(key) || this.is_refused(key, now_ms)) continue;
+      if (this.store.pages.has(key) || this.isRefused(key, nowMs)) continue;
       unmet++;
-      if (!this.loading.has(key) && this.may_ask(key, now_ms)) requests.push(request);
+      if (!this.loading.has(key) && this.mayAsk(key, nowMs)) requests.push(request);
     }
-    this.replace_queue(requests, unmet, now_ms);
+    this.replaceQueue(requests, unmet, nowMs);
   }
 
-  name_of({level, position}) {
+  nameOf({level, position}) {
     return `color page ${[level, ...position].join("/")}`;
   }
 
-  fetch_all(batch, options) {
+  fetchAll(batch, options) {
     return this.source.fetchColors(batch, options);
   }
 
-  keep(request, words, now_ms) {
-    return this.store.add(request, words, now_ms);
+  keep(request, words, nowMs) {
+    return this.store.add(request, words, nowMs);
   }
 }

@@ -1,7 +1,7 @@
 // The colors of a file: what the shaders need to draw them, and what a reading of the feedback says of them.
 
 import {ColorLoader} from "./color_loader.js";
-import {ColorStore, page_key} from "./color_store.js";
+import {ColorStore, pageKey} from "./color_store.js";
 
 const kMebibyte = 1 << 20;
 const kBudgetShare = 1 / 4;      // of that of tiles and colors
@@ -11,21 +11,21 @@ const kBaseBelow = 2;            // levels: of a wanted page a coarser one comes
 const kWanted = 2;               // of the feedback's last word, the least: so many pixels want the page
 
 // How much of the budget the colors of a file take.
-export function color_budget(info, budget_bytes) {
+export function colorBudget(info, budgetBytes) {
   if (!info.colors) return 0;
-  return Math.min(Math.max(budget_bytes * kBudgetShare, kMinBytes), kMebibyte + Number(info.voxels) * kBytesPerVoxel);
+  return Math.min(Math.max(budgetBytes * kBudgetShare, kMinBytes), kMebibyte + Number(info.voxels) * kBytesPerVoxel);
 }
 
 export class Colors {
-  constructor(gl, source, budget_bytes, on_arrival) {
+  constructor(gl, source, budgetBytes, onArrival) {
     this.levels = source.info.colors.levels;
-    this.store = new ColorStore(gl, budget_bytes);
-    this.loader = new ColorLoader(source, this.store, on_arrival);
+    this.store = new ColorStore(gl, budgetBytes);
+    this.loader = new ColorLoader(source, this.store, onArrival);
   }
 
-  begin_epoch() {
-    this.store.begin_epoch();
-    this.loader.begin_epoch();
+  beginEpoch() {
+    this.store.beginEpoch();
+    this.loader.beginEpoch();
   }
 
   uniforms() {
@@ -34,7 +34,7 @@ export class Colors {
   }
 
   // Takes the words that kColorFeedback wrote for a picture of an epoch.
-  take_reading(words, epoch, now_ms) {
+  takeReading(words, epoch, nowMs) {
     const wanted = new Map();
     for (let at = 0; at < words.length; at += 4) {
       const head = words[at], y = words[at + 1], z = words[at + 2], state = words[at + 3];
@@ -42,33 +42,33 @@ export class Colors {
       if (state < kWanted) {
         // Neighbors mostly use one page.
         if (at > 0 && head === words[at - 4] && y === words[at - 3] && z === words[at - 2] && words[at - 1] === state) continue;
-        this.store.mark(page_key(head >>> 20, head & 0xfffff, y, z), epoch, now_ms);
+        this.store.mark(pageKey(head >>> 20, head & 0xfffff, y, z), epoch, nowMs);
         continue;
       }
       const level = head >>> 20, position = [head & 0xfffff, y, z];
       this.want(wanted, level, position, state);
-      const drawn = this.mark_coarser(level, position, epoch, now_ms);
+      const drawn = this.markCoarser(level, position, epoch, nowMs);
       if (level - drawn > kBaseBelow && level >= kBaseBelow)
         this.want(wanted, level - kBaseBelow, position.map((at) => at >>> kBaseBelow), state);
     }
     if (epoch === this.store.epoch) this.store.rounds++;
-    this.loader.demand(wanted, now_ms);
+    this.loader.demand(wanted, nowMs);
   }
 
   // Pages for more pixels come first: so coarser ones, and where memory ends, no part of the picture is without them.
   want(wanted, level, position, pixels) {
-    const key = page_key(level, ...position), request = wanted.get(key);
+    const key = pageKey(level, ...position), request = wanted.get(key);
     if (request) request.priority += pixels;
     else wanted.set(key, {key, level, position, priority: pixels});
   }
 
   // The page whose color is on the screen while this one is missing is in use. Returns its level, -1 if there is none.
-  mark_coarser(level, position, epoch, now_ms) {
+  markCoarser(level, position, epoch, nowMs) {
     for (let coarser = level - 1; coarser >= 0; --coarser) {
       position = position.map((at) => at >>> 1);
-      const key = page_key(coarser, ...position);
+      const key = pageKey(coarser, ...position);
       if (!this.store.pages.has(key)) continue;
-      this.store.mark(key, epoch, now_ms);
+      this.store.mark(key, epoch, nowMs);
       return coarser;
     }
     return -1;

@@ -4,32 +4,32 @@
 const kMaxSamples = 4096;  // that the statistics are of
 const kHalf = new DataView(new ArrayBuffer(4));
 
-function half_to_number(bits) {
+function halfToNumber(bits) {
   const exponent = bits >> 10 & 31, fraction = bits & 1023;
   if (exponent === 0) return fraction * 2 ** -24;
   return (1 + fraction / 1024) * 2 ** (exponent - 15);
 }
-function bits_to_float(bits) {
+function bitsToFloat(bits) {
   kHalf.setUint32(0, bits);
   return kHalf.getFloat32(0);
 }
-function share_of(sorted, share) {
+function shareOf(sorted, share) {
   return sorted.length === 0 ? 0 : sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
 }
 
-// {wanted: Map of leaf address -> priority, slots: Set, coarse_pixels: of the largest missing cell,
-//  median_t, nearest_t, exposure (null: nothing is seen), steps_mean, steps_99}
-export function read_feedback(words) {
+// {wanted: Map of leaf address -> priority, slots: Set, coarsePixels: of the largest missing cell,
+//  medianT, nearestT, exposure (null: nothing is seen), stepsMean, steps99}
+export function readFeedback(words) {
   const wanted = new Map(), slots = new Set(), texels = words.length / 4;
   const stride = Math.ceil(texels / kMaxSamples) | 1, count = Math.ceil(texels / stride);
   const steps = new Uint16Array(count), distances = new Float32Array(count), luminances = new Float32Array(count);
-  let coarse_pixels = 0, step_sum = 0, seen = 0;
+  let coarsePixels = 0, stepSum = 0, seen = 0;
   for (let at = 0; at < words.length; at += 4) {
     const missing = words[at], pair = words[at + 1];
     if (missing !== 0) {
-      const pixels = half_to_number(pair & 0xffff);
+      const pixels = halfToNumber(pair & 0xffff);
       wanted.set(missing, (wanted.get(missing) || 0) + pixels);
-      if (pixels > coarse_pixels) coarse_pixels = pixels;
+      if (pixels > coarsePixels) coarsePixels = pixels;
     }
     const slot = words[at + 2] & 0x3fffff;
     if (slot !== 0) slots.add(slot);
@@ -37,21 +37,21 @@ export function read_feedback(words) {
   for (let i = 0; i < count; ++i) {
     const at = 4 * i * stride, pair = words[at + 1];
     steps[i] = words[at + 2] >>> 22 << 1;
-    step_sum += steps[i];
+    stepSum += steps[i];
     if (words[at + 3] === 0 && pair >>> 16 === 0) continue;
-    distances[seen] = bits_to_float(words[at + 3]);
-    luminances[seen++] = 1e-3 + half_to_number(pair >>> 16);
+    distances[seen] = bitsToFloat(words[at + 3]);
+    luminances[seen++] = 1e-3 + halfToNumber(pair >>> 16);
   }
   const t = distances.subarray(0, seen).sort(), bright = luminances.subarray(0, seen).sort();
   steps.sort();
-  return {wanted, slots, coarse_pixels, steps_mean: step_sum / Math.max(1, count), steps_99: share_of(steps, 0.99),
-          median_t: share_of(t, 0.5), nearest_t: t[0] || 0,
-          exposure: seen === 0 ? null : Math.min(0.42 / share_of(bright, 0.5), 0.85 / share_of(bright, 0.9))};
+  return {wanted, slots, coarsePixels, stepsMean: stepSum / Math.max(1, count), steps99: shareOf(steps, 0.99),
+          medianT: shareOf(t, 0.5), nearestT: t[0] || 0,
+          exposure: seen === 0 ? null : Math.min(0.42 / shareOf(bright, 0.5), 0.85 / shareOf(bright, 0.9))};
 }
 
 // {depth, level, steps} of each pixel, rows from the top, of a picture's words as pack_hit() packs them, rows from
 // the bottom. The depth of the sky is infinite.
-export function read_hits(words, width, height, levels) {
+export function readHits(words, width, height, levels) {
   const depth = new Float32Array(width * height).fill(Infinity), level = new Uint8Array(width * height);
   const steps = new Uint16Array(width * height), floats = new Float32Array(words.buffer);
   for (let i = 0; i < width * height; ++i) {

@@ -5,7 +5,7 @@ import {kQuad} from "./picture_shaders.js";
 export class WebGLUnavailable extends Error {}
 
 // The context of a canvas; null if there is none to be had.
-export function create_context(canvas) {
+export function createContext(canvas) {
   return canvas.getContext("webgl2", {alpha: false, antialias: false, depth: false, powerPreference: "high-performance",
                                       preserveDrawingBuffer: true});
 }
@@ -55,7 +55,7 @@ export class Program {
 
   // Runs it for one pixel of a target of these formats: most drivers compile the rest only then. Of `words` and
   // `floats`, textures, it reads nothing that matters.
-  warm_up(formats, words, floats) {
+  warmUp(formats, words, floats) {
     const {gl} = this, target = new Target(gl, 1, 1, formats);
     gl.useProgram(this.program);
     for (const {type, unit} of this.uniforms.values()) {
@@ -87,7 +87,7 @@ export class Program {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(gl.TEXTURE_2D, value);
       } else {
-        set_uniform(gl, location, type, value);
+        setUniform(gl, location, type, value);
       }
     }
     gl.activeTexture(gl.TEXTURE0);
@@ -98,7 +98,7 @@ export class Program {
   }
 }
 
-function set_uniform(gl, location, type, value) {
+function setUniform(gl, location, type, value) {
   switch (type) {
     case gl.FLOAT: return gl.uniform1f(location, value);
     case gl.FLOAT_VEC2: return gl.uniform2f(location, ...value);
@@ -143,12 +143,12 @@ export class Target {
   }
 }
 
-// Resolves when the GPU is done with all that it was given; to false if `is_over()` before that.
-export async function gpu_done(gl, is_over) {
+// Resolves when the GPU is done with all that it was given; to false if `isOver()` before that.
+export async function gpuDone(gl, isOver) {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
-  while (!is_over() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) await pause();
-  if (is_over()) return false;
+  while (!isOver() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) await pause();
+  if (isOver()) return false;
   gl.deleteSync(fence);
   return true;
 }

@@ -1,6 +1,6 @@
 // Programs and targets of a picture, and the order in which its passes run.
 
-import {AsyncReading, gpu_done, pause, Program, Target} from "./gl_objects.js";
+import {AsyncReading, gpuDone, pause, Program, Target} from "./gl_objects.js";
 import {kColorFeedback} from "./color_shader.js";
 import {kColoredTrace, kCombine, kFeedback, kLight, kOcclusion, kPick, kPresent, kSun, kSunPlaces, kSunRows, kTrace} from "./picture_shaders.js";
 
@@ -12,7 +12,7 @@ const kSkyFormats = ["RGBA8"], kFeedbackFormats = ["RGBA32UI"];
 const kColorTexels = 1 << 17;  // of the feedback of colors, about: each page that is seen needs one of its own
 
 // The pixels that a texel of a feedback is of, and which of them it says more about.
-function blocks_of(edge, seed) {
+function blocksOf(edge, seed) {
   return {u_block: edge, u_sample: [seed % edge, Math.floor(seed / edge) % edge]};
 }
 
@@ -27,61 +27,61 @@ export class Passes {
     this.present = new Program(gl, "present", kPresent);
     this.feedback = new Program(gl, "feedback", kFeedback);
     this.trace = null;           // these two depend on the file
-    this.color_feedback = null;
+    this.colorFeedback = null;
     this.pick = null;
     this.sun = null;
     this.later = null;           // promise of these two
     this.disposed = false;
     this.targets = null;
-    this.vertex_array = gl.createVertexArray();
+    this.vertexArray = gl.createVertexArray();
     // What does not depend on the file. A compiler that cannot say when it is done is not waited for before it has all.
     this.begun = this.parallel ? this.begin() : null;
     this.begun?.catch(() => {});  // compile() reports it
     this.compiled = null;        // promise of compile()
   }
 
-  get color_range() {
+  get colorRange() {
     return this.floats ? kHalfRange : kByteRange;
   }
 
   async begin() {
     if (!await this.finish([this.light, this.occlusion, this.combine, this.present, this.feedback])) return;
-    this.gl.bindVertexArray(this.vertex_array);
-    this.warm_up([[this.light, kLightFormats], [this.occlusion, kSkyFormats], [this.combine, [this.color_format]],
+    this.gl.bindVertexArray(this.vertexArray);
+    this.warmUp([[this.light, kLightFormats], [this.occlusion, kSkyFormats], [this.combine, [this.colorFormat]],
                   [this.feedback, kFeedbackFormats]]);
   }
 
   // Resolves when all programs for a file are compiled; the page stays responsive where the browser can compile in
   // the background. Throws WebGLUnavailable if one cannot be; does nothing if the context is lost.
   compile(colored) {
-    return this.compiled ??= this.compile_all(colored);
+    return this.compiled ??= this.compileAll(colored);
   }
 
-  async compile_all(colored) {
+  async compileAll(colored) {
     const {gl} = this;
     this.trace = new Program(gl, "trace", colored ? kColoredTrace : kTrace);
-    if (colored) this.color_feedback = new Program(gl, "color feedback", kColorFeedback);
+    if (colored) this.colorFeedback = new Program(gl, "color feedback", kColorFeedback);
     await (this.begun ??= this.begin());
-    if (!await this.finish([this.trace, ...(colored ? [this.color_feedback] : [])])) return;
-    this.warm_up([[this.trace, colored ? kColoredHitFormats : kHitFormats],
-                  ...(colored ? [[this.color_feedback, kFeedbackFormats]] : [])]);
-    await gpu_done(gl, () => this.disposed || gl.isContextLost());
+    if (!await this.finish([this.trace, ...(colored ? [this.colorFeedback] : [])])) return;
+    this.warmUp([[this.trace, colored ? kColoredHitFormats : kHitFormats],
+                  ...(colored ? [[this.colorFeedback, kFeedbackFormats]] : [])]);
+    await gpuDone(gl, () => this.disposed || gl.isContextLost());
   }
 
-  warm_up(programs) {
+  warmUp(programs) {
     const {gl} = this, words = new Target(gl, 1, 1, ["RGBA32UI"]), floats = new Target(gl, 1, 1, ["RGBA8"]);
-    for (const [program, formats] of programs) program.warm_up(formats, words.textures[0], floats.textures[0]);
+    for (const [program, formats] of programs) program.warmUp(formats, words.textures[0], floats.textures[0]);
     words.dispose();
     floats.dispose();
     gl.flush();
   }
 
-  get color_format() {
+  get colorFormat() {
     return this.floats ? "RGBA16F" : "RGBA8";
   }
 
   // The same for the programs that a first picture does not need. Resolves to whether they can be used.
-  compile_later() {
+  compileLater() {
     if (!this.later) {
       this.pick = new Program(this.gl, "pick", kPick);
       this.sun = new Program(this.gl, "sun", kSun);
@@ -101,18 +101,18 @@ export class Passes {
   // They are as large as they have to be, which is as large as the full one from the second size on: so nothing is
   // allocated when a camera begins to move or stops. `colored`: of a file with colors.
   resize(width, height, full, colored) {
-    const {targets} = this, is_for_canvas = targets?.full.width === full.width && targets.full.height === full.height;
-    if (!is_for_canvas) this.allocate(width, height, full, colored);
+    const {targets} = this, isForCanvas = targets?.full.width === full.width && targets.full.height === full.height;
+    if (!isForCanvas) this.allocate(width, height, full, colored);
     else if (width > targets.hits.width || height > targets.hits.height) this.allocate(full.width, full.height, full, colored);
     // A small picture says as much as a large one of what is missing: then a texel is of fewer pixels.
     const share = Math.max(width / full.width, height / full.height);
-    Object.assign(this.targets, {width, height, feedback_block: Math.ceil(Math.min(1, share) * kFeedbackBlock),
-                                 color_block: 2 ** Math.max(0, Math.ceil(Math.log2(width * height / kColorTexels) / 2))});
+    Object.assign(this.targets, {width, height, feedbackBlock: Math.ceil(Math.min(1, share) * kFeedbackBlock),
+                                 colorBlock: 2 ** Math.max(0, Math.ceil(Math.log2(width * height / kColorTexels) / 2))});
   }
 
   allocate(width, height, full, colored) {
-    const {gl} = this, color = this.color_format, across = Math.sqrt(kColorTexels * width / height);
-    this.release_targets();
+    const {gl} = this, color = this.colorFormat, across = Math.sqrt(kColorTexels * width / height);
+    this.releaseTargets();
     this.targets = {
       full: {width: full.width, height: full.height}, width, height,
       hits: new Target(gl, width, height, colored ? kColoredHitFormats : kHitFormats),
@@ -121,62 +121,62 @@ export class Passes {
       colors: [new Target(gl, width, height, [color]), new Target(gl, width, height, [color])],
       feedback: new Target(gl, Math.ceil(full.width / kFeedbackBlock), Math.ceil(full.height / kFeedbackBlock), kFeedbackFormats),
       // For any size, with the block of that.
-      color_feedback: colored ? new Target(gl, Math.ceil(Math.min(width, across + 4)),
+      colorFeedback: colored ? new Target(gl, Math.ceil(Math.min(width, across + 4)),
                                            Math.ceil(Math.min(height, kColorTexels / across + 4)), kFeedbackFormats) : null,
-      feedback_block: kFeedbackBlock, color_block: 1, current: 0,
+      feedbackBlock: kFeedbackBlock, colorBlock: 1, current: 0,
     };
   }
 
-  get target_bytes() {
-    return this.all_targets.reduce((sum, target) => sum + target.bytes, 0);
+  get targetBytes() {
+    return this.allTargets.reduce((sum, target) => sum + target.bytes, 0);
   }
-  get all_targets() {
+  get allTargets() {
     if (!this.targets) return [];
-    const {hits, light, sky, colors, feedback, color_feedback} = this.targets;
-    return [hits, light, sky, ...colors, feedback, color_feedback].filter((target) => target !== null);
+    const {hits, light, sky, colors, feedback, colorFeedback} = this.targets;
+    return [hits, light, sky, ...colors, feedback, colorFeedback].filter((target) => target !== null);
   }
 
   // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Yields between parts of at
-  // most `part_pixels()` pixels. Returns the reading of the feedback; its `colors` is that of the colors, ready as
+  // most `partPixels()` pixels. Returns the reading of the feedback; its `colors` is that of the colors, ready as
   // soon as the reading is, or null if none are shown.
-  *draw(values, part_pixels) {
-    const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback, color_feedback, feedback_block, color_block} = targets;
+  *draw(values, partPixels) {
+    const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback, colorFeedback, feedbackBlock, colorBlock} = targets;
     const share = this.floats ? 1 / (values.u_frame + 1) : 1;
     const [before, after] = [colors[targets.current], colors[1 - targets.current]];
     const all = {...values, u_size: [width, height], u_hits: hits.textures[0], u_light: light.textures[0], u_sky: sky.textures[0], u_normals: light.textures[1],
                  u_colors: hits.textures[1] || hits.textures[0], u_colored: hits.textures.length > 1,
                  u_shadow_missing: light.textures[2], u_before: before.textures[0], u_share: share,
-                 u_range: this.color_range, ...blocks_of(feedback_block, values.u_seed)};
-    const parts_of = (edge) => [Math.ceil(width / edge), Math.ceil(height / edge)];
-    let left = part_pixels();
-    const [sky_width, sky_height] = parts_of(2);
-    for (const [program, target, columns, all_rows] of [[this.trace, hits, width, height], [this.light, light, width, height],
-                                                        [this.occlusion, sky, sky_width, sky_height]])
-      for (let row = 0, rows; row < all_rows; row += rows) {
+                 u_range: this.colorRange, ...blocksOf(feedbackBlock, values.u_seed)};
+    const partsOf = (edge) => [Math.ceil(width / edge), Math.ceil(height / edge)];
+    let left = partPixels();
+    const [skyWidth, skyHeight] = partsOf(2);
+    for (const [program, target, columns, allRows] of [[this.trace, hits, width, height], [this.light, light, width, height],
+                                                        [this.occlusion, sky, skyWidth, skyHeight]])
+      for (let row = 0, rows; row < allRows; row += rows) {
         if (left < columns) {
           yield null;
-          left = part_pixels();
+          left = partPixels();
         }
-        rows = Math.min(all_rows - row, Math.max(1, Math.floor(left / columns)));
-        program.draw(target, all, columns, all_rows, {row, rows});
+        rows = Math.min(allRows - row, Math.max(1, Math.floor(left / columns)));
+        program.draw(target, all, columns, allRows, {row, rows});
         left -= rows * columns;
       }
     this.combine.draw(after, all, width, height);
     targets.current = 1 - targets.current;
-    this.feedback.draw(feedback, all, ...parts_of(feedback_block));
-    let of_colors = null;
-    if (color_feedback && values.u_color_levels >= 0) {
-      this.color_feedback.draw(color_feedback, {...all, ...blocks_of(color_block, values.u_seed)}, ...parts_of(color_block));
-      of_colors = new AsyncReading(gl, color_feedback, ...parts_of(color_block));
+    this.feedback.draw(feedback, all, ...partsOf(feedbackBlock));
+    let ofColors = null;
+    if (colorFeedback && values.u_color_levels >= 0) {
+      this.colorFeedback.draw(colorFeedback, {...all, ...blocksOf(colorBlock, values.u_seed)}, ...partsOf(colorBlock));
+      ofColors = new AsyncReading(gl, colorFeedback, ...partsOf(colorBlock));
     }
-    return Object.assign(new AsyncReading(gl, feedback, ...parts_of(feedback_block)), {colors: of_colors});
+    return Object.assign(new AsyncReading(gl, feedback, ...partsOf(feedbackBlock)), {colors: ofColors});
   }
 
   // Draws the accumulated picture to the canvas.
   show(exposure, width, height) {
     const {targets} = this;
     this.present.draw(null, {u_color: targets.colors[targets.current].textures[0], u_extent: [width, height],
-                             u_size: [targets.width, targets.height], u_exposure: exposure * this.color_range}, width, height);
+                             u_size: [targets.width, targets.height], u_exposure: exposure * this.colorRange}, width, height);
   }
 
   // The hits of a picture of any size, as words of pack_hit(), rows from the bottom.
@@ -190,8 +190,8 @@ export class Passes {
   }
 
   // The hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of the tile it is in. Null if
-  // the context is lost. The page does not wait for the GPU. After compile_later(): by then `values` may be out of date.
-  async pick_one(values) {
+  // the context is lost. The page does not wait for the GPU. After compileLater(): by then `values` may be out of date.
+  async pickOne(values) {
     const {gl} = this, target = new Target(gl, 2, 1, ["RGBA32UI"]);
     this.pick.draw(target, values, 2, 1);
     const reading = new AsyncReading(gl, target, 2, 1);
@@ -204,8 +204,8 @@ export class Passes {
   }
 
   // {place: of the 48 of the sun, the one that lights nearest to `share` of what the last picture shows,
-  //  wanted: leaf address -> 1, tiles that would make the choice better}. After compile_later().
-  choose_sun(values, share) {
+  //  wanted: leaf address -> 1, tiles that would make the choice better}. After compileLater().
+  chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();
     const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]), words = new Uint32Array(kSunPlaces * kSunRows * 4);
     this.sun.draw(target, {...values, u_size: [targets.width, targets.height], u_hits: targets.hits.textures[0],
@@ -213,7 +213,7 @@ export class Passes {
                  kSunPlaces, kSunRows);
     gl.readPixels(0, 0, kSunPlaces, kSunRows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
     target.dispose();
-    let best = 0, best_off = Infinity;
+    let best = 0, bestOff = Infinity;
     for (let place = 0; place < kSunPlaces; ++place) {
       let seen = 0, lit = 0;
       for (let row = 0; row < kSunRows; ++row) {
@@ -223,22 +223,22 @@ export class Passes {
         lit += state === 2;
       }
       const off = Math.abs(lit / Math.max(1, seen) - share);
-      if (off < best_off) [best, best_off] = [place, off];
+      if (off < bestOff) [best, bestOff] = [place, off];
     }
     return {place: best, wanted};
   }
 
   dispose() {
     this.disposed = true;
-    this.release_targets();
-    for (const program of [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback, this.color_feedback,
+    this.releaseTargets();
+    for (const program of [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback, this.colorFeedback,
                            this.pick, this.sun])
       program?.dispose();
-    this.gl.deleteVertexArray(this.vertex_array);
+    this.gl.deleteVertexArray(this.vertexArray);
   }
 
-  release_targets() {
-    for (const target of this.all_targets) target.dispose();
+  releaseTargets() {
+    for (const target of this.allTargets) target.dispose();
     this.targets = null;
   }
 }

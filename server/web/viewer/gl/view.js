@@ -1,7 +1,7 @@
 // The camera as the shaders need it: as query/render/camera.h, with the eye as an integer voxel plus a
 // fraction, so that float32 holds all that is relative to it.
 
-import {length, picture_axes, picture_direction, subtract} from "../vector.js";
+import {length, pictureAxes, pictureDirection, subtract} from "../vector.js";
 
 const kFar = 2 ** 30;  // voxels; an eye beyond is drawn from there
 
@@ -14,7 +14,7 @@ export class View {
     if (!(length(forward) > 0)) throw new Error("The camera must not be at its target.");
     this.eye = eye.map((x) => Math.min(Math.max(x, -kFar), kFar));
     this.target = target;
-    Object.assign(this, picture_axes(forward, up));
+    Object.assign(this, pictureAxes(forward, up));
     this.tangent = Math.tan(fovDegrees * Math.PI / 360);
   }
 
@@ -32,7 +32,7 @@ export class View {
   // Unit vector through a point in pixels from the upper left corner.
   direction(x, y, width, height) {
     const pixel = this.pixel(height);
-    return picture_direction(this, (x - width / 2) * pixel, (height / 2 - y) * pixel);
+    return pictureDirection(this, (x - width / 2) * pixel, (height / 2 - y) * pixel);
   }
 
   equals(other) {

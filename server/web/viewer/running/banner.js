@@ -1,7 +1,7 @@
 // What the picture of a running job shows, in words, over the picture.
 
-import {h, set_text, svg} from "../../lib/dom.js";
-import {count_text, has_ended, state_text, title_text} from "../../lib/format.js";
+import {h, setText, svg} from "../../lib/dom.js";
+import {countText, hasEnded, stateText, titleText} from "../../lib/format.js";
 import {kStyles} from "./subvolume_wires.js";
 
 export class Banner {
@@ -11,7 +11,7 @@ export class Banner {
     this.kinds = Object.fromEntries(Object.entries(kStyles).map(([kind, style]) => [kind, h("li", {}, sample(style), style.name)]));
     const legend = h("ul", {class: "running-legend"}, Object.values(this.kinds));
     const toggle = h("button", {type: "button", class: "small", "aria-pressed": "true", on: {click: () => {
-      wires.set_visible(!wires.visible);
+      wires.setVisible(!wires.visible);
       toggle.setAttribute("aria-pressed", String(wires.visible));
       legend.hidden = !wires.visible;
     }}}, "Subvolumes");
@@ -20,12 +20,12 @@ export class Banner {
 
   // `job` is null while the service does not answer; the counts are the last that are known.
   show(job, {built = 0, total = 0}) {
-    const what = `${count_text(built)} of ${count_text(total)} occupied subvolumes are built`;
-    set_text(this.text, !job ? "The service does not answer. This is what was built when it did."
-      : has_ended(job.state) ? `${title_text(job)} is ${state_text(job.state)} and has no result. This is what was built of it.`
-      : `${state_text(job.state)}: ${what}, drawn coarsely.`);
-    this.kinds.waiting.hidden = this.kinds.built.hidden = !this.wires.draws_all;
-    this.element.classList.toggle("bad", !job || has_ended(job.state));
+    const what = `${countText(built)} of ${countText(total)} occupied subvolumes are built`;
+    setText(this.text, !job ? "The service does not answer. This is what was built when it did."
+      : hasEnded(job.state) ? `${titleText(job)} is ${stateText(job.state)} and has no result. This is what was built of it.`
+      : `${stateText(job.state)}: ${what}, drawn coarsely.`);
+    this.kinds.waiting.hidden = this.kinds.built.hidden = !this.wires.drawsAll;
+    this.element.classList.toggle("bad", !job || hasEnded(job.state));
   }
 }
 

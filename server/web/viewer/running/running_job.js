@@ -1,42 +1,42 @@
 // The viewer of a job that runs: what is built so far, from the coarse bricks of its subvolumes, and the
 // wireframe of all of them. What is built grows under the camera; the tiles that were fetched stay.
 
-import {authorization, get_json, sleep} from "../../lib/api.js";
+import {authorization, getJson, sleep} from "../../lib/api.js";
 import {announce} from "../../lib/dom.js";
-import {has_ended, state_text} from "../../lib/format.js";
+import {hasEnded, stateText} from "../../lib/format.js";
 import {Viewer} from "../app.js";
-import {fragment_text} from "../camera_text.js";
+import {fragmentText} from "../camera_text.js";
 import {Renderer} from "../renderer.js";
 import {TileError, TileSource} from "../tile_source.js";
 import {Banner} from "./banner.js";
 import {SubvolumeWires} from "./subvolume_wires.js";
 
-const kPause_ms = 1500, kMaxPause_ms = 15000;
+const kPauseMs = 1500, kMaxPauseMs = 15000;
 const kGone = [404, 409, 410];   // what is built has another digest, or the job another state
 // A list of subvolumes is fetched again after this many times what it took, and after this time for each of them;
 // what has changed is reported a moment before the list has it, and what is begun is only in the list.
-const kListShare = 10, kListPausePerCube_ms = 0.1;
-const kListLooks = 2, kMaxListPause_ms = 15000;
+const kListShare = 10, kListPausePerCubeMs = 0.1;
+const kListLooks = 2, kMaxListPauseMs = 15000;
 
 // Shows the job until it has its result. Resolves to whether there was anything to show: not before the subvolumes
 // are planned. Throws WebGLUnavailable, and Problem when the job is gone. The camera is left in the address, where the
-// next viewer finds it. `show_tools` fills the tools of the page.
-export async function watch_job({job, place, budget_bytes, show_picture, show_tools, signal}) {
+// next viewer finds it. `showTools` fills the tools of the page.
+export async function watchJob({job, place, budgetBytes, showPicture, showTools, signal}) {
   const path = `/api/v1/jobs/${job.id}`;
   const source = new TileSource({base: `${path}/partial`, headers: authorization()});
-  const manifest = await manifest_of(source);
+  const manifest = await manifestOf(source);
   if (!manifest?.camera || signal.aborted) return false;
   const ended = new AbortController(), end = () => ended.abort();
   signal.addEventListener("abort", end, {once: true});
   const canvas = place("scene");
   let renderer = null, banner = null, wires = null, viewer = null, rests = false;
   try {
-    show_picture();
-    renderer = new Renderer(canvas, source, {budgetBytes: budget_bytes, onChange: () => viewer?.schedule()});
+    showPicture();
+    renderer = new Renderer(canvas, source, {budgetBytes: budgetBytes, onChange: () => viewer?.schedule()});
     const started = renderer.start();
     started.catch(() => {});
-    show_tools();
-    viewer = new Viewer({canvas, renderer, manifest, signal: ended.signal, file_name: `job-${job.id}`,
+    showTools();
+    viewer = new Viewer({canvas, renderer, manifest, signal: ended.signal, fileName: `job-${job.id}`,
                          places: {panel: place("panel"), tools: place("tools"), status: place("status")}});
     wires = viewer.overlay = new SubvolumeWires(canvas, () => viewer.schedule());
     banner = new Banner(wires);
@@ -45,7 +45,7 @@ export async function watch_job({job, place, budget_bytes, show_picture, show_to
     await started;
     window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer, wires, running: true};
     rests = await follow({path, source, renderer, banner, wires, signal: ended.signal});
-    history.replaceState(null, "", `#${fragment_text(viewer.bookmark_members())}`);
+    history.replaceState(null, "", `#${fragmentText(viewer.bookmarkMembers())}`);
     return true;
   } catch (error) {
     place("panel").hidden = place("tools").hidden = true;
@@ -59,26 +59,26 @@ export async function watch_job({job, place, budget_bytes, show_picture, show_to
     wires?.dispose();
     banner?.element.remove();
     delete window.voxdagViewer;
-    if (rests) await sleep(kPause_ms, signal, true);  // without tiles: theirs is another digest now
+    if (rests) await sleep(kPauseMs, signal, true);  // without tiles: theirs is another digest now
   }
 }
 
 // null while there is none: before the plan, when the files of the job are gone, and while the service is away.
-async function manifest_of(source) {
+async function manifestOf(source) {
   try {
     return await source.manifest();
   } catch (error) {
-    if (error instanceof TileError && (error.status === 404 || error.is_transient)) return null;
+    if (error instanceof TileError && (error.status === 404 || error.isTransient)) return null;
     throw error;
   }
 }
 
 // null while the service is away.
-async function job_of(path, signal) {
+async function jobOf(path, signal) {
   try {
-    return await get_json(path, signal);
+    return await getJson(path, signal);
   } catch (problem) {
-    if (signal.aborted || !problem.is_transient) throw problem;
+    if (signal.aborted || !problem.isTransient) throw problem;
     return null;
   }
 }
@@ -90,8 +90,8 @@ class SubvolumeList {
     this.list = null;
     this.key = null;
     this.looks = 0;            // that are left
-    this.next_ms = -Infinity;
-    this.latest_ms = -Infinity;
+    this.nextMs = -Infinity;
+    this.latestMs = -Infinity;
   }
 
   // Whether it was fetched.
@@ -99,15 +99,15 @@ class SubvolumeList {
     const {stage, subvolumes} = job.progress ?? {}, key = JSON.stringify([job.state, job.attempts, stage, subvolumes]);
     if (key !== this.key) this.looks = kListLooks;
     this.key = key;
-    const begin_ms = performance.now();
-    if (begin_ms >= this.latest_ms && job.state === "running") this.looks = Math.max(this.looks, 1);
-    if (this.looks === 0 || begin_ms < this.next_ms) return false;
-    const list = await get_json(`${this.path}/subvolumes`, signal).catch(() => null);
-    const now_ms = performance.now(), cubes = (list ?? this.list)?.cubes.length ?? 0;
-    this.next_ms = now_ms + Math.max(kListShare * (now_ms - begin_ms), kListPausePerCube_ms * cubes);
+    const beginMs = performance.now();
+    if (beginMs >= this.latestMs && job.state === "running") this.looks = Math.max(this.looks, 1);
+    if (this.looks === 0 || beginMs < this.nextMs) return false;
+    const list = await getJson(`${this.path}/subvolumes`, signal).catch(() => null);
+    const nowMs = performance.now(), cubes = (list ?? this.list)?.cubes.length ?? 0;
+    this.nextMs = nowMs + Math.max(kListShare * (nowMs - beginMs), kListPausePerCubeMs * cubes);
     if (!list) return false;
     this.looks--;
-    this.latest_ms = now_ms + kMaxListPause_ms;
+    this.latestMs = nowMs + kMaxListPauseMs;
     this.list = list;
     return true;
   }
@@ -116,37 +116,37 @@ class SubvolumeList {
 // Until the job has its result, or begins again, or what is built is another DAG, after a restart of the service.
 // Resolves to whether to wait before one looks again, since that could be so each time.
 async function follow({path, source, renderer, banner, wires, signal}) {
-  const {digest} = renderer.info, was_empty = !renderer.info.root;
+  const {digest} = renderer.info, wasEmpty = !renderer.info.root;
   const subvolumes = new SubvolumeList(path);
-  let state = null, is_arriving = false, pause_ms = kPause_ms;
+  let state = null, isArriving = false, pauseMs = kPauseMs;
   while (!signal.aborted) {
-    const job = await job_of(path, signal);
+    const job = await jobOf(path, signal);
     if (job?.state === "succeeded") {
       announce("The job has succeeded: this is its result.");
       return false;
     }
-    if (job && has_ended(state) && !has_ended(job.state)) return true;
+    if (job && hasEnded(state) && !hasEnded(job.state)) return true;
     if (job && job.state !== state) {
-      if (state !== null) announce(`The job is ${state_text(job.state)}.`);
+      if (state !== null) announce(`The job is ${stateText(job.state)}.`);
       state = job.state;
     }
-    const manifest = job && !has_ended(state) ? await manifest_of(source) : null;
+    const manifest = job && !hasEnded(state) ? await manifestOf(source) : null;
     if (manifest && manifest.digest !== digest) return true;
-    if (manifest?.root && was_empty) return false;
+    if (manifest?.root && wasEmpty) return false;
     if (manifest?.root && manifest.root.offset === renderer.info.root.offset) {
       Object.assign(renderer.info, {built: manifest.built, total: manifest.total});
-    } else if (manifest?.root && !is_arriving) {
+    } else if (manifest?.root && !isArriving) {
       // Its tile may take long: what the job does is shown all the same.
-      is_arriving = true;
-      renderer.show_root(manifest)
+      isArriving = true;
+      renderer.showRoot(manifest)
         .catch((error) => console.warn(`voxdag: what was built is not shown: ${error.message}`))
-        .finally(() => is_arriving = false);
+        .finally(() => isArriving = false);
     }
     if (job && await subvolumes.update(job, signal)) wires.show(subvolumes.list, state === "running");
     banner.show(job, subvolumes.list ?? source.info);
     // What has ended, or gives no answer, may continue some day.
-    pause_ms = manifest ? kPause_ms : Math.min(kMaxPause_ms, 1.5 * pause_ms);
-    await sleep(pause_ms, signal, true);
+    pauseMs = manifest ? kPauseMs : Math.min(kMaxPauseMs, 1.5 * pauseMs);
+    await sleep(pauseMs, signal, true);
   }
   return false;
 }

@@ -16,8 +16,8 @@ export const kStyles = {
 const kOrder = Object.keys(kStyles);
 
 export class SubvolumeWires {
-  constructor(scene, on_change) {
-    this.on_change = on_change;
+  constructor(scene, onChange) {
+    this.onChange = onChange;
     this.canvas = document.createElement("canvas");
     this.canvas.className = "wires";
     this.canvas.setAttribute("aria-hidden", "true");
@@ -25,7 +25,7 @@ export class SubvolumeWires {
     this.edges = Object.fromEntries(kOrder.map((state) => [state, new Float64Array(0)]));
     this.counts = Object.fromEntries(kOrder.map((state) => [state, 0]));
     this.visible = true;
-    this.draws_all = true;       // not only what is in work
+    this.drawsAll = true;       // not only what is in work
     this.drawn = null;           // for which camera and size
   }
 
@@ -33,30 +33,30 @@ export class SubvolumeWires {
   // unless the job `runs`.
   show({resolution, cubes, working = []}, runs) {
     this.resolution = resolution;
-    const at_work = new Set(runs ? working.map((cube) => cube.join()) : []);
+    const atWork = new Set(runs ? working.map((cube) => cube.join()) : []);
     const found = new Map();
-    this.draws_all = true;
+    this.drawsAll = true;
     this.counts = Object.fromEntries(kOrder.map((state) => [state, 0]));
     for (const [x, y, z, edge, built] of cubes) {
-      const rank = at_work.has([x, y, z, edge].join()) ? 2 : built ? 1 : 0;
+      const rank = atWork.has([x, y, z, edge].join()) ? 2 : built ? 1 : 0;
       this.counts[kOrder[rank]]++;
-      if (rank < 2 && !this.draws_all) continue;
-      add_edges(x, y, z, edge, rank, found);
-      if (!this.draws_all || found.size <= kMaxEdges) continue;
-      this.draws_all = false;
+      if (rank < 2 && !this.drawsAll) continue;
+      addEdges(x, y, z, edge, rank, found);
+      if (!this.drawsAll || found.size <= kMaxEdges) continue;
+      this.drawsAll = false;
       for (const [key, known] of found) if (known.rank < 2) found.delete(key);
     }
     const lists = kOrder.map(() => []);
     for (const {rank, points} of found.values()) lists[rank].push(...points);
     kOrder.forEach((state, rank) => this.edges[state] = Float64Array.from(lists[rank]));
     this.drawn = null;
-    this.on_change();
+    this.onChange();
   }
 
-  set_visible(visible) {
+  setVisible(visible) {
     this.visible = visible;
     this.canvas.hidden = !visible;
-    this.on_change();
+    this.onChange();
   }
 
   draw(camera) {
@@ -64,7 +64,7 @@ export class SubvolumeWires {
     const {canvas} = this, width = canvas.clientWidth, height = canvas.clientHeight, ratio = window.devicePixelRatio || 1;
     if (!width || !height) return;
     // Thousands of lines take longer than a part of a sample: they are drawn when they change, and not with each frame.
-    const {forward, up} = camera.axes(), drawn = [...camera.eye, ...forward, ...up, camera.fov_degrees, width, height, ratio].join();
+    const {forward, up} = camera.axes(), drawn = [...camera.eye, ...forward, ...up, camera.fovDegrees, width, height, ratio].join();
     if (drawn === this.drawn) return;
     this.drawn = drawn;
     if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
@@ -91,7 +91,7 @@ export class SubvolumeWires {
 
   // Adds the visible part of an edge to the path.
   projection(camera, width, height) {
-    const {forward, right, up} = camera.axes(), eye = camera.eye, pixel = camera.pixel_spread(height);
+    const {forward, right, up} = camera.axes(), eye = camera.eye, pixel = camera.pixelSpread(height);
     const near = kNear * this.resolution / 16;
     const place = (points, at) => {
       const offset = subtract([points[at], points[at + 1], points[at + 2]], eye);
@@ -101,14 +101,14 @@ export class SubvolumeWires {
       const share = (near - from[2]) / (to[2] - from[2]);
       return from.map((c, i) => c + share * (to[i] - c));
     };
-    const to_pixels = ([x, y, depth]) => [width / 2 + x / depth / pixel, height / 2 - y / depth / pixel];
+    const toPixels = ([x, y, depth]) => [width / 2 + x / depth / pixel, height / 2 - y / depth / pixel];
     return (pen, points, i) => {
       let a = place(points, i), b = place(points, i + 3);
       if (a[2] < near && b[2] < near) return;
       if (a[2] < near) a = cut(a, b);
       if (b[2] < near) b = cut(b, a);
-      pen.moveTo(...to_pixels(a));
-      pen.lineTo(...to_pixels(b));
+      pen.moveTo(...toPixels(a));
+      pen.lineTo(...toPixels(b));
     };
   }
 
@@ -118,7 +118,7 @@ export class SubvolumeWires {
 }
 
 // The twelve edges of a cube; one that several cubes of the same size share is drawn once.
-function add_edges(x, y, z, edge, rank, found) {
+function addEdges(x, y, z, edge, rank, found) {
   for (let axis = 0; axis < 3; ++axis)
     for (let corner = 0; corner < 4; ++corner) {
       const from = [x, y, z];

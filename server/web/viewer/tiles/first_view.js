@@ -16,16 +16,16 @@ export class FirstView {
     this.known = new Map();      // key -> words of a tile
     this.places = new Map();     // key -> where the tile is needed, low corners
     this.wanted = new Map();     // texel of a cut-off node -> pixels of its widest coarse cell
-    this.taken_ms = 0;           // when the last tile came
+    this.takenMs = 0;           // when the last tile came
   }
 
-  get is_over() {
+  get isOver() {
     return this.wanted.size === 0 || this.known.size > kMaxTiles;
   }
 
   // Whether a request that is not answered holds up what others could say.
-  stalls(now_ms) {
-    return now_ms - this.taken_ms > kStallMs;
+  stalls(nowMs) {
+    return nowMs - this.takenMs > kStallMs;
   }
 
   begin(store, tile, words) {
@@ -35,7 +35,7 @@ export class FirstView {
 
   // A tile of the store has these words.
   take(store, tile, words) {
-    this.taken_ms = performance.now();
+    this.takenMs = performance.now();
     if (this.known.has(tile.key)) return;
     this.known.set(tile.key, words);
     for (const corner of this.places.get(tile.key) ?? []) this.walk(store, tile, words, corner);
@@ -44,20 +44,20 @@ export class FirstView {
   // Adds what is missing below a tile at a place.
   walk(store, tile, words, corner) {
     if ((words[1] >>> 16 & 1) === 1) return;  // bricks
-    const leaf_edge = 2 ** (this.levels - tile.level - tile.levels), cell = leaf_edge / 4;
+    const leafEdge = 2 ** (this.levels - tile.level - tile.levels), cell = leafEdge / 4;
     if (cell <= this.finest) return;
     const leaves = kHeadWords + words[2];
-    const visit = (at, edge, x, y, z, is_leaf) => {
+    const visit = (at, edge, x, y, z, isLeaf) => {
       if (!this.needs(x, y, z, edge, cell)) return;
-      if (is_leaf) {
-        const from = leaves + at * kCutWords, pixels = this.coarse_pixels(words[from + 2], words[from + 3], x, y, z, cell);
+      if (isLeaf) {
+        const from = leaves + at * kCutWords, pixels = this.coarsePixels(words[from + 2], words[from + 3], x, y, z, cell);
         if (pixels > kPixels) this.want(store, store.leaf(tile, at), pixels, [x, y, z]);
         return;
       }
       const half = edge / 2;
       for (let child = 0, next = kHeadWords + at + 1, mask = words[kHeadWords + at]; child < 8; ++child)
         if (mask >>> child & 1)
-          visit(words[next++], half, x + half * (child >> 2), y + half * (child >> 1 & 1), z + half * (child & 1), half === leaf_edge);
+          visit(words[next++], half, x + half * (child >> 2), y + half * (child >> 1 & 1), z + half * (child & 1), half === leafEdge);
     };
     visit(0, 2 ** (this.levels - tile.level), ...corner, false);
   }
@@ -73,18 +73,18 @@ export class FirstView {
 
   // Whether a cube is in the picture, with cells that are too wide.
   needs(x, y, z, edge, cell) {
-    return this.pixels_of(x, y, z, edge, cell) > kPixels && this.is_seen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
+    return this.pixelsOf(x, y, z, edge, cell) > kPixels && this.isSeen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
   }
 
   // How many pixels wide a cell at the nearest point of a cube is.
-  pixels_of(x, y, z, edge, cell) {
+  pixelsOf(x, y, z, edge, cell) {
     const [ex, ey, ez] = this.view.eye;
     const far = Math.hypot(Math.max(x - ex, 0, ex - x - edge), Math.max(y - ey, 0, ey - y - edge), Math.max(z - ez, 0, ez - z - edge));
     return cell / Math.max(far * this.pixel, 1e-9);
   }
 
   // Whether a part of a ball may be in the picture.
-  is_seen(x, y, z, radius) {
+  isSeen(x, y, z, radius) {
     const {eye, forward, right, up} = this.view, dx = x - eye[0], dy = y - eye[1], dz = z - eye[2];
     const along = (axis) => axis[0] * dx + axis[1] * dy + axis[2] * dz;
     const depth = along(forward);
@@ -92,13 +92,13 @@ export class FirstView {
   }
 
   // Of the widest cell of a coarse brick that is in the picture.
-  coarse_pixels(low, high, x, y, z, cell) {
+  coarsePixels(low, high, x, y, z, cell) {
     let most = 0;
     for (let bit = 0; bit < 64; ++bit) {
       if (((bit < 32 ? low : high) >>> (bit & 31) & 1) === 0) continue;
       const cx = x + cell * (bit >> 4 & 2 | bit >> 2 & 1), cy = y + cell * (bit >> 3 & 2 | bit >> 1 & 1), cz = z + cell * (bit >> 2 & 2 | bit & 1);
-      const pixels = this.pixels_of(cx, cy, cz, cell, cell);
-      if (pixels > most && pixels > kPixels && this.is_seen(cx + cell / 2, cy + cell / 2, cz + cell / 2, cell * 0.867)) most = pixels;
+      const pixels = this.pixelsOf(cx, cy, cz, cell, cell);
+      if (pixels > most && pixels > kPixels && this.isSeen(cx + cell / 2, cy + cell / 2, cz + cell / 2, cell * 0.867)) most = pixels;
     }
     return most;
   }

@@ -19,46 +19,46 @@ const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
 // one pointer per child, in one or two texels. A cut-off node is one texel: the slot of its tile (0: none),
 // its coarse brick's two words, 0. Two bricks share a texel; the pointer's lowest bit says which.
 //
-// `shape` is that of tiles of this level (tile_shape).
-// Returns {level, levels, words, pointers, root, leaf_begin, addresses, coarse}: `words` are the pool's
+// `shape` is that of tiles of this level (tileShape).
+// Returns {level, levels, words, pointers, root, leafBegin, addresses, coarse}: `words` are the pool's
 // words at virtual addresses from 0 on, whole blocks; `pointers` are the positions in `words` of pointers
-// with virtual addresses, which the pool makes absolute; `root` is such a pointer; `leaf_begin` is the first
+// with virtual addresses, which the pool makes absolute; `root` is such a pointer; `leafBegin` is the first
 // leaf's texel. `addresses` are the word offsets of the cut-off nodes in the file, and `coarse` their coarse
 // bricks; both are null for a tile with bricks.
-export function decode_tile(tile, level, shape) {
-  check_head(tile, level, shape);
-  const {levels, bricks} = shape, node_words = tile[2], leaf_count = tile[3];
-  const nodes = tile.subarray(kHeadWords, kHeadWords + node_words);
-  const place = new Uint32Array(node_words);  // pointer to the node that begins here
-  const depth = new Uint8Array(node_words);
-  const leaf_begin = place_nodes(nodes, levels, place, depth);
-  const texels = leaf_begin + (bricks ? Math.ceil(leaf_count / 2) : leaf_count);
-  const words = new Uint32Array(round_up(texels, kBlockTexels) * kTexelWords);
-  const pointers = new Uint32Array(node_words);
-  let pointer_count = 0;
-  for (let at = 0; at < node_words;) {
+export function decodeTile(tile, level, shape) {
+  checkHead(tile, level, shape);
+  const {levels, bricks} = shape, nodeWords = tile[2], leafCount = tile[3];
+  const nodes = tile.subarray(kHeadWords, kHeadWords + nodeWords);
+  const place = new Uint32Array(nodeWords);  // pointer to the node that begins here
+  const depth = new Uint8Array(nodeWords);
+  const leafBegin = placeNodes(nodes, levels, place, depth);
+  const texels = leafBegin + (bricks ? Math.ceil(leafCount / 2) : leafCount);
+  const words = new Uint32Array(roundUp(texels, kBlockTexels) * kTexelWords);
+  const pointers = new Uint32Array(nodeWords);
+  let pointerCount = 0;
+  for (let at = 0; at < nodeWords;) {
     const count = kPopcount[nodes[at]], to = (place[at] >>> 8) * kTexelWords;
     for (let child = 0; child < count; ++child) {
       const index = nodes[at + 1 + child];
-      if (depth[at] === levels - 1 && index >= leaf_count) throw new Error("A tile has a leaf index beyond its leaves.");
+      if (depth[at] === levels - 1 && index >= leafCount) throw new Error("A tile has a leaf index beyond its leaves.");
       words[to + child] = depth[at] < levels - 1 ? place[index]
-        : bricks ? (leaf_begin + (index >>> 1)) * 256 + (index & 1) : (leaf_begin + index) * 256;
-      pointers[pointer_count++] = to + child;
+        : bricks ? (leafBegin + (index >>> 1)) * 256 + (index & 1) : (leafBegin + index) * 256;
+      pointers[pointerCount++] = to + child;
     }
     at += 1 + count;
   }
-  const leaves = copy_leaves(tile.subarray(kHeadWords + node_words), bricks, leaf_count, words, leaf_begin);
-  return {level, levels, words, pointers: pointers.subarray(0, pointer_count), root: place[0], leaf_begin,
+  const leaves = copyLeaves(tile.subarray(kHeadWords + nodeWords), bricks, leafCount, words, leafBegin);
+  return {level, levels, words, pointers: pointers.subarray(0, pointerCount), root: place[0], leafBegin,
           ...leaves};
 }
 
 // How many levels the tiles of a level have in a file with this manifest, and whether bricks are below them.
-export function tile_shape({levels, tile_levels}, level) {
+export function tileShape({levels, tile_levels}, level) {
   const below = levels - 2 - level, own = (below - 1) % tile_levels + 1;
   return {levels: own, bricks: own === below};
 }
 
-function check_head(tile, level, {levels, bricks}) {
+function checkHead(tile, level, {levels, bricks}) {
   if (tile.length < kHeadWords + 2 || tile[0] !== kMagic) throw new Error("A tile does not begin as tiles do.");
   const shape = level | levels << 8 | bricks << 16;
   if (tile[1] !== shape) throw new Error(`A tile has the shape ${tile[1].toString(16)}; expected ${shape.toString(16)}.`);
@@ -69,14 +69,14 @@ function check_head(tile, level, {levels, bricks}) {
 }
 
 // Packs the nodes in their order, none across the end of a block. Returns the texel after the last.
-function place_nodes(nodes, levels, place, depth) {
+function placeNodes(nodes, levels, place, depth) {
   let address = 0;
   for (let at = 0; at < nodes.length;) {
     const mask = nodes[at], count = kPopcount[mask & 255];
     if (mask === 0 || mask > 255 || at + count >= nodes.length)
       throw new Error(`A tile's node word ${at} is not a child mask.`);
     const texels = Math.ceil(count / kTexelWords);
-    if (address % kBlockTexels + texels > kBlockTexels) address = round_up(address, kBlockTexels);
+    if (address % kBlockTexels + texels > kBlockTexels) address = roundUp(address, kBlockTexels);
     place[at] = address * 256 + mask;
     address += texels;
     at += 1 + count;
@@ -98,12 +98,12 @@ function place_nodes(nodes, levels, place, depth) {
   return address;
 }
 
-function copy_leaves(leaves, bricks, count, words, begin) {
-  const expect_some = (low, high, leaf) => {
+function copyLeaves(leaves, bricks, count, words, begin) {
+  const expectSome = (low, high, leaf) => {
     if (low === 0 && high === 0) throw new Error(`A tile's leaf ${leaf} has nothing to draw.`);
   };
   if (bricks) {
-    for (let i = 0; i < count; ++i) expect_some(leaves[2 * i], leaves[2 * i + 1], i);
+    for (let i = 0; i < count; ++i) expectSome(leaves[2 * i], leaves[2 * i + 1], i);
     words.set(leaves, begin * kTexelWords);
     return {addresses: null, coarse: null};
   }
@@ -115,11 +115,11 @@ function copy_leaves(leaves, bricks, count, words, begin) {
     words[to + 1] = coarse[2 * i] = leaves[from + 2];
     words[to + 2] = coarse[2 * i + 1] = leaves[from + 3];
     if (addresses[i] > kMaxOffset) throw new Error(`A tile's leaf ${i} lies at word ${addresses[i]} of its level.`);
-    expect_some(coarse[2 * i], coarse[2 * i + 1], i);
+    expectSome(coarse[2 * i], coarse[2 * i + 1], i);
   }
   return {addresses, coarse};
 }
 
-function round_up(value, multiple) {
+function roundUp(value, multiple) {
   return Math.ceil(value / multiple) * multiple;
 }

@@ -14,40 +14,40 @@ const kFirstRows = 256;                       // of a pool that grows: 16 MiB
 const kErrorFlags = 8;                        // more than WebGL has
 
 export class TilePool {
-  constructor(gl, budget_bytes) {
+  constructor(gl, budgetBytes) {
     this.gl = gl;
     // A tile has one block or more, so there are at most as many slots; and an entry of the table for each.
-    const row_bytes = kRowTexels * kTexelBytes + kBlocksPerRow * 4;
-    const rows = Math.floor((budget_bytes - kTableWidth * 4) / row_bytes);
-    if (rows < 1) throw new Error(`A budget of ${budget_bytes} bytes is too small for the viewer.`);
+    const rowBytes = kRowTexels * kTexelBytes + kBlocksPerRow * 4;
+    const rows = Math.floor((budgetBytes - kTableWidth * 4) / rowBytes);
+    if (rows < 1) throw new Error(`A budget of ${budgetBytes} bytes is too small for the viewer.`);
     const grows = rows >= 4 * kFirstRows;
-    this.max_rows = Math.min(grows ? rows - kFirstRows : rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
-    this.rows = grows ? kFirstRows : this.max_rows;
-    this.block_count = this.max_rows * kBlocksPerRow;  // in the end
-    this.table_rows = Math.ceil(this.block_count / kTableWidth);
-    this.slot_count = this.table_rows * kTableWidth;
-    this.texels = this.create_texture(gl.RGBA32UI, kRowTexels, this.rows);
-    this.table = this.create_texture(gl.R32UI, kTableWidth, this.table_rows);
+    this.maxRows = Math.min(grows ? rows - kFirstRows : rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
+    this.rows = grows ? kFirstRows : this.maxRows;
+    this.blockCount = this.maxRows * kBlocksPerRow;  // in the end
+    this.tableRows = Math.ceil(this.blockCount / kTableWidth);
+    this.slotCount = this.tableRows * kTableWidth;
+    this.texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.rows);
+    this.table = this.createTexture(gl.R32UI, kTableWidth, this.tableRows);
     this.free = [];           // blocks that were used and released
-    this.next_block = 0;      // this one and those after it were never used
-    this.free_slots = [];
-    this.next_slot = 1;       // slot 0 means none
+    this.nextBlock = 0;      // this one and those after it were never used
+    this.freeSlots = [];
+    this.nextSlot = 1;       // slot 0 means none
   }
 
   get bytes() {
-    return this.rows * kRowTexels * kTexelBytes + this.slot_count * 4;
+    return this.rows * kRowTexels * kTexelBytes + this.slotCount * 4;
   }
-  get free_blocks() {
-    return this.free.length + this.block_count - this.next_block;
+  get freeBlocks() {
+    return this.free.length + this.blockCount - this.nextBlock;
   }
 
   // Block numbers, or null if there are not so many free ones: also if there seemed to be, but the pool cannot grow.
   allocate(count) {
-    if (this.free_blocks < count) return null;
-    const end = this.next_block + Math.max(0, count - this.free.length);
+    if (this.freeBlocks < count) return null;
+    const end = this.nextBlock + Math.max(0, count - this.free.length);
     if (end > this.rows * kBlocksPerRow && !this.grow()) return null;
     const blocks = new Uint32Array(count);
-    for (let i = 0; i < count; ++i) blocks[i] = this.free.length > 0 ? this.free.pop() : this.next_block++;
+    for (let i = 0; i < count; ++i) blocks[i] = this.free.length > 0 ? this.free.pop() : this.nextBlock++;
     return blocks.sort();
   }
 
@@ -55,11 +55,11 @@ export class TilePool {
   grow() {
     const {gl} = this, before = this.texels;
     for (let flags = 0; flags < kErrorFlags && gl.getError() !== gl.NO_ERROR; ++flags);  // of other calls
-    const texels = this.create_texture(gl.RGBA32UI, kRowTexels, this.max_rows);
+    const texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.maxRows);
     if (gl.getError() !== gl.NO_ERROR) {
       gl.deleteTexture(texels);
-      this.max_rows = this.rows;
-      this.block_count = this.rows * kBlocksPerRow;
+      this.maxRows = this.rows;
+      this.blockCount = this.rows * kBlocksPerRow;
       return false;
     }
     const framebuffer = gl.createFramebuffer();
@@ -70,7 +70,7 @@ export class TilePool {
     gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 0, 0, kRowTexels, this.rows);
     gl.deleteFramebuffer(framebuffer);
     gl.deleteTexture(before);
-    this.rows = this.max_rows;
+    this.rows = this.maxRows;
     return true;
   }
 
@@ -78,15 +78,15 @@ export class TilePool {
     for (let i = blocks.length - 1; i >= 0; --i) this.free.push(blocks[i]);
   }
 
-  allocate_slot() {
-    if (this.free_slots.length > 0) return this.free_slots.pop();
-    return this.next_slot < this.slot_count ? this.next_slot++ : 0;
+  allocateSlot() {
+    if (this.freeSlots.length > 0) return this.freeSlots.pop();
+    return this.nextSlot < this.slotCount ? this.nextSlot++ : 0;
   }
-  get has_free_slot() {
-    return this.free_slots.length > 0 || this.next_slot < this.slot_count;
+  get hasFreeSlot() {
+    return this.freeSlots.length > 0 || this.nextSlot < this.slotCount;
   }
-  release_slot(slot) {
-    this.free_slots.push(slot);
+  releaseSlot(slot) {
+    this.freeSlots.push(slot);
   }
 
   // Writes a decoded tile to its blocks. Returns the pointer to its root.
@@ -100,8 +100,8 @@ export class TilePool {
       let last = first + 1;
       while (last < blocks.length && blocks[last] === blocks[first] + last - first &&
              blocks[last] % kBlocksPerRow !== 0) ++last;
-      const block_words = kBlockTexels * kTexelWords;
-      this.write(blocks[first] * kBlockTexels, words.subarray(first * block_words, last * block_words));
+      const blockWords = kBlockTexels * kTexelWords;
+      this.write(blocks[first] * kBlockTexels, words.subarray(first * blockWords, last * blockWords));
       first = last;
     }
     return absolute(root);
@@ -116,7 +116,7 @@ export class TilePool {
   }
 
   // `pointer` to the root of the slot's tile, 0 if it is not there.
-  set_slot(slot, pointer) {
+  setSlot(slot, pointer) {
     const {gl} = this;
     gl.bindTexture(gl.TEXTURE_2D, this.table);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, slot % kTableWidth, Math.floor(slot / kTableWidth), 1, 1,
@@ -128,7 +128,7 @@ export class TilePool {
     this.gl.deleteTexture(this.table);
   }
 
-  create_texture(format, width, height) {
+  createTexture(format, width, height) {
     const {gl} = this;
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);

@@ -9,14 +9,14 @@
 // that are fetched for one view is bounded, however small the pool is.
 
 import {kRoundsToKnow} from "./loader.js";
-import {decode_tile, kBlockTexels, kTexelWords, tile_shape} from "./tile_format.js";
+import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js";
 
 const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
 const kFreeShare = 1 / 64;    // of the pool, that leaves at once
 
 // A number for a node: offsets are below 2^40.
-export function key_of(level, offset) {
+export function keyOf(level, offset) {
   return offset * 32 + level;
 }
 
@@ -29,38 +29,38 @@ export class TileStore {
     this.slots = new Map();     // key -> slot
     this.owner = [];            // block -> tile
     this.ordinal = [];          // block -> its number within the tile
-    this.by_slot = [];          // slot -> {key, tile or null, references}
+    this.bySlot = [];          // slot -> {key, tile or null, references}
     this.root = null;
-    this.tile_bytes = 0;
+    this.tileBytes = 0;
     this.epoch = 0;
     this.rounds = 0;            // readings of the feedback in this epoch
     this.evicted = 0;
   }
 
-  begin_epoch() {
+  beginEpoch() {
     this.epoch++;
     this.rounds = 0;
   }
 
   get(level, offset) {
-    return this.tiles.get(key_of(level, offset));
+    return this.tiles.get(keyOf(level, offset));
   }
 
   // The cut-off node in a texel of the pool, {tile, index, level, offset, key}; null if there is none
   // (any more).
-  cut_off_node(texel) {
+  cutOffNode(texel) {
     const block = Math.floor(texel / kBlockTexels), tile = this.owner[block];
     if (!tile || !tile.addresses) return null;
-    const index = this.ordinal[block] * kBlockTexels + texel % kBlockTexels - tile.leaf_begin;
+    const index = this.ordinal[block] * kBlockTexels + texel % kBlockTexels - tile.leafBegin;
     if (index < 0 || index >= tile.addresses.length) return null;
     const level = tile.level + tile.levels, offset = tile.addresses[index];
-    return {tile, index, level, offset, key: key_of(level, offset), texel};
+    return {tile, index, level, offset, key: keyOf(level, offset), texel};
   }
 
   // The same by the node's place in its tile.
   leaf(tile, index) {
-    const at = tile.leaf_begin + index;
-    return this.cut_off_node(tile.blocks[Math.floor(at / kBlockTexels)] * kBlockTexels + at % kBlockTexels);
+    const at = tile.leafBegin + index;
+    return this.cutOffNode(tile.blocks[Math.floor(at / kBlockTexels)] * kBlockTexels + at % kBlockTexels);
   }
 
   // Makes the cut-off node refer to its tile, which must be loaded.
@@ -68,7 +68,7 @@ export class TileStore {
     const slot = this.slots.get(node.key);
     if (node.tile.links.has(node.index) || slot === undefined) return false;
     node.tile.links.set(node.index, slot);
-    this.by_slot[slot].references++;
+    this.bySlot[slot].references++;
     const {coarse} = node.tile;
     this.pool.write(node.texel, Uint32Array.of(slot, coarse[2 * node.index], coarse[2 * node.index + 1], 0));
     return true;
@@ -76,37 +76,37 @@ export class TileStore {
 
   // Stores a tile as fetched. False if the pool is full of what the view needs. Throws if the tile is
   // damaged.
-  add(level, offset, words, now_ms) {
-    const key = key_of(level, offset);
+  add(level, offset, words, nowMs) {
+    const key = keyOf(level, offset);
     if (this.tiles.has(key)) return true;
-    const decoded = decode_tile(words, level, tile_shape(this.info, level));
+    const decoded = decodeTile(words, level, tileShape(this.info, level));
     const count = decoded.words.length * 4 / kBlockBytes;
-    if (!this.evict_for(count, !this.slots.has(key), now_ms)) return false;
+    if (!this.evictFor(count, !this.slots.has(key), nowMs)) return false;
     const blocks = this.pool.allocate(count);
     if (!blocks) return false;
-    const slot = this.slots.get(key) ?? this.pool.allocate_slot();
-    const tile = {key, level, offset, levels: decoded.levels, slot, blocks, leaf_begin: decoded.leaf_begin,
-                  addresses: decoded.addresses, coarse: decoded.coarse, links: new Map(), used_ms: now_ms, epoch: this.epoch, pointer: 0};
+    const slot = this.slots.get(key) ?? this.pool.allocateSlot();
+    const tile = {key, level, offset, levels: decoded.levels, slot, blocks, leafBegin: decoded.leafBegin,
+                  addresses: decoded.addresses, coarse: decoded.coarse, links: new Map(), usedMs: nowMs, epoch: this.epoch, pointer: 0};
     tile.pointer = this.pool.upload(blocks, decoded);
     blocks.forEach((block, i) => {
       this.owner[block] = tile;
       this.ordinal[block] = i;
     });
-    this.pool.set_slot(slot, tile.pointer);
+    this.pool.setSlot(slot, tile.pointer);
     this.slots.set(key, slot);
-    this.by_slot[slot] ??= {key, tile: null, references: 0};
-    this.by_slot[slot].tile = tile;
+    this.bySlot[slot] ??= {key, tile: null, references: 0};
+    this.bySlot[slot].tile = tile;
     this.tiles.set(key, tile);
-    this.tile_bytes += count * kBlockBytes;
+    this.tileBytes += count * kBlockBytes;
     return true;
   }
 
-  set_root(level, offset) {
+  setRoot(level, offset) {
     this.root = this.get(level, offset);
   }
 
   // The only brick of a grid of 4^3 voxels, as two words. Returns the pointer to it.
-  add_brick(brick) {
+  addBrick(brick) {
     const words = new Uint32Array(kBlockTexels * kTexelWords);
     words.set(brick);
     const blocks = this.pool.allocate(1);
@@ -115,24 +115,24 @@ export class TileStore {
   }
 
   // The tile in a slot was seen in a picture of epoch `epoch`.
-  mark(slot, epoch, now_ms) {
-    const tile = this.by_slot[slot]?.tile;
+  mark(slot, epoch, nowMs) {
+    const tile = this.bySlot[slot]?.tile;
     if (!tile) return;
-    tile.used_ms = now_ms;
+    tile.usedMs = nowMs;
     if (epoch > tile.epoch) tile.epoch = epoch;
   }
 
   // Makes room for a tile of `count` blocks. A slot may be taken by a tile that has left, as long as others
   // refer to it; so these leave until one is free.
-  evict_for(count, needs_slot, now_ms) {
-    const fits = (blocks) => this.pool.free_blocks >= blocks && (!needs_slot || this.pool.has_free_slot);
+  evictFor(count, needsSlot, nowMs) {
+    const fits = (blocks) => this.pool.freeBlocks >= blocks && (!needsSlot || this.pool.hasFreeSlot);
     if (fits(count)) return true;
-    const max_used_ms = now_ms - (this.rounds >= kRoundsToKnow ? 0 : kRecentMs);
+    const maxUsedMs = nowMs - (this.rounds >= kRoundsToKnow ? 0 : kRecentMs);
     const candidates = [];
     for (const tile of this.tiles.values())
-      if (tile !== this.root && tile.epoch !== this.epoch && tile.used_ms < max_used_ms) candidates.push(tile);
-    candidates.sort((a, b) => a.used_ms - b.used_ms);
-    const target = count + this.pool.block_count * kFreeShare;
+      if (tile !== this.root && tile.epoch !== this.epoch && tile.usedMs < maxUsedMs) candidates.push(tile);
+    candidates.sort((a, b) => a.usedMs - b.usedMs);
+    const target = count + this.pool.blockCount * kFreeShare;
     for (const tile of candidates) {
       if (fits(target)) break;
       this.evict(tile);
@@ -142,24 +142,24 @@ export class TileStore {
 
   evict(tile) {
     this.evicted++;
-    this.tile_bytes -= tile.blocks.length * kBlockBytes;
+    this.tileBytes -= tile.blocks.length * kBlockBytes;
     this.tiles.delete(tile.key);
     for (const block of tile.blocks) this.owner[block] = undefined;
     this.pool.release(tile.blocks);
-    this.pool.set_slot(tile.slot, 0);
-    this.by_slot[tile.slot].tile = null;
-    this.release_if_unused(tile.slot);
+    this.pool.setSlot(tile.slot, 0);
+    this.bySlot[tile.slot].tile = null;
+    this.releaseIfUnused(tile.slot);
     for (const slot of tile.links.values()) {
-      this.by_slot[slot].references--;
-      this.release_if_unused(slot);
+      this.bySlot[slot].references--;
+      this.releaseIfUnused(slot);
     }
   }
 
-  release_if_unused(slot) {
-    const entry = this.by_slot[slot];
+  releaseIfUnused(slot) {
+    const entry = this.bySlot[slot];
     if (!entry || entry.tile || entry.references > 0) return;
-    this.by_slot[slot] = undefined;
+    this.bySlot[slot] = undefined;
     this.slots.delete(entry.key);
-    this.pool.release_slot(slot);
+    this.pool.releaseSlot(slot);
   }
 }
