@@ -32,7 +32,7 @@ function show(page) {
 function route({focus = true} = {}) {
   const [path, query = ""] = (location.hash.slice(1) || "/").split("?");
   const found = kRoutes.map(([pattern, name, page]) => [pattern.exec(path), name, page])
-                       .find(([match]) => match);
+                    .find(([match]) => match);
   for (const link of document.querySelectorAll("nav a")) {
     if (found && link.dataset.page === found[1]) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
@@ -41,8 +41,10 @@ function route({focus = true} = {}) {
     const [match, , page] = found;
     show((signal) => page(match.slice(1), new URLSearchParams(query), signal));
   } else {
-    show(() => ({title: "Not found", content:
-      problemBox(new Problem(404, "not_found", `There is no page ${path}.`))}));
+    show(() => ({
+           title: "Not found",
+           content: problemBox(new Problem(404, "not_found", `There is no page ${path}.`))
+         }));
   }
   if (focus) main.focus({preventScroll: true});
 }
@@ -59,5 +61,6 @@ signOut.addEventListener("click", async () => {
 });
 
 route({focus: false});
-getJson("/version").then(({version}) => setText(document.getElementById("version"), `voxdag ${version}`))
-                    .catch(() => {});
+getJson("/version")
+    .then(({version}) => setText(document.getElementById("version"), `voxdag ${version}`))
+    .catch(() => {});

@@ -31,12 +31,13 @@ export function authorization() {
   return token.get() ? {Authorization: `Bearer ${token.get()}`} : {};
 }
 
-// Returns the Response of a successful request, else throws Problem. A 401 also shows the login page.
+// Returns the Response of a successful request, else throws Problem. A 401 also shows the login
+// page.
 export async function request(method, path, {headers = {}, body, signal} = {}) {
   let response;
   try {
-    response = await fetch(path, {method, body, signal, cache: "no-store",
-                                  headers: {...authorization(), ...headers}});
+    response = await fetch(
+        path, {method, body, signal, cache: "no-store", headers: {...authorization(), ...headers}});
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new Problem(0, "unreachable", "The service does not answer.");
@@ -47,8 +48,9 @@ export async function request(method, path, {headers = {}, body, signal} = {}) {
 
 async function problemOf(response) {
   const members = await response.json().catch(() => ({}));
-  const problem = new Problem(response.status, members.code || `http_${response.status}`,
-                              members.detail || response.statusText, members, response.headers);
+  const problem = new Problem(
+      response.status, members.code || `http_${response.status}`,
+      members.detail || response.statusText, members, response.headers);
   if (response.status === 401) window.dispatchEvent(new Event("voxdag-login"));
   return problem;
 }
@@ -69,8 +71,10 @@ export async function sendJson(method, path, body, {headers = {}, signal} = {}) 
 
 // A value for Idempotency-Key. crypto.randomUUID() is not available on plain http.
 export function randomKey() {
-  return Array.from(crypto.getRandomValues(new Uint8Array(16)),
-                    (byte) => byte.toString(16).padStart(2, "0")).join("");
+  return Array
+      .from(
+          crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0"))
+      .join("");
 }
 
 // Resolves after `ms`, or immediately when `signal` aborts; with `untilVisible` not before the page
@@ -87,7 +91,8 @@ export function sleep(ms, signal, untilVisible = false) {
       if (!untilVisible || !document.hidden) done();
     };
     const timer = setTimeout(doneIfVisible, ms);
-    if (untilVisible) document.addEventListener("visibilitychange", doneIfVisible, {signal: listening.signal});
+    if (untilVisible)
+      document.addEventListener("visibilitychange", doneIfVisible, {signal: listening.signal});
     signal.addEventListener("abort", done, {signal: listening.signal});
     if (signal.aborted) done();
   });

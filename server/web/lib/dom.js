@@ -16,12 +16,14 @@ export function svg(tag, attributes = {}, ...children) {
 function fill(element, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (name === "on") {
-      for (const [event, listener] of Object.entries(value)) element.addEventListener(event, listener);
+      for (const [event, listener] of Object.entries(value))
+        element.addEventListener(event, listener);
     } else if (value !== null && value !== undefined && value !== false) {
       element.setAttribute(name, value === true ? "" : value);
     }
   }
-  element.append(...children.flat().filter((child) => child !== null && child !== false && child !== undefined));
+  element.append(...children.flat().filter(
+      (child) => child !== null && child !== false && child !== undefined));
   return element;
 }
 
@@ -45,8 +47,8 @@ export function field(label, control, hint = null) {
   const id = control.id || `f-${++field.count}`;
   control.id = id;
   if (hint) control.setAttribute("aria-describedby", `${id}-hint`);
-  return h("div", {class: "field"}, h("label", {for: id}, label), control,
-           hint && h("p", {class: "hint", id: `${id}-hint`}, hint));
+  return h("div", {class: "field"}, h("label", {for: id
+           }, label), control, hint && h("p", {class: "hint", id: `${id}-hint`}, hint));
 }
 field.count = 0;
 
@@ -57,12 +59,11 @@ export function fact(name, ...value) {
 
 // Asks in a modal dialog; resolves to true if the user confirms the action.
 export function confirmAction(title, text, action) {
-  const dialog = h("dialog", {class: "ask", "aria-labelledby": "ask-title"},
-    h("form", {method: "dialog"},
-      h("h2", {id: "ask-title"}, title), h("p", {}, text),
-      h("div", {class: "buttons end"},
-        h("button", {value: "no", class: "quiet"}, "No"),
-        h("button", {value: "yes", class: "danger"}, action))));
+  const dialog =
+      h("dialog", {class: "ask", "aria-labelledby": "ask-title"},
+        h("form", {method: "dialog"}, h("h2", {id: "ask-title"}, title), h("p", {}, text),
+          h("div", {class: "buttons end"}, h("button", {value: "no", class: "quiet"}, "No"),
+            h("button", {value: "yes", class: "danger"}, action))));
   document.body.append(dialog);
   dialog.showModal();
   return new Promise((resolve) => dialog.addEventListener("close", () => {

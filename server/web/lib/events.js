@@ -26,7 +26,8 @@ export class EventParser {
   }
   parseLine(line) {
     if (line === "") {
-      if (this.data.length) this.onEvent({event: this.event, data: this.data.join("\n"), id: this.id});
+      if (this.data.length)
+        this.onEvent({event: this.event, data: this.data.join("\n"), id: this.id});
       this.begin();
       return;
     }
@@ -39,18 +40,22 @@ export class EventParser {
 }
 
 // Calls onEvent(name, parsed data) for every event, and onStatus("live" | "waiting", problem) when
-// the connection opens and closes. Returns when the stream has ended or `signal` aborts; throws Problem
-// if a retry is useless (401, 403, 404).
+// the connection opens and closes. Returns when the stream has ended or `signal` aborts; throws
+// Problem if a retry is useless (401, 403, 404).
 export async function follow(path, {onEvent, onStatus, signal}) {
   let lastId = null;
   let retryMs = 3000;
   let failures = 0;
   let ended = false;
-  const parserFor = () => new EventParser((event) => {
-    if (event.id !== null) lastId = event.id;
-    if (event.event === "end") ended = true;
-    onEvent(event.event, JSON.parse(event.data));
-  }, (ms) => { retryMs = ms; });
+  const parserFor = () => new EventParser(
+      (event) => {
+        if (event.id !== null) lastId = event.id;
+        if (event.event === "end") ended = true;
+        onEvent(event.event, JSON.parse(event.data));
+      },
+      (ms) => {
+        retryMs = ms;
+      });
 
   while (!signal.aborted && !ended) {
     let problem = null;
@@ -63,7 +68,9 @@ export async function follow(path, {onEvent, onStatus, signal}) {
       });
     } catch (error) {
       if (signal.aborted) return;
-      problem = error instanceof Problem ? error : new Problem(0, "unreachable", "The connection was lost.");
+      problem = error instanceof Problem ?
+          error :
+          new Problem(0, "unreachable", "The connection was lost.");
       if (problem.status && !problem.isTransient) throw problem;
     }
     if (ended || signal.aborted) return;

@@ -47,7 +47,8 @@ export function durationText(seconds) {
   if (seconds > 0 && seconds < 0.9995) return `${Math.max(1, Math.round(1000 * seconds))} ms`;
   const whole = Math.round(seconds);
   const two = (n) => String(n).padStart(2, "0");
-  if (whole >= 86400) return `${Math.floor(whole / 86400)} d ${two(Math.floor(whole / 3600) % 24)} h`;
+  if (whole >= 86400)
+    return `${Math.floor(whole / 86400)} d ${two(Math.floor(whole / 3600) % 24)} h`;
   if (whole >= 3600) return `${Math.floor(whole / 3600)} h ${two(Math.floor(whole / 60) % 60)} m`;
   if (whole >= 60) return `${Math.floor(whole / 60)} m ${two(whole % 60)} s`;
   return `${seconds.toFixed(1)} s`;
@@ -58,7 +59,9 @@ export function agoText(time) {
   const seconds = (Date.now() - Date.parse(time)) / 1000;
   const away = Math.abs(seconds);
   if (away < 45) return seconds >= 0 ? "just now" : "in a moment";
-  const [n, unit] = away < 5400 ? [away / 60, "min"] : away < 129600 ? [away / 3600, "h"] : [away / 86400, "days"];
+  const [n, unit] = away < 5400 ? [away / 60, "min"] :
+      away < 129600             ? [away / 3600, "h"] :
+                                  [away / 86400, "days"];
   const text = `${Math.round(n)} ${unit}`;
   return seconds >= 0 ? `${text} ago` : `in ${text}`;
 }
@@ -68,7 +71,7 @@ export function timeText(time) {
   const date = new Date(time);
   const two = (n) => String(n).padStart(2, "0");
   return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ` +
-         `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}`;
+      `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}`;
 }
 
 export function gridText(resolution) {

@@ -10,7 +10,9 @@ export const kSceneName = /^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\.(glb|gltf|ply)$/;
 
 // "My scene (2).glb" -> "My-scene-2.glb"
 export function sceneName(fileName) {
-  return fileName.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "").replace(/-+\./g, ".");
+  return fileName.replace(/[^A-Za-z0-9._-]+/g, "-")
+      .replace(/^[^A-Za-z0-9]+/, "")
+      .replace(/-+\./g, ".");
 }
 
 // Resolves to the SCENE. Calls onProgress(bytes received) often. Throws Problem, or AbortError when
@@ -66,16 +68,22 @@ async function resumeOffset(path, file, name, signal) {
 async function putPart(path, file, offset, onProgress, signal) {
   const end = Math.min(file.size, offset + kPartBytes);
   const part = await file.slice(offset, end).arrayBuffer();
-  const range = end > offset ? `${offset}-${end - 1}` : "*";  // an empty part finishes what has all its bytes
-  const headers = {...authorization(), "Content-Type": "application/octet-stream",
-                   "Content-Range": `bytes ${range}/${file.size}`, ...await digestHeader(part)};
+  const range =
+      end > offset ? `${offset}-${end - 1}` : "*";  // an empty part finishes what has all its bytes
+  const headers = {
+    ...authorization(),
+    "Content-Type": "application/octet-stream",
+    "Content-Range": `bytes ${range}/${file.size}`,
+    ...await digestHeader(part)
+  };
   return new Promise((resolve, reject) => {
     const put = new XMLHttpRequest();
     const cancel = () => put.abort();
     signal.addEventListener("abort", cancel, {once: true});
     put.open("PUT", path);
     for (const [name, value] of Object.entries(headers)) put.setRequestHeader(name, value);
-    put.upload.addEventListener("progress", (event) => onProgress(offset + Math.min(event.loaded, end - offset)));
+    put.upload.addEventListener(
+        "progress", (event) => onProgress(offset + Math.min(event.loaded, end - offset)));
     put.addEventListener("loadend", () => {
       signal.removeEventListener("abort", cancel);
       if (put.status >= 200 && put.status < 300) resolve(parse(put.responseText));
@@ -97,7 +105,9 @@ function problemOf(put) {
   if (put.status === 401) window.dispatchEvent(new Event("voxdag-login"));
   const members = parse(put.responseText);
   const headers = {get: (name) => put.getResponseHeader(name)};
-  return new Problem(put.status, members.code || `http_${put.status}`, members.detail || put.statusText, members, headers);
+  return new Problem(
+      put.status, members.code || `http_${put.status}`, members.detail || put.statusText, members,
+      headers);
 }
 
 function parse(text) {

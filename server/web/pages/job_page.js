@@ -1,11 +1,19 @@
 // The page of one job, updated by its events.
 
 import {getJson, sleep} from "../lib/api.js";
-import {ClusterView} from "../views/cluster_view.js";
-import {CubesView} from "../views/cubes_view.js";
 import {announce, clear, fact, h, setText} from "../lib/dom.js";
 import {follow} from "../lib/events.js";
-import {agoText, gridText, hasEnded, sceneText, stateText, timeText, titleText} from "../lib/format.js";
+import {
+  agoText,
+  gridText,
+  hasEnded,
+  sceneText,
+  stateText,
+  timeText,
+  titleText
+} from "../lib/format.js";
+import {ClusterView} from "../views/cluster_view.js";
+import {CubesView} from "../views/cubes_view.js";
 import {actions} from "../views/job_actions.js";
 import {LogView} from "../views/log_view.js";
 import {copyButton, problemBox, stateBadge} from "../views/parts.js";
@@ -28,8 +36,8 @@ class JobPage {
     this.path = `/api/v1/jobs/${id}`;
     this.signal = signal;
     this.job = null;
-    this.places = Object.fromEntries(
-      ["head", "actions", "error", "warnings", "result"].map((name) => [name, h("div", {class: name})]));
+    this.places = Object.fromEntries(["head", "actions", "error", "warnings", "result"].map(
+        (name) => [name, h("div", {class: name})]));
     this.places.error.setAttribute("role", "alert");
     this.link = h("span", {class: "link-state"});
     this.progress = new ProgressView();
@@ -38,8 +46,9 @@ class JobPage {
     this.rate = new RatePlot(id);
     this.cubes = new CubesView(`${this.path}/subvolumes`, signal);
     this.log = new LogView(`${this.path}/log`, signal);
-    this.element = h("div", {class: "stack"}, h("p", {class: "crumb"}, h("a", {href: "#/"}, "Jobs"), this.link),
-      h("p", {class: "loading"}, "Loading…"));
+    this.element = h(
+        "div", {class: "stack"}, h("p", {class: "crumb"}, h("a", {href: "#/"}, "Jobs"), this.link),
+        h("p", {class: "loading"}, "Loading…"));
   }
 
   // Follows the job until it has ended, and again if it is retried.
@@ -95,8 +104,10 @@ class JobPage {
     this.showHead();
     if (changed) this.showActions();
     clear(this.places.error, errorBox(job));
-    clear(this.places.warnings, job.warnings.length > 0 && h("ul", {class: "notice"},
-      job.warnings.map((text) => h("li", {}, text))));
+    clear(
+        this.places.warnings,
+        job.warnings.length > 0 &&
+            h("ul", {class: "notice"}, job.warnings.map((text) => h("li", {}, text))));
     this.progress.show(job);
     if (job.progress) this.updateProgress(job.progress);
     this.cubes.update(job);
@@ -121,38 +132,42 @@ class JobPage {
   }
 
   buildLayout() {
-    clear(this.element, this.element.firstChild,
-      this.places.head, this.places.actions, this.places.error, this.places.warnings,
-      this.progress.element, this.places.result,
-      h("div", {class: "two"},
-        h("div", {class: "stack"},
-          h("section", {class: "card", "aria-labelledby": "stages-title"},
-            h("h2", {id: "stages-title"}, "Stages"), this.timeline.element),
-          this.cluster.element,
-          this.rateCard = h("section", {class: "card", "aria-labelledby": "rate-title"},
-            h("h2", {id: "rate-title"}, "Rate"), this.rate.element),
-          h("section", {class: "card", "aria-labelledby": "about-title"},
-            h("h2", {id: "about-title"}, "About this job"), this.about = h("dl", {class: "facts"}))),
-        h("section", {class: "card", "aria-labelledby": "cubes-title"},
-          h("h2", {id: "cubes-title"}, "Subvolumes"), this.cubes.element)),
-      this.log.element);
+    clear(
+        this.element, this.element.firstChild, this.places.head, this.places.actions,
+        this.places.error, this.places.warnings, this.progress.element, this.places.result,
+        h("div", {class: "two"},
+          h("div", {class: "stack"},
+            h("section", {class: "card", "aria-labelledby": "stages-title"},
+              h("h2", {id: "stages-title"}, "Stages"), this.timeline.element),
+            this.cluster.element,
+            this.rateCard =
+                h("section", {class: "card", "aria-labelledby": "rate-title"},
+                  h("h2", {id: "rate-title"}, "Rate"), this.rate.element),
+            h("section", {class: "card", "aria-labelledby": "about-title"},
+              h("h2", {id: "about-title"}, "About this job"),
+              this.about = h("dl", {class: "facts"}))),
+          h("section", {class: "card", "aria-labelledby": "cubes-title"},
+            h("h2", {id: "cubes-title"}, "Subvolumes"), this.cubes.element)),
+        this.log.element);
   }
 
   showHead() {
     const job = this.job;
-    clear(this.places.head, h("div", {class: "title-row"}, h("h1", {}, titleText(job)), stateBadge(job.state)),
-      h("p", {class: "about"}, job.name ? `${sceneText(job)} · ` : "", gridText(job.resolution)));
-    const when = (time) => time ? [timeText(time), " ", h("span", {class: "faint"}, agoText(time))] : ["–"];
-    const options = Object.entries(job.options || {}).map(([name, value]) => `${name} ${value}`).join(", ");
-    clear(this.about,
-      fact("Id", h("code", {}, job.id), " ", copyButton(job.id, "the job's id")),
-      fact("Scene", [job.scene].flat().join(", ")),
-      fact("Options", options || "default"),
-      fact("Priority", String(job.priority)),
-      fact("Attempts", `${job.attempts} of ${job.max_attempts}`),
-      fact("Created", ...when(job.created_at)),
-      fact("Started", ...when(job.started_at)),
-      fact("Finished", ...when(job.finished_at)));
+    clear(
+        this.places.head,
+        h("div", {class: "title-row"}, h("h1", {}, titleText(job)), stateBadge(job.state)),
+        h("p", {class: "about"}, job.name ? `${sceneText(job)} · ` : "", gridText(job.resolution)));
+    const when = (time) =>
+        time ? [timeText(time), " ", h("span", {class: "faint"}, agoText(time))] : ["–"];
+    const options =
+        Object.entries(job.options || {}).map(([name, value]) => `${name} ${value}`).join(", ");
+    clear(
+        this.about, fact("Id", h("code", {}, job.id), " ", copyButton(job.id, "the job's id")),
+        fact("Scene", [job.scene].flat().join(", ")), fact("Options", options || "default"),
+        fact("Priority", String(job.priority)),
+        fact("Attempts", `${job.attempts} of ${job.max_attempts}`),
+        fact("Created", ...when(job.created_at)), fact("Started", ...when(job.started_at)),
+        fact("Finished", ...when(job.finished_at)));
   }
 
   // The buttons change with the state; keyboard focus stays among them.
@@ -164,12 +179,15 @@ class JobPage {
 
   showConnection(status, problem) {
     this.link.className = `link-state ${status}`;
-    setText(this.link, status === "live" ? "live" : `reconnecting: ${problem?.message || "the stream closed"}`);
+    setText(
+        this.link,
+        status === "live" ? "live" : `reconnecting: ${problem?.message || "the stream closed"}`);
   }
 
   showFailure(problem) {
-    clear(this.element, this.element.firstChild, problemBox(problem),
-      h("div", {class: "buttons"}, h("a", {class: "button", href: "#/"}, "All jobs")));
+    clear(
+        this.element, this.element.firstChild, problemBox(problem),
+        h("div", {class: "buttons"}, h("a", {class: "button", href: "#/"}, "All jobs")));
   }
 }
 
@@ -179,6 +197,7 @@ function errorBox(job) {
   const problem = {code: job.error.code, detail: job.error.message};
   if (job.state === "failed") return problemBox(problem, "This job failed.");
   if (job.not_before && Date.parse(job.not_before) > Date.now())
-    return problemBox(problem, `An attempt failed; the next one starts ${agoText(job.not_before)}.`);
+    return problemBox(
+        problem, `An attempt failed; the next one starts ${agoText(job.not_before)}.`);
   return job.state === "canceled" ? null : problemBox(problem, "An earlier attempt failed.");
 }

@@ -2,8 +2,19 @@
 
 import {getJson, poll} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";
-import {agoText, durationText, gridText, hasEnded, sceneText, shortCount, sizeText, stateText,
-        timeText, titleText, unitText} from "../lib/format.js";
+import {
+  agoText,
+  durationText,
+  gridText,
+  hasEnded,
+  sceneText,
+  shortCount,
+  sizeText,
+  stateText,
+  timeText,
+  titleText,
+  unitText
+} from "../lib/format.js";
 import {meter, problemBox, stateBadge, updateJobMeter} from "../views/parts.js";
 
 const kStates = ["running", "queued", "suspended", "failed", "canceled", "succeeded"];
@@ -38,10 +49,14 @@ export function jobsPage(_, query, signal) {
   };
   poll(update, (problem) => clear(error, problemBox(problem)), signal);
 
-  return {title: "Jobs", content: h("div", {class: "stack"},
-    h("div", {class: "page-head"}, h("h1", {}, "Jobs"),
-      h("a", {class: "button primary", href: "#/new"}, "New job")),
-    filters, error, list, empty, older)};
+  return {
+    title: "Jobs",
+    content:
+        h("div", {class: "stack"},
+          h("div", {class: "page-head"}, h("h1", {}, "Jobs"),
+            h("a", {class: "button primary", href: "#/new"}, "New job")),
+          filters, error, list, empty, older)
+  };
 }
 
 function emptyText(state, cursor) {
@@ -52,20 +67,29 @@ function emptyText(state, cursor) {
 
 function showFilters(element, counts, chosen) {
   const total = Object.values(counts).reduce((sum, n) => sum + n, 0);
-  const countOf = (state) => (counts[state] || 0) + (state === "running" ? counts.canceling || 0 : 0);
+  const countOf = (state) =>
+      (counts[state] || 0) + (state === "running" ? counts.canceling || 0 : 0);
   const entries = [[null, "all", total], ...kStates.map((state) => [state, state, countOf(state)])];
   if (!element.firstChild) {
-    element.append(h("nav", {"aria-label": "Jobs by state"}, entries.map(([state, name]) =>
-      h("a", {href: state ? `#/?state=${state}` : "#/", "aria-current": state === chosen ? "true" : null},
-        name, h("span", {class: "count"})))));
+    element.append(
+        h("nav", {"aria-label": "Jobs by state"},
+          entries.map(
+              ([state, name]) =>
+                  h("a", {
+                    href: state ? `#/?state=${state}` : "#/",
+                    "aria-current": state === chosen ? "true" : null
+                  },
+                    name, h("span", {class: "count"})))));
   }
   element.querySelectorAll(".count").forEach((count, i) => setText(count, String(entries[i][2])));
 }
 
 function showPaging(element, state, cursor, next_cursor) {
-  const to = (next) => `#/?${new URLSearchParams({...(state && {state}), ...(next && {cursor: next})})}`;
-  clear(element, cursor && h("a", {class: "button", href: to(null)}, "Newest"),
-        next_cursor && h("a", {class: "button", href: to(next_cursor)}, "Older jobs"));
+  const to = (next) =>
+      `#/?${new URLSearchParams({...(state && {state}), ...(next && {cursor: next})})}`;
+  clear(
+      element, cursor && h("a", {class: "button", href: to(null)}, "Newest"),
+      next_cursor && h("a", {class: "button", href: to(next_cursor)}, "Older jobs"));
 }
 
 // Reuses the rows of jobs that remain, to preserve focus and selection.
@@ -89,12 +113,13 @@ function jobRow(job) {
   const bar = meter(`progress of ${titleText(job)}`);
   const activity = h("span", {class: "does"});
   const made = h("time", {class: "made"});
-  const element = h("li", {},
-    h("a", {class: "job-row", href: `#/jobs/${job.id}`},
-      badge,
-      h("div", {class: "what"}, h("strong", {}, titleText(job)),
-        h("span", {class: "about"}, `${job.name ? `${sceneText(job)} · ` : ""}${gridText(job.resolution)}`)),
-      h("div", {class: "how-far"}, bar.element, activity), made));
+  const element =
+      h("li", {},
+        h("a", {class: "job-row", href: `#/jobs/${job.id}`}, badge,
+          h("div", {class: "what"}, h("strong", {}, titleText(job)),
+            h("span", {class: "about"},
+              `${job.name ? `${sceneText(job)} · ` : ""}${gridText(job.resolution)}`)),
+          h("div", {class: "how-far"}, bar.element, activity), made));
   let state = null;
   const update = (now) => {
     if (now.state !== state) {
@@ -121,12 +146,13 @@ function activityText(job) {
       return job.position ? `number ${job.position} in the queue` : "waiting";
     case "succeeded":
       return `${sizeText(job.result.bytes)} · ${shortCount(job.result.voxels)} voxels · ` +
-             `${durationText(job.result.wall_s)}`;
+          `${durationText(job.result.wall_s)}`;
     case "failed":
       return job.error ? `${job.error.code}: ${job.error.message}` : "";
     default: {
       if (!p) return "";
-      const far = p.total ? `${shortCount(p.done)} of ${unitText(shortCount(p.total), p.unit)}` : "";
+      const far =
+          p.total ? `${shortCount(p.done)} of ${unitText(shortCount(p.total), p.unit)}` : "";
       const left = job.state === "running" && p.eta_s > 0 ? `${durationText(p.eta_s)} left` : "";
       return [p.stage, far, left].filter(Boolean).join(" · ");
     }

@@ -19,22 +19,29 @@ class NewJob {
     this.scene = new SceneChoice(signal, () => this.changed());
     this.options = new JobOptions(() => this.changed());
     this.estimate = new EstimateView(signal);
-    this.name = h("input", {maxlength: "200", autocomplete: "off",
-                            on: {change: () => { this.key = randomKey(); }}});
+    this.name = h("input", {
+      maxlength: "200",
+      autocomplete: "off",
+      on: {
+        change: () => {
+          this.key = randomKey();
+        }
+      }
+    });
     this.error = h("div", {role: "alert"});
     this.key = randomKey();  // one per state of the form: a double click creates one job
     this.submit = h("button", {class: "primary"}, "Submit");
-    this.element = h("form", {class: "stack", novalidate: true},
-      h("p", {class: "crumb"}, h("a", {href: "#/"}, "Jobs")), h("h1", {}, "New job"),
-      h("div", {class: "two form-two"},
-        h("div", {class: "stack"},
-          this.scene.element,
-          h("section", {class: "card stack", "aria-labelledby": "grid-title"},
-            h("h2", {id: "grid-title"}, "Grid"), this.options.resolutionField,
-            field("Name of the job", this.name, "Optional.")),
-          this.options.element),
-        h("div", {class: "stack sticky"}, this.estimate.element, this.error,
-          h("div", {class: "buttons"}, this.submit))));
+    this.element =
+        h("form", {class: "stack", novalidate: true},
+          h("p", {class: "crumb"}, h("a", {href: "#/"}, "Jobs")), h("h1", {}, "New job"),
+          h("div", {class: "two form-two"},
+            h("div", {class: "stack"}, this.scene.element,
+              h("section", {class: "card stack", "aria-labelledby": "grid-title"},
+                h("h2", {id: "grid-title"}, "Grid"), this.options.resolutionField,
+                field("Name of the job", this.name, "Optional.")),
+              this.options.element),
+            h("div", {class: "stack sticky"}, this.estimate.element, this.error,
+              h("div", {class: "buttons"}, this.submit))));
     this.element.addEventListener("submit", (event) => {
       event.preventDefault();
       this.submitJob();
@@ -44,7 +51,8 @@ class NewJob {
   // `like`: the id of a job whose scene and options are copied.
   async begin(like) {
     try {
-      const model = like ? await getJson(`/api/v1/jobs/${encodeURIComponent(like)}`, this.signal) : null;
+      const model =
+          like ? await getJson(`/api/v1/jobs/${encodeURIComponent(like)}`, this.signal) : null;
       await this.scene.load(model ? [model.scene].flat() : null);
       if (model) this.options.set(model);
       this.changed();
@@ -85,8 +93,9 @@ class NewJob {
         clear(this.error, h("p", {class: "bad"}, "Choose a scene, or upload one."));
         return;
       }
-      const job = await sendJson("POST", "/api/v1/jobs", body,
-                                  {headers: {"Idempotency-Key": this.key}, signal: this.signal});
+      const job = await sendJson(
+          "POST", "/api/v1/jobs", body,
+          {headers: {"Idempotency-Key": this.key}, signal: this.signal});
       location.hash = `#/jobs/${job.id}`;
     } catch (problem) {
       if (this.signal.aborted) return;

@@ -1,8 +1,16 @@
 // The viewer: the picture, what moves it, and the panel.
 
 import {announce, h} from "../lib/dom.js";
+
 import {Camera} from "./camera.js";
-import {cameraFragment, cameraText, fragmentText, GridSpace, parseCameraFragment, parseCameraText} from "./camera_text.js";
+import {
+  cameraFragment,
+  cameraText,
+  fragmentText,
+  GridSpace,
+  parseCameraFragment,
+  parseCameraText
+} from "./camera_text.js";
 import {Controls} from "./controls.js";
 import {keysHelp, listenToKeys} from "./keys.js";
 import {Markers} from "./markers.js";
@@ -11,16 +19,16 @@ import {Panel} from "./panel.js";
 import {length, scale, subtract} from "./vector.js";
 
 const kDefaultFov = 35;
-const kPictureAspect = 16 / 9;   // of the views in the manifest
+const kPictureAspect = 16 / 9;  // of the views in the manifest
 const kSeenIntervalMs = 250;    // between two looks at how far away things are
 const kFirstSeenMs = 2000;      // until the first: it needs a program of its own
 const kStatisticsIntervalMs = 500;
 const kNoPicture = "There is no picture yet.";
-const kBookmarkDelayMs = 400;    // browsers refuse more than 100 changes of the address in 30 s
+const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
-  // `renderer` may start later; `places` are the elements {panel, tools, status}. With `bookmarks` the
-  // fragment of the address is that of the camera. Ends when `signal` aborts.
+  // `renderer` may start later; `places` are the elements {panel, tools, status}. With `bookmarks`
+  // the fragment of the address is that of the camera. Ends when `signal` aborts.
   constructor({canvas, renderer, manifest, places, fileName, signal, bookmarks = true}) {
     Object.assign(this, {canvas, renderer, manifest, places, fileName, signal, bookmarks});
     this.space = new GridSpace(manifest);
@@ -31,20 +39,26 @@ export class Viewer {
     this.markers = new Markers(canvas.parentElement);
     this.panel = new Panel(this);
     places.panel.replaceChildren(this.panel.element);
-    this.controls = new Controls(canvas, this.camera, this.motion, {
-      pick: async (x, y) => (await renderer.pick(x, y))?.position ?? null,
-      onClick: (x, y) => this.pick(x, y),
-      onDoubleClick: (x, y) => this.setPivot(x, y),
-      onChange: () => this.schedule(),
-    }, signal);
-    listenToKeys(bookmarks ? window : canvas, canvas, this.motion, this.actions(), () => this.schedule(), signal);
+    this.controls = new Controls(
+        canvas, this.camera, this.motion, {
+          pick: async (x, y) => (await renderer.pick(x, y))?.position ?? null,
+          onClick: (x, y) => this.pick(x, y),
+          onDoubleClick: (x, y) => this.setPivot(x, y),
+          onChange: () => this.schedule(),
+        },
+        signal);
+    listenToKeys(
+        bookmarks ? window : canvas, canvas, this.motion, this.actions(), () => this.schedule(),
+        signal);
     for (const button of places.tools.querySelectorAll("[data-tool]"))
       button.addEventListener("click", () => this.actions()[button.dataset.tool](), {signal});
-    this.saveButton = places.tools.querySelector('[data-tool="screenshot"]');
+    this.saveButton = places.tools.querySelector("[data-tool=\"screenshot\"]");
     this.saveButton.disabled = true;  // until there is a picture
     const resizes = new ResizeObserver(() => this.resize());
     resizes.observe(canvas);
-    if (bookmarks) window.addEventListener("hashchange", (event) => this.followBookmark(new URL(event.newURL).hash), {signal});
+    if (bookmarks)
+      window.addEventListener(
+          "hashchange", (event) => this.followBookmark(new URL(event.newURL).hash), {signal});
     const timer = setInterval(() => this.showStatistics(), kStatisticsIntervalMs);
     signal.addEventListener("abort", () => {
       clearInterval(timer);
@@ -63,7 +77,14 @@ export class Viewer {
   }
 
   defaultOptions() {
-    return {level: this.manifest.levels, wire: null, clip: null, occlusion: true, shadows: true, color: true};
+    return {
+      level: this.manifest.levels,
+      wire: null,
+      clip: null,
+      occlusion: true,
+      shadows: true,
+      color: true
+    };
   }
 
   firstCamera() {
@@ -76,7 +97,8 @@ export class Viewer {
     const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
     const outside = placement.eye.some((c) => c < 0 || c > this.manifest.resolution);
     if (!outside || aspect >= kPictureAspect) return placement;
-    const offset = scale(subtract(placement.eye, placement.target), Math.min(4, kPictureAspect / aspect));
+    const offset =
+        scale(subtract(placement.eye, placement.target), Math.min(4, kPictureAspect / aspect));
     return {...placement, eye: placement.target.map((c, axis) => c + offset[axis])};
   }
 
@@ -108,7 +130,7 @@ export class Viewer {
   }
 
   showMode() {
-    const button = this.places.tools.querySelector('[data-tool="toggleFly"]');
+    const button = this.places.tools.querySelector("[data-tool=\"toggleFly\"]");
     button.setAttribute("aria-pressed", String(Boolean(this.motion.flying)));
     this.canvas.classList.toggle("flying", Boolean(this.motion.flying));
   }
@@ -117,14 +139,17 @@ export class Viewer {
     const {panel, tools} = this.places;
     const hadFocus = panel.contains(document.activeElement);
     panel.hidden = !panel.hidden;
-    tools.querySelector('[data-tool="togglePanel"]')?.setAttribute("aria-expanded", String(!panel.hidden));
+    tools.querySelector("[data-tool=\"togglePanel\"]")
+        ?.setAttribute("aria-expanded", String(!panel.hidden));
     if (hadFocus) this.canvas.focus();
   }
 
   showHelp() {
-    const dialog = h("dialog", {class: "help", "aria-labelledby": "help-title"},
-      h("form", {method: "dialog"}, h("h2", {id: "help-title"}, "Keys and pointers"), keysHelp(),
-        h("div", {class: "buttons end"}, h("button", {class: "primary", autofocus: true}, "Close"))));
+    const dialog = h(
+        "dialog", {class: "help", "aria-labelledby": "help-title"},
+        h("form", {method: "dialog"}, h("h2", {id: "help-title"}, "Keys and pointers"), keysHelp(),
+          h("div", {class: "buttons end"},
+            h("button", {class: "primary", autofocus: true}, "Close"))));
     document.body.append(dialog);
     dialog.addEventListener("close", () => {
       dialog.remove();
@@ -135,7 +160,8 @@ export class Viewer {
 
   resize() {
     if (!this.canvas.clientWidth || !this.canvas.clientHeight) return;
-    this.renderer.resize(this.canvas.clientWidth, this.canvas.clientHeight, window.devicePixelRatio || 1);
+    this.renderer.resize(
+        this.canvas.clientWidth, this.canvas.clientHeight, window.devicePixelRatio || 1);
     this.schedule();
   }
 
@@ -163,7 +189,9 @@ export class Viewer {
   showMarkers() {
     this.overlay?.draw(this.camera);
     const {pick, start} = this.panel.pick;
-    this.markers.show([pick?.position, start?.position], this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.markers.show(
+        [pick?.position, start?.position], this.camera, this.canvas.clientWidth,
+        this.canvas.clientHeight);
   }
 
   applyCamera() {
@@ -172,7 +200,8 @@ export class Viewer {
     if (key === this.cameraKey) return;
     if (this.cameraKey) this.refusal = "";
     this.cameraKey = key;
-    this.renderer.setView({eye: [...eye], target: [...target], up: this.camera.axes().up, fovDegrees: fovDegrees});
+    this.renderer.setView(
+        {eye: [...eye], target: [...target], up: this.camera.axes().up, fovDegrees: fovDegrees});
     this.bookmark();
   }
 
@@ -182,7 +211,8 @@ export class Viewer {
     this.seen.time = now;
     this.seen.key = this.cameraKey;
     const hit = await this.renderer.pick(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
-    const free = Math.min(1.3 * this.seen.distance, Math.max(this.manifest.resolution / 4, this.camera.distance));
+    const free = Math.min(
+        1.3 * this.seen.distance, Math.max(this.manifest.resolution / 4, this.camera.distance));
     this.seen.distance = Math.max(1, hit ? hit.distance : free);
   }
 
@@ -190,7 +220,14 @@ export class Viewer {
   setOptions(changed) {
     Object.assign(this.options, changed);
     const {level, wire, clip, occlusion, shadows, color} = this.options;
-    this.renderer.setOptions({maxLevel: level, wireLevel: wire, clip, ambientOcclusion: occlusion, sunShadows: shadows, color});
+    this.renderer.setOptions({
+      maxLevel: level,
+      wireLevel: wire,
+      clip,
+      ambientOcclusion: occlusion,
+      sunShadows: shadows,
+      color
+    });
     this.panel.showOptions(this.options);
     this.bookmark();
     this.schedule();
@@ -240,15 +277,19 @@ export class Viewer {
 
   bookmarkMembers() {
     const {level, wire, clip, occlusion, shadows, color} = this.options;
-    return {...cameraFragment(this.space, this.camera),
-            level: level < this.manifest.levels ? level : null, wire,
-            clip: clip && [...clip.low, ...clip.high].join(","),
-            occlusion: occlusion ? null : 0, shadows: shadows ? null : 0,
-            color: color ? null : 0};
+    return {
+      ...cameraFragment(this.space, this.camera),
+      level: level < this.manifest.levels ? level : null,
+      wire,
+      clip: clip && [...clip.low, ...clip.high].join(","),
+      occlusion: occlusion ? null : 0,
+      shadows: shadows ? null : 0,
+      color: color ? null : 0
+    };
   }
 
-  // Takes camera and options from the fragment of an address, which may have changed since. A camera that cannot be used
-  // is left out, which the page says until the camera moves.
+  // Takes camera and options from the fragment of an address, which may have changed since. A
+  // camera that cannot be used is left out, which the page says until the camera moves.
   followBookmark(fragment) {
     if (fragment === this.fragment) return;
     const members = new URLSearchParams(this.bookmarks ? fragment.slice(1) : "");
@@ -267,15 +308,22 @@ export class Viewer {
   optionsOf(members) {
     const options = this.defaultOptions();
     const {levels, resolution} = this.manifest;
-    const level = (name, coarsest) => /^\d+$/.test(members.get(name) ?? "")
-      ? Math.min(Math.max(Number(members.get(name)), coarsest), levels) : null;
+    const level = (name, coarsest) => /^\d+$/.test(members.get(name) ?? "") ?
+        Math.min(Math.max(Number(members.get(name)), coarsest), levels) :
+        null;
     const corners = (members.get("clip") ?? "").split(",").map(Number);
     const box = corners.map((c) => Math.min(Math.max(Math.round(c), 0), resolution));
-    const isBox = box.length === 6 && corners.every(Number.isFinite) && [0, 1, 2].every((axis) => box[axis] < box[axis + 3]);
-    return {...options, level: level("level", 1) ?? options.level, wire: level("wire", 0),
-            clip: isBox ? {low: box.slice(0, 3), high: box.slice(3)} : null,
-            occlusion: members.get("occlusion") !== "0", shadows: members.get("shadows") !== "0",
-            color: members.get("color") !== "0"};
+    const isBox = box.length === 6 && corners.every(Number.isFinite) &&
+        [0, 1, 2].every((axis) => box[axis] < box[axis + 3]);
+    return {
+      ...options,
+      level: level("level", 1) ?? options.level,
+      wire: level("wire", 0),
+      clip: isBox ? {low: box.slice(0, 3), high: box.slice(3)} : null,
+      occlusion: members.get("occlusion") !== "0",
+      shadows: members.get("shadows") !== "0",
+      color: members.get("color") !== "0"
+    };
   }
 
   // The drawing buffer is only valid until the browser has shown it: draws and reads at once.
@@ -300,22 +348,35 @@ export class Viewer {
     this.panel.showStatistics(statistics);
     const {problem} = this.renderer, {refusal} = this;
     const {loading} = statistics;
-    this.showStatus(this.renderer.lost ? "The graphics card is not available: waiting for it."
-      : problem ? problemText(problem)
-      : refusal ? refusal
-      : loading > 0 ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"}…` : "", problem?.code === "replaced");
+    this.showStatus(
+        this.renderer.lost ? "The graphics card is not available: waiting for it." :
+            problem        ? problemText(problem) :
+            refusal        ? refusal :
+            loading > 0    ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"   }…` :
+                             "",
+        problem?.code === "replaced");
     this.places.status.classList.toggle("bad", Boolean(problem || refusal));
   }
 
   showStatus(text, canReload) {
     if (text === this.statusText) return;
     this.statusText = text;
-    this.places.status.replaceChildren(text, ...(canReload
-      ? [" ", h("button", {type: "button", class: "small", on: {click: () => location.reload()}}, "Reload")] : []));
+    this.places.status.replaceChildren(
+        text,
+        ...(canReload ?
+                [
+                  " ",
+                  h("button",
+                    {type: "button", class: "small", on: {click: () => location.reload()}},
+                    "Reload")
+                ] :
+                []));
   }
 }
 
 function problemText({code, message}) {
   if (code === "unauthorized") return "The service no longer accepts the token: reload the page.";
-  return code === "unreachable" ? `${message} What is missing is drawn coarse and asked for again.` : message;
+  return code === "unreachable" ?
+      `${message} What is missing is drawn coarse and asked for again.` :
+      message;
 }

@@ -3,7 +3,17 @@
 // Invariants: the eye is not on the target; after a motion the view is at most kMaxPitch from the
 // horizontal, so that up stays up. Only a camera that was set may look straight up or down.
 
-import {add, distance, dot, length, mix, pictureAxes, pictureDirection, scale, subtract} from "./vector.js";
+import {
+  add,
+  distance,
+  dot,
+  length,
+  mix,
+  pictureAxes,
+  pictureDirection,
+  scale,
+  subtract
+} from "./vector.js";
 
 const kMaxPitch = 89.9 * Math.PI / 180;
 const kMinDistance = 1 / 64;  // voxels from the eye to the target
@@ -12,13 +22,19 @@ const kFarthest = 32;         // edges of the grid from its center to the eye
 export class Camera {
   constructor(resolution) {
     this.resolution = resolution;
-    this.set({eye: [0.5, 0.6, 2.5].map((c) => c * resolution), target: Array(3).fill(resolution / 2), fovDegrees: 35});
+    this.set({
+      eye: [0.5, 0.6, 2.5].map((c) => c * resolution),
+      target: Array(3).fill(resolution / 2),
+      fovDegrees: 35
+    });
   }
 
   // Throws an Error with a message for people if no picture can be taken from there.
   set({eye, target, fovDegrees}) {
-    if (![...eye, ...target].every(Number.isFinite)) throw new Error("A camera has finite coordinates.");
-    if (!(fovDegrees >= 1 && fovDegrees <= 170)) throw new Error("The field of view must lie between 1 and 170 degrees.");
+    if (![...eye, ...target].every(Number.isFinite))
+      throw new Error("A camera has finite coordinates.");
+    if (!(fovDegrees >= 1 && fovDegrees <= 170))
+      throw new Error("The field of view must lie between 1 and 170 degrees.");
     if (!(distance(eye, target) > 0)) throw new Error("The camera must not be at its target.");
     Object.assign(this, {eye: [...eye], target: [...target], fovDegrees});
   }
@@ -49,19 +65,23 @@ export class Camera {
   // Around the target: positive angles (radians) move the eye to the right and up.
   orbit(yaw, pitch) {
     const at = spherical(subtract(this.eye, this.target));
-    this.eye = add(this.target, fromSpherical({...at, yaw: at.yaw + yaw, pitch: limitPitch(at.pitch + pitch)}));
+    this.eye =
+        add(this.target,
+            fromSpherical({...at, yaw: at.yaw + yaw, pitch: limitPitch(at.pitch + pitch)}));
   }
 
   // Around the eye: positive angles look to the right and up.
   turn(yaw, pitch) {
     const at = spherical(subtract(this.eye, this.target));
-    this.target = subtract(this.eye, fromSpherical({...at, yaw: at.yaw - yaw, pitch: limitPitch(at.pitch - pitch)}));
+    this.target = subtract(
+        this.eye, fromSpherical({...at, yaw: at.yaw - yaw, pitch: limitPitch(at.pitch - pitch)}));
   }
 
   // Moves eye and target by voxels along the axes of the picture.
   move(toRight, toTop, forward) {
     const axes = this.axes();
-    this.moveBy(add(add(scale(axes.right, toRight), scale(axes.up, toTop)), scale(axes.forward, forward)));
+    this.moveBy(
+        add(add(scale(axes.right, toRight), scale(axes.up, toTop)), scale(axes.forward, forward)));
   }
   moveBy(offset) {
     const eye = add(this.eye, offset);
@@ -74,8 +94,10 @@ export class Camera {
 
   // Scales all distances from `point`, which stays where it is in the picture.
   zoomAbout(point, factor) {
-    const least = kMinDistance / Math.min(this.distance, Math.max(distance(this.eye, point), kMinDistance));
-    const far = Math.max(1, kFarthest * this.resolution / Math.max(this.distance, distance(this.eye, point)));
+    const least =
+        kMinDistance / Math.min(this.distance, Math.max(distance(this.eye, point), kMinDistance));
+    const far = Math.max(
+        1, kFarthest * this.resolution / Math.max(this.distance, distance(this.eye, point)));
     const by = Math.min(Math.max(factor, Math.min(1, least)), far);
     const eye = add(point, scale(subtract(this.eye, point), by));
     const target = add(point, scale(subtract(this.target, point), by));
@@ -107,8 +129,11 @@ export function between(from, to, share) {
     yaw: a.yaw + arc * share,
     pitch: a.pitch + (b.pitch - a.pitch) * share,
   });
-  return {eye: add(target, offset), target,
-          fovDegrees: from.fovDegrees + (to.fovDegrees - from.fovDegrees) * share};
+  return {
+    eye: add(target, offset),
+    target,
+    fovDegrees: from.fovDegrees + (to.fovDegrees - from.fovDegrees) * share
+  };
 }
 
 function spherical(offset) {

@@ -28,7 +28,7 @@ export class GridSpace {
 // "--camera 1,2,3 --target 4,5,6 --fov 35"
 export function cameraText(space, {eye, target, fovDegrees}) {
   return `--camera ${space.text(eye)} --target ${space.text(target)} ` +
-         `--fov ${numberText(fovDegrees)}`;
+      `--fov ${numberText(fovDegrees)}`;
 }
 
 // Reads cameraText(), also from the middle of a command. Throws an Error that says what is missing.
@@ -44,12 +44,16 @@ export function cameraFragment(space, {eye, target, fovDegrees}) {
 // From the members of a fragment; null if it has no camera.
 export function parseCameraFragment(space, members, defaultFov) {
   if (!members.has("camera")) return null;
-  return parseCamera(space, members.get("camera"), members.get("target"), members.get("fov"), defaultFov);
+  return parseCamera(
+      space, members.get("camera"), members.get("target"), members.get("fov"), defaultFov);
 }
 
 function parseCamera(space, eye, target, fov, defaultFov) {
-  return {eye: parsePoint(space, eye, "--camera"), target: parsePoint(space, target, "--target"),
-          fovDegrees: fov ? parseNumber(fov, "--fov") : defaultFov};
+  return {
+    eye: parsePoint(space, eye, "--camera"),
+    target: parsePoint(space, target, "--target"),
+    fovDegrees: fov ? parseNumber(fov, "--fov") : defaultFov
+  };
 }
 
 function parsePoint(space, text, name) {
@@ -60,12 +64,15 @@ function parsePoint(space, text, name) {
 
 function parseNumber(text, name) {
   const value = Number(text);
-  if (text.trim() === "" || !Number.isFinite(value)) throw new Error(`${name}: "${text}" is not a number.`);
+  if (text.trim() === "" || !Number.isFinite(value))
+    throw new Error(`${name}: "${text}" is not a number.`);
   return value;
 }
 
 // "&"-joined, with the commas legible.
 export function fragmentText(members) {
-  return Object.entries(members).filter(([, value]) => value !== null && value !== undefined)
-               .map(([name, value]) => `${name}=${encodeURIComponent(value).replace(/%2C/g, ",")}`).join("&");
+  return Object.entries(members)
+      .filter(([, value]) => value !== null && value !== undefined)
+      .map(([name, value]) => `${name}=${encodeURIComponent(value).replace(/%2C/g, ",")}`)
+      .join("&");
 }

@@ -11,14 +11,18 @@ export class ClipView {
     this.resolution = resolution;
     this.onChange = onChange;
     this.box = {low: [0, 0, 0], high: Array(3).fill(resolution)};
-    this.enabled = h("input", {type: "checkbox", id: "clip-on", on: {change: () => this.changed()}});
+    this.enabled =
+        h("input", {type: "checkbox", id: "clip-on", on: {change: () => this.changed()}});
     this.sliders = ["low", "high"].map((end) => [0, 1, 2].map((axis) => this.slider(end, axis)));
-    const rows = [0, 1, 2].map((axis) => h("div", {class: "clip-axis"},
-      h("span", {class: "axis", "aria-hidden": "true"}, "xyz"[axis]), this.sliders[0][axis], this.sliders[1][axis],
-      this.outputs[axis]));
-    this.element = h("div", {class: "stack"},
-      h("div", {class: "check"}, this.enabled, h("label", {for: "clip-on"}, "Show only what is in a box")),
-      this.rows = h("div", {class: "clip-rows"}, rows));
+    const rows = [0, 1, 2].map(
+        (axis) =>
+            h("div", {class: "clip-axis"},
+              h("span", {class: "axis", "aria-hidden": "true"}, "xyz"[axis]), this.sliders[0][axis],
+              this.sliders[1][axis], this.outputs[axis]));
+    this.element =
+        h("div", {class: "stack"},
+          h("div", {class: "check"}, this.enabled, h("label", {for: "clip-on"
+            }, "Show only what is in a box")), this.rows = h("div", {class: "clip-rows"}, rows));
     this.show();
   }
 
@@ -26,9 +30,14 @@ export class ClipView {
 
   slider(end, axis) {
     const step = Math.max(1, this.resolution / kSteps);
-    return h("input", {type: "range", min: "0", max: String(this.resolution), step: String(step),
-                       "aria-label": `${"xyz"[axis]} ${end === "low" ? "from" : "to"}, in voxels`,
-                       on: {input: (event) => this.move(end, axis, Number(event.target.value))}});
+    return h("input", {
+      type: "range",
+      min: "0",
+      max: String(this.resolution),
+      step: String(step),
+      "aria-label": `${"xyz"[axis]} ${end === "low" ? "from" : "to"}, in voxels`,
+      on: {input: (event) => this.move(end, axis, Number(event.target.value))}
+    });
   }
 
   // The other end gives way: a box has at least one voxel.

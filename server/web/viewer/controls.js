@@ -1,18 +1,18 @@
-// Mouse, touch and wheel on the canvas. One pointer orbits (or turns, when flying), the right button,
-// the middle one, Shift or a second finger pan, the wheel and two fingers zoom. What a click means is
-// up to the caller.
+// Mouse, touch and wheel on the canvas. One pointer orbits (or turns, when flying), the right
+// button, the middle one, Shift or a second finger pan, the wheel and two fingers zoom. What a
+// click means is up to the caller.
 
 import {add, distance, dot, scale, subtract} from "./vector.js";
 
-const kOrbitAngle = Math.PI;       // radians per height of the canvas
+const kOrbitAngle = Math.PI;  // radians per height of the canvas
 const kClickMovePx = 5;
 const kClickTimeMs = 600;
 const kDoubleTimeMs = 350;
 const kDoubleMovePx = 24;
-const kWheelZoom = 0.0016;         // per pixel of the wheel
-const kAnchorTimeMs = 400;        // one turn of the wheel zooms to one point
+const kWheelZoom = 0.0016;  // per pixel of the wheel
+const kAnchorTimeMs = 400;  // one turn of the wheel zooms to one point
 const kLinePx = 20;
-const kRecentMs = 80;             // of a drag: its speed is that of the inertia
+const kRecentMs = 80;  // of a drag: its speed is that of the inertia
 
 export class Controls {
   // handlers: pick(x, y) -> Promise of a position or null; onClick(x, y); onDoubleClick(x, y);
@@ -21,11 +21,11 @@ export class Controls {
     Object.assign(this, {canvas, camera, motion, handlers});
     this.pointers = new Map();
     this.recent = [];
-    this.press = null;         // since the first pointer went down
+    this.press = null;  // since the first pointer went down
     this.lastClick = null;
-    this.anchor = null;        // of the wheel
+    this.anchor = null;  // of the wheel
     const listen = (name, listener, options = {}) =>
-      canvas.addEventListener(name, (event) => listener.call(this, event), {signal, ...options});
+        canvas.addEventListener(name, (event) => listener.call(this, event), {signal, ...options});
     listen("pointerdown", this.handleDown);
     listen("pointermove", this.handleMove);
     listen("pointerup", this.handleUp);
@@ -56,7 +56,13 @@ export class Controls {
     this.recent = [];
     if (this.pointers.size === 1) {
       const pans = event.button !== 0 || event.shiftKey;
-      this.press = {at, time: event.timeStamp, moved: false, pans, clicks: event.button === 0 && !event.shiftKey};
+      this.press = {
+        at,
+        time: event.timeStamp,
+        moved: false,
+        pans,
+        clicks: event.button === 0 && !event.shiftKey
+      };
       if (pans) this.findPanDepth(at);
     } else if (this.press) {
       this.press.moved = true;  // two fingers are no click
@@ -68,7 +74,8 @@ export class Controls {
   async findPanDepth(at) {
     const press = this.press;
     const point = await this.handlers.pick(...at);
-    if (point) press.depth = Math.max(dot(subtract(point, this.camera.eye), this.camera.axes().forward), 0);
+    if (point)
+      press.depth = Math.max(dot(subtract(point, this.camera.eye), this.camera.axes().forward), 0);
   }
 
   handleMove(event) {
@@ -89,7 +96,10 @@ export class Controls {
 
   centerOfFingers() {
     const [a, b] = [...this.pointers.values()];
-    return {at: [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], apart: Math.max(1, Math.hypot(a[0] - b[0], a[1] - b[1]))};
+    return {
+      at: [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2],
+      apart: Math.max(1, Math.hypot(a[0] - b[0], a[1] - b[1]))
+    };
   }
 
   moveFingers(old, now) {
@@ -125,7 +135,8 @@ export class Controls {
     const {press} = this;
     this.press = null;
     if (press.moved) return this.startCoasting(event.timeStamp);
-    if (press.clicks && event.timeStamp - press.time < kClickTimeMs) this.click(press.at, event.timeStamp);
+    if (press.clicks && event.timeStamp - press.time < kClickTimeMs)
+      this.click(press.at, event.timeStamp);
   }
 
   handleCancel(event) {
@@ -135,15 +146,17 @@ export class Controls {
 
   startCoasting(time) {
     const recent = this.recent.filter((move) => time - move.time < kRecentMs);
-    const sum = (name) => recent.reduce((total, move) => total + move[name], 0) / (kRecentMs / 1000);
-    if (recent.length > 1) this.motion.startCoasting([sum("yaw"), sum("pitch")], (...by) => this.rotateBy(...by));
+    const sum = (name) =>
+        recent.reduce((total, move) => total + move[name], 0) / (kRecentMs / 1000);
+    if (recent.length > 1)
+      this.motion.startCoasting([sum("yaw"), sum("pitch")], (...by) => this.rotateBy(...by));
     this.handlers.onChange();
   }
 
   click(at, time) {
     const last = this.lastClick;
     const isDouble = last && time - last.time < kDoubleTimeMs &&
-                      Math.hypot(at[0] - last.at[0], at[1] - last.at[1]) < kDoubleMovePx;
+        Math.hypot(at[0] - last.at[0], at[1] - last.at[1]) < kDoubleMovePx;
     this.lastClick = isDouble ? null : {at, time};
     if (isDouble) this.handlers.onDoubleClick(...at);
     else this.handlers.onClick(...at);
@@ -156,7 +169,8 @@ export class Controls {
     const pixels = event.deltaY * [1, kLinePx, this.size[1]][event.deltaMode];
     this.motion.stop();
     this.findAnchor(at, event.timeStamp);
-    const factor = Math.exp(Math.min(Math.max(pixels, -600), 600) * kWheelZoom * (event.ctrlKey ? 4 : 1));
+    const factor =
+        Math.exp(Math.min(Math.max(pixels, -600), 600) * kWheelZoom * (event.ctrlKey ? 4 : 1));
     const {camera, anchor} = this;
     if (anchor.point) camera.moveTargetToDepthOf(anchor.point);
     camera.zoomAbout(anchor.point ?? camera.pointAtTarget(...at, ...this.size), factor);
@@ -165,7 +179,8 @@ export class Controls {
 
   findAnchor(at, time) {
     const old = this.anchor;
-    if (old && time - old.time < kAnchorTimeMs && distance([...old.at, 0], [...at, 0]) < kClickMovePx) {
+    if (old && time - old.time < kAnchorTimeMs &&
+        distance([...old.at, 0], [...at, 0]) < kClickMovePx) {
       old.time = time;
       return;
     }

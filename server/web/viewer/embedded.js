@@ -3,6 +3,7 @@
 import {authorization} from "../lib/api.js";
 import {h} from "../lib/dom.js";
 import {titleText} from "../lib/format.js";
+
 import {Viewer} from "./app.js";
 import {Renderer} from "./renderer.js";
 import {TileSource} from "./tile_source.js";
@@ -10,10 +11,15 @@ import {fillTools} from "./tools.js";
 
 const kBudgetBytes = 64 * 2 ** 20;
 
-// Fills `place`; throws an Error, with `place` as it was, if that is not possible. Ends with `signal`.
+// Fills `place`; throws an Error, with `place` as it was, if that is not possible. Ends with
+// `signal`.
 export async function embedViewer(place, job, signal) {
-  const canvas = h("canvas", {class: "scene", tabindex: "0", role: "application",
-    "aria-label": `The voxels of ${titleText(job)}. Arrow keys orbit, H lists all keys.`});
+  const canvas = h("canvas", {
+    class: "scene",
+    tabindex: "0",
+    role: "application",
+    "aria-label": `The voxels of ${titleText(job)}. Arrow keys orbit, H lists all keys.`
+  });
   const stage = h("div", {class: "stage"}, canvas);
   const tools = h("div", {class: "tools embedded", role: "toolbar", "aria-label": "View"});
   fillTools(tools);
@@ -21,7 +27,8 @@ export async function embedViewer(place, job, signal) {
   stage.append(tools, status);
   const source = new TileSource({base: job.links.self, headers: authorization()});
   let viewer = null;
-  const renderer = new Renderer(canvas, source, {budgetBytes: kBudgetBytes, onChange: () => viewer?.schedule()});
+  const renderer =
+      new Renderer(canvas, source, {budgetBytes: kBudgetBytes, onChange: () => viewer?.schedule()});
   // A browser has few contexts: this one is released early, as the page that it was in lives on.
   const release = () => {
     renderer.dispose();
@@ -32,8 +39,15 @@ export async function embedViewer(place, job, signal) {
     await renderer.start();
     if (signal.aborted) return release();
     place.replaceChildren(stage);
-    viewer = new Viewer({canvas, renderer, manifest, signal, bookmarks: false, fileName: `job-${job.id}`,
-                         places: {panel: h("div"), tools, status}});
+    viewer = new Viewer({
+      canvas,
+      renderer,
+      manifest,
+      signal,
+      bookmarks: false,
+      fileName: `job-${job.id}`,
+      places: {panel: h("div"), tools, status}
+    });
   } catch (error) {
     release();
     throw error;

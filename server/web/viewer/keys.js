@@ -1,17 +1,40 @@
-// The keys of the canvas. Held keys move the camera, the others are actions. The same list is the help.
+// The keys of the canvas. Held keys move the camera, the others are actions. The same list is the
+// help.
 
 import {h} from "../lib/dom.js";
 
 const kHeld = {
-  ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down",
-  KeyW: "forward", KeyS: "back", KeyA: "strafeLeft", KeyD: "strafeRight", KeyE: "rise", KeyQ: "sink",
+  ArrowLeft: "left",
+  ArrowRight: "right",
+  ArrowUp: "up",
+  ArrowDown: "down",
+  KeyW: "forward",
+  KeyS: "back",
+  KeyA: "strafeLeft",
+  KeyD: "strafeRight",
+  KeyE: "rise",
+  KeyQ: "sink",
 };
 // By the character, since these keys are elsewhere on other keyboards.
-const kHeldCharacters = {"+": "zoomIn", "=": "zoomIn", "-": "zoomOut", "_": "zoomOut"};
+const kHeldCharacters = {
+  "+": "zoomIn",
+  "=": "zoomIn",
+  "-": "zoomOut",
+  "_": "zoomOut"
+};
 const kActions = {
-  f: "toggleFly", r: "reset", home: "reset", enter: "pickCenter", " ": "pickCenter", c: "pivotCenter",
+  f: "toggleFly",
+  r: "reset",
+  home: "reset",
+  enter: "pickCenter",
+  " ": "pickCenter",
+  c: "pivotCenter",
   g: "toggleColor",
-  m: "measure", p: "screenshot", o: "togglePanel", "?": "help", h: "help",
+  m: "measure",
+  p: "screenshot",
+  o: "togglePanel",
+  "?": "help",
+  h: "help",
 };
 
 const kHelp = [
@@ -20,7 +43,10 @@ const kHelp = [
   ["Wheel, pinch, + and −", "zoom, by wheel and pinch to the place that is pointed at"],
   ["W A S D, E and Q", "fly forward, left, back, right, up and down; Shift: faster"],
   ["F", "switch between orbit and flight"],
-  ["Double click or tap; C", "orbit around the place that is pointed at; around the center of the picture"],
+  [
+    "Double click or tap; C",
+    "orbit around the place that is pointed at; around the center of the picture"
+  ],
   ["Click or tap; Enter", "pick a voxel; the one in the center of the picture"],
   ["M", "measure from the picked voxel"],
   ["R", "reset the camera"],
@@ -30,8 +56,8 @@ const kHelp = [
   ["H", "this help"],
 ];
 
-// Calls actions by their names. `root` is the canvas, or the window: then the keys also act while nothing
-// has the focus.
+// Calls actions by their names. `root` is the canvas, or the window: then the keys also act while
+// nothing has the focus.
 export function listenToKeys(root, canvas, motion, actions, onChange, signal) {
   const held = new Map();  // by event.code: a character may change while its key is down
   root.addEventListener("keydown", (event) => {
@@ -64,5 +90,7 @@ export function listenToKeys(root, canvas, motion, actions, onChange, signal) {
 }
 
 export function keysHelp() {
-  return h("dl", {class: "keys"}, kHelp.map(([keys, what]) => h("div", {}, h("dt", {}, keys), h("dd", {}, what))));
+  return h(
+      "dl", {class: "keys"},
+      kHelp.map(([keys, what]) => h("div", {}, h("dt", {}, keys), h("dd", {}, what))));
 }

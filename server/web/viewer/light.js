@@ -1,5 +1,5 @@
-// The light of a picture: where the sun stands, how bright the picture is, how far occluders reach, and where the floor
-// is. Exposure and reach follow what is seen. All in voxels.
+// The light of a picture: where the sun stands, how bright the picture is, how far occluders reach,
+// and where the floor is. Exposure and reach follow what is seen. All in voxels.
 
 import {length, scale, subtract} from "./vector.js";
 
@@ -12,8 +12,8 @@ export class Light {
     this.readings = 0;
     this.low = box?.low ?? [0, 0, 0];
     this.high = box?.high ?? [resolution, resolution, resolution];
-    this.outside = true;         // the first camera sees the floor
-    this.turn = null;            // until there is a camera
+    this.outside = true;  // the first camera sees the floor
+    this.turn = null;     // until there is a camera
     this.setSun(0);
   }
 
@@ -22,12 +22,14 @@ export class Light {
     return eye[1] > this.low[1] && eye.some((x, i) => x < this.low[i] || x > this.high[i]);
   }
 
-  // What the shaders know of the floor for a camera there: how far it is below, or 0, and over which distance its shadow
-  // fades, from where.
+  // What the shaders know of the floor for a camera there: how far it is below, or 0, and over
+  // which distance its shadow fades, from where.
   floor(eye) {
     const center = this.low.map((x, i) => (x + this.high[i]) / 2);
-    return {u_floor: [this.seesFloor(eye) ? eye[1] - this.low[1] : 0, Math.max(1, this.diagonal)],
-            u_floor_center: subtract(center, eye)};
+    return {
+      u_floor: [this.seesFloor(eye) ? eye[1] - this.low[1] : 0, Math.max(1, this.diagonal)],
+      u_floor_center: subtract(center, eye)
+    };
   }
   get diagonal() {
     return length(subtract(this.high, this.low));
@@ -43,15 +45,19 @@ export class Light {
 
   // `place` is one of 48: 16 around, at three heights.
   setSun(place) {
-    const turn = this.turn - 2 * Math.PI * (place % 16) / 16, height = 0.65 + 0.25 * Math.floor(place / 16);
-    this.sun = [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
+    const turn = this.turn - 2 * Math.PI * (place % 16) / 16,
+          height = 0.65 + 0.25 * Math.floor(place / 16);
+    this.sun =
+        [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
   }
 
   // By what a camera at `eye` sees: smoothly while it moves, fast when it stands.
   adjust(read, eye, moving) {
     const share = moving ? 0.15 : 0.5;
     const toward = (from, to, known) => known ? from * (to / from) ** share : to;
-    this.skyReach = toward(this.skyReach, Math.max(1, (this.seesFloor(eye) ? 0.35 : 1) * read.medianT), this.readings > 0);
+    this.skyReach = toward(
+        this.skyReach, Math.max(1, (this.seesFloor(eye) ? 0.35 : 1) * read.medianT),
+        this.readings > 0);
     this.hazeStart = toward(this.hazeStart, Math.max(1, read.nearestT), this.readings > 0);
     // The exposure that the first reading measures is that of light without a reach.
     this.exposure = toward(this.exposure, read.exposure, this.readings > 1);

@@ -1,10 +1,11 @@
-// The page of the viewer: viewer.html?job=ID shows a job of the service, viewer.html alone the file of
-// `voxdag view`. ?budget=MiB limits the memory of the tiles.
+// The page of the viewer: viewer.html?job=ID shows a job of the service, viewer.html alone the file
+// of `voxdag view`. ?budget=MiB limits the memory of the tiles.
 
 import {authorization, getJson, Problem, sleep, token} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";
 import {hasEnded, stateText, titleText} from "../lib/format.js";
 import {problemBox} from "../views/parts.js";
+
 import {Viewer} from "./app.js";
 import {takeBegun} from "./early.js";
 import {Renderer, WebGLUnavailable} from "./renderer.js";
@@ -24,8 +25,12 @@ const lifetime = new AbortController();
 
 function budgetBytes() {
   const asked = Number(parameters.get("budget"));
-  const small = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
-  return (asked > 0 ? Math.max(asked, kMinBudgetMiB) : small ? kPhoneBudgetMiB : kBudgetMiB) * 2 ** 20;
+  const small =
+      matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
+  return (asked > 0 ? Math.max(asked, kMinBudgetMiB) :
+              small ? kPhoneBudgetMiB :
+                      kBudgetMiB) *
+      2 ** 20;
 }
 
 // Instead of the picture; nothing hides it again but a new message.
@@ -44,7 +49,8 @@ function showTitle(title) {
   setText(place("title"), title);
 }
 
-// Waits until the job has a result, and returns it. One that has failed or was canceled may be tried again.
+// Waits until the job has a result, and returns it. One that has failed or was canceled may be
+// tried again.
 async function finishedJob() {
   let known = null, waits = null, draws = true, pauseMs = kPauseMs;
   for (;;) {
@@ -56,7 +62,14 @@ async function finishedJob() {
       // The same page as that of a result; what it shows grows.
       const {watchJob} = await import("./running/running_job.js");
       try {
-        if (await watchJob({job, place, budgetBytes: budgetBytes(), showPicture: hideMessage, showTools, signal: lifetime.signal})) {
+        if (await watchJob({
+              job,
+              place,
+              budgetBytes: budgetBytes(),
+              showPicture: hideMessage,
+              showTools,
+              signal: lifetime.signal
+            })) {
           known = job;
           continue;
         }
@@ -89,17 +102,24 @@ class WaitingMessage {
     this.heading = h("h1", {});
     this.text = h("p", {});
     this.cubes = new PartialView(`/api/v1/jobs/${jobId}/partial`, lifetime.signal);
-    this.buttons = h("div", {class: "buttons"}, h("a", {class: "button", href: `/#/jobs/${jobId}`}, "The job's page"));
+    this.buttons =
+        h("div", {class: "buttons"},
+          h("a", {class: "button", href: `/#/jobs/${jobId}`}, "The job's page"));
   }
 
-  // `job` is null while the service does not answer; `before` is what was known of the job, if anything.
+  // `job` is null while the service does not answer; `before` is what was known of the job, if
+  // anything.
   show(job, before) {
     const said = `${job ? "This job is" : "This job was"} ${stateText((job ?? before).state)}.`;
-    if (before && said !== this.heading.textContent) announce(job ? said : "The service does not answer.");
+    if (before && said !== this.heading.textContent)
+      announce(job ? said : "The service does not answer.");
     setText(this.heading, said);
-    setText(this.text, !job ? "The service does not answer. It is asked again."
-      : hasEnded(job.state) ? "It has no result to look at. If it is tried again, it is shown here."
-      : "Its result is shown here when it is done.");
+    setText(
+        this.text,
+        !job ? "The service does not answer. It is asked again." :
+            hasEnded(job.state) ?
+               "It has no result to look at. If it is tried again, it is shown here." :
+               "Its result is shown here when it is done.");
     // What has the focus keeps it.
     if (place("message").hidden || !this.heading.isConnected)
       showMessage(this.heading, this.text, this.cubes.element, this.buttons);
@@ -107,33 +127,44 @@ class WaitingMessage {
   }
 }
 
-// The address may be anybody's, and this is copied to a shell: only what consists of numbers is taken.
+// The address may be anybody's, and this is copied to a shell: only what consists of numbers is
+// taken.
 function cameraOfAddress() {
   const members = new URLSearchParams(location.hash.slice(1));
-  return ["camera", "target", "fov"].filter((name) => /^[-+0-9.eE,]+$/.test(members.get(name) ?? ""))
-                                    .map((name) => ` --${name} ${members.get(name)}`).join("");
+  return ["camera", "target", "fov"]
+      .filter((name) => /^[-+0-9.eE,]+$/.test(members.get(name) ?? ""))
+      .map((name) => ` --${name} ${members.get(name)}`)
+      .join("");
 }
 
 // Without WebGL2 there is still a picture.
 async function showWithoutWebgl(reason, job) {
-  const content = [h("h1", {}, "This browser cannot draw the scene."),
-    h("p", {}, `The viewer needs WebGL2: ${reason}`)];
+  const content = [
+    h("h1", {}, "This browser cannot draw the scene."),
+    h("p", {}, `The viewer needs WebGL2: ${reason}`)
+  ];
   if (job?.preview) {
     const response = await fetch(job.links.preview, {headers: authorization()});
     const url = URL.createObjectURL(await response.blob());
-    content.push(h("img", {class: "still", src: url, alt: `Rendering of the voxels of ${titleText(job)}`}));
+    content.push(
+        h("img", {class: "still", src: url, alt: `Rendering of the voxels of ${titleText(job)}`}));
   }
-  content.push(h("p", {}, "A picture from any place is rendered by"),
-    h("code", {}, `voxdag render FILE.vdag -o picture.png${cameraOfAddress()}`));
+  content.push(
+      h("p", {}, "A picture from any place is rendered by"),
+      h("code", {}, `voxdag render FILE.vdag -o picture.png${cameraOfAddress()}`));
   showMessage(...content);
 }
 
 async function start() {
   if (askedJob !== null && !jobId)
-    return showFailure(new Problem(404, "not_found", "no such job: its id in the address of this page is malformed"));
+    return showFailure(new Problem(
+        404, "not_found", "no such job: its id in the address of this page is malformed"));
   const job = jobId ? await finishedJob() : null;
   const begun = takeBegun();
-  const source = begun?.source ?? new TileSource({base: jobId ? `/api/v1/jobs/${jobId}` : "/api/v1/view", headers: authorization()});
+  const source =
+      begun?.source ??
+      new TileSource(
+          {base: jobId ? `/api/v1/jobs/${jobId}` : "/api/v1/view", headers: authorization()});
   const canvas = place("scene"), ended = new AbortController();
   let viewer = null;
   let renderer = null;
@@ -145,14 +176,20 @@ async function start() {
       return manifest;
     });
     arrives.catch(() => {});
-    renderer = new Renderer(canvas, source, {budgetBytes: budgetBytes(), onChange: () => viewer?.schedule(), begun});
+    renderer = new Renderer(
+        canvas, source, {budgetBytes: budgetBytes(), onChange: () => viewer?.schedule(), begun});
     const manifest = await arrives;
     const started = renderer.start();  // the first tile need not wait for the panel
     started.catch(() => {});
     showTools();
-    viewer = new Viewer({canvas, renderer, manifest, signal: ended.signal,
+    viewer = new Viewer({
+      canvas,
+      renderer,
+      manifest,
+      signal: ended.signal,
       fileName: (job ? titleText(job) : document.title).replace(/[^A-Za-z0-9._-]+/g, "-"),
-      places: {panel: place("panel"), tools: place("tools"), status: place("status")}});
+      places: {panel: place("panel"), tools: place("tools"), status: place("status")}
+    });
     await started;
   } catch (error) {
     ended.abort();
@@ -166,12 +203,21 @@ async function start() {
 
 // The panel stays open or closed when another picture of the job follows.
 function showTools() {
-  const before = place("tools").querySelector('[data-tool="togglePanel"]')?.getAttribute("aria-expanded");
+  const before =
+      place("tools").querySelector("[data-tool=\"togglePanel\"]")?.getAttribute("aria-expanded");
   const open = before ? before === "true" : !matchMedia("(max-width: 700px)").matches;
   place("panel").hidden = !open;
   place("tools").hidden = false;
-  fillTools(place("tools"), h("button", {type: "button", class: "small", "data-tool": "togglePanel",
-                                          "aria-expanded": String(open), "aria-controls": "panel"}, "Panel"));
+  fillTools(
+      place("tools"),
+      h("button", {
+        type: "button",
+        class: "small",
+        "data-tool": "togglePanel",
+        "aria-expanded": String(open),
+        "aria-controls": "panel"
+      },
+        "Panel"));
 }
 
 function showFailure(error) {
@@ -183,11 +229,18 @@ function showFailure(error) {
   const isMissing = code === "not_found" && askedJob === null;
   // The id of a job that is not there is never given to another.
   const isFinal = code === "not_found" && error instanceof Problem;
-  showMessage(isMissing && [h("h1", {}, "The file is not there."),
-      h("p", {}, "This page shows the file of ", h("code", {}, "voxdag view"), ". A job of a service is viewed from its page.")],
-    problemBox({code, status: error.status, message: error.message}),
-    h("div", {class: "buttons"}, isFinal ? h("a", {class: "button", href: "/"}, "Start page")
-      : h("button", {type: "button", on: {click: () => location.reload()}}, "Try again")));
+  showMessage(
+      isMissing &&
+          [
+            h("h1", {}, "The file is not there."),
+            h("p", {}, "This page shows the file of ", h("code", {}, "voxdag view"),
+              ". A job of a service is viewed from its page.")
+          ],
+      problemBox({code, status: error.status, message: error.message}),
+      h("div", {class: "buttons"},
+        isFinal ?
+            h("a", {class: "button", href: "/"}, "Start page") :
+            h("button", {type: "button", on: {click: () => location.reload()}}, "Try again")));
 }
 
 // The service asks for a token: the page of the dashboard that does so is loaded only then.

@@ -1,11 +1,13 @@
 // Marks on the picture at the picked voxel and at the start of a measurement.
 
 import {h} from "../lib/dom.js";
+
 import {dot, subtract} from "./vector.js";
 
 export class Markers {
   constructor(stage) {
-    this.marks = ["picked", "start"].map((kind) => h("span", {class: `mark ${kind}`, "aria-hidden": "true", hidden: true}));
+    this.marks = ["picked", "start"].map(
+        (kind) => h("span", {class: `mark ${kind}`, "aria-hidden": "true", hidden: true}));
     stage.append(...this.marks);
   }
 
@@ -22,7 +24,8 @@ export class Markers {
       const depth = offset ? dot(offset, forward) : 0;
       mark.hidden = !(depth > 0);
       if (mark.hidden) return;
-      const x = width / 2 + dot(offset, right) / depth / pixel, y = height / 2 - dot(offset, up) / depth / pixel;
+      const x = width / 2 + dot(offset, right) / depth / pixel,
+            y = height / 2 - dot(offset, up) / depth / pixel;
       mark.hidden = !(x >= 0 && x <= width && y >= 0 && y <= height);
       mark.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
     });

@@ -4,14 +4,14 @@
 import {between} from "./camera.js";
 
 const kFlightS = 0.35;
-const kCoastS = 0.12;         // inertia falls to 1/e in this time
-const kMinCoast = 0.02;        // radians per second
+const kCoastS = 0.12;    // inertia falls to 1/e in this time
+const kMinCoast = 0.02;  // radians per second
 const kMaxCoast = 3;
-const kTurnRate = 1.2;         // radians per second, by arrow keys
-const kZoomRate = 1.6;         // per second, by + and -
-const kFlyRate = 0.8;          // distances of what is seen, per second
+const kTurnRate = 1.2;  // radians per second, by arrow keys
+const kZoomRate = 1.6;  // per second, by + and -
+const kFlyRate = 0.8;   // distances of what is seen, per second
 const kFast = 4;
-const kFirstStepS = 1 / 20;   // of a key, however short it is pressed
+const kFirstStepS = 1 / 20;  // of a key, however short it is pressed
 
 export class Motion {
   // seenDistance() is in voxels.
@@ -91,12 +91,19 @@ export class Motion {
     const camera = this.camera;
     const angle = kTurnRate * elapsedS * (this.fast ? 2 : 1);
     const step = kFlyRate * elapsedS * this.seenDistance() * (this.fast ? kFast : 1);
-    const turn = this.flying ? (yaw, pitch) => camera.turn(yaw, pitch) : (yaw, pitch) => camera.orbit(yaw, pitch);
+    const turn = this.flying ? (yaw, pitch) => camera.turn(yaw, pitch) :
+                               (yaw, pitch) => camera.orbit(yaw, pitch);
     const actions = {
-      left: () => turn(-angle, 0), right: () => turn(angle, 0), up: () => turn(0, angle), down: () => turn(0, -angle),
-      forward: () => camera.move(0, 0, step), back: () => camera.move(0, 0, -step),
-      strafeLeft: () => camera.move(-step, 0, 0), strafeRight: () => camera.move(step, 0, 0),
-      rise: () => camera.move(0, step, 0), sink: () => camera.move(0, -step, 0),
+      left: () => turn(-angle, 0),
+      right: () => turn(angle, 0),
+      up: () => turn(0, angle),
+      down: () => turn(0, -angle),
+      forward: () => camera.move(0, 0, step),
+      back: () => camera.move(0, 0, -step),
+      strafeLeft: () => camera.move(-step, 0, 0),
+      strafeRight: () => camera.move(step, 0, 0),
+      rise: () => camera.move(0, step, 0),
+      sink: () => camera.move(0, -step, 0),
       zoomIn: () => camera.zoomAbout(camera.target, Math.exp(-kZoomRate * elapsedS)),
       zoomOut: () => camera.zoomAbout(camera.target, Math.exp(kZoomRate * elapsedS)),
     };

@@ -3,6 +3,7 @@
 import {clear, fact, field, h, setText} from "../lib/dom.js";
 import {countText, sizeText} from "../lib/format.js";
 import {copyButton} from "../views/parts.js";
+
 import {ClipView} from "./clip_view.js";
 import {keysHelp} from "./keys.js";
 import {PickView} from "./pick_view.js";
@@ -18,13 +19,13 @@ export class Panel {
       viewer.schedule();
     });
     this.clip = new ClipView(manifest.resolution, (clip) => viewer.setOptions({clip}));
-    this.element = h("div", {class: "panel-parts"},
-      part("Camera", this.cameraPart(), true),
-      part("Picked voxel", this.pick.element, true),
-      part("Clipping box", [this.clip.element, this.boxButton = this.makeBoxButton()]),
-      part("Detail and light", this.detailPart(), true),
-      part("Statistics", this.statistics = h("dl", {class: "facts statistics"})),
-      part("Keys", keysHelp()));
+    this.element =
+        h("div", {class: "panel-parts"}, part("Camera", this.cameraPart(), true),
+          part("Picked voxel", this.pick.element, true),
+          part("Clipping box", [this.clip.element, this.boxButton = this.makeBoxButton()]),
+          part("Detail and light", this.detailPart(), true),
+          part("Statistics", this.statistics = h("dl", {class: "facts statistics"})),
+          part("Keys", keysHelp()));
     this.showBoxButton();
   }
 
@@ -32,12 +33,19 @@ export class Panel {
     const {viewer} = this;
     this.cameraText = h("code", {class: "camera-text", id: "camera-text"});
     this.copyPlace = h("span", {});
-    this.paste = h("input", {type: "text", spellcheck: "false", autocomplete: "off",
-                             placeholder: "--camera X,Y,Z --target X,Y,Z"});
+    this.paste = h("input", {
+      type: "text",
+      spellcheck: "false",
+      autocomplete: "off",
+      placeholder: "--camera X,Y,Z --target X,Y,Z"
+    });
     this.pasteError = h("p", {class: "bad", role: "alert"});
-    const form = h("form", {class: "stack paste"},
-      field("Take the camera of", this.paste, "Options of voxdag render, such as the ones above."), this.pasteError,
-      h("div", {class: "buttons"}, h("button", {class: "small"}, "Show"), this.viewsChoice()));
+    const form = h(
+        "form", {class: "stack paste"},
+        field(
+            "Take the camera of", this.paste, "Options of voxdag render, such as the ones above."),
+        this.pasteError,
+        h("div", {class: "buttons"}, h("button", {class: "small"}, "Show"), this.viewsChoice()));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       try {
@@ -53,18 +61,26 @@ export class Panel {
   viewsChoice() {
     const views = this.viewer.manifest.views ?? {};
     if (Object.keys(views).length === 0) return null;
-    const choice = h("select", {class: "small", "aria-label": "Named view"}, h("option", {value: ""}, "Named view…"),
-      Object.keys(views).map((name) => h("option", {value: name}, name)));
+    const choice =
+        h("select", {class: "small", "aria-label": "Named view"},
+          h("option", {value: ""}, "Named view…"),
+          Object.keys(views).map((name) => h("option", {value: name}, name)));
     choice.addEventListener("change", () => {
-      if (choice.value) this.viewer.flyTo(this.viewer.fit(this.viewer.space.placement(views[choice.value])));
+      if (choice.value)
+        this.viewer.flyTo(this.viewer.fit(this.viewer.space.placement(views[choice.value])));
       choice.value = "";
     });
     return choice;
   }
 
   makeBoxButton() {
-    return h("button", {type: "button", class: "small", on: {click: () => this.viewer.setOptions({clip: this.pick.box()})}},
-             "Box of the two picks");
+    return h(
+        "button", {
+          type: "button",
+          class: "small",
+          on: {click: () => this.viewer.setOptions({clip: this.pick.box()})}
+        },
+        "Box of the two picks");
   }
   showBoxButton() {
     if (this.boxButton) this.boxButton.hidden = this.pick.box() === null;
@@ -72,22 +88,44 @@ export class Panel {
 
   detailPart() {
     const {viewer, levels} = this;
-    this.level = h("input", {type: "range", min: "1", max: String(levels), step: "1",
-                             on: {input: () => viewer.setOptions({level: Number(this.level.value)})}});
+    this.level = h("input", {
+      type: "range",
+      min: "1",
+      max: String(levels),
+      step: "1",
+      on: {input: () => viewer.setOptions({level: Number(this.level.value)})}
+    });
     this.levelNote = h("output", {class: "faint"});
-    this.wire = h("select", {on: {change: () => viewer.setOptions({wire: this.wire.value === "" ? null : Number(this.wire.value)})}},
-      h("option", {value: ""}, "none"),
-      Array.from({length: levels + 1}, (_, level) => h("option", {value: String(level)},
-        `level ${level}: edge ${countText(2 ** (levels - level))}`)));
+    this.wire =
+        h("select", {
+          on: {
+            change: () =>
+                viewer.setOptions({wire: this.wire.value === "" ? null : Number(this.wire.value)})
+          }
+        },
+          h("option", {value: ""}, "none"),
+          Array.from(
+              {length: levels + 1},
+              (_, level) =>
+                  h("option", {value: String(level)},
+                    `level ${level}: edge ${countText(2 ** (levels - level))}`)));
     this.switches = {};
     return [
-      field("Finest level", this.level), this.levelNote, field("Wireframe of octree cubes", this.wire),
-      ...[["color", "Colors"], ["occlusion", "Ambient occlusion"], ["shadows", "Shadows of the sun"]].map(([name, label]) => {
-        if (name === "color" && !viewer.manifest.colors) return null;
-        const box = this.switches[name] = h("input", {type: "checkbox", id: `switch-${name}`,
-          on: {change: () => viewer.setOptions({[name]: box.checked})}});
-        return h("div", {class: "check"}, box, h("label", {for: `switch-${name}`}, label));
-      }),
+      field("Finest level", this.level),
+      this.levelNote,
+      field("Wireframe of octree cubes", this.wire),
+      ...[["color", "Colors"], ["occlusion", "Ambient occlusion"],
+          ["shadows", "Shadows of the sun"]]
+          .map(([name, label]) => {
+            if (name === "color" && !viewer.manifest.colors) return null;
+            const box = this.switches[name] = h("input", {
+              type: "checkbox",
+              id: `switch-${name}`,
+              on: {change: () => viewer.setOptions({[name]: box.checked})}
+            });
+            return h("div", {class: "check"}, box, h("label", {for: `switch-${name}`
+                     }, label));
+          }),
     ];
   }
 
@@ -99,8 +137,10 @@ export class Panel {
 
   showOptions({level, wire, clip, ...switched}) {
     this.level.value = String(level);
-    setText(this.levelNote, level === this.levels ? "single voxels"
-      : `cubes of ${countText(2 ** (this.levels - level))} voxels`);
+    setText(
+        this.levelNote,
+        level === this.levels ? "single voxels" :
+                                `cubes of ${countText(2 ** (this.levels - level))} voxels`);
     this.level.setAttribute("aria-valuetext", this.levelNote.textContent);
     this.wire.value = wire === null ? "" : String(wire);
     this.clip.set(clip);
@@ -116,7 +156,10 @@ export class Panel {
       ["Steps per ray", `${s.stepsMean.toFixed(1)}; 99 % within ${Math.round(s.steps99)}`],
       ["Tiles", `${countText(s.tiles)}${s.loading ? `, ${countText(s.loading)} loading` : ""}`],
       ...(this.viewer.manifest.colors ? [["Color pages", countText(s.colorPages)]] : []),
-      ["Memory for tiles", `${sizeText(s.poolBytes + s.colorPoolBytes)} of ${sizeText(s.budgetBytes)}`],
+      [
+        "Memory for tiles",
+        `${sizeText(s.poolBytes + s.colorPoolBytes)} of ${sizeText(s.budgetBytes)}`
+      ],
       ["Memory for pictures", sizeText(s.targetBytes)],
       ["Received", sizeText(s.fetchedBytes)],
       ["Failed requests", countText(s.failed)],
@@ -128,6 +171,7 @@ export class Panel {
 }
 
 function part(title, content, open = false) {
-  return h("details", {class: "panel-part", open}, h("summary", {}, h("h2", {}, title)),
-           h("div", {class: "stack"}, content));
+  return h(
+      "details", {class: "panel-part", open}, h("summary", {}, h("h2", {}, title)),
+      h("div", {class: "stack"}, content));
 }

@@ -2,6 +2,7 @@
 
 import {announce, clear, fact, h} from "../lib/dom.js";
 import {countText} from "../lib/format.js";
+
 import {distance, subtract} from "./vector.js";
 
 export class PickView {
@@ -18,12 +19,15 @@ export class PickView {
     this.pick = pick;
     this.show();
     if (!pick) announce("No voxel there.");
-    else announce(`Picked voxel ${pick.voxel.join(", ")}.${this.start ? ` Distance ${this.measureText()}.` : ""}`);
+    else
+      announce(`Picked voxel ${pick.voxel.join(", ")}.${
+          this.start ? ` Distance ${this.measureText()}.` : ""}`);
   }
 
   // Measures from the current pick, or no longer.
   toggleMeasure() {
-    if (!this.start && !this.pick) return announce("Pick a voxel first: distances are measured from it.");
+    if (!this.start && !this.pick)
+      return announce("Pick a voxel first: distances are measured from it.");
     this.start = this.start ? null : this.pick;
     announce(this.start ? "Measuring from this voxel: pick another one." : "Not measuring.");
     this.show();
@@ -33,9 +37,11 @@ export class PickView {
   box() {
     if (!this.start || !this.pick) return null;
     const edge = (pick) => this.cellEdge(pick);
-    return {low: this.pick.voxel.map((c, axis) => Math.min(c, this.start.voxel[axis])),
-            high: this.pick.voxel.map((c, axis) =>
-              Math.max(c + edge(this.pick), this.start.voxel[axis] + edge(this.start)))};
+    return {
+      low: this.pick.voxel.map((c, axis) => Math.min(c, this.start.voxel[axis])),
+      high: this.pick.voxel.map(
+          (c, axis) => Math.max(c + edge(this.pick), this.start.voxel[axis] + edge(this.start)))
+    };
   }
 
   cellEdge({level}) {
@@ -44,36 +50,60 @@ export class PickView {
 
   measureText() {
     const voxels = distance(this.pick.position, this.start.position);
-    return `${lengthText(voxels)} voxels, ${lengthText(voxels * this.space.edge / this.space.resolution)} in scene units`;
+    return `${lengthText(voxels)} voxels, ${
+        lengthText(voxels * this.space.edge / this.space.resolution)} in scene units`;
   }
 
   show() {
     const {pick, start} = this;
-    clear(this.element,
-      !pick && h("p", {class: "faint"}, "Click a voxel, or press Enter for the one in the center."),
-      pick && h("dl", {class: "facts pick"},
-        fact("Voxel", h("code", {"data-fact": "voxel"}, pick.voxel.join(", "))),
-        fact("In scene units", h("code", {"data-fact": "scene"},
-          this.space.text(pick.position).replaceAll(",", ", "))),
-        fact("Level", h("span", {"data-fact": "level"}, String(pick.level)), this.edgeNote(pick)),
-        fact("Node of the tile: level / word offset", h("code", {"data-fact": "node"}, `${pick.nodeLevel} / ${pick.nodeOffset}`)),
-        fact("Distance from the camera", `${lengthText(pick.distance)} voxels`)),
-      start && h("dl", {class: "facts measure"},
-        fact("From voxel", h("code", {}, start.voxel.join(", "))),
-        pick && fact("Distance", h("span", {"data-fact": "measure"}, this.measureText())),
-        pick && fact("Along the axes, in voxels",
-          h("code", {}, subtract(pick.position, start.position).map((c) => Number(c.toFixed(2))).join(", ")))),
-      (pick || start) && h("div", {class: "buttons"},
-        h("button", {type: "button", class: "small", "aria-pressed": String(Boolean(start)), "data-action": "measure",
-                     on: {click: () => this.toggleMeasureAndFocus()}}, "Measure from here"),
-        h("button", {type: "button", class: "small quiet", on: {click: () => this.forget()}}, "Clear")));
+    clear(
+        this.element,
+        !pick &&
+            h("p", {class: "faint"}, "Click a voxel, or press Enter for the one in the center."),
+        pick &&
+            h("dl", {class: "facts pick"},
+              fact("Voxel", h("code", {"data-fact": "voxel"}, pick.voxel.join(", "))),
+              fact(
+                  "In scene units",
+                  h("code", {"data-fact": "scene"},
+                    this.space.text(pick.position).replaceAll(",", ", "))),
+              fact(
+                  "Level", h("span", {"data-fact": "level"}, String(pick.level)),
+                  this.edgeNote(pick)),
+              fact(
+                  "Node of the tile: level / word offset",
+                  h("code", {"data-fact": "node"}, `${pick.nodeLevel} / ${pick.nodeOffset}`)),
+              fact("Distance from the camera", `${lengthText(pick.distance)} voxels`)),
+        start &&
+            h("dl", {class: "facts measure"},
+              fact("From voxel", h("code", {}, start.voxel.join(", "))),
+              pick && fact("Distance", h("span", {"data-fact": "measure"}, this.measureText())),
+              pick &&
+                  fact(
+                      "Along the axes, in voxels",
+                      h("code", {},
+                        subtract(pick.position, start.position)
+                            .map((c) => Number(c.toFixed(2)))
+                            .join(", ")))),
+        (pick || start) &&
+            h("div", {class: "buttons"},
+              h("button", {
+                type: "button",
+                class: "small",
+                "aria-pressed": String(Boolean(start)),
+                "data-action": "measure",
+                on: {click: () => this.toggleMeasureAndFocus()}
+              },
+                "Measure from here"),
+              h("button", {type: "button", class: "small quiet", on: {click: () => this.forget()}},
+                "Clear")));
     this.onChange();
   }
 
   // The buttons are replaced: the focus stays on the new one.
   toggleMeasureAndFocus() {
     this.toggleMeasure();
-    this.element.querySelector('[data-action="measure"]')?.focus();
+    this.element.querySelector("[data-action=\"measure\"]")?.focus();
   }
 
   forget() {
@@ -83,7 +113,11 @@ export class PickView {
 
   edgeNote(pick) {
     const edge = this.cellEdge(pick);
-    return h("span", {class: "faint"}, edge === 1 ? " (a voxel)" : ` (a cube of ${countText(edge)} voxels; more detail is not loaded or not visible)`);
+    return h(
+        "span", {class: "faint"},
+        edge === 1 ?
+            " (a voxel)" :
+            ` (a cube of ${countText(edge)} voxels; more detail is not loaded or not visible)`);
   }
 }
 

@@ -1,10 +1,10 @@
-// Draws a file of any size by casting rays through the tiles that are there, asks for those that are
-// missing, and does so within a budget of GPU memory (docs/view.md).
+// Draws a file of any size by casting rays through the tiles that are there, asks for those that
+// are missing, and does so within a budget of GPU memory (docs/view.md).
 
-import {createContext, WebGLUnavailable} from "./gl/gl_objects.js";
-import {Colors, colorBudget} from "./colors/colors.js";
-import {Passes} from "./gl/passes.js";
+import {colorBudget, Colors} from "./colors/colors.js";
 import {readFeedback, readHits} from "./gl/feedback.js";
+import {createContext, WebGLUnavailable} from "./gl/gl_objects.js";
+import {Passes} from "./gl/passes.js";
 import {jitterOf, pictureValues} from "./gl/picture_values.js";
 import {View} from "./gl/view.js";
 import {Light} from "./light.js";
@@ -20,14 +20,15 @@ export {WebGLUnavailable};
 
 const kMebibyte = 1 << 20;
 const kBudgetBytes = 256 * kMebibyte, kPhoneBudgetBytes = 64 * kMebibyte;
-const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;  // of the canvas: its targets are not part of the budget
-const kMovingMs = 180;          // after the last change of the view
-const kSamples = 16;            // per pixel of a still picture
-const kLitShare = 0.35;         // of what is seen within a scene
-const kSunTrials = 8;           // in which no fewer tiles are wanted that would say more
-const kFinePixels = 3;          // wide is a cell whose tile may arrive late
-const kFirstWaitMs = 400;       // for the tiles of the first view
-const kQuietRounds = 2;         // readings without a missing tile until a view is complete
+const kMaxPixels = 8e6,
+      kPhoneMaxPixels = 2e6;  // of the canvas: its targets are not part of the budget
+const kMovingMs = 180;        // after the last change of the view
+const kSamples = 16;          // per pixel of a still picture
+const kLitShare = 0.35;       // of what is seen within a scene
+const kSunTrials = 8;         // in which no fewer tiles are wanted that would say more
+const kFinePixels = 3;        // wide is a cell whose tile may arrive late
+const kFirstWaitMs = 400;     // for the tiles of the first view
+const kQuietRounds = 2;       // readings without a missing tile until a view is complete
 
 export class Renderer {
   // `begun`: what early.js has begun for this canvas, or null.
@@ -35,33 +36,53 @@ export class Renderer {
     this.canvas = canvas;
     this.source = source;
     this.onChange = onChange || (() => {});
-    const phone = matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
+    const phone =
+        matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
     this.budgetBytes = budgetBytes || (phone ? kPhoneBudgetBytes : kBudgetBytes);
     this.maxPixels = phone ? kPhoneMaxPixels : kMaxPixels;
-    this.options = {minLevel: 0, maxLevel: null, clip: null, ambientOcclusion: true, sunShadows: true,
-                    pixelTolerance: 1, wireLevel: null, color: true};
+    this.options = {
+      minLevel: 0,
+      maxLevel: null,
+      clip: null,
+      ambientOcclusion: true,
+      sunShadows: true,
+      pixelTolerance: 1,
+      wireLevel: null,
+      color: true
+    };
     this.view = null;
     this.firstPictureBytes = 0;
     this.sunTrials = 0;
     this.sunWanted = Infinity;  // tiles, at the least so far
     this.hasDrawn = false;      // since the context is there
-    this.colors = null;          // of a file that has some
-    this.sample = null;          // {parts, fence, partMs, busyMs, ...}: drawn in parts
+    this.colors = null;         // of a file that has some
+    this.sample = null;         // {parts, fence, partMs, busyMs, ...}: drawn in parts
     this.pace = new Pace();
-    this.size = {width: canvas.width, height: canvas.height, cssWidth: canvas.width, cssHeight: canvas.height};
-    this.times = {viewMs: -1e9, beginMs: begun?.beginMs ?? performance.now(), firstPictureMs: null, compileMs: 0};
+    this.size = {
+      width: canvas.width,
+      height: canvas.height,
+      cssWidth: canvas.width,
+      cssHeight: canvas.height
+    };
+    this.times = {
+      viewMs: -1e9,
+      beginMs: begun?.beginMs ?? performance.now(),
+      firstPictureMs: null,
+      compileMs: 0
+    };
     this.seed = 0;
     this.samples = 0;
     this.quietRounds = 0;
     this.coarsePixels = 0;
-    this.fullDrawn = false;     // the last frame that was read had all pixels
+    this.fullDrawn = false;  // the last frame that was read had all pixels
     this.stats = {stepsMean: 0, steps99: 0, rays: 0};
     this.waiting = [];
     this.disposed = false;
-    this.ready = false;          // programs, pool and root are there
-    this.started = null;         // {resolve, reject} of start()
+    this.ready = false;   // programs, pool and root are there
+    this.started = null;  // {resolve, reject} of start()
     this.gl = begun?.gl ?? createContext(canvas);
-    if (!this.gl) throw new WebGLUnavailable("This browser or its graphics driver does not offer WebGL 2.");
+    if (!this.gl)
+      throw new WebGLUnavailable("This browser or its graphics driver does not offer WebGL 2.");
     this.lost = this.gl.isContextLost();  // then onRestored() continues
     this.maxSize = 4096;
     canvas.addEventListener("webglcontextlost", this.onLost);
@@ -69,8 +90,8 @@ export class Renderer {
     if (!this.lost) this.createPrograms(begun?.passes);
   }
 
-  // Resolves when the first picture can be drawn, of a source whose manifest is there. With a view that was set before,
-  // its tiles are fetched at once.
+  // Resolves when the first picture can be drawn, of a source whose manifest is there. With a view
+  // that was set before, its tiles are fetched at once.
   async start() {
     this.info = this.source.info;
     this.light = new Light(this.info);
@@ -82,7 +103,8 @@ export class Renderer {
     });
   }
 
-  // Another root of the same DAG, which has grown: the tiles that are there stay. Resolves to whether it is shown.
+  // Another root of the same DAG, which has grown: the tiles that are there stay. Resolves to
+  // whether it is shown.
   async showRoot(info) {
     const {loader, store} = this;
     if (!this.ready || !this.info.root || info.levels <= 2) return false;
@@ -112,22 +134,27 @@ export class Renderer {
   }
 
   resize(cssWidth, cssHeight, deviceRatio) {
-    const pixelRatio = Math.min(deviceRatio, Math.sqrt(this.maxPixels / Math.max(1, cssWidth * cssHeight)));
-    const limit = this.maxSize, width = Math.min(limit, Math.max(1, Math.round(cssWidth * pixelRatio)));
+    const pixelRatio =
+        Math.min(deviceRatio, Math.sqrt(this.maxPixels / Math.max(1, cssWidth * cssHeight)));
+    const limit = this.maxSize,
+          width = Math.min(limit, Math.max(1, Math.round(cssWidth * pixelRatio)));
     const height = Math.min(limit, Math.max(1, Math.round(cssHeight * pixelRatio)));
-    const same = width === this.canvas.width && height === this.canvas.height && width === this.size.width;
+    const same =
+        width === this.canvas.width && height === this.canvas.height && width === this.size.width;
     this.size = {width, height, cssWidth, cssHeight};
     if (same) return;
     this.canvas.width = width;
     this.canvas.height = height;
-    if (this.ready && this.passes.targets) this.show();  // the old picture, until there is a new one
+    if (this.ready && this.passes.targets)
+      this.show();  // the old picture, until there is a new one
     this.beginEpoch();
   }
 
   // Draws a frame if there is something new to draw and the GPU is done with the last one.
   frame(nowMs) {
     const now = performance.now(), moving = now - this.times.viewMs < kMovingMs;
-    if (!this.ready || !this.view) return {moving, complete: true};  // onChange() says when there is more
+    if (!this.ready || !this.view)
+      return {moving, complete: true};  // onChange() says when there is more
     this.pace.tick(now);
     if (this.empty) {
       this.drawEmpty();
@@ -139,15 +166,18 @@ export class Renderer {
       if (!this.reading.pass.ready) return {moving, complete: false};
       this.takeReading(now);
     }
-    if (!moving && this.samples >= kSamples && ((this.isComplete && this.isDone) || this.rests(now))) return {moving, complete: true};
+    if (!moving && this.samples >= kSamples &&
+        ((this.isComplete && this.isDone) || this.rests(now)))
+      return {moving, complete: true};
     this.draw(now, moving);
     return {moving, complete: false};
   }
 
-  // Resolves when all tiles that the pixels of the canvas need have arrived, and the sun has its place: within a scene
-  // not while the service is away, if that lacks tiles.
+  // Resolves when all tiles that the pixels of the canvas need have arrived, and the sun has its
+  // place: within a scene not while the service is away, if that lacks tiles.
   complete() {
-    if (this.ready && this.isComplete && this.fullDrawn && this.sunIsPlaced && !this.reading) return Promise.resolve();
+    if (this.ready && this.isComplete && this.fullDrawn && this.sunIsPlaced && !this.reading)
+      return Promise.resolve();
     return new Promise((resolve) => {
       this.waiting.push(resolve);
       this.onChange();
@@ -166,19 +196,29 @@ export class Renderer {
     const words = await passes.pickOne(values);
     if (!words || !this.ready || (words[1] >>> 23 & 1) === 0) return null;
     if (store.evicted !== evicted) return this.pick(cssX, cssY);  // what it refers to may have left
-    const distance = new Float32Array(words.buffer, 0, 1)[0], log2Edge = words[1] >>> 16 & 31, axis = words[1] >>> 21 & 3;
+    const distance = new Float32Array(words.buffer, 0, 1)[0], log2Edge = words[1] >>> 16 & 31,
+          axis = words[1] >>> 21 & 3;
     const direction = view.direction(x, y, width, height);
     const normal = axis === 3 ? direction.map((d) => -d) : [0, 0, 0];
     if (axis < 3) normal[axis] = direction[axis] > 0 ? -1 : 1;
-    const node = words[2] !== 0 ? store.cutOffNode(words[2]) : store.bySlot[words[7]]?.tile || this.info.root;
-    return {voxel: [...words.slice(4, 7)], level: this.info.levels - log2Edge, position: add(view.eye, scale(direction, distance)),
-            distance, normal, nodeLevel: node.level, nodeOffset: String(node.offset)};
+    const node = words[2] !== 0 ? store.cutOffNode(words[2]) :
+                                  store.bySlot[words[7]]?.tile || this.info.root;
+    return {
+      voxel: [...words.slice(4, 7)],
+      level: this.info.levels - log2Edge,
+      position: add(view.eye, scale(direction, distance)),
+      distance,
+      normal,
+      nodeLevel: node.level,
+      nodeOffset: String(node.offset)
+    };
   }
 
   // Hits of a picture of any size with the tiles that are there, rows from the top.
   async capture({width, height}) {
-    const isDrawn = this.ready && !this.empty, words = isDrawn
-      ? this.passes.capture(this.uniforms(width, height), width, height) : new Uint32Array(4 * width * height);
+    const isDrawn = this.ready && !this.empty,
+          words = isDrawn ? this.passes.capture(this.uniforms(width, height), width, height) :
+                            new Uint32Array(4 * width * height);
     return readHits(words, width, height, this.info?.levels);
   }
 
@@ -215,7 +255,9 @@ export class Renderer {
 
   // Makes the renderer ready, from the beginning if the context was lost in between.
   async load() {
-    const {passes} = this, isOver = () => this.disposed || this.lost || passes !== this.passes || this.gl.isContextLost();
+    const {passes} = this,
+          isOver = () =>
+              this.disposed || this.lost || passes !== this.passes || this.gl.isContextLost();
     try {
       const root = this.loadRoot();
       root.catch(() => {});  // reported below, unless the programs fail
@@ -244,8 +286,11 @@ export class Renderer {
     this.rootPointer = undefined;
     this.empty = !root && !this.info.root_brick;
     const forColors = colorBudget(this.info, this.budgetBytes);
-    this.store = new TileStore(new TilePool(this.gl, this.poolBytes(this.budgetBytes - forColors)), this.info);
-    this.colors = forColors > 0 ? new Colors(this.gl, this.source, forColors, (failed) => this.onArrival(failed)) : null;
+    this.store = new TileStore(
+        new TilePool(this.gl, this.poolBytes(this.budgetBytes - forColors)), this.info);
+    this.colors = forColors > 0 ?
+        new Colors(this.gl, this.source, forColors, (failed) => this.onArrival(failed)) :
+        null;
     this.loader = new TileLoader(this.source, this.store, (failed) => this.onArrival(failed));
     if (root && levels > 2) {
       const words = await this.loader.loadRoot(root.level, root.offset);
@@ -257,13 +302,17 @@ export class Renderer {
     }
   }
 
-  // A small file needs less than the budget: at worst each voxel has a path of tiles. A growing DAG has no number yet.
+  // A small file needs less than the budget: at worst each voxel has a path of tiles. A growing DAG
+  // has no number yet.
   poolBytes(budgetBytes) {
     const {voxels, levels, tile_levels} = this.info;
-    return Math.min(budgetBytes, 4 * kMebibyte + Number(voxels ?? Infinity) * kBlockBytes * Math.ceil(levels / tile_levels));
+    return Math.min(
+        budgetBytes,
+        4 * kMebibyte + Number(voxels ?? Infinity) * kBlockBytes * Math.ceil(levels / tile_levels));
   }
 
-  // Begins the picture again. What is missing is found sooner by a small picture than by the rest of a large one.
+  // Begins the picture again. What is missing is found sooner by a small picture than by the rest
+  // of a large one.
   restart() {
     this.samples = 0;
     this.quietRounds = 0;
@@ -287,7 +336,9 @@ export class Renderer {
   // Before anything is drawn the tiles of a view are found without a reading of the feedback.
   seekFirstView(rootWords) {
     if (!this.view || this.options.clip || this.times.firstPictureMs !== null) return;
-    const {loader, store, info} = this, finest = 2 ** (info.levels - Math.min(info.levels, this.options.maxLevel ?? info.levels));
+    const {loader, store, info} = this,
+                          finest = 2 **
+        (info.levels - Math.min(info.levels, this.options.maxLevel ?? info.levels));
     loader.firstView = new FirstView(info, this.view, this.size, finest);
     loader.firstView.begin(store, store.root, rootWords);
     this.followFirstView();
@@ -302,7 +353,8 @@ export class Renderer {
 
   // A first picture that has its tiles is soon there; one without them only takes its time.
   get waitsForTiles() {
-    return performance.now() < this.waitUntilMs && (this.loader.firstView !== null || this.rootPointer === undefined);
+    return performance.now() < this.waitUntilMs &&
+        (this.loader.firstView !== null || this.rootPointer === undefined);
   }
 
   endFirstView() {
@@ -310,7 +362,8 @@ export class Renderer {
     if (this.loader) this.loader.firstView = null;
   }
 
-  // A few fine tiles that arrive late do not begin the picture again: its other samples will have them.
+  // A few fine tiles that arrive late do not begin the picture again: its other samples will have
+  // them.
   onArrival(failed = false) {
     if (this.loader?.firstView) this.followFirstView();
     if (!failed && (!this.isComplete || this.coarsePixels > kFinePixels)) this.restart();
@@ -333,14 +386,15 @@ export class Renderer {
     if (this.started) this.load();
   };
 
-  // Within a scene the sun takes a better place as soon as the first view is complete. Returns whether the picture
-  // is final as far as the sun is concerned.
+  // Within a scene the sun takes a better place as soon as the first view is complete. Returns
+  // whether the picture is final as far as the sun is concerned.
   improveSun(nowMs) {
     if (this.sunIsPlaced) return true;
     const {passes} = this, {width, height} = passes.targets;
     if (!this.canChooseSun) {
-      passes.compileLater().then((usable) => this.canChooseSun = usable && passes === this.passes,
-                                  () => this.sunTrials = kSunTrials);
+      passes.compileLater().then(
+          (usable) => this.canChooseSun = usable && passes === this.passes,
+          () => this.sunTrials = kSunTrials);
       return false;
     }
     const values = {...this.uniforms(width, height), u_turn: this.light.turn};
@@ -374,25 +428,32 @@ export class Renderer {
   // Whether all that can be drawn is drawn until the service is asked again.
   rests(now) {
     return this.fullDrawn && this.loaders.some((each) => each.pauses(now)) &&
-           this.loaders.every((each) => each.pauses(now) || each.isIdle);
+        this.loaders.every((each) => each.pauses(now) || each.isIdle);
   }
   get loaders() {
     return [this.loader, ...(this.colors && this.options.color ? [this.colors.loader] : [])];
   }
 
-  // The internal resolution: lower while the camera moves and while tiles arrive, if frames take long.
+  // The internal resolution: lower while the camera moves and while tiles arrive, if frames take
+  // long.
   internalSize(moving) {
     const {width, height} = this.size;
-    const arrives = this.quietRounds === 0 || (!this.isComplete && this.loaders.some((each) => each.requests > 0));
+    const arrives = this.quietRounds === 0 ||
+        (!this.isComplete && this.loaders.some((each) => each.requests > 0));
     const coarse = moving || (arrives && this.loaders.every((each) => each.outage.count === 0));
     const scale = moving ? this.pace.scale : coarse ? this.pace.seekingScale : 1;
-    return {width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)), full: scale === 1};
+    return {
+      width: Math.max(1, Math.round(width * scale)),
+      height: Math.max(1, Math.round(height * scale)),
+      full: scale === 1
+    };
   }
 
   draw(now, moving) {
     const {width, height, full} = this.internalSize(moving);
     const before = this.passes.targets;
-    if (before?.width !== width || before.height !== height || before.full.width !== this.size.width || before.full.height !== this.size.height)
+    if (before?.width !== width || before.height !== height ||
+        before.full.width !== this.size.width || before.full.height !== this.size.height)
       this.samples = 0;
     this.passes.resize(width, height, this.size, this.colors !== null);
     // Cells are as fine as the still picture needs, unless the camera moves.
@@ -400,14 +461,26 @@ export class Renderer {
     const values = this.uniforms(width, height, lodHeight);
     const frame = this.samples;
     this.seed++;
-    Object.assign(values, {u_frame: frame, u_seed: this.seed, u_jitter: jitterOf(full ? frame : this.seed)});
-    this.sample = {parts: this.passes.draw(values, () => this.pace.partPixels), fence: null, partMs: now, busyMs: 0,
-                   epoch: this.store.epoch, moving, full, width, height, outdated: false, pools: this.pools};
+    Object.assign(
+        values, {u_frame: frame, u_seed: this.seed, u_jitter: jitterOf(full ? frame : this.seed)});
+    this.sample = {
+      parts: this.passes.draw(values, () => this.pace.partPixels),
+      fence: null,
+      partMs: now,
+      busyMs: 0,
+      epoch: this.store.epoch,
+      moving,
+      full,
+      width,
+      height,
+      outdated: false,
+      pools: this.pools
+    };
     this.drawPart(now);
   }
 
-  // Gives the GPU as much of the sample as it can draw soon. More would stop the whole system, and some
-  // end a context that keeps them busy for seconds.
+  // Gives the GPU as much of the sample as it can draw soon. More would stop the whole system, and
+  // some end a context that keeps them busy for seconds.
   drawPart(now) {
     const {sample, gl} = this, {value: pass, done} = sample.parts.next();
     sample.partMs = now;
@@ -439,7 +512,9 @@ export class Renderer {
     const {sample, gl} = this;
     if (gl.getSyncParameter(sample.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
     gl.deleteSync(sample.fence);
-    if (sample.pools.some((texels, i) => texels !== this.pools[i])) {  // one has grown: the rest would see its old texture
+    if (sample.pools.some(
+            (texels, i) =>
+                texels !== this.pools[i])) {  // one has grown: the rest would see its old texture
       this.sample = null;
       return true;
     }
@@ -461,7 +536,8 @@ export class Renderer {
     this.pace.frameDone(now - partMs, busyMs, width * height, moving || !full);
     for (const slot of read.slots) this.store.mark(slot, epoch, now);
     // Not while samples of a still picture are added up.
-    if (read.exposure !== null && this.samples <= kSamples / 4) this.light.adjust(read, this.view.eye, moving);
+    if (read.exposure !== null && this.samples <= kSamples / 4)
+      this.light.adjust(read, this.view.eye, moving);
     this.coarsePixels = read.coarsePixels;
     if (epoch === this.store.epoch) this.store.rounds++;
     if (this.loader.firstView?.stalls(now)) this.endFirstView();
@@ -481,7 +557,8 @@ export class Renderer {
     if (!moving && nothingComes && !outdated) this.quietRounds++;
     else if (!this.isComplete || read.coarsePixels > kFinePixels) this.quietRounds = 0;
     this.fullDrawn = full;
-    if (this.isComplete && full && nothingComes && this.improveSun(now)) for (const resolve of this.waiting.splice(0)) resolve();
+    if (this.isComplete && full && nothingComes && this.improveSun(now))
+      for (const resolve of this.waiting.splice(0)) resolve();
   }
 
   drawEmpty() {

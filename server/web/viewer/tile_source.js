@@ -1,16 +1,23 @@
-// Fetches the manifest, tiles and color pages of one file. They never change for a digest, so the browser's cache
-// has a tile that is asked for alone again, and what a page asks for first when it is loaded again. Other batches
-// follow the view and are seldom asked for twice.
+// Fetches the manifest, tiles and color pages of one file. They never change for a digest, so the
+// browser's cache has a tile that is asked for alone again, and what a page asks for first when it
+// is loaded again. Other batches follow the view and are seldom asked for twice.
 
-const kTimeoutMs = 30000;       // without a byte: all of an answer may take longer on a slow link
-const kMaxBytes = 2 ** 26;      // of an answer; the largest batch that there can be has 44 MB
-const kLookAgainMs = 5000;      // between two looks at whether the file is still there
+const kTimeoutMs = 30000;   // without a byte: all of an answer may take longer on a slow link
+const kMaxBytes = 2 ** 26;  // of an answer; the largest batch that there can be has 44 MB
+const kLookAgainMs = 5000;  // between two looks at whether the file is still there
 const kMaxTileLevels = 5, kMaxBatch = 4096;
 
-const kReplaced = {code: "replaced", message: "The file was replaced by another one: reload the page."};
-const kRemoved = {code: "removed", message: "The file is not there any more: what is missing of it does not come."};
+const kReplaced = {
+  code: "replaced",
+  message: "The file was replaced by another one: reload the page."
+};
+const kRemoved = {
+  code: "removed",
+  message: "The file is not there any more: what is missing of it does not come."
+};
 
-// `status` is the HTTP status, 0 when there was no answer, 200 when it makes no sense; `code` is that of the service.
+// `status` is the HTTP status, 0 when there was no answer, 200 when it makes no sense; `code` is
+// that of the service.
 export class TileError extends Error {
   constructor(status, detail, {code = "", retryAfterMs = 0, timedOut = false} = {}) {
     super(detail);
@@ -27,7 +34,8 @@ export class TileError extends Error {
   }
   // Whether the service lives and has too much to do.
   get isBusy() {
-    return (this.status === 503 || this.status === 429) && (this.code === "busy" || this.retryAfterMs > 0);
+    return (this.status === 503 || this.status === 429) &&
+        (this.code === "busy" || this.retryAfterMs > 0);
   }
   // Whether all of the file may be missing.
   get isMissing() {
@@ -45,7 +53,7 @@ export class TileSource {
     this.base = base;
     this.headers = headers;
     this.info = null;
-    this.ended = null;           // {code, message} when there is nothing to be had any more
+    this.ended = null;  // {code, message} when there is nothing to be had any more
     this.timeoutMs = kTimeoutMs;
     this.looking = null;
     this.lookedMs = -Infinity;
@@ -60,7 +68,8 @@ export class TileSource {
     return info;
   }
 
-  // The tiles of the nodes [{level, offset}], as words, in the same order. All or a TileError. `options`: {signal, cache}.
+  // The tiles of the nodes [{level, offset}], as words, in the same order. All or a TileError.
+  // `options`: {signal, cache}.
   async fetchTiles(nodes, options) {
     const digest = encodeURIComponent(this.info.digest);
     if (nodes.length === 1) {
@@ -76,7 +85,8 @@ export class TileSource {
   // Color pages [{level, position: [x, y, z]}], in the same way.
   async fetchColors(pages, options) {
     const list = pages.map(({level, position}) => [level, ...position].join(".")).join(",");
-    const bytes = await this.request(`/tiles/colors?v=${encodeURIComponent(this.info.digest)}&pages=${list}`, options);
+    const bytes = await this.request(
+        `/tiles/colors?v=${encodeURIComponent(this.info.digest)}&pages=${list}`, options);
     return splitBatch(bytes, pages.length);
   }
 
@@ -103,7 +113,8 @@ export class TileSource {
   }
 
   async fetchManifest(signal) {
-    const text = new TextDecoder().decode(await this.request("/tiles", {cache: "no-store", signal}));
+    const text =
+        new TextDecoder().decode(await this.request("/tiles", {cache: "no-store", signal}));
     try {
       return JSON.parse(text);
     } catch {
@@ -127,7 +138,8 @@ export class TileSource {
     signal?.addEventListener("abort", end);
     if (signal?.aborted) end();
     try {
-      response = await fetch(this.base + path, {cache, headers: this.headers, signal: ending.signal});
+      response =
+          await fetch(this.base + path, {cache, headers: this.headers, signal: ending.signal});
       heard();
       const bytes = await bodyOf(response, heard);
       // Of the body as sent, which may be compressed.
@@ -139,7 +151,8 @@ export class TileSource {
         if (error.status === 410) this.ended = kReplaced;
         throw error;
       }
-      const detail = response ? "The service stopped in the middle of an answer." : "The service does not answer.";
+      const detail = response ? "The service stopped in the middle of an answer." :
+                                "The service does not answer.";
       throw new TileError(0, detail, {timedOut});
     } finally {
       clearTimeout(timer);
@@ -179,16 +192,20 @@ function problemOf({status, headers}, bytes) {
     // Not from the service: its status is all that it says.
   }
   const retryAfterMs = 1000 * Math.max(0, Number(headers.get("Retry-After")) || 0);
-  return new TileError(status, String(problem?.detail || `The service answered ${status}.`),
-                       {code: String(problem?.code ?? ""), retryAfterMs});
+  return new TileError(
+      status, String(problem?.detail || `The service answered ${status}.`),
+      {code: String(problem?.code ?? ""), retryAfterMs});
 }
 
 // Sizes of the GPU's memory and ends of loops depend on these.
 function checkManifest(info) {
   const expect = (isTrue, name) => {
-    if (!isTrue) throw new TileError(200, `The manifest's ${name} cannot be used: ${JSON.stringify(info?.[name])}.`);
+    if (!isTrue)
+      throw new TileError(
+          200, `The manifest's ${name} cannot be used: ${JSON.stringify(info?.[name])}.`);
   };
-  const isCount = (value, least, most) => Number.isInteger(value) && value >= least && value <= most;
+  const isCount = (value, least, most) =>
+      Number.isInteger(value) && value >= least && value <= most;
   const isWord = (value) => isCount(value, 0, 2 ** 32 - 1);
   expect(isCount(info?.levels, 2, 20), "levels");
   expect(info.resolution === 2 ** info.levels, "resolution");
@@ -198,10 +215,18 @@ function checkManifest(info) {
   // What a running job has built has no number yet, and no colors.
   const isGrowing = info.voxels === undefined && !info.colors;
   expect(isGrowing || (typeof info.voxels === "string" && /^\d+$/.test(info.voxels)), "voxels");
-  expect(!info.root || (info.root.level === 0 && isCount(info.root.offset, 0, 2 ** 40 - 1)), "root");
+  expect(
+      !info.root || (info.root.level === 0 && isCount(info.root.offset, 0, 2 ** 40 - 1)), "root");
   const {root_brick, colors} = info, needsBrick = Boolean(info.root) && info.levels === 2;
-  expect(root_brick ? Array.isArray(root_brick) && root_brick.length === 2 && root_brick.every(isWord) : !needsBrick, "root_brick");
-  expect(!colors || (isCount(colors.levels, 0, info.levels) && isCount(colors.batch_max, 1, kMaxBatch)), "colors");
+  expect(
+      root_brick ?
+          Array.isArray(root_brick) && root_brick.length === 2 && root_brick.every(isWord) :
+          !needsBrick,
+      "root_brick");
+  expect(
+      !colors ||
+          (isCount(colors.levels, 0, info.levels) && isCount(colors.batch_max, 1, kMaxBatch)),
+      "colors");
 }
 
 function wordsOf(bytes, begin, length) {

@@ -7,18 +7,20 @@ export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const length = (a) => Math.hypot(a[0], a[1], a[2]);
 export const distance = (a, b) => length(subtract(a, b));
 export const normalize = (a) => scale(a, 1 / length(a));
-export const cross = (a, b) =>
-  [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const cross =
+    (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 export const mix = (a, b, share) => add(scale(a, 1 - share), scale(b, share));
 
 // The unit vectors of a picture taken in a direction; looking straight up or down, up is -z or z.
 export function pictureAxes(direction, above = [0, 1, 0]) {
-  const forward = normalize(direction), vertical = Math.abs(dot(forward, normalize(above))) > 1 - 1e-9;
+  const forward = normalize(direction),
+        vertical = Math.abs(dot(forward, normalize(above))) > 1 - 1e-9;
   const right = normalize(cross(forward, vertical ? [0, 0, forward[1] < 0 ? -1 : 1] : above));
   return {forward, right, up: cross(right, forward)};
 }
 
-// The unit direction through a point of the picture, in units to the right of its center and above it.
+// The unit direction through a point of the picture, in units to the right of its center and above
+// it.
 export function pictureDirection({forward, right, up}, x, y) {
   return normalize(add(forward, add(scale(right, x), scale(up, y))));
 }

@@ -7,11 +7,13 @@ export class ClusterView {
   constructor() {
     this.summary = h("p", {class: "detail"});
     this.rows = h("tbody");
-    this.element = h("section", {class: "card", "aria-labelledby": "cluster-title"},
-      h("h2", {id: "cluster-title"}, "Tasks on the cluster"), this.summary,
-      h("table", {},
-        h("thead", {}, h("tr", {}, ["Node", "Running", "Built"].map((name) => h("th", {scope: "col"}, name)))),
-        this.rows));
+    this.element = h(
+        "section", {class: "card", "aria-labelledby": "cluster-title"},
+        h("h2", {id: "cluster-title"}, "Tasks on the cluster"), this.summary,
+        h("table", {},
+          h("thead", {},
+            h("tr", {}, ["Node", "Running", "Built"].map((name) => h("th", {scope: "col"}, name)))),
+          this.rows));
     this.element.hidden = true;
   }
 
@@ -22,10 +24,19 @@ export class ClusterView {
     // What is known of tasks is of the last attempt.
     const runs = job.state === "running";
     const running = cluster.nodes.reduce((sum, node) => sum + node.running, 0);
-    setText(this.summary, `${countText(cluster.built)} of ${countText(cluster.batches)} batches built` +
-      (runs ? ` · ${countText(running)} running, ${countText(cluster.waiting)} waiting` : "") +
-      (cluster.failed_attempts ? ` · ${countText(cluster.failed_attempts)} failed and submitted again` : ""));
-    clear(this.rows, cluster.nodes.map((node) =>
-      h("tr", {}, h("td", {}, node.name), h("td", {}, runs ? countText(node.running) : "–"), h("td", {}, countText(node.built)))));
+    setText(
+        this.summary,
+        `${countText(cluster.built)} of ${countText(cluster.batches)} batches built` +
+            (runs ? ` · ${countText(running)} running, ${countText(cluster.waiting)} waiting` :
+                    "") +
+            (cluster.failed_attempts ?
+                 ` · ${countText(cluster.failed_attempts)} failed and submitted again` :
+                 ""));
+    clear(
+        this.rows,
+        cluster.nodes.map(
+            (node) => h(
+                "tr", {}, h("td", {}, node.name), h("td", {}, runs ? countText(node.running) : "–"),
+                h("td", {}, countText(node.built)))));
   }
 }

@@ -1,5 +1,5 @@
-// The occupied subvolumes as cubes in an isometric view. Pending cubes are translucent; built ones are
-// solid, and highlighted for a moment when they are finished.
+// The occupied subvolumes as cubes in an isometric view. Pending cubes are translucent; built ones
+// are solid, and highlighted for a moment when they are finished.
 
 import {getJson} from "../lib/api.js";
 import {h, setText} from "../lib/dom.js";
@@ -10,7 +10,7 @@ const kMargin = 10;
 const kCos = Math.cos(Math.PI / 6), kSin = 0.5;
 const kGlowMs = 900;
 const kMinOutlinePx = 5;      // smaller cubes are drawn without outlines
-const kMaxGlowing = 6000;      // no highlights above this count: each frame draws all cubes
+const kMaxGlowing = 6000;     // no highlights above this count: each frame draws all cubes
 const kMinIntervalMs = 1000;  // between two requests
 
 export class CubesView {
@@ -22,9 +22,15 @@ export class CubesView {
     this.nextFetchMs = 0;
     this.canvas = h("canvas", {class: "cubes", role: "img"});
     this.note = h("p", {class: "faint"});
-    this.turner = h("div", {class: "buttons"}, ...[[-1, "Turn left"], [1, "Turn right"]].map(([by, text]) =>
-      h("button", {type: "button", class: "quiet small", on: {click: () => this.turnBy(by)}}, text)));
-    this.element = h("div", {class: "cubes-view"}, this.canvas, h("div", {class: "split"}, this.note, this.turner));
+    this.turner = h(
+        "div", {class: "buttons"},
+        ...[[-1, "Turn left"], [1, "Turn right"]].map(
+            ([by, text]) => h(
+                "button",
+                {type: "button", class: "quiet small", on: {click: () => this.turnBy(by)}}, text)));
+    this.element =
+        h("div", {class: "cubes-view"}, this.canvas,
+          h("div", {class: "split"}, this.note, this.turner));
     this.setEmpty(true);
     this.sayWhyEmpty(false, false);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
@@ -56,7 +62,8 @@ export class CubesView {
       this.key = key;
     } catch (problem) {
       if (this.signal.aborted) return;
-      if (problem.status === 404) this.key = key;  // not planned yet, or the job failed before planning
+      if (problem.status === 404)
+        this.key = key;  // not planned yet, or the job failed before planning
     } finally {
       this.fetching = false;
       sayIfEmpty();
@@ -87,10 +94,15 @@ export class CubesView {
     this.canvas.hidden = this.turner.hidden = empty;
   }
 
-  // Cubes of a job that has ended come only if it is tried again. `known`: the service has said that there are none.
+  // Cubes of a job that has ended come only if it is tried again. `known`: the service has said
+  // that there are none.
   sayWhyEmpty(ended, known) {
     if (this.resolution === undefined)
-      setText(this.note, !ended ? "Shown when the subvolumes are planned." : known ? "There are none." : "");
+      setText(
+          this.note,
+          !ended    ? "Shown when the subvolumes are planned." :
+              known ? "There are none." :
+                      "");
   }
 
   turnBy(by) {
@@ -105,8 +117,9 @@ export class CubesView {
     return [[x, y, z], [z, y, far(x)], [far(x), y, far(z)], [far(z), y, x]][this.turn];
   }
 
-  // Sorts the cubes from back to front. Octree cubes do not overlap, so the Morton order of their low
-  // corners is correct for any mixture of sizes: no cube precedes one that is lower on all axes.
+  // Sorts the cubes from back to front. Octree cubes do not overlap, so the Morton order of their
+  // low corners is correct for any mixture of sizes: no cube precedes one that is lower on all
+  // axes.
   order() {
     const minEdge = Math.min(...this.cubes.map((cube) => cube.edge));
     for (const cube of this.cubes) {
@@ -137,7 +150,8 @@ export class CubesView {
     this.frame(pen, colors, size);
     for (const cube of this.cubes)
       if (cube.litAt === null) this.drawPending(pen, colors, size, cube);
-    const glows = this.cubes.length <= kMaxGlowing && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const glows =
+        this.cubes.length <= kMaxGlowing && !matchMedia("(prefers-reduced-motion: reduce)").matches;
     const now = performance.now();
     let glowing = false;
     for (const cube of this.cubes) {
@@ -152,20 +166,31 @@ export class CubesView {
   colors() {
     const style = getComputedStyle(this.canvas);
     const get = (name) => style.getPropertyValue(name).trim();
-    return {top: get("--cube-top"), left: get("--cube-left"), right: get("--cube-right"), edge: get("--cube-edge"),
-            wait: get("--cube-wait"), waitEdge: get("--cube-wait-edge"), frame: get("--line"), glow: get("--cube-glow")};
+    return {
+      top: get("--cube-top"),
+      left: get("--cube-left"),
+      right: get("--cube-right"),
+      edge: get("--cube-edge"),
+      wait: get("--cube-wait"),
+      waitEdge: get("--cube-wait-edge"),
+      frame: get("--line"),
+      glow: get("--cube-glow")
+    };
   }
 
   point(size, x, y, z) {
-    return [kWidth / 2 + (x - z) * kCos * size,
-            kMargin + (this.resolution + (x + z) * kSin - y) * size];
+    return [
+      kWidth / 2 + (x - z) * kCos * size, kMargin + (this.resolution + (x + z) * kSin - y) * size
+    ];
   }
 
   // The floor and the far edges of the grid.
   frame(pen, colors, size) {
     const r = this.resolution;
-    const lines = [[[0, 0, 0], [r, 0, 0], [r, 0, r], [0, 0, r], [0, 0, 0]], [[0, 0, 0], [0, r, 0]],
-                   [[0, r, r], [0, r, 0], [r, r, 0]], [[0, 0, r], [0, r, r]], [[r, 0, 0], [r, r, 0]]];
+    const lines = [
+      [[0, 0, 0], [r, 0, 0], [r, 0, r], [0, 0, r], [0, 0, 0]], [[0, 0, 0], [0, r, 0]],
+      [[0, r, r], [0, r, 0], [r, r, 0]], [[0, 0, r], [0, r, r]], [[r, 0, 0], [r, r, 0]]
+    ];
     pen.strokeStyle = colors.frame;
     pen.lineWidth = 1;
     for (const line of lines) {

@@ -3,10 +3,11 @@
 import {sendJson, sleep} from "../lib/api.js";
 import {clear, h, setText} from "../lib/dom.js";
 import {countText, durationText, rangeText, shortCount, sizeText} from "../lib/format.js";
+
 import {problemBox} from "./parts.js";
 
 const kDebounceMs = 700;  // after the last change
-const kMaxAttempts = 5;    // while the service is busy with other plans
+const kMaxAttempts = 5;   // while the service is busy with other plans
 
 const kFigures = [
   ["voxels", "Voxels", shortCount],
@@ -23,8 +24,9 @@ export class EstimateView {
     this.signal = signal;
     this.status = h("p", {class: "hint", "aria-live": "polite"});
     this.table = h("div", {});
-    this.element = h("section", {class: "card estimate", "aria-labelledby": "estimate-title"},
-      h("h2", {id: "estimate-title"}, "Estimate"), this.status, this.table);
+    this.element =
+        h("section", {class: "card estimate", "aria-labelledby": "estimate-title"},
+          h("h2", {id: "estimate-title"}, "Estimate"), this.status, this.table);
     this.update(null);
   }
 
@@ -41,7 +43,8 @@ export class EstimateView {
       return;
     }
     const requestAbort = this.requestAbort = new AbortController();
-    this.signal.addEventListener("abort", () => requestAbort.abort(), {once: true, signal: requestAbort.signal});
+    this.signal.addEventListener(
+        "abort", () => requestAbort.abort(), {once: true, signal: requestAbort.signal});
     setText(this.status, "Estimating from small builds…");
     try {
       await sleep(kDebounceMs, requestAbort.signal);
@@ -67,16 +70,23 @@ export class EstimateView {
   }
 
   show(estimate) {
-    setText(this.status, `${countText(estimate.triangles)} triangles in ${countText(estimate.subvolumes)} ` +
-                          `occupied subvolume${estimate.subvolumes === 1 ? "" : "s"}`);
+    setText(
+        this.status,
+        `${countText(estimate.triangles)} triangles in ${countText(estimate.subvolumes)} ` +
+            `occupied subvolume${estimate.subvolumes === 1 ? "" : "s"}`);
     this.table.classList.remove("old");
-    clear(this.table, h("table", {},
-      h("thead", {}, h("tr", {}, h("td", {}), h("th", {scope: "col", class: "number"}, "Likely"),
-        h("th", {scope: "col", class: "number"}, "Range"))),
-      h("tbody", {}, kFigures.filter(([key]) => estimate[key]).map(([key, name, text]) => {
-        const {low, likely, high} = estimate[key];
-        return h("tr", {}, h("th", {scope: "row"}, name), h("td", {class: "number likely"}, text(likely)),
-                 h("td", {class: "number faint"}, rangeText(text(low), text(high))));
-      }))));
+    clear(
+        this.table,
+        h("table", {},
+          h("thead", {},
+            h("tr", {}, h("td", {}), h("th", {scope: "col", class: "number"}, "Likely"),
+              h("th", {scope: "col", class: "number"}, "Range"))),
+          h("tbody", {}, kFigures.filter(([key]) => estimate[key]).map(([key, name, text]) => {
+            const {low, likely, high} = estimate[key];
+            return h(
+                "tr", {}, h("th", {scope: "row"}, name),
+                h("td", {class: "number likely"}, text(likely)),
+                h("td", {class: "number faint"}, rangeText(text(low), text(high))));
+          }))));
   }
 }

@@ -3,6 +3,7 @@
 import {request, sendJson, token} from "../lib/api.js";
 import {clear, confirmAction, h} from "../lib/dom.js";
 import {hasEnded, sizeText, titleText} from "../lib/format.js";
+
 import {copyButton, problemBox} from "./parts.js";
 
 const kMaxInMemoryBytes = 2 ** 30;
@@ -15,7 +16,8 @@ export function actions(job, reload) {
     await reload();
   };
   const button = (text, action, kind = "") => {
-    const element = h("button", {type: "button", class: kind, "data-action": text.toLowerCase()}, text);
+    const element =
+        h("button", {type: "button", class: kind, "data-action": text.toLowerCase()}, text);
     element.addEventListener("click", async () => {
       if (element.hasAttribute("aria-busy")) return;
       element.setAttribute("aria-busy", "true");  // a disabled button would lose the focus
@@ -40,27 +42,42 @@ export function actions(job, reload) {
     may("failed", "canceled") && button("Retry", post("retry"), "primary"),
     may("queued", "running") && button("Suspend", post("suspend")),
     may("running", "suspended") && view(),
-    may("queued", "running", "suspended") && button("Cancel", async () => {
-      if (await confirmAction("Cancel this job?", "Its partial result will be deleted.", "Cancel the job"))
-        await post("cancel")();
-    }, "danger"),
-    hasEnded(job.state) && button("Delete", async () => {
-      const what = job.state === "succeeded" ? "Its result, report and log will be deleted." : "Its log will be deleted.";
-      if (!await confirmAction("Delete this job?", what, "Delete the job")) return;
-      await sendJson("DELETE", job.links.self);
-      location.hash = "#/";
-    }, "danger"),
-    may("succeeded") && h("a", {class: "button quiet", href: `#/new?like=${job.id}`}, "Copy to new job"),
+    may("queued", "running", "suspended") &&
+        button(
+            "Cancel",
+            async () => {
+              if (await confirmAction(
+                      "Cancel this job?", "Its partial result will be deleted.", "Cancel the job"))
+                await post("cancel")();
+            },
+            "danger"),
+    hasEnded(job.state) &&
+        button(
+            "Delete",
+            async () => {
+              const what = job.state === "succeeded" ?
+                  "Its result, report and log will be deleted." :
+                  "Its log will be deleted.";
+              if (!await confirmAction("Delete this job?", what, "Delete the job")) return;
+              await sendJson("DELETE", job.links.self);
+              location.hash = "#/";
+            },
+            "danger"),
+    may("succeeded") &&
+        h("a", {class: "button quiet", href: `#/new?like=${job.id}`}, "Copy to new job"),
   ];
   return [h("div", {class: "buttons"}, buttons), error];
 }
 
 function fileName(job) {
-  return `${titleText(job).replace(/\.(glb|gltf|ply)$/, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
+  return `${
+      titleText(job).replace(/\.(glb|gltf|ply)$/, "").replace(/[^A-Za-z0-9._-]+/g, "-") ||
+      "scene"}.vdag`;
 }
 
 // Without a token the browser downloads the link itself, which is resumable. A link cannot carry a
-// token: then the bytes are streamed to a file where the browser supports that, else held in memory.
+// token: then the bytes are streamed to a file where the browser supports that, else held in
+// memory.
 async function download(job) {
   const name = fileName(job);
   if (!token.get()) return clickLink(job.links.dag, name);
@@ -71,8 +88,12 @@ async function download(job) {
     await response.body.pipeTo(await handle.createWritable());
     return;
   }
-  if (job.result.bytes > kMaxInMemoryBytes) throw {code: "too_large", detail:
-    `This browser cannot save ${sizeText(job.result.bytes)} with a token: use the command under "Result".`};
+  if (job.result.bytes > kMaxInMemoryBytes)
+    throw {
+      code: "too_large",
+      detail: `This browser cannot save ${
+          sizeText(job.result.bytes)} with a token: use the command under "Result".`
+    };
   const url = URL.createObjectURL(await (await request("GET", job.links.dag)).blob());
   clickLink(url, name);
   setTimeout(() => URL.revokeObjectURL(url), 60000);
@@ -88,6 +109,6 @@ function clickLink(href, name) {
 // The same download as a shell command, which resumes after a lost connection.
 export function downloadCommand(job) {
   const text = `voxdag download ${job.id} -o ${fileName(job)} --server ${location.origin}` +
-               (token.get() ? " --token-file FILE" : "");
+      (token.get() ? " --token-file FILE" : "");
   return h("div", {class: "command"}, h("code", {}, text), copyButton(text, "the command"));
 }

@@ -13,12 +13,15 @@ export class LogView {
     this.signal = signal;
     this.isLive = false;
     this.text = h("pre", {class: "log", tabindex: "0", "aria-label": "The end of the log"});
-    this.element = h("details", {class: "card log-card"}, h("summary", {}, h("h2", {}, "Log")), this.text);
-    this.element.addEventListener("toggle", () => this.element.open ? this.begin() : this.closing?.abort());
+    this.element =
+        h("details", {class: "card log-card"}, h("summary", {}, h("h2", {}, "Log")), this.text);
+    this.element.addEventListener(
+        "toggle", () => this.element.open ? this.begin() : this.closing?.abort());
   }
 
   setLive(isLive) {
-    if (this.isLive && !isLive && this.element.open) setTimeout(() => this.begin(), 500);  // fetches the last lines
+    if (this.isLive && !isLive && this.element.open)
+      setTimeout(() => this.begin(), 500);  // fetches the last lines
     this.isLive = isLive;
   }
 

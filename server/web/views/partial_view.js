@@ -17,7 +17,8 @@ export class PartialView extends CubesView {
 
   // `cubes` of the service are [x, y, z, edge, low, high]: the halves of a brick.
   show({resolution, built, total, cubes}) {
-    const parts = cubes.length <= kMaxDetailed ? cubes.flatMap(cellsOf) : cubes.map(([x, y, z, edge]) => [x, y, z, edge, 1]);
+    const parts = cubes.length <= kMaxDetailed ? cubes.flatMap(cellsOf) :
+                                                 cubes.map(([x, y, z, edge]) => [x, y, z, edge, 1]);
     super.show({resolution, built, total, cubes: parts});
   }
 }

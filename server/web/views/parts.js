@@ -9,17 +9,24 @@ export function stateBadge(state) {
 
 // A Problem, or a job's error, with its code.
 export function problemBox(problem, title = null) {
-  return h("div", {class: "problem"},
-    title && h("strong", {}, title),
-    h("p", {}, problem.detail || problem.message),
-    h("p", {class: "code"}, problem.code, problem.status ? ` · HTTP ${problem.status}` : null));
+  return h(
+      "div", {class: "problem"}, title && h("strong", {}, title),
+      h("p", {}, problem.detail || problem.message),
+      h("p", {class: "code"}, problem.code, problem.status ? ` · HTTP ${problem.status}` : null));
 }
 
 // An accessible progress bar. update(fraction) takes 0 to 1, or null if it is unknown.
 export function meter(label) {
   const full = h("div", {class: "meter-full"});
-  const element = h("div", {class: "meter", role: "progressbar", "aria-label": label,
-                            "aria-valuemin": "0", "aria-valuemax": "100"}, full);
+  const element =
+      h("div", {
+        class: "meter",
+        role: "progressbar",
+        "aria-label": label,
+        "aria-valuemin": "0",
+        "aria-valuemax": "100"
+      },
+        full);
   const update = (fraction) => {
     element.classList.toggle("unknown", fraction === null);
     full.style.width = fraction === null ? "" : `${(100 * fraction).toFixed(2)}%`;
@@ -39,7 +46,8 @@ export function updateJobMeter(bar, job) {
 
 // A button that copies `text` to the clipboard.
 export function copyButton(text, what) {
-  const button = h("button", {type: "button", class: "quiet small", "aria-label": `Copy ${what}`}, "Copy");
+  const button =
+      h("button", {type: "button", class: "quiet small", "aria-label": `Copy ${what}`}, "Copy");
   button.addEventListener("click", async () => {
     const copied = await copy(text);
     setText(button, copied ? "Copied" : "Select and press Ctrl-C");

@@ -1,7 +1,16 @@
 // The current stage of a job, and the numbers of the attempt.
 
 import {h, setText} from "../lib/dom.js";
-import {countText, doneFraction, durationText, hasEnded, shortCount, sizeText, unitText} from "../lib/format.js";
+import {
+  countText,
+  doneFraction,
+  durationText,
+  hasEnded,
+  shortCount,
+  sizeText,
+  unitText
+} from "../lib/format.js";
+
 import {meter, updateJobMeter} from "./parts.js";
 
 const kFigures = [
@@ -20,11 +29,14 @@ export class ProgressView {
     this.bar = meter("progress of the current stage");
     this.detail = h("p", {class: "detail"});
     this.values = {};
-    const figures = kFigures.map(([key, name]) =>
-      h("div", {class: "figure"}, h("dt", {}, name), this.values[key] = h("dd", {}, "–")));
+    const figures = kFigures.map(
+        ([key, name]) =>
+            h("div", {class: "figure"}, h("dt", {}, name), this.values[key] = h("dd", {}, "–")));
     this.figures = h("dl", {class: "figures"}, figures);
-    this.element = h("section", {class: "card progress", "aria-label": "Progress"},
-      h("div", {class: "stage-row"}, this.stage, this.percent), this.bar.element, this.detail, this.figures);
+    this.element =
+        h("section", {class: "card progress", "aria-label": "Progress"},
+          h("div", {class: "stage-row"}, this.stage, this.percent), this.bar.element, this.detail,
+          this.figures);
   }
 
   show(job) {
@@ -36,32 +48,43 @@ export class ProgressView {
     setText(this.percent, fraction === null || job.state === "queued" ? "" : percentText(fraction));
     setText(this.detail, detailText(job));
     this.figures.hidden = !p;
-    if (p) for (const [key, , text] of kFigures) setText(this.values[key], text(p));
+    if (p)
+      for (const [key, , text] of kFigures) setText(this.values[key], text(p));
   }
 }
 
 function percentText(fraction) {
-  return fraction > 0 && fraction < 0.1 ? `${(Math.floor(1000 * fraction) / 10).toFixed(1)} %` : `${Math.floor(100 * fraction)} %`;
+  return fraction > 0 && fraction < 0.1 ? `${(Math.floor(1000 * fraction) / 10).toFixed(1)} %` :
+                                          `${Math.floor(100 * fraction)} %`;
 }
 
 function headline(job) {
   const stage = job.progress?.stage;
   switch (job.state) {
-    case "queued": return job.position ? `Number ${job.position} in the queue` : "Waiting in the queue";
-    case "suspended": return stage ? `Suspended in ${stage}` : "Suspended";
-    case "canceling": return "Canceling…";
-    case "canceled": return stage ? `Canceled in ${stage}` : "Canceled";
-    case "failed": return stage ? `Failed in ${stage}` : "Failed";
-    default: return stage || "Starting…";
+    case "queued":
+      return job.position ? `Number ${job.position} in the queue` : "Waiting in the queue";
+    case "suspended":
+      return stage ? `Suspended in ${stage}` : "Suspended";
+    case "canceling":
+      return "Canceling…";
+    case "canceled":
+      return stage ? `Canceled in ${stage}` : "Canceled";
+    case "failed":
+      return stage ? `Failed in ${stage}` : "Failed";
+    default:
+      return stage || "Starting…";
   }
 }
 
 function detailText(job) {
   const p = job.progress;
   if (!p || !p.stage) return "";
-  const far = p.total ? `${countText(p.done)} of ${unitText(countText(p.total), p.unit)}`
-                      : unitText(countText(p.done), p.unit);
+  const far = p.total ? `${countText(p.done)} of ${unitText(countText(p.total), p.unit)}` :
+                        unitText(countText(p.done), p.unit);
   if (hasEnded(job.state) || job.state !== "running") return far;
-  return [far, p.rate > 0 && `${shortCount(p.rate)} ${p.unit} per second`,
-          p.eta_s > 0 && `${durationText(p.eta_s)} left in this stage`].filter(Boolean).join(" · ");
+  return [
+    far, p.rate > 0 && `${shortCount(p.rate)} ${p.unit} per second`,
+    p.eta_s > 0 && `${durationText(p.eta_s)} left in this stage`
+  ].filter(Boolean)
+      .join(" · ");
 }

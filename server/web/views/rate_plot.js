@@ -5,7 +5,7 @@ import {durationText, shortCount} from "../lib/format.js";
 
 const kWidth = 520, kHeight = 170;
 const kLeft = 52, kRight = 8, kTop = 10, kBottom = 24;
-const kWindowS = 2;      // minimum duration that a rate is averaged over
+const kWindowS = 2;       // minimum duration that a rate is averaged over
 const kMaxSamples = 600;  // above it every other sample is dropped
 
 // Job id -> series by stage: shown again when the user returns to a job.
@@ -40,14 +40,17 @@ export class RatePlot {
     const from = series.marks[0];
     if (time - from.time < 0.4) return;
     series.samples.push([time, (p.done - from.done) / (time - from.time)]);
-    if (series.samples.length > kMaxSamples) series.samples = series.samples.filter((_, i) => i % 2 === 0);
+    if (series.samples.length > kMaxSamples)
+      series.samples = series.samples.filter((_, i) => i % 2 === 0);
     this.current = p.stage;
   }
 
   draw() {
-    const names = [...this.series.keys()].filter((name) => this.series.get(name).samples.length > 1);
-    const name = names.includes(this.chosen) ? this.chosen
-               : names.includes(this.current) ? this.current : longest(this.series, names);
+    const names =
+        [...this.series.keys()].filter((name) => this.series.get(name).samples.length > 1);
+    const name = names.includes(this.chosen) ? this.chosen :
+        names.includes(this.current)         ? this.current :
+                                               longest(this.series, names);
     this.showTabs(names, name);
     this.picture.toggleAttribute("hidden", !name);
     this.empty = !name;
@@ -57,8 +60,8 @@ export class RatePlot {
     }
     const {samples, unit} = this.series.get(name);
     setText(this.note, `${unit} per second during ${name}`);
-    this.picture.setAttribute("aria-label",
-      `Rate of ${name}: now ${shortCount(samples.at(-1)[1])} ${unit} per second`);
+    this.picture.setAttribute(
+        "aria-label", `Rate of ${name}: now ${shortCount(samples.at(-1)[1])} ${unit} per second`);
     clear(this.picture, plot(samples));
   }
 
@@ -66,10 +69,20 @@ export class RatePlot {
     const key = names.join();
     if (this.tabs.dataset.key !== key) {
       this.tabs.dataset.key = key;
-      clear(this.tabs, names.map((name) => h("button", {type: "button", on: {click: () => {
-        this.chosen = name;
-        this.draw();
-      }}}, name)));
+      clear(
+          this.tabs,
+          names.map(
+              (name) =>
+                  h("button", {
+                    type: "button",
+                    on: {
+                      click: () => {
+                        this.chosen = name;
+                        this.draw();
+                      }
+                    }
+                  },
+                    name)));
     }
     this.tabs.hidden = names.length < 2;
     for (const button of this.tabs.children)
@@ -88,13 +101,19 @@ function plot(samples) {
   const ticks = roundTicks(Math.max(...samples.map(([, rate]) => rate), 1e-9));
   const x = (time) => kLeft + (time - begin) / (end - begin) * (kWidth - kLeft - kRight);
   const y = (rate) => kHeight - kBottom - rate / ticks.at(-1) * (kHeight - kTop - kBottom);
-  const points = samples.map(([time, rate]) => `${x(time).toFixed(1)},${y(rate).toFixed(1)}`).join(" ");
-  const label = (atX, atY, anchor, text) => svg("text", {x: atX, y: atY, "text-anchor": anchor}, text);
+  const points =
+      samples.map(([time, rate]) => `${x(time).toFixed(1)},${y(rate).toFixed(1)}`).join(" ");
+  const label = (atX, atY, anchor, text) =>
+      svg("text", {x: atX, y: atY, "text-anchor": anchor}, text);
   return [
-    ...ticks.flatMap((tick) => [
-      svg("line", {class: "grid", x1: kLeft, x2: kWidth - kRight, y1: y(tick), y2: y(tick)}),
-      label(kLeft - 8, y(tick) + 4, "end", shortCount(tick))]),
-    svg("polygon", {class: "area", points: `${x(samples[0][0])},${y(0)} ${points} ${x(samples.at(-1)[0])},${y(0)}`}),
+    ...ticks.flatMap(
+        (tick) =>
+            [svg("line", {class: "grid", x1: kLeft, x2: kWidth - kRight, y1: y(tick), y2: y(tick)}),
+             label(kLeft - 8, y(tick) + 4, "end", shortCount(tick))]),
+    svg("polygon", {
+      class: "area",
+      points: `${x(samples[0][0])},${y(0)} ${points} ${x(samples.at(-1)[0])},${y(0)}`
+    }),
     svg("polyline", {class: "line", points}),
     label(kLeft, kHeight - 6, "start", durationText(begin)),
     label(kWidth - kRight, kHeight - 6, "end", durationText(end)),

@@ -5,8 +5,9 @@ import {durationText, shortCount, unitText} from "../lib/format.js";
 
 export class Timeline {
   constructor() {
-    this.element = h("div", {}, this.list = h("ol", {class: "timeline"}),
-                     this.none = h("p", {class: "empty"}, "No stage has started."));
+    this.element =
+        h("div", {}, this.list = h("ol", {class: "timeline"}),
+          this.none = h("p", {class: "empty"}, "No stage has started."));
     this.rows = [];
   }
 
@@ -14,7 +15,8 @@ export class Timeline {
     const stages = job.progress?.stages || [];
     this.none.hidden = stages.length > 0;
     // A new attempt has fewer or other stages.
-    if (stages.length < this.rows.length || this.rows.some((row, i) => row.name !== stages[i].name)) {
+    if (stages.length < this.rows.length ||
+        this.rows.some((row, i) => row.name !== stages[i].name)) {
       clear(this.list);
       this.rows = [];
     }
@@ -32,7 +34,9 @@ export class Timeline {
     const done = h("span", {class: "far"});
     const time = h("span", {class: "time"});
     const state = h("span", {class: "unseen"});
-    const element = h("li", {}, h("span", {class: "name"}, name, state), h("span", {class: "track"}, span), done, time);
+    const element =
+        h("li", {}, h("span", {class: "name"}, name, state), h("span", {class: "track"}, span),
+          done, time);
     this.list.append(element);
     const update = (stage, from, part, running) => {
       const now = !stage.ended && running;
@@ -41,8 +45,11 @@ export class Timeline {
       span.style.left = `${(100 * from).toFixed(2)}%`;
       span.style.width = `${(100 * part).toFixed(2)}%`;
       const count = shortCount(stage.done);
-      setText(done, stage.ended || !stage.total ? unitText(count, stage.unit)
-                                                : `${count} of ${unitText(shortCount(stage.total), stage.unit)}`);
+      setText(
+          done,
+          stage.ended || !stage.total ?
+              unitText(count, stage.unit) :
+              `${count} of ${unitText(shortCount(stage.total), stage.unit)}`);
       setText(time, durationText(stage.wall_s));
     };
     return {name, update};

@@ -7,7 +7,9 @@ const kMaxRequests = 2, kMaxBatch = 128;
 // Its requests are {key, level, position, priority}.
 export class ColorLoader extends Loader {
   constructor(source, store, onArrival) {
-    super(source, store, onArrival, {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.info.colors.batch_max)});
+    super(
+        source, store, onArrival,
+        {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.info.colors.batch_max)});
   }
 
   // `wanted`: key -> request, of one reading of the feedback.

@@ -1,24 +1,26 @@
-// The color pages on the GPU: their words in a pool of blocks as that of the tiles, and a hash table by
-// which the shaders find a page by its place. Pages that the view does not use leave when there is no room;
-// the coarsest stay, so that there is always some color.
+// The color pages on the GPU: their words in a pool of blocks as that of the tiles, and a hash
+// table by which the shaders find a page by its place. Pages that the view does not use leave when
+// there is no room; the coarsest stay, so that there is always some color.
 
 import {kRoundsToKnow} from "../tiles/loader.js";
 import {TilePool} from "../tiles/tile_pool.js";
+
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
 const kRecentMs = 1500;
-const kFreeShare = 1 / 64;       // of the pool, that leaves at once
-const kTableShare = 1 / 5;       // of the budget
+const kFreeShare = 1 / 64;                   // of the pool, that leaves at once
+const kTableShare = 1 / 5;                   // of the budget
 const kEntryBytes = 16, kTableWidth = 1024;  // the shaders know the width
-const kMaxEntries = 2 ** 21;     // the pool has 2^20 blocks at most, and half of the entries stay free
-const kCoarseLevel = 5;          // pages of this level and coarser ones stay: they are 76 at most
+const kMaxEntries = 2 ** 21;  // the pool has 2^20 blocks at most, and half of the entries stay free
+const kCoarseLevel = 5;       // pages of this level and coarser ones stay: they are 76 at most
 
 // The number of the pages along an axis.
 function pagesOf(level) {
   return 2 ** Math.max(0, level - 3);
 }
-const kPagesBefore = [0];        // a level, of coarser ones
-for (let level = 0; level < 20; ++level) kPagesBefore.push(kPagesBefore[level] + pagesOf(level) ** 3);
+const kPagesBefore = [0];  // a level, of coarser ones
+for (let level = 0; level < 20; ++level)
+  kPagesBefore.push(kPagesBefore[level] + pagesOf(level) ** 3);
 // A number for a page: below 2^52.
 export function pageKey(level, x, y, z) {
   const n = pagesOf(level);
@@ -28,13 +30,14 @@ export function pageKey(level, x, y, z) {
 export class ColorStore {
   constructor(gl, budgetBytes) {
     this.gl = gl;
-    const entries = Math.min(kMaxEntries, Math.max(kTableWidth, budgetBytes * kTableShare / kEntryBytes));
+    const entries =
+        Math.min(kMaxEntries, Math.max(kTableWidth, budgetBytes * kTableShare / kEntryBytes));
     this.entries = 2 ** Math.floor(Math.log2(entries));
     this.pool = new TilePool(gl, budgetBytes - this.entries * kEntryBytes);
     this.maxPages = this.entries / 2;
     this.table = this.pool.createTexture(gl.RGBA32UI, kTableWidth, this.entries / kTableWidth);
     this.words = new Uint32Array(4 * this.entries);  // what the table holds
-    this.pages = new Map();    // key -> page
+    this.pages = new Map();                          // key -> page
     this.usedBlocks = 0;
     this.epoch = 0;
     this.rounds = 0;
@@ -57,9 +60,12 @@ export class ColorStore {
     if (!this.evictFor(count, nowMs)) return false;
     const [x, y, z] = position, blocks = this.pool.allocate(count);
     if (!blocks) return false;
-    const page = {key, level, place: [x | level << 20, y, z], blocks, usedMs: nowMs, epoch: this.epoch};
+    const page =
+        {key, level, place: [x | level << 20, y, z], blocks, usedMs: nowMs, epoch: this.epoch};
     for (let i = 1; i < count; ++i) words[kMoreAt + i - 1] = blocks[i] * kBlockWords / 4;
-    blocks.forEach((block, i) => this.pool.write(block * kBlockWords / 4, words.subarray(i * kBlockWords, (i + 1) * kBlockWords)));
+    blocks.forEach(
+        (block, i) => this.pool.write(
+            block * kBlockWords / 4, words.subarray(i * kBlockWords, (i + 1) * kBlockWords)));
     // A page without cells is known, but not found by the shaders.
     if (count > 0) this.insert(page.place, blocks[0] + 1);
     this.pages.set(key, page);
@@ -76,12 +82,14 @@ export class ColorStore {
   }
 
   evictFor(count, nowMs) {
-    const fits = (blocks, pages) => this.pool.freeBlocks >= blocks && this.pages.size + pages <= this.maxPages;
+    const fits = (blocks, pages) =>
+        this.pool.freeBlocks >= blocks && this.pages.size + pages <= this.maxPages;
     if (fits(count, 1)) return true;
     const maxUsedMs = nowMs - (this.rounds >= kRoundsToKnow ? 0 : kRecentMs);
     const candidates = [];
     for (const page of this.pages.values())
-      if (page.level > kCoarseLevel && page.epoch !== this.epoch && page.usedMs < maxUsedMs) candidates.push(page);
+      if (page.level > kCoarseLevel && page.epoch !== this.epoch && page.usedMs < maxUsedMs)
+        candidates.push(page);
     candidates.sort((a, b) => a.usedMs - b.usedMs);
     const more = this.pool.blockCount * kFreeShare;
     for (const page of candidates) {
@@ -95,8 +103,9 @@ export class ColorStore {
     return fits(count, 1);
   }
 
-  // The table is probed from an entry's hash to the next free entry, of which there always are some. An entry is
-  // x and the level, y, z, and the number of the page's first block plus 1; 0 is free.
+  // The table is probed from an entry's hash to the next free entry, of which there always are
+  // some. An entry is x and the level, y, z, and the number of the page's first block plus 1; 0 is
+  // free.
   insert(place, number) {
     let at = this.homeOf(place);
     while (this.words[4 * at + 3] !== 0) at = this.next(at);
@@ -132,8 +141,9 @@ export class ColorStore {
     const {gl} = this;
     this.words.set(entry, 4 * at);
     gl.bindTexture(gl.TEXTURE_2D, this.table);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, at % kTableWidth, Math.floor(at / kTableWidth), 1, 1,
-                     gl.RGBA_INTEGER, gl.UNSIGNED_INT, this.words, 4 * at);
+    gl.texSubImage2D(
+        gl.TEXTURE_2D, 0, at % kTableWidth, Math.floor(at / kTableWidth), 1, 1, gl.RGBA_INTEGER,
+        gl.UNSIGNED_INT, this.words, 4 * at);
   }
 
   dispose() {

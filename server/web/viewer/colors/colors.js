@@ -1,19 +1,23 @@
-// The colors of a file: what the shaders need to draw them, and what a reading of the feedback says of them.
+// The colors of a file: what the shaders need to draw them, and what a reading of the feedback says
+// of them.
 
 import {ColorLoader} from "./color_loader.js";
 import {ColorStore, pageKey} from "./color_store.js";
 
 const kMebibyte = 1 << 20;
-const kBudgetShare = 1 / 4;      // of that of tiles and colors
-const kMinBytes = 96 * 1024;   // a pool and a hash table take no less
-const kBytesPerVoxel = 1024;     // at worst: a page for each voxel, as many again on coarser levels
-const kBaseBelow = 2;            // levels: of a wanted page a coarser one comes first, unless one as fine is there
-const kWanted = 2;               // of the feedback's last word, the least: so many pixels want the page
+const kBudgetShare = 1 / 4;   // of that of tiles and colors
+const kMinBytes = 96 * 1024;  // a pool and a hash table take no less
+const kBytesPerVoxel = 1024;  // at worst: a page for each voxel, as many again on coarser levels
+const kBaseBelow =
+    2;  // levels: of a wanted page a coarser one comes first, unless one as fine is there
+const kWanted = 2;  // of the feedback's last word, the least: so many pixels want the page
 
 // How much of the budget the colors of a file take.
 export function colorBudget(info, budgetBytes) {
   if (!info.colors) return 0;
-  return Math.min(Math.max(budgetBytes * kBudgetShare, kMinBytes), kMebibyte + Number(info.voxels) * kBytesPerVoxel);
+  return Math.min(
+      Math.max(budgetBytes * kBudgetShare, kMinBytes),
+      kMebibyte + Number(info.voxels) * kBytesPerVoxel);
 }
 
 export class Colors {
@@ -30,7 +34,12 @@ export class Colors {
 
   uniforms() {
     const {store} = this;
-    return {u_page_texels: store.pool.texels, u_page_table: store.table, u_page_mask: store.entries - 1, u_color_levels: this.levels};
+    return {
+      u_page_texels: store.pool.texels,
+      u_page_table: store.table,
+      u_page_mask: store.entries - 1,
+      u_color_levels: this.levels
+    };
   }
 
   // Takes the words that kColorFeedback wrote for a picture of an epoch.
@@ -41,7 +50,9 @@ export class Colors {
       if (state === 0) continue;
       if (state < kWanted) {
         // Neighbors mostly use one page.
-        if (at > 0 && head === words[at - 4] && y === words[at - 3] && z === words[at - 2] && words[at - 1] === state) continue;
+        if (at > 0 && head === words[at - 4] && y === words[at - 3] && z === words[at - 2] &&
+            words[at - 1] === state)
+          continue;
         this.store.mark(pageKey(head >>> 20, head & 0xfffff, y, z), epoch, nowMs);
         continue;
       }
@@ -55,14 +66,16 @@ export class Colors {
     this.loader.demand(wanted, nowMs);
   }
 
-  // Pages for more pixels come first: so coarser ones, and where memory ends, no part of the picture is without them.
+  // Pages for more pixels come first: so coarser ones, and where memory ends, no part of the
+  // picture is without them.
   want(wanted, level, position, pixels) {
     const key = pageKey(level, ...position), request = wanted.get(key);
     if (request) request.priority += pixels;
     else wanted.set(key, {key, level, position, priority: pixels});
   }
 
-  // The page whose color is on the screen while this one is missing is in use. Returns its level, -1 if there is none.
+  // The page whose color is on the screen while this one is missing is in use. Returns its level,
+  // -1 if there is none.
   markCoarser(level, position, epoch, nowMs) {
     for (let coarser = level - 1; coarser >= 0; --coarser) {
       position = position.map((at) => at >>> 1);

@@ -1,5 +1,5 @@
-// GLSL: colors of cells from the pages on the GPU (colors/page_format.js says how they lie there), and the
-// feedback of which pages are missing and which are used.
+// GLSL: colors of cells from the pages on the GPU (colors/page_format.js says how they lie there),
+// and the feedback of which pages are missing and which are used.
 
 import {kCameraSource, kPrecision} from "./ray_shader.js";
 
@@ -22,7 +22,8 @@ uvec4 page_texel(uint address) {
   return texelFetch(u_page_texels, ivec2(address & 4095u, address >> 12), 0);
 }
 uint word_of(uvec4 words, uint i) {
-  return (i & 2u) == 0u ? ((i & 1u) == 0u ? words.x : words.y) : ((i & 1u) == 0u ? words.z : words.w);
+  uvec2 pair = (i & 2u) == 0u ? words.xy : words.zw;
+  return (i & 1u) == 0u ? pair.x : pair.y;
 }
 uint popcount32(uint x) {
   x -= x >> 1 & 0x55555555u;
@@ -56,7 +57,8 @@ uint block_color(uvec4 block, uint i) {
     top = 3u;
   } else {
     uvec3 shift = uvec3(11, 5, 0), bits = uvec3(5, 6, 5), ones = (uvec3(1) << bits) - 1u;
-    uvec3 from = uvec3(block.x & 0xffffu) >> shift & ones, to = uvec3(block.x >> 16) >> shift & ones;
+    uvec3 from = uvec3(block.x & 0xffffu) >> shift & ones;
+    uvec3 to = uvec3(block.x >> 16) >> shift & ones;
     a = from << (8u - bits) | from >> (2u * bits - 8u);
     b = to << (8u - bits) | to >> (2u * bits - 8u);
     uint bit = 3u * i, low = word_of(block, 1u + (bit >> 5)) >> (bit & 31u);
@@ -94,15 +96,17 @@ uint spread_bits(int x) {
   return uint((x & 1) | (x & 2) << 2 | (x & 4) << 4);
 }
 
-// The color of the cell of 2^scale voxels with this low corner, or of the nearest coarser cell whose page is
-// there. A page is missing from a cell that will be replaced by finer ones only if the color is much coarser.
+// The color of the cell of 2^scale voxels with this low corner, or of the nearest coarser cell whose
+// page is loaded. For a cell that finer ones will replace, a page counts as missing only if the
+// color is much coarser.
 uint color_of_cell(ivec3 cell, int scale, bool is_final) {
   int wanted = min(u_levels - scale, u_color_levels);
   ivec3 at = cell >> (u_levels - wanted);
   for (int level = wanted; level >= 0; --level) {
     uint number = page_at(level, at >> 3);
     if (number != 0u) {
-      uint color = color_in_page((number - 1u) * 16u, spread_bits(at.x) << 2 | spread_bits(at.y) << 1 | spread_bits(at.z));
+      uint code = spread_bits(at.x) << 2 | spread_bits(at.y) << 1 | spread_bits(at.z);
+      uint color = color_in_page((number - 1u) * 16u, code);
       if (color != 0u) return color | (wanted - level >= (is_final ? 1 : 3) ? kPageMissing : 0u);
     }
     at >>= 1;
@@ -111,8 +115,9 @@ uint color_of_cell(ivec3 cell, int scale, bool is_final) {
 }
 `;
 
-// One texel for each block of u_block x u_block pixels: x and level, y, z of a page, and a number: 0 if there is
-// none, 1 if the page is used, one more than the pixels that it is missing from otherwise.
+// One texel for each block of u_block x u_block pixels: x and level, y, z of a page, and a number:
+// 0 if there is none, 1 if the page is used, one more than the pixels that it is missing from
+// otherwise.
 export const kColorFeedback = `#version 300 es
 ${kPrecision}${kCameraSource}${kColorState}
 uniform usampler2D u_hits, u_colors;
@@ -124,7 +129,8 @@ layout(location = 0) out uvec4 o_page;
 // The page that the color of a pixel is in. The hit is computed again: at worst it is a neighbor's.
 uvec3 page_of(ivec2 pixel, uvec4 g) {
   vec3 direction = direction_of(vec2(pixel) + 0.5 + u_jitter), p = direction * t_in(g);
-  if (axis_in(g) < 3) p += sign(direction) * vec3(equal(ivec3(axis_in(g)), ivec3(0, 1, 2))) * (0.5 * size_in(g));
+  if (axis_in(g) < 3)
+    p += sign(direction) * vec3(equal(ivec3(axis_in(g)), ivec3(0, 1, 2))) * (0.5 * size_in(g));
   ivec3 voxel = clamp(u_eye_cell + ivec3(floor(u_eye_part + p)), 0, (1 << u_levels) - 1);
   int level = min(u_levels - int(g.y >> 16 & 31u), u_color_levels);
   uvec3 page = uvec3(voxel >> (u_levels - level + 3));
@@ -133,7 +139,8 @@ uvec3 page_of(ivec2 pixel, uvec4 g) {
 }
 
 void main() {
-  ivec2 first = ivec2(gl_FragCoord.xy) * u_block, last = u_size - 1, chosen = min(first + u_sample, last);
+  ivec2 first = ivec2(gl_FragCoord.xy) * u_block, last = u_size - 1;
+  ivec2 chosen = min(first + u_sample, last);
   uint missing = 0u;
   for (int j = 0; j < u_block; ++j)
     for (int i = 0; i < u_block; ++i) {

@@ -1,5 +1,5 @@
-// What a reading of the feedback says: the tiles that are missing, those that were used, and statistics
-// of what is seen.
+// What a reading of the feedback says: the tiles that are missing, those that were used, and
+// statistics of what is seen.
 
 const kMaxSamples = 4096;  // that the statistics are of
 const kHalf = new DataView(new ArrayBuffer(4));
@@ -14,7 +14,9 @@ function bitsToFloat(bits) {
   return kHalf.getFloat32(0);
 }
 function shareOf(sorted, share) {
-  return sorted.length === 0 ? 0 : sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
+  return sorted.length === 0 ?
+      0 :
+      sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
 }
 
 // {wanted: Map of leaf address -> priority, slots: Set, coarsePixels: of the largest missing cell,
@@ -22,7 +24,8 @@ function shareOf(sorted, share) {
 export function readFeedback(words) {
   const wanted = new Map(), slots = new Set(), texels = words.length / 4;
   const stride = Math.ceil(texels / kMaxSamples) | 1, count = Math.ceil(texels / stride);
-  const steps = new Uint16Array(count), distances = new Float32Array(count), luminances = new Float32Array(count);
+  const steps = new Uint16Array(count), distances = new Float32Array(count),
+        luminances = new Float32Array(count);
   let coarsePixels = 0, stepSum = 0, seen = 0;
   for (let at = 0; at < words.length; at += 4) {
     const missing = words[at], pair = words[at + 1];
@@ -44,15 +47,23 @@ export function readFeedback(words) {
   }
   const t = distances.subarray(0, seen).sort(), bright = luminances.subarray(0, seen).sort();
   steps.sort();
-  return {wanted, slots, coarsePixels, stepsMean: stepSum / Math.max(1, count), steps99: shareOf(steps, 0.99),
-          medianT: shareOf(t, 0.5), nearestT: t[0] || 0,
-          exposure: seen === 0 ? null : Math.min(0.42 / shareOf(bright, 0.5), 0.85 / shareOf(bright, 0.9))};
+  return {
+    wanted,
+    slots,
+    coarsePixels,
+    stepsMean: stepSum / Math.max(1, count),
+    steps99: shareOf(steps, 0.99),
+    medianT: shareOf(t, 0.5),
+    nearestT: t[0] || 0,
+    exposure: seen === 0 ? null : Math.min(0.42 / shareOf(bright, 0.5), 0.85 / shareOf(bright, 0.9))
+  };
 }
 
-// {depth, level, steps} of each pixel, rows from the top, of a picture's words as pack_hit() packs them, rows from
-// the bottom. The depth of the sky is infinite.
+// {depth, level, steps} of each pixel, rows from the top, of a picture's words as pack_hit() packs
+// them, rows from the bottom. The depth of the sky is infinite.
 export function readHits(words, width, height, levels) {
-  const depth = new Float32Array(width * height).fill(Infinity), level = new Uint8Array(width * height);
+  const depth = new Float32Array(width * height).fill(Infinity),
+        level = new Uint8Array(width * height);
   const steps = new Uint16Array(width * height), floats = new Float32Array(words.buffer);
   for (let i = 0; i < width * height; ++i) {
     const from = 4 * ((height - 1 - Math.floor(i / width)) * width + i % width);

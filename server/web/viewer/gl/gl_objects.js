@@ -6,8 +6,13 @@ export class WebGLUnavailable extends Error {}
 
 // The context of a canvas; null if there is none to be had.
 export function createContext(canvas) {
-  return canvas.getContext("webgl2", {alpha: false, antialias: false, depth: false, powerPreference: "high-performance",
-                                      preserveDrawingBuffer: true});
+  return canvas.getContext("webgl2", {
+    alpha: false,
+    antialias: false,
+    depth: false,
+    powerPreference: "high-performance",
+    preserveDrawingBuffer: true
+  });
 }
 
 export class Program {
@@ -16,13 +21,14 @@ export class Program {
     this.gl = gl;
     this.name = name;
     this.program = gl.createProgram();
-    this.shaders = [[gl.VERTEX_SHADER, kQuad], [gl.FRAGMENT_SHADER, fragment]].map(([kind, text]) => {
-      const shader = gl.createShader(kind);
-      gl.shaderSource(shader, text);
-      gl.compileShader(shader);
-      gl.attachShader(this.program, shader);
-      return shader;
-    });
+    this.shaders =
+        [[gl.VERTEX_SHADER, kQuad], [gl.FRAGMENT_SHADER, fragment]].map(([kind, text]) => {
+          const shader = gl.createShader(kind);
+          gl.shaderSource(shader, text);
+          gl.compileShader(shader);
+          gl.attachShader(this.program, shader);
+          return shader;
+        });
     gl.linkProgram(this.program);
     this.uniforms = null;
   }
@@ -36,8 +42,9 @@ export class Program {
     const {gl} = this;
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
       const logs = this.shaders.map((shader) => gl.getShaderInfoLog(shader) || "").join("\n");
-      throw new WebGLUnavailable(`The shader "${this.name}" does not compile: ` +
-                                 `${gl.getProgramInfoLog(this.program) || ""}\n${logs}`);
+      throw new WebGLUnavailable(
+          `The shader "${this.name}" does not compile: ` +
+          `${gl.getProgramInfoLog(this.program) || ""}\n${logs}`);
     }
     for (const shader of this.shaders) gl.deleteShader(shader);
     this.uniforms = new Map();
@@ -53,8 +60,8 @@ export class Program {
     }
   }
 
-  // Runs it for one pixel of a target of these formats: most drivers compile the rest only then. Of `words` and
-  // `floats`, textures, it reads nothing that matters.
+  // Runs it for one pixel of a target of these formats: most drivers compile the rest only then. Of
+  // `words` and `floats`, textures, it reads nothing that matters.
   warmUp(formats, words, floats) {
     const {gl} = this, target = new Target(gl, 1, 1, formats);
     gl.useProgram(this.program);
@@ -73,8 +80,8 @@ export class Program {
     this.gl.deleteProgram(this.program);
   }
 
-  // Sets the uniforms that the program has, and runs it over the viewport, or some rows of it. `target`:
-  // null for the canvas.
+  // Sets the uniforms that the program has, and runs it over the viewport, or some rows of it.
+  // `target`: null for the canvas.
   draw(target, values, width, height, {row = 0, rows = height} = {}) {
     const {gl} = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
@@ -82,7 +89,8 @@ export class Program {
     gl.useProgram(this.program);
     for (const [name, {location, type, unit}] of this.uniforms) {
       const value = values[name];
-      if (value === undefined) throw new Error(`The uniform ${name} of "${this.name}" has no value.`);
+      if (value === undefined)
+        throw new Error(`The uniform ${name} of "${this.name}" has no value.`);
       if (unit >= 0) {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(gl.TEXTURE_2D, value);
@@ -100,18 +108,33 @@ export class Program {
 
 function setUniform(gl, location, type, value) {
   switch (type) {
-    case gl.FLOAT: return gl.uniform1f(location, value);
-    case gl.FLOAT_VEC2: return gl.uniform2f(location, ...value);
-    case gl.FLOAT_VEC3: return gl.uniform3f(location, ...value);
-    case gl.INT: case gl.BOOL: return gl.uniform1i(location, value);
-    case gl.INT_VEC2: return gl.uniform2i(location, ...value);
-    case gl.INT_VEC3: return gl.uniform3i(location, ...value);
-    case gl.UNSIGNED_INT: return gl.uniform1ui(location, value);
-    default: throw new Error(`a uniform has the type ${type}`);
+    case gl.FLOAT:
+      return gl.uniform1f(location, value);
+    case gl.FLOAT_VEC2:
+      return gl.uniform2f(location, ...value);
+    case gl.FLOAT_VEC3:
+      return gl.uniform3f(location, ...value);
+    case gl.INT:
+    case gl.BOOL:
+      return gl.uniform1i(location, value);
+    case gl.INT_VEC2:
+      return gl.uniform2i(location, ...value);
+    case gl.INT_VEC3:
+      return gl.uniform3i(location, ...value);
+    case gl.UNSIGNED_INT:
+      return gl.uniform1ui(location, value);
+    default:
+      throw new Error(`a uniform has the type ${type}`);
   }
 }
 
-const kTexelBytes = {RGBA32UI: 16, RGBA16F: 8, RGBA8: 4, R32UI: 4, R8: 1};
+const kTexelBytes = {
+  RGBA32UI: 16,
+  RGBA16F: 8,
+  RGBA8: 4,
+  R32UI: 4,
+  R8: 1
+};
 
 // A framebuffer with textures of the formats, "RGBA32UI" and so on.
 export class Target {

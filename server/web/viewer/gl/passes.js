@@ -1,15 +1,29 @@
 // Programs and targets of a picture, and the order in which its passes run.
 
-import {AsyncReading, gpuDone, pause, Program, Target} from "./gl_objects.js";
 import {kColorFeedback} from "./color_shader.js";
-import {kColoredTrace, kCombine, kFeedback, kLight, kOcclusion, kPick, kPresent, kSun, kSunPlaces, kSunRows, kTrace} from "./picture_shaders.js";
+import {AsyncReading, gpuDone, pause, Program, Target} from "./gl_objects.js";
+import {
+  kColoredTrace,
+  kCombine,
+  kFeedback,
+  kLight,
+  kOcclusion,
+  kPick,
+  kPresent,
+  kSun,
+  kSunPlaces,
+  kSunRows,
+  kTrace
+} from "./picture_shaders.js";
 
-const kHalfRange = 1;        // brightest light of a target with half floats
-const kByteRange = 8;        // and of one with bytes
-const kFeedbackBlock = 4;     // pixels of the canvas that a texel of the feedback is of
-const kHitFormats = ["RGBA32UI"], kColoredHitFormats = ["RGBA32UI", "R32UI"], kLightFormats = ["R8", "R32UI", "R32UI"];
+const kHalfRange = 1;      // brightest light of a target with half floats
+const kByteRange = 8;      // and of one with bytes
+const kFeedbackBlock = 4;  // pixels of the canvas that a texel of the feedback is of
+const kHitFormats = ["RGBA32UI"], kColoredHitFormats = ["RGBA32UI", "R32UI"],
+      kLightFormats = ["R8", "R32UI", "R32UI"];
 const kSkyFormats = ["RGBA8"], kFeedbackFormats = ["RGBA32UI"];
-const kColorTexels = 1 << 17;  // of the feedback of colors, about: each page that is seen needs one of its own
+const kColorTexels =
+    1 << 17;  // of the feedback of colors, about: each page that is seen needs one of its own
 
 // The pixels that a texel of a feedback is of, and which of them it says more about.
 function blocksOf(edge, seed) {
@@ -19,25 +33,28 @@ function blocksOf(edge, seed) {
 export class Passes {
   constructor(gl) {
     this.gl = gl;
-    this.floats = Boolean(gl.getExtension("EXT_color_buffer_float") || gl.getExtension("EXT_color_buffer_half_float"));
+    this.floats = Boolean(
+        gl.getExtension("EXT_color_buffer_float") ||
+        gl.getExtension("EXT_color_buffer_half_float"));
     this.parallel = gl.getExtension("KHR_parallel_shader_compile");
     this.light = new Program(gl, "light", kLight);
     this.occlusion = new Program(gl, "occlusion", kOcclusion);
     this.combine = new Program(gl, "combine", kCombine);
     this.present = new Program(gl, "present", kPresent);
     this.feedback = new Program(gl, "feedback", kFeedback);
-    this.trace = null;           // these two depend on the file
+    this.trace = null;  // these two depend on the file
     this.colorFeedback = null;
     this.pick = null;
     this.sun = null;
-    this.later = null;           // promise of these two
+    this.later = null;  // promise of these two
     this.disposed = false;
     this.targets = null;
     this.vertexArray = gl.createVertexArray();
-    // What does not depend on the file. A compiler that cannot say when it is done is not waited for before it has all.
+    // What does not depend on the file. A compiler that cannot say when it is done is not waited
+    // for before it has all.
     this.begun = this.parallel ? this.begin() : null;
     this.begun?.catch(() => {});  // compile() reports it
-    this.compiled = null;        // promise of compile()
+    this.compiled = null;         // promise of compile()
   }
 
   get colorRange() {
@@ -45,14 +62,18 @@ export class Passes {
   }
 
   async begin() {
-    if (!await this.finish([this.light, this.occlusion, this.combine, this.present, this.feedback])) return;
+    if (!await this.finish([this.light, this.occlusion, this.combine, this.present, this.feedback]))
+      return;
     this.gl.bindVertexArray(this.vertexArray);
-    this.warmUp([[this.light, kLightFormats], [this.occlusion, kSkyFormats], [this.combine, [this.colorFormat]],
-                  [this.feedback, kFeedbackFormats]]);
+    this.warmUp([
+      [this.light, kLightFormats], [this.occlusion, kSkyFormats],
+      [this.combine, [this.colorFormat]], [this.feedback, kFeedbackFormats]
+    ]);
   }
 
-  // Resolves when all programs for a file are compiled; the page stays responsive where the browser can compile in
-  // the background. Throws WebGLUnavailable if one cannot be; does nothing if the context is lost.
+  // Resolves when all programs for a file are compiled; the page stays responsive where the browser
+  // can compile in the background. Throws WebGLUnavailable if one cannot be; does nothing if the
+  // context is lost.
   compile(colored) {
     return this.compiled ??= this.compileAll(colored);
   }
@@ -63,14 +84,18 @@ export class Passes {
     if (colored) this.colorFeedback = new Program(gl, "color feedback", kColorFeedback);
     await (this.begun ??= this.begin());
     if (!await this.finish([this.trace, ...(colored ? [this.colorFeedback] : [])])) return;
-    this.warmUp([[this.trace, colored ? kColoredHitFormats : kHitFormats],
-                  ...(colored ? [[this.colorFeedback, kFeedbackFormats]] : [])]);
+    this.warmUp([
+      [this.trace, colored ? kColoredHitFormats : kHitFormats],
+      ...(colored ? [[this.colorFeedback, kFeedbackFormats]] : [])
+    ]);
     await gpuDone(gl, () => this.disposed || gl.isContextLost());
   }
 
   warmUp(programs) {
-    const {gl} = this, words = new Target(gl, 1, 1, ["RGBA32UI"]), floats = new Target(gl, 1, 1, ["RGBA8"]);
-    for (const [program, formats] of programs) program.warmUp(formats, words.textures[0], floats.textures[0]);
+    const {gl} = this, words = new Target(gl, 1, 1, ["RGBA32UI"]),
+          floats = new Target(gl, 1, 1, ["RGBA8"]);
+    for (const [program, formats] of programs)
+      program.warmUp(formats, words.textures[0], floats.textures[0]);
     words.dispose();
     floats.dispose();
     gl.flush();
@@ -80,7 +105,8 @@ export class Passes {
     return this.floats ? "RGBA16F" : "RGBA8";
   }
 
-  // The same for the programs that a first picture does not need. Resolves to whether they can be used.
+  // The same for the programs that a first picture does not need. Resolves to whether they can be
+  // used.
   compileLater() {
     if (!this.later) {
       this.pick = new Program(this.gl, "pick", kPick);
@@ -91,39 +117,57 @@ export class Passes {
   }
 
   async finish(programs) {
-    while (!this.disposed && !programs.every((program) => program.done(this.parallel))) await pause();
+    while (!this.disposed && !programs.every((program) => program.done(this.parallel)))
+      await pause();
     if (this.disposed || this.gl.isContextLost()) return false;
     for (const program of programs) program.finish();
     return true;
   }
 
-  // Targets for a picture of this size, of the `full` one {width, height}, or of fewer pixels while the camera moves.
-  // They are as large as they have to be, which is as large as the full one from the second size on: so nothing is
-  // allocated when a camera begins to move or stops. `colored`: of a file with colors.
+  // Targets for a picture of this size, of the `full` one {width, height}, or of fewer pixels while
+  // the camera moves. They are as large as they have to be, which is as large as the full one from
+  // the second size on: so nothing is allocated when a camera begins to move or stops. `colored`:
+  // of a file with colors.
   resize(width, height, full, colored) {
-    const {targets} = this, isForCanvas = targets?.full.width === full.width && targets.full.height === full.height;
+    const {targets} = this,
+          isForCanvas = targets?.full.width === full.width && targets.full.height === full.height;
     if (!isForCanvas) this.allocate(width, height, full, colored);
-    else if (width > targets.hits.width || height > targets.hits.height) this.allocate(full.width, full.height, full, colored);
-    // A small picture says as much as a large one of what is missing: then a texel is of fewer pixels.
+    else if (width > targets.hits.width || height > targets.hits.height)
+      this.allocate(full.width, full.height, full, colored);
+    // A small picture says as much as a large one of what is missing: then a texel is of fewer
+    // pixels.
     const share = Math.max(width / full.width, height / full.height);
-    Object.assign(this.targets, {width, height, feedbackBlock: Math.ceil(Math.min(1, share) * kFeedbackBlock),
-                                 colorBlock: 2 ** Math.max(0, Math.ceil(Math.log2(width * height / kColorTexels) / 2))});
+    Object.assign(this.targets, {
+      width,
+      height,
+      feedbackBlock: Math.ceil(Math.min(1, share) * kFeedbackBlock),
+      colorBlock: 2 ** Math.max(0, Math.ceil(Math.log2(width * height / kColorTexels) / 2))
+    });
   }
 
   allocate(width, height, full, colored) {
     const {gl} = this, color = this.colorFormat, across = Math.sqrt(kColorTexels * width / height);
     this.releaseTargets();
     this.targets = {
-      full: {width: full.width, height: full.height}, width, height,
+      full: {width: full.width, height: full.height},
+      width,
+      height,
       hits: new Target(gl, width, height, colored ? kColoredHitFormats : kHitFormats),
       light: new Target(gl, width, height, kLightFormats),
       sky: new Target(gl, Math.ceil(width / 2), Math.ceil(height / 2), kSkyFormats),
       colors: [new Target(gl, width, height, [color]), new Target(gl, width, height, [color])],
-      feedback: new Target(gl, Math.ceil(full.width / kFeedbackBlock), Math.ceil(full.height / kFeedbackBlock), kFeedbackFormats),
+      feedback: new Target(
+          gl, Math.ceil(full.width / kFeedbackBlock), Math.ceil(full.height / kFeedbackBlock),
+          kFeedbackFormats),
       // For any size, with the block of that.
-      colorFeedback: colored ? new Target(gl, Math.ceil(Math.min(width, across + 4)),
-                                           Math.ceil(Math.min(height, kColorTexels / across + 4)), kFeedbackFormats) : null,
-      feedbackBlock: kFeedbackBlock, colorBlock: 1, current: 0,
+      colorFeedback: colored ?
+          new Target(
+              gl, Math.ceil(Math.min(width, across + 4)),
+              Math.ceil(Math.min(height, kColorTexels / across + 4)), kFeedbackFormats) :
+          null,
+      feedbackBlock: kFeedbackBlock,
+      colorBlock: 1,
+      current: 0,
     };
   }
 
@@ -133,25 +177,43 @@ export class Passes {
   get allTargets() {
     if (!this.targets) return [];
     const {hits, light, sky, colors, feedback, colorFeedback} = this.targets;
-    return [hits, light, sky, ...colors, feedback, colorFeedback].filter((target) => target !== null);
+    return [hits, light, sky, ...colors, feedback, colorFeedback].filter(
+        (target) => target !== null);
   }
 
-  // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Yields between parts of at
-  // most `partPixels()` pixels. Returns the reading of the feedback; its `colors` is that of the colors, ready as
-  // soon as the reading is, or null if none are shown.
-  *draw(values, partPixels) {
-    const {targets, gl} = this, {width, height, hits, light, sky, colors, feedback, colorFeedback, feedbackBlock, colorBlock} = targets;
+  // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Yields between parts
+  // of at most `partPixels()` pixels. Returns the reading of the feedback; its `colors` is that of
+  // the colors, ready as soon as the reading is, or null if none are shown.
+  * draw(values, partPixels) {
+    const {
+      targets,
+      gl
+    } = this,
+  {width, height, hits, light, sky, colors, feedback, colorFeedback, feedbackBlock, colorBlock} =
+        targets;
     const share = this.floats ? 1 / (values.u_frame + 1) : 1;
     const [before, after] = [colors[targets.current], colors[1 - targets.current]];
-    const all = {...values, u_size: [width, height], u_hits: hits.textures[0], u_light: light.textures[0], u_sky: sky.textures[0], u_normals: light.textures[1],
-                 u_colors: hits.textures[1] || hits.textures[0], u_colored: hits.textures.length > 1,
-                 u_shadow_missing: light.textures[2], u_before: before.textures[0], u_share: share,
-                 u_range: this.colorRange, ...blocksOf(feedbackBlock, values.u_seed)};
+    const all = {
+      ...values,
+      u_size: [width, height],
+      u_hits: hits.textures[0],
+      u_light: light.textures[0],
+      u_sky: sky.textures[0],
+      u_normals: light.textures[1],
+      u_colors: hits.textures[1] || hits.textures[0],
+      u_colored: hits.textures.length > 1,
+      u_shadow_missing: light.textures[2],
+      u_before: before.textures[0],
+      u_share: share,
+      u_range: this.colorRange,
+      ...blocksOf(feedbackBlock, values.u_seed)
+    };
     const partsOf = (edge) => [Math.ceil(width / edge), Math.ceil(height / edge)];
     let left = partPixels();
     const [skyWidth, skyHeight] = partsOf(2);
-    for (const [program, target, columns, allRows] of [[this.trace, hits, width, height], [this.light, light, width, height],
-                                                        [this.occlusion, sky, skyWidth, skyHeight]])
+    for (const [program, target, columns, allRows] of [
+             [this.trace, hits, width, height], [this.light, light, width, height],
+             [this.occlusion, sky, skyWidth, skyHeight]])
       for (let row = 0, rows; row < allRows; row += rows) {
         if (left < columns) {
           yield null;
@@ -166,17 +228,25 @@ export class Passes {
     this.feedback.draw(feedback, all, ...partsOf(feedbackBlock));
     let ofColors = null;
     if (colorFeedback && values.u_color_levels >= 0) {
-      this.colorFeedback.draw(colorFeedback, {...all, ...blocksOf(colorBlock, values.u_seed)}, ...partsOf(colorBlock));
+      this.colorFeedback.draw(
+          colorFeedback, {...all, ...blocksOf(colorBlock, values.u_seed)}, ...partsOf(colorBlock));
       ofColors = new AsyncReading(gl, colorFeedback, ...partsOf(colorBlock));
     }
-    return Object.assign(new AsyncReading(gl, feedback, ...partsOf(feedbackBlock)), {colors: ofColors});
+    return Object.assign(
+        new AsyncReading(gl, feedback, ...partsOf(feedbackBlock)), {colors: ofColors});
   }
 
   // Draws the accumulated picture to the canvas.
   show(exposure, width, height) {
     const {targets} = this;
-    this.present.draw(null, {u_color: targets.colors[targets.current].textures[0], u_extent: [width, height],
-                             u_size: [targets.width, targets.height], u_exposure: exposure * this.colorRange}, width, height);
+    this.present.draw(
+        null, {
+          u_color: targets.colors[targets.current].textures[0],
+          u_extent: [width, height],
+          u_size: [targets.width, targets.height],
+          u_exposure: exposure * this.colorRange
+        },
+        width, height);
   }
 
   // The hits of a picture of any size, as words of pack_hit(), rows from the bottom.
@@ -189,8 +259,9 @@ export class Passes {
     return words;
   }
 
-  // The hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of the tile it is in. Null if
-  // the context is lost. The page does not wait for the GPU. After compileLater(): by then `values` may be out of date.
+  // The hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of the tile it is in.
+  // Null if the context is lost. The page does not wait for the GPU. After compileLater(): by then
+  // `values` may be out of date.
   async pickOne(values) {
     const {gl} = this, target = new Target(gl, 2, 1, ["RGBA32UI"]);
     this.pick.draw(target, values, 2, 1);
@@ -203,14 +274,21 @@ export class Passes {
     return reading.take();
   }
 
-  // {place: of the 48 of the sun, the one that lights nearest to `share` of what the last picture shows,
+  // {place: of the 48 of the sun, the one that lights nearest to `share` of what the last picture
+  // shows,
   //  wanted: leaf address -> 1, tiles that would make the choice better}. After compileLater().
   chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();
-    const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]), words = new Uint32Array(kSunPlaces * kSunRows * 4);
-    this.sun.draw(target, {...values, u_size: [targets.width, targets.height], u_hits: targets.hits.textures[0],
-                 u_normals: targets.light.textures[1]},
-                 kSunPlaces, kSunRows);
+    const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]),
+          words = new Uint32Array(kSunPlaces * kSunRows * 4);
+    this.sun.draw(
+        target, {
+          ...values,
+          u_size: [targets.width, targets.height],
+          u_hits: targets.hits.textures[0],
+          u_normals: targets.light.textures[1]
+        },
+        kSunPlaces, kSunRows);
     gl.readPixels(0, 0, kSunPlaces, kSunRows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
     target.dispose();
     let best = 0, bestOff = Infinity;
@@ -231,8 +309,9 @@ export class Passes {
   dispose() {
     this.disposed = true;
     this.releaseTargets();
-    for (const program of [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback, this.colorFeedback,
-                           this.pick, this.sun])
+    for (const program
+             of [this.trace, this.light, this.occlusion, this.combine, this.present, this.feedback,
+                 this.colorFeedback, this.pick, this.sun])
       program?.dispose();
     this.gl.deleteVertexArray(this.vertexArray);
   }

@@ -1,5 +1,6 @@
-// GLSL of the passes of a picture: trace (G-buffer), light (normals and sun), occlusion (sky), combine (filter, accumulate),
-// present (tones), feedback (what is missing, what was used). Lighting as in query/render.
+// GLSL of the passes of a picture: trace (G-buffer), light (normals and sun), occlusion (sky),
+// combine (filter, accumulate), present (tones), feedback (what is missing, what was used).
+// Lighting as in query/render.
 
 import {kColorSource, kColorState} from "./color_shader.js";
 import {kCameraSource, kPrecision, kRaySource} from "./ray_shader.js";
@@ -46,7 +47,8 @@ void main() {
   o_hit = pack_hit(found, hit, uint(step_count), wire, entered_slot);
 #endif
 #ifdef COLOR
-  o_color = found && u_color_levels >= 0 ? color_of_cell(hit_cell, hit.scale, hit.missing == 0u) : 0u;
+  o_color =
+      found && u_color_levels >= 0 ? color_of_cell(hit_cell, hit.scale, hit.missing == 0u) : 0u;
 #endif
 #ifdef PICK
   o_hit = pack_hit(found, hit, uint(step_count), false, entered_slot);
@@ -61,13 +63,15 @@ export const kTrace = `${kVersion}
 #define WIRE\n${kRaySource}${kCameraSource}${kTraceMain}`;
 // Of files with colors.
 export const kColoredTrace = `${kVersion}
-#define WIRE\n#define CELL\n#define COLOR\n${kRaySource}${kCameraSource}${kColorSource}${kTraceMain}`;
+#define WIRE\n#define CELL\n#define COLOR\n${kRaySource}${kCameraSource}${kColorSource}${
+    kTraceMain}`;
 export const kPick = `${kVersion}
 #define PICK\n#define CELL\n${kRaySource}${kCameraSource}${kTraceMain}`;
 
 const kSky = `
 const float kPi = 3.14159265, kOpenFloor = 0.82;  // green light of an open sky on a floor
-const vec3 kZenith = vec3(0.62, 0.78, 1.00), kHorizon = vec3(0.95, 0.98, 1.02), kGround = vec3(0.40, 0.36, 0.31);
+const vec3 kZenith = vec3(0.62, 0.78, 1.00), kHorizon = vec3(0.95, 0.98, 1.02);
+const vec3 kGround = vec3(0.40, 0.36, 0.31);
 vec3 sky_color(vec3 direction) {
   return mix(kHorizon, direction.y >= 0.0 ? kZenith : kGround, sqrt(abs(direction.y)));
 }
@@ -101,7 +105,7 @@ uniform int u_frame;         // number of the sample
 
 struct Surface {
   vec3 center, face, direction;
-  float t, size, cube;       // cube: 1 if voxels are seen as cubes, 0 if they are parts of a surface
+  float t, size, cube;       // cube: 1 if voxels appear as cubes, 0 if they form a surface
 };
 Surface surface_at(ivec2 pixel, uvec4 g) {
   Surface s;
@@ -155,9 +159,11 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 const kBlocked = `
 // Whether something lies within that distance between the surface and a light.
 bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out Hit hit) {
-  // In a narrow place the start may be occupied; the way that the ray came is free, unless the eye is in an occupied cell.
+  // In a narrow place the start may be occupied. The path of the camera ray is free, unless the eye
+  // is in an occupied cell.
   for (int attempt = 0; attempt < 2; ++attempt) {
-    set_ray_from(attempt == 0 ? start_of(s, normal) : s.direction * max(0.0, s.t - 1.5 * s.size), toward);
+    vec3 start = attempt == 0 ? start_of(s, normal) : s.direction * max(0.0, s.t - 1.5 * s.size);
+    set_ray_from(start, toward);
     if (!trace(0.0, reach, cone, hit)) return false;
     if (hit.t > 0.0) return true;
   }
@@ -180,8 +186,8 @@ vec3 offset_of(ivec2 pixel, float t) {
   return direction_of(vec2(pixel) + 0.5 + u_jitter) * t;
 }
 
-// The normal of the plane that best fits the surface near the pixel: the eigenvector of the covariance's
-// smallest eigenvalue, by inverse iteration.
+// The normal of the plane that best fits the surface near the pixel: the eigenvector of the
+// covariance's smallest eigenvalue, by inverse iteration.
 vec3 plane_normal(ivec2 pixel, vec3 center, float size, vec3 face, vec3 direction) {
   float footprint = u_pixel * length(center), reach = (float(kReach) + 0.5) * max(size, footprint);
   int stride = int(clamp(size / footprint, 1.0, 5.0));
@@ -239,8 +245,10 @@ void main() {
   }
   s = surface_at(pixel, g);
   vec3 normal = s.face;
-  if (s.cube < 1.0)
-    normal = normalize(mix(plane_normal(pixel, s.center, s.size, s.face, s.direction), s.face, s.cube));
+  if (s.cube < 1.0) {
+    vec3 plane = plane_normal(pixel, s.center, s.size, s.face, s.direction);
+    normal = normalize(mix(plane, s.face, s.cube));
+  }
   o_normal = pack_normal(normal);
   if (dot(normal, u_sun) <= 0.0) return;
   o_sun = 1.0;
@@ -267,7 +275,8 @@ layout(location = 0) out vec4 o_sky;
 const float kBounce = 0.42, kSkyWidening = 0.1;
 
 void main() {
-  ivec2 place = ivec2(gl_FragCoord.xy), pixel = min(2 * place + chosen_of_four(u_frame), u_size - 1);
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  ivec2 pixel = min(2 * place + chosen_of_four(u_frame), u_size - 1);
   uvec4 g = texelFetch(u_hits, pixel, 0);
   o_sky = vec4(0);
   Surface s;
@@ -296,8 +305,9 @@ void main() {
   o_sky = vec4(sky / 1.1, 1.0);
 }`;
 
-// For each of 48 places of the sun (columns) and the pixels that render probes, 40 x 24 (rows): 0 if the pixel sees no
-// surface, 1 if that is in shadow, 2 if it is lit; and the cut-off node whose tile would say more.
+// For each of 48 places of the sun (columns) and the pixels that render probes, 40 x 24 (rows): 0
+// if the pixel sees no surface, 1 if that is in shadow, 2 if it is lit; and the cut-off node whose
+// tile would say more.
 export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
@@ -312,7 +322,8 @@ void main() {
   if (!found_in(g)) return;
   Surface s = surface_at(pixel, g);
   vec3 normal = unpack_normal(texelFetch(u_normals, pixel, 0).x);
-  float turn = u_turn - 2.0 * kPi * float(place.x % 16) / 16.0, height = 0.65 + 0.25 * float(place.x / 16);
+  float turn = u_turn - 2.0 * kPi * float(place.x % 16) / 16.0;
+  float height = 0.65 + 0.25 * float(place.x / 16);
   vec3 sun = vec3(cos(turn) * cos(height), sin(height), sin(turn) * cos(height));
   Hit hit;
   if (dot(normal, sun) <= 0.0) {
@@ -331,7 +342,8 @@ vec3 reflected(vec3 albedo, vec3 normal, vec3 sky, float sun) {
 }
 `;
 
-// Light from the sky is averaged over 4 x 4 samples on the same plane; that on the floor over those of the floor.
+// Light from the sky is averaged over 4 x 4 samples on the same plane; that on the floor over those
+// of the floor.
 const kSkyFilter = `
 uniform usampler2D u_hits, u_normals;
 uniform sampler2D u_light, u_sky;
@@ -362,12 +374,13 @@ vec3 sky_around(ivec2 pixel, uvec4 g, vec3 normal) {
       sum += w * light.rgb;
       weights += w;
     }
-  return weights > 0.0 ? sum * (1.1 / weights) : on_surface ? 0.5 * sky_color(normal) : vec3(kOpenFloor);
+  if (weights > 0.0) return sum * (1.1 / weights);
+  return on_surface ? 0.5 * sky_color(normal) : vec3(kOpenFloor);
 }
 `;
 
-// The result is multiplied by its coverage, from which haze takes a share. A shadow on the floor is black that covers a
-// part of the background.
+// The result is multiplied by its coverage, from which haze takes a share. A shadow on the floor is
+// black that covers a part of the background.
 export const kCombine = `${kVersion}${kCameraSource}${kSky}${kColorState}${kSkyFilter}
 uniform usampler2D u_colors;
 uniform bool u_colored;      // u_colors has colors
@@ -397,10 +410,14 @@ void main() {
     if (u_floor.x > 0.0 && direction.y < 0.0) {
       vec3 offset = direction * (u_floor.x / -direction.y) - u_floor_center;
       float fade = exp(-1.6 * dot(offset, offset) / (u_floor.y * u_floor.y));
-      if (fade >= 0.01) color.a = fade * (0.75 - 0.35 * sky_around(pixel, g, vec3(0, 1, 0)).g / kOpenFloor - 0.40 * sun);
+      if (fade >= 0.01) {
+        float open = sky_around(pixel, g, vec3(0, 1, 0)).g / kOpenFloor;
+        color.a = fade * (0.75 - 0.35 * open - 0.40 * sun);
+      }
     }
   }
-  if (wire_in(g)) color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, 0.7), max(color.a, 0.7));
+  if (wire_in(g))
+    color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, 0.7), max(color.a, 0.7));
   o_color = u_share < 1.0 ? mix(texelFetch(u_before, pixel, 0), color, u_share) : color;
 }`;
 
@@ -418,7 +435,8 @@ vec3 tone_map(vec3 x) {
   return min(vec3(1), x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14));
 }
 vec3 srgb(vec3 v) {
-  return mix(12.92 * v, 1.055 * pow(max(v, vec3(1e-5)), vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), v));
+  vec3 bright = 1.055 * pow(max(v, vec3(1e-5)), vec3(1.0 / 2.4)) - 0.055;
+  return mix(12.92 * v, bright, step(vec3(0.0031308), v));
 }
 void main() {
   vec2 place = gl_FragCoord.xy / u_extent;
@@ -433,9 +451,10 @@ void main() {
   o_color = vec4(srgb(mix(background, lit, color.a)) + (float(order) / 16.0 - 0.47) / 255.0, 1.0);
 }`;
 
-// One texel for each block of u_block x u_block pixels: a cut-off node whose tile is missing (that of the
-// largest cell), how many pixels wide that cell is and how bright a sample, a tile that was used and the
-// steps of a sample, the sample's t. A sample is a pixel of the block that changes with each frame.
+// One texel for each block of u_block x u_block pixels: a cut-off node whose tile is missing (that
+// of the largest cell), how many pixels wide that cell is and how bright a sample, a tile that was
+// used and the steps of a sample, the sample's t. A sample is a pixel of the block that changes
+// with each frame.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;
@@ -472,7 +491,8 @@ void main() {
     vec3 normal = unpack_normal(texelFetch(u_normals, at, 0).x);
     vec3 sky = sky_around(at, g, normal);
     // The exposure is that of plaster, as in render: dark colors stay dark.
-    luminance = dot(reflected(kPlaster, normal, sky, texelFetch(u_light, at, 0).x), vec3(0.2126, 0.7152, 0.0722));
+    vec3 light = reflected(kPlaster, normal, sky, texelFetch(u_light, at, 0).x);
+    luminance = dot(light, vec3(0.2126, 0.7152, 0.0722));
   }
   o_feedback = uvec4(missing, packHalf2x16(vec2(min(pixels, 60000.0), luminance)),
                      g.w | min(steps_in(g) >> 1, 1023u) << 22, g.x);

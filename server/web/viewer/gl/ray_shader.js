@@ -1,9 +1,11 @@
-// GLSL: the pool's words, and the descent of one ray through the DAG (as query/rays/ray_walk.h does it).
+// GLSL: the words of the pool, and the descent of one ray through the DAG, as in
+// query/rays/ray_walk.h.
 //
-// The ray is mirrored so that its direction is positive on every axis. Voxel coordinates are integers.
-// A ray begins at an integer voxel plus a fraction, and the parameter of a plane is computed from the
-// difference of two integers by one formula, time_of: exact to the last step for any grid up to 2^20,
-// wherever the camera is. Cells on both sides of a plane agree to the last bit, so there are no cracks.
+// The ray is mirrored so that its direction is positive on every axis. Voxel coordinates are
+// integers. A ray begins at an integer voxel plus a fraction, and the parameter of a plane is
+// computed from the difference of two integers by one formula, time_of: exact to the last step for
+// any grid up to 2^20, wherever the camera is. Cells on both sides of a plane agree to the last
+// bit, so there are no cracks.
 
 export const kPrecision = `
 precision highp float;
@@ -113,8 +115,8 @@ void note_wire(ivec3 position, int scale, int axis, float t) {
 #endif
 
 // The first occupied cell between t_min and t_max. An occupied cell that is no wider than the cone,
-// which is cone.x + cone.y * t wide, is hit as a whole; so is the finest cell of the coarse brick of a
-// tile that is not loaded.
+// which is cone.x + cone.y * t wide, is hit as one cell. So is the finest cell in the coarse brick of
+// a tile that is not loaded.
 bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
   int edge = 1 << u_levels;
   ivec3 mirrored = ivec3(ray_mirror >> 2 & 1u, ray_mirror >> 1 & 1u, ray_mirror & 1u);
@@ -205,7 +207,8 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
     axis = nearest_axis(next);
     t = min(next.x, min(next.y, next.z));
     if (t >= t_end) return false;
-    ivec3 to = position + (ivec3(equal(ivec3(axis), ivec3(0, 1, 2))) << scale), flipped = position ^ to;
+    ivec3 to = position + (ivec3(equal(ivec3(axis), ivec3(0, 1, 2))) << scale);
+    ivec3 flipped = position ^ to;
     int changed = flipped.x | flipped.y | flipped.z;
     position = to;
     if (changed >> scale > 1) {

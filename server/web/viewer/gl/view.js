@@ -1,5 +1,5 @@
-// The camera as the shaders need it: as query/render/camera.h, with the eye as an integer voxel plus a
-// fraction, so that float32 holds all that is relative to it.
+// The camera as the shaders need it: as query/render/camera.h, with the eye as an integer voxel
+// plus a fraction, so that float32 holds all that is relative to it.
 
 import {length, pictureAxes, pictureDirection, subtract} from "../vector.js";
 
@@ -9,8 +9,10 @@ export class View {
   // In voxels; the vertical field of view in degrees.
   constructor({eye, target, up = [0, 1, 0], fovDegrees}) {
     const forward = subtract(target, eye);
-    if (![...eye, ...target, ...up, fovDegrees].every(Number.isFinite)) throw new Error("A camera has a number that is not finite.");
-    if (!(fovDegrees > 0 && fovDegrees < 180)) throw new Error("The field of view must lie between 0 and 180 degrees.");
+    if (![...eye, ...target, ...up, fovDegrees].every(Number.isFinite))
+      throw new Error("A camera has a number that is not finite.");
+    if (!(fovDegrees > 0 && fovDegrees < 180))
+      throw new Error("The field of view must lie between 0 and 180 degrees.");
     if (!(length(forward) > 0)) throw new Error("The camera must not be at its target.");
     this.eye = eye.map((x) => Math.min(Math.max(x, -kFar), kFar));
     this.target = target;
@@ -25,8 +27,15 @@ export class View {
 
   uniforms(width, height) {
     const cell = this.eye.map(Math.floor);
-    return {u_eye_cell: cell, u_eye_part: subtract(this.eye, cell), u_forward: this.forward, u_right: this.right,
-            u_up: this.up, u_pixel: this.pixel(height), u_center: [width / 2, height / 2]};
+    return {
+      u_eye_cell: cell,
+      u_eye_part: subtract(this.eye, cell),
+      u_forward: this.forward,
+      u_right: this.right,
+      u_up: this.up,
+      u_pixel: this.pixel(height),
+      u_center: [width / 2, height / 2]
+    };
   }
 
   // Unit vector through a point in pixels from the upper left corner.
@@ -36,7 +45,9 @@ export class View {
   }
 
   equals(other) {
-    return other !== null && ["eye", "forward", "up"].every((name) => this[name].every((x, i) => x === other[name][i])) &&
-           this.tangent === other.tangent;
+    return other !== null &&
+        ["eye", "forward", "up"].every(
+            (name) => this[name].every((x, i) => x === other[name][i])) &&
+        this.tangent === other.tangent;
   }
 }

@@ -2,34 +2,56 @@
 
 import {h, setText, svg} from "../../lib/dom.js";
 import {countText, hasEnded, stateText, titleText} from "../../lib/format.js";
+
 import {kStyles} from "./subvolume_wires.js";
 
 export class Banner {
   constructor(wires) {
     this.wires = wires;
     this.text = h("p", {class: "running-text"});
-    this.kinds = Object.fromEntries(Object.entries(kStyles).map(([kind, style]) => [kind, h("li", {}, sample(style), style.name)]));
+    this.kinds = Object.fromEntries(Object.entries(kStyles).map(
+        ([kind, style]) => [kind, h("li", {}, sample(style), style.name)]));
     const legend = h("ul", {class: "running-legend"}, Object.values(this.kinds));
-    const toggle = h("button", {type: "button", class: "small", "aria-pressed": "true", on: {click: () => {
-      wires.setVisible(!wires.visible);
-      toggle.setAttribute("aria-pressed", String(wires.visible));
-      legend.hidden = !wires.visible;
-    }}}, "Subvolumes");
+    const toggle =
+        h("button", {
+          type: "button",
+          class: "small",
+          "aria-pressed": "true",
+          on: {
+            click: () => {
+              wires.setVisible(!wires.visible);
+              toggle.setAttribute("aria-pressed", String(wires.visible));
+              legend.hidden = !wires.visible;
+            }
+          }
+        },
+          "Subvolumes");
     this.element = h("div", {class: "running"}, this.text, toggle, legend);
   }
 
   // `job` is null while the service does not answer; the counts are the last that are known.
   show(job, {built = 0, total = 0}) {
     const what = `${countText(built)} of ${countText(total)} occupied subvolumes are built`;
-    setText(this.text, !job ? "The service does not answer. This is what was built when it did."
-      : hasEnded(job.state) ? `${titleText(job)} is ${stateText(job.state)} and has no result. This is what was built of it.`
-      : `${stateText(job.state)}: ${what}, drawn coarsely.`);
+    setText(
+        this.text,
+        !job ? "The service does not answer. This is what was built when it did." :
+            hasEnded(job.state) ?
+               `${titleText(job)} is ${
+                   stateText(job.state)} and has no result. This is what was built of it.` :
+               `${stateText(job.state)}: ${what}, drawn coarsely.`);
     this.kinds.waiting.hidden = this.kinds.built.hidden = !this.wires.drawsAll;
     this.element.classList.toggle("bad", !job || hasEnded(job.state));
   }
 }
 
 function sample({color, width, dash}) {
-  return svg("svg", {width: 28, height: 10, "aria-hidden": "true"},
-    svg("line", {x1: 1, y1: 5, x2: 27, y2: 5, stroke: color, "stroke-width": width, "stroke-dasharray": dash.join(" ") || null}));
+  return svg("svg", {width: 28, height: 10, "aria-hidden": "true"}, svg("line", {
+               x1: 1,
+               y1: 5,
+               x2: 27,
+               y2: 5,
+               stroke: color,
+               "stroke-width": width,
+               "stroke-dasharray": dash.join(" ") || null
+             }));
 }

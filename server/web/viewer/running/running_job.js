@@ -1,5 +1,6 @@
-// The viewer of a job that runs: what is built so far, from the coarse bricks of its subvolumes, and the
-// wireframe of all of them. What is built grows under the camera; the tiles that were fetched stay.
+// The viewer of a job that runs: what is built so far, from the coarse bricks of its subvolumes,
+// and the wireframe of all of them. What is built grows under the camera; the tiles that were
+// fetched stay.
 
 import {authorization, getJson, sleep} from "../../lib/api.js";
 import {announce} from "../../lib/dom.js";
@@ -8,19 +9,21 @@ import {Viewer} from "../app.js";
 import {fragmentText} from "../camera_text.js";
 import {Renderer} from "../renderer.js";
 import {TileError, TileSource} from "../tile_source.js";
+
 import {Banner} from "./banner.js";
 import {SubvolumeWires} from "./subvolume_wires.js";
 
 const kPauseMs = 1500, kMaxPauseMs = 15000;
-const kGone = [404, 409, 410];   // what is built has another digest, or the job another state
-// A list of subvolumes is fetched again after this many times what it took, and after this time for each of them;
-// what has changed is reported a moment before the list has it, and what is begun is only in the list.
+const kGone = [404, 409, 410];  // what is built has another digest, or the job another state
+// A list of subvolumes is fetched again after this many times what it took, and after this time for
+// each of them; what has changed is reported a moment before the list has it, and what is begun is
+// only in the list.
 const kListShare = 10, kListPausePerCubeMs = 0.1;
 const kListLooks = 2, kMaxListPauseMs = 15000;
 
-// Shows the job until it has its result. Resolves to whether there was anything to show: not before the subvolumes
-// are planned. Throws WebGLUnavailable, and Problem when the job is gone. The camera is left in the address, where the
-// next viewer finds it. `showTools` fills the tools of the page.
+// Shows the job until it has its result. Resolves to whether there was anything to show: not before
+// the subvolumes are planned. Throws WebGLUnavailable, and Problem when the job is gone. The camera
+// is left in the address, where the next viewer finds it. `showTools` fills the tools of the page.
 export async function watchJob({job, place, budgetBytes, showPicture, showTools, signal}) {
   const path = `/api/v1/jobs/${job.id}`;
   const source = new TileSource({base: `${path}/partial`, headers: authorization()});
@@ -32,12 +35,19 @@ export async function watchJob({job, place, budgetBytes, showPicture, showTools,
   let renderer = null, banner = null, wires = null, viewer = null, rests = false;
   try {
     showPicture();
-    renderer = new Renderer(canvas, source, {budgetBytes: budgetBytes, onChange: () => viewer?.schedule()});
+    renderer = new Renderer(
+        canvas, source, {budgetBytes: budgetBytes, onChange: () => viewer?.schedule()});
     const started = renderer.start();
     started.catch(() => {});
     showTools();
-    viewer = new Viewer({canvas, renderer, manifest, signal: ended.signal, fileName: `job-${job.id}`,
-                         places: {panel: place("panel"), tools: place("tools"), status: place("status")}});
+    viewer = new Viewer({
+      canvas,
+      renderer,
+      manifest,
+      signal: ended.signal,
+      fileName: `job-${job.id}`,
+      places: {panel: place("panel"), tools: place("tools"), status: place("status")}
+    });
     wires = viewer.overlay = new SubvolumeWires(canvas, () => viewer.schedule());
     banner = new Banner(wires);
     canvas.parentElement.append(banner.element);
@@ -63,7 +73,8 @@ export async function watchJob({job, place, budgetBytes, showPicture, showTools,
   }
 }
 
-// null while there is none: before the plan, when the files of the job are gone, and while the service is away.
+// null while there is none: before the plan, when the files of the job are gone, and while the
+// service is away.
 async function manifestOf(source) {
   try {
     return await source.manifest();
@@ -89,14 +100,15 @@ class SubvolumeList {
     this.path = path;
     this.list = null;
     this.key = null;
-    this.looks = 0;            // that are left
+    this.looks = 0;  // that are left
     this.nextMs = -Infinity;
     this.latestMs = -Infinity;
   }
 
   // Whether it was fetched.
   async update(job, signal) {
-    const {stage, subvolumes} = job.progress ?? {}, key = JSON.stringify([job.state, job.attempts, stage, subvolumes]);
+    const {stage, subvolumes} = job.progress ?? {},
+                  key = JSON.stringify([job.state, job.attempts, stage, subvolumes]);
     if (key !== this.key) this.looks = kListLooks;
     this.key = key;
     const beginMs = performance.now();
@@ -113,8 +125,9 @@ class SubvolumeList {
   }
 }
 
-// Until the job has its result, or begins again, or what is built is another DAG, after a restart of the service.
-// Resolves to whether to wait before one looks again, since that could be so each time.
+// Until the job has its result, or begins again, or what is built is another DAG, after a restart
+// of the service. Resolves to whether to wait before one looks again, since that could be so each
+// time.
 async function follow({path, source, renderer, banner, wires, signal}) {
   const {digest} = renderer.info, wasEmpty = !renderer.info.root;
   const subvolumes = new SubvolumeList(path);
@@ -139,10 +152,11 @@ async function follow({path, source, renderer, banner, wires, signal}) {
       // Its tile may take long: what the job does is shown all the same.
       isArriving = true;
       renderer.showRoot(manifest)
-        .catch((error) => console.warn(`voxdag: what was built is not shown: ${error.message}`))
-        .finally(() => isArriving = false);
+          .catch((error) => console.warn(`voxdag: what was built is not shown: ${error.message}`))
+          .finally(() => isArriving = false);
     }
-    if (job && await subvolumes.update(job, signal)) wires.show(subvolumes.list, state === "running");
+    if (job && await subvolumes.update(job, signal))
+      wires.show(subvolumes.list, state === "running");
     banner.show(job, subvolumes.list ?? source.info);
     // What has ended, or gives no answer, may continue some day.
     pauseMs = manifest ? kPauseMs : Math.min(kMaxPauseMs, 1.5 * pauseMs);

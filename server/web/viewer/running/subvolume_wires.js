@@ -1,11 +1,12 @@
-// The wireframe of a job's subvolumes over the picture. What is built, in work and waiting differs by the
-// kind of line, not by its color alone. Drawn without the GPU's depth: what is behind the voxels shows through.
+// The wireframe of a job's subvolumes over the picture. What is built, in work and waiting differs
+// by the kind of line, not by its color alone. Drawn without the GPU's depth: what is behind the
+// voxels shows through.
 
 import {dot, subtract} from "../vector.js";
 
-const kMaxEdges = 24000;   // of more, only those of what is in work are drawn
-const kOpaque = 10;        // the square root of how many cubes of a kind are drawn opaque
-const kNear = 1e-3;        // of the grid: nearer than this nothing is drawn
+const kMaxEdges = 24000;  // of more, only those of what is in work are drawn
+const kOpaque = 10;       // the square root of how many cubes of a kind are drawn opaque
+const kNear = 1e-3;       // of the grid: nearer than this nothing is drawn
 
 // Later ones are drawn over earlier ones.
 export const kStyles = {
@@ -25,12 +26,12 @@ export class SubvolumeWires {
     this.edges = Object.fromEntries(kOrder.map((state) => [state, new Float64Array(0)]));
     this.counts = Object.fromEntries(kOrder.map((state) => [state, 0]));
     this.visible = true;
-    this.drawsAll = true;       // not only what is in work
-    this.drawn = null;           // for which camera and size
+    this.drawsAll = true;  // not only what is in work
+    this.drawn = null;     // for which camera and size
   }
 
-  // {resolution, cubes: [[x, y, z, edge, built]...], working: [[x, y, z, edge]...]} in voxels; nothing is in work
-  // unless the job `runs`.
+  // {resolution, cubes: [[x, y, z, edge, built]...], working: [[x, y, z, edge]...]} in voxels;
+  // nothing is in work unless the job `runs`.
   show({resolution, cubes, working = []}, runs) {
     this.resolution = resolution;
     const atWork = new Set(runs ? working.map((cube) => cube.join()) : []);
@@ -44,7 +45,8 @@ export class SubvolumeWires {
       addEdges(x, y, z, edge, rank, found);
       if (!this.drawsAll || found.size <= kMaxEdges) continue;
       this.drawsAll = false;
-      for (const [key, known] of found) if (known.rank < 2) found.delete(key);
+      for (const [key, known] of found)
+        if (known.rank < 2) found.delete(key);
     }
     const lists = kOrder.map(() => []);
     for (const {rank, points} of found.values()) lists[rank].push(...points);
@@ -61,13 +63,18 @@ export class SubvolumeWires {
 
   draw(camera) {
     if (!this.visible || !this.resolution) return;
-    const {canvas} = this, width = canvas.clientWidth, height = canvas.clientHeight, ratio = window.devicePixelRatio || 1;
+    const {canvas} = this, width = canvas.clientWidth, height = canvas.clientHeight,
+          ratio = window.devicePixelRatio || 1;
     if (!width || !height) return;
-    // Thousands of lines take longer than a part of a sample: they are drawn when they change, and not with each frame.
-    const {forward, up} = camera.axes(), drawn = [...camera.eye, ...forward, ...up, camera.fovDegrees, width, height, ratio].join();
+    // Thousands of lines take longer than a part of a sample: they are drawn when they change, and
+    // not with each frame.
+    const {forward, up} = camera.axes(), drawn = [
+      ...camera.eye, ...forward, ...up, camera.fovDegrees, width, height, ratio
+    ].join();
     if (drawn === this.drawn) return;
     this.drawn = drawn;
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    if (canvas.width !== Math.round(width * ratio) ||
+        canvas.height !== Math.round(height * ratio)) {
       canvas.width = Math.round(width * ratio);
       canvas.height = Math.round(height * ratio);
     }
@@ -91,7 +98,8 @@ export class SubvolumeWires {
 
   // Adds the visible part of an edge to the path.
   projection(camera, width, height) {
-    const {forward, right, up} = camera.axes(), eye = camera.eye, pixel = camera.pixelSpread(height);
+    const {forward, right, up} = camera.axes(), eye = camera.eye,
+                           pixel = camera.pixelSpread(height);
     const near = kNear * this.resolution / 16;
     const place = (points, at) => {
       const offset = subtract([points[at], points[at + 1], points[at + 2]], eye);
@@ -101,7 +109,8 @@ export class SubvolumeWires {
       const share = (near - from[2]) / (to[2] - from[2]);
       return from.map((c, i) => c + share * (to[i] - c));
     };
-    const toPixels = ([x, y, depth]) => [width / 2 + x / depth / pixel, height / 2 - y / depth / pixel];
+    const toPixels =
+        ([x, y, depth]) => [width / 2 + x / depth / pixel, height / 2 - y / depth / pixel];
     return (pen, points, i) => {
       let a = place(points, i), b = place(points, i + 3);
       if (a[2] < near && b[2] < near) return;

@@ -1,8 +1,9 @@
-// Finds the tiles of the first view while the shaders are compiled: by walking through the tiles that are there, as
-// a reading of the feedback would say them a level at a time. What surfaces hide is not known here, so a few tiles
-// too many are fetched; therefore this stops at cells that are still wide, after so many tiles, and when none come.
+// Finds the tiles of the first view while the shaders are compiled: by walking through the tiles
+// that are there, as a reading of the feedback would say them a level at a time. What surfaces hide
+// is not known here, so a few tiles too many are fetched; therefore this stops at cells that are
+// still wide, after so many tiles, and when none come.
 
-const kPixels = 15;            // wider cells are refined: of the canvas
+const kPixels = 15;  // wider cells are refined: of the canvas
 const kMaxTiles = 1500;
 const kStallMs = 1500;
 const kHeadWords = 4, kCutWords = 4;  // of a tile (docs/format.md)
@@ -13,10 +14,10 @@ export class FirstView {
     Object.assign(this, {levels, view, finest});
     this.pixel = view.pixel(height);
     this.slopes = [view.tangent * width / height, view.tangent];  // of the sides of the picture
-    this.known = new Map();      // key -> words of a tile
-    this.places = new Map();     // key -> where the tile is needed, low corners
-    this.wanted = new Map();     // texel of a cut-off node -> pixels of its widest coarse cell
-    this.takenMs = 0;           // when the last tile came
+    this.known = new Map();                                       // key -> words of a tile
+    this.places = new Map();  // key -> where the tile is needed, low corners
+    this.wanted = new Map();  // texel of a cut-off node -> pixels of its widest coarse cell
+    this.takenMs = 0;         // when the last tile came
   }
 
   get isOver() {
@@ -50,14 +51,18 @@ export class FirstView {
     const visit = (at, edge, x, y, z, isLeaf) => {
       if (!this.needs(x, y, z, edge, cell)) return;
       if (isLeaf) {
-        const from = leaves + at * kCutWords, pixels = this.coarsePixels(words[from + 2], words[from + 3], x, y, z, cell);
+        const from = leaves + at * kCutWords,
+              pixels = this.coarsePixels(words[from + 2], words[from + 3], x, y, z, cell);
         if (pixels > kPixels) this.want(store, store.leaf(tile, at), pixels, [x, y, z]);
         return;
       }
       const half = edge / 2;
-      for (let child = 0, next = kHeadWords + at + 1, mask = words[kHeadWords + at]; child < 8; ++child)
+      for (let child = 0, next = kHeadWords + at + 1, mask = words[kHeadWords + at]; child < 8;
+           ++child)
         if (mask >>> child & 1)
-          visit(words[next++], half, x + half * (child >> 2), y + half * (child >> 1 & 1), z + half * (child & 1), half === leafEdge);
+          visit(
+              words[next++], half, x + half * (child >> 2), y + half * (child >> 1 & 1),
+              z + half * (child & 1), half === leafEdge);
     };
     visit(0, 2 ** (this.levels - tile.level), ...corner, false);
   }
@@ -73,13 +78,16 @@ export class FirstView {
 
   // Whether a cube is in the picture, with cells that are too wide.
   needs(x, y, z, edge, cell) {
-    return this.pixelsOf(x, y, z, edge, cell) > kPixels && this.isSeen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
+    return this.pixelsOf(x, y, z, edge, cell) > kPixels &&
+        this.isSeen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
   }
 
   // How many pixels wide a cell at the nearest point of a cube is.
   pixelsOf(x, y, z, edge, cell) {
     const [ex, ey, ez] = this.view.eye;
-    const far = Math.hypot(Math.max(x - ex, 0, ex - x - edge), Math.max(y - ey, 0, ey - y - edge), Math.max(z - ez, 0, ez - z - edge));
+    const far = Math.hypot(
+        Math.max(x - ex, 0, ex - x - edge), Math.max(y - ey, 0, ey - y - edge),
+        Math.max(z - ez, 0, ez - z - edge));
     return cell / Math.max(far * this.pixel, 1e-9);
   }
 
@@ -88,7 +96,9 @@ export class FirstView {
     const {eye, forward, right, up} = this.view, dx = x - eye[0], dy = y - eye[1], dz = z - eye[2];
     const along = (axis) => axis[0] * dx + axis[1] * dy + axis[2] * dz;
     const depth = along(forward);
-    return [right, up].every((axis, i) => Math.abs(along(axis)) <= depth * this.slopes[i] + radius * Math.hypot(1, this.slopes[i]));
+    return [right, up].every(
+        (axis, i) => Math.abs(along(axis)) <=
+            depth * this.slopes[i] + radius * Math.hypot(1, this.slopes[i]));
   }
 
   // Of the widest cell of a coarse brick that is in the picture.
@@ -96,9 +106,12 @@ export class FirstView {
     let most = 0;
     for (let bit = 0; bit < 64; ++bit) {
       if (((bit < 32 ? low : high) >>> (bit & 31) & 1) === 0) continue;
-      const cx = x + cell * (bit >> 4 & 2 | bit >> 2 & 1), cy = y + cell * (bit >> 3 & 2 | bit >> 1 & 1), cz = z + cell * (bit >> 2 & 2 | bit & 1);
+      const cx = x + cell * (bit >> 4 & 2 | bit >> 2 & 1),
+            cy = y + cell * (bit >> 3 & 2 | bit >> 1 & 1), cz = z + cell * (bit >> 2 & 2 | bit & 1);
       const pixels = this.pixelsOf(cx, cy, cz, cell, cell);
-      if (pixels > most && pixels > kPixels && this.isSeen(cx + cell / 2, cy + cell / 2, cz + cell / 2, cell * 0.867)) most = pixels;
+      if (pixels > most && pixels > kPixels &&
+          this.isSeen(cx + cell / 2, cy + cell / 2, cz + cell / 2, cell * 0.867))
+        most = pixels;
     }
     return most;
   }

@@ -1,18 +1,26 @@
-// What decides what is fetched next, and survives what fails: for tiles and for color pages. Each reading
-// of the feedback replaces the queue, so that what has left the picture is not fetched any more.
+// What decides what is fetched next, and survives what fails: for tiles and for color pages. Each
+// reading of the feedback replaces the queue, so that what has left the picture is not fetched any
+// more.
 
 import {TileError} from "../tile_source.js";
 
-export const kRoundsToKnow = 4;  // readings of the feedback after which what was not seen is known to be so
+export const kRoundsToKnow =
+    4;  // readings of the feedback after which what was not seen is known to be so
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
-const kMaxTries = 3;           // of one item whose answers are of no use
-const kRefusedMs = 300000;     // until an item that was refused is asked for again
-const kMaxFailures = 65536;    // that are remembered
+const kMaxTries = 3;         // of one item whose answers are of no use
+const kRefusedMs = 300000;   // until an item that was refused is asked for again
+const kMaxFailures = 65536;  // that are remembered
 const kMaxWarnings = 20;
 const kFullPauseMs = 250;
 
-const kDamaged = {code: "damaged", message: "Part of the file is damaged and drawn coarse: run voxdag verify."};
-const kRefused = {code: "refused", message: "Part of the file is drawn coarse: the service fails to send it."};
+const kDamaged = {
+  code: "damaged",
+  message: "Part of the file is damaged and drawn coarse: run voxdag verify."
+};
+const kRefused = {
+  code: "refused",
+  message: "Part of the file is drawn coarse: the service fails to send it."
+};
 
 // Random, so that those who lost the same service do not come back at the same time.
 export function pauseAfter(failures) {
@@ -32,25 +40,26 @@ export class Loader {
     this.onArrival = onArrival;
     this.maxRequests = maxRequests;  // at the same time
     this.maxBatch = maxBatch;
-    this.allowed = maxRequests;       // fewer while the service is busy
-    this.batchSize = maxBatch;       // smaller where it is silent for long
+    this.allowed = maxRequests;  // fewer while the service is busy
+    this.batchSize = maxBatch;   // smaller where it is silent for long
     this.queue = [];
-    this.loading = new Map();    // key -> request
-    this.failures = new Map();   // key -> {count, retryMs, batch: the largest that it may be in, last}, the oldest first
+    this.loading = new Map();   // key -> request
+    this.failures = new Map();  // key -> {count, retryMs, batch: the largest that it may be in,
+                                // last}, the oldest first
     this.maxFailures = kMaxFailures;
     this.requests = 0;
     this.failedTotal = 0;
     this.requestedTotal = 0;
     this.outage = {count: 0, retryMs: 0};
     this.busy = {count: 0, retryMs: 0};
-    this.fullUntilMs = 0;      // Infinity: until the next epoch
-    this.trouble = null;         // {code, message}: as long as the outage
-    this.failure = null;         // the same, for good
-    this.refusal = null;         // the same: of some items only
+    this.fullUntilMs = 0;  // Infinity: until the next epoch
+    this.trouble = null;   // {code, message}: as long as the outage
+    this.failure = null;   // the same, for good
+    this.refusal = null;   // the same: of some items only
     this.warnings = 0;
     this.timer = 0;
-    this.wakes = new Set();      // times
-    this.unmet = 0;              // what the last reading wanted and may still come
+    this.wakes = new Set();  // times
+    this.unmet = 0;          // what the last reading wanted and may still come
     this.ending = new AbortController();
   }
 
@@ -92,8 +101,10 @@ export class Loader {
   replaceQueue(requests, unmet, nowMs) {
     this.unmet = unmet;
     if (unmet === 0) this.endOutage();
-    // What the service may fail at comes last, and of that what is more likely so: others are not to wait for it.
-    const trust = ({key}) => this.failures.get(key)?.last ? this.failures.get(key).batch : this.maxBatch;
+    // What the service may fail at comes last, and of that what is more likely so: others are not
+    // to wait for it.
+    const trust = ({key}) =>
+        this.failures.get(key)?.last ? this.failures.get(key).batch : this.maxBatch;
     this.queue = requests.sort((a, b) => trust(a) - trust(b) || a.priority - b.priority);
     this.send(nowMs);
   }
@@ -114,13 +125,15 @@ export class Loader {
     }
     // After an outage one request tries whether it is over.
     const maxRequests = this.outage.count > 0 ? 1 : Math.floor(this.allowed);
-    while (this.requests < maxRequests && this.queue.length > 0 && !this.isFull) this.fetch(this.takeBatch());
+    while (this.requests < maxRequests && this.queue.length > 0 && !this.isFull)
+      this.fetch(this.takeBatch());
   }
 
   takeBatch() {
     const sizeFor = ({key}) => Math.min(this.batchSize, this.failures.get(key)?.batch ?? Infinity);
     const batch = [this.queue.pop()], size = sizeFor(batch[0]);
-    while (batch.length < size && this.queue.length > 0 && sizeFor(this.queue.at(-1)) === size) batch.push(this.queue.pop());
+    while (batch.length < size && this.queue.length > 0 && sizeFor(this.queue.at(-1)) === size)
+      batch.push(this.queue.pop());
     return batch;
   }
 
@@ -157,7 +170,8 @@ export class Loader {
     this.endOutage();
     this.busy = {count: 0, retryMs: 0};
     this.allowed = Math.min(this.maxRequests, this.allowed + 1 / 4);
-    if (nowMs - beginMs < this.source.timeoutMs / 4) this.batchSize = Math.min(this.maxBatch, 2 * this.batchSize);
+    if (nowMs - beginMs < this.source.timeoutMs / 4)
+      this.batchSize = Math.min(this.maxBatch, 2 * this.batchSize);
     let hasRoom = true;
     batch.forEach((request, i) => {
       if (!hasRoom) return;
@@ -183,9 +197,11 @@ export class Loader {
     if (error.timedOut) this.batchSize = Math.max(1, this.batchSize >> 1);
     if (error.isBusy) this.rest(error.retryAfterMs, nowMs);
     else if (error.isDenied) this.pause({code: "unauthorized", message: error.message}, nowMs);
-    else if (isKnown && (error.isTransient || error.isSuspicious)) this.pause({code: "unreachable", message: error.message}, nowMs);
+    else if (isKnown && (error.isTransient || error.isSuspicious))
+      this.pause({code: "unreachable", message: error.message}, nowMs);
     else this.endOutage();
-    if (isKnown && (error.isDenied || error.isTransient) && !error.isSuspicious) this.askAgain(batch);
+    if (isKnown && (error.isDenied || error.isTransient) && !error.isSuspicious)
+      this.askAgain(batch);
     else this.split(batch, error, nowMs);
   }
 
@@ -194,7 +210,8 @@ export class Loader {
     if (batch.length === 1) return this.noteFailure(batch[0], error, nowMs);
     const half = Math.ceil(batch.length / 2);
     const last = error.isSuspicious === true;
-    for (const {key} of batch) this.remember(key, {count: 0, retryMs: 0, ...this.failures.get(key), batch: half, last});
+    for (const {key} of batch)
+      this.remember(key, {count: 0, retryMs: 0, ...this.failures.get(key), batch: half, last});
     if (last) this.queue.unshift(...batch.reverse());
     else this.askAgain(batch);
   }
@@ -208,7 +225,8 @@ export class Loader {
   remember(key, failure) {
     this.failures.delete(key);
     this.failures.set(key, failure);
-    if (this.failures.size > this.maxFailures) this.failures.delete(this.failures.keys().next().value);
+    if (this.failures.size > this.maxFailures)
+      this.failures.delete(this.failures.keys().next().value);
   }
 
   noteFailure(request, error, nowMs) {
@@ -220,12 +238,17 @@ export class Loader {
     this.remember(key, {count, retryMs, batch: 1, last: true});
     this.failedTotal++;
     if (count < kMaxTries) this.wakeAt(retryMs, nowMs);
-    else this.refusal = isAnswer && !error.isMissing && error.code !== "corrupt" ? this.refusal ?? kRefused : kDamaged;
+    else
+      this.refusal = isAnswer && !error.isMissing && error.code !== "corrupt" ?
+          this.refusal ?? kRefused :
+          kDamaged;
     if (this.warnings++ < kMaxWarnings)
-      console.warn(`voxdag: ${this.nameOf(request)} cannot be used${count < kMaxTries ? " and is asked for again" : ""}: ${error.message}`);
+      console.warn(`voxdag: ${this.nameOf(request)} cannot be used${
+          count < kMaxTries ? " and is asked for again" : ""}: ${error.message}`);
   }
 
-  // The service is away, or answers nothing that makes sense. Requests that fail together count once.
+  // The service is away, or answers nothing that makes sense. Requests that fail together count
+  // once.
   pause(trouble, nowMs) {
     this.failedTotal++;
     this.trouble = trouble;
@@ -247,7 +270,8 @@ export class Loader {
 
   // Nothing will come any more, as the error says. What is known of the file says more.
   fail(error) {
-    this.failure = this.source.ended ?? {code: error.isDenied ? "unauthorized" : "failed", message: error.message};
+    this.failure = this.source.ended ??
+        {code: error.isDenied ? "unauthorized" : "failed", message: error.message};
     this.queue = [];
   }
 
@@ -256,8 +280,9 @@ export class Loader {
     const nowMs = performance.now();
     if (this.hasEnded || this.unmet === 0) return false;
     return this.outage.count > 0 || nowMs < this.busy.retryMs ||
-           (nowMs < this.fullUntilMs && this.fullUntilMs !== Infinity) ||
-           [...this.failures.values()].some((f) => f.count > 0 && f.count < kMaxTries && nowMs < f.retryMs);
+        (nowMs < this.fullUntilMs && this.fullUntilMs !== Infinity) ||
+        [...this.failures.values()].some(
+            (f) => f.count > 0 && f.count < kMaxTries && nowMs < f.retryMs);
   }
 
   // Whether nothing is asked for until a time that wakes the renderer.
@@ -273,11 +298,13 @@ export class Loader {
   setTimer(nowMs) {
     clearTimeout(this.timer);
     if (this.wakes.size === 0 || this.disposed) return;
-    this.timer = setTimeout(() => this.wake(performance.now()), Math.max(0, Math.min(...this.wakes) - nowMs) + 1);
+    this.timer = setTimeout(
+        () => this.wake(performance.now()), Math.max(0, Math.min(...this.wakes) - nowMs) + 1);
   }
 
   wake(nowMs) {
-    for (const timeMs of this.wakes) if (timeMs <= nowMs) this.wakes.delete(timeMs);
+    for (const timeMs of this.wakes)
+      if (timeMs <= nowMs) this.wakes.delete(timeMs);
     this.setTimer(nowMs);
     this.send(nowMs);
     this.onArrival(true);

@@ -1,11 +1,11 @@
-// Decodes a tile (docs/format.md) and lays its words out for the pool. Tiles come from the network: every
-// index is checked, so that a damaged tile is an error and never a wrong address on the GPU.
+// Decodes a tile (docs/format.md) and lays its words out for the pool. Tiles come from the network:
+// every index is checked, so that a damaged tile is an error and never a wrong address on the GPU.
 
 export const kTexelWords = 4;
 export const kBlockTexels = 16;  // of the pool; a node or leaf never crosses the end of a block
 const kMagic = 0x31544456;
 const kHeadWords = 4;
-const kCutWords = 4;             // of a cut-off node in a tile
+const kCutWords = 4;  // of a cut-off node in a tile
 const kMaxOffset = 2 ** 40 - 1;
 
 const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
@@ -14,17 +14,18 @@ const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
   return bits;
 });
 
-// The pool has texels of four words, addressed by 24 bits. A *pointer* is the address of a texel times 256,
-// plus the child mask of the node there; so a ray knows a node's mask without reading the node. A node is
-// one pointer per child, in one or two texels. A cut-off node is one texel: the slot of its tile (0: none),
-// its coarse brick's two words, 0. Two bricks share a texel; the pointer's lowest bit says which.
+// The pool has texels of four words, addressed by 24 bits. A *pointer* is the address of a texel
+// times 256, plus the child mask of the node there; so a ray knows a node's mask without reading
+// the node. A node is one pointer per child, in one or two texels. A cut-off node is one texel: the
+// slot of its tile (0: none), its coarse brick's two words, 0. Two bricks share a texel; the
+// pointer's lowest bit says which.
 //
 // `shape` is that of tiles of this level (tileShape).
-// Returns {level, levels, words, pointers, root, leafBegin, addresses, coarse}: `words` are the pool's
-// words at virtual addresses from 0 on, whole blocks; `pointers` are the positions in `words` of pointers
-// with virtual addresses, which the pool makes absolute; `root` is such a pointer; `leafBegin` is the first
-// leaf's texel. `addresses` are the word offsets of the cut-off nodes in the file, and `coarse` their coarse
-// bricks; both are null for a tile with bricks.
+// Returns {level, levels, words, pointers, root, leafBegin, addresses, coarse}: `words` are the
+// pool's words at virtual addresses from 0 on, whole blocks; `pointers` are the positions in
+// `words` of pointers with virtual addresses, which the pool makes absolute; `root` is such a
+// pointer; `leafBegin` is the first leaf's texel. `addresses` are the word offsets of the cut-off
+// nodes in the file, and `coarse` their coarse bricks; both are null for a tile with bricks.
 export function decodeTile(tile, level, shape) {
   checkHead(tile, level, shape);
   const {levels, bricks} = shape, nodeWords = tile[2], leafCount = tile[3];
@@ -40,32 +41,47 @@ export function decodeTile(tile, level, shape) {
     const count = kPopcount[nodes[at]], to = (place[at] >>> 8) * kTexelWords;
     for (let child = 0; child < count; ++child) {
       const index = nodes[at + 1 + child];
-      if (depth[at] === levels - 1 && index >= leafCount) throw new Error("A tile has a leaf index beyond its leaves.");
-      words[to + child] = depth[at] < levels - 1 ? place[index]
-        : bricks ? (leafBegin + (index >>> 1)) * 256 + (index & 1) : (leafBegin + index) * 256;
+      if (depth[at] === levels - 1 && index >= leafCount)
+        throw new Error("A tile has a leaf index beyond its leaves.");
+      words[to + child] = depth[at] < levels - 1 ? place[index] :
+          bricks                                 ? (leafBegin + (index >>> 1)) * 256 + (index & 1) :
+                                                   (leafBegin + index) * 256;
       pointers[pointerCount++] = to + child;
     }
     at += 1 + count;
   }
-  const leaves = copyLeaves(tile.subarray(kHeadWords + nodeWords), bricks, leafCount, words, leafBegin);
-  return {level, levels, words, pointers: pointers.subarray(0, pointerCount), root: place[0], leafBegin,
-          ...leaves};
+  const leaves =
+      copyLeaves(tile.subarray(kHeadWords + nodeWords), bricks, leafCount, words, leafBegin);
+  return {
+    level,
+    levels,
+    words,
+    pointers: pointers.subarray(0, pointerCount),
+    root: place[0],
+    leafBegin,
+    ...leaves
+  };
 }
 
-// How many levels the tiles of a level have in a file with this manifest, and whether bricks are below them.
+// How many levels the tiles of a level have in a file with this manifest, and whether bricks are
+// below them.
 export function tileShape({levels, tile_levels}, level) {
   const below = levels - 2 - level, own = (below - 1) % tile_levels + 1;
   return {levels: own, bricks: own === below};
 }
 
 function checkHead(tile, level, {levels, bricks}) {
-  if (tile.length < kHeadWords + 2 || tile[0] !== kMagic) throw new Error("A tile does not begin as tiles do.");
+  if (tile.length < kHeadWords + 2 || tile[0] !== kMagic)
+    throw new Error("A tile does not begin as tiles do.");
   const shape = level | levels << 8 | bricks << 16;
-  if (tile[1] !== shape) throw new Error(`A tile has the shape ${tile[1].toString(16)}; expected ${shape.toString(16)}.`);
+  if (tile[1] !== shape)
+    throw new Error(
+        `A tile has the shape ${tile[1].toString(16)}; expected ${shape.toString(16)}.`);
   const length = kHeadWords + tile[2] + tile[3] * (bricks ? 2 : kCutWords);
   if (tile[2] < 2 || length !== tile.length)
     throw new Error(`A tile has ${tile.length} words; its head says ${length}.`);
-  if (tile[3] > 8 ** levels) throw new Error(`A tile has ${tile[3]} leaves; expected ${8 ** levels} at most.`);
+  if (tile[3] > 8 ** levels)
+    throw new Error(`A tile has ${tile[3]} leaves; expected ${8 ** levels} at most.`);
 }
 
 // Packs the nodes in their order, none across the end of a block. Returns the texel after the last.
@@ -84,7 +100,8 @@ function placeNodes(nodes, levels, place, depth) {
   // Children follow their parents, so one sweep finds every node's level.
   for (let at = 0; at < nodes.length;) {
     const count = kPopcount[nodes[at]];
-    if (at > 0 && depth[at] === 0) throw new Error(`A tile's node word ${at} begins a node that no other names.`);
+    if (at > 0 && depth[at] === 0)
+      throw new Error(`A tile's node word ${at} begins a node that no other names.`);
     for (let child = 1; child <= count && depth[at] < levels - 1; ++child) {
       const index = nodes[at + child];
       if (index <= at || index >= nodes.length || place[index] === 0)
@@ -114,7 +131,8 @@ function copyLeaves(leaves, bricks, count, words, begin) {
     addresses[i] = leaves[from] + leaves[from + 1] * 2 ** 32;
     words[to + 1] = coarse[2 * i] = leaves[from + 2];
     words[to + 2] = coarse[2 * i + 1] = leaves[from + 3];
-    if (addresses[i] > kMaxOffset) throw new Error(`A tile's leaf ${i} lies at word ${addresses[i]} of its level.`);
+    if (addresses[i] > kMaxOffset)
+      throw new Error(`A tile's leaf ${i} lies at word ${addresses[i]} of its level.`);
     expectSome(coarse[2 * i], coarse[2 * i + 1], i);
   }
   return {addresses, coarse};

@@ -1,20 +1,24 @@
 // Fetches the tiles that a picture lacks.
 
 import {TileError} from "../tile_source.js";
+
 import {Loader, pauseAfter} from "./loader.js";
 
 const kMaxRequests = 4, kMaxBatch = 48;
-const kMaxRootTries = 3;       // while the root's answers make no sense
+const kMaxRootTries = 3;  // while the root's answers make no sense
 
-// Its requests are {key, level, offset, priority, leaves}: leaves are the texels of cut-off nodes to be linked.
+// Its requests are {key, level, offset, priority, leaves}: leaves are the texels of cut-off nodes
+// to be linked.
 export class TileLoader extends Loader {
   constructor(source, store, onArrival) {
-    super(source, store, onArrival, {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.batchMax)});
-    this.firstView = null;      // the FirstView that the next tiles are shown to
+    super(
+        source, store, onArrival,
+        {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.batchMax)});
+    this.firstView = null;  // the FirstView that the next tiles are shown to
   }
 
-  // `wanted`: leaf address -> priority, of one reading of the feedback. Returns how many of the nodes
-  // were linked to tiles that are there already.
+  // `wanted`: leaf address -> priority, of one reading of the feedback. Returns how many of the
+  // nodes were linked to tiles that are there already.
   demand(wanted, nowMs) {
     const byKey = new Map();
     let linked = 0, unmet = 0;
@@ -36,7 +40,13 @@ export class TileLoader extends Loader {
         unmet++;
       } else {
         unmet++;
-        byKey.set(node.key, {key: node.key, level: node.level, offset: node.offset, priority, leaves: new Set([address])});
+        byKey.set(node.key, {
+          key: node.key,
+          level: node.level,
+          offset: node.offset,
+          priority,
+          leaves: new Set([address])
+        });
       }
     }
     this.replaceQueue([...byKey.values()], unmet, nowMs);
@@ -46,10 +56,11 @@ export class TileLoader extends Loader {
   // Loads one tile that no other refers to. Resolves to its words, undefined after dispose().
   async loadRoot(level, offset) {
     const {signal} = this.ending;
-    for (let tries = 1; ; ++tries) {
+    for (let tries = 1;; ++tries) {
       let words = null;
       try {
-        [words] = await this.source.fetchTiles([{level, offset}], {signal, cache: tries > 1 ? "reload" : undefined});
+        [words] = await this.source.fetchTiles(
+            [{level, offset}], {signal, cache: tries > 1 ? "reload" : undefined});
         if (this.disposed) return;
         if (!this.store.add(level, offset, words, performance.now())) words = null;
       } catch (error) {
@@ -58,7 +69,8 @@ export class TileLoader extends Loader {
         const isKnown = error instanceof TileError && error.status !== 200;
         if (isKnown ? !error.isTransient : tries >= kMaxRootTries) throw error;
         if (!error.isBusy) this.trouble = {code: "unreachable", message: error.message};
-        await new Promise((resolve) => setTimeout(resolve, pauseAfter(tries) + (error.retryAfterMs || 0)));
+        await new Promise(
+            (resolve) => setTimeout(resolve, pauseAfter(tries) + (error.retryAfterMs || 0)));
         if (this.disposed) return;
         continue;
       }

@@ -1,8 +1,8 @@
-// The GPU's memory for tiles: texels of four words in one unsigned integer texture, divided into blocks, and
-// the table that says for each slot where its tile begins. A tile takes any free blocks, so memory does not
-// fragment. Few views need much: a large pool begins small, and takes its final size at once when it is full.
-// Both textures, and while it grows the third, are together at most the budget. Where there is no memory for
-// more, a pool stays as small as it is.
+// The GPU's memory for tiles: texels of four words in one unsigned integer texture, divided into
+// blocks, and the table that says for each slot where its tile begins. A tile takes any free
+// blocks, so memory does not fragment. Few views need much: a large pool begins small, and takes
+// its final size at once when it is full. Both textures, and while it grows the third, are together
+// at most the budget. Where there is no memory for more, a pool stays as small as it is.
 
 import {kBlockTexels, kTexelWords} from "./tile_format.js";
 
@@ -10,28 +10,30 @@ const kRowTexels = 4096, kTableWidth = 1024;  // texture widths; the shaders kno
 const kMaxRows = 4096;                        // addresses have 24 bits
 const kBlocksPerRow = kRowTexels / kBlockTexels;
 const kTexelBytes = kTexelWords * 4;
-const kFirstRows = 256;                       // of a pool that grows: 16 MiB
-const kErrorFlags = 8;                        // more than WebGL has
+const kFirstRows = 256;  // of a pool that grows: 16 MiB
+const kErrorFlags = 8;   // more than WebGL has
 
 export class TilePool {
   constructor(gl, budgetBytes) {
     this.gl = gl;
-    // A tile has one block or more, so there are at most as many slots; and an entry of the table for each.
+    // A tile has one block or more, so there are at most as many slots; and an entry of the table
+    // for each.
     const rowBytes = kRowTexels * kTexelBytes + kBlocksPerRow * 4;
     const rows = Math.floor((budgetBytes - kTableWidth * 4) / rowBytes);
     if (rows < 1) throw new Error(`A budget of ${budgetBytes} bytes is too small for the viewer.`);
     const grows = rows >= 4 * kFirstRows;
-    this.maxRows = Math.min(grows ? rows - kFirstRows : rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
+    this.maxRows =
+        Math.min(grows ? rows - kFirstRows : rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
     this.rows = grows ? kFirstRows : this.maxRows;
     this.blockCount = this.maxRows * kBlocksPerRow;  // in the end
     this.tableRows = Math.ceil(this.blockCount / kTableWidth);
     this.slotCount = this.tableRows * kTableWidth;
     this.texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.rows);
     this.table = this.createTexture(gl.R32UI, kTableWidth, this.tableRows);
-    this.free = [];           // blocks that were used and released
-    this.nextBlock = 0;      // this one and those after it were never used
+    this.free = [];      // blocks that were used and released
+    this.nextBlock = 0;  // this one and those after it were never used
     this.freeSlots = [];
-    this.nextSlot = 1;       // slot 0 means none
+    this.nextSlot = 1;  // slot 0 means none
   }
 
   get bytes() {
@@ -41,20 +43,24 @@ export class TilePool {
     return this.free.length + this.blockCount - this.nextBlock;
   }
 
-  // Block numbers, or null if there are not so many free ones: also if there seemed to be, but the pool cannot grow.
+  // Block numbers, or null if there are not so many free ones: also if there seemed to be, but the
+  // pool cannot grow.
   allocate(count) {
     if (this.freeBlocks < count) return null;
     const end = this.nextBlock + Math.max(0, count - this.free.length);
     if (end > this.rows * kBlocksPerRow && !this.grow()) return null;
     const blocks = new Uint32Array(count);
-    for (let i = 0; i < count; ++i) blocks[i] = this.free.length > 0 ? this.free.pop() : this.nextBlock++;
+    for (let i = 0; i < count; ++i)
+      blocks[i] = this.free.length > 0 ? this.free.pop() : this.nextBlock++;
     return blocks.sort();
   }
 
-  // The texture is another one afterwards. False if there is no memory for it: the pool then keeps its size.
+  // The texture is another one afterwards. False if there is no memory for it: the pool then keeps
+  // its size.
   grow() {
     const {gl} = this, before = this.texels;
-    for (let flags = 0; flags < kErrorFlags && gl.getError() !== gl.NO_ERROR; ++flags);  // of other calls
+    for (let flags = 0; flags < kErrorFlags && gl.getError() !== gl.NO_ERROR; ++flags)
+      ;  // of other calls
     const texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.maxRows);
     if (gl.getError() !== gl.NO_ERROR) {
       gl.deleteTexture(texels);
@@ -93,15 +99,19 @@ export class TilePool {
   upload(blocks, {words, pointers, root}) {
     const absolute = (pointer) => {
       const texel = pointer >>> 8;
-      return (blocks[Math.floor(texel / kBlockTexels)] * kBlockTexels + texel % kBlockTexels) * 256 + (pointer & 255);
+      return (blocks[Math.floor(texel / kBlockTexels)] * kBlockTexels + texel % kBlockTexels) *
+          256 +
+          (pointer & 255);
     };
     for (const at of pointers) words[at] = absolute(words[at]);
     for (let first = 0; first < blocks.length;) {
       let last = first + 1;
       while (last < blocks.length && blocks[last] === blocks[first] + last - first &&
-             blocks[last] % kBlocksPerRow !== 0) ++last;
+             blocks[last] % kBlocksPerRow !== 0)
+        ++last;
       const blockWords = kBlockTexels * kTexelWords;
-      this.write(blocks[first] * kBlockTexels, words.subarray(first * blockWords, last * blockWords));
+      this.write(
+          blocks[first] * kBlockTexels, words.subarray(first * blockWords, last * blockWords));
       first = last;
     }
     return absolute(root);
@@ -111,16 +121,18 @@ export class TilePool {
   write(texel, words) {
     const {gl} = this;
     gl.bindTexture(gl.TEXTURE_2D, this.texels);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, texel % kRowTexels, Math.floor(texel / kRowTexels), words.length / kTexelWords, 1,
-                     gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+    gl.texSubImage2D(
+        gl.TEXTURE_2D, 0, texel % kRowTexels, Math.floor(texel / kRowTexels),
+        words.length / kTexelWords, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
   }
 
   // `pointer` to the root of the slot's tile, 0 if it is not there.
   setSlot(slot, pointer) {
     const {gl} = this;
     gl.bindTexture(gl.TEXTURE_2D, this.table);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, slot % kTableWidth, Math.floor(slot / kTableWidth), 1, 1,
-                     gl.RED_INTEGER, gl.UNSIGNED_INT, Uint32Array.of(pointer));
+    gl.texSubImage2D(
+        gl.TEXTURE_2D, 0, slot % kTableWidth, Math.floor(slot / kTableWidth), 1, 1, gl.RED_INTEGER,
+        gl.UNSIGNED_INT, Uint32Array.of(pointer));
   }
 
   dispose() {

@@ -1,19 +1,20 @@
 // The tiles in the pool, by node, and which of them leave when it is full.
 //
-// Tiles refer to each other by slots: a cut-off node in the pool names the slot of its tile, and the
-// pool's table says where that is, or that it is not there. So equal subtrees share one tile, and a tile
-// that leaves costs one write. A slot lives while its tile is loaded or a loaded tile refers to it.
+// Tiles refer to each other by slots: a cut-off node in the pool names the slot of its tile, and
+// the pool's table says where that is, or that it is not there. So equal subtrees share one tile,
+// and a tile that leaves costs one write. A slot lives while its tile is loaded or a loaded tile
+// refers to it.
 //
-// A tile leaves only if it was not seen in the current view ("epoch"), and not at all recently while
-// the camera moves. What was loaded for a view stays until the next one. Therefore the number of tiles
-// that are fetched for one view is bounded, however small the pool is.
+// A tile leaves only if it was not seen in the current view ("epoch"), and not at all recently
+// while the camera moves. What was loaded for a view stays until the next one. Therefore the number
+// of tiles that are fetched for one view is bounded, however small the pool is.
 
 import {kRoundsToKnow} from "./loader.js";
 import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js";
 
 const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
-const kFreeShare = 1 / 64;    // of the pool, that leaves at once
+const kFreeShare = 1 / 64;  // of the pool, that leaves at once
 
 // A number for a node: offsets are below 2^40.
 export function keyOf(level, offset) {
@@ -25,15 +26,15 @@ export class TileStore {
   constructor(pool, info) {
     this.pool = pool;
     this.info = info;
-    this.tiles = new Map();     // key -> tile
-    this.slots = new Map();     // key -> slot
-    this.owner = [];            // block -> tile
-    this.ordinal = [];          // block -> its number within the tile
-    this.bySlot = [];          // slot -> {key, tile or null, references}
+    this.tiles = new Map();  // key -> tile
+    this.slots = new Map();  // key -> slot
+    this.owner = [];         // block -> tile
+    this.ordinal = [];       // block -> its number within the tile
+    this.bySlot = [];        // slot -> {key, tile or null, references}
     this.root = null;
     this.tileBytes = 0;
     this.epoch = 0;
-    this.rounds = 0;            // readings of the feedback in this epoch
+    this.rounds = 0;  // readings of the feedback in this epoch
     this.evicted = 0;
   }
 
@@ -46,8 +47,8 @@ export class TileStore {
     return this.tiles.get(keyOf(level, offset));
   }
 
-  // The cut-off node in a texel of the pool, {tile, index, level, offset, key}; null if there is none
-  // (any more).
+  // The cut-off node in a texel of the pool, {tile, index, level, offset, key}; null if there is
+  // none (any more).
   cutOffNode(texel) {
     const block = Math.floor(texel / kBlockTexels), tile = this.owner[block];
     if (!tile || !tile.addresses) return null;
@@ -60,7 +61,8 @@ export class TileStore {
   // The same by the node's place in its tile.
   leaf(tile, index) {
     const at = tile.leafBegin + index;
-    return this.cutOffNode(tile.blocks[Math.floor(at / kBlockTexels)] * kBlockTexels + at % kBlockTexels);
+    return this.cutOffNode(
+        tile.blocks[Math.floor(at / kBlockTexels)] * kBlockTexels + at % kBlockTexels);
   }
 
   // Makes the cut-off node refer to its tile, which must be loaded.
@@ -70,12 +72,13 @@ export class TileStore {
     node.tile.links.set(node.index, slot);
     this.bySlot[slot].references++;
     const {coarse} = node.tile;
-    this.pool.write(node.texel, Uint32Array.of(slot, coarse[2 * node.index], coarse[2 * node.index + 1], 0));
+    this.pool.write(
+        node.texel, Uint32Array.of(slot, coarse[2 * node.index], coarse[2 * node.index + 1], 0));
     return true;
   }
 
-  // Stores a tile as fetched. False if the pool is full of what the view needs. Throws if the tile is
-  // damaged.
+  // Stores a tile as fetched. False if the pool is full of what the view needs. Throws if the tile
+  // is damaged.
   add(level, offset, words, nowMs) {
     const key = keyOf(level, offset);
     if (this.tiles.has(key)) return true;
@@ -85,8 +88,21 @@ export class TileStore {
     const blocks = this.pool.allocate(count);
     if (!blocks) return false;
     const slot = this.slots.get(key) ?? this.pool.allocateSlot();
-    const tile = {key, level, offset, levels: decoded.levels, slot, blocks, leafBegin: decoded.leafBegin,
-                  addresses: decoded.addresses, coarse: decoded.coarse, links: new Map(), usedMs: nowMs, epoch: this.epoch, pointer: 0};
+    const tile = {
+      key,
+      level,
+      offset,
+      levels: decoded.levels,
+      slot,
+      blocks,
+      leafBegin: decoded.leafBegin,
+      addresses: decoded.addresses,
+      coarse: decoded.coarse,
+      links: new Map(),
+      usedMs: nowMs,
+      epoch: this.epoch,
+      pointer: 0
+    };
     tile.pointer = this.pool.upload(blocks, decoded);
     blocks.forEach((block, i) => {
       this.owner[block] = tile;
@@ -122,15 +138,17 @@ export class TileStore {
     if (epoch > tile.epoch) tile.epoch = epoch;
   }
 
-  // Makes room for a tile of `count` blocks. A slot may be taken by a tile that has left, as long as others
-  // refer to it; so these leave until one is free.
+  // Makes room for a tile of `count` blocks. A slot may be taken by a tile that has left, as long
+  // as others refer to it; so these leave until one is free.
   evictFor(count, needsSlot, nowMs) {
-    const fits = (blocks) => this.pool.freeBlocks >= blocks && (!needsSlot || this.pool.hasFreeSlot);
+    const fits = (blocks) =>
+        this.pool.freeBlocks >= blocks && (!needsSlot || this.pool.hasFreeSlot);
     if (fits(count)) return true;
     const maxUsedMs = nowMs - (this.rounds >= kRoundsToKnow ? 0 : kRecentMs);
     const candidates = [];
     for (const tile of this.tiles.values())
-      if (tile !== this.root && tile.epoch !== this.epoch && tile.usedMs < maxUsedMs) candidates.push(tile);
+      if (tile !== this.root && tile.epoch !== this.epoch && tile.usedMs < maxUsedMs)
+        candidates.push(tile);
     candidates.sort((a, b) => a.usedMs - b.usedMs);
     const target = count + this.pool.blockCount * kFreeShare;
     for (const tile of candidates) {
