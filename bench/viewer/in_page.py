@@ -23,8 +23,8 @@ UNTIL_COMPLETE = """async ([camera, done]) => {
   while (!renderer.isComplete) await frame();
   const completeS = (performance.now() - begin) / 1000;
   if (done) await renderer.complete();
-  return {completeS, doneS: (performance.now() - begin) / 1000, firstPictureS: renderer.times.firstPictureMs / 1000, compileS: renderer.times.compileMs / 1000,
-          coarsePixels: renderer.coarsePixels, full: renderer.loader.isFull, width: renderer.canvas.width,
+  return {completeS, doneS: (performance.now() - begin) / 1000, firstPictureS: renderer.measured.firstPictureMs / 1000, compileS: renderer.context.compileMs / 1000,
+          coarsePixels: renderer.progress.coarsePixels, full: renderer.stream.loader.isFull, width: renderer.canvas.width,
           height: renderer.canvas.height, ...renderer.statistics()};
 }"""
 
@@ -35,7 +35,7 @@ REQUESTS = """(from) => [...performance.getEntriesByType("navigation"), ...perfo
 # Statistics of all rays of the picture: a histogram of steps, the share that hits, the widest cell in pixels, and the
 # places of the finest tiles that they end in, as level and position.
 HITS = """async () => {
-  const {renderer} = window.voxdagViewer, {info, view, passes} = renderer, {width, height} = renderer.size;
+  const {renderer} = window.voxdagViewer, {info, view, context: {passes}} = renderer, {width, height} = renderer.size;
   const words = passes.capture(renderer.uniforms(width, height), width, height), floats = new Float32Array(words.buffer);
   const steps = new Array(4097).fill(0), places = new Set(), pixel = view.pixel(height);
   let hits = 0, widest = 0;
@@ -61,8 +61,8 @@ HITS = """async () => {
 LIGHT_STEPS = """async () => {
   const {Program} = await import("/viewer/gl/gl_objects.js");
   const {kLight, kOcclusion} = await import("/viewer/gl/picture_shaders.js");
-  const {renderer} = window.voxdagViewer, {passes, gl} = renderer, {width, height} = renderer.size;
-  passes.resize(width, height, renderer.size, renderer.colors !== null);
+  const {renderer} = window.voxdagViewer, {passes, gl} = renderer.context, {width, height} = renderer.size;
+  passes.resize(width, height, renderer.size, renderer.stream.colors !== null);
   const values = {...renderer.uniforms(width, height), u_frame: 1, u_seed: 1, u_jitter: [0, 0],
                   u_occlusion: true};
   const names = ["trace", "light", "occlusion", "combine", "feedback"], passMs = {}, pixel = new Uint8Array(4);
@@ -114,9 +114,9 @@ LIGHT_STEPS = """async () => {
 # Draws `count` frames with all pixels of the canvas while the camera turns there and back. Returns how long that took.
 FRAMES = """async ([count, width, height]) => {
   const {viewer, renderer} = window.voxdagViewer, frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
-  renderer.internalSize = () => ({width, height, full: true});
-  const begin = performance.now(), end = renderer.seed + count;
-  for (let i = 0; renderer.seed < end; ++i) {
+  renderer.internalSize = () => ({width, height, isFull: true});
+  const begin = performance.now(), end = renderer.frames.seed + count;
+  for (let i = 0; renderer.frames.seed < end; ++i) {
     viewer.camera.turn(i % 24 < 12 ? 0.004 : -0.004, 0);
     viewer.schedule();
     await frame();
@@ -145,9 +145,9 @@ FLIGHT = """([cameras, legS]) => {
 # Milliseconds since the request for the page; null before the first picture.
 FIRST = """() => {
   const {renderer} = window.voxdagViewer ?? {};
-  if (renderer?.times.firstPictureMs == null) return null;
-  const {times} = renderer, statistics = renderer.statistics();
-  return {begin: times.beginMs, compile: times.compileMs, first: times.beginMs + times.firstPictureMs,
+  if (renderer?.measured.firstPictureMs == null) return null;
+  const {beginMs, firstPictureMs} = renderer.measured, statistics = renderer.statistics();
+  return {begin: beginMs, compile: statistics.compileMs, first: beginMs + firstPictureMs,
           tiles: statistics.tiles, width: renderer.canvas.width, height: renderer.canvas.height,
           marks: performance.getEntriesByType("mark").map((e) => [e.name, Math.round(e.startTime)])};
 }"""

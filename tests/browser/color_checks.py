@@ -137,7 +137,7 @@ def check_small_pool(visitor, url, camera, reference):
     assert seen["poolBytes"] + seen["colorPoolBytes"] <= seen["budgetBytes"], seen
     # Every page that is there is found by the shaders' way, and no other entry is in use.
     wrong = visitor.page.evaluate("""() => {
-      const {store} = voxdagViewer.renderer.colors;
+      const {store} = voxdagViewer.renderer.stream.colors;
       let wrong = 0, used = 0;
       for (const page of store.pages.values()) {
         if (page.blocks.length === 0) continue;
@@ -159,8 +159,8 @@ def check_without_pages(visitor, url, camera, gray):
     with visitor.expecting("Failed to load resource"):
         visitor.open(url)
         visitor.show(camera, complete=False)
-        visitor.wait_until("voxdagViewer.renderer.problem && voxdagViewer.renderer.loader.isIdle")
-        visitor.wait_until("voxdagViewer.renderer.fullDrawn")
+        visitor.wait_until("voxdagViewer.renderer.problem && voxdagViewer.renderer.stream.loader.isIdle")
+        visitor.wait_until("voxdagViewer.renderer.progress.isFullSize")
         plain = pixels_of(visitor)
         visitor.picture("no-pages")
     visitor.page.unroute("**/tiles/colors*")

@@ -110,7 +110,7 @@ COMPLETE_WITH_SUN = """async (pauseMs) => {
   const {viewer, renderer, camera, manifest} = voxdagViewer, {eye, target} = camera.get();
   renderer.light.placeSun(eye, target.map((c, axis) => c - eye[axis]));
   renderer.light.outside = false;
-  renderer.sunTrials = 6, renderer.sunWanted = 0;  // of 8 that may wait for tiles in vain
+  renderer.sun.idleTrials = 6, renderer.sun.fewestMissing = 0;  // of 8 that may wait for tiles in vain
   tiles.pauseMs = pauseMs;
   tiles.asked = 0;
   viewer.setOptions({shadows: true});
@@ -133,7 +133,7 @@ def check_late_sun(visitor, url, camera):
 # Draws and picks as soon as the context is back, when programs and tiles are not.
 LOSE = """() => {
   const {viewer, renderer} = voxdagViewer;
-  window.lost = {context: renderer.gl.getExtension("WEBGL_lose_context"), restored: 0, errors: []};
+  window.lost = {context: renderer.context.gl.getExtension("WEBGL_lose_context"), restored: 0, errors: []};
   viewer.canvas.addEventListener("webglcontextrestored", async () => {
     ++lost.restored;
     try {
@@ -217,7 +217,7 @@ def check_lost_context(visitor, url, camera, reference):
         page.evaluate("lost.context.restoreContext()")
         visitor.wait_until("lost.restored === 1")
         page.evaluate("lost.context.loseContext()")
-        visitor.wait_until("voxdagViewer.renderer.lost")
+        visitor.wait_until("voxdagViewer.renderer.context.isLost")
         page.evaluate("lost.context.restoreContext()")
         visitor.wait_until("lost.restored === 2")
         visitor.show(camera)

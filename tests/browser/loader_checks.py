@@ -373,7 +373,7 @@ def check_root_that_fails(visitor, faults):
     with visitor.expecting("CONTEXT_LOST|Context lost|status of 500|it is corrupt"):
         faults.way = "no root"
         visitor.page.evaluate("""async () => {
-          const {renderer, viewer} = voxdagViewer, context = renderer.gl.getExtension("WEBGL_lose_context");
+          const {renderer, viewer} = voxdagViewer, context = renderer.context.gl.getExtension("WEBGL_lose_context");
           const lost = new Promise((resolve) => viewer.canvas.addEventListener("webglcontextlost", resolve, {once: true}));
           context.loseContext();
           await lost;

@@ -214,7 +214,7 @@ def check_inside_cell(visitor, camera):
 # The blocks of the pool: those of the loaded tiles, those that a tile has twice, and those that are in use;
 # and the statistics of the same moment.
 COUNT_BLOCKS = """() => {
-  const {renderer} = voxdagViewer, {store} = renderer, seen = new Set();
+  const {renderer} = voxdagViewer, {store} = renderer.stream, seen = new Set();
   let count = 0;
   for (const tile of store.tiles.values())
     for (const block of tile.blocks) {
@@ -281,7 +281,7 @@ WebGL2RenderingContext.prototype.getError = function() {
   return was ? this.OUT_OF_MEMORY : getError.call(this);
 };
 """ % SMALL_ROWS
-POOL_ROWS = "voxdagViewer.renderer.store.pool.rows"
+POOL_ROWS = "voxdagViewer.renderer.stream.store.pool.rows"
 
 
 def check_growing_pool(visitor, url, cameras, references, can_grow):

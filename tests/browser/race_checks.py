@@ -60,7 +60,7 @@ def check_picks_while_loading(visitor, url, dag, camera, reference):
 
 # All tiles but the root's leave between a pick's ray and its reading.
 PICK_WITHOUT_TILES = """async ([x, y]) => {
-  const {renderer} = voxdagViewer, {passes, store} = renderer, itsPick = passes.pickOne;
+  const {renderer} = voxdagViewer, {context: {passes}, stream: {store}} = renderer, itsPick = passes.pickOne;
   let left = 0, evicted = 0;
   passes.pickOne = function(values) {
     const reading = itsPick.call(passes, values);
@@ -80,7 +80,7 @@ PICK_WITHOUT_TILES = """async ([x, y]) => {
 
 # Of the tiles that were first loaded for the view, those that the view is known to use now.
 SEEN = """() => {
-  const {store} = voxdagViewer.renderer, tiles = [...store.tiles.values()].slice(0, 30);
+  const {store} = voxdagViewer.renderer.stream, tiles = [...store.tiles.values()].slice(0, 30);
   return [tiles.filter(({epoch}) => epoch === store.epoch).length, tiles.length];
 }"""
 
@@ -101,14 +101,14 @@ def check_tiles_that_left(visitor, url, dag, cameras, references):
     visitor.show(cameras["top"])
     seen, tiles = visitor.page.evaluate(SEEN)
     assert seen > tiles / 4, f"only {seen} of {tiles} tiles are known to be seen: others would leave first"
-    visitor.page.evaluate("window.tilesOfTop = [...voxdagViewer.renderer.store.tiles.keys()]")
+    visitor.page.evaluate("window.tilesOfTop = [...voxdagViewer.renderer.stream.store.tiles.keys()]")
     for _ in range(10):
         for name in ("near", "inside", "street"):
             visitor.show(cameras[name], complete=False)
             visitor.page.wait_for_timeout(100)
-        if visitor.page.evaluate("tilesOfTop.some((key) => !voxdagViewer.renderer.store.tiles.has(key))"):
+        if visitor.page.evaluate("tilesOfTop.some((key) => !voxdagViewer.renderer.stream.store.tiles.has(key))"):
             break
-    assert visitor.page.evaluate("tilesOfTop.some((key) => !voxdagViewer.renderer.store.tiles.has(key))"), "no tile of the first view has left"
+    assert visitor.page.evaluate("tilesOfTop.some((key) => !voxdagViewer.renderer.stream.store.tiles.has(key))"), "no tile of the first view has left"
     visitor.show(cameras["top"])
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(references["top"], depths, cameras["top"], "top, after its tiles have left")
@@ -149,8 +149,8 @@ def check_end_of_first_view(visitor, url, camera, reference):
     visitor.page.route("**/tiles/first_view.js", make_small)
     visitor.page.add_init_script(COUNT_TILES)
     visitor.open(address(url, camera))
-    visitor.wait_until("asked.at_mark !== null")
-    at_mark = visitor.page.evaluate("asked.at_mark")
+    visitor.wait_until("asked.atMark !== null")
+    at_mark = visitor.page.evaluate("asked.atMark")
     visitor.show(camera)
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(reference, depths, camera, f"after {at_mark} tiles of the first view")

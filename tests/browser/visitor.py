@@ -23,7 +23,7 @@ SHOW = """async ([camera, complete]) => {
   await (%s)();
   if (!complete) return;
   await renderer.complete();
-  if (!renderer.fullDrawn || !renderer.sunIsPlaced) throw new Error("complete() came before the final picture");
+  if (!renderer.progress.isFullSize || !renderer.isSunPlaced) throw new Error("complete() came before the final picture");
 }""" % TWO_FRAMES
 
 CAPTURE = """async ([width, height]) => {

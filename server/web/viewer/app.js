@@ -52,7 +52,7 @@ export class Viewer {
         signal);
     for (const button of places.tools.querySelectorAll("[data-tool]"))
       button.addEventListener("click", () => this.actions()[button.dataset.tool](), {signal});
-    this.saveButton = places.tools.querySelector("[data-tool=\"screenshot\"]");
+    this.saveButton = places.tools.querySelector('[data-tool="screenshot"]');
     this.saveButton.disabled = true;  // until there is a picture
     const resizes = new ResizeObserver(() => this.resize());
     resizes.observe(canvas);
@@ -130,7 +130,7 @@ export class Viewer {
   }
 
   showMode() {
-    const button = this.places.tools.querySelector("[data-tool=\"toggleFly\"]");
+    const button = this.places.tools.querySelector('[data-tool="toggleFly"]');
     button.setAttribute("aria-pressed", String(Boolean(this.motion.flying)));
     this.canvas.classList.toggle("flying", Boolean(this.motion.flying));
   }
@@ -139,14 +139,14 @@ export class Viewer {
     const {panel, tools} = this.places;
     const hadFocus = panel.contains(document.activeElement);
     panel.hidden = !panel.hidden;
-    tools.querySelector("[data-tool=\"togglePanel\"]")
+    tools.querySelector('[data-tool="togglePanel"]')
         ?.setAttribute("aria-expanded", String(!panel.hidden));
     if (hadFocus) this.canvas.focus();
   }
 
   showHelp() {
     const dialog = h(
-        "dialog", {class: "help", "aria-labelledby": "help-title"},
+        "dialog", {class: "viewer help", "aria-labelledby": "help-title"},
         h("form", {method: "dialog"}, h("h2", {id: "help-title"}, "Keys and pointers"), keysHelp(),
           h("div", {class: "buttons end"},
             h("button", {class: "primary", autofocus: true}, "Close"))));
@@ -179,7 +179,7 @@ export class Viewer {
     if (this.signal.aborted) return;
     const moving = this.motion.step(now);
     this.applyCamera();
-    const drawn = this.renderer.frame(now);
+    const drawn = this.renderer.frame();
     this.saveButton.disabled = !this.renderer.hasDrawn;
     this.showMarkers();
     if (now - this.seen.time > kSeenIntervalMs) this.lookAhead(now);
@@ -244,12 +244,12 @@ export class Viewer {
   }
 
   async pick(x, y) {
-    if (!this.renderer.ready) return announce(kNoPicture);
+    if (!this.renderer.isReady) return announce(kNoPicture);
     this.panel.pick.set(await this.renderer.pick(x, y));
   }
 
   async setPivot(x, y) {
-    if (!this.renderer.ready) return announce(kNoPicture);
+    if (!this.renderer.isReady) return announce(kNoPicture);
     const hit = await this.renderer.pick(x, y);
     if (!hit) return announce("Nothing there to orbit around.");
     const {eye, fovDegrees} = this.camera.get();
@@ -329,7 +329,7 @@ export class Viewer {
   // The drawing buffer is only valid until the browser has shown it: draws and reads at once.
   savePicture() {
     if (!this.renderer.hasDrawn) return announce(kNoPicture);
-    this.renderer.frame(performance.now());
+    this.renderer.frame();
     this.canvas.toBlob((blob) => {
       if (!blob) return announce("The picture could not be saved.");
       const url = URL.createObjectURL(blob);
@@ -349,11 +349,11 @@ export class Viewer {
     const {problem} = this.renderer, {refusal} = this;
     const {loading} = statistics;
     this.showStatus(
-        this.renderer.lost ? "The graphics card is not available: waiting for it." :
-            problem        ? problemText(problem) :
-            refusal        ? refusal :
-            loading > 0    ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"   }…` :
-                             "",
+        this.renderer.context.isLost ? "The graphics card is not available: waiting for it." :
+            problem                  ? problemText(problem) :
+            refusal                  ? refusal :
+            loading > 0              ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"             }…` :
+                                       "",
         problem?.code === "replaced");
     this.places.status.classList.toggle("bad", Boolean(problem || refusal));
   }

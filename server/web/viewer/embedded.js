@@ -5,7 +5,7 @@ import {h} from "../lib/dom.js";
 import {titleText} from "../lib/format.js";
 
 import {Viewer} from "./app.js";
-import {Renderer} from "./renderer.js";
+import {Renderer} from "./render/renderer.js";
 import {TileSource} from "./tile_source.js";
 import {fillTools} from "./tools.js";
 
@@ -32,13 +32,14 @@ export async function embedViewer(place, job, signal) {
   // A browser has few contexts: this one is released early, as the page that it was in lives on.
   const release = () => {
     renderer.dispose();
-    if (!renderer.gl.isContextLost()) renderer.gl.getExtension("WEBGL_lose_context")?.loseContext();
+    if (!renderer.context.gl.isContextLost())
+      renderer.context.gl.getExtension("WEBGL_lose_context")?.loseContext();
   };
   try {
     const manifest = await source.manifest();
     await renderer.start();
     if (signal.aborted) return release();
-    place.replaceChildren(stage);
+    place.replaceChildren(h("div", {class: "viewer embedded"}, stage));
     viewer = new Viewer({
       canvas,
       renderer,

@@ -8,7 +8,7 @@ import {problemBox} from "../views/parts.js";
 
 import {Viewer} from "./app.js";
 import {takeBegun} from "./early.js";
-import {Renderer, WebGLUnavailable} from "./renderer.js";
+import {Renderer, WebGLUnavailable} from "./render/renderer.js";
 import {TileSource} from "./tile_source.js";
 import {fillTools} from "./tools.js";
 
@@ -204,7 +204,7 @@ async function start() {
 // The panel stays open or closed when another picture of the job follows.
 function showTools() {
   const before =
-      place("tools").querySelector("[data-tool=\"togglePanel\"]")?.getAttribute("aria-expanded");
+      place("tools").querySelector('[data-tool="togglePanel"]')?.getAttribute("aria-expanded");
   const open = before ? before === "true" : !matchMedia("(max-width: 700px)").matches;
   place("panel").hidden = !open;
   place("tools").hidden = false;

@@ -103,7 +103,7 @@ export class PickView {
   // The buttons are replaced: the focus stays on the new one.
   toggleMeasureAndFocus() {
     this.toggleMeasure();
-    this.element.querySelector("[data-action=\"measure\"]")?.focus();
+    this.element.querySelector('[data-action="measure"]')?.focus();
   }
 
   forget() {

@@ -145,6 +145,13 @@ export class Passes {
     });
   }
 
+  // True if the targets have this size already.
+  hasTargets(width, height, full) {
+    const {targets} = this;
+    return targets?.width === width && targets.height === height &&
+        targets.full.width === full.width && targets.full.height === full.height;
+  }
+
   allocate(width, height, full, colored) {
     const {gl} = this, color = this.colorFormat, across = Math.sqrt(kColorTexels * width / height);
     this.releaseTargets();

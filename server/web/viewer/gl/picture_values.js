@@ -5,8 +5,9 @@ const kConeShare = 0.75;  // of a pixel: the width at which a cell is hit as a w
 // Of a Renderer whose tiles are there, for a picture of width x height pixels with the detail of
 // one that is lodHeight pixels high.
 export function pictureValues(renderer, width, height, lodHeight) {
-  const {info, options, store, view, light, colors, rootPointer} = renderer, levels = info.levels,
-                                                    edge = 2 ** levels;
+  const {info, options, view, light, stream: {store, colors, rootPointer}} = renderer,
+                                                             levels = info.levels,
+                                                             edge = 2 ** levels;
   const clip = options.clip || {low: [0, 0, 0], high: [edge, edge, edge]};
   const bound = (p) => p.map((x) => Math.min(Math.max(Math.round(x), 0), edge));
   const finest = 2 ** (levels - Math.min(levels, Math.max(1, options.maxLevel ?? levels)));

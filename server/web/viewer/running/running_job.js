@@ -7,7 +7,7 @@ import {announce} from "../../lib/dom.js";
 import {hasEnded, stateText} from "../../lib/format.js";
 import {Viewer} from "../app.js";
 import {fragmentText} from "../camera_text.js";
-import {Renderer} from "../renderer.js";
+import {Renderer} from "../render/renderer.js";
 import {TileError, TileSource} from "../tile_source.js";
 
 import {Banner} from "./banner.js";

@@ -1,7 +1,7 @@
 // The light of a picture: where the sun stands, how bright the picture is, how far occluders reach,
 // and where the floor is. Exposure and reach follow what is seen. All in voxels.
 
-import {length, scale, subtract} from "./vector.js";
+import {length, scale, subtract} from "../vector.js";
 
 export class Light {
   // Of a file with this manifest.
@@ -33,6 +33,11 @@ export class Light {
   }
   get diagonal() {
     return length(subtract(this.high, this.low));
+  }
+
+  // The next reading sets brightness and reach at once instead of approaching them.
+  forgetReadings() {
+    this.readings = 0;
   }
 
   // Over the left shoulder of a camera, the first one, that looks `forward`.

@@ -1,0 +1,68 @@
+// The WebGL context of a canvas and its shader programs. A browser can take the context away at any
+// time and restore it later. A restored context is empty: programs, tiles and targets are made
+// again.
+
+import {createContext, WebGLUnavailable} from "../gl/gl_objects.js";
+import {Passes} from "../gl/passes.js";
+
+const kDefaultMaxSize = 4096;  // of a texture, until a context reports its own limit
+
+export class GraphicsContext {
+  // `early`: the context that early.js created for this canvas, or null. Throws WebGLUnavailable.
+  constructor(canvas, early, {onLost, onRestored}) {
+    this.canvas = canvas;
+    this.gl = early?.gl ?? createContext(canvas);
+    if (!this.gl)
+      throw new WebGLUnavailable("This browser or its graphics driver does not offer WebGL 2.");
+    this.isLost = this.gl.isContextLost();
+    this.isDisposed = false;
+    this.passes = null;
+    this.maxSize = kDefaultMaxSize;
+    this.compileBeginMs = 0;
+    this.compileMs = 0;
+    this.listening = new AbortController();
+    this.listen(onLost, onRestored);
+    if (!this.isLost) this.createPasses(early?.passes, early?.beginMs);
+  }
+
+  listen(onLost, onRestored) {
+    const {signal} = this.listening;
+    this.canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.isLost = true;
+      onLost();
+    }, {signal});
+    this.canvas.addEventListener("webglcontextrestored", () => {
+      this.isLost = false;
+      this.createPasses();
+      onRestored();
+    }, {signal});
+  }
+
+  createPasses(passes = null, beginMs = performance.now()) {
+    this.maxSize = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE) || kDefaultMaxSize;
+    this.compileBeginMs = passes ? beginMs : performance.now();
+    if (this.passes) this.passes.disposed = true;  // its objects were lost with the old context
+    this.passes = passes ?? new Passes(this.gl);
+  }
+
+  // True while these passes can draw: the context was neither lost nor replaced since.
+  owns(passes) {
+    return !this.isDisposed && !this.isLost && passes === this.passes && !this.gl.isContextLost();
+  }
+
+  // Resolves to true when the programs for the file can be used, to false if the context was lost.
+  async compile(isColored) {
+    const {passes} = this;
+    await passes.compile(isColored);
+    if (!this.owns(passes)) return false;
+    this.compileMs = performance.now() - this.compileBeginMs;
+    return true;
+  }
+
+  dispose() {
+    this.isDisposed = true;
+    this.listening.abort();
+    this.passes?.dispose();
+  }
+}

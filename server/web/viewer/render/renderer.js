@@ -1,0 +1,360 @@
+// Draws a file of any size within a budget of GPU memory: casts rays through the loaded tiles, and
+// requests the tiles that the rays miss (docs/view.md).
+//
+// Each part has one life cycle and its own class. The GraphicsContext lives until the renderer is
+// disposed, a TileStream as long as the context keeps its memory, the samples of a FrameAccumulator
+// until the picture starts again, and ViewProgress and SunSearch describe the current view.
+
+import {readFeedback, readHits} from "../gl/feedback.js";
+import {WebGLUnavailable} from "../gl/gl_objects.js";
+import {jitterOf, pictureValues} from "../gl/picture_values.js";
+import {View} from "../gl/view.js";
+
+import {FrameAccumulator} from "./frame_accumulator.js";
+import {GraphicsContext} from "./graphics_context.js";
+import {Light} from "./light.js";
+import {Pace} from "./pace.js";
+import {pickVoxel} from "./picker.js";
+import {mark, Statistics} from "./statistics.js";
+import {SunSearch} from "./sun_search.js";
+import {TileStream} from "./tile_stream.js";
+import {ViewProgress} from "./view_progress.js";
+
+export {WebGLUnavailable};
+
+const kBudgetBytes = 256 << 20, kPhoneBudgetBytes = 64 << 20;
+// Pixels of the canvas. The render targets are not part of the budget.
+const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;
+const kMovingMs = 180;           // after the last change of the view
+const kSamples = 16;             // per pixel of a still picture
+const kFirstPicturePixels = 16;  // the first picture has no missing cells as wide as this
+
+export class Renderer {
+  // `begun`: the context that early.js created for this canvas, or null. onChange() is called when
+  // frame() has more to draw. Throws WebGLUnavailable.
+  constructor(canvas, source, {budgetBytes, onChange, begun = null} = {}) {
+    this.canvas = canvas;
+    this.source = source;
+    this.onChange = onChange || (() => {});
+    const isPhone =
+        matchMedia("(pointer: coarse)").matches && Math.min(screen.width, screen.height) < 600;
+    this.budgetBytes = budgetBytes || (isPhone ? kPhoneBudgetBytes : kBudgetBytes);
+    this.maxPixels = isPhone ? kPhoneMaxPixels : kMaxPixels;
+    this.options = {
+      minLevel: 0,
+      maxLevel: null,
+      clip: null,
+      ambientOcclusion: true,
+      sunShadows: true,
+      pixelTolerance: 1,
+      wireLevel: null,
+      color: true
+    };
+    const {width, height} = canvas;
+    this.size = {width, height, cssWidth: width, cssHeight: height};
+    this.info = this.light = this.sun = this.stream = null;  // set by start()
+    this.view = null;
+    this.viewMs = -Infinity;  // the time of the last change of the view
+    this.isReady = false;     // programs, pool and root are loaded
+    this.started = null;      // {resolve, reject, isDone} of start()
+    this.measured = new Statistics(begun?.beginMs ?? performance.now());
+    this.pace = new Pace();
+    this.progress = new ViewProgress();
+    this.context = new GraphicsContext(canvas, begun, {
+      onLost: () => this.handleLoss(),
+      onRestored: () => this.started && this.load(),
+    });
+    this.frames = new FrameAccumulator(this.context, this.pace, () => this.show());
+  }
+
+  // Resolves when the first picture can be drawn. The manifest of the source must be loaded. If the
+  // view is set before, the tiles of the view are requested immediately.
+  async start() {
+    this.info = this.source.info;
+    this.light = new Light(this.info);
+    this.sun = new SunSearch(this.context, this.light);
+    if (this.view) this.light.placeSun(this.view.eye, this.view.forward);
+    await new Promise((resolve, reject) => {
+      this.started = {resolve, reject, isDone: false};
+      if (this.context.isDisposed) resolve();
+      else if (!this.context.isLost) this.load();
+    });
+  }
+
+  // Shows another root of the same DAG, which has grown; loaded tiles remain. Resolves to true if
+  // the root is shown.
+  async showRoot(info) {
+    const {stream} = this;
+    if (!this.isReady || !this.info.root || info.levels <= 2) return false;
+    await stream.loader.loadRoot(info.root.level, info.root.offset);
+    if (stream !== this.stream || !this.isReady) return false;
+    this.info = info;
+    stream.useRoot(info);
+    this.beginEpoch();
+    return true;
+  }
+
+  setView(placement) {
+    const view = new View(placement);
+    if (view.equals(this.view)) return;
+    this.view = view;
+    if (this.light?.turn === null) this.light.placeSun(view.eye, view.forward);
+    this.stream?.endFirstView();
+    this.viewMs = performance.now();
+    this.beginEpoch();
+  }
+
+  setOptions(options) {
+    Object.assign(this.options, options);
+    this.light?.forgetReadings();
+    this.stream?.endFirstView();
+    this.beginEpoch();
+  }
+
+  resize(cssWidth, cssHeight, deviceRatio) {
+    const ratio =
+        Math.min(deviceRatio, Math.sqrt(this.maxPixels / Math.max(1, cssWidth * cssHeight)));
+    const pixels = (css) => Math.min(this.context.maxSize, Math.max(1, Math.round(css * ratio)));
+    const {canvas} = this, width = pixels(cssWidth), height = pixels(cssHeight);
+    const isSame = width === canvas.width && height === canvas.height && width === this.size.width;
+    this.size = {width, height, cssWidth, cssHeight};
+    if (isSame) return;
+    canvas.width = width;
+    canvas.height = height;
+    if (this.isReady && this.context.passes.targets) this.show();  // until there is a new picture
+    this.beginEpoch();
+  }
+
+  // Draws a frame if there is something new to draw and the GPU has finished the last one. Returns
+  // whether the camera moves, and whether the picture is complete.
+  frame() {
+    const now = performance.now(), moving = now - this.viewMs < kMovingMs;
+    if (!this.isReady || !this.view) return {moving, complete: true};
+    this.pace.tick(now);
+    if (this.stream.isEmpty) {
+      this.drawEmpty();
+      return {moving: false, complete: true};
+    }
+    if (!this.takesNewFrame(now)) return {moving, complete: false};
+    if (!moving && this.isPictureFinal(now)) return {moving, complete: true};
+    this.draw(now, moving);
+    return {moving, complete: false};
+  }
+
+  // Continues the current sample and takes its reading. Returns true if both are done.
+  takesNewFrame(now) {
+    const {frames, stream} = this;
+    if (!frames.hasDrawn && stream.awaitsFirstTiles) return false;
+    if (frames.drawing && !frames.continue(now, stream.poolTextures)) return false;
+    if (!frames.reading) return true;
+    const sample = frames.takeReading();
+    if (sample) this.takeReading(sample, now);
+    return sample !== null;
+  }
+
+  // True if further samples would not change the picture, until a tile arrives.
+  isPictureFinal(now) {
+    if (this.frames.samples < kSamples) return false;
+    const {progress} = this;
+    return (progress.isComplete && progress.waiting.length === 0 && this.isSunPlaced) ||
+        (progress.isFullSize && this.stream.isPaused(now));
+  }
+
+  // Resolves when all tiles for the pixels of the canvas have arrived and the sun is placed. Inside
+  // a scene that needs the tiles for the sun, so it does not resolve while the service is away.
+  complete() {
+    if (this.isReady && this.isComplete && this.progress.isFullSize && this.isSunPlaced &&
+        !this.frames.reading)
+      return Promise.resolve();
+    return new Promise((resolve) => {
+      this.progress.waiting.push(resolve);
+      this.onChange();
+    });
+  }
+
+  // Resolves to the voxel at a point of the canvas, to null for the sky.
+  pick(cssX, cssY) {
+    return pickVoxel(this, cssX, cssY);
+  }
+
+  // The hits of a picture of any size with the loaded tiles, rows from the top.
+  async capture({width, height}) {
+    const words = this.canPick ?
+        this.context.passes.capture(this.uniforms(width, height), width, height) :
+        new Uint32Array(4 * width * height);
+    return readHits(words, width, height, this.info?.levels);
+  }
+
+  statistics() {
+    return this.measured.report(this);
+  }
+
+  // null, or {code, message}: why a part of the picture does not arrive.
+  get problem() {
+    return this.stream?.problem ?? null;
+  }
+
+  get hasDrawn() {
+    return this.frames.hasDrawn;
+  }
+
+  get canPick() {
+    return this.isReady && !this.stream.isEmpty;
+  }
+
+  get isComplete() {
+    return this.progress.isComplete;
+  }
+
+  get isSunPlaced() {
+    return this.sun.isOver || !this.options.sunShadows;
+  }
+
+  dispose() {
+    this.isReady = false;
+    this.context.dispose();
+    this.stream?.dispose();
+    this.started?.resolve();
+  }
+
+  // Loads the file into the current context, for the first time or after a loss.
+  async load() {
+    const {context, info} = this, {passes} = context;
+    try {
+      const root = this.loadRoot();
+      root.catch(() => {});  // reported below, unless the programs fail
+      if (!await context.compile(Boolean(info.colors))) return;
+      mark("compiled");
+      await root;
+      if (!context.owns(passes)) return;
+      this.isReady = true;
+      this.beginEpoch();
+      this.started.isDone = true;
+      this.started.resolve();
+    } catch (error) {
+      if (!context.owns(passes)) return;
+      if (!this.started.isDone) return this.started.reject(error);
+      console.error(error);
+      this.stream?.fail(error);
+      this.onChange();
+    }
+  }
+
+  async loadRoot() {
+    const stream = this.stream = new TileStream(
+        this.context.gl, this.source, this.info, this.options, this.budgetBytes,
+        (failed) => this.handleArrival(failed));
+    const words = await stream.loadRoot();
+    if (words && this.view && !this.options.clip && !this.measured.hasFirstPicture)
+      stream.seekFirstView(words, this.view, this.size);
+  }
+
+  handleLoss() {
+    this.isReady = false;
+    this.stream?.stop();
+    this.frames.reset();
+  }
+
+  // A tile or page arrived, or a request failed.
+  handleArrival(hasFailed = false) {
+    this.stream.continueFirstView();
+    if (!hasFailed && this.progress.needsRestartOnArrival) this.restart();
+    this.onChange();
+  }
+
+  restart() {
+    this.frames.restart();
+    this.progress.restart();
+  }
+
+  beginEpoch() {
+    this.restart();
+    this.pace.beginView();
+    this.stream?.beginEpoch();
+    this.onChange();
+  }
+
+  // The internal resolution: lower while the camera moves and while tiles arrive, if frames take
+  // long.
+  internalSize(moving) {
+    const scale = this.resolutionScale(moving);
+    const scaled = (pixels) => Math.max(1, Math.round(pixels * scale));
+    return {width: scaled(this.size.width), height: scaled(this.size.height), isFull: scale === 1};
+  }
+  resolutionScale(moving) {
+    const {progress, stream, pace} = this;
+    if (moving) return pace.scale;
+    const isSeeking = progress.quietReadings === 0 || (!progress.isComplete && stream.isLoading);
+    return isSeeking && !stream.hasOutage ? pace.seekingScale : 1;
+  }
+
+  draw(now, isMoving) {
+    const {frames, stream, size, context: {passes}} = this;
+    const {width, height, isFull} = this.internalSize(isMoving);
+    if (!passes.hasTargets(width, height, size)) frames.samples = 0;
+    passes.resize(width, height, size, stream.colors !== null);
+    // Cells are as fine as the still picture needs, unless the camera moves.
+    const values = this.uniforms(width, height, isMoving ? height : size.height);
+    frames.seed++;
+    Object.assign(values, {
+      u_frame: frames.samples,
+      u_seed: frames.seed,
+      u_jitter: jitterOf(isFull ? frames.samples : frames.seed)
+    });
+    const {poolTextures, store: {epoch}} = stream;
+    frames.begin(values, {width, height, isFull, isMoving, epoch, poolTextures}, now);
+  }
+
+  show() {
+    this.context.passes.show(this.light.exposure, this.canvas.width, this.canvas.height);
+  }
+
+  uniforms(width, height, lodHeight = height) {
+    return pictureValues(this, width, height, lodHeight);
+  }
+
+  // Takes the feedback of a drawn sample.
+  takeReading(sample, now) {
+    const {pass, epoch, isMoving, isFull, width, height} = sample, {stream, progress, pace} = this;
+    const read = readFeedback(pass.take());
+    read.coarsePixels *= this.size.height / height;  // pixels of the canvas
+    this.measured.noteFrame(read, width * height);
+    pace.frameDone(now - sample.partMs, sample.busyMs, width * height, isMoving || !isFull);
+    // The light is constant while samples of a still picture are accumulated.
+    if (read.exposure !== null && this.frames.samples <= kSamples / 4)
+      this.light.adjust(read, this.view.eye, isMoving);
+    progress.coarsePixels = read.coarsePixels;
+    stream.takeReading(read, pass.colors, epoch, now);
+    if (epoch !== stream.store.epoch) return;
+    if (!isMoving && !stream.loader.firstView)
+      pace.noteLacking(stream.missingCount, read.coarsePixels);
+    if (read.coarsePixels < kFirstPicturePixels)
+      this.measured.noteFirstPicture(now, this.source.fetchedBytes);
+    this.judgeProgress(sample, now);
+  }
+
+  // An outdated sample cannot show that the view is complete: tiles that arrived since it began may
+  // refer to more that are missing.
+  judgeProgress({isMoving, isFull, isOutdated}, now) {
+    const {progress} = this, {isQuiet} = this.stream;
+    progress.takeReading(!isMoving && isQuiet && !isOutdated, isFull);
+    if (!progress.isComplete || !isFull || !isQuiet) return;
+    if (this.isSunPlaced) progress.resolveWaiting();
+    else this.improveSun(now);
+  }
+
+  improveSun(now) {
+    const {width, height} = this.context.passes.targets;
+    if (!this.sun.run(this.uniforms(width, height), this.stream.loader, now)) return;
+    this.restart();
+    this.light.forgetReadings();
+  }
+
+  drawEmpty() {
+    const {canvas, context: {passes}} = this;
+    passes.resize(canvas.width, canvas.height, canvas, false);
+    passes.show(1, canvas.width, canvas.height);
+    this.frames.hasDrawn = true;
+    this.progress.resolveWaiting();
+  }
+}

@@ -1,0 +1,49 @@
+// Moves the sun so that it lights a good share of a view inside a scene. Runs once, after the first
+// complete view. The shadow test of a candidate place may miss tiles: they are requested, and the
+// search is repeated until nothing is missing or it makes no progress.
+
+const kLitShare = 0.35;    // of the visible surface
+const kMaxIdleTrials = 8;  // trials that find no fewer missing tiles than the best before
+
+export class SunSearch {
+  constructor(context, light) {
+    this.context = context;
+    this.light = light;
+    this.idleTrials = 0;
+    this.fewestMissing = Infinity;
+    this.usablePasses = null;  // whose programs for the search are compiled
+  }
+
+  get isOver() {
+    return this.light.outside || this.idleTrials >= kMaxIdleTrials;
+  }
+
+  // One trial with the picture that was drawn last. Returns true if it moved the sun.
+  run(values, loader, nowMs) {
+    const {passes} = this.context;
+    if (this.usablePasses !== passes) {
+      this.compile(passes);
+      return false;
+    }
+    const {place, wanted} = passes.chooseSun({...values, u_turn: this.light.turn}, kLitShare);
+    this.idleTrials = wanted.size < this.fewestMissing ? 0 : this.idleTrials + 1;
+    this.fewestMissing = Math.min(this.fewestMissing, wanted.size);
+    if (wanted.size > 0 && this.idleTrials < kMaxIdleTrials && !loader.isFull) {
+      loader.demand(wanted, nowMs);
+      return false;
+    }
+    this.end();
+    this.light.setSun(place);
+    return true;
+  }
+
+  compile(passes) {
+    passes.compileLater().then((usable) => {
+      if (usable) this.usablePasses = passes;
+    }, () => this.end());
+  }
+
+  end() {
+    this.idleTrials = kMaxIdleTrials;
+  }
+}

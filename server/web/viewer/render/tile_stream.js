@@ -1,0 +1,160 @@
+// The tiles and color pages of one file in one graphics context: loads the root and the tiles of
+// the first view, then the tiles that each reading of the feedback misses. A new context has a new
+// stream.
+
+import {colorBudget, Colors} from "../colors/colors.js";
+import {FirstView} from "../tiles/first_view.js";
+import {TileLoader} from "../tiles/tile_loader.js";
+import {TilePool} from "../tiles/tile_pool.js";
+import {TileStore} from "../tiles/tile_store.js";
+
+import {kBlockBytes, mark} from "./statistics.js";
+
+const kMinPoolBytes = 4 << 20;  // of a small file
+const kMaxFirstWaitMs = 400;    // the first frame waits this long for the tiles of the first view
+
+export class TileStream {
+  // `options`: the renderer's; `color` decides whether color pages are loaded. onArrival(failed): a
+  // tile or page arrived, or, if `failed`, a request failed or the retry state changed.
+  constructor(gl, source, info, options, budgetBytes, onArrival) {
+    this.info = info;
+    this.options = options;
+    this.onArrival = onArrival;
+    this.isEmpty = !info.root && !info.root_brick;
+    this.rootPointer = undefined;
+    this.waitUntilMs = performance.now() + kMaxFirstWaitMs;
+    const colorBytes = colorBudget(info, budgetBytes);
+    const poolBytes = poolBudget(info, budgetBytes - colorBytes);
+    this.store = new TileStore(new TilePool(gl, poolBytes), info);
+    this.colors = colorBytes > 0 ? new Colors(gl, source, colorBytes, onArrival) : null;
+    this.loader = new TileLoader(source, this.store, onArrival);
+  }
+
+  // Resolves to the words of the root tile; to undefined if the file has none or the stream ended.
+  async loadRoot() {
+    const {root, levels, root_brick: brick} = this.info;
+    if (root && levels > 2) {
+      const words = await this.loader.loadRoot(root.level, root.offset);
+      this.rootPointer = this.store.root?.pointer;
+      mark("root");
+      return words;
+    }
+    if (!this.isEmpty) this.rootPointer = this.store.addBrick(brick);
+    return undefined;
+  }
+
+  // Uses another root that the loader has loaded.
+  useRoot(info) {
+    this.info = info;
+    this.rootPointer = this.store.root.pointer;
+  }
+
+  beginEpoch() {
+    this.store.beginEpoch();
+    this.loader.beginEpoch();
+    this.colors?.beginEpoch();
+  }
+
+  // Finds the tiles of the first view without the feedback of a frame, from the words of the root.
+  seekFirstView(rootWords, view, size) {
+    const {levels} = this.info, finestLevel = Math.min(levels, this.options.maxLevel ?? levels);
+    this.loader.firstView = new FirstView(this.info, view, size, 2 ** (levels - finestLevel));
+    this.loader.firstView.begin(this.store, this.store.root, rootWords);
+    this.continueFirstView();
+  }
+
+  // Requests more tiles of the first view, if it is still being loaded.
+  continueFirstView() {
+    const {firstView} = this.loader;
+    if (!firstView) return;
+    if (firstView.isOver) return this.endFirstView();  // the next reading replaces the queue
+    this.loader.demand(firstView.wanted, performance.now());
+    if (this.loader.isIdle || this.loader.awaitsRetry) this.endFirstView();
+  }
+
+  endFirstView() {
+    if (this.loader.firstView) mark("tiles of the first view");
+    this.loader.firstView = null;
+  }
+
+  // True while the first frame waits: with its tiles it is complete soon, without them it only
+  // costs time.
+  get awaitsFirstTiles() {
+    return performance.now() < this.waitUntilMs &&
+        (this.loader.firstView !== null || this.rootPointer === undefined);
+  }
+
+  // Requests the tiles and pages that a frame of `epoch` misses, and marks the used ones.
+  // `pageFeedback` is the reading of the colors' feedback, or null.
+  takeReading(read, pageFeedback, epoch, nowMs) {
+    const {loader, store, colors} = this;
+    for (const slot of read.slots) store.mark(slot, epoch, nowMs);
+    if (epoch === store.epoch) store.rounds++;
+    if (loader.firstView?.stalls(nowMs)) this.endFirstView();
+    if (!loader.firstView && loader.demand(read.wanted, nowMs) > 0) this.onArrival();
+    if (pageFeedback) colors.takeReading(pageFeedback.take(), epoch, nowMs);
+    else colors?.loader.replaceQueue([], 0, nowMs);
+  }
+
+  get loaders() {
+    return [this.loader, ...(this.colors && this.options.color ? [this.colors.loader] : [])];
+  }
+
+  // Tiles and pages that the last reading missed and that may still arrive.
+  get missingCount() {
+    return this.loaders.reduce((sum, each) => sum + each.unmet, 0);
+  }
+
+  // True if nothing is under way and no retry is due.
+  get isQuiet() {
+    return this.loaders.every((each) => each.isIdle && !each.awaitsRetry);
+  }
+
+  get isLoading() {
+    return this.loaders.some((each) => each.requests > 0);
+  }
+
+  get hasOutage() {
+    return this.loaders.some((each) => each.outage.count > 0);
+  }
+
+  // True if nothing arrives until the next retry.
+  isPaused(nowMs) {
+    return this.loaders.some((each) => each.pauses(nowMs)) &&
+        this.loaders.every((each) => each.pauses(nowMs) || each.isIdle);
+  }
+
+  // The textures of the pools. A pool that grows has a new one.
+  get poolTextures() {
+    return [this.store.pool.texels, this.colors?.store.pool.texels];
+  }
+
+  // null, or {code, message}: why a part of the picture does not arrive.
+  get problem() {
+    return this.loader.problem || (this.options.color && this.colors?.loader.problem) || null;
+  }
+
+  fail(error) {
+    this.loader.fail(error);
+  }
+
+  // Ends all requests. The memory on the GPU remains, or was lost with the context.
+  stop() {
+    this.loader.dispose();
+    this.colors?.loader.dispose();
+  }
+
+  dispose() {
+    this.loader.dispose();
+    this.store.pool.dispose();
+    this.colors?.dispose();
+  }
+}
+
+// A small file needs less than the budget: at worst each voxel has its own path of tiles. A growing
+// DAG has no voxel count yet.
+function poolBudget({voxels, levels, tile_levels: tileLevels}, budgetBytes) {
+  const pathBlocks = Math.ceil(levels / tileLevels);
+  return Math.min(
+      budgetBytes, kMinPoolBytes + Number(voxels ?? Infinity) * kBlockBytes * pathBlocks);
+}
