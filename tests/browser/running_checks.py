@@ -156,8 +156,8 @@ def check_growing(visitor, server):
 
     server.send("POST", f"{job.path}/resume")
     visitor.wait_until("Boolean(window.voxdagViewer) && !voxdagViewer.running")
-    assert page.evaluate("same_page"), "the page was loaded again"
-    assert page.locator(".running, canvas.wires").count() == 0
+    assert page.evaluate("isSamePage"), "the page was loaded again"
+    assert page.locator(".banner, canvas.wires").count() == 0
     assert page.locator(".mark").count() == 2, "the marks of the running job are left"
     assert page.locator("#panel").is_hidden(), "the panel was opened again"
     away = math.dist(camera["eye"], visitor.camera()["eye"])
@@ -189,7 +189,7 @@ def check_ends(visitor, server):
     job.until("it is canceled", lambda: job.state() == "canceled")
     server.send("DELETE", job.path)
     page.get_by_text("no such job").wait_for()
-    for part in ("#scene", "#tools", "#panel", ".running", "canvas.wires"):
+    for part in ("#scene", "#tools", "#panel", ".banner", "canvas.wires"):
         assert page.locator(part).is_hidden(), f"{part} is shown next to the message"
 
 

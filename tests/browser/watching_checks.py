@@ -7,8 +7,8 @@ import signal
 from running_checks import RESOLUTION, SCENE, SUBVOLUME, Job, capture, hits
 
 MANY = 16  # running jobs that the service remembers for those who look at them
-BANNER = "document.querySelector('.running-text')?.textContent ?? ''"
-RUNS = "Boolean(window.voxdagViewer?.running) && voxdagViewer.renderer.ready"
+BANNER = "document.querySelector('.banner-text')?.textContent ?? ''"
+RUNS = "Boolean(window.voxdagViewer?.running) && voxdagViewer.renderer.isReady"
 
 
 def says(visitor, text):

@@ -8,10 +8,10 @@ import {kStyles} from "./subvolume_wires.js";
 export class Banner {
   constructor(wires) {
     this.wires = wires;
-    this.text = h("p", {class: "running-text"});
+    this.text = h("p", {class: "banner-text"});
     this.kinds = Object.fromEntries(Object.entries(kStyles).map(
         ([kind, style]) => [kind, h("li", {}, sample(style), style.name)]));
-    const legend = h("ul", {class: "running-legend"}, Object.values(this.kinds));
+    const legend = h("ul", {class: "banner-legend"}, Object.values(this.kinds));
     const toggle =
         h("button", {
           type: "button",
@@ -26,7 +26,7 @@ export class Banner {
           }
         },
           "Subvolumes");
-    this.element = h("div", {class: "running"}, this.text, toggle, legend);
+    this.element = h("div", {class: "banner"}, this.text, toggle, legend);
   }
 
   // `job` is null while the service does not answer; the counts are the last that are known.
