@@ -3,7 +3,7 @@
 //   1. A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for one of the
 //      triangles and the voxel's closed cube. Triangles that miss the cube are harmless.
 //   2. The sub-DAG is unique: no two equal nodes, level arrays in the total order. It does not
-//      depend on the order of the triangles, the memory, the method or what the backend has cached.
+//      depend on the order of the triangles, the memory, the method or the backend's caches.
 //   3. All large buffers are charged to the budget given. When it cannot hold the subvolume the
 //      outcome is kNeedsSplit, and the sink was not called; the caller splits the cube and tries
 //      again. A cube of kSmallestEdge voxels never needs more than kSmallestBudget.
@@ -60,8 +60,8 @@ class Backend {
  public:
   virtual ~Backend() = default;
   virtual std::string_view name() const = 0;
-  // Builds one subvolume. Throws Error (kCanceled, kDevice, kOutOfMemory, or what the stream
-  // throws); the backend stays usable.
+  // Builds one subvolume. Throws Error (kCanceled, kDevice, kOutOfMemory) and the stream's errors;
+  // the backend remains usable.
   virtual BuildOutcome build(const SubvolumeTask& task, TriangleStream& triangles,
                              MemoryBudget& budget, const CancelToken& cancel, SubDagSink& sink,
                              SubDagSummary& summary) = 0;

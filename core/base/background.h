@@ -11,9 +11,9 @@
 
 namespace voxdag {
 
-// Starts `work` on a thread of its own. If the system has no thread left, the first call of get()
-// or wait() runs it. What `work` throws, get() throws. The destructor of the future waits for the
-// thread.
+// Starts `work` on a new thread. If the system has no thread left, the first call of get() or
+// wait() runs it. get() rethrows the exception of `work`. The destructor of the future waits for
+// the thread.
 template <class Work>
 [[nodiscard]] std::future<void> run_in_background(Work&& work) {
   const auto shared = std::make_shared<std::decay_t<Work>>(std::forward<Work>(work));

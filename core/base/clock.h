@@ -33,10 +33,10 @@ class ThreadTimes {
   static constexpr size_t kBackground = kThreads - 1;
   using Seconds = std::array<double, kThreads>;
 
-  // Adds the time of this thread, which ends, to that of a worker; workers above 255 share a place.
+  // Adds the time of this ending thread to a worker's time; workers above 255 share a place.
   static void add(size_t worker) { times_ns_[std::min(worker, kBackground - 1)] += now_ns(); }
   static void add_background() { times_ns_[kBackground] += now_ns(); }
-  // The times so far. That of this thread is taken for that of worker 0, whose part it has.
+  // The times so far. This thread acts as worker 0, so its time counts as that worker's.
   static Seconds now() {
     Seconds seconds;
     for (size_t i = 0; i < kThreads; ++i) seconds[i] = 1e-9 * static_cast<double>(times_ns_[i]);

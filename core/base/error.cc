@@ -10,7 +10,7 @@ struct Row {
   int http_status;
 };
 
-// docs/errors.md shows this table to users. 130 is what a shell reports after Ctrl-C.
+// docs/errors.md shows this table to users. 130 is the shell's status after Ctrl-C.
 constexpr Row kTable[] = {
     {ErrorCode::kInvalidInput, "invalid_input", 2, 400},
     {ErrorCode::kNotFound, "not_found", 3, 404},

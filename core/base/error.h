@@ -12,25 +12,26 @@ namespace voxdag {
 
 enum class ErrorCode {
   kInvalidInput,        // a scene, option or request that breaks its rules
-  kNotFound,            // a file, job or scene that is not there
-  kCorrupt,             // bytes of ours that fail their checks
+  kNotFound,            // a file, job or scene that does not exist
+  kCorrupt,             // bytes written by voxdag that fail their checks
   kUnsupportedVersion,  // a format version this build does not read
   kIo,                  // the system refused a read, a write or a sync
   kNoSpace,             // the disk is full
-  kOutOfMemory,         // the memory budget or the machine cannot hold what is needed
+  kOutOfMemory,         // the memory budget or the machine is too small
   kDevice,              // the GPU or its driver failed
-  kCanceled,            // the user asked to stop
+  kCanceled,            // the user canceled the operation
   kLimit,               // a limit of the format or of the arithmetic, named in the message
 };
 
-// What went wrong, where (file, subvolume, scene node) and what was expected, in one sentence.
+// An error. The message names the problem, the place (file, subvolume, scene node) and the
+// expectation, in one sentence.
 class Error : public std::exception {
  public:
   Error(ErrorCode code, std::string message) : code_(code), message_(std::move(message)) {}
   ErrorCode code() const { return code_; }
   const std::string& message() const { return message_; }
-  // Whether a file of ours may be damaged, missing or of another version: work that depends on it
-  // has to be done again. All other errors say nothing about the files.
+  // True if a file written by voxdag may be damaged, missing or of a different version, so that
+  // work depending on it must be repeated. All other errors imply nothing about the files.
   bool is_corruption() const {
     return code_ == ErrorCode::kCorrupt || code_ == ErrorCode::kNotFound ||
            code_ == ErrorCode::kUnsupportedVersion;

@@ -10,7 +10,7 @@
 #define VOXDAG_HD
 #endif
 
-// SSE2, which every x86-64 has, may be used: not in what is compiled for a device.
+// SSE2, which every x86-64 has, may be used, except in device code.
 #if defined(__SSE2__) && !defined(__CUDA_ARCH__)
 #define VOXDAG_SSE2
 #endif

@@ -1,5 +1,5 @@
-// Accounts for large buffers, so that a build stays within --memory: each is charged here before it
-// is allocated, and its owner spills, splits or refuses what does not fit.
+// Accounts for large buffers, so that a build never exceeds --memory: each is charged here before
+// it is allocated. If the charge fails, its owner spills, splits or refuses the work.
 //
 // Invariants:
 //   1. used() <= limit() at any time.

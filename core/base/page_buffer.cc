@@ -33,8 +33,7 @@ void* allocate_pages(size_t bytes, std::string_view what) {
 
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what) {
 #if defined(__SANITIZE_THREAD__)
-  // ThreadSanitizer does not see mremap(): it takes the memory for that of the thread that had it
-  // before.
+  // ThreadSanitizer does not see mremap(): it attributes the memory to its previous thread.
   void* const grown = allocate_pages(new_bytes, what);
   std::memcpy(grown, pages, std::min(bytes, new_bytes));
   free_pages(pages, bytes);

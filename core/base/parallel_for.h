@@ -1,5 +1,5 @@
-// A loop over items on several threads; each thread takes the next item when it is done with one,
-// and may hand on what it made of it in the order of the items.
+// Loops over items on several threads. Each thread takes the next item when it has finished one,
+// and can commit its results in the order of the items.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@
 
 namespace voxdag {
 
-// Calls body(worker, item) for every item below `count`, on up to `workers` threads, the caller's
-// among them; `worker` is the number of the thread, from 0. After an exception no further item is
-// started; once all threads have stopped, that of the first item is rethrown: if the same items
-// fail each time, the same exception, whatever the number of threads.
+// Calls body(worker, item) for every item below `count`, on up to `workers` threads, including the
+// caller's; `worker` is the number of the thread, from 0. After an exception no further item is
+// started. Once all threads have stopped, the exception of the first failed item is rethrown. So if
+// the same items fail each time, the exception is the same for any number of threads.
 template <class Body>
 void parallel_for(unsigned workers, size_t count, Body&& body) {
   std::atomic<size_t> next{0};
@@ -48,7 +48,7 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
     for (unsigned worker = 1; worker < workers && worker < count; ++worker)
       threads.emplace_back(work_and_end, worker);
   } catch (const std::exception&) {
-    // The system has no more threads: those that were started, and this one, do all the work.
+    // The system has no more threads: the started threads and this one do all the work.
   }
   work(0);
   for (std::thread& thread : threads) thread.join();
@@ -90,8 +90,8 @@ class Turns {
 };
 
 // Calls prepare(worker, item) for every item below `count`, on several threads as parallel_for()
-// does, and then commit(worker, item), in the order of the items and one at a time. All items
-// before the first that throws are committed, and no other.
+// does, and then commit(worker, item), sequentially in the order of the items. All items before the
+// first that throws are committed, and no others.
 template <class Prepare, class Commit>
 void parallel_for_in_order(unsigned workers, size_t count, Prepare&& prepare, Commit&& commit) {
   Turns turns;

@@ -32,8 +32,8 @@ uint64_t min_up_from(const std::string& root, std::string path, const LimitOf& l
   }
 }
 
-// The lowest limit of all groups that `membership` names and of those above them; limit_of2() and
-// limit_of1() read that of a group's folder in version 2 and 1. A line of `membership` is
+// Returns the lowest limit of all groups in `membership` and of their ancestors; limit_of2() and
+// limit_of1() read the limit from a group's folder in version 2 and 1. A line of `membership` is
 // "<id>:<controllers>:<path>"; version 2 has no controllers there.
 template <class LimitOf2, class LimitOf1>
 uint64_t min_of_groups(const std::string& membership, const std::string& mount,
@@ -51,7 +51,8 @@ uint64_t min_of_groups(const std::string& membership, const std::string& mount,
       for (const char* root : {"", "/unified"})
         lowest = std::min(lowest, min_up_from(mount + root, path, limit_of2));
     } else if (("," + controllers + ",").find("," + controller + ",") != std::string::npos) {
-      // Mounted by its own name, or by those of all that it is mounted with.
+      // A controller is mounted under its name, or under the names of all controllers mounted with
+      // it.
       for (const std::string& name : {controller, controllers})
         lowest = std::min(lowest, min_up_from(mount + "/" + name, path, limit_of1));
     }
@@ -104,7 +105,7 @@ uint64_t cgroup_cpus(const std::string& membership, const std::string& mount) {
         return file >> quota >> period ? cpus(quota, period) : UINT64_MAX;
       },
       [](const std::string& folder) {
-        // A quota of -1 is none; read as an unsigned number it is above all limits.
+        // A quota of -1 means no quota; read as an unsigned number it is above all limits.
         return cpus(number_in(folder + "cpu.cfs_quota_us"),
                     number_in(folder + "cpu.cfs_period_us"));
       });

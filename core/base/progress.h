@@ -49,10 +49,9 @@ class Progress {
   // A warning that a user should read, one sentence.
   virtual void warn(std::string_view message) = 0;
 
-  // Where the grid lies in the scene; before the subvolumes are set.
+  // The position of the grid in the scene. Called before set_subvolumes().
   virtual void set_grid(const std::array<double, 3>& /*origin*/, double /*edge*/) {}
-  // All subvolumes of the build, those that an earlier run built included; they replace what was
-  // reported before.
+  // All subvolumes of the build, including those built by an earlier run. Replaces earlier reports.
   virtual void set_subvolumes(uint64_t /*resolution*/, std::span<const SubvolumeStatus> /*all*/) {}
   // A worker begins with a planned subvolume; it is done when it is built or split.
   virtual void subvolume_begun(int64_t /*id*/) {}

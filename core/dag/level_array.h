@@ -20,8 +20,7 @@ struct BrickLevelView {
 };
 
 // Any level above the bricks: node i has child mask masks[i] and hash hashes[i]. `children` lists
-// the children of node 0, then those of node 1, and so on: popcount(masks[i]) of each node, in
-// child order.
+// the children of node 0, then of node 1, and so on: popcount(masks[i]) per node, in child order.
 struct NodeLevelView {
   uint32_t level = 0;
   std::span<const uint64_t> hashes;

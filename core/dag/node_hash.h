@@ -30,8 +30,8 @@ VOXDAG_HD inline uint64_t node_hash_end(uint64_t state) {
   return fold_multiply(state, 0x1d8e4e27c47d124full);
 }
 
-// The hash of a node; `child_hashes` are those of the `count` children in `child_mask`, in child
-// order.
+// The hash of a node. `child_hashes` has the hashes of the `count` children in `child_mask`, in
+// child order.
 VOXDAG_HD inline uint64_t hash_node(uint32_t child_mask, int count, const uint64_t* child_hashes) {
   uint64_t h = node_hash_begin(child_mask);
   for (int i = 0; i < count; ++i) h = node_hash_add(h, child_hashes[i]);

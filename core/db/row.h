@@ -53,7 +53,7 @@ class RowWriter {
     ++next_;
   }
   void operator()(const char*, const std::optional<int64_t>& value) {
-    if (value) statement_.bind(next_, *value);  // what is not bound is NULL
+    if (value) statement_.bind(next_, *value);  // an unbound parameter is NULL
     ++next_;
   }
 

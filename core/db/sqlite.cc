@@ -163,7 +163,7 @@ SqlTransaction::~SqlTransaction() {
   try {
     database_.execute("ROLLBACK");
   } catch (const Error&) {
-    // The connection is gone or already rolled back: nothing was committed either way.
+    // The connection is closed or already rolled back: nothing was committed either way.
   }
 }
 

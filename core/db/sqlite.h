@@ -1,6 +1,6 @@
-// The little of SQLite that is needed here: a connection that closes itself, statements that bind
-// and step, and errors as voxdag::Error. row.h reads and writes whole rows. Not thread-safe: one
-// thread at a time may use a connection and its statements. Only sqlite.cc includes sqlite3.h.
+// A small wrapper of SQLite: a connection that closes itself, statements that bind and step, and
+// errors as voxdag::Error. row.h reads and writes complete rows. Not thread-safe: a connection and
+// its statements must not be used concurrently. Only sqlite.cc includes sqlite3.h.
 #pragma once
 
 #include <cstddef>

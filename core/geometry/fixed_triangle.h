@@ -1,5 +1,5 @@
 // A triangle on the fixed-point lattice: coordinates in units of 1/256 voxel, all of them odd, so
-// that no vertex ever lies on a voxel boundary (a multiple of 256).
+// that no vertex is ever on a voxel boundary (a multiple of 256).
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace voxdag {
 // Lattice units along the edge of a voxel.
 inline constexpr int kUnitBits = 8;
 inline constexpr int64_t kUnitsPerVoxel = int64_t{1} << kUnitBits;
-// Magnitudes stay below this, so that the products of the overlap test fit in 128 bits.
+// Magnitudes are below this, so that the products of the overlap test fit in 128 bits.
 inline constexpr int64_t kCoordinateLimit = int64_t{1} << 40;
 
 struct FixedTriangle {

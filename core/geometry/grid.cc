@@ -40,10 +40,11 @@ double largest_extent(const WorldBounds& bounds) {
   return extent;
 }
 
-// Two numbers that every processor computes with at once.
+// Two numbers per vector register, which every supported processor has.
 using Pair = double __attribute__((vector_size(16)));
 
-// floor(x), and a whole number near x beyond 2^51, without a branch: half of all go up.
+// floor(x), and a whole number near x beyond 2^51, without a branch, because half of all are
+// rounded up.
 Pair floor_of(Pair x) {
   constexpr Pair kNoFraction = {0x1.8p52, 0x1.8p52};
   const Pair nearest = (x + kNoFraction) - kNoFraction;

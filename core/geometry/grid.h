@@ -60,7 +60,7 @@ enum class SnapResult {
   kTooFar,   // reaches the grid, but a coordinate is beyond kCoordinateLimit: a limit error
 };
 
-// Snaps vertices, three coordinates each, in place. What is not a number stays so.
+// Snaps vertices, three coordinates each, in place. NaN remains NaN.
 void snap_vertices(const Grid& grid, std::span<double> coordinates);
 // `out` is only meaningful for kInside.
 SnapResult to_fixed(const Grid& grid, const SnappedTriangle& snapped, FixedTriangle& out);

@@ -17,13 +17,13 @@ inline Cube ancestor(const Cube& cube, uint32_t level) {
   return {level, {cube.position[0] >> up, cube.position[1] >> up, cube.position[2] >> up}};
 }
 
-// Whether `inner` is `outer` or lies in it.
+// True if `inner` is `outer` or inside it.
 inline bool contains(const Cube& outer, const Cube& inner) {
   return inner.level >= outer.level && ancestor(inner, outer.level) == outer;
 }
 
-// The inside of a cube. Neighbors in a scene mostly lie in the same cube, so that the last one is
-// worth asking before the octree is descended.
+// The interior of a cube. Neighbors in a scene are mostly in the same cube, so the last cube is
+// tested before the octree is descended.
 class CubeInside {
  public:
   // Contains nothing.

@@ -43,7 +43,7 @@ class ImageReader {
   // Bits of a channel, 8 or 16.
   int bits() const { return bits_; }
   // The next row: red, green, blue, alpha of each pixel, bits() each, in the machine's byte order.
-  // Throws BrokenImage, and what the source throws.
+  // Throws BrokenImage and the source's errors.
   virtual void read_row(std::span<std::byte> row) = 0;
 
  protected:
@@ -56,8 +56,8 @@ class ImageReader {
 // For kSize, rows are not read, and no memory is taken for them.
 enum class ImageUse { kPixels, kSize };
 
-// The source must outlive the reader. Throws BrokenImage, Error{kOutOfMemory} where decoding does
-// not fit the budget, and what the source throws.
+// The source must outlive the reader. Throws BrokenImage, Error{kOutOfMemory} if decoding does not
+// fit the budget, and the source's errors.
 std::unique_ptr<ImageReader> open_image(EncodedBytes& source, MemoryBudget& budget,
                                         ImageUse use = ImageUse::kPixels);
 

@@ -40,7 +40,8 @@ class JpegReader : public ImageReader {
       if (space != JCS_GRAYSCALE && space != JCS_YCbCr && space != JCS_RGB)
         throw BrokenImage{"is a JPEG image that is neither gray nor YCbCr nor RGB (CMYK, say)"};
       // Not every version and build of the library decodes these. In the first scan of a lossless
-      // image, Ss is its predictor; that of others begins with the mean of each block.
+      // image, Ss is its predictor; the first scan of other images has the mean of each block, Ss =
+      // 0.
       if (jpeg_.arith_code || jpeg_.data_precision != 8 || jpeg_.Ss != 0)
         throw BrokenImage{"is a JPEG image with arithmetic coding, lossless or not of 8 bits"};
       if (use == ImageUse::kSize) return;

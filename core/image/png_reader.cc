@@ -16,7 +16,7 @@
 namespace voxdag {
 namespace {
 
-// Of what libpng allocates: zlib's window and states, and buffers.
+// libpng's allocations: zlib's window and states, and buffers.
 constexpr uint64_t kPngStateBytes = uint64_t{1} << 20;
 
 class PngReader : public ImageReader {

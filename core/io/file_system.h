@@ -1,11 +1,11 @@
-// All file access of voxdag goes through here, so that tests can replace the disk by one that is
-// full, loses what was not synced, or flips bits. Paths are plain byte strings.
+// All file access of voxdag uses this interface. So tests can replace the disk with one that is
+// full, loses unsynced data, or flips bits. Paths are plain byte strings.
 //
 // Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT), kIo; the message names the call, the path, the
-// offset where there is one, and the system's reason. Short reads and writes and EINTR are handled
-// inside. A FileSystem may be called by several threads at once; a file by one at a time, except
-// that ReadableFile::read_at and WritableFile::write_at may be called by several, and
-// WritableFile::sync and release concurrently with them.
+// offset if there is one, and the system's reason. Short reads and writes and EINTR are handled
+// inside. A FileSystem is thread-safe. A file is not, except that several threads may call
+// ReadableFile::read_at and WritableFile::write_at, and WritableFile::sync and release concurrently
+// with them.
 #pragma once
 
 #include <cstddef>
@@ -47,7 +47,7 @@ class WritableFile {
   // Frees the space of a range whose contents are no longer needed. It reads as zeros afterwards,
   // or as before where the file system cannot do that.
   virtual void release(uint64_t /*offset*/, uint64_t /*bytes*/) {}
-  // Returns once all that was written is on the disk.
+  // Returns once all written data is on the disk.
   virtual void sync() = 0;
   // Flushes nothing by itself, reports what close() reports. Called by the destructor, silently.
   virtual void close() = 0;
@@ -57,7 +57,7 @@ struct DirectoryEntry {
   std::string name;
   bool is_directory = false;
   uint64_t bytes = 0;
-  uint64_t disk_bytes = 0;  // what it takes up: less than `bytes` where space was released
+  uint64_t disk_bytes = 0;  // disk usage: less than `bytes` where space was released
   double modified_s = 0;    // Unix time
   bool is_special = false;  // neither a file nor a directory: a link, a pipe, a device
 };
@@ -72,10 +72,11 @@ class FileSystem {
  public:
   virtual ~FileSystem() = default;
   virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
-  // An empty file under `path`; one that was there is emptied. Like open_write() and try_lock(), it
-  // refuses a symbolic link and a file with other hard links as Error{kInvalidInput}.
+  // Creates an empty file under `path`, or empties an existing file. Like open_write() and
+  // try_lock(), it refuses a symbolic link and a file with other hard links as
+  // Error{kInvalidInput}.
   virtual std::unique_ptr<WritableFile> create(const std::string& path) = 0;
-  // The file under `path` with its contents, or an empty one if there is none.
+  // Opens the file under `path` with its contents, or creates an empty one.
   virtual std::unique_ptr<WritableFile> open_write(const std::string& path) = 0;
   virtual bool exists(const std::string& path) = 0;
   virtual void rename(const std::string& from, const std::string& to) = 0;
@@ -102,15 +103,15 @@ class FileSystem {
 // The file system of this machine.
 FileSystem& system_files();
 
-// Where this process may write what it needs for a while: $TMPDIR, /tmp or the current folder.
+// Folder for temporary files of this process: $TMPDIR, /tmp or the current folder.
 std::string temporary_parent();
-// Makes a folder that only this user may enter, under `prefix` and six characters that nobody can
-// foresee, and returns its path.
+// Makes a folder that only this user may enter, named `prefix` plus six unpredictable characters,
+// and returns its path.
 std::string make_temporary_folder(const std::string& prefix);
 
-// Removes all that is in a folder, if it exists.
+// Removes the contents of a folder, if it exists.
 void remove_entries(FileSystem& files, const std::string& path);
-// Removes a folder and all that is in it, if it exists.
+// Removes a folder with its contents, if it exists.
 void remove_tree(FileSystem& files, const std::string& path);
 
 // The directory part of a path, "." if it has none.

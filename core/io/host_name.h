@@ -1,4 +1,4 @@
-// The name of this machine, for people: what a lock or a record of a shared disk was written by.
+// The name of this machine, for messages: the writer of a lock or of a record on a shared disk.
 #pragma once
 
 #include <string>

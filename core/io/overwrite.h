@@ -1,5 +1,5 @@
-// Which files may be overwritten: never what is read at the same time, and a file that the program
-// did not make itself only if the user insists.
+// Decides which files may be overwritten: never an input, and a file that the program did not make
+// only with --force.
 #pragma once
 
 #include <functional>

@@ -1,6 +1,6 @@
-// A mapped file that is truncated, or whose disk fails, ends the process that reads it by SIGBUS. A
-// process that has to live on watches its mappings: pages that are gone read as zeros, and the
-// mapping says so. (What a truncated file leaves of its last page reads as zeros without a fault.)
+// If a mapped file is truncated, or its disk fails, reading it ends the process with SIGBUS. A
+// process that must survive watches its mappings: missing pages read as zeros, and the mapping
+// reports them. (The rest of a truncated file's last page reads as zeros without a fault.)
 // Thread-safe.
 #pragma once
 
@@ -10,11 +10,11 @@ namespace voxdag {
 
 class WatchedMapping {
  public:
-  // At most this many are watched at a time; others are as they would be without.
+  // Maximum number of watched mappings; further mappings are not protected.
   static constexpr int kMaxWatched = 256;
 
-  // The first one of the process installs a handler for SIGBUS, for good. What is no fault of a
-  // watched mapping still ends the process.
+  // The first mapping of the process installs a handler for SIGBUS permanently. Faults outside
+  // watched mappings still end the process.
   WatchedMapping(const void* begin, uint64_t bytes);
   // To be called before the mapping ends.
   ~WatchedMapping();

@@ -28,7 +28,7 @@ class PagePool {
 
   // The size of a new page range for `bytes`: a power of two up to 4 MiB, whole pages above.
   static size_t range_bytes(size_t bytes);
-  // Removes the smallest cached range of `bytes` to `max_bytes` bytes; null if there is none.
+  // Removes the smallest cached range of `bytes` to `max_bytes` bytes; null without one.
   Pages take(size_t bytes, size_t max_bytes);
   // Caches the range; frees the oldest ones where there would be more than `max_cached` bytes.
   void put(Pages pages, size_t max_cached) noexcept;

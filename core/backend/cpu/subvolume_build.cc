@@ -5,7 +5,7 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr size_t kBatch = 256;       // triangles read at once
+constexpr size_t kBatch = 256;       // triangles per read
 constexpr size_t kFewTriangles = 4;  // in a tile where the plane memo may be faster
 
 Box box_of(const SubvolumeTask& task) {

@@ -1,5 +1,5 @@
 // Reduces the bricks of a tile to one node, level by level. Voxel blocks that occurred before are
-// found as a whole in the block memo. All other nodes of a level are hashed, then their slots and
+// found in the block memo. All other nodes of a level are hashed, then their slots and
 // records prefetched, then looked up, so that memory latencies overlap.
 //
 // The non-empty cubes of a level are a bit set in Morton order: its bytes are the child masks of
@@ -63,7 +63,7 @@ class TileReducer {
   void find_blocks(TileBricks& tile, int count);
   void find_new_blocks(TileBricks& tile, int count, bool insert);
   NodeRef reduce(int words, int count, int from_log2, int size_log2);
-  // Overwrites hashes and ids of the children by those of the parents.
+  // Overwrites the children's hashes and ids with the parents'.
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
   static constexpr int kMaxBricks = kTileBlocks * kBlockBricks;

@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kMinMajor = 8;  // compute capability of the oldest code in this build
 
-// The runtime's numbers of the devices that can run this build; if there is none, `problem` says
-// why.
+// Returns the runtime's numbers of the devices that can run this build. Without one, sets `problem`
+// to the reason.
 std::vector<int> usable_devices(std::string& problem) {
   int count = 0, driver = 0;
   const cudaError_t status = cudaGetDeviceCount(&count);

@@ -31,8 +31,8 @@ class BrickList {
   uint64_t* masks() { return masks_.data(); }
 
   // Reserves `count` places behind the last brick and returns the position of the first; commit()
-  // adds what was written there. Where the places do not fit, bricks that occur several times are
-  // merged; the list grows where that frees too little.
+  // adds the bricks written there. If there is no space, duplicate bricks are merged; if that frees
+  // too little, the list grows.
   uint32_t reserve(uint32_t count) {
     if (size_ + uint64_t{count} <= codes_.size()) return size_;
     merge();

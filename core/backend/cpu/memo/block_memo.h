@@ -4,7 +4,7 @@
 //   blocks    64 bytes each; all 0: free
 //   nodes     the node of the block in the same slot
 //
-// It is direct-mapped: a block replaces the one in its slot. Blocks are compared as a whole, so a
+// It is direct-mapped: a block replaces the one in its slot. All bytes of blocks are compared, so a
 // hit is right for any keys. It is bypassed for a while when most lookups miss: in scans hardly two
 // blocks are equal. It is charged to the budget; beyond its minimum size it is at most a sixteenth
 // of it. Not thread-safe. Throws OutOfBudget if not even the minimum size fits.

@@ -113,7 +113,7 @@ NodeRef PlaneMemo::node(const Plane& plane, PlaneDirection& direction, int64_t f
 
 NodeRef PlaneMemo::tile_node(PlaneDirection& direction, int64_t f, int size_log2) {
   constexpr int kLog2 = PlaneDirection::kSizeLog2;
-  // The plane's offset from a node is f plus that of the node's corner, which is 8 times `offsets`.
+  // The plane's offset from a node is f plus the corner's offset, which is 8 times `offsets`.
   const int64_t* offsets = direction.offsets();
   const int64_t low = direction.min_offset() - f, high = direction.max_offset() - f;
   uint64_t crossed[8];

@@ -29,7 +29,7 @@ class PlaneMemo {
   // log2 of the edge of the smallest cube that is worth a call of build().
   static constexpr int kSmallestLog2 = 4;
 
-  // Sets `node` to that of a cube which one triangle covers and no other touches. False if the
+  // Sets `node` to the node of a cube which one triangle covers and no other touches. False if the
   // plane is not in the memo (yet), or not for cubes of this size.
   bool build(const TriangleSet& triangles, Entry entry, const Box& cube, int size_log2,
              NodeRef& node);

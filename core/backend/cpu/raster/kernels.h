@@ -15,8 +15,9 @@ namespace voxdag::cpu {
 
 // Bit masks of the children of a cube.
 struct Octants {
-  uint32_t touched;  // all that the triangle touches, and perhaps some that it does not
-  uint32_t inside;   // those of `touched` that the triangle covers: only its plane matters there
+  uint32_t touched;  // every child that the triangle touches, and possibly some others
+  uint32_t
+      inside;  // children of `touched` inside the triangle's projection: the plane test decides
 };
 
 struct VoxelBlockContent {

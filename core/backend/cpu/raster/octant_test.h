@@ -1,11 +1,11 @@
-// Which of a cube's eight children a triangle may touch: the overlap test for all eight at once, in
-// doubles. The four numbers of a quad are the three edges of the triangle (the fourth is ignored)
-// or four children.
+// Finds the children of a cube that a triangle may touch: the overlap test for all eight in one
+// step, in doubles. The four numbers of a quad are the three edges of the triangle (the fourth is
+// ignored) or four children.
 //
-// Culling need not be exact, since the rasterizers are: a touched child must never be left out, one
-// that is not touched may remain. "Inside" must never be wrong. Both hold because every sum is
+// Culling need not be exact, since the rasterizers are. A touched child must never be omitted; an
+// untouched child may remain. "Inside" must never be wrong. Both hold because every sum is
 // widened, or narrowed, by more than its rounding error: vertices and edges are exact in doubles
-// (below 2^42), normals are made in integers and rounded once, and what follows are sums of at most
+// (below 2^42), normals are made in integers and rounded once, and the rest are sums of at most
 // eight products, each off by at most 3 * 2^-53 of |coefficient| * |distance|.
 //
 // Quad is a vector of four doubles with load(coordinates, origin), arithmetic and
@@ -105,7 +105,7 @@ struct OctantTest {
   }
 
   // The children on the inner side of the edges in projection `d`; `inside`, if not null, receives
-  // those that are so with their whole area.
+  // the children whose complete area is on that side.
   uint32_t edge_test(int d, uint32_t* inside) const {
     const int p = (d + 1) % 3, q = (d + 2) % 3;
     const Quad vp = Quad::load(t.v[p], cube.low[p]), vq = Quad::load(t.v[q], cube.low[q]);

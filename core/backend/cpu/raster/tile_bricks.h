@@ -1,4 +1,4 @@
-// The bricks of one tile: a cube of at most 64^3 voxels, small enough to stay in the cache while
+// The bricks of one tile: a cube of at most 64^3 voxels, small enough for the cache while
 // all its triangles are drawn. Not thread-safe.
 #pragma once
 

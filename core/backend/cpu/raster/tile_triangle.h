@@ -11,7 +11,7 @@
 // since for an integer i and any c: 256 i + c >= 0 <=> i + floor(c / 256) >= 0. So the tests do not
 // need the eight bits within a voxel.
 //
-// Bounds. Narrow triangles: half-edges <= 2^27, |n_a| <= 2^54 (the triangle's shadow lies in its
+// Bounds. Narrow triangles: half-edges <= 2^27, |n_a| <= 2^54 (the triangle's projection is in its
 // box), sum of |n_a| <= 3 * 2^54. If the plane misses the tile there is nothing to draw; if not,
 // |n.k + lowest| <= 64 * 3 * 2^54 < 2^62 at every corner of a voxel. Edges: |a|, |b| <= 2^27,
 // |c| < 2^50. Wide triangles: half-edges < 2^40, so |n_a| < 2^81, n.v < 2^124 in 128 bits; edge

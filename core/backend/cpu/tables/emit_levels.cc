@@ -44,7 +44,7 @@ class LevelEmitter {
   }
 
  private:
-  // Replaces the hashes of all records by those of --hash-bits, from the bricks up.
+  // Truncates the hashes of all records to --hash-bits, from the bricks up.
   void truncate_hashes() {
     PooledArray<uint64_t> brick_hashes(tables_.memory(), tables_.bricks().size());
     tables_.bricks().for_each([&](uint64_t mask, uint32_t id) {

@@ -100,7 +100,7 @@ class NodeTable {
 
   bool is_node(uint32_t id, uint32_t mask, const uint32_t* children, int child_count) const {
     const uint32_t* words = &records_[id + 2];
-    // All eight at once: a loop over the children would often be mispredicted.
+    // Compares all eight without branching: a loop over the children would often be mispredicted.
     const uint32_t(&compared)[8] = kFirstWords.of[child_count];
     uint32_t differ = words[0] ^ mask;
     for (int i = 0; i < 8; ++i) differ |= (words[1 + i] ^ children[i]) & compared[i];

@@ -1,6 +1,6 @@
-// The bricks of one tile of 64^3 voxels, drawn by one thread block: 4096 brick masks stay in its
-// shared memory while all triangles of the tile are drawn into them; then those that are not empty
-// are written in Morton order.
+// The bricks of one tile of 64^3 voxels, drawn by one thread block: its shared memory holds
+// 4096 brick masks while all triangles of the tile are drawn into them. Then the bricks that are
+// not empty are written in Morton order.
 //
 // Drawn are (triangle, cell) pairs, a cell being a cube of 16^3 voxels that the triangle touches:
 // one thread finds the bricks of its cell, then the voxels of each. Masks are combined by OR, so

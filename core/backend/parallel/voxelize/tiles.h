@@ -2,7 +2,7 @@
 // tile's bricks are drawn by one thread block in shared memory (tile_kernel.h). There is no list of
 // voxels, nothing smaller than a cell is sorted, and bricks are made in Morton order.
 //
-// All triangles of the subvolume and their pairs are in memory at once; a subvolume where they do
+// All triangles of the subvolume and their pairs are in memory together; a subvolume where they do
 // not fit is split. The smallest subvolume cannot be: it is voxelized by voxel_list.h instead,
 // which reads its triangles in batches.
 #pragma once

@@ -1,6 +1,6 @@
-// Which cells of a group of N x N x N cubes a triangle touches, all at once: the exact test of
-// core/geometry/overlap.h (Schwarz and Seidel 2010, section 4.1), with what the cells have in
-// common computed once.
+// Finds the cells of a group of N x N x N cubes that a triangle touches, in one step: the exact
+// test of core/geometry/overlap.h (Schwarz and Seidel 2010, section 4.1). Terms shared by the cells
+// are computed once.
 //
 // Let `low` be a corner of the lattice of cells, 2^shift units per edge, and k a cell's position on
 // it. Every test asks for the sign of
@@ -9,13 +9,13 @@
 //                                                        2^shift) >= 0  for an integer i
 //
 // so that only the floored constants ever see the units within a cell. Vertices are odd: their
-// differences are even, so half edges and quarter normals are integers; and none lies on the
+// differences are even, so half edges and quarter normals are integers; and no vertex is on the
 // boundary of a cell.
 //
 // Bounds, for triangles of less than 2^28 units in each axis ("narrow") and lattices of at most
 // 2^28 units (the largest grid): half edges < 2^27, quarter normals n_a < 2^55. Where triangle and
-// lattice are not apart in an axis, |low - v| < 2^29 there, so edge constants stay below 2^58. The
-// plane's need 128 bits. Clamping a constant changes no sign as long as what is added to it is
+// lattice are not apart in an axis, |low - v| < 2^29 there, so edge constants are below 2^58. The
+// plane's need 128 bits. Clamping a constant changes no sign as long as the added terms are
 // smaller: less than 2^30 for edges (8 half edges), 12 max |n_a| for the plane, with N = 4. Larger
 // triangles are tested cell by cell.
 #pragma once
@@ -114,7 +114,7 @@ struct TriangleOnLattice {
     return repeat_along<N>(axis == 2 ? 1 : 2, cells);
   }
 
-  // Cells whose corners do not all lie on one side of the plane.
+  // Cells with corners on both sides of the plane.
   template <int N, class Int>
   VOXDAG_HD uint64_t at_plane(const int (&at)[3], Int far) const {
     int128 here = plane;

@@ -3,9 +3,9 @@
 //
 //   1. For each row of voxels of the tile, the edges bound its coordinates in the three
 //   projections:
-//      that along the columns gives the voxel columns inside (footprint.h), the two others bounds
-//      of heights (sides.h).
-//   2. All 16 voxel columns of a column of bricks at once: the heights between which the plane
+//      the projection along the columns gives the voxel columns inside (footprint.h), the two
+//      others bound the heights (sides.h).
+//   2. All 16 voxel columns of a column of bricks in one step: the heights between which the plane
 //      passes them (heights.h), and the bounds above.
 //   3. These become one bit per voxel of each brick, which is where the two rasterizers differ.
 //

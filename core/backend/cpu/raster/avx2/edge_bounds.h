@@ -5,12 +5,12 @@
 // these are integers, so with y = (t - 1/2) / |up| and t = -(across k + c):
 //     up > 0:  x > floor(y)
 //     up < 0:  -x > floor(y)
-//     up = 0:  all, or none if t > 0; divided by 2^-60 instead, y is far below or above all
+//     up = 0:  all, no voxel if t > 0; divided by 2^-60 instead, y is far below or above all
 // y = slope k + start in doubles, where only the division, products and sums are rounded. It is at
 // least 1 / (2 |up|) >= 2^-28 away from a whole number, and its floor is exact where it matters:
-//     |c| <= 2^36   its error is below 2^-12 / |up| + 2^-45, including that of adding small numbers
-//     |c| > 2^36    |y| > 2^8 is beyond the tile, where only the side matters; its error is below 1
-//     up = 0        |y| >= 2^59, and its error is below 2^58
+//     |c| <= 2^36   its error is below 2^-12 / |up| + 2^-45, including the error of adding small
+//     numbers |c| > 2^36    |y| > 2^8 is beyond the tile, where only the side matters; its error is
+//     below 1 up = 0        |y| >= 2^59, and its error is below 2^58
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -61,7 +61,7 @@ struct EdgeLanes {
 };
 
 // [set of edges with up < 0]: the lanes, in halves of 32 bits, of two edges that bound x from below
-// and of two that bound it from above; lane 3 is none. Edges sum to 0, so one or two of them have
+// and of two that bound it from above; lane 3 is unused. Edges sum to 0, so one or two of them have
 // up < 0, unless up = 0 for all three: these may bound it from either side.
 struct BoundOrder {
   alignas(32) int32_t lane[8][8] = {};
@@ -80,7 +80,7 @@ constexpr BoundOrder kBoundOrder;
 
 class EdgeBounds {
  public:
-  // `bound_first`: the bounded coordinate is that of the edges' a, the rows' is that of b. Adds
+  // `bound_first`: the bounded coordinate belongs to the edges' a, the rows' coordinate to b. Adds
   // `below_more` to all bounds from below, `over_more` to those from above.
   VOXDAG_INLINE EdgeBounds(const Edge (&edges)[3], bool bound_first, double below_more,
                            double over_more) {

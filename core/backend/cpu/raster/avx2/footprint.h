@@ -48,9 +48,9 @@ struct Footprint {
       const __m256i bytes = bytes_of_bricks(voxels);
       const uint32_t empty = static_cast<uint32_t>(
           _mm256_movemask_epi8(_mm256_cmpeq_epi8(bytes, _mm256_setzero_si256())));
-      const uint32_t there = ~(empty & empty >> 16) & 0xffff;
-      // The triangle is convex, so those between are there as well.
-      if (there != 0) columns.add(q, __builtin_ctz(there), 31 - __builtin_clz(there));
+      const uint32_t present = ~(empty & empty >> 16) & 0xffff;
+      // The triangle is convex, so the columns between are also present.
+      if (present != 0) columns.add(q, __builtin_ctz(present), 31 - __builtin_clz(present));
       store(inside[q], interleaved(_mm256_permute4x64_epi64(bytes, 0b11'01'10'00)));
     }
   }

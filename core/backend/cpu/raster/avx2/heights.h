@@ -158,8 +158,8 @@ class Heights {
   }
 
   const TileTriangle<int32_t>& t;
-  // The height of a column of bricks: that of its lowest voxel column, kLowered units of 16-bit
-  // lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
+  // The height of a column of bricks is the height of its lowest voxel column, kLowered units of
+  // 16-bit lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
   int64_t origin_, step_p_, step_q_;
   // An upper bound of the distance from there to the highest top of the column.
   int64_t reach_;

@@ -34,7 +34,7 @@ Octants test_octants(const NarrowTriangle& triangle, const Box& cube, bool insid
 
 const __m256i* halves(const VoxelBlock& block) { return reinterpret_cast<const __m256i*>(&block); }
 
-// block_key(), of four bricks at once.
+// block_key() for four bricks per step.
 BlockSummary summarize(const VoxelBlock& block) {
   const __m256i low = _mm256_load_si256(halves(block));
   const __m256i high = _mm256_load_si256(halves(block) + 1);

@@ -21,8 +21,8 @@ namespace {
 using HeightBounds = __m256i;
 constexpr int kMaxHeight = 15;
 
-// From the four bounds from below and the four from above in a row of bricks, to those of columns:
-// [of p].
+// From the four bounds from below and the four from above in a row of bricks, to the bounds of
+// columns: [of p].
 struct SideOrder {
   alignas(32) uint8_t byte[2][32] = {};
   constexpr SideOrder() {
