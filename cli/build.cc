@@ -5,9 +5,9 @@
 #include "cli/build_options.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
-#include "scheduler/cluster/run_batch.h"
-#include "scheduler/cluster/slurm/slurm.h"
 #include "scheduler/run_build.h"
+#include "scheduler/slurm/commands/slurm.h"
+#include "scheduler/slurm/run_batch.h"
 
 namespace voxdag::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include "cli/command.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
-#include "scheduler/cluster/run_batch.h"
+#include "scheduler/slurm/run_batch.h"
 
 namespace voxdag::cli {
 namespace {

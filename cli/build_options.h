@@ -4,7 +4,7 @@
 #include <string>
 
 #include "cli/command.h"
-#include "scheduler/build_spec.h"
+#include "scheduler/spec/build_spec.h"
 
 namespace voxdag::cli {
 

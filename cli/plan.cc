@@ -3,8 +3,8 @@
 #include "cli/build_options.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
-#include "scheduler/cluster/cluster_plan.h"
-#include "scheduler/plan/estimate.h"
+#include "scheduler/plan_build.h"
+#include "scheduler/slurm/cluster_plan.h"
 
 namespace voxdag::cli {
 namespace {

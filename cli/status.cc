@@ -6,9 +6,9 @@
 
 #include "cli/command.h"
 #include "core/base/text.h"
-#include "scheduler/cluster/cluster_state.h"
-#include "scheduler/job/job_status.h"
-#include "scheduler/job/work_folder.h"
+#include "scheduler/slurm/files/cluster_state.h"
+#include "scheduler/state/job_status.h"
+#include "scheduler/state/work_folder.h"
 
 namespace voxdag::cli {
 namespace {

@@ -2,7 +2,7 @@
 
 #include "cli/command.h"
 #include "core/base/error.h"
-#include "scheduler/cluster/cluster_build.h"
+#include "scheduler/slurm/cluster_build.h"
 
 namespace voxdag::cli {
 namespace {

@@ -1,8 +1,8 @@
 // run_build(): scene in, global file out. The one entry for the command line and the service.
 #pragma once
 
-#include "scheduler/build_report.h"
-#include "scheduler/build_spec.h"
+#include "scheduler/spec/build_report.h"
+#include "scheduler/spec/build_spec.h"
 
 namespace voxdag {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/io/file_system.h"
-#include "scheduler/build_spec.h"
+#include "scheduler/spec/build_spec.h"
 #include "server/http/http_server.h"
 #include "server/steps.h"
 

@@ -48,6 +48,26 @@ PUBLIC_HEADERS = {"merge": ["merge/merge.h"]}
 # Tests and benchmarks may include more than the public header.
 BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 
+# Folders whose inner folders are in layers: each includes only itself and folders further down.
+LAYERS = {
+    "scheduler": [
+        "scheduler",
+        "scheduler/slurm",
+        "scheduler/slurm/files",
+        "scheduler/slurm/commands",
+        "scheduler/stages/attributes",
+        "scheduler/stages/merge",
+        "scheduler/stages/build",
+        "scheduler/stages/partition",
+        "scheduler/stages/plan",
+        "scheduler/stages/ingest",
+        "scheduler/state/checkpoint",
+        "scheduler/state",
+        "scheduler/triangles",
+        "scheduler/spec",
+    ],
+}
+
 # Third-party headers, and the folders where each may be included.
 THIRD_PARTY = {
     "zstd.h": ["core/format"],
@@ -94,6 +114,18 @@ def folder_of(path):
     return path.rpartition("/")[0]
 
 
+def check_inner_include(source, target, layers):
+    """What is wrong with an include between two folders of these layers, or None."""
+    if layers is None:
+        return None
+    for folder in (source, target):
+        if folder not in layers:
+            return f"{folder} has no place among the layers of LAYERS"
+    if layers.index(target) < layers.index(source):
+        return f"{source} may not include {target}, which is a layer above it"
+    return None
+
+
 def check_include(path, bracket, header):
     """What is wrong with this file including that header, or None."""
     layer = layer_of(path)
@@ -107,8 +139,10 @@ def check_include(path, bracket, header):
     if path in STANDALONE_HEADERS and header not in STANDALONE_HEADERS[path]:
         return f'stands alone, yet includes "{header}"'
     target = layer_of(header)
-    if target == layer or "/" not in header:
+    if "/" not in header:
         return None
+    if target == layer:
+        return check_inner_include(folder_of(path), folder_of(header), LAYERS.get(layer))
     if target not in INCLUDES[layer]:
         return f"{layer} may not include {target}"
     public = PUBLIC_HEADERS.get(target)

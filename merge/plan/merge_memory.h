@@ -1,4 +1,5 @@
-// How a merge divides the memory that it is given; scheduler/memory_plan.h has the other stages.
+// How a merge divides the memory that it is given; scheduler/spec/memory_plan.h has the other
+// stages.
 //
 //   position maps    of the level below and of this one, up to resident_bytes each; else spilled
 //   workers          frames, windows of spilled maps, what sorting a bucket needs

@@ -9,7 +9,7 @@
 #include "python/native/bindings.h"
 #include "python/native/long_work.h"
 #include "python/native/path_text.h"
-#include "scheduler/plan/estimate.h"
+#include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
 
 namespace voxdag::python {

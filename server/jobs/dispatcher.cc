@@ -7,7 +7,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "scheduler/cluster/cluster_build.h"
+#include "scheduler/slurm/cluster_build.h"
 #include "server/jobs/job_outcome.h"
 #include "server/jobs/process/job_task.h"
 

@@ -1,7 +1,7 @@
 #include "server/jobs/job_folders.h"
 
 #include "core/base/clock.h"
-#include "scheduler/cluster/cluster_build.h"
+#include "scheduler/slurm/cluster_build.h"
 #include "server/jobs/process/job_process.h"
 #include "server/jobs/process/job_task.h"
 #include "server/jobs/task_resolver.h"

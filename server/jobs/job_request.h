@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "scheduler/build_spec.h"
+#include "scheduler/spec/build_spec.h"
 
 namespace voxdag::server {
 

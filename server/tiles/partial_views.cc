@@ -13,7 +13,7 @@
 #include "core/geometry/grid.h"
 #include "core/io/random_id.h"
 #include "query/render/views.h"
-#include "scheduler/job/work_folder.h"
+#include "scheduler/state/work_folder.h"
 #include "server/http/problem.h"
 
 namespace voxdag::server {

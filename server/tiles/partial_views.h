@@ -11,8 +11,8 @@
 #include <string>
 
 #include "core/io/file_system.h"
-#include "scheduler/job/coarse_cubes.h"
 #include "server/jobs/process/job_folder.h"
+#include "server/tiles/coarse_cubes.h"
 #include "server/tiles/manifest.h"
 #include "server/tiles/partial_dag.h"
 #include "server/tiles/viewed_dag.h"

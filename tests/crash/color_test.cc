@@ -3,9 +3,9 @@
 #include <array>
 #include <set>
 
-#include "scheduler/color/color_store.h"
+#include "scheduler/stages/attributes/color_store.h"
 #include "tests/crash/crash_fixture.h"
-#include "tests/unit/scheduler_color/painted_scene.h"
+#include "tests/unit/scheduler/stages/attributes/painted_scene.h"
 
 namespace crash {
 namespace {

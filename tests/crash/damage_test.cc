@@ -2,7 +2,7 @@
 #include <fstream>
 
 #include "core/base/error.h"
-#include "scheduler/job/job_store.h"
+#include "scheduler/state/job_store.h"
 #include "tests/crash/crash_fixture.h"
 #include "tests/unit/io/flip_bits.h"
 

@@ -12,7 +12,7 @@
 #include "core/format/artifact/frame_codec.h"
 #include "core/format/global/global_layout.h"
 #include "merge/checkpoint/merge_state.h"
-#include "scheduler/ingest/ingest_record.h"
+#include "scheduler/state/checkpoint/ingest_record.h"
 #include "tests/fuzz/scene/compressed_scenes.h"
 #include "tests/fuzz/scene/rich_scene.h"
 #include "tests/unit/format/test_artifacts.h"

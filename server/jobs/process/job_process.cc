@@ -10,9 +10,9 @@
 
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
-#include "scheduler/job/work_folder.h"
-#include "scheduler/plan/estimate.h"
+#include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
+#include "scheduler/state/work_folder.h"
 #include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
 #include "server/jobs/process/job_task.h"

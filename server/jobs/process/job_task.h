@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/io/file_system.h"
-#include "scheduler/build_spec.h"
+#include "scheduler/spec/build_spec.h"
 
 namespace voxdag::server {
 

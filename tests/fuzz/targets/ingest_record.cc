@@ -1,6 +1,6 @@
 // The record of an interrupted ingest in the job store, whose checksum is made to fit: what was
 // decoded can be decoded again from its encoding.
-#include "scheduler/ingest/ingest_record.h"
+#include "scheduler/state/checkpoint/ingest_record.h"
 
 #include "core/base/error.h"
 #include "tests/fuzz/targets/fuzz_target.h"

@@ -12,11 +12,11 @@
 #include <thread>
 
 #include "core/base/error.h"
-#include "scheduler/job/build_locks.h"
-#include "scheduler/job/job_store.h"
-#include "scheduler/job/work_folder.h"
-#include "scheduler/plan/estimate.h"
+#include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
+#include "scheduler/state/build_locks.h"
+#include "scheduler/state/job_store.h"
+#include "scheduler/state/work_folder.h"
 #include "tests/unit/base/error_of.h"
 #include "tests/unit/io/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"

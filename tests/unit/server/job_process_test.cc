@@ -11,7 +11,7 @@
 #include <iterator>
 #include <sstream>
 
-#include "scheduler/job/work_folder.h"
+#include "scheduler/state/work_folder.h"
 #include "server/data_folder.h"
 #include "server/jobs/process/job_folder.h"
 #include "server/jobs/process/job_messages.h"

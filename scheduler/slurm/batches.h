@@ -1,0 +1,40 @@
+// How subvolumes are cut into batches. Pure functions.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/geometry/cube.h"
+#include "scheduler/slurm/files/batch_file.h"
+#include "scheduler/slurm/files/cluster_state.h"
+
+namespace voxdag {
+
+// The place of a cube along the Morton curve: cubes near each other in it share the most nodes.
+uint64_t morton_place(const Cube& cube);
+
+// Cuts items in the order given into at most `batches` parts of about equal weight, each with at
+// least one item. Returns where each part ends.
+std::vector<size_t> cut_into_batches(std::span<const double> weights, uint64_t batches);
+
+// Batches of subvolumes, in the order given.
+struct CutBatches {
+  std::vector<Batch> batches;
+  std::vector<OpenBatch> open;      // of the same batches
+  std::vector<size_t> first_items;  // the index of the first subvolume of each
+};
+// At most `most` batches, numbered from `first_number` on, all else as in `like`.
+CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvolumes,
+                        uint64_t most, uint32_t first_number);
+
+// How many tasks a build is worth, when the user does not say: about kTaskSeconds of one CPU each.
+uint64_t default_tasks(double expected_bricks, uint64_t subvolumes);
+
+// CPU time per expected brick: 3 ns where the scene repeats itself, 150 ns where nothing does.
+inline constexpr double kSecondsPerBrick = 30e-9;
+inline constexpr double kTaskSeconds = 120;
+inline constexpr uint64_t kMaxDefaultTasks = 1000;
+
+}  // namespace voxdag

@@ -1,0 +1,26 @@
+// What a cluster build would take, for `voxdag plan --cluster`.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "scheduler/stages/plan/estimate.h"
+
+namespace voxdag {
+
+struct ClusterPlan {
+  uint64_t tasks = 0;
+  uint64_t memory_bytes = 0;   // that a task should have: it works with less, in more passes
+  EstimateRange cpu_hours;     // of all tasks
+  EstimateRange task_s;        // of one task with one CPU, if all were equal
+  EstimateRange shared_bytes;  // of the shared disk at its peak
+  EstimateRange merge_s;       // CPU time of the merge, on the machine that submits
+};
+
+// `tasks`: as many as asked for, 0 for the build's own choice.
+ClusterPlan plan_cluster(const Estimate& estimate, uint64_t tasks);
+
+// The estimate and the plan as one JSON object.
+std::string cluster_plan_json(const Estimate& estimate, const ClusterPlan& plan);
+
+}  // namespace voxdag

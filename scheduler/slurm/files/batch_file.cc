@@ -1,0 +1,203 @@
+#include "scheduler/slurm/files/batch_file.h"
+
+#include <array>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "scheduler/triangles/chunk.h"
+
+namespace voxdag {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view kBatchMagic = "vdbatch1";
+constexpr uint64_t kMaxHeaderBytes = uint64_t{1} << 30;
+
+struct Prologue {
+  char magic[8];
+  uint64_t header_bytes;
+  uint64_t header_checksum;
+};
+static_assert(sizeof(Prologue) == 24);
+
+Json to_json(const Batch& batch) {
+  Json subvolumes = Json::array();
+  for (const BatchSubvolume& s : batch.subvolumes)
+    subvolumes.push_back(
+        {s.id,
+         {s.cube.level, s.cube.position[0], s.cube.position[1], s.cube.position[2]},
+         s.weight,
+         s.triangles});
+  return {{"number", batch.number},
+          {"program", batch.program},
+          {"build", batch.build},
+          {"grid_levels", batch.shape.grid_levels},
+          {"hash_bits", batch.shape.hash_bits},
+          {"wide", batch.wide},
+          {"backend", batch.backend},
+          {"method", batch.method},
+          {"longest_edge", batch.longest_edge},
+          {"subvolumes", subvolumes}};
+}
+
+Batch from_json(const Json& json) {
+  Batch batch;
+  batch.number = json.at("number");
+  batch.program = json.at("program");
+  batch.build = json.at("build");
+  batch.shape = {.grid_levels = json.at("grid_levels"), .hash_bits = json.at("hash_bits")};
+  batch.wide = json.at("wide");
+  batch.backend = json.at("backend");
+  batch.method = json.at("method");
+  batch.longest_edge = json.at("longest_edge");
+  for (const Json& s : json.at("subvolumes"))
+    batch.subvolumes.push_back(
+        {.id = s.at(0),
+         .cube = {s.at(1).at(0), {s.at(1).at(1), s.at(1).at(2), s.at(1).at(3)}},
+         .weight = s.at(2),
+         .triangles = s.at(3)});
+  return batch;
+}
+
+// Collects bytes and writes them by large blocks.
+class BlockWriter {
+ public:
+  explicit BlockWriter(WritableFile& file) : file_(file) { block_.reserve(kBlockBytes); }
+  void add(std::span<const std::byte> bytes) {
+    block_.insert(block_.end(), bytes.begin(), bytes.end());
+    if (block_.size() >= kBlockBytes) flush();
+  }
+  void flush() {
+    file_.write_at(written_, block_);
+    written_ += block_.size();
+    block_.clear();
+  }
+
+ private:
+  static constexpr size_t kBlockBytes = size_t{1} << 20;
+
+  WritableFile& file_;
+  std::vector<std::byte> block_;
+  uint64_t written_ = 0;
+};
+
+template <class T>
+std::span<const std::byte> bytes_of(const T& value) {
+  return std::as_bytes(std::span(&value, 1));
+}
+
+void write_triangles(TriangleStream& triangles, uint64_t expected, size_t record_bytes,
+                     const CancelToken& cancel, BlockWriter& out) {
+  std::array<FixedTriangle, kBatchChunkRecords> batch;
+  std::vector<std::byte> records;
+  for (uint64_t left = expected; left > 0;) {
+    cancel.check();
+    size_t filled = 0;
+    const size_t wanted = std::min<uint64_t>(left, batch.size());
+    while (filled < wanted) {
+      const size_t n = triangles.read(std::span(batch).subspan(filled, wanted - filled));
+      if (n == 0)
+        throw DamagedTriangles("a bin of triangles ends early: expected " +
+                               std::to_string(expected));
+      filled += n;
+    }
+    records.resize(filled * record_bytes);
+    for (size_t i = 0; i < filled; ++i)
+      encode_triangle(batch[i], record_bytes, records.data() + i * record_bytes);
+    const uint64_t checksum = checksum64(records);
+    out.add(bytes_of(checksum));
+    out.add(records);
+    left -= filled;
+  }
+}
+
+}  // namespace
+
+double Batch::weight() const {
+  double sum = 0;
+  for (const BatchSubvolume& subvolume : subvolumes) sum += subvolume.weight;
+  return sum;
+}
+
+void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
+                 const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
+                 const CancelToken& cancel) {
+  const std::string header = to_json(batch).dump();
+  const auto header_bytes = std::as_bytes(std::span(header));
+  Prologue prologue{{}, header.size(), checksum64(header_bytes)};
+  std::memcpy(prologue.magic, kBatchMagic.data(), sizeof prologue.magic);
+  const std::string partial = path + ".partial";
+  const auto file = files.create(partial);
+  BlockWriter out(*file);
+  out.add(bytes_of(prologue));
+  out.add(header_bytes);
+  for (size_t i = 0; i < batch.subvolumes.size(); ++i)
+    write_triangles(*open(i), batch.subvolumes[i].triangles, triangle_record_bytes(batch.wide),
+                    cancel, out);
+  out.flush();
+  file->sync();
+  file->close();
+  files.rename(partial, path);
+  files.sync_directory(parent_directory(path));
+}
+
+BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.open_read(path)) {
+  const auto damaged = [&](const std::string& what) {
+    return Error(ErrorCode::kCorrupt, path + ": " + what + ": expected the batch of a build");
+  };
+  Prologue prologue{};
+  if (file_->size() < sizeof prologue) throw damaged("it is too short");
+  file_->read_at(0, std::as_writable_bytes(std::span(&prologue, 1)));
+  if (std::string_view(prologue.magic, sizeof prologue.magic) != kBatchMagic)
+    throw Error(
+        ErrorCode::kUnsupportedVersion,
+        path + ": it is no batch of this version: expected \"" + std::string(kBatchMagic) + "\"");
+  if (prologue.header_bytes > std::min(kMaxHeaderBytes, file_->size() - sizeof prologue))
+    throw damaged("its header does not fit the file");
+  std::string header(static_cast<size_t>(prologue.header_bytes), '\0');
+  const auto header_bytes = std::as_writable_bytes(std::span(header));
+  file_->read_at(sizeof prologue, header_bytes);
+  if (checksum64(header_bytes) != prologue.header_checksum)
+    throw damaged("its header fails its checksum");
+  try {
+    batch_ = from_json(Json::parse(header));
+  } catch (const nlohmann::json::exception& error) {
+    throw damaged(std::string("its header has other members (") + error.what() + ")");
+  }
+  data_begin_ = sizeof prologue + header.size();
+}
+
+std::vector<BinId> BatchFile::copy_to(TriangleStore& store, const CancelToken& cancel) const {
+  std::vector<Cube> cubes;
+  for (const BatchSubvolume& subvolume : batch_.subvolumes) cubes.push_back(subvolume.cube);
+  store.add_cube_bins(cubes);
+  std::vector<BinId> bins;
+  const size_t record_bytes = triangle_record_bytes(batch_.wide);
+  std::vector<std::byte> chunk;
+  uint64_t offset = data_begin_;
+  for (size_t i = 0; i < batch_.subvolumes.size(); ++i) {
+    bins.push_back(store.cube_bins()[i].bin);
+    for (uint64_t left = batch_.subvolumes[i].triangles; left > 0;) {
+      cancel.check();
+      const uint64_t n = std::min(left, kBatchChunkRecords);
+      chunk.resize(sizeof(uint64_t) + n * record_bytes);
+      file_->read_at(offset, chunk);
+      const auto records = std::span<const std::byte>(chunk).subspan(sizeof(uint64_t));
+      uint64_t checksum = 0;
+      std::memcpy(&checksum, chunk.data(), sizeof checksum);
+      if (checksum64(records) != checksum)
+        throw Error(ErrorCode::kCorrupt,
+                    file_->path() + " at offset " + std::to_string(offset) +
+                        ": triangles fail their checksum: expected what was written there");
+      add_records(store, bins.back(), records);
+      offset += chunk.size();
+      left -= n;
+    }
+  }
+  return bins;
+}
+
+}  // namespace voxdag

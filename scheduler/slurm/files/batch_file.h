@@ -1,0 +1,72 @@
+// The input of a cluster task: all that it needs to build its subvolumes, their triangles included,
+// in one file that is written once and then only read.
+//
+//   "vdbatch1"  u64 bytes of the header  u64 its XXH64  header (JSON)
+//   chunks of records: u64 XXH64 of the records  up to kBatchChunkRecords records (chunk.h)
+//
+// Chunks lie one after the other, those of the first subvolume first; all but the last of a
+// subvolume are full.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/dag/sub_dag.h"
+#include "core/geometry/cube.h"
+#include "core/io/file_system.h"
+#include "scheduler/state/job_store.h"
+#include "scheduler/triangles/memory_store.h"
+
+namespace voxdag {
+
+inline constexpr uint64_t kBatchChunkRecords = 1024;
+
+struct BatchSubvolume {
+  SubvolumeId id = 0;
+  Cube cube;
+  double weight = 0;
+  uint64_t triangles = 0;
+};
+
+struct Batch {
+  uint32_t number = 0;
+  std::string program;  // the version of voxdag that wrote it, and the only one that may build it
+  std::string build;    // tells this build from others
+  DagShape shape;
+  bool wide = false;  // records have 64 bits per coordinate
+  std::string backend, method;
+  int64_t longest_edge = INT64_MAX;        // of a subvolume, in voxels
+  std::vector<BatchSubvolume> subvolumes;  // in Morton order
+
+  double weight() const;
+};
+
+// Writes the file, durable under its name on return. `open` gives the triangles of a subvolume, by
+// its index.
+void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
+                 const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
+                 const CancelToken& cancel);
+
+class BatchFile {
+ public:
+  // Throws Error{kCorrupt} or Error{kUnsupportedVersion}.
+  BatchFile(FileSystem& files, const std::string& path);
+
+  const Batch& batch() const { return batch_; }
+  // Adds the triangles to a store, and returns the bin of each subvolume. Throws Error{kCorrupt}
+  // for records that fail their checksum.
+  std::vector<BinId> copy_to(TriangleStore& store, const CancelToken& cancel) const;
+
+ private:
+  std::unique_ptr<ReadableFile> file_;
+  Batch batch_;
+  uint64_t data_begin_ = 0;
+};
+
+}  // namespace voxdag

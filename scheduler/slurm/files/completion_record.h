@@ -1,0 +1,55 @@
+// What a cluster task says when it is done: one small file, written whole or not at all, after all
+// that it names is durable. A text line of JSON and one with its XXH64, so that a torn or damaged
+// record is known.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/dag/sub_dag.h"
+#include "core/format/artifact/artifact.h"
+#include "core/io/file_system.h"
+#include "scheduler/state/job_store.h"
+
+namespace voxdag {
+
+// Of a record's file.
+inline constexpr uint64_t kMaxRecordBytes = uint64_t{1} << 30;
+
+struct BuiltSubvolume {
+  SubvolumeId id = 0;
+  SubDagSummary summary;  // of all its parts, if it was split
+};
+
+struct CompletionRecord {
+  std::string program;  // as in Batch
+  std::string build;
+  uint32_t batch = 0;
+  std::string attempt;
+  std::string node;      // the machine that built it
+  std::string task;      // Slurm's name of the task, JOB_INDEX
+  ArtifactRef artifact;  // of all subvolumes; of no bytes if none has a voxel
+  uint64_t segment_bytes = 0;
+  std::vector<BuiltSubvolume> subvolumes;
+  uint64_t rows_before = 0, rows_after = 0;  // of the artifacts, and of the one they became
+  uint64_t split = 0;                        // subvolumes that were split
+  double started_s = 0;                      // Unix time
+  double wall_s = 0, cpu_s = 0;
+  uint64_t peak_rss_bytes = 0;
+};
+
+std::string encode_record(const CompletionRecord& record);
+// Throws Error{kCorrupt} for a text that encode_record() did not make.
+CompletionRecord decode_record(const std::string& text);
+
+// Why an attempt ended without a record, as far as the task itself could say.
+struct AttemptFailure {
+  uint32_t batch = 0;
+  std::string attempt, node, task;
+  std::string message;
+};
+std::string encode_failure(const AttemptFailure& failure);
+AttemptFailure decode_failure(const std::string& text);
+
+}  // namespace voxdag

@@ -1,0 +1,68 @@
+#include "scheduler/slurm/files/record_check.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/base/error.h"
+#include "core/format/artifact/artifact_reader.h"
+#include "core/format/artifact/segment_writer.h"
+#include "core/geometry/octree_descent.h"
+
+namespace voxdag {
+namespace {
+
+[[noreturn]] void refuse_record(const std::string& what) { throw Error(ErrorCode::kCorrupt, what); }
+
+void check_roots(const ArtifactReader& artifact, std::span<const ExpectedSubvolume> subvolumes,
+                 std::set<Cube> to_find) {
+  for (const ArtifactRoot& root : artifact.roots()) {
+    const auto owner = std::ranges::find_if(
+        subvolumes, [&](const ExpectedSubvolume& s) { return contains(s.cube, root.cube); });
+    if (owner == subvolumes.end()) refuse_record("its artifact has the root of another cube");
+    to_find.erase(owner->cube);
+  }
+  if (!to_find.empty()) refuse_record("its artifact lacks the root of a subvolume");
+}
+
+}  // namespace
+
+CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folder,
+                                   const ClusterFolder::Entry& entry, const ClusterState& state,
+                                   std::span<const ExpectedSubvolume> subvolumes) {
+  const CompletionRecord record =
+      decode_record(read_small_file(files, entry.path, kMaxRecordBytes));
+  if (record.program != state.program)
+    throw Error(ErrorCode::kUnsupportedVersion, "it is of voxdag " + record.program + " on " +
+                                                    record.node + ": expected voxdag " +
+                                                    state.program);
+  if (record.build != state.build || record.batch != entry.batch || record.attempt != entry.attempt)
+    refuse_record("it is of another build, batch or attempt");
+  if (!std::ranges::equal(record.subvolumes, subvolumes, {}, &BuiltSubvolume::id,
+                          &ExpectedSubvolume::id))
+    refuse_record("it names other subvolumes than the batch");
+  std::set<Cube> to_find;
+  for (size_t i = 0; i < subvolumes.size(); ++i)
+    if (!record.subvolumes[i].summary.empty()) to_find.insert(subvolumes[i].cube);
+  if (to_find.empty()) return record;
+  if (record.artifact.segment != ClusterFolder::segment_of(record.batch))
+    refuse_record("it names another segment");
+  const std::shared_ptr<ReadableFile> segment =
+      files.open_read(segment_of_record(files, folder, record));
+  if (segment->size() < record.segment_bytes)
+    refuse_record("its segment has " + std::to_string(segment->size()) + " bytes: expected " +
+                  std::to_string(record.segment_bytes));
+  const ArtifactReader artifact(segment, record.artifact);
+  if (artifact.shape() != state.shape)
+    refuse_record("its artifact is of another grid or hash size");
+  check_roots(artifact, subvolumes, std::move(to_find));
+  return record;
+}
+
+std::string segment_of_record(FileSystem& files, const ClusterFolder& folder,
+                              const CompletionRecord& record) {
+  const std::string of_attempt = segment_path(folder.attempt_folder(record.batch, record.attempt),
+                                              ClusterFolder::segment_of(record.batch));
+  return files.exists(of_attempt) ? of_attempt : folder.accepted_segment_path(record.batch);
+}
+
+}  // namespace voxdag

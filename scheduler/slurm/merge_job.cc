@@ -1,0 +1,223 @@
+#include "scheduler/slurm/merge_job.h"
+
+#include <algorithm>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "scene/triangle_source.h"
+#include "scheduler/slurm/files/cluster_state.h"
+#include "scheduler/state/work_folder.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kMaxReportBytes = uint64_t{1} << 24;
+// Between two looks at the files.
+constexpr double kFilesPause_s = 0.5;
+// How long an NFS client may believe that a file is not there which it has looked for before
+// (acdirmax, nfs(5)), and some more.
+constexpr double kShown_s = 75;
+// Of the end of a log, for a message.
+constexpr uint64_t kMaxTailBytes = 600;
+
+// The last lines of a file; "" if it cannot be read.
+std::string tail(FileSystem& files, const std::string& path) {
+  try {
+    const auto file = files.open_read(path);
+    const uint64_t bytes = std::min(file->size(), kMaxTailBytes);
+    std::string text(static_cast<size_t>(bytes), '\0');
+    file->read_at(file->size() - bytes, std::as_writable_bytes(std::span(text)));
+    if (bytes < file->size()) text.erase(0, text.find('\n') + 1);
+    while (text.ends_with('\n')) text.pop_back();
+    return text;
+  } catch (const Error&) {
+    return "";
+  }
+}
+
+// The code whose exit status Slurm has seen, in STATUS:SIGNAL.
+ErrorCode code_of(const SlurmEnd& end) {
+  if (end.state != "FAILED") return ErrorCode::kIo;
+  for (int code = 0; code <= static_cast<int>(ErrorCode::kLimit); ++code)
+    if (end.exit_code == std::to_string(exit_status(static_cast<ErrorCode>(code))) + ":0")
+      return static_cast<ErrorCode>(code);
+  return ErrorCode::kIo;
+}
+
+std::string merge_request_of(const BuildSpec& spec, const BuildContext& context) {
+  MemoryBudget budget(spec.run.memory_bytes);
+  const auto scene =
+      open_scene(context.files, spec.geometry.scenes, {.skip_invalid = spec.geometry.skip_invalid},
+                 budget, context.cancel);
+  std::string text = geometry_json(spec.geometry);
+  std::vector<SourceFile> files = scene->files();
+  if (spec.geometry.attributes.any())
+    for (const ImageSource& image : scene->materials().images) files.push_back(image.file);
+  for (const auto& [path, identity] : files)
+    text += '\0' + path + '\0' + std::to_string(identity.bytes) + '\0' +
+            std::to_string(identity.modified_ns);
+  return sha256_hex(text);
+}
+
+}  // namespace
+
+MergeJob::MergeJob(const BuildSpec& spec, const std::string& work_folder,
+                   const BuildContext& context, CommandRunner& commands)
+    : spec_(spec),
+      options_(*spec.run.cluster),
+      context_(context),
+      folder_(work_folder),
+      slurm_(commands, context.cancel),
+      request_(merge_request_of(spec, context)) {}
+
+std::optional<BuildReport> MergeJob::finished() const {
+  const std::string path = report_path(spec_.run.output);
+  try {
+    if (!context_.files.exists(path)) return std::nullopt;
+    const BuildReport report =
+        decode_report(read_small_file(context_.files, path, kMaxReportBytes));
+    if (report.merge_request == request_ &&
+        context_.files.open_read(spec_.run.output)->size() == report.bytes)
+      return report;
+  } catch (const Error&) {
+    // Whatever it is, it is no report of such a job.
+  }
+  return std::nullopt;
+}
+
+void MergeJob::forget_finished() {
+  if (finished()) context_.files.remove(report_path(spec_.run.output));
+}
+
+std::optional<std::vector<SlurmJob>> MergeJob::ask() {
+  const auto jobs = slurm_.jobs(name_);
+  if (!jobs && is_answering_)
+    context_.progress.warn("Slurm does not answer (squeue): waiting for it");
+  is_answering_ = jobs.has_value();
+  return jobs;
+}
+
+bool MergeJob::is_alive() {
+  const auto state = read_cluster_state(context_.files, folder_.work_folder());
+  if (!state) return false;
+  take_names(*state);
+  for (;;) {
+    if (const auto jobs = ask()) return !jobs->empty();
+    std::this_thread::sleep_for(std::chrono::duration<double>(options_.slurm_interval_s));
+    context_.cancel.check();
+  }
+}
+
+bool MergeJob::has_left_work() const {
+  return !spec_.run.keep_work &&
+         context_.files.exists(WorkFolder::store_path(folder_.work_folder()));
+}
+
+void MergeJob::take_names(const ClusterState& state) {
+  name_ = state.merge_job_name();
+  task_name_ = state.task_name();
+}
+
+BuildReport MergeJob::follow(const std::string& submitted) {
+  std::string id = submitted;
+  double asked_s = -options_.slurm_interval_s, gone_since_s = 0;
+  context_.progress.begin_stage("build", 0, "batches");
+  std::optional<BuildReport> report;
+  for (;;) {
+    report = finished();
+    if (report && !has_left_work()) break;
+    show_progress();
+    const double now_s = wall_seconds();
+    if (now_s - asked_s >= options_.slurm_interval_s) {
+      asked_s = now_s;
+      const auto jobs = ask();
+      if (jobs && !jobs->empty()) {
+        id = jobs->front().id;
+        take_state(jobs->front());
+        cancel_given_up(jobs->front());
+        gone_since_s = 0;
+      } else if (jobs) {
+        // The shared disk may show what the job wrote later than Slurm its end.
+        if (gone_since_s == 0) gone_since_s = now_s;
+        const double gone_s = now_s - gone_since_s;
+        if (gone_s >= options_.grace_s) {
+          if (report) break;
+          const auto end = id.empty() ? std::nullopt : slurm_.end_of(id);
+          if (!end || end->state != "COMPLETED" || gone_s >= options_.grace_s + kShown_s)
+            fail(id, end);
+        }
+      }
+    }
+    if (context_.cancel.canceled())
+      throw Error(ErrorCode::kCanceled,
+                  "canceled; job " + id +
+                      " and its tasks run on: run the same command again to follow them, or stop "
+                      "them with voxdag stop-tasks");
+    std::this_thread::sleep_for(
+        std::chrono::duration<double>(std::min(kFilesPause_s, options_.slurm_interval_s)));
+  }
+  context_.progress.end_stage();
+  return *report;
+}
+
+// Slurm holds what it could not start. A batch is submitted again by the job that merges, which
+// waits until the batch's task has ended; that job itself by the next command.
+void MergeJob::cancel_given_up(const SlurmJob& job) {
+  std::vector<std::string> given_up;
+  if (job.is_given_up()) given_up.push_back(job.id);
+  if (job.state == "PENDING") {
+    const auto tasks = slurm_.active(task_name_);
+    for (const SlurmTask& task : tasks.value_or(std::vector<SlurmTask>{}))
+      if (task.is_given_up()) given_up.push_back(task.name());
+  }
+  if (!given_up.empty() && slurm_.cancel_tasks(given_up))
+    context_.progress.warn("Slurm could not start and holds " + std::to_string(given_up.size()) +
+                           " tasks, " + given_up[0] + " for one: canceled");
+}
+
+// Says once that the job runs, or why it does not.
+void MergeJob::take_state(const SlurmJob& job) {
+  if (job.state == "PENDING" && !waits_for_its_turn(job.reason) &&
+      noted_reasons_.insert(job.reason).second)
+    context_.progress.warn("job " + job.id + ", which merges, waits: " + job.reason);
+  if (job.state == "RUNNING" && !is_running_)
+    context_.progress.warn("job " + job.id + " merges: see its log in " + folder_.path());
+  is_running_ = job.state == "RUNNING";
+}
+
+// Batches that are built, by the records of tasks and, once it runs, by what the job has accepted.
+void MergeJob::show_progress() {
+  std::optional<ClusterState> state;
+  try {
+    state = read_cluster_state(context_.files, folder_.work_folder());
+  } catch (const Error&) {
+    // The job itself says so, if it lasts.
+  }
+  if (!state) return;
+  take_names(*state);
+  std::set<uint32_t> recorded;
+  for (const ClusterFolder::Entry& entry : folder_.list(context_.files))
+    if (entry.kind == ClusterFolder::Kind::kRecord) recorded.insert(entry.batch);
+  const uint64_t open = state->open.size();
+  const uint64_t built = state->totals.batches + std::min<uint64_t>(recorded.size(), open);
+  context_.progress.set_total(state->totals.batches + open);
+  if (built <= shown_built_) return;
+  context_.progress.advance(built - shown_built_);
+  shown_built_ = built;
+}
+
+void MergeJob::fail(const std::string& id, const std::optional<SlurmEnd>& end) const {
+  const std::string log = folder_.path() + "/log-" + id + ".txt";
+  const std::string said = tail(context_.files, log);
+  throw Error(end ? code_of(*end) : ErrorCode::kIo,
+              "the job " + id + " that merges has ended without a result: " +
+                  (end ? end->text() : "Slurm does not say how") +
+                  (said.empty() ? "" : "; its log " + log + " ends with:\n" + said) +
+                  "\nthe same command submits it again");
+}
+
+}  // namespace voxdag

@@ -1,0 +1,54 @@
+// The report of a finished build. A plain value.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/geometry/grid.h"
+#include "merge/merge.h"
+#include "scheduler/spec/stage_clock.h"
+#include "scheduler/spec/stage_totals.h"
+
+namespace voxdag {
+
+struct BuildReport {
+  std::string output;
+  std::string sha256;
+  Grid grid;
+  uint32_t hash_bits = 64;
+  uint64_t bytes = 0;
+  MergeReport merge;
+  uint64_t triangles = 0;  // that may touch the grid
+  uint64_t dropped_outside = 0;
+  uint64_t dropped_invalid = 0;
+  uint64_t subvolumes = 0;  // built, empty ones included
+  uint64_t subvolumes_split = 0;
+  uint64_t subvolumes_reused = 0;  // from an earlier run of this job, or from the cache
+  uint64_t subvolumes_cached = 0;  // those from the cache
+  uint64_t artifact_bytes = 0;
+  uint64_t artifact_nodes = 0;
+  uint64_t spill_bytes = 0;
+  uint64_t memory_bytes = 0;
+  unsigned threads = 0;
+  std::string backend;  // that built what was not reused
+  std::vector<StageTime> stages;
+  double wall_s = 0;
+  double cpu_s = 0;
+  uint64_t peak_rss_bytes = 0;
+  std::optional<ColorReport> colors;     // of a build with colors
+  std::optional<ClusterTotals> cluster;  // of the tasks of a cluster build
+  std::string merge_request;  // of a build that a job of the cluster merged (MergeJob::request())
+};
+
+// Where the report of the build of this file lies.
+inline std::string report_path(const std::string& output) { return output + ".report.json"; }
+
+// One JSON object; docs/cli.md lists its names.
+std::string report_json(const BuildReport& report);
+// Throws Error{kCorrupt} for a text that report_json() did not make. What is not in the text has
+// its default.
+BuildReport decode_report(const std::string& text);
+
+}  // namespace voxdag

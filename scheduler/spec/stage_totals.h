@@ -1,0 +1,32 @@
+// What single stages add to the report of a build. Plain values.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+namespace voxdag {
+
+// Totals of the tasks of a cluster build.
+struct ClusterTotals {
+  uint64_t batches = 0;   // built
+  uint64_t attempts = 0;  // that failed
+  uint64_t split = 0;     // subvolumes that tasks split
+  uint64_t rows_before = 0, rows_after = 0;
+  double cpu_s = 0;         // of all tasks whose records count
+  double longest_s = 0;     // wall time of the longest of them
+  double first_task_s = 0;  // from the first submission to the begin of the first task
+  uint64_t requests = 0;    // to Slurm
+  std::map<std::string, uint64_t> batches_of_node;
+};
+
+// Totals of the attributes stage.
+struct ColorReport {
+  uint64_t resolution = 0;               // of the color grid; 0 for a file without colors
+  uint64_t cells = 0;                    // of that grid, that have a color
+  uint64_t images = 0, image_bytes = 0;  // and pyramids of those that were decoded
+  uint64_t cubes = 0, cubes_reused = 0;  // with surfaces, and those that an earlier run baked
+  uint64_t spill_bytes = 0;
+};
+
+}  // namespace voxdag

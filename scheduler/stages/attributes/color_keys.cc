@@ -1,0 +1,56 @@
+#include "scheduler/stages/attributes/color_keys.h"
+
+#include "core/format/bytes.h"
+
+namespace voxdag {
+namespace {
+
+// Of the rule, the decoders, the blocks and the records of regions: raised with any change of one,
+// so that what an earlier version has baked is not used.
+constexpr uint32_t kColorVersion = 1;
+
+}  // namespace
+
+std::vector<Checksum128> look_digests(std::span<const Material> materials,
+                                      std::span<const std::string> images,
+                                      const AttributeSet& attributes) {
+  std::vector<Checksum128> digests;
+  digests.reserve(materials.size());
+  std::vector<std::byte> bytes;
+  for (const Material& m : materials) {
+    bytes.clear();
+    ByteSink sink(bytes);
+    for (const uint16_t factor : m.factor) sink.put(factor);
+    sink.put(m.alpha_cutoff);
+    sink.put(static_cast<uint8_t>(m.alpha_mode));
+    for (const Wrap wrap : m.wrap) sink.put(static_cast<uint8_t>(wrap));
+    if (m.image != Material::kNoImage) sink.put_bytes(std::as_bytes(std::span(images[m.image])));
+    if (attributes.material) sink.put(m.number);
+    digests.push_back(checksum128(bytes));
+  }
+  return digests;
+}
+
+Checksum128 surface_digest(std::span<const std::byte> record, const Checksum128& look) {
+  const Checksum128 own = checksum128(record);
+  const uint64_t words[] = {own.low, own.high, look.low, look.high};
+  return checksum128(std::as_bytes(std::span(words)));
+}
+
+Checksum128 attribute_key(const StoredAttribute& attribute, const ColorGrid& grid, const Cube& cube,
+                          const BinContent& content) {
+  std::vector<std::byte> bytes;
+  ByteSink sink(bytes);
+  for (const uint32_t number : {kColorVersion, grid.levels, grid.color_levels, cube.level,
+                                cube.position[0], cube.position[1], cube.position[2]})
+    sink.put(number);
+  for (const uint64_t number : {content.surfaces, content.sum.low, content.sum.high})
+    sink.put(number);
+  if (attribute.kind != Attribute::kColor) {
+    sink.put(static_cast<uint32_t>(attribute.kind));
+    sink.put(attribute.value_bytes);
+  }
+  return checksum128(bytes);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,377 @@
+#include "scheduler/stages/attributes/color_stage.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/base/process_limits.h"
+#include "core/format/bytes.h"
+#include "core/format/checksum.h"
+#include "core/format/color/color_layout.h"
+#include "core/format/color/color_section_writer.h"
+#include "core/format/color/value_section_writer.h"
+#include "core/format/global/global_layout.h"
+#include "core/geometry/morton.h"
+#include "scene/textures/texture_set.h"
+#include "scheduler/spec/memory_plan.h"
+#include "scheduler/stages/attributes/bin_surfaces.h"
+#include "scheduler/stages/attributes/color_keys.h"
+#include "scheduler/stages/attributes/color_store.h"
+#include "scheduler/stages/attributes/cube_baker.h"
+#include "scheduler/stages/attributes/region_record.h"
+#include "scheduler/triangles/chunk.h"
+
+namespace voxdag {
+namespace {
+
+// Bins are cubes of this level at most: 16^3 of them.
+constexpr uint32_t kMaxBinLevel = 4;
+
+std::vector<Cube> bins_of(const ColorGrid& grid) {
+  const uint32_t level = std::min(grid.region_level(), kMaxBinLevel);
+  std::vector<Cube> cubes(size_t{1} << 3 * level);
+  for (size_t i = 0; i < cubes.size(); ++i) {
+    cubes[i].level = level;
+    morton_decode(i, cubes[i].position[0], cubes[i].position[1], cubes[i].position[2]);
+  }
+  return cubes;
+}
+
+template <class T>
+T number_at(const ReadableFile& file, uint64_t offset) {
+  std::array<std::byte, sizeof(T)> bytes;
+  file.read_at(offset, bytes);
+  return ByteSource(bytes).get<T>();
+}
+
+// The cells with attributes of a sound global file, those of the finest level: all its sections
+// have the same ones.
+uint64_t count_finest_cells(const ReadableFile& file) {
+  namespace layout = global_layout;
+  if (number_at<uint64_t>(file, layout::kAttributeCountAt) == 0) return 0;
+  return number_at<uint64_t>(file, layout::kAttributesAt + layout::kAttributeFinestCellsAt);
+}
+
+// Readers refuse a longer list.
+void check_list(std::span<const std::string> materials) {
+  const uint64_t bytes = list_bytes(materials) + 2 * color_layout::kUnitBytes;
+  if (materials.size() > color_layout::kMaxMaterials || bytes > color_layout::kMaxNamesBytes)
+    throw Error(ErrorCode::kLimit, "the scene has " + std::to_string(materials.size()) +
+                                       " materials, with names of " + std::to_string(bytes) +
+                                       " bytes: expected up to " +
+                                       std::to_string(color_layout::kMaxMaterials) + " and " +
+                                       std::to_string(color_layout::kMaxNamesBytes) +
+                                       " bytes; leave out --attributes material");
+}
+
+// What bakes, and what one cube became.
+struct BakeWorker {
+  std::unique_ptr<TextureReader> textures;
+  std::optional<CubeBaker> baker;
+  CubeBaker::Records records;  // of the last parts
+  bool is_baked = false;       // now; the others are stored
+};
+
+// The section of an attribute.
+class OpenSection {
+ public:
+  OpenSection(GlobalFileWriter& out, Attribute attribute, uint32_t levels,
+              std::span<const std::string> materials, MemoryBudget& budget) {
+    if (attribute == Attribute::kColor)
+      colors_.emplace(out, levels, budget);
+    else
+      values_.emplace(out, attribute, levels, materials, budget);
+  }
+  // Returns how many cells of the color grid they have.
+  uint64_t add(std::span<const std::byte> records) {
+    RegionRecords regions(records);
+    uint64_t cells = 0;
+    while (const auto region = regions.next()) {
+      if (colors_)
+        colors_->add_region(*region);
+      else
+        values_->add_region(*region);
+      cells += region->counts[0];
+    }
+    return cells;
+  }
+  void finish() { colors_ ? colors_->finish() : values_->finish(); }
+
+ private:
+  std::optional<ColorSectionWriter> colors_;
+  std::optional<ValueSectionWriter> values_;
+};
+
+}  // namespace
+
+struct ColorStage::State {
+  const ColorSource source;
+  const StageContext context;
+  const ColorGrid grid;
+  const std::vector<Cube> cubes;
+  std::unique_ptr<TriangleSource> scene;
+  SceneMaterials materials;
+  std::vector<StoredAttribute> attributes;
+  std::vector<std::string> images;  // their digests
+  // Once the surfaces are read:
+  std::optional<MemoryBudget> share;
+  std::optional<SurfaceStore> store;
+  BinnedSurfaces surfaces;
+  template <class T>
+  using ByAttributeAndCube = std::vector<std::vector<T>>;
+  ByAttributeAndCube<Checksum128> keys;
+  // Where they are stored, once they are baked.
+  ByAttributeAndCube<std::vector<ColorStore::Place>> parts;
+
+  State(const ColorSource& s, const StageContext& c)
+      : source(s),
+        context(c),
+        grid{s.grid.levels, levels_of_resolution(s.options.color_resolution)},
+        cubes(bins_of(grid)) {}
+
+  void open();
+  void read_surfaces();
+  std::unique_ptr<TextureSet> decode_images(const ColorStore& artifacts);
+  bool is_stored(const ColorStore& artifacts, size_t cube) const;
+  void store_parts(ColorStore& artifacts, size_t cube, const CubeBaker::Records& records,
+                   bool are_last);
+  void bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
+            ColorReport& report);
+  void add_stored(const ColorStore& artifacts, size_t attribute, GlobalFileWriter& out,
+                  const ColorReport& report);
+};
+
+bool ColorStage::State::is_stored(const ColorStore& artifacts, size_t cube) const {
+  return std::ranges::all_of(
+      keys, [&](const auto& of_attribute) { return artifacts.has(of_attribute[cube]); });
+}
+
+void ColorStage::State::open() {
+  const BuildContext& build = context.build;
+  scene = open_scene(build.files, source.options.scenes,
+                     {source.options.skip_invalid, source.work_folder + "/decoded.vdspill"},
+                     context.budget, build.cancel);
+  materials = scene->materials();
+  materials.name_unlisted();
+  const AttributeSet& wanted = source.options.attributes;
+  for (const Attribute attribute : wanted.list())
+    attributes.push_back({attribute, attribute == Attribute::kColor
+                                         ? 0
+                                         : value_bytes(attribute, materials.names.size())});
+  if (wanted.material) check_list(materials.names);
+  if (!wanted.shows_images()) materials.drop_images();
+  for (const std::string& warning : std::exchange(materials.warnings, {}))
+    build.progress.warn(warning);
+  images = image_digests(build.files, materials.images, context.threads, build.cancel);
+}
+
+void ColorStage::State::read_surfaces() {
+  if (store) return;
+  share.emplace(context.budget.available() / 3, &context.budget);
+  store.emplace(context.build.files, source.work_folder + "/surfaces.vdspill", *share);
+  const std::vector<Checksum128> looks =
+      look_digests(materials.materials, images, source.options.attributes);
+  const SurfaceBinning binning{
+      .grid = source.grid,
+      .materials = materials.materials,
+      .looks = looks,
+      .cubes = cubes,
+      .record_bytes = triangle_record_bytes(source.options.bounds.has_value()),
+      .digest = source.digest,
+      .buffer_bytes = MemoryPlan::divide(context.budget.limit()).partition_buffer_bytes};
+  surfaces = bin_surfaces(*scene, binning, *store, context);
+  scene.reset();
+  trim_heap();
+  for (const StoredAttribute& attribute : attributes)
+    for (auto& of_attribute = keys.emplace_back(); of_attribute.size() < cubes.size();) {
+      const size_t i = of_attribute.size();
+      of_attribute.push_back(attribute_key(attribute, grid, cubes[i], surfaces.contents[i]));
+    }
+  parts.resize(attributes.size(), std::vector<std::vector<ColorStore::Place>>(cubes.size()));
+}
+
+// Those that cubes show which are to be baked.
+std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& artifacts) {
+  ImageClasses needed;
+  for (size_t i = 0; i < cubes.size(); ++i)
+    if (!is_stored(artifacts, i)) needed |= surfaces.contents[i].images;
+  uint64_t count = 0;
+  for (size_t i = 0; i < materials.images.size(); ++i) count += needed.test(i % needed.size());
+  SceneMaterials shown = materials;
+  for (Material& material : shown.materials)
+    if (material.image != Material::kNoImage && !needed.test(material.image % needed.size()))
+      material.image = Material::kNoImage;
+  const BuildContext& build = context.build;
+  const auto prepare = [&] {
+    build.progress.begin_stage("images", materials.images.size(), "images");
+    build.progress.resume_at(materials.images.size() - count);
+    auto textures =
+        TextureSet::prepare(build.files, shown, source.work_folder + "/images.vdspill",
+                            context.threads, context.budget, build.progress, build.cancel);
+    build.progress.end_stage();
+    return textures;
+  };
+  try {
+    return prepare();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kOutOfMemory) throw;
+  }
+  // Large images may be decoded in the memory of the surfaces.
+  store->move_to_file(surfaces.bins);
+  trim_heap();
+  return prepare();
+}
+
+void ColorStage::State::store_parts(ColorStore& artifacts, size_t cube,
+                                    const CubeBaker::Records& records, bool are_last) {
+  for (size_t i = 0; i < attributes.size(); ++i) {
+    std::vector<ColorStore::Place>& stored = parts[i][cube];
+    stored.push_back(artifacts.add(keys[i][cube], stored.size(), are_last, records[i]));
+  }
+}
+
+// Bakes all attributes, and adds the first of them.
+void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
+                             ColorReport& report) {
+  const BuildContext& build = context.build;
+  const auto memory =
+      ColorMemory::divide(context.budget.available(), context.threads, source.options.attributes);
+  std::vector<BakeWorker> workers(memory.workers);
+  for (BakeWorker& worker : workers) worker.records.resize(attributes.size());
+  OpenSection section(out, attributes[0].kind, grid.color_levels, materials.names, context.budget);
+  build.progress.begin_stage("color", report.cubes, "cubes");
+  build.progress.resume_at(report.cubes_reused);
+  std::vector<std::byte> part;
+  parallel_for_in_order(
+      memory.workers, cubes.size(),
+      [&](unsigned number, size_t item) {
+        BakeWorker& worker = workers[number];
+        for (auto& records : worker.records) records.clear();
+        worker.is_baked = false;
+        if (surfaces.contents[item].surfaces == 0) return;
+        if (is_stored(artifacts, item)) {
+          for (size_t i = 0; i < attributes.size(); ++i)
+            parts[i][item] = artifacts.parts(keys[i][item]);
+          return;
+        }
+        if (!worker.baker) {
+          worker.textures = textures.open(memory.texture_bytes);
+          worker.baker.emplace(grid, attributes, textures.materials(), *worker.textures, *store,
+                               memory.region_bytes, memory.surface_bytes, context.budget,
+                               build.cancel);
+        }
+        worker.baker->bake(cubes[item], surfaces.bins[item], worker.records,
+                           [&](CubeBaker::Records& records) {
+                             store_parts(artifacts, item, records, false);
+                             for (auto& of_attribute : records) of_attribute.clear();
+                           });
+        store_parts(artifacts, item, worker.records, true);
+        worker.is_baked = true;
+      },
+      [&](unsigned number, size_t item) {
+        build.cancel.check();
+        const BakeWorker& worker = workers[number];
+        // The last part is still in memory if it was baked now.
+        std::span<const ColorStore::Place> stored = parts[0][item];
+        if (worker.is_baked) stored = stored.first(stored.size() - 1);
+        for (const ColorStore::Place& place : stored) {
+          artifacts.read(place, part);
+          report.cells += section.add(part);
+        }
+        report.cells += section.add(worker.records[0]);
+        if (worker.is_baked) build.progress.advance(1);
+      });
+  build.progress.end_stage();
+  if (report.cells > 0) section.finish();
+}
+
+// Sections are written one after the other: what the others become is read from the work folder.
+void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute,
+                                   GlobalFileWriter& out, const ColorReport& report) {
+  const BuildContext& build = context.build;
+  const Attribute kind = attributes[attribute].kind;
+  OpenSection section(out, kind, grid.color_levels, materials.names, context.budget);
+  build.progress.begin_stage(name_of(kind), report.cubes, "cubes");
+  std::vector<std::byte> part;
+  for (size_t item = 0; item < cubes.size(); ++item) {
+    if (surfaces.contents[item].surfaces == 0) continue;
+    for (const ColorStore::Place& place : parts[attribute][item]) {
+      build.cancel.check();
+      artifacts.read(place, part);
+      section.add(part);
+    }
+    build.progress.advance(1);
+  }
+  build.progress.end_stage();
+  section.finish();
+}
+
+ColorStage::ColorStage(const ColorSource& source, const StageContext& context)
+    : state_(std::make_unique<State>(source, context)) {
+  state_->open();
+}
+
+ColorStage::~ColorStage() = default;
+
+std::string ColorStage::digest() {
+  state_->read_surfaces();
+  Sha256 hash;
+  for (const auto& keys : state_->keys) hash.add(std::as_bytes(std::span(keys)));
+  if (state_->source.options.attributes.material)
+    for (const std::string& name : state_->materials.names) {
+      const uint64_t size = name.size();
+      hash.add(std::as_bytes(std::span(&size, 1)));
+      hash.add(std::as_bytes(std::span(name)));
+    }
+  return hash.finish();
+}
+
+std::string ColorStage::digest_of(FileSystem& files, const std::string& output,
+                                  std::optional<ColorReport>& report) {
+  std::string of_keys = digest();
+  report.emplace();
+  report->cells = count_finest_cells(*files.open_read(output));
+  if (report->cells == 0) return of_keys;
+  report->resolution = uint64_t{1} << state_->grid.color_levels;
+  report->images = state_->materials.images.size();
+  for (const BinContent& content : state_->surfaces.contents) report->cubes += content.surfaces > 0;
+  report->cubes_reused = report->cubes;
+  return of_keys;
+}
+
+ColorReport ColorStage::add_to(GlobalFileWriter& out) {
+  if (out.progress().levels.empty()) return {};
+  const StageContext& context = state_->context;
+  state_->read_surfaces();
+  ColorStore artifacts(context.build.files, state_->source.artifact_path,
+                       state_->source.checkpoint_interval_s, context.build.progress,
+                       context.build.cancel);
+  std::vector<Checksum128> all_keys;
+  for (const auto& keys : state_->keys) all_keys.insert(all_keys.end(), keys.begin(), keys.end());
+  artifacts.keep_only(all_keys, context.build.cancel);
+  ColorReport report;
+  report.resolution = uint64_t{1} << state_->grid.color_levels;
+  for (size_t i = 0; i < state_->cubes.size(); ++i) {
+    if (state_->surfaces.contents[i].surfaces == 0) continue;
+    ++report.cubes;
+    if (!state_->is_stored(artifacts, i)) continue;
+    ++report.cubes_reused;
+    state_->store->clear(state_->surfaces.bins[i]);
+  }
+  const auto textures = state_->decode_images(artifacts);
+  state_->bake(artifacts, *textures, out, report);
+  for (size_t i = 1; i < state_->attributes.size() && report.cells > 0; ++i)
+    state_->add_stored(artifacts, i, out, report);
+  report.images = state_->materials.images.size();
+  report.image_bytes = textures->bytes();
+  report.spill_bytes = state_->store->file_bytes();
+  return report;
+}
+
+}  // namespace voxdag

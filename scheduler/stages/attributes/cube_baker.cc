@@ -1,0 +1,215 @@
+#include "scheduler/stages/attributes/cube_baker.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include "core/base/error.h"
+#include "core/geometry/morton.h"
+#include "core/geometry/octree_descent.h"
+#include "scheduler/spec/memory_plan.h"
+#include "scheduler/stages/attributes/region_record.h"
+
+namespace voxdag {
+namespace {
+
+// Of a surface in memory: itself, once more for its region, and in the lists of up to 14 cubes in
+// each other its number, and which children it touches.
+constexpr uint64_t kSurfaceBytes =
+    2 * sizeof(FixedSurface) + 14 * (sizeof(uint32_t) + sizeof(uint8_t));
+// Records for a child cube that are collected before they go to the store.
+constexpr size_t kPartBytes = 16 << 10;
+
+// Of a cell that is baked: its sum, the same in order, and colors.
+constexpr uint64_t kCellBytes = sizeof(ColorSum) + sizeof(ColoredCell) + 8;
+// Aside from those: places of cells, the next coarser level, and two parts of the records.
+constexpr uint64_t kFixedBytes = uint64_t{6} << 20;
+
+uint32_t max_cells_of(uint64_t region_bytes) {
+  constexpr uint32_t kTriangleCells = RegionBaker<TextureReader>::kTriangleCells;
+  static_assert(ColorMemory::kRegionBytes > kFixedBytes + 2 * kTriangleCells * kCellBytes);
+  static_assert(ColorMemory::kSolidRegionBytes >
+                kFixedBytes + (color::RegionCells::kMaxCells + kTriangleCells) * kCellBytes);
+  return static_cast<uint32_t>(std::min<uint64_t>(
+      (region_bytes - kFixedBytes) / kCellBytes - kTriangleCells, color::RegionCells::kMaxCells));
+}
+
+AttributeSet set_of(std::span<const StoredAttribute> attributes) {
+  AttributeSet set;
+  for (const StoredAttribute& attribute : attributes) set.add(attribute.kind);
+  return set;
+}
+
+}  // namespace
+
+CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
+                     std::span<const Material> materials, TextureReader& textures,
+                     SurfaceStore& store, uint64_t region_bytes, uint64_t surface_bytes,
+                     MemoryBudget& budget, const CancelToken& cancel)
+    : grid_(grid),
+      attributes_(attributes),
+      store_(store),
+      surface_bytes_(surface_bytes),
+      max_cells_(max_cells_of(region_bytes)),
+      budget_(budget),
+      cancel_(cancel),
+      charge_(budget, region_bytes + ColorMemory::value_bytes(set_of(attributes)), "baking colors"),
+      sum_charge_(budget, 0, "normals and materials of a region"),
+      baker_(grid, materials, textures, set_of(attributes)),
+      valued_(attributes.size()) {}
+
+void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, Records& records,
+                     const TakeRecords& take) {
+  bake(cube, bin, {records, take});
+}
+
+void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink) {
+  if (bin.surfaces == 0) return;
+  const uint64_t bytes = bin.surfaces * kSurfaceBytes;
+  if (bytes > surface_bytes_) return divide(cube, bin, sink);
+  const MemoryCharge charge(budget_, bytes, "surfaces to be baked");
+  surfaces_.clear();
+  surfaces_.reserve(bin.surfaces);
+  store_.for_each(bin, [&](const FixedSurface& surface) { surfaces_.push_back(surface); });
+  store_.clear(bin);
+  std::vector<uint32_t> all(surfaces_.size());
+  std::iota(all.begin(), all.end(), 0u);
+  descend(cube, all, sink);
+  surfaces_ = {};
+  touching_ = {};
+}
+
+// Too many surfaces for the memory: those of the eight children are stored apart.
+void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink) {
+  if (cube.level == grid_.region_level()) return bake_in_parts(cube, bin, sink);
+  std::array<SurfaceStore::Bin, 8> children;
+  {
+    SurfaceWriter writer(store_, children, kPartBytes * children.size());
+    std::vector<std::byte> record;
+    const int64_t units = cube.edge_voxels(grid_.levels) * kUnitsPerVoxel;
+    store_.for_each(bin, [&](const FixedSurface& surface) {
+      record.clear();
+      // Whether it has an image does not matter for what was stored without coordinates.
+      append_surface(surface, true, record);
+      for (uint32_t mask = touched_children(surface.position, cube, units); mask; mask &= mask - 1)
+        writer.append(static_cast<size_t>(lowest_bit(mask)), record);
+    });
+    store_.clear(bin);
+    writer.flush();
+  }
+  for (int child = 0; child < 8; ++child) {
+    cancel_.check();
+    bake(cube.child(child), children[static_cast<size_t>(child)], sink);
+  }
+}
+
+void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching, const Sink& sink) {
+  if (touching.empty()) return;
+  if (cube.level == grid_.region_level()) {
+    touching_.clear();
+    for (const uint32_t i : touching) touching_.push_back(surfaces_[i]);
+    return bake_region(
+        cube, [&](const auto& add) { add(touching_); }, sink);
+  }
+  std::vector<uint8_t> masks;
+  masks.reserve(touching.size());
+  const int64_t units = cube.edge_voxels(grid_.levels) * kUnitsPerVoxel;
+  for (const uint32_t i : touching)
+    masks.push_back(static_cast<uint8_t>(touched_children(surfaces_[i].position, cube, units)));
+  std::vector<uint32_t> part;
+  for (int child = 0; child < 8; ++child) {
+    part.clear();
+    for (size_t i = 0; i < touching.size(); ++i)
+      if (masks[i] >> child & 1) part.push_back(touching[i]);
+    descend(cube.child(child), part, sink);
+  }
+}
+
+// The surfaces of a region that do not fit the memory come one part after the other.
+void CubeBaker::bake_in_parts(const Cube& region, SurfaceStore::Bin& bin, const Sink& sink) {
+  const size_t most = std::max<size_t>(surface_bytes_ / sizeof(FixedSurface), 1);
+  const MemoryCharge charge(budget_, most * sizeof(FixedSurface), "surfaces to be baked");
+  touching_.clear();
+  touching_.reserve(most);
+  const auto add_all = [&](const auto& add) {
+    const auto add_part = [&] {
+      add(touching_);
+      touching_.clear();
+    };
+    store_.for_each(bin, [&](const FixedSurface& surface) {
+      touching_.push_back(surface);
+      if (touching_.size() == most) add_part();
+    });
+    add_part();
+  };
+  bake_region(region, add_all, sink);
+  store_.clear(bin);
+  touching_ = {};
+}
+
+// add_surfaces(add) calls add() with all surfaces, in one part or several. The cells of a region
+// that has too many for the memory are baked by its eight children.
+template <class AddSurfaces>
+void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces, const Sink& sink) {
+  const uint32_t levels = grid_.color_levels - grid_.region_level();
+  RegionEncoder colors(levels);
+  for (auto& cells : valued_) cells.clear();
+  if (bake_cells(region, max_cells_, add_surfaces)) {
+    collect(0, colors);
+  } else {
+    const uint32_t cells_of_child = 1u << (3 * levels - 3);
+    for (uint32_t child = 0; child < 8; ++child) {
+      if (!bake_cells(region.child(static_cast<int>(child)), cells_of_child, add_surfaces))
+        throw Error(ErrorCode::kOutOfMemory,
+                    "not enough memory for the materials of a region: expected more memory, fewer "
+                    "threads, or a finer color grid");
+      collect(child * cells_of_child, colors);
+    }
+  }
+  const uint64_t morton = morton_encode(region.position[0], region.position[1], region.position[2]);
+  size_t most = 0;
+  for (size_t i = 0; i < attributes_.size(); ++i) {
+    const auto [kind, value_bytes] = attributes_[i];
+    if (kind == Attribute::kColor ? colors.empty() : valued_[i].empty()) return;
+    append_region(kind == Attribute::kColor
+                      ? colors.finish(morton)
+                      : encode_values(kind, value_bytes, levels, morton, valued_[i]),
+                  sink.records[i]);
+    most = std::max(most, sink.records[i].size());
+  }
+  if (most >= kManyRecordBytes) sink.take(sink.records);
+}
+
+// False: they are more than `max_cells`, or their sums of other attributes do not fit the memory.
+template <class AddSurfaces>
+bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces) {
+  bool are_all = true;
+  baker_.begin(cube, max_cells);
+  add_surfaces([&](std::span<const FixedSurface> surfaces) {
+    cancel_.check();
+    are_all = are_all && baker_.add(surfaces, [&](uint64_t bytes) { return charge_sums(bytes); });
+  });
+  baker_.finish(cells_, values_);
+  return are_all;
+}
+
+// False if the sums of normals and materials do not fit. What was allocated stays for the next
+// region, but for large lists of materials.
+bool CubeBaker::charge_sums(uint64_t bytes) {
+  constexpr uint64_t kSlackBytes = uint64_t{4} << 20;
+  const uint64_t more = bytes - std::min(bytes, ColorMemory::kValueSumBytes);
+  if (more <= sum_charge_.bytes() && sum_charge_.bytes() <= more + kSlackBytes) return true;
+  return sum_charge_.try_resize(more);
+}
+
+// What the baked cells have, for the region that they are in.
+void CubeBaker::collect(uint32_t first_code, RegionEncoder& colors) {
+  for (size_t i = 0; i < attributes_.size(); ++i) {
+    if (attributes_[i].kind == Attribute::kColor)
+      colors.add(cells_, first_code);
+    else
+      append_values(attributes_[i].kind, cells_, values_, first_code, valued_[i]);
+  }
+}
+
+}  // namespace voxdag

@@ -1,0 +1,78 @@
+// Bakes the regions of cubes of the color grid, for one thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/base/cancel_token.h"
+#include "core/base/memory_budget.h"
+#include "core/color/blocks/region.h"
+#include "core/color/blocks/value_region.h"
+#include "core/color/rule/bake_region.h"
+#include "scene/textures/texture_set.h"
+#include "scheduler/stages/attributes/color_keys.h"
+#include "scheduler/triangles/surface_store.h"
+
+namespace voxdag {
+
+class CubeBaker {
+ public:
+  // For each attribute the records (region_record.h) of regions.
+  using Records = std::vector<std::vector<std::byte>>;
+
+  // Charges `region_bytes`, at least ColorMemory::kRegionBytes, and ColorMemory::value_bytes():
+  // with more, more cells of a region are baked at once. Surfaces in memory take up to
+  // `surface_bytes`. The references must outlive it.
+  CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
+            std::span<const Material> materials, TextureReader& textures, SurfaceStore& store,
+            uint64_t region_bytes, uint64_t surface_bytes, MemoryBudget& budget,
+            const CancelToken& cancel);
+
+  // Records that are more than memory should hold, and whole. It takes them and leaves none.
+  using TakeRecords = std::function<void(Records& records)>;
+  // Appends the records of the regions with surfaces in Morton order, and clears the bin, which has
+  // all surfaces that touch the cube. `records`: in the order of the attributes. Whenever there are
+  // kManyRecordBytes of one of them, take(records) follows.
+  void bake(const Cube& cube, SurfaceStore::Bin& bin, Records& records, const TakeRecords& take);
+
+  static constexpr size_t kManyRecordBytes = 256 << 10;
+
+ private:
+  // Where records go.
+  struct Sink {
+    Records& records;
+    const TakeRecords& take;
+  };
+
+  void bake(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink);
+  void divide(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink);
+  void descend(const Cube& cube, std::span<const uint32_t> touching, const Sink& sink);
+  void bake_in_parts(const Cube& region, SurfaceStore::Bin& bin, const Sink& sink);
+  template <class AddSurfaces>
+  void bake_region(const Cube& region, const AddSurfaces& add_surfaces, const Sink& sink);
+  template <class AddSurfaces>
+  bool bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces);
+  bool charge_sums(uint64_t bytes);
+  void collect(uint32_t first_code, RegionEncoder& colors);
+
+  const ColorGrid grid_;
+  const std::span<const StoredAttribute> attributes_;
+  SurfaceStore& store_;
+  const uint64_t surface_bytes_;
+  const uint32_t max_cells_;  // of a region, at once
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+  const MemoryCharge charge_;
+  MemoryCharge sum_charge_;  // of what is more than ColorMemory::kValueSumBytes
+  RegionBaker<TextureReader> baker_;
+  std::vector<FixedSurface> surfaces_;  // of the cube
+  std::vector<FixedSurface> touching_;  // of a region, or a part of them
+  std::vector<ColoredCell> cells_;
+  std::vector<CellValues> values_;
+  std::vector<std::vector<ValuedCell>> valued_;  // of a region, by attribute; none of color
+};
+
+}  // namespace voxdag

@@ -1,0 +1,93 @@
+#include "scheduler/stages/build/choose_backend.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+namespace {
+
+// Workers per GPU: enough that transfers and host work of some overlap with kernels of others.
+constexpr unsigned kWorkersPerDevice = 4;
+// A CUDA context alone has some hundred MiB resident that are charged to no budget.
+constexpr uint64_t kMinMemoryForGpu = uint64_t{2} << 30;
+
+[[noreturn]] void refuse_backend(const std::string& what) {
+  throw Error(ErrorCode::kInvalidInput, what);
+}
+
+Method method_of(const RunOptions& options) {
+  if (options.method == "pointers") return Method::kPointers;
+  if (options.method == "hashes") return Method::kHashes;
+  return Method::kFast;
+}
+
+BackendChoice cpu_choice() {
+  return {"cpu", [] { return make_cpu_backend(); }};
+}
+
+// The workers open the GPUs in turn.
+BackendChoice gpu_choice(const Gpus& gpus) {
+  const auto next = std::make_shared<std::atomic<int>>(0);
+  return {"cuda", [gpus, next] { return gpus.open((*next)++ % gpus.count); },
+          kWorkersPerDevice * static_cast<unsigned>(gpus.count)};
+}
+
+Gpus cuda_gpus(Method method) {
+  return {cuda_device_count(), [method](int device) { return make_cuda_backend(method, device); }};
+}
+
+// Why a GPU must not be used; "" if it may be.
+std::string fault_of(const Gpus& gpus, int device) {
+  try {
+    return difference_from_cpu(*gpus.open(device));
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+}  // namespace
+
+void check_backend(const RunOptions& options) {
+  const std::string& backend = options.backend;
+  const std::string& method = options.method;
+  const bool parallel = backend == "parallel-host" || backend == "cuda";
+  if (!parallel && backend != "auto" && backend != "cpu")
+    refuse_backend("backend '" + backend + "': expected auto, cpu, cuda or parallel-host");
+  if (!parallel && !method.empty() && method != "consing")
+    refuse_backend("method '" + method + "': backend " + backend +
+                   " has consing only; expected --backend parallel-host or cuda");
+  if (parallel && !method.empty() && method != "pointers" && method != "hashes")
+    refuse_backend("method '" + method + "': backend " + backend + " has pointers and hashes");
+  if (backend == "cuda" && !cuda_device_available())
+    throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
+}
+
+BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
+  const Method method = method_of(options);
+  if (options.backend == "parallel-host")
+    return {"parallel-host", [method] { return make_parallel_host_backend(method); }};
+  if (options.backend == "cuda") return gpu_choice(cuda_gpus(method));
+  // With `auto`, a method that is given is one of the CPU backend.
+  if (options.backend == "cpu" || !options.method.empty()) return cpu_choice();
+  return choose_automatically(cuda_gpus(method), options.memory_bytes, progress);
+}
+
+BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress) {
+  if (gpus.count == 0) return cpu_choice();
+  if (memory_bytes < kMinMemoryForGpu) {
+    progress.warn("building on the CPU: a GPU needs --memory of at least 2 GiB");
+    return cpu_choice();
+  }
+  for (int device = 0; device < gpus.count; ++device) {
+    const std::string fault = fault_of(gpus, device);
+    if (fault.empty()) continue;
+    progress.warn("building on the CPU: GPU " + std::to_string(device) +
+                  " failed its check: " + fault);
+    return cpu_choice();
+  }
+  return gpu_choice(gpus);
+}
+
+}  // namespace voxdag

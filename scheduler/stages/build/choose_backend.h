@@ -1,0 +1,45 @@
+// Which backend a build's workers open. Thread-safe.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/backend/backend.h"
+#include "core/base/progress.h"
+#include "scheduler/spec/build_spec.h"
+
+namespace voxdag {
+
+struct BackendChoice {
+  std::string name;
+  // Opens one backend per call; every worker calls it once.
+  std::function<std::unique_ptr<Backend>()> open;
+  unsigned max_workers = 256;  // more of them gain nothing
+};
+
+// Throws Error{kInvalidInput} for a backend or method that does not exist or do not go together,
+// Error{kDevice} if there is no GPU for `cuda`.
+void check_backend(const RunOptions& options);
+
+// The choice for options that passed check_backend() and have their memory filled in. `auto` takes
+// the GPUs if there are any, the budget suffices for them and each builds a few subvolumes like the
+// CPU backend; else the CPU, with a warning if there is a GPU.
+BackendChoice choose_backend(const RunOptions& options, Progress& progress);
+
+// The machine's GPUs; tests have others.
+struct Gpus {
+  int count = 0;
+  std::function<std::unique_ptr<Backend>(int device)> open;
+};
+// The choice for `auto`.
+BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress);
+
+// Whether a backend gives correct results on this machine: drivers and devices differ, and nobody
+// would notice a wrong voxel.
+// Builds a few small subvolumes, with a thousand triangles of all sizes and several hash lengths,
+// by `backend` and by the CPU backend. Returns "" if all level arrays and counts are equal, else a
+// sentence. Throws what the backend throws. The CPU's part takes about 30 ms.
+std::string difference_from_cpu(Backend& backend);
+
+}  // namespace voxdag

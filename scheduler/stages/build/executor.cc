@@ -1,0 +1,225 @@
+#include "scheduler/stages/build/executor.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/format/artifact/artifact_writer.h"
+#include "scheduler/spec/memory_plan.h"
+#include "scheduler/stages/build/split_subvolume.h"
+#include "scheduler/stages/partition/partition.h"
+#include "scheduler/state/job_progress.h"
+
+namespace voxdag {
+namespace {
+
+bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) {
+  return a.subvolume.weight < b.subvolume.weight;
+}
+
+// The subvolumes that are left, heaviest first, for all workers. It ends when none is left and none
+// is being built, since one that is built may be split.
+class Queue {
+ public:
+  explicit Queue(std::vector<QueuedSubvolume> heap) : heap_(std::move(heap)) {
+    std::make_heap(heap_.begin(), heap_.end(), lighter);
+  }
+  // The next one to build; nothing at the end.
+  std::optional<QueuedSubvolume> pop() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return failure_ || !heap_.empty() || in_flight_ == 0; });
+    if (failure_ || heap_.empty()) return std::nullopt;
+    std::pop_heap(heap_.begin(), heap_.end(), lighter);
+    const QueuedSubvolume next = heap_.back();
+    heap_.pop_back();
+    ++in_flight_;
+    return next;
+  }
+  // `parts` replace a subvolume that was popped; there are none if it was built.
+  void done(const std::vector<QueuedSubvolume>& parts) {
+    std::lock_guard lock(mutex_);
+    --in_flight_;
+    for (const QueuedSubvolume& part : parts) {
+      heap_.push_back(part);
+      std::push_heap(heap_.begin(), heap_.end(), lighter);
+    }
+    changed_.notify_all();
+  }
+  // Runs a worker's code; an exception stops all workers.
+  template <class Code>
+  void guard(const Code& code) {
+    try {
+      code();
+    } catch (...) {
+      std::lock_guard lock(mutex_);
+      if (!failure_) failure_ = std::current_exception();
+      changed_.notify_all();
+    }
+  }
+  // To be called once all workers have stopped.
+  bool has_failed() const { return failure_ != nullptr; }
+  // To be called once all workers have stopped.
+  void rethrow_failure() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<QueuedSubvolume> heap_;
+  unsigned in_flight_ = 0;
+  std::exception_ptr failure_;
+};
+
+class Worker {
+ public:
+  Worker(const ExecutorOptions& options, uint32_t number, TriangleStore& triangles, JobStore& jobs,
+         MemoryBudget& budget, uint64_t share_bytes, const BuildContext& context)
+      : options_(options),
+        triangles_(triangles),
+        jobs_(jobs),
+        files_(context.files),
+        cancel_(context.cancel),
+        progress_(context.progress),
+        share_(share_bytes, &budget),
+        commits_(std::make_unique<CommitQueue>(
+            jobs,
+            std::make_unique<SegmentWriter>(context.files, options.segment_folder,
+                                            options.first_segment_id + number, budget),
+            triangles, options.checkpoint_interval_s)),
+        segment_(commits_->segment()),
+        backend_(options.open_backend()) {}
+
+  // Builds one subvolume, or returns the up to eight that replace it.
+  std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
+    cancel_.check();
+    const StoredSubvolume& subvolume = queued.subvolume;
+    const int64_t edge = subvolume.cube.edge_voxels(options_.shape.grid_levels);
+    if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
+    progress_.subvolume_begun(subvolume.id);
+    const SubvolumeTask task{options_.shape.grid_levels, subvolume.cube, options_.shape.hash_bits};
+    const auto triangles = triangles_.open(queued.bin);
+    std::optional<std::string> key;
+    if (options_.cache) {
+      MemoryBudget key_share(WorkerMemory::key_bytes(share_.limit()), &share_);
+      key = ArtifactCache::key(task, *triangles, key_share);
+      StoredSubvolume copied = subvolume;
+      if (key && options_.cache->find(*key, options_.shape.grid_levels, copied, segment_)) {
+        ++counts.cached;
+        record_built(copied, queued.bin);
+        return {};
+      }
+    }
+    ArtifactWriter artifact(segment_, options_.shape);
+    StoredSubvolume built = subvolume;
+    if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
+        BuildOutcome::kNeedsSplit)
+      return split(queued);
+    if (!built.summary.empty()) {
+      const ArtifactRoot root{subvolume.cube, 0, built.summary.root_hash, built.summary.voxels,
+                              built.summary.svo_nodes};
+      built.artifact = artifact.finish({&root, 1});
+      if (key) add_to_cache(*key, built.artifact);
+    }
+    record_built(built, queued.bin);
+    return {};
+  }
+  std::unique_ptr<CommitQueue> release_commits() { return std::move(commits_); }
+
+  ExecutorCounts counts;
+
+ private:
+  void record_built(const StoredSubvolume& built, BinId bin) {
+    commits_->add_built(built, bin);
+    SubvolumeStatus status = status_of(built, options_.shape.grid_levels);
+    status.built = true;
+    progress_.subvolume_built(status);
+  }
+
+  void add_to_cache(const std::string& key, const ArtifactRef& artifact) {
+    segment_.flush();
+    if (!written_segment_)
+      written_segment_ = files_.open_read(segment_path(options_.segment_folder, segment_.id()));
+    options_.cache->add(key, *written_segment_, artifact);
+  }
+
+  std::vector<QueuedSubvolume> split(const QueuedSubvolume& whole) {
+    const StoredSubvolume& subvolume = whole.subvolume;
+    if (subvolume.cube.edge_voxels(options_.shape.grid_levels) <= kSmallestEdge)
+      throw Error(ErrorCode::kOutOfMemory,
+                  "a subvolume of " + std::to_string(kSmallestEdge) +
+                      " voxels per edge does not fit a worker's share of " +
+                      std::to_string(share_.limit()) + " bytes: give it more memory (--memory)");
+    ++counts.split;
+    return split_subvolume(whole, options_.shape.grid_levels, triangles_, jobs_, progress_,
+                           cancel_);
+  }
+
+  const ExecutorOptions& options_;
+  TriangleStore& triangles_;
+  JobStore& jobs_;
+  FileSystem& files_;
+  const CancelToken& cancel_;
+  Progress& progress_;
+  MemoryBudget share_;
+  std::unique_ptr<CommitQueue> commits_;
+  SegmentWriter& segment_;
+  std::unique_ptr<Backend> backend_;
+  std::unique_ptr<ReadableFile> written_segment_;
+};
+
+}  // namespace
+
+ExecutorCounts build_subvolumes(const ExecutorOptions& options,
+                                std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
+                                JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,
+                                const BuildContext& context) {
+  uint64_t total = options.built + subvolumes.size();
+  Queue queue(std::move(subvolumes));
+  const auto memory = WorkerMemory::divide(budget.available(), options.threads);
+  std::vector<std::unique_ptr<Worker>> workers;
+  for (unsigned i = 0; i < memory.workers; ++i)
+    workers.push_back(
+        std::make_unique<Worker>(options, i, triangles, jobs, budget, memory.share_bytes, context));
+  std::mutex progress_mutex;
+  const auto work = [&](Worker& worker) {
+    while (const auto subvolume = queue.pop()) {
+      const auto parts = worker.build(*subvolume);
+      queue.done(parts);
+      std::lock_guard lock(progress_mutex);
+      if (parts.empty()) {
+        context.progress.advance(1);
+      } else {
+        context.progress.set_total(total += parts.size() - 1);
+      }
+    }
+  };
+  std::vector<std::thread> threads;
+  queue.guard([&] {
+    for (size_t i = 0; i < workers.size(); ++i)
+      threads.emplace_back([&, i] {
+        queue.guard([&] { work(*workers[i]); });
+        ThreadTimes::add(i);
+      });
+  });
+  for (std::thread& thread : threads) thread.join();
+  ExecutorCounts counts;
+  for (const auto& worker : workers) {
+    counts.split += worker->counts.split;
+    counts.cached += worker->counts.cached;
+    auto commits = worker->release_commits();
+    if (!queue.has_failed()) queue.guard([&] { commits->finish(); });
+    unfinished.add(std::move(commits));
+  }
+  // A failure does not lose what is finished.
+  if (queue.has_failed()) queue.guard([&] { unfinished.commit(); });
+  queue.rethrow_failure();
+  return counts;
+}
+
+}  // namespace voxdag

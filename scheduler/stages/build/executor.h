@@ -1,0 +1,53 @@
+// Builds subvolumes on worker threads: each takes the heaviest one left, builds it with its own
+// backend, appends the artifact to its own segment file and commits it. A subvolume that outgrows
+// the worker's share of memory is split in eight, which are queued in its place.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/backend/backend.h"
+#include "core/format/artifact/artifact.h"
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/state/artifact_cache.h"
+#include "scheduler/state/commit_queue.h"
+#include "scheduler/state/job_store.h"
+#include "scheduler/triangles/triangle_store.h"
+
+namespace voxdag {
+
+// A subvolume that is to be built, and the bin of its triangles.
+struct QueuedSubvolume {
+  StoredSubvolume subvolume;
+  BinId bin = 0;
+};
+
+struct ExecutorOptions {
+  DagShape shape;
+  unsigned threads = 1;
+  uint64_t built = 0;  // subvolumes that need not be built, for the progress
+  // Subvolumes with longer edges are split before they are tried.
+  int64_t longest_edge = INT64_MAX;
+  std::function<std::unique_ptr<Backend>()> open_backend;
+  std::string segment_folder;
+  uint32_t first_segment_id = 0;
+  double checkpoint_interval_s = 2;
+  ArtifactCache* cache = nullptr;  // null if builds share no artifacts
+};
+
+struct ExecutorCounts {
+  uint64_t split = 0;
+  uint64_t cached = 0;  // copied from the cache instead of built
+};
+
+// Builds all of `subvolumes` and uses up their bins. The results are recorded in `jobs`, those of
+// the last groups once `unfinished`, to which the workers' queues are added, is committed. Throws
+// the first Error of any worker after all have stopped and what was finished is recorded.
+ExecutorCounts build_subvolumes(const ExecutorOptions& options,
+                                std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
+                                JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,
+                                const BuildContext& context);
+
+}  // namespace voxdag

@@ -1,0 +1,34 @@
+// The two passes over a scene: the scan finds its bounds; ingest snaps its triangles to the grid,
+// counts them into the top tree and stores them in the scene's bin. Both continue from the state
+// that they are given, which may be that of an earlier run.
+//
+// Several threads read pieces of the scene, of 16384 declared triangles each, and hand on what they
+// made of them in the order of the pieces: the state, and so the plan, does not depend on the
+// number of threads.
+#pragma once
+
+#include <functional>
+
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/stages/ingest/top_tree.h"
+#include "scheduler/state/checkpoint/ingest_record.h"
+#include "scheduler/triangles/triangle_store.h"
+
+namespace voxdag {
+
+// Called after each piece, when the state covers all triangles up to its position.
+using AfterPiece = std::function<void()>;
+
+// Adds the scene's triangles to the bounds of `state`.
+void scan(TriangleSource& scene, IngestState& state, const StageContext& context,
+          const AfterPiece& after_piece);
+
+// The grid that the geometry options describe, for a scene with these bounds.
+Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
+
+// Streams the scene into the scene's bin of `store` and counts it into `top`. Throws Error{kLimit}
+// for a triangle that reaches into the grid from beyond the coordinate limit.
+void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, TopTree& top,
+            const StageContext& context, const AfterPiece& after_piece);
+
+}  // namespace voxdag

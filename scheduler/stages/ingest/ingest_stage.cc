@@ -1,0 +1,145 @@
+#include "scheduler/stages/ingest/ingest_stage.h"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "core/base/error.h"
+#include "core/base/process_limits.h"
+#include "scheduler/spec/memory_plan.h"
+#include "scheduler/stages/ingest/ingest.h"
+
+namespace voxdag {
+namespace {
+
+// Expected bricks of a subvolume: a fraction of a second of work, and tables that stay in the
+// processor's caches.
+constexpr double kMaxBricksPerSubvolume = 4e6;
+// A small build has about this many subvolumes at least, of at least this many expected bricks.
+constexpr double kMinSubvolumes = 64;
+constexpr double kMinBricksPerSubvolume = 131072;
+// How long a build waits until the times of the scene's files can be trusted.
+constexpr int64_t kMaxWait_ns = 200'000'000;
+// More bins than this would make their buffers too small; large subvolumes are split later.
+constexpr size_t kMaxBins = 8192;
+
+std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const RunOptions& options) {
+  if (options.subvolume_edge) {
+    int64_t edge = static_cast<int64_t>(options.subvolume_edge);
+    auto plan = top.subvolumes_by_edge(edge);
+    while (plan.size() > kMaxBins) plan = top.subvolumes_by_edge(edge *= 2);
+    return plan;
+  }
+  double max_weight = std::clamp(top.total_weight() / kMinSubvolumes, kMinBricksPerSubvolume,
+                                 kMaxBricksPerSubvolume);
+  auto plan = top.subvolumes_by_weight(max_weight);
+  while (plan.size() > kMaxBins) plan = top.subvolumes_by_weight(max_weight *= 2);
+  return plan;
+}
+
+TopTreeCells cells_of(const TopTree& top) { return {top.cells(), top.total_weight()}; }
+
+class Preparation {
+ public:
+  Preparation(const BuildSpec& spec, MemoryBudget& budget, const BuildContext& context,
+              IngestCheckpoint& checkpoint)
+      : spec_(spec), budget_(budget), context_(context), checkpoint_(checkpoint) {}
+
+  PreparedScene run(StageClock& clock) {
+    state_ = checkpoint_.resume().value_or(IngestState{});
+    if (state_.stage < IngestStage::kPartition) open();
+    if (state_.stage == IngestStage::kScan) find_grid();
+    clock.finish("scan");
+    open_store();
+    if (state_.stage < IngestStage::kReady) ingest_and_plan();
+    prepared_.max_durable_bytes = max_durable_bytes(spec_, state_.declared_triangles);
+    clock.finish("ingest");
+    return std::move(prepared_);
+  }
+
+ private:
+  void reopen() {
+    scene_ = open_scene(context_.files, spec_.geometry.scenes,
+                        {spec_.geometry.skip_invalid, checkpoint_.decoded_path()}, budget_,
+                        context_.cancel);
+  }
+
+  void open() {
+    const int64_t opened_ns = unix_ns();
+    reopen();
+    if (!checkpoint_.matches(scene_->files())) {
+      state_ = {};
+      enable_checkpoints(opened_ns);
+    }
+    state_.declared_triangles = scene_->declared_triangles();
+    if (state_.position == 0) checkpoint_.check_disk_space(*scene_);
+    for (const std::string& warning : scene_->warnings()) context_.progress.warn(warning);
+  }
+
+  // Waits until the scene's files are old enough to trust their times, if that is soon.
+  void enable_checkpoints(int64_t opened_ns) {
+    checkpoint_.forget();
+    if (!checkpoint_.is_worthwhile(*scene_)) return;
+    const int64_t wait_ns = trusted_from_ns(scene_->files()) - opened_ns;
+    if (wait_ns > 0 && wait_ns <= kMaxWait_ns) {
+      std::this_thread::sleep_for(std::chrono::nanoseconds(wait_ns));
+      opened_ns = unix_ns();
+      reopen();
+    }
+    checkpoint_.enable(*scene_, opened_ns);
+  }
+
+  void find_grid() {
+    if (!spec_.geometry.bounds)
+      scan(*scene_, state_, stage_context(), [&] {
+        if (checkpoint_.is_due()) checkpoint_.save(state_);
+      });
+    state_.grid = choose_grid(spec_.geometry, state_.bounds);
+    state_.stage = IngestStage::kIngest;
+    state_.position = 0;
+    state_.digest = ContentDigest(state_.grid);
+    state_.top_tree_depth = TopTree::depth_within(state_.grid.levels, memory_.top_tree_bytes);
+    checkpoint_.save(state_);
+  }
+
+  void open_store() {
+    prepared_.triangle_budget = std::make_unique<MemoryBudget>(memory_.triangle_bytes, &budget_);
+    prepared_.triangles = checkpoint_.open_store(state_, *prepared_.triangle_budget);
+    if (state_.stage == IngestStage::kReady) prepared_.triangles->release(kSceneBin);
+  }
+
+  void ingest_and_plan() {
+    TopTree top(state_.grid.levels, budget_, state_.top_tree_depth);
+    if (checkpoint_.has_top_tree(state_))
+      checkpoint_.load_top_tree(state_, top.fill(state_.top_tree_weight));
+    if (state_.stage == IngestStage::kIngest) {
+      ingest(*scene_, state_, *prepared_.triangles, top, stage_context(), [&] {
+        if (checkpoint_.is_due()) checkpoint_.save_in_background(state_, cells_of(top));
+      });
+      state_.stage = IngestStage::kPartition;
+      state_.position = 0;
+      checkpoint_.save(state_, cells_of(top));
+    }
+    prepared_.plan = choose_subvolumes(top, spec_.run);
+  }
+
+  StageContext stage_context() const { return {context_, spec_.run.threads, budget_}; }
+
+  const BuildSpec& spec_;
+  MemoryBudget& budget_;
+  const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
+  const BuildContext& context_;
+  IngestCheckpoint& checkpoint_;
+  std::unique_ptr<TriangleSource> scene_;
+  PreparedScene prepared_;
+  IngestState& state_ = prepared_.state;
+};
+
+}  // namespace
+
+PreparedScene prepare_scene(const BuildSpec& spec, MemoryBudget& budget, StageClock& clock,
+                            const BuildContext& context, IngestCheckpoint& checkpoint) {
+  return Preparation(spec, budget, context, checkpoint).run(clock);
+}
+
+}  // namespace voxdag

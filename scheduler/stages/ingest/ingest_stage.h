@@ -1,0 +1,36 @@
+// The ingest stage: from the scene to its triangles in a store, and the subvolumes they are for.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/spec/stage_clock.h"
+#include "scheduler/stages/ingest/top_tree.h"
+#include "scheduler/state/checkpoint/ingest_checkpoint.h"
+#include "scheduler/triangles/triangle_store.h"
+
+namespace voxdag {
+
+// A scene after ingest: its triangles, and the subvolumes they are to be partitioned to.
+struct PreparedScene {
+  IngestState state;
+  std::unique_ptr<MemoryBudget> triangle_budget;
+  std::unique_ptr<TriangleStore> triangles;
+  std::vector<SubvolumePlan> plan;  // empty if an earlier run partitioned the triangles
+  double max_durable_bytes = 0;     // of disk that the triangles take in a build
+
+  // Of the grid and the snapped triangles: names the content.
+  std::string digest() const { return state.digest.hex(); }
+};
+
+// Scans and ingests the scene of a checked spec and plans its subvolumes, resuming at the
+// checkpoint of an earlier run; the scene is not opened if that one was past ingest. Throws
+// DamagedTriangles if the stored triangles are damaged.
+PreparedScene prepare_scene(const BuildSpec& spec, MemoryBudget& budget, StageClock& clock,
+                            const BuildContext& context, IngestCheckpoint& checkpoint);
+
+}  // namespace voxdag

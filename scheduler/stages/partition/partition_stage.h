@@ -1,0 +1,17 @@
+// The partition stage: from the scene's triangles to a bin for each subvolume.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/stages/ingest/ingest_stage.h"
+
+namespace voxdag {
+
+// Partitions the triangles to the subvolumes at `cubes`; returns the bin of each, in the same
+// order. Throws DamagedTriangles if triangles are missing.
+std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube> cubes,
+                                      IngestCheckpoint& checkpoint, const StageContext& context);
+
+}  // namespace voxdag

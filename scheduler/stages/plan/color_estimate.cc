@@ -1,0 +1,87 @@
+#include "scheduler/stages/plan/color_estimate.h"
+
+#include <algorithm>
+
+#include "core/color/cell_values.h"
+#include "scene/textures/texture_set.h"
+#include "scene/triangle_source.h"
+#include "scheduler/spec/memory_plan.h"
+
+namespace voxdag {
+namespace {
+
+// Measured on Sponza at 4096: 4 bits for each cell, a third of that for the coarser levels, and
+// prefixes.
+// The padding of regions with few cells is more.
+constexpr double kColorBytesPerCell = 0.69;
+// Values are not compressed; a third more for the coarser levels, and prefixes.
+constexpr double kCellsOfAllLevels = 1.36;
+constexpr double kPrefixBytesPerCell = 0.03;
+constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};
+// Its header, tables and padding.
+constexpr EstimateRange kFixedFileBytes = {0, 4096, 12288};
+// Sums and lengths of regions.
+constexpr double kArtifactOverFile = 1.02;
+// A surface with an image and without vertex colors, in all its cubes.
+constexpr double kExpectedSurfaceBytes = 65;
+constexpr EstimateRange kSurfaceCopies = {1, 1.5, 3};
+constexpr double kSecondsPerCell = 1.2e-7;
+constexpr double kSecondsPerValue = 2e-8;  // of each other attribute
+// An image's page is decoded, filtered and stored.
+constexpr double kSecondsPerPage = 3e-5;
+
+// In the file, without the padding of regions with few cells.
+double bytes_per_cell(const AttributeSet& attributes, uint64_t materials) {
+  double bytes = 0;
+  for (const Attribute attribute : attributes.list())
+    bytes += attribute == Attribute::kColor
+                 ? kColorBytesPerCell
+                 : kCellsOfAllLevels * value_bytes(attribute, materials) + kPrefixBytesPerCell;
+  return bytes;
+}
+
+EstimateRange above(const EstimateRange& range, double limit) {
+  const auto rest = [&](double value) { return std::max(value - limit, 0.0); };
+  return {rest(range.low), rest(range.likely), rest(range.high)};
+}
+
+}  // namespace
+
+ColorEstimate estimate_colors(const GeometryOptions& options, const EstimateRange& cells,
+                              uint64_t triangles, const StageContext& context) {
+  const BuildContext& build = context.build;
+  const auto scene = open_scene(build.files, options.scenes, {.skip_invalid = options.skip_invalid},
+                                context.budget, build.cancel);
+  SceneMaterials materials = scene->materials();
+  materials.name_unlisted();
+  if (!options.attributes.shows_images()) materials.drop_images();
+  const auto image_bytes =
+      static_cast<double>(pyramid_bytes(build.files, materials, context.budget, build.cancel));
+  const double cell_bytes = bytes_per_cell(options.attributes, materials.names.size());
+  const auto sections = static_cast<double>(options.attributes.list().size());
+  const double limit = static_cast<double>(context.budget.limit());
+  const double share = limit / 3;
+  const EstimateRange surfaces =
+      kExpectedSurfaceBytes * static_cast<double>(triangles) * kSurfaceCopies;
+  ColorEstimate estimate;
+  estimate.cells = cells;
+  estimate.file_bytes = {cell_bytes * kFileSpread.low * cells.low,
+                         cell_bytes * kFileSpread.likely * cells.likely,
+                         cell_bytes * kFileSpread.high * cells.high};
+  estimate.file_bytes = estimate.file_bytes + sections * kFixedFileBytes;
+  estimate.artifact_bytes = kArtifactOverFile * estimate.file_bytes;
+  estimate.spill_bytes = above(surfaces, share) + exactly(image_bytes > share ? image_bytes : 0.0);
+  const double workers = static_cast<double>(
+      context.threads * (ColorMemory::kRegionBytes + ColorMemory::value_bytes(options.attributes)));
+  estimate.memory_bytes = surfaces + exactly(image_bytes + workers);
+  for (double* figure :
+       {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})
+    *figure = std::min(*figure, limit);
+  const double per_cell = kSecondsPerCell + (sections - 1) * kSecondsPerValue;
+  const double seconds =
+      per_cell * cells.likely + kSecondsPerPage * image_bytes / static_cast<double>(kPageBytes);
+  estimate.cpu_s = within(seconds, 1.5);
+  return estimate;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,26 @@
+// What the colors of a build, and other attributes, will take, its geometry not counted.
+#pragma once
+
+#include <cstdint>
+
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/stages/plan/estimate_range.h"
+
+namespace voxdag {
+
+struct ColorEstimate {
+  EstimateRange cells;           // of the color grid, that have a color
+  EstimateRange file_bytes;      // of the sections in the global file
+  EstimateRange artifact_bytes;  // of colors in the work folder, until the file is done
+  EstimateRange spill_bytes;     // of surfaces and pyramids of images that do not fit in memory
+  EstimateRange memory_bytes;
+  EstimateRange cpu_s;
+
+  EstimateRange disk_bytes() const { return file_bytes + artifact_bytes + spill_bytes; }
+};
+
+// `options` with a color resolution. Opens the scene and the headers of its images.
+ColorEstimate estimate_colors(const GeometryOptions& options, const EstimateRange& cells,
+                              uint64_t triangles, const StageContext& context);
+
+}  // namespace voxdag

@@ -1,0 +1,308 @@
+#include "scheduler/stages/plan/estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "scheduler/spec/memory_plan.h"
+#include "scheduler/stages/plan/pilot_triangles.h"
+
+namespace voxdag {
+namespace {
+
+// What the growth of the DAG per doubling of R exceeds this by falls by this factor per doubling.
+// Measured from 8192 on: Sponza's falls from 2.72 to 2.52 at 524288, the dragon's from 3.17 to 2.75
+// at 32768 and 2.65 on average to 262144. At coarser resolutions it falls and rises again, while
+// triangles become larger than bricks: hence fine pilots.
+constexpr double kLateGrowth = 2.5;
+constexpr double kGrowthDecay = 0.75;
+// Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
+constexpr double kSpreadPerDoubling = 1.12;
+// Bytes per node of the global file: a pilot has fewer, since coarse levels repeat more.
+constexpr double kMaxBytesPerNode = 23;
+constexpr double kBytesGrowthPerDoubling = 1.04;
+// Measured on real scenes: nodes of all artifacts over unique ones, their compressed bytes, and CPU
+// time of a whole build over that of a pilot's nodes.
+constexpr double kArtifactNodesPerUnique = 1.5;
+constexpr double kArtifactBytesPerNode = 16;
+// More than an uncompressed node takes, in an artifact or in the global file.
+constexpr double kMaxDiskBytesPerNode = 40;
+constexpr double kBuildOverPilotTime = 1.5;
+// A surface that crosses a brick sets about 16 of its voxels.
+constexpr double kMaxCellsPerBrick = 32;
+// Peak memory of the merge per unique node, and memory of a process without a scene.
+constexpr double kMemoryBytesPerNode = 26;
+constexpr double kBaseMemoryBytes = 24e6;
+
+// Below this resolution a build fits any disk that can hold its scene: no estimate is made.
+constexpr uint32_t kMinLevelsToEstimate = 12;
+// The pilot of this estimate is so much coarser than the build that it costs next to nothing.
+constexpr uint32_t kPilotLevelsBelow = 5;
+
+// A pilot build: the whole scene as one subvolume on a coarser grid, counted and thrown away.
+struct PilotCounts {
+  uint32_t levels = 0;  // of the pilot's grid
+  double voxels = 0;
+  double svo_nodes = 0;
+  double dag_nodes = 0;
+  double file_bytes = 0;  // what its global file would take
+  double cpu_s = 0;
+};
+
+class CountingSink : public SubDagSink {
+ public:
+  void bricks(const BrickLevelView& level) override { words += 2 * level.masks.size(); }
+  void nodes(const NodeLevelView& level) override {
+    words += level.masks.size() + level.children.size();
+  }
+  uint64_t words = 0;
+};
+
+// Builds triangles that are snapped to 2^levels, or finer ones by `shift`, on a grid of 2^levels.
+// Nothing if that does not fit the budget.
+std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t shift,
+                                       uint32_t levels, Backend& backend, MemoryBudget& budget,
+                                       const CancelToken& cancel) {
+  const double start = thread_cpu_seconds();
+  const auto stream = triangles.open(shift);
+  CountingSink sink;
+  SubDagSummary summary;
+  if (backend.build({levels, Cube{}, 64}, *stream, budget, cancel, sink, summary) ==
+      BuildOutcome::kNeedsSplit)
+    return std::nullopt;
+  PilotCounts counts;
+  counts.levels = levels;
+  counts.voxels = static_cast<double>(summary.voxels);
+  counts.svo_nodes = static_cast<double>(summary.svo_nodes);
+  counts.dag_nodes = static_cast<double>(summary.dag_nodes);
+  counts.file_bytes = 4.0 * static_cast<double>(sink.words);
+  counts.cpu_s = thread_cpu_seconds() - start + triangles.cpu_s();
+  return counts;
+}
+
+// Pilots at two resolutions, a doubling apart, the coarser first: the finest of which triangles and
+// tables fit the budget. Fewer if those of a few resolutions do not fit.
+std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
+                                      const StageContext& context) {
+  const auto backend = make_cpu_backend();
+  MemoryBudget share(MemoryPlan::pilot_bytes(context.budget.available()), &context.budget);
+  MemoryBudget triangle_share(share.limit() / 2, &share);
+  const uint32_t grid_levels = scene.state.grid.levels;
+  const uint32_t finest = std::min(pilot_levels, grid_levels);
+  const uint32_t coarsest = std::max<uint32_t>(kMinGridLevels, finest - std::min(finest, 4u));
+  std::vector<PilotCounts> pilots;
+  std::optional<PilotTriangles> triangles;
+  uint32_t triangle_levels = finest;
+  for (uint32_t levels = finest; levels >= coarsest && pilots.size() < 2; --levels) {
+    if (!triangles || !triangles->is_complete()) {
+      triangles.emplace(*scene.triangles, grid_levels - levels, triangle_share, context);
+      triangle_levels = levels;
+    }
+    if (!triangles->is_complete()) continue;
+    const auto pilot = build_pilot(*triangles, triangle_levels - levels, levels, *backend, share,
+                                   context.build.cancel);
+    if (pilot) pilots.insert(pilots.begin(), *pilot);
+  }
+  return pilots;
+}
+
+// a R^2 + b R through the last two pilots, at `doublings` past the last, or before it.
+double grow_as_surface(double coarse, double fine, int doublings) {
+  const double ratio = std::exp2(doublings);
+  const double square = 2 * (fine - 2 * coarse), linear = fine - square;  // of the fine pilot
+  if (square <= 0) return fine * ratio * ratio;
+  const double grown = square * ratio * ratio + linear * ratio;
+  return doublings < 0 ? std::max(grown, 1.0) : std::max(grown, fine);
+}
+
+// The growth from the last pilot but one to the last, falling from there.
+double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
+  const double nodes = pilots.back().dag_nodes;
+  if (pilots.size() < 2 || nodes == 0) return nodes * std::exp2(1.5 * doublings);
+  double growth = nodes / std::max(pilots[pilots.size() - 2].dag_nodes, 1.0);
+  double result = nodes;
+  for (int i = 0; i < doublings; ++i) {
+    if (growth > kLateGrowth) growth = kLateGrowth + (growth - kLateGrowth) * kGrowthDecay;
+    result *= growth;
+  }
+  return result;
+}
+
+// What must be spilled is spilled already. A large scene is also stored durably where the disk has
+// space; it is freed piece by piece while artifacts are written.
+EstimateRange triangles_on_disk(const PreparedScene& scene) {
+  const double spilled = static_cast<double>(scene.triangles->file_bytes());
+  return {spilled, std::max(spilled, scene.max_durable_bytes / 2),
+          std::max(spilled, scene.max_durable_bytes)};
+}
+
+void add_colors(const ColorEstimate& colors, Estimate& estimate) {
+  estimate.colors = colors;
+  estimate.file_bytes = estimate.file_bytes + colors.file_bytes;
+  estimate.disk_bytes = estimate.disk_bytes + colors.disk_bytes();
+  const EstimateRange memory = colors.memory_bytes + exactly(kBaseMemoryBytes);
+  estimate.memory_bytes = {std::max(estimate.memory_bytes.low, memory.low),
+                           std::max(estimate.memory_bytes.likely, memory.likely),
+                           std::max(estimate.memory_bytes.high, memory.high)};
+  estimate.cpu_s = estimate.cpu_s + colors.cpu_s;
+}
+
+// An upper bound for the disk that a build of the scene needs, computed without pilots: several
+// times what it will need.
+double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
+                      const StageContext& context) {
+  // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
+  // (expected_work()): over all levels twice its bricks, and one cube per level.
+  double bricks = 0;
+  for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
+  const double triangles = static_cast<double>(scene.state.counts.triangles);
+  const double octree_nodes = 2 * bricks + scene.state.grid.levels * triangles;
+  const double geometry = kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
+  if (!options.attributes.any()) return geometry;
+  const uint32_t color_levels = levels_of_resolution(options.color_resolution);
+  const double cells =
+      kMaxCellsPerBrick * bricks * std::exp2(-2.0 * (scene.state.grid.levels - color_levels)) +
+      triangles;
+  return geometry + estimate_colors(options, exactly(cells), scene.state.counts.triangles, context)
+                        .disk_bytes()
+                        .high;
+}
+
+void check_disk(const char* what, const EstimateRange& bytes, const std::string& folder,
+                uint64_t free, Progress& progress) {
+  const auto gigabytes = [](double count) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.2f GB", count / 1e9);
+    return std::string(text);
+  };
+  const double free_bytes = static_cast<double>(free);
+  const std::string need = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
+                           " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
+                           " has " + gigabytes(free_bytes) + " free";
+  if (bytes.low > free_bytes) throw DoesNotFit(need + ": expected more free space");
+  if (bytes.high > free_bytes) progress.warn(need);
+}
+
+// Throws Error{kNoSpace} with the estimate if not even its low end fits on the disk of the work
+// folder, or the file's on that of the output's folder; warns if the high end may not fit.
+void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
+                    const std::string& output_folder, Progress& progress) {
+  const uint64_t work_free = files.free_space(work_folder);
+  const uint64_t output_free = files.free_space(output_folder);
+  // Equal to the byte: taken for one disk, which must hold everything.
+  if (work_free == output_free) {
+    check_disk("the build", estimate.disk_bytes, work_folder, work_free, progress);
+    return;
+  }
+  const EstimateRange& all = estimate.disk_bytes;
+  const EstimateRange& file = estimate.file_bytes;
+  check_disk("the build's work folder",
+             {all.low - file.low, all.likely - file.likely, all.high - file.high}, work_folder,
+             work_free, progress);
+  check_disk("the global file", file, output_folder, output_free, progress);
+}
+
+}  // namespace
+
+Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
+                        uint32_t pilot_levels, const StageContext& context) {
+  const MemoryBudget& budget = context.budget;
+  Estimate estimate;
+  estimate.triangles = scene.state.counts.triangles;
+  estimate.subvolumes = scene.plan.size();
+  for (const SubvolumePlan& subvolume : scene.plan) estimate.expected_bricks += subvolume.weight;
+  estimate.free_memory = budget.limit();
+  const auto pilots = build_pilots(scene, pilot_levels, context);
+  if (pilots.empty()) {
+    // Too many triangles even for a small grid: their expected voxels are an upper bound.
+    estimate.voxels = {0, scene.state.counts.expected_voxels, scene.state.counts.expected_voxels};
+    return estimate;
+  }
+  const PilotCounts& last = pilots.back();
+  const PilotCounts& before = pilots[pilots.size() > 1 ? pilots.size() - 2 : 0];
+  const int doublings = static_cast<int>(scene.state.grid.levels - last.levels);
+  estimate.pilot_resolution = uint64_t{1} << last.levels;
+
+  const double surface_spread = 1 + 0.02 * doublings;
+  const double spread = std::pow(kSpreadPerDoubling, doublings);
+  estimate.voxels = within(grow_as_surface(before.voxels, last.voxels, doublings), surface_spread);
+  estimate.svo_nodes =
+      within(grow_as_surface(before.svo_nodes, last.svo_nodes, doublings), surface_spread);
+  const double nodes = std::min(grow_as_dag(pilots, doublings), estimate.svo_nodes.likely);
+  estimate.dag_nodes = within(nodes, spread);
+  const double pilot_bytes = last.dag_nodes > 0 ? last.file_bytes / last.dag_nodes : 0;
+  const double bytes = std::max(
+      pilot_bytes,
+      std::min(pilot_bytes * std::pow(kBytesGrowthPerDoubling, doublings), kMaxBytesPerNode));
+  estimate.file_bytes = bytes * estimate.dag_nodes + exactly(8192);
+
+  const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
+  estimate.disk_bytes =
+      estimate.file_bytes + kArtifactBytesPerNode * artifact_nodes + triangles_on_disk(scene);
+  const double triangle_bytes = static_cast<double>(scene.triangles->record_bytes()) *
+                                static_cast<double>(scene.state.counts.triangles);
+  estimate.memory_bytes = kMemoryBytesPerNode * estimate.dag_nodes + exactly(triangle_bytes);
+  for (double* figure :
+       {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})
+    *figure = std::min(*figure, static_cast<double>(budget.limit())) + kBaseMemoryBytes;
+  const double growth = last.dag_nodes > 0 ? nodes / last.dag_nodes : 1;
+  estimate.cpu_s = within(last.cpu_s * growth * kBuildOverPilotTime, 1.5 * spread);
+  if (options.attributes.any()) {
+    const int color_doublings = static_cast<int>(levels_of_resolution(options.color_resolution)) -
+                                static_cast<int>(last.levels);
+    const EstimateRange cells = within(grow_as_surface(before.voxels, last.voxels, color_doublings),
+                                       1.02 + 0.02 * std::abs(color_doublings));
+    add_colors(estimate_colors(options, cells, estimate.triangles, context), estimate);
+  }
+  estimate.wall_s = (1.05 / std::max(1u, context.threads)) * estimate.cpu_s;
+  return estimate;
+}
+
+bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene,
+                      const std::string& work_folder, MemoryBudget& budget,
+                      const BuildContext& context) {
+  const uint32_t levels = scene.state.grid.levels;
+  if (spec.run.force || levels < kMinLevelsToEstimate) return false;
+  const std::string output_folder = parent_directory(spec.run.output);
+  const uint64_t free_bytes =
+      std::min(context.files.free_space(work_folder), context.files.free_space(output_folder));
+  const StageContext stage{context, spec.run.threads, budget};
+  if (max_disk_bytes(spec.geometry, scene, stage) < static_cast<double>(free_bytes)) return false;
+  const Estimate estimate = estimate_build(spec.geometry, scene, levels - kPilotLevelsBelow, stage);
+  check_estimate(estimate, context.files, work_folder, output_folder, context.progress);
+  return true;
+}
+
+std::string estimate_json(const Estimate& e) {
+  using nlohmann::ordered_json;
+  const auto range = [](const EstimateRange& r) {
+    return ordered_json{{"low", r.low}, {"likely", r.likely}, {"high", r.high}};
+  };
+  ordered_json json = {
+      {"triangles", e.triangles},
+      {"subvolumes", e.subvolumes},
+      {"pilot_resolution", e.pilot_resolution},
+      {"voxels", range(e.voxels)},
+      {"svo_nodes", range(e.svo_nodes)},
+      {"dag_nodes", range(e.dag_nodes)},
+      {"file_bytes", range(e.file_bytes)},
+      {"disk_bytes", range(e.disk_bytes)},
+      {"memory_bytes", range(e.memory_bytes)},
+      {"cpu_s", range(e.cpu_s)},
+      {"wall_s", range(e.wall_s)},
+      {"free_disk_bytes", e.free_disk},
+      {"memory_budget_bytes", e.free_memory},
+  };
+  if (const auto& c = e.colors)
+    json["colors"] = {{"cells", range(c->cells)},
+                      {"file_bytes", range(c->file_bytes)},
+                      {"artifact_bytes", range(c->artifact_bytes)},
+                      {"spill_bytes", range(c->spill_bytes)},
+                      {"cpu_s", range(c->cpu_s)}};
+  return json.dump(2);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,151 @@
+#include "scheduler/state/artifact_cache.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/format/artifact/artifact_copy.h"
+#include "core/format/checksum.h"
+
+namespace voxdag {
+namespace {
+
+// Increased with every change that makes other artifacts of the same triangles.
+constexpr uint64_t kContentVersion = 1;
+
+using Corner = std::array<int64_t, 3>;
+using Triangle = std::array<Corner, 3>;
+
+Triangle canonical(const FixedTriangle& triangle, const int64_t (&low)[3]) {
+  Triangle t;
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t a = 0; a < 3; ++a) t[i][a] = triangle.v[i][a] - low[a];
+  std::sort(t.begin(), t.end());
+  return t;
+}
+
+bool is_entry(const DirectoryEntry& entry) {
+  return !entry.is_directory && entry.name.ends_with(".vdart");
+}
+
+bool is_partial(const DirectoryEntry& entry) {
+  return !entry.is_directory && entry.name.find(".vdart.partial") != std::string::npos;
+}
+
+// An entry is written in seconds: a partial one of this age has lost its writer.
+constexpr double kAbandonedAfter_s = 3600;
+
+}  // namespace
+
+ArtifactCache::ArtifactCache(FileSystem& files, std::string folder, uint64_t limit_bytes)
+    : files_(files), folder_(std::move(folder)), limit_bytes_(limit_bytes) {
+  files_.make_directories(folder_);
+  const double now_s = clock_seconds(CLOCK_REALTIME);
+  for (const DirectoryEntry& entry : files_.list(folder_)) {
+    if (is_entry(entry)) known_bytes_ += entry.bytes;
+    if (is_partial(entry) && now_s - entry.modified_s > kAbandonedAfter_s) remove(entry);
+  }
+}
+
+std::string ArtifactCache::partial_of(const std::string& key) {
+  return path_of(key) + ".partial-" + std::to_string(getpid()) + "-" + std::to_string(partials_++);
+}
+
+std::optional<std::string> ArtifactCache::key(const SubvolumeTask& task, TriangleStream& triangles,
+                                              MemoryBudget& budget) {
+  MemoryCharge charge;
+  std::vector<Triangle> content;
+  try {
+    charge = MemoryCharge(budget, triangles.count() * sizeof(Triangle), "a content key");
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+  content.reserve(triangles.count());
+  const int64_t edge_units = task.cube.edge_voxels(task.grid_levels) * kUnitsPerVoxel;
+  int64_t low[3];
+  for (int a = 0; a < 3; ++a) low[a] = static_cast<int64_t>(task.cube.position[a]) * edge_units;
+  triangles.rewind();
+  std::array<FixedTriangle, 256> batch;
+  while (const size_t n = triangles.read(batch))
+    for (size_t i = 0; i < n; ++i) content.push_back(canonical(batch[i], low));
+  std::sort(content.begin(), content.end());
+  content.erase(std::unique(content.begin(), content.end()), content.end());
+
+  Sha256 digest;
+  const uint64_t head[] = {kContentVersion, task.grid_levels - task.cube.level, task.hash_bits};
+  digest.add(std::as_bytes(std::span(head)));
+  digest.add(std::as_bytes(std::span(content)));
+  triangles.rewind();
+  return digest.finish();
+}
+
+bool ArtifactCache::find(const std::string& key, uint32_t grid_levels, StoredSubvolume& subvolume,
+                         SegmentWriter& segment) {
+  try {
+    const CacheEntry entry = read_cache_entry(files_, path_of(key));
+    subvolume.artifact =
+        copy_artifact(*entry.file, entry.ref, subvolume.cube, grid_levels, segment);
+    subvolume.summary = {entry.root.voxels, entry.root.svo_nodes, entry.dag_nodes, entry.root.hash};
+    mark_used(key);
+    return true;
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kNoSpace) throw;  // the segment's disk is full, not the cache's
+    return false;
+  }
+}
+
+void ArtifactCache::mark_used(const std::string& key) {
+  try {
+    files_.touch(path_of(key));
+  } catch (const Error&) {
+    // The cache is read-only here.
+  }
+}
+
+void ArtifactCache::add(const std::string& key, const ReadableFile& segment,
+                        const ArtifactRef& artifact) {
+  try {
+    const std::string partial = partial_of(key);
+    uint64_t bytes = 0;
+    try {
+      bytes = write_cache_entry(files_, path_of(key), partial, segment, artifact);
+    } catch (const Error&) {
+      files_.remove(partial);
+      throw;
+    }
+    std::lock_guard lock(mutex_);
+    known_bytes_ += bytes;
+    if (known_bytes_ > limit_bytes_) evict();
+  } catch (const Error&) {
+    // The build does not need the entry.
+  }
+}
+
+void ArtifactCache::evict() {
+  std::vector<DirectoryEntry> entries = files_.list(folder_);
+  std::erase_if(entries, [](const DirectoryEntry& entry) { return !is_entry(entry); });
+  std::sort(entries.begin(), entries.end(), [](const DirectoryEntry& a, const DirectoryEntry& b) {
+    return a.modified_s < b.modified_s;
+  });
+  known_bytes_ = 0;
+  for (const DirectoryEntry& entry : entries) known_bytes_ += entry.bytes;
+  for (const DirectoryEntry& entry : entries) {
+    if (known_bytes_ <= limit_bytes_ / 10 * 9) return;
+    known_bytes_ -= entry.bytes;
+    remove(entry);
+  }
+}
+
+void ArtifactCache::remove(const DirectoryEntry& entry) {
+  try {
+    files_.remove(folder_ + "/" + entry.name);
+  } catch (const Error&) {
+    // Another build removed it first.
+  }
+}
+
+}  // namespace voxdag

@@ -1,0 +1,56 @@
+// Artifacts shared between builds: a subvolume whose content was built before, here or in another
+// place of the grid, is copied instead of built.
+//
+// The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube (each
+// with its corners sorted, all sorted, duplicates removed), the cube's edge, hash-bits and the
+// format's version. The cache is a folder with one file per entry; the least recently used are
+// removed when the limit is exceeded. Any number of builds may share it: entries appear whole, by
+// renaming, and an entry that vanishes or is damaged is a miss. Thread-safe.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "core/backend/backend.h"
+#include "core/format/artifact/segment_writer.h"
+#include "core/io/file_system.h"
+#include "scheduler/state/job_store.h"
+
+namespace voxdag {
+
+class ArtifactCache {
+ public:
+  ArtifactCache(FileSystem& files, std::string folder, uint64_t limit_bytes);
+
+  // The key of a subvolume; nothing if its triangles do not fit `budget`: it is not cached then.
+  static std::optional<std::string> key(const SubvolumeTask& task, TriangleStream& triangles,
+                                        MemoryBudget& budget);
+  // Copies the entry of `key` into `segment` and fills in the subvolume's artifact and summary;
+  // false if there is no entry, or it is
+  // damaged.
+  bool find(const std::string& key, uint32_t grid_levels, StoredSubvolume& subvolume,
+            SegmentWriter& segment);
+  // Adds the artifact, which lies flushed in `segment`. Fails silently, since no build needs it.
+  void add(const std::string& key, const ReadableFile& segment, const ArtifactRef& artifact);
+
+ private:
+  std::string path_of(const std::string& key) const { return folder_ + "/" + key + ".vdart"; }
+  // A name that no other writer uses, in this process or another.
+  std::string partial_of(const std::string& key);
+  void mark_used(const std::string& key);
+  // Removes the least recently used entries until nine tenths of the limit are left.
+  void evict();
+  void remove(const DirectoryEntry& entry);
+
+  FileSystem& files_;
+  const std::string folder_;
+  const uint64_t limit_bytes_;
+  std::mutex mutex_;          // guards known_bytes_
+  uint64_t known_bytes_ = 0;  // when the folder was last listed, plus what was added since
+  std::atomic<uint64_t> partials_{0};
+};
+
+}  // namespace voxdag

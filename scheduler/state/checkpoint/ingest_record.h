@@ -1,0 +1,58 @@
+// What a checkpoint of scan, ingest and partition records: which scene they read and how far they
+// are. One row of the job store holds it; the triangles themselves lie in the durable store.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/geometry/grid.h"
+#include "scene/triangle_source.h"
+#include "scheduler/state/checkpoint/content_digest.h"
+#include "scheduler/triangles/durable_store.h"
+
+namespace voxdag {
+
+struct IngestCounts {
+  uint64_t triangles = 0;        // that may touch the grid
+  uint64_t dropped_outside = 0;  // their boxes miss it
+  uint64_t dropped_invalid = 0;
+  double expected_voxels = 0;  // the sum over the triangles; shared voxels count twice
+};
+
+enum class IngestStage : uint32_t {
+  kScan,       // the bounds of the triangles up to `position` are known
+  kIngest,     // the grid is known, and the triangles up to `position` are in the scene's bin
+  kPartition,  // all are, and the first `position` of them are in the cube bins, too
+  kReady,      // all are in the cube bins; the scene's bin is gone
+};
+
+// A plain value. What is not known yet has its default.
+struct IngestState {
+  IngestStage stage = IngestStage::kScan;
+  uint32_t top_tree_depth = 0;
+  uint64_t declared_triangles = 0;
+  uint64_t position = 0;
+  WorldBounds bounds;
+  Grid grid;
+  IngestCounts counts;
+  ContentDigest digest;
+  Extent top_tree;  // its cells, in the durable store's file
+  double top_tree_weight = 0;
+  DurableStoreState triangles;  // without a file once all subvolumes are recorded
+};
+
+struct IngestRecord {
+  std::string request;            // the geometry options and scenes of the build
+  std::vector<SourceFile> files;  // that the scene was read from
+  IngestState state;
+};
+
+std::vector<std::byte> encode(const IngestRecord& record);
+// Throws Error{kCorrupt} for bytes that encode() did not write, Error{kUnsupportedVersion} for
+// those of another version of it.
+IngestRecord decode_ingest_record(std::span<const std::byte> bytes);
+
+}  // namespace voxdag

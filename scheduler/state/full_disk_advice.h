@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <string>
+
+#include "scheduler/state/job_store.h"
+
+namespace voxdag {
+
+// What to do about a full disk, as the end of an error message. The artifacts of all subvolumes,
+// estimated from those that are built, and a global file of about the same size must fit.
+// Colors come on top.
+inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, bool has_colors) {
+  double built = 0, planned = 0, bytes = 0;
+  for (const StoredSubvolume& subvolume : leaves) {
+    (subvolume.state == SubvolumeState::kBuilt ? built : planned) += subvolume.weight;
+    bytes += static_cast<double>(subvolume.artifact.bytes);
+  }
+  std::string needed;
+  if (built > 0) {
+    const double artifacts = bytes * (1 + planned / built);
+    needed = "about " + std::to_string(std::llround((2 * artifacts - bytes) / 1e6)) + " MB of ";
+    if (has_colors) needed = "what colors take (voxdag plan says how much) and " + needed;
+  }
+  return "; the job is paused: free " + needed + "disk space and run the same command again";
+}
+
+}  // namespace voxdag

@@ -1,0 +1,65 @@
+// Passes a build's progress on, and writes it to the job store about once per second, so that
+// `voxdag status` can show it from another process. Thread-safe.
+//
+// The thread whose call is due lists the work folder and writes the row; no other thread waits for
+// it. That is little enough not to need a thread of its own.
+#pragma once
+
+#include <mutex>
+
+#include "core/base/error.h"
+#include "core/base/progress.h"
+#include "scheduler/state/job_store.h"
+#include "scheduler/state/work_folder.h"
+
+namespace voxdag {
+
+class JobProgress : public Progress {
+ public:
+  JobProgress(Progress& shown, JobStore& store, const WorkFolder& work)
+      : shown_(shown), work_(work), store_(&store) {}
+
+  void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
+  void resume_at(uint64_t done) override;
+  void advance(uint64_t count) override;
+  void set_total(uint64_t total) override;
+  void end_stage() override;
+  void warn(std::string_view message) override { shown_.warn(message); }
+  void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override {
+    shown_.set_subvolumes(resolution, all);
+  }
+  void set_grid(const std::array<double, 3>& origin, double edge) override {
+    shown_.set_grid(origin, edge);
+  }
+  void subvolume_begun(int64_t id) override { shown_.subvolume_begun(id); }
+  void subvolume_built(const SubvolumeStatus& built) override { shown_.subvolume_built(built); }
+  void subvolume_split(int64_t id, std::span<const SubvolumeStatus> parts) override {
+    shown_.subvolume_split(id, parts);
+  }
+  void set_cluster_tasks(const ClusterTasks& tasks) override { shown_.set_cluster_tasks(tasks); }
+  void record_failure(const Error& error);
+  // From here on progress is only passed on: the store is about to close.
+  void detach();
+
+ private:
+  // Changes the snapshot, and writes it if that is due or `at_once`.
+  template <class Change>
+  void update(bool at_once, const Change& change);
+  void write();
+
+  Progress& shown_;
+  const WorkFolder& work_;
+  std::mutex mutex_;  // guards the next two
+  ProgressSnapshot snapshot_;
+  double last_written_s_ = 0;
+  std::mutex store_mutex_;  // guards the store; locked before mutex_, never after it
+  JobStore* store_;
+};
+
+// A subvolume as Progress reports it.
+SubvolumeStatus status_of(const StoredSubvolume& subvolume, uint32_t grid_levels);
+// Reports all subvolumes of a build.
+void report_subvolumes(std::span<const StoredSubvolume> all, uint32_t grid_levels,
+                       Progress& progress);
+
+}  // namespace voxdag

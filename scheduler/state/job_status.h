@@ -1,0 +1,37 @@
+// The state of a build, read from its work folder at any time, even while another process builds
+// there.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/io/file_system.h"
+#include "scheduler/state/job_store.h"
+
+namespace voxdag {
+
+struct JobStatus {
+  bool running = false;  // a process has locked the folder
+  std::string holder;    // that process
+  std::string geometry;  // options as JSON; "" before the job began
+  uint64_t subvolumes = 0;
+  uint64_t built = 0;
+  std::optional<ProgressSnapshot> progress;
+  std::vector<StageTime> stages;
+
+  // Units per second in the current stage, and seconds left at that rate; 0 if unknown.
+  double rate() const;
+  double eta_s() const;
+};
+
+// Throws Error{kNotFound} if the folder has no job store.
+JobStatus read_job_status(FileSystem& files, const std::string& work_folder);
+
+// One JSON object, names as in docs/cli.md.
+// `cluster`: that of a cluster build as JSON, if it
+// is one.
+std::string status_json(const JobStatus& status, const std::string& cluster = "");
+
+}  // namespace voxdag

@@ -1,0 +1,498 @@
+#include "scheduler/state/job_store.h"
+
+#include "core/base/error.h"
+#include "core/db/row.h"
+#include "core/format/checksum.h"
+
+namespace voxdag {
+namespace {
+
+// "vdag": marks a database as a job store.
+constexpr int64_t kApplicationId = 0x76646167;
+
+constexpr int64_t kSchemaVersion = 7;
+
+constexpr const char* kTables = R"sql(
+CREATE TABLE job (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  scene_digest TEXT NOT NULL,
+  geometry TEXT NOT NULL,
+  format_version INTEGER NOT NULL,
+  -- Their ids are 1, 2, ...
+  subvolumes INTEGER NOT NULL,
+  row_checksum INTEGER NOT NULL
+);
+CREATE TABLE subvolume (
+  id INTEGER PRIMARY KEY,
+  parent INTEGER REFERENCES subvolume (id),
+  level INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL, z INTEGER NOT NULL,
+  weight REAL NOT NULL,
+  state INTEGER NOT NULL CHECK (state BETWEEN 0 AND 2),
+  segment INTEGER NOT NULL, offset INTEGER NOT NULL, bytes INTEGER NOT NULL,
+  index_offset INTEGER NOT NULL, checksum INTEGER NOT NULL,
+  voxels INTEGER NOT NULL, svo_nodes INTEGER NOT NULL, dag_nodes INTEGER NOT NULL,
+  root_hash INTEGER NOT NULL,
+  row_checksum INTEGER NOT NULL
+);
+-- Replacing a row searches for rows that refer to it: without an index, all of them.
+CREATE INDEX subvolume_by_parent ON subvolume (parent);
+CREATE TABLE stage_time (
+  id INTEGER PRIMARY KEY,
+  name TEXT NOT NULL, wall_s REAL NOT NULL, cpu_s REAL NOT NULL,
+  largest_thread_share REAL NOT NULL
+);
+CREATE TABLE progress (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  stage TEXT NOT NULL, unit TEXT NOT NULL, done INTEGER NOT NULL, total INTEGER NOT NULL,
+  resumed_at INTEGER NOT NULL,
+  stage_started_s REAL NOT NULL, updated_s REAL NOT NULL,
+  memory_bytes INTEGER NOT NULL, disk_bytes INTEGER NOT NULL, last_error TEXT NOT NULL
+);
+-- An unfinished merge, and the file that a finished one is about to publish.
+CREATE TABLE merge (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  level INTEGER NOT NULL,
+  state BLOB NOT NULL,
+  row_checksum INTEGER NOT NULL
+);
+CREATE TABLE result (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  output TEXT NOT NULL, sha256 TEXT NOT NULL, bytes INTEGER NOT NULL,
+  voxels INTEGER NOT NULL, svo_nodes INTEGER NOT NULL, dag_nodes INTEGER NOT NULL,
+  merge_passes INTEGER NOT NULL, merge_partitions INTEGER NOT NULL,
+  merge_streamed_groups INTEGER NOT NULL, sections TEXT NOT NULL,
+  row_checksum INTEGER NOT NULL
+);
+-- The progress of scan, ingest and partition; the triangles are in a file.
+CREATE TABLE ingest (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  record BLOB NOT NULL,
+  row_checksum INTEGER NOT NULL
+);
+)sql";
+
+void check_sound(SqlDatabase& database) {
+  auto check = database.prepare("PRAGMA integrity_check(1)");
+  std::string found = check.step() ? check.text(0) : "no answer";
+  if (found == "ok") return;
+  // A heading may come first.
+  if (found.starts_with("***")) found.erase(0, found.find('\n') + 1);
+  throw Error(ErrorCode::kCorrupt, "it is damaged (" + found + ")");
+}
+
+// Throws Error{kInvalidInput} or Error{kUnsupportedVersion}.
+void check_schema(SqlDatabase& database, const std::string& path) {
+  if (database.integer("PRAGMA application_id") != kApplicationId)
+    throw Error(ErrorCode::kInvalidInput, path + " is not a job store of voxdag");
+  const int64_t version = database.integer("PRAGMA user_version");
+  if (version != kSchemaVersion)
+    throw Error(ErrorCode::kUnsupportedVersion,
+                path + " is a job store of version " + std::to_string(version) +
+                    ": expected version " + std::to_string(kSchemaVersion));
+}
+
+// Creates the tables in an empty database, in one transaction; else checks them.
+void prepare_schema(SqlDatabase& database, const std::string& path) {
+  const bool empty = is_new(database);
+  if (!empty) check_schema(database, path);
+  database.execute("PRAGMA journal_mode = WAL");
+  database.execute("PRAGMA foreign_keys = ON");
+  if (!empty) return check_sound(database);
+  change_schema(database, kTables, kApplicationId, kSchemaVersion);
+}
+
+// SQLite does not check its pages: every row that decides the result has a checksum, and the job's
+// row the number of subvolumes. What another row says that is missing is done again.
+template <class Record>
+struct Sealed {
+  Record record;
+  uint64_t checksum = 0;
+};
+
+// The bytes of the columns, each with its length, in order.
+class RowDigest {
+ public:
+  void fixed(const char*, int64_t) {}
+  template <class Value>
+  void operator()(const char*, const Value& value) {
+    const auto word = static_cast<int64_t>(value);
+    add(&word, sizeof word);
+  }
+  void operator()(const char*, const double& value) { add(&value, sizeof value); }
+  void operator()(const char*, const std::string& text) { add(text.data(), text.size()); }
+  void operator()(const char*, const std::vector<std::byte>& blob) {
+    add(blob.data(), blob.size());
+  }
+  void operator()(const char*, const std::optional<int64_t>& value) {
+    add(value ? &*value : nullptr, value ? sizeof *value : 0);
+  }
+  uint64_t value() const { return checksum64(std::as_bytes(std::span(bytes_))); }
+
+ private:
+  void add(const void* data, uint64_t size) {
+    bytes_.append(reinterpret_cast<const char*>(&size), sizeof size);
+    bytes_.append(static_cast<const char*>(data), size);
+  }
+  std::string bytes_;
+};
+
+struct SubvolumeRow {
+  StoredSubvolume subvolume;
+  std::optional<SubvolumeId> parent;
+};
+
+template <class Row>
+void columns(Row& row, SubvolumeRow& r) {
+  StoredSubvolume& s = r.subvolume;
+  row("id", s.id);
+  row("parent", r.parent);
+  row("level", s.cube.level);
+  row("x", s.cube.position[0]);
+  row("y", s.cube.position[1]);
+  row("z", s.cube.position[2]);
+  row("weight", s.weight);
+  row("state", s.state);
+  row("segment", s.artifact.segment);
+  row("offset", s.artifact.offset);
+  row("bytes", s.artifact.bytes);
+  row("index_offset", s.artifact.index_offset);
+  row("checksum", s.artifact.checksum);
+  row("voxels", s.summary.voxels);
+  row("svo_nodes", s.summary.svo_nodes);
+  row("dag_nodes", s.summary.dag_nodes);
+  row("root_hash", s.summary.root_hash);
+}
+
+struct IngestRow {
+  std::vector<std::byte> record;
+};
+
+template <class Row>
+void columns(Row& row, IngestRow& r) {
+  row.fixed("id", 1);
+  row("record", r.record);
+}
+
+struct JobRow {
+  JobIdentity job;
+  int64_t subvolumes = 0;
+};
+
+}  // namespace
+
+template <class Row>
+void columns(Row& row, JobIdentity& job) {
+  row.fixed("id", 1);
+  row("scene_digest", job.scene_digest);
+  row("geometry", job.geometry);
+  row("format_version", job.format_version);
+}
+
+template <class Row>
+void columns(Row& row, StoredMerge& merge) {
+  row.fixed("id", 1);
+  row("level", merge.level);
+  row("state", merge.state);
+}
+
+template <class Row>
+void columns(Row& row, JobResult& result) {
+  row.fixed("id", 1);
+  row("output", result.output);
+  row("sha256", result.sha256);
+  row("bytes", result.bytes);
+  row("voxels", result.merge.voxels);
+  row("svo_nodes", result.merge.svo_nodes);
+  row("dag_nodes", result.merge.dag_nodes);
+  row("merge_passes", result.merge.passes);
+  row("merge_partitions", result.merge.hash_partitions);
+  row("merge_streamed_groups", result.merge.streamed_groups);
+  row("sections", result.sections);
+}
+
+template <class Row>
+void columns(Row& row, StageTime& time) {
+  row("name", time.name);
+  row("wall_s", time.wall_s);
+  row("cpu_s", time.cpu_s);
+  row("largest_thread_share", time.largest_thread_share);
+}
+
+template <class Row>
+void columns(Row& row, ProgressSnapshot& progress) {
+  row.fixed("id", 1);
+  row("stage", progress.stage);
+  row("unit", progress.unit);
+  row("done", progress.done);
+  row("total", progress.total);
+  row("resumed_at", progress.resumed_at);
+  row("stage_started_s", progress.stage_started_s);
+  row("updated_s", progress.updated_s);
+  row("memory_bytes", progress.memory_bytes);
+  row("disk_bytes", progress.disk_bytes);
+  row("last_error", progress.last_error);
+}
+
+namespace {
+
+template <class Row>
+void columns(Row& row, JobRow& r) {
+  columns(row, r.job);
+  row("subvolumes", r.subvolumes);
+}
+
+template <class Row, class Record>
+void columns(Row& row, Sealed<Record>& sealed) {
+  columns(row, sealed.record);
+  row("row_checksum", sealed.checksum);
+}
+
+template <class Record>
+uint64_t checksum_of(Record& record) {
+  RowDigest digest;
+  columns(digest, record);
+  return digest.value();
+}
+
+template <class Record>
+void put_sealed(SqlDatabase& database, const std::string& table, Record record) {
+  const uint64_t checksum = checksum_of(record);
+  put_row(database, table, Sealed<Record>{std::move(record), checksum});
+}
+
+// Throws Error{kCorrupt} naming `what` if the row is not as it was written.
+template <class Record>
+Record unsealed(Sealed<Record> sealed, const std::string& what) {
+  if (sealed.checksum != checksum_of(sealed.record))
+    throw Error(ErrorCode::kCorrupt,
+                "job store: the row of " + what + " fails its checksum: start over with --restart");
+  return std::move(sealed.record);
+}
+
+template <class Record>
+std::optional<Record> find_sealed(SqlDatabase& database, const std::string& table,
+                                  const std::string& what) {
+  auto row = find_row<Sealed<Record>>(database, table);
+  if (!row) return std::nullopt;
+  return unsealed(std::move(*row), what);
+}
+
+void write_subvolume(SqlDatabase& database, const StoredSubvolume& s,
+                     std::optional<SubvolumeId> parent) {
+  put_sealed(database, "subvolume", SubvolumeRow{s, parent});
+}
+
+}  // namespace
+
+JobStore::JobStore(const std::string& path, Access access)
+    : database_(path, access == Access::kBuild ? SqlDatabase::Mode::kReadWrite
+                                               : SqlDatabase::Mode::kReadOnly) {
+  try {
+    if (access == Access::kBuild)
+      prepare_schema(database_, path);
+    else
+      check_schema(database_, path);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion)
+      throw;
+    throw Error(error.code(),
+                "job store " + path + ": " + error.message() + "; start over with --restart");
+  }
+}
+
+std::optional<JobIdentity> JobStore::job() {
+  std::lock_guard lock(mutex_);
+  auto row = find_sealed<JobRow>(database_, "job", "the job");
+  if (!row) return std::nullopt;
+  return std::move(row->job);
+}
+
+void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> plan) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.execute("UPDATE subvolume SET parent = NULL; DELETE FROM subvolume;");
+  database_.execute(
+      "DELETE FROM job; DELETE FROM progress; DELETE FROM merge; DELETE FROM result;");
+  put_sealed(database_, "job", JobRow{job, static_cast<int64_t>(plan.size())});
+  SubvolumeId next = 1;
+  for (StoredSubvolume subvolume : plan) {
+    subvolume.id = next++;
+    write_subvolume(database_, subvolume, std::nullopt);
+  }
+  transaction.commit();
+  built_in_memory_.clear();
+}
+
+std::vector<StoredSubvolume> JobStore::leaves() {
+  std::lock_guard lock(mutex_);
+  // Both statements see the same state of the database, since the first one stays open.
+  auto jobs = select_rows<Sealed<JobRow>>(database_, "job");
+  if (!jobs.step()) return {};
+  const JobRow job = unsealed(read_row<Sealed<JobRow>>(jobs), "the job");
+  auto rows = select_rows<Sealed<SubvolumeRow>>(database_, "subvolume", "ORDER BY id");
+  std::vector<StoredSubvolume> leaves;
+  int64_t count = 0;
+  while (rows.step()) {
+    auto row = read_row<Sealed<SubvolumeRow>>(rows);
+    const std::string name = "subvolume " + std::to_string(row.record.subvolume.id);
+    const StoredSubvolume subvolume = unsealed(std::move(row), name).subvolume;
+    if (subvolume.id != ++count) break;
+    if (subvolume.state == SubvolumeState::kSplit) continue;
+    const auto built = built_in_memory_.find(subvolume.id);
+    leaves.push_back(built == built_in_memory_.end() ? subvolume : built->second);
+  }
+  if (count != job.subvolumes)
+    throw Error(ErrorCode::kCorrupt,
+                "job store: rows of subvolumes are missing: start over with --restart");
+  return leaves;
+}
+
+void JobStore::record_built(std::span<const StoredSubvolume> built) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  for (StoredSubvolume subvolume : built) {
+    subvolume.state = SubvolumeState::kBuilt;
+    update_row(subvolume);
+  }
+  transaction.commit();
+  for (const StoredSubvolume& subvolume : built) built_in_memory_.erase(subvolume.id);
+}
+
+void JobStore::mark_built_in_memory(std::span<const StoredSubvolume> built) {
+  std::lock_guard lock(mutex_);
+  for (const StoredSubvolume& subvolume : built)
+    built_in_memory_.insert_or_assign(subvolume.id, subvolume).first->second.state =
+        SubvolumeState::kBuilt;
+}
+
+void JobStore::forget_built_in_memory() {
+  std::lock_guard lock(mutex_);
+  built_in_memory_.clear();
+}
+
+std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
+                                                std::span<const Cube> parts) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_, Durable::kLater);
+  StoredSubvolume split = whole;
+  split.state = SubvolumeState::kSplit;
+  update_row(split);
+  auto job = find_sealed<JobRow>(database_, "job", "the job");
+  if (!job) throw Error(ErrorCode::kCorrupt, "job store: the row of the job is missing");
+  SubvolumeId next = job->subvolumes + 1;
+  job->subvolumes += static_cast<int64_t>(parts.size());
+  put_sealed(database_, "job", *job);
+  std::vector<SubvolumeId> ids;
+  for (const Cube& cube : parts) {
+    StoredSubvolume part;
+    part.id = next++;
+    part.cube = cube;
+    part.weight = whole.weight / static_cast<double>(parts.size());
+    write_subvolume(database_, part, whole.id);
+    ids.push_back(part.id);
+  }
+  transaction.commit();
+  return ids;
+}
+
+void JobStore::mark_for_rebuild(const StoredSubvolume& lost) {
+  std::lock_guard lock(mutex_);
+  StoredSubvolume planned;
+  planned.id = lost.id;
+  planned.cube = lost.cube;
+  planned.weight = lost.weight;
+  SqlTransaction transaction(database_);
+  update_row(planned);
+  database_.execute("DELETE FROM ingest");
+  transaction.commit();
+  built_in_memory_.erase(lost.id);
+}
+
+void JobStore::update_row(const StoredSubvolume& subvolume) {
+  auto rows = select_rows<SubvolumeRow>(database_, "subvolume", "WHERE id = ?");
+  rows.bind(0, subvolume.id);
+  write_subvolume(database_, subvolume,
+                  rows.step() ? read_row<SubvolumeRow>(rows).parent : std::nullopt);
+}
+
+std::optional<std::vector<std::byte>> JobStore::ingest() {
+  std::lock_guard lock(mutex_);
+  auto row = find_sealed<IngestRow>(database_, "ingest", "what was ingested");
+  if (!row) return std::nullopt;
+  return std::move(row->record);
+}
+
+void JobStore::save_ingest(std::span<const std::byte> record) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  put_sealed(database_, "ingest", IngestRow{{record.begin(), record.end()}});
+  transaction.commit();
+}
+
+void JobStore::forget_ingest() {
+  std::lock_guard lock(mutex_);
+  if (database_.integer("SELECT count(*) FROM ingest") == 0) return;
+  SqlTransaction transaction(database_);
+  database_.execute("DELETE FROM ingest");
+  transaction.commit();
+}
+
+std::optional<StoredMerge> JobStore::merge() {
+  std::lock_guard lock(mutex_);
+  return find_sealed<StoredMerge>(database_, "merge", "the merge");
+}
+
+void JobStore::save_merge(uint32_t level, std::span<const std::byte> state) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  put_sealed(database_, "merge", StoredMerge{level, {state.begin(), state.end()}});
+  transaction.commit();
+}
+
+void JobStore::forget_merge() {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  database_.execute("DELETE FROM merge; DELETE FROM result;");
+  transaction.commit();
+}
+
+void JobStore::record_result(const JobResult& result) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_);
+  put_sealed(database_, "result", result);
+  transaction.commit();
+}
+
+std::optional<JobResult> JobStore::result() {
+  std::lock_guard lock(mutex_);
+  return find_sealed<JobResult>(database_, "result", "the result");
+}
+
+void JobStore::add_stage_time(const StageTime& time) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_, Durable::kLater);
+  put_row(database_, "stage_time", time);
+  transaction.commit();
+}
+
+std::vector<StageTime> JobStore::stage_times() {
+  std::lock_guard lock(mutex_);
+  auto rows = select_rows<StageTime>(database_, "stage_time", "ORDER BY id");
+  std::vector<StageTime> times;
+  while (rows.step()) times.push_back(read_row<StageTime>(rows));
+  return times;
+}
+
+void JobStore::set_progress(const ProgressSnapshot& p) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_, Durable::kLater);
+  put_row(database_, "progress", p);
+  transaction.commit();
+}
+
+std::optional<ProgressSnapshot> JobStore::progress() {
+  std::lock_guard lock(mutex_);
+  return find_row<ProgressSnapshot>(database_, "progress");
+}
+
+}  // namespace voxdag

@@ -1,0 +1,140 @@
+// The durable state of a build in one SQLite file of the work folder (WAL, synchronous = FULL where
+// it matters, foreign keys): the progress of ingest, the job, its subvolumes and their artifacts,
+// the unfinished merge, timings and progress.
+//
+// Invariants:
+//   1. A row names an artifact only after the artifact's bytes were synced.
+//   2. Subvolumes form a forest: a split one has its eight parts (those with triangles) as
+//      children; the leaves are what is built.
+//   3. Every row that decides the result carries a checksum; one that fails it is Error{kCorrupt}.
+//      Subvolumes are numbered from 1, and the job's row has their number: so is one that is
+//      missing.
+//   4. All rows of one call are committed together or not at all.
+// Thread-safe. One process writes, which the work folder's lock ensures; readers (`voxdag status`)
+// may open the same file at any time. Only the writer's leaves() include what is built but not yet
+// durable.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/dag/sub_dag.h"
+#include "core/db/sqlite.h"
+#include "core/format/artifact/artifact.h"
+#include "core/geometry/cube.h"
+#include "merge/merge.h"
+#include "scheduler/spec/stage_clock.h"
+
+namespace voxdag {
+
+// What must be the same for a build to be resumed.
+struct JobIdentity {
+  std::string scene_digest;  // of the grid and the snapped triangles
+  std::string geometry;      // geometry options as JSON, for messages
+  int64_t format_version = 0;
+  bool operator==(const JobIdentity&) const = default;
+};
+
+enum class SubvolumeState { kPlanned = 0, kBuilt = 1, kSplit = 2 };
+
+using SubvolumeId = int64_t;
+
+struct StoredSubvolume {
+  SubvolumeId id = 0;
+  Cube cube;
+  double weight = 0;
+  SubvolumeState state = SubvolumeState::kPlanned;
+  // Of the built ones; no artifact if `summary` is empty.
+  ArtifactRef artifact;
+  SubDagSummary summary;
+};
+
+// A merge that is not finished; see Checkpoint.
+struct StoredMerge {
+  uint32_t level = 0;  // only levels of the artifacts above this one are still read
+  std::vector<std::byte> state;
+};
+
+// A complete global file that is about to be renamed to its final name.
+struct JobResult {
+  std::string output;
+  std::string sha256;
+  uint64_t bytes = 0;
+  MergeReport merge;     // without input_nodes and scratch_bytes
+  std::string sections;  // digest of what is behind the levels; "" if nothing is
+};
+
+// The progress of a build as other processes see it.
+struct ProgressSnapshot {
+  std::string stage;
+  std::string unit;
+  uint64_t done = 0;
+  uint64_t total = 0;
+  uint64_t resumed_at = 0;     // units that earlier runs did
+  double stage_started_s = 0;  // Unix time
+  double updated_s = 0;
+  uint64_t memory_bytes = 0;  // resident
+  uint64_t disk_bytes = 0;    // in the work folder
+  std::string last_error;
+};
+
+class JobStore {
+ public:
+  enum class Access { kBuild, kRead };
+
+  // Opens the store; for kBuild creates it. Throws
+  // Error{kCorrupt} for a damaged one, Error{kInvalidInput} for another kind of database,
+  // Error{kUnsupportedVersion}.
+  JobStore(const std::string& path, Access access);
+
+  std::optional<JobIdentity> job();
+  // Replaces all that the store has by a new job whose subvolumes are all planned.
+  void start(const JobIdentity& job, std::span<const StoredSubvolume> plan);
+  // All that are not split, in the order of their ids.
+  std::vector<StoredSubvolume> leaves();
+  void record_built(std::span<const StoredSubvolume> built);
+  // Makes leaves() of this object return these subvolumes as built, although they become durable
+  // only with record_built().
+  void mark_built_in_memory(std::span<const StoredSubvolume> built);
+  // Makes leaves() return as planned again what is not recorded.
+  void forget_built_in_memory();
+  // Returns the ids of the parts, in their order.
+  std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
+  // Plans a subvolume again whose artifact turned out to be damaged. The progress of ingest is
+  // forgotten too, since the triangles of built subvolumes are gone.
+  void mark_for_rebuild(const StoredSubvolume& lost);
+
+  // The progress of scan, ingest and partition as save_ingest() stored it, of the present job or of
+  // one that is about to start. Throws Error{kCorrupt} if it fails its checksum.
+  std::optional<std::vector<std::byte>> ingest();
+  void save_ingest(std::span<const std::byte> record);
+  // Writes nothing if none is stored.
+  void forget_ingest();
+
+  std::optional<StoredMerge> merge();
+  void save_merge(uint32_t level, std::span<const std::byte> state);
+  // Forgets the state of the merge and its result.
+  void forget_merge();
+  void record_result(const JobResult& result);
+  std::optional<JobResult> result();
+
+  void add_stage_time(const StageTime& time);
+  std::vector<StageTime> stage_times();
+  void set_progress(const ProgressSnapshot& progress);
+  std::optional<ProgressSnapshot> progress();
+
+ private:
+  void update_row(const StoredSubvolume& subvolume);
+
+  std::mutex mutex_;  // guards all below
+  SqlDatabase database_;
+  std::map<SubvolumeId, StoredSubvolume> built_in_memory_;  // not yet recorded
+};
+
+}  // namespace voxdag

@@ -1,0 +1,237 @@
+#include "scheduler/state/work_folder.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <string_view>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/format/artifact/segment_writer.h"
+#include "core/io/host_name.h"
+#include "scheduler/state/build_locks.h"
+
+namespace voxdag {
+namespace {
+
+constexpr std::string_view kLockName = "lock";
+constexpr std::string_view kScratchName = "merge";
+constexpr std::string_view kClusterName = "cluster";
+// Threads that remove files, which takes half a second per GB of a file that is cached.
+constexpr unsigned kRemovers = 4;
+
+// The id in "segment-<id>.vdseg".
+std::optional<uint32_t> segment_id(std::string_view name) {
+  constexpr std::string_view kBefore = "segment-", kAfter = ".vdseg";
+  if (!name.starts_with(kBefore) || !name.ends_with(kAfter)) return std::nullopt;
+  uint32_t id = 0;
+  const char* const end = name.data() + name.size() - kAfter.size();
+  const auto [rest, failure] = std::from_chars(name.data() + kBefore.size(), end, id);
+  if (failure != std::errc{} || rest != end) return std::nullopt;
+  return id;
+}
+
+bool is_scratch(const DirectoryEntry& entry) {
+  return !entry.is_directory && !entry.is_special &&
+         (segment_id(entry.name) || entry.name.starts_with("merge-"));
+}
+
+// NFS gives such a name to a file that is removed while somebody has it open.
+bool is_left_by_nfs(std::string_view name) { return name.starts_with(".nfs"); }
+
+// Files and folders of a cluster build; slurm/files/cluster_folder.h lists them.
+bool is_of_cluster(const DirectoryEntry& entry) {
+  if (entry.is_special) return false;
+  const std::string_view name = entry.name;
+  if (entry.is_directory) return name.starts_with("attempt-");
+  if (is_left_by_nfs(name)) return true;
+  const auto is = [&](std::string_view begin, std::string_view end) {
+    return name.starts_with(begin) && (name.ends_with(end) || name.ends_with(".partial"));
+  };
+  return is("batch-", ".vdbatch") || is("batch-", ".json") || is("log-", ".txt") ||
+         is("cluster.json", "cluster.json");
+}
+
+bool is_ours(const DirectoryEntry& entry) {
+  if (entry.is_special) return false;
+  const std::string_view name = entry.name;
+  if (is_left_by_nfs(name)) return true;
+  if (entry.is_directory) return name == kScratchName || name == kClusterName;
+  return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
+         name == "job.db-journal" || name.ends_with(".vdspill") || name.ends_with(".vddurable") ||
+         segment_id(name).has_value();
+}
+
+}  // namespace
+
+WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max_wait_s)
+    : files_(context.files), path_(std::move(path)) {
+  const std::string lock_path = path_ + "/" + std::string(kLockName);
+  // A build that ends removes the folder, so it may have to be made again.
+  const auto try_lock = [&]() -> std::unique_ptr<FileLock> {
+    files_.make_directories(path_);
+    check_is_ours();
+    was_there_ = files_.exists(lock_path);
+    try {
+      return files_.try_lock(lock_path);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kNotFound) throw;
+      return nullptr;
+    }
+  };
+  lock_ = wait_for_lock(try_lock, "the work folder " + path_, max_wait_s, context);
+  if (!lock_)
+    throw Error(ErrorCode::kIo, "the work folder " + path_ + " is in use by " +
+                                    read_small_file(files_, lock_path, 1 << 12) +
+                                    ": expected to be the only build there");
+  const std::string holder = "process " + std::to_string(getpid()) + " on " + host_name();
+  // create() empties the file: the last name may have been longer.
+  files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
+}
+
+void WorkFolder::check_is_ours() const {
+  const auto refuse = [&](const std::string& name) {
+    throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " holds " + name +
+                                              ", which voxdag did not make: expected an empty "
+                                              "folder or that of an earlier build (--work)");
+  };
+  for (const DirectoryEntry& entry : files_.list(path_))
+    if (!is_ours(entry)) refuse(entry.name);
+  const auto check_folder = [&](std::string_view name, bool (*is_known)(const DirectoryEntry&)) {
+    const std::string folder = path_ + "/" + std::string(name);
+    if (!files_.exists(folder)) return;
+    for (const DirectoryEntry& entry : files_.list(folder))
+      if (!is_known(entry)) refuse(std::string(name) + "/" + entry.name);
+  };
+  check_folder(kScratchName, is_scratch);
+  check_folder(kClusterName, is_of_cluster);
+}
+
+std::string WorkFolder::holder(FileSystem& files, const std::string& folder) {
+  const std::string lock_path = folder + "/" + std::string(kLockName);
+  if (!files.exists(lock_path) || !files.is_locked(lock_path)) return "";
+  return read_small_file(files, lock_path, 1 << 12);
+}
+
+std::vector<std::string> WorkFolder::files_in(FileSystem& files, const std::string& folder) {
+  std::vector<std::string> paths;
+  const std::string scratch = folder + "/" + std::string(kScratchName);
+  try {
+    for (const std::string& from : {folder, scratch})
+      for (const DirectoryEntry& entry : files.list(from))
+        if (from == scratch ? is_scratch(entry) : is_ours(entry) && !entry.is_directory)
+          paths.push_back(from + "/" + entry.name);
+  } catch (const Error& error) {
+    // A build that ends removes the folder.
+    if (error.code() != ErrorCode::kNotFound) throw;
+  }
+  return paths;
+}
+
+std::shared_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {
+  return files_.open_read(segment_path(path_, id));
+}
+
+uint32_t WorkFolder::next_segment_id() const {
+  uint32_t next = 0;
+  for (const DirectoryEntry& entry : files_.list(path_))
+    if (const auto id = segment_id(entry.name); id && *id < kFirstClusterSegment)
+      next = std::max(next, *id + 1);
+  return next;
+}
+
+uint64_t WorkFolder::bytes() const {
+  uint64_t bytes = 0;
+  for (const std::string& folder : {path_, scratch_path(), cluster_path()}) {
+    if (!files_.exists(folder)) continue;
+    for (const DirectoryEntry& entry : files_.list(folder))
+      if (!entry.is_directory) bytes += std::min(entry.bytes, entry.disk_bytes);
+  }
+  return bytes;
+}
+
+void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_named) {
+  for (const DirectoryEntry& entry : files_.list(path_)) {
+    const auto id = segment_id(entry.name);
+    if (id && !is_named(*id)) files_.remove(path_ + "/" + entry.name);
+  }
+}
+
+// A task that still runs may add files at any time: the folder is left then.
+void WorkFolder::remove_cluster_files() {
+  if (!files_.exists(cluster_path())) return;
+  for (const DirectoryEntry& entry : files_.list(cluster_path())) {
+    if (!is_of_cluster(entry)) continue;
+    const std::string path = cluster_path() + "/" + entry.name;
+    if (!entry.is_directory) {
+      remove_silently(path);
+      continue;
+    }
+    // The attempt may remove it, too.
+    try {
+      for (const DirectoryEntry& inner : files_.list(path))
+        if (segment_id(inner.name)) remove_silently(path + "/" + inner.name);
+    } catch (const Error&) {
+      continue;
+    }
+    remove_if_empty(path);
+  }
+  remove_if_empty(cluster_path());
+}
+
+void WorkFolder::release(const SegmentRange& range) {
+  std::unique_ptr<WritableFile>& file = released_[range.segment];
+  if (!file) file = files_.open_write(segment_path(path_, range.segment));
+  file->release(range.offset, range.bytes);
+}
+
+void WorkFolder::empty_scratch() {
+  for (const std::string& path : scratch_files()) files_.remove(path);
+  files_.make_directories(scratch_path());
+}
+
+std::vector<std::string> WorkFolder::scratch_files() const {
+  std::vector<std::string> paths;
+  if (!files_.exists(scratch_path())) return paths;
+  for (const DirectoryEntry& entry : files_.list(scratch_path()))
+    if (is_scratch(entry)) paths.push_back(scratch_path() + "/" + entry.name);
+  return paths;
+}
+
+void WorkFolder::remove_if_empty(const std::string& folder) {
+  try {
+    files_.remove_directory(folder);
+  } catch (const Error&) {
+    // What is not ours, or was added just now, stays.
+  }
+}
+
+void WorkFolder::remove_silently(const std::string& path) {
+  try {
+    if (files_.exists(path)) files_.remove(path);
+  } catch (const Error&) {
+    // A file that is left costs space; the next build in this folder removes it.
+  }
+}
+
+void WorkFolder::remove() {
+  released_.clear();
+  try {
+    // The lock file is removed last: until then no other build may use the folder.
+    std::vector<std::string> others = scratch_files();
+    for (const DirectoryEntry& entry : files_.list(path_))
+      if (is_ours(entry) && !entry.is_directory && entry.name != kLockName)
+        others.push_back(path_ + "/" + entry.name);
+    parallel_for(kRemovers, others.size(), [&](unsigned, size_t i) { files_.remove(others[i]); });
+    remove_cluster_files();
+    if (files_.exists(scratch_path())) files_.remove_directory(scratch_path());
+    files_.remove(path_ + "/" + std::string(kLockName));
+    files_.remove_directory(path_);
+  } catch (const Error&) {
+    // Files that are left cost only space.
+  }
+}
+
+}  // namespace voxdag

@@ -1,0 +1,86 @@
+// The folder of a build's job store and temporary files, locked by one process at a time. Only
+// files that voxdag made, known by their names, are ever removed from it; the folder itself is
+// removed when nothing else is left.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/format/artifact/artifact.h"
+#include "core/io/file_system.h"
+#include "scheduler/spec/build_spec.h"
+
+namespace voxdag {
+
+// Segments that tasks of a cluster wrote have ids from here on, those of this process below.
+inline constexpr uint32_t kFirstClusterSegment = uint32_t{1} << 24;
+
+class WorkFolder {
+ public:
+  // Makes the folder and locks it. Throws Error{kIo} if another process still has it locked after
+  // `max_wait_s` (saying which), Error{kInvalidInput} if it has files that are not voxdag's.
+  WorkFolder(const BuildContext& context, std::string path, double max_wait_s);
+
+  const std::string& path() const { return path_; }
+  // Whether an earlier build used the folder.
+  bool was_there() const { return was_there_; }
+  std::string store_path() const { return store_path(path_); }
+  static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
+  // The process that has locked the folder: "process 17 on box"; "" if none has.
+  static std::string holder(FileSystem& files, const std::string& folder);
+  // The files in a folder that have names of ours: a build there may remove or change them.
+  static std::vector<std::string> files_in(FileSystem& files, const std::string& folder);
+  std::string spill_path() const { return path_ + "/triangles.vdspill"; }
+  // What a scene's compressed geometry is decoded to.
+  std::string decoded_path() const { return path_ + "/decoded.vdspill"; }
+  // Triangles that outlive a run.
+  std::string durable_path() const { return path_ + "/triangles.vddurable"; }
+  // Colors of cubes that outlive a run.
+  std::string colors_path() const { return path_ + "/colors.vddurable"; }
+  std::string scratch_path() const { return path_ + "/merge"; }
+  // What a cluster build shares with its tasks.
+  std::string cluster_path() const { return path_ + "/cluster"; }
+  std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
+  // One more than the largest id of a segment that is there.
+  uint32_t next_segment_id() const;
+  // Bytes of all files in the folder, for reports.
+  uint64_t bytes() const;
+
+  // Frees the space of bytes of a segment that are no longer read. One call at a time.
+  void release(const SegmentRange& range);
+
+  // Removes the segments for which `is_named` is false: an interrupted build left them, and no row
+  // of the store names them.
+  void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
+  // Removes merge data.
+  void empty_scratch();
+  // Removes what a cluster build has here. Silent, like remove().
+  void remove_cluster_files();
+  // Removes spilled triangles. Silent, like remove().
+  void remove_spilled() { remove_silently(spill_path()); }
+  // Removes durable triangles. Silent, like remove().
+  void remove_durable() { remove_silently(durable_path()); }
+  // Removes colors. Silent, like remove().
+  void remove_colors() { remove_silently(colors_path()); }
+  // Removes all files of voxdag, and the folder if it is empty then. Silent: what cannot be removed
+  // costs space, not correctness.
+  void remove();
+
+ private:
+  void check_is_ours() const;
+  std::vector<std::string> scratch_files() const;
+  void remove_if_empty(const std::string& folder);
+  void remove_silently(const std::string& path);
+
+  FileSystem& files_;
+  const std::string path_;
+  bool was_there_ = false;
+  std::unique_ptr<FileLock> lock_;
+  std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments that lost some bytes
+};
+
+}  // namespace voxdag

@@ -1,0 +1,78 @@
+#include "scheduler/triangles/surface_record.h"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "scheduler/triangles/triangle_file.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint8_t kWidePosition = 1, kTextured = 2, kWideTexture = 4, kColored = 8, kFlipped = 16;
+
+bool fits_narrow(int64_t value) {
+  return value >= std::numeric_limits<int32_t>::min() &&
+         value <= std::numeric_limits<int32_t>::max();
+}
+
+uint8_t flags_of(const FixedSurface& surface, bool has_image) {
+  uint8_t flags = (has_image ? kTextured : 0) | (surface.is_flipped ? kFlipped : 0);
+  for (const auto& vertex : surface.position.v)
+    if (!std::ranges::all_of(vertex, fits_narrow)) flags |= kWidePosition;
+  for (const SurfaceCorner& corner : surface.corners) {
+    if (has_image && !std::ranges::all_of(corner.texture, fits_narrow)) flags |= kWideTexture;
+    if (corner.color != SurfaceCorner{}.color) flags |= kColored;
+  }
+  return flags;
+}
+
+void put_coordinate(ByteSink& sink, int64_t value, bool is_wide) {
+  if (is_wide)
+    sink.put(value);
+  else
+    sink.put(static_cast<int32_t>(value));
+}
+
+int64_t get_coordinate(ByteSource& in, bool is_wide) {
+  return is_wide ? in.get<int64_t>() : in.get<int32_t>();
+}
+
+}  // namespace
+
+void append_surface(const FixedSurface& surface, bool has_image, std::vector<std::byte>& out) {
+  const uint8_t flags = flags_of(surface, has_image);
+  ByteSink sink(out);
+  sink.put(flags);
+  sink.put(surface.material);
+  for (const auto& vertex : surface.position.v)
+    for (const int64_t value : vertex) put_coordinate(sink, value, flags & kWidePosition);
+  if (flags & kTextured)
+    for (const SurfaceCorner& corner : surface.corners)
+      for (const int64_t value : corner.texture) put_coordinate(sink, value, flags & kWideTexture);
+  if (flags & kColored)
+    for (const SurfaceCorner& corner : surface.corners)
+      for (const uint16_t value : corner.color) sink.put(value);
+}
+
+std::optional<FixedSurface> SurfaceRecords::next() {
+  if (in_.ok() && in_.left() == 0) return std::nullopt;
+  const uint8_t flags = in_.get<uint8_t>();
+  FixedSurface surface;
+  surface.is_flipped = (flags & kFlipped) != 0;
+  surface.material = in_.get<uint32_t>();
+  for (auto& vertex : surface.position.v)
+    for (int64_t& value : vertex) value = get_coordinate(in_, flags & kWidePosition);
+  if (flags & kTextured)
+    for (SurfaceCorner& corner : surface.corners)
+      for (int64_t& value : corner.texture) value = get_coordinate(in_, flags & kWideTexture);
+  if (flags & kColored)
+    for (SurfaceCorner& corner : surface.corners)
+      for (uint16_t& value : corner.color) value = in_.get<uint16_t>();
+  if (!in_.ok() || flags >= 2 * kFlipped)
+    throw DamagedTriangles("stored surfaces have a record that ends too early or has flags " +
+                           std::to_string(flags) + ": expected what was written there");
+  return surface;
+}
+
+}  // namespace voxdag

@@ -1,0 +1,142 @@
+// Cluster builds whose merge is a job of the cluster, with a Slurm that is played by the test.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <utility>
+
+#include "core/base/error.h"
+#include "scheduler/slurm/cluster_build.h"
+#include "tests/unit/base/error_of.h"
+#include "tests/unit/scheduler/slurm/played_slurm.h"
+
+namespace voxdag {
+namespace {
+
+class ClusterMergeJob : public Cluster {
+ protected:
+  void SetUp() override {
+    Cluster::SetUp();
+    slurm_.merge_job = [&] {
+      of_job_ = run_build(job_spec(), {system_files(), of_job_log_, never_});
+    };
+  }
+  BuildSpec merging_spec() {
+    BuildSpec merging = spec(4);
+    merging.run.cluster->merge_job = {
+        .arguments = {"build", "x y"}, .folder = "/", .submit_options = {"--mem=1G"}};
+    return merging;
+  }
+  BuildSpec job_spec() {
+    BuildSpec job = spec(4);
+    job.run.cluster->is_merge_job = true;
+    return job;
+  }
+  Warnings of_job_log_;
+  CancelToken never_;
+  BuildReport of_job_;
+};
+
+TEST_F(ClusterMergeJob, ItsReportIsThatOfTheCommand) {
+  slurm_.fates = {"", "FAILED"};  // which the job submits again
+  const BuildReport report = build(merging_spec());
+  EXPECT_EQ(report_json(report), report_json(of_job_));
+  EXPECT_EQ(report.cluster->batches, 4u);
+  EXPECT_EQ(report.cluster->attempts, 1u);
+  EXPECT_NE(of_job_log_.text.find("FAILED; it is submitted again"), std::string::npos);
+  const auto submitted = std::ranges::find_if(slurm_.commands, [](const auto& command) {
+    return std::ranges::find(command, "--dependency=afterany:1") != command.end();
+  });
+  ASSERT_NE(submitted, slurm_.commands.end());
+  for (const char* word : {"--mem=1G", "--chdir=/"})
+    EXPECT_NE(std::ranges::find(*submitted, word), submitted->end()) << word;
+  // The same command again finds the result; another scene or a restart does not.
+  slurm_.commands.clear();
+  EXPECT_EQ(report_json(build(merging_spec())), report_json(report));
+  EXPECT_EQ(count("sbatch"), 2u);  // tests the options of the tasks, and of the job
+  BuildSpec restarted = merging_spec();
+  restarted.run.restart = true;
+  build(restarted);
+  EXPECT_EQ(count("sbatch"), 2u + 5);
+  write_spheres(scene(), 20000, 2);
+  EXPECT_NE(run_build(merging_spec(), context()).sha256, expected_);
+}
+
+TEST_F(ClusterMergeJob, ATaskThatSlurmHoldsForEverDoesNotHoldItUp) {
+  slurm_.fates = {"", PlayedSlurm::kHeld};
+  const auto merge = std::exchange(slurm_.merge_job, nullptr);
+  slurm_.merge_job = [&] {
+    // It depends on the array.
+    if (count("scancel") > 0)
+      merge();
+    else
+      slurm_.waiting_merge_job = "2";
+  };
+  slurm_.merge_state = "PENDING|Dependency";
+  EXPECT_EQ(build(merging_spec()).cluster->attempts, 1u);
+  EXPECT_NE(warnings_.text.find("could not start and holds 1 tasks, 1_1 for one: canceled"),
+            std::string::npos)
+      << warnings_.text;
+}
+
+TEST_F(ClusterMergeJob, WhatAPersonHasToDoIsSaid) {
+  const auto merge = std::exchange(slurm_.merge_job, nullptr);
+  int looks = 0;
+  slurm_.merge_state = "PENDING|JobHeldUser";
+  slurm_.merge_job = [&] {
+    if (++looks < 3)
+      slurm_.waiting_merge_job = "2";
+    else
+      merge();
+  };
+  build(merging_spec());
+  const std::string said = "job 2, which merges, waits: JobHeldUser\n";
+  EXPECT_EQ(warnings_.text.find(said), warnings_.text.rfind(said));
+  EXPECT_NE(warnings_.text.find(said), std::string::npos) << warnings_.text;
+}
+
+TEST_F(ClusterMergeJob, IfItIsLostTheSameCommandSubmitsItAgain) {
+  const auto merge = std::exchange(slurm_.merge_job, nullptr);
+  slurm_.merge_end = "CANCELLED Reason=None ExitCode=0:15";
+  const Error error = error_of([&] { run_build(merging_spec(), context()); });
+  EXPECT_EQ(error.code(), ErrorCode::kIo);
+  EXPECT_NE(error.message().find("the job 2 that merges has ended without a result: CANCELLED"),
+            std::string::npos)
+      << error.message();
+  slurm_.merge_job = [&] {
+    std::ofstream(output() + ".work/cluster/log-3.txt") << "first\nvoxdag: error: the last line\n";
+  };
+  slurm_.merge_end = "FAILED Reason=NonZeroExitCode ExitCode=7:0";
+  const Error full = error_of([&] { run_build(merging_spec(), context()); });
+  EXPECT_EQ(full.code(), ErrorCode::kNoSpace);
+  EXPECT_NE(full.message().find("ends with:\nfirst\nvoxdag: error: the last line"),
+            std::string::npos)
+      << full.message();
+  slurm_.merge_job = merge;
+  EXPECT_EQ(build(merging_spec()).cluster->batches, 4u);
+}
+
+TEST_F(ClusterMergeJob, WhoComesBackFollowsAndWhoStopsTheTasksStopsItFirst) {
+  slurm_.merge_job = [&] { cancel_.cancel(); };
+  const Error error = error_of([&] { run_build(merging_spec(), context()); });
+  EXPECT_EQ(error.code(), ErrorCode::kCanceled);
+  EXPECT_NE(error.message().find("job 2 and its tasks run on"), std::string::npos)
+      << error.message();
+  slurm_.waiting_merge_job = "2";
+  slurm_.commands.clear();
+  int looks = 0;
+  slurm_.merge_job = [&] {
+    if (++looks < 3)
+      slurm_.waiting_merge_job = "2";
+    else
+      of_job_ = run_build(job_spec(), {system_files(), of_job_log_, never_});
+  };
+  const BuildReport report = run_build(merging_spec(), {system_files(), warnings_, never_});
+  EXPECT_EQ(report.sha256, expected_);
+  EXPECT_EQ(count("sbatch"), 3u);  // both test the options only
+  // Neither did the job stop itself.
+  for (const auto& command : slurm_.commands)
+    EXPECT_FALSE(command[0] == "scancel" && command[1].ends_with("-merge"));
+}
+
+}  // namespace
+}  // namespace voxdag

@@ -1,0 +1,46 @@
+// The bytes of colored files: those that every version, compiler and distribution must make of the
+// same scene, its images' decoders included. A change of them is a new version of the format.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "scheduler/run_build.h"
+#include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/scheduler/stages/attributes/painted_scene.h"
+
+namespace voxdag {
+namespace {
+
+// The painted scene, with one of tests/golden in place of its image unless that is "".
+std::string digest_of(const std::string& image, uint64_t color_resolution) {
+  TemporaryFolder folder;
+  BuildSpec spec;
+  spec.geometry.scenes = {PaintedScene::write(folder.path())};
+  if (!image.empty())
+    std::filesystem::copy_file(VOXDAG_SOURCE_DIR "/tests/golden/" + image,
+                               folder.path() + "/halves.png",
+                               std::filesystem::copy_options::overwrite_existing);
+  spec.geometry.resolution = 128;
+  spec.geometry.attributes.color = true;
+  spec.geometry.color_resolution = color_resolution;
+  spec.run.output = folder.path() + "/out.vdag";
+  spec.run.memory_bytes = uint64_t{128} << 20;
+  spec.run.threads = 2;
+  return build_now(spec).sha256;
+}
+
+TEST(GoldenColors, Png) {
+  EXPECT_EQ(digest_of("", 128), "a7e8a2694b4630e056de778ee92493485349979f999fee85aa979b7274fc089d");
+  EXPECT_EQ(digest_of("", 16), "c5edeb1ed8c25e73db763d62cb6908aa5559b2169b549c9ed96fc52b5a032f6f");
+}
+
+// The same samples, stored in two ways.
+TEST(GoldenColors, Jpeg) {
+  const char* const expected = "37b0b86705169ef42183e369c19154ed5af1e19cf4a098456979f4e274d81030";
+  EXPECT_EQ(digest_of("waves.jpg", 128), expected);
+  EXPECT_EQ(digest_of("waves_progressive.jpg", 128), expected);
+}
+
+}  // namespace
+}  // namespace voxdag

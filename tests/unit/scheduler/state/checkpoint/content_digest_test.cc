@@ -1,0 +1,36 @@
+#include "scheduler/state/checkpoint/content_digest.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace voxdag {
+namespace {
+
+// Another grid, other pieces, another order of them: another digest. It continues from a copy.
+TEST(ContentDigest, TellsContentsApart) {
+  const Checksum128 a{1, 2}, b{3, 4};
+  std::set<std::string> all;
+  for (const Grid& grid : {Grid{10, {1.5, -2, 0.25}, 7.5}, Grid{9, {1.5, -2, 0.25}, 7.5},
+                           Grid{10, {1.5, -2, 0}, 7.5}, Grid{10, {1.5, -2, 0.25}, 7}}) {
+    ContentDigest digest(grid);
+    all.insert(digest.hex());
+    digest.add(a);
+    all.insert(digest.hex());
+    const ContentDigest copy = digest;
+    digest.add(b);
+    all.insert(digest.hex());
+    ContentDigest again = copy;
+    again.add(b);
+    EXPECT_EQ(again.hex(), digest.hex());
+    EXPECT_EQ(digest.hex().size(), 32u);
+    ContentDigest reversed(grid);
+    reversed.add(b);
+    reversed.add(a);
+    all.insert(reversed.hex());
+  }
+  EXPECT_EQ(all.size(), 16u);
+}
+
+}  // namespace
+}  // namespace voxdag

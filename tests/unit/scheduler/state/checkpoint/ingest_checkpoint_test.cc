@@ -1,0 +1,295 @@
+// Scan, ingest and partition of a large scene survive an interruption: what was done is not done
+// again, and never taken for that of another scene.
+#include "scheduler/state/checkpoint/ingest_checkpoint.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "tests/unit/io/temporary_folder.h"
+#include "tests/unit/scheduler/interruptions.h"
+#include "tests/unit/scheduler/metered_files.h"
+#include "tests/unit/scheduler/spheres_build.h"
+
+namespace voxdag {
+namespace {
+
+class LastWarning : public NoProgress {
+ public:
+  void warn(std::string_view message) override { text = message; }
+  std::string text;
+};
+
+class IngestCheckpointTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    make_scene(1);
+    BuildSpec plain = spec();
+    plain.run.durable_min_triangles = UINT64_MAX;
+    const BuildReport report = build(plain);
+    expected_ = report.sha256;
+    subvolumes_ = report.subvolumes;
+    whole_ = files_.bytes_read[scene()];
+    EXPECT_FALSE(files_.bytes_written.contains(durable()));
+    std::filesystem::remove(output());
+  }
+  void make_scene(uint64_t seed) const { write_spheres(scene(), 80000, seed); }
+  std::string scene() const { return folder_.file("scene.glb"); }
+  std::string output() const { return folder_.file("out.vdag"); }
+  std::string work() const { return output() + ".work"; }
+  std::string durable() const { return work() + "/triangles.vddurable"; }
+
+  // Has checkpoints at the ends of scan, ingest and partition.
+  BuildSpec spec() const {
+    BuildSpec spec = spheres_build(scene(), output());
+    spec.run.checkpoint_interval_s = 1e9;
+    spec.run.durable_min_triangles = 1;
+    return spec;
+  }
+  // Has a checkpoint after every piece of the scene, too.
+  BuildSpec often() const {
+    BuildSpec often = spec();
+    often.run.checkpoint_interval_s = 0;
+    return often;
+  }
+  BuildReport build(const BuildSpec& spec) {
+    files_.forget_counts();
+    last_warning_ = {};
+    CancelToken cancel;
+    return run_build(spec, {files_, last_warning_, cancel});
+  }
+  // Builds to the right bytes, without a warning.
+  BuildReport expect_to_resume(const BuildSpec& spec) {
+    const BuildReport report = build(spec);
+    EXPECT_EQ(report.sha256, expected_);
+    EXPECT_EQ(last_warning_.text, "");
+    EXPECT_FALSE(std::filesystem::exists(work()));
+    std::filesystem::remove(output());
+    return report;
+  }
+  // Bytes read of the scene, relative to those of a build that reads all of it.
+  double part_read() {
+    return static_cast<double>(files_.bytes_read[scene()]) / static_cast<double>(whole_);
+  }
+
+  TemporaryFolder folder_;
+  MeteredFiles files_;
+  LastWarning last_warning_;
+  std::string expected_;
+  uint64_t subvolumes_ = 0;
+  uint64_t whole_ = 0;
+};
+
+// Interrupted at any point, a build resumes there: it reads the rest of the scene, and nothing once
+// the scene is ingested.
+TEST_F(IngestCheckpointTest, ResumesWhereItWas) {
+  struct Moment {
+    const char* stage;
+    uint64_t after;
+    double min_read, max_read;  // part of the scene that is read afterwards
+  };
+  for (const Moment& moment :
+       {Moment{"scan", 40000, 0.6, 0.9}, Moment{"ingest", 10000, 0.3, 0.6},
+        Moment{"ingest", 60000, 0.01, 0.3}, Moment{"build", 0, 0, 0}, Moment{"merge", 0, 0, 0}}) {
+    SCOPED_TRACE(std::string(moment.stage) + " after " + std::to_string(moment.after));
+    build_until(often(), moment.stage, moment.after, files_);
+    expect_to_resume(often());
+    EXPECT_GE(part_read(), moment.min_read);
+    EXPECT_LE(part_read(), moment.max_read);
+  }
+}
+
+// The partition, too, resumes at each of its checkpoints.
+TEST_F(IngestCheckpointTest, ResumesInThePartition) {
+  build(often());
+  std::filesystem::remove(output());
+  const uint64_t syncs = files_.syncs[durable()];
+  ASSERT_GT(syncs, 10u);
+  for (const uint64_t at : {syncs, syncs - 1, syncs - 4}) {
+    SCOPED_TRACE(testing::Message() << "sync " << at << " of " << syncs);
+    files_.failing_sync[durable()] = at;
+    EXPECT_THROW(build(often()), Error);
+    files_.failing_sync.clear();
+    const uint64_t first_run = files_.bytes_written[durable()];
+    expect_to_resume(often());
+    EXPECT_EQ(part_read(), 0);
+    EXPECT_LT(files_.bytes_written[durable()], first_run);
+  }
+}
+
+// Run options may change in between: subvolumes that are split since find their triangles, and so
+// do those that were built before.
+TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
+  for (const char* stage : {"ingest", "build"}) {
+    SCOPED_TRACE(stage);
+    build_until(spec(), stage, 10);
+    BuildSpec other = spec();
+    other.run.subvolume_edge = 64;
+    other.run.memory_bytes = uint64_t{64} << 20;
+    other.run.threads = 3;
+    build_until(other, "build", 15);
+    const BuildReport report = expect_to_resume(other);
+    EXPECT_GT(report.subvolumes_reused, 0u);
+    EXPECT_GT(report.subvolumes, subvolumes_);
+    EXPECT_EQ(part_read(), 0);
+  }
+}
+
+// Disk space is freed as subvolumes are recorded.
+TEST_F(IngestCheckpointTest, FreesWhatIsBuilt) {
+  build_until(spec(), "build", 0);
+  const uint64_t all = std::filesystem::file_size(durable());
+  build_until(spec(), "build", subvolumes_ / 2, files_);
+  EXPECT_GT(files_.bytes_released[durable()], all / 4);
+  EXPECT_TRUE(std::filesystem::exists(durable()));
+  build_until(spec(), "merge", 0);
+  EXPECT_FALSE(std::filesystem::exists(durable()));
+  expect_to_resume(spec());
+}
+
+// Another scene under the same name is refused, and does no harm to the job, which resumes once the
+// first scene is back, though its times have changed.
+TEST_F(IngestCheckpointTest, KnowsItsSceneByContent) {
+  build_until(spec(), "build", 20);
+  std::filesystem::rename(scene(), folder_.file("first.glb"));
+  make_scene(2);
+  try {
+    build(spec());
+    FAIL() << "built another scene";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+    EXPECT_NE(error.message().find("other contents"), std::string::npos) << error.what();
+  }
+  std::filesystem::copy(folder_.file("first.glb"), scene(),
+                        std::filesystem::copy_options::overwrite_existing);
+  EXPECT_GE(expect_to_resume(spec()).subvolumes_reused, 20u);
+  EXPECT_GE(part_read(), 1);
+}
+
+// A byte that changes in place, the time of modification set back, is a change; so is one that
+// comes during ingest.
+TEST_F(IngestCheckpointTest, NoticesAChangeInPlace) {
+  for (const char* stage : {"scan", "ingest"}) {
+    SCOPED_TRACE(stage);
+    build_until(often(), stage, 10000);
+    const auto time = std::filesystem::last_write_time(scene());
+    {
+      std::fstream file(scene(), std::ios::in | std::ios::out | std::ios::binary);
+      file.seekp(static_cast<std::streamoff>(std::filesystem::file_size(scene()) - 9));
+      file.put('\x3a');
+    }
+    std::filesystem::last_write_time(scene(), time);
+    const BuildReport report = build(spec());
+    EXPECT_GE(part_read(), 1);
+    BuildSpec fresh = spec();
+    fresh.run.work_folder = folder_.file("fresh");
+    fresh.run.durable_min_triangles = UINT64_MAX;
+    EXPECT_EQ(report.sha256, build(fresh).sha256);
+    std::filesystem::remove(output());
+    make_scene(1);
+  }
+}
+
+// A change of a buffer in a file of its own is noticed.
+TEST_F(IngestCheckpointTest, NoticesAChangeOfABuffer) {
+  const std::string glb = read_small_file(system_files(), scene(), UINT64_MAX);
+  uint32_t json_size = 0;
+  std::memcpy(&json_size, glb.data() + 12, sizeof json_size);
+  std::string json = glb.substr(20, json_size);
+  const std::string what = "\"buffers\":[{";
+  ASSERT_NE(json.find(what), std::string::npos);
+  json.insert(json.find(what) + what.size(), "\"uri\":\"corners.bin\",");
+  std::ofstream(folder_.file("scene.gltf")) << json;
+  const std::string buffer = folder_.file("corners.bin");
+  std::ofstream(buffer) << glb.substr(28 + json_size);
+  BuildSpec separate = spec();
+  separate.geometry.scenes = {folder_.file("scene.gltf")};
+  build_until(separate, "ingest", 10000);
+  system_files().touch(buffer);
+  EXPECT_EQ(build(separate).sha256, expected_);
+  EXPECT_GT(files_.bytes_read[buffer], std::filesystem::file_size(buffer));
+}
+
+// Damage is named in a warning, and the scene is read again.
+TEST_F(IngestCheckpointTest, DamageIsHealed) {
+  // Flips one bit in every `distance` bytes, but for the last few.
+  const auto flip = [&](uint64_t distance) {
+    std::fstream file(durable(), std::ios::in | std::ios::out | std::ios::binary);
+    for (int64_t at = static_cast<int64_t>(std::filesystem::file_size(durable())) - 5; at > 0;
+         at -= static_cast<int64_t>(distance)) {
+      file.seekg(at);
+      const char byte = static_cast<char>(file.get() ^ 0x20);
+      file.seekp(at);
+      file.put(byte);
+    }
+  };
+  const auto change_row = [&] {
+    SqlDatabase(work() + "/job.db", SqlDatabase::Mode::kReadWrite)
+        .execute("UPDATE ingest SET record = x'00' || record");
+  };
+  for (const char* stage : {"ingest", "build"})
+    for (int kind = 0; kind < 5; ++kind) {
+      SCOPED_TRACE(testing::Message() << stage << ", kind " << kind);
+      build_until(often(), stage, stage == std::string("ingest") ? 20000 : 3, files_);
+      if (kind == 0) flip(500);
+      if (kind == 1) flip(UINT32_MAX);
+      if (kind == 2) std::filesystem::remove(durable());
+      if (kind == 3) std::filesystem::resize_file(durable(), 12345);
+      if (kind == 4) change_row();
+      EXPECT_EQ(build(spec()).sha256, expected_);
+      EXPECT_NE(last_warning_.text.find(kind == 4 ? "row" : "triangles.vddurable"),
+                std::string::npos)
+          << last_warning_.text;
+      std::filesystem::remove(output());
+    }
+}
+
+// For an artifact that is damaged after the triangles were removed, the scene is read again.
+TEST_F(IngestCheckpointTest, ReadsTheSceneForADamagedArtifact) {
+  build_until(spec(), "merge", 0);
+  std::filesystem::resize_file(work() + "/segment-0.vdseg", 1000);
+  EXPECT_EQ(build(spec()).sha256, expected_);
+  EXPECT_GE(part_read(), 1);
+}
+
+// Without disk space for triangles that memory can hold, there are no checkpoints; if the disk
+// fills up later, the triangles are read again into memory.
+TEST_F(IngestCheckpointTest, DoesWithoutDiskSpace) {
+  files_.free_bytes = 3'000'000;
+  expect_to_resume(spec());
+  EXPECT_FALSE(files_.bytes_written.contains(durable()));
+  files_.free_bytes = UINT64_MAX;
+  files_.full_for = durable();
+  EXPECT_EQ(build(spec()).sha256, expected_);
+  EXPECT_NE(last_warning_.text.find("memory"), std::string::npos) << last_warning_.text;
+}
+
+// Starting over forgets what was ingested; a small scene has no checkpoints.
+TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
+  build_until(spec(), "build", 0);
+  BuildSpec again = spec();
+  again.run.restart = true;
+  expect_to_resume(again);
+  EXPECT_GE(part_read(), 1);
+  BuildSpec usual = spec();
+  usual.run.durable_min_triangles = BuildSpec{}.run.durable_min_triangles;
+  expect_to_resume(usual);
+  EXPECT_FALSE(files_.bytes_written.contains(durable()));
+}
+
+// A file's times are trusted once the clock of the file system has advanced since.
+TEST(TrustedFiles, AreOlderThanATickOfTheirClock) {
+  constexpr int64_t kSecond = 1'000'000'000;
+  const auto file = [](int64_t modified_ns, int64_t changed_ns) {
+    return SourceFile{"a", FileIdentity{7, 100, modified_ns, changed_ns}};
+  };
+  EXPECT_EQ(trusted_from_ns({file(5 * kSecond + 1, 3 * kSecond)}), 5 * kSecond + 1 + kSecond / 10);
+  EXPECT_EQ(trusted_from_ns({file(5, 9), file(3, 4)}), 9 + kSecond / 10);
+  EXPECT_EQ(trusted_from_ns({file(4 * kSecond, 6 * kSecond)}), 8 * kSecond);
+  EXPECT_EQ(trusted_from_ns({file(5, 9), SourceFile{"b", FileIdentity{}}}), INT64_MAX);
+}
+
+}  // namespace
+}  // namespace voxdag
