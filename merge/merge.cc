@@ -14,7 +14,7 @@ namespace {
 // Rows of an artifact are counted in 32 bits.
 constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
 
-// Merges in passes while not all artifacts fit at once, then into the global file or an artifact.
+// Merges in passes until all artifacts fit in one pass, then into the global file or an artifact.
 class Merger {
  public:
   Merger(const MergeInputs& inputs, const MergeContext& context, uint64_t narrow_words,
@@ -60,7 +60,7 @@ class Merger {
     return context_.report.input_nodes + (fit_at_once() ? 1 : 2) * pending_.rows();
   }
 
-  // Until all artifacts fit at once.
+  // Runs until all artifacts fit in one pass.
   void run_passes() {
     while (!fit_at_once()) {
       run_pass();

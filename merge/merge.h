@@ -2,19 +2,19 @@
 // DAG, or one artifact.
 //
 // Levels are merged from the bricks up. The nodes above the subvolumes (the top tree) are one more
-// run of their level. A level is merged one hash partition at a time (usually one is enough):
+// run of their level. A level is merged hash partition by hash partition (usually one is enough):
 //
-//   load     the rows of all runs whose hash lies in the partition are read, and their children
-//            are replaced by their positions in the merged level below (rewiring)
+//   load     the rows of all runs with a hash in the partition are read, and their children are
+//            replaced by their positions in the merged level below (rewiring)
 //   sort     the rows are divided into buckets by the next bits of the hash; several threads sort
 //            one bucket each and deduplicate its rows
 //   output   buckets are written in the order of their hashes, and the position of every row is
 //            stored for the level above
 //
 // The order within the runs is used to find the frames of a partition and the rows of a bucket, and
-// by the k-way heap merge for rows that a sort cannot hold (truncated hashes). What is in memory is
-// bounded by the budget, never by the scene: if not all runs fit at once, neighboring artifacts are
-// first merged with each other, in one or more passes. docs/architecture.md, "Why the merge is
+// by the k-way heap merge for rows that a sort cannot hold (truncated hashes). Memory use is
+// bounded by the budget, never by the scene: if not all runs fit in one pass, neighboring artifacts
+// are first merged with each other, in one or more passes. docs/architecture.md, "Why the merge is
 // right", has the proof; merge/load/row.h defines the terms.
 #pragma once
 
@@ -46,8 +46,8 @@ struct MergeInputs {
   std::vector<ArtifactRef> artifacts;
   // Opens the segment file with an id.
   std::function<std::shared_ptr<ReadableFile>(uint32_t)> open_segment;
-  // A folder for what does not fit in memory, used by this merge alone. After the merge it has only
-  // the files that the state in the checkpoint names.
+  // A folder for data that does not fit in memory, used only by this merge. After the merge it has
+  // only the files named by the state in the checkpoint.
   std::string scratch_folder;
   // The least CPU time between two checkpoints, in seconds.
   double checkpoint_interval_s = 2;
@@ -57,8 +57,8 @@ struct MergeInputs {
 //
 // A state is some hundred KB that only the merge understands. It names files of the scratch folder
 // and the partial global file, all of which are synced before save(). It identifies the inputs by
-// their content, so it still fits after an artifact was built again. save() and release() are
-// called by background threads, one call at a time.
+// their content, so it still fits after an artifact was built again. Background threads
+// call save() and release(), one after the other.
 class Checkpoint {
  public:
   virtual ~Checkpoint() = default;
@@ -79,7 +79,7 @@ struct MergeReport {
   uint64_t svo_nodes = 0;  // top tree included
   uint64_t dag_nodes = 0;
   uint64_t input_nodes = 0;  // rows of all runs of all passes
-  uint32_t passes = 0;       // 1 if all runs were merged at once
+  uint32_t passes = 0;       // 1 if all runs were merged in one pass
   uint64_t scratch_bytes = 0;
   uint64_t hash_partitions = 0;
   uint64_t streamed_groups = 0;  // groups of equal hashes that did not fit in memory

@@ -14,7 +14,7 @@
 namespace voxdag {
 namespace {
 
-// What stays in the own cache of a core while it is sorted.
+// Rows that fit in a core's cache while they are sorted.
 constexpr uint64_t kBucketRows = 8192;
 // With many runs buckets are larger, so that the share of each run is worth a visit.
 constexpr uint64_t kMinBucketRowsPerRun = 16;
@@ -171,7 +171,7 @@ class PartitionMerge {
 
 uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {
   const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * task.runs.size());
-  // Half of what the memory of a worker can hold, since buckets differ in size.
+  // Half of a worker's memory, because buckets differ in size.
   const uint64_t row_bytes = BucketSorter::bytes_for({1, task.format.max_words()});
   return std::min(rows, context.plan.worker_bytes / (2 * row_bytes));
 }

@@ -7,7 +7,7 @@
 
 namespace voxdag {
 
-// The memory that the workers may take besides the partition and the maps.
+// Memory for the workers, in addition to the partition and the maps.
 uint64_t bytes_for_workers(const MergeMemory& plan);
 
 // Adds partitions, groups and rows to the report.

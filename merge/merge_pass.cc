@@ -101,7 +101,7 @@ class Pass {
       memory_.reserve(max, 0, context_.budget);
   }
 
-  // What a level may take besides its partition.
+  // Memory for a level in addition to its partition.
   uint64_t bytes_besides_partition() const {
     return bytes_for_workers(context_.plan) + context_.plan.resident_bytes;
   }

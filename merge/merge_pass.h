@@ -16,7 +16,7 @@ namespace voxdag {
 struct PassTask {
   DagShape shape;
   // In the final pass the top tree is added and the last level is the root; in earlier passes it is
-  // that of the highest subvolume.
+  // the level of the highest subvolume.
   bool is_final = false;
   std::span<const ArtifactReader> artifacts;
 };
@@ -27,7 +27,7 @@ struct PassProgress {
   std::optional<PositionMaps> maps;  // of that level
   bool wide = false;                 // whether children in that level are wide
   std::vector<PlacedNode> placed;    // on that level
-  // Of subvolumes on that level and below, `index` being their position in the output.
+  // Roots of subvolumes on that level and below; `index` is their position in the output.
   std::vector<ArtifactRoot> roots;
 };
 

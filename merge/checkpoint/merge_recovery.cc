@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// Releasing fewer bytes at once costs more than it gains.
+// Releasing fewer bytes per call costs more than it gains.
 constexpr uint64_t kMinReleasedBytes = uint64_t{32} << 10;
 
 }  // namespace

@@ -28,17 +28,17 @@ class MergeRecovery {
   // and returns how far the final pass is. A state that does not fit is discarded with a warning.
   PassProgress restore(GlobalFileWriter& out);
 
-  // Whether a state should be saved now. Throws what the last save threw.
+  // True if a state should be saved now. Rethrows the last save's error.
   bool due() { return saver_.due(); }
   // Within a pass: `merged`, in `segment`, replace the pending artifacts before `next`.
   void save_in_pass(PassSegment& segment, std::vector<ArtifactRef> merged, size_t next);
   // After a pass: `merged`, in `segment`, have replaced all artifacts, which were `before`.
   void save_pass(const PassSegment& segment, std::vector<ArtifactRef> merged,
                  std::span<const SurveyedArtifact> before);
-  // After a level of the final pass; `readers` are those of the pending artifacts.
+  // After a level of the final pass. `readers` read the pending artifacts.
   void save_level(const PassProgress& progress, std::span<const ArtifactReader> readers,
                   GlobalFileWriter& out);
-  // Waits for the save in progress, and throws what it threw.
+  // Waits for the save in progress, and rethrows its error.
   void wait() { saver_.wait(); }
   void finish() { saver_.finish(); }
 
@@ -48,7 +48,7 @@ class MergeRecovery {
   MergeState make_state(std::vector<ArtifactRef> intermediates) const;
   // The intermediates among the pending artifacts from `begin` on.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
-  // Frames of the inputs from the bricks up to `level`, without those that were returned before.
+  // Frames of the inputs from the bricks up to `level`, without frames returned earlier.
   std::vector<SegmentRange> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
 
   const MergeContext& context_;

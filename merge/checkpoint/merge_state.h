@@ -1,8 +1,8 @@
 // The durable state of an unfinished merge, and its encoding.
 //
-// A merge reduces a set of artifacts to fewer ones in passes, and writes those that are left into
+// A merge reduces a set of artifacts to fewer ones in passes, and writes the remaining ones into
 // the global file, level by level, in the final pass. Its state is that set and, during the final
-// pass, how far the pass is.
+// pass, the pass's progress.
 #pragma once
 
 #include <cstddef>

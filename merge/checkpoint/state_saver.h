@@ -1,7 +1,7 @@
 // Saves the state of a merge in the background, and retains the scratch files that the durable
 // state names.
 //
-// One thread calls it. While a state is being saved, a thread of its own uses the checkpoint.
+// One thread calls it. A background thread uses the checkpoint while a state is being saved.
 #pragma once
 
 #include <atomic>
@@ -42,9 +42,9 @@ class StateSaver {
   // makes durable; the files of the state before are removed then, and `merged` is released.
   void save(uint32_t level, MergeState state, std::vector<std::shared_ptr<ScratchPath>> named,
             std::function<void()> sync, std::vector<SegmentRange> merged);
-  // Waits for the save in progress, and throws what it threw.
+  // Waits for the save in progress, and rethrows its error.
   void wait();
-  // The same at the end of the merge. Bytes that are not released yet stay, since their files are
+  // The same at the end of the merge. Does not release the remaining bytes, because their files are
   // removed soon.
   void finish();
 

@@ -1,6 +1,6 @@
 // Merges the rows of one hash when they do not fit in memory (hashes truncated to a few bits). They
 // cannot be divided by hash, so they are merged row by row: the rows of every run are rewired into
-// a scratch file, one part of one run at a time, and read back through one small buffer per run.
+// a scratch file, part by part, and read back through one small buffer per run.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
-// K-way heap merge, row by row, for what the bucket sort cannot hold: many rows with few distinct
-// hashes (truncated hashes). Each run is in the total order, so a heap with one cursor per run is
-// enough, whatever the number of equal hashes. Not thread-safe.
+// K-way heap merge, row by row, for rows that the bucket sort cannot hold: many rows with few
+// distinct hashes (truncated hashes). Each run is in the total order, so a heap with one cursor per
+// run is enough, whatever the number of equal hashes. Not thread-safe.
 #pragma once
 
 #include <algorithm>

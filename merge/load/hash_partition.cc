@@ -79,7 +79,7 @@ void PartitionMemory::reserve(const RowCount& count, uint32_t position_words,
   if (rows <= hashes_.size() && words <= words_.size() &&
       position_words * rows <= positions_.size())
     return;
-  release();  // all columns, so that the peak is what one partition takes
+  release();  // all columns, so that the peak is the size of one partition
   hashes_ = PageBuffer<uint64_t>(budget, rows, "a hash partition of the merge");
   masks_ = PageBuffer<uint8_t>(budget, rows, "a hash partition of the merge");
   words_ = PageBuffer<uint32_t>(budget, words, "a hash partition of the merge");

@@ -1,10 +1,11 @@
-// A hash partition: all rows of one level whose hash lies in an interval, from all runs, in memory,
-// their children replaced by positions.
+// A hash partition: all rows of one level with a hash in an interval, from all runs, in memory,
+// with their children replaced by positions.
 //
 //   columns:   [slice of run 0] [slice of run 1] ...
 //   buckets:   the interval, divided into shares of 2^bucket_bits hashes
 //
-// A slice is whole frames of a run, so a few rows at its ends may lie outside of the interval.
+// A slice consists of complete frames of a run, so a few rows at its ends may be outside the
+// interval.
 //
 // Within a slice rows are in the order of their hashes, so each bucket is a contiguous part of
 // every slice: from bucket_begin(b, slice) to bucket_begin(b + 1, slice). Usually one partition is
@@ -43,8 +44,8 @@ struct RowOffset {
 // as long to zero new pages as it takes to read rows into them.
 class PartitionMemory {
  public:
-  // Makes space for so many rows, each with `position_words` words of a position; what was in the
-  // columns is lost.
+  // Makes space for so many rows, each with `position_words` words of a position; the previous
+  // contents of the columns are lost.
   void reserve(const RowCount& count, uint32_t position_words, MemoryBudget& budget);
   void release() { *this = {}; }
   uint64_t bytes() const;
@@ -57,7 +58,7 @@ class PartitionMemory {
   PageBuffer<uint32_t> positions_;
 };
 
-// The threads that load a partition, and the memory that each may use besides it.
+// The threads that load a partition, and the additional memory that each may use.
 struct PartitionWorkers {
   unsigned count = 1;
   uint64_t bytes_each = 0;
@@ -81,8 +82,8 @@ class HashPartition {
   static std::vector<RunSlice> slices_within(std::span<const LevelRun* const> runs,
                                              const HashInterval& interval);
 
-  // Buckets get about `bucket_rows` rows if hashes are spread evenly. `memory` is used by one
-  // partition at a time.
+  // Buckets get about `bucket_rows` rows if hashes are spread evenly. Only one partition uses
+  // `memory`.
   HashPartition(std::span<const LevelRun* const> runs, std::vector<RunSlice> slices,
                 const HashInterval& interval, uint64_t bucket_rows, uint32_t position_words,
                 PartitionMemory& memory, MemoryBudget& budget);
@@ -109,7 +110,7 @@ class HashPartition {
  private:
   class Loader;
 
-  // The first hash of a bucket; that of bucket_count() is one past the last.
+  // The first hash of a bucket; for bucket_count(), one past the last hash.
   uint64_t first_hash(size_t bucket) const {
     return bucket == 0 ? interval_.first
                        : ((interval_.first >> bucket_bits_) + bucket) << bucket_bits_;

@@ -25,8 +25,8 @@ struct FrameSpan {
 class LevelRun {
  public:
   virtual ~LevelRun() = default;
-  // Decodes a frame. Several threads may call it at once, each with its own `out`. Children are
-  // indices, or words of positions if they are rewired().
+  // Decodes a frame. Several threads may call it concurrently, each with a separate `out`. Children
+  // are indices, or words of positions if they are rewired().
   virtual void read_frame(size_t index, Frame& out) const = 0;
 
   std::span<const FrameInfo> frames() const { return frames_; }

@@ -9,8 +9,8 @@
 namespace voxdag {
 namespace {
 
-// Frames of one work item when the maps are in memory: enough that the map of the run stays in the
-// cache of the thread.
+// Frames of one work item when the maps are in memory: enough that the map of the run remains in
+// the thread's cache.
 constexpr size_t kFramesPerItem = 16;
 
 // Writes the positions that the map has for the children. The map may be wide though its level, and
@@ -92,7 +92,7 @@ class HashPartition::Loader {
     std::vector<bool> replaced;  // for each child of a slice; see HashPartition::bytes_for()
   };
 
-  // Copies a frame into the columns; without a map its children stay as they are.
+  // Copies a frame into the columns; without a map its children are unchanged.
   void place(const RunSlice& slice, const LevelRun& run, size_t f, const Frame& frame,
              const uint32_t* map) {
     const uint64_t row = slice.row_base + run.rows_before(f) - slice.first_row;
@@ -124,7 +124,7 @@ class HashPartition::Loader {
     return worker.window.data();
   }
 
-  // The number of bucket begins, that of bucket_count() included, at or before this hash.
+  // The number of bucket begins, including the end of the last bucket, at or before this hash.
   size_t begins_up_to(uint64_t hash) const {
     const HashInterval& interval = partition_.interval_;
     if (hash < interval.first) return 0;
@@ -132,7 +132,7 @@ class HashPartition::Loader {
     return (hash >> partition_.bucket_bits_) - (interval.first >> partition_.bucket_bits_) + 1;
   }
 
-  // Sets the bucket begins that lie after the first row of this frame, up to the first row of the
+  // Sets the bucket begins after the first row of this frame, up to the first row of the
   // next one.
   void mark_bucket_begins(size_t slice_index, const LevelRun& run, size_t f, const Frame& frame) {
     const RunSlice& slice = partition_.slices_[slice_index];
@@ -163,7 +163,7 @@ class HashPartition::Loader {
                                              : hash > partition_.interval_.last;
   }
 
-  // For a map that is larger than the memory of a worker: loads one window of it at a time.
+  // For a map that is larger than the memory of a worker: loads it window by window.
   void replace_by_windows(Worker& worker, const RunSlice& slice, const CancelToken& cancel) {
     const bool wide = partition_.format().wide;
     const uint64_t children = slice.size.words >> wide;

@@ -5,14 +5,14 @@
 //   hash partition  a contiguous range of the hash space, merged as one unit: its rows
 //                   from all runs are in memory together
 //   bucket          an equal share of a hash partition's range, whose rows one thread sorts
-//   position        where a row lies in the merged level: a word offset in the global file,
+//   position        place of a row in the merged level: a word offset in the global file,
 //                   an index in an artifact
 //
 // A node's words are its children, one word each, or in a wide level two, the high half first. A
 // brick is held as a node of mask 3 whose two words are the high and the low half of its voxel
 // mask. So one order, (hash, mask, words lexicographically), is the total order of all of them.
 //
-// Wherever the words of a row lie, kMaxRowWords words can be read from the first one on: a row is
+// kMaxRowWords words can be read from the first word of any row on: a row is
 // then copied without a branch on its number of words, which would be as good as random.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Files in a folder of the merge's own, for what does not fit in memory or must survive a crash.
+// Files in the merge's folder, for data that does not fit in memory or must survive a crash.
 //
 // A file is removed with the last object that refers to its path, unless it is retained for a later
 // run that resumes the merge. Reading returns the words that were written, or throws
@@ -74,7 +74,7 @@ struct ScratchFileState {
 };
 
 // One file of 32-bit words without gaps, written and read by offset. Each word is written once, by
-// one thread at a time; several threads may read what was written before.
+// one thread. Several threads may read words written earlier.
 class ScratchFile {
  public:
   explicit ScratchFile(ScratchFolder& folder);

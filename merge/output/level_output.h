@@ -39,10 +39,10 @@ class LevelOutput {
   // Whether the children of parents of a level with so many positions are wide.
   virtual bool is_wide(uint64_t positions) const = 0;
   virtual void begin_level(uint32_t level) = 0;
-  // Gets all rows of the level in order, by one thread at a time.
+  // Receives all rows of the level in order. Calls do not overlap.
   virtual void add(const MergedRows& rows) = 0;
-  // Gets the same rows once more, the first one at `position`, in any order and by several threads
-  // at once: the part of the work that needs no order.
+  // Receives the same rows again, the first one at `position`, in any order and concurrently from
+  // several threads, for work that does not depend on the order.
   virtual void write(uint64_t position, const MergedRows& rows) = 0;
   virtual void end_level(const LevelExtent& level) = 0;
 };

@@ -9,7 +9,7 @@
 
 namespace voxdag {
 
-// Segments of the scratch folder have ids from here on; those of the inputs are below.
+// Smallest id of a segment in the scratch folder; the inputs' segments have lower ids.
 inline constexpr uint32_t kFirstPassSegment = uint32_t{1} << 31;
 inline bool is_pass_segment(uint32_t id) { return id >= kFirstPassSegment; }
 

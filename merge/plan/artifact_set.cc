@@ -86,8 +86,8 @@ uint64_t min_partition_bytes(const ArtifactReader& reader, bool wide) {
   return max;
 }
 
-// Every artifact counts as at least this much, so that the budget also bounds the number of runs
-// that are open at once.
+// Every artifact counts as at least this much, so that the budget also bounds the number of open
+// runs.
 constexpr uint64_t kMinRunBytes = uint64_t{64} << 10;
 
 // The Morton code of the cube's low corner, in bricks of the largest grid.

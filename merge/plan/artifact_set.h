@@ -1,4 +1,4 @@
-// Artifacts that are merged together: the inputs, or those of an earlier merge pass.
+// Artifacts that are merged together: the inputs, or artifacts of an earlier merge pass.
 #pragma once
 
 #include <cstdint>

@@ -2,7 +2,7 @@
 // stages.
 //
 //   position maps    of the level below and of this one, up to resident_bytes each; else spilled
-//   workers          frames, windows of spilled maps, what sorting a bucket needs
+//   workers          frames, windows of spilled maps, memory for sorting a bucket
 //   hash partition   all the rest, at least partition_bytes
 //
 // The fan-in is bounded by the hash partition: it must hold two frames of every run, so that,

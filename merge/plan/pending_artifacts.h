@@ -42,7 +42,8 @@ class PendingArtifacts {
   PassSegment& add_segment(std::unique_ptr<PassSegment> segment);
   // The scratch files of all segments.
   std::vector<std::shared_ptr<ScratchPath>> segment_paths() const;
-  // After a pass: `merged`, which all lie in `segment`, replace all artifacts, which are returned.
+  // After a pass: `merged`, all in `segment`, replace all artifacts. Returns the replaced
+  // artifacts.
   std::vector<SurveyedArtifact> replace_all(const std::vector<ArtifactRef>& merged,
                                             const PassSegment& segment);
   // When a merge is resumed: `intermediates`, whose segments were added, replace the inputs whose

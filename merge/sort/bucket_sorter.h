@@ -3,7 +3,7 @@
 //
 // Unless hashes are truncated they are spread evenly, so one pass that distributes the rows by the
 // bits of the hash below those of the bucket leaves almost nothing to sort. Rows of equal hash are
-// then compared as a whole. One sorter is used by one thread.
+// then compared completely. One thread uses a sorter.
 #pragma once
 
 #include <cstdint>
