@@ -2,7 +2,7 @@
 // deduplicates them. This is the inner loop of the merge.
 //
 // Unless hashes are truncated they are spread evenly, so one pass that distributes the rows by the
-// bits of the hash below those of the bucket leaves almost nothing to sort. Rows of equal hash are
+// bits of the hash below the bucket's leaves almost nothing to sort. Rows of equal hash are
 // then compared completely. One thread uses a sorter.
 #pragma once
 

@@ -158,7 +158,7 @@ TEST_F(BuildCommand, RefusesWrongFiles) {
   EXPECT_FALSE(exists("taken.work"));
 }
 
-// A work folder with foreign files is not touched.
+// A work folder with files not created by voxdag is not touched.
 TEST_F(BuildCommand, LeavesForeignWorkFoldersAlone) {
   ASSERT_EQ(mkdir(folder_.file("mine").c_str(), 0777), 0);
   put("mine/letter.txt", "dear");

@@ -164,7 +164,7 @@ TEST_F(Client, SuspendsCancelsAndResumes) {
   for (const std::string& id : {suspended, canceled}) EXPECT_EQ(run({"watch", id}).status, 0);
 }
 
-// A watcher waits for a server that restarts; the job continues, too.
+// A watcher waits for a server that restarts; and the job continues.
 TEST_F(Client, WatchesAcrossARestart) {
   const std::string first = submit_long(), id = submit("64");
   const std::string url = server_->url();

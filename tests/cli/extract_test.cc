@@ -1,4 +1,4 @@
-// extract: the options, the report, and files that equal those of builds.
+// extract: the options, the report, and files that equal the builds' files.
 #include <filesystem>
 
 #include "tests/cli/command_line.h"
@@ -32,7 +32,7 @@ TEST_F(Extract, EqualsBuilds) {
   EXPECT_EQ(world["sha256"], cube["sha256"]);
 }
 
-// The promise of --memory, for a result that is larger than what is given and what it allows above.
+// --memory holds for a result larger than the limit plus its tolerance.
 TEST_F(Extract, LargeResultsWithinLittleMemory) {
   constexpr uint64_t kMemory = 64 << 20, kAllowed = kMemory + (64 << 20);
   ASSERT_EQ(run({"generate", "soup", "large.glb", "--triangles", "45000"}).status, 0);

@@ -59,7 +59,7 @@ TEST_F(FileCommands, VerifyAgainstAnotherScene) {
   EXPECT_EQ(answer.status, 4) << answer.err;
 }
 
-// Colors are baked again, in some regions: those of the scene are equal, other ones are an error.
+// Colors are baked again in some regions: equal for the same scene, an error for another one.
 TEST_F(FileCommands, VerifyComparesColors) {
   for (const char* colors : {"--colors", "--json"}) {
     const std::string name = colors == std::string("--json") ? "plain.glb" : "city.glb";
@@ -102,7 +102,7 @@ TEST_F(FileCommands, Diff) {
   expect_error(2, "", {"diff", "m.vdag", "a.vdag"});
 }
 
-// Of the same voxels with other colors, and of a part that keeps its colors.
+// Compares the same voxels with other colors, and a part that keeps its colors.
 TEST_F(FileCommands, DiffOfColors) {
   const std::string head =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"

@@ -70,7 +70,7 @@ class InterruptExport : public Interrupt {
     ASSERT_EQ(run({"build", "s.glb", "-r", "1024", "-o", "s.vdag"}).status, 0);
     std::signal(SIGHUP, SIG_DFL);  // whatever runs the tests
   }
-  // The answer of a run that is sent the signal when the file `first` is there.
+  // The answer of a run that receives the signal once the file `first` exists.
   Answer interrupt_at(const std::string& first, int signal, const std::vector<std::string>& args) {
     Answer answer;
     for (int attempt = 0; attempt < 10; ++attempt) {
@@ -106,7 +106,7 @@ TEST_F(InterruptExport, LeavesNothing) {
         EXPECT_EQ(outputs(), 0u);
       } else {
         EXPECT_GT(outputs(), 0u);
-        // The same command has to succeed, and removes what the killed one has left.
+        // The same command has to succeed, and removes the killed one's files.
         const Answer again = run(args);
         EXPECT_EQ(again.status, 0) << again.err;
         EXPECT_EQ(outputs(), 1u);

@@ -61,7 +61,7 @@ class ClusterTest(unittest.TestCase):
             shutil.rmtree(self.work)
 
     def sha256(self, resolution, *options):
-        """Of the file that this machine builds alone."""
+        """Digest of the file that this machine builds alone."""
         key = (self.scene, resolution, *options)
         if key not in self.expected:
             out = self.folder / "local.vdag"
@@ -223,7 +223,7 @@ class ClusterTest(unittest.TestCase):
         self.cluster.restart_nodes()
 
     def test_a_node_that_cannot_start_tasks(self):
-        # Slurm holds for ever what such a node was given.
+        # Slurm holds the tasks of such a node forever.
         spool = self.folder / "slurm" / "spool-n1"
         away = spool.rename(f"{spool}.away")
         spool.touch()
@@ -258,14 +258,14 @@ class ClusterTest(unittest.TestCase):
         report, _ = self.finish(self.start(16384, 8), 16384)
         self.assertEqual(report["cluster"]["batches"], 8)
         self.assertEqual(report["cluster"]["failed_attempts"], 0)
-        # What ran at the interruption is what was taken over: nothing was submitted twice.
+        # The running tasks were taken over: nothing was submitted twice.
         self.wait_for_tasks(name, {"COMPLETED": 8})
 
     def queue(self):
         return self.cluster.command("squeue", "--noheader", "--array").stdout
 
     def task_name(self):
-        """Of the tasks of this build."""
+        """Name of the tasks of this build."""
         return "voxdag-" + json.loads((self.work / "cluster/cluster.json").read_text())["build"]
 
     def submitted(self, name):
@@ -318,7 +318,7 @@ class ClusterTest(unittest.TestCase):
         self.assertGreater(report["subvolumes"]["reused"], 0)
 
     def test_torn_and_foreign_records_do_not_count(self):
-        # The tasks begin only once the records are there.
+        # The tasks begin only once the records exist.
         build = self.start(16384, 4, "--cluster-options", "--begin=now+4")
         folder = self.work / "cluster"
         self.wait_for(lambda: list(folder.glob("batch-3.vdbatch")), "batch")
@@ -429,7 +429,7 @@ class ClusterTest(unittest.TestCase):
 
     @slow
     def test_a_task_that_is_out_of_memory(self):
-        # No task can do with so little. Without cgroups Slurm calls that FAILED or CANCELLED, too.
+        # No task can run with this little memory. Without cgroups Slurm may report FAILED or CANCELLED.
         build = self.start(32768, 2, "--cluster-options", "--mem=8M", "--cluster-retries", "0")
         _, messages = self.end(build)
         self.assertEqual(build.returncode, 10, messages)

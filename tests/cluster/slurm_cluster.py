@@ -1,5 +1,5 @@
-"""A Slurm cluster on this machine, in a folder of its own: munged, slurmctld and some slurmd, each with
-its name and port. No systemd, no privileges of the tests' own; everything ends with the context."""
+"""A Slurm cluster on this machine, in a separate folder: munged, slurmctld and some slurmd, each with
+its name and port. No systemd, no extra privileges for the tests; everything ends with the context."""
 
 import os
 import pwd
@@ -165,7 +165,7 @@ class SlurmCluster:
         self.wait_for(are_idle, "idle nodes", 150)
 
     def kill(self, name, how=signal.SIGKILL):
-        """Ends a daemon; what a node runs is left running (as on a machine that lost its network)."""
+        """Ends a daemon; the node's tasks keep running (as on a machine that lost its network)."""
         process = self.processes.pop(name)
         process.send_signal(how)
         process.wait()

@@ -67,7 +67,7 @@ TEST_P(Cubes, SmallCubesOfLargeGrids) {
     }
 }
 
-// Large cubes of large grids, too large for the oracle as a whole: regions of them are compared
+// Large cubes of large grids, too large for the oracle: regions of them are compared
 // voxel by voxel, near triangles and anywhere.
 TEST_P(Cubes, RegionsOfLargeCubes) {
   const auto backend = open();

@@ -8,7 +8,7 @@
 namespace voxdag {
 namespace {
 
-// Stores what it receives, and checks the order of the calls.
+// Stores the received arrays, and checks the order of the calls.
 class OrderedSink : public SubDagSink {
  public:
   OrderedSink(Built& built, const SubvolumeTask& task)

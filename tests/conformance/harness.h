@@ -48,8 +48,8 @@ struct Built {
   bool sink_called = false;
 };
 
-// Builds, and checks what holds for every outcome: the sink is called in order, only for what was
-// built, and all memory is released.
+// Builds, and checks the guarantees of every outcome: the sink is called in order, only for built
+// subvolumes, and all memory is released.
 Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,
             uint64_t budget_bytes = kAmpleBudget);
 Built build(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles,

@@ -10,8 +10,8 @@
 
 namespace {
 
-// Bytes allocated by `new` now, and their maximum: what a backend allocates without charging it
-// must be small.
+// Bytes currently allocated by `new`, and their maximum. A backend may allocate only little memory
+// without charging it.
 std::atomic<int64_t> g_heap{0}, g_heap_peak{0};
 
 void* counted(void* block) {
@@ -72,8 +72,8 @@ class EndlessStream : public TriangleStream {
   uint64_t count_, next_ = 0;
 };
 
-// The smallest cube fits the smallest budget, however many triangles there are, and what is not
-// charged is small.
+// The smallest cube fits the smallest budget, however many triangles there are, and uncharged
+// memory is small.
 TEST_P(Memory, SmallestCubeFitsWithAnyTriangles) {
   const auto backend = open();
   const SubvolumeTask task{14, {8, {200, 3, 117}}, 64};  // 64 voxels

@@ -1,5 +1,5 @@
-// The order, number and packing of the triangles never show in the result; what goes wrong outside
-// comes through, and the backend stays usable.
+// The order, number and packing of the triangles never affect the result; errors of the stream
+// are passed on, and the backend remains usable.
 #include <algorithm>
 
 #include "core/base/error.h"
@@ -29,7 +29,7 @@ void expect_same(const Built& a, const Built& b) {
   EXPECT_EQ(a.summary.root_hash, b.summary.root_hash);
 }
 
-// Triangles shuffled, duplicated, with rotated vertices, read one by one or all at once.
+// Triangles shuffled, duplicated, with rotated vertices, read one by one or in one batch.
 TEST_P(Streams, OrderAndRepetitionDoNotShow) {
   const auto backend = open();
   oracle::Triangles scene = mixed_scene(1);

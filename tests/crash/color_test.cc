@@ -33,7 +33,7 @@ TEST_P(ColorCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 TEST_P(ColorCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
-// What is not wanted any more is dropped, at once or not at all.
+// Unwanted artifacts are dropped, all of them or none.
 TEST(ColorStoreCrash, KeepsWhatIsWanted) {
   const voxdag::TemporaryFolder folder;
   const std::string path = folder.file("colors.vddurable");

@@ -41,7 +41,7 @@ inline uint64_t rounds() {
   return text ? std::strtoull(text, nullptr, 10) : 6;
 }
 
-// Where the scene's triangles lie until they are built.
+// Where the scene's triangles are stored until they are built.
 enum class Ingested { kInMemory, kDurable };
 
 class CrashTest : public testing::TestWithParam<Ingested> {
@@ -88,7 +88,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     return report;
   }
 
-  // Builds in a process of its own; true if it was killed before its end.
+  // Builds in a separate process; true if it was killed before its end.
   bool killed(FaultPlan plan, std::chrono::microseconds after = {}) const {
     const pid_t child = fork();
     if (child == 0) {
@@ -98,7 +98,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
       } catch (...) {
         _exit(1);
       }
-      std::fflush(stdout);  // what an EXPECT of the child has reported
+      std::fflush(stdout);  // output of the child's EXPECTs
       _exit(HasFailure() ? 1 : 0);
     }
     if (after.count() > 0) {
@@ -159,8 +159,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     }
   }
 
-  // A disk that is full, or fails, from any operation on says so, and nothing is lost when it has
-  // recovered.
+  // A disk that is full, or fails, from any operation on is reported, and nothing is lost when it
+  // has recovered.
   void break_disk_at_any_operation() {
     const uint64_t operations = operations_of_a_build();
     struct Case {
@@ -175,7 +175,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
         FaultyFiles files({c.fault, at});
         try {
           run(files);
-          // Removing what is left over may fail in silence, nothing else.
+          // Only the removal of leftover files may fail silently.
           EXPECT_TRUE(std::filesystem::exists(output()));
           std::filesystem::remove_all(output() + ".work");
         } catch (const voxdag::Error& error) {

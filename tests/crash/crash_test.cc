@@ -2,7 +2,7 @@
 // the disk, resumes when it is run again and ends with the same bytes.
 //
 // The short form that CI runs samples the operations. VOXDAG_CRASH_ROUNDS=N gives the number of
-// moments per fault; with N large, every operation is tried and as many random moments.
+// moments per fault; with N large, every operation is tested and as many random moments.
 #include "core/base/clock.h"
 #include "tests/crash/crash_fixture.h"
 
@@ -44,7 +44,7 @@ TEST_P(FineCrashTest, KilledAtRandomMoments) {
 
 TEST_P(CrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
-// A disk that fills up while subvolumes are built loses nothing of what it could store.
+// A disk that fills up while subvolumes are built loses no stored subvolume.
 TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   if (is_durable()) GTEST_SKIP() << "counts the operations of a build without durable triangles";
   voxdag::GenerateOptions options;

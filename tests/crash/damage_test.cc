@@ -84,7 +84,8 @@ TEST_P(DamageTest, BitsFlippedBetweenTwoRuns) {
   EXPECT_GT(flips, 0u);
 }
 
-// The first page tells a file of ours; with its job next to it the file is ours without it.
+// The first page identifies a file of voxdag; with its job next to it the file is accepted without
+// it.
 TEST_P(DamageTest, FirstPageOfThePartialFile) {
   const std::string partial = output() + ".partial";
   uint64_t at = operations_of_a_build();
@@ -113,7 +114,7 @@ TEST_P(DamageTest, BitsFlippedInTheJobStore) {
   }
 }
 
-// More triangles than the memory for them: what was spilled is read back changed, and the scene is
+// More triangles than memory for them: spilled triangles are read back changed, and the scene is
 // read again.
 TEST_P(DamageTest, BitsFlippedInSpilledTriangles) {
   voxdag::GenerateOptions options;

@@ -154,7 +154,7 @@ void FaultyFiles::sync_directory(const std::string& path) {
 }
 
 void FaultyFiles::cut_power() {
-  // Held until the end: no other thread may take for durable what is forgotten here.
+  // Held until the end: no other thread may treat bytes as durable that are dropped here.
   std::lock_guard lock(mutex_);
   for (const auto& [path, bytes] : synced_)
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;

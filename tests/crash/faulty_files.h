@@ -1,5 +1,5 @@
-// A file system that fails on request: after leveldb's fault_injection_test, a disk that forgets
-// what was not synced, is full, or takes the process with it.
+// A file system that fails on request: after leveldb's fault_injection_test, a disk that drops
+// unsynced data, is full, or kills the process.
 //
 // Every call that changes the disk is an operation, numbered from 1 in the order in which they
 // begin (they differ a little from run to run where there are several threads). Thread-safe.
@@ -21,7 +21,7 @@ enum class Fault {
   kNone,
   kKillBefore,  // SIGKILL instead of the operation
   kKillAfter,   // SIGKILL once it is done
-  kPowerCut,    // all that was not synced is forgotten, then SIGKILL
+  kPowerCut,    // unsynced data is dropped, then SIGKILL
   kNoSpace,     // this write and all later ones are half done and fail with Error{kNoSpace}
   kIoError,     // this and all later operations fail with Error{kIo}; a write is half done
   kFlipBit,     // if it is a write, one bit of it lands on the disk flipped
@@ -50,8 +50,8 @@ class FaultyFiles : public voxdag::ForwardingFiles {
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
-  // Runs one operation, which gets its number, or what the plan has in its place; `half` is what
-  // an operation does that the disk gives up on.
+  // Runs one operation, which gets its number, or the planned fault instead; `half` is the partial
+  // operation of a failing disk.
   template <class Operation, class Half>
   void operate(const Operation& operation, const Half& half);
   template <class Operation>
@@ -62,13 +62,13 @@ class FaultyFiles : public voxdag::ForwardingFiles {
   template <class Operation, class Half, class Flipped>
   void write(const Operation& operation, const Half& half, const Flipped& flipped);
   void read();
-  // Files back to what was synced of them, names to what was synced of their folders; SIGKILL.
+  // Reverts files and names to their synced state; SIGKILL.
   void cut_power();
 
   const FaultPlan plan_;
   std::atomic<uint64_t> operations_{0};
   std::atomic<uint64_t> reads_{0};
-  std::mutex mutex_;                                   // guards what a power cut leaves
+  std::mutex mutex_;                                   // guards the state after a power cut
   std::map<std::string, std::string> synced_;          // contents, of files that were written here
   std::map<std::string, std::string> unsynced_names_;  // new name -> old name, "" for a new file
   std::map<std::string, std::string> replaced_;        // contents of files whose names those took

@@ -9,7 +9,7 @@
 namespace crash {
 namespace {
 
-// What a process needs besides its budget: code, stacks, the allocator's reserves, SQLite.
+// Memory of a process in addition to its budget: code, stacks, the allocator's reserves, SQLite.
 constexpr uint64_t kBesides = uint64_t{1} << 30;
 
 // A sanitizer's shadow alone takes more than any limit worth testing.

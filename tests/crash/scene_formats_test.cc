@@ -19,7 +19,7 @@ void append(std::string& bytes, T value) {
   bytes.append(own, sizeof(T));
 }
 
-// `expected_` is of scene.glb; what is built is a file of its triangles.
+// `expected_` is the build of scene.glb; the tests build another file with the same triangles.
 class FormatTest : public CrashTest {
  protected:
   BuildSpec spec() const override {

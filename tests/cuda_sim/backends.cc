@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// Every subvolume has a schedule of its own, and must leave no device memory behind.
+// Every subvolume has a separate schedule, and must leave no device memory behind.
 class Checked : public Backend {
  public:
   explicit Checked(Method method) : backend_(make_cuda_backend(method)) {}

@@ -1,5 +1,5 @@
-// Each call of the runtime fails in turn, once: the outcome is right, or says what went wrong, and
-// the backend is usable afterwards.
+// Each call of the runtime fails in turn, once: the outcome is right, or an error that names the
+// failure, and the backend is usable afterwards.
 #include "tests/cuda_sim/sim/faults.h"
 
 #include "core/base/error.h"
@@ -47,7 +47,7 @@ oracle::Dag expected() {
   return oracle::build_dag(oracle::voxelize(scene(), oracle::region_of(kTask.cube, 6)), 64);
 }
 
-// A failure that passes is repaired by returning the pool's memory; one that stays means a split.
+// A failure that passes is repaired by returning the pool's memory; a permanent one means a split.
 TEST_P(Faults, EveryAllocation) {
   const auto backend = open();
   const oracle::Dag truth = expected();

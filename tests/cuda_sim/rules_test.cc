@@ -1,5 +1,5 @@
-// The simulated device itself: it finds what it promises to find, in programs that break one rule
-// each, and lets sound programs pass.
+// Tests the simulated device: it finds the violation in programs that break one rule each, and
+// accepts sound programs.
 #include <gtest/gtest.h>
 
 #include "tests/cuda_sim/rules/programs.h"

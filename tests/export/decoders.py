@@ -46,7 +46,7 @@ def ply(path, grid):
 
 
 def npz(path, grid):
-    with numpy.load(path) as arrays:  # checks the CRC of each array, too
+    with numpy.load(path) as arrays:  # also checks the CRC of each array
         assert sorted(arrays.files) == ["cells", "grid", "positions"]
         assert arrays["cells"].dtype == numpy.int32 and arrays["positions"].dtype == numpy.float64
         assert (arrays["grid"] == [*grid.origin, grid.voxel]).all()
@@ -170,7 +170,7 @@ def bt(path, grid, reader):
     leaves = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 5)
     corners, edges, occupied = leaves[:, :3] - 32768, leaves[:, 3], leaves[:, 4] == 1
     assert (edges[occupied] == 1).all()
-    # What is known lies in the region, and of a whole grid all is known.
+    # Known cells are in the region; in a complete grid all cells are known.
     assert (corners >= grid.low).all() and (corners + edges[:, None] <= grid.high).all()
     known = (edges.astype(numpy.int64) ** 3).sum()
     assert known == grid.resolution**3 or (grid.high - grid.low < grid.resolution).any()
@@ -264,7 +264,7 @@ def vox(path, grid):
     visit(0, numpy.zeros(3, numpy.int64))
     x, y, z = numpy.concatenate(cells).T
     # z is up, the middle of the grid's floor is the origin. A voxel has the coordinate of its low
-    # corner, and that of -z is the high one of z.
+    # corner, which for -z is the high corner of z.
     middle = grid.resolution // 2
     return numpy.stack([x + middle, z, middle - 1 - y], axis=1)
 
@@ -300,7 +300,7 @@ def vdb_colors(path, grid):
     low, high = read.evalActiveVoxelBoundingBox()
     values = numpy.zeros((*(numpy.array(high) - low + 1), 3), numpy.float32)
     read.copyToArray(values, ijk=low)
-    cells = vdb(path, grid)  # which are the active ones of this grid, too
+    cells = vdb(path, grid)  # which are also the active voxels of this grid
     assert len(cells) == read.activeVoxelCount()
     accessor = read.getConstAccessor()
     assert all(accessor.isValueOn(tuple(map(int, cell))) for cell in cells[::97])
@@ -349,7 +349,7 @@ def glb(path, grid):
     normals = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     low, high = corners.min(axis=1), corners.max(axis=1)
     found = []
-    # Along each axis faces that look back and forth take turns: between them is what is solid.
+    # Along each axis, backward and forward faces alternate, with the solid between them.
     for axis in range(3):
         here = normals[:, axis] != 0
         assert (low[here, axis] == high[here, axis]).all()

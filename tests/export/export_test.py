@@ -148,7 +148,7 @@ class Test:
         return "sheet.vdag", json.loads(self.run("info", "sheet.vdag", "--json"))
 
     def check_colors(self):
-        """Each voxel has the color that the reader finds, and none if that is asked for."""
+        """Each voxel has the reader's color, or no color if gray is requested."""
         decode = getattr(decoders, self.name + "_colors", None)
         if not decode:
             return

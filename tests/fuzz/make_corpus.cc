@@ -173,7 +173,7 @@ void add_records(const Corpus& corpus) {
   corpus.add("ingest_record", "one_file", without_checksum(encode(record)));
 }
 
-// Small images of every kind, and the first bytes of what is not read.
+// Small images of every kind, and the first bytes of unsupported formats.
 void add_images(const Corpus& corpus) {
   std::string pixels;
   for (size_t i = 0; i < size_t{16} * 12 * 8; ++i) pixels += static_cast<char>(i * i / 7 % 251);

@@ -7,8 +7,8 @@
                                 [FILE.vdag[:X0,Y0,Z0,X1,Y1,Z1] ...]
 
 Without files a generated city is built at --resolution. Each file, or region of it, is exported to each format. The
-formats of --may-refuse, by default none for the city and all for files, may be refused: then the export must name what
-fits, and leave nothing. Files have no colors, or the decoders of ply and npz fail. One that is written is decoded as a whole by
+formats of --may-refuse, by default none for the city and all for files, may be refused: then the export must name a selection
+that fits, and leave no file. Files have no colors, or the decoders of ply and npz fail. A written file is decoded completely by
 tests/export/whole, which shares nothing with the exporter, and must have the count and the 128 bits of
 order-independent hashes of positions that the reader header finds in the .vdag file; a glb file, the faces between
 voxels and empty cells. Prints a row of a table for each; exit status 1 if anything differs. Takes 12 GB of disk for
@@ -52,7 +52,7 @@ def digest(options, *args):
 
 
 def mebibytes(size):
-    """Of a size such as 512MiB or 4GiB."""
+    """Number of MiB in a size such as 512MiB or 4GiB."""
     number, unit = re.fullmatch(r"(\d+)(MiB|GiB)", size).groups()
     return int(number) * (1024 if unit == "GiB" else 1)
 
@@ -79,7 +79,7 @@ class Selection:
 
 
 def check(options, selection, name, folder):
-    """A row of the table; raises AssertionError if the export is not what it must be."""
+    """A row of the table; raises AssertionError if the export is wrong."""
     output = folder / ("whole" + SUFFIXES.get(name, "." + name))
     region = ["--region", ",".join(selection.region)] if selection.region else []
     started = time.monotonic()

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Builds are killed at random moments, and the same command runs again at once.
+"""Kills builds at random moments, and immediately runs the same command again.
 
     tests/long/kill_builds.py [--voxdag build/cpu/voxdag] [--kills 300] [--scene FILE] [-r 2048] [--color]
 
 Without --scene a terrain is generated. With --color the file has colors. The build is killed (SIGKILL) one to six times, each time at a
-random moment of what is left of it, and started again without a pause; then it runs to its end. What
+random moment of the remaining time, and started again without a pause; then it runs to its end. What
 must hold:
 
   - no command is refused or fails, whatever the killed one has left or still holds;

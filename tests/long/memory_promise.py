@@ -11,7 +11,7 @@ ALLOWANCE = 64 * MIB  # of the promise of --memory
 
 
 def holds(build_command, budgets):
-    """Runs `voxdag build` with each budget, in bytes, None for the default, and prints what it took. Returns whether the
+    """Runs `voxdag build` with each budget, in bytes, None for the default, and prints its costs. Returns True if the
     peak of resident memory, by the report and by the system's own measurement, was at most ALLOWANCE above each
     budget, and the files were equal."""
     digests, within = set(), True

@@ -5,7 +5,7 @@
 
 Each client repeats, chosen by its seed: upload a scene, submit a job, follow its events, download and
 compare the result, cancel, suspend and resume, retry, delete. Every KILL-EVERY minutes the service is
-killed (SIGKILL) and started again at once on the same data. What must hold:
+killed (SIGKILL) and immediately started again on the same data. What must hold:
 
   - a result has the SHA-256 that a build without a service gives, and so have its bytes;
   - a job that was acknowledged is never lost, and none fails;
@@ -101,7 +101,7 @@ class Client(threading.Thread):
             self.counts[what] = self.counts.get(what, 0) + 1
 
     def request(self, method, path, body=None, headers=None):
-        """The status and bytes of the answer; repeats what got no answer, and what was too busy."""
+        """The status and bytes of the answer; repeats requests without an answer, and requests refused as busy."""
         deadline = time.monotonic() + JOB_TIMEOUT_S
         while True:
             try:
@@ -218,7 +218,7 @@ def prepare(voxdag, folder):
 
 
 def grew(samples, slack):
-    """Whether the median of the last quarter is more than `slack` times that of the first."""
+    """True if the median of the last quarter is more than `slack` times the first quarter's."""
     quarter = max(1, len(samples) // 4)
     first, last = sorted(samples[:quarter]), sorted(samples[-quarter:])
     return last[len(last) // 2] > slack * first[len(first) // 2]

@@ -3,7 +3,7 @@
 
     tests/long/wheel.py [--folder DIR]
 
-Builds the wheel of this checkout with `pip wheel`, which compiles the whole library, in a build folder of its own.
+Builds the wheel of this checkout with `pip wheel`, which compiles the complete library, in a separate build folder.
 What must hold: the wheel has the name and the tags that this Python needs (cp312-abi3 from 3.12 on, before that one for
 each version), the package with its types and the license, and no other file. Installed, it runs the program at the top of
 docs/python.md in an empty folder, which makes a picture of something, and mypy knows its types. Needs PyPI.
@@ -41,7 +41,7 @@ def field(name):
 
 
 def expected_tags():
-    """The tags of a wheel, and what the names of its modules end in."""
+    """The tags of a wheel, and the suffix of its modules' names."""
     platform = re.sub("[-.]", "_", sysconfig.get_platform())
     if sys.version_info >= (3, 12):
         return f"cp312-abi3-{platform}", ".abi3.so"

@@ -1,4 +1,4 @@
-// The invariants of a sub-DAG, for tests of what makes one.
+// The invariants of a sub-DAG, for tests of its producers.
 #pragma once
 
 #include "core/dag/sub_dag.h"

@@ -19,7 +19,7 @@ enum class SceneKind {
   kSpanning,        // from one side of the region to another
   kCoincident,      // the same triangles again, with rotated vertices
   kThroughCorners,  // edges exactly through voxel corners
-  kCrossing,        // partly or wholly outside the region
+  kCrossing,        // partly or completely outside the region
   kWide,            // through the region, vertices at the limit of the coordinates
 };
 constexpr SceneKind kAllKinds[] = {

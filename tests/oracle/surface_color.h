@@ -1,7 +1,6 @@
-// The color of a cube of the grid as a reference has it: the mean of what the surfaces in the
-// closed cube look like, in linear light, over many points that are spread evenly over their area.
-// Triangles are clipped to the cube; images are looked at in their finest texels, bilinearly. All
-// of it in doubles.
+// The reference color of a cube of the grid: the mean color of the surfaces in the closed cube, in
+// linear light, over many points spread evenly over their area. Triangles are clipped to the cube;
+// images are sampled bilinearly in their finest texels. All computations are in doubles.
 #pragma once
 
 #include <array>
@@ -49,7 +48,7 @@ double linear_to_srgb(double linear);
 
 // In 8 bits; nothing where the surfaces have no area in the cube: they touch it in points or lines.
 // Surfaces count by area and by alpha, or by area alone where all points are transparent.
-// `points`: how many are looked at.
+// `points`: number of samples.
 std::optional<std::array<uint8_t, 3>> mean_color(std::span<const Surface* const> surfaces,
                                                  const Point& low, int64_t edge, int points = 128);
 

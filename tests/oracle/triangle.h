@@ -1,5 +1,5 @@
-// The plain types of the oracle: independent code, as simple as can be, that says what voxdag must
-// answer. It shares nothing with what it checks, constants included.
+// The plain types of the oracle: independent code, as simple as possible, that computes voxdag's
+// correct answers. It shares nothing with the checked code, not even constants.
 //
 // Lengths are in lattice units, 256 to a voxel; vertices are odd, so never on a voxel's boundary.
 #pragma once

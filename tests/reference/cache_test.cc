@@ -1,5 +1,5 @@
-// Subvolumes shared between builds: what did not change is copied, and nothing of it shows in the
-// bytes.
+// Subvolumes shared between builds: unchanged subvolumes are copied, and the bytes do not
+// depend on it.
 #include <filesystem>
 #include <fstream>
 
@@ -20,8 +20,8 @@ Triangles room_with_chair(int resolution, int64_t chair_x_voxels) {
   return scene;
 }
 
-// One thing moved: 95 % of the subvolumes and more come from the cache, and the bytes are those of
-// a build from scratch.
+// One thing moved: 95 % of the subvolumes or more come from the cache, and the bytes equal a build
+// from scratch.
 TEST_F(CacheTest, OneChairMoved) {
   constexpr int kResolution = 1024;
   auto before = spec_for(room_with_chair(kResolution, 100), kResolution);

@@ -28,7 +28,7 @@ struct FileDag {
 FileDag read_dag(const voxdag_reader::File& file);
 
 // Checks counts and node arrays of a file against the oracle's; on small grids also every single
-// voxel, asked for by its place.
+// voxel, by its position.
 void expect_file_equals(const std::string& path, const oracle::Voxels& voxels, int hash_bits);
 
 // The bytes of a file.
@@ -40,7 +40,7 @@ class Reference : public testing::Test {
   // A spec for a scene in lattice units on a grid of R voxels: the cube is given, so that the
   // product snaps every vertex to where it was.
   voxdag::BuildSpec spec_for(const Triangles& scene, int64_t resolution, int copies = 1);
-  // Builds under a name of its own.
+  // Builds under a unique name.
   voxdag::BuildReport run(voxdag::BuildSpec spec);
   // Builds a scene in lattice units, and compares with the oracle.
   voxdag::BuildReport expect_right(const Triangles& scene, int resolution, voxdag::BuildSpec spec);

@@ -96,7 +96,8 @@ TEST_F(Api, RendersAPreview) {
   EXPECT_TRUE(http_->get("/api/v1/jobs/" + id + "/preview.png").body.starts_with("\x89PNG"));
 }
 
-// The preview of a job with colors shows them, that of the same scene without colors does not.
+// The preview of a job with colors shows them; the preview of the same scene without colors does
+// not.
 TEST_F(Api, RendersColorsInAPreview) {
   start();
   ASSERT_EQ(put_scene("red.ply", kRedSquare).status, 201);

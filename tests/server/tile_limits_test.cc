@@ -116,7 +116,7 @@ TEST_F(TileLimits, ASlowReaderBlocksItselfAlone) {
   close(ben);
 }
 
-// What a client reads at last is whole, however late.
+// A slow client finally reads a complete answer.
 TEST_F(TileLimits, ASlowReaderGetsItsAnswer) {
   const std::string whole = get("ben", largest_batch(version_)).body;
   EXPECT_GE(whole.size(), size_t{512} << 10) << "a small answer holds no permit";

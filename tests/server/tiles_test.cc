@@ -132,7 +132,7 @@ TEST_F(Tiles, AreCompressedForClientsThatAcceptIt) {
   EXPECT_LT(packed.size(), whole.size());
 }
 
-// A batch is all of its tiles, in the order asked for, or an error.
+// A batch is all of its tiles, in the requested order, or an error.
 TEST_F(Tiles, ComeInBatches) {
   finish_job();
   const auto file = open_global_file(result_);
@@ -304,7 +304,7 @@ TEST_F(View, ServesTheFileAndTheAssets) {
   EXPECT_EQ(http_->get("/lib/dom.js").header("Content-Type"), "text/javascript; charset=utf-8");
   EXPECT_EQ(http_->get("/api/v1/jobs").status, 404);
   EXPECT_EQ(http_->send("POST", "/api/v1/view/tiles", "{}").status, 405);
-  // Any page of the web may send requests here, under a name of its own.
+  // Any web page may send requests here, under its host name.
   EXPECT_EQ(http_->get("/api/v1/view/tiles", {{"Host", "evil.example"}}).status, 403);
 }
 
@@ -356,7 +356,7 @@ TEST_F(View, AFileThatIsTruncatedWhileItIsOpenedIsAnErrorAndNoCrash) {
   }
 }
 
-// The colors of a file, 8 x 8 x 8 cells at a time.
+// The colors of a file, 8 x 8 x 8 cells per page.
 TEST_F(View, SendsColorPages) {
   build("64", "--color");
   start();

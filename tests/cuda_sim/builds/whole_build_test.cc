@@ -99,8 +99,8 @@ TEST_F(SimulatedBuild, ResumesAfterAKill) {
   EXPECT_GT(kills, 0);
 }
 
-// A device that fails in the middle ends the build with an error that names it; what was stored is
-// used by the next one.
+// A device that fails in the middle ends the build with an error that names it; the next build uses
+// the stored subvolumes.
 TEST_F(SimulatedBuild, SaysThatTheDeviceFailed) {
   cuda_sim::plan_fault({cuda_sim::Call::kOther, 2000, cudaErrorLaunchFailure, true});
   try {

@@ -1,5 +1,5 @@
 // The part of the CUDA runtime that core/backend/cuda calls, for the simulated device. The meaning
-// of each call is the runtime's; what hardware may let pass is a violation here.
+// of each call is the runtime's; errors that hardware may tolerate are violations here.
 #pragma once
 
 #include <cstddef>

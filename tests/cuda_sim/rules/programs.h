@@ -12,12 +12,12 @@ namespace voxdag::cuda_sim {
 struct BrokenProgram {
   const char* name;
   void (*run)();          // does not return
-  const char* violation;  // what the message must contain
+  const char* violation;  // required part of the message
 };
 std::vector<BrokenProgram> broken_programs();
 
 // Every thread of some blocks writes a word of shared memory, passes a barrier and reads its
-// neighbor's. Returns what each one read: the neighbor's number in the block.
+// neighbor's word. Returns the words that were read: the neighbor's number in the block.
 std::vector<uint32_t> exchange_with_neighbors(uint32_t blocks, uint32_t threads);
 
 // The mailbox of a download as the host sees it: before the stream was waited for, and after.
@@ -26,7 +26,8 @@ struct DownloadedWord {
 };
 DownloadedWord download_word(uint32_t value);
 
-// Uploads a value by the backend's own CudaSpace, changes it at once, and returns what arrived.
+// Uploads a value with the backend's CudaSpace, changes it immediately, and returns the value that
+// arrived.
 uint64_t upload_then_change(uint64_t value);
 
 // Device memory, which has no access rights when this returns.

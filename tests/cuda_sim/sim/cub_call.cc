@@ -22,7 +22,7 @@ struct Range {
     return begin < at + other_bytes && at < begin + bytes;
   }
 };
-// Of the call that runs.
+// State of the running call.
 Range g_storage;
 std::vector<Range> g_read;
 

@@ -118,7 +118,7 @@ void DeviceMemory::close_now() {
   closed_ = true;
 }
 
-// The allocation that holds a range as a whole, of the device that operates.
+// The allocation of the current device that contains the complete range.
 const DeviceMemory::Life* DeviceMemory::life_at(const void* p, uint64_t bytes) const {
   const uint64_t at = offset(p);
   if (at >= kBytes) return nullptr;

@@ -1,10 +1,10 @@
 // The memory of all simulated devices: one range of addresses that has no access rights while the
 // host runs, and in which every byte is known to be allocated or not, written or not.
 //
-//   1. Each allocation has pages of its own. It lives from the moment its allocation executes in
+//   1. Each allocation has separate pages. It lives from the moment its allocation executes in
 //      stream order until its release does, and can be used by its device only.
 //   2. Reading a byte that was never written is a violation, so what fresh memory contains does not
-//      matter. Released memory is junk at once, and its addresses are used again late.
+//      matter. Released memory is junk immediately, and its addresses are reused late.
 //   3. Two threads of a launch that are not ordered write no byte twice, and read none that the
 //      other wrote, unless both use atomics.
 //
@@ -29,15 +29,15 @@ class DeviceMemory {
 
   bool contains(const void* p) const { return offset(p) < kBytes; }
 
-  // Addresses for an allocation; null if there are none.
+  // Returns addresses for an allocation, or null.
   void* reserve(uint64_t bytes);
   void begin_life(void* memory, uint64_t bytes, int device);
   void end_life(void* memory);
   // Ends all lives.
   void reset();
 
-  // Gives access, for operations of a device, and takes it away: from what the compiler instruments
-  // of the backend's sources every time, from all code one time of kCloseOneOf, since that is slow.
+  // Gives access for operations of a device, and revokes it: for instrumented code of the backend's
+  // sources every time, for all code one time in kCloseOneOf, because that is slow.
   void open(int device);
   void close();
   bool is_open() const { return open_; }
@@ -67,8 +67,8 @@ class DeviceMemory {
   };
   static constexpr uint32_t kCloseOneOf = 2048;
   static constexpr uint64_t kGuardPages =
-      16;                                    // behind each allocation, and what is left of its last
-  static constexpr uint64_t kChunk = 16384;  // that is cleaned at once
+      16;  // behind each allocation, plus the rest of its last page
+  static constexpr uint64_t kChunk = 16384;      // cleaned per step
   static constexpr size_t kQuarantineSize = 64;  // released ranges that wait for their next use
   static constexpr uint8_t kJunk = 0xdb;
 
@@ -92,7 +92,7 @@ class DeviceMemory {
   std::deque<std::pair<uint64_t, uint64_t>> quarantine_;
 };
 
-// Of the process.
+// The only instance.
 DeviceMemory& device_memory();
 
 }  // namespace voxdag::cuda_sim

@@ -18,7 +18,7 @@ struct Fault {
   bool sticky = false;
 };
 
-// The next call to fail; replaces what was planned. Without an argument none fails.
+// Sets the next call to fail, replacing an earlier plan.
 void plan_fault(const Fault& fault);
 void plan_no_fault();
 // Whether the planned call was reached.

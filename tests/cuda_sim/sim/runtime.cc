@@ -64,7 +64,7 @@ CUstream_st::Operation upload(void* to, const void* from, size_t bytes) {
 }
 
 CUstream_st::Operation download(void* to, const void* from, size_t bytes) {
-  std::memset(to, 0xe7, bytes);  // what the host reads too early
+  std::memset(to, 0xe7, bytes);  // junk for a host that reads too early
   return {"a download",
           [=] {
             device_memory().expect_written(from, bytes, "a download reads");
@@ -148,7 +148,7 @@ cudaError_t cudaMemPoolSetAttribute(cudaMemPool_t, cudaMemPoolAttr, void*) {
   return Begin().status;
 }
 
-// The pool holds exactly what is in use.
+// The pool holds exactly the memory in use.
 cudaError_t cudaMemPoolGetAttribute(cudaMemPool_t, cudaMemPoolAttr, void* value) {
   const Begin call;
   *static_cast<uint64_t*>(value) = g_in_use;

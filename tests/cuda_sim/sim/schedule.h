@@ -1,4 +1,4 @@
-// When queued work runs, and in which order what has no order: decided by a seed.
+// Decides by a seed when queued work runs, and in which order if the order is unspecified.
 #pragma once
 
 #include <cstdint>

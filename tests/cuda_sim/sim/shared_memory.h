@@ -13,7 +13,7 @@ inline constexpr size_t kMaxSharedBytes = size_t{48} << 10;
 
 enum class Access { kRead, kWrite, kAtomic };
 
-// Forgets what the last block wrote.
+// Discards the writes of the last block.
 void begin_block(size_t shared_bytes);
 // All threads passed a barrier.
 void next_interval();

@@ -1,5 +1,5 @@
-// Streams that run late: work is queued, and runs when synchronization demands it, or earlier where
-// the schedule says so. All of it runs on the host thread that needs it, under one lock.
+// Streams that run late: work is queued, and runs when synchronization demands it, or earlier if
+// the schedule decides so. All of it runs on the host thread that needs it, under one lock.
 #pragma once
 
 #include <cuda_runtime_api.h>

@@ -21,7 +21,7 @@ struct KernelLaunch {
 
 void run_kernel(const KernelLaunch& launch);
 
-// Of the kernel that runs; `running` is true only while its code does, on this thread.
+// The running kernel; `running` is true only while its code runs on this thread.
 struct RunningThread {
   bool running = false;
   uint32_t block = 0, thread = 0;

@@ -1,5 +1,5 @@
-// What the simulated device does when a program breaks a rule of CUDA that hardware may let pass:
-// it says which, and ends the process. A test of a rule expects the death.
+// Reports a violation of a CUDA rule that hardware may tolerate, and ends the process. A test of a
+// rule expects the death.
 #pragma once
 
 #include <string>

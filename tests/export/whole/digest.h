@@ -1,7 +1,7 @@
 // A set of cells as a count and two sums of 64-bit hashes of their positions. It does not depend on
 // the order of the cells, so that files of any size are compared one to one without being sorted or
-// held in memory: a cell that is missing, comes twice or lies elsewhere changes all three, or the
-// sums, but for a chance of 2^-128.
+// held in memory: a missing, duplicate or misplaced cell changes all three, or the sums, except
+// with a probability of 2^-128.
 #pragma once
 
 #include <cstdint>

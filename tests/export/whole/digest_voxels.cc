@@ -3,7 +3,7 @@
 //     digest_voxels vdag|faces FILE.vdag [X0 Y0 Z0 X1 Y1 Z1]    of a region, by the reader header
 //     digest_voxels FORMAT FILE ORIGIN_X ORIGIN_Y ORIGIN_Z VOXEL LEVELS
 //
-// `faces` are those between voxels and empty cells, which are what a glb file has. Prints the count
+// `faces` counts the faces between voxels and empty cells, which form a glb file. Prints the count
 // and the hashes; exit status 1 for a file that breaks its format, 2 for a format without decoder.
 #include <algorithm>
 

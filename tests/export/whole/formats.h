@@ -24,8 +24,8 @@ struct Grid {
   int levels;    // the grid has 2^levels voxels per edge
 
   int64_t resolution() const { return int64_t{1} << levels; }
-  // The whole number of voxels, plus `shift`, that lie between the grid's low corner and a world
-  // coordinate.
+  // The integer number of voxels between the grid's low corner and a world coordinate, plus
+  // `shift`.
   int64_t cell(int axis, double world, double shift) const {
     const double cell = (world - origin[static_cast<size_t>(axis)]) / voxel - shift;
     const double rounded = std::rint(cell);

@@ -10,7 +10,7 @@ namespace {
 
 using Corner = std::array<int64_t, 3>;
 
-// A child's corner in units of its edge; the bits of x, y and z in `child` are those of `axes`.
+// A child's corner in units of its edge; `axes` has the bits of x, y and z in `child`.
 Corner child_of(const Corner& corner, uint32_t child, const std::array<uint32_t, 3>& axes) {
   return {2 * corner[0] + (child & axes[0] ? 1 : 0), 2 * corner[1] + (child & axes[1] ? 1 : 0),
           2 * corner[2] + (child & axes[2] ? 1 : 0)};

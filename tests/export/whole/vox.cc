@@ -99,7 +99,7 @@ class VoxScene {
     if (node.model >= 0) show(models_.at(static_cast<size_t>(node.model)), place);
   }
   // A model's center, rounded down, is at its place. z is up, and the origin in the middle of the
-  // grid's floor; a voxel has the coordinate of its low corner, and that of -z is the high one of
+  // grid's floor; a voxel has the coordinate of its low corner, which for -z is the high corner of
   // z.
   void show(const VoxModel& model, const std::array<int64_t, 3>& place) const {
     const int64_t middle = resolution_ / 2;

@@ -1,5 +1,5 @@
-// Small scenes whose geometry is compressed, in every way that voxdag decodes: what fuzzers start
-// from. Without the libraries there are none.
+// Small scenes whose geometry is compressed, in every way that voxdag decodes, as the fuzzers'
+// corpus. Without the libraries the corpus is empty.
 #pragma once
 
 #include <map>

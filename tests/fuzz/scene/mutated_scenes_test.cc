@@ -42,14 +42,14 @@ std::string mutate(std::string file, std::mt19937& random) {
   return file;
 }
 
-// What became of the mutations; a fuzzer whose files all break at once, or all work, tests little.
+// Outcomes of the mutations. A fuzzer whose files all fail immediately, or all work, tests little.
 struct Outcomes {
   int worked = 0;
   int refused = 0;
   int with_image = 0;
 };
 
-// Reads what the triangles look like. Returns how many have an image.
+// Reads the materials of the triangles. Returns the number of triangles with an image.
 int read_looks(OpenScene& open) {
   NoProgress progress;
   const auto textures = TextureSet::prepare(open.files, open.source->materials(), "scratch", 1,
@@ -111,7 +111,7 @@ TEST(FuzzScene, MutatedGltfWithDataUri) {
   EXPECT_GT(outcomes.refused, 100);
 }
 
-// Materials, images and what they are read from.
+// Materials, images and their buffers.
 TEST(FuzzScene, MutatedLooks) {
   const SceneBuilder scene = rich_painted_scene();
   OpenScene open(scene.glb());

@@ -1,7 +1,7 @@
 // Global files: the reader, lookups, colors, rays, tiles and the verifier. The input is the used
 // part of the header page, up to the attribute table or, if attributes are counted, up to its end,
-// and what is behind that page; feature bits, sizes, checksums and the checksum table are made to
-// fit, so that a mutation reaches what is behind them.
+// and the bytes after that page. Feature bits, sizes, checksums and the checksum table are
+// corrected, so that a mutation reaches the code behind them.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -29,7 +29,7 @@ namespace {
 namespace layout = global_layout;
 constexpr uint64_t kMaxVisits = 4096;
 constexpr uint64_t kBudgetBytes = uint64_t{16} << 20;
-// Of files with wide levels, which are small here.
+// Threshold of wide levels, which are small here.
 constexpr uint64_t kNarrowWords = 2;
 
 void put(std::vector<std::byte>& file, size_t at, uint64_t value) {
@@ -43,7 +43,7 @@ T get(std::span<const std::byte> bytes, size_t at) {
   return value;
 }
 
-// Of a file of version 2: one without attributes is there for its wide levels.
+// Feature bits of a file of version 2. A file without attributes has wide levels.
 uint64_t features_of(std::span<const std::byte> header, bool has_attributes) {
   if (!has_attributes) return layout::kWideLevels;
   for (size_t l = 0; l < layout::kMaxLevels; ++l)
@@ -164,8 +164,8 @@ void encode_tiles(const voxdag_reader::File& file) {
   }
 }
 
-// What somebody asks for who knows nothing of the file: words of it are addresses. A file may be
-// sound where no node lies at an address.
+// Queries of a client without knowledge of the file, which uses its words as addresses. In a sound
+// file an address need not have a node.
 void answer_strangers(const voxdag_reader::File& file) {
   const query::DagView view(file);
   const CheckedBlocks blocks(file);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kMaxWaits = 20;
 
-// Answers every request with its target and what it could read of the body.
+// Answers every request with its target and the readable part of its body.
 Response echo(Request& request) {
   std::string body = request.method + " " + request.target.path + "\n";
   if (request.read_body)
@@ -79,7 +79,7 @@ std::string exchange(int port, const uint8_t* data, size_t size) {
                 "the loopback has a free port");
   fuzz::require(::connect(fd, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0,
                 "the service accepts connections");
-  // The service may refuse the rest of what is sent to it.
+  // The service may refuse the rest of the bytes.
   for (size_t sent = 0; sent < size;) {
     const ssize_t n = ::send(fd, data + sent, size - sent, MSG_NOSIGNAL);
     if (n <= 0) break;

@@ -1,5 +1,5 @@
-// Images: PNG and JPEG, as they are, and PNG also with checksums of chunks that are made to fit, so
-// that a mutation reaches what is behind them. Whatever the bytes, they are pixels, the same ones
+// Images: PNG and JPEG, as they are, and PNG also with corrected checksums of its chunks, so
+// that a mutation reaches the code behind them. Whatever the bytes, they are pixels, the same ones
 // each time, or a problem.
 #include <zlib.h>
 
@@ -16,7 +16,7 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMemoryBytes = uint64_t{8} << 20;
-// Of a large image only the first rows.
+// Only the first rows of a large image are decoded.
 constexpr uint64_t kMaxPixels = uint64_t{1} << 20;
 
 class BytesSource : public EncodedBytes {
@@ -33,7 +33,7 @@ class BytesSource : public EncodedBytes {
   std::span<const std::byte> bytes_;
 };
 
-// A checksum of the pixels, or what is wrong with them.
+// A checksum of the pixels, or the error.
 std::string decode(std::span<const std::byte> bytes) {
   MemoryBudget budget(kMemoryBytes);
   std::string result;

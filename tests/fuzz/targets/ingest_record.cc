@@ -1,5 +1,5 @@
-// The record of an interrupted ingest in the job store, whose checksum is made to fit: what was
-// decoded can be decoded again from its encoding.
+// The record of an interrupted ingest in the job store, with a corrected checksum: a decoded
+// record can be encoded and decoded again.
 #include "scheduler/state/checkpoint/ingest_record.h"
 
 #include "core/base/error.h"

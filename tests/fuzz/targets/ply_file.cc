@@ -1,4 +1,4 @@
-// PLY files: the header, the rows, and the triangles. The first bytes of every input are those of a
+// PLY files: the header, the rows, and the triangles. Every input begins like a
 // PLY file.
 #include "tests/fuzz/targets/scene_triangles.h"
 

@@ -13,7 +13,7 @@ namespace voxdag::fuzz {
 constexpr uint64_t kMaxTriangles = 2000;
 constexpr uint64_t kSceneBudgetBytes = uint64_t{16} << 20;
 
-// Reads all triangles of the file at once, and one by one, if it is a scene.
+// Reads all triangles of the file in one batch, and one by one, if it is a scene.
 inline void check_scene(std::string file) {
   test::MemoryFiles files;
   files.contents["scene"] = std::move(file);

@@ -13,9 +13,8 @@ namespace voxdag::cuda_sim {
 cudaError_t cub_call(const char* name, void* storage, size_t& bytes, size_t n, cudaStream_t stream,
                      std::function<void()> work);
 
-// What a call reads and writes; a violation where it may not.
-// Nothing may overlap the storage, and what is written nothing that is read, unless it
-// `is_in_place`.
+// Declares the reads and writes of a call; forbidden ones are violations. Nothing may overlap the
+// storage, and outputs may not overlap inputs unless the call `is_in_place`.
 void cub_reads(const void* p, size_t bytes);
 void cub_writes(void* p, size_t bytes, bool is_in_place = false);
 void cub_spoils(void* p, size_t bytes);
