@@ -81,8 +81,8 @@ int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, con
   return compared;
 }
 
-// Nodes, hashes and counts from the memo are those of drawing the same planes: for walls,
-// for small normals and for others.
+// Nodes, hashes and counts from the memo equal those from drawing the same planes: walls, small
+// normals and others.
 TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
   oracle::Random random(6);
   const auto tile = std::make_unique<TileBricks>();

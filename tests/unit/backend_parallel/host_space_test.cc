@@ -171,7 +171,7 @@ TEST_P(HostSpaceTest, BlocksRunPhaseByPhase) {
   for (uint32_t i = 0; i < out.size(); ++i) EXPECT_EQ(out[i], 31 - i % 32 + 100 * (i / 32));
 }
 
-// What the budget cannot hold is OutOfBudget, and nothing stays charged.
+// Exceeding the budget throws OutOfBudget, and nothing remains charged.
 TEST_P(HostSpaceTest, BuffersAreCharged) {
   MemoryBudget small(1 << 20);
   HostSpace here(small, cancel, GetParam());

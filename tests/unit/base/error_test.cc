@@ -39,8 +39,8 @@ TEST(ErrorTable, IsAsPromised) {
   }
 }
 
-// A script can tell errors apart by the exit status, and never takes one for success or for what a
-// shell itself reports (126 and above, Ctrl-C aside).
+// A script can tell errors apart by the exit status, and never mistakes one for success or for a
+// status of the shell (126 and above, except Ctrl-C).
 TEST(ErrorTable, ExitStatusesAreDistinctAndNotTheShells) {
   std::set<int> seen;
   for (const Row& row : kPromised) {
@@ -51,7 +51,7 @@ TEST(ErrorTable, ExitStatusesAreDistinctAndNotTheShells) {
   }
 }
 
-// What was thrown is what is caught, as Error and as std::exception.
+// The caught error equals the thrown one, as Error and as std::exception.
 TEST(Error, KeepsCodeAndMessage) {
   try {
     throw Error(ErrorCode::kNoSpace, "disk full: spill.bin");

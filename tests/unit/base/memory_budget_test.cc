@@ -12,7 +12,7 @@
 namespace voxdag {
 namespace {
 
-// What fits is charged, what does not changes nothing; the limit itself fits.
+// A charge that fits is recorded; one that does not changes nothing. The limit itself fits.
 TEST(MemoryBudget, ChargesUpToItsLimit) {
   MemoryBudget budget(100);
   EXPECT_TRUE(budget.try_charge(60));
@@ -39,7 +39,7 @@ TEST(MemoryBudget, RefusesSizesThatWouldWrap) {
   EXPECT_FALSE(endless.try_charge(2));
 }
 
-// The error names the buffer, its size, what is free and the limit.
+// The error names the buffer, its size, the free memory and the limit.
 TEST(MemoryBudget, NamesWhatDidNotFit) {
   MemoryBudget budget(1000);
   budget.charge(300, "the first");

@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// Pages come zero-filled, also those of a buffer that was just freed with other contents.
+// Pages are zero-filled, even after a buffer with other contents was freed.
 TEST(PageBuffer, IsZeroFilled) {
   MemoryBudget budget(uint64_t{64} << 20);
   for (int round = 0; round < 3; ++round) {
@@ -41,7 +41,7 @@ TEST(PageBuffer, ChargesWhatItHolds) {
   EXPECT_EQ(budget.used(), 0u);
 }
 
-// Growing retains the contents, zero-fills the rest and charges it; what does not fit changes
+// Growing retains the contents, zero-fills the rest and charges it; a failed growth changes
 // nothing.
 TEST(PageBuffer, Grows) {
   MemoryBudget budget(uint64_t{1} << 20);
@@ -73,7 +73,7 @@ TEST(PageBuffer, MayBeEmpty) {
 }
 
 // Refused by the budget, by the system, or because the size in bytes does not fit 64 bits:
-// kOutOfMemory naming the buffer, and nothing stays charged.
+// kOutOfMemory naming the buffer, and nothing remains charged.
 TEST(PageBuffer, NamesWhatDidNotFit) {
   MemoryBudget small(4096), endless(UINT64_MAX);
   const auto refused = [](MemoryBudget& budget, size_t size) {

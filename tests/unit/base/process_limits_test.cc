@@ -56,7 +56,7 @@ TEST_F(CgroupTest, CpuQuotas) {
   EXPECT_GE(default_threads(), 1u);
 }
 
-// Version 1, alone or together with version 2, and what is no membership at all.
+// Version 1, alone or together with version 2, and texts that are not memberships.
 TEST_F(CgroupTest, WalksUpInVersion1) {
   write("memory/pool/job/memory.limit_in_bytes", "9223372036854771712\n");
   write("memory/pool/memory.limit_in_bytes", "700000000\n");

@@ -32,7 +32,7 @@ TEST(Text, DecodesPercentEscapes) {
     EXPECT_EQ(percent_decoded(text), std::nullopt) << text;
 }
 
-// A list has exactly as many numbers as asked for, and nothing before, between or after them.
+// A list has exactly the requested number of numbers, and nothing before, between or after them.
 TEST(Text, ParsesListsOfNumbers) {
   const auto three = parse_numbers<double, 3>("1,-2.5,3e2", ',');
   ASSERT_TRUE(three);

@@ -1,5 +1,4 @@
-// The material of a cell is that of the largest weight, however many there are and in which order
-// they come.
+// The material of a cell has the largest weight, for any number and order of materials.
 #include "core/color/rule/attribute_sums.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +20,7 @@ TEST(AttributeSums, FindTheHeaviestOfManyMaterials) {
   for (int round = 0; round < 2; ++round) {
     for (uint32_t i = 0; i < kAdded; ++i) {
       const auto cell = static_cast<uint32_t>(random() % kCells);
-      // Cells of odd numbers are covered at some time, and what came before does not count.
+      // Cells of odd numbers are covered at some time, and earlier contributions do not count.
       if (cell % 2 == 1 && !is_covered[cell] && random() % 2000 == 0) {
         sums.reset(cell);
         weights[cell].clear();

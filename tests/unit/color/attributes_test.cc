@@ -62,7 +62,7 @@ TEST(NormalCode, DirectionsAreThoseOfTheirCodes) {
                      static_cast<double>(d[2])};
       ASSERT_NEAR(length(v), 16384, 1);
       ASSERT_LT(degrees_between(v, direction_of(code)), 0.01) << p << " " << q;
-      // The same code, but for those of one direction: on the rim, of the lower half.
+      // The same code, except for codes of equal directions: on the rim, in the lower half.
       const NormalCode again = encode_normal(d[0], d[1], d[2]);
       ASSERT_TRUE(again == code || d[2] <= 0);
       ASSERT_LT(degrees_between(v, direction_of(again)), 0.01);
@@ -92,7 +92,7 @@ TEST(ValueOfParent, FollowsTheChildren) {
   EXPECT_EQ(of(Attribute::kNormal, {up, right}), encode_normal(1, 0, 1));
   EXPECT_EQ(of(Attribute::kNormal, {down, up, right}), right);
   EXPECT_EQ(of(Attribute::kNormal, {down, up}), down);
-  // A code that another one is equal to stays as it is.
+  // Equal codes are unchanged.
   EXPECT_EQ(of(Attribute::kNormal, {0u, 0u}), 0u);
 }
 
@@ -195,7 +195,7 @@ double largest_of(const Vector& v) {
   return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
 }
 
-// Triangles of all kinds, some flipped, of materials with alphas of their own.
+// Triangles of all kinds, some flipped, with materials of different alpha.
 TEST(Attributes, AreThoseOfTheTriangles) {
   TestLooks looks;
   for (uint32_t i = 0; i < looks.materials.size(); ++i) {

@@ -98,7 +98,7 @@ TEST(BakeRegion, SumsAreFunctionsOfTheCell) {
     }
 }
 
-// Nor how many of them come at a time: what covers a cell may come after what only touches it.
+// The result does not depend on the batches: a covering triangle may follow a touching one.
 TEST(BakeRegion, TrianglesMayComeInParts) {
   const TestLooks looks;
   for (const SceneKind kind : oracle::kAllKinds) {

@@ -1,5 +1,5 @@
-// How near the rule's colors, and those that blocks store, are to the mean over the surface in each
-// cell, as the oracle finds it. The bounds are up to a dB below what was measured.
+// Compares the rule's colors, and the stored colors, with the oracle's mean over the surface in
+// each cell. The bounds are up to a dB below the measured values.
 #include <gtest/gtest.h>
 
 #include <algorithm>

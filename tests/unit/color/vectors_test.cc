@@ -1,5 +1,5 @@
-// What the rule does with vectors, next to the same in plain code, and quotients in doubles next to
-// those of integers.
+// Compares the rule's vector code with plain code, and its quotients in doubles with integer
+// quotients.
 #include <gtest/gtest.h>
 
 #include "core/color/color_of.h"

@@ -1,4 +1,4 @@
-// Every visitor finds what a description says, and nothing else.
+// Every visitor finds the described fields, and no others.
 #include <gtest/gtest.h>
 
 #include "core/fields/json_fields.h"

@@ -15,7 +15,7 @@ class ArtifactCopyTest : public testing::Test {
   ArtifactCopyTest() {
     SegmentWriter segment(system_files(), folder_.path(), 0, budget_);
     const ArtifactRoot root{{5, {7, 0, 31}}, 0, dag_.root_hash, dag_.voxels, dag_.svo_nodes};
-    // Something before it, so that offsets are not those of the entry.
+    // Another artifact first, so that its offsets differ from the entry's.
     write_artifact(segment, random_rows(1, 50, 10, 1, 64), 10, 64);
     const ArtifactRef ref =
         write_artifact(segment, oracle::as_sub_dag(dag_, 10), 10, 64, {&root, 1});

@@ -1,5 +1,5 @@
-// Bytes from a disk that lies: every bit of a small segment turned, every length it may be cut to,
-// and indexes that are well-formed by checksum but say impossible things.
+// Bytes from a faulty disk: every bit of a small segment flipped, every truncated length, and
+// indexes with a valid checksum but impossible contents.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -88,7 +88,7 @@ TEST(ArtifactDamageTest, WildReferencesAreCaught) {
 }
 
 // An index whose checksum is right but whose fields were changed: never a crash, never more memory
-// than its bytes allow, and what is read after all is read without leaving the file.
+// than its bytes allow, and no read outside the file.
 TEST(ArtifactDamageTest, MutatedIndexesNeverCrash) {
   const SmallSegment small;
   int refused = 0;

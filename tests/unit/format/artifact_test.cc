@@ -142,7 +142,7 @@ TEST_F(ArtifactTest, ManyArtifactsShareASegment) {
     EXPECT_EQ(read_artifact(open(refs[i])), random_rows(i, 100 * i + 1, 8, 2, 64)) << i;
 }
 
-// What the header says of the writer's memory is what it charges, and all of it comes back.
+// The writer charges the memory that the header documents, and releases all of it.
 TEST_F(ArtifactTest, WriterChargesItsMemory) {
   {
     SegmentWriter segment(system_files(), folder_.path(), 0, budget_);

@@ -25,7 +25,7 @@ class DiffTest : public testing::Test {
   const std::string a_ = folder_.file("a.vdag"), b_ = folder_.file("b.vdag");
 };
 
-// The counts are those of comparing voxel by voxel, whatever the two files' hash bits.
+// The counts equal a comparison voxel by voxel, whatever the two files' hash bits.
 TEST_F(DiffTest, CountsTheVoxelsThatDiffer) {
   for (const int edge : {4, 8, 32})
     for (uint64_t seed = 0; seed < 8; ++seed) {

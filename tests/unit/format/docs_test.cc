@@ -22,7 +22,8 @@ std::vector<std::string> lines_of(const std::string& document) {
   return lines;
 }
 
-// The cells of a row of a table, without the blanks and backquotes around them; none if it is none.
+// The cells of a row of a table, without the blanks and backquotes around them; empty for other
+// lines.
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
   if (line.empty() || line[0] != '|') return cells;

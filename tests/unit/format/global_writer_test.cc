@@ -106,7 +106,7 @@ TEST_F(GlobalWriterTest, EmptySceneIsAHeaderPage) {
   EXPECT_EQ(read_bytes(path_).size(), kPageBytes);
 }
 
-// A file that is not finished leaves nothing, and what was there before stays.
+// An unfinished file leaves nothing, and an existing file is kept.
 TEST_F(GlobalWriterTest, UnfinishedFilesVanish) {
   write_bytes(path_, "before");
   {
@@ -132,8 +132,8 @@ TEST_F(GlobalWriterTest, IsDurableBeforeItIsNamed) {
   EXPECT_EQ(files.log, expected);
 }
 
-// Whatever call fails, there is no file under the final name unless it is whole, and no partial
-// one.
+// Whatever call fails, the file under the final name is complete or missing, and no partial file
+// remains.
 TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(3, 16), 64);
   const auto build = [&](FileSystem& files) {

@@ -1,4 +1,4 @@
-// The index of a level in several spans is that of one walk, whatever the words look like.
+// The index of a level in several spans equals the index of one walk, for any words.
 #include "core/format/global/node_index.h"
 
 #include <gmock/gmock.h>
@@ -70,7 +70,7 @@ TEST_P(NodeIndexTest, LevelsOfSeveralSpans) {
 // Every word looks like a child mask, so that spans are guessed wrong.
 TEST_P(NodeIndexTest, PointersThatLookLikeMasks) { expect_index(random_level(1, 100'000, 256)); }
 
-// The same message from any number of threads: that of the first word that is wrong.
+// Any number of threads gives the same message, about the first wrong word.
 TEST_P(NodeIndexTest, BrokenMasks) {
   std::mt19937_64 random(7);
   for (int round = 0; round < 20; ++round) {

@@ -16,7 +16,7 @@ class ReaderTest : public testing::Test {
   const std::string path_ = folder_.file("scene.vdag");
 };
 
-// Sets the voxels of a walk, and counts what it visits.
+// Sets the voxels of a walk, and counts the visits.
 struct Collector {
   explicit Collector(int edge) : voxels(edge) {}
   bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) {
@@ -69,7 +69,7 @@ TEST_F(ReaderTest, TellsTheGrid) {
   EXPECT_EQ(file.brick_level(), 3u);
 }
 
-// A visitor that declines a node is not shown what is below it.
+// A visitor that declines a node does not see its descendants.
 TEST_F(ReaderTest, WalksArePruned) {
   oracle::Voxels voxels(16);
   voxels.set(0, 0, 0);
@@ -103,7 +103,7 @@ TEST_F(ReaderTest, EmptySceneHasNoVoxels) {
   file.verify_checksums();
 }
 
-// A pipe that nobody writes to is refused at once.
+// A pipe without a writer is refused immediately.
 TEST_F(ReaderTest, Hardening_L5_APipeIsRefused) {
   const std::string pipe = folder_.file("pipe");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
@@ -115,7 +115,7 @@ TEST_F(ReaderTest, Hardening_L5_APipeIsRefused) {
   }
 }
 
-// Files that are no global file give different errors: missing, foreign, too new, damaged.
+// Files that are not readable global files give different errors: missing, other, too new, damaged.
 TEST_F(ReaderTest, ProblemsAreReported) {
   using voxdag_reader::Problem;
   const auto problem = [&] {

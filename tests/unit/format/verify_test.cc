@@ -45,7 +45,7 @@ uint64_t checksum_of(const ByteString& bytes, size_t begin, size_t size) {
   return checksum64(std::as_bytes(std::span(bytes)).subspan(begin, size));
 }
 
-// Makes all checksums right again: a file that lies with a straight face.
+// Corrects all checksums, so that only the contents are wrong.
 void reseal(ByteString& bytes) {
   const size_t table = get<uint64_t>(bytes, kTableOffsetAt);
   for (size_t begin = kPageBytes, i = 0; begin < table; begin += kChecksumBlockBytes, ++i)
@@ -61,7 +61,7 @@ class VerifyTest : public testing::Test {
   const std::string path_ = folder_.file("scene.vdag");
 };
 
-// Whatever voxels and hash bits: what the writer makes of a right DAG is right.
+// For any voxels and hash bits, the writer's file of a correct DAG passes.
 TEST_F(VerifyTest, RightFilesPass) {
   for (const int edge : {4, 8, 16, 64, 128})
     for (const uint32_t hash_bits : {4u, 16u, 64u}) {

@@ -1,4 +1,4 @@
-// Files with wide levels, version 2 of the format, and headers that lie about them.
+// Files with wide levels, version 2 of the format, and headers with wrong claims about them.
 #include <gmock/gmock.h>
 
 #include <cstring>

@@ -1,5 +1,5 @@
-// The color section: what the reader and the cursor find at every cell of every level equals what
-// a decoder written from docs/format.md finds, and is close to the color that was put in.
+// The color section: at every cell of every level the colors of the reader and of the cursor equal
+// those of a decoder written from docs/format.md, and are close to the original colors.
 #include <gmock/gmock.h>
 
 #include "core/color/color_of.h"
@@ -250,8 +250,8 @@ TEST_F(ColorSectionTest, RegionsMustBeInOrderAndWhole) {
   EXPECT_EQ(error_of([&] { add(regions, 1000); }).code(), ErrorCode::kOutOfMemory);
 }
 
-// Every byte of a section changed, with and without its checksums put right: no read leaves the
-// file (the address sanitizer sees it), and verify finds all that is not a color.
+// Every byte of a section changed, with and without corrected checksums: no read leaves the
+// file (the address sanitizer checks this), and verify finds every error.
 TEST_F(ColorSectionTest, DamageIsAnError) {
   const ColoredScene scene{3, 3, random_codes(2, 3, 60), smooth_colors(3, 60)};
   write_colored(path_, scene);

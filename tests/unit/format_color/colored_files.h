@@ -185,7 +185,7 @@ inline uint64_t number_at(const ByteString& bytes, uint64_t at, size_t size) {
   return value;
 }
 
-// Of a file that has one block of them and is otherwise damaged.
+// Corrects the checksums of a damaged file with one block of checksums.
 inline void put_checksums_right(ByteString& file) {
   const uint64_t table = number_at(file, 96, 8);
   const auto data = std::as_bytes(std::span(file));

@@ -1,6 +1,6 @@
-// The sections of alpha, normals and materials: what the reader finds at every cell of every level
-// equals what a decoder written from docs/format.md finds, and is what was put in or what the rule
-// makes of the children.
+// The sections of alpha, normals and materials: at every cell of every level the reader's value
+// equals that of a decoder written from docs/format.md, and is the original value or follows from
+// the children by the rule.
 #include <gmock/gmock.h>
 
 #include <cmath>

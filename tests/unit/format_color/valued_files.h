@@ -16,7 +16,7 @@ inline uint32_t value_of_code(Attribute attribute, uint64_t code, uint64_t mater
   return static_cast<uint32_t>(random.between(0, 254) | random.between(0, 254) << 8);
 }
 
-// "", "m1", "m2m2", ..., and "" for what has no material.
+// "", "m1", "m2m2", ..., and "" for cells without a material.
 inline std::vector<std::string> names_of_materials(size_t count) {
   std::vector<std::string> names(count);
   for (size_t i = 0; i + 1 < count; ++i)

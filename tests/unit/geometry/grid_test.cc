@@ -53,7 +53,7 @@ TEST(WorldBounds, GrowByTriangles) {
   }
 }
 
-// The default cube, from numbers worked out by hand (all of them exact in binary).
+// The default cube, from manually computed numbers (all exact in binary).
 TEST(Grid, DefaultCubeIsThatOfTheDesign) {
   const Grid grid = Grid::around(bounds({-1, 2, 10}, {7, 4, 11}), 10);
   EXPECT_EQ(grid.levels, 10u);

@@ -30,7 +30,7 @@ TEST(Snap, GoesToTheMiddleOfASlice) {
   EXPECT_EQ(snapped(std::nextafter(16.0, 0)), 4095);
 }
 
-// No vertex is ever on a voxel's boundary, nor in another voxel than the one it was in.
+// A vertex is never on a voxel's boundary, and remains in its voxel.
 TEST(Snap, IsOddAndStaysInItsVoxel) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> uniform(0, 16);

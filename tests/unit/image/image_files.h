@@ -22,7 +22,7 @@ std::string png_file(const PngFormat& format, const std::string& pixels);
 // `pixels` has 1 (gray), 3 (RGB) or 4 (CMYK) bytes each.
 std::string jpeg_file(uint32_t width, uint32_t height, int components, const std::string& pixels,
                       bool is_progressive = false);
-// RGB, the scan of each channel apart; the last of them is there so often.
+// RGB, with a separate scan for each channel; the last scan is repeated `repeats` times.
 std::string jpeg_of_scans(uint32_t width, uint32_t height, const std::string& pixels, int repeats);
 
 }  // namespace voxdag::test

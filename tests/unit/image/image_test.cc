@@ -1,5 +1,5 @@
-// Images of every kind decode to the pixels that were stored, and none that is broken or claims too
-// much does harm.
+// Images of every kind decode to the stored pixels, and images that are broken or claim too much do
+// no harm.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -326,7 +326,7 @@ TEST(Images, TruncatedAnywhere) {
   }
 }
 
-// Of each file with a byte changed: pixels, or a problem, never anything else.
+// Each file with a changed byte gives pixels or a problem, never anything else.
 TEST(Images, DamagedAnywhere) {
   for (const std::string& file :
        {png_file({9, 7, 8, 6, "", true}, noise(4 * 63)), jpeg_file(24, 16, 3, noise(3 * 24 * 16)),

@@ -1,4 +1,4 @@
-// Runs work in a process of its own that may be killed on the way.
+// Runs work in a separate process that may be killed.
 #pragma once
 
 #include <sys/wait.h>

@@ -85,7 +85,7 @@ TEST_F(PosixFiles, ReadingPastTheEndIsCorrupt) {
   expect_error(ErrorCode::kCorrupt, "byte 100", [&] { read(*in, 100, 1); });
 }
 
-// create() empties what was there, open_write() does not.
+// create() empties an existing file, open_write() does not.
 TEST_F(PosixFiles, CreateEmptiesAndOpenWriteKeeps) {
   put(path_, "abcdef");
   files_.open_write(path_)->write_at(2, bytes("XX"));
@@ -127,7 +127,7 @@ TEST_F(PosixFiles, FilesAreNotFolders) {
   expect_error(ErrorCode::kInvalidInput, "expected a folder", [&] { files_.list(path_); });
 }
 
-// A full disk has a code of its own. /dev/full is one that always is.
+// A full disk has a separate code. /dev/full is always full.
 TEST_F(PosixFiles, FullDiskIsNoSpace) {
   if (!files_.exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
   const auto full = files_.create("/dev/full");
@@ -156,7 +156,7 @@ TEST_F(PosixFiles, Folders) {
   EXPECT_GT(files_.free_space(deep.substr(0, deep.size() - 2)), 0u);
 }
 
-// Renaming replaces what bears the name; removing removes.
+// Renaming replaces an existing file; removing removes it.
 TEST_F(PosixFiles, RenameReplaces) {
   put(path_, "new");
   put(folder_.file("old"), "old");
@@ -167,7 +167,7 @@ TEST_F(PosixFiles, RenameReplaces) {
   EXPECT_FALSE(files_.exists(folder_.file("old")));
 }
 
-// Threads may write and read disjoint parts of one file at once.
+// Threads may write and read disjoint parts of one file concurrently.
 TEST_F(PosixFiles, ThreadsShareAFile) {
   constexpr size_t kPart = 100000;
   const auto out = files_.create(path_);
@@ -185,7 +185,7 @@ TEST_F(PosixFiles, ThreadsShareAFile) {
   EXPECT_EQ(files_.open_read(path_)->size(), 4 * kPart);
 }
 
-// One holder at a time, until the lock goes out of scope; the file stays.
+// A lock has one holder, until it goes out of scope; the file is kept.
 TEST_F(PosixFiles, LocksAreExclusive) {
   auto first = files_.try_lock(path_);
   ASSERT_NE(first, nullptr);
@@ -206,8 +206,8 @@ TEST_F(PosixFiles, LocksAreVisible) {
   EXPECT_TRUE(files_.is_locked(path_));
 }
 
-// A link, symbolic or hard, could lead to any file: what is to be changed is not opened through
-// one.
+// A link, symbolic or hard, could lead to any file, so files are not opened for writing through
+// links.
 TEST_F(PosixFiles, LinksAreNotChanged) {
   const std::string link = folder_.file("link");
   put(path_, "precious");
@@ -259,8 +259,8 @@ TEST_F(PosixFiles, SmallFilesAreSmall) {
   expect_error(ErrorCode::kLimit, "at most 4", [&] { read_small_file(files_, path_, 4); });
 }
 
-// A file that is found as it was found has its identity; one that was changed in place, replaced or
-// grown has another, and setting its time back does not help.
+// An unchanged file keeps its identity. A file that was changed in place, replaced or appended to
+// has a different one, even if its time is set back.
 TEST_F(PosixFiles, IdentityTellsAChange) {
   put(path_, "12345");
   const auto identity = [&] { return files_.open_read(path_)->identity(); };

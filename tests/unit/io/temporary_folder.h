@@ -1,4 +1,4 @@
-// A folder of its own for every test, removed with all that is in it.
+// A separate folder for every test, removed with its contents.
 #pragma once
 
 #include <gtest/gtest.h>

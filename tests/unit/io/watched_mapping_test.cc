@@ -69,7 +69,7 @@ TEST(WatchedMapping, DamageEndsWithTheWatch) {
   EXPECT_FALSE(WatchedMapping(next.data(), next.bytes()).is_damaged());
 }
 
-// g++ has macros for sanitizers, clang a test. They end the process in a way of their own.
+// g++ has macros for sanitizers, clang a test. They end the process differently.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define VOXDAG_SANITIZED 1
 #elif defined(__has_feature)

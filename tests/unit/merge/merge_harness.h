@@ -199,7 +199,7 @@ class MergeHarness {
     return out.finish({dag.voxels, dag.svo_nodes});
   }
 
-  // The merged file is that of the voxels' DAG, and so are the counts.
+  // The merged file and the counts equal the voxels' DAG.
   void expect_dag_of(const oracle::Voxels& voxels, const Merged& merged) {
     const oracle::Dag dag = oracle::build_dag(voxels, static_cast<int>(hash_bits_));
     EXPECT_EQ(merged.report.voxels, dag.voxels);

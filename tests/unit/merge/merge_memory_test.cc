@@ -32,7 +32,7 @@ TEST(MergeMemory, HashPartitionsGiveTheSameBytes) {
   }
 }
 
-// Artifacts too many to be merged at once are merged in several passes.
+// Too many artifacts for one pass are merged in several passes.
 TEST(MergeMemory, PassesGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(2, 256);
   for (const uint32_t hash_bits : {4u, 64u}) {

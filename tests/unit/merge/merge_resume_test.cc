@@ -157,7 +157,7 @@ TEST(MergeCheckpoint, TheMergeContinuesWhileAStateIsSaved) {
   harness.add(noise_voxels(36, 256), equal_cubes(1));
   const std::string expected = harness.merge().file.sha256;
   struct Meeting {
-    // Returns once both are there; false if the other does not come.
+    // Returns once both have arrived; false if the other one does not arrive.
     bool meet(bool& here, const bool& there) {
       std::unique_lock lock(mutex);
       here = true;
@@ -201,7 +201,7 @@ INSTANTIATE_TEST_SUITE_P(Ways, MergeResume,
                                          Case{"ThreePasses", 8 * kMiB, 64, 3, 3}),
                          [](const auto& test) { return test.param.name; });
 
-// A state, a map, an intermediate artifact or a partial file with a flipped bit, or that is gone:
+// A state, a map, an intermediate artifact or a partial file that has a flipped bit or is missing:
 // never a wrong DAG. With the inputs at hand the merge starts over.
 TEST(MergeDamage, DamageStartsOver) {
   const oracle::Voxels voxels = noise_voxels(33, 256);
@@ -240,8 +240,8 @@ TEST(MergeDamage, DamageStartsOver) {
           std::filesystem::remove(places[i]);
         else
           change_byte(places[i], 4096 + 100, 4);
-        // The damage is detected at once, or when the bytes are read: then the next merge starts
-        // over.
+        // The damage is detected immediately, or when the bytes are read; then the next merge
+        // starts over.
         try {
           EXPECT_EQ(harness.merge(options).file.sha256, expected);
           EXPECT_EQ(checkpoint.forgotten, 1u);

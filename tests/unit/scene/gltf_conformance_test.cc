@@ -106,8 +106,8 @@ double distance(const Corners& a, const Corners& b) {
 }
 
 // Equality of the two as multisets, whatever their order and winding: every expected triangle takes
-// the nearest found one that is left. They are looked up by the cell of their centroid and the
-// cells around it, so that rounding cannot hide one.
+// the nearest remaining found one. They are indexed by the cell of their centroid and the cells
+// around it, so that rounding cannot hide one.
 void expect_same_triangles(const std::vector<Corners>& found,
                            const std::vector<Corners>& expected) {
   ASSERT_EQ(found.size(), expected.size());
@@ -178,7 +178,7 @@ TEST_F(GltfConformance, Manifest) {
   size_t compared = 0, refused = 0;
   for (const Entry& entry : read_manifest(folder / "MANIFEST.tsv", 3, 4)) {
     SCOPED_TRACE(entry.file);
-    // The compressed one is that of RealCompressed.
+    // The compressed file is tested by RealCompressed.
     if (entry.expect == "refuse-or-decode") continue;
     if (entry.expect == "refuse") {
       expect_refused(folder / entry.file);

@@ -1,4 +1,4 @@
-// The files that a scene lies in: containers, and reading them by windows within a budget.
+// The files of a scene: containers, and reading them in windows within a budget.
 #include <gtest/gtest.h>
 #include <tiny_gltf.h>
 

@@ -89,7 +89,7 @@ TEST(GltfGeometry, InterleavedVertices) {
             (std::vector<Corners>{kLower}));
 }
 
-// Sparse elements replace those of a base, or zeros where there is none; vertices and indices.
+// Sparse elements replace base elements, or zeros without a base; vertices and indices.
 TEST(GltfGeometry, SparseAccessors) {
   const auto sparse = [](SceneBuilder& scene, std::vector<uint16_t> at, auto values) {
     return Json{{"count", at.size()},

@@ -27,7 +27,7 @@ std::vector<unsigned char> encode_sequence(const std::vector<uint32_t>& indices)
   return out;
 }
 
-// The codec turns triangles, so what it makes of them is what is stored uncompressed.
+// The codec rotates the corners of triangles, so the uncompressed copy stores its output.
 std::vector<uint32_t> turned(const std::vector<uint32_t>& indices) {
   const auto bytes = encode_triangles(indices);
   std::vector<uint32_t> out(indices.size());

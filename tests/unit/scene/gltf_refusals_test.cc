@@ -13,7 +13,7 @@ namespace {
 // A valid scene with one thing wrong, and words that the error must have.
 struct Refusal {
   const char* what;
-  const char* pointer;  // JSON pointer of what is replaced, or added
+  const char* pointer;  // JSON pointer of the replaced or added value
   Json value;
   const char* words;
   ErrorCode code = ErrorCode::kInvalidInput;
@@ -202,7 +202,7 @@ TEST(Hardening, L8_GarbageIsNotCalledJson) {
   }
 }
 
-// Two parents need two edits at once.
+// Two parents require two edits.
 TEST(GltfRefusals, TwoParents) {
   SceneBuilder scene = valid_scene();
   scene.add("nodes", Json::object());
@@ -265,7 +265,7 @@ TEST(Hardening, MemberThatIsANumberAndThenAnObjectIsRefused) {
   EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
 }
 
-// JSON nested deeper than any stack, in what is read and in what is not.
+// JSON nested deeper than any stack, in members that are read and in members that are not.
 TEST(GltfRefusals, DeeplyNestedJson) {
   const std::string deep = std::string(1000000, '[') + std::string(1000000, ']');
   EXPECT_EQ(error_of_file(R"({"asset":{"version":"2.0"},"extras":)" + deep + "}").message(), "");

@@ -1,5 +1,5 @@
-// PLY files made here: every format and layout gives the triangles of the same mesh, and what is
-// broken is refused by name.
+// PLY files made here: every format and layout gives the triangles of the same mesh, and broken
+// files are refused by name.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -343,7 +343,7 @@ TEST(Ply, InvalidTrianglesAreNamedOrSkipped) {
   }
 }
 
-// Counts beyond what the file holds, and headers that are none.
+// Counts beyond what the file holds, and invalid headers.
 TEST(Ply, HostileHeadersAreRefused) {
   const std::string begin = "ply\nformat binary_little_endian 1.0\n";
   const std::string xyz = "property float x\nproperty float y\nproperty float z\n";

@@ -42,7 +42,7 @@ Corners corners_of(const RealTriangle& triangle) {
   return corners;
 }
 
-// Checks also that what is read snapped, and the bounds, are those of these triangles.
+// Also checks that the snapped triangles and the bounds belong to these triangles.
 std::vector<Corners> triangles_between(TriangleCursor& cursor, uint64_t first, uint64_t end) {
   const Grid grid = Grid::given({-3, 2, 0.1}, 70, 10);
   std::vector<Corners> all, all_snapped, read_snapped;

@@ -70,7 +70,7 @@ struct SceneBuilder {
     bin.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
     return add("bufferViews", std::move(more));
   }
-  // An accessor with a view of its own. `more` adds to or overrides its members.
+  // An accessor with a separate view. `more` adds to or overrides its members.
   template <class T>
   int add_accessor(const char* type, int component_type, const std::vector<T>& values,
                    Json more = Json::object()) {

@@ -28,8 +28,8 @@ TEST(Surfaces, TextureCoordinatesAndColorsOfCorners) {
   EXPECT_EQ(all[0].position.v[1][0], 1);
 }
 
-// The front of every second triangle of a strip is where its corners run clockwise, and that of all
-// in a mirrored node.
+// The front of every second triangle of a strip is where its corners run clockwise, as for every
+// triangle of a mirrored node.
 TEST(Surfaces, FlippedInStripsAndMirrors) {
   const auto flips_of = [](int mode, Json node) {
     SceneBuilder scene = one_triangle();
@@ -202,7 +202,7 @@ TEST(Materials, DiffuseTextureOfSpecularGlossiness) {
   EXPECT_EQ(surfaces_of(*open.source).at(0).corners[1].texture[0], 2 * kOneImage);
 }
 
-// The materials and images of each file follow those of the files before it.
+// The materials and images of each file follow the preceding files'.
 TEST(Materials, OfSeveralFiles) {
   MemoryFiles files;
   SceneBuilder plain = one_triangle();
@@ -233,8 +233,8 @@ TEST(Materials, OfSeveralFiles) {
   EXPECT_EQ(material(2).number, 3u);
 }
 
-// Triangles without material have the number after the last, and so has a material that lost its
-// image that of the material.
+// Triangles without material have the number after the last. A material that lost its image keeps
+// its number.
 TEST(Materials, NumbersOfThoseThatAreNotListed) {
   SceneBuilder scene = textured("");
   const Json primitive = only_primitive(scene);

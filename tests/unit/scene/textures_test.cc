@@ -99,7 +99,7 @@ TEST(Textures, PyramidOfOddSizes) {
     for (uint32_t x = 0; x < width; ++x) ASSERT_EQ(a->texel(0, 0, x, y), b->texel(0, 0, x, y));
 }
 
-// A page of the scratch file that is not what was written gives no color.
+// A changed page of the scratch file gives no color.
 TEST(Textures, DamagedPages) {
   const uint32_t width = 300, height = 200;
   const std::string glb = textured(png_of(width, height, noise(4 * width * height))).glb();

@@ -48,7 +48,7 @@ TEST(ChildProcesses, LeaveTheSignalsOfTheirParentAsTheyWere) {
   EXPECT_EQ(child.wait().exit_status, 0);
 }
 
-// One that is to ignore the end of its terminal still does: `nohup voxdag serve`.
+// A child started with SIGHUP ignored still ignores it: `nohup voxdag serve`.
 TEST(ChildProcesses, IgnoreWhatTheirParentIgnores) {
   const TemporaryFolder folder;
   const auto before = std::signal(SIGHUP, SIG_IGN);

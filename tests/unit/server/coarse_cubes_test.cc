@@ -65,7 +65,7 @@ TEST_F(CoarseCubesTest, HaveTheCellsOfTheResult) {
   const voxdag_reader::File file(output_);
   for (const auto& [id, cube] : cubes.cubes())
     ASSERT_EQ(cube.brick, Cells(file, cube.cube).mask) << "subvolume " << id;
-  // What is known stays so when the artifacts are gone; a newcomer sees none.
+  // Known cubes remain known after the artifacts were removed; a new reader sees none.
   for (const auto& entry : std::filesystem::directory_iterator(work_))
     if (entry.path().extension() == ".vdseg") std::filesystem::remove(entry.path());
   const size_t before = cubes.cubes().size();

@@ -19,7 +19,7 @@ class SmallDisk : public ForwardingFiles {
   uint64_t free = 100 * kMiB;
 };
 
-// Writes as much as the disk takes; what is written is not free any more.
+// Writes until the disk is full; written bytes are no longer free.
 uint64_t fill(SmallDisk& disk, DiskSpace::Reservation& space, uint64_t bytes) {
   constexpr uint64_t kPiece = kMiB / 4;
   uint64_t written = 0;
@@ -83,7 +83,7 @@ TEST(Hardening, UploadsThatSendSlowlyKeepNobodyOut) {
   EXPECT_EQ(disk.free, 30 * kMiB);
 }
 
-// As many bytes are reserved in the end as in the beginning.
+// The same number of bytes is reserved at the end as at the beginning.
 TEST(Hardening, UploadsGiveBackWhatTheyReserved) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -96,7 +96,7 @@ TEST(Hardening, UploadsGiveBackWhatTheyReserved) {
   EXPECT_TRUE(fits(space, 70 * kMiB));
 }
 
-// Others write to the disk, too.
+// Other programs also write to the disk.
 TEST(Hardening, M1_AnUploadStopsIfTheDiskFillsUp) {
   const TemporaryFolder folder;
   SmallDisk disk;

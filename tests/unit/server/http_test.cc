@@ -114,8 +114,8 @@ TEST(ConnectionTable, EvictsTheLongestWaiting) {
   EXPECT_EQ(table.size(), 2u);
 }
 
-// Connections whose client is waited for within a body or an answer are closed, too, unless it was
-// only a moment.
+// Connections that wait for their client within a body or an answer are also closed, unless they
+// wait only briefly.
 TEST(Hardening, M4_SlowTransfersAreEvicted) {
   HttpLimits limits;
   limits.max_connections = 4;

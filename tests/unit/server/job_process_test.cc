@@ -1,5 +1,5 @@
-// The process of a job on a machine where things go wrong: whatever fails, nothing that it reports
-// or logs names a folder of the machine, and a failed job says which of its scenes is at fault.
+// The process of a job on a failing machine: whatever fails, its reports and logs name no folder of
+// the machine, and a failed job names the faulty scene.
 #include "server/jobs/process/job_process.h"
 
 #include <gtest/gtest.h>
@@ -77,7 +77,7 @@ class JobProcess : public testing::Test {
       return found;
     }
   };
-  // Runs the job in a process of its own, since it changes its working directory.
+  // Runs the job in a separate process, because it changes its working directory.
   Run run(FaultPlan plan = {}) {
     const std::string output = folder_.file("stdout"), log = folder_.file("stderr");
     const pid_t child = fork();
@@ -122,7 +122,7 @@ TEST_F(JobProcess, BuildsAndReportsItsResult) {
             first.output.substr(first.output.rfind("{\"json\"")));
 }
 
-// The list of subvolumes of an earlier run stays as long as its work does.
+// The list of subvolumes of an earlier run is kept as long as its work.
 TEST_F(JobProcess, ListsNothingOfAnEarlierRunBeforeItsOwnPlan) {
   put_scene("no scene at all");
   write_file_atomically(system_files(), job_.subvolumes(), "the list");
@@ -147,7 +147,7 @@ TEST_F(JobProcess, NamesTheSceneAsTheClientDid) {
   expect_failure("scene.gltf", run());
 }
 
-// Neither the service's files nor those of the job itself are geometry.
+// Neither the service's files nor the job's files are readable as geometry.
 TEST_F(JobProcess, ReadsNoFileOfTheServiceAsABuffer) {
   write_file_atomically(system_files(), folder_.file("secret.bin"), std::string(36, 'x'));
   for (const char* uri : {"../secret.bin", "task.json", "log"}) {

@@ -274,7 +274,7 @@ TEST(Subvolumes, AreListedWhileOneIsBuilt) {
   EXPECT_NE(text.find("\"working\":[[512,0,0,512]]"), std::string::npos) << text;
 }
 
-// Neither dots nor symbolic links lead out of what a scene may read.
+// Neither dots nor symbolic links lead outside the scene's readable folders.
 TEST(ConfinedFilesTest, OpensNothingOutside) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder.file("in/side"));

@@ -63,7 +63,7 @@ TEST(PartialDag, HasTheCellsOfItsParts) {
     }
     PartialDag dag(levels);
     std::shuffle(parts.begin(), parts.end(), random);
-    // Roots of before stay as they are.
+    // Earlier roots are unchanged.
     std::vector<PartialDag::Part> first(parts.begin(), parts.begin() + 9);
     const auto old_root = dag.add(first), root = dag.add(parts);
     ASSERT_TRUE(old_root && root);

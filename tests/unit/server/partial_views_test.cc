@@ -50,7 +50,8 @@ Cells cells_of(const query::DagView& dag, uint64_t root) {
   return cells;
 }
 
-// Of a build: what its job's process would list, canceled after so many built subvolumes.
+// Lists a build's subvolumes as its job's process would, and cancels it after some built
+// subvolumes.
 class ListedBuild : public NoProgress {
  public:
   explicit ListedBuild(int most) : most_(most) {}
@@ -239,7 +240,7 @@ TEST_F(PartialViewsTest, AreForgottenWhenNobodyAsksForThem) {
   EXPECT_NO_THROW(views.json("other", job_, kResolution));
 }
 
-// The folder is there when it is looked for, and gone when it is read.
+// The folder exists when it is checked, and is missing when it is read.
 class VanishingFiles : public ForwardingFiles {
  public:
   VanishingFiles() : ForwardingFiles(system_files()) {}

@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// Statuses and codes are those of docs/errors.md and docs/api.md.
+// Statuses and codes match docs/errors.md and docs/api.md.
 TEST(PublicProblem, HasTheStatusAndCodeOfItsKind) {
   using Kind = RequestError::Kind;
   struct Row {

@@ -141,7 +141,7 @@ TEST_F(Scenes, AreWrittenByOneRequestAtATime) {
   EXPECT_FALSE(refusal([&] { SceneUpload(*store_, "b.glb", 0, 5); }));
 }
 
-// The old scene stays until the new one is complete.
+// The old scene is kept until the new one is complete.
 TEST_F(Scenes, AreReplacedAtOnce) {
   put("a.glb", "old");
   SceneUpload upload(*store_, "a.glb", 0, 3);
@@ -209,7 +209,7 @@ TEST_F(Scenes, HardeningH3_AreNotCompleteWithoutTheirBytes) {
   }
 }
 
-// The file of an upload that was lost, or is shorter than what is recorded, is sent again.
+// The file of an upload that was lost, or is shorter than recorded, is sent again.
 TEST_F(Scenes, HardeningH4_StartOverIfTheirBytesAreLost) {
   const std::string part = folder_.file("parts/a.glb");
   for (const char* left : {"", "0123"}) {
@@ -230,7 +230,7 @@ TEST_F(Scenes, HardeningH4_StartOverIfTheirBytesAreLost) {
   EXPECT_EQ(contents("a.glb"), "ok");
 }
 
-// A database that is gone costs no scene, and files that no upload made are left alone.
+// A lost database costs no scene, and files not created by an upload are not touched.
 TEST_F(Scenes, HardeningH2_StayWithoutTheirDatabase) {
   put("a.glb", "hello");
   store_.reset();
@@ -269,7 +269,7 @@ TEST_F(Scenes, AreRemovedInTheEnd) {
   EXPECT_FALSE(has_entries(system_files(), folder_.file("files")));
 }
 
-// A deletion that failed halfway takes what it marked, not what was uploaded since.
+// A deletion that failed midway removes its marked files, not later uploads.
 TEST_F(Scenes, AreNotRemovedByAnEarlierDeletion) {
   put("a.glb", "old");
   const std::string marked = store_->path("a.glb") + kDeleted;
@@ -313,7 +313,7 @@ TEST_F(Scenes, AreNotDroppedSilently) {
   EXPECT_NE(log_.find("scene a.glb: failed to finish its upload"), std::string::npos) << log_;
 }
 
-// All bytes are there, but the service stopped, or a job began to use the scene.
+// All bytes have arrived, but the service stopped, or a job began to use the scene.
 TEST_F(Scenes, AreFinishedByAnEmptyPart) {
   for (const std::optional<uint64_t> total : {std::optional<uint64_t>(5), {}}) {
     for (const bool stopped : {false, true}) {

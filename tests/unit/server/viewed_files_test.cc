@@ -47,7 +47,7 @@ class ViewedFilesTest : public testing::Test {
   const std::string path_ = folder_.file("m.vdag");
 };
 
-// Of many that open a file at once, all get the same one: its manifest is made once.
+// Concurrent openers of a file get the same object: its manifest is made once.
 TEST_F(ViewedFilesTest, AreOneForAllThatComeAtOnce) {
   for (int round = 0; round < 20; ++round) {
     ViewedFiles files(system_files(), 4);

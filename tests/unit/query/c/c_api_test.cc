@@ -1,5 +1,4 @@
-// The functions of voxdag.h against the class that they stand for, and what they say to bad
-// arguments.
+// Compares the functions of voxdag.h with the C++ class, and checks their errors for bad arguments.
 #include <gtest/gtest.h>
 
 #include <cmath>

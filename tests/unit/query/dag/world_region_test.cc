@@ -12,7 +12,7 @@
 namespace voxdag::query {
 namespace {
 
-// A grid whose edge and low corner are no round numbers, as that of a scene.
+// A grid whose edge and low corner are not round numbers, as in real scenes.
 class WorldRegion : public testing::Test {
  protected:
   static constexpr uint32_t kLevels = 17;

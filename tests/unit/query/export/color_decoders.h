@@ -49,7 +49,7 @@ class FileNumbers {
   size_t at_;
 };
 
-// A .vox file: the color of each voxel, where (x, y, z) is (x, -z, y) of ours.
+// A .vox file: the color of each voxel, where (x, y, z) is (x, -z, y) in voxdag.
 inline std::map<Cell3, Color3> decode_vox(const std::string& bytes, int64_t resolution) {
   struct Model {
     int64_t edge = 0;

@@ -1,4 +1,4 @@
-// Palettes: few colors stay as they are, many become 255 that are near them, whatever their order.
+// Palettes: few colors are unchanged, many become the nearest of 255, for any order.
 #include "query/export/color/color_palette.h"
 
 #include <gtest/gtest.h>

@@ -182,7 +182,7 @@ TEST_F(ExportColors, GlbHasLinearColorsOfFaces) {
   });
 }
 
-// Faces of one color are merged as those of a gray file are.
+// Faces of one color are merged as in a gray file.
 TEST_F(ExportColors, GlbMergesFacesOfOneColor) {
   std::vector<uint64_t> sheet;
   for (uint32_t x = 0; x < 64; ++x)
@@ -263,7 +263,7 @@ TEST_F(ExportColors, DamageIsAnErrorOrHarmless) {
   EXPECT_GT(refused, 5);
 }
 
-// Without its colors a file is written like one that has none.
+// With --gray a file is exported like a file without colors.
 TEST_F(ExportColors, AreLeftOutOnRequest) {
   const ColoredScene scene{6, 6, random_codes(5, 6, 3000), smooth_colors(6, 20)};
   const Selection all{6, whole_grid(6)};

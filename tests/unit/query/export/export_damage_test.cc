@@ -55,7 +55,7 @@ TEST_P(ExportDamage, IsAnErrorOrHarmless) {
   int refused = 0;
   for (int round = 0; round < 60; ++round) {
     std::string damaged = intact;
-    // The words of levels of so few nodes lie at the begin of their pages.
+    // Such small levels have their words at the beginning of their pages.
     const size_t pages = (intact.size() - kPage) / kPage;
     const size_t at = kPage * (1 + random() % std::max<size_t>(pages, 1)) + 4 * (random() % 8);
     if (at + 4 > damaged.size()) continue;

@@ -84,7 +84,7 @@ TEST_P(ExportKilled, IsRepeatedByTheSameCommand) {
   take("out");
 }
 
-// Two at a time do not write to the same file.
+// Two exports never write to the same file concurrently.
 TEST_P(ExportKilled, IsNotConfusedWithARunningOne) {
   const auto held = system_files().try_lock(output("out") + ".lock");
   EXPECT_EQ(error_of([&] { run(system_files(), "out", true); }).code(), ErrorCode::kIo);

@@ -1,6 +1,6 @@
-// Limits that only files of many gigabytes reach: the input is a header that says so, and a hole in
-// place of the levels' words, or the limit is a smaller one. Each is refused at one more than the
-// limit and not at the limit, with a level that fits, and leaves nothing behind.
+// Limits that only files of many gigabytes reach: the input is a header with such counts and a hole
+// in place of the levels' words, or a smaller limit. Each is refused at one more than the limit and
+// not at the limit, with a level that fits, and leaves nothing behind.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -68,7 +68,7 @@ class ExportHuge : public testing::Test {
     return export_dag(system_files(), *file, request, progress, CancelToken{});
   }
 
-  // `problem` is what the message says after the name of the output.
+  // `problem` is the part of the message after the name of the output.
   void expect_refused(const std::vector<GlobalLevel>& levels, const std::string& format,
                       const std::string& problem, const std::string& fitting) {
     const Error refused = error(levels, export_format(format));
@@ -148,7 +148,7 @@ TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
                  "16 (65536");
 }
 
-// A brick has one word, and one for each of its octants: here there are none.
+// A brick has one word, and one for each non-empty octant; here all are empty.
 TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
   const uint64_t others = 2 * 5 + 1 + 255;
   expect_not_refused(many_words(chain(10), k32Bits - 1 - others), "svdag");

@@ -84,8 +84,8 @@ TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
   }
 }
 
-// The search for a level that fits begins with the coarsest: of a grid that is full it would take
-// hours to count what does not fit.
+// The search for a level that fits begins with the coarsest: for a full grid it would take
+// hours to count the voxels of a level that does not fit.
 TEST_F(ExportLimits, AreFoundAtOnce) {
   const auto file = full_grid(20);
   const double start_s = process_cpu_seconds();
@@ -127,7 +127,7 @@ TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
   EXPECT_NE(message.find("--level 17 (131072 voxels per edge) fits"), std::string::npos) << message;
 }
 
-// The formats that are made in memory as a whole.
+// The formats that are built completely in memory.
 TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
   const auto file = full_grid(9);
   for (const ExportFormat& format : export_formats()) {
@@ -168,7 +168,7 @@ TEST_F(ExportLimits, FilesOfTwoNamesNeedTheSuffixThatViewersLookFor) {
   EXPECT_THROW(export_format("stl"), Error);
 }
 
-// A request to stop ends an export, and removes what it has written.
+// Cancellation ends an export, and removes its files.
 TEST_F(ExportLimits, NothingIsLeftAfterACancellation) {
   const auto file = full_grid(9);
   CancelToken cancel;

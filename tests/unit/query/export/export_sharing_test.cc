@@ -1,4 +1,5 @@
-// What formats make of equal subtrees, and what they tell the user: 64 equal cubes of 256^3 voxels.
+// Sharing of equal subtrees in each format, and the output for the user: 64 equal cubes of 256^3
+// voxels.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -1,5 +1,4 @@
-// The colors of what is extracted, decoded by code that was written from the document, against
-// those of the input.
+// Compares the colors of an extract, decoded by code written from the document, with the input's.
 #include <cmath>
 #include <optional>
 
@@ -21,7 +20,7 @@ double stored_of(double linear) {
 }
 
 // Each cell has one of two colors, at random, so that a cell with the color of another one shows.
-// All blends of the two lie on a line, which blocks encode well.
+// All blends of the two are on a line, which blocks encode well.
 constexpr int kTolerance = 40;  // the two differ by 130
 SumOf two_colors() {
   return [](uint64_t code) {
@@ -44,7 +43,7 @@ class ExtractColors : public Extract {
     return selection.region.contains({x * edge, y * edge, z * edge}, edge);
   }
 
-  // The scene of the part, and where its grid lies in that of the input.
+  // The scene of the part, and the position of its grid in the input's grid.
   ColoredScene part_of_scene(const Selection& selection, const Cube& cube) const {
     ColoredScene part;
     part.levels = selection.grid_levels - cube.level;
@@ -162,8 +161,8 @@ TEST_F(ExtractColors, OfRegions) {
   EXPECT_GT(cut_, 100u);
 }
 
-// The eighths of the grid, with regions of their own and a color grid that ends with a tier: the
-// bytes of the file that has only that eighth.
+// The eighths of the grid, with separate regions and a color grid that ends with a tier, have the
+// bytes of a file with only that eighth.
 TEST_F(ExtractColors, OfAnAlignedCubeAreThoseOfItsScene) {
   for (const auto& [levels, color_levels] : {std::pair{9u, 7u}, {7u, 7u}}) {
     write(levels, color_levels, smooth_colors(color_levels, 20));
@@ -214,7 +213,7 @@ TEST_F(ExtractColors, OfNothing) {
   EXPECT_EQ(open_global_file(path("out.vdag"))->version(), 1u);
 }
 
-// Damage in a color that is copied, in one that is encoded again, and in the directory.
+// Damage in a copied color, in a re-encoded color, and in the directory.
 TEST_F(ExtractColors, DamageIsFound) {
   write(8, 8);
   const std::string intact = bytes("in.vdag");

@@ -14,7 +14,7 @@ namespace {
 class ExtractErrors : public Extract {
  protected:
   ExtractErrors() { write_global(path("in.vdag"), random_voxels(7, 64)); }
-  // The error of an extraction of the whole grid; nullopt if there was none.
+  // The error of an extraction of the complete grid; nullopt without an error.
   std::optional<ErrorCode> error_with(FileSystem& files, Progress& progress,
                                       const CancelToken& cancel) {
     try {
@@ -108,7 +108,7 @@ TEST_F(ExtractErrors, FailingReads) {
 }
 
 // Whatever operation a process is killed at, the same extraction succeeds afterwards, unless it was
-// at its end, and removes what was left: temporary files and folders, but none of other names.
+// at its end, and removes the leftovers: temporary files and folders, but no files of other names.
 TEST_F(ExtractErrors, Killed) {
   std::filesystem::create_directory(path("out.vdag.work-"));
   std::filesystem::create_directory(path("out.vdag.work-1234567"));
@@ -149,7 +149,7 @@ TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   EXPECT_FALSE(is_said({{31, 0, 0}, {33, 64, 64}}, false));
 }
 
-// An existing file is replaced only if that is asked for, whoever has made it.
+// An existing file is replaced only with --force, whoever made it.
 TEST_F(ExtractErrors, ExistingOutput) {
   ExtractSpec part = spec("out.vdag", {5, whole_grid(5)});
   const auto file = open_global_file(path("in.vdag"));
@@ -186,7 +186,7 @@ TEST_F(ExtractErrors, Canceled) {
   }
 }
 
-// Two at a time do not write to the same file.
+// Two extractions never write to the same file concurrently.
 TEST_F(ExtractErrors, OutputInUse) {
   const auto lock = system_files().try_lock(path("out.vdag.lock"));
   EXPECT_EQ(error_with(system_files(), warnings_, never_), ErrorCode::kIo);

@@ -1,5 +1,5 @@
-// Alpha, normals and materials of what is extracted, decoded by code that was written from the
-// document, against those of the input.
+// Compares alpha, normals and materials of an extract, decoded by code written from the document,
+// with the input's.
 #include "tests/unit/format_color/valued_files.h"
 #include "tests/unit/query/extract/extract_fixture.h"
 
@@ -22,8 +22,8 @@ class ExtractValues : public Extract {
     return selection.region.contains({x * edge, y * edge, z * edge}, edge);
   }
 
-  // Extracts, which verifies (that coarser cells are what finer ones make them), and compares the
-  // finest cells and all that are not cut.
+  // Extracts, verifies (that coarser cells follow from finer ones), and compares the finest cells
+  // and all cells that are not cut.
   void check(const Selection& selection, bool crop) {
     const Cube cube = crop ? crop_cube(selection) : Cube{};
     ColoredScene part;

@@ -1,4 +1,5 @@
-// Colors of many cells at once, from C++ and from C, against a decoder written from the document.
+// Compares colors of batches of cells, from C++ and from C, with a decoder written from the
+// document.
 #include <gtest/gtest.h>
 
 #include "query/c/voxdag.h"
@@ -54,7 +55,7 @@ TEST_F(Colors, OfEveryCell) {
   }
 }
 
-// In any order, with cells among them that are not set or lie outside the grid.
+// In any order, including empty cells and cells outside the grid.
 TEST_F(Colors, InAnyOrder) {
   const Dag dag(path_);
   std::vector<Position> points = cells(9);

@@ -61,7 +61,7 @@ TEST(TopCells, HaveTheNodesOfTheirGrid) {
       }
 }
 
-// Points that do not descend through what is damaged have the answers that they had.
+// Points that do not descend through damaged nodes have unchanged answers.
 TEST(TopCells, LeaveDamageToThosePointsThatMeetIt) {
   const QueryFile file(random_voxels(6, 256));
   std::vector<Position> points;

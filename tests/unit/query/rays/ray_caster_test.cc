@@ -18,7 +18,7 @@ constexpr double kFar = 1e30;
 
 Vec toward(const Vec& from, const Vec& to) { return normalized(to - from); }
 
-// A single voxel in a single brick is hit where it lies, on the face that looks at the ray.
+// A single voxel in a single brick is hit at its position, on the face toward the ray.
 TEST(RayCaster, HitsAVoxelOfABrick) {
   const VoxelScene scene(2, {{1, 2, 3}});
   const DagView dag = scene.view();
@@ -37,7 +37,7 @@ TEST(RayCaster, HitsAVoxelOfABrick) {
   EXPECT_FALSE(caster.cast({{{-5, 1.5, 3.5}}, {{1, 0, 0}}}, {}, 0, kFar, hit));
 }
 
-// A ray that begins within a voxel hits it at once; one that begins behind it misses it, and so
+// A ray that begins within a voxel hits it immediately; one that begins behind it misses it, and so
 // does one whose t_max is too small.
 TEST(RayCaster, KeepsToItsInterval) {
   const VoxelScene scene(3, {{4, 4, 4}});
@@ -136,7 +136,7 @@ TEST(RayCaster, SeesNoCracksAtHighResolution) {
   }
 }
 
-// A cell no larger than the cone is hit as a whole; the cone grows with distance.
+// A cell no larger than the cone counts as one solid cell; the cone grows with distance.
 TEST(RayCaster, EndsAtTheConesWidth) {
   const VoxelScene scene(6, {{63, 63, 63}});
   const DagView dag = scene.view();

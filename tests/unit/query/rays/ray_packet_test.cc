@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kFar = 1e30;
 
-// Rays of all kinds around a grid of this edge: like those of a picture, in all directions, along
+// Rays of all kinds around a grid of this edge: parallel and perspective, in all directions, along
 // axes and diagonals, and through edges and corners of the lattice.
 std::vector<Ray> many_rays(int edge, uint64_t seed) {
   oracle::Random random(seed);
@@ -67,7 +67,7 @@ void expect_equal(WalkPacket walk, const DagView& dag, const std::vector<Ray>& r
   }
 }
 
-// To the last bit what the caster of single rays finds, in files of all shapes.
+// Results equal the single-ray caster's to the last bit, in files of all shapes.
 void expect_single_rays(WalkPacket walk) {
   uint64_t hits = 0;
   for (const int edge : {4, 8, 64})
@@ -161,7 +161,7 @@ TEST_F(DagRays, RefusesWhatIsNoRay) {
   EXPECT_EQ(code_of({0, 0, 0}, {0, 0, 1}, {1, -1}), ErrorCode::kInvalidInput);
 }
 
-// More rays than one thread takes at once.
+// More rays than one thread takes per batch.
 TEST_F(DagRays, ThreadsDoNotChangeTheHits) {
   std::vector<Coordinates> origins, directions;
   for (const Ray& ray : many_rays(16, 9))

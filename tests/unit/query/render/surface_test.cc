@@ -28,7 +28,7 @@ std::set<VoxelScene::Voxel> shell(const VoxelScene::Voxel& low, const VoxelScene
   return voxels;
 }
 
-// The normal of a wall is perpendicular to it and points to the side that is looked at.
+// The normal of a wall is perpendicular to it and points to the visible side.
 TEST(Surface, NormalOfAWall) {
   const VoxelScene scene = VoxelScene::wall(6, 30);
   const DagView dag = scene.view();
@@ -105,8 +105,8 @@ TEST(Views, OfASmallSceneShowIt) {
     }
 }
 
-// The automatic view of an object is from outside, that of a furnished room with outer walls from
-// within.
+// The automatic view of an object is from outside; the view of a furnished room with outer walls is
+// from within.
 TEST(Views, RoomsAreSeenFromWithin) {
   const VoxelScene object(5, shell({8, 8, 8}, {23, 23, 23}));
   auto voxels = shell({0, 0, 0}, {63, 63, 63});

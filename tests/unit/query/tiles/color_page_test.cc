@@ -146,7 +146,7 @@ TEST_F(ColorPagesTest, OfDamagedColorsAreErrors) {
   int refused = 0;
   for (int i = 0; i < 60; ++i) {
     ByteString bytes = whole;
-    // The tiers are the last 64 bytes, the directories lie before them.
+    // The tiers are the last 64 bytes, the directories precede them.
     for (int n = 0; n < 4; ++n)
       bytes[section + size - static_cast<uint64_t>(random.between(65, 1500))] ^=
           static_cast<char>(random.between(1, 255));

@@ -1,4 +1,4 @@
-// Tiles and color pages of a file that bits were flipped in: what was written, or an error.
+// Tiles and color pages of a file with flipped bits: the original contents, or an error.
 #include <gtest/gtest.h>
 
 #include <cstring>

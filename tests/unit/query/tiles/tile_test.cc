@@ -84,7 +84,7 @@ class Comparison {
   void run(uint64_t root) {
     compare(0, tile_.level, root);
     EXPECT_EQ(leaves_.size(), tile_.leaf_count);
-    // Nodes lie in level order without gaps, and equal ones once.
+    // Nodes are in level order without gaps, and equal nodes occur once.
     size_t end = 0;
     uint32_t level = tile_.level;
     for (const auto& [at, node] : nodes_) {
@@ -230,7 +230,7 @@ bool has_tile(const DagView& dag, uint32_t depth, const TileAddress& root) {
   }
 }
 
-// What is asked for may be any word of a level: an answer or an error, and nodes are always found.
+// A request may name any word of a level. It gets an answer or an error; nodes are always found.
 TEST(Tile, AnyOffsetIsAnsweredOrRefused) {
   const QueryFile scene(voxdag::random_voxels(5, 64));
   const File file(scene.path());

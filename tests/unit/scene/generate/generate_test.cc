@@ -172,7 +172,7 @@ TEST(GenerateInstances, ACityOfInstancesIsTheSameCity) {
   EXPECT_TRUE(a == b);
 }
 
-// Colors are those of vertices times their material's, and the triangles are the same.
+// Colors are the vertex colors times the material's, and the triangles are the same.
 TEST(GenerateColors, ACityWithColorsIsTheSameCity) {
   GenerateOptions options = small(SceneKind::kCity);
   const Made plain = make(options);
@@ -244,7 +244,7 @@ TEST(GenerateTerrain, IsASquareWithoutGaps) {
   EXPECT_EQ(heights.size(), 301u * 301);
 }
 
-// City and spheres come within a quarter of the triangles asked for.
+// City and spheres come within a quarter of the requested triangles.
 TEST(GenerateSize, IsAboutWhatWasAsked) {
   for (SceneKind kind : {SceneKind::kCity, SceneKind::kSpheres}) {
     SCOPED_TRACE(scene_kind(kind).name);
@@ -286,7 +286,7 @@ ErrorCode refusal(const GenerateOptions& options) {
   return ErrorCode::kIo;
 }
 
-// What cannot fit a .glb however it is packed is refused at once.
+// A scene that cannot fit a .glb however it is packed is refused immediately.
 TEST(GenerateLimit, MoreThanAGlbHoldsIsRefused) {
   GenerateOptions menger = small(SceneKind::kMenger);
   menger.level = 6;

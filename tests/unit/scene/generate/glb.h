@@ -44,7 +44,7 @@ struct File {
     EXPECT_EQ(json["asset"]["version"], "2.0");
   }
 
-  // The elements of an accessor, which must lie in its view, and that in the buffer.
+  // The elements of an accessor, which must be inside its view, and the view inside the buffer.
   template <class Element>
   std::vector<Element> elements(size_t accessor, int component_type, const char* type) const {
     const auto& a = json["accessors"].at(accessor);

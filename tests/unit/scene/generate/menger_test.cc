@@ -1,5 +1,5 @@
 // The sponge's voxels and DAG, known beforehand: in the grid whose voxels are the unit cells
-// (--bounds 0,0,0,R) each unit face lies on the low side of a layer of voxels.
+// (--bounds 0,0,0,R) each unit face is on the low side of a layer of voxels.
 #include <gtest/gtest.h>
 
 #include "scene/generate/generate.h"

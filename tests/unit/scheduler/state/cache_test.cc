@@ -1,4 +1,4 @@
-// Subvolumes shared between builds: what was built before is copied, and the bytes are the same.
+// Subvolumes shared between builds: earlier results are copied, and the bytes are the same.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -23,7 +23,7 @@ class CacheTest : public testing::Test {
     grid_ = build(spec()).grid;
   }
 
-  // A triangle of a hundredth of the scene's edge, its node moved by so many of its own edges.
+  // A triangle of a hundredth of the scene's edge, its node moved by `steps` of its edges.
   void write_chair(double steps) const {
     const double edge = grid_.edge / 100;
     const auto number = [](double value) { return std::to_string(value); };
@@ -69,7 +69,7 @@ class CacheTest : public testing::Test {
 };
 
 // One node moved: all but the few subvolumes that it left or entered are taken from the cache, and
-// the bytes are those of a build from scratch.
+// the bytes equal a build from scratch.
 TEST_F(CacheTest, AMovedNodeCostsItsOwnSubvolumes) {
   const std::string cache = folder_.file("cache");
   write_chair(0);
@@ -85,7 +85,7 @@ TEST_F(CacheTest, AMovedNodeCostsItsOwnSubvolumes) {
   EXPECT_LT(second.subvolumes_reused, second.subvolumes);
 }
 
-// A damaged entry is a miss; the cache stays within its limit; what a killed build left there is
+// A damaged entry is a miss; the cache never exceeds its limit; files of a killed build are
 // removed.
 TEST_F(CacheTest, DamageLimitAndLeftovers) {
   const std::string cache = folder_.file("cache");

@@ -38,7 +38,7 @@ class SlowDisk : public ForwardingFiles {
     std::lock_guard lock(mutex_);
     return begun_;
   }
-  // Returns once so many syncs were begun.
+  // Returns once `count` syncs have begun.
   void wait_for_syncs(int count) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return begun_ >= count; });
@@ -113,7 +113,7 @@ class CommitQueueTest : public testing::Test {
     built.summary = {1, 1, 1, 1};
     queue.add_built(built, bin);
   }
-  // Builds until a sync is begun.
+  // Builds until a sync begins.
   void build_a_group() {
     for (const uint64_t before = segment_.size(); segment_.size() - before < kGroup;) build_one();
     disk_.wait_for_syncs(1);
@@ -195,7 +195,7 @@ TEST_F(CommitQueueTest, WhatAFailedSyncLostIsNotRecorded) {
   EXPECT_EQ(recorded(), 0u);
 }
 
-// The last group can be merged at once, and waits for the disk only if it is asked to.
+// The last group can be merged immediately, and waits for the disk only on request.
 TEST_F(CommitQueueTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
   disk_.block_syncs();
   for (int i = 0; i < 3; ++i) build_one();

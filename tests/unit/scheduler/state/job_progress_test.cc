@@ -52,8 +52,8 @@ class BlockingProgress : public NoProgress {
   int ended_ = 0;
 };
 
-// A thread that waits for its turn to write then writes what is true, not what was true when it
-// began to wait: else the row could go back in time for good, at the end of a stage.
+// A thread that waited for its turn writes the current state, not the state at the beginning of its
+// wait; otherwise an old row could remain at the end of a stage.
 TEST(JobProgressTest, WritesTheNewestSnapshot) {
   const TemporaryFolder folder;
   CancelToken cancel;

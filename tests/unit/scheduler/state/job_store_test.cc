@@ -34,7 +34,7 @@ class JobStoreTest : public testing::Test {
   const JobIdentity job_{"abc", "{\"resolution\":4}", 1};
 };
 
-// What was recorded is there when the store is opened again, every bit of every number.
+// Recorded rows exist when the store is opened again, with every bit of every number.
 TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   {
     JobStore store(path(), JobStore::Access::kBuild);
@@ -59,7 +59,7 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   EXPECT_EQ(store.stage_times()[0].largest_thread_share, 0.25);
 }
 
-// What is marked as built without a record is planned again when it is forgotten; records stay.
+// A subvolume marked as built without a record is planned again when it is dropped; records remain.
 TEST_F(JobStoreTest, ForgetsWhatIsBuiltInMemoryOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(2));
@@ -92,7 +92,7 @@ TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   EXPECT_TRUE(leaves[2].summary.empty());
 }
 
-// What is built but not recorded yet is in no row; what is lost is planned again.
+// A built but unrecorded subvolume is in no row; a lost one is planned again.
 TEST_F(JobStoreTest, BuiltInMemoryIsKnownToTheWriterOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(3));
@@ -131,7 +131,7 @@ TEST_F(JobStoreTest, StartingOverForgets) {
   EXPECT_EQ(store.leaves().size(), 2u);
 }
 
-// Files of another kind or version are refused, and the error says which it is.
+// Files of another kind or version are refused, and the error names it.
 TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
   std::ofstream(path()) << "this is no database at all, whatever its name may say";
   try {
@@ -284,8 +284,8 @@ TEST_F(JobStoreTest, CanBeReadDuringABuild) {
   EXPECT_THROW(looker.set_progress(progress), Error);
 }
 
-// The progress of ingest outlives the start of a job and is forgotten on request, and when an
-// artifact is lost whose triangles are gone; a damaged row is detected.
+// The progress of ingest outlives the start of a job and is dropped on request, and when an
+// artifact is lost whose triangles were freed; a damaged row is detected.
 TEST_F(JobStoreTest, RemembersTheProgressOfIngest) {
   const std::vector<std::byte> record = {std::byte{3}, std::byte{0}, std::byte{200}};
   JobStore store(path(), JobStore::Access::kBuild);

@@ -1,4 +1,4 @@
-// What both triangle stores promise, and what only the durable one does.
+// The guarantees of both triangle stores, and of the durable one.
 #include "scheduler/triangles/triangle_store.h"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ bool equal(const std::vector<FixedTriangle>& a, const std::vector<FixedTriangle>
                     });
 }
 
-// What goes into a bin comes out of it, in order, whether it stayed in memory or was spilled, with
+// A bin returns its triangles in order, whether they were in memory or spilled, with
 // narrow and with wide records, read in batches of any size and again after a rewind.
 TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
   for (const bool wide : {false, true})
@@ -75,7 +75,7 @@ TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
       BinWriter writer(*store, ids, 1 << 16);
       std::mt19937_64 random(7);
       for (int i = 0; i < 5000; ++i) {
-        const size_t target = random() % 3;  // the last one stays empty
+        const size_t target = random() % 3;  // the last one is empty
         expected[target].push_back(random_triangle(random, wide ? kCoordinateLimit : 1ll << 31));
         writer.append(target, expected[target].back());
       }
@@ -99,8 +99,8 @@ TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
     }
 }
 
-// drop() frees what no other run can read; the last release() frees the rest, and that of a part
-// counts for the bin that the part was copied from.
+// drop() frees what no other run can read; the last release() frees the rest. The release of a
+// part counts for the bin that the part was copied from.
 TEST_P(TriangleStoreTest, FreesABinWithItsLastReference) {
   MemoryBudget share(1 << 20);
   const auto store = open_store(false, share);

@@ -201,7 +201,7 @@ TEST_F(ColorStage, RefusesOptionsThatDoNotFit) {
   EXPECT_NE(refusal(s).find("without colors"), std::string::npos);
 }
 
-// A plan knows colors: what they take in the file, and more on the disk.
+// A plan includes colors: their size in the file, and additional disk space.
 TEST_F(ColorStage, ArePlanned) {
   const auto plan = [](const BuildSpec& spec) {
     NoProgress progress;

@@ -41,7 +41,7 @@ class ColorStoreTest : public testing::Test {
     return all;
   }
   uint64_t file_bytes() const { return std::filesystem::file_size(path_); }
-  // Writes over what is there.
+  // Overwrites a byte of the file.
   void damage(uint64_t offset) const {
     std::fstream(path_, std::ios::in | std::ios::out | std::ios::binary)
             .seekp(static_cast<std::streamoff>(offset))

@@ -101,7 +101,7 @@ TEST_F(CubeBaking, DividesSurfaces) {
   for (RegionRecords records(whole.records[0]); records.next();) ++regions;
   EXPECT_GT(regions, 100u);
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 60 << 10).records, whole.records);
-  // Not even those of a region fit: they come in parts.
+  // Not even the surfaces of one region fit: they come in parts.
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 1 << 10).records, whole.records);
 }
 
@@ -125,7 +125,7 @@ TEST_F(SolidCubes, AreBakedByChildren) {
   for (RegionRecords records(whole.records[0]); const auto region = records.next();)
     cells += region->counts[0];
   EXPECT_EQ(cells, uint64_t{1} << 21);
-  // No more than a few of their regions are in memory at a time.
+  // At most a few of their regions are in memory.
   EXPECT_GE(whole.parts, 4u);
   for (const uint64_t surface_bytes : {1 << 20, 2 << 10}) {
     const Baked by_children = bake(ColorMemory::kRegionBytes, surface_bytes);

@@ -37,7 +37,7 @@ query::Picture render(const std::string& path) {
                         cancel);
 }
 
-// A picture is not made of them, and the error says what is damaged.
+// No picture is made from damaged colors, and the error names the damage.
 TEST(DamagedColors, EndARender) {
   const TemporaryFolder folder;
   BuildSpec spec;

@@ -122,7 +122,7 @@ inline BuildReport build_now(const BuildSpec& spec) {
   return run_build(spec, {system_files(), progress, cancel});
 }
 
-// A build of it, that replaces what an earlier one has left.
+// A build of the scene that replaces the files of an earlier one.
 inline BuildSpec painted_spec(const std::string& scene, const std::string& output,
                               uint64_t resolution) {
   BuildSpec spec;

@@ -73,7 +73,7 @@ class IngestTest : public testing::TestWithParam<unsigned> {
     const BuildContext build{system_files(), progress_, cancel_};
     ingest(scene_, state_, triangles_, top_, {build, threads, budget_}, after_piece);
   }
-  // The triangles in their order, and what was made of them, are always the same.
+  // The triangles, their order and the results are always the same.
   void expect_whole_scene() {
     ASSERT_EQ(triangles_.count(kSceneBin), state_.counts.triangles);
     std::vector<FixedTriangle> triangles(state_.counts.triangles);
@@ -141,7 +141,7 @@ TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
   scene_.too_far_at = 5 * kPiece + 7;
   const Error error = error_of_ingest([] {});
   EXPECT_EQ(error.code(), ErrorCode::kLimit);
-  // Of 81927 triangles, 820 are invalid.
+  // 820 of 81927 triangles are invalid.
   EXPECT_NE(error.message().find("triangle 81107 of the scene"), std::string::npos)
       << error.message();
 }

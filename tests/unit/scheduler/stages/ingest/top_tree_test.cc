@@ -51,7 +51,7 @@ void add(TopTree& top, const FixedTriangle& t) {
   top.add(tally);
 }
 
-// Triangles next to each other, counted together, give what each of them gives alone.
+// Neighboring triangles counted together give the sum of separate counts.
 TEST(TopTree, OneTallyOrMany) {
   MemoryBudget budget(uint64_t{1} << 30);
   TopTree one(kLevels, budget, 5), many(kLevels, budget, 5);
@@ -106,7 +106,7 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
         // The tree may name a leaf too many (a box inside one cube is not tested), never too few.
         const auto touched = touched_by_brute_force(t, leaves);
         EXPECT_TRUE(std::includes(got.begin(), got.end(), touched.begin(), touched.end()));
-        // Voxels of the triangle inside the grid lie in some leaf.
+        // Voxels of the triangle inside the grid are in some leaf.
         const int64_t origin[3] = {0, 0, 0};
         if (triangle_touches_cube(t, origin, int64_t{kUnitsPerVoxel} << kLevels)) {
           EXPECT_FALSE(touched.empty());
@@ -175,7 +175,7 @@ TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
     }
 }
 
-// Cubes of a plan are disjoint, in Morton order, and no heavier than asked for unless they are
+// Cubes of a plan are disjoint, in Morton order, and no heavier than requested unless they are
 // single cells.
 TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   MemoryBudget budget(uint64_t{1} << 30);
@@ -209,7 +209,8 @@ TEST(TopTree, ExpectedVoxelsOfAnAxisAlignedTriangle) {
   EXPECT_NEAR(expected_work(t).bricks, 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
 }
 
-// A tally of many triangles, used again after clear(), adds what those of single triangles add.
+// A tally of many triangles, used again after clear(), adds the same as tallies of single
+// triangles.
 TEST(TopTree, TalliesAddUp) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(5);

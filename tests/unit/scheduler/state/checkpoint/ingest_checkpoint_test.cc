@@ -1,5 +1,5 @@
-// Scan, ingest and partition of a large scene survive an interruption: what was done is not done
-// again, and never taken for that of another scene.
+// Scan, ingest and partition of a large scene survive an interruption: finished work is not
+// repeated, and is never used for another scene.
 #include "scheduler/state/checkpoint/ingest_checkpoint.h"
 
 #include <gtest/gtest.h>
@@ -48,7 +48,7 @@ class IngestCheckpointTest : public testing::Test {
     spec.run.durable_min_triangles = 1;
     return spec;
   }
-  // Has a checkpoint after every piece of the scene, too.
+  // Also writes a checkpoint after every piece of the scene.
   BuildSpec often() const {
     BuildSpec often = spec();
     often.run.checkpoint_interval_s = 0;
@@ -69,7 +69,7 @@ class IngestCheckpointTest : public testing::Test {
     std::filesystem::remove(output());
     return report;
   }
-  // Bytes read of the scene, relative to those of a build that reads all of it.
+  // Bytes read of the scene, as a fraction of a build that reads all of it.
   double part_read() {
     return static_cast<double>(files_.bytes_read[scene()]) / static_cast<double>(whole_);
   }
@@ -101,7 +101,7 @@ TEST_F(IngestCheckpointTest, ResumesWhereItWas) {
   }
 }
 
-// The partition, too, resumes at each of its checkpoints.
+// The partition also resumes at each of its checkpoints.
 TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   build(often());
   std::filesystem::remove(output());
@@ -119,8 +119,8 @@ TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   }
 }
 
-// Run options may change in between: subvolumes that are split since find their triangles, and so
-// do those that were built before.
+// Run options may change in between: subvolumes that were split later find their triangles, and so
+// do subvolumes built before.
 TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   for (const char* stage : {"ingest", "build"}) {
     SCOPED_TRACE(stage);
@@ -192,7 +192,7 @@ TEST_F(IngestCheckpointTest, NoticesAChangeInPlace) {
   }
 }
 
-// A change of a buffer in a file of its own is noticed.
+// A change of a buffer in a separate file is noticed.
 TEST_F(IngestCheckpointTest, NoticesAChangeOfABuffer) {
   const std::string glb = read_small_file(system_files(), scene(), UINT64_MAX);
   uint32_t json_size = 0;
@@ -266,7 +266,7 @@ TEST_F(IngestCheckpointTest, DoesWithoutDiskSpace) {
   EXPECT_NE(last_warning_.text.find("memory"), std::string::npos) << last_warning_.text;
 }
 
-// Starting over forgets what was ingested; a small scene has no checkpoints.
+// Starting over drops ingested triangles; a small scene has no checkpoints.
 TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   build_until(spec(), "build", 0);
   BuildSpec again = spec();
