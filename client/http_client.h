@@ -1,5 +1,5 @@
-// Requests over HTTP or HTTPS to one server. The connection stays open between requests. httplib is
-// included in http_client.cc only. Used by one thread.
+// Requests over HTTP or HTTPS to one server. The connection is kept open between requests. httplib
+// is included in http_client.cc only. Used by one thread.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct ClientResponse {
   int status = 0;
   HeaderMap headers;
   std::string body;  // empty if it was passed to a sink
-  // The first field of this name, ignoring case; "" if there is none.
+  // The first field of this name, ignoring case; "" without one.
   std::string header(std::string_view name) const;
 };
 

@@ -89,8 +89,8 @@ class Download {
     return 0;
   }
 
-  // Distinguishes errors of the local file, which a retry does not fix, from those of the
-  // connection: both are kIo.
+  // Distinguishes errors of the local file, which a retry does not fix, from errors of the
+  // connection. Both are kIo.
   template <class Step>
   void guard_file(const Step& step) {
     file_failed_ = true;

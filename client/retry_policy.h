@@ -22,8 +22,8 @@ class RetryPolicy {
   double waited_s_ = 0, pause_s_ = kFirstPause_s;
 };
 
-// Seconds to wait before a busy server (408, 429, 502 to 504) is asked again, 0 if it does not say;
-// -1 for any other status, which a retry would not change.
+// Seconds to wait before the next request to a busy server (408, 429, 502 to 504), 0 if the answer
+// has no such field; -1 for any other status, which a retry would not change.
 double retry_after_s(const ClientResponse& response);
 
 // Throws Error{kCanceled} within about 50 ms of a cancellation.

@@ -12,7 +12,7 @@ namespace {
 constexpr double kPitch = 64;         // from street to street
 constexpr double kBlock = 52;         // edge of a block, pavement included
 constexpr double kPavement = 0.1875;  // height
-constexpr double kBuilt = 48;         // edge of what lots may fill
+constexpr double kBuilt = 48;         // edge of the area for lots
 // Measured triangles of an average block, from which the number of blocks is estimated.
 constexpr uint64_t kTrianglesPerBlock = 9900;
 

@@ -29,7 +29,7 @@ constexpr uint32_t kMaxMengerLevel = 5;
 // Bytes of a triangle of terrain, the kind that stores triangles most compactly.
 constexpr uint64_t kMinBytesPerTriangle = 12;
 
-// Refuses what is too large without counting; GlbLayout finds the rest.
+// Refuses sizes that are too large without counting; GlbLayout finds the rest.
 void check_size(const GenerateOptions& options) {
   const bool is_menger = options.kind == SceneKind::kMenger;
   const bool fits =

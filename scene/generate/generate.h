@@ -20,8 +20,7 @@ enum class SceneKind { kCity, kMenger, kTerrain, kSoup, kSpheres };
 class SceneBuilder;
 struct GenerateOptions;
 
-// A material of a scene with colors: vertices have colors of their own, which are multiplied with
-// it.
+// A material of a scene with colors. It is multiplied with the colors of the vertices.
 struct SceneMaterial {
   const char* name;
   float base_color[3];  // linear

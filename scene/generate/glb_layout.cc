@@ -32,7 +32,7 @@ json vectors(uint64_t count) {
   return {{"componentType", kFloat}, {"type", "VEC3"}, {"count", count}};
 }
 
-// Of arrays that follow each other.
+// A primitive of consecutive arrays.
 json primitive(uint64_t positions, bool has_colors, uint32_t material) {
   if (!has_colors) return {{"attributes", {{"POSITION", positions}}}, {"indices", positions + 1}};
   return {{"attributes", {{"POSITION", positions}, {"COLOR_0", positions + 1}}},

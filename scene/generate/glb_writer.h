@@ -17,7 +17,7 @@ namespace voxdag {
 
 class GlbWriter : public BlockSink {
  public:
-  // Writes the header and `json` at once. `progress` is advanced by stored triangles.
+  // Writes the header and `json` immediately. `progress` is advanced by stored triangles.
   GlbWriter(FileSystem& files, const std::string& path, const std::string& json, uint64_t bin_bytes,
             Progress& progress, const CancelToken& cancel);
   // Removes the partial file unless finish() has returned.

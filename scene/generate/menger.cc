@@ -1,6 +1,6 @@
-// Menger's sponge of level n: those of 3^n unit cells per axis that at no scale lie in the middle
-// of two or three axes. Every face between a cell of the sponge and one outside it is a unit square
-// with corners on the integer lattice: 2 * 20^n + 4 * 8^n squares.
+// Menger's sponge of level n: the cells, of 3^n unit cells per axis, that at no scale are in the
+// middle of two or three axes. Every face between a cell of the sponge and one outside it is a unit
+// square with corners on the integer lattice: 2 * 20^n + 4 * 8^n squares.
 #include "scene/generate/scene_builder.h"
 
 namespace voxdag {

@@ -45,7 +45,7 @@ struct Mesh {
   uint32_t vertices() const { return static_cast<uint32_t>(positions.size()); }
   uint32_t triangles() const { return static_cast<uint32_t>(indices.size() / 3); }
 
-  // Of vertices that are added from now on; without it the mesh has no colors.
+  // Color of vertices added later; without it the mesh has no colors.
   std::optional<Rgba8> color;
   uint32_t material = 0;
 

@@ -28,7 +28,7 @@ class BlockSink {
 class SceneBuilder {
  public:
   // Without `instances`, parts are copied triangle by triangle to each place. With `colors`, each
-  // material has meshes of its own.
+  // material has separate meshes.
   SceneBuilder(BlockSink& sink, bool instances, bool colors);
   bool has_colors() const { return colors_; }
 

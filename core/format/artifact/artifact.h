@@ -6,7 +6,7 @@
 //
 // A frame has kFrameRows consecutive rows of one level (the last frame of a level has the rest) as
 // columns, compressed where that pays, with a checksum of its bytes as stored. The index lists
-// roots, levels and frames and has a checksum of its own. An ArtifactRef points at it, so that a
+// roots, levels and frames and has a separate checksum. An ArtifactRef points to it, so that a
 // reader never scans a segment. An artifact of one subvolume has one root; a merge pass writes
 // artifacts with many.
 //
@@ -24,7 +24,7 @@ namespace voxdag {
 
 inline constexpr uint32_t kFrameRows = 4096;
 
-// Where an artifact lies. `checksum` is that of its index, which has those of all frames.
+// The place of an artifact. `checksum` covers its index, which has the checksums of all frames.
 struct ArtifactRef {
   uint32_t segment = 0;       // id of the segment file
   uint64_t offset = 0;        // first byte of the artifact

@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// Appends the artifact that `from` holds at `ref` to `to`, as that of `cube` on a grid of
+// Appends the artifact at `ref` in `from` to `to`, as the artifact of `cube` on a grid of
 // 2^grid_levels voxels per edge. The checksums of the frames are verified. Throws Error{kCorrupt}
 // if the artifact is damaged, not of one subvolume, or not of a cube of this size.
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,

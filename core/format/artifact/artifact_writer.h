@@ -14,8 +14,8 @@ namespace voxdag {
 
 class ArtifactWriter : public SubDagSink {
  public:
-  // A segment has at most one ArtifactWriter at a time. One that is destroyed without finish()
-  // leaves bytes in the segment that nothing refers to.
+  // A segment has at most one ArtifactWriter. A writer destroyed without finish() leaves
+  // unreferenced bytes in the segment.
   ArtifactWriter(SegmentWriter& segment, const DagShape& shape);
   ~ArtifactWriter() override;
 
@@ -24,7 +24,7 @@ class ArtifactWriter : public SubDagSink {
   void append_nodes(const NodeLevelView& rows);
   void end_level();
 
-  // SubDagSink: a whole level at once.
+  // SubDagSink: a complete level per call.
   void bricks(const BrickLevelView& level) override;
   void nodes(const NodeLevelView& level) override;
 

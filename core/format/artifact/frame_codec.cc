@@ -40,7 +40,7 @@ uint32_t plane_count(std::span<const uint32_t> children) {
   return all > 0xffffff ? 4 : all > 0xffff ? 3 : all > 0xff ? 2 : 1;
 }
 
-// One decompression context per thread, since several threads read frames at once.
+// One decompression context per thread, because several threads read frames concurrently.
 ZSTD_DCtx* decompression_context() {
   struct Deleter {
     void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }

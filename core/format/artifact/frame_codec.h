@@ -46,11 +46,11 @@ class FrameEncoder {
   std::vector<std::byte> out_;
 };
 
-// Decodes `bytes`, which may lie in `out.stored`, and computes the hashes of the bricks, truncated
-// to `hash_bits`. Returns nullptr, or what is wrong with the bytes.
+// Decodes `bytes`, which may be in `out.stored`, and computes the hashes of the bricks, truncated
+// to `hash_bits`. Returns nullptr or the error.
 const char* decode_brick_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t hash_bits,
                                Frame& out);
-// Decodes `bytes`, which may lie in `out.stored`. Returns nullptr, or what is wrong with the bytes.
+// Decodes `bytes`, which may be in `out.stored`. Returns nullptr or the error.
 const char* decode_node_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t children,
                               Frame& out);
 

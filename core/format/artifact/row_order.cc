@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// The number of children of all masks, eight masks at a time; sets `any_empty` if a mask is 0.
+// The number of children of all masks, eight masks per step; sets `any_empty` if a mask is 0.
 uint64_t children_of(std::span<const uint8_t> masks, bool& any_empty) {
   constexpr uint64_t kOnes = 0x0101010101010101, kTops = 0x8080808080808080;
   uint64_t children = 0, empty = 0;

@@ -52,7 +52,7 @@ class SegmentWriter {
   friend ArtifactRef copy_artifact(const ReadableFile&, const ArtifactRef&, const Cube&, uint32_t,
                                    SegmentWriter&);
   void append(std::span<const std::byte> bytes);
-  // Ends the artifact whose first frame lies at `first`.
+  // Ends the artifact whose first frame is at `first`.
   ArtifactRef append_index(uint64_t first, std::span<const std::byte> index);
 
   FileSystem& files_;
