@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "core/backend/cpu/tables/brick_table.h"
-#include "core/backend/cpu/tables/node_table.h"
+#include "core/dag/consing/brick_table.h"
+#include "core/dag/consing/node_table.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
@@ -17,7 +17,7 @@ constexpr size_t kBatch = 512;
 struct Setting {
   MemoryBudget budget{uint64_t{8} << 30};
   PagePool pool;
-  Memory memory{budget, pool};
+  PooledMemory memory{budget, pool};
 };
 
 // Entry numbers in random order, enough for 256 batches.

@@ -13,6 +13,9 @@
 
 namespace voxdag {
 
+// Thrown if a budget, or a device's memory, cannot hold a piece of work that its owner can split.
+struct OutOfBudget {};
+
 class MemoryBudget {
  public:
   explicit MemoryBudget(uint64_t limit_bytes, MemoryBudget* parent = nullptr)

@@ -12,6 +12,7 @@
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
 #include "core/base/parallel_for.h"
+#include "core/dag/consing/consing_memory.h"
 #include "core/format/artifact/artifact_writer.h"
 #include "core/format/artifact/segment_writer.h"
 #include "core/format/global/global_writer.h"
@@ -31,7 +32,7 @@ namespace {
 // to write, a window of the file, and pages that are retained for its next cube.
 constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
-    kSegmentWriterBytes + NodeReader::kMemoryBytes + BackendMemory::kMinPageBytes;
+    kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;
 constexpr unsigned kMaxWorkers = 256;  // each has a file open
 // What a node takes while its cube is reduced, for a first guess at the number of cubes.
 constexpr uint64_t kBytesPerNode = 128;
@@ -123,7 +124,7 @@ class Extraction {
           segment(all.files_, all.work_.path(), id, all.budget_) {}
 
     MemoryBudget share;
-    cpu::PagePool pages;
+    PagePool pages;
     NodeReader reader;
     PartBuilder builder;
     SegmentWriter segment;

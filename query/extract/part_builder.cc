@@ -21,7 +21,7 @@ uint8_t coarser_cells(uint64_t mask) {
   return cells;
 }
 
-void append(cpu::Memory& memory, cpu::PooledArray<uint32_t>& all, uint64_t& count, uint32_t child) {
+void append(PooledMemory& memory, PooledArray<uint32_t>& all, uint64_t& count, uint32_t child) {
   if (count == UINT32_MAX) throw OutOfBudget{};
   if (count == all.size()) all.grow(memory, count + 1024);
   all[count++] = child;
@@ -53,8 +53,8 @@ template <class Visit>
 void PartBuilder::read(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children,
                        Visit visit) {
   const PartLevel::Sorted sorted = nodes.sort();
-  children.masks = cpu::PooledArray<uint8_t>(memory_, nodes.size());
-  children.first = cpu::PooledArray<uint32_t>(memory_, nodes.size());
+  children.masks = PooledArray<uint8_t>(memory_, nodes.size());
+  children.first = PooledArray<uint32_t>(memory_, nodes.size());
   below.reserve(std::min(kExpectedChildren * nodes.size(), file_.level(level + 1).node_count));
   const int wide = file_.level(level + 1).pointer_bits == 64;
   const auto prefetch = [&](std::span<const uint32_t> words) {
@@ -110,10 +110,10 @@ void PartBuilder::read_all_children(uint32_t level, PartLevel& nodes, PartLevel&
 }
 
 // The occupied octants of each node or brick: the cells of the selected grid in it.
-cpu::PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
+PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   const uint32_t level = brick_level() + 1;
   const PartLevel::Sorted sorted = nodes.sort();
-  cpu::PooledArray<uint8_t> cells(memory_, nodes.size());
+  PooledArray<uint8_t> cells(memory_, nodes.size());
   const bool bricks = level == file_.brick_level();
   reader_.for_each(
       level, sorted.span(), [&](const WantedNode& wanted, std::span<const uint32_t> words) {
@@ -126,8 +126,8 @@ cpu::PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
 }
 
 // The masks of the bricks of the selected grid, before the region cuts them.
-cpu::PooledArray<uint64_t> PartBuilder::read_bricks(PartLevel& bricks) {
-  cpu::PooledArray<uint64_t> masks(memory_, bricks.size());
+PooledArray<uint64_t> PartBuilder::read_bricks(PartLevel& bricks) {
+  PooledArray<uint64_t> masks(memory_, bricks.size());
   if (selection_.grid_levels == file_.grid_levels()) {
     const PartLevel::Sorted sorted = bricks.sort();
     reader_.for_each(brick_level(), sorted.span(),
@@ -139,7 +139,7 @@ cpu::PooledArray<uint64_t> PartBuilder::read_bricks(PartLevel& bricks) {
   PartLevel below = level_of_part(brick_level() + 1);
   Children children;
   read_all_children(brick_level(), bricks, below, children);
-  const cpu::PooledArray<uint8_t> cells = read_cells(below);
+  const PooledArray<uint8_t> cells = read_cells(below);
   for (uint64_t i = 0; i < bricks.size(); ++i) {
     uint64_t mask = 0, next = children.first[i];
     for (int c = 0; c < 8; ++c)
@@ -162,10 +162,9 @@ uint64_t PartBuilder::selected_bits(const PartLevel::Position& brick) const {
   return bits;
 }
 
-cpu::PooledArray<PartBuilder::Built> PartBuilder::build_bricks(PartLevel& bricks,
-                                                               cpu::SubDagTables& tables) {
-  const cpu::PooledArray<uint64_t> masks = read_bricks(bricks);
-  cpu::PooledArray<Built> built(memory_, bricks.size());
+PooledArray<PartBuilder::Built> PartBuilder::build_bricks(PartLevel& bricks, SubDagTables& tables) {
+  const PooledArray<uint64_t> masks = read_bricks(bricks);
+  PooledArray<Built> built(memory_, bricks.size());
   for (uint64_t i = 0; i < bricks.size(); ++i) {
     if (i % kNodesBetweenChecks == 0) cancel_.check();
     const uint64_t mask =
@@ -175,11 +174,11 @@ cpu::PooledArray<PartBuilder::Built> PartBuilder::build_bricks(PartLevel& bricks
   return built;
 }
 
-cpu::PooledArray<PartBuilder::Built> PartBuilder::build_nodes(uint32_t level, uint64_t count,
-                                                              const Children& children,
-                                                              const cpu::PooledArray<Built>& below,
-                                                              cpu::SubDagTables& tables) {
-  cpu::PooledArray<Built> built(memory_, count);
+PooledArray<PartBuilder::Built> PartBuilder::build_nodes(uint32_t level, uint64_t count,
+                                                         const Children& children,
+                                                         const PooledArray<Built>& below,
+                                                         SubDagTables& tables) {
+  PooledArray<Built> built(memory_, count);
   const int size_log2 = static_cast<int>(selection_.grid_levels - level);
   for (uint64_t i = 0; i < count; ++i) {
     if (i % kNodesBetweenChecks == 0) cancel_.check();
@@ -190,8 +189,8 @@ cpu::PooledArray<PartBuilder::Built> PartBuilder::build_nodes(uint32_t level, ui
       for (int n = 0; n < kPopcount8[children.masks[ahead]]; ++n)
         __builtin_prefetch(&below[children.all[children.first[ahead] + n]]);
     }
-    cpu::NodeRef refs[8];
-    cpu::OctreeCounts counts;
+    NodeRef refs[8];
+    OctreeCounts counts;
     uint64_t next = children.first[i];
     for (int c = 0; c < 8; ++c) {
       if (!(children.masks[i] >> c & 1)) continue;
@@ -199,7 +198,7 @@ cpu::PooledArray<PartBuilder::Built> PartBuilder::build_nodes(uint32_t level, ui
       refs[c] = child.ref;
       counts += child.counts;
     }
-    const cpu::NodeRef ref = tables.add_node(size_log2, refs);
+    const NodeRef ref = tables.add_node(size_log2, refs);
     counts.nodes += ref.exists;
     built[i] = {ref, counts};
   }
@@ -218,8 +217,8 @@ SubDagSummary PartBuilder::build(const Part& part, const SubDagShape& shape, Sub
     levels[0].add_cut(part.offset, at);
   for (uint32_t l = top; l < bricks; ++l)
     read_nodes(l, levels[l - top], levels[l - top + 1], children[l - top]);
-  cpu::SubDagTables tables(memory_, static_cast<int>(selection_.grid_levels - top));
-  cpu::PooledArray<Built> built = build_bricks(levels.back(), tables);
+  SubDagTables tables(memory_, static_cast<int>(selection_.grid_levels - top));
+  PooledArray<Built> built = build_bricks(levels.back(), tables);
   levels.back().release_entries();
   for (uint32_t l = bricks; l-- > top;) {
     built = build_nodes(l, levels[l - top].size(), children[l - top], built, tables);
@@ -228,7 +227,7 @@ SubDagSummary PartBuilder::build(const Part& part, const SubDagShape& shape, Sub
   // The tables count what is added to them, shared nodes once.
   tables.counts() = built[0].counts;
   built = {};
-  return cpu::emit_levels(tables, shape, sink);
+  return emit_levels(tables, shape, sink);
 }
 
 }  // namespace voxdag::query

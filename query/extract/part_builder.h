@@ -16,8 +16,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/backend/cpu/tables/sub_dag_tables.h"
 #include "core/base/cancel_token.h"
+#include "core/dag/consing/sub_dag_tables.h"
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
 #include "query/dag/selection.h"
@@ -35,7 +35,7 @@ struct Part {
 class PartBuilder {
  public:
   PartBuilder(const voxdag_reader::File& file, const Selection& selection, NodeReader& reader,
-              cpu::Memory memory, const CancelToken& cancel)
+              PooledMemory memory, const CancelToken& cancel)
       : file_(file), selection_(selection), reader_(reader), memory_(memory), cancel_(cancel) {}
 
   // Passes the part's level arrays to the sink, `shape` being that of the new grid. Throws
@@ -47,14 +47,14 @@ class PartBuilder {
 
  private:
   struct Built {
-    cpu::NodeRef ref;
-    cpu::OctreeCounts counts;
+    NodeRef ref;
+    OctreeCounts counts;
   };
   // The children of a level's nodes, as numbers in the level below.
   struct Children {
-    cpu::PooledArray<uint8_t> masks;   // by number; without what the region cuts away
-    cpu::PooledArray<uint32_t> first;  // by number
-    cpu::PooledArray<uint32_t> all;
+    PooledArray<uint8_t> masks;   // by number; without what the region cuts away
+    PooledArray<uint32_t> first;  // by number
+    PooledArray<uint32_t> all;
     uint64_t count = 0;
   };
 
@@ -71,18 +71,17 @@ class PartBuilder {
   void read(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children, Visit visit);
   void read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);
   void read_all_children(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);
-  cpu::PooledArray<uint64_t> read_bricks(PartLevel& bricks);
-  cpu::PooledArray<uint8_t> read_cells(PartLevel& nodes);
+  PooledArray<uint64_t> read_bricks(PartLevel& bricks);
+  PooledArray<uint8_t> read_cells(PartLevel& nodes);
   uint64_t selected_bits(const PartLevel::Position& brick) const;
-  cpu::PooledArray<Built> build_bricks(PartLevel& bricks, cpu::SubDagTables& tables);
-  cpu::PooledArray<Built> build_nodes(uint32_t level, uint64_t count, const Children& children,
-                                      const cpu::PooledArray<Built>& below,
-                                      cpu::SubDagTables& tables);
+  PooledArray<Built> build_bricks(PartLevel& bricks, SubDagTables& tables);
+  PooledArray<Built> build_nodes(uint32_t level, uint64_t count, const Children& children,
+                                 const PooledArray<Built>& below, SubDagTables& tables);
 
   const voxdag_reader::File& file_;
   const Selection& selection_;
   NodeReader& reader_;
-  cpu::Memory memory_;
+  PooledMemory memory_;
   const CancelToken& cancel_;
 };
 

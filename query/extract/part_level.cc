@@ -31,7 +31,7 @@ void sort_by_digit(std::span<const WantedNode> from, WantedNode* to, int shift) 
 PartLevel::Sorted PartLevel::sort() {
   slots_ = {};
   slots_size_ = 0;
-  Sorted sorted{cpu::PooledArray<WantedNode>(*memory_, count_), count_};
+  Sorted sorted{PooledArray<WantedNode>(*memory_, count_), count_};
   uint64_t all_bits = 0;
   for (uint64_t i = 0; i < count_; ++i) {
     sorted.nodes[i] = {entries_[i].offset, i};
@@ -42,7 +42,7 @@ PartLevel::Sorted PartLevel::sort() {
               [](const WantedNode& a, const WantedNode& b) { return a.offset < b.offset; });
     return sorted;
   }
-  cpu::PooledArray<WantedNode> other(*memory_, count_);
+  PooledArray<WantedNode> other(*memory_, count_);
   for (int shift = 0; shift < 64 - std::countl_zero(all_bits); shift += kDigitBits) {
     sort_by_digit(sorted.span(), other.data(), shift);
     std::swap(sorted.nodes, other);
@@ -52,7 +52,7 @@ PartLevel::Sorted PartLevel::sort() {
 
 void PartLevel::grow_slots(uint64_t slots_needed) {
   const uint64_t size = std::bit_ceil(std::max(slots_needed, kFirstSlots));
-  cpu::PooledArray<uint64_t> slots(*memory_, size, cpu::PooledArray<uint64_t>::kZero);
+  PooledArray<uint64_t> slots(*memory_, size, PooledArray<uint64_t>::kZero);
   const int shift = 64 - std::countr_zero(size);
   for (uint64_t index = 0; index < count_; ++index) {
     if (is_cut(index)) continue;

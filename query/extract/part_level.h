@@ -14,7 +14,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/backend/cpu/memory.h"
+#include "core/dag/consing/pooled_memory.h"
 #include "query/extract/node_reader.h"
 
 namespace voxdag::query {
@@ -24,7 +24,7 @@ class PartLevel {
   using Position = std::array<uint32_t, 3>;  // in cubes of the level
 
   // `wide`: the level of the file has over 2^32 words.
-  PartLevel(cpu::Memory& memory, bool wide) : memory_(&memory), wide_(wide) {}
+  PartLevel(PooledMemory& memory, bool wide) : memory_(&memory), wide_(wide) {}
 
   uint64_t size() const { return count_; }
   bool is_cut(uint64_t index) const { return entries_[index].place != kWhole; }
@@ -64,7 +64,7 @@ class PartLevel {
 
   // All nodes in the order of their offsets. Nothing may be added after it.
   struct Sorted {
-    cpu::PooledArray<WantedNode> nodes;
+    PooledArray<WantedNode> nodes;
     uint64_t count = 0;
     std::span<const WantedNode> span() const { return {nodes.data(), count}; }
   };
@@ -94,10 +94,10 @@ class PartLevel {
   static constexpr uint64_t kFirstEntries = 256;
   static constexpr uint64_t kFirstSlots = 512;
 
-  cpu::Memory* memory_;
+  PooledMemory* memory_;
   bool wide_;
-  cpu::PooledArray<Entry> entries_;
-  cpu::PooledArray<uint64_t> slots_;
+  PooledArray<Entry> entries_;
+  PooledArray<uint64_t> slots_;
   uint64_t slots_size_ = 0;
   int shift_ = 64;
   uint64_t count_ = 0;

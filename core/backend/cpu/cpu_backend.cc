@@ -15,7 +15,7 @@ class CpuBackend : public Backend {
 
   BuildOutcome build(const SubvolumeTask& task, TriangleStream& triangles, MemoryBudget& budget,
                      const CancelToken& cancel, SubDagSink& sink, SubDagSummary& summary) override {
-    cpu::Memory memory{budget, pages_};
+    PooledMemory memory{budget, pages_};
     try {
       const auto build =
           std::make_unique<cpu::SubvolumeBuild>(task, kernels_, memory, cancel, table_sizes_);

@@ -21,8 +21,9 @@ int size_log2_of(const SubvolumeTask& task) {
 
 }  // namespace
 
-SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, Memory& memory,
-                               const CancelToken& cancel, const TableSizes& expected)
+SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels,
+                               PooledMemory& memory, const CancelToken& cancel,
+                               const TableSizes& expected)
     : task_(task),
       kernels_(kernels),
       memory_(memory),

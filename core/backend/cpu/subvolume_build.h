@@ -8,9 +8,9 @@
 #include "core/backend/backend.h"
 #include "core/backend/cpu/memo/plane_memo.h"
 #include "core/backend/cpu/raster/kernels.h"
-#include "core/backend/cpu/tables/sub_dag_tables.h"
 #include "core/backend/cpu/tile_reducer.h"
 #include "core/backend/cpu/triangle_set.h"
+#include "core/dag/consing/sub_dag_tables.h"
 
 namespace voxdag::cpu {
 
@@ -18,7 +18,7 @@ namespace voxdag::cpu {
 // small.
 class SubvolumeBuild {
  public:
-  SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, Memory& memory,
+  SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, PooledMemory& memory,
                  const CancelToken& cancel, const TableSizes& expected);
   SubDagSummary run(TriangleStream& stream, SubDagSink& sink);
   // After run().
@@ -40,7 +40,7 @@ class SubvolumeBuild {
 
   const SubvolumeTask task_;
   const Kernels& kernels_;
-  Memory& memory_;
+  PooledMemory& memory_;
   const CancelToken& cancel_;
   TriangleSet triangles_;
   // The stack of entries of all cubes from the root to the current one, and the octants that the

@@ -11,8 +11,8 @@
 #include "core/backend/cpu/memo/block_memo.h"
 #include "core/backend/cpu/raster/kernels.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
-#include "core/backend/cpu/tables/sub_dag_tables.h"
 #include "core/base/popcount8.h"
+#include "core/dag/consing/sub_dag_tables.h"
 
 namespace voxdag::cpu {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "core/backend/cpu/memory.h"
+#include "core/dag/consing/pooled_memory.h"
 #include "core/geometry/fixed_triangle.h"
 
 namespace voxdag::cpu {
@@ -84,7 +84,7 @@ struct Entry {
 // The triangles of one subvolume. Not thread-safe. Throws OutOfBudget.
 class TriangleSet {
  public:
-  explicit TriangleSet(Memory& memory) : memory_(memory) {}
+  explicit TriangleSet(PooledMemory& memory) : memory_(memory) {}
 
   // Entries of triangles are 0..narrow_count()-1, and the same with kWide.
   uint32_t narrow_count() const { return narrow_count_; }
@@ -96,7 +96,7 @@ class TriangleSet {
   const WideTriangle& wide(Entry entry) const { return wide_[entry.number()]; }
 
  private:
-  Memory& memory_;
+  PooledMemory& memory_;
   PooledArray<NarrowTriangle> narrow_;  // one more than used, so that four can be loaded for three
   PooledArray<WideTriangle> wide_;
   uint32_t narrow_count_ = 0;

@@ -7,8 +7,8 @@
 #include <string>
 #include <type_traits>
 
-#include "core/backend/backend_memory.h"
 #include "core/base/error.h"
+#include "core/base/memory_budget.h"
 
 namespace voxdag::cuda {
 

@@ -32,7 +32,6 @@
 #include <cstdint>
 #include <utility>
 
-#include "core/backend/backend_memory.h"
 #include "core/base/memory_budget.h"
 
 namespace voxdag::parallel {

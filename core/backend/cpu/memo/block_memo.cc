@@ -15,7 +15,7 @@ constexpr uint64_t kMaxSlots = uint64_t{1} << 16;  // more would exceed the CPU 
 
 }  // namespace
 
-BlockMemo::BlockMemo(Memory& memory) : memory_(memory) {
+BlockMemo::BlockMemo(PooledMemory& memory) : memory_(memory) {
   set_slots(affordable(kFirstSlots) ? kFirstSlots : kMinSlots);
 }
 

@@ -12,8 +12,8 @@
 
 #include <cstdint>
 
-#include "core/backend/cpu/memory.h"
 #include "core/backend/cpu/raster/voxel_block.h"
+#include "core/dag/consing/pooled_memory.h"
 
 namespace voxdag::cpu {
 
@@ -26,7 +26,7 @@ class BlockMemo {
     uint16_t bricks;
   };
 
-  explicit BlockMemo(Memory& memory);
+  explicit BlockMemo(PooledMemory& memory);
 
   // Whether to use the memo for the next `count` blocks.
   bool is_worthwhile(int count) {
@@ -67,7 +67,7 @@ class BlockMemo {
   // Makes four times the slots if the budget has room for them.
   void grow();
 
-  Memory& memory_;
+  PooledMemory& memory_;
   PooledArray<VoxelBlock> blocks_;
   PooledArray<Node> nodes_;
   uint64_t slots_ = 0;     // a power of two

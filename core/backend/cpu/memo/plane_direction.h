@@ -8,7 +8,7 @@
 
 #include "core/backend/cpu/memo/plane.h"
 #include "core/backend/cpu/raster/kernels.h"
-#include "core/backend/cpu/tables/sub_dag_tables.h"
+#include "core/dag/consing/sub_dag_tables.h"
 
 namespace voxdag::cpu {
 

@@ -16,14 +16,15 @@
 #include "core/backend/cpu/memo/plane.h"
 #include "core/backend/cpu/memo/plane_direction.h"
 #include "core/backend/cpu/raster/kernels.h"
-#include "core/backend/cpu/tables/sub_dag_tables.h"
 #include "core/backend/cpu/tile_reducer.h"
+#include "core/dag/consing/sub_dag_tables.h"
 
 namespace voxdag::cpu {
 
 class PlaneMemo {
  public:
-  PlaneMemo(Memory& memory, SubDagTables& tables, TileReducer& reducer, const Kernels& kernels)
+  PlaneMemo(PooledMemory& memory, SubDagTables& tables, TileReducer& reducer,
+            const Kernels& kernels)
       : memory_(memory), tables_(tables), reducer_(reducer), kernels_(kernels) {}
 
   // log2 of the edge of the smallest cube that is worth a call of build().
@@ -66,7 +67,7 @@ class PlaneMemo {
   // Makes free slots by growing, or by clearing the table.
   void reserve_small_nodes();
 
-  Memory& memory_;
+  PooledMemory& memory_;
   SubDagTables& tables_;
   TileReducer& reducer_;
   const Kernels& kernels_;

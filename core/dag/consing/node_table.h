@@ -13,10 +13,10 @@
 #include <cstdint>
 #include <span>
 
-#include "core/backend/cpu/memory.h"
 #include "core/base/popcount8.h"
+#include "core/dag/consing/pooled_memory.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 
 // [count]: all ones in the first `count` words.
 struct FirstWords {
@@ -48,7 +48,7 @@ class NodeTable {
     int child_count() const { return popcount8(mask()); }
   };
 
-  explicit NodeTable(Memory& memory) : memory_(memory) {}
+  explicit NodeTable(PooledMemory& memory) : memory_(memory) {}
 
   uint64_t size() const { return count_; }
   uint64_t total_children() const { return used_ - count_ * Record::kWords; }
@@ -112,7 +112,7 @@ class NodeTable {
   void grow_records(uint64_t words);
   bool less(uint64_t slot_a, uint64_t slot_b);
 
-  Memory& memory_;
+  PooledMemory& memory_;
   PooledArray<uint64_t> slots_;  // 0: free
   PooledArray<uint32_t> records_;
   uint64_t capacity_ = 0;
@@ -121,4 +121,4 @@ class NodeTable {
   uint64_t used_ = 0;  // words of records, from kFirstId on
 };
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

@@ -8,10 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/backend/backend_memory.h"
 #include "core/base/memory_budget.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 
 // A cache of free page ranges. Not thread-safe.
 class PagePool {
@@ -44,7 +43,7 @@ class PagePool {
 
 // Allocates the arrays of one build, charged to `budget` while they live. Cached pages are not
 // charged, but are freed where the budget has no room for them and an allocation together.
-class Memory {
+class PooledMemory {
  public:
   MemoryBudget& budget;
   PagePool& pool;
@@ -71,7 +70,7 @@ class PooledArray {
   enum Contents { kAny, kZero };
 
   PooledArray() = default;
-  PooledArray(Memory& memory, size_t size, Contents contents = kAny)
+  PooledArray(PooledMemory& memory, size_t size, Contents contents = kAny)
       : memory_(&memory), pages_(memory.allocate(size * sizeof(T), contents == kZero)) {}
   PooledArray(PooledArray&& other) noexcept { swap(other); }
   PooledArray& operator=(PooledArray&& other) noexcept {
@@ -84,7 +83,7 @@ class PooledArray {
 
   // Makes the size at least `size`, and at least a quarter larger than before. Elements are
   // preserved; new ones are undefined.
-  void grow(Memory& memory, size_t size) {
+  void grow(PooledMemory& memory, size_t size) {
     if (!pages_.data) {
       *this = PooledArray(memory, size);
       return;
@@ -109,8 +108,8 @@ class PooledArray {
     std::swap(pages_, other.pages_);
   }
 
-  Memory* memory_ = nullptr;
+  PooledMemory* memory_ = nullptr;
   PagePool::Pages pages_;
 };
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/backend/cpu/tables/sub_dag_tables.h"
+#include "core/dag/consing/sub_dag_tables.h"
 #include "core/dag/node_hash.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 namespace {
 
 constexpr size_t kPrefetchAhead = 12;  // records
@@ -22,7 +22,7 @@ class LevelEmitter {
       max_children = std::max(max_children, tables.nodes(s).total_children());
     }
     max_hashes = std::max(max_hashes, max_nodes);
-    Memory& memory = tables.memory();
+    PooledMemory& memory = tables.memory();
     brick_places_ = PooledArray<uint32_t>(memory, tables.bricks().size());
     hashes_ = PooledArray<uint64_t>(memory, max_hashes);
     masks_ = PooledArray<uint8_t>(memory, max_nodes);
@@ -127,4 +127,4 @@ SubDagSummary emit_levels(SubDagTables& tables, const SubDagShape& shape, SubDag
   return LevelEmitter(tables, shape, sink).run();
 }
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

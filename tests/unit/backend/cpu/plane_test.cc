@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "core/backend/cpu/memo/plane_memo.h"
-#include "tests/unit/backend_cpu/tiles.h"
+#include "tests/unit/backend/cpu/tiles.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -17,7 +17,7 @@ struct Workshop {
 
   MemoryBudget budget{uint64_t{256} << 20};
   PagePool pool;
-  Memory memory{budget, pool};
+  PooledMemory memory{budget, pool};
   SubDagTables tables;
   TileReducer reducer;
   PlaneMemo planes;

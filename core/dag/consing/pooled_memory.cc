@@ -1,13 +1,13 @@
-#include "core/backend/cpu/memory.h"
+#include "core/dag/consing/pooled_memory.h"
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
 
-#include "core/backend/backend_memory.h"
 #include "core/base/page_buffer.h"
+#include "core/dag/consing/consing_memory.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 namespace {
 
 constexpr char kWhat[] = "a subvolume";
@@ -60,12 +60,12 @@ void PagePool::clear() noexcept {
   while (!cached_.empty()) free_oldest();
 }
 
-void Memory::charge(size_t bytes) {
+void PooledMemory::charge(size_t bytes) {
   if (pool.cached_bytes() + bytes > budget.available()) pool.clear();
   if (!budget.try_charge(bytes)) throw OutOfBudget{};
 }
 
-PagePool::Pages Memory::allocate(size_t bytes, bool zero) {
+PagePool::Pages PooledMemory::allocate(size_t bytes, bool zero) {
   const size_t needed = PagePool::range_bytes(bytes);
   PagePool::Pages pages = pool.take(needed, zero ? needed : 2 * needed);
   const bool fresh = !pages.data;
@@ -89,7 +89,7 @@ PagePool::Pages Memory::allocate(size_t bytes, bool zero) {
   return pages;
 }
 
-void Memory::grow(PagePool::Pages& pages, size_t bytes) {
+void PooledMemory::grow(PagePool::Pages& pages, size_t bytes) {
   const size_t new_bytes = PagePool::range_bytes(bytes), more = new_bytes - pages.bytes;
   // Where the system cannot move the pages, old and new ones exist for a moment; the charge is for
   // one of them.
@@ -103,9 +103,9 @@ void Memory::grow(PagePool::Pages& pages, size_t bytes) {
   pages.bytes = new_bytes;
 }
 
-void Memory::free(PagePool::Pages pages) noexcept {
-  pool.put(pages, BackendMemory::page_bytes(budget.limit()));
+void PooledMemory::free(PagePool::Pages pages) noexcept {
+  pool.put(pages, ConsingMemory::page_bytes(budget.limit()));
   budget.release(pages.bytes);
 }
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

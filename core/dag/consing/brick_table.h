@@ -9,9 +9,9 @@
 #include <cstdint>
 #include <span>
 
-#include "core/backend/cpu/memory.h"
+#include "core/dag/consing/pooled_memory.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 
 class BrickTable {
  public:
@@ -21,7 +21,7 @@ class BrickTable {
     uint32_t tag;  // top half of the brick's hash
   };
 
-  explicit BrickTable(Memory& memory) : memory_(memory) {}
+  explicit BrickTable(PooledMemory& memory) : memory_(memory) {}
 
   uint64_t size() const { return count_; }
 
@@ -60,11 +60,11 @@ class BrickTable {
  private:
   void grow(uint64_t bricks);
 
-  Memory& memory_;
+  PooledMemory& memory_;
   PooledArray<Slot> slots_;
   uint64_t capacity_ = 0;
   int shift_ = 64;  // index of a hash = hash >> shift_
   uint64_t count_ = 0;
 };
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

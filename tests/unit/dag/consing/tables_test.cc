@@ -4,20 +4,20 @@
 #include <map>
 #include <vector>
 
-#include "core/backend/cpu/tables/brick_table.h"
-#include "core/backend/cpu/tables/node_table.h"
+#include "core/dag/consing/brick_table.h"
+#include "core/dag/consing/node_table.h"
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
 #include "tests/oracle/scenes.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 namespace {
 
 class Tables : public testing::Test {
  protected:
   MemoryBudget budget_{uint64_t{1} << 30};
   PagePool pool_;
-  Memory memory_{budget_, pool_};
+  PooledMemory memory_{budget_, pool_};
   oracle::Random random_{5};
 
   uint64_t word() { return hash_brick(static_cast<uint64_t>(random_.between(0, INT64_MAX - 1))); }
@@ -145,7 +145,7 @@ TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
 // A table that cannot grow throws OutOfBudget, and nothing is charged afterwards.
 TEST_F(NodeTables, ThrowsWithoutMemoryToGrow) {
   MemoryBudget small(64 << 10);
-  Memory memory{small, pool_};
+  PooledMemory memory{small, pool_};
   {
     NodeTable table(memory);
     EXPECT_THROW(
@@ -162,4 +162,4 @@ TEST_F(NodeTables, ThrowsWithoutMemoryToGrow) {
 }
 
 }  // namespace
-}  // namespace voxdag::cpu
+}  // namespace voxdag

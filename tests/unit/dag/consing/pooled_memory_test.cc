@@ -1,21 +1,21 @@
-#include "core/backend/cpu/memory.h"
+#include "core/dag/consing/pooled_memory.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-namespace voxdag::cpu {
+namespace voxdag {
 namespace {
 
-class CpuMemory : public testing::Test {
+class PooledMemoryTest : public testing::Test {
  protected:
   MemoryBudget budget_{uint64_t{64} << 20};
   PagePool pool_;
-  Memory memory_{budget_, pool_};
+  PooledMemory memory_{budget_, pool_};
 };
 
 // Cached pages are zeroed again where zeroed pages were requested.
-TEST_F(CpuMemory, CachedPagesAreZeroedAgain) {
+TEST_F(PooledMemoryTest, CachedPagesAreZeroedAgain) {
   for (const size_t size : {1000u, 100000u, 3000000u}) {
     SCOPED_TRACE(size);
     {
@@ -29,7 +29,7 @@ TEST_F(CpuMemory, CachedPagesAreZeroedAgain) {
 
 // Cached pages are freed where the budget cannot hold them and an allocation together, and are at
 // most an eighth of a large budget.
-TEST_F(CpuMemory, CachedPagesStayWithinTheBudget) {
+TEST_F(PooledMemoryTest, CachedPagesStayWithinTheBudget) {
   { const PooledArray<uint8_t> used(memory_, 7 << 20); }
   EXPECT_EQ(pool_.cached_bytes(), 7u << 20);
   { const PooledArray<uint8_t> more(memory_, 16 << 20); }
@@ -45,7 +45,7 @@ TEST_F(CpuMemory, CachedPagesStayWithinTheBudget) {
 }
 
 // The oldest cached pages are evicted by newer ones.
-TEST_F(CpuMemory, NewPagesEvictOldOnes) {
+TEST_F(PooledMemoryTest, NewPagesEvictOldOnes) {
   for (const size_t mib : {5u, 2u}) {
     const PooledArray<uint8_t> used(memory_, mib << 20);
   }
@@ -56,14 +56,14 @@ TEST_F(CpuMemory, NewPagesEvictOldOnes) {
 }
 
 // A zeroed array has exactly the requested size: the hash tables rely on that.
-TEST_F(CpuMemory, ZeroedArraysAreExact) {
+TEST_F(PooledMemoryTest, ZeroedArraysAreExact) {
   { const PooledArray<uint8_t> used(memory_, 7 << 20); }
   const PooledArray<uint8_t> table(memory_, 4 << 20, PooledArray<uint8_t>::kZero);
   EXPECT_EQ(table.size(), 4u << 20);
 }
 
 // Growing preserves the contents, on cached pages and on new ones, and charges the array's size.
-TEST_F(CpuMemory, ArraysGrow) {
+TEST_F(PooledMemoryTest, ArraysGrow) {
   PooledArray<uint32_t> array(memory_, 10);
   uint32_t filled = 0;
   while (array.size() < 6000000) {
@@ -75,7 +75,7 @@ TEST_F(CpuMemory, ArraysGrow) {
 }
 
 // What does not fit throws OutOfBudget; the array that could not grow is unchanged.
-TEST_F(CpuMemory, TooLargeIsOutOfBudget) {
+TEST_F(PooledMemoryTest, TooLargeIsOutOfBudget) {
   EXPECT_THROW(PooledArray<uint64_t>(memory_, 9 << 20), OutOfBudget);
   PooledArray<uint64_t> array(memory_, 6 << 20);
   array[0] = 42;
@@ -88,4 +88,4 @@ TEST_F(CpuMemory, TooLargeIsOutOfBudget) {
 }
 
 }  // namespace
-}  // namespace voxdag::cpu
+}  // namespace voxdag

@@ -1,10 +1,10 @@
-#include "core/backend/cpu/tables/brick_table.h"
+#include "core/dag/consing/brick_table.h"
 
-#include "core/backend/cpu/tables/slot_order.h"
 #include "core/base/host_device.h"
+#include "core/dag/consing/slot_order.h"
 #include "core/dag/node_hash.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 
 void BrickTable::grow(uint64_t bricks) {
   if (bricks > UINT32_MAX) throw OutOfBudget{};
@@ -37,4 +37,4 @@ std::span<const BrickTable::Slot> BrickTable::sort_slots(uint32_t hash_bits) {
   return slots;
 }
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

@@ -1,12 +1,12 @@
-#include "core/backend/cpu/tables/node_table.h"
+#include "core/dag/consing/node_table.h"
 
 #include <algorithm>
 #include <cstring>
 
-#include "core/backend/cpu/tables/slot_order.h"
+#include "core/dag/consing/slot_order.h"
 #include "core/dag/level_array.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 namespace {
 
 constexpr uint64_t kWordLimit = uint64_t{1} << 32;  // ids are 32-bit
@@ -62,4 +62,4 @@ std::span<const uint64_t> NodeTable::sort_slots(bool hashes_changed) {
   return slots;
 }
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

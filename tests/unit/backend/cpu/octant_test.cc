@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/oracle/overlap.h"
-#include "tests/unit/backend_cpu/tiles.h"
+#include "tests/unit/backend/cpu/tiles.h"
 
 namespace voxdag::cpu {
 namespace {

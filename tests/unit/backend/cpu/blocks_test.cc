@@ -7,7 +7,7 @@
 #include "core/backend/cpu/memo/block_memo.h"
 #include "core/dag/brick.h"
 #include "core/dag/node_hash.h"
-#include "tests/unit/backend_cpu/tiles.h"
+#include "tests/unit/backend/cpu/tiles.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -83,7 +83,7 @@ class Memos : public Blocks {
  protected:
   MemoryBudget budget_{uint64_t{256} << 20};
   PagePool pool_;
-  Memory memory_{budget_, pool_};
+  PooledMemory memory_{budget_, pool_};
 };
 
 // A block is found with its own node or not at all, also where thousands have the same key; one
@@ -139,7 +139,7 @@ TEST_F(Memos, RestWhereTheyDoNotPay) {
 // In a small budget the memo is small, and nothing is charged afterwards.
 TEST_F(Memos, FitSmallBudgets) {
   MemoryBudget small(64 << 10);
-  Memory memory{small, pool_};
+  PooledMemory memory{small, pool_};
   {
     BlockMemo memo(memory);
     EXPECT_LE(small.used(), 8u << 10);

@@ -1,19 +1,19 @@
-#include "core/backend/cpu/tables/sub_dag_tables.h"
+#include "core/dag/consing/sub_dag_tables.h"
 
-#include "core/backend/backend_memory.h"
+#include "core/dag/consing/consing_memory.h"
 #include "core/dag/node_hash.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 namespace {
 
 constexpr uint64_t kBytesPerEntry = 80;  // of a table, at most, records included
 
 }  // namespace
 
-SubDagTables::SubDagTables(Memory& memory, int size_log2, const TableSizes& expected)
+SubDagTables::SubDagTables(PooledMemory& memory, int size_log2, const TableSizes& expected)
     : memory_(memory), bricks_(memory) {
   // Only so much that a cube which turns out smaller has room to spare.
-  uint64_t affordable = BackendMemory::table_bytes(memory.budget.available());
+  uint64_t affordable = ConsingMemory::table_bytes(memory.budget.available());
   const auto reserve = [&](auto& table, int s) {
     const uint64_t bytes = expected.entries[s] * kBytesPerEntry;
     if (bytes == 0 || bytes > affordable) return;
@@ -57,4 +57,4 @@ NodeRef SubDagTables::add_node(int size_log2, const NodeRef (&children)[8]) {
   return {hash, table.find_or_add(hash, mask, ids, count), true};
 }
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

@@ -5,12 +5,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/backend/cpu/tables/brick_table.h"
-#include "core/backend/cpu/tables/node_table.h"
 #include "core/dag/brick.h"
+#include "core/dag/consing/brick_table.h"
+#include "core/dag/consing/node_table.h"
 #include "core/dag/sub_dag.h"
 
-namespace voxdag::cpu {
+namespace voxdag {
 
 // A node of a known level, or none (an empty cube): its id in that level's table, and its full hash
 // so that hashing a parent needs no lookup of its children.
@@ -43,13 +43,13 @@ struct TableSizes {
 // A cube of `size_log2` = s has an edge of 2^s voxels; bricks have s = 2.
 class SubDagTables {
  public:
-  SubDagTables(Memory& memory, int size_log2, const TableSizes& expected = {});
+  SubDagTables(PooledMemory& memory, int size_log2, const TableSizes& expected = {});
 
   int size_log2() const { return kBrickLevels + static_cast<int>(nodes_.size()); }
   BrickTable& bricks() { return bricks_; }
   // The table for cubes of edge 2^size_log2, size_log2 > 2.
   NodeTable& nodes(int size_log2) { return nodes_[size_log2 - kBrickLevels - 1]; }
-  Memory& memory() { return memory_; }
+  PooledMemory& memory() { return memory_; }
 
   OctreeCounts& counts() { return counts_; }
   TableSizes sizes() const;
@@ -60,7 +60,7 @@ class SubDagTables {
   NodeRef add_node(int size_log2, const NodeRef (&children)[8]);
 
  private:
-  Memory& memory_;
+  PooledMemory& memory_;
   BrickTable bricks_;
   std::vector<NodeTable> nodes_;
   OctreeCounts counts_;
@@ -70,4 +70,4 @@ class SubDagTables {
 // call of the sink if the budget cannot hold the largest level array in addition to the tables.
 SubDagSummary emit_levels(SubDagTables& tables, const SubDagShape& shape, SubDagSink& sink);
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace voxdag::cpu {
+namespace voxdag {
 
 // Slots are at most 5/8 full, and a power of two.
 inline uint64_t entries_for(uint64_t slots) { return slots / 8 * 5; }
@@ -70,4 +70,4 @@ void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
   }
 }
 
-}  // namespace voxdag::cpu
+}  // namespace voxdag

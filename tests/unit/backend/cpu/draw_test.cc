@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "tests/unit/backend_cpu/tiles.h"
+#include "tests/unit/backend/cpu/tiles.h"
 
 namespace voxdag::cpu {
 namespace {
