@@ -5,7 +5,6 @@
 #include <future>
 
 #include "core/base/background.h"
-#include "core/base/bounded_queue.h"
 #include "core/base/error.h"
 #include "core/dag/brick.h"
 #include "core/format/bytes.h"
@@ -19,7 +18,6 @@ using namespace global_layout;
 
 namespace {
 
-constexpr size_t kQueuedChunks = 2;  // from the thread that reads to the one that digests
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;
 static_assert(kReadBytes % kChecksumBlockBytes == 0);
 
@@ -338,19 +336,22 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   };
   add_expected(0, header.bytes());
   BlockChecksums read_back;
-  // The digest takes longest, so it has a thread of its own.
-  run_producer_consumer<std::vector<std::byte>, kQueuedChunks>(
-      threads,
-      [&](auto pass) {
-        for (uint64_t at = kPageBytes; at < end; at += kReadBytes)
-          pass([&](std::vector<std::byte>& chunk) {
-            cancel.check();
-            chunk.resize(std::min(kReadBytes, end - at));
-            written->read_at(at, chunk);
-            read_back.add(chunk);
-          });
-      },
-      [&](const std::vector<std::byte>& chunk) { digest.add(chunk); });
+  // The digest takes longest, so a thread of its own digests a chunk while the next one is read.
+  std::vector<std::byte> chunk, digested_chunk;
+  std::future<void> digested;
+  for (uint64_t at = kPageBytes; at < end; at += kReadBytes) {
+    cancel.check();
+    chunk.resize(std::min(kReadBytes, end - at));
+    written->read_at(at, chunk);
+    read_back.add(chunk);
+    if (digested.valid()) digested.get();
+    chunk.swap(digested_chunk);
+    if (threads > 1)
+      digested = run_in_background([&] { digest.add(digested_chunk); });
+    else
+      digest.add(digested_chunk);
+  }
+  if (digested.valid()) digested.get();
   const auto found = read_back.values();
   const auto wrong = std::ranges::mismatch(found, checksums).in1 - found.begin();
   if (static_cast<size_t>(wrong) < checksums.size())
