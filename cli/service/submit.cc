@@ -1,5 +1,3 @@
-#include <sys/random.h>
-
 #include <cstdio>
 
 #include "cli/build_options.h"
@@ -8,7 +6,7 @@
 #include "cli/service/job_text.h"
 #include "cli/terminal/progress_bar.h"
 #include "client/scene_upload.h"
-#include "core/base/text.h"
+#include "core/io/random_id.h"
 
 namespace voxdag::cli {
 namespace {
@@ -55,14 +53,6 @@ Json scenes_json(const std::vector<std::string>& scenes, FileSystem& files,
   return names;
 }
 
-// For Idempotency-Key: a retry after a lost answer must not create a second job.
-std::string random_key() {
-  unsigned char bytes[16];
-  if (getrandom(bytes, sizeof bytes, 0) != sizeof bytes)
-    throw Error(ErrorCode::kIo, "getrandom: no random bytes");
-  return hex_text(bytes);
-}
-
 void run(const SubmitCommand& command, ServiceClient& service, CommandContext& context) {
   const BuildSpec spec = command.build.spec();
   Json body = {{"scene", scenes_json(spec.geometry.scenes, context.files, service)},
@@ -70,7 +60,9 @@ void run(const SubmitCommand& command, ServiceClient& service, CommandContext& c
                {"options", options_json(spec)}};
   if (!command.name.empty()) body["name"] = command.name;
   if (command.priority != 0) body["priority"] = command.priority;
-  Json job = service.post("/api/v1/jobs", body, {{"Idempotency-Key", random_key()}});
+  // A retry after a lost answer must not create a second job.
+  const std::string key = random_id() + random_id();
+  Json job = service.post("/api/v1/jobs", body, {{"Idempotency-Key", key}});
   if (!command.json) std::printf("%s\n", state_line(job).c_str());
   std::fflush(stdout);
   if (command.wait) job = follow_job(service, job.at("id"));
