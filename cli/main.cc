@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "cli/command.h"
+#include "core/base/process_limits.h"
 
 namespace voxdag::cli {
 namespace {
@@ -81,6 +82,7 @@ int run(int argc, char** argv) {
 }  // namespace voxdag::cli
 
 int main(int argc, char** argv) {
+  voxdag::return_freed_memory_to_system();
   voxdag::cli::catch_signals();
   return voxdag::cli::run(argc, argv);
 }

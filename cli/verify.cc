@@ -40,7 +40,6 @@ struct Sample {
 
 Sample check_against(const VerifyCommand& command, const voxdag_reader::File& file,
                      Progress& progress, CommandContext& context) {
-  return_freed_memory_to_system();
   const Grid grid = grid_of(file);
   const bool has_attributes = attributes_of(file).any();
   MemoryBudget budget(has_attributes ? std::max(default_memory(), kSceneMemory) : kSceneMemory);

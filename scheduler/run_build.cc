@@ -477,7 +477,6 @@ class Build {
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context) {
   const BuildSpec full = checked(spec);
   check_places(full, context);
-  return_freed_memory_to_system();
   if (full.run.cluster) ClusterBuild::check(full, commands_of(full), context);
   const std::string work = work_folder_of(full.run);
   // It may hold the locks.

@@ -102,7 +102,6 @@ std::string Service::url() const {
 }
 
 void Service::run() {
-  return_freed_memory_to_system();
   // Builds stop while requests in progress finish.
   std::thread cleaner([this] {
     clean_up_periodically();

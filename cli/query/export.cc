@@ -35,7 +35,6 @@ void run(const ExportCommand& command, CommandContext& context) {
   request.memory_bytes = memory_limit(command.memory);
   request.gray = command.gray;
   request.replace = command.force;
-  return_freed_memory_to_system();
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
   request.selection = command.selection.selection(*file);

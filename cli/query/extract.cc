@@ -76,7 +76,6 @@ void run(const ExtractCommand& command, CommandContext& context) {
   spec.output = command.output;
   spec.replace = command.force;
   spec.threads = command.threads;
-  return_freed_memory_to_system();
   const auto progress = make_progress_bar();
   const double start_s = wall_seconds(), start_cpu_s = process_cpu_seconds();
   const query::ExtractReport report =

@@ -12,12 +12,12 @@ inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;
 
 // Half of what RAM and cgroups allow, at least kMinMemory; bytes.
 uint64_t default_memory();
-// The lowest limit of the cgroups in `membership` (the text of /proc/self/cgroup) and of their
-// ancestors, of version 2 or 1, mounted under `mount`; UINT64_MAX without a limit.
+// The lowest limit of the cgroups that `membership` (the text of /proc/self/cgroup) names and of
+// their ancestors, of version 2 or 1, mounted under `mount`; UINT64_MAX if there is none.
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount);
-// The CPUs that this process may use: its affinity mask's, or fewer if a cgroup has a quota.
+// The CPUs that this process may use: those of its affinity mask, or fewer if a cgroup has a quota.
 unsigned default_threads();
-// The lowest quota of the cgroups as above, in CPUs and rounded up; UINT64_MAX without a quota.
+// The lowest quota of the cgroups as above, in CPUs and rounded up; UINT64_MAX if there is none.
 uint64_t cgroup_cpus(const std::string& membership, const std::string& mount);
 // Largest resident set of this process so far (VmHWM), in bytes.
 uint64_t peak_resident_bytes();
@@ -26,9 +26,9 @@ uint64_t resident_bytes();
 // How many files and sockets this process may have open (RLIMIT_NOFILE).
 uint64_t max_open_files();
 
-// Makes the C library return freed memory to the system immediately instead of retaining it, so
-// that resident memory follows what a MemoryBudget has charged. Process-wide; repeated calls are
-// harmless. No effect without glibc.
+// Makes the C library return freed memory to the system immediately, so that resident memory
+// follows the charges of a MemoryBudget. Called by main() only: the setting is process-wide, so a
+// library must leave it to its host program. No effect without glibc.
 void return_freed_memory_to_system();
 // Returns the pages of small freed blocks, which the C library retains despite the settings above;
 // for use after many of them were freed. No effect without glibc.

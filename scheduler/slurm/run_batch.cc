@@ -308,7 +308,6 @@ uint64_t allocation_for(uint64_t budget_bytes) {
 }
 
 CompletionRecord run_batch(const BatchRun& run, const BuildContext& context) {
-  return_freed_memory_to_system();
   return Task(run, context).build();
 }
 
