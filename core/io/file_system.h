@@ -98,6 +98,8 @@ class FileSystem {
   virtual bool is_locked(const std::string& path) = 0;
   // Bytes that an unprivileged user may still write to the disk of `path`.
   virtual uint64_t free_space(const std::string& path) = 0;
+  // The number of the disk of `path`. Paths on one disk share its free space.
+  virtual uint64_t device(const std::string& path) = 0;
 };
 
 // The file system of this machine.

@@ -37,6 +37,7 @@ class ForwardingFiles : public FileSystem {
   }
   bool is_locked(const std::string& path) override { return files_.is_locked(path); }
   uint64_t free_space(const std::string& path) override { return files_.free_space(path); }
+  uint64_t device(const std::string& path) override { return files_.device(path); }
 
  private:
   FileSystem& files_;

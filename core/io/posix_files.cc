@@ -244,6 +244,11 @@ class PosixFileSystem : public FileSystem {
     if (statvfs(path.c_str(), &s) != 0) fail("stat", path, errno);
     return static_cast<uint64_t>(s.f_bavail) * s.f_frsize;
   }
+  uint64_t device(const std::string& path) override {
+    struct stat s {};
+    if (stat(path.c_str(), &s) != 0) fail("stat", path, errno);
+    return s.st_dev;
+  }
 };
 
 }  // namespace

@@ -192,8 +192,7 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
                     const std::string& output_folder, Progress& progress) {
   const uint64_t work_free = files.free_space(work_folder);
   const uint64_t output_free = files.free_space(output_folder);
-  // Equal to the byte: taken for one disk, which must hold everything.
-  if (work_free == output_free) {
+  if (files.device(work_folder) == files.device(output_folder)) {
     check_disk("the build", estimate.disk_bytes, work_folder, work_free, progress);
     return;
   }

@@ -111,6 +111,7 @@ TEST_F(PosixFiles, MissingThingsAreNotFound) {
   expect_not_found([&] { files_.list(gone); });
   expect_not_found([&] { files_.sync_directory(gone); });
   expect_not_found([&] { files_.free_space(gone); });
+  expect_not_found([&] { files_.device(gone); });
   EXPECT_FALSE(files_.exists(gone));
 }
 
@@ -154,6 +155,13 @@ TEST_F(PosixFiles, Folders) {
   files_.remove_directory(deep);
   EXPECT_FALSE(files_.exists(deep));
   EXPECT_GT(files_.free_space(deep.substr(0, deep.size() - 2)), 0u);
+}
+
+// Files of one folder are on one disk; /proc is another one.
+TEST_F(PosixFiles, DevicesTellDisksApart) {
+  put(path_, "x");
+  EXPECT_EQ(files_.device(path_), files_.device(folder_.path()));
+  if (files_.exists("/proc")) EXPECT_NE(files_.device("/proc"), files_.device(folder_.path()));
 }
 
 // Renaming replaces an existing file; removing removes it.

@@ -113,6 +113,17 @@ TEST_F(Hardening, L8_TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
   EXPECT_NO_THROW(plan_build(tight, context()));
 }
 
+// The device of two folders decides whether one disk must hold everything, not their free space.
+TEST_F(Hardening, DisksAreToldApartByTheirDevice) {
+  BuildSpec large = spec();
+  large.geometry.resolution = 4096;
+  files_.free_bytes = 100'000;
+  const auto refusal = [&] { return error_of([&] { run_build(large, context()); }).message(); };
+  EXPECT_NE(refusal().find("the build is estimated"), std::string::npos) << refusal();
+  files_.other_disk = output() + ".work";
+  EXPECT_NE(refusal().find("the build's work folder is"), std::string::npos) << refusal();
+}
+
 // A build that waits for another one's output holds a lock that has a name once it gets it, even if
 // the other one has published its file: a third one has to wait.
 TEST_F(Hardening, N4_ALockOfTheOutputHasAName) {

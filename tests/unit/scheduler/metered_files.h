@@ -26,6 +26,7 @@ class MeteredFiles : public ForwardingFiles {
   std::map<std::string, uint64_t> failing_sync;    // by path, counted from 1: fails with kIo
   std::string full_for;                            // no write to this file finds room
   uint64_t free_bytes = UINT64_MAX;
+  std::string other_disk;  // a folder that is on a disk of its own
 
   void forget_counts() {
     bytes_read.clear();
@@ -45,6 +46,9 @@ class MeteredFiles : public ForwardingFiles {
   }
   uint64_t free_space(const std::string& path) override {
     return std::min(free_bytes, ForwardingFiles::free_space(path));
+  }
+  uint64_t device(const std::string& path) override {
+    return path == other_disk ? UINT64_MAX : ForwardingFiles::device(path);
   }
 
  private:

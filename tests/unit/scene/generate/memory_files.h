@@ -38,6 +38,7 @@ class MemoryFiles : public voxdag::FileSystem {
   std::unique_ptr<voxdag::FileLock> try_lock(const std::string&) override { unexpected(); }
   bool is_locked(const std::string&) override { unexpected(); }
   uint64_t free_space(const std::string&) override { unexpected(); }
+  uint64_t device(const std::string&) override { unexpected(); }
 
  private:
   [[noreturn]] static void unexpected() { throw std::logic_error("not part of writing a scene"); }
