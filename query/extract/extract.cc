@@ -160,7 +160,7 @@ class Extraction {
   const Cube crop_;
   DagShape shape_;
   MemoryBudget budget_;
-  std::unique_ptr<SourceFile> source_;
+  std::unique_ptr<CheckedReader> source_;
   TemporaryWork work_;
   std::mutex mutex_;  // of report_ and the lists of parts and artifacts
   ExtractReport report_;
@@ -222,7 +222,7 @@ std::vector<Part> Extraction::build_part(Worker& worker, const Part& part,
 }
 
 std::vector<ArtifactRef> Extraction::build_parts() {
-  source_ = std::make_unique<SourceFile>(files_, file_, budget_);
+  source_ = std::make_unique<CheckedReader>(files_, file_, budget_);
   const uint64_t free_bytes = budget_.available();
   const unsigned count = static_cast<unsigned>(
       std::clamp<uint64_t>(free_bytes / (kMinShareBytes + kOutsideShareBytes), 1,

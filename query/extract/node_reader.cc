@@ -1,11 +1,9 @@
 #include "query/extract/node_reader.h"
 
 #include <algorithm>
-#include <atomic>
 
 #include "core/base/error.h"
 #include "core/base/popcount8.h"
-#include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
 
 namespace voxdag::query {
@@ -16,42 +14,34 @@ constexpr uint64_t kMaxNodeWords = 17;  // a child mask and eight wide offsets
 // words do.
 constexpr uint64_t kGapWords = 2048;
 
-static_assert(SourceFile::kBlockBytes == global_layout::kChecksumBlockBytes);
-
 }  // namespace
 
-SourceFile::SourceFile(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget)
+CheckedReader::CheckedReader(FileSystem& files, const voxdag_reader::File& header,
+                             MemoryBudget& budget)
     : header_(header),
       file_(files.open_read(header.path())),
-      intact_(budget, header.checksum_table_offset() / kBlockBytes / 64 + 1,
-              "the list of checksum blocks") {}
+      charge_(budget, CheckedBlocks::memory_bytes(header.checksum_table_offset()),
+              "the list of checksum blocks"),
+      blocks_(header) {}
 
-void SourceFile::check_block(uint64_t block, std::span<std::byte> buffer) {
-  const uint64_t bit = uint64_t{1} << block % 64;
-  std::atomic_ref intact(intact_[block / 64]);
-  if (intact.load(std::memory_order_relaxed) & bit) return;
-  const uint64_t begin = global_layout::kPageBytes + block * kBlockBytes;
-  const auto bytes =
-      buffer.first(std::min<uint64_t>(kBlockBytes, header_.checksum_table_offset() - begin));
-  file_->read_at(begin, bytes);
+void CheckedReader::check_block(uint64_t block, std::span<std::byte> buffer) {
+  if (blocks_.is_intact(block)) return;
+  const auto bytes = buffer.first(blocks_.size_of(block));
+  file_->read_at(blocks_.offset_of(block), bytes);
   uint64_t expected = 0;
   file_->read_at(header_.checksum_table_offset() + block * sizeof(expected),
                  std::as_writable_bytes(std::span(&expected, 1)));
-  if (checksum64(bytes) != expected)
-    throw Error(ErrorCode::kCorrupt, header_.path() + ": bytes " + std::to_string(begin) + " to " +
-                                         std::to_string(begin + bytes.size() - 1) +
-                                         ": the block fails its checksum");
-  intact.fetch_or(bit, std::memory_order_relaxed);
+  blocks_.compare(block, bytes, expected);
 }
 
-void SourceFile::read(uint32_t level, uint64_t first, std::span<uint32_t> words,
-                      std::span<std::byte> block) {
+void CheckedReader::read(uint32_t level, uint64_t first, std::span<uint32_t> words,
+                         std::span<std::byte> block) {
   const uint64_t begin = header_.level(level).file_offset + first * sizeof(uint32_t);
   check(begin, words.size_bytes(), block);
   file_->read_at(begin, std::as_writable_bytes(words));
 }
 
-void SourceFile::check(uint64_t begin, uint64_t bytes, std::span<std::byte> block) {
+void CheckedReader::check(uint64_t begin, uint64_t bytes, std::span<std::byte> block) {
   const uint64_t end = begin + bytes - global_layout::kPageBytes;
   for (uint64_t b = (begin - global_layout::kPageBytes) / kBlockBytes; b * kBlockBytes < end; ++b)
     check_block(b, block);

@@ -11,16 +11,17 @@
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
+#include "core/format/global/checked_blocks.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
 
 namespace voxdag::query {
 
-// A global file, and which of its checksum blocks were found intact. Thread-safe.
-class SourceFile {
+// Reads ranges of a global file and checks the checksum blocks that they touch. Thread-safe.
+class CheckedReader {
  public:
   // `header` is the same file, of which only the header is read.
-  SourceFile(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
+  CheckedReader(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
 
   const voxdag_reader::File& header() const { return header_; }
   // Fills `words` from word `first` of the level, within which they lie. `block` is a buffer of
@@ -30,14 +31,15 @@ class SourceFile {
   // Compares the checksum blocks that have these bytes of the file, as read() does.
   void check(uint64_t begin, uint64_t bytes, std::span<std::byte> block);
 
-  static constexpr uint64_t kBlockBytes = uint64_t{1} << 16;
+  static constexpr uint64_t kBlockBytes = CheckedBlocks::kBlockBytes;
 
  private:
   void check_block(uint64_t block, std::span<std::byte> buffer);
 
   const voxdag_reader::File& header_;
   const std::unique_ptr<ReadableFile> file_;
-  PageBuffer<uint64_t> intact_;  // one bit per checksum block
+  const MemoryCharge charge_;
+  const CheckedBlocks blocks_;
 };
 
 // An entry of a list of nodes: where the node begins, and its number among all that are wanted.
@@ -51,13 +53,13 @@ class NodeReader {
  public:
   static constexpr uint64_t kBufferBytes = uint64_t{1} << 19;
   // What a reader charges.
-  static constexpr uint64_t kMemoryBytes = kBufferBytes + SourceFile::kBlockBytes;
+  static constexpr uint64_t kMemoryBytes = kBufferBytes + CheckedReader::kBlockBytes;
 
-  NodeReader(SourceFile& source, MemoryBudget& budget, const CancelToken& cancel)
+  NodeReader(CheckedReader& source, MemoryBudget& budget, const CancelToken& cancel)
       : source_(source),
         cancel_(cancel),
         buffer_(budget, kBufferBytes / sizeof(uint32_t), "a window of a file"),
-        block_(budget, SourceFile::kBlockBytes, "a block of a file") {}
+        block_(budget, CheckedReader::kBlockBytes, "a block of a file") {}
 
   // The node, valid until the next call.
   voxdag_reader::Node node(uint32_t level, uint64_t offset);
@@ -84,7 +86,7 @@ class NodeReader {
   size_t fill(uint32_t level, std::span<const WantedNode> wanted);
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
 
-  SourceFile& source_;
+  CheckedReader& source_;
   const CancelToken& cancel_;
   PageBuffer<uint32_t> buffer_;
   PageBuffer<std::byte> block_;

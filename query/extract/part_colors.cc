@@ -29,7 +29,8 @@ using voxdag_reader::ColorTier;
 constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
 // What a thread has while it encodes a region: its cells, the next coarser ones and all colors.
 constexpr uint64_t kWorkerBytes =
-    kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) + SourceFile::kBlockBytes;
+    kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) +
+    CheckedReader::kBlockBytes;
 // Of a region: colors, or values and those of the coarser levels.
 uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
   if (attribute == Attribute::kColor) return kMaxRegionCells * 3 / 4;
@@ -105,7 +106,7 @@ class PartColors {
 
   // Compares what finds nodes and colors with its checksums.
   void check_index() {
-    std::vector<std::byte> block(SourceFile::kBlockBytes);
+    std::vector<std::byte> block(CheckedReader::kBlockBytes);
     for (uint32_t l = 0; l <= std::min(finest_, file_.brick_level()); ++l) {
       const voxdag_reader::Level& level = file_.level(l);
       source_.check(level.file_offset, level.word_count * sizeof(uint32_t), block);
@@ -265,7 +266,7 @@ class PartColors {
   // Compares the colors that the cells of a cube have, down to level `finest`, with their
   // checksums.
   void check_colors(uint32_t finest, uint32_t level, uint64_t code) {
-    std::vector<std::byte> block(SourceFile::kBlockBytes);
+    std::vector<std::byte> block(CheckedReader::kBlockBytes);
     for (uint32_t t = 0; t < section_.tier_count(); ++t) {
       const ColorTier& tier = section_.tier(t);
       const bool is_coarser = t > 0 && tier.finest_level < level;
@@ -312,7 +313,7 @@ class PartColors {
   const Attribute attribute_;
   const ColorSection& section_;
   const DagView dag_;
-  SourceFile source_;
+  CheckedReader source_;
   const ResidentPages pages_;
   const CancelToken& cancel_;
   const uint32_t levels_;  // of the part's color grid

@@ -89,7 +89,7 @@ TEST_F(HostileView, SeesThatAFileIsDamaged) {
   EXPECT_EQ(expect_corrupt(get(above + "/" + offset)), "");
   EXPECT_EQ(expect_corrupt(get("batch?nodes=0.0," + above + "." + offset)), "");
   EXPECT_EQ(get("0/0").status, 200);
-  EXPECT_EQ(lines_of_log(path_ + ": the block at byte"), 1u);
+  EXPECT_EQ(lines_of_log(path_ + ": bytes "), 1u);
   flip(brick);
   EXPECT_TRUE(get(above + "/" + offset).body == whole);
 }
@@ -119,7 +119,7 @@ TEST_F(HostileView, SeesThatColorsAreDamaged) {
   }
   EXPECT_GT(refused, 0u);
   EXPECT_LT(refused, pages.size());
-  EXPECT_EQ(lines_of_log(path_ + ": the block at byte"), 1u);
+  EXPECT_EQ(lines_of_log(path_ + ": bytes "), 1u);
 }
 
 // A page of another site cannot use an open viewer, but a link to its start page works.

@@ -13,26 +13,41 @@ CheckedBlocks::CheckedBlocks(const voxdag_reader::File& file)
     : file_(file),
       first_(file.data() + global_layout::kPageBytes),
       bytes_(file.checksum_table_offset() - global_layout::kPageBytes),
-      intact_(std::make_unique<std::atomic<uint64_t>[]>(bytes_ / kBlockBytes / 64 + 1)) {
+      intact_(std::make_unique<std::atomic<uint64_t>[]>(memory_bytes(file.checksum_table_offset()) /
+                                                        sizeof(uint64_t))) {
   static_assert(kBlockBytes == global_layout::kChecksumBlockBytes);
 }
 
-// Bytes behind the last block are nobody's.
+uint64_t CheckedBlocks::offset_of(uint64_t block) const {
+  return global_layout::kPageBytes + block * kBlockBytes;
+}
+
+uint64_t CheckedBlocks::size_of(uint64_t block) const {
+  return std::min(kBlockBytes, bytes_ - block * kBlockBytes);
+}
+
+// Bytes behind the last block belong to no block.
 void CheckedBlocks::compare_all(uint64_t place, uint64_t bytes) const {
   const uint64_t end = std::min(place + bytes, bytes_);
   for (uint64_t block = place / kBlockBytes; block * kBlockBytes < end; ++block)
     if (!is_intact(block)) compare(block);
 }
 
-// Several threads may compare the same block at a time, to the same effect.
 void CheckedBlocks::compare(uint64_t block) const {
-  const uint64_t begin = block * kBlockBytes;
-  const std::span<const unsigned char> bytes(first_ + begin, std::min(kBlockBytes, bytes_ - begin));
   uint64_t expected = 0;
-  std::memcpy(&expected, file_.data() + file_.checksum_table_offset() + 8 * block, sizeof expected);
-  if (checksum64(std::as_bytes(bytes)) != expected)
-    throw DamagedBlock(file_.path() + ": the block at byte " +
-                       std::to_string(global_layout::kPageBytes + begin) + " fails its checksum");
+  std::memcpy(&expected, file_.data() + file_.checksum_table_offset() + sizeof expected * block,
+              sizeof expected);
+  compare(block, std::as_bytes(std::span(file_.data() + offset_of(block), size_of(block))),
+          expected);
+}
+
+// Several threads may compare the same block concurrently, with the same result.
+void CheckedBlocks::compare(uint64_t block, std::span<const std::byte> bytes,
+                            uint64_t expected) const {
+  if (checksum64(bytes) != expected)
+    throw DamagedBlock(file_.path() + ": bytes " + std::to_string(offset_of(block)) + " to " +
+                       std::to_string(offset_of(block) + bytes.size() - 1) +
+                       ": the block fails its checksum");
   intact_[block / 64].fetch_or(uint64_t{1} << block % 64, std::memory_order_relaxed);
 }
 

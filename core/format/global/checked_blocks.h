@@ -1,14 +1,15 @@
-// Compares the checksum blocks of a global file with their checksums when they are used for the
-// first time, for those who serve a part of a file as long as it lies on a disk and cannot wait for
-// all of it to be verified (docs/format.md, "The checksum table").
+// Compares the checksum blocks of a global file with their checksums when they are first used, for
+// readers of a part of a file that cannot wait until all of it is verified (docs/format.md, "The
+// checksum table").
 //
-// A block is compared again only if it was damaged: what becomes damaged on the disk after its
-// first use, and is read again, is not noticed. Costs a bit per 64 KiB of the file. Thread-safe.
+// An intact block is not compared again, so damage to the disk after its first use goes unnoticed.
+// Needs one bit of memory per 64 KiB of the file. Thread-safe.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "core/base/error.h"
@@ -24,6 +25,12 @@ class DamagedBlock : public Error {
 
 class CheckedBlocks {
  public:
+  static constexpr uint64_t kBlockBytes = 65536;
+  // Memory for a file whose checksum table begins at this offset.
+  static constexpr uint64_t memory_bytes(uint64_t table_offset) {
+    return sizeof(uint64_t) * (table_offset / kBlockBytes / 64 + 1);
+  }
+
   // The file, which must outlive it, has checked its header page and its checksum table.
   explicit CheckedBlocks(const voxdag_reader::File& file);
 
@@ -41,14 +48,21 @@ class CheckedBlocks {
     if (place % kBlockBytes + bytes > kBlockBytes || !is_intact(block)) compare_all(place, bytes);
   }
 
- private:
-  static constexpr uint64_t kBlockBytes = 65536;  // whose checksums are in the table
-
+  uint64_t count() const { return (bytes_ + kBlockBytes - 1) / kBlockBytes; }
+  // True if the block was compared before and is intact.
   bool is_intact(uint64_t block) const {
     return intact_[block / 64].load(std::memory_order_relaxed) >> block % 64 & 1;
   }
-  void compare_all(uint64_t place, uint64_t bytes) const;
+  // Compares a block in the file's mapping with its checksum. Throws DamagedBlock.
   void compare(uint64_t block) const;
+  // The same for a block that the caller has read, and its checksum in the table.
+  void compare(uint64_t block, std::span<const std::byte> bytes, uint64_t expected) const;
+  // The offset of a block in the file, and its size.
+  uint64_t offset_of(uint64_t block) const;
+  uint64_t size_of(uint64_t block) const;
+
+ private:
+  void compare_all(uint64_t place, uint64_t bytes) const;
 
   const voxdag_reader::File& file_;
   const unsigned char* const first_;  // of the first block

@@ -13,7 +13,7 @@
 #include "core/color/cell_values.h"
 #include "core/dag/level_array.h"
 #include "core/dag/node_hash.h"
-#include "core/format/checksum.h"
+#include "core/format/global/checked_blocks.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/node_index.h"
 #include "core/format/global/open_global.h"
@@ -78,7 +78,6 @@ class Verifier {
   void check_attributes(bool has_attributes) const;
   void check_section(size_t entry, Attribute attribute) const;
   void check_blocks();
-  void check_block(uint64_t block, uint64_t table) const;
   void check_padding() const;
   void check_zeros(uint64_t begin, uint64_t end, const std::string& what) const;
   void check_level(uint32_t level);
@@ -201,26 +200,16 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
   check_zeros(entry + kAttributeReservedAt, entry + kAttributeEntryBytes, "reserved");
 }
 
-void Verifier::check_block(uint64_t block, uint64_t table) const {
-  const uint64_t begin = kPageBytes + block * kChecksumBlockBytes;
-  const uint64_t size = std::min(kChecksumBlockBytes, table - begin);
-  uint64_t expected;
-  std::memcpy(&expected, file_.data() + table + 8 * block, sizeof(expected));
-  if (checksum64(std::as_bytes(std::span(file_.data() + begin, size))) != expected)
-    broken(file_.path() + ": bytes " + std::to_string(begin) + " to " +
-               std::to_string(begin + size - 1),
-           "the block fails its checksum");
-}
-
 void Verifier::check_blocks() {
-  const uint64_t table = file_.checksum_table_offset(), bytes = table - kPageBytes;
-  const uint64_t blocks = (bytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
+  const uint64_t bytes = file_.checksum_table_offset() - kPageBytes;
+  const CheckedBlocks checked(file_);
+  const uint64_t blocks = checked.count();
   progress_.begin_stage("verify checksums", bytes, "bytes");
   parallel_for(
       threads_, (blocks + kBlocksPerItem - 1) / kBlocksPerItem, [&](unsigned, size_t item) {
         const uint64_t first = item * kBlocksPerItem;
         const uint64_t end = std::min(first + kBlocksPerItem, blocks);
-        for (uint64_t block = first; block < end; ++block) check_block(block, table);
+        for (uint64_t block = first; block < end; ++block) checked.compare(block);
         progress_.advance(std::min(end * kChecksumBlockBytes, bytes) - first * kChecksumBlockBytes);
         cancel_.check();
       });
