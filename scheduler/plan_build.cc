@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "core/base/process_limits.h"
 #include "scheduler/check_spec.h"
 #include "scheduler/state/work_folder.h"
 
@@ -19,7 +18,6 @@ uint32_t plan_pilot_levels(uint32_t grid_levels) {
 
 Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   const BuildSpec full = checked(spec);
-  return_freed_memory_to_system();
   MemoryBudget budget(full.run.memory_bytes);
   StageClock clock;
   const std::string folder = full.run.work_folder.empty()

@@ -147,9 +147,10 @@ class Extraction {
   }
 
   std::vector<ArtifactRef> build_parts();
-  std::vector<Part> first_parts(Worker& worker, uint64_t wanted) const;
+  std::vector<SelectedPart> first_parts(Worker& worker, uint64_t wanted) const;
   uint64_t wanted_parts(unsigned workers, uint64_t share_bytes) const;
-  std::vector<Part> build_part(Worker& worker, const Part& part, std::vector<ArtifactRef>& built);
+  std::vector<SelectedPart> build_part(Worker& worker, const SelectedPart& part,
+                                       std::vector<ArtifactRef>& built);
   MergeInputs merge_inputs(std::vector<ArtifactRef> artifacts);
 
   const ExtractSpec& spec_;
@@ -176,22 +177,22 @@ uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const 
 }
 
 // The cube of the new grid, divided until there are about as many parts as wanted.
-std::vector<Part> Extraction::first_parts(Worker& worker, uint64_t wanted) const {
+std::vector<SelectedPart> Extraction::first_parts(Worker& worker, uint64_t wanted) const {
   if (file_.empty()) return {};
-  std::vector<Part> parts{{}};
+  std::vector<SelectedPart> parts{{}};
   for (uint32_t level = 0; level < crop_.level; ++level) {
     const Cube next = ancestor(crop_, level + 1);
-    std::vector<Part> children = worker.builder.split(parts[0]);
-    std::erase_if(children, [&](const Part& child) { return child.cube != next; });
+    std::vector<SelectedPart> children = worker.builder.split(parts[0]);
+    std::erase_if(children, [&](const SelectedPart& child) { return child.cube != next; });
     if (children.empty()) return {};
     parts = std::move(children);
   }
   const uint32_t brick_level = spec_.selection.grid_levels - kBrickLevels;
   while (parts.size() < wanted && !parts.empty() && parts[0].cube.level < brick_level) {
-    std::vector<Part> children;
-    for (const Part& part : parts) {
+    std::vector<SelectedPart> children;
+    for (const SelectedPart& part : parts) {
       cancel_.check();
-      for (const Part& child : worker.builder.split(part)) children.push_back(child);
+      for (const SelectedPart& child : worker.builder.split(part)) children.push_back(child);
     }
     parts = std::move(children);
   }
@@ -199,8 +200,8 @@ std::vector<Part> Extraction::first_parts(Worker& worker, uint64_t wanted) const
 }
 
 // Returns the parts that replace one that does not fit.
-std::vector<Part> Extraction::build_part(Worker& worker, const Part& part,
-                                         std::vector<ArtifactRef>& built) {
+std::vector<SelectedPart> Extraction::build_part(Worker& worker, const SelectedPart& part,
+                                                 std::vector<ArtifactRef>& built) {
   const Cube cube = in_new_grid(part.cube);
   try {
     ArtifactWriter artifact(worker.segment, shape_);
@@ -233,13 +234,13 @@ std::vector<ArtifactRef> Extraction::build_parts() {
   for (unsigned i = 0; i < count; ++i)
     workers.push_back(std::make_unique<Worker>(*this, i, share_bytes));
   std::vector<ArtifactRef> built;
-  std::vector<Part> parts = first_parts(*workers[0], wanted_parts(count, share_bytes));
+  std::vector<SelectedPart> parts = first_parts(*workers[0], wanted_parts(count, share_bytes));
   uint64_t total = parts.size();
   progress_.begin_stage("extract", total, "cubes");
   while (!parts.empty()) {
-    std::vector<Part> smaller;
+    std::vector<SelectedPart> smaller;
     parallel_for(count, parts.size(), [&](unsigned worker, size_t i) {
-      const std::vector<Part> replaced = build_part(*workers[worker], parts[i], built);
+      const std::vector<SelectedPart> replaced = build_part(*workers[worker], parts[i], built);
       const std::lock_guard lock(mutex_);
       smaller.insert(smaller.end(), replaced.begin(), replaced.end());
       total += replaced.size();

@@ -34,13 +34,13 @@ std::array<int64_t, 3> PartBuilder::corner(uint32_t level,
   return {position[0] * edge(level), position[1] * edge(level), position[2] * edge(level)};
 }
 
-std::vector<Part> PartBuilder::split(const Part& part) {
+std::vector<SelectedPart> PartBuilder::split(const SelectedPart& part) {
   const voxdag_reader::Node node = reader_.node(part.cube.level, part.offset);
-  std::vector<Part> children;
+  std::vector<SelectedPart> children;
   int next = 0;
   for (int c = 0; c < 8; ++c) {
     if (!(node.child_mask >> c & 1)) continue;
-    const Part child{part.cube.child(c), node.child(next++)};
+    const SelectedPart child{part.cube.child(c), node.child(next++)};
     const auto& p = child.cube.position;
     if (selection_.region.intersects(corner(child.cube.level, {p[0], p[1], p[2]}),
                                      edge(child.cube.level)))
@@ -205,7 +205,8 @@ PooledArray<PartBuilder::Built> PartBuilder::build_nodes(uint32_t level, uint64_
   return built;
 }
 
-SubDagSummary PartBuilder::build(const Part& part, const SubDagShape& shape, SubDagSink& sink) {
+SubDagSummary PartBuilder::build(const SelectedPart& part, const SubDagShape& shape,
+                                 SubDagSink& sink) {
   const uint32_t top = part.cube.level, bricks = brick_level();
   std::vector<PartLevel> levels;
   for (uint32_t l = top; l <= bricks; ++l) levels.push_back(level_of_part(l));

@@ -27,7 +27,7 @@
 namespace voxdag::query {
 
 // A cube of the selected grid that has voxels of the file.
-struct Part {
+struct SelectedPart {
   Cube cube;
   uint64_t offset = 0;  // of its root in level cube.level of the file
 };
@@ -40,10 +40,10 @@ class PartBuilder {
 
   // Passes the part's level arrays to the sink, `shape` being that of the new grid. Throws
   // OutOfBudget, before the sink was called, if the budget cannot hold the part.
-  SubDagSummary build(const Part& part, const SubDagShape& shape, SubDagSink& sink);
+  SubDagSummary build(const SelectedPart& part, const SubDagShape& shape, SubDagSink& sink);
 
   // The parts that replace a part above the bricks: its children of which anything is selected.
-  std::vector<Part> split(const Part& part);
+  std::vector<SelectedPart> split(const SelectedPart& part);
 
  private:
   struct Built {

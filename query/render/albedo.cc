@@ -23,7 +23,7 @@ const std::array<double, 256>& linear_of() {
 
 }  // namespace
 
-Vec Albedo::of(const Surface& surface) {
+Vec Albedo::of(const SurfaceHit& surface) {
   if (!cursor_) return kPlaster;
   const auto rgb = with_reader_errors([&] {
     return cursor_->color(surface.cell[0], surface.cell[1], surface.cell[2], surface.depth);

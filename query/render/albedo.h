@@ -6,7 +6,7 @@
 
 #include "core/format/global/voxdag_reader.h"
 #include "query/dag/vec.h"
-#include "query/render/surface.h"
+#include "query/render/surface_hit.h"
 
 namespace voxdag::query {
 
@@ -20,7 +20,7 @@ class Albedo {
     if (colors && colors->has_colors()) cursor_.emplace(*colors);
   }
   // Red, green and blue, linear. Throws Error{kCorrupt} for damaged colors.
-  Vec of(const Surface& surface);
+  Vec of(const SurfaceHit& surface);
 
  private:
   std::optional<voxdag_reader::ColorCursor> cursor_;

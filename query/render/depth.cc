@@ -6,7 +6,7 @@
 #include "core/base/parallel_for.h"
 #include "core/image/npy_header.h"
 #include "query/rays/ray_caster.h"
-#include "query/render/surface.h"
+#include "query/render/surface_hit.h"
 
 namespace voxdag::query {
 

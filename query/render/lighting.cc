@@ -32,7 +32,7 @@ bool inside(const Box& box, const Vec& p) {
 }  // namespace
 
 Lighting::Lighting(const DagView& dag, const Box& box, const Camera& camera,
-                   const std::vector<Surface>& seen)
+                   const std::vector<SurfaceHit>& seen)
     : caster_(dag), box_(box), pixel_spread_(camera.pixel_spread()) {
   if (seen.empty()) return;
   has_floor_ = camera.eye()[1] > box.low[1] && !inside(box, camera.eye());
@@ -40,7 +40,7 @@ Lighting::Lighting(const DagView& dag, const Box& box, const Camera& camera,
   place_sun(seen, camera.forward() * -1.0);
 }
 
-Vec Lighting::sky_light(const Surface& s, int rays, const Sampler& sampler) const {
+Vec Lighting::sky_light(const SurfaceHit& s, int rays, const Sampler& sampler) const {
   Vec sum;
   for (int i = 0; i < rays; ++i) {
     const Vec direction = cosine_direction(s.normal, sampler.pair(kSkyDimension, i, rays));
@@ -55,13 +55,13 @@ Vec Lighting::sky_light(const Surface& s, int rays, const Sampler& sampler) cons
   return sum * (1.0 / rays);
 }
 
-bool Lighting::sees(const Surface& s, const Vec& sun) const {
+bool Lighting::sees(const SurfaceHit& s, const Vec& sun) const {
   Hit hit;
   return dot(s.normal, sun) > 0 &&
          !caster_.cast({s.start, sun}, {s.size, kSunWidening}, 0, kSkyDistance, hit);
 }
 
-double Lighting::sun_light(const Surface& s, const Sampler& sampler) const {
+double Lighting::sun_light(const SurfaceHit& s, const Sampler& sampler) const {
   const Sampler::Pair p = sampler.pair(kSunDimension);
   Vec u, w;
   basis_around(sun_, u, w);
@@ -78,7 +78,7 @@ Vec Lighting::reflected(const Vec& albedo, const Vec& normal, const Vec& sky, do
 double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
   constexpr int kSkyRays = 4;
   if (!has_floor_ || ray.direction[1] >= 0) return 1;
-  Surface s;
+  SurfaceHit s;
   s.t = (box_.low[1] - ray.origin[1]) / ray.direction[1];
   s.size = 0.5 * pixel_spread_ * s.t;
   s.normal = {{0, 1, 0}};
@@ -92,7 +92,7 @@ double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
 
 // For a camera outside the scene the sun stands over its left shoulder. Within a scene it takes the
 // one of 48 places all around, at three heights, that lights about a third of what is seen.
-void Lighting::place_sun(const std::vector<Surface>& seen, const Vec& back) {
+void Lighting::place_sun(const std::vector<SurfaceHit>& seen, const Vec& back) {
   constexpr int kTurns = 16, kHeights = 3;
   constexpr double kLitTarget = 0.35;
   double best = kSkyDistance;
@@ -102,7 +102,7 @@ void Lighting::place_sun(const std::vector<Surface>& seen, const Vec& back) {
     const Vec sun{
         {std::cos(turn) * std::cos(height), std::sin(height), std::sin(turn) * std::cos(height)}};
     const auto lit =
-        std::count_if(seen.begin(), seen.end(), [&](const Surface& s) { return sees(s, sun); });
+        std::count_if(seen.begin(), seen.end(), [&](const SurfaceHit& s) { return sees(s, sun); });
     const double off =
         std::fabs(static_cast<double>(lit) / static_cast<double>(seen.size()) - kLitTarget);
     if (off >= best) continue;

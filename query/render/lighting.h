@@ -7,7 +7,7 @@
 #include "query/rays/ray_caster.h"
 #include "query/render/camera.h"
 #include "query/render/sampling.h"
-#include "query/render/surface.h"
+#include "query/render/surface_hit.h"
 #include "query/render/views.h"
 
 namespace voxdag::query {
@@ -17,20 +17,20 @@ class Lighting {
   // Places the sun for what the camera sees, of which `seen` is a sample. A camera that looks at
   // the scene from outside also sees a floor below it, which takes the scene's shadow.
   Lighting(const DagView& dag, const Box& box, const Camera& camera,
-           const std::vector<Surface>& seen);
+           const std::vector<SurfaceHit>& seen);
 
   // Red, green and blue light from the sky; an open sky gives about 1.
-  Vec sky_light(const Surface& surface, int rays, const Sampler& sampler) const;
+  Vec sky_light(const SurfaceHit& surface, int rays, const Sampler& sampler) const;
   // 1 if the surface sees the sampled point of the sun, 0 if not.
-  double sun_light(const Surface& surface, const Sampler& sampler) const;
+  double sun_light(const SurfaceHit& surface, const Sampler& sampler) const;
   // What a surface with this albedo and normal reflects of both, red, green and blue.
   Vec reflected(const Vec& albedo, const Vec& normal, const Vec& sky, double sun) const;
   // Brightness of the floor where `ray` meets it; 1 without a floor or shadow.
   double floor_light(const Ray& ray, const Sampler& sampler) const;
 
  private:
-  bool sees(const Surface& surface, const Vec& sun) const;
-  void place_sun(const std::vector<Surface>& seen, const Vec& back);
+  bool sees(const SurfaceHit& surface, const Vec& sun) const;
+  void place_sun(const std::vector<SurfaceHit>& seen, const Vec& back);
 
   const RayCaster caster_;
   const Box box_;

@@ -8,7 +8,7 @@
 #include "query/render/albedo.h"
 #include "query/render/g_buffer.h"
 #include "query/render/lighting.h"
-#include "query/render/surface.h"
+#include "query/render/surface_hit.h"
 
 namespace voxdag::query {
 namespace {
@@ -24,26 +24,28 @@ uint8_t srgb_byte(double linear, double dither) {
 }
 
 // What the camera sees through a coarse grid of points, nearest first.
-std::vector<Surface> probe_view(const DagView& dag, const Camera& camera, int width, int height) {
+std::vector<SurfaceHit> probe_view(const DagView& dag, const Camera& camera, int width,
+                                   int height) {
   constexpr int kColumns = 40, kRows = 24;
-  std::vector<Surface> seen;
-  Surface s;
+  std::vector<SurfaceHit> seen;
+  SurfaceHit s;
   for (int i = 0; i < kColumns * kRows; ++i) {
     const double x = (i % kColumns + 0.5) / kColumns, y = (i / kColumns + 0.5) / kRows;
     if (find_surface(dag, camera.ray(x * width, y * height), camera.pixel_spread(), s))
       seen.push_back(s);
   }
-  std::sort(seen.begin(), seen.end(), [](const Surface& a, const Surface& b) { return a.t < b.t; });
+  std::sort(seen.begin(), seen.end(),
+            [](const SurfaceHit& a, const SurfaceHit& b) { return a.t < b.t; });
   return seen;
 }
 
 // The factor that gives the median light of the probed surfaces a middle tone, and their brightest
 // tenth one below white, if all were of plaster: dark surfaces stay dark.
-double choose_exposure(const Lighting& lighting, const std::vector<Surface>& seen) {
+double choose_exposure(const Lighting& lighting, const std::vector<SurfaceHit>& seen) {
   constexpr int kSkyRays = 8;
   if (seen.empty()) return 1;
   std::vector<double> luminance;
-  for (const Surface& s : seen) {
+  for (const SurfaceHit& s : seen) {
     const Sampler sampler(luminance.size());
     const Vec light =
         lighting.reflected(kPlaster, s.normal, lighting.sky_light(s, kSkyRays, sampler),
@@ -77,7 +79,7 @@ GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighti
     const Sampler::Pair within = sampler.pair(0);
     const Ray ray =
         camera.ray(x + (i % samples + within.u) / samples, y + (i / samples + within.v) / samples);
-    Surface s;
+    SurfaceHit s;
     if (!find_surface(dag, ray, camera.pixel_spread(), s)) {
       ++misses;
       floor += lighting.floor_light(ray, sampler);
@@ -109,7 +111,7 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
   const int width = options.width, height = options.height;
   const Camera camera(placement, width, height);
   const Box box = dag.empty() ? Box{} : occupied_box(dag);
-  const std::vector<Surface> seen = probe_view(dag, camera, width, height);
+  const std::vector<SurfaceHit> seen = probe_view(dag, camera, width, height);
   const Lighting lighting(dag, box, camera, seen);
   const double exposure = choose_exposure(lighting, seen);
   const double haze_start = seen.empty() ? 0 : seen[0].t;

@@ -1,7 +1,7 @@
 #include "scheduler/state/job_store.h"
 
 #include "core/base/error.h"
-#include "core/db/row.h"
+#include "core/db/table_rows.h"
 #include "core/format/checksum.h"
 
 namespace voxdag {

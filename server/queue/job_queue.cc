@@ -4,7 +4,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "core/db/row.h"
+#include "core/db/table_rows.h"
 #include "core/io/random_id.h"
 #include "server/json_text.h"
 

@@ -8,8 +8,8 @@ namespace {
 constexpr size_t kBatch = 256;       // triangles per read
 constexpr size_t kFewTriangles = 4;  // in a tile where the plane memo may be faster
 
-Box box_of(const SubvolumeTask& task) {
-  Box box;
+LatticeCube box_of(const SubvolumeTask& task) {
+  LatticeCube box;
   box.edge = task.cube.edge_voxels(task.grid_levels) * kUnitsPerVoxel;
   for (int a = 0; a < 3; ++a) box.low[a] = task.cube.position[a] * box.edge;
   return box;
@@ -48,7 +48,7 @@ SubDagSummary SubvolumeBuild::run(TriangleStream& stream, SubDagSink& sink) {
 }
 
 NodeRef SubvolumeBuild::build_streamed(TriangleStream& stream) {
-  const Box box = box_of(task_);
+  const LatticeCube box = box_of(task_);
   std::vector<FixedTriangle> batch(kBatch);
   while (const size_t count = stream.read(batch)) {
     cancel_.check();
@@ -58,7 +58,7 @@ NodeRef SubvolumeBuild::build_streamed(TriangleStream& stream) {
 }
 
 void SubvolumeBuild::read(TriangleStream& stream) {
-  const Box box = box_of(task_);
+  const LatticeCube box = box_of(task_);
   std::vector<FixedTriangle> batch(kBatch);
   while (const size_t count = stream.read(batch)) {
     cancel_.check();
@@ -77,7 +77,7 @@ void SubvolumeBuild::reserve_entries(size_t count) {
   if (count > entries_.size()) entries_.grow(memory_, count);
 }
 
-NodeRef SubvolumeBuild::build(int size_log2, const Box& cube, size_t first, size_t count) {
+NodeRef SubvolumeBuild::build(int size_log2, const LatticeCube& cube, size_t first, size_t count) {
   if (count == 0) return {};
   if (NodeRef node; count == 1 && entries_[first].inside() &&
                     planes_.build(triangles_, entries_[first], cube, size_log2, node))
@@ -119,18 +119,19 @@ bool SubvolumeBuild::worth_splitting(int size_log2, size_t first, size_t count) 
   return true;
 }
 
-NodeRef SubvolumeBuild::build_tile(int size_log2, const Box& cube, size_t first, size_t count) {
+NodeRef SubvolumeBuild::build_tile(int size_log2, const LatticeCube& cube, size_t first,
+                                   size_t count) {
   cancel_.check();
   for (size_t i = 0; i < count; ++i) draw(entries_[first + i], cube);
   return reducer_.reduce_bricks(tile_, size_log2);
 }
 
-Octants SubvolumeBuild::test_octants(Entry entry, const Box& cube) const {
+Octants SubvolumeBuild::test_octants(Entry entry, const LatticeCube& cube) const {
   return entry.wide() ? test_octants_wide(triangles_.wide(entry), cube, entry.inside())
                       : kernels_.test_octants(triangles_.narrow(entry), cube, entry.inside());
 }
 
-void SubvolumeBuild::draw(const WideTriangle& triangle, const Box& tile) {
+void SubvolumeBuild::draw(const WideTriangle& triangle, const LatticeCube& tile) {
   if (is_narrow(triangle)) {
     TileTriangle<int32_t> narrow;
     if (narrow.set_up(narrowed(triangle), false, tile)) kernels_.draw(narrow, tile_);
@@ -140,7 +141,7 @@ void SubvolumeBuild::draw(const WideTriangle& triangle, const Box& tile) {
   }
 }
 
-void SubvolumeBuild::draw(Entry entry, const Box& tile) {
+void SubvolumeBuild::draw(Entry entry, const LatticeCube& tile) {
   if (entry.wide()) {
     TileTriangle<int64_t> wide;
     if (wide.set_up(triangles_.wide(entry), entry.inside(), tile)) draw_wide(wide, tile_);

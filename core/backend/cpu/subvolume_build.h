@@ -7,9 +7,9 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/cpu/memo/plane_memo.h"
+#include "core/backend/cpu/memo/tile_reducer.h"
 #include "core/backend/cpu/raster/kernels.h"
-#include "core/backend/cpu/tile_reducer.h"
-#include "core/backend/cpu/triangle_set.h"
+#include "core/backend/cpu/raster/triangle_set.h"
 #include "core/dag/consing/sub_dag_tables.h"
 
 namespace voxdag::cpu {
@@ -29,13 +29,13 @@ class SubvolumeBuild {
   void read(TriangleStream& stream);
   // The node of a cube of 2^size_log2 voxels that the entries [first, first + count) of the stack
   // may touch.
-  NodeRef build(int size_log2, const Box& cube, size_t first, size_t count);
+  NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   // Whether a cube of at most tile size is better split, since its parts may be in the plane memo.
   bool worth_splitting(int size_log2, size_t first, size_t count);
-  NodeRef build_tile(int size_log2, const Box& cube, size_t first, size_t count);
-  Octants test_octants(Entry entry, const Box& cube) const;
-  void draw(const WideTriangle& triangle, const Box& tile);
-  void draw(Entry entry, const Box& tile);
+  NodeRef build_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
+  Octants test_octants(Entry entry, const LatticeCube& cube) const;
+  void draw(const WideTriangle& triangle, const LatticeCube& tile);
+  void draw(Entry entry, const LatticeCube& tile);
   void reserve_entries(size_t count);
 
   const SubvolumeTask task_;

@@ -1,5 +1,5 @@
 // The GPU's space: loops are kernels on one stream, memory is the device's.
-// core/backend/parallel/space.h specifies the calls. Only for CUDA sources.
+// core/backend/parallel/space/space.h specifies the calls. Only for CUDA sources.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 #include "core/backend/cuda/cuda_device.h"
 #include "core/backend/cuda/kernels.h"
-#include "core/backend/parallel/space.h"
+#include "core/backend/parallel/space/space.h"
 
 namespace voxdag::cuda {
 

@@ -23,7 +23,7 @@ __global__ void __launch_bounds__(kThreadsPerBlock) run_for_each(uint32_t n, F f
   if (i < n) f(i);
 }
 
-// A thread block kernel (core/backend/parallel/thread_block.h), launched with
+// A thread block kernel (core/backend/parallel/space/thread_block.h), launched with
 // sizeof(Kernel::Shared) bytes of shared memory.
 template <class Kernel>
 __global__ void __launch_bounds__(Kernel::kThreads, Kernel::kMinResidentBlocks)

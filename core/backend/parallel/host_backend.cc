@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <thread>
 
-#include "core/backend/parallel/host_space.h"
 #include "core/backend/parallel/parallel_backend.h"
+#include "core/backend/parallel/space/host_space.h"
 
 namespace voxdag {
 namespace parallel {

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "core/backend/backend.h"
-#include "core/backend/parallel/brick_list.h"
 #include "core/backend/parallel/dag/dag_by_hashes.h"
 #include "core/backend/parallel/dag/dag_by_pointers.h"
 #include "core/backend/parallel/dag/host_levels.h"
 #include "core/backend/parallel/dag/octree.h"
+#include "core/backend/parallel/space/brick_list.h"
 #include "core/backend/parallel/voxelize/tiles.h"
 #include "core/backend/parallel/voxelize/voxel_list.h"
 
@@ -42,7 +42,8 @@ BrickList<Space> voxelize(Space& space, Method method, const SubvolumeTask& task
 }
 
 template <class Space>
-Dag<Space> make_dag(Space& space, Method method, const Octree<Space>& tree, uint32_t hash_bits) {
+SpaceDag<Space> make_dag(Space& space, Method method, const Octree<Space>& tree,
+                         uint32_t hash_bits) {
   if (method != Method::kPointers)
     if (auto dag = make_dag_by_hashes(space, tree, hash_bits)) return std::move(*dag);
   return make_dag_by_pointers(space, tree, hash_bits);

@@ -77,22 +77,22 @@ void ColorPalette::make() {
   points_.reserve(kBins);
   for (uint32_t bin = 0; bin < kBins; ++bin)
     if (bins_[bin].count != 0) points_.push_back({oklab_of(mean_of(bins_[bin])), bin});
-  std::vector<Box> boxes = {box_of(0, points_.size())};
+  std::vector<PaletteBox> boxes = {box_of(0, points_.size())};
   while (boxes.size() < kMaxColors) {
     // The first of the largest ones. Without a spread there is nothing to cut.
-    const auto largest = std::ranges::max_element(boxes, {}, &Box::spread);
+    const auto largest = std::ranges::max_element(boxes, {}, &PaletteBox::spread);
     if (largest->spread == 0) break;
-    const Box box = *largest;
+    const PaletteBox box = *largest;
     const size_t middle = cut(box);
     *largest = box_of(box.begin, middle);
     boxes.push_back(box_of(middle, box.end));
   }
-  for (const Box& box : boxes) colors_.push_back(mean_of(sum_of(box)));
+  for (const PaletteBox& box : boxes) colors_.push_back(mean_of(sum_of(box)));
   assign_bins();
 }
 
-ColorPalette::Box ColorPalette::box_of(size_t begin, size_t end) const {
-  Box box{begin, end};
+ColorPalette::PaletteBox ColorPalette::box_of(size_t begin, size_t end) const {
+  PaletteBox box{begin, end};
   for (size_t axis = 0; axis < 3; ++axis) {
     uint64_t sum = 0, count = 0, spread = 0;
     for (size_t i = begin; i < end; ++i) {
@@ -110,7 +110,7 @@ ColorPalette::Box ColorPalette::box_of(size_t begin, size_t end) const {
 
 // Puts the points below the mean of a box, which has a spread, before the others; returns where
 // those begin. No sum depends on the order within the two.
-size_t ColorPalette::cut(const Box& box) {
+size_t ColorPalette::cut(const PaletteBox& box) {
   const auto first = points_.begin() + static_cast<ptrdiff_t>(box.begin);
   const auto last = points_.begin() + static_cast<ptrdiff_t>(box.end);
   const auto middle = std::partition(
@@ -118,7 +118,7 @@ size_t ColorPalette::cut(const Box& box) {
   return static_cast<size_t>(middle - points_.begin());
 }
 
-ColorPalette::Bin ColorPalette::sum_of(const Box& box) const {
+ColorPalette::Bin ColorPalette::sum_of(const PaletteBox& box) const {
   Bin sum;
   for (size_t i = box.begin; i < box.end; ++i) {
     const Bin& bin = bins_[points_[i].bin];

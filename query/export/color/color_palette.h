@@ -46,7 +46,7 @@ class ColorPalette {
     std::array<uint32_t, 3> lab{};
     uint32_t bin = 0;
   };
-  struct Box {
+  struct PaletteBox {
     size_t begin = 0, end = 0;    // of its points
     size_t axis = 0;              // of the largest spread
     uint64_t spread = 0;          // sum of squared distances along it
@@ -55,9 +55,9 @@ class ColorPalette {
 
   static voxdag_reader::Rgb mean_of(const Bin& bin);
   bool add_distinct(uint32_t packed);
-  Box box_of(size_t begin, size_t end) const;
-  size_t cut(const Box& box);
-  Bin sum_of(const Box& box) const;
+  PaletteBox box_of(size_t begin, size_t end) const;
+  size_t cut(const PaletteBox& box);
+  Bin sum_of(const PaletteBox& box) const;
   void assign_bins();
 
   MemoryCharge charge_;

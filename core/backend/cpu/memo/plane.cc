@@ -25,7 +25,7 @@ bool Plane::crosses(int64_t f, int size_log2) const {
   return f + size * rising() >= 0 && f + size * falling() + (fractional ? 1 : 0) <= 0;
 }
 
-bool Plane::offset_from(const Box& cube, int size_log2, int64_t& f) const {
+bool Plane::offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const {
   int128 at_corner = c;
   for (int a = 0; a < 3; ++a) at_corner += static_cast<int128>(n[a]) * cube.low[a];
   const int128 floored = at_corner >> kUnitBits;

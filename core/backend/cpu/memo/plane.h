@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/backend/cpu/triangle_set.h"
+#include "core/backend/cpu/raster/triangle_set.h"
 #include "core/base/integers.h"
 #include "core/dag/brick.h"
 
@@ -29,7 +29,7 @@ struct Plane {
   // Whether the plane touches a cube of 2^size_log2 voxels with offset f. Needs fits().
   bool crosses(int64_t f, int size_log2) const;
   // Sets f for a cube; false if the plane misses it. Needs fits().
-  bool offset_from(const Box& cube, int size_log2, int64_t& f) const;
+  bool offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const;
 };
 
 // The plane of a triangle whose vertices have equal coordinates along an axis; found without

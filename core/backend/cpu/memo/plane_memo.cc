@@ -25,8 +25,8 @@ uint64_t small_key(const Plane& plane, int64_t f, int size_log2) {
 
 }  // namespace
 
-bool PlaneMemo::build(const TriangleSet& triangles, Entry entry, const Box& cube, int size_log2,
-                      NodeRef& node_out) {
+bool PlaneMemo::build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube,
+                      int size_log2, NodeRef& node_out) {
   node_out = {};
   int64_t f;
   if (const auto plane = entry.wide() ? axis_aligned_plane(triangles.wide(entry))

@@ -15,8 +15,8 @@
 
 #include "core/backend/cpu/memo/plane.h"
 #include "core/backend/cpu/memo/plane_direction.h"
+#include "core/backend/cpu/memo/tile_reducer.h"
 #include "core/backend/cpu/raster/kernels.h"
-#include "core/backend/cpu/tile_reducer.h"
 #include "core/dag/consing/sub_dag_tables.h"
 
 namespace voxdag::cpu {
@@ -32,7 +32,7 @@ class PlaneMemo {
 
   // Sets `node` to the node of a cube which one triangle covers and no other touches. False if the
   // plane is not in the memo (yet), or not for cubes of this size.
-  bool build(const TriangleSet& triangles, Entry entry, const Box& cube, int size_log2,
+  bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
   // Whether build() would succeed for cubes of up to 64^3 voxels that the triangle covers.
   bool has_plane(const TriangleSet& triangles, Entry entry);

@@ -8,8 +8,8 @@
 
 #include "core/backend/cpu/raster/tile_bricks.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
+#include "core/backend/cpu/raster/triangle_set.h"
 #include "core/backend/cpu/raster/voxel_block.h"
-#include "core/backend/cpu/triangle_set.h"
 
 namespace voxdag::cpu {
 
@@ -30,7 +30,7 @@ struct Kernels {
   // Sets exactly the voxels of the tile that the triangle touches.
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
   // The triangle must touch the cube. `inside`: it covers the whole cube.
-  Octants (*test_octants)(const NarrowTriangle& triangle, const Box& cube, bool inside);
+  Octants (*test_octants)(const NarrowTriangle& triangle, const LatticeCube& cube, bool inside);
   // Sets bit i of `bits` iff low <= values[i] <= high, for `count` values, a multiple of 4; the
   // other bits of the last word are 0.
   void (*find_in_range)(const int64_t* values, int count, int64_t low, int64_t high,
@@ -60,6 +60,6 @@ void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile);
 
 // Wide triangles have a portable implementation only.
 void draw_wide(const TileTriangle<int64_t>& triangle, TileBricks& tile);
-Octants test_octants_wide(const WideTriangle& triangle, const Box& cube, bool inside);
+Octants test_octants_wide(const WideTriangle& triangle, const LatticeCube& cube, bool inside);
 
 }  // namespace voxdag::cpu

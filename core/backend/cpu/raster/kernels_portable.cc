@@ -39,7 +39,7 @@ struct PlainQuad {
   }
 };
 
-Octants test_octants_narrow(const NarrowTriangle& triangle, const Box& cube, bool inside) {
+Octants test_octants_narrow(const NarrowTriangle& triangle, const LatticeCube& cube, bool inside) {
   return OctantTest<PlainQuad, int32_t>(triangle, cube).run(inside);
 }
 
@@ -94,7 +94,7 @@ const Kernels* avx2_kernels() { return nullptr; }
 const Kernels* avx512_kernels() { return nullptr; }
 #endif
 
-Octants test_octants_wide(const WideTriangle& triangle, const Box& cube, bool inside) {
+Octants test_octants_wide(const WideTriangle& triangle, const LatticeCube& cube, bool inside) {
   return OctantTest<PlainQuad, int64_t>(triangle, cube).run(inside);
 }
 

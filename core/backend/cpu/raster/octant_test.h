@@ -45,13 +45,14 @@ struct OctantTest {
   using Int = typename TileTriangle<Coordinate>::Int;
 
   const Triangle<Coordinate>& t;
-  const Box& cube;
+  const LatticeCube& cube;
   double half;        // edge of a child
   double reach;       // no coordinate relative to the cube's low corner is larger
   int long_axes = 0;  // along which the triangle is as long as a child
   double normal[3];
 
-  OctantTest(const Triangle<Coordinate>& triangle, const Box& box) : t(triangle), cube(box) {
+  OctantTest(const Triangle<Coordinate>& triangle, const LatticeCube& box)
+      : t(triangle), cube(box) {
     half = static_cast<double>(cube.edge / 2);
   }
 

@@ -14,7 +14,7 @@ Int positive(Int x) {
 
 template <class Coordinate>
 bool TileTriangle<Coordinate>::set_up(const Triangle<Coordinate>& triangle, bool is_inside,
-                                      const Box& tile) {
+                                      const LatticeCube& tile) {
   inside = is_inside;
   int64_t v[3][3];
   for (int a = 0; a < 3; ++a) {

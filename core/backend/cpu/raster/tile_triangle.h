@@ -21,7 +21,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "core/backend/cpu/triangle_set.h"
+#include "core/backend/cpu/raster/triangle_set.h"
 #include "core/base/integers.h"
 
 namespace voxdag::cpu {
@@ -46,7 +46,7 @@ struct TileTriangle {
   Edge edges[3][3];  // [projection][edge]
 
   // False if the triangle certainly touches no voxel of the tile.
-  bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const Box& tile);
+  bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const LatticeCube& tile);
 
  private:
   bool set_plane(const int64_t (&v)[3][3], int64_t (&half)[3][3], int64_t tile_voxels);

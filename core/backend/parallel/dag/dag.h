@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/backend/parallel/dag/octree.h"
-#include "core/backend/parallel/space.h"
+#include "core/backend/parallel/space/space.h"
 #include "core/dag/node_hash.h"
 
 namespace voxdag::parallel {
@@ -25,7 +25,7 @@ struct DagLevel {
 };
 
 template <class Space>
-struct Dag {
+struct SpaceDag {
   DagBricks<Space> bricks;
   std::vector<DagLevel<Space>> levels;  // from the bricks' parents up to the root
   uint64_t root_hash = 0;

@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "core/backend/parallel/dag/dag.h"
-#include "core/backend/parallel/order.h"
-#include "core/backend/parallel/thread_block.h"
+#include "core/backend/parallel/space/order.h"
+#include "core/backend/parallel/space/thread_block.h"
 
 namespace voxdag::parallel {
 
@@ -192,14 +192,14 @@ Survivors<Space> surviving_root(Space& space, const SpaceArray<Space, uint64_t>&
 
 // The DAG, or nothing if two different nodes have the same hash.
 template <class Space>
-std::optional<Dag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& tree,
-                                             uint32_t hash_bits) {
+std::optional<SpaceDag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& tree,
+                                                  uint32_t hash_bits) {
   auto hashes = hash_octree(space, tree, hash_bits);
   SpaceArray<Space, uint32_t> mismatch(space, 1);
   const uint32_t none = 0;
   space.upload(&none, mismatch.data(), 1);
   Survivors<Space> survivors = surviving_root(space, hashes.back());
-  Dag<Space> dag;
+  SpaceDag<Space> dag;
   dag.root_hash = space.value(survivors.hashes.data());
   dag.levels.resize(tree.levels.size());
   for (size_t l = tree.levels.size(); l-- > 0;) {

@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "core/backend/parallel/dag/dag.h"
-#include "core/backend/parallel/order.h"
+#include "core/backend/parallel/space/order.h"
 
 namespace voxdag::parallel {
 
@@ -207,8 +207,8 @@ DagLevel<Space> make_level(Space& space, const LinkedNodes& links, Reduced<Space
 }
 
 template <class Space>
-Dag<Space> make_dag_by_pointers(Space& space, const Octree<Space>& tree, uint32_t hash_bits) {
-  Dag<Space> dag;
+SpaceDag<Space> make_dag_by_pointers(Space& space, const Octree<Space>& tree, uint32_t hash_bits) {
+  SpaceDag<Space> dag;
   Reduced<Space> reduced = reduce_bricks(space, tree, hash_bits);
   dag.bricks.count = reduced.count;
   dag.bricks.masks =

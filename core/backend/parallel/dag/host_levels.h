@@ -51,7 +51,8 @@ class HostArray {
 template <class Space>
 class HostLevels {
  public:
-  HostLevels(Space& space, Dag<Space>&& dag) : brick_masks_(space, std::move(dag.bricks.masks)) {
+  HostLevels(Space& space, SpaceDag<Space>&& dag)
+      : brick_masks_(space, std::move(dag.bricks.masks)) {
     for (DagLevel<Space>& level : dag.levels)
       levels_.push_back({{space, std::move(level.hashes)},
                          {space, std::move(level.masks)},

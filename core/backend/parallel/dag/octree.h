@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/backend/parallel/brick_list.h"
-#include "core/backend/parallel/space.h"
+#include "core/backend/parallel/space/brick_list.h"
+#include "core/backend/parallel/space/space.h"
 #include "core/base/host_device.h"
 
 namespace voxdag::parallel {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "core/backend/backend.h"
-#include "core/backend/parallel/space.h"
-#include "core/backend/parallel/voxelize/touched_cells.h"
+#include "core/backend/parallel/space/space.h"
+#include "core/backend/parallel/voxelize/triangle_cells.h"
 #include "core/dag/brick.h"
 
 namespace voxdag::parallel {

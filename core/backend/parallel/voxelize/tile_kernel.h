@@ -9,9 +9,9 @@
 
 #include <cstdint>
 
-#include "core/backend/parallel/thread_block.h"
+#include "core/backend/parallel/space/thread_block.h"
 #include "core/backend/parallel/voxelize/pairs.h"
-#include "core/backend/parallel/voxelize/touched_cells.h"
+#include "core/backend/parallel/voxelize/triangle_cells.h"
 
 namespace voxdag::parallel {
 

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "core/backend/parallel/brick_list.h"
+#include "core/backend/parallel/space/brick_list.h"
 #include "core/backend/parallel/voxelize/pairs.h"
 #include "core/backend/parallel/voxelize/tile_kernel.h"
 #include "core/backend/parallel/voxelize/voxel_list.h"

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "core/backend/parallel/brick_list.h"
+#include "core/backend/parallel/space/brick_list.h"
 #include "core/backend/parallel/voxelize/pairs.h"
 
 namespace voxdag::parallel {

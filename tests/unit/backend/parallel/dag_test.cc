@@ -5,7 +5,7 @@
 #include "core/backend/parallel/dag/dag_by_pointers.h"
 #include "core/backend/parallel/dag/host_levels.h"
 #include "core/backend/parallel/dag/octree.h"
-#include "core/backend/parallel/host_space.h"
+#include "core/backend/parallel/space/host_space.h"
 #include "core/dag/brick.h"
 #include "tests/oracle/check_sub_dag.h"
 #include "tests/oracle/scenes.h"
@@ -31,7 +31,7 @@ class ParallelDag : public testing::Test {
     bricks.commit(count, true);
     return make_octree(space, bricks, levels);
   }
-  SubDag as_sub_dag(Dag<HostSpace>&& dag, uint32_t levels) {
+  SubDag as_sub_dag(SpaceDag<HostSpace>&& dag, uint32_t levels) {
     SubDag out;
     HostLevels<HostSpace>(space, std::move(dag)).send(levels, out);
     return out;

@@ -1,6 +1,6 @@
 // The host's primitives against the standard library's loops, at sizes around the parts that
 // threads work on.
-#include "core/backend/parallel/host_space.h"
+#include "core/backend/parallel/space/host_space.h"
 
 #include <gtest/gtest.h>
 

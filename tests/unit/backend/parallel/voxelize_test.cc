@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <map>
 
-#include "core/backend/parallel/host_space.h"
+#include "core/backend/parallel/space/host_space.h"
 #include "core/backend/parallel/voxelize/tiles.h"
 #include "core/backend/parallel/voxelize/voxel_list.h"
 #include "tests/oracle/core_types.h"

@@ -17,10 +17,10 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/avx2/columns.h"
 #include "core/backend/cpu/raster/avx2/footprint.h"
 #include "core/backend/cpu/raster/avx2/heights.h"
 #include "core/backend/cpu/raster/avx2/sides.h"
+#include "core/backend/cpu/raster/avx2/tile_columns.h"
 #include "core/backend/cpu/raster/kernels.h"
 
 namespace voxdag::cpu {

@@ -17,7 +17,7 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/avx2/columns.h"
+#include "core/backend/cpu/raster/avx2/tile_columns.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
 
 namespace voxdag::cpu {

@@ -28,7 +28,7 @@ struct Avx2Quad {
   uint32_t negative() const { return static_cast<uint32_t>(_mm256_movemask_pd(x)); }
 };
 
-Octants test_octants(const NarrowTriangle& triangle, const Box& cube, bool inside) {
+Octants test_octants(const NarrowTriangle& triangle, const LatticeCube& cube, bool inside) {
   return OctantTest<Avx2Quad, int32_t>(triangle, cube).run(inside);
 }
 

@@ -5,7 +5,7 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/avx2/columns.h"
+#include "core/backend/cpu/raster/avx2/tile_columns.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
 
 namespace voxdag::cpu {

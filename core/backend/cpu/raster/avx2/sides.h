@@ -7,8 +7,8 @@
 
 #include <immintrin.h>
 
-#include "core/backend/cpu/raster/avx2/columns.h"
 #include "core/backend/cpu/raster/avx2/edge_bounds.h"
+#include "core/backend/cpu/raster/avx2/tile_columns.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
 
 namespace voxdag::cpu {

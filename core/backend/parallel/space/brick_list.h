@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <utility>
 
-#include "core/backend/parallel/order.h"
-#include "core/backend/parallel/space.h"
+#include "core/backend/parallel/space/order.h"
+#include "core/backend/parallel/space/space.h"
 
 namespace voxdag::parallel {
 

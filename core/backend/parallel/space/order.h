@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "core/backend/parallel/space.h"
+#include "core/backend/parallel/space/space.h"
 #include "core/base/host_device.h"
 
 namespace voxdag::parallel {

@@ -29,7 +29,7 @@ inline constexpr int64_t kNarrowCoordinate = int64_t{1} << 30;
 inline constexpr int64_t kNarrowExtent = int64_t{1} << 28;
 
 // Lattice coordinates of a cube.
-struct Box {
+struct LatticeCube {
   int64_t low[3];
   int64_t edge;
 
@@ -39,7 +39,7 @@ struct Box {
       if (t.high(a) < low[a] || t.low(a) > low[a] + edge) return true;
     return false;
   }
-  Box child(int index) const {
+  LatticeCube child(int index) const {
     const int64_t half = edge / 2;
     return {{low[0] + (index >> 2) * half, low[1] + (index >> 1 & 1) * half,
              low[2] + (index & 1) * half},

@@ -1,4 +1,4 @@
-#include "core/backend/cpu/tile_reducer.h"
+#include "core/backend/cpu/memo/tile_reducer.h"
 
 #include <utility>
 

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <span>
 
-#include "core/backend/parallel/space.h"
+#include "core/backend/parallel/space/space.h"
 #include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/parallel_for.h"

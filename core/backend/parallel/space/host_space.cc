@@ -1,4 +1,4 @@
-#include "core/backend/parallel/host_space.h"
+#include "core/backend/parallel/space/host_space.h"
 
 #include <bit>
 #include <numeric>

@@ -1,5 +1,5 @@
 // touched_cells() equals the definition, core/geometry/overlap.h, cell for cell.
-#include "core/backend/parallel/voxelize/touched_cells.h"
+#include "core/backend/parallel/voxelize/triangle_cells.h"
 
 #include <gtest/gtest.h>
 

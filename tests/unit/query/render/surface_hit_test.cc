@@ -1,4 +1,4 @@
-#include "query/render/surface.h"
+#include "query/render/surface_hit.h"
 
 #include <gtest/gtest.h>
 
@@ -29,11 +29,11 @@ std::set<VoxelScene::Voxel> shell(const VoxelScene::Voxel& low, const VoxelScene
 }
 
 // The normal of a wall is perpendicular to it and points to the visible side.
-TEST(Surface, NormalOfAWall) {
+TEST(SurfaceHit, NormalOfAWall) {
   const VoxelScene scene = VoxelScene::wall(6, 30);
   const DagView dag = scene.view();
   for (double side : {-1.0, 1.0}) {
-    Surface s;
+    SurfaceHit s;
     const Ray ray{{{30.5 + 25 * side, 20, 20}}, normalized({{-side, 0.3, 0.4}})};
     ASSERT_TRUE(find_surface(dag, ray, 0.1, s));
     EXPECT_LT(degrees_between(s.normal, {{side, 0, 0}}), 0.1);
@@ -44,13 +44,13 @@ TEST(Surface, NormalOfAWall) {
 
 // Stairs of single voxels are shown as a slope of 45 degrees if a voxel is as small as a pixel, and
 // as stairs if it is many pixels large.
-TEST(Surface, StairsAreASlopeFromAfar) {
+TEST(SurfaceHit, StairsAreASlopeFromAfar) {
   std::set<VoxelScene::Voxel> voxels;
   for (int64_t x = 0; x < 32; ++x)
     for (int64_t z = 0; z < 32; ++z) voxels.insert({x, x, z});
   const VoxelScene scene(5, voxels);
   const DagView dag = scene.view();
-  Surface s;
+  SurfaceHit s;
   const Ray ray{{{16.5, 60, 16.5}}, {{0, -1, 0}}};
   ASSERT_TRUE(find_surface(dag, ray, 0.02, s));
   EXPECT_LT(degrees_between(s.normal, {{-1, 1, 0}}), 2);
@@ -59,10 +59,10 @@ TEST(Surface, StairsAreASlopeFromAfar) {
 }
 
 // Too few cells to fit a plane: a lone voxel has the normal of the face that the ray entered.
-TEST(Surface, ALoneVoxelShowsItsFace) {
+TEST(SurfaceHit, ALoneVoxelShowsItsFace) {
   const VoxelScene scene(4, {{7, 7, 7}});
   const DagView dag = scene.view();
-  Surface s;
+  SurfaceHit s;
   ASSERT_TRUE(find_surface(dag, {{{7.5, 20, 7.5}}, {{0, -1, 0}}}, 0.1, s));
   EXPECT_LT(degrees_between(s.normal, {{0, 1, 0}}), 0.1);
 }

@@ -16,7 +16,7 @@ inline constexpr double kFarthest = 1e30;
 // quarters of a pixel are seen as a whole.
 inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread}; }
 
-struct Surface {
+struct SurfaceHit {
   double t = 0;          // ray parameter of the hit
   double size = 0;       // edge of the cell that was hit, in voxels
   uint32_t depth = 0;    // of that cell, below the root
@@ -28,6 +28,6 @@ struct Surface {
 // Finds the first surface on a ray through a pixel that is `pixel_spread` wide at distance 1; false
 // if there is none. Voxels of many pixels are shown as cubes, smaller ones as the surface that they
 // sample. Throws Error{kCorrupt} for a damaged DAG.
-bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surface& surface);
+bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, SurfaceHit& surface);
 
 }  // namespace voxdag::query

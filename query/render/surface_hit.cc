@@ -1,4 +1,4 @@
-#include "query/render/surface.h"
+#include "query/render/surface_hit.h"
 
 #include <algorithm>
 
@@ -73,7 +73,7 @@ Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
 
 }  // namespace
 
-bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surface& s) {
+bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, SurfaceHit& s) {
   const RayCaster caster(dag);
   Hit hit;
   if (!caster.cast(ray, visible_cone(pixel_spread), 0, kFarthest, hit)) return false;

@@ -1,4 +1,4 @@
-#include "core/backend/cpu/triangle_set.h"
+#include "core/backend/cpu/raster/triangle_set.h"
 
 namespace voxdag::cpu {
 
