@@ -29,8 +29,8 @@ class CpuBackend : public Backend {
 
  private:
   const cpu::Kernels& kernels_;
-  cpu::PagePool pages_;
-  cpu::TableSizes table_sizes_;  // of the last subvolume
+  PagePool pages_;
+  TableSizes table_sizes_;  // of the last subvolume
 };
 
 }  // namespace
