@@ -106,7 +106,7 @@ class Build {
   Build(const BuildSpec& spec, const BuildContext& context)
       : spec_(spec),
         budget_(spec_.run.memory_bytes),
-        output_lock_(context, spec_.run.output, spec_.run.lock_wait_s),
+        output_lock_(lock_output(context, spec_.run.output, spec_.run.lock_wait_s)),
         work_(context, work_folder_of(spec_.run), spec_.run.lock_wait_s),
         jobs_(open_job_store(context.files, work_, spec_.run.restart)),
         progress_(context.progress, *jobs_, work_),

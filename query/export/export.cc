@@ -5,7 +5,7 @@
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
-#include "query/dag/output_lock.h"
+#include "query/dag/locked_outputs.h"
 #include "query/export/export_job.h"
 
 namespace voxdag::query {
@@ -57,7 +57,7 @@ ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const CancelToken& cancel) {
   check_grid(request.selection, file.grid_levels());
   const std::vector<std::string> paths = export_paths(*request.format, request.output);
-  const OutputLock lock(files, {paths, file.path(), request.replace});
+  const LockedOutputs lock(files, {paths, file.path(), request.replace});
   const WatchedFile watched(file);
   MemoryBudget budget(request.memory_bytes);
   const bool has_colors = file.has_colors() && !request.gray;

@@ -56,7 +56,7 @@ struct ExportRequest {
 // nothing is left, unless the disk refuses the second of two names, and what a process that was
 // killed has left is removed by the next one. Throws Error{kLimit} if the format cannot hold them,
 // Error{kOutOfMemory} if the memory cannot, where the message says what would do, and what
-// OutputLock does.
+// LockedOutputs does.
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel);

@@ -20,7 +20,7 @@
 #include "core/format/global/watched_file.h"
 #include "core/geometry/octree_descent.h"
 #include "merge/merge.h"
-#include "query/dag/output_lock.h"
+#include "query/dag/locked_outputs.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_builder.h"
 #include "query/extract/part_colors.h"
@@ -293,7 +293,7 @@ Cube crop_cube(const Selection& selection) {
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel) {
   check_grid(spec.selection, file.grid_levels());
-  const OutputLock lock(files, {{spec.output}, file.path(), spec.replace});
+  const LockedOutputs lock(files, {{spec.output}, file.path(), spec.replace});
   const WatchedFile watched(file);  // colors are read in place
   return watched.run([&] {
     return Extraction(file, spec, files, progress, cancel).run([&] { watched.expect_whole(); });

@@ -53,7 +53,8 @@ Cube crop_cube(const Selection& selection);
 
 // Writes spec.output, which appears when it is complete; temporary files lie in a folder next to
 // it, which is removed whatever happens, after a kill by the next extract of that output. Throws
-// Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and what OutputLock does.
+// Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and what LockedOutputs
+// does.
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

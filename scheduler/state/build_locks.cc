@@ -5,7 +5,6 @@
 #include <thread>
 
 #include "core/base/clock.h"
-#include "core/base/error.h"
 
 namespace voxdag {
 namespace {
@@ -35,23 +34,9 @@ std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<File
   }
 }
 
-OutputLock::OutputLock(const BuildContext& context, const std::string& output, double max_wait_s)
-    : files_(context.files),
-      path_(path_of(output)),
-      lock_(wait_for_lock([&] { return files_.try_lock(path_); }, output, max_wait_s, context)) {
-  if (!lock_)
-    throw Error(ErrorCode::kIo, output +
-                                    " is being written by another build: expected another file "
-                                    "(-o), or to wait for that build");
-}
-
-OutputLock::~OutputLock() {
-  try {
-    // A file of that name that is not empty is somebody else's.
-    if (files_.open_read(path_)->size() == 0) files_.remove(path_);
-  } catch (const Error&) {
-    // An empty file is left, which the next build there locks again.
-  }
+OutputLock lock_output(const BuildContext& context, const std::string& output, double max_wait_s) {
+  const auto try_lock = [&] { return context.files.try_lock(OutputLock::path_of(output)); };
+  return OutputLock(context.files, output, wait_for_lock(try_lock, output, max_wait_s, context));
 }
 
 }  // namespace voxdag

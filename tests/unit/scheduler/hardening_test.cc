@@ -73,10 +73,10 @@ TEST_F(Hardening, M5_WaitsForTheLocksOfADyingBuild) {
 TEST_F(Hardening, M5_ALockThatStaysIsATransientError) {
   BuildSpec impatient = spec();
   impatient.run.lock_wait_s = 0.1;
-  const OutputLock output_lock(context(), output(), 0);
+  const OutputLock output_lock(files_, output());
   const Error by_output = error_of([&] { run_build(impatient, context()); });
   EXPECT_EQ(by_output.code(), ErrorCode::kIo);
-  EXPECT_NE(by_output.message().find("is being written by another build"), std::string::npos);
+  EXPECT_NE(by_output.message().find("is being written by another process"), std::string::npos);
   impatient.run.output = folder_.file("other.vdag");
   const WorkFolder work(context(), folder_.file("other.vdag.work"), 0);
   const Error by_folder = error_of([&] { run_build(impatient, context()); });
@@ -86,7 +86,7 @@ TEST_F(Hardening, M5_ALockThatStaysIsATransientError) {
 
 // Whoever waits for a lock can be stopped.
 TEST_F(Hardening, M5_WaitingCanBeCanceled) {
-  const OutputLock output_lock(context(), output(), 0);
+  const OutputLock output_lock(files_, output());
   std::thread user([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     cancel_.cancel();
@@ -127,9 +127,9 @@ TEST_F(Hardening, DisksAreToldApartByTheirDevice) {
 // A build that waits for another one's output holds a lock that has a name once it gets it, even if
 // the other one has published its file: a third one has to wait.
 TEST_F(Hardening, N4_ALockOfTheOutputHasAName) {
-  auto first = std::make_unique<OutputLock>(context(), output(), 0);
+  auto first = std::make_unique<OutputLock>(files_, output());
   std::unique_ptr<OutputLock> second;
-  std::thread waiting([&] { second = std::make_unique<OutputLock>(context(), output(), 30); });
+  std::thread waiting([&] { second.reset(new OutputLock(lock_output(context(), output(), 30))); });
   // What the first build does at its end, and before that if its merge restarts.
   for (int file = 0; file < 2; ++file) {
     std::ofstream(output() + ".partial") << "levels";
@@ -139,7 +139,7 @@ TEST_F(Hardening, N4_ALockOfTheOutputHasAName) {
   }
   first.reset();
   waiting.join();
-  EXPECT_EQ(error_of([&] { OutputLock(context(), output(), 0); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(error_of([&] { OutputLock(files_, output()); }).code(), ErrorCode::kIo);
   second.reset();
   EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
 }

@@ -241,9 +241,7 @@ TEST_F(ResumeTest, OwnsItsOutputAlone) {
   first.run.work_folder = folder_.path() + "/first";
   build_until(first, "build", 5);
   {
-    CancelToken cancel;
-    NoProgress progress;
-    const OutputLock held({system_files(), progress, cancel}, output(), 0);
+    const OutputLock held(system_files(), output());
     BuildSpec second = spec();
     second.run.lock_wait_s = 0.1;
     EXPECT_EQ(code_of(second), ErrorCode::kIo);

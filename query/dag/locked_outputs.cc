@@ -1,4 +1,4 @@
-#include "query/dag/output_lock.h"
+#include "query/dag/locked_outputs.h"
 
 #include <array>
 
@@ -8,7 +8,6 @@
 namespace voxdag::query {
 namespace {
 
-std::string lock_path(const std::string& output) { return output + ".lock"; }
 std::string partial_path(const std::string& output) { return output + ".partial"; }
 
 void refuse_impossible(FileSystem& files, const Outputs& outputs) {
@@ -39,7 +38,7 @@ void refuse_replacing(FileSystem& files, const Outputs& outputs) {
 // Whether the last one that wrote there was killed. A file of that name that is not empty is
 // somebody else's, and what a build leaves is of use to it.
 bool is_left_behind(FileSystem& files, const std::string& output) {
-  const auto lock = open_if_there(files, lock_path(output));
+  const auto lock = open_if_there(files, OutputLock::path_of(output));
   return lock && lock->size() == 0 && !files.exists(output + ".work");
 }
 
@@ -57,41 +56,21 @@ void remove_leftovers(FileSystem& files, const Outputs& outputs) {
       remove_tree(files, folder + "/" + entry.name);
 }
 
-// What is refused is refused before the lock is made: a process that is killed in between must not
-// leave one next to a temporary file that is not its own.
-const std::string& checked_output(FileSystem& files, const Outputs& outputs) {
+// Refuses outputs before the lock exists: a process that is killed in between must not leave a lock
+// next to a temporary file that is not its own. Returns whether a killed process left its files.
+bool check_outputs(FileSystem& files, const Outputs& outputs) {
   refuse_impossible(files, outputs);
-  if (!is_left_behind(files, outputs.paths[0])) refuse_replacing(files, outputs);
-  return outputs.paths[0];
+  const bool left_behind = is_left_behind(files, outputs.paths[0]);
+  if (!left_behind) refuse_replacing(files, outputs);
+  return left_behind;
 }
 
 }  // namespace
 
-OutputLock::OutputLock(FileSystem& files, const std::string& output)
-    : files_(files),
-      path_(lock_path(output)),
-      is_left_behind_(is_left_behind(files, output)),
-      lock_(files.try_lock(path_)) {
-  if (!lock_)
-    throw Error(ErrorCode::kIo,
-                output +
-                    " is being written by another process: expected another file (-o), or to wait "
-                    "for that process");
-}
-
-OutputLock::OutputLock(FileSystem& files, const Outputs& outputs)
-    : OutputLock(files, checked_output(files, outputs)) {
+LockedOutputs::LockedOutputs(FileSystem& files, const Outputs& outputs)
+    : is_left_behind_(check_outputs(files, outputs)), lock_(files, outputs.paths[0]) {
   if (is_left_behind_) remove_leftovers(files, outputs);
   refuse_replacing(files, outputs);
-}
-
-OutputLock::~OutputLock() {
-  try {
-    // A file of that name that is not empty is somebody else's.
-    if (files_.open_read(path_)->size() == 0) files_.remove(path_);
-  } catch (const Error&) {
-    // An empty file is left, which the next one that writes there locks again.
-  }
 }
 
 }  // namespace voxdag::query

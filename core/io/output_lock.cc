@@ -1,0 +1,25 @@
+#include "core/io/output_lock.h"
+
+#include "core/base/error.h"
+
+namespace voxdag {
+
+OutputLock::OutputLock(FileSystem& files, const std::string& output, std::unique_ptr<FileLock> lock)
+    : files_(files), path_(path_of(output)), lock_(std::move(lock)) {
+  if (!lock_)
+    throw Error(ErrorCode::kIo,
+                output +
+                    " is being written by another process: expected another file (-o), or to wait "
+                    "for that process");
+}
+
+OutputLock::~OutputLock() {
+  try {
+    // A file of that name that is not empty was not created by voxdag.
+    if (files_.open_read(path_)->size() == 0) files_.remove(path_);
+  } catch (const Error&) {
+    // An empty file remains, which the next process that writes the output locks again.
+  }
+}
+
+}  // namespace voxdag
