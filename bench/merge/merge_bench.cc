@@ -6,10 +6,12 @@
 #include <memory>
 
 #include "bench/merge/synthetic_runs.h"
+#include "merge/fallback/heap_merge.h"
 #include "merge/load/hash_partition.h"
 #include "merge/merge.h"
 #include "merge/merge_level.h"
 #include "merge/plan/artifact_set.h"
+#include "merge/sort/bucket_sorter.h"
 
 namespace voxdag {
 namespace {
@@ -76,6 +78,25 @@ BENCHMARK(BM_Merge)
     ->Args({512, 40})
     ->Unit(benchmark::kMillisecond);
 
+// The rows of a slice of a partition, from first to last.
+class SliceRows {
+ public:
+  SliceRows(const HashPartition& partition, const RunSlice& slice)
+      : partition_(&partition),
+        row_(slice.row_base),
+        end_(slice.row_base + slice.size.rows),
+        word_(slice.word_base) {}
+  bool at_end() const { return row_ == end_; }
+  RowKey row() const {
+    return {partition_->hashes()[row_], partition_->masks()[row_], partition_->words() + word_};
+  }
+  void advance() { word_ += partition_->format().words(partition_->masks()[row_++]); }
+
+ private:
+  const HashPartition* partition_;
+  uint64_t row_, end_, word_;
+};
+
 // One level in memory: the steps of a merge without output files.
 class OneLevel {
  public:
@@ -115,6 +136,41 @@ class OneLevel {
     for (const auto& run : runs_)
       for (size_t f = 0; f < run->frames().size(); ++f) run->read_frame(f, frame);
   }
+  // Sorts a loaded partition bucket by bucket, as the merge does. Returns the number of unique
+  // rows.
+  uint64_t sort_buckets(const HashPartition& partition) {
+    uint64_t unique = 0;
+    RowCount largest{};
+    for (size_t b = 0; b < partition.bucket_count(); ++b) {
+      RowCount size{};
+      for (size_t s = 0; s < partition.slices().size(); ++s) {
+        const RowOffset begin = partition.bucket_begin(b, s),
+                        end = partition.bucket_begin(b + 1, s);
+        size.rows += end.row - begin.row;
+        size.words += end.word - begin.word;
+      }
+      largest = {std::max(largest.rows, size.rows), std::max(largest.words, size.words)};
+    }
+    BucketSorter sorter(budget_, partition.format(), largest);
+    for (size_t b = 0; b < partition.bucket_count(); ++b) {
+      sorter.sort(partition, b, true);
+      unique += sorter.unique().row_count();
+    }
+    return unique;
+  }
+  // Merges the slices of a loaded partition by a k-way heap. Returns the number of unique rows.
+  static uint64_t merge_by_heap(const HashPartition& partition) {
+    std::vector<SliceRows> cursors;
+    for (const RunSlice& slice : partition.slices()) cursors.emplace_back(partition, slice);
+    uint64_t unique = 0;
+    RowKey last{};
+    merge_cursors(partition.format(), std::span(cursors), [&](size_t, const RowKey& row) {
+      unique += unique == 0 || compare_rows(partition.format(), last, row) != 0;
+      last = row;
+    });
+    return unique;
+  }
+
   // Runs all steps, with an output that discards its data.
   void merge(bool bricks) {
     struct Nowhere : LevelOutput {
@@ -175,6 +231,20 @@ void BM_MergeLevel(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
 }
 
+// Sorting a loaded partition into the total order: by buckets, and by a k-way heap merge of the
+// runs.
+template <bool kByHeap>
+void BM_SortPartition(benchmark::State& state) {
+  OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
+  HashPartition partition = level.partition();
+  level.load(partition);
+  uint64_t unique = 0;
+  for (auto _ : state)
+    unique = kByHeap ? OneLevel::merge_by_heap(partition) : level.sort_buckets(partition);
+  state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
+  state.counters["unique"] = static_cast<double>(unique);
+}
+
 void levels(benchmark::internal::Benchmark* benchmark) {
   for (const int runs : {64, 512})
     for (const int level : {0, 1}) benchmark->Args({runs, level});
@@ -183,6 +253,8 @@ void levels(benchmark::internal::Benchmark* benchmark) {
 BENCHMARK(BM_Decode)->Apply(levels);
 BENCHMARK(BM_LoadPartition)->Apply(levels);
 BENCHMARK(BM_MergeLevel)->Apply(levels);
+BENCHMARK(BM_SortPartition<false>)->Name("BM_SortByBuckets")->Apply(levels);
+BENCHMARK(BM_SortPartition<true>)->Name("BM_SortByHeap")->Apply(levels);
 
 }  // namespace
 }  // namespace voxdag
