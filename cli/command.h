@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
 
 namespace CLI {
 class App;

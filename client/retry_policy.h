@@ -3,7 +3,7 @@
 #pragma once
 
 #include "client/http_client.h"
-#include "core/base/cancel_token.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::client {
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "client/http_client.h"
-#include "core/base/cancel_token.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::client {
 

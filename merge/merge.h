@@ -27,7 +27,6 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/dag/sub_dag.h"
@@ -36,6 +35,7 @@
 #include "core/format/global/global_writer.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -5,7 +5,6 @@
 #include <span>
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "merge/load/hash_partition.h"
@@ -15,6 +14,7 @@
 #include "merge/merge.h"
 #include "merge/output/level_output.h"
 #include "merge/plan/merge_memory.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/color/surface.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -7,6 +7,7 @@ exits 1 if there is any.
 """
 
 import collections
+import os
 import re
 import subprocess
 import sys
@@ -30,6 +31,7 @@ PRODUCT_INCLUDES = CORE_INCLUDES | {
     "scene": ["core/base", "core/io", "core/geometry", "core/color", "core/image", "core/format"],
     "merge": CORE,
     "scheduler": CORE + ["scene", "merge"],
+    "library": CORE + ["scene", "scheduler"],
     "query": CORE + ["scene", "merge"],
     "client": ["core/base", "core/io", "core/format"],  # core/format: SHA-256
     "server": CORE + ["scene", "scheduler", "query"],
@@ -42,7 +44,12 @@ INCLUDES = PRODUCT_INCLUDES | {
     "tests": ANYTHING,
     "bench": ANYTHING + ["tests"],
     "docs": ["core/format"],
+    "include": [],
+    "examples": [],
 }
+# Installed headers. Every folder may include them by this prefix; they include each other and the
+# standard library.
+INSTALLED_PREFIX = "voxdag/"
 # Folders that others include through one header only.
 PUBLIC_HEADERS = {"merge": ["merge/merge.h"]}
 # Tests and benchmarks may include more than the public header.
@@ -96,6 +103,8 @@ STANDALONE_HEADERS = {
     "core/format/global/voxdag_reader.h": ["voxdag_reader_colors.h"],
     "core/format/global/voxdag_reader_colors.h": [],
 }
+# Where headers with a folder in their name are found.
+INCLUDE_ROOTS = ("", "include/")
 # Where code may ask which compiler is at work.
 CUDA_PLACES = ("core/base/host_device.h", "core/backend/")
 MAX_FILE_LINES = 500
@@ -109,6 +118,8 @@ CUDA_MACRO = re.compile(r"\b__(CUDA|NVCC)\w*")
 
 def layer_of(path):
     """The folder of the tables above that a file belongs to."""
+    if path.startswith(INSTALLED_PREFIX):
+        return "include"
     parts = path.split("/")
     return "/".join(parts[:2]) if parts[0] == "core" else parts[0]
 
@@ -132,6 +143,8 @@ def check_inner_include(source, target, layers):
 def check_include(path, bracket, header):
     """What is wrong with this file including that header, or None."""
     layer = layer_of(path)
+    if layer == "include" and ("." in header or "/" in header) and layer_of(header) != "include":
+        return f"is installed, yet includes {header}"
     if bracket == "<":
         allowed = THIRD_PARTY.get(header)
         if allowed and layer not in allowed:
@@ -146,7 +159,7 @@ def check_include(path, bracket, header):
         return None
     if target == layer:
         return check_inner_include(folder_of(path), folder_of(header), LAYERS.get(layer))
-    if target not in INCLUDES[layer]:
+    if target != "include" and target not in INCLUDES[layer]:
         return f"{layer} may not include {target}"
     public = PUBLIC_HEADERS.get(target)
     if public and header not in public and layer not in BEHIND_PUBLIC_HEADERS:
@@ -169,6 +182,8 @@ def check_file(path, edges):
             if problem := check_include(path, *match.groups()):
                 yield number, problem
             if match.group(1) == '"' and "/" in match.group(2):
+                if not any(os.path.exists(root + match.group(2)) for root in INCLUDE_ROOTS):
+                    yield number, f'there is no "{match.group(2)}"'
                 edges.setdefault((folder_of(path), folder_of(match.group(2))), f"{path}:{number}")
         if not path.startswith(CUDA_PLACES) and (match := CUDA_MACRO.search(line)):
             yield number, f"{match.group()} belongs in {' or '.join(CUDA_PLACES)}"

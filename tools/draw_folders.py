@@ -5,7 +5,8 @@
     tools/draw_folders.py --check    exits 1 if the picture in the tree is not the current one
 
 An arrow that follows from two others (a includes b, b includes c, so a may see c) is left out, so
-that the picture shows the layers. tests, bench and docs include everything and are left out.
+that the picture shows the layers. tests, bench and docs include everything and are left out, and so
+are the installed headers, which everything includes.
 """
 
 import collections
@@ -25,6 +26,7 @@ BOXES = {
     "python": (4.4, 1, "Python package"),
     "client": (0, 1, "HTTP client"),
     "server": (2.5, 1, "HTTP service"),
+    "library": (3.6, 1, "voxdag/build.h"),
     "scheduler": (2.9, 2, "the build"),
     "core/db": (0.9, 3, "SQLite"),
     "core/backend": (1.85, 3, "cpu, parallel, cuda"),
@@ -55,7 +57,9 @@ def include_graph():
             for line in file:
                 match = INCLUDE.match(line)
                 if match and match.group(1) == '"' and "/" in match.group(2):
-                    graph[source].add(layer_of(match.group(2)))
+                    target = layer_of(match.group(2))
+                    if target in PRODUCT_INCLUDES:
+                        graph[source].add(target)
         graph[source].discard(source)
     return graph
 

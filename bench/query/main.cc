@@ -65,7 +65,7 @@ void lookups(const char* who, const QuerySet& queries, Timings& timings, const T
   print(who, "set cells", timings.set_cells, expected ? &expected->set_cells : nullptr);
 }
 
-void lookups(const Dag& dag, uint32_t grid_levels, const QuerySet& queries, Timings& timings) {
+void lookups(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries, Timings& timings) {
   std::vector<uint8_t> set(kPoints);
   lookups("voxdag", queries, timings, nullptr, [&](const std::vector<Position>& points) {
     dag.lookup(points, grid_levels, set);
@@ -81,7 +81,7 @@ void lookups(const Dag& dag, uint32_t grid_levels, const QuerySet& queries, Timi
           });
 }
 
-Timing rays(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+Timing rays(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries) {
   const double cell = static_cast<double>(int64_t{1} << (dag.grid_levels() - grid_levels));
   std::vector<Coordinates> origins = queries.origins;
   for (Coordinates& origin : origins)
@@ -96,7 +96,8 @@ Timing rays(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
   });
   print("voxdag", "primary rays", packets);
   const Timing single = best_of_three(count, [&] {
-    const RayCaster caster(dag.view());
+    const DagView view(dag.file());
+    const RayCaster caster(view);
     uint64_t found = 0;
     for (size_t i = 0; i < count; ++i) {
       const auto& [o, d] = std::pair(origins[i], queries.directions[i]);
@@ -110,7 +111,7 @@ Timing rays(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
 }
 
 // The cells of a few boxes one by one.
-void reader_boxes(const Dag& dag, uint32_t grid_levels, const QuerySet& queries) {
+void reader_boxes(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries) {
   const int64_t edge = int64_t{1} << grid_levels;
   std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);
   print("loop over the reader", "boxes of 64^3, a few", best_of_three(kReaderBoxes, [&] {
@@ -130,7 +131,7 @@ void reader_boxes(const Dag& dag, uint32_t grid_levels, const QuerySet& queries)
         }));
 }
 
-void regions(const Dag& dag, uint32_t grid_levels, const QuerySet& queries, Timings& timings) {
+void regions(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries, Timings& timings) {
   std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);
   timings.boxes = measure_boxes(cells, [&](size_t i) {
     dag.box({grid_levels, box_around(queries, i)}, cells);
@@ -155,7 +156,7 @@ void regions(const Dag& dag, uint32_t grid_levels, const QuerySet& queries, Timi
 }
 
 void measure(const std::string& path, uint32_t grid_levels, int picture) {
-  const Dag dag(path);
+  const DagFile dag(path);
   const uint32_t levels = std::min(grid_levels, dag.grid_levels());
   std::printf("%s, grid of 2^%u\n", path.c_str(), levels);
   const QuerySet queries = make_queries(dag, levels, kPoints, picture);

@@ -1,4 +1,5 @@
 #include "bench/query/others.h"
+#include "query/lookup/bricks.h"
 
 #ifdef VOXDAG_BENCH_OCTOMAP
 
@@ -8,7 +9,7 @@
 
 namespace voxdag::query {
 
-std::optional<Timings> measure_octomap(const Dag& dag, uint32_t grid_levels,
+std::optional<Timings> measure_octomap(const DagFile& dag, uint32_t grid_levels,
                                        const QuerySet& queries) {
   octomap::OcTree tree(1.0);
   const auto half = static_cast<double>(int64_t{1} << (grid_levels - 1));
@@ -85,7 +86,7 @@ std::optional<Timings> measure_octomap(const Dag& dag, uint32_t grid_levels,
 
 namespace voxdag::query {
 
-std::optional<Timings> measure_octomap(const Dag&, uint32_t, const QuerySet&) { return {}; }
+std::optional<Timings> measure_octomap(const DagFile&, uint32_t, const QuerySet&) { return {}; }
 
 }  // namespace voxdag::query
 

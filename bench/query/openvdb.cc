@@ -1,4 +1,5 @@
 #include "bench/query/others.h"
+#include "query/lookup/bricks.h"
 
 #ifdef VOXDAG_BENCH_OPENVDB
 
@@ -10,7 +11,7 @@
 
 namespace voxdag::query {
 
-std::optional<Timings> measure_openvdb(const Dag& dag, uint32_t grid_levels,
+std::optional<Timings> measure_openvdb(const DagFile& dag, uint32_t grid_levels,
                                        const QuerySet& queries) {
   openvdb::initialize();
   const auto grid = openvdb::BoolGrid::create(false);
@@ -93,7 +94,7 @@ std::optional<Timings> measure_openvdb(const Dag& dag, uint32_t grid_levels,
 
 namespace voxdag::query {
 
-std::optional<Timings> measure_openvdb(const Dag&, uint32_t, const QuerySet&) { return {}; }
+std::optional<Timings> measure_openvdb(const DagFile&, uint32_t, const QuerySet&) { return {}; }
 
 }  // namespace voxdag::query
 

@@ -43,7 +43,7 @@ Region box_around(const QuerySet& queries, size_t i) {
   return box;
 }
 
-QuerySet make_queries(const Dag& dag, uint32_t grid_levels, size_t points, int picture_edge) {
+QuerySet make_queries(const DagFile& dag, uint32_t grid_levels, size_t points, int picture_edge) {
   QuerySet queries;
   std::mt19937_64 random(1);
   const uint64_t edge = uint64_t{1} << grid_levels;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "query/lookup/dag.h"
+#include "voxdag/query.h"
 
 namespace voxdag::query {
 
@@ -22,7 +22,7 @@ Region box_around(const QuerySet& queries, size_t i);
 
 // `points` of each kind in the grid of 2^grid_levels, and the rays through the pixels of a square
 // picture, in cells of that grid, for the placement that `voxdag render` would choose.
-QuerySet make_queries(const Dag& dag, uint32_t grid_levels, size_t points, int picture_edge);
+QuerySet make_queries(const DagFile& dag, uint32_t grid_levels, size_t points, int picture_edge);
 
 // What a benchmark found, so that libraries can be compared, and its speed.
 struct Timing {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <thread>
 
-#include "core/base/cancel_token.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::cli {
 

@@ -18,11 +18,11 @@
 #include <string>
 #include <string_view>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
 #include "core/geometry/fixed_triangle.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

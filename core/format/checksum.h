@@ -10,9 +10,9 @@
 #include <string>
 #include <string_view>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

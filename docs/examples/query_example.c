@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   voxdag_file* file;
-  voxdag_facts facts;
+  voxdag_facts facts = {.struct_size = sizeof facts};
   expect(voxdag_open(argv[1], &file));
   expect(voxdag_get_facts(file, &facts));
   const int64_t edge = INT64_C(1) << facts.grid_levels;
@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
   const double middle = (double)edge / 2;
   const voxdag_ray down = {{middle, (double)edge, middle}, {0, -1, 0}};
   voxdag_hit hit;
-  expect(voxdag_cast_rays(file, &down, 1, INFINITY, 1, &hit));
+  expect(voxdag_cast_rays(file, &down, 1, NULL, &hit));
   if (isfinite(hit.distance)) {
     uint8_t set = 0;
     expect(voxdag_lookup(file, facts.grid_levels, (const int64_t(*)[3])hit.voxel, 1, &set));

@@ -17,11 +17,11 @@
 #include <span>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "merge/load/level_run.h"
 #include "merge/load/position_maps.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -1,5 +1,3 @@
-#include "query/lookup/dag.h"
-
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
@@ -13,6 +11,8 @@
 #include "core/format/global/open_global.h"
 #include "python/native/bindings.h"
 #include "python/native/path_text.h"
+#include "query/dag/selection.h"
+#include "voxdag/query.h"
 
 namespace voxdag::python {
 
@@ -47,7 +47,7 @@ void expect_length(size_t length, size_t expected) {
 
 unsigned threads_of(unsigned threads) { return threads ? threads : default_threads(); }
 
-void lookup(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+void lookup(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
             const Column<uint8_t>& set, unsigned threads) {
   expect_length(set.shape(0), points.shape(0));
   const nb::gil_scoped_release released;
@@ -57,7 +57,7 @@ void lookup(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t g
 // Rays that are cast at a time, so that the hits as the library has them take little memory.
 constexpr size_t kRays = size_t{1} << 16;
 
-void rays(const query::Dag& dag, const Rows<const double>& origins,
+void rays(const query::DagFile& dag, const Rows<const double>& origins,
           const Rows<const double>& directions, double max_distance, double stop_size,
           const Column<double>& distances, const Rows<int64_t>& voxels, const Rows<int8_t>& normals,
           unsigned threads) {
@@ -87,8 +87,8 @@ void rays(const query::Dag& dag, const Rows<const double>& origins,
   }
 }
 
-void dense(const query::Dag& dag, const Position& low, const Position& high, uint32_t grid_levels,
-           const Cells<uint8_t>& cells) {
+void dense(const query::DagFile& dag, const Position& low, const Position& high,
+           uint32_t grid_levels, const Cells<uint8_t>& cells) {
   for (size_t axis = 0; axis < 3; ++axis)
     expect_length(cells.shape(axis),
                   static_cast<size_t>(std::max<int64_t>(0, high[axis] - low[axis])));
@@ -96,15 +96,15 @@ void dense(const query::Dag& dag, const Position& low, const Position& high, uin
   dag.box({grid_levels, {low, high}}, {cells.data(), cells.size()});
 }
 
-void points(const query::Dag& dag, const Position& low, const Position& high, uint32_t grid_levels,
-            const Rows<int64_t>& found) {
+void points(const query::DagFile& dag, const Position& low, const Position& high,
+            uint32_t grid_levels, const Rows<int64_t>& found) {
   const nb::gil_scoped_release released;
   expect_length(found.shape(0), dag.positions({grid_levels, {low, high}}, positions_of(found)));
 }
 
 // The cell of each point of world space.
-void world_to_cells(const query::Dag& dag, const Rows<const double>& points, uint32_t grid_levels,
-                    const Rows<int64_t>& cells) {
+void world_to_cells(const query::DagFile& dag, const Rows<const double>& points,
+                    uint32_t grid_levels, const Rows<int64_t>& cells) {
   expect_length(cells.shape(0), points.shape(0));
   const nb::gil_scoped_release released;
   for (size_t i = 0; i < points.shape(0); ++i)
@@ -113,7 +113,7 @@ void world_to_cells(const query::Dag& dag, const Rows<const double>& points, uin
           query::world_to_cell(dag.file(), grid_levels, axis, points.data()[3 * i + axis]);
 }
 
-std::pair<Position, Position> world_to_region(const query::Dag& dag,
+std::pair<Position, Position> world_to_region(const query::DagFile& dag,
                                               const std::array<double, 6>& box,
                                               uint32_t grid_levels) {
   const query::Region region = query::world_to_region(dag.file(), grid_levels, box);
@@ -121,19 +121,19 @@ std::pair<Position, Position> world_to_region(const query::Dag& dag,
 }
 
 // The number of rows that points() fills, found by a walk over the region alone.
-uint64_t point_count(const query::Dag& dag, const Position& low, const Position& high,
+uint64_t point_count(const query::DagFile& dag, const Position& low, const Position& high,
                      uint32_t grid_levels) {
   const nb::gil_scoped_release released;
   return dag.positions({grid_levels, {low, high}}, {});
 }
 
-uint64_t count(const query::Dag& dag, const Position& low, const Position& high,
+uint64_t count(const query::DagFile& dag, const Position& low, const Position& high,
                uint32_t grid_levels) {
   const nb::gil_scoped_release released;
   return dag.count({grid_levels, {low, high}});
 }
 
-void nearest(const query::Dag& dag, const Rows<const int64_t>& points, double max_distance,
+void nearest(const query::DagFile& dag, const Rows<const int64_t>& points, double max_distance,
              const Rows<int64_t>& voxels, const Column<double>& distances, unsigned threads) {
   expect_length(voxels.shape(0), points.shape(0));
   expect_length(distances.shape(0), points.shape(0));
@@ -150,7 +150,7 @@ void nearest(const query::Dag& dag, const Rows<const int64_t>& points, double ma
 
 // set(row, region, number) for each row of `found` whose cell has the attribute.
 template <class Array, class Set>
-void fill(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+void fill(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
           const voxdag_reader::ColorSection& section, const Array& found, const Set& set) {
   expect_length(found.shape(0), points.shape(0));
   const size_t columns = found.ndim() == 1 ? 1 : found.shape(1);
@@ -167,7 +167,7 @@ void fill(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t gri
   });
 }
 
-void colors(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+void colors(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
             const Rows<uint8_t>& found) {
   fill(dag, points, grid_levels, dag.file().colors(), found,
        [](uint8_t* row, const auto& region, uint64_t number) {
@@ -178,7 +178,7 @@ void colors(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t g
        });
 }
 
-void normals(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+void normals(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
              const Rows<float>& found) {
   fill(dag, points, grid_levels, dag.file().normals(), found,
        [](float* row, const auto& region, uint64_t number) {
@@ -191,7 +191,7 @@ void normals(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t 
 
 // Alphas and materials.
 template <voxdag_reader::ColorSection const& (voxdag_reader::File::*kSection)() const, class Value>
-void values(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
+void values(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
             const Column<Value>& found) {
   fill(dag, points, grid_levels, (dag.file().*kSection)(), found,
        [](Value* row, const auto& region, uint64_t number) {
@@ -200,7 +200,7 @@ void values(const query::Dag& dag, const Rows<const int64_t>& points, uint32_t g
 }
 
 // Names are UTF-8, unless the scene had others.
-std::vector<nb::bytes> material_names(const query::Dag& dag) {
+std::vector<nb::bytes> material_names(const query::DagFile& dag) {
   std::vector<nb::bytes> names;
   for (const std::string& name : dag.file().material_names())
     names.emplace_back(name.data(), name.size());
@@ -208,7 +208,7 @@ std::vector<nb::bytes> material_names(const query::Dag& dag) {
 }
 
 // Nodes and bytes of each level.
-std::vector<std::pair<uint64_t, uint64_t>> levels(const query::Dag& dag) {
+std::vector<std::pair<uint64_t, uint64_t>> levels(const query::DagFile& dag) {
   std::vector<std::pair<uint64_t, uint64_t>> all;
   for (uint32_t l = 0; l <= dag.file().brick_level(); ++l) {
     const voxdag_reader::Level& level = dag.file().level(l);
@@ -220,17 +220,17 @@ std::vector<std::pair<uint64_t, uint64_t>> levels(const query::Dag& dag) {
 }  // namespace
 
 void bind_dag(nb::module_& module) {
-  nb::class_<query::Dag>(module, "Dag")
+  nb::class_<query::DagFile>(module, "Dag")
       .def("__init__",
-           [](query::Dag* dag, const PathText& path) {
+           [](query::DagFile* dag, const PathText& path) {
              const nb::gil_scoped_release released;
-             new (dag) query::Dag(path.bytes);
+             new (dag) query::DagFile(path.bytes);
            })
-      .def_prop_ro("grid_levels", &query::Dag::grid_levels)
-      .def_prop_ro("voxels", [](const query::Dag& dag) { return dag.file().voxels(); })
-      .def_prop_ro("edge", [](const query::Dag& dag) { return dag.file().edge(); })
+      .def_prop_ro("grid_levels", &query::DagFile::grid_levels)
+      .def_prop_ro("voxels", [](const query::DagFile& dag) { return dag.file().voxels(); })
+      .def_prop_ro("edge", [](const query::DagFile& dag) { return dag.file().edge(); })
       .def_prop_ro("origin",
-                   [](const query::Dag& dag) { return std::to_array(dag.file().origin()); })
+                   [](const query::DagFile& dag) { return std::to_array(dag.file().origin()); })
       .def("levels", &levels)
       .def("world_to_cells", &world_to_cells)
       .def("world_to_region", &world_to_region)
@@ -242,7 +242,7 @@ void bind_dag(nb::module_& module) {
       .def("count", &count)
       .def("nearest", &nearest)
       .def_prop_ro("attributes",
-                   [](const query::Dag& dag) { return attributes_of(dag.file()).names(); })
+                   [](const query::DagFile& dag) { return attributes_of(dag.file()).names(); })
       .def_prop_ro("material_names", &material_names)
       .def("colors", &colors)
       .def("alphas", &values<&voxdag_reader::File::alphas, uint8_t>)

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::python {
 

@@ -4,24 +4,25 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <memory>
 #include <new>
 #include <string>
 #include <vector>
 
-#include "core/base/error.h"
-#include "query/lookup/dag.h"
+#include "core/format/global/voxdag_reader.h"
+#include "voxdag/query.h"
 
 using voxdag::query::Position;
 
 struct voxdag_file {
   explicit voxdag_file(const char* path) : dag(path) {}
-  const voxdag::query::Dag dag;
+  const voxdag::query::DagFile dag;
 };
 
 namespace {
 
-// Of a fixed size: to say that memory is short must not take memory.
+// Has a fixed size, so that reporting a lack of memory needs no memory.
 thread_local std::array<char, 1024> last_error;
 
 void set_error(const char* text) {
@@ -88,6 +89,17 @@ voxdag::query::Selection selection_of(uint32_t grid_levels, const voxdag_region*
   return selection;
 }
 
+voxdag::query::RayLimits ray_limits_of(const voxdag_ray_limits* limits) {
+  if (!limits) return {};
+  const char* const bytes = reinterpret_cast<const char*>(limits);
+  if (limits->struct_size < sizeof *limits)
+    refuse("limits of rays of struct_size " + std::to_string(limits->struct_size) +
+           ": expected sizeof(voxdag_ray_limits)");
+  if (std::any_of(bytes + sizeof *limits, bytes + limits->struct_size, [](char c) { return c; }))
+    refuse("limits of rays have members that libvoxdag.so " VOXDAG_VERSION " does not know");
+  return {limits->max_distance, limits->stop_size};
+}
+
 // Items for which memory is taken at a time.
 constexpr size_t kBatch = 4096;
 
@@ -108,6 +120,8 @@ void copy_hit(const voxdag::query::RayHit& from, uint32_t grid_levels, voxdag_hi
 
 }  // namespace
 
+const char* voxdag_version(void) { return VOXDAG_VERSION; }
+
 const char* voxdag_error(void) { return last_error.data(); }
 
 voxdag_status voxdag_open(const char* path, voxdag_file** file) {
@@ -125,17 +139,34 @@ voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
   return answer([&] {
     expect_pointer(file, "the file");
     expect_pointer(facts, "the place of the facts");
-    const voxdag_reader::File& f = file->dag.file();
-    *facts = {};
-    facts->grid_levels = f.grid_levels();
-    facts->color_levels = f.color_levels();
-    std::copy_n(f.origin(), 3, facts->origin);
-    facts->edge = f.edge();
-    facts->voxels = f.voxels();
-    facts->svo_nodes = f.svo_nodes();
-    facts->dag_nodes = f.dag_nodes();
-    facts->bytes = f.file_bytes();
+    if (facts->struct_size < offsetof(voxdag_facts, bytes) + sizeof facts->bytes)
+      refuse("facts of struct_size " + std::to_string(facts->struct_size) +
+             ": expected sizeof(voxdag_facts)");
+    const voxdag::query::DagFile& dag = file->dag;
+    voxdag_facts known{};
+    known.struct_size = facts->struct_size;
+    known.grid_levels = dag.grid_levels();
+    known.color_levels = dag.color_levels();
+    known.attributes = (dag.has_colors() ? VOXDAG_HAS_COLORS : 0u) |
+                       (dag.has_alphas() ? VOXDAG_HAS_ALPHAS : 0u) |
+                       (dag.has_normals() ? VOXDAG_HAS_NORMALS : 0u) |
+                       (dag.has_materials() ? VOXDAG_HAS_MATERIALS : 0u);
+    known.materials = static_cast<uint32_t>(dag.material_names().size());
+    std::ranges::copy(dag.origin(), known.origin);
+    known.edge = dag.edge();
+    known.voxels = dag.voxels();
+    known.svo_nodes = dag.svo_nodes();
+    known.dag_nodes = dag.dag_nodes();
+    known.bytes = dag.file_bytes();
+    // Members that a later header has, and this library does not know, become 0.
+    std::memset(facts, 0, known.struct_size);
+    std::memcpy(facts, &known, std::min(known.struct_size, sizeof known));
   });
+}
+
+const char* voxdag_material_name(const voxdag_file* file, uint32_t material) {
+  if (!file || material >= file->dag.material_names().size()) return nullptr;
+  return file->dag.material_names()[material].c_str();
 }
 
 voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
@@ -157,12 +188,41 @@ voxdag_status voxdag_colors(const voxdag_file* file, uint32_t grid_levels,
   });
 }
 
+voxdag_status voxdag_alphas(const voxdag_file* file, uint32_t grid_levels,
+                            const int64_t (*cells)[3], size_t count, uint8_t* alphas) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) expect_pointer(alphas, "the array of alphas");
+    file->dag.alphas(positions_of(cells, count), grid_levels, {alphas, count});
+  });
+}
+
+voxdag_status voxdag_normals(const voxdag_file* file, uint32_t grid_levels,
+                             const int64_t (*cells)[3], size_t count, float (*normals)[3]) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) expect_pointer(normals, "the array of normals");
+    file->dag.normals(positions_of(cells, count), grid_levels,
+                      {reinterpret_cast<voxdag::query::Normal*>(normals), count});
+  });
+}
+
+voxdag_status voxdag_materials(const voxdag_file* file, uint32_t grid_levels,
+                               const int64_t (*cells)[3], size_t count, uint32_t* materials) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) expect_pointer(materials, "the array of materials");
+    file->dag.materials(positions_of(cells, count), grid_levels, {materials, count});
+  });
+}
+
 voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays, size_t count,
-                               double max_distance, double stop_edge, voxdag_hit* hits) {
+                               const voxdag_ray_limits* limits, voxdag_hit* hits) {
   return answer([&] {
     expect_pointer(file, "the file");
     if (count) expect_pointer(rays, "the array of rays");
     if (count) expect_pointer(hits, "the array of hits");
+    const voxdag::query::RayLimits known = ray_limits_of(limits);
     std::vector<voxdag::query::Coordinates> origins(std::min(count, kBatch)), directions(origins);
     std::vector<voxdag::query::RayHit> found(origins.size());
     for_each_batch(count, [&](size_t first, size_t some) {
@@ -170,8 +230,8 @@ voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays, 
         std::copy_n(rays[first + i].origin, 3, origins[i].begin());
         std::copy_n(rays[first + i].direction, 3, directions[i].begin());
       }
-      file->dag.rays(std::span(origins).first(some), std::span(directions).first(some),
-                     {max_distance, stop_edge}, std::span(found).first(some));
+      file->dag.rays(std::span(origins).first(some), std::span(directions).first(some), known,
+                     std::span(found).first(some));
       for (size_t i = 0; i < some; ++i)
         copy_hit(found[i], file->dag.grid_levels(), hits[first + i]);
     });

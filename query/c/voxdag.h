@@ -1,15 +1,18 @@
-/* Queries of finished .vdag files, for C and everything that can call it. libvoxdag.so holds
- * nothing but these functions; a .vdag file of any size is mapped, not read.
+/* Queries of finished .vdag files, for C and every language that can call C. A .vdag file of any
+ * size is mapped, not read.
  *
  *     voxdag_file* file;
  *     if (voxdag_open("scene.vdag", &file) != VOXDAG_OK) { puts(voxdag_error()); exit(1); }
  *     voxdag_lookup(file, 13, positions, count, set);
  *     voxdag_close(file);
  *
- * Positions are voxels, or cells of the coarser grid of 2^grid_levels per edge, a cell being set
- * where any voxel in it is. Every function that can fail returns a status; the text of the last
- * failure on the calling thread is voxdag_error(). A file is immutable: any number of threads may
- * ask at the same time. docs/query.md says more. */
+ * Positions are voxels, or cells of the coarser grid of 2^grid_levels per edge. A cell is set where
+ * any voxel in it is set. Every function that can fail returns a status; voxdag_error() returns the
+ * message of the last failure on the calling thread. A file is immutable: any number of threads may
+ * query it concurrently. docs/library.md describes conventions and units.
+ *
+ * A struct that may grow begins with `struct_size`: set it to its sizeof. Programs compiled with
+ * this header run with every later libvoxdag.so of the same soname. */
 #ifndef VOXDAG_H
 #define VOXDAG_H
 
@@ -31,7 +34,7 @@ typedef enum voxdag_status {
   VOXDAG_INVALID_INPUT,       /* an argument that breaks its rules */
   VOXDAG_NOT_FOUND,           /* no such file */
   VOXDAG_CORRUPT,             /* the file is damaged, or not a .vdag file */
-  VOXDAG_UNSUPPORTED_VERSION, /* the file is of a later format version */
+  VOXDAG_UNSUPPORTED_VERSION, /* the file has a later format version */
   VOXDAG_IO,                  /* the system refused to read it */
   VOXDAG_OUT_OF_MEMORY,
   VOXDAG_LIMIT,
@@ -41,18 +44,30 @@ typedef enum voxdag_status {
 /* An open file. */
 typedef struct voxdag_file voxdag_file;
 
+/* Bits of voxdag_facts.attributes. */
+#define VOXDAG_HAS_COLORS 1u
+#define VOXDAG_HAS_ALPHAS 2u
+#define VOXDAG_HAS_NORMALS 4u
+#define VOXDAG_HAS_MATERIALS 8u
+
+/* The material of a cell that is not set. */
+#define VOXDAG_NO_MATERIAL UINT32_MAX
+
 typedef struct voxdag_facts {
+  size_t struct_size;    /* sizeof(voxdag_facts), set by the caller */
   uint32_t grid_levels;  /* the grid has 2^grid_levels voxels per edge */
-  uint32_t color_levels; /* the finest grid with colors has 2^color_levels cells; 0 for none */
+  uint32_t color_levels; /* the finest grid with attributes has 2^color_levels cells per edge */
+  uint32_t attributes;   /* VOXDAG_HAS_... */
+  uint32_t materials;    /* the number of materials */
   double origin[3];      /* the low corner of the grid in the units of the scene */
   double edge;           /* of the grid, in the units of the scene */
-  uint64_t voxels;       /* that are set */
-  uint64_t svo_nodes;
+  uint64_t voxels;       /* set ones */
+  uint64_t svo_nodes;    /* nodes of the octree without sharing */
   uint64_t dag_nodes;
   uint64_t bytes; /* of the file */
 } voxdag_facts;
 
-/* The half-open box low <= p < high. It may reach beyond the grid. */
+/* The half-open box low <= p < high. It may extend beyond the grid. */
 typedef struct voxdag_region {
   int64_t low[3];
   int64_t high[3];
@@ -60,39 +75,62 @@ typedef struct voxdag_region {
 
 typedef struct voxdag_ray {
   double origin[3];    /* in voxels */
-  double direction[3]; /* of any length but 0 */
+  double direction[3]; /* of any length except 0 */
 } voxdag_ray;
 
+typedef struct voxdag_ray_limits {
+  size_t struct_size;  /* sizeof(voxdag_ray_limits), set by the caller */
+  double max_distance; /* in voxels; INFINITY for no limit */
+  double stop_size;    /* rays hit cells of at most this edge, in voxels, as one cell; 0: voxels */
+} voxdag_ray_limits;
+
 typedef struct voxdag_hit {
-  double distance;  /* in voxels; infinite if nothing was hit */
-  int64_t voxel[3]; /* the low corner of the cell that was hit, in voxels; -1 for nothing */
-  int8_t normal[3]; /* of the face; 0 if the ray began in the cell, or hit nothing */
+  double distance;  /* in voxels; infinite without a hit */
+  int64_t voxel[3]; /* the low corner of the hit cell, in voxels; -1 without a hit */
+  int8_t normal[3]; /* of the face; 0 if the ray began in the cell, and without a hit */
   int8_t reserved[5];
 } voxdag_hit;
 
-/* What the last function that failed on this thread has to say. Never null; valid until the next
+/* The version of the library, such as "0.1.0". */
+VOXDAG_API const char* voxdag_version(void);
+
+/* The message of the last function that failed on this thread. Never null; valid until the next
  * call on this thread. */
 VOXDAG_API const char* voxdag_error(void);
 
 VOXDAG_API voxdag_status voxdag_open(const char* path, voxdag_file** file);
-/* Nothing happens for a null pointer. No other thread may be using the file. */
+/* Ignores a null pointer. No other thread may be using the file. */
 VOXDAG_API void voxdag_close(voxdag_file* file);
+/* Fills the first facts->struct_size bytes. */
 VOXDAG_API voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts);
+/* The name of a material, or null if there is none of this number. The last name is "", for
+ * triangles without a material. Valid while the file is open. */
+VOXDAG_API const char* voxdag_material_name(const voxdag_file* file, uint32_t material);
 
-/* set[i] = 1 if cell i is set, else 0; cells outside the grid are not. */
+/* set[i] = 1 if cell i is set, else 0. Cells outside the grid are not set. */
 VOXDAG_API voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
                                        const int64_t (*cells)[3], size_t count, uint8_t* set);
 
-/* The color of each cell: red, green and blue in sRGB, and 255; all four are 0 for a cell that is
- * not set. Cells finer than the color grid have the color of the cell that they lie in.
- * VOXDAG_INVALID_INPUT for a file without colors: its facts say so. */
+/* Attributes of each cell. A cell finer than the color grid has the value of the cell that contains
+ * it. VOXDAG_INVALID_INPUT for an attribute that the file does not have.
+ *   colors      red, green and blue in sRGB, and 255; zeros for a cell that is not set
+ *   alphas      0 to 255, linear; 0 for a cell that is not set
+ *   normals     unit vectors; zeros for a cell that is not set
+ *   materials   numbers for voxdag_material_name(), or VOXDAG_NO_MATERIAL */
 VOXDAG_API voxdag_status voxdag_colors(const voxdag_file* file, uint32_t grid_levels,
                                        const int64_t (*cells)[3], size_t count, uint8_t (*rgba)[4]);
+VOXDAG_API voxdag_status voxdag_alphas(const voxdag_file* file, uint32_t grid_levels,
+                                       const int64_t (*cells)[3], size_t count, uint8_t* alphas);
+VOXDAG_API voxdag_status voxdag_normals(const voxdag_file* file, uint32_t grid_levels,
+                                        const int64_t (*cells)[3], size_t count,
+                                        float (*normals)[3]);
+VOXDAG_API voxdag_status voxdag_materials(const voxdag_file* file, uint32_t grid_levels,
+                                          const int64_t (*cells)[3], size_t count,
+                                          uint32_t* materials);
 
-/* What each ray hits first, up to max_distance (INFINITY for no limit). Cells of an edge up to
- * stop_edge voxels are hit as a whole: 1 for voxels. */
+/* The first set cell on each ray. Null for `limits`: voxels at any distance. */
 VOXDAG_API voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays,
-                                          size_t count, double max_distance, double stop_edge,
+                                          size_t count, const voxdag_ray_limits* limits,
                                           voxdag_hit* hits);
 
 /* The number of set cells in a region. */
@@ -105,14 +143,14 @@ VOXDAG_API voxdag_status voxdag_dense(const voxdag_file* file, uint32_t grid_lev
                                       const voxdag_region* region, uint8_t* cells);
 
 /* The set cells of a region, in Morton order. VOXDAG_INVALID_INPUT unless `capacity`, the length of
- * `cells`, is at least what voxdag_count() says. */
+ * `cells`, is at least the region's voxdag_count(). */
 VOXDAG_API voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_levels,
                                      const voxdag_region* region, size_t capacity,
                                      int64_t (*cells)[3]);
 
-/* For each voxel the nearest one that is set, by the distance between the centers, which is
- * written to `distances` unless that is null; of several the first in Morton order. Without one up
- * to max_distance: -1, and an infinite distance. */
+/* For each voxel the nearest set voxel, by the distance between the centers; among equally near
+ * voxels, the first in Morton order. -1 and an infinite distance if none is within max_distance.
+ * `distances` may be null. */
 VOXDAG_API voxdag_status voxdag_nearest(const voxdag_file* file, const int64_t (*voxels)[3],
                                         size_t count, double max_distance, int64_t (*nearest)[3],
                                         double* distances);

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
 #include "query/dag/selection.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

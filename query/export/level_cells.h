@@ -5,12 +5,12 @@
 
 #include <cstdint>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "core/format/global/node_index.h"
 #include "core/format/global/voxdag_reader.h"
 #include "query/dag/dag_view.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/voxdag_reader.h"
@@ -19,6 +18,7 @@
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 #include "query/dag/selection.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

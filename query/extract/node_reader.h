@@ -8,12 +8,12 @@
 #include <span>
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "core/format/global/checked_blocks.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

@@ -16,13 +16,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/dag/consing/sub_dag_tables.h"
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
 #include "query/dag/selection.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_level.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

@@ -24,7 +24,6 @@
 
 #include <cstdint>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/color/attribute_set.h"
@@ -33,6 +32,7 @@
 #include "core/geometry/cube.h"
 #include "core/io/file_system.h"
 #include "query/dag/selection.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

@@ -9,17 +9,9 @@
 
 #include "core/dag/brick.h"
 #include "query/dag/dag_view.h"
-#include "query/dag/selection.h"
-#include "query/lookup/position.h"
+#include "voxdag/cells.h"
 
 namespace voxdag::query {
-
-// 4x4x4 cells of the selected grid. The bits of the mask are those of the file's bricks, see
-// core/dag/brick.h.
-struct Brick {
-  Position low;  // of its low corner, a multiple of 4, in cells
-  uint64_t mask;
-};
 
 // The cell of a bit of a brick's mask.
 inline Position brick_cell(const Brick& brick, int bit) {

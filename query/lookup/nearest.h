@@ -2,22 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 
 #include "query/dag/dag_view.h"
-#include "query/lookup/position.h"
+#include "voxdag/query.h"
 
 namespace voxdag::query {
-
-// Points that are searched from lie within this distance of the grid's origin on every axis, so
-// that squares of distances fit in 64 bits.
-inline constexpr int64_t kMaxCoordinate = int64_t{1} << 30;
-
-struct Nearest {
-  Position cell{};
-  uint64_t squared_distance = 0;  // between the centers of the cells, in cells
-  bool found = false;
-};
 
 // The set cell of the grid of 2^grid_levels per edge whose center is nearest to that of the cell
 // `from`; of several the one with the lowest Morton code. None if it is farther than the root of

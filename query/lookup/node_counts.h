@@ -11,7 +11,7 @@
 #include "core/format/global/voxdag_reader.h"
 #include "query/dag/dag_view.h"
 #include "query/dag/selection.h"
-#include "query/lookup/position.h"
+#include "voxdag/cells.h"
 
 namespace voxdag::query {
 

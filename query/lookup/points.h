@@ -5,8 +5,8 @@
 #include <span>
 
 #include "query/dag/dag_view.h"
-#include "query/lookup/position.h"
 #include "query/lookup/top_cells.h"
+#include "voxdag/cells.h"
 
 namespace voxdag::query {
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "query/dag/dag_view.h"
 #include "query/render/camera.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

@@ -1,12 +1,12 @@
 // Renders a picture of a DAG on several threads; the pixels do not depend on their number.
 #pragma once
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "query/dag/dag_view.h"
 #include "query/render/camera.h"
 #include "query/render/g_buffer.h"
 #include "query/render/picture.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

@@ -5,13 +5,13 @@
 #include <cstdint>
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 #include "scene/triangle_source.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

@@ -9,11 +9,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/grid.h"
 #include "scene/triangle_source.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

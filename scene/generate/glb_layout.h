@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "scene/generate/scene_builder.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "core/io/file_system.h"
 #include "scene/generate/scene_builder.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

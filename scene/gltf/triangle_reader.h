@@ -8,7 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/page_buffer.h"
 #include "core/geometry/grid.h"
 #include "scene/gltf/looks/look_reader.h"
@@ -18,6 +17,7 @@
 #include "scene/gltf/mesh_data/used_vertices.h"
 #include "scene/gltf/mesh_data/vertex_cache.h"
 #include "scene/gltf/mesh_data/vertex_source.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::gltf {
 

@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "scene/gltf/growing_charge.h"
 #include "scene/ply/header.h"
 #include "scene/ply/rows.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::ply {
 

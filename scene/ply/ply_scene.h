@@ -3,10 +3,10 @@
 
 #include <memory>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "scene/triangle_source.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::ply {
 

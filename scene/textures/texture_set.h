@@ -17,12 +17,12 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/io/file_system.h"
 #include "scene/textures/texture_reader.h"
 #include "scene/triangle_source.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

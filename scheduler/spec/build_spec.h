@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/color/attribute_set.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

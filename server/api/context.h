@@ -7,7 +7,6 @@
 #include <set>
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "server/api/access/concurrency_limiter.h"
 #include "server/api/metrics.h"
 #include "server/config.h"
@@ -18,6 +17,7 @@
 #include "server/scenes/scene_store.h"
 #include "server/tiles/partial_views.h"
 #include "server/tiles/viewed_files.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::server {
 

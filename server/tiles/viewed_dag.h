@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "core/format/global/checked_blocks.h"
 #include "core/format/global/voxdag_reader.h"
 #include "query/dag/dag_view.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::server {
 

@@ -9,9 +9,9 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/cuda/cuda_handles.h"
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/geometry/fixed_triangle.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::cuda {
 

@@ -6,9 +6,9 @@
 
 #include <cstdint>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/format/global/voxdag_reader.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

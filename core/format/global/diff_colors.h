@@ -5,8 +5,8 @@
 
 #include <cstdint>
 
-#include "core/base/cancel_token.h"
 #include "core/format/global/voxdag_reader.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -19,10 +19,10 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/format/global/global_layout.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -10,11 +10,11 @@
 #include <span>
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "core/format/global/voxdag_reader.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -16,11 +16,11 @@
 #include <cstdint>
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/voxdag_reader.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

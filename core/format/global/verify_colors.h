@@ -9,9 +9,9 @@
 //      rule makes of their children's, and the bytes of cells that are not there are 0.
 #pragma once
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "core/format/global/voxdag_reader.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -9,7 +9,7 @@ namespace voxdag::gltf {
 namespace {
 
 // "DRACO", u8 major and minor version, u8 geometry type, u8 method, u16 flags.
-constexpr size_t kHeaderBytes = 11;
+constexpr size_t kDracoHeaderBytes = 11;
 constexpr uint8_t kMesh = 1;
 constexpr uint8_t kSequential = 0, kEdgebreaker = 1;
 constexpr uint8_t kMetadataFlag = 0x80;  // of the high byte of the flags
@@ -86,8 +86,8 @@ DracoHeader read_draco_header(std::span<std::byte> data) {
   DracoHeader header;
   if (bytes.next() & kMetadataFlag) {
     skip_metadata(bytes);
-    header.begin = bytes.position() - kHeaderBytes;
-    std::copy_backward(data.begin(), data.begin() + kHeaderBytes,
+    header.begin = bytes.position() - kDracoHeaderBytes;
+    std::copy_backward(data.begin(), data.begin() + kDracoHeaderBytes,
                        data.begin() + static_cast<ptrdiff_t>(bytes.position()));
     data[bytes.position() - 1] &= static_cast<std::byte>(~kMetadataFlag);
   }

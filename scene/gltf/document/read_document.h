@@ -1,10 +1,10 @@
 // From the bytes of a scene file to its Document.
 #pragma once
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "scene/gltf/document/document.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::gltf {
 

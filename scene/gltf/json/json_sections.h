@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "scene/gltf/json/json_element.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::gltf {
 

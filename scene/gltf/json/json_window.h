@@ -13,10 +13,10 @@
 #include <streambuf>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/io/file_system.h"
 #include "scene/gltf/growing_charge.h"
 #include "scene/gltf/json/file_range.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::gltf {
 

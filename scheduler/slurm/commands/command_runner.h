@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/base/cancel_token.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

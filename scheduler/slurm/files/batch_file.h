@@ -15,13 +15,13 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
 #include "core/io/file_system.h"
 #include "scheduler/state/job_store.h"
 #include "scheduler/triangles/memory_store.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

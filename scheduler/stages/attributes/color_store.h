@@ -21,10 +21,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "core/format/checksum.h"
 #include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

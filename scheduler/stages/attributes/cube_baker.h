@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/color/blocks/region.h"
 #include "core/color/blocks/value_region.h"
@@ -15,6 +14,7 @@
 #include "scene/textures/texture_set.h"
 #include "scheduler/stages/attributes/color_keys.h"
 #include "scheduler/triangles/surface_store.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "scheduler/stages/build/executor.h"
 #include "scheduler/state/job_store.h"
 #include "scheduler/triangles/triangle_store.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

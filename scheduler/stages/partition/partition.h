@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/geometry/octree_descent.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/triangles/triangle_store.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 

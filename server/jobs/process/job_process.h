@@ -9,9 +9,9 @@
 
 #include <string>
 
-#include "core/base/cancel_token.h"
 #include "core/io/file_system.h"
 #include "server/jobs/process/job_folder.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::server {
 

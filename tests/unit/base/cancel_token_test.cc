@@ -1,4 +1,4 @@
-#include "core/base/cancel_token.h"
+#include "voxdag/cancel_token.h"
 
 #include <gtest/gtest.h>
 

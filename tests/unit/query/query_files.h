@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "query/lookup/dag.h"
 #include "tests/unit/format/test_files.h"
+#include "voxdag/query.h"
 
 // A file, and the cells of each of its grids by brute force.
 class QueryFile {
@@ -44,7 +44,7 @@ class QueryFile {
 };
 
 // A lookup finds these cells of the grid of 2^grid_levels, with one thread and with four.
-inline void expect_lookups(const voxdag::query::Dag& dag, uint32_t grid_levels,
+inline void expect_lookups(const voxdag::query::DagFile& dag, uint32_t grid_levels,
                            const std::vector<voxdag::query::Position>& points,
                            const QueryFile::Cells& cells) {
   std::vector<uint8_t> set(points.size(), 7), set_by_four(points.size(), 7);

@@ -6,10 +6,10 @@
 #include <span>
 
 #include "core/backend/parallel/space/space.h"
-#include "core/base/cancel_token.h"
 #include "core/base/memory_budget.h"
 #include "core/base/parallel_for.h"
 #include "core/geometry/fixed_triangle.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::parallel {
 

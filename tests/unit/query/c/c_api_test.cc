@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "query/c/voxdag.h"
-#include "query/lookup/dag.h"
+#include "voxdag/query.h"
 
 namespace voxdag::query {
 namespace {
@@ -19,25 +19,60 @@ class CApiTest : public testing::Test {
   }
   void TearDown() override { voxdag_close(file_); }
   voxdag_region whole() const {
-    const int64_t edge = dag_.file().resolution();
+    const int64_t edge = dag_.resolution();
     return {{0, 0, 0}, {edge, edge, edge}};
   }
 
-  const Dag dag_{kPath};
+  const DagFile dag_{kPath};
   const uint32_t levels_ = dag_.grid_levels();
   voxdag_file* file_ = nullptr;
 };
 
 TEST_F(CApiTest, Facts) {
-  voxdag_facts facts;
+  voxdag_facts facts{};
+  facts.struct_size = sizeof facts;
   ASSERT_EQ(voxdag_get_facts(file_, &facts), VOXDAG_OK);
   EXPECT_EQ(facts.grid_levels, levels_);
-  EXPECT_EQ(facts.voxels, dag_.file().voxels());
-  EXPECT_EQ(facts.dag_nodes, dag_.file().dag_nodes());
-  EXPECT_EQ(facts.svo_nodes, dag_.file().svo_nodes());
-  EXPECT_EQ(facts.bytes, dag_.file().file_bytes());
-  EXPECT_EQ(facts.edge, dag_.file().edge());
-  EXPECT_EQ(facts.origin[1], dag_.file().origin()[1]);
+  EXPECT_EQ(facts.voxels, dag_.voxels());
+  EXPECT_EQ(facts.dag_nodes, dag_.dag_nodes());
+  EXPECT_EQ(facts.svo_nodes, dag_.svo_nodes());
+  EXPECT_EQ(facts.bytes, dag_.file_bytes());
+  EXPECT_EQ(facts.edge, dag_.edge());
+  EXPECT_EQ(facts.origin[1], dag_.origin()[1]);
+}
+
+// Programs may be older or newer than the library.
+TEST_F(CApiTest, StructsOfOtherSizes) {
+  EXPECT_STREQ(voxdag_version(), VOXDAG_VERSION);
+  voxdag_facts facts{};
+  EXPECT_EQ(voxdag_get_facts(file_, &facts), VOXDAG_INVALID_INPUT);
+  struct {
+    voxdag_facts known{};
+    uint64_t unknown = 7, behind = 7;
+  } later;
+  later.known.struct_size = sizeof(voxdag_facts) + 8;
+  ASSERT_EQ(voxdag_get_facts(file_, &later.known), VOXDAG_OK);
+  EXPECT_EQ(later.known.voxels, dag_.voxels());
+  EXPECT_EQ(later.known.struct_size, sizeof(voxdag_facts) + 8);
+  EXPECT_EQ(later.unknown, 0u);
+  EXPECT_EQ(later.behind, 7u);
+
+  const double edge = static_cast<double>(dag_.resolution());
+  const voxdag_ray down{{edge / 2, edge + 1, edge / 2}, {0, -1, 0}};
+  voxdag_hit hit;
+  struct {
+    voxdag_ray_limits known{sizeof(voxdag_ray_limits) + 8, INFINITY, 0};
+    uint64_t unknown = 0;
+  } limits;
+  EXPECT_EQ(voxdag_cast_rays(file_, &down, 1, &limits.known, &hit), VOXDAG_OK) << voxdag_error();
+  EXPECT_TRUE(std::isfinite(hit.distance));
+  limits.known.max_distance = 0.5;
+  EXPECT_EQ(voxdag_cast_rays(file_, &down, 1, &limits.known, &hit), VOXDAG_OK);
+  EXPECT_FALSE(std::isfinite(hit.distance));
+  limits.unknown = 1;
+  EXPECT_EQ(voxdag_cast_rays(file_, &down, 1, &limits.known, &hit), VOXDAG_INVALID_INPUT);
+  limits.known.struct_size = sizeof(size_t);
+  EXPECT_EQ(voxdag_cast_rays(file_, &down, 1, &limits.known, &hit), VOXDAG_INVALID_INPUT);
 }
 
 TEST_F(CApiTest, CellsOfEveryLevel) {
@@ -66,13 +101,13 @@ TEST_F(CApiTest, CellsOfEveryLevel) {
 }
 
 TEST_F(CApiTest, Rays) {
-  const double edge = static_cast<double>(dag_.file().resolution());
+  const double edge = static_cast<double>(dag_.resolution());
   std::vector<voxdag_ray> rays;
   for (int i = 0; i < 5000; ++i)
     rays.push_back(
         {{std::fmod(0.37 * i, edge), edge + 1, std::fmod(0.73 * i, edge)}, {0.01, -3, 0.02}});
   std::vector<voxdag_hit> hits(rays.size());
-  ASSERT_EQ(voxdag_cast_rays(file_, rays.data(), rays.size(), INFINITY, 1, hits.data()), VOXDAG_OK);
+  ASSERT_EQ(voxdag_cast_rays(file_, rays.data(), rays.size(), nullptr, hits.data()), VOXDAG_OK);
   uint64_t found = 0;
   for (size_t i = 0; i < rays.size(); ++i) {
     RayHit hit;
@@ -133,8 +168,8 @@ TEST_F(CApiTest, Refuses) {
   EXPECT_EQ(voxdag_dense(file_, levels_, &flat, nullptr), VOXDAG_OK) << voxdag_error();
   const voxdag_ray still{{0, 0, 0}, {0, 0, 0}}, nowhere{{0, 0, 0}, {0, NAN, 1}};
   voxdag_hit hit;
-  EXPECT_EQ(voxdag_cast_rays(file_, &still, 1, INFINITY, 1, &hit), VOXDAG_INVALID_INPUT);
-  EXPECT_EQ(voxdag_cast_rays(file_, &nowhere, 1, INFINITY, 1, &hit), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_cast_rays(file_, &still, 1, nullptr, &hit), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_cast_rays(file_, &nowhere, 1, nullptr, &hit), VOXDAG_INVALID_INPUT);
   voxdag_close(nullptr);
 }
 

@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancel_token.h"
 #include "core/base/progress.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
 #include "query/extract/extract.h"
 #include "tests/oracle/dag.h"
 #include "tests/unit/format/test_files.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 

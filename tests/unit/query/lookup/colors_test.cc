@@ -2,9 +2,10 @@
 // document.
 #include <gtest/gtest.h>
 
+#include "core/format/global/voxdag_reader.h"
 #include "query/c/voxdag.h"
-#include "query/lookup/dag.h"
-#include "tests/unit/format_color/colored_files.h"
+#include "tests/unit/format_color/valued_files.h"
+#include "voxdag/query.h"
 
 namespace voxdag::query {
 namespace {
@@ -35,7 +36,7 @@ class Colors : public testing::Test {
 TEST_F(Colors, OfEveryCell) {
   const ByteString bytes = read_bytes(path_);
   const SectionDecoder decoder(bytes, scene_);
-  const Dag dag(path_);
+  const DagFile dag(path_);
   EXPECT_TRUE(dag.has_colors());
   EXPECT_EQ(dag.color_levels(), 7u);
   for (uint32_t level = 0; level <= scene_.levels; ++level) {
@@ -57,7 +58,7 @@ TEST_F(Colors, OfEveryCell) {
 
 // In any order, including empty cells and cells outside the grid.
 TEST_F(Colors, InAnyOrder) {
-  const Dag dag(path_);
+  const DagFile dag(path_);
   std::vector<Position> points = cells(9);
   std::vector<Rgba> colors(points.size());
   dag.colors(points, 9, colors);
@@ -83,12 +84,14 @@ TEST_F(Colors, InAnyOrder) {
 TEST_F(Colors, FromC) {
   const std::vector<Position> points = cells(8);
   std::vector<Rgba> expected(points.size()), colors(points.size());
-  Dag(path_).colors(points, 8, expected);
+  DagFile(path_).colors(points, 8, expected);
   voxdag_file* file = nullptr;
   ASSERT_EQ(voxdag_open(path_.c_str(), &file), VOXDAG_OK);
-  voxdag_facts facts;
+  voxdag_facts facts{};
+  facts.struct_size = sizeof facts;
   ASSERT_EQ(voxdag_get_facts(file, &facts), VOXDAG_OK);
   EXPECT_EQ(facts.color_levels, 7u);
+  EXPECT_EQ(facts.attributes, VOXDAG_HAS_COLORS);
   const auto cells = reinterpret_cast<const int64_t(*)[3]>(points.data());
   const auto rgba = reinterpret_cast<uint8_t(*)[4]>(colors.data());
   ASSERT_EQ(voxdag_colors(file, 8, cells, points.size(), rgba), VOXDAG_OK) << voxdag_error();
@@ -100,10 +103,68 @@ TEST_F(Colors, FromC) {
   voxdag_close(file);
 }
 
+// Alpha, normals and materials of the color grid's cells and of a cell that is not set.
+TEST_F(Colors, OtherAttributes) {
+  const std::string path = folder_.file("valued.vdag");
+  write_valued(path, scene_, {.alpha = true, .normal = true, .material = true}, 5);
+  const DagFile dag(path);
+  EXPECT_FALSE(dag.has_colors());
+  EXPECT_TRUE(dag.has_alphas() && dag.has_normals() && dag.has_materials());
+  EXPECT_EQ(dag.color_levels(), 7u);
+  EXPECT_EQ(dag.material_names(), names_of_materials(5));
+  std::vector<Position> points = cells(7);
+  const Codes codes = scene_.cells(7);
+  points.push_back({-1, 0, 0});
+  std::vector<uint8_t> alphas(points.size(), 9);
+  std::vector<Normal> normals(points.size(), Normal{9, 9, 9});
+  std::vector<uint32_t> materials(points.size(), 9);
+  dag.alphas(points, 7, alphas);
+  dag.normals(points, 7, normals, 2);
+  dag.materials(points, 7, materials);
+  for (size_t i = 0; i < codes.size(); ++i) {
+    ASSERT_EQ(alphas[i], value_of_code(Attribute::kAlpha, codes[i], 5));
+    ASSERT_EQ(materials[i], value_of_code(Attribute::kMaterial, codes[i], 5));
+    const uint32_t normal = value_of_code(Attribute::kNormal, codes[i], 5);
+    const unsigned char code[2] = {static_cast<unsigned char>(normal),
+                                   static_cast<unsigned char>(normal >> 8)};
+    const voxdag_reader::Normal expected = voxdag_reader::octahedral_normal(code);
+    ASSERT_EQ(normals[i], (Normal{expected.x, expected.y, expected.z}));
+  }
+  EXPECT_EQ(alphas.back(), 0);
+  EXPECT_EQ(normals.back(), Normal{});
+  EXPECT_EQ(materials.back(), kNoMaterial);
+
+  voxdag_file* file = nullptr;
+  ASSERT_EQ(voxdag_open(path.c_str(), &file), VOXDAG_OK);
+  voxdag_facts facts{};
+  facts.struct_size = sizeof facts;
+  ASSERT_EQ(voxdag_get_facts(file, &facts), VOXDAG_OK);
+  EXPECT_EQ(facts.attributes, VOXDAG_HAS_ALPHAS | VOXDAG_HAS_NORMALS | VOXDAG_HAS_MATERIALS);
+  EXPECT_EQ(facts.materials, 5u);
+  EXPECT_STREQ(voxdag_material_name(file, 1), "m1");
+  EXPECT_EQ(voxdag_material_name(file, 5), nullptr);
+  const auto cells = reinterpret_cast<const int64_t(*)[3]>(points.data());
+  std::vector<uint8_t> c_alphas(points.size());
+  std::vector<Normal> c_normals(points.size());
+  std::vector<uint32_t> c_materials(points.size());
+  EXPECT_EQ(voxdag_alphas(file, 7, cells, points.size(), c_alphas.data()), VOXDAG_OK);
+  EXPECT_EQ(voxdag_normals(file, 7, cells, points.size(),
+                           reinterpret_cast<float(*)[3]>(c_normals.data())),
+            VOXDAG_OK);
+  EXPECT_EQ(voxdag_materials(file, 7, cells, points.size(), c_materials.data()), VOXDAG_OK);
+  EXPECT_EQ(c_alphas, alphas);
+  EXPECT_EQ(c_normals, normals);
+  EXPECT_EQ(c_materials, materials);
+  Rgba color;
+  EXPECT_EQ(voxdag_colors(file, 7, cells, 1, reinterpret_cast<uint8_t(*)[4]>(&color)),
+            VOXDAG_INVALID_INPUT);
+  voxdag_close(file);
+}
+
 TEST_F(Colors, OfAFileWithoutColors) {
   const std::string plain = folder_.file("plain.vdag");
   write_colored(plain, scene_, false);
-  const Dag dag(plain);
+  const DagFile dag(plain);
   EXPECT_FALSE(dag.has_colors());
   const Position point{};
   Rgba color;
@@ -115,8 +176,8 @@ TEST_F(Colors, OfAFileWithoutColors) {
     EXPECT_NE(error.message().find("with colors"), std::string::npos) << error.message();
   }
   std::vector<Rgba> too_many(2);
-  EXPECT_THROW(Dag(path_).colors({&point, 1}, 9, too_many), Error);
-  EXPECT_THROW(Dag(path_).colors({&point, 1}, 10, {&color, 1}), Error);
+  EXPECT_THROW(DagFile(path_).colors({&point, 1}, 9, too_many), Error);
+  EXPECT_THROW(DagFile(path_).colors({&point, 1}, 10, {&color, 1}), Error);
 }
 
 }  // namespace

@@ -1,5 +1,3 @@
-#include "query/lookup/dag.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,8 +5,10 @@
 #include <limits>
 #include <tuple>
 
+#include "core/format/global/voxdag_reader.h"
 #include "core/geometry/morton.h"
 #include "tests/unit/query/query_files.h"
+#include "voxdag/query.h"
 
 using namespace voxdag;
 using namespace voxdag::query;
@@ -48,23 +48,23 @@ std::vector<Region> regions_of(uint32_t grid_levels, uint64_t seed) {
 
 // All functions against brute force, on every grid of files of three sizes, with narrow and with
 // wide levels.
-class DagFile : public testing::TestWithParam<std::tuple<int, uint64_t>> {
+class DagFileTest : public testing::TestWithParam<std::tuple<int, uint64_t>> {
  protected:
-  DagFile()
+  DagFileTest()
       : file_(random_voxels(static_cast<uint64_t>(std::get<0>(GetParam())) + 3,
                             std::get<0>(GetParam())),
               std::get<1>(GetParam())),
         dag_(file_.path()) {}
 
   const QueryFile file_;
-  const Dag dag_;
+  const DagFile dag_;
 };
 
-INSTANTIATE_TEST_SUITE_P(AllSizes, DagFile,
+INSTANTIATE_TEST_SUITE_P(AllSizes, DagFileTest,
                          testing::Combine(testing::Values(4, 8, 32),
                                           testing::Values(global_layout::kNarrowLevelWords, 2)));
 
-TEST_P(DagFile, LooksUpEveryCell) {
+TEST_P(DagFileTest, LooksUpEveryCell) {
   for (uint32_t levels = 0; levels <= dag_.grid_levels(); ++levels) {
     SCOPED_TRACE(levels);
     const QueryFile::Cells cells = file_.cells(levels);
@@ -78,7 +78,7 @@ TEST_P(DagFile, LooksUpEveryCell) {
   }
 }
 
-TEST_P(DagFile, CountsAndListsAndFillsRegions) {
+TEST_P(DagFileTest, CountsAndListsAndFillsRegions) {
   for (uint32_t levels = 0; levels <= dag_.grid_levels(); ++levels) {
     const QueryFile::Cells cells = file_.cells(levels);
     for (const Region& region : regions_of(levels, levels)) {
@@ -109,15 +109,15 @@ TEST_P(DagFile, CountsAndListsAndFillsRegions) {
 }
 
 // Without memory for counts the same numbers are found.
-TEST_P(DagFile, CountsWithoutStoredCounts) {
-  const Dag poor(file_.path(), 0);
+TEST_P(DagFileTest, CountsWithoutStoredCounts) {
+  const DagFile poor(file_.path(), 0);
   for (uint32_t levels = 0; levels <= dag_.grid_levels(); ++levels)
     for (const Region& region : regions_of(levels, 100 + levels))
       ASSERT_EQ(poor.count({levels, region}), dag_.count({levels, region}));
 }
 
 // A list that is too short is filled, and the number is that of all cells.
-TEST_P(DagFile, ListsAsManyAsFit) {
+TEST_P(DagFileTest, ListsAsManyAsFit) {
   const Selection all{dag_.grid_levels(), whole_grid(dag_.grid_levels())};
   std::vector<Position> some(3), every(dag_.count(all));
   EXPECT_EQ(dag_.positions(all, some), every.size());
@@ -125,7 +125,7 @@ TEST_P(DagFile, ListsAsManyAsFit) {
   EXPECT_TRUE(std::equal(some.begin(), some.end(), every.begin()));
 }
 
-TEST_P(DagFile, VisitsBricksInMortonOrder) {
+TEST_P(DagFileTest, VisitsBricksInMortonOrder) {
   for (uint32_t levels = 2; levels <= dag_.grid_levels(); ++levels) {
     std::vector<uint64_t> codes;
     dag_.bricks({levels, whole_grid(levels)}, [&](const Brick& brick) {
@@ -152,7 +152,7 @@ Nearest try_every_cell(const QueryFile::Cells& cells, const Position& from, doub
   return best;
 }
 
-TEST_P(DagFile, FindsTheNearestCell) {
+TEST_P(DagFileTest, FindsTheNearestCell) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   for (uint32_t levels = 0; levels <= dag_.grid_levels(); ++levels) {
     const QueryFile::Cells cells = file_.cells(levels);
@@ -184,7 +184,7 @@ TEST(Dag, BreaksTiesByMortonCode) {
     for (const int y : {6, 10})
       for (const int z : {6, 10}) voxels.set(x, y, z);
   const QueryFile file(voxels);
-  const Dag dag(file.path());
+  const DagFile dag(file.path());
   const std::vector<Position> points = {{8, 8, 8}, {8, 8, 9}, {10, 8, 8}};
   std::vector<Nearest> found(points.size());
   dag.nearest(points, 4, 100, found);
@@ -195,7 +195,7 @@ TEST(Dag, BreaksTiesByMortonCode) {
 
 TEST(Dag, AnswersForAnEmptyFile) {
   const QueryFile file(oracle::Voxels(16));
-  const Dag dag(file.path());
+  const DagFile dag(file.path());
   const std::vector<Position> points(3);
   std::vector<uint8_t> set(3, 7);
   dag.lookup(points, 4, set);
@@ -214,7 +214,7 @@ TEST(Dag, AnswersForAnEmptyFile) {
 
 TEST(Dag, RefusesWrongArguments) {
   const QueryFile file(random_voxels(5, 16));
-  const Dag dag(file.path());
+  const DagFile dag(file.path());
   const std::vector<Position> points(2), far(1, {kMaxCoordinate + 1, 0, 0});
   std::vector<uint8_t> set(3);
   std::vector<Nearest> found(1);
@@ -230,7 +230,7 @@ TEST(Dag, RefusesWrongArguments) {
             ErrorCode::kInvalidInput);
   EXPECT_EQ(code_of([&] { dag.nearest(far, 4, 1, found); }), ErrorCode::kInvalidInput);
   EXPECT_EQ(code_of([&] { dag.nearest(points, 4, -1, found); }), ErrorCode::kInvalidInput);
-  EXPECT_EQ(code_of([&] { Dag nothing(file.path() + ".not"); }), ErrorCode::kNotFound);
+  EXPECT_EQ(code_of([&] { DagFile nothing(file.path() + ".not"); }), ErrorCode::kNotFound);
 }
 
 // Flipped bytes give an error that names the file, or some answer; nothing outside the file is read
@@ -239,7 +239,7 @@ TEST(Dag, SurvivesDamage) {
   for (const uint64_t narrow_words : {global_layout::kNarrowLevelWords, uint64_t{2}}) {
     const QueryFile file(random_voxels(11, 32), narrow_words);
     const ByteString whole = read_bytes(file.path());
-    const uint64_t levels_end = Dag(file.path()).file().checksum_table_offset();
+    const uint64_t levels_end = DagFile(file.path()).file().checksum_table_offset();
     oracle::Random random(17);
     int errors = 0;
     for (int i = 0; i < 50; ++i) {
@@ -249,7 +249,7 @@ TEST(Dag, SurvivesDamage) {
             static_cast<char>(random.between(1, 255));
       const std::string path = file.path() + ".damaged";
       write_bytes(path, damaged);
-      const Dag dag(path);
+      const DagFile dag(path);
       const auto tries = [&](const auto& run) {
         try {
           run();
@@ -276,7 +276,7 @@ TEST(Dag, SurvivesDamage) {
       tries([&] { dag.rays(origins, directions, {}, hits); });
       tries([&] { dag.box(all, cells); });
       tries([&] { dag.count(all); });
-      tries([&] { Dag(path, 0).count({4, whole_grid(3)}); });
+      tries([&] { DagFile(path, 0).count({4, whole_grid(3)}); });
     }
     EXPECT_GT(errors, 30);
   }

@@ -74,13 +74,14 @@ void expect_single_rays(WalkPacket walk) {
     for (const uint64_t narrow_words : {global_layout::kNarrowLevelWords, uint64_t{2}}) {
       SCOPED_TRACE(edge);
       const QueryFile file(random_voxels(static_cast<uint64_t>(edge), edge), narrow_words);
-      const Dag dag(file.path());
+      const DagFile dag(file.path());
       const std::vector<Ray> rays = many_rays(edge, 5);
-      expect_equal(walk, dag.view(), rays, 0, 0, kFar, 64, hits);
-      expect_equal(walk, dag.view(), rays, 0, 0, std::numeric_limits<double>::infinity(), 33, hits);
-      expect_equal(walk, dag.view(), rays, 0, 0, edge, 7, hits);
+      expect_equal(walk, DagView(dag.file()), rays, 0, 0, kFar, 64, hits);
+      expect_equal(walk, DagView(dag.file()), rays, 0, 0, std::numeric_limits<double>::infinity(),
+                   33, hits);
+      expect_equal(walk, DagView(dag.file()), rays, 0, 0, edge, 7, hits);
       for (const double stop : {1.0, 2.0, 5.5, 2.0 * edge})
-        expect_equal(walk, dag.view(), rays, stop, 0.25 * edge, kFar, 64, hits);
+        expect_equal(walk, DagView(dag.file()), rays, stop, 0.25 * edge, kFar, 64, hits);
     }
   EXPECT_GT(hits, 20000u);
 }
@@ -107,7 +108,7 @@ class DagRays : public testing::Test {
   }
 
   const QueryFile file_{one_voxel()};
-  const Dag dag_{file_.path()};
+  const DagFile dag_{file_.path()};
 };
 
 // Distances are in voxels whatever the length of the direction; the normal looks at the ray.

@@ -1,19 +1,19 @@
-// A request to stop long work, made by a signal handler or another thread. The work checks it
-// every few milliseconds. Thread-safe.
+// A request to stop a build.
 #pragma once
 
 #include <atomic>
 
-#include "core/base/error.h"
+#include "voxdag/error.h"
 
 namespace voxdag {
 
+// Thread-safe. The work checks the token every few milliseconds.
 class CancelToken {
  public:
   // Async-signal-safe.
   void cancel() { canceled_.store(true, std::memory_order_relaxed); }
   bool canceled() const { return canceled_.load(std::memory_order_relaxed); }
-  // Throws Error{kCanceled} once cancel() was called.
+  // Throws Error{kCanceled} after cancel().
   void check() const {
     if (canceled()) throw Error(ErrorCode::kCanceled, "canceled");
   }

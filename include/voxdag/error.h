@@ -1,0 +1,45 @@
+// The one exception type of voxdag and its few codes.
+#pragma once
+
+#include <exception>
+#include <string>
+#include <utility>
+
+namespace voxdag {
+
+enum class ErrorCode {
+  kInvalidInput,        // a scene, option or request that breaks its rules
+  kNotFound,            // a file, job or scene that does not exist
+  kCorrupt,             // bytes written by voxdag that fail their checks
+  kUnsupportedVersion,  // a format version this build does not read
+  kIo,                  // the system refused a read, a write or a sync
+  kNoSpace,             // the disk is full
+  kOutOfMemory,         // the memory budget or the machine is too small
+  kDevice,              // the GPU or its driver failed
+  kCanceled,            // the user canceled the operation
+  kLimit,               // a limit of the format or of the arithmetic, named in the message
+};
+
+// One sentence: what went wrong, where (file, subvolume, scene node) and what was expected.
+class Error : public std::exception {
+ public:
+  Error(ErrorCode code, std::string message) : code_(code), message_(std::move(message)) {}
+  ErrorCode code() const { return code_; }
+  const std::string& message() const { return message_; }
+  // True if a file written by voxdag may be damaged, missing or of a different version, so that
+  // work depending on it must be repeated. All other errors imply nothing about the files.
+  bool is_corruption() const {
+    return code_ == ErrorCode::kCorrupt || code_ == ErrorCode::kNotFound ||
+           code_ == ErrorCode::kUnsupportedVersion;
+  }
+  const char* what() const noexcept override { return message_.c_str(); }
+
+ private:
+  ErrorCode code_;
+  std::string message_;
+};
+
+// The stable name of a code, as JSON reports carry it: "invalid_input", "no_space", ...
+const char* error_name(ErrorCode code);
+
+}  // namespace voxdag

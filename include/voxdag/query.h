@@ -1,0 +1,175 @@
+// Queries of a finished .vdag file: points, attributes, rays, boxes, counts, neighbors and tiles.
+//
+//     voxdag::query::DagFile dag("scene.vdag");
+//     std::vector<voxdag::query::Position> points = {{1, 2, 3}, {4, 5, 6}};
+//     std::vector<uint8_t> set(points.size());
+//     dag.lookup(points, dag.grid_levels(), set);
+//
+// The file is mapped, not read. A batch function takes any number of items in one call, works on up
+// to `threads` threads, the caller's among them, and allocates nothing per item. The results do not
+// depend on the threads. All spans of one call have the same length.
+//
+// All functions are const and thread-safe. They throw Error{kInvalidInput} for arguments that break
+// their rules, and Error{kCorrupt} that names the file if the bytes they read are damaged. They
+// check offsets on the way, and no checksums (`voxdag verify` does). docs/library.md describes
+// conventions and units.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "voxdag/cells.h"
+#include "voxdag/error.h"
+
+namespace voxdag_reader {
+class File;
+}
+
+namespace voxdag::query {
+
+// Three coordinates in voxels; the grid is the cube [0, R]^3.
+using Coordinates = std::array<double, 3>;
+
+// sRGB, and alpha: 255 for a color, 0 where a cell has no color.
+using Rgba = std::array<uint8_t, 4>;
+
+// A unit vector, or zeros.
+using Normal = std::array<float, 3>;
+
+inline constexpr uint32_t kNoMaterial = UINT32_MAX;
+
+struct RayLimits {
+  double max_distance = std::numeric_limits<double>::infinity();  // in voxels
+  // A ray hits cells of at most this edge, in voxels, as one cell. Below 2: voxels.
+  double stop_size = 0;
+};
+
+struct RayHit {
+  double distance = 0;       // in voxels, from the origin to the face
+  Position cell{};           // in the grid of 2^grid_levels
+  uint32_t grid_levels = 0;  // of the cell's grid
+  // The normal of the face by which the ray entered: 0, 1, 2 for x, y, z, and 1 or -1. A ray that
+  // begins in the cell has distance 0, axis -1 and sign 0: no face.
+  int8_t axis = -1;
+  int8_t sign = 0;
+  bool hit = false;  // without a hit, the other members have no meaning
+};
+
+struct Nearest {
+  Position cell{};
+  uint64_t squared_distance = 0;  // between the centers of the cells, in cells
+  bool found = false;
+};
+
+// Points for nearest() are within this distance of the grid's origin on every axis, so that squares
+// of distances fit in 64 bits.
+inline constexpr int64_t kMaxCoordinate = int64_t{1} << 30;
+
+class DagFile {
+ public:
+  // Default limit of the memory for the node counts that count() stores, in bytes.
+  static constexpr uint64_t kDefaultMemory = uint64_t{1} << 30;
+
+  // Opens and maps the file, which must not become shorter while it is open. count() uses at most
+  // `memory_bytes`. Throws Error{kNotFound}, Error{kIo}, Error{kUnsupportedVersion}, or
+  // Error{kCorrupt} for a damaged header.
+  explicit DagFile(const std::string& path, uint64_t memory_bytes = kDefaultMemory);
+  ~DagFile();
+  DagFile(DagFile&&) noexcept;
+  DagFile& operator=(DagFile&&) noexcept;
+
+  // The file has 2^grid_levels() voxels per edge.
+  uint32_t grid_levels() const;
+  int64_t resolution() const { return int64_t{1} << grid_levels(); }
+  // The low corner of the grid and the length of its edge, in the units of the scene.
+  Coordinates origin() const;
+  double edge() const;
+  uint64_t voxels() const;     // set ones
+  uint64_t svo_nodes() const;  // nodes of the octree without sharing, bricks included
+  uint64_t dag_nodes() const;  // bricks included
+  uint64_t file_bytes() const;
+
+  // set[i] becomes 1 if cell points[i] is set, and 0 if it is not or is outside the grid.
+  void lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
+              unsigned threads = 1) const;
+
+  // Attributes of cells. The grids of up to 2^color_levels() cells per edge have their own values;
+  // a finer cell has the value of the cell that contains it. A file of an empty scene has none.
+  // Positions near their predecessors are faster. Throws Error{kInvalidInput} for an attribute that
+  // the file does not have.
+  uint32_t color_levels() const;
+  bool has_colors() const;
+  bool has_alphas() const;
+  bool has_normals() const;
+  bool has_materials() const;
+  // colors[i] becomes the color of cell points[i], and zeros if the cell is not set.
+  void colors(std::span<const Position> points, uint32_t grid_levels, std::span<Rgba> colors,
+              unsigned threads = 1) const;
+  // Linear, 0 to 255; 0 for a cell that is not set.
+  void alphas(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> alphas,
+              unsigned threads = 1) const;
+  // Zeros for a cell that is not set.
+  void normals(std::span<const Position> points, uint32_t grid_levels, std::span<Normal> normals,
+               unsigned threads = 1) const;
+  // Indices into material_names(); kNoMaterial for a cell that is not set.
+  void materials(std::span<const Position> points, uint32_t grid_levels,
+                 std::span<uint32_t> materials, unsigned threads = 1) const;
+  // The last one, "", is for triangles without a material. Empty without the attribute.
+  const std::vector<std::string>& material_names() const;
+
+  // The first set cell on each ray. Directions have any length except 0; all numbers are finite,
+  // and limits are not negative. A cell includes its faces, so no ray passes between two cells that
+  // share one. Rays close to their predecessors, such as rays of neighboring pixels, are faster.
+  void rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
+            const RayLimits& limits, std::span<RayHit> hits, unsigned threads = 1) const;
+
+  // The region as a dense array, 1 for each set cell: position p is at
+  // ((p.x - low.x) * ny + p.y - low.y) * nz + p.z - low.z. `cells` has the region's size.
+  void box(const Selection& selection, std::span<uint8_t> cells) const;
+
+  // The set cells of the region, in Morton order: stores as many as fit and returns how many the
+  // region has.
+  uint64_t positions(const Selection& selection, std::span<Position> positions) const;
+
+  // Calls `visit` for each brick with set cells in the region, in Morton order; masks are cut to
+  // the region.
+  void bricks(const Selection& selection, const std::function<void(const Brick&)>& visit) const;
+
+  // The number of set cells in the region. The first count in a grid reads every node of its levels
+  // once, and stores a number for each.
+  uint64_t count(const Selection& selection) const;
+
+  // For each point the nearest set cell, from center to center, at most `max_distance` cells away.
+  // Among equally near cells, the first in Morton order. Points may be outside the grid, with
+  // coordinates of at most kMaxCoordinate.
+  void nearest(std::span<const Position> points, uint32_t grid_levels, double max_distance,
+               std::span<Nearest> cells, unsigned threads = 1) const;
+
+  // The cell that contains a point of the scene's space; it may be outside the grid, at most 2^62
+  // cells away. A point on a boundary between cells, up to rounding, counts as on it.
+  Position world_to_cell(const Coordinates& world, uint32_t grid_levels) const;
+  // The cells that the half-open box of the scene's space touches. An infinite side ends with the
+  // grid.
+  Region world_to_region(const Coordinates& low, const Coordinates& high,
+                         uint32_t grid_levels) const;
+
+  // A node of level `level` with the `tile_levels` (1 to 5) levels below it, for viewers, in the
+  // format of docs/format.md, "Tiles". The root is at level 0, offset 0; a tile has the offsets of
+  // the tiles below it. Throws Error{kNotFound} if no node can be at that word offset.
+  std::vector<uint32_t> tile(uint32_t tile_levels, uint32_t level, uint64_t offset) const;
+
+  // The file itself, for voxdag_reader.h. It lives as long as this object.
+  const voxdag_reader::File& file() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace voxdag::query

@@ -1,0 +1,381 @@
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <mutex>
+#include <optional>
+
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/base/process_limits.h"
+#include "core/format/global/open_global.h"
+#include "query/dag/dag_view.h"
+#include "query/dag/selection.h"
+#include "query/lookup/bricks.h"
+#include "query/lookup/nearest.h"
+#include "query/lookup/node_counts.h"
+#include "query/lookup/points.h"
+#include "query/lookup/top_cells.h"
+#include "query/rays/double_pair.h"
+#include "query/rays/ray_packet.h"
+#include "query/tiles/tile.h"
+#include "voxdag/query.h"
+
+namespace voxdag::query {
+namespace {
+
+// Items that one thread takes at once: a multiple of a packet of rays.
+constexpr size_t kBatch = 4096;
+
+[[noreturn]] void refuse(const char* expected) {
+  throw Error(ErrorCode::kInvalidInput, std::string("query: expected ") + expected);
+}
+inline void require(bool right, const char* expected) {
+  if (!right) refuse(expected);
+}
+
+// Calls body(first, count) for batches of `items`.
+template <class Body>
+void for_each_batch(unsigned threads, size_t items, const Body& body) {
+  parallel_for(std::max(1u, threads), (items + kBatch - 1) / kBatch, [&](unsigned, size_t batch) {
+    const size_t first = batch * kBatch;
+    body(first, std::min(kBatch, items - first));
+  });
+}
+
+// Rays with directions of length 1, two at a time: their divisions would take longer than their
+// walk through large cells.
+void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
+               Ray* rays) {
+  const DoublePair zero = DoublePair::of(0), one = DoublePair::of(1);
+  for (size_t first = 0; first < origins.size(); first += 2) {
+    const size_t second = std::min(first + 1, origins.size() - 1);
+    DoublePair d[3], largest = zero, nothing = zero;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      alignas(16) const double o[2] = {origins[first][axis], origins[second][axis]};
+      alignas(16) const double two[2] = {directions[first][axis], directions[second][axis]};
+      d[axis] = DoublePair::load(two);
+      // Infinity and NaN are not 0 after this.
+      nothing = nothing + DoublePair::load(o) * zero + d[axis] * zero;
+      largest = max(largest, absolute(d[axis]));
+    }
+    require(equal(nothing, zero) == 3 && less(zero, largest) == 3,
+            "rays of finite numbers with directions that are not 0");
+    // The largest component first, so that no square overflows or vanishes.
+    for (DoublePair& component : d) component = component / largest;
+    const DoublePair scale = one / square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      alignas(16) double two[2];
+      (d[axis] * scale).store(two);
+      for (const auto& [ray, i] : {std::pair(first, 0), std::pair(second, 1)}) {
+        rays[ray].origin[static_cast<int>(axis)] = origins[ray][axis];
+        rays[ray].direction[static_cast<int>(axis)] = two[i];
+      }
+    }
+  }
+}
+
+RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
+  RayHit out;
+  out.hit = true;
+  out.distance = hit.t;
+  out.cell = {hit.cell[0], hit.cell[1], hit.cell[2]};
+  out.grid_levels = hit.depth;
+  out.axis = static_cast<int8_t>(hit.axis);
+  if (hit.axis >= 0) out.sign = ray.direction[hit.axis] >= 0 ? int8_t{-1} : int8_t{1};
+  return out;
+}
+
+// The largest square whose root, as a double, is at most `distance`. Distances of more than 2^31 do
+// not occur.
+uint64_t largest_square(double distance) {
+  if (distance >= 0x1p31) return uint64_t{1} << 62;
+  auto square = static_cast<uint64_t>(distance * distance);
+  while (square > 0 && std::sqrt(static_cast<double>(square)) > distance) --square;
+  while (std::sqrt(static_cast<double>(square + 1)) <= distance) ++square;
+  return square;
+}
+
+}  // namespace
+
+// The file, and the tables that many questions make worthwhile.
+struct DagFile::State {
+  State(const std::string& path, uint64_t memory_bytes)
+      : file(open_global_file(path)), view(*file), budget(memory_bytes) {}
+
+  void expect_questions(size_t count);
+  const TopCells* top_cells(size_t points);
+  const NodeCounts& counts(uint32_t grid_levels);
+
+  const std::unique_ptr<const voxdag_reader::File> file;
+  const DagView view;
+  MemoryBudget budget;
+  std::once_flag huge_pages, make_top;
+  std::atomic<uint64_t> points_asked = 0;
+  std::optional<TopCells> top;  // of a file that many points were looked up in
+  std::mutex mutex;
+  std::array<std::unique_ptr<NodeCounts>, 21> counts_of;  // by grid levels; guarded by mutex
+};
+
+// Huge pages are requested by a call of this many questions, and the table of the top by this many
+// questions of all calls. Together they reach most of the nodes that later ones do.
+constexpr size_t kManyQuestions = size_t{1} << 14;
+
+// A few questions should not read parts of 2 MiB for each node, and neither should many about a
+// file that memory cannot hold.
+void DagFile::State::expect_questions(size_t count) {
+  if (count < kManyQuestions || file->file_bytes() > default_memory()) return;
+  // Pages in memory keep their size, and not every system has huge pages for files.
+  std::call_once(huge_pages, [&] {
+    madvise(const_cast<unsigned char*>(file->data()), file->file_bytes(), MADV_HUGEPAGE);
+  });
+}
+
+// Null for few questions, or if the top is damaged: then each descent reports the damage it meets.
+const TopCells* DagFile::State::top_cells(size_t points) {
+  if ((points_asked += points) < kManyQuestions || !TopCells::serve(view, view.grid_levels()))
+    return nullptr;
+  std::call_once(make_top, [&] {
+    try {
+      top.emplace(view);
+    } catch (const Error&) {
+    }
+  });
+  return top ? &*top : nullptr;
+}
+
+const NodeCounts& DagFile::State::counts(uint32_t grid_levels) {
+  const std::lock_guard lock(mutex);
+  std::unique_ptr<NodeCounts>& counts = counts_of[grid_levels];
+  if (!counts) counts = std::make_unique<NodeCounts>(*file, view, grid_levels, budget);
+  return *counts;
+}
+
+DagFile::DagFile(const std::string& path, uint64_t memory_bytes)
+    : state_(std::make_unique<State>(path, memory_bytes)) {}
+DagFile::~DagFile() = default;
+DagFile::DagFile(DagFile&&) noexcept = default;
+DagFile& DagFile::operator=(DagFile&&) noexcept = default;
+
+const voxdag_reader::File& DagFile::file() const { return *state_->file; }
+uint32_t DagFile::grid_levels() const { return file().grid_levels(); }
+Coordinates DagFile::origin() const { return std::to_array(file().origin()); }
+double DagFile::edge() const { return file().edge(); }
+uint64_t DagFile::voxels() const { return file().voxels(); }
+uint64_t DagFile::svo_nodes() const { return file().svo_nodes(); }
+uint64_t DagFile::dag_nodes() const { return file().dag_nodes(); }
+uint64_t DagFile::file_bytes() const { return file().file_bytes(); }
+
+void DagFile::lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
+                     unsigned threads) const {
+  check_grid_levels(state_->view, grid_levels);
+  require(points.size() == set.size(), "as many results as points");
+  state_->expect_questions(points.size());
+  const TopCells* const top = state_->top_cells(points.size());
+  naming_file(file().path(), [&] {
+    for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
+      look_up(state_->view, top, grid_levels, points.subspan(first, count),
+              set.subspan(first, count));
+    });
+  });
+}
+
+uint32_t DagFile::color_levels() const {
+  for (const Attribute attribute : attributes_of(file()).list())
+    return section_of(file(), attribute).color_levels();
+  return 0;
+}
+bool DagFile::has_colors() const { return file().colors().tier_count() > 0; }
+bool DagFile::has_alphas() const { return file().alphas().tier_count() > 0; }
+bool DagFile::has_normals() const { return file().normals().tier_count() > 0; }
+bool DagFile::has_materials() const { return file().materials().tier_count() > 0; }
+const std::vector<std::string>& DagFile::material_names() const {
+  return file().materials().names();
+}
+
+namespace {
+
+// An attribute's section, and how build makes a file that has it.
+struct AttributeSource {
+  const voxdag_reader::File& file;
+  const voxdag_reader::ColorSection& section;
+  const char* expected;
+};
+
+// values[i] becomes value_of(region, number) for the number of the cell in its region, and `none`
+// if the cell is not set.
+template <class Value, class ValueOf>
+void read_attribute(const AttributeSource& source, std::span<const Position> points,
+                    uint32_t grid_levels, Value none, std::span<Value> values, unsigned threads,
+                    const ValueOf& value_of) {
+  require(points.size() == values.size(), "as many results as points");
+  require(source.section.tier_count() > 0, source.expected);
+  with_reader_errors([&] {
+    for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
+      voxdag_reader::ColorCursor cursor(source.file, source.section);
+      for (size_t i = first; i < first + count; ++i) {
+        const auto [x, y, z] = points[i];
+        uint64_t number = 0;
+        const auto* const region = cursor.find(x, y, z, grid_levels, number);
+        values[i] = region ? value_of(*region, number) : none;
+      }
+    });
+  });
+}
+
+}  // namespace
+
+void DagFile::colors(std::span<const Position> points, uint32_t grid_levels, std::span<Rgba> colors,
+                     unsigned threads) const {
+  check_grid_levels(state_->view, grid_levels);
+  read_attribute({file(), file().colors(), "a file with colors, as voxdag build --color makes it"},
+                 points, grid_levels, Rgba{}, colors, threads,
+                 [](const voxdag_reader::ColorRegion& region, uint64_t number) {
+                   const voxdag_reader::Rgb color = region.color(number);
+                   return Rgba{color.r, color.g, color.b, 255};
+                 });
+}
+
+void DagFile::alphas(std::span<const Position> points, uint32_t grid_levels,
+                     std::span<uint8_t> alphas, unsigned threads) const {
+  check_grid_levels(state_->view, grid_levels);
+  read_attribute(
+      {file(), file().alphas(), "a file with alpha, as voxdag build --attributes alpha makes it"},
+      points, grid_levels, uint8_t{0}, alphas, threads,
+      [](const voxdag_reader::ColorRegion& region, uint64_t number) {
+        return static_cast<uint8_t>(region.value(number));
+      });
+}
+
+void DagFile::normals(std::span<const Position> points, uint32_t grid_levels,
+                      std::span<Normal> normals, unsigned threads) const {
+  check_grid_levels(state_->view, grid_levels);
+  read_attribute({file(), file().normals(),
+                  "a file with normals, as voxdag build --attributes normal makes it"},
+                 points, grid_levels, Normal{}, normals, threads,
+                 [](const voxdag_reader::ColorRegion& region, uint64_t number) {
+                   const voxdag_reader::Normal normal = region.normal(number);
+                   return Normal{normal.x, normal.y, normal.z};
+                 });
+}
+
+void DagFile::materials(std::span<const Position> points, uint32_t grid_levels,
+                        std::span<uint32_t> materials, unsigned threads) const {
+  check_grid_levels(state_->view, grid_levels);
+  read_attribute({file(), file().materials(),
+                  "a file with materials, as voxdag build --attributes material makes it"},
+                 points, grid_levels, kNoMaterial, materials, threads,
+                 [](const voxdag_reader::ColorRegion& region, uint64_t number) {
+                   return region.value(number);
+                 });
+}
+
+void DagFile::rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
+                   const RayLimits& limits, std::span<RayHit> hits, unsigned threads) const {
+  require(origins.size() == directions.size() && origins.size() == hits.size(),
+          "as many directions and results as origins");
+  require(limits.max_distance >= 0 && limits.stop_size >= 0, "limits of rays that are at least 0");
+  state_->expect_questions(origins.size());
+  naming_file(file().path(), [&] {
+    for_each_batch(threads, origins.size(), [&](size_t batch, size_t count) {
+      constexpr size_t kRays = RayPacket::kRays;
+      RayPacket packet(state_->view, limits.stop_size, 0, limits.max_distance);
+      Ray rays[kRays];
+      Hit found[kRays];
+      for (size_t first = batch; first < batch + count; first += kRays) {
+        const size_t n = std::min(kRays, batch + count - first);
+        make_rays(origins.subspan(first, n), directions.subspan(first, n), rays);
+        const uint64_t have_hit = packet.cast({rays, n}, found);
+        for (size_t i = 0; i < n; ++i)
+          hits[first + i] = have_hit >> i & 1 ? as_ray_hit(found[i], rays[i]) : RayHit{};
+      }
+    });
+  });
+}
+
+void DagFile::bricks(const Selection& selection,
+                     const std::function<void(const Brick&)>& visit) const {
+  naming_file(file().path(), [&] { for_each_brick(state_->view, selection, visit); });
+}
+
+void DagFile::box(const Selection& selection, std::span<uint8_t> cells) const {
+  const Position &low = selection.region.low, &high = selection.region.high;
+  check_grid_levels(state_->view, selection.grid_levels);
+  uint64_t size = selection.region.empty() ? 0 : 1;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const uint64_t edge = high[axis] <= low[axis] ? 0
+                                                  : static_cast<uint64_t>(high[axis]) -
+                                                        static_cast<uint64_t>(low[axis]);
+    require(!__builtin_mul_overflow(size, edge, &size), "a region that fits in memory");
+  }
+  require(cells.size() == size, "as many results as cells in the region");
+  std::fill(cells.begin(), cells.end(), uint8_t{0});
+  bricks(selection, [&](const Brick& brick) {
+    for_each_cell_of(brick, [&](const Position& p) {
+      const int64_t at =
+          ((p[0] - low[0]) * (high[1] - low[1]) + p[1] - low[1]) * (high[2] - low[2]) + p[2] -
+          low[2];
+      cells[static_cast<size_t>(at)] = 1;
+    });
+  });
+}
+
+uint64_t DagFile::positions(const Selection& selection, std::span<Position> positions) const {
+  uint64_t count = 0;
+  bricks(selection, [&](const Brick& brick) {
+    if (count >= positions.size()) {
+      count += static_cast<uint64_t>(std::popcount(brick.mask));
+      return;
+    }
+    for (uint64_t left = brick.mask; left != 0; left &= left - 1, ++count)
+      if (count < positions.size()) positions[count] = brick_cell(brick, std::countr_zero(left));
+  });
+  return count;
+}
+
+uint64_t DagFile::count(const Selection& selection) const {
+  check_grid_levels(state_->view, selection.grid_levels);
+  return naming_file(file().path(),
+                     [&] { return state_->counts(selection.grid_levels).count(selection.region); });
+}
+
+void DagFile::nearest(std::span<const Position> points, uint32_t grid_levels, double max_distance,
+                      std::span<Nearest> cells, unsigned threads) const {
+  check_grid_levels(state_->view, grid_levels);
+  require(points.size() == cells.size(), "as many results as points");
+  require(max_distance >= 0, "a distance that is at least 0");
+  const uint64_t max_squared = largest_square(max_distance);
+  naming_file(file().path(), [&] {
+    for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
+      for (size_t i = first; i < first + count; ++i) {
+        for (const int64_t c : points[i])
+          require(c >= -kMaxCoordinate && c <= kMaxCoordinate, "coordinates within 2^30");
+        cells[i] = find_nearest(state_->view, grid_levels, points[i], max_squared);
+      }
+    });
+  });
+}
+
+Position DagFile::world_to_cell(const Coordinates& world, uint32_t grid_levels) const {
+  Position cell;
+  for (size_t axis = 0; axis < 3; ++axis)
+    cell[axis] = query::world_to_cell(file(), grid_levels, axis, world[axis]);
+  return cell;
+}
+
+Region DagFile::world_to_region(const Coordinates& low, const Coordinates& high,
+                                uint32_t grid_levels) const {
+  return query::world_to_region(file(), grid_levels,
+                                {low[0], low[1], low[2], high[0], high[1], high[2]});
+}
+
+std::vector<uint32_t> DagFile::tile(uint32_t tile_levels, uint32_t level, uint64_t offset) const {
+  require(tile_levels >= 1 && tile_levels <= kMaxTileLevels, "1 to 5 levels in a tile");
+  return naming_file(file().path(), [&] {
+    return encode_tile(state_->view, tile_levels, {level, offset});
+  });
+}
+
+}  // namespace voxdag::query
