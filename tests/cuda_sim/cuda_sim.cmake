@@ -4,7 +4,7 @@
 if(VOXDAG_SANITIZE)
   return()
 endif()
-file(GLOB cuda_sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/core/backend/cuda/*.cu)
+file(GLOB cuda_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/core/backend/cuda/*.cu)
 file(GLOB simulation_sources CONFIGURE_DEPENDS cuda_sim/sim/*.cc)
 set(program_sources cuda_sim/rules/programs.cc)
 set_source_files_properties(${cuda_sources} ${program_sources} PROPERTIES LANGUAGE CXX COMPILE_OPTIONS
@@ -26,8 +26,8 @@ target_link_libraries(test_cuda_sim PRIVATE voxdag_cuda_sim voxdag_backend_cpu v
                       GTest::gmock GTest::gtest_main)
 voxdag_compile_quickly(test_cuda_sim)
 target_compile_definitions(test_cuda_sim PRIVATE
-  VOXDAG_SHARED_SCENES="${CMAKE_SOURCE_DIR}/../shared/scenes"
-  VOXDAG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  VOXDAG_SHARED_SCENES="${PROJECT_SOURCE_DIR}/../shared/scenes"
+  VOXDAG_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 # What takes minutes on the simulated device runs in tools/test-long.
 set(long_tests "*AnyTriangles*:*ASplit*:*Reuse.*:*CountsAddUp*:*RegionsOfLargeCubes*")
 foreach(method fast hashes pointers)
@@ -40,19 +40,19 @@ gtest_discover_tests(test_cuda_sim DISCOVERY_TIMEOUT 60 TEST_FILTER "SimulatedDe
 
 # What each kernel takes of a device, and the toolkit's oldest and newest architecture.
 if(VOXDAG_HAS_CUDA AND Python3_FOUND)
-  add_test(NAME cuda_kernels COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tools/check-kernels
+  add_test(NAME cuda_kernels COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/tools/check-kernels
                                      --nvcc ${CMAKE_CUDA_COMPILER})
   set_tests_properties(cuda_kernels PROPERTIES LABELS conformance TIMEOUT 900)
 endif()
 
 # Whole builds, with the scheduler's workers.
 add_executable(test_cuda_sim_builds cuda_sim/builds/whole_build_test.cc)
-target_link_libraries(test_cuda_sim_builds PRIVATE voxdag_cuda_sim voxdag_scheduler
+target_link_libraries(test_cuda_sim_builds PRIVATE voxdag_cuda_sim voxdag_scheduler voxdag_generate
                       GTest::gmock GTest::gtest_main)
 target_sources(test_cuda_sim_builds PRIVATE crash/faulty_files.cc)
 voxdag_compile_quickly(test_cuda_sim_builds)
 target_compile_definitions(test_cuda_sim_builds PRIVATE
-  VOXDAG_SHARED_SCENES="${CMAKE_SOURCE_DIR}/../shared/scenes"
-  VOXDAG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  VOXDAG_SHARED_SCENES="${PROJECT_SOURCE_DIR}/../shared/scenes"
+  VOXDAG_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 gtest_discover_tests(test_cuda_sim_builds DISCOVERY_TIMEOUT 60
   PROPERTIES LABELS cuda_sim_fast TIMEOUT 900)

@@ -1,11 +1,9 @@
-// A quantity that is estimated, and the range in which it is expected.
+// Arithmetic of estimates.
 #pragma once
 
-namespace voxdag {
+#include "voxdag/build.h"
 
-struct EstimateRange {
-  double low = 0, likely = 0, high = 0;
-};
+namespace voxdag {
 
 inline EstimateRange exactly(double value) { return {value, value, value}; }
 inline EstimateRange within(double value, double factor) {

@@ -18,6 +18,6 @@ if(VOXDAG_VDB AND VOXDAG_OPENVDB_INCLUDE AND VOXDAG_OPENVDB_LIBRARY AND VOXDAG_B
   endif()
 endif()
 add_test(NAME export_whole
-         COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/long/exports_whole.py --resolution 128
+         COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/tests/long/exports_whole.py --resolution 128
                  --voxdag $<TARGET_FILE:voxdag> --digest $<TARGET_FILE:digest_voxels>)
 set_tests_properties(export_whole PROPERTIES LABELS cli TIMEOUT 300)

@@ -1,0 +1,133 @@
+// Builds: a scene in, one .vdag file out.
+//
+//     voxdag::BuildOptions options;
+//     options.scenes = {"scene.glb"};
+//     options.resolution = 8192;
+//     options.output = "scene.vdag";
+//     const voxdag::BuildResult result = voxdag::build(options);
+//
+// A build may be interrupted at any time, also by SIGKILL: the same call resumes it from its work
+// folder and produces the same bytes. The scene and the options of geometry decide every byte of
+// the file; memory, threads and folders never do.
+//
+// Errors are voxdag::Error with one of the codes of voxdag/error.h and a message that names the
+// problem, the place and the expectation. Both functions are thread-safe; two builds with one
+// output or one work folder exclude each other. docs/library.md has more.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "voxdag/cancel_token.h"
+#include "voxdag/error.h"
+#include "voxdag/mesh.h"
+
+namespace voxdag {
+
+// The device and the algorithm that voxelize a part of the scene. kAuto takes a GPU where one is
+// present; kDefault is the backend's fastest method. All of them produce the same bytes.
+enum class BackendName { kAuto, kCpu, kCuda, kParallelHost };
+enum class MethodName { kDefault, kConsing, kPointers, kHashes };
+
+struct BuildOptions {
+  // The scene: files (glTF 2.0, PLY), a mesh in memory, or both. Together they are one scene.
+  std::vector<std::string> scenes;
+  std::optional<Mesh> mesh;
+
+  // Options of geometry.
+  uint64_t resolution = 0;  // voxels per edge of the grid, a power of two from 4 to 2^20
+  // The cube of the grid, in the units of the scene: its low corner, and its edge. At most one of
+  // `bounds` and `voxel_size` can be given; without both, the cube encloses the scene.
+  std::optional<std::array<double, 4>> bounds;
+  std::optional<double> voxel_size;
+  bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
+  uint32_t hash_bits = 64;    // of the node hash, 4 to 64
+  // The attributes to store for the cells of a color grid, and its cells per edge, a power of two;
+  // 0 for the resolution, at most 4096.
+  bool color = false, alpha = false, normal = false, material = false;
+  uint64_t color_resolution = 0;
+
+  // The file to write, and the folder for the work in between; "" for output + ".work". The output
+  // path is created only by the final rename, so it never holds a partial file.
+  std::string output;
+  std::string work_folder;
+  bool keep_work = false;    // keep the work folder after success
+  bool restart = false;      // start over, whatever the work folder holds
+  bool force = false;        // build although the estimate predicts a lack of memory or disk space
+  std::string cache_folder;  // of subvolumes shared between builds; "" for none
+  uint64_t cache_bytes = uint64_t{16} << 30;
+
+  // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB.
+  uint64_t memory_bytes = 0;    // from 64 MiB up; 0 for half of the machine's or the cgroup's
+  unsigned threads = 0;         // 0 for all that the process may use
+  uint64_t subvolume_edge = 0;  // voxels, a power of two; 0 for a choice by the plan
+  BackendName backend = BackendName::kAuto;
+  MethodName method = MethodName::kDefault;
+};
+
+// The state of a running build.
+struct BuildProgress {
+  std::string_view stage;  // "ingest", "build", "merge", ...
+  std::string_view unit;   // counted by done and total: "triangles", "subvolumes", ...
+  uint64_t done = 0;
+  uint64_t total = 0;  // 0 while unknown
+};
+
+// All members may be empty. The build calls the functions from its own threads, one call at a time.
+// They must not throw; a function that wants to end the build calls cancel() of the token.
+struct BuildHooks {
+  std::function<void(const BuildProgress&)> on_progress;  // at most ten times a second
+  std::function<void(std::string_view message)> on_warning;
+  const CancelToken* cancel = nullptr;  // build() throws Error{kCanceled} soon after cancel()
+};
+
+struct BuildResult {
+  std::string output;
+  std::string sha256;  // of the output, in hexadecimal digits
+  uint64_t bytes = 0;  // of the output
+  uint32_t grid_levels = 0;
+  std::array<double, 3> origin{};  // the low corner of the grid, in the units of the scene
+  double edge = 0;                 // of the grid
+  uint64_t triangles = 0;          // that may touch the grid
+  uint64_t dropped_outside = 0;    // triangles
+  uint64_t dropped_invalid = 0;    // triangles
+  uint64_t voxels = 0;
+  uint64_t dag_nodes = 0;
+  uint64_t subvolumes = 0;
+  uint64_t subvolumes_reused = 0;  // from an interrupted run, or from the cache
+  double wall_s = 0, cpu_s = 0;
+  uint64_t peak_memory_bytes = 0;  // resident, of the whole process
+  std::string json;                // the complete report, as `voxdag build --json` prints it
+};
+
+// Runs the build, or resumes the build in its work folder. Also writes the report to output +
+// ".report.json".
+BuildResult build(const BuildOptions& options, const BuildHooks& hooks = {});
+
+// An estimated quantity, and the range in which it is expected.
+struct EstimateRange {
+  double low = 0, likely = 0, high = 0;
+};
+
+// What a build would take.
+struct BuildPlan {
+  uint64_t triangles = 0;
+  EstimateRange voxels, dag_nodes;
+  EstimateRange file_bytes;    // of the output
+  EstimateRange disk_bytes;    // of the output and the work folder, at their peak
+  EstimateRange memory_bytes;  // peak resident memory
+  EstimateRange cpu_s, wall_s;
+  uint64_t free_disk = 0;    // on the disk of the work folder; 0 if unknown
+  uint64_t free_memory = 0;  // the build's memory limit
+  std::string json;          // the complete estimate, as `voxdag plan --json` prints it
+};
+
+// Estimates a build. Creates no files.
+BuildPlan plan(const BuildOptions& options, const BuildHooks& hooks = {});
+
+}  // namespace voxdag

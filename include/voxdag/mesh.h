@@ -1,0 +1,20 @@
+// A triangle mesh in memory, as the scene of a build.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <variant>
+
+namespace voxdag {
+
+// Refers to arrays of the caller, which must not change or move until the build returns.
+struct Mesh {
+  // x, y and z of each vertex, in any units. A build with doubles does not round them to floats.
+  std::variant<std::span<const float>, std::span<const double>> positions;
+  // Three vertex numbers for each triangle. Degenerate triangles are set like all others.
+  std::span<const uint32_t> indices;
+  // Red, green, blue and alpha of each vertex, in sRGB; alpha is linear. Empty for white.
+  std::span<const uint8_t> colors = {};
+};
+
+}  // namespace voxdag
