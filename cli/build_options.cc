@@ -28,7 +28,8 @@ void BuildOptions::declare(Command& command) {
       .group(geometry);
   command.option("--hash-bits", g.hash_bits, "truncate node hashes to this many bits, 4 to 64")
       .group(geometry);
-  command.flag("--color", g.attributes.color, "store the colors of the scene's materials")
+  command
+      .flag("--color", g.attributes[Attribute::kColor], "store the colors of the scene's materials")
       .group(geometry);
   command
       .option("--attributes", attributes_,

@@ -51,14 +51,15 @@ void print(const voxdag_reader::File& file, const std::string& sha256) {
               count_text(file.dag_nodes()).c_str(), file.hash_bits());
   for (const Attribute attribute : attributes_of(file).list()) {
     const nlohmann::ordered_json facts = section_facts(section_of(file, attribute));
-    std::printf("  %ss of %lld^3 cells and coarser ones: %s, %s\n", name_of(attribute),
+    std::printf("  %s of %lld^3 cells and coarser ones: %s, %s\n", traits_of(attribute).plural,
                 static_cast<long long>(facts["resolution"].get<int64_t>()),
                 count_text(facts["cells"].get<uint64_t>()).c_str(),
                 size_text(facts["bytes"].get<uint64_t>()).c_str());
   }
-  // The last one has no name: it is that of triangles without material.
-  if (!file.material_names().empty())
-    std::printf("  %s materials\n", count_text(file.material_names().size() - 1).c_str());
+  // The last name, "", is for triangles without a material.
+  for (const AttributeTraits& row : kAttributeTable)
+    if (const auto& names = section_of(file, row.attribute).names(); !names.empty())
+      std::printf("  %s %s\n", count_text(names.size() - 1).c_str(), row.plural);
   std::printf("  level  cube edge            nodes         size\n");
   for (uint32_t l = 0; l <= file.brick_level(); ++l)
     std::printf("  %5u  %9lld  %15s  %11s%s\n", l, static_cast<long long>(file.resolution() >> l),

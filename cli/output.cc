@@ -32,14 +32,14 @@ nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section)
 
 void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json) {
   for (const Attribute attribute : attributes_of(file).list()) {
-    const nlohmann::ordered_json facts = section_facts(section_of(file, attribute));
-    if (attribute == Attribute::kColor)
+    const voxdag_reader::ColorSection& section = section_of(file, attribute);
+    nlohmann::ordered_json facts = section_facts(section);
+    if (!section.names().empty()) facts["names"] = section.names();
+    if (traits_of(attribute).is_color())
       json["colors"] = facts;
     else
       json["attributes"][name_of(attribute)] = facts;
   }
-  if (!file.material_names().empty())
-    json["attributes"]["material"]["names"] = file.material_names();
 }
 
 void OutputFile::declare_force(Command& command) {

@@ -25,7 +25,10 @@ BuildSpec spec_of(const BuildOptions& options) {
   geometry.voxel_size = options.voxel_size;
   geometry.skip_invalid = options.skip_invalid;
   geometry.hash_bits = options.hash_bits;
-  geometry.attributes = {options.color, options.alpha, options.normal, options.material};
+  geometry.attributes[Attribute::kColor] = options.color;
+  geometry.attributes[Attribute::kAlpha] = options.alpha;
+  geometry.attributes[Attribute::kNormal] = options.normal;
+  geometry.attributes[Attribute::kMaterial] = options.material;
   geometry.color_resolution = options.color_resolution;
   RunOptions& run = spec.run;
   run.output = options.output;

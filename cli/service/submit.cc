@@ -29,9 +29,8 @@ Json options_json(const BuildSpec& spec) {
   if (g.voxel_size) options["voxel_size"] = *g.voxel_size;
   if (g.skip_invalid) options["skip_invalid"] = true;
   if (g.hash_bits != GeometryOptions{}.hash_bits) options["hash_bits"] = g.hash_bits;
-  if (g.attributes.color) options["color"] = true;
-  AttributeSet others = g.attributes;
-  others.color = false;
+  if (g.attributes.has(Attribute::kColor)) options["color"] = true;
+  const AttributeSet others = g.attributes.without(Attribute::kColor);
   if (others.any()) options["attributes"] = others.names();
   if (g.color_resolution != 0) options["color_resolution"] = g.color_resolution;
   if (r.memory_bytes != 0) options["memory"] = r.memory_bytes;

@@ -1,72 +1,91 @@
-// The attributes that cells of the color grid can have, and which of them a build stores.
+// A set of attributes, such as those that a build stores.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
+#include <functional>
+#include <initializer_list>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/color/attributes.h"
 
 namespace voxdag {
 
-// The numbers are those of the kinds of sections in the global file.
-enum class Attribute : uint32_t { kColor = 1, kAlpha = 2, kNormal = 3, kMaterial = 4 };
-
-inline constexpr Attribute kAllAttributes[] = {Attribute::kColor, Attribute::kAlpha,
-                                               Attribute::kNormal, Attribute::kMaterial};
-
-constexpr const char* name_of(Attribute attribute) {
-  constexpr const char* kNames[] = {"color", "alpha", "normal", "material"};
-  return kNames[static_cast<size_t>(attribute) - 1];
-}
-
-struct AttributeSet {
-  bool color = false, alpha = false, normal = false, material = false;
-
-  constexpr bool has(Attribute attribute) const {
-    return attribute == Attribute::kColor    ? color
-           : attribute == Attribute::kAlpha  ? alpha
-           : attribute == Attribute::kNormal ? normal
-                                             : material;
+class AttributeSet {
+ public:
+  constexpr AttributeSet() = default;
+  constexpr AttributeSet(std::initializer_list<Attribute> attributes) {
+    for (const Attribute attribute : attributes) add(attribute);
   }
-  void add(Attribute attribute) {
-    color |= attribute == Attribute::kColor;
-    alpha |= attribute == Attribute::kAlpha;
-    normal |= attribute == Attribute::kNormal;
-    material |= attribute == Attribute::kMaterial;
+  static constexpr AttributeSet all() {
+    AttributeSet set;
+    for (const AttributeTraits& row : kAttributeTable) set.add(row.attribute);
+    return set;
   }
-  constexpr bool any() const { return color || alpha || normal || material; }
-  // Whether some of them depend on textures.
-  constexpr bool shows_images() const { return color || alpha; }
-  bool operator==(const AttributeSet&) const = default;
 
-  // In the order of their numbers.
+  constexpr bool operator[](Attribute attribute) const { return has_[index_of(attribute)]; }
+  constexpr bool& operator[](Attribute attribute) { return has_[index_of(attribute)]; }
+  constexpr bool has(Attribute attribute) const { return (*this)[attribute]; }
+  constexpr void add(Attribute attribute) { (*this)[attribute] = true; }
+  constexpr AttributeSet without(Attribute attribute) const {
+    AttributeSet rest = *this;
+    rest[attribute] = false;
+    return rest;
+  }
+  constexpr bool any() const { return *this != AttributeSet(); }
+  // True if some of them depend on the scene's textures.
+  constexpr bool use_images() const { return any_row(&AttributeTraits::uses_images); }
+  // True if values of some of them are indexes of a list of names.
+  constexpr bool have_names() const { return any_row(&AttributeTraits::has_names); }
+  constexpr bool operator==(const AttributeSet&) const = default;
+
+  // In the order of their sections.
   std::vector<Attribute> list() const {
-    std::vector<Attribute> all;
-    for (const Attribute attribute : kAllAttributes)
-      if (has(attribute)) all.push_back(attribute);
-    return all;
+    std::vector<Attribute> found;
+    for (const AttributeTraits& row : kAttributeTable)
+      if (has(row.attribute)) found.push_back(row.attribute);
+    return found;
   }
   std::vector<std::string> names() const {
-    std::vector<std::string> all;
-    for (const Attribute attribute : list()) all.emplace_back(name_of(attribute));
-    return all;
+    std::vector<std::string> found;
+    for (const Attribute attribute : list()) found.emplace_back(name_of(attribute));
+    return found;
   }
+
+ private:
+  static constexpr size_t index_of(Attribute attribute) {
+    return static_cast<size_t>(attribute) - 1;
+  }
+  constexpr bool any_row(auto AttributeTraits::*property) const {
+    return std::ranges::any_of(kAttributeTable, [&](const AttributeTraits& row) {
+      return has(row.attribute) && std::invoke(property, row);
+    });
+  }
+
+  bool has_[std::size(kAttributeTable)] = {};
 };
 
-// Adds an attribute by its name. Throws Error{kInvalidInput} that names `option`.
-inline void add_attribute(AttributeSet& set, std::string_view name, const std::string& option) {
-  for (const Attribute attribute : kAllAttributes)
-    if (name == name_of(attribute)) return set.add(attribute);
-  throw Error(ErrorCode::kInvalidInput, option + ": '" + std::string(name) +
-                                            "' is no attribute: expected color, alpha, normal or "
-                                            "material");
+// Throws Error{kInvalidInput} that names `option` for a name that is not in the table.
+inline Attribute attribute_named(std::string_view name, const std::string& option) {
+  std::string expected = kAttributeTable[0].name;
+  for (const AttributeTraits& row : kAttributeTable) {
+    if (name == row.name) return row.attribute;
+    if (&row == kAttributeTable) continue;
+    expected += (&row == std::end(kAttributeTable) - 1 ? " or " : ", ") + std::string(row.name);
+  }
+  throw Error(ErrorCode::kInvalidInput,
+              option + ": '" + std::string(name) + "' is no attribute: expected " + expected);
 }
 
-// Those of a comma list.
+inline void add_attribute(AttributeSet& set, std::string_view name, const std::string& option) {
+  set.add(attribute_named(name, option));
+}
+
+// Returns the attributes of a comma list.
 inline AttributeSet parse_attributes(std::string_view text, const std::string& option) {
   AttributeSet set;
   for (size_t at = 0; at <= text.size();) {

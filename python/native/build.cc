@@ -40,7 +40,7 @@ BuildSpec spec_of(std::vector<PathText> scenes, uint64_t resolution, nb::dict op
   take("skip_invalid", spec.geometry.skip_invalid);
   take("hash_bits", spec.geometry.hash_bits);
   std::vector<std::string> attributes;
-  take("color", spec.geometry.attributes.color);
+  take("color", spec.geometry.attributes[Attribute::kColor]);
   take("attributes", attributes);
   for (const std::string& name : attributes)
     add_attribute(spec.geometry.attributes, name, "attributes");

@@ -3,6 +3,7 @@
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
@@ -148,55 +149,40 @@ void nearest(const query::DagFile& dag, const Rows<const int64_t>& points, doubl
   }
 }
 
-// set(row, region, number) for each row of `found` whose cell has the attribute.
-template <class Array, class Set>
-void fill(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
-          const voxdag_reader::ColorSection& section, const Array& found, const Set& set) {
-  expect_length(found.shape(0), points.shape(0));
-  const size_t columns = found.ndim() == 1 ? 1 : found.shape(1);
+// Fills the rows of the cells that have the attribute. `Number`: see attribute_types().
+template <class Number>
+void values(const query::DagFile& dag, const std::string& name, const Rows<const int64_t>& points,
+            uint32_t grid_levels, const nb::ndarray<Number, nb::c_contig, nb::device::cpu>& found) {
+  const Attribute attribute = attribute_named(name, "attributes");
+  const uint32_t components = traits_of(traits_of(attribute).encoding).components;
+  expect_length(found.size(), components * points.shape(0));
   const nb::gil_scoped_release released;
   with_reader_errors([&] {
-    voxdag_reader::ColorCursor cursor(dag.file(), section);
+    voxdag_reader::ColorCursor cursor(dag.file(), section_of(dag.file(), attribute));
     const std::span<const Position> cells = positions_of(points);
     for (size_t i = 0; i < cells.size(); ++i) {
       uint64_t number;
       const auto* const region =
           cursor.find(cells[i][0], cells[i][1], cells[i][2], grid_levels, number);
-      if (region) set(found.data() + columns * i, *region, number);
+      Number* row = found.data() + components * i;
+      if (region)
+        put_value(attribute, *region, number,
+                  [&](auto component) { *row++ = static_cast<Number>(component); });
     }
   });
 }
 
-void colors(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
-            const Rows<uint8_t>& found) {
-  fill(dag, points, grid_levels, dag.file().colors(), found,
-       [](uint8_t* row, const auto& region, uint64_t number) {
-         const voxdag_reader::Rgb rgb = region.color(number);
-         row[0] = rgb.r;
-         row[1] = rgb.g;
-         row[2] = rgb.b;
-       });
-}
-
-void normals(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
-             const Rows<float>& found) {
-  fill(dag, points, grid_levels, dag.file().normals(), found,
-       [](float* row, const auto& region, uint64_t number) {
-         const voxdag_reader::Normal normal = region.normal(number);
-         row[0] = normal.x;
-         row[1] = normal.y;
-         row[2] = normal.z;
-       });
-}
-
-// Alphas and materials.
-template <voxdag_reader::ColorSection const& (voxdag_reader::File::*kSection)() const, class Value>
-void values(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
-            const Column<Value>& found) {
-  fill(dag, points, grid_levels, (dag.file().*kSection)(), found,
-       [](Value* row, const auto& region, uint64_t number) {
-         *row = static_cast<Value>(region.value(number));
-       });
+// The name of each attribute, the components of its values and their numpy type.
+std::vector<std::tuple<std::string, uint32_t, std::string>> attribute_types() {
+  std::vector<std::tuple<std::string, uint32_t, std::string>> all;
+  for (const AttributeTraits& row : kAttributeTable) {
+    const EncodingTraits& encoding = traits_of(row.encoding);
+    const char* const type = row.has_names()                         ? "int64"
+                             : encoding.number == NumberType::kFloat ? "float32"
+                                                                     : "uint8";
+    all.emplace_back(row.name, encoding.components, type);
+  }
+  return all;
 }
 
 // Names are UTF-8, unless the scene had others.
@@ -244,10 +230,10 @@ void bind_dag(nb::module_& module) {
       .def_prop_ro("attributes",
                    [](const query::DagFile& dag) { return attributes_of(dag.file()).names(); })
       .def_prop_ro("material_names", &material_names)
-      .def("colors", &colors)
-      .def("alphas", &values<&voxdag_reader::File::alphas, uint8_t>)
-      .def("normals", &normals)
-      .def("materials", &values<&voxdag_reader::File::materials, int64_t>);
+      .def("values", &values<uint8_t>)
+      .def("values", &values<float>)
+      .def("values", &values<int64_t>);
+  module.def("attribute_types", &attribute_types);
 }
 
 }  // namespace voxdag::python

@@ -7,6 +7,10 @@ import numpy as np
 from . import _native
 from ._error import Error, Path, path_text, thread_count
 
+# By name: the components of a value, and their type. The int64 ones are indexes; -1 means none.
+_ATTRIBUTE_TYPES = {name: (components, np.dtype(dtype))
+                    for name, components, dtype in _native.attribute_types()}
+
 # A half-open box: the low corner x, y, z and the high corner x, y, z.
 Region = Union[Sequence[Any], np.ndarray]
 
@@ -233,14 +237,10 @@ class Dag:
             raise Error(f"{self.path} has no {attribute!r}: expected one of its attributes, "
                         f"{', '.join(self._dag.attributes) or 'none'}", "invalid_input")
         positions = self._positions(points, level, world)
-        rows = len(positions)
-        kinds: Dict[str, Tuple[Tuple[int, ...], Any]] = {
-            "color": ((rows, 3), np.uint8), "alpha": ((rows,), np.uint8),
-            "normal": ((rows, 3), np.float32), "material": ((rows,), np.int64)}
-        shape, dtype = kinds[attribute]
-        values = np.full(shape, -1 if attribute == "material" else 0, dtype)
-        get: Any = getattr(self._dag, attribute + "s")
-        get(positions, self._levels(level), values)
+        components, dtype = _ATTRIBUTE_TYPES[attribute]
+        shape = (len(positions),) if components == 1 else (len(positions), components)
+        values = np.full(shape, -1 if dtype == np.int64 else 0, dtype)
+        self._dag.values(attribute, positions, self._levels(level), values)
         return values
 
     def _levels(self, level: Optional[int]) -> int:

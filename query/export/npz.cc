@@ -7,7 +7,7 @@
 
 #include "core/format/bytes.h"
 #include "core/image/npy_header.h"
-#include "query/export/color/cell_values.h"
+#include "query/export/color/attribute_cursor.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/lookup/bricks.h"
@@ -132,29 +132,34 @@ class NpzWriter {
  public:
   explicit NpzWriter(const ExportJob& job) : job_(job), file_(job.files, job.output) {}
 
-  // Adds an array of `count` numbers; fill(put) calls put(number) for each.
-  template <class Number, class Fill>
-  void add(const char* name, const std::string& header, uint64_t count, const Fill& fill) {
-    NpzMember member{name, header.size() + count * sizeof(Number), file_.size(), 0};
+  // Adds an array of `rows` rows of `components` numbers of a numpy type, such as "<f4". fill(put)
+  // calls put(number) for each number.
+  template <class Fill>
+  void add(const std::string& name, const std::string& type, uint32_t components, uint64_t rows,
+           const Fill& fill) {
+    const std::string columns = components == 1 ? "" : " " + std::to_string(components);
+    const std::string header = npy_header(type, "(" + std::to_string(rows) + "," + columns + ")");
+    const uint64_t row_bytes = components * static_cast<uint64_t>(type.back() - '0');
+    NpzMember member{name + ".npy", header.size() + rows * row_bytes, file_.size(), 0};
     file_.write(local_header(member));
     Crc32 crc;
     crc.add(std::as_bytes(std::span(header)));
     file_.write(header);
-    std::vector<Number> block;
+    std::vector<std::byte> block;
     uint64_t written = 0;
     const auto flush = [&] {
-      crc.add(std::as_bytes(std::span(block)));
-      file_.write(std::as_bytes(std::span(block)));
+      crc.add(block);
+      file_.write(std::span<const std::byte>(block));
+      written += block.size();
       block.clear();
     };
-    fill([&](Number number) {
-      block.push_back(number);
-      ++written;
-      if (block.size() == 8192) flush();
+    fill([&](auto number) {
+      const auto bytes = std::as_bytes(std::span(&number, 1));
+      block.insert(block.end(), bytes.begin(), bytes.end());
+      if (block.size() >= kBlockBytes) flush();
     });
     flush();
-    // In voxels, of three numbers each.
-    require_written(job_, written / 3, count / 3);
+    require_written(job_, written / row_bytes, rows);
     member.crc = crc.value();
     // Only now is the checksum known.
     const uint64_t end = file_.size();
@@ -171,6 +176,7 @@ class NpzWriter {
   }
 
  private:
+  static constexpr size_t kBlockBytes = size_t{64} << 10;
   const ExportJob& job_;
   ExportFile file_;
   std::vector<NpzMember> members_;
@@ -184,6 +190,50 @@ void visit_cells(const ExportJob& job, ExportStage& stage, const VisitCell& visi
   });
 }
 
+// numpy's name of a type, and its description in files.
+struct NumpyType {
+  const char* name;
+  const char* description;
+};
+NumpyType numpy_type(NumberType number) {
+  switch (number) {
+    case NumberType::kUint8:
+      return {"uint8", "|u1"};
+    case NumberType::kUint32:
+      return {"uint32", "<u4"};
+    case NumberType::kFloat:
+      break;
+  }
+  return {"float32", "<f4"};
+}
+
+void add_positions(const ExportJob& job, uint64_t voxels, ExportStage& stage, NpzWriter& writer) {
+  writer.add("cells", "<i4", 3, voxels, [&](const auto& put) {
+    visit_cells(job, stage, [&](const Position& cell) {
+      for (size_t axis = 0; axis < 3; ++axis) put(static_cast<int32_t>(cell[axis]));
+    });
+  });
+  writer.add("positions", "<f8", 3, voxels, [&](const auto& put) {
+    visit_cells(job, stage, [&](const Position& cell) {
+      for (size_t axis = 0; axis < 3; ++axis)
+        put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
+    });
+  });
+}
+
+// Returns the array's description for the report.
+std::string add_values(const ExportJob& job, uint64_t voxels, AttributeCursor& attribute,
+                       ExportStage& stage, NpzWriter& writer) {
+  const NumpyType type = numpy_type(attribute.encoding().number);
+  writer.add(attribute.traits().plural, type.description, attribute.encoding().components, voxels,
+             [&](const auto& put) {
+               visit_cells(job, stage, [&](const Position& cell) { attribute.put(cell, put); });
+             });
+  return std::string(", '") + attribute.traits().plural + "' (" + type.name +
+         (attribute.traits().has_names() ? ", indexes of the names that voxdag info --json prints)"
+                                         : ")");
+}
+
 }  // namespace
 
 ExportReport write_npz(const ExportJob& job) {
@@ -191,64 +241,23 @@ ExportReport write_npz(const ExportJob& job) {
   // No limit of the format is in reach: 2^48 voxels have more bytes than file systems take.
   const uint64_t voxels = require_voxels(job, uint64_t{1} << 48, "an array takes");
   report.voxels = voxels;
-  const bool has_colors = job.has_colors;
-  const std::vector<Attribute> attributes = exported_values(job);
-  uint64_t bytes = 3 * (sizeof(int32_t) + sizeof(double) + (has_colors ? 1 : 0));  // of a voxel
-  for (const Attribute attribute : attributes) bytes += exported_bytes(attribute);
-  require_space(job, voxels * bytes + 4096);
+  std::vector<AttributeCursor> attributes = exported_attributes(job);
+  const uint64_t voxel_bytes = 3 * (sizeof(int32_t) + sizeof(double)) + decoded_bytes(attributes);
+  require_space(job, voxels * voxel_bytes + 4096);
   NpzWriter writer(job);
-  ExportStage stage(job, "export", ((has_colors ? 3 : 2) + attributes.size()) * voxels, "rows");
-  const std::string shape = "(" + std::to_string(voxels) + ", 3)";
-  writer.add<int32_t>("cells.npy", npy_header("<i4", shape), 3 * voxels, [&](const auto& put) {
-    visit_cells(job, stage, [&](const Position& cell) {
-      for (size_t axis = 0; axis < 3; ++axis) put(static_cast<int32_t>(cell[axis]));
-    });
-  });
-  writer.add<double>("positions.npy", npy_header("<f8", shape), 3 * voxels, [&](const auto& put) {
-    visit_cells(job, stage, [&](const Position& cell) {
-      for (size_t axis = 0; axis < 3; ++axis)
-        put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
-    });
-  });
-  if (has_colors)
-    writer.add<uint8_t>("colors.npy", npy_header("|u1", shape), 3 * voxels, [&](const auto& put) {
-      voxdag_reader::ColorCursor colors(job.file);
-      visit_cells(job, stage, [&](const Position& cell) {
-        const voxdag_reader::Rgb color = color_of_cell(job, colors, cell);
-        for (const uint8_t channel : {color.r, color.g, color.b}) put(channel);
-      });
-    });
-  const std::string column = "(" + std::to_string(voxels) + ",)";
-  const auto add_values = [&]<class Number>(Number, const char* name, const std::string& header,
-                                            Attribute attribute, uint64_t count) {
-    writer.add<Number>(name, header, count, [&](const auto& put) {
-      CellValueCursor values(job, attribute);
-      visit_cells(job, stage, [&](const std::array<int64_t, 3>& cell) {
-        values.put(cell, [&](auto number) { put(static_cast<Number>(number)); });
-      });
-    });
-  };
-  for (const Attribute attribute : attributes) {
-    if (attribute == Attribute::kAlpha)
-      add_values(uint8_t{}, "alphas.npy", npy_header("|u1", column), attribute, voxels);
-    else if (attribute == Attribute::kNormal)
-      add_values(float{}, "normals.npy", npy_header("<f4", shape), attribute, 3 * voxels);
-    else
-      add_values(uint32_t{}, "materials.npy", npy_header("<u4", column), attribute, voxels);
-  }
-  writer.add<double>("grid.npy", npy_header("<f8", "(4,)"), 4, [&](const auto& put) {
+  ExportStage stage(job, "export", (2 + attributes.size()) * voxels, "rows");
+  add_positions(job, voxels, stage, writer);
+  std::string arrays =
+      "numpy.load() gives 'cells' (int32), 'positions' (their centers, float64), 'grid' (low "
+      "corner of the grid and edge of a voxel)";
+  for (AttributeCursor& attribute : attributes)
+    arrays += add_values(job, voxels, attribute, stage, writer);
+  writer.add("grid", "<f8", 1, 4, [&](const auto& put) {
     for (size_t axis = 0; axis < 3; ++axis) put(job.file.origin()[axis]);
     put(job.cell_edge());
   });
   report.bytes = writer.finish();
-  report.notes.push_back(
-      "numpy.load() gives 'cells' (int32), 'positions' (their centers, float64) and 'grid' (low "
-      "corner of the grid and edge of a voxel)" +
-      std::string(has_colors ? ", and 'colors' (sRGB, uint8)" : ""));
-  if (!attributes.empty())
-    report.notes.push_back(
-        "what the file has of 'alphas' (uint8), 'normals' (float32) and 'materials' (uint32, "
-        "numbers in the list that voxdag info --json prints) is there, too");
+  report.notes.push_back(arrays);
   return report;
 }
 

@@ -1,11 +1,11 @@
 // PLY, binary: the centers of the voxels as doubles, since floats cannot tell the voxels of a large
-// grid apart, and their colors and other attributes, if the file has some. The format: Greg Turk,
+// grid apart, and the attributes of the file. The format: Greg Turk,
 // "The PLY Polygon File Format", 1994.
 #include <bit>
 #include <string>
 #include <vector>
 
-#include "query/export/color/cell_values.h"
+#include "query/export/color/attribute_cursor.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/lookup/bricks.h"
@@ -16,17 +16,23 @@ namespace {
 // Most readers count vertices in 32-bit integers.
 constexpr uint64_t kMaxPlyVertices = (uint64_t{1} << 31) - 1;
 
-const char* properties_of(Attribute attribute) {
-  if (attribute == Attribute::kAlpha) return "property uchar alpha\n";
-  if (attribute == Attribute::kMaterial) return "property uint material\n";
-  return "property float nx\nproperty float ny\nproperty float nz\n";
+std::string property_lines(const AttributeCursor& attribute) {
+  const NumberType number = attribute.encoding().number;
+  const char* const type = number == NumberType::kUint8    ? "uchar"
+                           : number == NumberType::kUint32 ? "uint"
+                                                           : "float";
+  std::string lines;
+  for (uint32_t i = 0; i < attribute.encoding().components; ++i)
+    lines += std::string("property ") + type + " " + attribute.traits().ply_properties[i] + "\n";
+  return lines;
 }
 
-std::string ply_header(uint64_t vertices, bool has_colors, const std::string& more) {
-  return "ply\nformat binary_little_endian 1.0\ncomment voxel centers by voxdag\nelement vertex " +
-         std::to_string(vertices) + "\nproperty double x\nproperty double y\nproperty double z\n" +
-         (has_colors ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "") +
-         more + "end_header\n";
+std::string ply_header(uint64_t vertices, std::span<const AttributeCursor> attributes) {
+  std::string header =
+      "ply\nformat binary_little_endian 1.0\ncomment voxel centers by voxdag\nelement vertex " +
+      std::to_string(vertices) + "\nproperty double x\nproperty double y\nproperty double z\n";
+  for (const AttributeCursor& attribute : attributes) header += property_lines(attribute);
+  return header + "end_header\n";
 }
 
 }  // namespace
@@ -34,18 +40,10 @@ std::string ply_header(uint64_t vertices, bool has_colors, const std::string& mo
 ExportReport write_ply(const ExportJob& job) {
   ExportReport report;
   report.voxels = require_voxels(job, kMaxPlyVertices, "readers of PLY take");
-  const bool has_colors = job.has_colors;
-  std::string properties;
-  uint64_t bytes = 3 * sizeof(double) + (has_colors ? 3 : 0);  // of a voxel
-  std::vector<CellValueCursor> values;
-  for (const Attribute attribute : exported_values(job)) {
-    properties += properties_of(attribute);
-    bytes += exported_bytes(attribute);
-    values.emplace_back(job, attribute);
-  }
-  const std::string header = ply_header(report.voxels, has_colors, properties);
-  require_space(job, header.size() + report.voxels * bytes);
-  voxdag_reader::ColorCursor colors(job.file);
+  std::vector<AttributeCursor> attributes = exported_attributes(job);
+  const std::string header = ply_header(report.voxels, attributes);
+  require_space(job,
+                header.size() + report.voxels * (3 * sizeof(double) + decoded_bytes(attributes)));
   ExportFile file(job.files, job.output);
   file.write(header);
   ExportStage stage(job, "export", report.voxels, "voxels");
@@ -54,8 +52,8 @@ ExportReport write_ply(const ExportJob& job) {
     for_each_cell_of(brick, [&](const Position& cell) {
       for (size_t axis = 0; axis < 3; ++axis)
         file.put(job.world(axis, static_cast<double>(cell[axis]) + 0.5));
-      if (has_colors) file.put(color_of_cell(job, colors, cell));
-      for (CellValueCursor& value : values) value.put(cell, [&](auto number) { file.put(number); });
+      for (AttributeCursor& attribute : attributes)
+        attribute.put(cell, [&](auto number) { file.put(number); });
     });
     const auto voxels = static_cast<uint64_t>(std::popcount(brick.mask));
     written_voxels += voxels;

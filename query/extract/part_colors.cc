@@ -2,18 +2,16 @@
 
 #include <algorithm>
 #include <bit>
-#include <functional>
-#include <utility>
 #include <vector>
 
 #include "core/base/page_buffer.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
 #include "core/color/blocks/value_region.h"
+#include "core/color/cell_values.h"
 #include "core/color/color_of.h"
+#include "core/format/color/attribute_section_writer.h"
 #include "core/format/color/color_layout.h"
-#include "core/format/color/color_section_writer.h"
-#include "core/format/color/value_section_writer.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
 #include "query/dag/dag_view.h"
@@ -33,8 +31,9 @@ constexpr uint64_t kWorkerBytes =
     CheckedReader::kBlockBytes;
 // Of a region: colors, or values and those of the coarser levels.
 uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
-  if (attribute == Attribute::kColor) return kMaxRegionCells * 3 / 4;
-  return kMaxRegionCells * 5 / 4 * value_bytes(attribute, file.material_names().size());
+  if (traits_of(attribute).is_color()) return kMaxRegionCells * 3 / 4;
+  return kMaxRegionCells * 5 / 4 *
+         value_bytes(attribute, section_of(file, attribute).names().size());
 }
 // Regions that are encoded at a time.
 constexpr size_t kBatchRegions = 32;
@@ -88,7 +87,7 @@ class PartColors {
              unsigned threads, const CancelToken& cancel)
       : part_(part),
         file_(part.file),
-        attribute_(attribute),
+        traits_(traits_of(attribute)),
         section_(section_of(part.file, attribute)),
         dag_(part.file),
         source_(files, part.file, budget),
@@ -116,9 +115,9 @@ class PartColors {
       source_.check(offset_of(tier.directory), tier.region_count * color_layout::kRegionEntryBytes,
                     block);
     }
-    // The list of materials follows the last directory.
+    // The list of names follows the last directory.
     const ColorTier& last = section_.tier(section_.tier_count() - 1);
-    if (attribute_ == Attribute::kMaterial)
+    if (traits_.has_names())
       source_.check(offset_of(last.directory) + last.region_count * color_layout::kRegionEntryBytes,
                     list_bytes(section_.names()), block);
   }
@@ -139,9 +138,9 @@ class PartColors {
   EncodedRegion encode(const PlacedCube& cube) {
     pages_.check();
     const uint32_t level = region_level(0);
-    if (attribute_ == Attribute::kColor && is_copied(0, cube.code)) return copy(0, cube.code);
+    if (traits_.is_color() && is_copied(0, cube.code)) return copy(0, cube.code);
     check_colors(finest_, level, cube.code);
-    if (attribute_ != Attribute::kColor) return encode_valued(cube);
+    if (!traits_.is_color()) return encode_valued(cube);
     voxdag_reader::ColorCursor colors(file_);
     std::vector<ColoredCell> cells;
     const uint64_t first = cube.code << 3 * depth_of(0);
@@ -167,15 +166,13 @@ class PartColors {
       if (!region) file_.broken_colors("a cell of the DAG has none");
       bytes = region->block_bytes / 32;
       const uint32_t value = region->value(i);
-      if (attribute_ == Attribute::kMaterial && value >= section_.names().size())
-        file_.broken_colors("a cell has a material that is not in the list");
-      if (attribute_ == Attribute::kNormal && ((value & 0xff) == 0xff || value >> 8 == 0xff))
-        file_.broken_colors("a normal has a byte of 255");
+      if (const char* expected = value_error(traits_.encoding, value, section_.names().size()))
+        file_.broken_colors("a value of the " + std::string(traits_.plural) + ": " + expected);
       cells.push_back({static_cast<uint32_t>(cell.code - first), value});
     });
     cancel_.check();
-    return encode_values(attribute_, bytes, depth_of(0), morton_in_part(region_level(0), cube.code),
-                         cells);
+    return encode_values(traits_.attribute, bytes, depth_of(0),
+                         morton_in_part(region_level(0), cube.code), cells);
   }
 
   // Of a tier above the finest; `morton` is that of the part.
@@ -310,7 +307,7 @@ class PartColors {
 
   const ColoredPart& part_;
   const voxdag_reader::File& file_;
-  const Attribute attribute_;
+  const AttributeTraits& traits_;
   const ColorSection& section_;
   const DagView dag_;
   CheckedReader source_;
@@ -324,10 +321,9 @@ class PartColors {
 // Encodes regions on all threads, and writes them in order.
 class RegionWriter {
  public:
-  using AddRegion = std::function<void(const EncodedRegion& region)>;
-
-  RegionWriter(PartColors& colors, AddRegion add, unsigned workers, Progress& progress)
-      : colors_(colors), add_(std::move(add)), workers_(workers), progress_(progress) {
+  RegionWriter(PartColors& colors, AttributeSectionWriter& section, unsigned workers,
+               Progress& progress)
+      : colors_(colors), section_(section), workers_(workers), progress_(progress) {
     batch_.reserve(kBatchRegions);
   }
   void add(const PlacedCube& cube) {
@@ -340,7 +336,7 @@ class RegionWriter {
         workers_, batch_.size(),
         [&](unsigned, size_t i) { regions[i] = colors_.encode(batch_[i]); },
         [&](unsigned, size_t i) {
-          add_(regions[i]);
+          section_.add_region(regions[i]);
           regions[i] = {};
         });
     progress_.advance(batch_.size());
@@ -349,7 +345,7 @@ class RegionWriter {
 
  private:
   PartColors& colors_;
-  const AddRegion add_;
+  AttributeSectionWriter& section_;
   const unsigned workers_;
   Progress& progress_;
   std::vector<PlacedCube> batch_;
@@ -374,25 +370,15 @@ void write_part_attribute(const ColoredPart& part, Attribute attribute, FileSyst
   const MemoryCharge work(budget, workers * kWorkerBytes, "the cells of colored regions");
   PartColors colors(part, attribute, files, budget, workers, cancel);
   colors.check_index();
-  const auto add_regions = [&](auto& section) {
-    RegionWriter writer(
-        colors, [&](const EncodedRegion& region) { section.add_region(region); }, workers,
-        progress);
-    colors.for_each_region([&](const PlacedCube& cube) { writer.add(cube); });
-    writer.flush();
-    section.finish();
-  };
-  if (attribute == Attribute::kColor) {
-    ColorSectionWriter section(
-        out, colors.levels(), budget,
-        [&](uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
-          return colors.encode_coarse(tier, morton, cells);
-        });
-    add_regions(section);
-  } else {
-    ValueSectionWriter section(out, attribute, colors.levels(), part.file.material_names(), budget);
-    add_regions(section);
-  }
+  AttributeSectionWriter section(
+      out, attribute, colors.levels(), section_of(part.file, attribute).names(), budget,
+      [&](uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
+        return colors.encode_coarse(tier, morton, cells);
+      });
+  RegionWriter writer(colors, section, workers, progress);
+  colors.for_each_region([&](const PlacedCube& cube) { writer.add(cube); });
+  writer.flush();
+  section.finish();
   part.file.release_pages();
   progress.end_stage();
 }

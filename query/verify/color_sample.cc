@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/color/blocks/value_region.h"
+#include "core/color/blocks/attribute_encoder.h"
 #include "core/color/rule/bake_region.h"
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
@@ -21,7 +21,7 @@ using voxdag_reader::ColorTier;
 
 struct SampledRegion {
   // By attribute, in the order of their numbers; those that the file has.
-  std::array<ColorRegion, std::size(kAllAttributes)> stored;
+  std::array<ColorRegion, std::size(kAttributeTable)> stored;
   Cube cube;
   std::vector<FixedSurface> surfaces;  // that may touch it
 };
@@ -126,25 +126,23 @@ class RegionComparison {
     const ColorRegion& stored = region.stored[index_of(attribute)];
     const EncodedRegion baked = encode(region.cube, attribute, stored);
     if (is_same(baked, stored)) return true;
-    const bool is_near = attribute == Attribute::kColor && baked.counts[0] == stored.counts[0] &&
+    const bool is_near = traits_of(attribute).is_color() && baked.counts[0] == stored.counts[0] &&
                          difference(baked, stored).psnr() >= kMinSamplePsnr;
     if (!is_near)
       throw Error(ErrorCode::kCorrupt,
-                  file_.path() + ": the " + name_of(attribute) + "s of the region at color cell " +
-                      place_of(region.cube, grid_) + " are not those of the scene (" +
-                      std::to_string(stored.counts[0]) + " cells in the file, " +
-                      std::to_string(baked.counts[0]) + " in the scene)");
+                  file_.path() + ": the " + traits_of(attribute).plural +
+                      " of the region at color cell " + place_of(region.cube, grid_) +
+                      " are not those of the scene (" + std::to_string(stored.counts[0]) +
+                      " cells in the file, " + std::to_string(baked.counts[0]) + " in the scene)");
     return false;
   }
 
  private:
   EncodedRegion encode(const Cube& cube, Attribute attribute, const ColorRegion& stored) const {
     if (cells_.empty()) return {};
-    const uint32_t levels = grid_.color_levels - cube.level;
-    if (attribute == Attribute::kColor) return encode_region(levels, stored.morton, cells_);
-    std::vector<ValuedCell> valued;
-    append_values(attribute, cells_, values_, 0, valued);
-    return encode_values(attribute, stored.block_bytes / 32, levels, stored.morton, valued);
+    AttributeEncoder encoder(attribute, stored.block_bytes / 32, grid_.color_levels - cube.level);
+    encoder.add(cells_, values_, 0);
+    return encoder.finish(stored.morton);
   }
 
   const voxdag_reader::File& file_;
@@ -178,9 +176,9 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
   find_surfaces(scene, snap, grid, regions, charge, progress, cancel);
   SceneMaterials materials = scene.materials();
   materials.name_unlisted();
-  if (attributes.material && file.material_names() != materials.names)
+  if (attributes.have_names() && file.material_names() != materials.names)
     throw Error(ErrorCode::kCorrupt, file.path() + ": its materials are not those of the scene");
-  if (!attributes.shows_images()) materials.drop_images();
+  if (!attributes.use_images()) materials.drop_images();
   progress.begin_stage("images", materials.images.size(), "images");
   const auto textures =
       TextureSet::prepare(files, materials, scratch_path, threads, budget, progress, cancel);

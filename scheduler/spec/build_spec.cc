@@ -11,7 +11,7 @@ std::string geometry_json(const GeometryOptions& options) {
   if (options.bounds) json["bounds"] = *options.bounds;
   if (options.voxel_size) json["voxel_size"] = *options.voxel_size;
   if (options.attributes.any()) json["color_resolution"] = options.color_resolution;
-  if (options.attributes.any() && options.attributes != AttributeSet{.color = true})
+  if (options.attributes.any() && options.attributes != AttributeSet{Attribute::kColor})
     json["attributes"] = options.attributes.names();
   return json.dump();
 }

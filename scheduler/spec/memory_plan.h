@@ -87,7 +87,7 @@ struct ColorMemory {
   static constexpr uint64_t kValueSumBytes = uint64_t{4} << 20;
 
   static constexpr uint64_t value_bytes(const AttributeSet& attributes) {
-    return attributes.alpha || attributes.normal || attributes.material ? kValueBytes : 0;
+    return attributes.without(Attribute::kColor).any() ? kValueBytes : 0;
   }
 
   unsigned workers = 1;

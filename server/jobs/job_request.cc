@@ -145,14 +145,13 @@ void read_options(const ordered_json& options, BuildSpec& spec) {
         [&](const auto& v) {
           g.hash_bits = static_cast<uint32_t>(count_of(v, "hash_bits", 4, 64));
         }},
-       {"color", [&](const auto& v) { g.attributes.color |= flag_of(v, "color"); }},
+       {"color", [&](const auto& v) { g.attributes[Attribute::kColor] |= flag_of(v, "color"); }},
        {"attributes",
         [&](const auto& v) {
           for (const std::string& name : texts_of(v, "attributes"))
-            add_attribute(
-                g.attributes,
-                one_of(ordered_json(name), "attributes", {"color", "alpha", "normal", "material"}),
-                "attributes");
+            add_attribute(g.attributes,
+                          one_of(ordered_json(name), "attributes", AttributeSet::all().names()),
+                          "attributes");
         }},
        {"color_resolution",
         [&](const auto& v) { g.color_resolution = power_of_two(v, "color_resolution", 4); }},

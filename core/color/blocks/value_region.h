@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "core/color/attributes.h"
 #include "core/color/blocks/region.h"
-#include "core/color/cell_values.h"
 
 namespace voxdag {
 
@@ -18,14 +18,9 @@ struct ValuedCell {
   uint32_t value = 0;  // below 256^bytes
 };
 
-// Appends the values that baked cells have, their codes counted from `first_code`. `values` has one
-// for each cell, unless the attribute is alpha.
-void append_values(Attribute attribute, std::span<const ColoredCell> cells,
-                   std::span<const CellValues> values, uint32_t first_code,
-                   std::vector<ValuedCell>& out);
-
-// What encode_region() is for colors; `total` stays zero. Coarser cells get value_of_parent().
-// Thread-safe. Memory: up to 10 bytes for each cell, aside from what is returned.
+// Encodes a region, as encode_region() does for colors, and leaves `total` zero. Coarser cells get
+// the attribute's value_of_parent(). Thread-safe. Memory: up to 10 bytes for each cell, aside from
+// the result.
 EncodedRegion encode_values(Attribute attribute, uint32_t bytes, uint32_t levels, uint64_t morton,
                             std::span<const ValuedCell> cells);
 

@@ -133,68 +133,89 @@ class RegionBaker {
     return axes >= 2;
   }
 
+  // Adds a triangle to the cells of which it covers columns. Cells are collected in a batch, so
+  // that they are on their way from memory while others are found.
+  template <class Int>
+  class CoveredCells {
+   public:
+    CoveredCells(RegionBaker& baker, const FixedSurface& surface,
+                 const color::CellTriangle<Int>& triangle)
+        : baker_(baker), surface_(surface), triangle_(triangle), covered_(triangle) {}
+    void add(int64_t p, int64_t q, uint32_t columns, uint32_t code) {
+      baker_.cells_.prefetch(code);
+      batch_[collected_].p = p;
+      batch_[collected_].q = q;
+      batch_[collected_].columns = columns;
+      batch_[collected_].cell = code;
+      if (++collected_ == kBatch) flush();
+    }
+    void flush() {
+      if (collected_ == 0) return;
+      if (!look_)
+        look_.emplace(surface_, baker_.materials_[surface_.material], baker_.textures_,
+                      triangle_.cell_bits, triangle_.area);
+      for (Cell& added : std::span(batch_).first(collected_)) {
+        const color::ColumnTotals totals = color::totals_of(added.columns);
+        added.weight = covered_.weight(totals);
+        added.spot = look_->spot_at(covered_.mean_point(added.p, added.q, totals));
+        added.cell = baker_.cells_.cover(added.cell);
+      }
+      for (const Cell& added : std::span(batch_).first(collected_))
+        look_->add(added.spot, added.weight, baker_.cells_.sum(added.cell));
+      if (baker_.cells_.attributes().is_needed()) add_attributes();
+      collected_ = 0;
+    }
+
+   private:
+    static constexpr size_t kBatch = 32;
+    struct Cell {
+      int64_t p, q;
+      uint32_t columns, cell, weight;  // `cell`: the code, from cover() on the number
+      typename color::SurfaceLook<Textures>::Spot spot;
+    };
+
+    void add_attributes() {
+      if (!facing_) facing_.emplace(baker_.facing_of(surface_));
+      for (const Cell& added : std::span(batch_).first(collected_))
+        baker_.cells_.attributes().add(
+            added.cell, *facing_, static_cast<uint32_t>(popcount64(added.columns)), added.weight);
+    }
+
+    RegionBaker& baker_;
+    const FixedSurface& surface_;
+    const color::CellTriangle<Int>& triangle_;
+    const color::CoveredSurface<Int> covered_;
+    std::optional<color::SurfaceLook<Textures>> look_;
+    std::optional<color::SurfaceFacing> facing_;
+    Cell batch_[kBatch];
+    size_t collected_ = 0;
+  };
+
   template <class Int>
   void add_in(uint32_t index, const CellBox& box) {
     const FixedSurface& surface = triangles_[index];
     const color::CellTriangle<Int> triangle(surface.position, grid_.cell_bits());
     color::CellRange range;
+    const uint32_t* spread[3];
+    int64_t low[3];
     for (int d = 0; d < 3; ++d) {
       const int a = triangle.axis[d];
       range.first[d] = std::max(box.low[a], first_[a]);
       range.last[d] = std::min(box.high[a], last_[a]);
+      spread[d] = spread_[a];
+      low[d] = first_[a];
     }
-    const color::CoveredSurface<Int> covered(triangle);
-    std::optional<color::SurfaceLook<Textures>> look;
-    std::optional<color::SurfaceFacing> facing;
-    // Cells are collected, so that they are on their way from memory while others are found.
-    constexpr size_t kBatch = 32;
-    struct {
-      int64_t p, q;
-      uint32_t columns, cell, weight;
-      typename color::SurfaceLook<Textures>::Spot spot;
-    } batch[kBatch];
-    size_t collected = 0;
-    const auto add_batch = [&] {
-      if (collected == 0) return;
-      if (!look)
-        look.emplace(surface, materials_[surface.material], textures_, triangle.cell_bits,
-                     triangle.area);
-      for (size_t i = 0; i < collected; ++i) {
-        auto& [p, q, columns, cell, weight, spot] = batch[i];
-        const color::ColumnTotals totals = color::totals_of(columns);
-        weight = covered.weight(totals);
-        spot = look->spot_at(covered.mean_point(p, q, totals));
-        cell = cells_.cover(cell);
-      }
-      for (size_t i = 0; i < collected; ++i)
-        look->add(batch[i].spot, batch[i].weight, cells_.sum(batch[i].cell));
-      if (cells_.attributes().is_needed()) {
-        if (!facing) facing.emplace(facing_of(surface));
-        for (size_t i = 0; i < collected; ++i)
-          cells_.attributes().add(batch[i].cell, *facing,
-                                  static_cast<uint32_t>(popcount64(batch[i].columns)),
-                                  batch[i].weight);
-      }
-      collected = 0;
-    };
-    const uint32_t* spread[3];
-    for (int d = 0; d < 3; ++d) spread[d] = spread_[triangle.axis[d]];
-    const int64_t low[3] = {first_[triangle.axis[0]], first_[triangle.axis[1]],
-                            first_[triangle.axis[2]]};
+    CoveredCells<Int> covered(*this, surface, triangle);
     color::TouchedCells<Int>(triangle, range)
         .visit([&](int64_t p, int64_t q, int64_t r, uint32_t columns) {
           const uint32_t code =
               spread[0][p - low[0]] | spread[1][q - low[1]] | spread[2][r - low[2]];
-          if (columns == 0) return wait(index, code);
-          cells_.prefetch(code);
-          auto& added = batch[collected++];
-          added.p = p;
-          added.q = q;
-          added.columns = columns;
-          added.cell = code;
-          if (collected == kBatch) add_batch();
+          if (columns == 0)
+            wait(index, code);
+          else
+            covered.add(p, q, columns, code);
         });
-    add_batch();
+    covered.flush();
   }
 
   void wait(uint32_t index, uint32_t code) {

@@ -1,6 +1,7 @@
 // Opens global files with the standalone reader, and translates its errors to Error.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -46,21 +47,49 @@ auto naming_file(const std::string& path, const Use& use) {
   }
 }
 
+// The reader, which stands alone, repeats the table's numbers.
+static_assert(std::ranges::all_of(kAttributeTable, [](const AttributeTraits& row) {
+  const auto kind = static_cast<uint32_t>(row.attribute);
+  return kind < voxdag_reader::kEndOfKinds &&
+         voxdag_reader::kKindBlockBytes[kind] == traits_of(row.encoding).block_bytes;
+}));
+
 // The section of an attribute; one without tiers if the file has none.
 inline const voxdag_reader::ColorSection& section_of(const voxdag_reader::File& file,
                                                      Attribute attribute) {
-  return attribute == Attribute::kColor    ? file.colors()
-         : attribute == Attribute::kAlpha  ? file.alphas()
-         : attribute == Attribute::kNormal ? file.normals()
-                                           : file.materials();
+  return file.section(static_cast<uint32_t>(attribute));
 }
 
-// What the cells of a file have.
+// The attributes that a file has.
 inline AttributeSet attributes_of(const voxdag_reader::File& file) {
   AttributeSet set;
-  for (const Attribute attribute : kAllAttributes)
-    if (section_of(file, attribute).tier_count() > 0) set.add(attribute);
+  for (const AttributeTraits& row : kAttributeTable)
+    if (section_of(file, row.attribute).tier_count() > 0) set.add(row.attribute);
   return set;
+}
+
+// Calls put(number) for each component of a stored value.
+template <class Put>
+void put_value(Attribute attribute, const voxdag_reader::ColorRegion& region, uint64_t i,
+               const Put& put) {
+  switch (traits_of(attribute).encoding) {
+    case Encoding::kColorBlock: {
+      const voxdag_reader::Rgb rgb = region.color(i);
+      for (const uint8_t channel : {rgb.r, rgb.g, rgb.b}) put(channel);
+      break;
+    }
+    case Encoding::kByte:
+      put(static_cast<uint8_t>(region.value(i)));
+      break;
+    case Encoding::kOctahedral: {
+      const voxdag_reader::Normal normal = region.normal(i);
+      for (const float component : {normal.x, normal.y, normal.z}) put(component);
+      break;
+    }
+    case Encoding::kNameIndex:
+      put(region.value(i));
+      break;
+  }
 }
 
 // The bytes of a file, and the file of such bytes: whoever watches the mapping for pages that

@@ -171,32 +171,32 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
     std::memcpy(&value, file_.data() + entry + at, sizeof(value));
     return value;
   };
-  const std::string name = name_of(attribute);
+  const std::string plural = traits_of(attribute).plural;
   const voxdag_reader::ColorSection& section = section_of(file_, attribute);
   uint64_t cells = 0, finest_cells = 0;
   for (uint32_t t = 0; t < section.tier_count(); ++t) cells += section.tier(t).cell_count;
   for (uint64_t i = 0; i < section.tier(0).region_count; ++i) {
     voxdag_reader::ColorRegion region;
     if (!voxdag_reader::ColorSection::region(section.tier(0), i, region))
-      broken(file_.path() + ": " + name + "s", "region " + std::to_string(i) + " is damaged");
+      broken(file_.path() + ": " + plural, "region " + std::to_string(i) + " is damaged");
     finest_cells += region.counts[0];
   }
   if (field(kAttributeCellsAt) != cells || field(kAttributeFinestCellsAt) != finest_cells)
-    broken(file_.path() + ": header", std::to_string(field(kAttributeCellsAt)) + " " + name +
-                                          "s, the section has " + std::to_string(cells));
+    broken(file_.path() + ": header", std::to_string(field(kAttributeCellsAt)) + " " + plural +
+                                          ", the section has " + std::to_string(cells));
   // Behind the names, up to the tier table.
   const uint64_t end = field(kAttributeOffsetAt) + field(kAttributeBytesAt);
-  if (attribute == Attribute::kMaterial) {
+  if (traits_of(attribute).has_names()) {
     const voxdag_reader::ColorTier& last = section.tier(section.tier_count() - 1);
     const uint64_t names = static_cast<uint64_t>(last.directory - file_.data()) +
                            32 * last.region_count + list_bytes(section.names());
     const uint64_t tiers = end - 32 * section.tier_count();
     if (tiers != (names + 15) / 16 * 16 || !section.names().back().empty())
-      broken(file_.path() + ": materials",
+      broken(file_.path() + ": " + plural,
              "expected a list that ends with an empty name, up to the next multiple of 16 bytes");
-    check_zeros(names, tiers, "padding after the names of materials");
+    check_zeros(names, tiers, "padding after the names of " + plural);
   }
-  check_zeros(end, round_up_to_page(end), "padding after the " + name + "s");
+  check_zeros(end, round_up_to_page(end), "padding after the " + plural);
   check_zeros(entry + kAttributeReservedAt, entry + kAttributeEntryBytes, "reserved");
 }
 

@@ -65,7 +65,10 @@ class CellWalk {
 class ColorVerifier {
  public:
   ColorVerifier(const voxdag_reader::File& file, Attribute attribute)
-      : file_(file), attribute_(attribute), section_(section_of(file, attribute)), cells_(file) {}
+      : file_(file),
+        traits_(traits_of(attribute)),
+        section_(section_of(file, attribute)),
+        cells_(file) {}
 
   bool is_number_of_regions(const ColorTier& tier) const {
     return cells_.count(0, 0, tier.region_level, tier.region_count) == tier.region_count;
@@ -90,8 +93,7 @@ class ColorVerifier {
       if (coarser >= kPrefixLevels && coarser - kPrefixLevels < 2 && level > tier.region_level)
         prefix[coarser - kPrefixLevels].push_back(counts[coarser - kPrefixLevels]);
       ++counts[coarser];
-      if (coarser == 0 && attribute_ != Attribute::kColor)
-        finest.push_back({static_cast<uint32_t>(code), 0});
+      if (coarser == 0 && !traits_.is_color()) finest.push_back({static_cast<uint32_t>(code), 0});
     };
     cells_.walk(tier.region_level, place, 0, tier.finest_level, visit);
     if (!std::equal(counts.begin(), counts.end(), region.counts))
@@ -101,7 +103,7 @@ class ColorVerifier {
         if (region.prefix(table, entry) != prefix[table][entry])
           fail(tier, i, "prefix " + std::to_string(entry) + " is not the number of cells before");
     check_padding(tier, i, region);
-    if (attribute_ == Attribute::kColor)
+    if (traits_.is_color())
       check_blocks(tier, i, region);
     else
       check_values(tier, i, region, finest);
@@ -109,7 +111,7 @@ class ColorVerifier {
   }
 
   [[noreturn]] void fail(const ColorTier& tier, uint64_t i, const std::string& what) const {
-    throw Error(ErrorCode::kCorrupt, file_.path() + ": " + name_of(attribute_) + "s of level " +
+    throw Error(ErrorCode::kCorrupt, file_.path() + ": " + traits_.plural + " of level " +
                                          std::to_string(tier.finest_level) + ", region " +
                                          std::to_string(i) + ": " + what);
   }
@@ -140,16 +142,14 @@ class ColorVerifier {
     };
     for (size_t at = 0; at < cells.size(); ++at) {
       const uint32_t value = cells[at].value = region.value(at);
-      if (attribute_ == Attribute::kNormal && ((value & 255) == 255 || value >> 8 == 255))
-        fail_at(at, "expected bytes up to 254");
-      if (attribute_ == Attribute::kMaterial && value >= section_.names().size())
-        fail_at(at, "expected one of " + std::to_string(section_.names().size()) + " materials");
+      if (const char* expected = value_error(traits_.encoding, value, section_.names().size()))
+        fail_at(at, expected);
       if (tier.finest_level != section_.color_levels() &&
           value != value_from_below(tier,
                                     region.morton << 3 * (region.level_count - 1) | cells[at].code))
         fail_at(at, "expected that of its children");
     }
-    const EncodedRegion expected = encode_values(attribute_, region.block_bytes / 32,
+    const EncodedRegion expected = encode_values(traits_.attribute, region.block_bytes / 32,
                                                  region.level_count - 1, region.morton, cells);
     const auto* const stored = reinterpret_cast<const std::byte*>(region.blocks);
     const auto differing = std::mismatch(expected.blocks.begin(), expected.blocks.end(), stored);
@@ -173,7 +173,7 @@ class ColorVerifier {
       children[count++] = region.value(region.cells - 1);
     }
     if (count == 0) fail(tier, 0, "a cell has no regions below");
-    return value_of_parent(attribute_, std::span(children, count));
+    return traits_.value_of_parent(std::span(children, count));
   }
 
   static bool is_canonical(const unsigned char* block, unsigned cells) {
@@ -195,7 +195,7 @@ class ColorVerifier {
   }
 
   const voxdag_reader::File& file_;
-  const Attribute attribute_;
+  const AttributeTraits& traits_;
   const ColorSection& section_;
   const CellWalk cells_;
 };
@@ -208,7 +208,7 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
     const ColorTier& tier = section.tier(t);
     if (!verifier.is_number_of_regions(tier))
       verifier.fail(tier, tier.region_count, "the DAG has another number of regions");
-    progress.begin_stage("verify " + std::string(name_of(attribute)) + "s", tier.region_count,
+    progress.begin_stage("verify " + std::string(traits_of(attribute).plural), tier.region_count,
                          "regions");
     std::atomic<uint64_t> cells = 0;
     parallel_for(threads, tier.region_count, [&](unsigned, size_t i) {
@@ -237,8 +237,8 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
 void verify_colors(const voxdag_reader::File& file, unsigned threads, Progress& progress,
                    const CancelToken& cancel) {
   with_reader_errors([&] {
-    for (const Attribute attribute : kAllAttributes)
-      verify_section(file, attribute, threads, progress, cancel);
+    for (const AttributeTraits& row : kAttributeTable)
+      verify_section(file, row.attribute, threads, progress, cancel);
   });
 }
 

@@ -256,45 +256,36 @@ class File {
   // Whether cells have colors: those of the levels 0 to color_levels(). An empty scene has none.
   bool has_colors() const { return colors().tier_count() > 0; }
   uint32_t color_levels() const { return colors().color_levels(); }
-  const ColorSection& colors() const { return sections_[0]; }
+  // The section of an attribute. It has no tiers if the file has none of that kind.
+  const ColorSection& section(uint32_t kind) const { return sections_[kind - 1]; }
+  const ColorSection& colors() const { return section(kColors); }
+  const ColorSection& alphas() const { return section(kAlphas); }
+  const ColorSection& normals() const { return section(kNormals); }
+  const ColorSection& materials() const { return section(kMaterials); }
   // The color of a cell of level `level`, 0 to grid_levels(), which has 2^level cells along each
   // axis; of its ancestor of level color_levels() if it is finer. None where the cell is not set or
   // the file has no colors. A ColorCursor is faster where many cells are near each other.
   std::optional<Rgb> color(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     return BasicColorCursor<File>(*this).color(x, y, z, level);
   }
-  // The other attributes that a file may have, by the same cells; a section that the file has not
-  // has no tiers.
-  const ColorSection& alphas() const { return sections_[1]; }
-  const ColorSection& normals() const { return sections_[2]; }
-  const ColorSection& materials() const { return sections_[3]; }
-  // 0 to 255, linear.
+  // The other attributes, by the same cells. Alpha is 0 to 255, linear.
   std::optional<unsigned char> alpha(int64_t x, int64_t y, int64_t z, uint32_t level) const {
-    uint64_t i = 0;
-    BasicColorCursor<File> cells(*this, alphas());
-    const ColorRegion* const region = cells.find(x, y, z, level, i);
-    return region ? std::optional(static_cast<unsigned char>(region->value(i))) : std::nullopt;
+    const auto value = BasicColorCursor<File>(*this, alphas()).value(x, y, z, level);
+    return value ? std::optional(static_cast<unsigned char>(*value)) : std::nullopt;
   }
   std::optional<Normal> normal(int64_t x, int64_t y, int64_t z, uint32_t level) const {
-    uint64_t i = 0;
-    BasicColorCursor<File> cells(*this, normals());
-    const ColorRegion* const region = cells.find(x, y, z, level, i);
-    return region ? std::optional(region->normal(i)) : std::nullopt;
+    return BasicColorCursor<File>(*this, normals()).normal(x, y, z, level);
   }
   // An index into material_names().
   std::optional<uint32_t> material(int64_t x, int64_t y, int64_t z, uint32_t level) const {
-    uint64_t i = 0;
-    BasicColorCursor<File> cells(*this, materials());
-    const ColorRegion* const region = cells.find(x, y, z, level, i);
-    if (region && region->value(i) >= material_names().size())
+    const auto index = BasicColorCursor<File>(*this, materials()).value(x, y, z, level);
+    if (index && *index >= material_names().size())
       broken_colors("a cell has a material that the list has not");
-    return region ? std::optional(region->value(i)) : std::nullopt;
+    return index;
   }
   const std::vector<std::string>& material_names() const { return materials().names(); }
   // Throws Error: the colors, or other attributes, do not fit the DAG.
-  [[noreturn]] void broken_colors(const char* what) const {
-    corrupt(std::string("colors: ") + what);
-  }
+  [[noreturn]] void broken_colors(const std::string& what) const { corrupt("colors: " + what); }
 
   // Walks the octree depth first, children in child order, and calls
   //     bool visitor.node(level, x, y, z, offset)   returns false to skip the subtree
@@ -445,7 +436,7 @@ class File {
     table_offset_ = end;
   }
 
-  // Sections lie behind the levels in the order of their kinds; those of other kinds are skipped.
+  // Sections are behind the levels in the order of their kinds. Unknown kinds are skipped.
   void read_attributes(const unsigned char* page) {
     const uint64_t count = get<uint64_t>(page + 120);
     expect(count >= 1 && count <= 16 && dag_nodes_ > 0, "expected 1 to 16 attribute sections");
@@ -459,7 +450,7 @@ class File {
                  bytes <= bytes_->size() - table_offset_,
              "an attribute section does not follow what is before it, or ends beyond the file");
       expect(levels >= 2 && levels <= grid_levels_, "expected attributes of a level of the grid");
-      if (kind <= 4) {
+      if (kind < kEndOfKinds) {
         const char* const wrong = sections_[kind - 1].open(data() + table_offset_, bytes, levels,
                                                            kind, get<uint32_t>(entry + 40));
         expect(!wrong, wrong);
@@ -488,7 +479,7 @@ class File {
   uint32_t version_ = 0, max_pointer_bits_ = 32, grid_levels_ = 0, hash_bits_ = 0;
   uint64_t voxels_ = 0, svo_nodes_ = 0, dag_nodes_ = 0, table_offset_ = 0;
   Level levels_[kMaxBrickLevel + 1];
-  ColorSection sections_[4];  // by kind
+  ColorSection sections_[kEndOfKinds - 1];  // by kind
 };
 
 // Looks up colors; see voxdag_reader_colors.h.

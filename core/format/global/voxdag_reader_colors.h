@@ -156,16 +156,20 @@ struct ColorRegion {
   }
 };
 
+// The kinds of attribute sections, and the bytes that 32 values take in each; 0 where the values
+// are indexes of a list of names, whose length decides their width.
+enum Kind : uint32_t { kColors = 1, kAlphas, kNormals, kMaterials, kEndOfKinds };
+constexpr uint32_t kKindBlockBytes[kEndOfKinds] = {0, 16, 32, 64, 0};
+
 // The colors of a file, or another attribute of its cells.
 class ColorSection {
  public:
-  // The section of an attribute: 1 colors, 2 alpha, 3 normals, 4 materials. Returns what is wrong
-  // with it, or null.
+  // Opens the section of a known kind. Returns what is wrong with it, or null.
   const char* open(const unsigned char* section, uint64_t bytes, uint32_t color_levels,
-                   uint32_t kind = 1, uint32_t block_bytes = 16) {
-    const bool is_material = kind == 4;
-    const bool is_width = is_material ? block_bytes == 32 || block_bytes == 64 || block_bytes == 128
-                                      : block_bytes == 8u << kind;
+                   uint32_t kind = kColors, uint32_t block_bytes = 16) {
+    const bool has_names = kKindBlockBytes[kind] == 0;
+    const bool is_width = has_names ? block_bytes == 32 || block_bytes == 64 || block_bytes == 128
+                                    : block_bytes == kKindBlockBytes[kind];
     if (!is_width) return "expected blocks of 16 bytes for colors, or as many as values have";
     color_levels_ = color_levels;
     tier_count_ = color_levels / 7 + 1;
@@ -190,10 +194,11 @@ class ColorSection {
       tier.directory = section + end;
       end += 32 * tier.region_count;
     }
-    if (is_material) return read_names(section + end, tables - end, block_bytes / 32);
+    if (has_names) return read_names(section + end, tables - end, block_bytes / 32);
     return end == tables ? nullptr : "the color section is longer than its tiers";
   }
-  // Of materials: those that values are indexes of. The last one, "", is that of triangles without.
+  // The list that a material is an index of. The last name, "", is for triangles without a
+  // material.
   const std::vector<std::string>& names() const { return names_; }
 
   uint32_t color_levels() const { return color_levels_; }
@@ -287,8 +292,19 @@ class BasicColorCursor {
     const ColorRegion* const region = find(x, y, z, level, i);
     return region ? std::optional(region->color(i)) : std::nullopt;
   }
-  // The same color where it is stored: that of cell `i` of a region, which is valid until the next
-  // call. Null where there is none.
+  // See File::alpha(), material() and normal(), for a cursor of their section.
+  std::optional<uint32_t> value(int64_t x, int64_t y, int64_t z, uint32_t level) {
+    uint64_t i = 0;
+    const ColorRegion* const region = find(x, y, z, level, i);
+    return region ? std::optional(region->value(i)) : std::nullopt;
+  }
+  std::optional<Normal> normal(int64_t x, int64_t y, int64_t z, uint32_t level) {
+    uint64_t i = 0;
+    const ColorRegion* const region = find(x, y, z, level, i);
+    return region ? std::optional(region->normal(i)) : std::nullopt;
+  }
+  // The place of a value: cell `i` of a region, which is valid until the next call. Null where the
+  // cell is not set or has none.
   const ColorRegion* find(int64_t x, int64_t y, int64_t z, uint32_t level, uint64_t& i) {
     if (section_->tier_count() == 0 || level > dag_->grid_levels()) return nullptr;
     const int64_t edge = int64_t{1} << level;

@@ -25,7 +25,7 @@ std::vector<Checksum128> look_digests(std::span<const Material> materials,
     sink.put(static_cast<uint8_t>(m.alpha_mode));
     for (const Wrap wrap : m.wrap) sink.put(static_cast<uint8_t>(wrap));
     if (m.image != Material::kNoImage) sink.put_bytes(std::as_bytes(std::span(images[m.image])));
-    if (attributes.material) sink.put(m.number);
+    if (attributes.have_names()) sink.put(m.number);
     digests.push_back(checksum128(bytes));
   }
   return digests;
@@ -46,7 +46,7 @@ Checksum128 attribute_key(const StoredAttribute& attribute, const ColorGrid& gri
     sink.put(number);
   for (const uint64_t number : {content.surfaces, content.sum.low, content.sum.high})
     sink.put(number);
-  if (attribute.kind != Attribute::kColor) {
+  if (!traits_of(attribute.kind).is_color()) {
     sink.put(static_cast<uint32_t>(attribute.kind));
     sink.put(attribute.value_bytes);
   }

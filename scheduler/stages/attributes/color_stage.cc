@@ -11,11 +11,11 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
+#include "core/color/cell_values.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
+#include "core/format/color/attribute_section_writer.h"
 #include "core/format/color/color_layout.h"
-#include "core/format/color/color_section_writer.h"
-#include "core/format/color/value_section_writer.h"
 #include "core/format/global/global_layout.h"
 #include "core/geometry/morton.h"
 #include "scene/textures/texture_set.h"
@@ -78,35 +78,16 @@ struct BakeWorker {
   bool is_baked = false;       // now; the others are stored
 };
 
-// The section of an attribute.
-class OpenSection {
- public:
-  OpenSection(GlobalFileWriter& out, Attribute attribute, uint32_t levels,
-              std::span<const std::string> materials, MemoryBudget& budget) {
-    if (attribute == Attribute::kColor)
-      colors_.emplace(out, levels, budget);
-    else
-      values_.emplace(out, attribute, levels, materials, budget);
+// Adds the regions of records to a section. Returns how many cells of the color grid they have.
+uint64_t add_regions(std::span<const std::byte> records, AttributeSectionWriter& section) {
+  RegionRecords regions(records);
+  uint64_t cells = 0;
+  while (const auto region = regions.next()) {
+    section.add_region(*region);
+    cells += region->counts[0];
   }
-  // Returns how many cells of the color grid they have.
-  uint64_t add(std::span<const std::byte> records) {
-    RegionRecords regions(records);
-    uint64_t cells = 0;
-    while (const auto region = regions.next()) {
-      if (colors_)
-        colors_->add_region(*region);
-      else
-        values_->add_region(*region);
-      cells += region->counts[0];
-    }
-    return cells;
-  }
-  void finish() { colors_ ? colors_->finish() : values_->finish(); }
-
- private:
-  std::optional<ColorSectionWriter> colors_;
-  std::optional<ValueSectionWriter> values_;
-};
+  return cells;
+}
 
 }  // namespace
 
@@ -161,11 +142,9 @@ void ColorStage::State::open() {
   materials.name_unlisted();
   const AttributeSet& wanted = source.options.attributes;
   for (const Attribute attribute : wanted.list())
-    attributes.push_back({attribute, attribute == Attribute::kColor
-                                         ? 0
-                                         : value_bytes(attribute, materials.names.size())});
-  if (wanted.material) check_list(materials.names);
-  if (!wanted.shows_images()) materials.drop_images();
+    attributes.push_back({attribute, value_bytes(attribute, materials.names.size())});
+  if (wanted.have_names()) check_list(materials.names);
+  if (!wanted.use_images()) materials.drop_images();
   for (const std::string& warning : std::exchange(materials.warnings, {}))
     build.progress.warn(warning);
   images = image_digests(build.files, materials.images, context.threads, build.cancel);
@@ -244,7 +223,8 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
       ColorMemory::divide(context.budget.available(), context.threads, source.options.attributes);
   std::vector<BakeWorker> workers(memory.workers);
   for (BakeWorker& worker : workers) worker.records.resize(attributes.size());
-  OpenSection section(out, attributes[0].kind, grid.color_levels, materials.names, context.budget);
+  AttributeSectionWriter section(out, attributes[0].kind, grid.color_levels, materials.names,
+                                 context.budget);
   build.progress.begin_stage("color", report.cubes, "cubes");
   build.progress.resume_at(report.cubes_reused);
   std::vector<std::byte> part;
@@ -282,9 +262,9 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
         if (worker.is_baked) stored = stored.first(stored.size() - 1);
         for (const ColorStore::Place& place : stored) {
           artifacts.read(place, part);
-          report.cells += section.add(part);
+          report.cells += add_regions(part, section);
         }
-        report.cells += section.add(worker.records[0]);
+        report.cells += add_regions(worker.records[0], section);
         if (worker.is_baked) build.progress.advance(1);
       });
   build.progress.end_stage();
@@ -296,7 +276,7 @@ void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute
                                    GlobalFileWriter& out, const ColorReport& report) {
   const BuildContext& build = context.build;
   const Attribute kind = attributes[attribute].kind;
-  OpenSection section(out, kind, grid.color_levels, materials.names, context.budget);
+  AttributeSectionWriter section(out, kind, grid.color_levels, materials.names, context.budget);
   build.progress.begin_stage(name_of(kind), report.cubes, "cubes");
   std::vector<std::byte> part;
   for (size_t item = 0; item < cubes.size(); ++item) {
@@ -304,7 +284,7 @@ void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute
     for (const ColorStore::Place& place : parts[attribute][item]) {
       build.cancel.check();
       artifacts.read(place, part);
-      section.add(part);
+      add_regions(part, section);
     }
     build.progress.advance(1);
   }
@@ -323,7 +303,7 @@ std::string ColorStage::digest() {
   state_->read_surfaces();
   Sha256 hash;
   for (const auto& keys : state_->keys) hash.add(std::as_bytes(std::span(keys)));
-  if (state_->source.options.attributes.material)
+  if (state_->source.options.attributes.have_names())
     for (const std::string& name : state_->materials.names) {
       const uint64_t size = name.size();
       hash.add(std::as_bytes(std::span(&size, 1)));

@@ -55,8 +55,7 @@ CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> att
       cancel_(cancel),
       charge_(budget, region_bytes + ColorMemory::value_bytes(set_of(attributes)), "baking colors"),
       sum_charge_(budget, 0, "normals and materials of a region"),
-      baker_(grid, materials, textures, set_of(attributes)),
-      valued_(attributes.size()) {}
+      baker_(grid, materials, textures, set_of(attributes)) {}
 
 void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, Records& records,
                      const TakeRecords& take) {
@@ -152,10 +151,11 @@ void CubeBaker::bake_in_parts(const Cube& region, SurfaceStore::Bin& bin, const 
 template <class AddSurfaces>
 void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces, const Sink& sink) {
   const uint32_t levels = grid_.color_levels - grid_.region_level();
-  RegionEncoder colors(levels);
-  for (auto& cells : valued_) cells.clear();
+  std::vector<AttributeEncoder> encoders;
+  for (const auto& [kind, value_bytes] : attributes_)
+    encoders.emplace_back(kind, value_bytes, levels);
   if (bake_cells(region, max_cells_, add_surfaces)) {
-    collect(0, colors);
+    collect(0, encoders);
   } else {
     const uint32_t cells_of_child = 1u << (3 * levels - 3);
     for (uint32_t child = 0; child < 8; ++child) {
@@ -163,18 +163,14 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
         throw Error(ErrorCode::kOutOfMemory,
                     "not enough memory for the materials of a region: expected more memory, fewer "
                     "threads, or a finer color grid");
-      collect(child * cells_of_child, colors);
+      collect(child * cells_of_child, encoders);
     }
   }
   const uint64_t morton = morton_encode(region.position[0], region.position[1], region.position[2]);
   size_t most = 0;
   for (size_t i = 0; i < attributes_.size(); ++i) {
-    const auto [kind, value_bytes] = attributes_[i];
-    if (kind == Attribute::kColor ? colors.empty() : valued_[i].empty()) return;
-    append_region(kind == Attribute::kColor
-                      ? colors.finish(morton)
-                      : encode_values(kind, value_bytes, levels, morton, valued_[i]),
-                  sink.records[i]);
+    if (encoders[i].empty()) return;
+    append_region(encoders[i].finish(morton), sink.records[i]);
     most = std::max(most, sink.records[i].size());
   }
   if (most >= kManyRecordBytes) sink.take(sink.records);
@@ -202,14 +198,9 @@ bool CubeBaker::charge_sums(uint64_t bytes) {
   return sum_charge_.try_resize(more);
 }
 
-// What the baked cells have, for the region that they are in.
-void CubeBaker::collect(uint32_t first_code, RegionEncoder& colors) {
-  for (size_t i = 0; i < attributes_.size(); ++i) {
-    if (attributes_[i].kind == Attribute::kColor)
-      colors.add(cells_, first_code);
-    else
-      append_values(attributes_[i].kind, cells_, values_, first_code, valued_[i]);
-  }
+// Adds the baked cells to their region.
+void CubeBaker::collect(uint32_t first_code, std::span<AttributeEncoder> encoders) const {
+  for (AttributeEncoder& encoder : encoders) encoder.add(cells_, values_, first_code);
 }
 
 }  // namespace voxdag

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "core/base/memory_budget.h"
-#include "core/color/blocks/region.h"
-#include "core/color/blocks/value_region.h"
+#include "core/color/blocks/attribute_encoder.h"
 #include "core/color/rule/bake_region.h"
 #include "scene/textures/texture_set.h"
 #include "scheduler/stages/attributes/color_keys.h"
@@ -56,7 +55,7 @@ class CubeBaker {
   template <class AddSurfaces>
   bool bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces);
   bool charge_sums(uint64_t bytes);
-  void collect(uint32_t first_code, RegionEncoder& colors);
+  void collect(uint32_t first_code, std::span<AttributeEncoder> encoders) const;
 
   const ColorGrid grid_;
   const std::span<const StoredAttribute> attributes_;
@@ -72,7 +71,6 @@ class CubeBaker {
   std::vector<FixedSurface> touching_;  // of a region, or a part of them
   std::vector<ColoredCell> cells_;
   std::vector<CellValues> values_;
-  std::vector<std::vector<ValuedCell>> valued_;  // of a region, by attribute; none of color
 };
 
 }  // namespace voxdag

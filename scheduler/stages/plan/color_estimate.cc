@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "core/color/cell_values.h"
 #include "scene/textures/texture_set.h"
 #include "scene/triangle_source.h"
 #include "scheduler/spec/memory_plan.h"
@@ -34,7 +33,7 @@ constexpr double kSecondsPerPage = 3e-5;
 double bytes_per_cell(const AttributeSet& attributes, uint64_t materials) {
   double bytes = 0;
   for (const Attribute attribute : attributes.list())
-    bytes += attribute == Attribute::kColor
+    bytes += traits_of(attribute).is_color()
                  ? kColorBytesPerCell
                  : kCellsOfAllLevels * value_bytes(attribute, materials) + kPrefixBytesPerCell;
   return bytes;
@@ -54,7 +53,7 @@ ColorEstimate estimate_colors(const GeometryOptions& options, const EstimateRang
                                 context.budget, build.cancel);
   SceneMaterials materials = scene->materials();
   materials.name_unlisted();
-  if (!options.attributes.shows_images()) materials.drop_images();
+  if (!options.attributes.use_images()) materials.drop_images();
   const auto image_bytes =
       static_cast<double>(pyramid_bytes(build.files, materials, context.budget, build.cancel));
   const double cell_bytes = bytes_per_cell(options.attributes, materials.names.size());

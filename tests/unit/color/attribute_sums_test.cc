@@ -12,7 +12,7 @@ namespace {
 
 TEST(AttributeSums, FindTheHeaviestOfManyMaterials) {
   constexpr uint32_t kCells = 40, kMaterials = 3000, kAdded = 300000;
-  color::AttributeSums sums({.material = true});
+  color::AttributeSums sums({Attribute::kMaterial});
   std::mt19937 random(1);
   std::vector<std::map<uint32_t, uint64_t>> weights(kCells);
   std::vector<bool> is_covered(kCells);

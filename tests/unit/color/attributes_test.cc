@@ -79,7 +79,7 @@ TEST(NormalCode, OfTheAxes) {
 
 TEST(ValueOfParent, FollowsTheChildren) {
   const auto of = [](Attribute attribute, std::vector<uint32_t> children) {
-    return value_of_parent(attribute, children);
+    return traits_of(attribute).value_of_parent(children);
   };
   EXPECT_EQ(of(Attribute::kAlpha, {255}), 255u);
   EXPECT_EQ(of(Attribute::kAlpha, {0, 1}), 1u);
@@ -215,7 +215,7 @@ TEST(Attributes, AreThoseOfTheTriangles) {
         surfaces[i].is_flipped = i % 3 == 1;
         for (SurfaceCorner& corner : surfaces[i].corners) corner.color = SurfaceCorner{}.color;
       }
-      const AttributeSet wanted{.alpha = true, .normal = true, .material = true};
+      const AttributeSet wanted{Attribute::kAlpha, Attribute::kNormal, Attribute::kMaterial};
       RegionBaker<const TestImages> baker(grid, looks.materials, looks.images, wanted);
       std::vector<ColoredCell> cells;
       std::vector<CellValues> values;
@@ -274,7 +274,7 @@ TEST(Attributes, AreFunctionsOfTheCell) {
     SCOPED_TRACE(oracle::kind_name(kind));
     auto surfaces = looks.surfaces(oracle::make_scene(kind, 4, whole, 40), 4);
     RegionBaker<const TestImages> baker(grid, looks.materials, looks.images,
-                                        {.normal = true, .material = true});
+                                        {Attribute::kNormal, Attribute::kMaterial});
     const auto bake = [&](size_t part) {
       std::vector<ColoredCell> cells;
       std::vector<CellValues> values;

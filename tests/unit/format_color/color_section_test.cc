@@ -207,7 +207,7 @@ TEST_F(ColorSectionTest, AnUnfinishedSectionIsWrittenAgain) {
     progress = writer.progress();
     writer.sync();
     MemoryBudget budget(uint64_t{1} << 28);
-    ColorSectionWriter colors(writer, 8, budget);
+    AttributeSectionWriter colors(writer, Attribute::kColor, 8, {}, budget);
     for (const EncodedRegion& region : encode_regions(scene)) colors.add_region(region);
   }
   GlobalFileWriter writer(system_files(), path_, grid, 64);
@@ -224,7 +224,7 @@ TEST_F(ColorSectionTest, RegionsMustBeInOrderAndWhole) {
     GlobalFileWriter writer(system_files(), path_, Grid::given({0, 0, 0}, 1, 8), 64);
     write_levels(writer, sparse_dag(scene.voxels, 8), 8);
     MemoryBudget budget(bytes);
-    ColorSectionWriter colors(writer, 8, budget);
+    AttributeSectionWriter colors(writer, Attribute::kColor, 8, {}, budget);
     for (const EncodedRegion& region : some) colors.add_region(region);
     colors.finish();
   };
@@ -317,7 +317,7 @@ TEST_F(ColorSectionTest, MissingRegionsAreNotCounted) {
   std::vector<ColoredCell> cells(size_t{1} << 18, cell);
   for (uint32_t code = 0; code < cells.size(); ++code) cells[code].code = code;
   MemoryBudget budget(uint64_t{64} << 20);
-  ColorSectionWriter section(writer, kLevels, budget);
+  AttributeSectionWriter section(writer, Attribute::kColor, kLevels, {}, budget);
   section.add_region(encode_region(6, 0, cells));
   section.finish();
   writer.finish({uint64_t{1} << 60, svo_nodes});
@@ -328,7 +328,9 @@ TEST_F(ColorSectionTest, MissingRegionsAreNotCounted) {
 TEST_F(ColorSectionTest, NothingIsNotColored) {
   GlobalFileWriter writer(system_files(), path_, Grid::given({0, 0, 0}, 1, 8), 64);
   MemoryBudget budget(uint64_t{1} << 20);
-  EXPECT_EQ(error_of([&] { ColorSectionWriter(writer, 8, budget); }).code(), ErrorCode::kCorrupt);
+  EXPECT_EQ(
+      error_of([&] { AttributeSectionWriter(writer, Attribute::kColor, 8, {}, budget); }).code(),
+      ErrorCode::kCorrupt);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@
 
 #include "core/color/blocks/region.h"
 #include "core/format/checksum.h"
-#include "core/format/color/color_section_writer.h"
+#include "core/format/color/attribute_section_writer.h"
 #include "core/geometry/morton.h"
 #include "tests/oracle/dag.h"
 #include "tests/unit/format/test_files.h"
@@ -162,7 +162,7 @@ inline void write_levels(GlobalFileWriter& writer, const oracle::Dag& dag, uint3
 
 inline void write_colors(GlobalFileWriter& writer, const ColoredScene& scene) {
   MemoryBudget budget(uint64_t{1} << 28);
-  ColorSectionWriter colors(writer, scene.color_levels, budget);
+  AttributeSectionWriter colors(writer, Attribute::kColor, scene.color_levels, {}, budget);
   for (const EncodedRegion& region : encode_regions(scene)) colors.add_region(region);
   colors.finish();
 }

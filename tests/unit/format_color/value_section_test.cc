@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "core/color/normal_code.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
@@ -15,8 +16,8 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr AttributeSet kAll{true, true, true, true};
-constexpr AttributeSet kValues{false, true, true, true};
+constexpr AttributeSet kAll = AttributeSet::all();
+constexpr AttributeSet kValues = kAll.without(Attribute::kColor);
 
 class ValueSectionTest : public testing::Test {
  protected:
@@ -69,7 +70,7 @@ class ValueSectionTest : public testing::Test {
         if (level == 0) break;
         values.clear();
         for (const auto& [code, of_cell] : children)
-          values[code] = value_of_parent(attribute, of_cell);
+          values[code] = traits_of(attribute).value_of_parent(of_cell);
       }
       if (attribute != Attribute::kMaterial) continue;
       EXPECT_EQ(decoder.names(), names_of_materials(materials));
@@ -94,7 +95,7 @@ TEST_F(ValueSectionTest, HaveTheValuesOfAllLevels) {
 
 TEST_F(ValueSectionTest, MaterialsAreAsWideAsTheyMustBe) {
   const ColoredScene scene{8, 8, random_codes(3, 8, 400), smooth_colors(8, 3)};
-  const AttributeSet materials{.material = true};
+  const AttributeSet materials{Attribute::kMaterial};
   for (const size_t count : {1u, 256u, 257u, 65536u, 65537u}) check(scene, materials, count);
 }
 
@@ -102,13 +103,15 @@ TEST_F(ValueSectionTest, MaterialsAreAsWideAsTheyMustBe) {
 TEST_F(ValueSectionTest, AreIndependent) {
   const ColoredScene scene{7, 6, random_codes(4, 7, 300), smooth_colors(6, 4)};
   for (int bits = 1; bits < 16; ++bits) {
-    const AttributeSet set{(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0, (bits & 8) != 0};
+    AttributeSet set;
+    for (const AttributeTraits& row : kAttributeTable)
+      if (bits >> (static_cast<uint32_t>(row.attribute) - 1) & 1) set.add(row.attribute);
     SCOPED_TRACE(bits);
     check(scene, set, 7, bits % 2 ? 50 : uint64_t{1} << 32);
   }
   // Without others, colors have the bytes that they always had.
   write_colored(folder_.file("colored.vdag"), scene);
-  write_valued(path_, scene, {.color = true});
+  write_valued(path_, scene, {Attribute::kColor});
   EXPECT_EQ(read_bytes(path_), read_bytes(folder_.file("colored.vdag")));
 }
 
@@ -118,11 +121,11 @@ TEST_F(ValueSectionTest, HaveTheBytesThatTheyAlwaysHad) {
   const auto digest = [&](const AttributeSet& set) {
     return write_valued(path_, scene, set, 3).sha256;
   };
-  EXPECT_EQ(digest({.alpha = true}),
+  EXPECT_EQ(digest({Attribute::kAlpha}),
             "5ed227ce23ed95da04e472e244d76891b157cfc280e0921a14d2f1d4adc4f1a2");
-  EXPECT_EQ(digest({.normal = true}),
+  EXPECT_EQ(digest({Attribute::kNormal}),
             "9d6bd3ca92cb481048dd849ca1cce46ee28cbb9c6bf484d57c1bf1c3ea2431c7");
-  EXPECT_EQ(digest({.material = true}),
+  EXPECT_EQ(digest({Attribute::kMaterial}),
             "328cc70b5cae7b77fee21e8d32c6dbf55d839d14bde1021101e85f70979887b5");
   EXPECT_EQ(digest(kAll), "1098b061302d88df97fe77106b8abf11aa1695a20567374cd7f4ab64bc936a8c");
 }
@@ -233,7 +236,7 @@ TEST_F(ValueSectionTest, RegionsMustFitTheAttribute) {
     GlobalFileWriter writer(system_files(), path_, Grid::given({0, 0, 0}, 1, 8), 64);
     write_levels(writer, sparse_dag(scene.voxels, 8), 8);
     MemoryBudget budget(uint64_t{1} << 28);
-    ValueSectionWriter section(writer, Attribute::kNormal, 8, {}, budget);
+    AttributeSectionWriter section(writer, Attribute::kNormal, 8, {}, budget);
     for (const EncodedRegion& region : some) section.add_region(region);
     section.finish();
   };

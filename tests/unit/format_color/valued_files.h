@@ -2,7 +2,8 @@
 // docs/format.md alone.
 #pragma once
 
-#include "core/format/color/value_section_writer.h"
+#include "core/color/blocks/value_region.h"
+#include "core/format/color/attribute_section_writer.h"
 #include "tests/unit/format_color/colored_files.h"
 
 namespace voxdag {
@@ -52,8 +53,8 @@ inline GlobalFileSummary write_valued(const std::string& path, const ColoredScen
       write_colors(writer, scene);
       continue;
     }
-    ValueSectionWriter section(writer, attribute, scene.color_levels, names_of_materials(materials),
-                               budget);
+    AttributeSectionWriter section(writer, attribute, scene.color_levels,
+                                   names_of_materials(materials), budget);
     for (const EncodedRegion& region : encode_values_of(scene, attribute, materials))
       section.add_region(region);
     section.finish();

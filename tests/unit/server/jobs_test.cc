@@ -33,7 +33,7 @@ TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   EXPECT_EQ(g.bounds, (std::array<double, 4>{0, -1.5, 2, 8}));
   EXPECT_TRUE(g.skip_invalid);
   EXPECT_EQ(g.hash_bits, 16u);
-  EXPECT_EQ(g.attributes, (AttributeSet{.normal = true, .material = true}));
+  EXPECT_EQ(g.attributes, (AttributeSet{Attribute::kNormal, Attribute::kMaterial}));
   EXPECT_EQ(g.color_resolution, 64u);
   EXPECT_EQ(request.spec.run.memory_bytes, uint64_t{2} << 30);
   EXPECT_EQ(request.spec.run.threads, 2u);

@@ -53,7 +53,7 @@ class ExportValues : public testing::Test {
 };
 
 TEST_F(ExportValues, ToPly) {
-  write({false, true, true, true});
+  write(AttributeSet::all().without(Attribute::kColor));
   for (const uint32_t level : {6u, 4u}) {
     const std::string bytes = exported("ply", level);
     const size_t header = bytes.find("end_header\n") + 11;
@@ -74,7 +74,7 @@ TEST_F(ExportValues, ToPly) {
 }
 
 TEST_F(ExportValues, ToNpz) {
-  write({true, true, true, true});
+  write(AttributeSet::all());
   const std::string bytes = exported("npz", 5);
   std::string alphas, normals, materials;
   for (const Cell& cell : cells_of(5)) {

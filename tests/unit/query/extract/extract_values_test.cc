@@ -6,7 +6,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr AttributeSet kValues{.alpha = true, .normal = true, .material = true};
+constexpr AttributeSet kValues{Attribute::kAlpha, Attribute::kNormal, Attribute::kMaterial};
 
 class ExtractValues : public Extract {
  protected:

@@ -18,7 +18,7 @@
 namespace voxdag {
 namespace {
 
-constexpr AttributeSet kAll{true, true, true, true};
+constexpr AttributeSet kAll = AttributeSet::all();
 
 class Attributes : public testing::Test {
  protected:
@@ -102,11 +102,12 @@ TEST_F(Attributes, AreIndependent) {
     EXPECT_GT(sections[kind].size(), 2000u);
   }
   for (const AttributeSet& set :
-       {AttributeSet{.color = true}, AttributeSet{.alpha = true}, AttributeSet{.normal = true},
-        AttributeSet{.material = true}, AttributeSet{.alpha = true, .material = true}}) {
+       {AttributeSet{Attribute::kColor}, AttributeSet{Attribute::kAlpha},
+        AttributeSet{Attribute::kNormal}, AttributeSet{Attribute::kMaterial},
+        AttributeSet{Attribute::kAlpha, Attribute::kMaterial}}) {
     std::filesystem::remove(output());
     const BuildReport report = build(spec(64, 64, set));
-    EXPECT_EQ(report.colors->images, set.shows_images() ? 1u : 0u);
+    EXPECT_EQ(report.colors->images, set.use_images() ? 1u : 0u);
     for (uint32_t kind = 1; kind <= 4; ++kind)
       EXPECT_EQ(section_of_kind(output(), kind),
                 set.has(static_cast<Attribute>(kind)) ? sections[kind] : "");
@@ -159,7 +160,7 @@ TEST_F(Attributes, AHalfStoredCubeIsBakedAgain) {
 
 // Names are in the file: a finished build does not answer for others.
 TEST_F(Attributes, FollowTheNamesOfMaterials) {
-  BuildSpec s = spec(32, 32, {.material = true});
+  BuildSpec s = spec(32, 32, {Attribute::kMaterial});
   s.run.keep_work = true;
   const std::string before = build(s).sha256;
   EXPECT_EQ(build(s).sha256, before);
@@ -173,7 +174,7 @@ TEST_F(Attributes, FollowTheNamesOfMaterials) {
 
 // The work folder is that of other options.
 TEST_F(Attributes, BelongToTheJob) {
-  build_until(spec(128, 128, {.color = true}), "write", 0);
+  build_until(spec(128, 128, {Attribute::kColor}), "write", 0);
   const Error error = error_of([&] { build(spec(128, 128, kAll)); });
   EXPECT_NE(error.message().find("\"attributes\":[\"color\",\"alpha\",\"normal\",\"material\"]"),
             std::string::npos)
@@ -192,8 +193,8 @@ TEST_F(Attributes, ArePlanned) {
 
 TEST(AttributeList, IsParsed) {
   EXPECT_EQ(parse_attributes("normal,alpha", "--attributes"),
-            (AttributeSet{.alpha = true, .normal = true}));
-  EXPECT_EQ(parse_attributes("color", "--attributes"), AttributeSet{.color = true});
+            (AttributeSet{Attribute::kAlpha, Attribute::kNormal}));
+  EXPECT_EQ(parse_attributes("color", "--attributes"), AttributeSet{Attribute::kColor});
   for (const char* wrong : {"", "normals", "alpha,", "alpha normal"})
     EXPECT_NE(error_of([&] { parse_attributes(wrong, "--attributes"); })
                   .message()

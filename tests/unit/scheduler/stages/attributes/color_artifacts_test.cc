@@ -159,7 +159,7 @@ TEST(ColorKeys, NameAllThatColorsDependOn) {
   const Material plain;
   const std::vector<std::string> images = {"image", "other"};
   const auto look = [&](const Material& material) {
-    return look_digests(std::span(&material, 1), images, {.color = true})[0];
+    return look_digests(std::span(&material, 1), images, {Attribute::kColor})[0];
   };
   std::vector<Material> materials(8, plain);
   materials[1].factor[2] = 7;
@@ -176,7 +176,7 @@ TEST(ColorKeys, NameAllThatColorsDependOn) {
   named.number = 9;
   EXPECT_EQ(look(named), look(plain));
   // That of a material counts where cells have it.
-  const AttributeSet with_materials{.material = true};
+  const AttributeSet with_materials{Attribute::kMaterial};
   EXPECT_NE(look_digests(std::span(&named, 1), images, with_materials)[0],
             look_digests(std::span(&plain, 1), images, with_materials)[0]);
 
@@ -234,7 +234,7 @@ class ColorsOnCluster : public Cluster {
   BuildSpec colored(BuildSpec spec) const {
     spec.geometry.scenes = {painted_};
     spec.geometry.resolution = 256;
-    spec.geometry.attributes.color = true;
+    spec.geometry.attributes.add(Attribute::kColor);
     spec.run.threads = 2;
     return spec;
   }

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/format/color/color_section_writer.h"
+#include "core/format/color/attribute_section_writer.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
 #include "query/export/export.h"
@@ -164,7 +164,7 @@ TEST_F(ColorStage, FollowTheImage) {
   const auto file = open_global_file(output());
   // Without colors the image does not matter.
   BuildSpec plain = spec(64);
-  plain.geometry.attributes.color = false;
+  plain.geometry.attributes = {};
   const std::string gray = build(plain).sha256;
   PaintedScene::write(folder_.path(), 255);
   EXPECT_EQ(build(plain).sha256, gray);
@@ -197,7 +197,7 @@ TEST_F(ColorStage, RefusesOptionsThatDoNotFit) {
             std::string::npos);
   EXPECT_NE(refusal(spec(64, 48)).find("color resolution 48"), std::string::npos);
   BuildSpec s = spec(64, 32);
-  s.geometry.attributes.color = false;
+  s.geometry.attributes = {};
   EXPECT_NE(refusal(s).find("without colors"), std::string::npos);
 }
 
@@ -215,7 +215,7 @@ TEST_F(ColorStage, ArePlanned) {
     const auto file_bytes = static_cast<double>(report.bytes);
     EXPECT_LE(estimate.file_bytes.low, file_bytes);
     EXPECT_GE(estimate.file_bytes.high, file_bytes);
-    s.geometry.attributes.color = false;
+    s.geometry.attributes = {};
     s.geometry.color_resolution = 0;
     const Estimate plain = plan(s);
     const auto section_bytes = file_bytes - static_cast<double>(build(s).bytes);

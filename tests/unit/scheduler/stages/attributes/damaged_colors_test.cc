@@ -43,7 +43,7 @@ TEST(DamagedColors, EndARender) {
   BuildSpec spec;
   spec.geometry.scenes = {PaintedScene::write(folder.path())};
   spec.geometry.resolution = 32;
-  spec.geometry.attributes.color = true;
+  spec.geometry.attributes.add(Attribute::kColor);
   spec.run.output = folder.file("out.vdag");
   build_now(spec);
   render(spec.run.output);

@@ -22,7 +22,7 @@ std::string digest_of(const std::string& image, uint64_t color_resolution) {
                                folder.path() + "/halves.png",
                                std::filesystem::copy_options::overwrite_existing);
   spec.geometry.resolution = 128;
-  spec.geometry.attributes.color = true;
+  spec.geometry.attributes.add(Attribute::kColor);
   spec.geometry.color_resolution = color_resolution;
   spec.run.output = folder.path() + "/out.vdag";
   spec.run.memory_bytes = uint64_t{128} << 20;

@@ -128,7 +128,7 @@ inline BuildSpec painted_spec(const std::string& scene, const std::string& outpu
   BuildSpec spec;
   spec.geometry.scenes = {scene};
   spec.geometry.resolution = resolution;
-  spec.geometry.attributes.color = true;
+  spec.geometry.attributes.add(Attribute::kColor);
   spec.run.output = output;
   spec.run.memory_bytes = uint64_t{256} << 20;
   spec.run.threads = 2;

@@ -1,0 +1,39 @@
+// Encodes the cells of a region for one attribute: colors from the sums of the cells (region.h),
+// other attributes from their values (value_region.h).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/color/blocks/region.h"
+#include "core/color/blocks/value_region.h"
+#include "core/color/cell_values.h"
+
+namespace voxdag {
+
+class AttributeEncoder {
+ public:
+  // `value_bytes`: see value_bytes(); not used for colors. `levels`: see RegionEncoder.
+  AttributeEncoder(Attribute attribute, uint32_t value_bytes, uint32_t levels)
+      : traits_(traits_of(attribute)),
+        value_bytes_(value_bytes),
+        levels_(levels),
+        colors_(levels) {}
+
+  // Adds baked cells in increasing order, their codes counted from `first_code`. `values` has an
+  // element for each cell if AttributeSums is needed for the attribute.
+  void add(std::span<const ColoredCell> cells, std::span<const CellValues> values,
+           uint32_t first_code);
+  bool empty() const { return traits_.is_color() ? colors_.empty() : values_.empty(); }
+  // Once, after at least one cell was added.
+  EncodedRegion finish(uint64_t morton);
+
+ private:
+  const AttributeTraits& traits_;
+  uint32_t value_bytes_, levels_;
+  RegionEncoder colors_;
+  std::vector<ValuedCell> values_;
+};
+
+}  // namespace voxdag

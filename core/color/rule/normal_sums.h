@@ -1,0 +1,64 @@
+// The normals of the cells of a region, as sums of areas along the axes. Sums are integers and
+// commute.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/color/attributes.h"
+#include "core/color/cell_values.h"
+#include "core/color/rule/surface_facing.h"
+
+namespace voxdag::color {
+
+// The sum of the triangles' areas in a cell. `turned` sums them with the dominant component turned
+// positive: the orientation of a sheet whose two sides are in the cell.
+struct NormalSum {
+  int64_t area[3] = {}, turned[3] = {};
+
+  VOXDAG_HD void add(const SurfaceFacing& facing, int64_t columns) {
+    for (int a = 0; a < 3; ++a) {
+      const int64_t more = columns * facing.area[a];
+      area[a] += more;
+      turned[a] += facing.is_backward ? -more : more;
+    }
+  }
+};
+
+// The normal of the sum of all areas, or of the turned areas where the sum is less than 1/64 of
+// them.
+VOXDAG_HD inline NormalCode normal_of_sum(const NormalSum& sum) {
+  const auto largest = [](const int64_t(&v)[3]) {
+    int64_t most = 0;
+    for (const int64_t x : v) most = absolute(x) > most ? absolute(x) : most;
+    return most;
+  };
+  const int64_t rest = largest(sum.area), turned = largest(sum.turned);
+  const auto& v = 64 * rest < turned ? sum.turned : sum.area;
+  return (rest | turned) == 0 ? kNoNormal : encode_normal(v[0], v[1], v[2]);
+}
+
+// One of AttributeSums.
+class NormalSums {
+ public:
+  static constexpr Attribute kAttribute = Attribute::kNormal;
+
+  void add(uint32_t cell, const SurfaceFacing& facing, uint32_t columns, uint32_t) {
+    if (cell >= sums_.size()) sums_.resize(cell + 1);
+    sums_[cell].add(facing, columns);
+  }
+  void reset(uint32_t cell) {
+    if (cell < sums_.size()) sums_[cell] = {};
+  }
+  void finish() {}
+  void get(uint32_t cell, CellValues& values) const {
+    if (cell < sums_.size()) values.normal = normal_of_sum(sums_[cell]);
+  }
+  void clear() { sums_.clear(); }
+  uint64_t bytes() const { return sums_.capacity() * sizeof(NormalSum); }
+
+ private:
+  std::vector<NormalSum> sums_;
+};
+
+}  // namespace voxdag::color

@@ -1,0 +1,54 @@
+// The side, area and material of a triangle, which add up to the normals and materials of cells.
+// docs/color.md, "Other attributes", states the rule.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/host_device.h"
+#include "core/color/rule/cell_triangle.h"
+#include "core/color/surface.h"
+
+namespace voxdag::color {
+
+// The area of a covered column, measured square to the triangle's dominant axis.
+inline constexpr double kColumnArea = 1 << 20;
+
+// A triangle's contribution to each cell that it touches.
+struct SurfaceFacing {
+  // For each column: the normal, as long as the column's area. Up to kColumnArea along each axis.
+  int64_t area[3] = {};
+  bool is_backward = false;  // its dominant component is negative
+  uint32_t material = 0;
+};
+
+template <class Int>
+VOXDAG_HD inline void set_area(const FixedTriangle& triangle, SurfaceFacing& facing) {
+  Int n[3];
+  normal_of(triangle, n);
+  int dominant = magnitude(n[1]) > magnitude(n[0]) ? 1 : 0;
+  if (magnitude(n[2]) > magnitude(n[dominant])) dominant = 2;
+  if (n[dominant] == 0) return;
+  const double scale = kColumnArea / to_double(magnitude(n[dominant]));
+  for (int a = 0; a < 3; ++a) {
+    const double length = to_double(magnitude(n[a])) * scale;
+    const auto rounded = static_cast<int64_t>(length + 0.5);
+    facing.area[a] = n[a] < 0 ? -rounded : rounded;
+  }
+  facing.is_backward = n[dominant] < 0;
+}
+
+// `material` is the index of the triangle's material in the list of names.
+VOXDAG_HD inline SurfaceFacing facing_of(const FixedSurface& surface, uint32_t material) {
+  SurfaceFacing facing;
+  facing.material = material;
+  if (is_narrow(surface.position))
+    set_area<int64_t>(surface.position, facing);
+  else
+    set_area<int128>(surface.position, facing);
+  if (!surface.is_flipped) return facing;
+  for (int64_t& area : facing.area) area = -area;
+  facing.is_backward = !facing.is_backward;
+  return facing;
+}
+
+}  // namespace voxdag::color

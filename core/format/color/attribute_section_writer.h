@@ -1,0 +1,52 @@
+// Writes the section of an attribute behind the levels of a global file. docs/format.md, "The color
+// section" and "The sections of alpha, normals and materials", is the byte layout.
+//
+// The regions of tier 0 are written as they come. The cells of the coarser tiers and the
+// directories stay in memory until finish(): 32 bytes a region, and tier 1, which is a
+// ten-thousandth of tier 0. All of that is charged to the budget. One thread uses a writer.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/base/memory_budget.h"
+#include "core/color/attributes.h"
+#include "core/color/blocks/region.h"
+#include "core/format/global/global_writer.h"
+
+namespace voxdag {
+
+class AttributeSectionWriter {
+ public:
+  // Encodes a region of colors of a tier above the first; each cell has the sum of the totals of
+  // the regions in it.
+  using EncodeColors = std::function<EncodedRegion(uint32_t tier, uint64_t morton,
+                                                   std::span<const ColoredCell> cells)>;
+
+  // The levels of `file` must be complete, and there must be some. The set cells of level
+  // `cell_levels` (2 to 20, at most the grid's) have the attribute, and those of all coarser
+  // levels. `names`: the list that values are indexes of, if the attribute has one. Without
+  // `encode_coarse` coarser cells have the colors of their sums.
+  AttributeSectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
+                         std::span<const std::string> names, MemoryBudget& budget,
+                         EncodeColors encode_coarse = nullptr);
+  ~AttributeSectionWriter();
+
+  // Adds a region of tier 0: cubes of level max(cell_levels - 6, 0), in increasing Morton order.
+  // Throws Error{kCorrupt} for one that is not in order or does not fit together,
+  // Error{kOutOfMemory}.
+  void add_region(const EncodedRegion& region);
+  // Writes the other tiers and ends the section. There must be at least one region.
+  void finish();
+
+ private:
+  class Tiers;
+  template <class Rule>
+  class TiersOf;
+  std::unique_ptr<Tiers> tiers_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,58 @@
+// The attributes of selected cells, for formats of tables: a few numbers for each attribute.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/format/global/open_global.h"
+#include "query/export/export_job.h"
+
+namespace voxdag::query {
+
+// Reads the values of one attribute of the file.
+class AttributeCursor {
+ public:
+  AttributeCursor(const ExportJob& job, Attribute attribute)
+      : job_(job),
+        traits_(traits_of(attribute)),
+        cursor_(job.file, section_of(job.file, attribute)) {}
+
+  const AttributeTraits& traits() const { return traits_; }
+  const EncodingTraits& encoding() const { return traits_of(traits_.encoding); }
+
+  // Calls put(number) for each component of the value. Throws Error{kCorrupt}.
+  template <class Put>
+  void put(const std::array<int64_t, 3>& cell, const Put& put) {
+    uint64_t i = 0;
+    const voxdag_reader::ColorRegion* const region = with_reader_errors(
+        [&] { return cursor_.find(cell[0], cell[1], cell[2], job_.selection.grid_levels, i); });
+    if (!region)
+      throw Error(ErrorCode::kCorrupt, job_.file.path() + ": a cell has no " + traits_.name +
+                                           ": the file is damaged (voxdag verify says where)");
+    put_value(traits_.attribute, *region, i, put);
+  }
+
+ private:
+  const ExportJob& job_;
+  const AttributeTraits& traits_;
+  voxdag_reader::ColorCursor cursor_;
+};
+
+// One cursor for each attribute of the file, without colors if the job has none.
+inline std::vector<AttributeCursor> exported_attributes(const ExportJob& job) {
+  std::vector<AttributeCursor> cursors;
+  for (const Attribute attribute : attributes_of(job.file).list())
+    if (job.has_colors || attribute != Attribute::kColor) cursors.emplace_back(job, attribute);
+  return cursors;
+}
+
+// Bytes of the numbers of a cell.
+inline uint64_t decoded_bytes(std::span<const AttributeCursor> attributes) {
+  uint64_t bytes = 0;
+  for (const AttributeCursor& attribute : attributes) bytes += attribute.encoding().decoded_bytes();
+  return bytes;
+}
+
+}  // namespace voxdag::query
