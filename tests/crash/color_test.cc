@@ -21,7 +21,7 @@ class ColorCrashTest : public CrashTest {
     BuildSpec spec = CrashTest::spec();
     spec.geometry.scenes = {scene_};
     spec.geometry.resolution = 128;
-    spec.geometry.attributes = {true, true, true, true};
+    spec.geometry.attributes = voxdag::AttributeSet::all();
     return spec;
   }
 

@@ -142,8 +142,9 @@ void add_colored_files(const Corpus& corpus) {
   for (const uint32_t levels : {3u, 7u}) {
     const std::string name = "valued_" + std::to_string(1 << levels),
                       path = folder.path() + "/" + name;
-    write_valued(path, {levels, levels, random_codes(levels, levels, 30), smooth_colors(levels, 9)},
-                 {levels == 3, true, true, true});
+    write_valued(
+        path, {levels, levels, random_codes(levels, levels, 30), smooth_colors(levels, 9)},
+        levels == 3 ? AttributeSet::all() : AttributeSet::all().without(Attribute::kColor));
     add_global_file(corpus, name.c_str(), path, global_layout::kFeaturesAt);
   }
 }

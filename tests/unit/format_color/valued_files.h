@@ -2,6 +2,7 @@
 // docs/format.md alone.
 #pragma once
 
+#include "core/color/attribute_set.h"
 #include "core/color/blocks/value_region.h"
 #include "core/format/color/attribute_section_writer.h"
 #include "tests/unit/format_color/colored_files.h"

@@ -66,7 +66,7 @@ class ExtractValues : public Extract {
 TEST_F(ExtractValues, OfEverythingAreTheSameBytes) {
   for (const auto& [levels, color_levels] : {std::pair{9u, 9u}, {8u, 7u}, {6u, 2u}, {16u, 15u}}) {
     SCOPED_TRACE(testing::Message() << levels << ", " << color_levels);
-    write(levels, color_levels, {true, true, true, true});
+    write(levels, color_levels, AttributeSet::all());
     extract_file("in.vdag", spec("out.vdag", {levels, whole_grid(levels)}));
     EXPECT_TRUE(bytes("out.vdag") == bytes("in.vdag"));
   }

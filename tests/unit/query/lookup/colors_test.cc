@@ -106,7 +106,7 @@ TEST_F(Colors, FromC) {
 // Alpha, normals and materials of the color grid's cells and of a cell that is not set.
 TEST_F(Colors, OtherAttributes) {
   const std::string path = folder_.file("valued.vdag");
-  write_valued(path, scene_, {.alpha = true, .normal = true, .material = true}, 5);
+  write_valued(path, scene_, {Attribute::kAlpha, Attribute::kNormal, Attribute::kMaterial}, 5);
   const DagFile dag(path);
   EXPECT_FALSE(dag.has_colors());
   EXPECT_TRUE(dag.has_alphas() && dag.has_normals() && dag.has_materials());
