@@ -14,6 +14,7 @@
 
 #include "scheduler/slurm/commands/slurm.h"
 #include "scheduler/slurm/files/cluster_folder.h"
+#include "scheduler/slurm/files/cluster_state.h"
 #include "scheduler/spec/build_report.h"
 #include "scheduler/spec/build_spec.h"
 
