@@ -248,7 +248,7 @@ ExportReport write_npz(const ExportJob& job) {
   ExportStage stage(job, "export", (2 + attributes.size()) * voxels, "rows");
   add_positions(job, voxels, stage, writer);
   std::string arrays =
-      "numpy.load() gives 'cells' (int32), 'positions' (their centers, float64), 'grid' (low "
+      "numpy.load() gives 'cells' (int32), 'positions' (their centers, float64) and 'grid' (low "
       "corner of the grid and edge of a voxel)";
   for (AttributeCursor& attribute : attributes)
     arrays += add_values(job, voxels, attribute, stage, writer);

@@ -33,8 +33,8 @@ INSTANTIATE_TEST_SUITE_P(NarrowAndWide, TopCellsFile,
 
 TEST_P(TopCellsFile, LooksUpManyPoints) {
   const QueryFile file(random_voxels(6, 256), GetParam());
-  const Dag dag(file.path());
-  ASSERT_TRUE(TopCells::serve(dag.view(), dag.grid_levels()));
+  const DagFile dag(file.path());
+  ASSERT_TRUE(TopCells::serve(DagView(dag.file()), dag.grid_levels()));
   for (uint32_t levels = 0; levels <= dag.grid_levels(); ++levels) {
     SCOPED_TRACE(levels);
     const QueryFile::Cells cells = file.cells(levels);
@@ -45,8 +45,8 @@ TEST_P(TopCellsFile, LooksUpManyPoints) {
 
 TEST(TopCells, HaveTheNodesOfTheirGrid) {
   const QueryFile file(random_voxels(6, 256));
-  const Dag dag(file.path());
-  const TopCells top(dag.view());
+  const DagFile dag(file.path());
+  const TopCells top(DagView(dag.file()));
   const QueryFile::Cells cells = file.cells(TopCells::kLevels), below = file.cells(6);
   for (int64_t x = 0; x < 32; ++x)
     for (int64_t y = 0; y < 32; ++y)
@@ -67,11 +67,11 @@ TEST(TopCells, LeaveDamageToThosePointsThatMeetIt) {
   std::vector<Position> points;
   ByteString damaged = read_bytes(file.path());
   {
-    const Dag dag(file.path());
-    const DagView::Children root = dag.view().children(0, dag.view().root());
+    const DagFile dag(file.path());
+    const DagView::Children root = DagView(dag.file()).children(0, DagView(dag.file()).root());
     ASSERT_TRUE(root.has(0) && root.has(7));
     const auto* const last = reinterpret_cast<const unsigned char*>(
-        &dag.view().level(0).words[__builtin_popcount(root.mask)]);
+        &DagView(dag.file()).level(0).words[__builtin_popcount(root.mask)]);
     damaged[static_cast<size_t>(last - dag.file().data()) + 3] = 0x7f;
   }
   const std::string path = file.path() + ".damaged";
@@ -80,7 +80,7 @@ TEST(TopCells, LeaveDamageToThosePointsThatMeetIt) {
   oracle::Random random(5);
   while (points.size() < kManyPoints)
     points.push_back({random.between(0, 127), random.between(0, 127), random.between(0, 127)});
-  const Dag dag(path);
+  const DagFile dag(path);
   std::vector<uint8_t> set(points.size());
   dag.lookup(points, 8, set);
   for (size_t i = 0; i < points.size(); ++i)
