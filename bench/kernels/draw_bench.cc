@@ -41,7 +41,7 @@ void draw(benchmark::State& state, const Kernels* k) {
   std::vector<uint8_t> existing(kTileBlocks / 8);
   std::vector<uint16_t> blocks(kTileBlocks + 1);
   std::vector<uint64_t> keys(kTileBlocks + 1);
-  const Box box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
+  const LatticeCube box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
   int64_t bricks = 0, drawn = 0;
   for (auto _ : state)
     for (size_t i = 0; i < kTriangles; ++i) {
@@ -66,7 +66,7 @@ void draw(benchmark::State& state, const Kernels* k) {
 void test_octants(benchmark::State& state, const Kernels* k) {
   if (!k) return state.SkipWithError("not supported by this CPU");
   const auto scene = triangles(256, 64);
-  const Box box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
+  const LatticeCube box{{0, 0, 0}, kTileVoxels * kUnitsPerVoxel};
   for (auto _ : state)
     for (size_t i = 0; i < kTriangles; ++i)
       benchmark::DoNotOptimize(k->test_octants(scene[i], box, false));

@@ -109,7 +109,7 @@ TEST(Draw, InsideIsThePlaneOnly) {
     for (const oracle::Triangle& t : scene) {
       if (!is_narrow(t)) continue;
       const Padded<int32_t> narrow(t);
-      const Box box = box_of(region);
+      const LatticeCube box = box_of(region);
       const Octants octants = portable_kernels().test_octants(narrow.triangle, box, false);
       for (int c = 0; c < 8; ++c) {
         if (!(octants.inside >> c & 1)) continue;

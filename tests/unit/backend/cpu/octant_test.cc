@@ -35,7 +35,7 @@ TEST(Octants, NoTouchedChildIsLeftOut) {
   for (const oracle::SceneKind kind : oracle::kAllKinds)
     for (int round = 0; round < 200; ++round) {
       const oracle::Region region = random_region(random, static_cast<int>(random.between(2, 20)));
-      const Box box = box_of(region);
+      const LatticeCube box = box_of(region);
       SCOPED_TRACE(testing::Message()
                    << oracle::kind_name(kind) << ", edge " << region.edge << ", round " << round);
       const uint64_t seed = static_cast<uint64_t>(round);

@@ -24,7 +24,7 @@ struct Workshop {
 };
 
 // The node of a cube that the triangle covers, tile by tile.
-NodeRef drawn_node(Workshop& shop, const NarrowTriangle& t, const Box& box, int size_log2,
+NodeRef drawn_node(Workshop& shop, const NarrowTriangle& t, const LatticeCube& box, int size_log2,
                    TileBricks& tile) {
   if (size_log2 > kTileLog2) {
     NodeRef children[8];
@@ -61,7 +61,7 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
 }
 
 // Compares a cube from the memo with the same one drawn, and its children down to the smallest.
-int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, const Box& box,
+int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, const LatticeCube& box,
             int size_log2, TileBricks& tile) {
   const OctreeCounts before = by_memo.tables.counts();
   NodeRef node;

@@ -36,8 +36,8 @@ inline std::vector<const Kernels*> all_kernels() {
 
 inline bool is_narrow(const oracle::Triangle& t) { return is_narrow(axis_major(oracle::fixed(t))); }
 
-inline Box box_of(const oracle::Region& region) {
-  Box box;
+inline LatticeCube box_of(const oracle::Region& region) {
+  LatticeCube box;
   for (int a = 0; a < 3; ++a) box.low[a] = region.low[a] * kUnitsPerVoxel;
   box.edge = region.edge * kUnitsPerVoxel;
   return box;
