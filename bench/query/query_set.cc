@@ -5,6 +5,7 @@
 #include <bit>
 #include <random>
 
+#include "query/dag/dag_view.h"
 #include "query/render/views.h"
 
 namespace voxdag::query {
@@ -44,16 +45,17 @@ Region box_around(const QuerySet& queries, size_t i) {
 }
 
 QuerySet make_queries(const DagFile& dag, uint32_t grid_levels, size_t points, int picture_edge) {
+  const DagView view(dag.file());
   QuerySet queries;
   std::mt19937_64 random(1);
   const uint64_t edge = uint64_t{1} << grid_levels;
   const auto anywhere = [&] { return static_cast<int64_t>(random() % edge); };
   for (size_t i = 0; i < points; ++i) {
     queries.uniform.push_back({anywhere(), anywhere(), anywhere()});
-    queries.set_cells.push_back(random_set_cell(dag.view(), grid_levels, random));
+    queries.set_cells.push_back(random_set_cell(view, grid_levels, random));
   }
-  const Camera camera(named_view("auto", dag.view(), 1, {}), picture_edge, picture_edge);
-  const double scale = static_cast<double>(edge) / static_cast<double>(dag.view().resolution());
+  const Camera camera(named_view("auto", view, 1, {}), picture_edge, picture_edge);
+  const double scale = static_cast<double>(edge) / static_cast<double>(view.resolution());
   for (int tile = 0; tile < picture_edge * picture_edge / 64; ++tile)
     for (int i = 0; i < 64; ++i) {
       const int x = tile % (picture_edge / 8) * 8 + i % 8,
