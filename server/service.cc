@@ -10,6 +10,7 @@
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "server/api/public_problem.h"
+#include "server/api/routes/routes.h"
 #include "server/data_folder.h"
 #include "server/http/connection/listener.h"
 
@@ -92,6 +93,8 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
   add_event_routes(router_);
   add_scene_routes(router_);
   add_system_routes(router_);
+  add_asset_routes(router_, "index.html");
+  add_document_route(router_);
 }
 
 std::string Service::url() const {
@@ -162,6 +165,9 @@ Response Service::answer(Request& request) {
     log_("request " + request.id + " " + request.method + " failed: an unknown exception");
     response = problem_response(public_problem(std::exception()));
   }
+  if (!router_.is_documented(request, response.status))
+    log_("request " + request.id + " " + request.method +
+         ": the OpenAPI document lacks the status " + std::to_string(response.status));
   record(request, response.status, start_s);
   return response;
 }

@@ -9,7 +9,7 @@
 
 #include "server/api/access/access_control.h"
 #include "server/api/context.h"
-#include "server/api/routes/router.h"
+#include "server/api/routing/router.h"
 #include "server/clock_guard.h"
 #include "server/http/http_server.h"
 

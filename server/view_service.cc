@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "server/api/public_problem.h"
+#include "server/api/routes/routes.h"
 #include "server/api/routes/tile_routes.h"
 
 namespace voxdag::server {
@@ -29,12 +30,18 @@ ViewService::ViewService(const std::string& path, int port, FileSystem& files, L
       http_(options(port), [this](Request& request) { return answer(request); }) {
   viewed_.open(path_);
   add_tile_routes(
-      router_, "/api/v1/view", Packing::kNone, Colors::kServed,
+      router_,
+      {.base = "/api/v1/view",
+       .id = "",
+       .subject = "The file: ",
+       .manifest_schema = "TileManifest",
+       .packing = Packing::kNone},
       [this](const Call&) {
         return Viewed{viewed_.open(path_), nullptr};
       },
       stopping_);
   add_asset_routes(router_, "viewer.html");
+  add_document_route(router_);
 }
 
 std::string ViewService::url() const {

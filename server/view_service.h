@@ -7,7 +7,7 @@
 #include <string>
 
 #include "server/api/access/access_control.h"
-#include "server/api/routes/router.h"
+#include "server/api/routing/router.h"
 #include "server/http/http_server.h"
 #include "server/steps.h"
 #include "server/tiles/viewed_files.h"

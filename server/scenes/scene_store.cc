@@ -11,6 +11,7 @@
 namespace voxdag::server {
 namespace {
 
+constexpr std::string_view kSceneEndings[] = {".glb", ".gltf", ".ply"};
 constexpr size_t kMaxNameBytes = 128;
 // "vdsc": the scenes of a service.
 constexpr int64_t kSceneApplicationId = 0x76647363;
@@ -66,7 +67,19 @@ bool is_scene_name(std::string_view name) {
 }
 
 bool has_scene_ending(std::string_view name) {
-  return name.ends_with(".glb") || name.ends_with(".gltf") || name.ends_with(".ply");
+  return std::any_of(std::begin(kSceneEndings), std::end(kSceneEndings),
+                     [&](std::string_view ending) { return name.ends_with(ending); });
+}
+
+std::string scene_name_pattern() {
+  std::string endings;
+  size_t longest = 0;
+  for (const std::string_view ending : kSceneEndings) {
+    endings += (endings.empty() ? "" : "|") + std::string(ending.substr(1));
+    longest = std::max(longest, ending.size());
+  }
+  return "^[A-Za-z0-9][A-Za-z0-9._-]{0," + std::to_string(kMaxNameBytes - 1 - longest) + "}\\.(" +
+         endings + ")$";
 }
 
 std::string file_sha256(FileSystem& files, const std::string& path, uint64_t size,

@@ -27,8 +27,10 @@ namespace voxdag::server {
 
 // 1 to 128 of A–Z a–z 0–9 . _ -, first a letter or digit, with the ending of a scene.
 bool is_scene_name(std::string_view name);
-// Whether it ends with ".glb", ".gltf" or ".ply".
+// True if it ends with ".glb", ".gltf" or ".ply".
 bool has_scene_ending(std::string_view name);
+// A regular expression of scene names, for the OpenAPI document.
+std::string scene_name_pattern();
 
 struct Scene {
   std::string name;

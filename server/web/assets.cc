@@ -12,8 +12,7 @@ std::string type_of(std::string_view name) {
   if (suffix == "html") return "text/html; charset=utf-8";
   if (suffix == "css") return "text/css; charset=utf-8";
   if (suffix == "js") return "text/javascript; charset=utf-8";
-  if (suffix == "svg") return "image/svg+xml";
-  return "application/json";
+  return "image/svg+xml";
 }
 
 }  // namespace

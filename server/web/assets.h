@@ -1,4 +1,4 @@
-// The files compiled into the program (embed.cmake): those of the dashboard and openapi.json.
+// The files of the dashboard, which are compiled into the program (embed.cmake).
 #pragma once
 
 #include <cstddef>

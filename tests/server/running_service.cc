@@ -27,7 +27,10 @@ RunningService::RunningService() {
   config_.jobs.nice = 0;
 }
 
-RunningService::~RunningService() { stop(); }
+RunningService::~RunningService() {
+  stop();
+  EXPECT_EQ(log_.find("the OpenAPI document lacks"), std::string::npos) << log_;
+}
 
 void RunningService::start() {
   service_ = std::make_unique<Service>(config_, *files_, [this](const std::string& line) {

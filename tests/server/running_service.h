@@ -24,6 +24,7 @@ using client::HttpClient;
 class RunningService : public testing::Test {
  protected:
   RunningService();
+  // Expects that the service has answered with documented statuses only.
   ~RunningService() override;
 
   void start();

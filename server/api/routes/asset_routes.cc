@@ -1,5 +1,7 @@
 // The embedded files.
-#include "server/api/routes/router.h"
+#include "core/format/checksum.h"
+#include "server/api/openapi/document.h"
+#include "server/api/routes/routes.h"
 #include "server/web/assets.h"
 
 namespace voxdag::server {
@@ -27,10 +29,29 @@ Response get_asset(Call& call, const Asset& asset) {
 
 void add_asset_routes(Router& router, const std::string& start_page) {
   for (const Asset& asset : embedded_assets()) {
-    const auto get = [asset](Call& call) { return get_asset(call, asset); };
-    router.add("GET", '/' + asset.name, Role::kNone, get, kAnyQuery);
-    if (asset.name == start_page) router.add("GET", "/", Role::kNone, get, kAnyQuery);
+    const auto add = [&](const std::string& path) {
+      router.add({.method = "GET", .pattern = path, .role = Role::kNone, .accepts_any_query = true},
+                 [asset](Call& call) { return get_asset(call, asset); });
+    };
+    add('/' + asset.name);
+    if (asset.name == start_page) add("/");
   }
+}
+
+void add_document_route(Router& router) {
+  router.add({.method = "GET",
+              .pattern = "/openapi.json",
+              .role = Role::kNone,
+              .id = "openapi",
+              .summary = "This document",
+              .tag = "service",
+              .accepts_any_query = true,
+              .answers = {{200, "OpenAPI 3.1", {json_content()}}, {304, "the client has it"}}},
+             [&router](Call& call) {
+               const std::string text = openapi_document(router);
+               const std::string etag = '"' + sha256_hex(text) + '"';
+               return get_asset(call, {"openapi.json", text, "application/json", etag});
+             });
 }
 
 }  // namespace voxdag::server

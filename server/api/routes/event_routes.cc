@@ -4,7 +4,7 @@
 #include "server/api/context.h"
 #include "server/api/job_json.h"
 #include "server/api/public_problem.h"
-#include "server/api/routes/router.h"
+#include "server/api/routes/routes.h"
 
 namespace voxdag::server {
 namespace {
@@ -134,7 +134,15 @@ Response follow(Context& context, Call& call) {
 }  // namespace
 
 void add_event_routes(Router& router) {
-  router.add("GET", "/api/v1/jobs/{id}/events", Role::kRead, follow);
+  router.add({.method = "GET",
+              .pattern = "/api/v1/jobs/{id}/events",
+              .id = "followJob",
+              .summary = "Server-sent events: state, job, progress, end",
+              .tag = "jobs",
+              .headers = {{"Last-Event-ID", "id of the last event received"}},
+              .answers = {{200, "a stream that ends with the job", {{"text/event-stream"}}}},
+              .problems = {404}},
+             follow);
 }
 
 }  // namespace voxdag::server

@@ -9,15 +9,30 @@
 #include "server/api/context.h"
 #include "server/api/job_json.h"
 #include "server/api/public_problem.h"
-#include "server/api/routes/router.h"
+#include "server/api/routes/routes.h"
 #include "server/data_folder.h"
 #include "server/jobs/process/child_process.h"
 
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kMaxListed = 200;
 constexpr size_t kMaxKeyChars = 255;
+
+const Parameter kDryRun = {"dry_run", "return an estimate instead of queuing the job",
+                           "^(true|false)$"};
+const Parameter kIdempotencyKey = {
+    "Idempotency-Key", "a request with a known key returns the same job", "^[!-~]{0,255}$"};
+const Parameter kLocation = {"Location", "URL of the job"};
+const Parameter kReplayed = {"Idempotent-Replayed", "true if the key was used before"};
+const Parameter kJobLimit = {"limit", "maximum number of entries", "", IntegerRange{1, 200, 50}};
+const Parameter kJobCursor = {"cursor", "next_cursor of the previous page", "",
+                              IntegerRange{1, INT64_MAX, INT64_MAX}};
+const Parameter kJobStates = {"state", "comma-separated list of states", [] {
+                                std::string states = kJobStateNames[0];
+                                for (size_t i = 1; i < kJobStateNames.size(); ++i)
+                                  states += std::string("|") + kJobStateNames[i];
+                                return "^(" + states + ")(,(" + states + "))*$";
+                              }()};
 
 std::string to_json(Context& context, const Job& job) {
   const auto live = context.dispatcher.live(job.id);
@@ -155,9 +170,8 @@ Response post_job(Context& context, Call& call) {
 
 JobFilter filter_of(const Call& call) {
   JobFilter filter;
-  filter.limit = call.query_integer("limit", filter.limit, 1, kMaxListed);
-  filter.before =
-      static_cast<int64_t>(call.query_integer("cursor", INT64_MAX, 1, uint64_t{INT64_MAX}));
+  filter.limit = call.query_integer(kJobLimit);
+  filter.before = static_cast<int64_t>(call.query_integer(kJobCursor));
   if (!call.request.target.query.contains("state")) return filter;
   const std::string states = call.query("state");
   for (size_t begin = 0; begin <= states.size();) {
@@ -255,16 +269,70 @@ Job find_job(JobQueue& queue, const std::string& id) {
 }
 
 void add_job_routes(Router& router) {
-  const std::string job = "/api/v1/jobs/{id}";
-  router.add("POST", "/api/v1/jobs", Role::kSubmit, post_job, {"dry_run"});
-  router.add("GET", "/api/v1/jobs", Role::kRead, list_jobs, {"state", "limit", "cursor"});
-  router.add("GET", job, Role::kRead, get_job);
-  router.add("PATCH", job, Role::kAdmin, patch_job);
-  router.add("DELETE", job, Role::kAdmin, freeing_space(delete_job));
-  router.add("POST", job + "/cancel", Role::kSubmit, freeing_space(act(&Dispatcher::cancel)));
-  router.add("POST", job + "/suspend", Role::kSubmit, act(&Dispatcher::suspend));
-  router.add("POST", job + "/resume", Role::kSubmit, act(&Dispatcher::resume));
-  router.add("POST", job + "/retry", Role::kSubmit, retry_job);
+  const std::string jobs = "/api/v1/jobs", job = jobs + "/{id}";
+  router.add({.method = "POST",
+              .pattern = jobs,
+              .role = Role::kSubmit,
+              .id = "postJob",
+              .summary = "Queue a build, or estimate one",
+              .tag = "jobs",
+              .query = {kDryRun},
+              .headers = {kIdempotencyKey},
+              .body = json_content("JobRequest"),
+              .answers = {{200, "the estimate of a dry run", {json_content("Plan")}},
+                          {202, "the queued job", {json_content("Job")}, {kLocation, kReplayed}}},
+              .problems = {404, 408, 409, 413, 415, 422, 507}},
+             post_job);
+  router.add({.method = "GET",
+              .pattern = jobs,
+              .id = "listJobs",
+              .summary = "Jobs, newest first",
+              .tag = "jobs",
+              .query = {kJobStates, kJobLimit, kJobCursor},
+              .answers = {{200, "a page of jobs", {json_content("JobList")}}}},
+             list_jobs);
+  router.add({.method = "GET",
+              .pattern = job,
+              .id = "getJob",
+              .summary = "One job",
+              .tag = "jobs",
+              .answers = {{200, "the job", {json_content("Job")}}},
+              .problems = {404}},
+             get_job);
+  router.add({.method = "PATCH",
+              .pattern = job,
+              .role = Role::kAdmin,
+              .id = "patchJob",
+              .summary = "Change a job's priority",
+              .tag = "jobs",
+              .body = json_content("JobPatch"),
+              .answers = {{200, "the job", {json_content("Job")}}},
+              .problems = {404, 408, 413, 415}},
+             patch_job);
+  router.add({.method = "DELETE",
+              .pattern = job,
+              .role = Role::kAdmin,
+              .id = "deleteJob",
+              .summary = "Delete an ended job and its files",
+              .tag = "jobs",
+              .answers = {{204, "deleted"}},
+              .problems = {404, 409}},
+             freeing_space(delete_job));
+  const auto add_action = [&](const std::string& name, const std::string& summary, auto handler) {
+    router.add({.method = "POST",
+                .pattern = job + '/' + name,
+                .role = Role::kSubmit,
+                .id = name + "Job",
+                .summary = summary,
+                .tag = "jobs",
+                .answers = {{202, "the job", {json_content("Job")}}},
+                .problems = {404, 409}},
+               Router::Handler(std::move(handler)));
+  };
+  add_action("cancel", "Cancel a job", freeing_space(act(&Dispatcher::cancel)));
+  add_action("suspend", "Suspend a job at its next checkpoint", act(&Dispatcher::suspend));
+  add_action("resume", "Resume a suspended job", act(&Dispatcher::resume));
+  add_action("retry", "Retry a failed or canceled job", retry_job);
 }
 
 }  // namespace voxdag::server

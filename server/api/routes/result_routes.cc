@@ -5,7 +5,7 @@
 #include "core/io/random_id.h"
 #include "server/api/context.h"
 #include "server/api/public_problem.h"
-#include "server/api/routes/router.h"
+#include "server/api/routes/routes.h"
 #include "server/http/digest_field.h"
 
 namespace voxdag::server {
@@ -14,8 +14,8 @@ namespace {
 constexpr const char* kDagType = "application/octet-stream";
 // Of what is sent at once: reports, previews and lists of subvolumes.
 constexpr uint64_t kMaxResultBytes = uint64_t{1} << 30;
-constexpr uint64_t kDefaultLogBytes = 65536;
-constexpr uint64_t kMaxLogBytes = uint64_t{1} << 20;
+const Parameter kMaxLogBytes = {"max_bytes", "maximum size of the answer", "",
+                                IntegerRange{1, 1 << 20, 65536}};
 
 Job finished_job(Context& context, Call& call) {
   Job job = find_job(context.queue, call.names[0]);
@@ -140,7 +140,7 @@ Response get_preview(Context& context, Call& call) {
 }
 
 Response get_log(Context& context, Call& call) {
-  const uint64_t max_bytes = call.query_integer("max_bytes", kDefaultLogBytes, 1, kMaxLogBytes);
+  const uint64_t max_bytes = call.query_integer(kMaxLogBytes);
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).log();
   Response response = make_response(200, "text/plain; charset=utf-8", "no-store");
@@ -163,12 +163,45 @@ Response get_subvolumes(Context& context, Call& call) {
 }  // namespace
 
 void add_result_routes(Router& router) {
-  const std::string job = "/api/v1/jobs/{id}/";
-  router.add("GET", job + "dag", Role::kRead, get_dag);
-  router.add("GET", job + "report", Role::kRead, get_report);
-  router.add("GET", job + "preview.png", Role::kRead, get_preview);
-  router.add("GET", job + "log", Role::kRead, get_log, {"max_bytes"});
-  router.add("GET", job + "subvolumes", Role::kRead, get_subvolumes);
+  const auto add = [&](const std::string& path, const std::string& id, const std::string& summary,
+                       Answer answer, Router::Handler handler,
+                       const std::vector<Parameter>& query = {}) {
+    router.add({.method = "GET",
+                .pattern = "/api/v1/jobs/{id}/" + path,
+                .id = id,
+                .summary = summary,
+                .tag = "results",
+                .query = query,
+                .answers = {std::move(answer)},
+                .problems = {404}},
+               std::move(handler));
+  };
+  router.add({.method = "GET",
+              .pattern = "/api/v1/jobs/{id}/dag",
+              .id = "getDag",
+              .summary = "The .vdag file or ranges of it",
+              .tag = "results",
+              .headers = {{"Range", "bytes=FIRST-LAST"},
+                          {"If-Range", "ETag of the file that the range refers to"},
+                          {"If-None-Match", "known ETags"}},
+              .answers = {{200,
+                           "the complete file",
+                           {{kDagType}},
+                           {{"ETag", "its SHA-256"}, {"Accept-Ranges", "bytes"}}},
+                          {206,
+                           "one range, or several as multipart",
+                           {{kDagType}, {"multipart/byteranges"}}},
+                          {304, "the file has one of the known ETags"}},
+              .problems = {404, 416}},
+             get_dag);
+  add("report", "getReport", "The report of the build",
+      {200, "the output of voxdag build --json", {json_content()}}, get_report);
+  add("preview.png", "getPreview", "A rendered preview",
+      {200, "a PNG of 960 x 540 pixels", {{"image/png"}}}, get_preview);
+  add("log", "getLog", "The tail of the log", {200, "complete lines of text", {{"text/plain"}}},
+      get_log, {kMaxLogBytes});
+  add("subvolumes", "getSubvolumes", "The occupied subvolumes and whether they are built",
+      {200, "cubes in voxels", {json_content("Subvolumes")}}, get_subvolumes);
 }
 
 }  // namespace voxdag::server

@@ -6,15 +6,25 @@
 #include "server/api/context.h"
 #include "server/api/job_json.h"
 #include "server/api/public_problem.h"
-#include "server/api/routes/router.h"
+#include "server/api/routes/routes.h"
 #include "server/http/digest_field.h"
 #include "server/scenes/scene_upload.h"
 
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kMaxListedScenes = 200;
-constexpr size_t kDefaultListed = 100;
+const Parameter kSceneLimit = {"limit", "maximum number of entries", "", IntegerRange{1, 200, 100}};
+const Parameter kSceneCursor = {"cursor", "next_cursor of the previous page", scene_name_pattern()};
+const Parameter kContentRange = {
+    "Content-Range",
+    "bytes FIRST-LAST/TOTAL of a part; bytes */TOTAL, with an empty body, finishes an upload that "
+    "has all its bytes",
+    "^(bytes ([0-9]{1,18}-[0-9]{1,18}|\\*)/[0-9]{1,18})?$"};
+constexpr const char* kDigestPattern = "^(sha-256=:[A-Za-z0-9+/]{43}=:)?$";
+const Parameter kContentDigest = {"Content-Digest", "sha-256=:BASE64: of this part",
+                                  kDigestPattern};
+const Parameter kReprDigest = {"Repr-Digest", "sha-256=:BASE64: of the complete scene",
+                               kDigestPattern};
 
 nlohmann::ordered_json scene_json(const Scene& scene) {
   nlohmann::ordered_json json = {
@@ -167,7 +177,7 @@ Response put_scene(Context& context, Call& call) {
 }
 
 Response list_scenes(Context& context, Call& call) {
-  const size_t limit = call.query_integer("limit", kDefaultListed, 1, kMaxListedScenes);
+  const size_t limit = call.query_integer(kSceneLimit);
   const std::string cursor = call.query("cursor");
   if (call.request.target.query.contains("cursor") && !is_scene_name(cursor))
     throw bad_request("'cursor': expected the next_cursor of a page");
@@ -200,10 +210,51 @@ Response delete_scene(Context& context, Call& call) {
 }  // namespace
 
 void add_scene_routes(Router& router) {
-  router.add("GET", "/api/v1/scenes", Role::kRead, list_scenes, {"limit", "cursor"});
-  router.add("GET", "/api/v1/scenes/{name}", Role::kRead, get_scene);
-  router.add("PUT", "/api/v1/scenes/{name}", Role::kSubmit, put_scene);
-  router.add("DELETE", "/api/v1/scenes/{name}", Role::kAdmin, delete_scene);
+  const std::string scene = "/api/v1/scenes/{name}";
+  const std::vector<Content> body = {json_content("Scene")};
+  const IntegerRange any_size{0, INT64_MAX};
+  const std::vector<Parameter> headers = {
+      {"Upload-Offset", "bytes received", "", any_size},
+      {"Upload-Length", "bytes of the complete scene, once known", "", any_size}};
+  router.add({.method = "GET",
+              .pattern = "/api/v1/scenes",
+              .id = "listScenes",
+              .summary = "Scenes, by name",
+              .tag = "scenes",
+              .query = {kSceneLimit, kSceneCursor},
+              .answers = {{200, "a page of scenes", {json_content("SceneList")}}}},
+             list_scenes);
+  router.add({.method = "GET",
+              .pattern = scene,
+              .id = "getScene",
+              .summary = "One scene and the state of its upload",
+              .tag = "scenes",
+              .answers = {{200, "the scene", body, headers}},
+              .problems = {404}},
+             get_scene);
+  router.add({.method = "PUT",
+              .pattern = scene,
+              .role = Role::kSubmit,
+              .id = "putScene",
+              .summary = "Upload a scene or a part of it",
+              .tag = "scenes",
+              .headers = {kContentRange, kContentDigest, kReprDigest},
+              .body = Content{"application/octet-stream"},
+              .is_body_required = false,
+              .answers = {{200, "the scene was replaced", body, headers},
+                          {201, "the scene was created", body, headers},
+                          {202, "the upload is not complete yet", body, headers}},
+              .problems = {408, 409, 413, 415, 507}},
+             put_scene);
+  router.add({.method = "DELETE",
+              .pattern = scene,
+              .role = Role::kAdmin,
+              .id = "deleteScene",
+              .summary = "Delete a scene",
+              .tag = "scenes",
+              .answers = {{204, "deleted"}},
+              .problems = {404, 409}},
+             delete_scene);
 }
 
 }  // namespace voxdag::server

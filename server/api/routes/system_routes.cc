@@ -9,7 +9,7 @@
 #include "core/base/process_limits.h"
 #include "server/api/context.h"
 #include "server/api/public_problem.h"
-#include "server/api/routes/router.h"
+#include "server/api/routes/routes.h"
 
 namespace voxdag::server {
 namespace {
@@ -79,21 +79,32 @@ Response get_metrics(Context& context, double started_s) {
 }  // namespace
 
 void add_system_routes(Router& router) {
-  const auto add = [&](const std::string& path, Role role, Router::Handler handler) {
-    router.add("GET", path, role, std::move(handler), kAnyQuery);
+  const auto add = [&](const std::string& path, Role role, const std::string& id,
+                       const std::string& summary, Answer answer, Router::Handler handler) {
+    router.add({.method = "GET",
+                .pattern = path,
+                .role = role,
+                .id = id,
+                .summary = summary,
+                .tag = "service",
+                .accepts_any_query = true,
+                .answers = {std::move(answer)}},
+               std::move(handler));
   };
-  add("/healthz", Role::kNone,
+  add("/healthz", Role::kNone, "health", "Liveness check", {200, "ok", {json_content()}},
       [](Context&, Call&) { return json_response(200, "{\"status\":\"ok\"}"); });
-  add("/readyz", Role::kNone, [probe = std::make_shared<WriteProbe>()](Context& context, Call&) {
-    return get_ready(context, *probe);
-  });
-  add("/version", Role::kNone, [](Context&, Call&) {
-    return json_response(200, "{\"version\":\"" VOXDAG_VERSION "\",\"api\":\"v1\"}");
-  });
-  add("/metrics", Role::kRead, [started_s = wall_seconds()](Context& context, Call&) {
-    return get_metrics(context, started_s);
-  });
-  add_asset_routes(router, "index.html");
+  add("/readyz", Role::kNone, "ready", "Readiness check", {200, "ready", {json_content()}},
+      [probe = std::make_shared<WriteProbe>()](Context& context, Call&) {
+        return get_ready(context, *probe);
+      });
+  add("/version", Role::kNone, "version", "Versions of the program and the API",
+      {200, "versions", {json_content()}}, [](Context&, Call&) {
+        return json_response(200, "{\"version\":\"" VOXDAG_VERSION "\",\"api\":\"v1\"}");
+      });
+  add("/metrics", Role::kRead, "metrics", "Metrics in the Prometheus text format",
+      {200, "metrics", {{"text/plain"}}}, [started_s = wall_seconds()](Context& context, Call&) {
+        return get_metrics(context, started_s);
+      });
 }
 
 }  // namespace voxdag::server

@@ -28,6 +28,20 @@ constexpr size_t kLargeAnswer = 512 << 10;
 // Of the cells of a color page in any file, and of the page's place.
 constexpr uint64_t kMaxColorLevel = 20, kMaxPage = (uint64_t{1} << 17) - 1;
 
+const Parameter kDigest = {"v", "digest of the manifest", "^[0-9a-f]{32}$", {}, true};
+const Parameter kNodes = {"nodes",
+                          "LEVEL.OFFSET of each tile, separated by commas",
+                          "^[0-9]{1,2}\\.[0-9]{1,13}(,[0-9]{1,2}\\.[0-9]{1,13}){0," +
+                              std::to_string(kMaxTilesOfBatch - 1) + "}$",
+                          {},
+                          true};
+const Parameter kPages = {"pages",
+                          "LEVEL.X.Y.Z of each page, separated by commas",
+                          "^[0-9]{1,2}(\\.[0-9]{1,6}){3}(,[0-9]{1,2}(\\.[0-9]{1,6}){3}){0," +
+                              std::to_string(kMaxColorPagesOfBatch - 1) + "}$",
+                          {},
+                          true};
+
 static_assert(std::endian::native == std::endian::little, "tiles are sent as they lie in memory");
 
 void append_words(const std::vector<uint32_t>& words, std::string& bytes) {
@@ -269,25 +283,45 @@ Viewed part_of_job(Context& context, const Call& call) {
 
 }  // namespace
 
-void add_tile_routes(Router& router, const std::string& base, Packing packing, Colors colors,
-                     const FindViewed& find, const CancelToken& stopping) {
-  const auto add = [&](const std::string& path, auto answer, const QueryNames& query) {
-    const auto handler = [find, answer, packing](Call& call) {
-      Viewed viewed = find(call);
-      Response response = answer_of_whole(call, *viewed.dag, answer);
-      if (packing == Packing::kGzip) pack(call.request, response);
-      hold_permit(std::move(viewed.permit), response);
-      return response;
-    };
-    router.add("GET", base + path, Role::kRead, handler, query);
+void add_tile_routes(Router& router, const TileRoutes& routes, const FindViewed& find,
+                     const CancelToken& stopping) {
+  const auto add = [&](const std::string& path, const std::string& id, const std::string& summary,
+                       const std::vector<Parameter>& query, const std::vector<Answer>& answers,
+                       auto answer) {
+    std::vector<int> problems = {404, 409};
+    if (!query.empty()) problems.push_back(410);
+    router.add({.method = "GET",
+                .pattern = routes.base + path,
+                .id = "get" + routes.id + id,
+                .summary = routes.subject + summary,
+                .tag = "results",
+                .query = query,
+                .answers = answers,
+                .problems = problems},
+               [find, answer, packing = routes.packing](Call& call) {
+                 Viewed viewed = find(call);
+                 Response response = answer_of_whole(call, *viewed.dag, answer);
+                 if (packing == Packing::kGzip) pack(call.request, response);
+                 hold_permit(std::move(viewed.permit), response);
+                 return response;
+               });
   };
-  const auto manifest = [&stopping](const Call&, const ViewedDag& dag) {
-    return get_manifest(dag, stopping);
-  };
-  add("/tiles", manifest, {});
-  add("/tiles/batch", get_batch, {"v", "nodes"});
-  if (colors == Colors::kServed) add("/tiles/colors", get_colors, {"v", "pages"});
-  add("/tiles/{level}/{offset}", get_tile, {"v"});
+  const std::vector<Answer> tiles = {{200,
+                                      "docs/format.md, Tiles",
+                                      {{"application/octet-stream"}},
+                                      {{"ETag", "a tag of the contents of this URL"}}},
+                                     {304, "the client has it"}};
+  add("/tiles", "Tiles", "grid, cameras, and how tiles are addressed", {},
+      {{200, "the manifest", {json_content(routes.manifest_schema)}}},
+      [&stopping](const Call&, const ViewedDag& dag) { return get_manifest(dag, stopping); });
+  add("/tiles/batch", "TileBatch", "several tiles, each after its length in bytes",
+      {kDigest, kNodes}, tiles, get_batch);
+  if (routes.colors == Colors::kServed)
+    add("/tiles/colors", "ColorPages",
+        "colors of cubes of 8 x 8 x 8 cells, each after its length in bytes", {kDigest, kPages},
+        tiles, get_colors);
+  add("/tiles/{level}/{offset}", "Tile", "a node and a few levels below it", {kDigest}, tiles,
+      get_tile);
 }
 
 void add_job_tile_routes(Router& router) {
@@ -296,10 +330,26 @@ void add_job_tile_routes(Router& router) {
   };
   const std::string job = "/api/v1/jobs/{id}";
   const CancelToken& stopping = router.context().stopping;
-  add_tile_routes(router, job, Packing::kGzip, Colors::kServed, finder(result_of_job), stopping);
-  add_tile_routes(router, job + "/partial", Packing::kGzip, Colors::kNone, finder(part_of_job),
-                  stopping);
-  router.add("GET", job + "/partial", Role::kRead, get_partial);
+  add_tile_routes(
+      router, {.base = job, .id = "", .subject = "The result: ", .manifest_schema = "TileManifest"},
+      finder(result_of_job), stopping);
+  add_tile_routes(router,
+                  {.base = job + "/partial",
+                   .id = "Partial",
+                   .subject = "A job that has not succeeded: ",
+                   .manifest_schema = "PartialManifest",
+                   .colors = Colors::kNone},
+                  finder(part_of_job), stopping);
+  router.add({.method = "GET",
+              .pattern = job + "/partial",
+              .id = "getPartial",
+              .summary = "The subvolumes that a job has built so far, coarsely",
+              .tag = "results",
+              .answers = {{200,
+                           "built subvolumes in voxels, each with a coarse brick",
+                           {json_content("Partial")}}},
+              .problems = {404}},
+             get_partial);
 }
 
 }  // namespace voxdag::server

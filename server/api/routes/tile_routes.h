@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "server/api/routes/router.h"
+#include "server/api/routing/router.h"
 #include "server/tiles/viewed_dag.h"
 
 namespace voxdag::server {
@@ -24,10 +24,19 @@ enum class Packing { kNone, kGzip };
 
 enum class Colors { kNone, kServed };
 
+struct TileRoutes {
+  std::string base;     // "/api/v1/jobs/{id}"
+  std::string id;       // part of the operations' ids
+  std::string subject;  // begin of the operations' summaries
+  std::string manifest_schema;
+  Packing packing = Packing::kGzip;
+  Colors colors = Colors::kServed;
+};
+
 // Adds BASE/tiles, BASE/tiles/batch and BASE/tiles/{level}/{offset}, and BASE/tiles/colors if they
-// are served. Manifests that are being made when `stopping` is canceled are given up; it must
-// outlive the router.
-void add_tile_routes(Router& router, const std::string& base, Packing packing, Colors colors,
-                     const FindViewed& find, const CancelToken& stopping);
+// are served. Manifests in the making are given up when `stopping` is canceled; it must outlive the
+// router.
+void add_tile_routes(Router& router, const TileRoutes& routes, const FindViewed& find,
+                     const CancelToken& stopping);
 
 }  // namespace voxdag::server

@@ -1,0 +1,81 @@
+// One row of the router's table: what a request looks like, who may send it, and its answers. The
+// router checks requests against the row, and the OpenAPI document is generated from it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/api/access/tokens.h"
+#include "server/http/message.h"
+
+namespace voxdag::server {
+
+struct IntegerRange {
+  uint64_t min = 0, max = 0;
+  std::optional<uint64_t> default_value = {};
+};
+
+// A query parameter, or a header field of a request or of an answer.
+struct Parameter {
+  std::string name;
+  std::string description;
+  std::string pattern = {};  // regular expression of its value; "" for any text
+  std::optional<IntegerRange> integer = {};
+  bool is_required = false;
+};
+
+// A request's body, or one of the bodies that an answer can have.
+struct Content {
+  std::string type;         // media type
+  std::string schema = {};  // name of a schema in openapi/schemas.h; "" for bytes, text or any JSON
+};
+
+struct Answer {
+  int status;
+  std::string description;
+  std::vector<Content> contents = {};  // none: no body
+  std::vector<Parameter> headers = {};
+};
+
+// A request to which access was granted.
+struct Call {
+  Request& request;
+  Caller caller;
+  std::vector<std::string> names;  // values of the {...} segments of the pattern
+
+  // The value of a query parameter; "" if it is missing.
+  std::string query(const std::string& name) const;
+  // The value of a query parameter with an IntegerRange. Throws Problem (400) if it is not in the
+  // range.
+  uint64_t query_integer(const Parameter& parameter) const;
+};
+
+struct Route {
+  std::string method;
+  std::string pattern;  // "/api/v1/jobs/{id}/dag". A GET route also answers HEAD.
+  Role role = Role::kRead;
+  // A route without an id is not in the document.
+  std::string id = {};
+  std::string summary = {};
+  std::string tag = {};
+  // The query parameters that the router accepts. It answers any other with 400.
+  std::vector<Parameter> query = {};
+  bool accepts_any_query = false;
+  std::vector<Parameter> headers = {};
+  std::optional<Content> body = {};
+  bool is_body_required = true;
+  std::vector<Answer> answers = {};
+  // Statuses of its problems, besides those that every route has (kCommonProblems).
+  std::vector<int> problems = {};
+};
+
+inline constexpr int kCommonProblems[] = {400, 401, 403, 429, 431, 500, 503};
+
+// "application/json" with a body of this schema.
+inline Content json_content(std::string schema = "") {
+  return {"application/json", std::move(schema)};
+}
+
+}  // namespace voxdag::server

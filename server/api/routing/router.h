@@ -1,0 +1,54 @@
+// Routes requests to handlers and checks the role that each needs.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/api/access/access_control.h"
+#include "server/api/routing/route.h"
+
+namespace voxdag::server {
+
+struct Context;
+
+class Router {
+ public:
+  using Handler = std::function<Response(Context&, Call&)>;
+  using PlainHandler = std::function<Response(Call&)>;
+
+  // For routes that need no Context.
+  Router() = default;
+  explicit Router(Context& context) : context_(&context) {}
+
+  Context& context() const { return *context_; }
+
+  void add(Route route, Handler handler);
+  void add(Route route, PlainHandler handler);
+  // Throws Problem: 404, 405 with Allow, and as `access` and the handler do.
+  Response route(Request& request, AccessControl& access) const;
+
+  std::vector<Route> routes() const;
+  // False if the request's route does not list this status.
+  bool is_documented(const Request& request, int status) const;
+
+ private:
+  struct Entry {
+    Route route;
+    std::vector<std::string> segments;  // of the pattern
+    PlainHandler handler;
+  };
+  Context* const context_ = nullptr;
+  std::vector<Entry> entries_;
+};
+
+Response json_response(int status, std::string body);
+// 204
+Response no_content();
+// The body of a request. Throws Problem: 413 if it is larger than `max_bytes`, 415 if its content
+// type is not JSON, 400 or 408 if it ends early.
+std::string read_json_body(Request& request, uint64_t max_bytes);
+// Throws Problem (400) if there is a body.
+void expect_no_body(const Request& request);
+
+}  // namespace voxdag::server
