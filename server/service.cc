@@ -9,9 +9,9 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
-#include "server/api/public_problem.h"
+#include "server/api/answers/public_problem.h"
 #include "server/api/routes/routes.h"
-#include "server/data_folder.h"
+#include "server/disk/data_folder.h"
 #include "server/http/connection/listener.h"
 
 namespace voxdag::server {
@@ -139,7 +139,7 @@ void Service::clean_up_periodically() {
     });
     steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
     steps_.run("close files that nobody views",
-               [this] { context_.viewed.close_stale(kMaxIdleOfViews_s); });
+               [this] { context_.open_sources.close_stale(kMaxIdleOfViews_s); });
     steps_.run("forget running jobs that nobody views",
                [this] { context_.partial.close_stale(kMaxIdleOfViews_s); });
     steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });

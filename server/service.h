@@ -8,9 +8,9 @@
 #include <string>
 
 #include "server/api/access/access_control.h"
-#include "server/api/context.h"
+#include "server/api/context/context.h"
 #include "server/api/routing/router.h"
-#include "server/clock_guard.h"
+#include "server/base/clock_guard.h"
 #include "server/http/http_server.h"
 
 namespace voxdag::server {

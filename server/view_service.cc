@@ -3,7 +3,7 @@
 #include <exception>
 #include <thread>
 
-#include "server/api/public_problem.h"
+#include "server/api/answers/public_problem.h"
 #include "server/api/routes/routes.h"
 #include "server/api/routes/tile_routes.h"
 
@@ -25,10 +25,10 @@ HttpOptions options(int port) {
 ViewService::ViewService(const std::string& path, int port, FileSystem& files, Log log)
     : path_(path),
       log_(std::move(log)),
-      viewed_(files, kMaxOpen),
+      open_sources_(files, kMaxOpen),
       access_(ServerConfig{}, files),
       http_(options(port), [this](Request& request) { return answer(request); }) {
-  viewed_.open(path_);
+  open_sources_.open(path_);
   add_tile_routes(
       router_,
       {.base = "/api/v1/view",
@@ -37,7 +37,7 @@ ViewService::ViewService(const std::string& path, int port, FileSystem& files, L
        .manifest_schema = "TileManifest",
        .packing = Packing::kNone},
       [this](const Call&) {
-        return Viewed{viewed_.open(path_), nullptr};
+        return TileAccess{open_sources_.open(path_), nullptr};
       },
       stopping_);
   add_asset_routes(router_, "viewer.html");
@@ -50,7 +50,7 @@ std::string ViewService::url() const {
 
 void ViewService::run() {
   // The cameras are looked for while a browser starts. If that fails, so will the request for them.
-  const std::jthread cameras([this, file = viewed_.open(path_)] {
+  const std::jthread cameras([this, file = open_sources_.open(path_)] {
     try {
       file->manifest(stopping_);
     } catch (const std::exception&) {

@@ -8,9 +8,9 @@
 
 #include "server/api/access/access_control.h"
 #include "server/api/routing/router.h"
+#include "server/base/steps.h"
 #include "server/http/http_server.h"
-#include "server/steps.h"
-#include "server/tiles/viewed_files.h"
+#include "server/tiles/open_tile_sources.h"
 
 namespace voxdag::server {
 
@@ -34,7 +34,7 @@ class ViewService {
 
   const std::string path_;
   const Log log_;
-  ViewedFiles viewed_;
+  OpenTileSources open_sources_;
   CancelToken stopping_;
   AccessControl access_;
   Router router_;

@@ -4,8 +4,8 @@
 #pragma once
 
 #include "server/http/connection/connection.h"
-#include "server/http/message.h"
-#include "server/http/request_head.h"
+#include "server/http/message/message.h"
+#include "server/http/message/request_head.h"
 
 namespace voxdag::server {
 

@@ -6,7 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/io/random_id.h"
-#include "server/http/problem.h"
+#include "server/http/message/problem.h"
 
 namespace voxdag::server {
 namespace {

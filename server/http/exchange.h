@@ -6,8 +6,8 @@
 
 #include "server/http/body_reader.h"
 #include "server/http/connection/connection.h"
-#include "server/http/message.h"
-#include "server/http/request_head.h"
+#include "server/http/message/message.h"
+#include "server/http/message/request_head.h"
 
 namespace voxdag::server {
 

@@ -15,7 +15,7 @@
 #include "server/http/connection/thread_pool.h"
 #include "server/http/connection/tls.h"
 #include "server/http/exchange.h"
-#include "server/http/problem.h"
+#include "server/http/message/problem.h"
 
 namespace voxdag::server {
 namespace {

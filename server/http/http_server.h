@@ -6,8 +6,8 @@
 #include <memory>
 #include <string>
 
-#include "server/http/limits.h"
-#include "server/http/message.h"
+#include "server/http/connection/limits.h"
+#include "server/http/message/message.h"
 
 namespace voxdag::server {
 

@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "scheduler/slurm/cluster_build.h"
 #include "server/jobs/job_outcome.h"
-#include "server/jobs/process/job_task.h"
+#include "server/jobs/protocol/job_task.h"
 
 namespace voxdag::server {
 namespace {
@@ -247,7 +247,7 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
   try {
     files_.make_directories(place.path);
     write_task(files_, place.task(),
-               tasks_.make(parse_job_request(job.request), Task::Kind::kBuild));
+               tasks_.make(parse_job_request(job.request), JobTask::Kind::kBuild));
     end = run_child({{config_.program, "run-job", place.path}, place.log(), config_.jobs.nice},
                     live, kNoTimeLimit_s);
   } catch (const std::exception& error) {

@@ -19,15 +19,15 @@
 #include <string>
 #include <thread>
 
-#include "server/clock_guard.h"
-#include "server/config.h"
-#include "server/disk_space.h"
+#include "server/base/clock_guard.h"
+#include "server/base/steps.h"
+#include "server/config/config.h"
+#include "server/disk/disk_space.h"
 #include "server/jobs/job_folders.h"
 #include "server/jobs/live_job.h"
 #include "server/jobs/process/child_process.h"
 #include "server/jobs/task_resolver.h"
 #include "server/queue/job_queue.h"
-#include "server/steps.h"
 
 namespace voxdag::server {
 

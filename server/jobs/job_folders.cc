@@ -3,7 +3,7 @@
 #include "core/base/clock.h"
 #include "scheduler/slurm/cluster_build.h"
 #include "server/jobs/process/job_process.h"
-#include "server/jobs/process/job_task.h"
+#include "server/jobs/protocol/job_task.h"
 #include "server/jobs/task_resolver.h"
 
 namespace voxdag::server {

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "server/data_folder.h"
-#include "server/jobs/process/job_folder.h"
+#include "server/base/steps.h"
+#include "server/disk/data_folder.h"
+#include "server/jobs/protocol/job_folder.h"
 #include "server/queue/job_queue.h"
-#include "server/steps.h"
 
 namespace voxdag::server {
 

@@ -1,7 +1,7 @@
 // What becomes of a job when its process has ended.
 #pragma once
 
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/jobs/live_job.h"
 #include "server/jobs/process/child_process.h"
 #include "server/queue/job.h"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/json_text.h"
+#include "server/base/json_text.h"
 
 namespace voxdag::server {
 namespace {

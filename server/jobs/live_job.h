@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/clock.h"
-#include "server/jobs/process/job_messages.h"
+#include "server/jobs/protocol/job_messages.h"
 
 namespace voxdag::server {
 

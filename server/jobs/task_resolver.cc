@@ -4,8 +4,8 @@
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "server/base/request_error.h"
 #include "server/jobs/process/confined_files.h"
-#include "server/request_error.h"
 
 namespace voxdag::server {
 namespace {
@@ -35,7 +35,7 @@ std::vector<std::string> TaskResolver::uploads_of(const JobRequest& request) {
   return uploads;
 }
 
-void TaskResolver::add_scene(const std::string& scene, Task& task) {
+void TaskResolver::add_scene(const std::string& scene, JobTask& task) {
   const RequestError missing(RequestError::Kind::kNotFound,
                              "no scene '" + scene.substr(0, 128) +
                                  "': expected an uploaded one, or a path below one of the scene "
@@ -64,8 +64,8 @@ uint64_t TaskResolver::memory_of(const JobRequest& request) const {
   return requested ? requested : memory_bytes_ / config_.jobs.max_concurrent;
 }
 
-Task TaskResolver::make(const JobRequest& request, Task::Kind kind) {
-  Task task;
+JobTask TaskResolver::make(const JobRequest& request, JobTask::Kind kind) {
+  JobTask task;
   task.kind = kind;
   task.request = request.text;
   for (const std::string& scene : request.scenes) add_scene(scene, task);

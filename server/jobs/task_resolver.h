@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "server/config.h"
-#include "server/jobs/job_request.h"
-#include "server/jobs/process/job_task.h"
+#include "server/config/config.h"
+#include "server/jobs/protocol/job_request.h"
+#include "server/jobs/protocol/job_task.h"
 #include "server/scenes/scene_store.h"
 
 namespace voxdag::server {
@@ -19,7 +19,7 @@ class TaskResolver {
   // Throws RequestError: kNotFound for a scene that does not exist or lies outside the configured
   // roots (the message does not say which), kConflict for one that is still being uploaded, kLimit
   // for more memory than a job may have.
-  Task make(const JobRequest& request, Task::Kind kind);
+  JobTask make(const JobRequest& request, JobTask::Kind kind);
   // The scenes of a request that are uploads.
   static std::vector<std::string> uploads_of(const JobRequest& request);
 
@@ -30,7 +30,7 @@ class TaskResolver {
 
  private:
   // Adds to the task what the scene needs.
-  void add_scene(const std::string& scene, Task& task);
+  void add_scene(const std::string& scene, JobTask& task);
 
   const ServerConfig& config_;
   SceneStore& scenes_;

@@ -6,7 +6,7 @@
 #include "core/base/error.h"
 #include "core/db/table_rows.h"
 #include "core/io/random_id.h"
-#include "server/json_text.h"
+#include "server/base/json_text.h"
 
 namespace voxdag::server {
 
@@ -246,7 +246,7 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
     if (auto known = job_of_key(writer_, key)) return {std::move(*known), true};
     if (static_cast<uint64_t>(writer_.integer("SELECT count(*) FROM job WHERE " + kOpen)) >=
         max_open)
-      throw RequestError(RequestError::Kind::kQueueFull, "the queue is full");
+      throw RequestError(RequestError::Kind::kBusy, "the queue is full");
     if (job.id.empty()) job.id = random_id();
     job.number = writer_.integer("SELECT coalesce(max(number), 0) + 1 FROM job");
     if (job.created_s == 0) job.created_s = unix_seconds();

@@ -18,9 +18,9 @@
 #include <vector>
 
 #include "core/db/sqlite.h"
-#include "server/data_folder.h"
+#include "server/base/request_error.h"
+#include "server/disk/data_folder.h"
 #include "server/queue/job.h"
-#include "server/request_error.h"
 
 namespace voxdag::server {
 
@@ -48,7 +48,7 @@ class JobQueue {
     bool replayed = false;
   };
   // Queues the job under its id, or a new one, or finds the job that has this key. Throws
-  // RequestError: kKeyReused if the key came with another request, kQueueFull if `max_open` jobs
+  // RequestError: kKeyReused if the key came with another request, kBusy if `max_open` jobs
   // have not ended.
   Added add(Job job, const IdempotencyKey& key, uint64_t max_open);
 

@@ -6,7 +6,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/checksum.h"
-#include "server/request_error.h"
+#include "server/base/request_error.h"
 
 namespace voxdag::server {
 namespace {

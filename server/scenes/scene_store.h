@@ -20,8 +20,8 @@
 
 #include "core/db/sqlite.h"
 #include "core/io/file_system.h"
-#include "server/data_folder.h"
-#include "server/steps.h"
+#include "server/base/steps.h"
+#include "server/disk/data_folder.h"
 
 namespace voxdag::server {
 

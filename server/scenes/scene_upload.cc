@@ -1,7 +1,7 @@
 #include "server/scenes/scene_upload.h"
 
 #include "core/base/error.h"
-#include "server/request_error.h"
+#include "server/base/request_error.h"
 
 namespace voxdag::server {
 namespace {

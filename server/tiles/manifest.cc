@@ -1,6 +1,6 @@
 #include "server/tiles/manifest.h"
 
-#include "server/tiles/viewed_dag.h"
+#include "server/tiles/tile_source.h"
 
 namespace voxdag::server {
 namespace {

@@ -5,7 +5,7 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/image/image_reader.h"
-#include "server/http/digest_field.h"
+#include "server/http/message/digest_field.h"
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {

@@ -12,7 +12,7 @@
 #include "core/base/error.h"
 #include "core/db/sqlite.h"
 #include "core/format/checksum.h"
-#include "server/request_error.h"
+#include "server/base/request_error.h"
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {

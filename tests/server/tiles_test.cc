@@ -326,7 +326,7 @@ TEST_F(View, NoticesThatTheFileWasReplaced) {
 // Somebody truncates the file between a request's look at it and its reads.
 TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   build("64");
-  const ViewedFile file(path_, system_files().open_read(path_)->identity());
+  const FileTileSource file(path_, system_files().open_read(path_)->identity());
   EXPECT_NO_THROW(file.expect_whole());
   std::filesystem::resize_file(path_, 4096);
   try {
@@ -348,7 +348,7 @@ TEST_F(View, AFileThatIsTruncatedWhileItIsOpenedIsAnErrorAndNoCrash) {
     const auto bytes = map_global_file(path_);
     std::filesystem::resize_file(path_, left);
     try {
-      const ViewedFile file(path_, identity, bytes);
+      const FileTileSource file(path_, identity, bytes);
       FAIL() << "the file is opened";
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::kIo) << error.message();
@@ -424,7 +424,7 @@ TEST_F(View, ShowsASingleBrickAndAnEmptyScene) {
   EXPECT_EQ(status("0/0", m["digest"]), 404);
 }
 
-TEST(ViewedFiles, AreFew) {
+TEST(OpenTileSources, AreFew) {
   TemporaryFolder folder;
   const std::string scene = folder.file("m.glb"), program = VOXDAG_BINARY;
   ASSERT_EQ(
@@ -438,7 +438,7 @@ TEST(ViewedFiles, AreFew) {
                         .c_str()),
         0);
   }
-  ViewedFiles files(system_files(), 2);
+  OpenTileSources files(system_files(), 2);
   const auto first = files.open(paths[0]);
   EXPECT_EQ(files.open(paths[0]), first);
   files.open(paths[1]);

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/base/clock.h"
-#include "server/api/public_problem.h"
+#include "server/api/answers/public_problem.h"
 #include "server/http/connection/connection_table.h"
 
 namespace voxdag::server {

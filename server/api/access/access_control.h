@@ -7,8 +7,8 @@
 
 #include "server/api/access/rate_limiter.h"
 #include "server/api/access/tokens.h"
-#include "server/config.h"
-#include "server/http/message.h"
+#include "server/config/config.h"
+#include "server/http/message/message.h"
 
 namespace voxdag::server {
 

@@ -6,7 +6,7 @@
 
 #include "core/base/text.h"
 #include "server/api/openapi/schemas.h"
-#include "server/http/target.h"
+#include "server/http/message/target.h"
 #include "server/scenes/scene_store.h"
 
 namespace voxdag::server {

@@ -1,9 +1,9 @@
 // The server-sent events of a job.
 #include "core/base/clock.h"
 #include "core/base/text.h"
-#include "server/api/context.h"
-#include "server/api/job_json.h"
-#include "server/api/public_problem.h"
+#include "server/api/answers/job_json.h"
+#include "server/api/answers/public_problem.h"
+#include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
 
 namespace voxdag::server {

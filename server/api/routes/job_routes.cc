@@ -6,11 +6,11 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/io/random_id.h"
-#include "server/api/context.h"
-#include "server/api/job_json.h"
-#include "server/api/public_problem.h"
+#include "server/api/answers/job_json.h"
+#include "server/api/answers/public_problem.h"
+#include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
-#include "server/data_folder.h"
+#include "server/disk/data_folder.h"
 #include "server/jobs/process/child_process.h"
 
 namespace voxdag::server {
@@ -87,7 +87,7 @@ class Plan {
   Plan(Context& context, const JobRequest& request)
       : context_(context), scenes_(TaskResolver::uploads_of(request)) {
     std::lock_guard lock(context_.scene_mutex);
-    task = context_.tasks.make(request, Task::Kind::kPlan);
+    task = context_.tasks.make(request, JobTask::Kind::kPlan);
     context_.planned_scenes.insert(scenes_.begin(), scenes_.end());
   }
   ~Plan() {
@@ -96,7 +96,7 @@ class Plan {
       context_.planned_scenes.erase(context_.planned_scenes.find(scene));
   }
   Plan(const Plan&) = delete;
-  Task task;
+  JobTask task;
 
  private:
   Context& context_;
@@ -157,7 +157,7 @@ Response post_job(Context& context, Call& call) {
   if (context.draining) throw busy("the service is stopping");
   std::lock_guard lock(context.scene_mutex);
   if (const auto known = context.queue.find_by_key(key)) return accepted(context, *known, true);
-  context.tasks.make(request, Task::Kind::kBuild);  // throws if the request cannot be built
+  context.tasks.make(request, JobTask::Kind::kBuild);  // throws if the request cannot be built
   Job job;
   job.name = request.name;
   job.request = request.text;
@@ -224,10 +224,10 @@ Response patch_job(Context& context, Call& call) {
 Response delete_job(Context& context, Call& call) {
   expect_no_body(call.request);
   const std::string result = context.dispatcher.folder(call.names[0]).result();
-  context.viewed.close(result);
+  context.open_sources.close(result);
   context.dispatcher.remove(call.names[0]);
   // Somebody may have asked for a tile in between.
-  context.viewed.close(result);
+  context.open_sources.close(result);
   context.partial.close(call.names[0]);
   return no_content();
 }
@@ -238,7 +238,7 @@ Response retry_job(Context& context, Call& call) {
   std::lock_guard lock(context.scene_mutex);
   const Job job = find_job(context.queue, call.names[0]);
   if (job.state == JobState::kFailed || job.state == JobState::kCanceled)
-    context.tasks.make(parse_job_request(job.request), Task::Kind::kBuild);
+    context.tasks.make(parse_job_request(job.request), JobTask::Kind::kBuild);
   const Job queued = context.dispatcher.retry(job.id);
   // What it builds now may be another scene.
   if (has_ended(job.state)) context.partial.close(job.id);

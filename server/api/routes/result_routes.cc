@@ -3,10 +3,10 @@
 
 #include "core/base/error.h"
 #include "core/io/random_id.h"
-#include "server/api/context.h"
-#include "server/api/public_problem.h"
+#include "server/api/answers/public_problem.h"
+#include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
-#include "server/http/digest_field.h"
+#include "server/http/message/digest_field.h"
 
 namespace voxdag::server {
 namespace {

@@ -3,11 +3,11 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
-#include "server/api/context.h"
-#include "server/api/job_json.h"
-#include "server/api/public_problem.h"
+#include "server/api/answers/job_json.h"
+#include "server/api/answers/public_problem.h"
+#include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
-#include "server/http/digest_field.h"
+#include "server/http/message/digest_field.h"
 #include "server/scenes/scene_upload.h"
 
 namespace voxdag::server {

@@ -7,8 +7,8 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
-#include "server/api/context.h"
-#include "server/api/public_problem.h"
+#include "server/api/answers/public_problem.h"
+#include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
 
 namespace voxdag::server {

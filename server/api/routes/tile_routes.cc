@@ -9,15 +9,15 @@
 #include "core/format/checksum.h"
 #include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
-#include "server/api/context.h"
-#include "server/api/gzip.h"
-#include "server/api/public_problem.h"
+#include "server/api/answers/gzip.h"
+#include "server/api/answers/public_problem.h"
+#include "server/api/context/context.h"
 
 namespace voxdag::server {
 namespace {
 
-// What has a digest in its URL never changes.
-constexpr const char* kForEver = "private, max-age=31536000, immutable";
+// Cache-Control of URLs with a digest: their contents never change.
+constexpr const char* kImmutable = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
 // Of a node above the bricks in any file (docs/format.md).
 constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
@@ -48,7 +48,7 @@ void append_words(const std::vector<uint32_t>& words, std::string& bytes) {
   bytes.append(reinterpret_cast<const char*>(words.data()), words.size() * sizeof(uint32_t));
 }
 
-std::vector<uint32_t> make_tile(const ViewedDag& dag, const query::TileAddress& address) {
+std::vector<uint32_t> make_tile(const TileSource& dag, const query::TileAddress& address) {
   try {
     return query::encode_tile(dag.dag(), kTileLevels, address, dag.blocks());
   } catch (const DamagedBlock&) {
@@ -101,7 +101,7 @@ auto parse_batch(const std::string& name, std::string_view list, size_t most, co
   }
 }
 
-void check_digest(const Call& call, const ViewedDag& dag) {
+void check_digest(const Call& call, const TileSource& dag) {
   const std::string digest = call.query("v");
   if (digest.size() != dag.digest().size() ||
       digest.find_first_not_of("0123456789abcdef") != std::string::npos)
@@ -111,13 +111,13 @@ void check_digest(const Call& call, const ViewedDag& dag) {
                   "the file was replaced, or its tiles are made otherwise now: get the manifest");
 }
 
-// `make` returns the bytes of the answer. They depend on nothing but the digest and what the
-// request names, which are the entity tag.
+// A response that clients can keep. `make` returns its bytes, which depend only on the digest and
+// `name`: the entity tag is a hash of both.
 template <class Make>
-Response answer_for_ever(const Call& call, const ViewedDag& dag, const std::string& name,
-                         const Make& make) {
+Response immutable_response(const Call& call, const TileSource& dag, const std::string& name,
+                            const Make& make) {
   check_digest(call, dag);
-  Response response = make_response(200, "application/octet-stream", kForEver);
+  Response response = make_response(200, "application/octet-stream", kImmutable);
   const std::string tag = sha256_hex(dag.digest() + ' ' + name).substr(0, kTagDigits);
   response.headers.emplace("ETag", "W/\"" + tag + '"');
   response.headers.emplace("Vary", "Accept-Encoding, Authorization");
@@ -132,25 +132,25 @@ Response answer_for_ever(const Call& call, const ViewedDag& dag, const std::stri
 }
 
 // The message names the file, which clients do not see.
-Problem damaged(const ViewedDag& dag, const Error& error) {
+Problem damaged(const TileSource& dag, const Error& error) {
   Problem result = problem(ErrorCode::kCorrupt,
-                           "the part of the DAG, or of its colors, that was asked for is damaged: "
+                           "the requested part of the DAG or of its colors is damaged: "
                            "run 'voxdag verify' on the file, and build it again");
   if (dag.is_first_damage()) result.log_text = error.message();
   return result;
 }
 
-void expect_unchanged(const ViewedDag& dag) {
-  dag.expect_whole();
+void expect_unchanged(const TileSource& dag) {
+  dag.expect_readable();
   if (dag.was_overwritten())
     throw Problem(410, "gone", "the file was replaced while it was read: get the manifest");
 }
 
-// An answer, or an error, that comes from zeros in place of what cannot be read, or from a file
-// that is being written, is none.
+// The answer, or an error, if the file was readable and unchanged throughout. Pages that cannot be
+// read are zeros, and a file that is being written is half old: both can make any answer or error.
 template <class Answer>
-Response answer_of_whole(const Call& call, const ViewedDag& dag, const Answer& answer) {
-  dag.expect_whole();  // what is damaged already is not read again
+Response consistent_response(const Call& call, const TileSource& dag, const Answer& answer) {
+  dag.expect_readable();  // a damaged file is not read again
   try {
     Response response = answer(call, dag);
     expect_unchanged(dag);
@@ -165,7 +165,7 @@ Response answer_of_whole(const Call& call, const ViewedDag& dag, const Answer& a
   }
 }
 
-Response get_manifest(const ViewedDag& dag, const CancelToken& stopping) {
+Response get_manifest(const TileSource& dag, const CancelToken& stopping) {
   try {
     return json_response(200, dag.manifest(stopping));
   } catch (const Error& error) {
@@ -174,18 +174,18 @@ Response get_manifest(const ViewedDag& dag, const CancelToken& stopping) {
   }
 }
 
-Response get_tile(const Call& call, const ViewedDag& dag) {
+Response get_tile(const Call& call, const TileSource& dag) {
   const std::string name = *(call.names.end() - 2) + '.' + call.names.back();
   const query::TileAddress address = parse_address(name, 404);
-  return answer_for_ever(call, dag, name, [&] {
+  return immutable_response(call, dag, name, [&] {
     std::string bytes;
     append_words(make_tile(dag, address), bytes);
     return bytes;
   });
 }
 
-// What `make` returns for each of the addresses, after its length in bytes. Its disk may be slow:
-// nobody works for a client that has left, and when a service stops, all are made to leave.
+// The words that `make` returns for each address, after their length in bytes. Ends early if the
+// client has left, because disks may be slow; a service that stops closes all connections.
 template <class Addresses, class Make>
 std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {
   std::string bytes;
@@ -198,20 +198,20 @@ std::string batch_of(const Call& call, const Addresses& addresses, const Make& m
   return bytes;
 }
 
-Response get_batch(const Call& call, const ViewedDag& dag) {
+Response get_batch(const Call& call, const TileSource& dag) {
   const std::string nodes = call.query("nodes");
   const auto addresses = parse_batch("nodes", nodes, kMaxTilesOfBatch, [](const std::string& text) {
     return parse_address(text, 400);
   });
-  return answer_for_ever(call, dag, "batch " + nodes, [&] {
+  return immutable_response(call, dag, "batch " + nodes, [&] {
     return batch_of(call, addresses, [&](const auto& address) { return make_tile(dag, address); });
   });
 }
 
-Response get_colors(const Call& call, const ViewedDag& dag) {
+Response get_colors(const Call& call, const TileSource& dag) {
   const std::string pages = call.query("pages");
   const auto addresses = parse_batch("pages", pages, kMaxColorPagesOfBatch, parse_page);
-  return answer_for_ever(call, dag, "colors " + pages, [&] {
+  return immutable_response(call, dag, "colors " + pages, [&] {
     if (!dag.colored_file()) throw not_found("the DAG has no colors");
     query::ColorPages pages_of_file(*dag.colored_file(), dag.dag(), dag.blocks());
     return batch_of(call, addresses,
@@ -229,7 +229,7 @@ void hold_permit(std::shared_ptr<void> permit, Response& response) {
   if (response.body.size() >= kLargeAnswer) response.permit = std::move(permit);
 }
 
-Viewed result_of_job(Context& context, const Call& call) {
+TileAccess open_result(Context& context, const Call& call) {
   const Job job = find_job(context.queue, call.names[0]);
   if (job.state != JobState::kSucceeded) {
     Problem problem = conflict("the job has no result yet: expected a succeeded job");
@@ -237,13 +237,12 @@ Viewed result_of_job(Context& context, const Call& call) {
     throw problem;
   }
   auto permit = tile_permit(context, call);
-  return {context.viewed.open(context.dispatcher.folder(job.id).result()), std::move(permit)};
+  return {context.open_sources.open(context.dispatcher.folder(job.id).result()), std::move(permit)};
 }
 
-// What `make` returns of what a job that has not succeeded has built so far, given the job, its
-// folder and its resolution.
+// Calls `make` with the id, folder and resolution of a job that has not succeeded.
 template <class Make>
-auto of_unfinished_job(Context& context, const Call& call, const Make& make) {
+auto with_unfinished_job(Context& context, const Call& call, const Make& make) {
   const Job job = find_job(context.queue, call.names[0]);
   if (job.state == JobState::kSucceeded)
     throw not_found("the job has its result: expected one that has not succeeded");
@@ -251,8 +250,7 @@ auto of_unfinished_job(Context& context, const Call& call, const Make& make) {
   try {
     return make(job.id, context.dispatcher.folder(job.id), resolution);
   } catch (const Error& error) {
-    // A store that is just being made has no tables yet, and that of a job that ends is removed
-    // while it is read.
+    // A new store has no tables yet, and a job that ends removes its store during the reading.
     const bool is_read = find_job(context.queue, call.names[0]).state != JobState::kSucceeded;
     if (is_read && !error.is_corruption() && error.code() != ErrorCode::kInvalidInput) throw;
     throw not_found("nothing is known of what the job has built");
@@ -262,7 +260,7 @@ auto of_unfinished_job(Context& context, const Call& call, const Make& make) {
 Response get_partial(Context& context, Call& call) {
   auto permit = tile_permit(context, call);
   Response response = json_response(
-      200, of_unfinished_job(context, call, [&](const auto& id, const auto& folder, uint64_t r) {
+      200, with_unfinished_job(context, call, [&](const auto& id, const auto& folder, uint64_t r) {
         return context.partial.json(id, folder, r);
       }));
   pack(call.request, response);
@@ -270,26 +268,24 @@ Response get_partial(Context& context, Call& call) {
   return response;
 }
 
-Viewed part_of_job(Context& context, const Call& call) {
+TileAccess open_unfinished_job(Context& context, const Call& call) {
   auto permit = tile_permit(context, call);
-  // Whoever looks at the part when the job ends need not be refused at once.
+  // Viewers can finish with the last tiles when the job ends.
   auto dag = context.partial.known(find_job(context.queue, call.names[0]).id, call.query("v"));
   if (!dag)
-    dag = of_unfinished_job(context, call, [&](const auto& id, const auto& folder, uint64_t r) {
-      return context.partial.dag(id, folder, r);
+    dag = with_unfinished_job(context, call, [&](const auto& id, const auto& folder, uint64_t r) {
+      return context.partial.tiles(id, folder, r);
     });
   return {std::move(dag), std::move(permit)};
 }
 
 }  // namespace
 
-void add_tile_routes(Router& router, const TileRoutes& routes, const FindViewed& find,
+void add_tile_routes(Router& router, const TileRoutes& routes, const OpenTiles& open,
                      const CancelToken& stopping) {
   const auto add = [&](const std::string& path, const std::string& id, const std::string& summary,
                        const std::vector<Parameter>& query, const std::vector<Answer>& answers,
                        auto answer) {
-    std::vector<int> problems = {404, 409};
-    if (!query.empty()) problems.push_back(410);
     router.add({.method = "GET",
                 .pattern = routes.base + path,
                 .id = "get" + routes.id + id,
@@ -297,12 +293,12 @@ void add_tile_routes(Router& router, const TileRoutes& routes, const FindViewed&
                 .tag = "results",
                 .query = query,
                 .answers = answers,
-                .problems = problems},
-               [find, answer, packing = routes.packing](Call& call) {
-                 Viewed viewed = find(call);
-                 Response response = answer_of_whole(call, *viewed.dag, answer);
+                .problems = {404, 409, 410}},
+               [open, answer, packing = routes.packing](Call& call) {
+                 TileAccess access = open(call);
+                 Response response = consistent_response(call, *access.dag, answer);
                  if (packing == Packing::kGzip) pack(call.request, response);
-                 hold_permit(std::move(viewed.permit), response);
+                 hold_permit(std::move(access.permit), response);
                  return response;
                });
   };
@@ -313,7 +309,7 @@ void add_tile_routes(Router& router, const TileRoutes& routes, const FindViewed&
                                      {304, "the client has it"}};
   add("/tiles", "Tiles", "grid, cameras, and how tiles are addressed", {},
       {{200, "the manifest", {json_content(routes.manifest_schema)}}},
-      [&stopping](const Call&, const ViewedDag& dag) { return get_manifest(dag, stopping); });
+      [&stopping](const Call&, const TileSource& dag) { return get_manifest(dag, stopping); });
   add("/tiles/batch", "TileBatch", "several tiles, each after its length in bytes",
       {kDigest, kNodes}, tiles, get_batch);
   if (routes.colors == Colors::kServed)
@@ -332,14 +328,14 @@ void add_job_tile_routes(Router& router) {
   const CancelToken& stopping = router.context().stopping;
   add_tile_routes(
       router, {.base = job, .id = "", .subject = "The result: ", .manifest_schema = "TileManifest"},
-      finder(result_of_job), stopping);
+      finder(open_result), stopping);
   add_tile_routes(router,
                   {.base = job + "/partial",
                    .id = "Partial",
                    .subject = "A job that has not succeeded: ",
                    .manifest_schema = "PartialManifest",
                    .colors = Colors::kNone},
-                  finder(part_of_job), stopping);
+                  finder(open_unfinished_job), stopping);
   router.add({.method = "GET",
               .pattern = job + "/partial",
               .id = "getPartial",

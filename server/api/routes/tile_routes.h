@@ -6,17 +6,17 @@
 #include <string>
 
 #include "server/api/routing/router.h"
-#include "server/tiles/viewed_dag.h"
+#include "server/tiles/tile_source.h"
 
 namespace voxdag::server {
 
 // The DAG that a call asks for, and a permit to do so, null if none is needed.
-struct Viewed {
-  std::shared_ptr<const ViewedDag> dag;
+struct TileAccess {
+  std::shared_ptr<const TileSource> dag;
   std::shared_ptr<void> permit;
 };
 // Throws Problem if there is none, or no permit is free.
-using FindViewed = std::function<Viewed(const Call&)>;
+using OpenTiles = std::function<TileAccess(const Call&)>;
 
 // Whether tiles are compressed for clients that accept it. It halves their bytes, at about 80 MB/s
 // of one core: a gain on a network, a loss on the loopback.
@@ -36,7 +36,7 @@ struct TileRoutes {
 // Adds BASE/tiles, BASE/tiles/batch and BASE/tiles/{level}/{offset}, and BASE/tiles/colors if they
 // are served. Manifests in the making are given up when `stopping` is canceled; it must outlive the
 // router.
-void add_tile_routes(Router& router, const TileRoutes& routes, const FindViewed& find,
+void add_tile_routes(Router& router, const TileRoutes& routes, const OpenTiles& open,
                      const CancelToken& stopping);
 
 }  // namespace voxdag::server

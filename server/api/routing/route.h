@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/api/access/tokens.h"
-#include "server/http/message.h"
+#include "server/http/message/message.h"
 
 namespace voxdag::server {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/base/text.h"
-#include "server/http/problem.h"
+#include "server/http/message/problem.h"
 
 namespace voxdag::server {
 namespace {

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "server/http/connection/connection_table.h"
+#include "server/http/connection/limits.h"
 #include "server/http/connection/tls.h"
-#include "server/http/limits.h"
 
 namespace voxdag::server {
 

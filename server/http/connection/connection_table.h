@@ -10,7 +10,7 @@
 #include <mutex>
 #include <string>
 
-#include "server/http/limits.h"
+#include "server/http/connection/limits.h"
 
 namespace voxdag::server {
 

@@ -13,11 +13,11 @@
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
 #include "scheduler/state/work_folder.h"
-#include "server/jobs/job_request.h"
+#include "server/base/request_error.h"
 #include "server/jobs/process/confined_files.h"
-#include "server/jobs/process/job_task.h"
 #include "server/jobs/process/progress_pipe.h"
-#include "server/request_error.h"
+#include "server/jobs/protocol/job_request.h"
+#include "server/jobs/protocol/job_task.h"
 
 namespace voxdag::server {
 namespace {
@@ -35,7 +35,7 @@ void enter(const std::string& folder) {
 }
 
 // Makes the uploads of a task appear in the working directory under their public names.
-void link_uploads(const Task& task) {
+void link_uploads(const JobTask& task) {
   for (const auto& [name, path] : task.uploads) {
     std::error_code failure;
     std::filesystem::remove(name, failure);
@@ -47,7 +47,7 @@ void link_uploads(const Task& task) {
 }
 
 // The scene's files, and what the build itself writes and reads again.
-ConfinedFiles confined(FileSystem& files, const Task& task, const JobFolder& folder) {
+ConfinedFiles confined(FileSystem& files, const JobTask& task, const JobFolder& folder) {
   const std::string here = resolved_path(".") + "/";
   std::vector<std::string> readable = task.readable;
   readable.push_back(here + folder.work() + "/");
@@ -58,7 +58,7 @@ ConfinedFiles confined(FileSystem& files, const Task& task, const JobFolder& fol
   return ConfinedFiles(files, readable);
 }
 
-BuildSpec spec_of(const Task& task, const JobFolder& folder) {
+BuildSpec spec_of(const JobTask& task, const JobFolder& folder) {
   const JobRequest request = parse_job_request(task.request);
   BuildSpec spec = request.spec;
   spec.geometry.scenes = request.scenes;
@@ -106,12 +106,12 @@ std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildCon
 
 std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progress,
                     const CancelToken& cancel) {
-  const Task task = read_task(files, folder.task());
+  const JobTask task = read_task(files, folder.task());
   link_uploads(task);
   ConfinedFiles readable = confined(files, task, folder);
   const BuildContext context{readable, progress, cancel};
   const BuildSpec spec = spec_of(task, folder);
-  if (task.kind == Task::Kind::kPlan) return estimate_json(plan_build(spec, context));
+  if (task.kind == JobTask::Kind::kPlan) return estimate_json(plan_build(spec, context));
   // What an earlier run has listed is of no use to this one, whose scene may be another.
   if (!files.exists(WorkFolder::store_path(folder.work())) && !files.exists(folder.report()) &&
       files.exists(folder.subvolumes()))

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "core/io/file_system.h"
-#include "server/jobs/process/job_folder.h"
+#include "server/jobs/protocol/job_folder.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::server {

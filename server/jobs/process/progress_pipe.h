@@ -10,8 +10,8 @@
 
 #include "core/base/progress.h"
 #include "core/io/file_system.h"
-#include "server/jobs/process/job_messages.h"
 #include "server/jobs/process/subvolume_map.h"
+#include "server/jobs/protocol/job_messages.h"
 
 namespace voxdag::server {
 

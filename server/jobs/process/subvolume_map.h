@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/base/progress.h"
-#include "server/jobs/process/job_messages.h"
+#include "server/jobs/protocol/job_messages.h"
 
 namespace voxdag::server {
 

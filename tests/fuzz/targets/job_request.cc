@@ -1,9 +1,9 @@
 // The body of POST /jobs: the text that is stored for a request parses to the same request.
-#include "server/jobs/job_request.h"
+#include "server/jobs/protocol/job_request.h"
 
 #include <string>
 
-#include "server/request_error.h"
+#include "server/base/request_error.h"
 #include "tests/fuzz/targets/fuzz_target.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -7,11 +7,11 @@
 #include "server/api/access/concurrency_limiter.h"
 #include "server/api/access/rate_limiter.h"
 #include "server/api/access/tokens.h"
-#include "server/api/public_problem.h"
-#include "server/config.h"
-#include "server/http/digest_field.h"
-#include "server/jobs/job_request.h"
-#include "server/request_error.h"
+#include "server/api/answers/public_problem.h"
+#include "server/base/request_error.h"
+#include "server/config/config.h"
+#include "server/http/message/digest_field.h"
+#include "server/jobs/protocol/job_request.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag::server {

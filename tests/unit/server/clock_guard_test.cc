@@ -1,4 +1,4 @@
-#include "server/clock_guard.h"
+#include "server/base/clock_guard.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/tiles/coarse_cubes.h"
+#include "server/tiles/partial/coarse_cubes.h"
 
 #include <gtest/gtest.h>
 

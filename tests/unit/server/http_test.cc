@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
 
 #include "core/base/clock.h"
-#include "server/http/byte_range.h"
 #include "server/http/connection/connection_table.h"
-#include "server/http/headers.h"
-#include "server/http/problem.h"
-#include "server/http/target.h"
+#include "server/http/message/byte_range.h"
+#include "server/http/message/headers.h"
+#include "server/http/message/problem.h"
+#include "server/http/message/target.h"
 
 namespace voxdag::server {
 namespace {

@@ -12,10 +12,10 @@
 #include <sstream>
 
 #include "scheduler/state/work_folder.h"
-#include "server/data_folder.h"
-#include "server/jobs/process/job_folder.h"
-#include "server/jobs/process/job_messages.h"
-#include "server/jobs/process/job_task.h"
+#include "server/disk/data_folder.h"
+#include "server/jobs/protocol/job_folder.h"
+#include "server/jobs/protocol/job_messages.h"
+#include "server/jobs/protocol/job_task.h"
 #include "tests/crash/faulty_files.h"
 #include "tests/unit/io/temporary_folder.h"
 
@@ -51,10 +51,10 @@ class JobProcess : public testing::Test {
     write_file_atomically(system_files(), scene_path(), text);
   }
   // An empty folder with the task, as the service makes it.
-  void start_over(Task::Kind kind = Task::Kind::kBuild) {
+  void start_over(JobTask::Kind kind = JobTask::Kind::kBuild) {
     remove_tree(system_files(), job_.path);
     std::filesystem::create_directories(job_.path);
-    Task task;
+    JobTask task;
     task.kind = kind;
     task.request = R"({"scene":["scene.gltf"],"resolution":64,"options":{}})";
     task.uploads = {{"scene.gltf", scene_path()}};
@@ -183,7 +183,7 @@ TEST_F(JobProcess, NamesNoFolderOfABrokenJob) {
 // A disk that is full, or broken, from its n-th operation on.
 TEST_F(JobProcess, NamesNoFolderOfABrokenDisk) {
   for (const Fault fault : {Fault::kNoSpace, Fault::kIoError, Fault::kReadError}) {
-    for (const Task::Kind kind : {Task::Kind::kBuild, Task::Kind::kPlan}) {
+    for (const JobTask::Kind kind : {JobTask::Kind::kBuild, JobTask::Kind::kPlan}) {
       for (uint64_t at = 1; at < 100; ++at) {
         SCOPED_TRACE(testing::Message() << static_cast<int>(fault) << " at " << at);
         start_over(kind);

@@ -6,13 +6,13 @@
 #include <thread>
 
 #include "core/io/file_system.h"
+#include "server/base/request_error.h"
 #include "server/jobs/job_outcome.h"
-#include "server/jobs/job_request.h"
 #include "server/jobs/process/confined_files.h"
-#include "server/jobs/process/job_task.h"
 #include "server/jobs/process/progress_pipe.h"
 #include "server/jobs/process/subvolume_map.h"
-#include "server/request_error.h"
+#include "server/jobs/protocol/job_request.h"
+#include "server/jobs/protocol/job_task.h"
 #include "tests/unit/io/temporary_folder.h"
 
 namespace voxdag::server {
@@ -90,15 +90,15 @@ TEST(JobRequestBody, IsRefusedByName) {
 
 TEST(TaskFile, IsReadAsItWasWritten) {
   const TemporaryFolder folder;
-  Task task;
-  task.kind = Task::Kind::kPlan;
+  JobTask task;
+  task.kind = JobTask::Kind::kPlan;
   task.request = "{\"a\":1}";
   task.uploads = {{"a.glb", "/x/a.glb"}};
   task.readable = {"/x/"};
   task.memory_bytes = 123;
   task.threads = 3;
   write_task(system_files(), folder.file("task.json"), task);
-  const Task back = read_task(system_files(), folder.file("task.json"));
+  const JobTask back = read_task(system_files(), folder.file("task.json"));
   EXPECT_EQ(back.kind, task.kind);
   EXPECT_EQ(back.request, task.request);
   EXPECT_EQ(back.uploads, task.uploads);

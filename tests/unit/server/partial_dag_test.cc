@@ -1,4 +1,4 @@
-#include "server/tiles/partial_dag.h"
+#include "server/tiles/partial/partial_dag.h"
 
 #include <gtest/gtest.h>
 

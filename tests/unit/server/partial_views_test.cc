@@ -1,4 +1,4 @@
-#include "server/tiles/partial_views.h"
+#include "server/tiles/partial/partial_views.h"
 
 #include <gtest/gtest.h>
 
@@ -16,8 +16,7 @@
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/forwarding_files.h"
 #include "scheduler/run_build.h"
-#include "scheduler/state/work_folder.h"
-#include "server/http/problem.h"
+#include "server/http/message/problem.h"
 #include "server/jobs/process/subvolume_map.h"
 #include "tests/unit/base/error_of.h"
 #include "tests/unit/io/temporary_folder.h"
@@ -93,10 +92,10 @@ class PartialViewsTest : public testing::Test {
   void write(const std::string& path, const std::string& text) {
     std::ofstream(path, std::ios::binary) << text;
   }
-  auto look(PartialViews& views) { return views.dag("job", job_, kResolution); }
+  auto look(PartialViews& views) { return views.tiles("job", job_, kResolution); }
   // Looks until the condition holds, for at most ten seconds.
   template <class Condition>
-  std::shared_ptr<const ViewedDag> look_until(PartialViews& views, const Condition& condition) {
+  std::shared_ptr<const TileSource> look_until(PartialViews& views, const Condition& condition) {
     auto dag = look(views);
     for (int i = 0; i < 1000 && !condition(nlohmann::json::parse(dag->manifest({}))); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -229,7 +228,8 @@ TEST_F(PartialViewsTest, AreForgottenWhenNobodyAsksForThem) {
   write(job_.subvolumes(), build(10));
   PartialViews views(system_files(), 1);
   const std::string digest = look(views)->digest();
-  EXPECT_THROW(views.json("other", job_, kResolution), Problem) << "the first is being looked at";
+  EXPECT_THROW(views.json("other", job_, kResolution), RequestError)
+      << "the first is being viewed";
   EXPECT_THROW(views.json("waiting", JobFolder{folder_.file("none")}, kResolution), Error)
       << "has no place among them";
   EXPECT_NE(views.known("job", digest), nullptr);

@@ -1,8 +1,8 @@
-#include "server/api/public_problem.h"
+#include "server/api/answers/public_problem.h"
 
 #include <gtest/gtest.h>
 
-#include "server/request_error.h"
+#include "server/base/request_error.h"
 
 namespace voxdag::server {
 namespace {
@@ -18,7 +18,7 @@ TEST(PublicProblem, HasTheStatusAndCodeOfItsKind) {
   for (const auto& [kind, status, code] :
        {Row{Kind::kInvalid, 400, "invalid_input"}, Row{Kind::kNotFound, 404, "not_found"},
         Row{Kind::kLimit, 422, "limit"}, Row{Kind::kConflict, 409, "conflict"},
-        Row{Kind::kKeyReused, 422, "idempotency_mismatch"}, Row{Kind::kQueueFull, 503, "busy"}}) {
+        Row{Kind::kKeyReused, 422, "idempotency_mismatch"}, Row{Kind::kBusy, 503, "busy"}}) {
     SCOPED_TRACE(code);
     const RequestError error(kind, "the reason");
     const Problem problem = public_problem(error);
@@ -37,7 +37,7 @@ TEST(PublicProblem, CarriesWhatAClientNeedsToContinue) {
   const Problem problem = public_problem(conflict);
   EXPECT_EQ(problem.state, "running");
   EXPECT_EQ(header_value(problem.headers, "Upload-Offset"), "5");
-  const Problem full = public_problem(RequestError(RequestError::Kind::kQueueFull, "full"));
+  const Problem full = public_problem(RequestError(RequestError::Kind::kBusy, "full"));
   EXPECT_EQ(header_value(full.headers, "Retry-After"), "60");
 }
 

@@ -122,7 +122,7 @@ TEST_F(Queue, RefusesJobsOverItsLimit) {
   Job job;
   job.request = "{}";
   queue_->add(job, {}, 1);
-  EXPECT_EQ(refusal([&] { queue_->add(job, {}, 1); }), RequestError::Kind::kQueueFull);
+  EXPECT_EQ(refusal([&] { queue_->add(job, {}, 1); }), RequestError::Kind::kBusy);
 }
 
 TEST_F(Queue, RemovesOnlyWhatHasEnded) {

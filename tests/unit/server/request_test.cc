@@ -8,7 +8,7 @@
 
 #include "core/base/clock.h"
 #include "server/http/exchange.h"
-#include "server/http/problem.h"
+#include "server/http/message/problem.h"
 
 namespace voxdag::server {
 namespace {

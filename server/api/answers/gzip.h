@@ -1,0 +1,19 @@
+// The content coding gzip (RFC 9110, 8.4.1.3). Stateless; thread-safe.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "server/http/message/message.h"
+
+namespace voxdag::server {
+
+// Whether the value of Accept-Encoding allows it.
+bool accepts_gzip(std::string_view accepted);
+// Throws Error{kOutOfMemory}.
+std::string gzip(std::string_view bytes);
+
+// Compresses the body of an answer if the client accepts that and it saves bytes.
+void pack(const Request& request, Response& response);
+
+}  // namespace voxdag::server

@@ -1,0 +1,80 @@
+#include "server/api/answers/job_json.h"
+
+#include <cmath>
+
+#include "core/base/text.h"
+#include "server/base/json_text.h"
+
+namespace voxdag::server {
+namespace {
+
+// A text as a JSON string, or a list of texts as an array.
+template <class T>
+std::string as_json(const T& value) {
+  return json_text(nlohmann::json(value));
+}
+
+std::string time_member(double unix_s) {
+  return unix_s == 0 ? "null" : '"' + time_text(unix_s) + '"';
+}
+
+std::string error_member(const std::optional<JobError>& error) {
+  if (!error) return "null";
+  return "{\"code\":" + as_json(error->code) + ",\"message\":" + as_json(error->message) +
+         ",\"at\":" + time_member(error->at_s) +
+         ",\"transient\":" + (error->transient ? "true" : "false") + "}";
+}
+
+std::string links(const std::string& self) {
+  std::string text = "{\"self\":\"" + self + '"';
+  for (const char* name : {"events", "log", "subvolumes", "dag", "report"})
+    text += ",\"" + std::string(name) + "\":\"" + self + '/' + name + '"';
+  return text + ",\"preview\":\"" + self + "/preview.png\"}";
+}
+
+// The members of a stored request, whatever else a damaged record has.
+std::string request_members(const std::string& request) {
+  using nlohmann::ordered_json;
+  const auto stored = ordered_json::parse(request, nullptr, false);
+  ordered_json members = {
+      {"scene", ordered_json::array()}, {"resolution", 0}, {"options", ordered_json::object()}};
+  for (const auto& [name, value] : members.items())
+    if (stored.contains(name)) value = stored[name];
+  const std::string text = json_text(members);
+  return text.substr(1, text.size() - 2);
+}
+
+// `json` is JSON text already.
+std::string or_null(const std::string& json) { return json.empty() ? "null" : json; }
+
+}  // namespace
+
+std::string time_text(double unix_s) {
+  if (unix_s == 0) return "";
+  const auto milliseconds = static_cast<int64_t>(std::floor(unix_s * 1000));
+  char fraction[8];
+  std::snprintf(fraction, sizeof fraction, ".%03dZ", static_cast<int>(milliseconds % 1000));
+  return utc_text(milliseconds / 1000, "%Y-%m-%dT%H:%M:%S") + fraction;
+}
+
+std::string job_json(const Job& job, const LiveJob* live, uint64_t position,
+                     unsigned max_attempts) {
+  const std::string progress = live ? live->progress_json() : "";
+  return "{\"id\":\"" + job.id + "\",\"name\":" + as_json(job.name) + ",\"state\":\"" +
+         state_name(job.state) + "\"," + request_members(job.request) +
+         ",\"priority\":" + std::to_string(job.priority) +
+         ",\"attempts\":" + std::to_string(job.attempts) +
+         ",\"max_attempts\":" + std::to_string(max_attempts) +
+         ",\"created_at\":" + time_member(job.created_s) +
+         ",\"started_at\":" + time_member(job.started_s) +
+         ",\"finished_at\":" + time_member(job.finished_s) +
+         ",\"not_before\":" + time_member(job.not_before_s) +
+         ",\"position\":" + (position == 0 ? "null" : std::to_string(position)) +
+         ",\"progress\":" + or_null(progress.empty() ? job.progress : progress) +
+         ",\"result\":" + or_null(job.result) + ",\"error\":" + error_member(job.error) +
+         ",\"warnings\":" + as_json(live ? live->warnings() : job.warnings) +
+         ",\"preview\":" + (job.preview == Preview::kReady ? "true" : "false") +
+         ",\"links\":" + links("/api/v1/jobs/" + job.id) + "}";
+}
+
+}  // namespace voxdag::server

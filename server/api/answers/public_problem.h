@@ -1,0 +1,15 @@
+// Which problem a client sees for what a handler threw.
+#pragma once
+
+#include <exception>
+
+#include "server/http/message/problem.h"
+
+namespace voxdag::server {
+
+// A Problem stays as it is, and a RequestError keeps its message. An Error keeps its code, with a
+// fixed text in place of its message, which may hold paths of the server. Anything else is `busy`
+// (no memory) or `internal`.
+Problem public_problem(const std::exception& error);
+
+}  // namespace voxdag::server

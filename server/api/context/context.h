@@ -1,0 +1,56 @@
+// What the request handlers share: references to the parts of the service, which Service owns.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "server/api/access/concurrency_limiter.h"
+#include "server/api/context/metrics.h"
+#include "server/config/config.h"
+#include "server/disk/disk_space.h"
+#include "server/jobs/dispatcher.h"
+#include "server/jobs/task_resolver.h"
+#include "server/queue/job_queue.h"
+#include "server/scenes/scene_store.h"
+#include "server/tiles/open_tile_sources.h"
+#include "server/tiles/partial/partial_views.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::server {
+
+struct Context {
+  const ServerConfig& config;
+  FileSystem& files;
+  JobQueue& queue;
+  SceneStore& scenes;
+  TaskResolver& tasks;
+  DiskSpace& disk;
+  Dispatcher& dispatcher;
+  Metrics& metrics;
+  const std::atomic<bool>& draining;
+
+  ConcurrencyLimiter event_streams{config.transfers.max_event_streams,
+                                   config.transfers.max_event_streams_per_client};
+  ConcurrencyLimiter uploads{config.transfers.max_concurrent, config.transfers.max_per_client};
+  ConcurrencyLimiter downloads{config.transfers.max_concurrent, config.transfers.max_per_client};
+  ConcurrencyLimiter tiles{config.transfers.max_concurrent, config.transfers.max_per_client};
+  ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
+  OpenTileSources open_sources{files, 16};
+  PartialViews partial{files, 16};
+  // Canceled when the service stops.
+  CancelToken stopping = {};
+  // Held while a job that uses scenes is added or tried again, and while a scene that no job uses
+  // is replaced or removed: neither may happen between the other's check and its change.
+  std::mutex scene_mutex = {};
+  // Uploads that dry runs read, guarded by scene_mutex. They may be replaced, which leaves the old
+  // file to those that read it, but not removed.
+  std::multiset<std::string> planned_scenes = {};
+};
+
+// Throws Problem (404) if there is none.
+Job find_job(JobQueue& queue, const std::string& id);
+
+}  // namespace voxdag::server

@@ -1,0 +1,74 @@
+// A request and its answer as handlers see them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/io/file_system.h"
+#include "server/http/message/byte_range.h"
+#include "server/http/message/headers.h"
+#include "server/http/message/target.h"
+
+namespace voxdag::server {
+
+// How reading a body ended: complete, stopped by the sink, or cut off by the client.
+enum class BodyEnd { kComplete, kStopped, kBroken, kTooSlow };
+
+struct Request {
+  std::string method;
+  Target target;
+  HeaderMap headers;
+  std::string peer;    // the client's address
+  std::string id;      // X-Request-Id of the answer, also in the log
+  std::string caller;  // the name of its token, once it is known
+  std::optional<uint64_t> content_length;
+  bool has_body = false;  // a Content-Length above 0, or chunked
+
+  // Passes the body to `sink` in pieces, until that returns false. Called at most once; if the body
+  // is not read to its end, the connection is closed after the answer.
+  using Sink = std::function<bool(std::string_view piece)>;
+  std::function<BodyEnd(const Sink& sink)> read_body;
+
+  // Whether the client has closed the connection; for handlers that take long.
+  std::function<bool()> client_has_left;
+
+  std::string header(std::string_view name) const { return header_value(headers, name); }
+};
+
+// A piece of an answer from a file: a text, then a range of the file (may be empty).
+struct FilePiece {
+  std::string text;
+  ByteRange range;
+};
+
+// The source of an event stream. A call returns what is to be sent next, "" for nothing yet, or no
+// value at the end; it takes at most about a second.
+using EventSource = std::function<std::optional<std::string>()>;
+
+struct Response {
+  int status = 200;
+  HeaderMap headers;
+  // At most one of body, file and next_event is set.
+  std::string body;
+  std::shared_ptr<ReadableFile> file;
+  std::vector<FilePiece> pieces;  // what to send of `file`
+  EventSource next_event;
+  // A permit of a ConcurrencyLimiter, released when the answer is sent.
+  std::shared_ptr<void> permit;
+};
+
+inline Response make_response(int status, const char* content_type, const char* cache_control,
+                              std::string body = "") {
+  Response response;
+  response.status = status;
+  response.headers = {{"Content-Type", content_type}, {"Cache-Control", cache_control}};
+  response.body = std::move(body);
+  return response;
+}
+
+}  // namespace voxdag::server

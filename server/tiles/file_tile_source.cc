@@ -1,0 +1,101 @@
+#include "server/tiles/file_tile_source.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "core/format/global/open_global.h"
+#include "query/render/views.h"
+#include "server/tiles/manifest.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr size_t kHeaderBytes = 4096;
+constexpr size_t kDigestDigits = 32;
+
+// The header page has the checksum of the table of the checksums of all other bytes.
+std::string digest_of(const voxdag_reader::File& file) {
+  std::string text(reinterpret_cast<const char*>(file.data()), kHeaderBytes);
+  text += "tiles 1 " + std::to_string(kTileLevels);
+  if (file.has_colors()) text += " colors 1";
+  return sha256_hex(text).substr(0, kDigestDigits);
+}
+
+std::string describe(const voxdag_reader::File& file, const query::DagView& dag,
+                     const std::string& digest, const CancelToken& cancel) {
+  const GridPlace place{{file.origin()[0], file.origin()[1], file.origin()[2]}, file.edge()};
+  auto json =
+      manifest_of(dag, digest, place, dag.empty() ? std::nullopt : std::optional<uint64_t>(0));
+  json["voxels"] = std::to_string(file.voxels());
+  if (file.has_colors())
+    json["colors"] = {{"levels", file.color_levels()}, {"batch_max", kMaxColorPagesOfBatch}};
+  if (dag.empty()) return json.dump();
+  query::NamedViews views(dag, cancel);
+  const query::Box& box = views.box();
+  json["box"] = {{"low", box.low.v}, {"high", box.high.v}};
+  json["camera"] = camera_of("auto", views, dag, place);
+  for (const std::string& view : query::view_names())
+    if (view != "auto" && view != "inside")
+      json["views"][view] = camera_of(view, views, dag, place);
+  return json.dump();
+}
+
+}  // namespace
+
+FileTileSource::FileTileSource(const std::string& path, const FileIdentity& identity,
+                               std::shared_ptr<ManifestCache> manifests)
+    : FileTileSource(path, identity, map_global_file(path), std::move(manifests)) {}
+
+FileTileSource::FileTileSource(const std::string& path, const FileIdentity& identity,
+                               std::shared_ptr<const voxdag_reader::Bytes> bytes,
+                               std::shared_ptr<ManifestCache> manifests)
+    : identity_(identity),
+      bytes_(std::move(bytes)),
+      mapping_(bytes_->data(), bytes_->size()),
+      file_(read_header(path)),
+      blocks_(*file_),
+      dag_(*file_),
+      digest_(digest_of(*file_)),
+      manifests_(std::move(manifests)) {
+  expect_readable();
+}
+
+std::unique_ptr<voxdag_reader::File> FileTileSource::read_header(const std::string& path) const {
+  try {
+    return open_global_bytes(path, bytes_);
+  } catch (const Error&) {
+    expect_readable();  // what zeros look like says nothing about the file
+    throw;
+  }
+}
+
+const std::string& FileTileSource::manifest(const CancelToken& cancel) const {
+  if (has_manifest_) return manifest_;
+  const std::lock_guard lock(manifest_mutex_);
+  if (has_manifest_) return manifest_;
+  const auto known = manifests_ ? manifests_->find(digest_) : std::nullopt;
+  if (!known && !dag_.empty()) blocks_.expect_intact(dag_.level(0).words.data(), 8);  // the root
+  manifest_ = known ? *known : describe(*file_, dag_, digest_, cancel);
+  expect_readable();
+  if (manifests_ && !known) manifests_->keep(digest_, manifest_);
+  has_manifest_ = true;
+  return manifest_;
+}
+
+void FileTileSource::expect_readable() const {
+  if (mapping_.is_damaged())
+    throw Error(ErrorCode::kIo,
+                "the DAG became shorter, or its disk failed, while it was looked at");
+}
+
+bool FileTileSource::was_overwritten() const {
+  try {
+    return system_files().open_read(file_->path())->identity() != identity_;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound) throw;
+    return false;
+  }
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,62 @@
+// A finished DAG that viewers look at: its file, open. Thread-safe.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "core/io/file_system.h"
+#include "core/io/watched_mapping.h"
+#include "server/tiles/manifest_cache.h"
+#include "server/tiles/tile_source.h"
+
+namespace voxdag::server {
+
+class FileTileSource : public TileSource {
+ public:
+  // Throws Error if the file is no valid DAG; only its header and checksum table are read. Pages
+  // that cannot be read are survived: while it is opened they are an Error{kIo}.
+  // Manifests are looked for and stored in `manifests`, if it is given.
+  FileTileSource(const std::string& path, const FileIdentity& identity,
+                 std::shared_ptr<ManifestCache> manifests = nullptr);
+  // The same of a file that is mapped already.
+  FileTileSource(const std::string& path, const FileIdentity& identity,
+                 std::shared_ptr<const voxdag_reader::Bytes> bytes,
+                 std::shared_ptr<ManifestCache> manifests = nullptr);
+
+  const query::DagView& dag() const override { return dag_; }
+  const CheckedBlocks* blocks() const override { return &blocks_; }
+  const voxdag_reader::File* colored_file() const override { return file_.get(); }
+  // Of the file when it was opened.
+  const FileIdentity& identity() const { return identity_; }
+  // Of the contents of the file and of how its tiles are made.
+  const std::string& digest() const override { return digest_; }
+  // The first call looks for the cameras, which may take a second, or longer if the file is not in
+  // memory; others wait for it. If it is canceled, the next one begins again.
+  const std::string& manifest(const CancelToken& cancel) const override;
+  void expect_readable() const override;
+  // Whether expect_readable() throws: the file is to be opened again.
+  bool is_broken() const { return mapping_.is_damaged(); }
+  // A file that was removed still has its contents.
+  bool was_overwritten() const override;
+  bool is_first_damage() const override { return !has_damage_.exchange(true); }
+
+ private:
+  std::unique_ptr<voxdag_reader::File> read_header(const std::string& path) const;
+
+  const FileIdentity identity_;
+  const std::shared_ptr<const voxdag_reader::Bytes> bytes_;
+  const WatchedMapping mapping_;  // from before the first byte is read
+  const std::unique_ptr<voxdag_reader::File> file_;
+  const CheckedBlocks blocks_;
+  const query::DagView dag_;
+  const std::string digest_;
+  const std::shared_ptr<ManifestCache> manifests_;  // or null
+  mutable std::atomic<bool> has_damage_{false};
+  mutable std::mutex manifest_mutex_;  // guards the next while it is made
+  mutable std::string manifest_;
+  mutable std::atomic<bool> has_manifest_{false};  // manifest_ does not change any more
+};
+
+}  // namespace voxdag::server

@@ -1,0 +1,78 @@
+#include "server/tiles/partial/partial_frame.h"
+
+#include <bit>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+#include "core/geometry/grid.h"
+#include "query/render/views.h"
+#include "server/tiles/partial/partial_dag.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr uint64_t kMaxPlanBytes = uint64_t{1} << 30;
+
+// The planned subvolumes, as solid parts, from the list that the job's process wrote.
+std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, uint64_t resolution) {
+  const uint32_t levels = levels_of_resolution(resolution);
+  std::vector<PartialDag::Part> parts;
+  for (const auto& entry : plan.at("cubes")) {
+    const uint64_t edge = entry.at(3).get<uint64_t>();
+    const auto is_outside = [&](uint64_t at) { return at >= resolution || at % edge != 0; };
+    if (!std::has_single_bit(edge) || edge < uint64_t{kBrickEdge} || edge > resolution ||
+        is_outside(entry.at(0)) || is_outside(entry.at(1)) || is_outside(entry.at(2)))
+      throw Error(ErrorCode::kCorrupt, "the list of the subvolumes has an invalid cube");
+    Cube cube{levels - levels_of_resolution(edge), {}};
+    for (size_t axis = 0; axis < 3; ++axis)
+      cube.position[axis] = static_cast<uint32_t>(entry.at(axis).get<uint64_t>() / edge);
+    parts.push_back({cube, ~uint64_t{0}});
+  }
+  return parts;
+}
+
+}  // namespace
+
+std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution) {
+  const uint32_t levels = levels_of_resolution(resolution);
+  nlohmann::json list = nlohmann::json::array();
+  for (const auto& [id, coarse] : cubes.cubes()) {
+    const Cube& cube = coarse.cube;
+    const int64_t edge = cube.edge_voxels(levels);
+    list.push_back({cube.position[0] * edge, cube.position[1] * edge, cube.position[2] * edge, edge,
+                    static_cast<uint32_t>(coarse.brick),
+                    static_cast<uint32_t>(coarse.brick >> 32)});
+  }
+  return nlohmann::ordered_json{{"resolution", resolution},
+                                {"built", cubes.built()},
+                                {"total", cubes.total()},
+                                {"cubes", std::move(list)}}
+      .dump();
+}
+
+nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, uint64_t resolution) {
+  if (!files.exists(folder.subvolumes()))
+    throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
+  const uint32_t levels = levels_of_resolution(resolution);
+  try {
+    const auto plan =
+        nlohmann::json::parse(read_small_file(files, folder.subvolumes(), kMaxPlanBytes));
+    const GridPlace place{plan.at("origin"), plan.at("edge")};
+    nlohmann::ordered_json frame = {{"origin", place.origin}, {"edge", place.edge}};
+    PartialDag nodes(levels);
+    // A DAG made in one step has one node on the root level.
+    if (nodes.add(planned_parts(plan, resolution))) {
+      const PartialDagCopy planned(nodes, levels);
+      const CancelToken never;
+      query::NamedViews views(planned.view(), never);
+      frame["box"] = {{"low", views.box().low.v}, {"high", views.box().high.v}};
+      frame["camera"] = camera_of("iso", views, planned.view(), place);
+    }
+    return frame;
+  } catch (const nlohmann::json::exception&) {
+    throw Error(ErrorCode::kCorrupt, "the list of the subvolumes is damaged");
+  }
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,23 @@
+// The JSON that describes an unfinished job to viewers (docs/api.md).
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/io/file_system.h"
+#include "server/jobs/protocol/job_folder.h"
+#include "server/tiles/manifest.h"
+#include "server/tiles/partial/coarse_cubes.h"
+
+namespace voxdag::server {
+
+// The built subvolumes, each with its coarse brick.
+std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution);
+
+// Manifest members that the plan fixes: the grid's place, the planned subvolumes' bounding box, and
+// a camera that sees all of them. Throws Error: kNotFound before the plan exists, kCorrupt if it is
+// damaged.
+nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, uint64_t resolution);
+
+}  // namespace voxdag::server

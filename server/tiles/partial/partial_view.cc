@@ -1,0 +1,185 @@
+#include "server/tiles/partial/partial_view.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "core/geometry/grid.h"
+#include "core/io/random_id.h"
+#include "scheduler/state/work_folder.h"
+#include "server/tiles/partial/partial_frame.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr double kReadInterval_s = 1;
+constexpr double kMaxCpuShare = 0.05;  // of one core
+constexpr double kMaxReading_s = 0.5;  // wall time of one reading
+constexpr size_t kDagDigits = 32;
+
+class PartialTileSource : public TileSource {
+ public:
+  PartialTileSource(const PartialDag& nodes, uint32_t levels, std::string digest)
+      : copy_(nodes, levels), digest_(std::move(digest)) {}
+  void set_manifest(std::string manifest) { manifest_ = std::move(manifest); }
+
+  const query::DagView& dag() const override { return copy_.view(); }
+  const std::string& digest() const override { return digest_; }
+  const std::string& manifest(const CancelToken&) const override { return manifest_; }
+
+ private:
+  const PartialDagCopy copy_;
+  const std::string digest_;
+  std::string manifest_;
+};
+
+}  // namespace
+
+ReadLimiter::Charge::Charge(ReadLimiter& limiter)
+    : limiter_(limiter), start_s_(thread_cpu_seconds()) {}
+
+ReadLimiter::Charge::~Charge() {
+  const double used_s = thread_cpu_seconds() - start_s_;
+  limiter_.idle_until_s_ = std::max(limiter_.idle_until_s_, wall_seconds()) + used_s / kMaxCpuShare;
+}
+
+bool ReadLimiter::may_read() const { return wall_seconds() >= std::max(next_s_, idle_until_s_); }
+
+void ReadLimiter::note_read() { next_s_ = wall_seconds() + kReadInterval_s; }
+
+std::optional<uint64_t> GrowingDag::add(const CoarseCubes& cubes, uint32_t levels) {
+  std::vector<PartialDag::Part> parts;
+  for (const auto& [id, coarse] : cubes.cubes()) parts.push_back({coarse.cube, coarse.brick});
+  std::optional<uint64_t> root;
+  if (nodes_) root = nodes_->dag.add(parts);
+  if (nodes_ && nodes_->dag.word_count() <= nodes_->max_words) return root;
+  // If this throws, the old nodes and their digest remain.
+  auto nodes = std::make_unique<Nodes>(
+      levels, sha256_hex("partial " + job_ + random_id()).substr(0, kDagDigits));
+  root = nodes->dag.add(parts);
+  nodes->max_words = std::max(max_words_, 2 * nodes->dag.word_count());
+  nodes_ = std::move(nodes);
+  return root;
+}
+
+std::shared_ptr<const std::string> PublishedAnswers::json() const {
+  const std::lock_guard lock(mutex_);
+  return json_;
+}
+
+std::shared_ptr<const TileSource> PublishedAnswers::tiles() const {
+  const std::lock_guard lock(mutex_);
+  return tiles_;
+}
+
+std::shared_ptr<const TileSource> PublishedAnswers::known(const std::string& digest) const {
+  const std::lock_guard lock(mutex_);
+  return known_ && known_->digest() == digest ? known_ : nullptr;
+}
+
+void PublishedAnswers::set_json(std::string json) {
+  auto shared = std::make_shared<const std::string>(std::move(json));
+  const std::lock_guard lock(mutex_);
+  json_ = std::move(shared);
+}
+
+void PublishedAnswers::set_tiles(std::shared_ptr<const TileSource> tiles) {
+  const std::lock_guard lock(mutex_);
+  tiles_ = known_ = std::move(tiles);
+}
+
+bool PublishedAnswers::clear() {
+  const std::lock_guard lock(mutex_);
+  json_.reset();
+  tiles_.reset();
+  return known_ != nullptr;
+}
+
+std::shared_ptr<const std::string> PartialView::json(const JobFolder& folder, uint64_t resolution) {
+  return read(folder, &PublishedAnswers::json, [&] { update_json(resolution); });
+}
+
+std::shared_ptr<const TileSource> PartialView::tiles(const JobFolder& folder, uint64_t resolution) {
+  return read(folder, &PublishedAnswers::tiles, [&] { update_tiles(folder, resolution); });
+}
+
+template <class Answer, class Update>
+Answer PartialView::read(const JobFolder& folder, Answer (PublishedAnswers::*answer)() const,
+                         const Update& update) {
+  std::unique_lock reading(reading_mutex_, std::try_to_lock);
+  if (!reading) {
+    if (auto last = (answers_.*answer)()) return last;
+    reading.lock();
+  }
+  refresh(folder.work());
+  update();
+  return (answers_.*answer)();
+}
+
+void PartialView::refresh(const std::string& work_folder) {
+  if (!limiter_.may_read()) {
+    if (has_failed_)
+      throw Error(ErrorCode::kInvalidInput, work_folder + ": nothing could be read a moment ago");
+    return;
+  }
+  const ReadLimiter::Charge charge(limiter_);
+  limiter_.note_read();
+  has_failed_ = true;
+  try {
+    cubes_.refresh(files_, work_folder, kMaxReading_s);
+    if (cubes_.total() == 0)
+      throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
+  } catch (const Error& error) {
+    // The job's process may have removed the folder during the reading.
+    if (error.code() != ErrorCode::kNotFound && files_.exists(WorkFolder::store_path(work_folder)))
+      throw;
+    restart();
+    throw Error(ErrorCode::kNotFound, error.message());
+  }
+  has_failed_ = is_worthless_ = false;
+  ++version_;
+}
+
+// The job may build another scene, elsewhere, when its folder exists again.
+void PartialView::restart() {
+  cubes_ = {};
+  frame_ = nullptr;
+  nodes_.clear();
+  is_worthless_ = !answers_.clear();
+}
+
+void PartialView::update_json(uint64_t resolution) {
+  if (json_version_ == version_) return;
+  const ReadLimiter::Charge charge(limiter_);
+  answers_.set_json(describe_cubes(cubes_, resolution));
+  json_version_ = version_;
+}
+
+void PartialView::find_frame(const JobFolder& folder, uint64_t resolution) {
+  if (!frame_.is_null()) return;
+  // One attempt per reading of the folder.
+  if (std::exchange(frame_version_, version_) == version_)
+    throw Error(ErrorCode::kNotFound, "the subvolumes were not planned a moment ago");
+  frame_ = read_frame(files_, folder, resolution);
+}
+
+void PartialView::update_tiles(const JobFolder& folder, uint64_t resolution) {
+  if (tiles_version_ == version_) return;
+  const ReadLimiter::Charge charge(limiter_);
+  find_frame(folder, resolution);
+  const uint32_t levels = levels_of_resolution(resolution);
+  const auto root = nodes_.add(cubes_, levels);
+  auto tiles = std::make_shared<PartialTileSource>(nodes_.dag(), levels, nodes_.digest());
+  nlohmann::ordered_json manifest = manifest_of(tiles->dag(), tiles->digest(), {}, root);
+  manifest.update(frame_);
+  manifest["built"] = cubes_.built();
+  manifest["total"] = cubes_.total();
+  tiles->set_manifest(manifest.dump());
+  tiles_version_ = version_;
+  answers_.set_tiles(std::move(tiles));
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,135 @@
+// The subvolumes that one job has built so far, coarsely, as a list and as a DAG.
+//
+// 1. The job's folder is read at most once per second, by one of the requests; the others get the
+//    last answer. Reading and converting take at most a twentieth of one core.
+// 2. One reading handles a limited number of subvolumes: those of a large job appear step by step.
+// 3. Nodes never move while a digest is in use: a new digest replaces all nodes in one step.
+//
+// Thread-safe.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "core/io/file_system.h"
+#include "server/jobs/protocol/job_folder.h"
+#include "server/tiles/partial/coarse_cubes.h"
+#include "server/tiles/partial/partial_dag.h"
+#include "server/tiles/tile_source.h"
+
+namespace voxdag::server {
+
+// Limits how often, and for how much CPU time, a job's folder is read. Used by one thread.
+class ReadLimiter {
+ public:
+  // Charges the CPU time of its scope.
+  class Charge {
+   public:
+    explicit Charge(ReadLimiter& limiter);
+    ~Charge();
+    Charge(const Charge&) = delete;
+
+   private:
+    ReadLimiter& limiter_;
+    const double start_s_;
+  };
+
+  bool may_read() const;
+  void note_read();
+
+ private:
+  double next_s_ = 0;        // in wall_seconds(): one interval after the last reading
+  double idle_until_s_ = 0;  // until the CPU time charged is a small share of the wall time
+};
+
+// The DAG of the built subvolumes. It grows under one digest until it has too many nodes that no
+// root reaches; then it is made again under a new one. Used by one thread.
+class GrowingDag {
+ public:
+  GrowingDag(std::string job, uint64_t max_words) : job_(std::move(job)), max_words_(max_words) {}
+
+  // Adds what `cubes` has besides the earlier ones. Returns the root's word offset; no value if
+  // nothing is built.
+  std::optional<uint64_t> add(const CoarseCubes& cubes, uint32_t levels);
+  void clear() { nodes_.reset(); }
+
+  const PartialDag& dag() const { return nodes_->dag; }
+  const std::string& digest() const { return nodes_->digest; }
+
+ private:
+  struct Nodes {
+    Nodes(uint32_t levels, std::string name) : dag(levels), digest(std::move(name)) {}
+    PartialDag dag;
+    const std::string digest;
+    uint64_t max_words = 0;  // the DAG is made again above this size
+  };
+  const std::string job_;
+  const uint64_t max_words_;
+  std::unique_ptr<Nodes> nodes_;
+};
+
+// The answers to requests. Thread-safe; the lock is held briefly.
+class PublishedAnswers {
+ public:
+  std::shared_ptr<const std::string> json() const;
+  std::shared_ptr<const TileSource> tiles() const;
+  // The last tiles set, even after clear(), if they have this digest; else null.
+  std::shared_ptr<const TileSource> known(const std::string& digest) const;
+
+  void set_json(std::string json);
+  void set_tiles(std::shared_ptr<const TileSource> tiles);
+  // Returns whether tiles are still known.
+  bool clear();
+
+ private:
+  mutable std::mutex mutex_;  // guards the members below
+  std::shared_ptr<const std::string> json_;
+  std::shared_ptr<const TileSource> tiles_, known_;
+};
+
+class PartialView {
+ public:
+  PartialView(FileSystem& files, const std::string& job, uint64_t max_words)
+      : files_(files), job_(job), nodes_(job, max_words) {}
+
+  const std::string& job() const { return job_; }
+  // Both as PartialViews describes them.
+  std::shared_ptr<const std::string> json(const JobFolder& folder, uint64_t resolution);
+  std::shared_ptr<const TileSource> tiles(const JobFolder& folder, uint64_t resolution);
+  std::shared_ptr<const TileSource> known(const std::string& digest) const {
+    return answers_.known(digest);
+  }
+  // True once the job's folder has disappeared before its tiles were requested.
+  bool is_worthless() const { return is_worthless_; }
+
+ private:
+  // The last answer while another thread reads the folder; otherwise a new one.
+  template <class Answer, class Update>
+  Answer read(const JobFolder& folder, Answer (PublishedAnswers::*answer)() const,
+              const Update& update);
+  void refresh(const std::string& work_folder);
+  void restart();
+  void update_json(uint64_t resolution);
+  void update_tiles(const JobFolder& folder, uint64_t resolution);
+  void find_frame(const JobFolder& folder, uint64_t resolution);
+
+  FileSystem& files_;
+  const std::string job_;
+  PublishedAnswers answers_;
+  std::atomic<bool> is_worthless_{false};
+
+  std::mutex reading_mutex_;  // held by the thread that reads the folder; guards the members below
+  ReadLimiter limiter_;
+  CoarseCubes cubes_;
+  uint64_t version_ = 0;          // number of successful readings
+  bool has_failed_ = false;       // the last reading
+  nlohmann::ordered_json frame_;  // the manifest's constant members; null before the plan exists
+  GrowingDag nodes_;
+  uint64_t json_version_ = 0, tiles_version_ = 0, frame_version_ = 0;  // of the last updates
+};
+
+}  // namespace voxdag::server
