@@ -73,6 +73,39 @@ LAYERS = {
         "scheduler/triangles",
         "scheduler/spec",
     ],
+    "server": [
+        "server",
+        "server/api/routes",
+        "server/api/openapi",
+        "server/api/routing",
+        "server/api/context",
+        "server/api/access",
+        "server/api/answers",
+        "server/web",
+        "server/tiles/partial",
+        "server/tiles",
+        "server/jobs",
+        "server/jobs/process",
+        "server/jobs/protocol",
+        "server/scenes",
+        "server/queue",
+        "server/config",
+        "server/http",
+        "server/http/connection",
+        "server/http/message",
+        "server/disk",
+        "server/base",
+    ],
+}
+# Folders that only some files of their layer may include, given by the beginnings of their paths.
+INCLUDED_BY = {
+    "server/http": (
+        "server/api/",
+        "server/config/",
+        "server/http/",
+        "server/service.",
+        "server/view_service.",
+    ),
 }
 
 # Below these folders a folder and its parent may still include each other. The list may only shrink.
@@ -158,6 +191,9 @@ def check_include(path, bracket, header):
     if "/" not in header:
         return None
     if target == layer:
+        for folder, includers in INCLUDED_BY.items():
+            if header.startswith(folder + "/") and not path.startswith(includers):
+                return f"{folder} is included by {', '.join(includers)} only"
         return check_inner_include(folder_of(path), folder_of(header), LAYERS.get(layer))
     if target != "include" and target not in INCLUDES[layer]:
         return f"{layer} may not include {target}"

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "core/base/clock.h"
-#include "server/api/answers/public_problem.h"
 #include "server/http/connection/connection_table.h"
+#include "server/http/message/problem.h"
 
 namespace voxdag::server {
 namespace {
