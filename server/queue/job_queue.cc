@@ -7,6 +7,7 @@
 #include "core/db/table_rows.h"
 #include "core/io/random_id.h"
 #include "server/base/json_text.h"
+#include "server/disk/store.h"
 
 namespace voxdag::server {
 
@@ -18,9 +19,6 @@ using nlohmann::json;
 
 constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 
-// "vdsv": the queue of a service.
-constexpr int64_t kApplicationId = 0x76647376;
-constexpr int64_t kSchemaVersion = 3;
 // Interrupted runs in a row after which a job is tried again at once, and after which it is not
 // tried again: with the pauses in between it has then interrupted the service for over an hour.
 constexpr unsigned kFreeInterruptions = 5;
@@ -71,33 +69,10 @@ CREATE TABLE idempotency (
 CREATE INDEX idempotency_by_job ON idempotency (job);
 )sql";
 
-// Makes the tables of a new database, or checks that an existing one is a queue of this version or
-// the last, and brings it to this one.
-SqlDatabase open_writer(const std::string& path, bool may_create) {
-  SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
-  const bool fresh = is_new(database);
-  const int64_t version = database.integer("PRAGMA user_version");
-  if (!fresh && database.integer("PRAGMA application_id") != kApplicationId)
-    throw Error(ErrorCode::kInvalidInput, path + ": expected a queue of voxdag serve");
-  if (fresh && !may_create)
-    throw Error(ErrorCode::kInvalidInput,
-                path +
-                    ": there is no queue, but there are folders of jobs: expected their queue. "
-                    "Restore it from a backup, or start once with --adopt, which makes a new queue "
-                    "of the jobs that are found");
-  if (!fresh && version != kSchemaVersion && version != kSchemaVersion - 1)
-    throw Error(ErrorCode::kUnsupportedVersion, path + ": the queue's version is " +
-                                                    std::to_string(version) + ", expected " +
-                                                    std::to_string(kSchemaVersion));
-  database.execute("PRAGMA journal_mode = WAL");
-  database.execute("PRAGMA foreign_keys = ON");
-  if (version != kSchemaVersion)
-    change_schema(
-        database,
-        fresh ? kSchema : "ALTER TABLE job ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0",
-        kApplicationId, kSchemaVersion);
-  return database;
-}
+// "vdsv": the queue of a service.
+const StoreFormat kQueueFormat = {
+    "a queue", "jobs",  0x76647376,
+    3,         kSchema, "ALTER TABLE job ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0"};
 
 // A row of the table `job`: the members without a type of SQL are JSON.
 struct JobRow {
@@ -232,7 +207,7 @@ std::optional<JobState> parse_state(std::string_view name) {
 }
 
 JobQueue::JobQueue(const std::string& path, bool may_create)
-    : writer_(open_writer(path, may_create)),
+    : writer_(open_store(path, kQueueFormat, may_create)),
       file_(path),
       reader_(path, SqlDatabase::Mode::kReadOnly),
       find_(select_rows<JobRow>(reader_, "job", "WHERE id = ?")) {}

@@ -7,15 +7,13 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "server/base/request_error.h"
+#include "server/disk/store.h"
 
 namespace voxdag::server {
 namespace {
 
 constexpr std::string_view kSceneEndings[] = {".glb", ".gltf", ".ply"};
 constexpr size_t kMaxNameBytes = 128;
-// "vdsc": the scenes of a service.
-constexpr int64_t kSceneApplicationId = 0x76647363;
-constexpr int64_t kSceneSchemaVersion = 0;
 
 // `total` is -1 while it is not known; `sha256` is "" until the upload is complete.
 constexpr const char* kSceneSchema = R"sql(
@@ -34,21 +32,8 @@ std::string make_folders(FileSystem& files, const std::string& folder) {
   return folder;
 }
 
-SqlDatabase open_database(const std::string& path, bool may_create) {
-  SqlDatabase database(path, SqlDatabase::Mode::kReadWrite);
-  const bool fresh = is_new(database);
-  if (!fresh && database.integer("PRAGMA application_id") != kSceneApplicationId)
-    throw Error(ErrorCode::kInvalidInput, path + ": expected the scenes of voxdag serve");
-  if (fresh && !may_create)
-    throw Error(ErrorCode::kInvalidInput,
-                path +
-                    ": there are scenes without records: expected the database of these "
-                    "scenes. Restore it from a backup, or start once with --adopt, which makes new "
-                    "records of the scenes that are found");
-  database.execute("PRAGMA journal_mode = WAL");
-  if (fresh) change_schema(database, kSceneSchema, kSceneApplicationId, kSceneSchemaVersion);
-  return database;
-}
+// "vdsc": the scenes of a service.
+const StoreFormat kSceneFormat = {"records of scenes", "scenes", 0x76647363, 0, kSceneSchema};
 
 Scene scene_of_row(const SqlStatement& row) {
   return {row.text(0), true, row.word(1), row.word(1), row.text(2), row.real(3)};
@@ -101,9 +86,9 @@ SceneStore::SceneStore(FileSystem& files, const std::string& folder, Log log, bo
     : files_(files),
       folder_(make_folders(files, folder)),
       log_(std::move(log)),
-      database_(
-          open_database(folder + "/scenes.db", adopt || (!has_entries(files, folder + "/files") &&
-                                                         !has_entries(files, folder + "/parts")))),
+      database_(open_store(folder + "/scenes.db", kSceneFormat,
+                           adopt || (!has_entries(files, folder + "/files") &&
+                                     !has_entries(files, folder + "/parts")))),
       file_(folder + "/scenes.db") {
   finish_all_publishing();
   finish_removals();
